@@ -1,0 +1,3 @@
+"""MJCF humanoids as retargeting targets."""
+
+DISTRIBUTION = "spark-sim"

@@ -1,0 +1,29 @@
+"""Errors that a user can act on: every one names the value, its place, and what to do."""
+
+
+class SparkSimError(Exception):
+    """Base of all errors that spark-sim raises on purpose; the CLI prints them without a traceback."""
+
+
+class FileFormatError(SparkSimError):
+    """A file does not say what its format promises. Reads `path:line: what is wrong; expected ...`."""
+
+    def __init__(self, path: object, line: int | None, message: str) -> None:
+        self.path, self.line = path, line
+        super().__init__(f"{path}{'' if line is None else f':{line}'}: {message}")
+
+
+class ConventionError(SparkSimError):
+    """Unit, up axis, or another convention can't be inferred, or a given one is not known."""
+
+
+class SkeletonError(SparkSimError):
+    """A skeleton lacks what the task needs (no legs, a cycle, mismatching joint counts)."""
+
+
+class OutputError(SparkSimError):
+    """A result can't be written where it was asked for."""
+
+
+class DependencyError(SparkSimError):
+    """An optional package or system library is missing; the message says how to install it."""

@@ -1,0 +1,304 @@
+"""Rotations: the only rotation code of the project, for numpy arrays and torch tensors alike.
+
+Quaternions are wxyz, unit, Hamilton; matrices act on column vectors; angles are radians. `q_a_b`
+and `R_a_b` map b-coordinates into a, so `quat_mul(q_a_b, q_b_c)` is `q_a_c`. All functions
+broadcast over leading axes, keep the dtype and the device, and have finite values and gradients
+everywhere but where a rotation is truly undefined (the zero vector).
+
+Sources: Shoemake 1985 (slerp); Shepperd 1978 (matrix to quaternion); Zhou et al. 2019, arXiv
+1812.07035 (6D); Dobrowolski 2015, arXiv 1506.05481 (swing and twist).
+"""
+
+from typing import Any, Literal, get_args
+
+from array_api_compat import array_namespace
+from jaxtyping import Float
+
+Axis = Literal["x", "y", "z"]
+AXES: tuple[Axis, ...] = get_args(Axis)
+
+# Below this squared angle the Taylor series of sin(x)/x is exact in float64 to its last bits.
+_SMALL_SQUARED = 1e-6
+
+
+def quat_mul(q_a_b: Float[Any, "*#n 4"], q_b_c: Float[Any, "*#n 4"]) -> Float[Any, "*n 4"]:
+    """Hamilton product: the rotation `q_b_c` followed by `q_a_b`."""
+    xp = array_namespace(q_a_b, q_b_c)
+    w1, x1, y1, z1 = (q_a_b[..., i] for i in range(4))
+    w2, x2, y2, z2 = (q_b_c[..., i] for i in range(4))
+    return xp.stack(
+        [
+            w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
+            w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
+            w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
+            w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
+        ],
+        axis=-1,
+    )
+
+
+def quat_conj(q_a_b: Float[Any, "*n 4"]) -> Float[Any, "*n 4"]:
+    """The inverse rotation `q_b_a` of a unit quaternion."""
+    xp = array_namespace(q_a_b)
+    return xp.concat([q_a_b[..., :1], -q_a_b[..., 1:]], axis=-1)
+
+
+def quat_rotate(q_a_b: Float[Any, "*#n 4"], v_b: Float[Any, "*#n 3"]) -> Float[Any, "*n 3"]:
+    """The vector `v_b` in a-coordinates."""
+    xp = array_namespace(q_a_b, v_b)
+    w, x, y, z = (q_a_b[..., i] for i in range(4))
+    a, b, c = (v_b[..., i] for i in range(3))
+    tx, ty, tz = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    return xp.stack(
+        [
+            a + w * tx + y * tz - z * ty,
+            b + w * ty + z * tx - x * tz,
+            c + w * tz + x * ty - y * tx,
+        ],
+        axis=-1,
+    )
+
+
+def quat_normalize(q: Float[Any, "*n 4"]) -> Float[Any, "*n 4"]:
+    """The unit quaternion along `q`; the zero quaternion becomes the identity."""
+    xp = array_namespace(q)
+    squared = xp.sum(q * q, axis=-1, keepdims=True)
+    zero = squared == 0
+    identity = quat_identity(q)
+    return xp.where(zero, identity, q / xp.sqrt(xp.where(zero, xp.ones_like(squared), squared)))
+
+
+def quat_identity(like: Float[Any, "*n _"]) -> Float[Any, "*n 4"]:
+    """Identity quaternions with the leading shape, dtype and device of `like`."""
+    xp = array_namespace(like)
+    one = xp.ones_like(like[..., :1])
+    return xp.concat([one, xp.zeros_like(one), xp.zeros_like(one), xp.zeros_like(one)], axis=-1)
+
+
+def quat_continuous(q: Float[Any, "T *n 4"]) -> Float[Any, "T *n 4"]:
+    """The same rotations with signs such that neighbours along the first axis are the nearer pair."""
+    xp = array_namespace(q)
+    dots = xp.sum(q[1:] * q[:-1], axis=-1, keepdims=True)
+    flips = xp.where(dots < 0, -xp.ones_like(dots), xp.ones_like(dots))
+    return xp.concat([q[:1], q[1:] * xp.cumulative_prod(flips, axis=0)], axis=0)
+
+
+def quat_angle(q_a_b: Float[Any, "*#n 4"], q_a_c: Float[Any, "*#n 4"]) -> Float[Any, "*n"]:
+    """The angle in [0, pi] between two rotations, exact near 0 and near pi."""
+    xp = array_namespace(q_a_b, q_a_c)
+    relative = quat_mul(quat_conj(q_a_b), q_a_c)
+    vector = xp.sqrt(xp.sum(relative[..., 1:] ** 2, axis=-1))
+    return 2 * xp.atan2(vector, xp.abs(relative[..., 0]))
+
+
+def quat_from_rotvec(rotvec: Float[Any, "*n 3"]) -> Float[Any, "*n 4"]:
+    """Exponential map: a rotation by `|rotvec|` radians about `rotvec`."""
+    xp = array_namespace(rotvec)
+    squared = xp.sum(rotvec * rotvec, axis=-1, keepdims=True)
+    small = squared < _SMALL_SQUARED
+    safe = xp.where(small, xp.ones_like(squared), squared)
+    angle = xp.sqrt(safe)
+    half_sinc = xp.where(small, 0.5 - squared / 48, xp.sin(angle / 2) / angle)
+    cos = xp.where(small, 1 - squared / 8 + squared**2 / 384, xp.cos(angle / 2))
+    return xp.concat([cos, half_sinc * rotvec], axis=-1)
+
+
+def rotvec_from_quat(q: Float[Any, "*n 4"]) -> Float[Any, "*n 3"]:
+    """Logarithm map: the rotation vector of at most pi radians."""
+    xp = array_namespace(q)
+    q = xp.where(q[..., :1] < 0, -q, q)
+    w, vector = q[..., :1], q[..., 1:]
+    squared = xp.sum(vector * vector, axis=-1, keepdims=True)
+    small = squared < _SMALL_SQUARED
+    safe = xp.where(small, xp.ones_like(squared), squared)
+    length = xp.sqrt(safe)
+    # Series of 2 atan(s/w)/s in s, for unit quaternions with small vector part s.
+    safe_w = xp.where(small, w, xp.ones_like(w))
+    series = 2 / safe_w * (1 - squared / (3 * safe_w**2) + squared**2 / (5 * safe_w**4))
+    return xp.where(small, series, 2 * xp.atan2(length, w) / length) * vector
+
+
+def quat_slerp(
+    q0: Float[Any, "*#n 4"], q1: Float[Any, "*#n 4"], fraction: Float[Any, "*#n"]
+) -> Float[Any, "*n 4"]:
+    """Spherical interpolation along the shorter arc: `q0` at fraction 0, `q1` at 1."""
+    delta = rotvec_from_quat(quat_mul(quat_conj(q0), q1))
+    return quat_mul(q0, quat_from_rotvec(delta * fraction[..., None]))
+
+
+def quat_between(u: Float[Any, "*#n 3"], v: Float[Any, "*#n 3"]) -> Float[Any, "*n 4"]:
+    """The smallest rotation that takes the direction of `u` to that of `v`.
+
+    Opposite directions turn by pi about an axis orthogonal to `u`, chosen by `u` alone. A zero
+    vector gives the identity.
+    """
+    xp = array_namespace(u, v)
+    u, v = xp.broadcast_arrays(u, v)
+    norm_u = xp.sqrt(xp.sum(u * u, axis=-1, keepdims=True))
+    norm_v = xp.sqrt(xp.sum(v * v, axis=-1, keepdims=True))
+    undefined = (norm_u == 0) | (norm_v == 0)
+    u = u / xp.where(norm_u == 0, xp.ones_like(norm_u), norm_u)
+    v = v / xp.where(norm_v == 0, xp.ones_like(norm_v), norm_v)
+    w = 1 + xp.sum(u * v, axis=-1, keepdims=True)
+    opposite = w < 1e-12
+    x, y, z = u[..., :1], u[..., 1:2], u[..., 2:]
+    zero = xp.zeros_like(x)
+    orthogonal = xp.where(
+        xp.abs(x) > xp.abs(z), xp.concat([-y, x, zero], axis=-1), xp.concat([zero, -z, y], axis=-1)
+    )
+    axis = xp.where(opposite, orthogonal, _cross(u, v))
+    q = xp.concat([xp.where(opposite, zero, w), axis], axis=-1)
+    return xp.where(undefined, quat_identity(q), quat_normalize(q))
+
+
+def quat_swing_twist(
+    q: Float[Any, "*#n 4"], axis: Float[Any, "*#n 3"]
+) -> tuple[Float[Any, "*n 4"], Float[Any, "*n 4"]]:
+    """Split `q = swing * twist`: `twist` turns about the unit `axis`, `swing` about a normal of it.
+
+    Where the twist is undefined (swing of pi) it is the identity.
+    """
+    xp = array_namespace(q, axis)
+    along = xp.sum(q[..., 1:] * axis, axis=-1, keepdims=True)
+    w = q[..., :1] + xp.zeros_like(along)
+    twist = quat_normalize(xp.concat([w, along * axis], axis=-1))
+    return quat_mul(q, quat_conj(twist)), twist
+
+
+def yaw_from_quat(q: Float[Any, "*n 4"]) -> Float[Any, "*n"]:
+    """Heading in (-pi, pi]: the angle of the twist about world Z."""
+    xp = array_namespace(q)
+    w, z = q[..., 0], q[..., 3]
+    sign = xp.where(w < 0, -xp.ones_like(w), xp.ones_like(w))
+    return 2 * xp.atan2(z * sign, w * sign)
+
+
+def quat_from_yaw(yaw: Float[Any, "*n"]) -> Float[Any, "*n 4"]:
+    """A rotation by `yaw` about Z."""
+    return quat_about("z", yaw)
+
+
+def quat_about(axis: Axis, angle: Float[Any, "*n"]) -> Float[Any, "*n 4"]:
+    """A rotation by `angle` about one coordinate axis."""
+    xp = array_namespace(angle)
+    parts = [xp.cos(angle / 2)] + [xp.zeros_like(angle)] * 3
+    parts[1 + AXES.index(axis)] = xp.sin(angle / 2)
+    return xp.stack(parts, axis=-1)
+
+
+def quat_from_euler(angles: Float[Any, "*n 3"], order: str) -> Float[Any, "*n 4"]:
+    """Intrinsic Euler angles, as BVH means them: `order` "zxy" is `Rz(a0) Rx(a1) Ry(a2)`."""
+    first, second, third = (
+        quat_about(axis, angles[..., i]) for i, axis in enumerate(_axes_of(order))
+    )
+    return quat_mul(quat_mul(first, second), third)
+
+
+def euler_from_quat(q: Float[Any, "*n 4"], order: str) -> Float[Any, "*n 3"]:
+    """Intrinsic Euler angles of three different axes; the middle angle lies in [-pi/2, pi/2].
+
+    At the singularity (middle angle of pi/2) the third angle is 0. Bernardes and Viollet 2022.
+    """
+    xp = array_namespace(q)
+    k, j, i = (AXES.index(axis) for axis in _axes_of(order))  # intrinsic = extrinsic reversed
+    sign = float((i - j) * (j - k) * (k - i) // 2)
+    w, qi, qj, qk = q[..., 0], q[..., 1 + i], q[..., 1 + j], q[..., 1 + k] * sign
+    a, b, c, d = w - qj, qi + qk, qj + w, qk - qi
+    middle = 2 * xp.atan2(xp.sqrt(c * c + d * d), xp.sqrt(a * a + b * b)) - xp.pi / 2
+    half_sum, half_difference = xp.atan2(b, a), xp.atan2(d, c)
+    low, high = (c * c + d * d) < 1e-14, (a * a + b * b) < 1e-14
+    first = xp.where(
+        low, 2 * half_sum, xp.where(high, 2 * half_difference, half_sum + half_difference)
+    )
+    third = xp.where(low | high, xp.zeros_like(first), half_sum - half_difference)
+    angles = xp.stack([sign * first, middle, third], axis=-1)
+    return xp.remainder(angles + xp.pi, 2 * xp.pi) - xp.pi
+
+
+def matrix_from_quat(q: Float[Any, "*n 4"]) -> Float[Any, "*n 3 3"]:
+    """The rotation matrix of a unit quaternion."""
+    xp = array_namespace(q)
+    w, x, y, z = (q[..., i] for i in range(4))
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def quat_from_matrix(R: Float[Any, "*n 3 3"]) -> Float[Any, "*n 4"]:
+    """The quaternion of a rotation matrix, with w >= 0 (Shepperd's four branches, batched)."""
+    xp = array_namespace(R)
+    r = [[R[..., i, j] for j in range(3)] for i in range(3)]
+    t = r[0][0] + r[1][1] + r[2][2]
+    candidates = xp.stack(
+        [
+            xp.stack([1 + t, r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]], axis=-1),
+            xp.stack(
+                [r[2][1] - r[1][2], 1 + 2 * r[0][0] - t, r[0][1] + r[1][0], r[0][2] + r[2][0]],
+                axis=-1,
+            ),
+            xp.stack(
+                [r[0][2] - r[2][0], r[0][1] + r[1][0], 1 + 2 * r[1][1] - t, r[1][2] + r[2][1]],
+                axis=-1,
+            ),
+            xp.stack(
+                [r[1][0] - r[0][1], r[0][2] + r[2][0], r[1][2] + r[2][1], 1 + 2 * r[2][2] - t],
+                axis=-1,
+            ),
+        ],
+        axis=-2,
+    )
+    diagonal = xp.stack([t, r[0][0], r[1][1], r[2][2]], axis=-1)
+    best = xp.argmax(diagonal, axis=-1)
+    choice = best[..., None] == xp.arange(4, dtype=best.dtype)
+    q = xp.sum(xp.where(choice[..., None], candidates, xp.zeros_like(candidates)), axis=-2)
+    return quat_normalize(xp.where(q[..., :1] < 0, -q, q))
+
+
+def sixd_from_matrix(R: Float[Any, "*n 3 3"]) -> Float[Any, "*n 6"]:
+    """The first two columns of `R`, one after the other (Zhou et al. 2019)."""
+    xp = array_namespace(R)
+    return xp.concat([R[..., :, 0], R[..., :, 1]], axis=-1)
+
+
+def matrix_from_sixd(sixd: Float[Any, "*n 6"]) -> Float[Any, "*n 3 3"]:
+    """Gram-Schmidt on the two columns. Zero or parallel columns have no rotation: the gradient is
+    finite there, the value is not a rotation."""
+    xp = array_namespace(sixd)
+    x = _unit(sixd[..., :3])
+    second = sixd[..., 3:]
+    y = _unit(second - xp.sum(x * second, axis=-1, keepdims=True) * x)
+    return xp.stack([x, y, _cross(x, y)], axis=-1)
+
+
+def sixd_from_quat(q: Float[Any, "*n 4"]) -> Float[Any, "*n 6"]:
+    """`sixd_from_matrix` of a unit quaternion."""
+    return sixd_from_matrix(matrix_from_quat(q))
+
+
+def quat_from_sixd(sixd: Float[Any, "*n 6"]) -> Float[Any, "*n 4"]:
+    """The quaternion of a 6D rotation."""
+    return quat_from_matrix(matrix_from_sixd(sixd))
+
+
+def _axes_of(order: str) -> tuple[Axis, ...]:
+    axes: tuple[Axis, ...] = tuple(a for c in order.lower() for a in AXES if a == c)
+    if len(order) != 3 or len(set(axes)) != 3:
+        raise ValueError(f"Euler order {order!r}: expected a permutation of 'xyz'")
+    return axes
+
+
+def _cross(u: Float[Any, "*n 3"], v: Float[Any, "*n 3"]) -> Float[Any, "*n 3"]:
+    xp = array_namespace(u, v)
+    a, b, c = (u[..., i] for i in range(3))
+    d, e, f = (v[..., i] for i in range(3))
+    return xp.stack([b * f - c * e, c * d - a * f, a * e - b * d], axis=-1)
+
+
+def _unit(v: Float[Any, "*n 3"]) -> Float[Any, "*n 3"]:
+    xp = array_namespace(v)
+    squared = xp.sum(v * v, axis=-1, keepdims=True)
+    tiny = squared < 1e-24
+    return v / xp.sqrt(xp.where(tiny, xp.ones_like(squared), squared))

@@ -1,0 +1,3 @@
+"""The application: command line and public Python API."""
+
+DISTRIBUTION = "spark-sim"
