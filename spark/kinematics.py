@@ -27,7 +27,9 @@ def local_rotations(
     children = np.arange(1, len(skeleton))
     if len(children):
         parents = skeleton.parents[children]
-        local[..., children, :] = quat_mul(quat_conj(world[..., parents, :]), world[..., children, :])
+        local[..., children, :] = quat_mul(
+            quat_conj(world[..., parents, :]), world[..., children, :]
+        )
     return local
 
 

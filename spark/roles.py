@@ -1,0 +1,85 @@
+"""What each joint of a skeleton is: its role on a human body, and the body part it belongs to."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+
+
+class Role(StrEnum):
+    """The joints that humanoids share. `SPINE` and `NECK` may be held by several joints."""
+
+    PELVIS = "pelvis"
+    SPINE = "spine"
+    NECK = "neck"
+    HEAD = "head"
+    LEFT_CLAVICLE = "left_clavicle"
+    LEFT_UPPER_ARM = "left_upper_arm"
+    LEFT_FOREARM = "left_forearm"
+    LEFT_HAND = "left_hand"
+    RIGHT_CLAVICLE = "right_clavicle"
+    RIGHT_UPPER_ARM = "right_upper_arm"
+    RIGHT_FOREARM = "right_forearm"
+    RIGHT_HAND = "right_hand"
+    LEFT_UPPER_LEG = "left_upper_leg"
+    LEFT_LOWER_LEG = "left_lower_leg"
+    LEFT_FOOT = "left_foot"
+    LEFT_TOE = "left_toe"
+    RIGHT_UPPER_LEG = "right_upper_leg"
+    RIGHT_LOWER_LEG = "right_lower_leg"
+    RIGHT_FOOT = "right_foot"
+    RIGHT_TOE = "right_toe"
+
+
+class Group(StrEnum):
+    """The paper's six body parts (section 4.1)."""
+
+    TORSO = "torso"
+    LEFT_LEG = "left_leg"
+    RIGHT_LEG = "right_leg"
+    LEFT_ARM = "left_arm"
+    RIGHT_ARM = "right_arm"
+    HEAD = "head"
+
+
+LIMBS: dict[Group, tuple[Role, ...]] = {
+    Group.LEFT_LEG: (Role.LEFT_UPPER_LEG, Role.LEFT_LOWER_LEG, Role.LEFT_FOOT, Role.LEFT_TOE),
+    Group.RIGHT_LEG: (Role.RIGHT_UPPER_LEG, Role.RIGHT_LOWER_LEG, Role.RIGHT_FOOT, Role.RIGHT_TOE),
+    Group.LEFT_ARM: (
+        Role.LEFT_CLAVICLE,
+        Role.LEFT_UPPER_ARM,
+        Role.LEFT_FOREARM,
+        Role.LEFT_HAND,
+    ),
+    Group.RIGHT_ARM: (
+        Role.RIGHT_CLAVICLE,
+        Role.RIGHT_UPPER_ARM,
+        Role.RIGHT_FOREARM,
+        Role.RIGHT_HAND,
+    ),
+}
+"""The four limbs, each from the body outwards."""
+
+
+@dataclass(frozen=True)
+class RoleMap:
+    """The role of each joint (None: it follows its parent), with the confidence in [0, 1] and why."""
+
+    roles: tuple[Role | None, ...]
+    confidence: tuple[float, ...]
+    reasons: tuple[str, ...]
+
+    @cached_property
+    def _joints(self) -> dict[Role, tuple[int, ...]]:
+        return {
+            role: tuple(j for j, r in enumerate(self.roles) if r is role)
+            for role in Role
+            if role in self.roles
+        }
+
+    def joints(self, role: Role) -> tuple[int, ...]:
+        """The joints that hold `role`, from the pelvis outwards; empty where there is none."""
+        return self._joints.get(role, ())
+
+    def joint(self, role: Role) -> int | None:
+        """The first joint that holds `role`."""
+        return next(iter(self.joints(role)), None)
