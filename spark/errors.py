@@ -2,11 +2,11 @@
 
 
 class SparkSimError(Exception):
-    """Base of all errors that spark-sim raises on purpose; the CLI prints them without a traceback."""
+    """Base of all errors raised on purpose; the CLI prints them without a traceback."""
 
 
 class FileFormatError(SparkSimError):
-    """A file does not say what its format promises. Reads `path:line: what is wrong; expected ...`."""
+    """A file breaks its format. Reads `path:line: what is wrong; expected ...`."""
 
     def __init__(self, path: object, line: int | None, message: str) -> None:
         self.path, self.line = path, line

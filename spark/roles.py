@@ -62,7 +62,7 @@ LIMBS: dict[Group, tuple[Role, ...]] = {
 
 @dataclass(frozen=True)
 class RoleMap:
-    """The role of each joint (None: it follows its parent), with the confidence in [0, 1] and why."""
+    """The role of each joint (None: it follows its parent), the confidence in [0, 1], and why."""
 
     roles: tuple[Role | None, ...]
     confidence: tuple[float, ...]

@@ -76,7 +76,7 @@ def quat_identity(like: Float[Any, "*n _"]) -> Float[Any, "*n 4"]:
 
 
 def quat_continuous(q: Float[Any, "T *n 4"]) -> Float[Any, "T *n 4"]:
-    """The same rotations with signs such that neighbours along the first axis are the nearer pair."""
+    """The same rotations, signed so that neighbours along the first axis are the nearer pair."""
     xp = array_namespace(q)
     dots = xp.sum(q[1:] * q[:-1], axis=-1, keepdims=True)
     flips = xp.where(dots < 0, -xp.ones_like(dots), xp.ones_like(dots))
