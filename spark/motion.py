@@ -1,7 +1,6 @@
 """A motion: a skeleton moving in time, in SI units and Z-up axes."""
 
 from dataclasses import dataclass, replace
-from typing import Self
 
 import numpy as np
 from jaxtyping import Float
@@ -47,7 +46,7 @@ class Motion:
         """Seconds from the first to the last frame."""
         return (len(self) - 1) * self.frame_time
 
-    def frames(self, start: int, stop: int) -> Self:
+    def frames(self, start: int, stop: int) -> "Motion":
         """The clip of frames `start` to `stop`, exclusive."""
         return replace(
             self,
