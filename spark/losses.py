@@ -1,0 +1,61 @@
+"""Training losses: the paper's section 4.5, one function an equation, and the default preset's own.
+
+Rotations are compared as 6D features, positions in hip heights. Padding joints count nowhere.
+"""
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from spark.model import Body, Pose
+
+Scalar = Float[Tensor, ""]
+
+
+def reconstruction(predicted: Pose, truth: Pose, body: Body) -> Scalar:
+    """L_rec: squared 6D difference, averaged over joint-frame pairs."""
+    return _mean(((predicted.rotations - truth.rotations) ** 2).sum(-1), body.valid)
+
+
+def cycle(latent_a: Float[Tensor, "B T 24 D"], latent_b: Float[Tensor, "B T 24 D"]) -> Scalar:
+    """L_cyc: the retargeted motion's latent against the source's; neither is detached."""
+    return ((latent_a - latent_b) ** 2).mean()
+
+
+def root(predicted: Pose, truth: Pose) -> Scalar:
+    """L_root: the root's position and its rotation."""
+    position = ((predicted.root - truth.root) ** 2).mean()
+    return position + ((predicted.rotations[:, :, 0] - truth.rotations[:, :, 0]) ** 2).mean()
+
+
+def positions(
+    predicted: Float[Tensor, "B T J 3"], truth: Float[Tensor, "B T J 3"], body: Body
+) -> Scalar:
+    """L_FK: squared distance of joint positions after forward kinematics, per coordinate."""
+    return _mean(((predicted - truth) ** 2).mean(-1), body.valid)
+
+
+def contact(
+    predicted: Float[Tensor, "B T J 3"],
+    planted: Bool[Tensor, "B T J"],
+    frame_time: float,
+    body: Body,
+) -> Scalar:
+    """Squared speed [hip heights / s] of joints in the frames in which they are planted."""
+    speed = torch.diff(predicted, dim=1) / frame_time
+    held = (planted[:, 1:] & planted[:, :-1] & body.valid[:, None]).to(predicted.dtype)
+    return ((speed**2).sum(-1) * held).sum() / held.sum().clamp(min=1)
+
+
+def end_effectors(
+    predicted: Float[Tensor, "B T J 3"],
+    truth: Float[Tensor, "B T J 3"],
+    effectors: Bool[Tensor, "B J"],
+) -> Scalar:
+    """L_FK of hands, feet and head alone: where an error is seen first."""
+    return _mean(((predicted - truth) ** 2).mean(-1), effectors)
+
+
+def _mean(values: Float[Tensor, "B T J"], joints: Bool[Tensor, "B J"]) -> Scalar:
+    weights = joints[:, None].to(values.dtype).expand_as(values)
+    return (values * weights).sum() / weights.sum().clamp(min=1)

@@ -1,0 +1,414 @@
+"""SPARK: motion on one skeleton in, the same motion on another out (the paper's section 4).
+
+Read it beside the paper. The encoder looks at the joints of each body part in a frame, pools every
+part into 4 tokens by attention (6 parts, 24 tokens), and lets each token look along time. The
+decoder starts from one query a target joint and frame, lets the joints of a frame look at one
+another and at that frame's 24 tokens, and gives each joint a rotation and the root a position.
+
+Two presets of one network. `Config.paper()` is the paper; `Config.default()` predicts a residual on
+the analytic transfer, zero at the start, so that before the first step it *is* the analytic
+transfer. Each difference is a field of `Config`, so each ablation is one of them too.
+
+Axes: B batch, T frames, J joints, G = 6 groups, N joints of a group (padded), D width.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import torch
+import torch.nn.functional as nnf
+from jaxtyping import Bool, Float, Int
+from torch import Tensor, nn
+
+from spark.rotation import matrix_from_sixd
+
+N_GROUPS = 6
+QUERIES_PER_GROUP = 4
+N_TOKENS = N_GROUPS * QUERIES_PER_GROUP
+TPOSE_FEATURES = 13
+SHAPE_FEATURES = 6  # bone offset, depth, leaf flag, degrees of freedom
+
+
+@dataclass(frozen=True)
+class Config:
+    """Everything that makes one network differ from another."""
+
+    width: int = 128
+    heads: int = 4
+    encoder_blocks: int = 4
+    decoder_blocks: int = 4
+    name_width: int = 128
+    max_group: int = 16
+    mask_joints: float = 0.1  # share of joints zeroed before pooling, in training
+    drop_names: float = 0.0  # share of skeletons whose names are withheld, in training
+    share_joints: bool = True  # False: the ablation "w/o share"
+    positions_in: bool = False  # True: the ablation "w/ pos"
+    residual: bool = False  # predict a rotation on top of the analytic transfer
+    noise: bool = True  # decoder starts from noise, as in the paper, or from a learned query
+    shape_features: bool = False
+    relative_time: bool = False  # rotary positions along time instead of absolute ones
+    causal: bool = False  # a frame sees the past alone: for streaming
+    decoder_time: bool = False  # the decoder's joints look along time too
+
+    @classmethod
+    def paper(cls) -> Self:
+        """The published network."""
+        return cls()
+
+    @classmethod
+    def default(cls) -> Self:
+        """A residual on the analytic transfer: starts equal to it."""
+        return cls(
+            mask_joints=0.0,
+            drop_names=0.1,
+            positions_in=True,
+            residual=True,
+            noise=False,
+            shape_features=True,
+            relative_time=True,
+            decoder_time=True,
+        )
+
+
+class Body(NamedTuple):
+    """A batch of skeletons as the network sees them, padded to J joints; root = joint 0."""
+
+    names: Float[Tensor, "B J E"]  # name embeddings; zero where a name is withheld
+    tpose: Float[Tensor, "B J 13"]  # position, 6D rotation, velocity, foot contact
+    shape: Float[Tensor, "B J 6"]
+    groups: Int[Tensor, "B 6 N"]  # joints of each group from root to leaf; -1 pads
+    arc: Float[Tensor, "B 6 N"]  # normalised arc length of those joints along their group
+    valid: Bool[Tensor, "B J"]
+    parents: Int[Tensor, "B J"]  # the root's parent is itself, and so is a padding joint's
+    offsets: Float[Tensor, "B J 3"]  # canonical bone offsets in hip heights
+
+
+class Pose(NamedTuple):
+    """A batch of motions on a `Body`, in canonical form."""
+
+    rotations: Float[Tensor, "B T J 6"]  # local, since the T-pose
+    root: Float[Tensor, "B T 3"]  # hip heights, relative to the window's first heading
+
+
+class Attention(nn.Module):
+    """Multi-head attention over the second-to-last axis, with optional rotary positions."""
+
+    def __init__(self, width: int, heads: int, rotary: bool = False, causal: bool = False) -> None:
+        super().__init__()
+        self.heads, self.rotary, self.causal = heads, rotary, causal
+        self.q = nn.Linear(width, width)
+        self.kv = nn.Linear(width, 2 * width)
+        self.out = nn.Linear(width, width)
+
+    def forward(
+        self,
+        x: Float[Tensor, "M Q D"],
+        context: Float[Tensor, "M K D"],
+        mask: Bool[Tensor, "M #Q K"] | None = None,
+    ) -> Float[Tensor, "M Q D"]:
+        """`x` looks at `context` where `mask` is True."""
+        q = self._split(self.q(x))
+        k, v = (self._split(part) for part in self.kv(context).chunk(2, dim=-1))
+        if self.rotary:
+            q, k = _rotary(q), _rotary(k)
+        attended = nnf.scaled_dot_product_attention(
+            q, k, v, attn_mask=None if mask is None else mask[:, None], is_causal=self.causal
+        )
+        return self.out(attended.transpose(1, 2).flatten(2))
+
+    def _split(self, x: Float[Tensor, "M K D"]) -> Float[Tensor, "M H K C"]:
+        return x.view(*x.shape[:-1], self.heads, -1).transpose(1, 2)
+
+
+class Feedforward(nn.Sequential):
+    """Position-wise network, four times as wide inside."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__(nn.Linear(width, 4 * width), nn.GELU(), nn.Linear(4 * width, width))
+
+
+class TemporalBlock(nn.Module):
+    """One of the encoder's blocks: each token looks along time (eq. 2 and 3)."""
+
+    def __init__(self, config: Config) -> None:
+        super().__init__()
+        width = config.width
+        self.norm_time, self.norm_ff = nn.LayerNorm(width), nn.LayerNorm(width)
+        self.time = Attention(width, config.heads, config.relative_time, config.causal)
+        self.ff = Feedforward(width)
+
+    def forward(self, x: Float[Tensor, "M T D"]) -> Float[Tensor, "M T D"]:
+        """M tokens, each along its T frames."""
+        normed = self.norm_time(x)
+        x = x + self.time(normed, normed)
+        return x + self.ff(self.norm_ff(x))
+
+
+class DecoderBlock(nn.Module):
+    """Joints of a frame look at one another, at its 24 tokens and, as a switch, along time."""
+
+    def __init__(self, config: Config) -> None:
+        super().__init__()
+        width, heads = config.width, config.heads
+        self.norm_self, self.norm_cross = nn.LayerNorm(width), nn.LayerNorm(width)
+        self.norm_ff = nn.LayerNorm(width)
+        self.self_attention = Attention(width, heads)
+        self.cross_attention = Attention(width, heads)
+        self.ff = Feedforward(width)
+        self.along_time = TemporalBlock(config) if config.decoder_time else None
+
+    def forward(
+        self,
+        y: Float[Tensor, "B T J D"],
+        latent: Float[Tensor, "B T 24 D"],
+        valid: Bool[Tensor, "B J"],
+    ) -> Float[Tensor, "B T J D"]:
+        """One step of refinement of the target's joint features."""
+        B, T, J, _ = y.shape
+        frames = y.flatten(0, 1)
+        mask = valid[:, None, None].expand(B, T, 1, J).flatten(0, 1)
+        normed = self.norm_self(frames)
+        frames = frames + self.self_attention(normed, normed, mask)
+        frames = frames + self.cross_attention(self.norm_cross(frames), latent.flatten(0, 1))
+        frames = frames + self.ff(self.norm_ff(frames))
+        y = frames.unflatten(0, (B, T))
+        if self.along_time is None:
+            return y
+        tokens = y.transpose(1, 2).flatten(0, 1)
+        return self.along_time(tokens).unflatten(0, (B, J)).transpose(1, 2)
+
+
+class JointEmbedding(nn.Module):
+    """What the network knows of a joint besides its motion: place, name and T-pose."""
+
+    def __init__(self, config: Config) -> None:
+        super().__init__()
+        width = config.width
+        features = TPOSE_FEATURES + (SHAPE_FEATURES if config.shape_features else 0)
+        self.shape_features, self.arc_length = config.shape_features, config.relative_time
+        self.position = nn.Parameter(0.02 * torch.randn(N_GROUPS, config.max_group, width))
+        self.arc = nn.Linear(1, width, bias=False)
+        self.name = nn.Linear(config.name_width, width)
+        self.tpose = nn.Sequential(nn.Linear(features, width), nn.GELU(), nn.Linear(width, width))
+
+    def joints(self, body: Body) -> Float[Tensor, "B J D"]:
+        """E_name + MLP(T-pose) of each joint."""
+        features = torch.cat([body.tpose, body.shape], -1) if self.shape_features else body.tpose
+        return self.name(body.names) + self.tpose(features)
+
+    def places(self, body: Body) -> Float[Tensor, "B 6 N D"]:
+        """E_pos of each place in each group."""
+        place = self.position[:, : body.groups.shape[-1]].expand(len(body.groups), -1, -1, -1)
+        return place + self.arc(body.arc[..., None]) if self.arc_length else place
+
+
+class Encoder(nn.Module):
+    """Section 4.2: motion on any skeleton to 24 tokens a frame."""
+
+    def __init__(self, config: Config) -> None:
+        super().__init__()
+        width = config.width
+        self.config = config
+        self.motion = nn.Linear(6 + (3 if config.positions_in else 0), width)
+        self.root = nn.Linear(3 + (3 if config.positions_in else 0), width)
+        self.queries = nn.Parameter(torch.rand(N_GROUPS, QUERIES_PER_GROUP, width) - 0.5)
+        self.pool = Attention(width, config.heads)
+        self.time = nn.ModuleList(TemporalBlock(config) for _ in range(config.encoder_blocks))
+        self.norm = nn.LayerNorm(width)  # on H: without it the cycle loss shrinks H to zero
+
+    def forward(
+        self, pose: Pose, body: Body, embedding: JointEmbedding
+    ) -> Float[Tensor, "B T 24 D"]:
+        """The latent H."""
+        x = self._joint_features(pose, body) + embedding.joints(body)[:, None]
+        index = body.groups.clamp(min=0)
+        in_group = body.groups >= 0
+        if not self.config.share_joints:
+            in_group = in_group & _first_owner(body.groups)
+        B, T, _, D = x.shape
+        groups = _take(x, index.flatten(1)).view(B, T, *index.shape[1:], D)
+        groups = groups + embedding.places(body)[:, None]
+        if self.training and self.config.mask_joints:
+            kept = torch.rand(B, T, *index.shape[1:], 1, device=x.device) >= self.config.mask_joints
+            groups = groups * kept
+        # A group without joints still needs one key: it looks at its zeroed first place.
+        empty = ~in_group.any(-1, keepdim=True)
+        groups = groups * (~empty)[:, None, :, :, None]
+        in_group = torch.cat([in_group[..., :1] | empty, in_group[..., 1:]], -1)
+        z = self.pool(
+            self.queries.expand(B, T, -1, -1, -1).flatten(0, 2),
+            groups.flatten(0, 2),
+            in_group[:, None, :, None].expand(B, T, -1, -1, -1).flatten(0, 2),
+        ).view(B, T, N_TOKENS, D)
+        tokens = z.transpose(1, 2).flatten(0, 1)
+        if not self.config.relative_time:
+            tokens = tokens + _sinusoids(T, D, tokens)
+        for block in self.time:
+            tokens = block(tokens)
+        return self.norm(tokens.unflatten(0, (B, N_TOKENS)).transpose(1, 2))
+
+    def _joint_features(self, pose: Pose, body: Body) -> Float[Tensor, "B T J D"]:
+        joints, root = pose.rotations, pose.root
+        if self.config.positions_in:
+            relative = forward_kinematics(pose, body) - pose.root[:, :, None]
+            joints = torch.cat([joints, relative], -1)
+            velocity = torch.diff(root, dim=1, prepend=root[:, :1])
+            root = torch.cat([root, velocity], -1)
+        x = self.motion(joints)
+        return torch.cat([x[:, :, :1] + self.root(root)[:, :, None], x[:, :, 1:]], 2)
+
+
+class Decoder(nn.Module):
+    """Section 4.3: 24 tokens a frame to a motion on the target skeleton."""
+
+    def __init__(self, config: Config) -> None:
+        super().__init__()
+        width = config.width
+        self.config = config
+        self.query = nn.Parameter(torch.rand(width) - 0.5)
+        self.start = nn.Linear(6, width) if config.residual else None
+        self.start_root = nn.Linear(3, width) if config.residual else None
+        self.blocks = nn.ModuleList(DecoderBlock(config) for _ in range(config.decoder_blocks))
+        self.norm = nn.LayerNorm(width)
+        self.rotation = nn.Linear(width, 6)
+        self.root = nn.Linear(width, 3)
+        if config.residual:
+            for head in (self.rotation, self.root):
+                nn.init.zeros_(head.weight)
+                nn.init.zeros_(head.bias)
+
+    def forward(
+        self,
+        latent: Float[Tensor, "B T 24 D"],
+        body: Body,
+        embedding: JointEmbedding,
+        start: Pose | None = None,
+    ) -> Pose:
+        """The motion on `body`; a residual network corrects `start`, the analytic transfer."""
+        B, T = latent.shape[:2]
+        J = body.valid.shape[1]
+        y = embedding.joints(body) + _scatter_places(embedding.places(body), body)
+        if self.config.noise:
+            y = y[:, None] + torch.rand(B, T, J, y.shape[-1], device=y.device, dtype=y.dtype) - 0.5
+        else:
+            y = (y + self.query)[:, None].expand(B, T, J, -1)
+        if start is not None and self.start is not None and self.start_root is not None:
+            y = y + self.start(start.rotations)
+            y = torch.cat([y[:, :, :1] + self.start_root(start.root)[:, :, None], y[:, :, 1:]], 2)
+        for block in self.blocks:
+            y = block(y, latent, body.valid)
+        y = self.norm(y)
+        sixd, root = self.rotation(y), self.root(y[:, :, 0])
+        if start is None:
+            return Pose(sixd, root)
+        identity = sixd.new_tensor([1.0, 0, 0, 0, 1, 0])
+        turned = matrix_from_sixd(sixd + identity) @ matrix_from_sixd(start.rotations)
+        columns = turned[..., :2].transpose(-1, -2).flatten(-2)
+        return Pose(columns, start.root + root)
+
+
+class Spark(nn.Module):
+    """Encoder and decoder with the joint embeddings that they share."""
+
+    def __init__(self, config: Config) -> None:
+        super().__init__()
+        self.config = config
+        self.embedding = JointEmbedding(config)
+        self.encoder = Encoder(config)
+        self.decoder = Decoder(config)
+
+    def encode(self, pose: Pose, body: Body) -> Float[Tensor, "B T 24 D"]:
+        """H of a motion on its skeleton."""
+        return self.encoder(pose, self._withhold(body), self.embedding)
+
+    def decode(
+        self, latent: Float[Tensor, "B T 24 D"], body: Body, start: Pose | None = None
+    ) -> Pose:
+        """The motion that H describes, on `body`. A residual network must be given its `start`."""
+        if self.config.residual and start is None:
+            raise ValueError("this network corrects the analytic transfer: `start` is missing")
+        return self.decoder(
+            latent, self._withhold(body), self.embedding, start if self.config.residual else None
+        )
+
+    def forward(self, pose: Pose, source: Body, target: Body, start: Pose | None = None) -> Pose:
+        """Retarget `pose` from `source` to `target` (figure 2b)."""
+        return self.decode(self.encode(pose, source), target, start)
+
+    def _withhold(self, body: Body) -> Body:
+        if not (self.training and self.config.drop_names):
+            return body
+        kept = torch.rand(len(body.names), 1, 1, device=body.names.device) >= self.config.drop_names
+        return body._replace(names=body.names * kept)
+
+
+def forward_kinematics(pose: Pose, body: Body) -> Float[Tensor, "B T J 3"]:
+    """Joint positions in hip heights; a padding joint lies at the root.
+
+    Rotations are chained by pointer jumping: in step k every joint takes in its 2^k-th ancestor, so
+    a tree of depth 16 needs 4 batched products, whatever the skeletons in the batch.
+    """
+    B, J = body.valid.shape
+    world = matrix_from_sixd(pose.rotations)
+    parents = body.parents
+    own = torch.arange(J, device=parents.device).expand(B, J)
+    pending = parents != own
+    pointer = parents
+    steps = max(1, (max(J - 1, 1)).bit_length())
+    for _ in range(steps):
+        upper = _take(world, pointer)
+        world = torch.where(pending[:, None, :, None, None], upper @ world, world)
+        nearer = torch.gather(pointer, 1, pointer)
+        pending = pending & torch.gather(pending, 1, pointer)
+        pointer = nearer
+    bones = (_take(world, parents) @ body.offsets[:, None, :, :, None]).squeeze(-1)
+    moves = (parents != own)[:, None, :, None]
+    positions = bones * moves
+    pointer = parents
+    pending = parents != own
+    for _ in range(steps):
+        upper = _take(positions, pointer)
+        positions = torch.where(pending[:, None, :, None], positions + upper, positions)
+        pending = pending & torch.gather(pending, 1, pointer)
+        pointer = torch.gather(pointer, 1, pointer)
+    return positions + pose.root[:, :, None]
+
+
+def _take(x: Tensor, joints: Int[Tensor, "B J"]) -> Tensor:
+    """`x[b, :, joints[b]]` for each b."""
+    index = joints.view(len(joints), 1, -1, *([1] * (x.ndim - 3))).expand(-1, *x.shape[1:])
+    return torch.gather(x, 2, index)
+
+
+def _first_owner(groups: Int[Tensor, "B G N"]) -> Bool[Tensor, "B G N"]:
+    """Where a joint stands for the first time, groups in order: the others give it up."""
+    flat = groups.flatten(1)
+    same = flat[:, :, None] == flat[:, None, :]
+    earlier = torch.ones_like(same[0]).tril(-1)
+    return ~(same & earlier).any(-1).view_as(groups)
+
+
+def _scatter_places(places: Float[Tensor, "B G N D"], body: Body) -> Float[Tensor, "B J D"]:
+    """E_pos of each joint: that of the first group that holds it."""
+    B, J = body.valid.shape
+    first = (body.groups >= 0) & _first_owner(body.groups)
+    target = torch.where(first, body.groups, J).flatten(1)
+    out = places.new_zeros(B, J + 1, places.shape[-1])
+    index = target[..., None].expand(-1, -1, places.shape[-1])
+    return out.scatter(1, index, places.flatten(1, 2))[:, :J]
+
+
+def _sinusoids(T: int, D: int, like: Tensor) -> Float[Tensor, "T D"]:
+    time = torch.arange(T, device=like.device, dtype=torch.float32)[:, None]
+    rate = torch.exp(torch.arange(0, D, 2, device=like.device) * (-9.21034 / D))
+    return torch.cat([torch.sin(time * rate), torch.cos(time * rate)], -1).to(like.dtype)
+
+
+def _rotary(x: Float[Tensor, "M H T C"]) -> Float[Tensor, "M H T C"]:
+    """Rotary positions (Su et al. 2021): attention then depends on differences of time alone."""
+    half = x.shape[-1] // 2
+    time = torch.arange(x.shape[-2], device=x.device, dtype=torch.float32)[:, None]
+    rate = torch.exp(torch.arange(half, device=x.device) * (-6.9078 / half))
+    cos, sin = torch.cos(time * rate).to(x.dtype), torch.sin(time * rate).to(x.dtype)
+    a, b = x[..., :half], x[..., half:]
+    return torch.cat([a * cos - b * sin, a * sin + b * cos], -1)
