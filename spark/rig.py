@@ -1,12 +1,23 @@
 """A rig: a skeleton and all that was understood of it."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
 
-from spark.roles import Group, RoleMap
+from spark.kinematics import end_positions, world_positions
+from spark.motion import Motion
+from spark.roles import Group, Role, RoleMap
 from spark.skeleton import Skeleton
+from spark.tpose import carrier_of, find_tpose
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+_UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
+_FEET = ((Role.LEFT_FOOT, Role.LEFT_TOE), (Role.RIGHT_FOOT, Role.RIGHT_TOE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,3 +38,48 @@ class Rig:
     carrier: int
     hip_height: float
     notes: tuple[str, ...] = ()
+
+    @cached_property
+    def pelvis(self) -> int:
+        """The joint that carries the legs."""
+        return self.roles.require(Role.PELVIS)
+
+    @cached_property
+    def hips(self) -> list[int]:
+        """The upper-leg joints; their middle is the point that carries the body's path."""
+        return [j for role in _UPPER_LEGS for j in self.roles.joints(role)[:1]]
+
+    @cached_property
+    def contact_joints(self) -> list[int]:
+        """The joint of each foot that touches the floor: its toe, or the ankle without one."""
+        pairs = ((self.roles.joint(toe), self.roles.joint(foot)) for foot, toe in _FEET)
+        return [j for toe, foot in pairs if (j := foot if toe is None else toe) is not None]
+
+
+def understand(motion: Motion, override: "Mapping[str, object] | None" = None) -> Rig:
+    """What the skeleton of `motion` is: no configuration, names and geometry say it.
+
+    Raises SkeletonError with the reason where the body is not a humanoid. `override` is a role map
+    as `spark.naming.assign_roles` takes it.
+    """
+    from spark.naming import assign_roles, groups_of
+
+    skeleton = motion.skeleton
+    roles = assign_roles(skeleton, motion, override)
+    tpose = find_tpose(motion, roles)
+    pelvis = roles.require(Role.PELVIS)
+    carrier = carrier_of(skeleton, pelvis)
+    height = hip_height(skeleton, roles, tpose)
+    return Rig(skeleton, roles, groups_of(skeleton, roles), tpose, carrier, height)
+
+
+def hip_height(skeleton: Skeleton, roles: RoleMap, tpose: Float[np.ndarray, "J 4"]) -> float:
+    """Height [m] of the hips' middle above the lowest point of the feet in the T-pose; of the whole
+    legs where there are no feet."""
+    positions = world_positions(skeleton, tpose, np.zeros(3))
+    ends = end_positions(skeleton, positions, tpose)
+    hips = [j for role in _UPPER_LEGS for j in roles.joints(role)[:1]]
+    feet = [j for foot, _ in _FEET for j in roles.joints(foot)] or hips
+    below = sorted({k for j in feet for k in skeleton.subtree(j)})
+    heights = [*positions[below, 2], *ends[np.isin(skeleton.end_parents, below), 2]]
+    return float(positions[hips, 2].mean() - min(heights))

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 
+from spark.errors import SkeletonError
+
 
 class Role(StrEnum):
     """The joints that humanoids share. `SPINE` and `NECK` may be held by several joints."""
@@ -83,3 +85,12 @@ class RoleMap:
     def joint(self, role: Role) -> int | None:
         """The first joint that holds `role`."""
         return next(iter(self.joints(role)), None)
+
+    def require(self, role: Role) -> int:
+        """The first joint that holds `role`; SkeletonError where there is none."""
+        joint = self.joint(role)
+        if joint is None:
+            raise SkeletonError(
+                f"no joint is the {role.value.replace('_', ' ')}; name it in a map file"
+            )
+        return joint

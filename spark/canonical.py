@@ -1,0 +1,64 @@
+"""Canonical form: a motion as rotations since the T-pose, one language for every rig."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from spark.contacts import floor_height
+from spark.kinematics import forward, local_rotations, world_positions
+from spark.motion import Motion
+from spark.rig import Rig
+from spark.rotation import quat_conj, quat_mul, quat_rotate
+
+
+@dataclass(frozen=True, eq=False)
+class CanonicalMotion:
+    """A motion of `rig` in world axes: X forward in the T-pose, Z up.
+
+    `rotations[t, j]` is `G_j(t) = R_world_j(t) R_world_j(T)^-1`; `hips` is the path of the middle
+    of the two upper-leg joints [m], the same point of the anatomy wherever a rig's pelvis joint
+    lies; `floor_z` is the height [m] of the floor under the motion.
+    """
+
+    rig: Rig
+    frame_time: float
+    rotations: Float[np.ndarray, "T J 4"]
+    hips: Float[np.ndarray, "T 3"]
+    floor_z: float = 0.0
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.hips)
+
+
+def to_canonical(motion: Motion, rig: Rig) -> CanonicalMotion:
+    """The canonical form of a motion on its own rig. Bones that the file stretches keep the
+    skeleton's length: only the hips' path and the rotations are taken over."""
+    positions, world = forward(motion)
+    return CanonicalMotion(
+        rig,
+        motion.frame_time,
+        quat_mul(world, quat_conj(rig.tpose)),
+        positions[:, rig.hips].mean(1),
+        floor_height(rig, positions, world),
+    )
+
+
+def from_canonical(canonical: CanonicalMotion) -> Motion:
+    """The motion on the rig's own skeleton: the inverse of `to_canonical`.
+
+    The rig's carrier takes the path through the world; joints above it stay where they rest.
+    """
+    rig, skeleton = canonical.rig, canonical.rig.skeleton
+    world = quat_mul(canonical.rotations, rig.tpose)
+    rotations = local_rotations(skeleton, world)
+    root = np.tile(skeleton.offsets[0], (len(canonical), 1))
+    positions = world_positions(skeleton, world, root)
+    missing = canonical.hips - positions[:, rig.hips].mean(1)
+    if rig.carrier == 0:
+        return Motion(skeleton, canonical.frame_time, root + missing, rotations)
+    above = int(skeleton.parents[rig.carrier])
+    translations = np.tile(skeleton.offsets, (len(canonical), 1, 1))
+    translations[:, rig.carrier] += quat_rotate(quat_conj(world[:, above]), missing)
+    return Motion(skeleton, canonical.frame_time, root, rotations, translations)

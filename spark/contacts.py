@@ -1,0 +1,54 @@
+"""Where the floor is, and when a foot stands on it. In seconds and metres, never per frame."""
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from spark.feet import sole_corners, sole_positions, standing_height
+from spark.rig import Rig
+
+# A foot is planted while it is slower and lower than this; for a body 1.75 m tall, scaled with it.
+PLANTED_SPEED = 0.15
+PLANTED_HEIGHT = 0.06
+ADULT_HEIGHT = 1.75
+
+
+def floor_height(
+    rig: Rig, positions: Float[np.ndarray, "T J 3"], world: Float[np.ndarray, "T J 4"]
+) -> float:
+    """The floor's height [m]: the 5th percentile over frames of the lowest sole point.
+
+    A body without feet has its floor at 0.
+    """
+    soles = sole_corners(rig)
+    if not soles:
+        return 0.0
+    points = [sole_positions(sole, positions, world)[..., 2] for sole in soles]
+    return float(np.percentile(np.concatenate(points, axis=1).min(1), 5))
+
+
+def speeds(positions: Float[np.ndarray, "T *n 3"], frame_time: float) -> Float[np.ndarray, "T *n"]:
+    """Horizontal speed [m/s] by central differences; a single frame stands still."""
+    if len(positions) < 2:
+        return np.zeros(positions.shape[:-1])
+    velocity = np.gradient(positions[..., :2], frame_time, axis=0)
+    return np.linalg.norm(velocity, axis=-1)
+
+
+def planted_points(
+    positions: Float[np.ndarray, "T *n 3"], frame_time: float, height: float
+) -> Bool[np.ndarray, "T *n"]:
+    """Which points stand: slow, and near their own lowest height (1st percentile).
+
+    `height` [m] is the body's standing height, which the thresholds scale with.
+    """
+    scale = height / ADULT_HEIGHT
+    low = np.percentile(positions[..., 2], 1, axis=0)
+    near = positions[..., 2] < low + PLANTED_HEIGHT * scale
+    return near & (speeds(positions, frame_time) < PLANTED_SPEED * scale)
+
+
+def planted_feet(
+    rig: Rig, positions: Float[np.ndarray, "T J 3"], frame_time: float
+) -> Bool[np.ndarray, "T F"]:
+    """For each of the rig's feet, whether its toe stands (the ankle where there is no toe)."""
+    return planted_points(positions[:, rig.contact_joints], frame_time, standing_height(rig))
