@@ -10,6 +10,8 @@ mean pose of the motion stands in for it, and the axes that knees and elbows ben
 twist; such axes are a joint's coordinate axes, so that all clips of a rig give the same T-pose.
 """
 
+from itertools import product
+
 import numpy as np
 from jaxtyping import Float
 
@@ -39,6 +41,15 @@ _BENT = {  # upper segment: the lower one, and the axis that it bends about in t
     Role.RIGHT_UPPER_ARM: (Role.RIGHT_FOREARM, np.array([0.0, 0, 1])),
 }
 
+# The 24 turns of a cube: rigs are built with joint axes at right angles.
+_RIGHT_ANGLES = np.array(
+    [
+        q / np.linalg.norm(q)
+        for q in np.array(list(product((-1, 0, 1), repeat=4)), dtype=np.float64)
+        if tuple(q) > (0, 0, 0, 0) and np.count_nonzero(q) in (1, 2, 4)
+    ]
+)
+
 Vector = Float[np.ndarray, "3"]
 Quat = Float[np.ndarray, "4"]
 
@@ -55,7 +66,7 @@ def find_tpose(motion: Motion, roles: RoleMap) -> Float[np.ndarray, "J 4"]:
     posed = _legs_hang(skeleton, roles, frame)
     q_pelvis = quat_from_matrix(frame)
     identity = quat_identity(np.zeros((len(skeleton), 1)))
-    reference = identity if posed else _mean_rotations(motion.rotations)
+    reference = identity if posed else _typical_rotations(motion.rotations)
     goals = _goals(motion, roles, posed, q_pelvis)
 
     tpose = identity.copy()
@@ -120,7 +131,7 @@ def _goals(
                 bone = bone_vector(motion.skeleton, roles, j)
                 if bone is None:
                     continue
-                if arm and place > 0:
+                if arm and (place > 0 or not posed):
                     goals[j] = bone, out
                 elif not arm and place < 2:
                     goals[j] = bone, np.array([0.0, 0, -1])
@@ -188,10 +199,15 @@ def _legs_hang(skeleton: Skeleton, roles: RoleMap, frame: Float[np.ndarray, "3 3
     return True
 
 
-def _mean_rotations(rotations: Float[np.ndarray, "T J 4"]) -> Float[np.ndarray, "J 4"]:
-    """The mean rotation of each joint over time (Markley et al. 2007)."""
+def _typical_rotations(rotations: Float[np.ndarray, "T J 4"]) -> Float[np.ndarray, "J 4"]:
+    """The mean rotation of each joint over time (Markley et al. 2007), or the turn by right angles
+    that it is near to: that is then how the rig was built, and the rest how the actor stood."""
     moments = np.einsum("tji,tjk->jik", rotations, rotations)
-    return np.linalg.eigh(moments)[1][..., -1]
+    mean = np.linalg.eigh(moments)[1][..., -1]
+    near = np.abs(mean @ _RIGHT_ANGLES.T)
+    best = near.argmax(-1)
+    built = near.max(-1) > np.cos(np.radians(35) / 2)
+    return np.where(built[:, None], _RIGHT_ANGLES[best], mean)
 
 
 def _snap(v: Vector) -> Vector:
