@@ -1,0 +1,181 @@
+"""What a file leaves unsaid: the length of its unit and which of its axes points up.
+
+Both are read off the body in the frames of the motion, since rest poses are often collapsed or
+stand along another axis: a human is about 1.7 m tall, and above its feet. What was inferred is
+said in notes, and can be given instead.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from jaxtyping import Float
+
+from spark.errors import ConventionError
+from spark.kinematics import end_positions, forward, world_positions
+from spark.motion import Motion
+from spark.rotation import quat_identity
+
+Up = Literal["x", "y", "z"]
+UPS: tuple[Up, ...] = get_args(Up)
+
+# Metres in a unit. CMU's is 1/0.45 of an inch, from the scale line of its ASF files.
+UNITS = {"m": 1.0, "cm": 0.01, "cmu": 0.0254 / 0.45, "inch": 0.0254, "mm": 0.001, "dm": 0.1}
+
+# How much rarer than metres and centimetres a unit is, as the logarithm of its probability.
+_RARITY = {"m": 0.0, "cm": 0.0, "cmu": -1.0, "inch": -1.0, "mm": -1.0, "dm": -1.5}
+
+# Adults and children, and what the measures below miss it by, as a log-normal distribution.
+_HEIGHT, _HEIGHT_SPREAD = 1.7, 0.3
+_PLAUSIBLE = (0.5, 3.0)
+
+# Units or axes this close in log-probability are named in a note.
+_CLOSE = 0.75
+
+# From fingertip or tiptoe to the far toe along the bones, a body measures 1.5 of its height.
+_REACH = 1.5
+
+_FEET = re.compile(r"foot|feet|toe|ankle|hoof|paw", re.IGNORECASE)
+_HEAD = re.compile(r"head|skull", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Convention:
+    """How a file's numbers are meant: metres in its unit, and its axis that points up.
+
+    Internal X, Y, Z are the file's Z, X, Y where Y is up, its Y, Z, X where X is up, and its own
+    where Z is up.
+    """
+
+    unit_m: float
+    up: Up
+
+    @property
+    def axes(self) -> tuple[int, int, int]:
+        """The file's axes that become internal X, Y, Z: `internal = file[..., axes]`."""
+        up = UPS.index(self.up)
+        return (up + 1) % 3, (up + 2) % 3, up
+
+    @property
+    def unit(self) -> str:
+        """The unit as `--unit` takes it: its name, or metres where it has none."""
+        return next((name for name, m in UNITS.items() if m == self.unit_m), f"{self.unit_m:g}")
+
+
+def given_unit(unit: str | float) -> float:
+    """Metres in a unit, from its name or its length in metres. Raises `ConventionError`."""
+    try:
+        metres = UNITS[unit] if unit in UNITS else float(unit)
+    except ValueError:
+        metres = np.nan
+    if not (np.isfinite(metres) and metres > 0):
+        raise ConventionError(
+            f"unit {unit!r} is not known; expected one of {', '.join(UNITS)}, or metres in a unit"
+        )
+    return metres
+
+
+def given_up(up: str) -> Up:
+    """The axis of that name. Raises `ConventionError`."""
+    for axis in UPS:
+        if axis == up.lower():
+            return axis
+    raise ConventionError(f"up axis {up!r} is not known; expected one of {', '.join(UPS)}")
+
+
+def infer_unit(motion: Motion) -> tuple[float, tuple[str, ...]]:
+    """Metres in a unit of `motion`, which is in file units, and the notes on it.
+
+    The known unit that makes the body's height most probable. Raises `ConventionError` where all
+    joints lie in one point.
+    """
+    size, measure = _stature(motion)
+    if not size > 0:
+        raise ConventionError(
+            "all joints lie in one point, so there is no height to tell the unit by; give --unit"
+        )
+    chances = {
+        name: _RARITY[name] - 0.5 * (np.log(size * metres / _HEIGHT) / _HEIGHT_SPREAD) ** 2
+        for name, metres in UNITS.items()
+    }
+    best, second = sorted(UNITS, key=lambda name: -chances[name])[:2]
+    tall = size * UNITS[best]
+    notes = [f"unit {best} ({100 * UNITS[best]:.4g} cm), inferred: {measure} is {tall:.2f} m"]
+    if chances[best] - chances[second] < _CLOSE:
+        notes.append(f"unit {second} would do nearly as well ({size * UNITS[second]:.2f} m)")
+    if not _PLAUSIBLE[0] < tall < _PLAUSIBLE[1]:
+        notes.append("no known unit gives a height from 0.5 to 3 m; check, and give --unit")
+    return UNITS[best], tuple(notes)
+
+
+def infer_up(motion: Motion) -> tuple[Up, tuple[str, ...]]:
+    """The up axis of `motion`, which is in file axes, and the notes on it.
+
+    Weighs where the body is above its feet, in the frames and at rest, where a floor lies at zero,
+    and how common each axis is.
+    """
+    skeleton = motion.skeleton
+    positions, world = forward(motion)
+    rest = world_positions(skeleton, quat_identity(world[:1]), motion.root_pos[:1])
+    points = np.concatenate([positions, end_positions(skeleton, positions, world)], axis=1)
+    size = max(float(np.max(np.median(np.ptp(points, axis=1), axis=0))), 1e-300)
+    floor = np.median(np.min(points, axis=1), axis=0) / size
+
+    standing = _above_feet(motion, positions)
+    # Log-probabilities: X-up files hardly exist; lying bodies and odd rest poses do.
+    chances = np.array([-4.0, 0.0, -1.0])
+    chances += 5.0 * standing + 1.5 * _above_feet(motion, rest)
+    chances += 2.0 * (np.abs(floor) < 0.03)
+    best, second = np.argsort(-chances)[:2].tolist()
+    up = UPS[best]
+    notes = [f"up axis {up}, inferred"]
+    if chances[best] - chances[second] < _CLOSE:
+        notes = [f"up axis {up}, a guess: {UPS[second]} is nearly as likely; check, and give --up"]
+    elif standing[best] < -0.5:
+        notes.append(f"the body is upside down along {up}; check, and give --up")
+    return up, tuple(notes)
+
+
+def _above_feet(motion: Motion, positions: Float[np.ndarray, "T J 3"]) -> Float[np.ndarray, "3"]:
+    """The mean direction from the feet to the rest of the body; zero where no name says foot."""
+    feet = np.array([bool(_FEET.search(name)) for name in motion.skeleton.names])
+    if feet.all() or not feet.any():
+        return np.zeros(3)
+    up = positions[:, ~feet].mean(axis=1) - positions[:, feet].mean(axis=1)
+    lengths = np.linalg.norm(up, axis=-1, keepdims=True)
+    return (up / np.where(lengths > 0, lengths, 1.0)).mean(axis=0)
+
+
+def _stature(motion: Motion) -> tuple[float, str]:
+    """The body's height along its bones, whatever its pose, and what was measured.
+
+    From the head down to the feet where names tell them, else from the longest path in the tree.
+    """
+    skeleton = motion.skeleton
+    positions, _ = forward(motion)
+    bones = np.zeros(len(skeleton))
+    children = np.arange(1, len(skeleton))
+    spans = positions[:, children] - positions[:, skeleton.parents[children]]
+    bones[1:] = np.median(np.linalg.norm(spans, axis=-1), axis=0)
+
+    head = next((j for j, name in enumerate(skeleton.names) if _HEAD.search(name)), None)
+    feet = [j for j, name in enumerate(skeleton.names) if _FEET.search(name)]
+    if head is not None and feet:
+        above = set(skeleton.ancestors(head))
+        paths = [bones[list(above.symmetric_difference(skeleton.ancestors(j)))] for j in feet]
+        height = float(np.median([path.sum() for path in paths]))
+        if height > 0:
+            return height, "from head to feet it"
+
+    # The longest path through each joint joins its two deepest branches.
+    deepest = np.zeros((len(skeleton), 2))
+    for parent, length in zip(skeleton.end_parents, skeleton.end_offsets, strict=True):
+        _deepen(deepest[parent], float(np.linalg.norm(length)))
+    for j in range(len(skeleton) - 1, 0, -1):
+        _deepen(deepest[skeleton.parents[j]], bones[j] + deepest[j, 0])
+    return float(deepest.sum(axis=1).max()) / _REACH, "judged by its longest chain of bones, it"
+
+
+def _deepen(two_deepest: Float[np.ndarray, "2"], depth: float) -> None:
+    two_deepest[:] = sorted((*two_deepest, depth), reverse=True)[:2]
