@@ -1,0 +1,47 @@
+"""Velocity and acceleration over a fixed time, so that the frame rate does not change them."""
+
+import numpy as np
+from jaxtyping import Float
+from scipy.interpolate import make_interp_spline
+
+# Where the window is sampled, in halves of it: so densely that the count does not matter.
+_OFFSETS = np.linspace(-1.0, 1.0, 11)
+
+
+def derivative(
+    values: Float[np.ndarray, "T *n"], frame_time: float, order: int, window: float
+) -> Float[np.ndarray, "T *n"]:
+    """The first or second time derivative of `values`, per second or per second squared.
+
+    At each frame a parabola is fitted to the `window` seconds before and after it, with Gaussian
+    weights (Savitzky and Golay 1964, weighted); between frames the values are those of a cubic
+    spline. Exact for parabolas. Nearer to the clip's ends than the window, the value is that of the
+    nearest frame with a whole window; a clip shorter than two windows has one that fits. One frame
+    stands still.
+    """
+    count = len(values)
+    duration = (count - 1) * frame_time
+    if count < 2:
+        return np.zeros_like(values)
+    half = min(window, 0.5 * duration)
+    times = np.arange(count) * frame_time
+    centres = np.clip(times, half, duration - half)
+    spline = make_interp_spline(times, values.reshape(count, -1), k=min(3, count - 1))
+    samples = spline((centres[:, None] + half * _OFFSETS).ravel())
+    weights = _WEIGHTS[order] / half**order
+    return np.einsum("k,tkn->tn", weights, samples.reshape(count, len(_OFFSETS), -1)).reshape(
+        values.shape
+    )
+
+
+def _fit_weights() -> Float[np.ndarray, "3 K"]:
+    """Weights whose sums over the samples are the fitted parabola's derivatives at its centre."""
+    basis = _OFFSETS[:, None] ** np.arange(3) / np.array([1.0, 1.0, 2.0])
+    gauss = np.exp(-0.5 * (2 * _OFFSETS) ** 2)[:, None]
+    weights: Float[np.ndarray, "3 K"] = np.linalg.solve(
+        basis.T @ (gauss * basis), (gauss * basis).T
+    )
+    return weights
+
+
+_WEIGHTS = _fit_weights()

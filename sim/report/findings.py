@@ -1,0 +1,74 @@
+"""From flags to sentences that one can act on."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from sim.report.measures import Drift, spans
+from sim.report.result import Finding, Measured
+
+# Flags of one kind that are no further apart than this [s] are one event.
+_GAP = 0.1
+
+
+def find(clip: Measured, drift: Drift | None) -> tuple[Finding, ...]:
+    """All events of a clip, the gravest of each measure first."""
+    gap = int(_GAP / clip.frame_time)
+    found = [
+        *_sinking(clip, gap),
+        *_floating(clip, gap),
+        *_sliding(clip, gap),
+        *_bending(clip, gap),
+    ]
+    order = {name: i for i, name in enumerate(dict.fromkeys(f.measure for f in found))}
+    found.sort(key=lambda f: (order[f.measure], -f.amount))
+    return (*found, *(_straying(drift) if drift else ()))
+
+
+def _sinking(clip: Measured, gap: int) -> Iterator[Finding]:
+    for name in dict.fromkeys(clip.depth_names):
+        depth = clip.depth[:, [n == name for n in clip.depth_names]].max(axis=1)
+        for start, stop in spans(depth > clip.thresholds.penetration, gap):
+            deepest = start + int(depth[start:stop].argmax())
+            amount = float(depth[deepest])
+            sentence = f"{name} sinks {100 * amount:.1f} cm under the floor"
+            yield Finding("penetration", name, start, stop, amount, sentence)
+
+
+def _floating(clip: Measured, gap: int) -> Iterator[Finding]:
+    for start, stop in spans(clip.flags["F"], gap):
+        amount = float(clip.clearance[start:stop].max())
+        sentence = f"the body floats {100 * amount:.1f} cm above the floor"
+        yield Finding("floating", "body", start, stop, amount, sentence)
+
+
+def _sliding(clip: Measured, gap: int) -> Iterator[Finding]:
+    for side in dict.fromkeys(clip.sides):
+        columns = [s == side for s in clip.sides]
+        speed = np.where(clip.skating, clip.speeds, 0.0)[:, columns].max(axis=1)
+        for start, stop in spans(speed > 0, gap):
+            amount = float(speed[start:stop].sum()) * clip.frame_time
+            sentence = f"{side} slides {100 * amount:.1f} cm"
+            yield Finding("skating", side, start, stop, amount, sentence)
+
+
+def _bending(clip: Measured, gap: int) -> Iterator[Finding]:
+    for limit in clip.limits:
+        for excess, movement in zip(limit.excess.T, limit.movements, strict=True):
+            for start, stop in spans(excess > 0, gap):
+                amount = float(excess[start:stop].max())
+                sentence = f"{limit.joint} {movement} {np.degrees(amount):.0f}° beyond its limit"
+                yield Finding("joint limit", limit.joint, start, stop, amount, sentence)
+
+
+def _straying(drift: Drift) -> Iterator[Finding]:
+    worst = int(drift.distance.argmax())
+    amount = float(drift.distance[worst])
+    if amount > 0.05 * max(drift.path_length, 1.0):
+        sentence = f"the root strays {amount:.2f} m from the source's path"
+        yield Finding("root drift", "root", worst, worst + 1, amount, sentence)
+    worst = int(np.abs(drift.heading).argmax())
+    amount = float(np.abs(drift.heading[worst]))
+    if amount > np.radians(10):
+        sentence = f"the heading is {np.degrees(amount):.0f}° off the source's"
+        yield Finding("root drift", "heading", worst, worst + 1, amount, sentence)

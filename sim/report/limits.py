@@ -1,0 +1,180 @@
+"""Anatomical limits of the joints, by role, whatever the rig's joint axes and spine count are.
+
+A joint's turn is its bone's rotation since the T-pose relative to that of the bone it hangs on, in
+T-pose world axes; right limbs are mirrored into left ones. It is split into the twist about the
+bone and the swing of it (Dobrowolski 2015), and the swing, a rotation vector across the bone, into
+two components.
+
+The ranges are those of the very mobile (AAOS "Joint Motion", Boone and Azen 1979, Kapandji) and 20
+to 40 degrees more: a rig's joint centres and T-pose are not an anatomist's, and a limit that flags
+captured people is worth nothing. They tell a knee that bends backwards, not a stiff one.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from spark.rig import Rig
+from spark.roles import Role
+from spark.rotation import quat_conj, quat_mul, quat_swing_twist, rotvec_from_quat
+
+_X, _Y, _Z = 0, 1, 2
+
+
+_Range = tuple[int, int]
+_Words = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class JointLimit:
+    """Ranges [deg] of one joint, of a left limb's or of the trunk's, by T-pose world axis.
+
+    `bone` is the index of the axis along the bone: its range is that of the twist, the others are
+    those of the swing. `below` holds the roles that the joint may hang on, the nearest first.
+    `movements` say what a turn beyond either end of each range is called.
+    """
+
+    name: str
+    role: str
+    below: tuple[str, ...]
+    bone: int
+    ranges: tuple[_Range, _Range, _Range]
+    movements: tuple[_Words, _Words, _Words]
+    paired: bool = True
+
+
+_TWISTS: _Words = ("twists", "twists")
+_SIDEWAYS: _Words = ("bends sideways", "bends sideways")
+
+# The signs follow from the T-pose (X forward, Y left, Z up): a left arm lies along +Y, so a turn
+# about +X lifts it and one about -Z brings it forward; a leg hangs along -Z, so a turn about -Y
+# swings it forward and one about +X moves a left leg outwards.
+LIMITS: tuple[JointLimit, ...] = (
+    JointLimit(
+        "hip",
+        "upper_leg",
+        ("pelvis",),
+        _Z,
+        ((-60, 110), (-160, 60), (-90, 90)),
+        (("swings inwards", "swings outwards"), ("flexes", "extends"), _TWISTS),
+    ),
+    JointLimit(
+        "knee",
+        "lower_leg",
+        ("upper_leg",),
+        _Z,
+        ((-45, 45), (-25, 175), (-75, 75)),
+        (_SIDEWAYS, ("bends backwards", "flexes"), _TWISTS),
+    ),
+    JointLimit(
+        "ankle",
+        "foot",
+        ("lower_leg",),
+        _X,
+        ((-75, 75), (-65, 95), (-75, 75)),
+        (_TWISTS, ("bends up", "bends down"), ("turns in", "turns out")),
+    ),
+    JointLimit(
+        "shoulder",
+        "upper_arm",
+        ("spine", "pelvis"),
+        _Y,
+        ((-135, 140), (-170, 170), (-165, 100)),
+        (("drops", "lifts"), _TWISTS, ("goes across", "goes back")),
+    ),
+    JointLimit(
+        "elbow",
+        "forearm",
+        ("upper_arm",),
+        _Y,
+        ((-120, 120), (-170, 170), (-170, 40)),
+        (_SIDEWAYS, _TWISTS, ("flexes", "bends backwards")),
+    ),
+    JointLimit(
+        "wrist",
+        "hand",
+        ("forearm",),
+        _Y,
+        ((-120, 120), (-170, 170), (-80, 80)),
+        (("flexes", "extends"), _TWISTS, _SIDEWAYS),
+    ),
+    JointLimit(
+        "trunk",
+        "spine",
+        ("pelvis",),
+        _Z,
+        ((-70, 70), (-65, 120), (-90, 90)),
+        (_SIDEWAYS, ("bends backwards", "bends forward"), _TWISTS),
+        paired=False,
+    ),
+    JointLimit(
+        "neck",
+        "head",
+        ("spine", "pelvis"),
+        _Z,
+        ((-80, 80), (-100, 100), (-120, 120)),
+        (_SIDEWAYS, ("bends backwards", "bends forward"), _TWISTS),
+        paired=False,
+    ),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class LimitExcess:
+    """How far one joint ("left knee") goes beyond its ranges [rad]: `excess[t, e]` is 0 inside;
+    `movements[e]` says which end of which range e is."""
+
+    joint: str
+    excess: Float[np.ndarray, "T 6"]
+    movements: tuple[str, ...]
+
+
+def limit_excess(since_tpose: Float[np.ndarray, "T J 4"], rig: Rig) -> tuple[LimitExcess, ...]:
+    """The excess of each joint of `rig` that has a limit, from the rotations since the T-pose (G).
+
+    A joint that the rig lacks, or that hangs on nothing, is left out.
+    """
+    found = []
+    for limit in LIMITS:
+        for side in ("left", "right") if limit.paired else ("",):
+            joint = _joint(rig, side, limit.role)
+            parent = next(
+                (p for role in limit.below if (p := _joint(rig, side, role)) is not None), None
+            )
+            if joint is None or parent is None:
+                continue
+            turn = quat_mul(quat_conj(since_tpose[:, parent]), since_tpose[:, joint])
+            if side == "right":
+                turn = turn * np.array([1.0, -1.0, 1.0, -1.0])  # mirrored in the XZ plane
+            found.append(
+                LimitExcess(
+                    f"{side} {limit.name}".strip(),
+                    _excess(swing_and_twist(turn, limit.bone), np.radians(limit.ranges)),
+                    tuple(word for words in limit.movements for word in words),
+                )
+            )
+    return tuple(found)
+
+
+def swing_and_twist(turn: Float[np.ndarray, "T 4"], bone: int) -> Float[np.ndarray, "T 3"]:
+    """The twist [rad] about axis `bone` in its place, the swing's rotation vector in the others."""
+    swing, twist = quat_swing_twist(turn, np.eye(3)[bone])
+    return rotvec_from_quat(swing) + rotvec_from_quat(twist)
+
+
+def _excess(
+    angles: Float[np.ndarray, "T 3"], ranges: Float[np.ndarray, "3 2"]
+) -> Float[np.ndarray, "T 6"]:
+    beyond = np.stack([ranges[:, 0] - angles, angles - ranges[:, 1]], axis=-1)
+    return np.maximum(beyond, 0).reshape(-1, 6)
+
+
+def _joint(rig: Rig, side: str, role: str) -> int | None:
+    """The outermost joint with the role; the trunk's roles have no side."""
+    name = role if role in _UNPAIRED else f"{side}_{role}"
+    joints = rig.roles.joints(Role(name))
+    return joints[-1] if joints else None
+
+
+_UNPAIRED = {Role.PELVIS, Role.SPINE, Role.NECK, Role.HEAD}

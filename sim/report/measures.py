@@ -1,0 +1,111 @@
+"""The report's measures: one pure function each, arrays in, arrays out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.ndimage import maximum_filter1d
+
+from sim.report.derivatives import derivative
+from sim.report.thresholds import GRAVITY
+
+
+def floor_height(lowest: Float[np.ndarray, "T"]) -> float:
+    """The floor's z [m]: the 5th percentile of the lowest sole point's height over a clip."""
+    return float(np.percentile(lowest, 5))
+
+
+def penetration_depth(heights: Float[np.ndarray, "T N"]) -> Float[np.ndarray, "T N"]:
+    """How deep each point lies under the floor [m], from its height above the floor; 0 above."""
+    return np.maximum(-heights, 0.0)
+
+
+def floating(
+    clearance: Float[np.ndarray, "T"],
+    com_acceleration_z: Float[np.ndarray, "T"],
+    height: float,
+    free_fall: float,
+    blur: int,
+) -> Bool[np.ndarray, "T"]:
+    """F: nothing of the body is within `height` [m] of the floor, and yet it does not fall.
+
+    `clearance` [m] is the height of the body's lowest point. Free fall is a vertical acceleration
+    of the centre of mass within `free_fall` [m/s²] of gravity's, up to `blur` frames away: take-off
+    and landing are smeared over that many by the window the acceleration is taken with.
+    """
+    falls = np.abs(com_acceleration_z + GRAVITY) <= free_fall
+    falls = maximum_filter1d(falls.astype(np.uint8), 2 * blur + 1, mode="nearest").astype(bool)
+    return (clearance > height) & ~falls
+
+
+def horizontal_speed(
+    points: Float[np.ndarray, "T P 3"], frame_time: float, window: float
+) -> Float[np.ndarray, "T P"]:
+    """Speed along the floor [m/s]."""
+    return np.linalg.norm(derivative(points[..., :2], frame_time, 1, window), axis=-1)
+
+
+def skating(
+    heights: Float[np.ndarray, "T P"],
+    speeds: Float[np.ndarray, "T P"],
+    height: float,
+    speed: float,
+) -> Bool[np.ndarray, "T P"]:
+    """S: points lower than `height` [m] over the floor that move along it faster than `speed`."""
+    return (heights < height) & (speeds > speed)
+
+
+def spans(flags: Bool[np.ndarray, "T"], gap: int = 0) -> list[tuple[int, int]]:
+    """The runs of True as [start, stop); runs that at most `gap` frames separate are one."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    merged: list[tuple[int, int]] = []
+    for start, stop in edges.reshape(-1, 2).tolist():
+        if merged and start - merged[-1][1] <= gap:
+            merged[-1] = (merged[-1][0], stop)
+        else:
+            merged.append((start, stop))
+    return merged
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """How far the root strays from the source's path, which is scaled by the hip heights' ratio.
+
+    `distance` [m] is horizontal, frame by frame, with both paths starting at the same point;
+    `path_length` [m] is that of the scaled source; `heading` [rad] is the difference of headings.
+    """
+
+    distance: Float[np.ndarray, "T"]
+    path_length: float
+    heading: Float[np.ndarray, "T"]
+
+
+def root_drift(
+    hips: Float[np.ndarray, "T 3"],
+    heading: Float[np.ndarray, "T"],
+    source_hips: Float[np.ndarray, "T 3"],
+    source_heading: Float[np.ndarray, "T"],
+    scale: float,
+) -> Drift:
+    """Both motions at the same times; `scale` is the hip height over the source's."""
+    path = (hips - hips[0])[:, :2]
+    source_path = scale * (source_hips - source_hips[0])[:, :2]
+    turned = heading - source_heading
+    # Headings are known up to whole turns.
+    turned = turned - 2 * np.pi * np.round(turned[0] / (2 * np.pi))
+    return Drift(
+        distance=np.linalg.norm(path - source_path, axis=-1),
+        path_length=float(np.linalg.norm(np.diff(source_path, axis=0), axis=-1).sum()),
+        heading=turned,
+    )
+
+
+def at_times(
+    values: Float[np.ndarray, "T *n"], frame_time: float, times: Float[np.ndarray, "K"]
+) -> Float[np.ndarray, "K *n"]:
+    """Values between frames, linearly; before and after the clip those of its ends."""
+    frames = np.clip(times / frame_time, 0, len(values) - 1)
+    first = np.minimum(frames.astype(np.int64), max(len(values) - 2, 0))
+    second = np.minimum(first + 1, len(values) - 1)
+    fraction = (frames - first).reshape(-1, *(1,) * (values.ndim - 1))
+    return (1 - fraction) * values[first] + fraction * values[second]

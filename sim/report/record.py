@@ -1,0 +1,103 @@
+"""The report as plain data for JSON."""
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from sim.report.measures import Drift, spans
+from sim.report.result import FLAGS, Finding, Measured, Report
+
+SCHEMA = "spark-sim report 1"
+
+
+def record(report: Report) -> dict[str, Any]:
+    """Numbers in SI, units in the keys; frames count from 0 and spans are [start, stop)."""
+    clip = report.clip
+    return {
+        "schema": SCHEMA,
+        "thresholds": clip.thresholds.version,
+        "threshold_values": _threshold_values(clip),
+        "frames": len(clip.clearance),
+        "frame_time_s": clip.frame_time,
+        "implausible_share": report.implausible,
+        "clip": _measured(clip),
+        "source": None if report.source is None else _measured(report.source),
+        "difference_to_source": None if report.source is None else _difference(report),
+        "root_drift": None if report.drift is None else _drift(report.drift),
+        "findings": [_finding(finding, clip.frame_time) for finding in report.findings],
+        "notes": list(report.notes),
+    }
+
+
+_UNITS = {
+    "penetration": "m",
+    "floating": "m",
+    "free_fall": "m_s2",
+    "skate_height": "m",
+    "skate_speed": "m_s",
+    "window": "s",
+}
+_FINDING_UNITS = {"joint limit": "rad", "heading": "rad"}
+
+
+def _threshold_values(clip: Measured) -> dict[str, float]:
+    values = asdict(clip.thresholds)
+    return {f"{name}_{unit}": values[name] for name, unit in _UNITS.items()}
+
+
+def _measured(clip: Measured) -> dict[str, Any]:
+    return {
+        "implausible_share": float(clip.implausible.mean()),
+        "floor_z_m": clip.floor_z,
+        "flags": {
+            FLAGS[letter]: {
+                "share": clip.shares[letter],
+                "spans": [list(span) for span in spans(flag)],
+            }
+            for letter, flag in clip.flags.items()
+        },
+        "deepest_m": float(clip.depth.max()),
+        "highest_clearance_m": float(clip.clearance.max()),
+        "fastest_skate_m_s": float(np.where(clip.skating, clip.speeds, 0.0).max()),
+        "joint_limits": {
+            limit.joint: {
+                "share": clip.limit_shares[limit.joint],
+                "largest_excess_rad": float(limit.excess.max()),
+            }
+            for limit in clip.limits
+        },
+    }
+
+
+def _difference(report: Report) -> dict[str, float]:
+    assert report.source is not None
+    ours, theirs = report.clip.shares, report.source.shares
+    shares = {f"{FLAGS[letter]}_share": ours[letter] - theirs[letter] for letter in ours}
+    source = float(report.source.implausible.mean())
+    return {"implausible_share": report.implausible - source, **shares}
+
+
+def _drift(drift: Drift) -> dict[str, Any]:
+    length = drift.path_length
+    return {
+        "largest_m": float(drift.distance.max()),
+        "final_m": float(drift.distance[-1]),
+        "source_path_m": length,
+        "final_share_of_path": float(drift.distance[-1] / length) if length > 0 else None,
+        "largest_heading_rad": float(np.abs(drift.heading).max()),
+        "final_heading_rad": float(drift.heading[-1]),
+    }
+
+
+def _finding(finding: Finding, frame_time: float) -> dict[str, Any]:
+    unit = _FINDING_UNITS.get(finding.measure, _FINDING_UNITS.get(finding.where, "m"))
+    return {
+        "measure": finding.measure,
+        "where": finding.where,
+        "start_frame": finding.start,
+        "stop_frame": finding.stop,
+        "start_s": finding.start * frame_time,
+        f"amount_{unit}": finding.amount,
+        "text": f"{finding.sentence} {finding.place(frame_time)}",
+    }

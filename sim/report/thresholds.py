@@ -1,0 +1,41 @@
+"""The report's thresholds, in one table. Any change of a value is a new version."""
+
+from dataclasses import dataclass, replace
+
+GRAVITY = 9.81  # [m/s²]
+HUMAN_HIP_HEIGHT = 0.9  # [m]
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """`plausibility v1`: what counts as implausible, for a body whose hips stand 0.9 m high."""
+
+    version: str = "plausibility v1"
+    # P: the lowest point lies deeper than this under the floor [m].
+    penetration: float = 0.01
+    # F: the lowest point is higher than this [m], and the centre of mass is not in free fall: its
+    # vertical acceleration differs from gravity's by more than this [m/s²] all over the window.
+    floating: float = 0.04
+    free_fall: float = 4.0
+    # S: a support point lower than this [m] moves along the floor faster than this [m/s].
+    skate_height: float = 0.025
+    skate_speed: float = 0.3
+    # Time [s] over which velocities and accelerations are taken, whatever the frame rate.
+    window: float = 0.05
+
+    def scaled(self, hip_height: float) -> "Thresholds":
+        """The same table for a body of another size: lengths and speeds grow with the hip height.
+
+        Accelerations and times do not: gravity is the same for a doll.
+        """
+        scale = hip_height / HUMAN_HIP_HEIGHT
+        return replace(
+            self,
+            penetration=self.penetration * scale,
+            floating=self.floating * scale,
+            skate_height=self.skate_height * scale,
+            skate_speed=self.skate_speed * scale,
+        )
+
+
+PLAUSIBILITY_V1 = Thresholds()

@@ -1,0 +1,145 @@
+"""Each measure of the report against an answer worked out by hand."""
+
+import numpy as np
+import pytest
+
+from sim.report.derivatives import derivative
+from sim.report.limits import limit_excess, swing_and_twist
+from sim.report.measures import (
+    at_times,
+    floating,
+    floor_height,
+    horizontal_speed,
+    penetration_depth,
+    root_drift,
+    skating,
+    spans,
+)
+from spark.roles import Role
+from spark.rotation import quat_about, quat_mul
+from tests.stick import joint, standing, stick_rig
+
+
+@pytest.mark.parametrize("fps", [15, 24, 29.97, 60, 120])
+def test_derivatives_are_exact_for_parabolas_at_any_frame_rate(fps: float) -> None:
+    times = np.arange(int(3 * fps)) / fps
+    values = 1 + 2 * times - 4 * times**2
+    inside = (times > 0.1) & (times < times[-1] - 0.1)
+    velocity = derivative(values, 1 / fps, 1, 0.05)
+    acceleration = derivative(values, 1 / fps, 2, 0.05)
+    np.testing.assert_allclose(velocity[inside], (2 - 8 * times)[inside], atol=1e-9)
+    np.testing.assert_allclose(acceleration, -8, atol=1e-6)
+
+
+def test_derivatives_of_one_two_and_three_frames() -> None:
+    assert derivative(np.array([5.0]), 0.1, 1, 0.05) == [0]
+    np.testing.assert_allclose(derivative(np.array([5.0, 6.0]), 0.1, 1, 0.05), [10, 10])
+    np.testing.assert_allclose(derivative(np.array([0.0, 1.0, 4.0]), 1.0, 2, 0.05), [2, 2, 2])
+
+
+def test_the_floor_is_the_fifth_percentile_so_a_few_deep_frames_do_not_lower_it() -> None:
+    lowest = np.full(100, 0.02)
+    lowest[:4] = -0.5
+    assert floor_height(lowest) == pytest.approx(0.02)
+
+
+def test_depth_is_how_far_a_point_is_under_the_floor() -> None:
+    heights = np.array([[0.03, -0.02], [0.0, 0.5]])
+    np.testing.assert_array_equal(penetration_depth(heights), [[0, 0.02], [0, 0]])
+
+
+def test_floating_needs_height_and_no_free_fall() -> None:
+    clearance = np.array([0.03, 0.05, 0.05, 0.05, 0.05])
+    acceleration = np.array([0.0, 0.0, 0.0, -9.81, -6.0])
+    expected = [False, True, True, False, False]  # -6 + 9.81 = 3.81 is still within 4 m/s²
+    np.testing.assert_array_equal(floating(clearance, acceleration, 0.04, 4.0, 0), expected)
+    expected = [False, True, False, False, False]  # the frame beside the fall is in its blur
+    np.testing.assert_array_equal(floating(clearance, acceleration, 0.04, 4.0, 1), expected)
+
+
+def test_speed_is_horizontal_and_per_second() -> None:
+    times = np.arange(60) / 60
+    points = np.stack([0.3 * times, 0.4 * times, 5 * times], axis=-1)[:, None]
+    np.testing.assert_allclose(horizontal_speed(points, 1 / 60, 0.05), 0.5, rtol=1e-9)
+
+
+def test_skating_is_low_and_fast() -> None:
+    heights = np.array([[0.02, 0.03, 0.02]])
+    speeds = np.array([[0.31, 0.31, 0.29]])
+    np.testing.assert_array_equal(skating(heights, speeds, 0.025, 0.3), [[True, False, False]])
+
+
+def test_spans_are_half_open_and_small_gaps_close() -> None:
+    flags = np.array([1, 1, 0, 1, 0, 0, 0, 1], dtype=bool)
+    assert spans(flags) == [(0, 2), (3, 4), (7, 8)]
+    assert spans(flags, gap=1) == [(0, 4), (7, 8)]
+    assert spans(np.zeros(3, dtype=bool)) == []
+
+
+def test_drift_compares_scaled_paths_from_a_common_start() -> None:
+    # The source walks 3 m along X; a body half its size should walk 1.5 m, and walks 1.5 m along Y.
+    ahead = np.linspace(0, 3, 4)
+    source = np.stack([ahead, 0 * ahead, 0 * ahead + 0.9], axis=-1)
+    path = np.stack([0 * ahead + 7, 0.5 * ahead, 0 * ahead + 0.45], axis=-1)
+    turned = np.full(4, 2 * np.pi + 0.1)
+    drift = root_drift(path, turned, source, np.zeros(4), 0.5)
+    assert drift.path_length == pytest.approx(1.5)
+    np.testing.assert_allclose(drift.distance, 0.5 * ahead * np.sqrt(2))
+    np.testing.assert_allclose(drift.heading, 0.1)
+
+
+def test_values_between_frames_are_linear_and_held_at_the_ends() -> None:
+    values = np.array([[0.0, 1.0], [2.0, 3.0]])
+    at = at_times(values, 0.5, np.array([-1.0, 0.25, 9.0]))
+    np.testing.assert_allclose(at, [[0, 1], [1, 2], [2, 3]])
+    np.testing.assert_allclose(at_times(values[:1], 0.5, np.array([3.0])), [[0, 1]])
+
+
+def test_swing_and_twist_add_up_for_a_turn_about_one_axis() -> None:
+    for axis, expected in (("x", [0.4, 0, 0]), ("y", [0, 0.4, 0]), ("z", [0, 0, 0.4])):
+        turn = quat_about(axis, np.array([0.4]))
+        for bone in range(3):
+            np.testing.assert_allclose(swing_and_twist(turn, bone)[0], expected, atol=1e-12)
+
+
+# Turns of one joint away from the T-pose, and the only excess they give [deg].
+BENDS = [
+    (Role.LEFT_LOWER_LEG, "y", 120, None, 0),
+    (Role.RIGHT_LOWER_LEG, "y", 120, None, 0),
+    (Role.LEFT_LOWER_LEG, "y", -60, "left knee bends backwards", 35),
+    (Role.RIGHT_LOWER_LEG, "y", -60, "right knee bends backwards", 35),
+    (Role.LEFT_LOWER_LEG, "x", 60, "left knee bends sideways", 15),
+    (Role.LEFT_UPPER_LEG, "y", -120, None, 0),
+    (Role.LEFT_UPPER_LEG, "y", 100, "left hip extends", 40),
+    (Role.LEFT_FOREARM, "z", -140, None, 0),
+    (Role.LEFT_FOREARM, "z", 70, "left elbow bends backwards", 30),
+    (Role.RIGHT_FOREARM, "z", 140, None, 0),
+    (Role.RIGHT_FOREARM, "z", -70, "right elbow bends backwards", 30),
+    (Role.LEFT_UPPER_ARM, "x", -90, None, 0),
+    (Role.HEAD, "z", 140, "neck twists", 20),
+    (Role.SPINE, "y", 90, None, 0),
+    (Role.SPINE, "y", -90, "trunk bends backwards", 25),
+]
+
+
+@pytest.mark.parametrize(("role", "axis", "degrees", "movement", "excess"), BENDS)
+def test_limits_name_the_joint_the_movement_and_the_excess(
+    role: Role, axis: str, degrees: float, movement: str | None, excess: float
+) -> None:
+    rig = stick_rig()
+    turn = quat_about(axis, np.radians(degrees))  # type: ignore[arg-type]
+    since_tpose = standing(rig, 1).rotations.copy()
+    below = list(rig.skeleton.subtree(joint(role)))
+    since_tpose[:, below] = turn
+    # The pelvis's own orientation must not matter.
+    since_tpose = quat_mul(quat_about("z", np.array(2.0)), since_tpose)
+    found = {
+        f"{limit.joint} {name}": np.degrees(value)
+        for limit in limit_excess(since_tpose, rig)
+        for name, value in zip(limit.movements, limit.excess[0], strict=True)
+        if value > 0
+    }
+    if movement is None:
+        assert found == {}
+    else:
+        assert found == {movement: pytest.approx(excess)}
