@@ -186,7 +186,7 @@ def _add_sites(bodies: dict[int, mujoco.MjsBody], rig: Rig) -> None:
 
 
 def _add_actuators(spec: mujoco.MjSpec, rig: Rig, weight: float) -> None:
-    """Position servos about each axis of every limb and trunk joint, as stiff as what they carry."""
+    """Position servos about each axis of each joint with a role, as stiff as what they carry."""
     for j in kept_joints(rig):
         role = rig.roles.roles[j]
         if j == rig.carrier or role is None:

@@ -134,7 +134,7 @@ def _add_box(
     points: Float[np.ndarray, "P 3"],
     height: float,
 ) -> None:
-    """A flat box over `points` (from the joint, T-pose world axes), thinner than the ankle is high."""
+    """A flat box over `points`: from the joint, in T-pose world axes; thinner than the ankle."""
     low, high = points.min(0), points.max(0)
     half = (high - low) / 2
     half[2] = min(_FOOT * height, max(-low[2], 0.01)) / 2

@@ -1,0 +1,64 @@
+"""Pictures of a scene, drawn off screen through EGL."""
+
+import os
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+from jaxtyping import UInt8
+
+from sim.scene import Scene
+from spark.errors import DependencyError
+
+if TYPE_CHECKING:
+    from mujoco import Renderer
+
+# Elements are drawn from geom groups: 2 is seen, 3 collides and is seen, sites are not.
+_AZIMUTH, _ELEVATION = 140.0, -12.0
+
+
+def frames(
+    scene: Scene, picked: Iterable[int], *, width: int = 960, height: int = 540
+) -> Iterator[UInt8[np.ndarray, "H W 3"]]:
+    """The scene at the picked frames, seen by a camera that follows the figures.
+
+    Raises DependencyError, with the packages to install, where nothing can be drawn.
+    """
+    renderer = _renderer(scene, width, height)
+    data = mujoco.MjData(scene.model)
+    option = mujoco.MjvOption()
+    option.geomgroup[:] = (1, 1, 1, 1, 0, 0)
+    option.sitegroup[:] = 0
+    camera = mujoco.MjvCamera()
+    camera.azimuth, camera.elevation = _AZIMUTH, _ELEVATION
+    camera.distance = 1.1 + 1.25 * scene.extent * max(1.0, 0.9 * 16 / 9 * height / width)
+    try:
+        for frame in picked:
+            data.qpos[:] = scene.qpos[frame]
+            mujoco.mj_kinematics(scene.model, data)
+            mujoco.mj_camlight(scene.model, data)
+            camera.lookat[:] = scene.centers[frame]
+            renderer.update_scene(data, camera, option)
+            renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
+            renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
+            yield renderer.render()
+    finally:
+        renderer.close()
+
+
+def _renderer(scene: Scene, width: int, height: int) -> "Renderer":
+    if "MUJOCO_GL" not in os.environ and not has_display():
+        os.environ["MUJOCO_GL"] = "egl"
+    try:
+        return mujoco.Renderer(scene.model, height, width)
+    except Exception as error:  # the GL loaders raise whatever their platform does
+        raise DependencyError(
+            f"no OpenGL to draw with ({type(error).__name__}: {error}). On Debian or Ubuntu: "
+            "apt-get install libegl1 libgl1-mesa-dri libopengl0. Or use --html, which needs none."
+        ) from error
+
+
+def has_display() -> bool:
+    """Whether a window can be opened."""
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -1,0 +1,80 @@
+"""Scenes as video files and as strips of pictures."""
+
+import subprocess
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from shutil import which
+
+import numpy as np
+
+from sim.render import frames
+from sim.scene import Scene
+from spark.errors import DependencyError, OutputError
+
+Progress = Callable[[Iterable[int]], Iterable[int]]
+
+
+def write_video(
+    scene: Scene,
+    path: str | Path,
+    *,
+    width: int = 960,
+    height: int = 540,
+    progress: Progress = iter,
+) -> None:
+    """An H.264 video of the whole scene at its own frame rate. `progress` wraps the frames."""
+    path = Path(path)
+    encoder = [
+        *(_ffmpeg(), "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24"),
+        *("-s", f"{width}x{height}", "-r", f"{1 / scene.frame_time:.6f}", "-i", "-"),
+        *("-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p"),
+        *("-movflags", "+faststart", "-f", "mp4", str(path)),
+    ]
+    process = subprocess.Popen(encoder, stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert process.stdin is not None
+    assert process.stderr is not None
+    try:
+        picked = progress(range(len(scene.qpos)))
+        for picture in frames(scene, picked, width=width, height=height):
+            process.stdin.write(picture.tobytes())
+        process.stdin.close()
+    except BrokenPipeError:
+        pass  # the encoder has given up; its own words follow
+    except BaseException:
+        process.kill()
+        path.unlink(missing_ok=True)
+        raise
+    message = process.stderr.read().decode(errors="replace").strip()
+    if process.wait():
+        raise OutputError(f"{path}: the video encoder failed: {message}")
+
+
+def write_strip(
+    scene: Scene, path: str | Path, *, count: int = 6, width: int = 300, height: int = 330
+) -> None:
+    """One PNG of `count` moments, evenly spread from the first frame to the last."""
+    try:
+        from PIL import Image
+    except ImportError as error:
+        raise DependencyError("pictures need Pillow: pip install 'spark-sim[video]'") from error
+    path = Path(path)
+    picked = np.linspace(0, len(scene.qpos) - 1, count).round().astype(int).tolist()
+    pictures = list(frames(scene, picked, width=width, height=height))
+    try:
+        Image.fromarray(np.concatenate(pictures, axis=1)).save(path, format="PNG", optimize=True)
+    except OSError as error:
+        raise OutputError(f"{path}: can't be written ({error.strerror or error})") from error
+
+
+def _ffmpeg() -> str:
+    """imageio-ffmpeg's own binary, or the system's."""
+    try:
+        import imageio_ffmpeg
+    except ImportError:
+        found = which("ffmpeg")
+        if found is None:
+            raise DependencyError(
+                "videos need ffmpeg: pip install 'spark-sim[video]', or install ffmpeg"
+            ) from None
+        return found
+    return imageio_ffmpeg.get_ffmpeg_exe()

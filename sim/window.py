@@ -1,0 +1,38 @@
+"""The MuJoCo window."""
+
+import time
+
+from sim.render import has_display
+from sim.scene import Scene
+from spark.errors import DependencyError
+
+
+def open_window(scene: Scene) -> None:
+    """Play the scene in a loop until the window is closed. Space pauses."""
+    if not has_display():
+        raise DependencyError(
+            "there is no display to open a window on; use --html out.html or --video out.mp4"
+        )
+    import mujoco
+    import mujoco.viewer
+
+    paused = False
+
+    def on_key(code: int) -> None:
+        nonlocal paused
+        if code == ord(" "):
+            paused = not paused
+
+    data = mujoco.MjData(scene.model)
+    frame = 0
+    with mujoco.viewer.launch_passive(scene.model, data, key_callback=on_key) as viewer:
+        viewer.cam.distance = 1.0 + 1.3 * scene.extent
+        viewer.cam.lookat[:] = scene.centers[0]
+        while viewer.is_running():
+            started = time.monotonic()
+            data.qpos[:] = scene.qpos[frame]
+            mujoco.mj_kinematics(scene.model, data)
+            viewer.sync()
+            if not paused:
+                frame = (frame + 1) % len(scene.qpos)
+            time.sleep(max(0.0, scene.frame_time - (time.monotonic() - started)))
