@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from mujoco import Renderer
 
 # Elements are drawn from geom groups: 2 is seen, 3 collides and is seen, sites are not.
-_AZIMUTH, _ELEVATION = 140.0, -12.0
+_AZIMUTH, _ELEVATION = 150.0, -10.0
+_FIELD_OF_VIEW = 35.0
 
 
 def frames(
@@ -32,7 +33,9 @@ def frames(
     option.sitegroup[:] = 0
     camera = mujoco.MjvCamera()
     camera.azimuth, camera.elevation = _AZIMUTH, _ELEVATION
-    camera.distance = 1.1 + 1.25 * scene.extent * max(1.0, 0.9 * 16 / 9 * height / width)
+    half = np.tan(np.radians(_FIELD_OF_VIEW / 2))
+    camera.distance = max(scene.width * height / width, scene.height) * 0.58 / half
+    scene.model.vis.global_.fovy = _FIELD_OF_VIEW
     try:
         for frame in picked:
             data.qpos[:] = scene.qpos[frame]

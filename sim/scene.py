@@ -15,6 +15,8 @@ from spark.motion import Motion
 from spark.rig import Rig
 from spark.rotation import quat_slerp
 
+_SPACING = 0.8  # of standing heights, between neighbours
+
 
 @dataclass(frozen=True, eq=False)
 class Figure:
@@ -30,15 +32,16 @@ class Figure:
 class Scene:
     """One model of all figures and their coordinates over common frames; floor at z = 0.
 
-    `centers` is the path of the figures' middle, for a camera to follow; `extent` [m] what it must
-    show of them.
+    `centers` is the path of the figures' middle, for a camera to follow; `width` and `height` [m]
+    are what it must show around it.
     """
 
     model: mujoco.MjModel
     qpos: Float[np.ndarray, "T nq"]
     frame_time: float
     centers: Float[np.ndarray, "T 3"]
-    extent: float
+    width: float
+    height: float
 
 
 def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
@@ -64,7 +67,7 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
             qpos_from_motion(model, figure.motion, figure.rig), figure.motion.frame_time, times
         )
         qpos[:, :2] -= qpos[0, :2].copy()
-        qpos[:, 1] -= (k - (len(figures) - 1) / 2) * 1.1 * height
+        qpos[:, 1] += (k - (len(figures) - 1) / 2) * _SPACING * height
         qpos[:, 2] -= figure.floor_z
         coordinates.append(qpos)
         paths.append(qpos[:, :3])
@@ -74,13 +77,14 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
             spec.delete(actuator)
         world.attach(spec, prefix=f"{k}_", frame=world.worldbody.add_frame())
     centers = np.mean(paths, axis=0)
-    centers[:, 2] = 0.5 * height
+    centers[:, 2] = 0.48 * height
     return Scene(
         world.compile(),
         np.concatenate(coordinates, axis=1),
         frame_time,
         centers,
-        height * (1 + 1.1 * (len(figures) - 1)),
+        height * (0.9 + _SPACING * (len(figures) - 1)),
+        height,
     )
 
 
@@ -109,8 +113,8 @@ def _at_times(
 def _world() -> mujoco.MjSpec:
     """A light grey floor with a grid, lit from above; shadows cost ten times the rest."""
     spec = mujoco.MjSpec()
-    spec.visual.headlight.diffuse = [0.55, 0.55, 0.55]
-    spec.visual.headlight.ambient = [0.42, 0.42, 0.42]
+    spec.visual.headlight.diffuse = [0.0, 0.0, 0.0]
+    spec.visual.headlight.ambient = [0.55, 0.55, 0.55]
     spec.visual.headlight.specular = [0.0, 0.0, 0.0]
     spec.visual.quality.offsamples = 0
     spec.visual.quality.shadowsize = 0
@@ -141,7 +145,11 @@ def _world() -> mujoco.MjSpec:
     spec.worldbody.add_geom(
         name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05], material="floor"
     )
-    spec.worldbody.add_light(
-        pos=[0, 0, 4], dir=[-0.3, 0.2, -1], diffuse=[0.35, 0.35, 0.35], castshadow=False
-    )
+    for direction, strength in (([-0.5, 0.3, -1.0], 0.45), ([0.3, -0.6, -0.4], 0.2)):
+        spec.worldbody.add_light(
+            type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+            dir=direction,
+            diffuse=[strength] * 3,
+            castshadow=False,
+        )
     return spec
