@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from spark.errors import FileFormatError, SkeletonError
 from spark.files import write_atomically
+from spark.scanner import LARGEST, Scanner, number, shown
 
 Vector = tuple[float, float, float]
 
@@ -24,6 +25,11 @@ CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis i
 
 # Deeper trees than any creature has: what lies beyond is a broken file.
 _MAX_DEPTH = 512
+
+# [s] A nanosecond: shorter frames are a broken file.
+_SHORTEST_FRAME = 1e-9
+
+_CHANNEL_OF = {name.lower().encode(): name for name in CHANNELS}
 
 
 @dataclass(frozen=True)
@@ -79,6 +85,30 @@ class Bvh:
         stops = np.cumsum([0, *(len(joint.channels) for joint in self.joints)]).tolist()
         return tuple(slice(start, stop) for start, stop in pairwise(stops))
 
+    @property
+    def position_channels(self) -> Int[np.ndarray, "P 3"]:
+        """Joint, axis (0 to 2) and column of every position channel."""
+        found = [
+            (j, "XYZ".index(channel[0]), columns.start + i)
+            for j, (joint, columns) in enumerate(zip(self.joints, self.columns, strict=True))
+            for i, channel in enumerate(joint.channels)
+            if channel.endswith("position")
+        ]
+        return np.array(found, dtype=np.int64).reshape(-1, 3)
+
+    @property
+    def rotation_channels(self) -> dict[str, tuple[list[int], list[list[int]]]]:
+        """For each order of rotation axes ("zxy"): the joints that have it, and their columns."""
+        groups: dict[str, tuple[list[int], list[list[int]]]] = {}
+        for j, (joint, columns) in enumerate(zip(self.joints, self.columns, strict=True)):
+            found = [i for i, channel in enumerate(joint.channels) if channel.endswith("rotation")]
+            if found:
+                order = "".join(joint.channels[i][0].lower() for i in found)
+                members, where = groups.setdefault(order, ([], []))
+                members.append(j)
+                where.append([columns.start + i for i in found])
+        return groups
+
 
 def read_bvh(path: str | Path) -> Bvh:
     """The file at `path`, exactly: writing it and reading it again gives equal values.
@@ -89,7 +119,7 @@ def read_bvh(path: str | Path) -> Bvh:
     with what it claims.
     """
     path = Path(path)
-    scanner = _Scanner(path, _read(path))
+    scanner = Scanner(path, _read(path))
     joints = _parse_hierarchy(scanner)
     frame_time, values = _parse_motion(scanner, sum(len(joint.channels) for joint in joints))
     return Bvh(joints, frame_time, values, path)
@@ -150,12 +180,8 @@ def _read(path: Path) -> bytes:
     if not data.strip():
         raise FileFormatError(path, None, "is empty; expected HIERARCHY and MOTION")
     raise FileFormatError(
-        path, 1, f"starts with {_shown(data.split()[0])}; a BVH file starts with HIERARCHY"
+        path, 1, f"starts with {shown(data.split()[0])}; a BVH file starts with HIERARCHY"
     )
-
-
-def _shown(word: bytes) -> str:
-    return repr(word[:40].decode(errors="backslashreplace")) if word else "the end of the file"
 
 
 def _decoded(name: bytes) -> str:
@@ -165,64 +191,7 @@ def _decoded(name: bytes) -> str:
         return name.decode("latin-1")
 
 
-_WORD = re.compile(rb"\s*([{}]|[^\s{}]*)")
-_LABEL = re.compile(rb"[^\S\r\n]*([^\r\n{}]*)")
-_LINE_END = re.compile(rb"\r\n|\r|\n")
-_NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
-_CHANNEL_OF = {name.lower().encode(): name for name in CHANNELS}
-
-
-class _Scanner:
-    """Walks over the words of a file and knows the line it is on."""
-
-    def __init__(self, path: Path, data: bytes) -> None:
-        self.path, self.data = path, data
-        self.start = self.end = 3 if data.startswith(b"\xef\xbb\xbf") else 0
-
-    def word(self) -> bytes:
-        """The next word or brace; empty at the end of the file."""
-        found = _WORD.match(self.data, self.end)
-        assert found
-        self.start, self.end = found.span(1)
-        return found[1]
-
-    def label(self) -> bytes:
-        """The rest of the line, up to a brace."""
-        found = _LABEL.match(self.data, self.end)
-        assert found
-        self.start, self.end = found.span(1)
-        return found[1].strip()
-
-    def expect(self, keyword: str) -> None:
-        word = self.word()
-        if word.lower() != keyword.lower().encode():
-            self.fail(f"expected {keyword}, found {_shown(word)}")
-
-    def number(self, what: str) -> float:
-        word = self.word()
-        value = float(word) if _NUMBER.fullmatch(word) else np.inf
-        if not np.isfinite(value):
-            self.fail(f"expected a number for {what}, found {_shown(word)}")
-        return value
-
-    def count(self, what: str) -> int:
-        word = self.word()
-        if not re.fullmatch(rb"\d{1,15}", word):
-            self.fail(f"expected a whole number for {what}, found {_shown(word)}")
-        return int(word)
-
-    def vector(self, what: str) -> Vector:
-        return self.number(what), self.number(what), self.number(what)
-
-    def line(self, position: int) -> int:
-        return len(_LINE_END.findall(self.data, 0, position)) + 1
-
-    def fail(self, message: str, position: int | None = None) -> NoReturn:
-        line = self.line(self.start if position is None else position)
-        raise FileFormatError(self.path, line, message)
-
-
-def _parse_hierarchy(scanner: _Scanner) -> tuple[BvhJoint, ...]:
+def _parse_hierarchy(scanner: Scanner) -> tuple[BvhJoint, ...]:
     scanner.expect("HIERARCHY")
     scanner.expect("ROOT")
     joints: list[_OpenJoint] = []
@@ -232,7 +201,7 @@ def _parse_hierarchy(scanner: _Scanner) -> tuple[BvhJoint, ...]:
         word = scanner.word()
         match word.lower():
             case b"offset" if joint.offset is None:
-                joint.offset = scanner.vector(f"the OFFSET of {joint.name!r}")
+                joint.offset = _parse_vector(scanner, f"the OFFSET of {joint.name!r}")
             case b"channels" if joint.channels is None:
                 joint.channels = _parse_channels(scanner, joint.name)
             case b"joint":
@@ -243,7 +212,7 @@ def _parse_hierarchy(scanner: _Scanner) -> tuple[BvhJoint, ...]:
                 scanner.label()
                 scanner.expect("{")
                 scanner.expect("OFFSET")
-                joint.ends.append(scanner.vector(f"the End Site of {joint.name!r}"))
+                joint.ends.append(_parse_vector(scanner, f"the End Site of {joint.name!r}"))
                 scanner.expect("}")
             case b"}":
                 if joint.offset is None:
@@ -252,7 +221,7 @@ def _parse_hierarchy(scanner: _Scanner) -> tuple[BvhJoint, ...]:
             case _:
                 scanner.fail(
                     f"expected OFFSET, CHANNELS (once each), JOINT, End Site or }} in joint "
-                    f"{joint.name!r}, found {_shown(word)}"
+                    f"{joint.name!r}, found {shown(word)}"
                 )
     return tuple(joint.closed() for joint in joints)
 
@@ -270,7 +239,7 @@ class _OpenJoint:
         return BvhJoint(self.name, self.parent, self.offset, self.channels or (), tuple(self.ends))
 
 
-def _open_joint(scanner: _Scanner, joints: list[_OpenJoint], parent: int) -> int:
+def _open_joint(scanner: Scanner, joints: list[_OpenJoint], parent: int) -> int:
     name = _decoded(scanner.label())
     if not name:
         scanner.fail("expected the name of a joint")
@@ -279,7 +248,11 @@ def _open_joint(scanner: _Scanner, joints: list[_OpenJoint], parent: int) -> int
     return len(joints) - 1
 
 
-def _parse_channels(scanner: _Scanner, name: str) -> tuple[str, ...]:
+def _parse_vector(scanner: Scanner, what: str) -> Vector:
+    return scanner.number(what), scanner.number(what), scanner.number(what)
+
+
+def _parse_channels(scanner: Scanner, name: str) -> tuple[str, ...]:
     count = scanner.count(f"the number of CHANNELS of {name!r}")
     if count > len(CHANNELS):
         scanner.fail(f"{count} CHANNELS for {name!r}; expected at most {len(CHANNELS)}")
@@ -290,45 +263,35 @@ def _parse_channels(scanner: _Scanner, name: str) -> tuple[str, ...]:
         if channel is None or channel in channels:
             scanner.fail(
                 f"expected {count} different CHANNELS for {name!r} out of {', '.join(CHANNELS)}; "
-                f"found {_shown(word)}"
+                f"found {shown(word)}"
             )
         channels.append(channel)
     return tuple(channels)
 
 
-def _parse_motion(scanner: _Scanner, channels: int) -> tuple[float, Float[np.ndarray, "T C"]]:
+def _parse_motion(scanner: Scanner, channels: int) -> tuple[float, Float[np.ndarray, "T C"]]:
     word = scanner.word()
     if word.lower() == b"root":
         scanner.fail("a second ROOT; expected one skeleton a file: split it")
-    if word.lower() != b"motion":
+    if not word:
         scanner.fail(
-            f"expected MOTION, found {_shown(word)}; a rig without motion ends with the lines "
+            "expected MOTION, found the end of the file; a rig without motion ends with the lines "
             "MOTION, Frames: 0, Frame Time: 0.04"
         )
+    if word.lower() != b"motion":
+        scanner.fail(f"expected MOTION, found {shown(word)}")
     if channels == 0:
         scanner.fail("no joint has CHANNELS, so nothing can move; expected at least one")
-    _expect_label(scanner, rb"frames", "Frames:")
+    scanner.expect_label("Frames")
     frames = scanner.count("Frames")
-    frames_at = scanner.start
-    _expect_label(scanner, rb"frame[ \t]*time", "Frame Time:")
+    scanner.expect_label("Frame", "Time")
     frame_time = scanner.number("Frame Time")
-    if frame_time <= 0:
+    if frame_time < _SHORTEST_FRAME:
         scanner.fail(f"Frame Time is {frame_time:g}; expected seconds a frame, such as 0.0333333")
-    rows = scanner.data[scanner.end :]
-    values = _parse_rows(rows, frames, channels)
+    values = _parse_rows(scanner.data[scanner.end :], frames, channels)
     if values is None:
-        _diagnose(scanner, frames, channels, frames_at)
+        _diagnose(scanner, frames, channels)
     return frame_time, values
-
-
-def _expect_label(scanner: _Scanner, pattern: bytes, label: str) -> None:
-    found = re.compile(rb"\s*(" + pattern + rb")[ \t]*:?", re.IGNORECASE).match(
-        scanner.data, scanner.end
-    )
-    if not found:
-        word = scanner.word()
-        scanner.fail(f"expected {label}, found {_shown(word)}")
-    scanner.end = found.end()
 
 
 def _parse_rows(rows: bytes, frames: int, channels: int) -> Float[np.ndarray, "T C"] | None:
@@ -352,35 +315,37 @@ def _parse_rows(rows: bytes, frames: int, channels: int) -> Float[np.ndarray, "T
     except (ValueError, DeprecationWarning):
         return None
     # `fromstring` also reads "1.2.3" as two numbers: only as many as there are words will do.
-    if len(values) != len(starts) or not np.all(np.isfinite(values)):
+    if len(values) != len(starts) or not np.all(np.abs(values) <= LARGEST):
         return None
     return values.reshape(frames, channels)
 
 
-def _diagnose(scanner: _Scanner, frames: int, channels: int, frames_at: int) -> NoReturn:
+def _diagnose(scanner: Scanner, frames: int, channels: int) -> NoReturn:
     """Say why `_parse_rows` gave up: a slow second pass over the text."""
-    line = scanner.line(scanner.end)
-    found, odd, last = 0, None, line
-    for row in _LINE_END.split(scanner.data[scanner.end :]):
-        words = row.split()
+    rows = [(line, words) for line, words in scanner.lines() if words]
+    for line, words in rows:
         for word in words:
-            if not (_NUMBER.fullmatch(word) and np.isfinite(float(word))):
+            if number(word) is None:
                 raise FileFormatError(
-                    scanner.path, line, f"expected a finite number, found {_shown(word)}"
+                    scanner.path,
+                    line,
+                    f"expected a finite number, at most 1e12, found {shown(word)}",
                 )
-        if words:
-            found, last = found + len(words), line
-            if odd is None and len(words) != channels:
-                odd = line, len(words)
-        line += 1
-    claim = f"Frames: {frames} on line {scanner.line(frames_at)}"
-    where, here = odd if odd and found != frames * channels else (last, 0)
-    short = "cut short" if found < frames * channels else "too long"
-    raise FileFormatError(
-        scanner.path,
-        where,
-        f"{found} values for {claim} with {channels} channels; expected {frames * channels}: the "
-        f"motion is {short}"
-        + (f", this line has {here} values" if here else "")
-        + f"; there are {found // channels} whole frames",
-    )
+    found = sum(len(words) for _, words in rows)
+    odd = [(line, len(words)) for line, words in rows if len(words) != channels]
+    claim = f"Frames: {frames} with {channels} channels each"
+    if found == frames * channels:
+        message = f"{odd[0][1]} values in this row; expected {channels}, one for each channel"
+    elif found < frames * channels:
+        message = f"the motion is cut short: {claim} need {frames * channels} values, not {found}"
+    else:
+        message = f"the motion is too long: {claim} need {frames * channels} values, not {found}"
+    if found != frames * channels:
+        message += (
+            f"; set Frames: {found // channels} to use it"
+            if found % channels == 0
+            else f" ({found // channels} whole frames); fetch or export the file again"
+        )
+    # A few odd rows are the fault; many are rows wrapped over lines.
+    at = odd[0][0] if 0 < len(odd) < max(2, len(rows) // 2) else (rows[-1][0] if rows else None)
+    raise FileFormatError(scanner.path, at, message)

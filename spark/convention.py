@@ -31,9 +31,9 @@ _HEIGHT, _HEIGHT_SPREAD = 1.7, 0.3
 _PLAUSIBLE = (0.5, 3.0)
 
 # Units or axes this close in log-probability are named in a note.
-_CLOSE = 0.75
+_CLOSE = 0.6
 
-# From fingertip or tiptoe to the far toe along the bones, a body measures 1.5 of its height.
+# Along its bones, from a fingertip or toe to the farthest other one, a body measures 1.5 heights.
 _REACH = 1.5
 
 _FEET = re.compile(r"foot|feet|toe|ankle|hoof|paw", re.IGNORECASE)
@@ -52,21 +52,32 @@ class Convention:
     up: Up
 
     @property
-    def axes(self) -> tuple[int, int, int]:
+    def axes(self) -> list[int]:
         """The file's axes that become internal X, Y, Z: `internal = file[..., axes]`."""
         up = UPS.index(self.up)
-        return (up + 1) % 3, (up + 2) % 3, up
+        return [(up + 1) % 3, (up + 2) % 3, up]
 
     @property
     def unit(self) -> str:
-        """The unit as `--unit` takes it: its name, or metres where it has none."""
+        """The unit as `given_unit` takes it: its name, or metres where it has none."""
         return next((name for name, m in UNITS.items() if m == self.unit_m), f"{self.unit_m:g}")
+
+    def from_file(self, vectors: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+        """Vectors [m] in internal axes from vectors as a file has them."""
+        return vectors[..., self.axes] * self.unit_m
+
+    def to_file(self, vectors: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+        """Vectors [m] in internal axes as a file has them, rounded to 1e-8 m."""
+        in_file = np.empty_like(vectors)
+        in_file[..., self.axes] = vectors / self.unit_m
+        return np.round(in_file, round(8 + float(np.log10(self.unit_m)))) + 0.0  # no "-0.0"
 
 
 def given_unit(unit: str | float) -> float:
     """Metres in a unit, from its name or its length in metres. Raises `ConventionError`."""
     try:
-        metres = UNITS[unit] if unit in UNITS else float(unit)
+        name = str(unit).lower()
+        metres = UNITS[name] if name in UNITS else float(unit)
     except ValueError:
         metres = np.nan
     if not (np.isfinite(metres) and metres > 0):
@@ -90,7 +101,7 @@ def infer_unit(motion: Motion) -> tuple[float, tuple[str, ...]]:
     The known unit that makes the body's height most probable. Raises `ConventionError` where all
     joints lie in one point.
     """
-    size, measure = _stature(motion)
+    size, how = _stature(motion)
     if not size > 0:
         raise ConventionError(
             "all joints lie in one point, so there is no height to tell the unit by; give --unit"
@@ -101,11 +112,14 @@ def infer_unit(motion: Motion) -> tuple[float, tuple[str, ...]]:
     }
     best, second = sorted(UNITS, key=lambda name: -chances[name])[:2]
     tall = size * UNITS[best]
-    notes = [f"unit {best} ({100 * UNITS[best]:.4g} cm), inferred: {measure} is {tall:.2f} m"]
+    notes = [f"unit {best} ({100 * UNITS[best]:.4g} cm), {how}: {tall:.2f} m"]
     if chances[best] - chances[second] < _CLOSE:
-        notes.append(f"unit {second} would do nearly as well ({size * UNITS[second]:.2f} m)")
-    if not _PLAUSIBLE[0] < tall < _PLAUSIBLE[1]:
-        notes.append("no known unit gives a height from 0.5 to 3 m; check, and give --unit")
+        notes.append(
+            f"unit {second} ({size * UNITS[second]:.2f} m) is nearly as likely; check, and give "
+            "--unit"
+        )
+    elif not _PLAUSIBLE[0] < tall < _PLAUSIBLE[1]:
+        notes.append(f"{tall:.2f} m is no human's height; check, and give --unit")
     return UNITS[best], tuple(notes)
 
 
@@ -123,14 +137,17 @@ def infer_up(motion: Motion) -> tuple[Up, tuple[str, ...]]:
     floor = np.median(np.min(points, axis=1), axis=0) / size
 
     standing = _above_feet(motion, positions)
-    # Log-probabilities: X-up files hardly exist; lying bodies and odd rest poses do.
+    # Log-probabilities. X-up files hardly exist; bodies that lie down and odd rest poses do, but
+    # seldom straight along an axis all the time: hence the cubes.
     chances = np.array([-4.0, 0.0, -1.0])
-    chances += 5.0 * standing + 1.5 * _above_feet(motion, rest)
+    chances += 5.0 * standing**3 + 2.5 * _above_feet(motion, rest) ** 3
     chances += 2.0 * (np.abs(floor) < 0.03)
     best, second = np.argsort(-chances)[:2].tolist()
     up = UPS[best]
-    notes = [f"up axis {up}, inferred"]
-    if chances[best] - chances[second] < _CLOSE:
+    notes = [f"up axis {up}, along which the body stands"]
+    if not standing.any():
+        notes = [f"up axis {up}, a guess: no joint is named as a foot; check, and give --up"]
+    elif chances[best] - chances[second] < _CLOSE:
         notes = [f"up axis {up}, a guess: {UPS[second]} is nearly as likely; check, and give --up"]
     elif standing[best] < -0.5:
         notes.append(f"the body is upside down along {up}; check, and give --up")
@@ -148,9 +165,9 @@ def _above_feet(motion: Motion, positions: Float[np.ndarray, "T J 3"]) -> Float[
 
 
 def _stature(motion: Motion) -> tuple[float, str]:
-    """The body's height along its bones, whatever its pose, and what was measured.
+    """The body's height along its bones, whatever its pose, and how it was measured.
 
-    From the head down to the feet where names tell them, else from the longest path in the tree.
+    From the head to the nearer foot where names tell them, else from the longest path in the tree.
     """
     skeleton = motion.skeleton
     positions, _ = forward(motion)
@@ -164,9 +181,9 @@ def _stature(motion: Motion) -> tuple[float, str]:
     if head is not None and feet:
         above = set(skeleton.ancestors(head))
         paths = [bones[list(above.symmetric_difference(skeleton.ancestors(j)))] for j in feet]
-        height = float(np.median([path.sum() for path in paths]))
+        height = min(float(path.sum()) for path in paths)
         if height > 0:
-            return height, "from head to feet it"
+            return height, "by the way from its head to its feet"
 
     # The longest path through each joint joins its two deepest branches.
     deepest = np.zeros((len(skeleton), 2))
@@ -174,7 +191,7 @@ def _stature(motion: Motion) -> tuple[float, str]:
         _deepen(deepest[parent], float(np.linalg.norm(length)))
     for j in range(len(skeleton) - 1, 0, -1):
         _deepen(deepest[skeleton.parents[j]], bones[j] + deepest[j, 0])
-    return float(deepest.sum(axis=1).max()) / _REACH, "judged by its longest chain of bones, it"
+    return float(deepest.sum(axis=1).max()) / _REACH, "judged by its longest chain of bones"
 
 
 def _deepen(two_deepest: Float[np.ndarray, "2"], depth: float) -> None:

@@ -27,3 +27,9 @@ class OutputError(SparkSimError):
 
 class DependencyError(SparkSimError):
     """An optional package or system library is missing; the message says how to install it."""
+
+
+def name_list(names: list[str]) -> str:
+    """Names for a message: the first five in quotes, and how many more there are."""
+    shown = ", ".join(map(repr, names[:5]))
+    return shown + (f" and {len(names) - 5} more" if len(names) > 5 else "")

@@ -3,10 +3,23 @@
 import numpy as np
 from jaxtyping import Float
 
-from spark.rotation import AXES, euler_from_quat
+from spark.rotation import AXES, euler_from_quat, quat_about, quat_mul
 
 # A middle angle this near to 90 degrees leaves only a sum of the other two defined [rad].
 _SINGULAR = 1e-6
+
+
+def quat_from_angles(angles: Float[np.ndarray, "*n k"], order: str) -> Float[np.ndarray, "*n 4"]:
+    """Intrinsic rotations [rad] about one or more axes: "zx" is `Rz(a0) Rx(a1)`."""
+    first, *others = (
+        quat_about(axis, angles[..., order.index(axis)])
+        for letter in order
+        for axis in AXES
+        if axis == letter
+    )
+    for q in others:
+        first = quat_mul(first, q)
+    return first
 
 
 def euler_over_time(q: Float[np.ndarray, "T *n 4"], order: str) -> Float[np.ndarray, "T *n k"]:
@@ -18,17 +31,17 @@ def euler_over_time(q: Float[np.ndarray, "T *n 4"], order: str) -> Float[np.ndar
     [-pi/2, pi/2], the others the one that is nearer to the frame before.
     """
     if len(order) == 1:
-        along = q[..., 1 + AXES.index(order)]  # type: ignore[arg-type]
+        along = q[..., 1 + "xyz".index(order)]
         return np.unwrap(2 * np.arctan2(along, q[..., 0]), axis=0)[..., None]
     all_axes = order + "".join(axis for axis in AXES if axis not in order)
     angles = euler_from_quat(q, all_axes)
-    other = np.pi + np.array([1.0, -1.0, 1.0]) * angles
     if len(order) == 2:
         # The solution without a third angle is the one that two axes can express.
+        other = _other(angles)
         exact = np.abs(_wrapped(other[..., 2])) < np.abs(angles[..., 2])
         return np.unwrap(np.where(exact[..., None], other, angles), axis=0)[..., :2]
     _hold_third(angles, all_axes)
-    other = np.pi + np.array([1.0, -1.0, 1.0]) * angles
+    other = _other(angles)
     # Changing over saves the same whichever solution the frame before took, so that whether a frame
     # takes the other one is a parity of the changes up to it.
     stay = np.abs(_wrapped(angles[1:] - angles[:-1])).sum(axis=-1)
@@ -36,6 +49,10 @@ def euler_over_time(q: Float[np.ndarray, "T *n 4"], order: str) -> Float[np.ndar
     changed = np.zeros(angles.shape[:-1], dtype=bool)
     changed[1:] = np.cumsum(change < stay, axis=0) % 2 == 1
     return np.unwrap(np.where(changed[..., None], other, angles), axis=0)
+
+
+def _other(angles: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
+    return np.pi + np.array([1.0, -1.0, 1.0]) * angles
 
 
 def _wrapped(angle: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:

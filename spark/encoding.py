@@ -1,0 +1,159 @@
+"""Motions back into files: the way from SI units and Z-up axes to the numbers of a BVH."""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from spark.bvh import Bvh, BvhJoint, Vector
+from spark.convention import Convention, given_unit, given_up
+from spark.errors import SkeletonError, name_list
+from spark.euler import euler_over_time, quat_from_angles
+from spark.motion import Motion
+from spark.recording import Recording
+from spark.rotation import quat_angle, quat_identity
+from spark.skeleton import Skeleton
+
+# What channels can't express goes without a note up to this angle [rad], and up to this fraction
+# of the longest bone.
+_LOST_ANGLE = 1e-4
+_LOST_LENGTH = 1e-4
+
+_POSITIONS = ("Xposition", "Yposition", "Zposition")
+_ROTATIONS = ("Zrotation", "Xrotation", "Yrotation")
+
+
+def encode(motion: Motion, template: Recording) -> tuple[Bvh, tuple[str, ...]]:
+    """`motion` in the hierarchy, channels, unit and axes of `template`'s file, and notes.
+
+    Angles run on over time without jumps of whole turns. The notes name what the file's channels
+    can't express: rotations and positions of joints that lack them. Numbers are rounded to 1e-6
+    degrees and 1e-8 m. Raises `SkeletonError` where `motion` has other joints than the template.
+    """
+    ours, theirs = motion.skeleton, template.motion.skeleton
+    if ours.names != theirs.names or not np.array_equal(ours.parents, theirs.parents):
+        raise SkeletonError(
+            f"the motion has {len(ours)} joints, from {ours.names[0]!r} to {ours.names[-1]!r}, and "
+            f"the file {len(theirs)}, from {theirs.names[0]!r} to {theirs.names[-1]!r}; expected "
+            "the same joints in the same order"
+        )
+    bvh, convention = template.bvh, template.convention
+    values = np.zeros((len(motion), bvh.values.shape[1]))
+    notes = _encode_rotations(motion, bvh, convention, values)
+    notes += _encode_positions(motion, template, values)
+    return Bvh(bvh.joints, motion.frame_time, values), notes
+
+
+def encode_new(motion: Motion, *, unit: str | float = "cm", up: str = "y") -> Bvh:
+    """`motion` in a hierarchy of its own, ZXY angles, position channels where positions change.
+
+    Joints come depth-first, as the format nests them, which may not be the skeleton's order. The
+    root's OFFSET is zero, since some readers add it to its position.
+    """
+    convention = Convention(given_unit(unit), given_up(up))
+    motion = _depth_first(motion)
+    skeleton = motion.skeleton
+    moves = np.arange(len(skeleton)) == 0
+    if motion.translations is not None:
+        moves |= np.any(motion.translations != skeleton.offsets, axis=(0, 2))
+    offsets = convention.to_file(skeleton.offsets)
+    offsets[0] = 0.0
+    ends = convention.to_file(skeleton.end_offsets)
+    joints = tuple(
+        BvhJoint(
+            _writable(name),
+            int(skeleton.parents[j]),
+            _vector(offsets[j]),
+            (_POSITIONS if moves[j] else ()) + _ROTATIONS,
+            tuple(map(_vector, ends[skeleton.end_parents == j])),
+        )
+        for j, name in enumerate(skeleton.names)
+    )
+    empty = np.zeros((0, sum(len(joint.channels) for joint in joints)))
+    template = Recording(Bvh(joints, motion.frame_time, empty), motion, convention)
+    return encode(motion, template)[0]
+
+
+def _encode_rotations(
+    motion: Motion, bvh: Bvh, convention: Convention, values: Float[np.ndarray, "T C"]
+) -> tuple[str, ...]:
+    """Fill the rotation channels; notes on rotations that the channels don't reach."""
+    in_file = np.empty_like(motion.rotations)
+    in_file[..., [0, *(1 + axis for axis in convention.axes)]] = motion.rotations
+    lost = quat_angle(quat_identity(in_file), in_file)
+    for order, (members, columns) in bvh.rotation_channels.items():
+        angles = euler_over_time(in_file[:, members], order)
+        values[:, columns] = np.round(np.degrees(angles), 6) + 0.0  # no "-0.0"
+        lost[:, members] = quat_angle(quat_from_angles(angles, order), in_file[:, members])
+    worst = lost.max(axis=0)
+    names = [bvh.joints[j].name for j in np.flatnonzero(worst > _LOST_ANGLE)]
+    if not names:
+        return ()
+    return (
+        f"no rotation channels for all that {name_list(names)} turn: up to "
+        f"{np.degrees(worst.max()):.3g} degrees are lost",
+    )
+
+
+def _encode_positions(
+    motion: Motion, template: Recording, values: Float[np.ndarray, "T C"]
+) -> tuple[str, ...]:
+    """Fill the position channels; notes on positions that the channels don't reach."""
+    bvh, convention = template.bvh, template.convention
+    joints, axes, columns = bvh.position_channels.T
+    offsets = np.array([joint.offset for joint in bvh.joints])
+    local = np.repeat(motion.skeleton.offsets[None], len(motion), axis=0)
+    if motion.translations is not None:
+        local[:] = motion.translations
+    local[:, 0] = motion.root_pos
+    in_file = convention.to_file(local)
+    values[:, columns] = in_file[:, joints, axes]
+    if template.adds_offset:
+        values[:, columns] -= np.where(joints > 0, offsets[joints, axes], 0.0)
+
+    lost = np.abs(in_file - offsets) * convention.unit_m
+    lost[:, joints, axes] = 0.0
+    worst = lost.max(axis=(0, 2))
+    longest = np.linalg.norm(motion.skeleton.offsets, axis=-1).max()
+    names = [bvh.joints[j].name for j in np.flatnonzero(worst > _LOST_LENGTH * longest)]
+    if not names:
+        return ()
+    return (
+        f"no position channels for where {name_list(names)} lie in their parents: up to "
+        f"{worst.max():.3g} m are lost",
+    )
+
+
+def _vector(row: Float[np.ndarray, "3"]) -> Vector:
+    x, y, z = row.tolist()
+    return x, y, z
+
+
+def _writable(name: str) -> str:
+    """The name without what ends a name in a BVH file."""
+    return "".join("_" if letter in "\r\n{}" else letter for letter in name).strip() or "_"
+
+
+def _depth_first(motion: Motion) -> Motion:
+    """The same motion with its joints in the order in which a file nests them."""
+    skeleton = motion.skeleton
+    order: list[int] = []
+    stack = [0]
+    while stack:
+        order.append(stack.pop())
+        stack += reversed(skeleton.children[order[-1]])
+    place = np.argsort(order)
+    parents = skeleton.parents[order]
+    return replace(
+        motion,
+        skeleton=Skeleton(
+            tuple(skeleton.names[j] for j in order),
+            np.where(parents < 0, -1, place[parents]),
+            skeleton.offsets[order],
+            skeleton.translating[order],
+            place[skeleton.end_parents],
+            skeleton.end_offsets,
+        ),
+        rotations=motion.rotations[:, order],
+        translations=None if motion.translations is None else motion.translations[:, order],
+    )
