@@ -54,7 +54,7 @@ def test_a_body_held_five_centimetres_up_floats_in_all_frames() -> None:
     rig = stick_rig()
     still = standing(rig, 120)
     report = judge(along(still, 2, 0.05), rig, source=(still, rig))
-    assert shares(report) == {"P": 0, "F": 1, "S": 0}
+    assert shares(report) == {"P": 0, "F": 1, "S": 0, "R": 1}
     assert texts(report) == ["the body floats 5.0 cm above the floor in frames 0-119 (0.0-2.0 s)"]
 
 
@@ -136,6 +136,23 @@ def test_a_hand_under_the_floor_is_named_and_a_man_lying_down_does_not_float() -
         for text in texts(judge(sunk, rig))
         + texts(judge(sunk, rig, source=(standing(rig, 60), rig)))
     )
+
+
+def test_a_body_that_leans_as_no_one_can_stand_needs_a_hand() -> None:
+    rig = stick_rig()
+    still = standing(rig, 60)
+    for degrees, expected in ((3, 0), (45, 1)):
+        tilt = quat_about("y", np.radians(float(degrees)))
+        leaning = replace(
+            still,
+            root_pos=quat_rotate(tilt, still.root_pos),
+            rotations=still.rotations.copy(),
+        )
+        leaning.rotations[:, 0] = tilt
+        for foot in (Role.LEFT_FOOT, Role.RIGHT_FOOT):
+            leaning.rotations[:, joint(foot)] = quat_about("y", np.radians(-float(degrees)))
+        leaning = along(leaning, 2, 0.1 * (1 - np.cos(np.radians(degrees))))
+        assert shares(judge(leaning, rig, source=(still, rig)))["R"] == expected
 
 
 @pytest.mark.parametrize("fps", [15.0, 30.0, 120.0])

@@ -32,14 +32,14 @@ def _sinking(clip: Measured, gap: int) -> Iterator[Finding]:
             deepest = start + int(depth[start:stop].argmax())
             amount = float(depth[deepest])
             sentence = f"{name} sinks {100 * amount:.1f} cm under the floor"
-            yield Finding("penetration", name, start, stop, amount, sentence)
+            yield Finding("penetration", name, start, stop, amount, "m", sentence)
 
 
 def _floating(clip: Measured, gap: int) -> Iterator[Finding]:
     for start, stop in spans(clip.flags["F"], gap):
         amount = float(clip.clearance[start:stop].max())
         sentence = f"the body floats {100 * amount:.1f} cm above the floor"
-        yield Finding("floating", "body", start, stop, amount, sentence)
+        yield Finding("floating", "body", start, stop, amount, "m", sentence)
 
 
 def _sliding(clip: Measured, gap: int) -> Iterator[Finding]:
@@ -49,7 +49,18 @@ def _sliding(clip: Measured, gap: int) -> Iterator[Finding]:
         for start, stop in spans(speed > 0, gap):
             amount = float(speed[start:stop].sum()) * clip.frame_time
             sentence = f"{side} slides {100 * amount:.1f} cm"
-            yield Finding("skating", side, start, stop, amount, sentence)
+            yield Finding("skating", side, start, stop, amount, "m", sentence)
+
+
+def _pushed(clip: Measured, gap: int) -> Iterator[Finding]:
+    force, torque = clip.unexplained.T
+    for start, stop in spans(clip.flags["R"] & ~clip.flags["F"], gap):
+        amount, unit = float(force[start:stop].max()), "bw"
+        sentence = f"the body is pushed by {amount:.2f} body weights that nothing gives"
+        if amount <= clip.thresholds.wrench_force:
+            amount, unit = float(torque[start:stop].max()), "bw_m"
+            sentence = f"the body is turned by {amount:.2f} body weights x 1 m that nothing gives"
+        yield Finding("root wrench", "body", start, stop, amount, unit, sentence)
 
 
 def _bending(clip: Measured, gap: int) -> Iterator[Finding]:
@@ -58,7 +69,7 @@ def _bending(clip: Measured, gap: int) -> Iterator[Finding]:
             for start, stop in spans(excess > 0, gap):
                 amount = float(excess[start:stop].max())
                 sentence = f"{limit.joint} {movement} {np.degrees(amount):.0f}° beyond its limit"
-                yield Finding("joint limit", limit.joint, start, stop, amount, sentence)
+                yield Finding("joint limit", limit.joint, start, stop, amount, "rad", sentence)
 
 
 def _straying(drift: Drift) -> Iterator[Finding]:
@@ -66,9 +77,9 @@ def _straying(drift: Drift) -> Iterator[Finding]:
     amount = float(drift.distance[worst])
     if amount > 0.05 * max(drift.path_length, 1.0):
         sentence = f"the root strays {amount:.2f} m from the source's path"
-        yield Finding("root drift", "root", worst, worst + 1, amount, sentence)
+        yield Finding("root drift", "root", worst, worst + 1, amount, "m", sentence)
     worst = int(np.abs(drift.heading).argmax())
     amount = float(np.abs(drift.heading[worst]))
     if amount > np.radians(10):
         sentence = f"the heading is {np.degrees(amount):.0f}° off the source's"
-        yield Finding("root drift", "heading", worst, worst + 1, amount, sentence)
+        yield Finding("root drift", "heading", worst, worst + 1, amount, "rad", sentence)

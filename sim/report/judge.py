@@ -1,6 +1,7 @@
 """Judge a motion: how plausible it is, and how it differs from the motion it was made from."""
 
 import numpy as np
+from jaxtyping import Float
 
 from sim.report.derivatives import derivative
 from sim.report.findings import find
@@ -8,6 +9,7 @@ from sim.report.limits import limit_excess
 from sim.report.measures import (
     Drift,
     at_times,
+    blurred,
     floating,
     floor_height,
     horizontal_speed,
@@ -16,8 +18,9 @@ from sim.report.measures import (
     skating,
 )
 from sim.report.result import Measured, Report
-from sim.report.thresholds import PLAUSIBILITY_V1
+from sim.report.thresholds import HUMAN_HIP_HEIGHT, PLAUSIBILITY_V1, Thresholds
 from sim.report.track import Track, track
+from sim.report.wrench import required_wrench, unexplained
 from spark.errors import SkeletonError
 from spark.motion import Motion
 from spark.rig import Rig
@@ -56,6 +59,7 @@ def _measure(track: Track, floor_z: float) -> Measured:
     depth = penetration_depth(np.concatenate([soles, joints], axis=1))
     clearance = np.minimum(soles.min(axis=1), (joints - track.flesh).min(axis=1))
     speeds = horizontal_speed(track.points, frame_time, window)
+    wrench = _unexplained(track, floor_z, thresholds)
     skates = skating(soles, speeds, thresholds.skate_height, thresholds.skate_speed)
     return Measured(
         frame_time=frame_time,
@@ -71,6 +75,8 @@ def _measure(track: Track, floor_z: float) -> Measured:
                 blur=round(window / frame_time),
             ),
             "S": np.any(skates, axis=1),
+            "R": (wrench[:, 0] > thresholds.wrench_force)
+            | (wrench[:, 1] > thresholds.wrench_torque),
         },
         depth=depth,
         depth_names=(*track.sides, *track.joint_names),
@@ -78,7 +84,28 @@ def _measure(track: Track, floor_z: float) -> Measured:
         skating=skates,
         speeds=speeds,
         sides=track.sides,
+        unexplained=wrench,
         limits=limit_excess(track.since_tpose, track.rig),
+    )
+
+
+def _unexplained(track: Track, floor_z: float, thresholds: Thresholds) -> Float[np.ndarray, "T 2"]:
+    frame_time, window = track.motion.frame_time, thresholds.window
+    below = np.array([0.0, 0.0, 1.0])
+    points = np.concatenate([track.points, track.joints - track.flesh[:, None] * below], axis=1)
+    # The wrench is a mean over the window: what touched within it may have given it.
+    touching = blurred(
+        points[..., 2] - floor_z < thresholds.contact_height, round(window / frame_time)
+    )
+    wrench = required_wrench(
+        track.segment_coms, track.world[:, track.body.joints], track.body, frame_time, window
+    )
+    return unexplained(
+        wrench,
+        points - track.com[:, None],
+        touching,
+        thresholds.friction,
+        track.rig.hip_height / HUMAN_HIP_HEIGHT,
     )
 
 

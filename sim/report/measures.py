@@ -34,8 +34,13 @@ def floating(
     and landing are smeared over that many by the window the acceleration is taken with.
     """
     falls = np.abs(com_acceleration_z + GRAVITY) <= free_fall
-    falls = maximum_filter1d(falls.astype(np.uint8), 2 * blur + 1, mode="nearest").astype(bool)
-    return (clearance > height) & ~falls
+    return (clearance > height) & ~blurred(falls, blur)
+
+
+def blurred(flags: Bool[np.ndarray, "T *n"], frames: int) -> Bool[np.ndarray, "T *n"]:
+    """True where the flag is up at most `frames` frames away."""
+    grown = maximum_filter1d(flags.astype(np.uint8), 2 * frames + 1, axis=0, mode="nearest")
+    return grown.astype(bool)
 
 
 def horizontal_speed(

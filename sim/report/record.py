@@ -36,14 +36,17 @@ _UNITS = {
     "free_fall": "m_s2",
     "skate_height": "m",
     "skate_speed": "m_s",
+    "wrench_force": "bw",
+    "wrench_torque": "bw_m",
+    "contact_height": "m",
+    "friction": "",
     "window": "s",
 }
-_FINDING_UNITS = {"joint limit": "rad", "heading": "rad"}
 
 
 def _threshold_values(clip: Measured) -> dict[str, float]:
     values = asdict(clip.thresholds)
-    return {f"{name}_{unit}": values[name] for name, unit in _UNITS.items()}
+    return {f"{name}_{unit}" if unit else name: values[name] for name, unit in _UNITS.items()}
 
 
 def _measured(clip: Measured) -> dict[str, Any]:
@@ -60,6 +63,8 @@ def _measured(clip: Measured) -> dict[str, Any]:
         "deepest_m": float(clip.depth.max()),
         "highest_clearance_m": float(clip.clearance.max()),
         "fastest_skate_m_s": float(np.where(clip.skating, clip.speeds, 0.0).max()),
+        "largest_unexplained_force_bw": float(clip.unexplained[:, 0].max()),
+        "largest_unexplained_torque_bw_m": float(clip.unexplained[:, 1].max()),
         "joint_limits": {
             limit.joint: {
                 "share": clip.limit_shares[limit.joint],
@@ -91,13 +96,12 @@ def _drift(drift: Drift) -> dict[str, Any]:
 
 
 def _finding(finding: Finding, frame_time: float) -> dict[str, Any]:
-    unit = _FINDING_UNITS.get(finding.measure, _FINDING_UNITS.get(finding.where, "m"))
     return {
         "measure": finding.measure,
         "where": finding.where,
         "start_frame": finding.start,
         "stop_frame": finding.stop,
         "start_s": finding.start * frame_time,
-        f"amount_{unit}": finding.amount,
+        f"amount_{finding.unit}": finding.amount,
         "text": f"{finding.sentence} {finding.place(frame_time)}",
     }

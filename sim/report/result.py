@@ -10,7 +10,7 @@ from sim.report.limits import LimitExcess
 from sim.report.measures import Drift
 from sim.report.thresholds import Thresholds
 
-FLAGS = {"P": "penetration", "F": "floating", "S": "skating"}
+FLAGS = {"P": "penetration", "F": "floating", "S": "skating", "R": "root wrench"}
 """The per-frame flags: letter and name."""
 
 
@@ -18,7 +18,8 @@ FLAGS = {"P": "penetration", "F": "floating", "S": "skating"}
 class Finding:
     """One thing to look at: what, where, in which frames [start, stop), how much.
 
-    `amount` is in the SI unit of its measure; `sentence` says it all, without the frames.
+    `amount` is in `unit` ("m", "rad", "bw" body weights, "bw_m"); `sentence` says it all, without
+    the frames.
     """
 
     measure: str
@@ -26,6 +27,7 @@ class Finding:
     start: int
     stop: int
     amount: float
+    unit: str
     sentence: str
 
     def place(self, frame_time: float) -> str:
@@ -55,6 +57,7 @@ class Measured:
     skating: Bool[np.ndarray, "T P"]
     speeds: Float[np.ndarray, "T P"]
     sides: tuple[str, ...]
+    unexplained: Float[np.ndarray, "T 2"]
     limits: tuple[LimitExcess, ...]
 
     @property

@@ -20,6 +20,12 @@ class Thresholds:
     # S: a support point lower than this [m] moves along the floor faster than this [m/s].
     skate_height: float = 0.025
     skate_speed: float = 0.3
+    # R: the force [body weights] or torque [body weights x 1 m] that the floor can't give, with
+    # friction cones of this coefficient at the points lower than this [m].
+    wrench_force: float = 0.15
+    wrench_torque: float = 0.15
+    contact_height: float = 0.04
+    friction: float = 1.0
     # Time [s] over which velocities and accelerations are taken, whatever the frame rate.
     window: float = 0.05
 
@@ -35,6 +41,8 @@ class Thresholds:
             floating=self.floating * scale,
             skate_height=self.skate_height * scale,
             skate_speed=self.skate_speed * scale,
+            wrench_torque=self.wrench_torque * scale,
+            contact_height=self.contact_height * scale,
         )
 
 

@@ -35,9 +35,10 @@ class Track:
 
     `points` are the soles' corners, named by `point_names` ("left heel inner") and `sides` ("left
     foot"); `joints` are the other joints with a role, named by `joint_names`, inside a sphere of
-    flesh of radius `flesh` [m]. `com` is the centre of mass, `hips` the middle of the hip joints,
-    `heading` [rad] the pelvis's turn about Z since the T-pose, without jumps. `since_tpose` is G:
-    each joint's rotation since the T-pose in world axes.
+    flesh of radius `flesh` [m]. `com` is the centre of mass, `segment_coms` are those of the pieces
+    of `body`; `hips` is the middle of the hip joints, `heading` [rad] the pelvis's turn about Z
+    since the T-pose, without jumps. `positions` and `world` are the joints' as `forward` gives
+    them; `since_tpose` is G, each joint's rotation since the T-pose in world axes.
     """
 
     motion: Motion
@@ -48,10 +49,12 @@ class Track:
     joints: Float[np.ndarray, "T B 3"]
     joint_names: tuple[str, ...]
     flesh: Float[np.ndarray, "B"]
+    segment_coms: Float[np.ndarray, "T S 3"]
     com: Float[np.ndarray, "T 3"]
     hips: Float[np.ndarray, "T 3"]
     heading: Float[np.ndarray, "T"]
     positions: Float[np.ndarray, "T J 3"]
+    world: Float[np.ndarray, "T J 4"]
     since_tpose: Float[np.ndarray, "T J 4"]
     body: Segments
 
@@ -90,10 +93,12 @@ def track(motion: Motion, rig: Rig) -> Track:
         joints=positions[:, [j for j, _, _ in others]],
         joint_names=tuple(role.replace("_", " ") for _, role, _ in others),
         flesh=height * np.array([flesh for _, _, flesh in others]),
+        segment_coms=coms,
         com=np.einsum("s,tsx->tx", body.masses, coms),
         hips=positions[:, rig.hips].mean(axis=1),
         heading=np.unwrap(yaw_from_quat(since_tpose[:, rig.pelvis])),
         positions=positions,
+        world=world,
         since_tpose=since_tpose,
         body=body,
     )

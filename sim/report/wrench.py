@@ -1,0 +1,100 @@
+"""R: what the floor cannot explain of the forces that a motion needs.
+
+The six root rows of inverse dynamics are Newton's and Euler's equations of the whole body: the
+floor must give the force m (a + g) and, about the centre of mass, the torque dL/dt. It pushes at
+the points near it, within friction cones; what remains, a hand from heaven would have to give.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.optimize import nnls
+
+from sim.anthropometry import Segments
+from sim.report.derivatives import derivative
+from sim.report.thresholds import GRAVITY
+from spark.rotation import matrix_from_quat, quat_conj, quat_continuous, quat_mul
+
+_EDGES = 8  # of the pyramid in a friction cone
+
+
+def required_wrench(
+    segment_coms: Float[np.ndarray, "T S 3"],
+    q_world: Float[np.ndarray, "T S 4"],
+    body: Segments,
+    frame_time: float,
+    window: float,
+) -> Float[np.ndarray, "T 6"]:
+    """Force [body weights] and torque about the centre of mass [body weights x 1 m] of the floor.
+
+    `q_world` are the rotations of the segments' joints.
+    """
+    com = np.einsum("s,tsx->tx", body.masses, segment_coms)
+    force = derivative(com, frame_time, 2, window)
+    force[:, 2] += GRAVITY
+    momentum = angular_momentum(segment_coms, q_world, body, frame_time)
+    torque = derivative(momentum, frame_time, 1, window)
+    return np.concatenate([force, torque], axis=1) / GRAVITY
+
+
+def angular_momentum(
+    segment_coms: Float[np.ndarray, "T S 3"],
+    q_world: Float[np.ndarray, "T S 4"],
+    body: Segments,
+    frame_time: float,
+) -> Float[np.ndarray, "T 3"]:
+    """About the centre of mass, for a body of unit mass [m²/s], world axes."""
+    if len(q_world) < 2:
+        return np.zeros((len(q_world), 3))
+    arms = segment_coms - np.einsum("s,tsx->tx", body.masses, segment_coms)[:, None]
+    orbital = np.cross(arms, np.gradient(arms, frame_time, axis=0))
+    q = quat_continuous(q_world)
+    omega = 2 * quat_mul(np.gradient(q, frame_time, axis=0), quat_conj(q))[..., 1:]
+    R = matrix_from_quat(q_world)
+    spin = np.einsum("tsij,sjk,tslk,tsl->tsi", R, body.inertias, R, omega, optimize=True)
+    return np.einsum("s,tsx->tx", body.masses, orbital + spin)
+
+
+def unexplained(
+    wrench: Float[np.ndarray, "T 6"],
+    arms: Float[np.ndarray, "T P 3"],
+    touching: Bool[np.ndarray, "T P"],
+    friction: float,
+    length: float,
+) -> Float[np.ndarray, "T 2"]:
+    """What remains of force [body weights] and torque [body weights x 1 m] (norms).
+
+    `arms` [m] are the contact points seen from the centre of mass. The forces at the points that
+    touch, in cones of `friction`, are those that leave the least sum of squares; in it a torque of
+    1 body weight x `length` counts as much as a force of 1 body weight.
+    """
+    angle = 2 * np.pi * np.arange(_EDGES) / _EDGES
+    edges = np.stack([friction * np.cos(angle), friction * np.sin(angle), np.ones(_EDGES)])
+    scale = np.array([1.0, 1.0, 1.0, length, length, length])
+    wanted = wrench / scale
+    residual = wanted.copy()
+    for t in np.flatnonzero(touching.any(axis=1)):
+        points = arms[t, touching[t]]
+        columns = np.concatenate(
+            [
+                np.broadcast_to(edges, (len(points), 3, _EDGES)),
+                _cross_matrix(points / length) @ edges,
+            ],
+            axis=1,
+        )
+        A = columns.transpose(1, 0, 2).reshape(6, -1)
+        forces, _ = nnls(A, wanted[t])
+        residual[t] = wanted[t] - A @ forces
+    return np.stack(
+        [
+            np.linalg.norm(residual[:, :3], axis=1),
+            length * np.linalg.norm(residual[:, 3:], axis=1),
+        ],
+        axis=1,
+    )
+
+
+def _cross_matrix(v: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "P 3 3"]:
+    matrix = np.zeros((len(v), 3, 3))
+    matrix[:, [2, 0, 1], [1, 2, 0]] = v
+    matrix[:, [1, 2, 0], [2, 0, 1]] = -v
+    return matrix
