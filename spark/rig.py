@@ -2,19 +2,19 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
 
+from spark.groups import groups_of
+from spark.groups import groups_of
 from spark.kinematics import end_positions, world_positions
 from spark.motion import Motion
+from spark.naming import Override, assign_roles
+from spark.naming import Override, assign_roles
 from spark.roles import Group, Role, RoleMap
 from spark.skeleton import Skeleton
 from spark.tpose import carrier_of, find_tpose
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 _UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
 _FEET = ((Role.LEFT_FOOT, Role.LEFT_TOE), (Role.RIGHT_FOOT, Role.RIGHT_TOE))
@@ -56,14 +56,12 @@ class Rig:
         return [j for toe, foot in pairs if (j := foot if toe is None else toe) is not None]
 
 
-def understand(motion: Motion, override: "Mapping[str, object] | None" = None) -> Rig:
+def understand(motion: Motion, override: Override | None = None) -> Rig:
     """What the skeleton of `motion` is: no configuration, names and geometry say it.
 
     Raises SkeletonError with the reason where the body is not a humanoid. `override` is a role map
     as `spark.naming.assign_roles` takes it.
     """
-    from spark.naming import assign_roles, groups_of
-
     skeleton = motion.skeleton
     roles = assign_roles(skeleton, motion, override)
     tpose = find_tpose(motion, roles)

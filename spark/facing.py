@@ -1,0 +1,108 @@
+"""Where a body's front is, which tells left from right, and whether it walks on four legs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from spark.limb_roles import Labels
+from spark.stance import Stance
+from spark.topology import Pair
+
+_FOOT, _KNEE, _ELBOW = 1.0, 3.0, 2.0  # how surely each shows the front
+_GROUND = 0.3  # hands lower than this share of the hip height stand on the ground
+
+
+@dataclass(frozen=True)
+class LabelledPair:
+    """Two limbs of which the joints' parts are known."""
+
+    pair: Pair
+    labels: tuple[Labels, Labels]
+
+    def joint(self, side: int, part: str) -> int | None:
+        """The joint that is `part` of the first (0) or second (1) limb."""
+        chain = (self.pair.first, self.pair.second)[side]
+        place = self.labels[side].places.get(part)
+        return None if place is None else chain[place]
+
+
+def first_is_left(
+    stance: Stance, legs: LabelledPair, arms: LabelledPair | None, above: int | None
+) -> float:
+    """Evidence that the pairs' `first` limbs are the left ones: sure at 0.3, against below 0.
+
+    Feet point forward, knees bend forward and elbows backward; `above` is a joint of the upper
+    body. The frame is the body's own, so the pose may sit, lie or hang.
+    """
+    at = stance.joints
+    hips = [legs.joint(side, "upper_leg") or 0 for side in (0, 1)]
+    across = at[:, hips[0]] - at[:, hips[1]]
+    middle = at[:, hips].mean(axis=1)
+    up = np.broadcast_to([0.0, 0.0, 1.0], across.shape) if above is None else at[:, above] - middle
+    forward = np.cross(across, up)
+    forward /= np.maximum(np.linalg.norm(forward, axis=-1, keepdims=True), 1e-9)
+
+    evidence = 0.0
+    for side in (0, 1):
+        evidence += _KNEE * _bend(
+            stance, legs, side, ("upper_leg", "lower_leg", "foot"), forward
+        ) + _FOOT * _foot(stance, legs, side, forward)
+        if arms is not None:
+            evidence -= _ELBOW * _bend(
+                stance, arms, side, ("upper_arm", "forearm", "hand"), forward
+            )
+    return evidence
+
+
+def _bend(
+    stance: Stance,
+    limb: LabelledPair,
+    side: int,
+    parts: tuple[str, str, str],
+    forward: Float[np.ndarray, "T 3"],
+) -> float:
+    """How far the middle joint stands before the straight line, as a share of the limb."""
+    upper, middle, _ = joints = [limb.joint(side, part) for part in parts]
+    if upper is None or middle is None:
+        return 0.0
+    at = stance.joints
+    end = stance.tip(middle) if joints[2] is None else at[:, joints[2]]
+    begin = at[:, upper]
+    line = end - begin
+    length = np.maximum(np.linalg.norm(line, axis=-1), 1e-9)
+    along = ((at[:, middle] - begin) * line).sum(-1, keepdims=True) / length[:, None] ** 2
+    out = at[:, middle] - begin - along * line
+    return float(np.mean((out * forward).sum(-1) / length))
+
+
+def _foot(
+    stance: Stance, legs: LabelledPair, side: int, forward: Float[np.ndarray, "T 3"]
+) -> float:
+    """How much the foot points forward: 1 straight ahead."""
+    ankle = legs.joint(side, "foot")
+    if ankle is None:
+        return 0.0
+    foot = stance.tip(ankle) - stance.joints[:, ankle]
+    length = np.linalg.norm(foot, axis=-1)
+    if np.median(length) < 1e-6:
+        return 0.0
+    return float(np.mean((foot * forward).sum(-1) / np.maximum(length, 1e-9)))
+
+
+def stands_on_four(stance: Stance, rest: Stance, legs: Pair, arms: Pair) -> bool:
+    """Whether the tips of `arms` are as low as those of `legs`, seen from the legs' carrier.
+
+    The rest pose tells where it is a stance, the typical frame of the motion otherwise: a fallen
+    biped does not become a quadruped.
+    """
+    for seen in (rest, stance):
+        feet = seen.lowest[:, legs.roots].mean(axis=1)
+        hands = seen.lowest[:, arms.roots].mean(axis=1)
+        hips = seen.joints[:, legs.roots, 2].mean(axis=1)
+        leg = max(seen.reach[legs.roots[0]], 1e-9)
+        standing = hips - feet > 0.5 * leg
+        if standing.any():
+            low = (hands - feet)[standing] < _GROUND * (hips - feet)[standing]
+            return bool(low.mean() > 0.5)
+    return False

@@ -1,0 +1,117 @@
+"""Which joint of a limb is which: names and lengths weighed over the whole chain at once."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import log
+
+from spark.name_hints import NameHint
+from spark.stance import Stance
+
+LEG = ("upper_leg", "lower_leg", "foot", "toe")
+ARM = ("clavicle", "upper_arm", "forearm", "hand")
+
+_NAME = 3.0  # what a sure name weighs against the geometry's few units
+_LONGEST = 14  # joints of a chain that are looked at: a hand's fingers are beyond
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Part of a limb to its place in the chain, and how well it fits."""
+
+    places: Mapping[str, int]
+    score: float
+
+
+def label_limb(
+    stance: Stance,
+    hints: Sequence[NameHint],
+    chains: Sequence[tuple[int, ...]],
+    parts: tuple[str, ...],
+) -> list[Labels]:
+    """The best labels of each chain; mirrored chains of one length get the same places."""
+    if len({len(chain) for chain in chains}) == 1:
+        return [_best(stance, hints, chains, parts)] * len(chains)
+    return [_best(stance, hints, [chain], parts) for chain in chains]
+
+
+def _best(
+    stance: Stance,
+    hints: Sequence[NameHint],
+    chains: Sequence[tuple[int, ...]],
+    parts: tuple[str, ...],
+) -> Labels:
+    length = min(len(chains[0]), _LONGEST)
+    # A joint that is aside by name (a twist bone, a finger) stands for nothing.
+    free = [i for i in range(length) if not any(hints[chain[i]].aside for chain in chains)]
+    names = {
+        (part, i): sum(_name_score(hints[chain[i]], part, parts) for chain in chains) / len(chains)
+        for part in parts
+        for i in free
+    }
+    along = [_arc_lengths(stance, chain) for chain in chains]
+    shape = _leg_shape if parts is LEG else _arm_shape
+    best = Labels({}, float("-inf"))
+    for places in _placements(free, parts):
+        score = _NAME * sum(names[part, i] for part, i in places.items())
+        score += sum(shape(places, at) for at in along) / len(chains)
+        if score > best.score + 1e-9:
+            best = Labels(places, score)
+    return best
+
+
+def _placements(free: list[int], parts: tuple[str, ...]) -> Iterator[dict[str, int]]:
+    """All ways to lay the parts along the chain in order; ends of a limb may be missing."""
+    fewer = (parts[:-1], parts[:2]) if parts is LEG else (parts[:-1], parts[1:], parts[1:-1])
+    for kept in (parts, *fewer):
+        for chosen in combinations(free, len(kept)):
+            yield dict(zip(kept, chosen, strict=True))
+
+
+def _name_score(hint: NameHint, part: str, parts: tuple[str, ...]) -> float:
+    if part in hint.parts:
+        return hint.parts[part]
+    return -0.6 if any(other in hint.parts for other in parts) else 0.0
+
+
+def _arc_lengths(stance: Stance, chain: tuple[int, ...]) -> list[float]:
+    """Distance along the chain from its carrier to each joint, and last to the tip [m]."""
+    at = [float(stance.bones[chain[0]])]
+    for joint in chain[1:]:
+        at.append(at[-1] + float(stance.bones[joint]))
+    return [*at, at[-1] + float(stance.end_reach[chain[-1]])]
+
+
+def _leg_shape(places: Mapping[str, int], at: list[float]) -> float:
+    """Thigh and shank are about equal and make most of the leg; the foot is about half of one."""
+    hip, knee = at[places["upper_leg"]], at[places["lower_leg"]]
+    ankle = at[places["foot"]] if "foot" in places else at[-1]
+    thigh, shank, foot = knee - hip, ankle - knee, at[-1] - ankle
+    score = _near(thigh, shank, 1.0, 0.3) - max(0.0, hip / (thigh + 1e-6) - 0.7)
+    if "foot" not in places:
+        return score - 2.5
+    score += _near(foot, shank, 0.45, 0.9)
+    if "toe" in places:
+        score += 0.4 + _near(at[places["toe"]] - ankle, shank, 0.35, 0.9)
+    return score
+
+
+def _arm_shape(places: Mapping[str, int], at: list[float]) -> float:
+    """Upper arm and forearm are about equal; hand and clavicle are about half of one."""
+    shoulder, elbow = at[places["upper_arm"]], at[places["forearm"]]
+    wrist = at[places["hand"]] if "hand" in places else at[-1]
+    upper, fore, hand = elbow - shoulder, wrist - elbow, at[-1] - wrist
+    score = _near(upper, fore, 1.1, 0.3)
+    score += _near(hand, fore, 0.6, 1.0) if "hand" in places else -1.0
+    if "clavicle" in places:
+        score += 0.2 + _near(shoulder - at[places["clavicle"]], upper, 0.5, 1.0)
+    else:
+        score -= 0.3 * places["upper_arm"]
+    return score
+
+
+def _near(length: float, other: float, ratio: float, spread: float) -> float:
+    """Log of a Gaussian on the log of length/other, no worse than -4."""
+    if min(length, other) < 1e-6:
+        return -4.0 if max(length, other) > 1e-6 else -1.0
+    return max(-4.0, -0.5 * (log(length / (ratio * other)) / spread) ** 2)

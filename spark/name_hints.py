@@ -1,0 +1,176 @@
+"""What a joint's name says: which joint of a limb it may be, on which side, or why it is none.
+
+Names are cut into words (`LeftUpLeg`, `thigh_l`, `lfemur`, `Bip01 L Thigh`, `左ひざ`); the words
+say the side and the part.
+"""
+
+import re
+import unicodedata
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+from spark.aliases import (
+    ASIDE,
+    AXES,
+    FORELEG,
+    LEFT,
+    MEANINGS,
+    MODIFIERS,
+    NOISE,
+    RIGHT,
+    SPECIFIC,
+    SPELLINGS,
+)
+
+_VERTEBRA = re.compile(r"([lct])(\d{1,2})")
+_PIECES = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+|[^\W\d_A-Za-z]+")
+
+_WORDS = (
+    {word for key in MEANINGS for word in key.split()}
+    | set(SPELLINGS)
+    | set(ASIDE)
+    | MODIFIERS
+    | NOISE
+    | AXES
+)
+_WHOLE = "|".join(
+    sorted((re.escape(w) for w in _WORDS if len(w) > 2 or not w.isascii()), key=len, reverse=True)
+)
+_SIDES = "left|right|左|右"
+_COMPOUND = re.compile(
+    rf"(?P<before>{_SIDES}|l|r)?(?P<words>(?:up|lo|{_WHOLE})+?)(?P<after>{_SIDES}|l|r)?"
+)
+_SPLIT = re.compile(rf"{_WHOLE}|up|lo")
+
+
+@dataclass(frozen=True)
+class NameHint:
+    """What a name says. `parts` gives roles without their side and how surely the name means them.
+
+    `aside` tells why the joint is none of the roles ("a finger"); `foreleg` marks a front leg,
+    `wing` a wing: limbs in the place of arms.
+    """
+
+    side: str = ""
+    parts: dict[str, float] = field(default_factory=dict)
+    aside: str = ""
+    foreleg: bool = False
+
+
+def read_names(names: Sequence[str]) -> list[NameHint]:
+    """What each name of a skeleton says; a prefix or suffix that most names share says nothing."""
+    cut = [_pieces(name) for name in names]
+    if len(names) >= 5:
+        _strip_common(cut, 0)
+        _strip_common(cut, -1)
+    axes = any(piece in ("pitch", "yaw") for pieces in cut for piece in pieces)
+    return [_read(tuple(pieces), axes) for pieces in cut]
+
+
+def _pieces(name: str) -> list[str]:
+    name = unicodedata.normalize("NFKC", name)
+    name = re.split(r"[:|]", name)[-1]
+    return [piece.lower() for piece in _PIECES.findall(name)]
+
+
+def _strip_common(cut: list[list[str]], end: int) -> None:
+    """Take away, in place, the words that most names begin (0) or end (-1) with."""
+    for _ in range(4):
+        counts = Counter(pieces[end] for pieces in cut if len(pieces) > 1)
+        if not counts:
+            return
+        word, count = counts.most_common(1)[0]
+        meaningful = word in LEFT | RIGHT or word in MEANINGS or word in ASIDE
+        if count < 0.7 * len(cut) or (meaningful and word != "root"):
+            return
+        for pieces in cut:
+            if len(pieces) > 1 and pieces[end] == word:
+                pieces.pop(end)
+
+
+@lru_cache(maxsize=4096)
+def _read(pieces: tuple[str, ...], axes: bool) -> NameHint:
+    if vertebra := _VERTEBRA.fullmatch("".join(pieces)):
+        return NameHint(parts={"neck" if vertebra[1] == "c" else "spine": 0.7})
+    words, numbers, unknown = _words(pieces)
+    side = "left" if words & LEFT else ""
+    if words & RIGHT:
+        side = "" if side else "right"
+    words -= LEFT | RIGHT
+    if axes:
+        words -= AXES
+    for word in sorted(words):
+        # "NeckTwist" is the neck itself on the rigs that have it.
+        if word in ASIDE and not ("neck" in words and word == "twist"):
+            return NameHint(side, aside=ASIDE[word])
+    parts, foreleg = _parts(words, bool(side))
+    if side and set(parts) <= {"pelvis", "spine", "neck", "head"}:
+        return NameHint(side, aside="beside the midline") if parts else NameHint(side)
+    if "foot" in parts and numbers and numbers[0] > 0:
+        parts = {"foot": 0.5, "toe": 0.7}
+    doubt = 0.6 if unknown else 1.0
+    if set(parts) - {"spine", "neck", "wing"}:
+        # Of a joint and its numbered companions the first is meant.
+        doubt *= max(0.4, 1.0 - 0.08 * sum(min(n, 9) for n in numbers))
+    return NameHint(side, {p: doubt * s for p, s in parts.items()}, "", foreleg)
+
+
+def _words(pieces: tuple[str, ...]) -> tuple[set[str], list[int], bool]:
+    """The known words of a name, its numbers, and whether something in it is not known."""
+    words: list[str] = []
+    numbers: list[int] = []
+    unknown = False
+    for piece in pieces:
+        if piece.isdigit():
+            numbers.append(int(piece[:4]))
+        elif found := _known(piece):
+            words += found
+        else:
+            unknown = True
+    if unknown and (found := _known("".join(p for p in pieces if not p.isdigit()))):
+        # "LUArm" is cut as LU + Arm; as one word it is l + uarm.
+        words, unknown = found, False
+    spelled = " ".join(SPELLINGS.get(word, word) for word in words)
+    return set(spelled.split()), numbers, unknown
+
+
+@lru_cache(maxsize=4096)
+def _known(piece: str) -> list[str]:
+    if piece in _WORDS or piece in LEFT or piece in RIGHT:
+        return [piece]
+    if match := _COMPOUND.fullmatch(piece):
+        around = [side for side in (match["before"], match["after"]) if side]
+        return [*around, *_SPLIT.findall(match["words"])]
+    return []
+
+
+def _parts(words: set[str], sided: bool) -> tuple[dict[str, float], bool]:
+    """The meanings of a set of words, and whether they are a front leg's."""
+    foreleg = "front" in words and bool(words & FORELEG.keys() or "leg" in words)
+    upper, lower = "upper" in words, "lower" in words
+    if foreleg:
+        return _foreleg_parts(words, upper, lower), True
+    for limb in ("arm", "leg"):
+        if limb in words and (upper or lower) and not words & SPECIFIC:
+            return MEANINGS[f"{'upper' if upper else 'lower'} {limb}"], False
+    if "hip" in words and sided:
+        return MEANINGS["hip joint" if "joint" in words else "sided hip"], False
+    specific = [word for word in sorted(words & MEANINGS.keys()) if word in SPECIFIC]
+    general = [word for word in sorted(words & MEANINGS.keys()) if word not in SPECIFIC]
+    if specific and "leg" in general:
+        # "AnkleLeg" is a leg's segment above the foot, and still the ankle where nothing else is.
+        return {part: 0.6 * s for part, s in MEANINGS[specific[0]].items()}, False
+    for word in (*specific, *general):
+        return MEANINGS[word], False
+    return {}, False
+
+
+def _foreleg_parts(words: set[str], upper: bool, lower: bool) -> dict[str, float]:
+    for word, part in FORELEG.items():
+        if word in words:
+            return {part: 0.7}
+    if upper or lower:
+        return {"upper_arm" if upper else "forearm": 0.7}
+    return {"upper_arm": 0.4, "forearm": 0.4}

@@ -1,0 +1,119 @@
+"""The role of every joint of a rig, from its names, its build and its motion."""
+
+from collections.abc import Mapping, Sequence
+
+from spark.body_plan import BodyPlan, plan_body
+from spark.errors import SkeletonError
+from spark.facing import LabelledPair
+from spark.motion import Motion
+from spark.name_hints import NameHint, read_names
+from spark.roles import Role, RoleMap
+from spark.skeleton import Skeleton
+from spark.stance import measure
+
+Override = Mapping[Role, Sequence[int]]
+"""Roles given by the user: their joints from the pelvis outwards; none where nobody holds one."""
+
+# How often each kind of evidence alone is right.
+_BY_NAME, _BY_CHAIN, _BY_SHAPE = 0.85, 0.6, 0.6
+_SIDE_SURE = 0.15
+
+
+def assign_roles(
+    skeleton: Skeleton, motion: Motion | None = None, override: Override | None = None
+) -> RoleMap:
+    """The role of each joint, how sure it is, and why.
+
+    Evidence in this order: names; chains and their symmetry; the poses of `motion` (the rest pose
+    without one); `override` stands above all, and suffices where it gives pelvis and legs.
+    SkeletonError with the reason where the body does not walk on two legs.
+    """
+    override = override or {}
+    hints = read_names(skeleton.names)
+    try:
+        found = _infer(skeleton, motion, hints)
+    except SkeletonError:
+        if not all(override.get(role) for role in _NEEDED):
+            raise
+        found = {}
+    return _merge(skeleton, hints, found, override)
+
+
+_NEEDED = {Role.PELVIS} | {
+    Role(f"{side}_{part}_leg") for side in ("left", "right") for part in ("upper", "lower")
+}
+
+Found = dict[int, tuple[Role, float, str]]
+
+
+def _infer(skeleton: Skeleton, motion: Motion | None, hints: Sequence[NameHint]) -> Found:
+    """Joint to role, confidence and reason."""
+    plan = plan_body(measure(skeleton, motion), hints)
+    found: Found = {}
+    pelvis = hints[plan.pelvis].parts.get("pelvis", 0.0) > 0.3
+    found[plan.pelvis] = (Role.PELVIS, _sure(pelvis, True, True), "carries the legs")
+    for joints, role, part, reason in (
+        (plan.spine, Role.SPINE, "spine", "between the pelvis and the arms"),
+        (plan.neck, Role.NECK, "neck", "between the arms and the head"),
+        (() if plan.head is None else (plan.head,), Role.HEAD, "head", "top of the trunk"),
+    ):
+        for j in joints:
+            named = part in hints[j].parts
+            why = f"name {skeleton.names[j]!r}" if named else reason
+            found[j] = (role, _sure(named, True, role is not Role.HEAD), why)
+    for limb in (plan.legs, plan.arms):
+        if limb is not None:
+            _infer_limb(skeleton, hints, plan, limb, found)
+    return found
+
+
+def _infer_limb(
+    skeleton: Skeleton, hints: Sequence[NameHint], plan: BodyPlan, limb: LabelledPair, found: Found
+) -> None:
+    is_leg = limb is plan.legs
+    sides = ("left", "right") if limb.pair.sided or plan.sides >= 0 else ("right", "left")
+    agreement = plan.sides if limb.pair.sided else abs(plan.sides)
+    for index, side in enumerate(sides):
+        for part in limb.labels[index].places:
+            joint = limb.joint(index, part)
+            assert joint is not None
+            named = hints[joint].parts.get(part, 0.0) > 0.3
+            sure = _sure(named, joint in plan.mirrored, agreement > _SIDE_SURE)
+            why = f"chain from the {'pelvis down' if is_leg else 'trunk outwards'}"
+            if named:
+                why = f"name {skeleton.names[joint]!r}"
+            if limb.pair.sided and agreement < -_SIDE_SURE:
+                sure, why = 0.6 * sure, f"{why}, though it lies on the other side of the body"
+            elif not limb.pair.sided and agreement < _SIDE_SURE:
+                sure, why = 0.6 * sure, f"{why}; the side is a guess"
+            found[joint] = (Role(f"{side}_{part}"), sure, why)
+
+
+def _sure(named: bool, chained: bool, shaped: bool) -> float:
+    """Independent pieces of evidence: wrong only where all of them are."""
+    wrong = 1.0
+    for holds, right in ((named, _BY_NAME), (chained, _BY_CHAIN), (shaped, _BY_SHAPE)):
+        wrong *= 1.0 - right if holds else 1.0
+    return round(1.0 - wrong, 3)
+
+
+def _merge(
+    skeleton: Skeleton, hints: Sequence[NameHint], found: Found, override: Override
+) -> RoleMap:
+    given = {j: role for role, joints in override.items() for j in joints}
+    roles: list[Role | None] = []
+    sure: list[float] = []
+    reasons: list[str] = []
+    for j in range(len(skeleton)):
+        if j in given:
+            entry: tuple[Role | None, float, str] = (given[j], 1.0, "given")
+        elif j in found and found[j][0] not in override:
+            entry = found[j]
+        elif hints[j].aside:
+            entry = (None, _BY_NAME, f"{hints[j].aside}, by its name")
+        else:
+            entry = (None, _BY_CHAIN, "follows its parent")
+        roles.append(entry[0])
+        sure.append(entry[1])
+        reasons.append(entry[2])
+    return RoleMap(tuple(roles), tuple(sure), tuple(reasons))

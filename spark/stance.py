@@ -1,0 +1,116 @@
+"""How a skeleton is built and stands, measured on the frames of a motion."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from spark.kinematics import end_positions, forward
+from spark.motion import Motion
+from spark.skeleton import Skeleton
+
+MAX_FRAMES = 48
+
+
+@dataclass(frozen=True, eq=False)
+class Stance:
+    """Joints and End Sites of a skeleton in some frames [m, world]; lengths are pose-free.
+
+    `posed` is False where the rest pose had to do: no motion was given.
+    """
+
+    skeleton: Skeleton
+    joints: Float[np.ndarray, "T J 3"]
+    ends: Float[np.ndarray, "T E 3"]
+    posed: bool
+
+    @cached_property
+    def bones(self) -> Float[np.ndarray, "J"]:
+        """Distance of each joint from its parent [m]; 0 for the root."""
+        lengths = np.zeros(len(self.skeleton))
+        steps = self.joints[:, 1:] - self.joints[:, self.skeleton.parents[1:]]
+        lengths[1:] = np.median(np.linalg.norm(steps, axis=-1), axis=0)
+        return lengths
+
+    @cached_property
+    def end_reach(self) -> Float[np.ndarray, "J"]:
+        """Distance of each joint's farthest End Site [m]; 0 without one."""
+        reach = np.zeros(len(self.skeleton))
+        np.maximum.at(
+            reach, self.skeleton.end_parents, np.linalg.norm(self.skeleton.end_offsets, axis=-1)
+        )
+        return reach
+
+    @cached_property
+    def reach(self) -> Float[np.ndarray, "J"]:
+        """Length [m] of the longest way from each joint down to a tip, along the bones."""
+        reach = self.end_reach.copy()
+        for j in range(len(self.skeleton) - 1, 0, -1):
+            parent = self.skeleton.parents[j]
+            reach[parent] = max(reach[parent], reach[j] + self.bones[j])
+        return reach
+
+    @cached_property
+    def lowest(self) -> Float[np.ndarray, "T J"]:
+        """Height [m] of the lowest point at or below each joint in the tree."""
+        lowest = self.joints[..., 2].copy()
+        for e, j in enumerate(self.skeleton.end_parents.tolist()):
+            lowest[:, j] = np.minimum(lowest[:, j], self.ends[:, e, 2])
+        for j in range(len(self.skeleton) - 1, 0, -1):
+            parent = self.skeleton.parents[j]
+            lowest[:, parent] = np.minimum(lowest[:, parent], lowest[:, j])
+        return lowest
+
+    @cached_property
+    def upright(self) -> Bool[np.ndarray, "T"]:
+        """Frames in which the skeleton is taller than wide."""
+        size = np.ptp(self.joints, axis=1)
+        return size[:, 2] >= np.max(size[:, :2], axis=1)
+
+    def tip(self, joint: int) -> Float[np.ndarray, "T 3"]:
+        """The point farthest along the bones below `joint`: its own End Site, or a joint."""
+        while True:
+            below = self.skeleton.children[joint]
+            nearest = max(below, key=lambda c: self.reach[c] + self.bones[c], default=None)
+            if nearest is None or self.end_reach[joint] >= self.reach[joint]:
+                break
+            joint = nearest
+        at = np.flatnonzero(self.skeleton.end_parents == joint)
+        if not len(at):
+            return self.joints[:, joint]
+        far = at[np.argmax(np.linalg.norm(self.skeleton.end_offsets[at], axis=-1))]
+        return self.ends[:, far]
+
+
+def rest_stance(skeleton: Skeleton) -> Stance:
+    """The rest pose as one frame."""
+    joints = skeleton.rest_positions
+    return Stance(
+        skeleton, joints[None], (joints[skeleton.end_parents] + skeleton.end_offsets)[None], False
+    )
+
+
+def measure(skeleton: Skeleton, motion: Motion | None) -> Stance:
+    """At most `MAX_FRAMES` frames spread over `motion`, or the rest pose where there is none.
+
+    Frames in which the bones shrink away (positions animated in another unit than the offsets) are
+    taken with the skeleton's own offsets.
+    """
+    if motion is None or not len(motion):
+        return rest_stance(skeleton)
+    step = -(-len(motion) // MAX_FRAMES)
+    some = Motion(
+        skeleton,
+        motion.frame_time,
+        motion.root_pos[::step],
+        motion.rotations[::step],
+        None if motion.translations is None else motion.translations[::step],
+    )
+    joints, world = forward(some)
+    stance = Stance(skeleton, joints, end_positions(skeleton, joints, world), True)
+    own = np.linalg.norm(skeleton.offsets[1:], axis=-1).sum()
+    if motion.translations is not None and not 0.5 * own < stance.bones.sum() < 2.0 * own:
+        joints, world = forward(Motion(skeleton, 1.0, some.root_pos, some.rotations))
+        stance = Stance(skeleton, joints, end_positions(skeleton, joints, world), True)
+    return stance

@@ -1,0 +1,150 @@
+"""The limbs of a skeleton: found by what the names say, or by mirrored pairs of chains."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from spark.name_hints import NameHint
+from spark.skeleton import Skeleton
+from spark.stance import Stance
+
+SIMILAR = 0.2  # bones of a mirrored pair differ by less than this share of the chain
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two limbs side by side and the joint that carries both, nearest the trunk first.
+
+    `first` is the left one where `sided`, and the one that comes first in the file otherwise.
+    """
+
+    carrier: int
+    first: tuple[int, ...]
+    second: tuple[int, ...]
+    sided: bool
+
+    @property
+    def roots(self) -> tuple[int, int]:
+        """The joints with which the limbs begin."""
+        return self.first[0], self.second[0]
+
+
+def chain_below(stance: Stance, joint: int) -> tuple[int, ...]:
+    """`joint` and the joints after it along the longest way down."""
+    chain = [joint]
+    while below := stance.skeleton.children[chain[-1]]:
+        chain.append(max(below, key=lambda c: stance.reach[c] + stance.bones[c]))
+    return tuple(chain)
+
+
+def path_between(skeleton: Skeleton, start: int, end: int) -> tuple[int, ...]:
+    """The joints strictly between two joints, over their common ancestor, in order from `start`."""
+    up, down = skeleton.ancestors(start), skeleton.ancestors(end)
+    common = next(j for j in up if j in down)
+    whole = [*up[: up.index(common)], common, *reversed(down[: down.index(common)])]
+    return tuple(j for j in whole if j not in (start, end))
+
+
+def common_ancestor(skeleton: Skeleton, a: int, b: int) -> int:
+    """The last joint above (or at) both."""
+    others = set(skeleton.ancestors(b))
+    return next(j for j in skeleton.ancestors(a) if j in others)
+
+
+def best_paths(
+    skeleton: Skeleton, hints: Sequence[NameHint], score: Callable[[NameHint], float]
+) -> Float[np.ndarray, "J"]:
+    """The sum of `score` over each joint and its ancestors: the best limb ends at the maximum."""
+    total = np.array([score(hint) for hint in hints])
+    for j in range(1, len(skeleton)):
+        total[j] += total[skeleton.parents[j]]
+    return total
+
+
+def named_pair(
+    stance: Stance, hints: Sequence[NameHint], parts: frozenset[str], least: float
+) -> Pair | None:
+    """The left and right limb whose joints' names mean `parts`, at least `least` in all a side."""
+    skeleton = stance.skeleton
+    tips: list[int] = []
+    for side in ("left", "right"):
+
+        def score(hint: NameHint, side: str = side) -> float:
+            if hint.side != side:
+                return 0.0
+            return max((s for part, s in hint.parts.items() if part in parts), default=0.0)
+
+        total = best_paths(skeleton, hints, score)
+        tip = int(np.argmax(total))
+        if total[tip] < least:
+            return None
+        tips.append(tip)
+    carrier = common_ancestor(skeleton, *tips)
+    if carrier in tips:
+        return None
+    left, right = (_through(stance, carrier, tip) for tip in tips)
+    return Pair(carrier, left, right, sided=True)
+
+
+def _through(stance: Stance, carrier: int, tip: int) -> tuple[int, ...]:
+    """The chain that leaves `carrier` towards `tip` and goes on as far as it can."""
+    up = stance.skeleton.ancestors(tip)
+    down = tuple(reversed(up[: up.index(carrier)]))
+    return (*down, *chain_below(stance, tip)[1:])
+
+
+def mirrored_pairs(stance: Stance, hints: Sequence[NameHint], shortest: float) -> tuple[Pair, ...]:
+    """Pairs of similar chains that one joint carries, each at least `shortest` [m] long.
+
+    Chains whose first joint is by name a finger, hair, cloth, ... do not count, and of a pair
+    within a pair (fingers of a hand) only the outer one does.
+    """
+    skeleton = stance.skeleton
+    pairs: list[Pair] = []
+    inside: set[int] = set()
+    for carrier in range(len(skeleton)):
+        if carrier in inside:
+            continue
+        chains = [
+            chain_below(stance, child)
+            for child in skeleton.children[carrier]
+            if not hints[child].aside.startswith(_NEVER_LIMBS)
+            and stance.reach[child] + stance.bones[child] >= shortest
+        ]
+        while len(chains) >= 2:
+            a, b, difference = min(
+                (
+                    (a, b, _difference(stance, a, b))
+                    for i, a in enumerate(chains)
+                    for b in chains[i + 1 :]
+                ),
+                key=lambda found: found[2],
+            )
+            if difference > SIMILAR:
+                break
+            chains = [chain for chain in chains if chain not in (a, b)]
+            pairs.append(Pair(carrier, a, b, sided=False))
+            inside.update(skeleton.subtree(a[0]), skeleton.subtree(b[0]))
+    return tuple(pairs)
+
+
+_NEVER_LIMBS = (
+    "a finger",
+    "part of the face",
+    "hair",
+    "clothes",
+    "soft tissue",
+    "a prop",
+    "an animal's part",
+)
+
+
+def _difference(stance: Stance, a: tuple[int, ...], b: tuple[int, ...]) -> float:
+    """How unlike two chains are: bone by bone, as a share of their length."""
+    if len(a) != len(b):
+        return np.inf
+    one = np.array([*stance.bones[list(a)], stance.end_reach[a[-1]]])
+    two = np.array([*stance.bones[list(b)], stance.end_reach[b[-1]]])
+    return float(np.abs(one - two).sum() / max(one.sum(), two.sum(), 1e-9))
