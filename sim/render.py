@@ -1,6 +1,5 @@
 """Pictures of a scene, drawn off screen through EGL."""
 
-import os
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
@@ -51,8 +50,6 @@ def frames(
 
 
 def _renderer(scene: Scene, width: int, height: int) -> "Renderer":
-    if "MUJOCO_GL" not in os.environ and not has_display():
-        os.environ["MUJOCO_GL"] = "egl"
     try:
         return mujoco.Renderer(scene.model, height, width)
     except Exception as error:  # the GL loaders raise whatever their platform does
@@ -60,8 +57,3 @@ def _renderer(scene: Scene, width: int, height: int) -> "Renderer":
             f"no OpenGL to draw with ({type(error).__name__}: {error}). On Debian or Ubuntu: "
             "apt-get install libegl1 libgl1-mesa-dri libopengl0. Or use --html, which needs none."
         ) from error
-
-
-def has_display() -> bool:
-    """Whether a window can be opened."""
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
