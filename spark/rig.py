@@ -7,10 +7,8 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.groups import groups_of
-from spark.groups import groups_of
 from spark.kinematics import end_positions, world_positions
 from spark.motion import Motion
-from spark.naming import Override, assign_roles
 from spark.naming import Override, assign_roles
 from spark.roles import Group, Role, RoleMap
 from spark.skeleton import Skeleton
