@@ -29,6 +29,8 @@ _MAX_DEPTH = 512
 # [s] A nanosecond: shorter frames are a broken file.
 _SHORTEST_FRAME = 1e-9
 
+_NAME = re.compile(r"[^\s{}]([^\r\n{}]*[^\s{}])?", re.ASCII)
+
 _CHANNEL_OF = {name.lower().encode(): name for name in CHANNELS}
 
 
@@ -36,7 +38,8 @@ _CHANNEL_OF = {name.lower().encode(): name for name in CHANNELS}
 class BvhJoint:
     """A joint in the file's units and axes. `parent` is -1 at the root; `ends` are its End Sites.
 
-    `channels` are names out of `CHANNELS`, in the order of the file.
+    `channels` are names out of `CHANNELS`, in the order of the file. A `name` has no braces or line
+    ends, and no spaces around it.
     """
 
     name: str
@@ -67,6 +70,8 @@ class Bvh:
             )
         open_joints: list[int] = []
         for j, joint in enumerate(self.joints):
+            if not _NAME.fullmatch(joint.name):
+                raise SkeletonError(f"joint {j} has the name {joint.name!r}, which BVH can't hold")
             while open_joints and open_joints[-1] != joint.parent:
                 open_joints.pop()
             if bool(open_joints) == (j == 0) or (j == 0 and joint.parent != -1):
@@ -331,21 +336,24 @@ def _diagnose(scanner: Scanner, frames: int, channels: int) -> NoReturn:
                     line,
                     f"expected a finite number, at most 1e12, found {shown(word)}",
                 )
-    found = sum(len(words) for _, words in rows)
+    found, needed = sum(len(words) for _, words in rows), frames * channels
     odd = [(line, len(words)) for line, words in rows if len(words) != channels]
-    claim = f"Frames: {frames} with {channels} channels each"
-    if found == frames * channels:
-        message = f"{odd[0][1]} values in this row; expected {channels}, one for each channel"
-    elif found < frames * channels:
-        message = f"the motion is cut short: {claim} need {frames * channels} values, not {found}"
-    else:
-        message = f"the motion is too long: {claim} need {frames * channels} values, not {found}"
-    if found != frames * channels:
-        message += (
-            f"; set Frames: {found // channels} to use it"
-            if found % channels == 0
-            else f" ({found // channels} whole frames); fetch or export the file again"
+    if found == needed:
+        at, width = odd[0]
+        raise FileFormatError(
+            scanner.path, at, f"{width} values in this row; expected {channels}, one a channel"
         )
+    fault = "cut short" if found < needed else "too long"
+    remedy = (
+        f"; set Frames: {found // channels} to use it"
+        if found % channels == 0
+        else f" ({found // channels} whole frames); fetch or export the file again"
+    )
     # A few odd rows are the fault; many are rows wrapped over lines.
-    at = odd[0][0] if 0 < len(odd) < max(2, len(rows) // 2) else (rows[-1][0] if rows else None)
-    raise FileFormatError(scanner.path, at, message)
+    at = odd[0][0] if 0 < len(odd) < max(2, len(rows) // 2) else rows[-1][0] if rows else None
+    raise FileFormatError(
+        scanner.path,
+        at,
+        f"the motion is {fault}: Frames: {frames} with {channels} channels each need {needed} "
+        f"values, not {found}{remedy}",
+    )

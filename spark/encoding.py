@@ -1,5 +1,6 @@
 """Motions back into files: the way from SI units and Z-up axes to the numbers of a BVH."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -130,8 +131,8 @@ def _vector(row: Float[np.ndarray, "3"]) -> Vector:
 
 
 def _writable(name: str) -> str:
-    """The name without what ends a name in a BVH file."""
-    return "".join("_" if letter in "\r\n{}" else letter for letter in name).strip() or "_"
+    """The name without what a BVH file can't hold in one."""
+    return re.sub(r"[\r\n{}]", "_", name).strip() or "_"
 
 
 def _depth_first(motion: Motion) -> Motion:
