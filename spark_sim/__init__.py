@@ -1,3 +1,38 @@
-"""The application: command line and public Python API."""
+"""The application: command line and public Python API.
+
+    import spark_sim
+
+    walk = spark_sim.load("walk.bvh")
+    out = spark_sim.retarget(walk, "mutant.bvh")
+    out.save("out.bvh")
+    print(spark_sim.report(out, source=walk).text())
+
+Names are loaded when they are first used, so that the import itself costs nothing.
+"""
+
+from typing import TYPE_CHECKING, Any
 
 DISTRIBUTION = "spark-sim"
+
+if TYPE_CHECKING:
+    from spark.errors import SparkSimError
+    from spark_sim.clip import Clip, load, play, report, retarget, sample
+
+__all__ = ["Clip", "SparkSimError", "load", "play", "report", "retarget", "sample"]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version(DISTRIBUTION)
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    module = import_module("spark.errors" if name == "SparkSimError" else "spark_sim.clip")
+    return getattr(module, name)
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -1,0 +1,52 @@
+# make demo    from nothing: environment, demo motions, retargeting, report, video, page, picture
+# make test    the test suite                make check   lint, format, types, architecture
+# make bench   benchmarks                    make wheel   build, install elsewhere, run
+# make clean   remove what these made
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+export OMP_NUM_THREADS ?= 1
+
+.PHONY: demo test check bench wheel clean
+.DELETE_ON_ERROR:
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "spark-sim needs Python 3.11 or newer; name one: make PYTHON=python3.12" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+# Two environments in one folder: the demo does not wait for torch and the test tools.
+$(VENV)/.video: $(BIN)/python pyproject.toml constraints.txt
+	$(PIP) install --quiet -c constraints.txt -e ".[video]"
+	@touch $@
+
+$(VENV)/.dev: $(BIN)/python pyproject.toml constraints.txt
+	$(PIP) install --quiet -c constraints.txt -e ".[dev]"
+	@touch $@
+
+$(VENV)/.gl: $(VENV)/.video scripts/headless_gl.sh
+	bash scripts/headless_gl.sh $(BIN)/python
+	@touch $@
+
+demo: $(VENV)/.video $(VENV)/.gl
+	bash scripts/demo.sh $(BIN)/spark-sim out
+
+test: $(VENV)/.dev $(VENV)/.gl
+	$(BIN)/pytest -n 2 -m "not bench"
+
+check: $(VENV)/.dev
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/pytest tests/test_architecture.py
+
+bench: $(VENV)/.dev
+	$(BIN)/pytest -m bench -n 0 --benchmark-columns=min,median,stddev,rounds
+
+wheel: $(VENV)/.dev
+	bash scripts/wheel_test.sh $(BIN)/python
+
+clean:
+	rm -rf $(VENV) build dist out .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache

@@ -1,0 +1,44 @@
+"""The `spark-sim` program: makes sure that the packages are its own, then runs the command line.
+
+Only `sys` is imported here: `sim` and `robots` are common names, and code of another distribution
+must not run any further than its own `__init__`.
+"""
+
+import sys
+
+DISTRIBUTION = "spark-sim"
+PACKAGES = ("spark", "sim", "robots")
+
+
+def foreign_package() -> str | None:
+    """What is wrong with the packages that Python finds under our names; None where all is well."""
+    for name in PACKAGES:
+        try:
+            package = __import__(name)
+        except Exception as error:  # a foreign package may fail in any way
+            return f"the package {name!r} can't be imported ({type(error).__name__}: {error})"
+        if getattr(package, "DISTRIBUTION", None) != DISTRIBUTION:
+            place = package.__file__ or next(iter(package.__path__), "an unknown place")
+            return f"the package {name!r} that Python finds isn't spark-sim's: {place}"
+    return None
+
+
+def main() -> int:
+    """Run the command line; returns the exit code."""
+    problem = foreign_package()
+    if problem is not None:
+        print(
+            f"spark-sim: error: {problem}\n"
+            "Something else of that name is installed or lies in the current folder. Give "
+            "spark-sim an environment\nof its own: python3 -m venv ENV && "
+            "ENV/bin/pip install spark-sim",
+            file=sys.stderr,
+        )
+        return 2
+    from spark_sim.cli import run
+
+    return run(sys.argv[1:])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,141 @@
+"""The command line: one parser, one way to fail."""
+
+import os
+import sys
+from argparse import Action, ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from spark.errors import SparkSimError
+from spark_sim import console
+from spark_sim.commands import inspect, mjcf, play, report, retarget, sample
+
+COMMANDS = (retarget, inspect, report, play, mjcf, sample)
+
+DESCRIPTION = "Put a human motion on another body and measure how believable the result is."
+
+EXAMPLES = """\
+examples:
+  spark-sim sample                              # demo motions to play with
+  spark-sim retarget walk.bvh --to mutant.bvh   # another body, any rig
+  spark-sim play walk.bvh walk_on_mutant.bvh    # watch both, side by side
+  spark-sim report walk_on_mutant.bvh --source walk.bvh
+
+spark-sim COMMAND --help tells more of each command.
+"""
+
+FAILED, INTERNAL_ERROR, INTERRUPTED, BROKEN_PIPE = 2, 70, 130, 141
+
+
+class _Formatter(RawDescriptionHelpFormatter):
+    """Help of one look on every Python, whatever the terminal."""
+
+    def __init__(self, prog: str) -> None:
+        width = min(int(os.environ.get("COLUMNS") or _terminal_width()), 100)
+        super().__init__(prog, max_help_position=26, width=width - 2)
+
+    def _format_action_invocation(self, action: Action) -> str:
+        if not action.option_strings or action.nargs == 0:
+            return super()._format_action_invocation(action)
+        value = self._format_args(action, self._get_default_metavar_for_optional(action))
+        return f"{', '.join(action.option_strings)} {value}"
+
+
+def _terminal_width() -> int:
+    try:
+        return os.get_terminal_size(sys.stdout.fileno()).columns or 80
+    except (OSError, ValueError):
+        return 80
+
+
+class _Parser(ArgumentParser):
+    """Errors in two lines: what is wrong, and where help is."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(formatter_class=_Formatter, allow_abbrev=False, **settings)
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(FAILED, f"spark-sim: error: {message}\nSee {self.prog} --help\n")
+
+
+class _Version(Action):
+    def __call__(self, parser: ArgumentParser, *_: Any) -> NoReturn:
+        from importlib.metadata import version
+
+        print(f"spark-sim {version('spark-sim')}")
+        parser.exit()
+
+
+def build_parser() -> ArgumentParser:
+    """The whole command line. Imports nothing heavy, so that help comes at once."""
+    parser = _Parser(
+        prog="spark-sim",
+        usage="spark-sim COMMAND ...",
+        description=DESCRIPTION,
+        epilog=EXAMPLES,
+    )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
+    subparsers = parser.add_subparsers(
+        title="commands", metavar="COMMAND", dest="command", prog="spark-sim"
+    )
+    for command in COMMANDS:
+        name = command.__name__.rpartition(".")[2]
+        subparser = subparsers.add_parser(
+            name,
+            help=command.SUMMARY,
+            usage=f"spark-sim {name} {command.USAGE}",
+            description=command.DESCRIPTION,
+            epilog=command.EXAMPLES,
+        )
+        command.configure(subparser)
+        subparser.set_defaults(run=command.run)
+    return parser
+
+
+def run(argv: Sequence[str]) -> int:
+    """Parse and carry out one command line; every failure ends as one line on stderr.
+
+    Exit codes: 0 done; 1 `report --fail-over` found too much; 2 wrong input or usage; 70 a fault of
+    spark-sim itself; 130 interrupted; 141 the reader of stdout went away.
+    """
+    parser = build_parser()
+    args = parser.parse_args(argv)
+    if args.command is None:
+        parser.print_help(sys.stderr)
+        return FAILED
+    try:
+        code = _run(args)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # What is still buffered has no reader: keep the interpreter from complaining at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    return code
+
+
+def _run(args: Namespace) -> int:
+    try:
+        code: int = args.run(args)
+    except BrokenPipeError:
+        raise
+    except SparkSimError as error:
+        return _fail(str(error), FAILED)
+    except OSError as error:
+        place = "" if error.filename is None else f"{error.filename}: "
+        return _fail(f"{place}{error.strerror or error}", FAILED)
+    except Exception as error:
+        if os.environ.get("SPARK_SIM_TRACEBACK"):
+            raise
+        return _fail(
+            f"{type(error).__name__}: {error}\nThis is a fault of spark-sim. Please report it with "
+            "what it prints when SPARK_SIM_TRACEBACK=1 is set.",
+            INTERNAL_ERROR,
+        )
+    return code
+
+
+def _fail(message: str, code: int) -> int:
+    console.error(message)
+    return code

@@ -1,0 +1,195 @@
+"""The Python API: clips, and what can be done with them. The command line is a layer over it."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from spark.bvh import write_bvh
+from spark.canonical import from_canonical, to_canonical
+from spark.encoding import encode, encode_new
+from spark.errors import ConventionError, FileFormatError, SkeletonError
+from spark.motion import Motion
+from spark.naming import Override
+from spark.recording import Recording, read_recording
+from spark.rig import Rig, understand
+from spark.transfer import transfer
+from spark_sim import files, rolemap
+
+if TYPE_CHECKING:
+    from sim.report import Report
+
+File = str | Path
+
+_NOT_YET = {
+    ".xml": "MuJoCo models can't be read yet; expected a BVH file",
+    ".fbx": "FBX files can't be read yet; expected a BVH file (Blender converts one to the other)",
+    ".glb": "glTF files can't be read yet; expected a BVH file",
+    ".gltf": "glTF files can't be read yet; expected a BVH file",
+    ".amc": "AMC files can't be read yet; expected a BVH file",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """A motion on a body: a recording and, found when first asked for, its rig.
+
+    `name` is what pictures and messages call it. `roles` is the user's own map of joints
+    (`spark_sim.rolemap`), where one was given. `given_rig` is the rig, where it is known already.
+    """
+
+    recording: Recording
+    name: str
+    roles: Override | None = None
+    given_rig: Rig | None = None
+
+    @property
+    def motion(self) -> Motion:
+        """The motion in SI units, Z up."""
+        return self.recording.motion
+
+    @cached_property
+    def rig(self) -> Rig:
+        """Roles, groups and T-pose. Raises `SkeletonError` where the body is no humanoid."""
+        if self.given_rig is not None:
+            return self.given_rig
+        try:
+            return understand(self.motion, self.roles)
+        except SkeletonError as error:
+            raise SkeletonError(f"{self.recording.bvh.path or self.name}: {error}") from error
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was assumed about the file and, for a humanoid, its body."""
+        return (*self.recording.notes, *self.rig.notes)
+
+    def save(self, path: File, *, force: bool = False) -> Path:
+        """Write the motion as BVH. Raises `OutputError` where `path` exists, unless forced."""
+        path = Path(path)
+        files.claim(path, force=force)
+        write_bvh(self.recording.bvh, path)
+        return path
+
+    def save_mjcf(self, path: File, *, force: bool = False) -> tuple[Path, Path]:
+        """Write a MuJoCo model of the body, and `NAME_scene.xml` beside it, with a floor and light.
+
+        Raises `OutputError` where one of them exists, unless forced.
+        """
+        from sim.body import write_mjcf
+
+        path = Path(path)
+        for written in (path, path.with_name(f"{path.stem}_scene.xml")):
+            files.claim(written, force=force)
+        return write_mjcf(self.rig, path)
+
+
+def load(
+    path: File, *, unit: str | float | None = None, up: str | None = None, roles: File | None = None
+) -> Clip:
+    """Read a BVH file. What is not given is inferred, and said in the clip's `notes`.
+
+    `unit` is m, dm, cm, mm, inch, cmu or a number of metres; `up` is x, y or z; `roles` is a map of
+    joints in TOML, as `spark-sim inspect --save-map` writes it.
+    """
+    path = Path(path)
+    if path.suffix.lower() in _NOT_YET:
+        raise FileFormatError(path, None, _NOT_YET[path.suffix.lower()])
+    recording = read_recording(path, unit=unit, up=up)
+    names = None if roles is None else rolemap.read(roles, recording.motion.skeleton)
+    return Clip(recording, path.stem, names)
+
+
+def retarget(source: Clip | File, target: Clip | File, *, method: str = "copy") -> Clip:
+    """The motion of `source` on the body of `target`, in the hierarchy and units of its file.
+
+    Both are clips, or paths of BVH files. Raises `SkeletonError` where one is no humanoid.
+    """
+    if method != "copy":
+        raise ConventionError(f"method {method!r} is not known; expected 'copy'")
+    source, target = _clip(source), _clip(target)
+    moved = transfer(to_canonical(source.motion, source.rig), target.rig)
+    motion = from_canonical(moved)
+    bvh, lost = encode(motion, target.recording)
+    recording = replace(target.recording, bvh=bvh, motion=motion, notes=(*moved.notes, *lost))
+    # The rig is given: what is known of a body does not depend on the motion that it makes.
+    return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig)
+
+
+def report(clip: Clip | File, *, source: Clip | File | None = None) -> "Report":
+    """How believable a motion is; with `source`, beside the motion it was made from."""
+    from sim.report import judge
+
+    clip = _clip(clip)
+    if source is None:
+        return judge(clip.motion, clip.rig)
+    source = _clip(source)
+    return judge(clip.motion, clip.rig, source=(source.motion, source.rig))
+
+
+def play(
+    *clips: Clip | File,
+    video: File | None = None,
+    html: File | None = None,
+    strip: File | None = None,
+    force: bool = False,
+    progress: Callable[[Iterable[int]], Iterable[int]] = iter,
+) -> None:
+    """Show motions side by side: as a video (MP4), a web page or a strip of moments (PNG), as many
+    of them as are named; in a window where none is.
+
+    `progress` wraps the frames of the video. Raises `DependencyError` where there is no display, or
+    nothing to draw or encode with, and `OutputError` where a file exists, unless forced.
+    """
+    from sim.scene import Figure, build_scene
+    from spark.contacts import floor_height
+    from spark.kinematics import forward
+
+    for path in (video, html, strip):
+        if path is not None:
+            files.claim(Path(path), force=force)
+    shown = [_clip(clip) for clip in clips]
+    figures = [
+        Figure(c.rig, c.motion, c.name, floor_height(c.rig, *forward(c.motion))) for c in shown
+    ]
+    scene = build_scene(figures)
+    if video is not None:
+        from sim.video import write_video
+
+        write_video(scene, video, progress=progress)
+    if html is not None:
+        from sim.page import write_page
+
+        write_page(figures, html, title=" · ".join(c.name for c in shown))
+    if strip is not None:
+        from sim.video import write_strip
+
+        write_strip(scene, strip)
+    if video is html is strip is None:
+        from sim.window import open_window
+
+        open_window(scene)
+
+
+def sample(folder: File = "samples", *, force: bool = False) -> tuple[Path, ...]:
+    """Write the demo motions as BVH files into `folder`: each of them on two different rigs.
+
+    Raises `OutputError` where one of the files exists, unless forced.
+    """
+    from spark.sample import BUILDS, MOTIONS, sample_motion, sample_rig
+
+    written = {
+        (rig, motion): Path(folder) / f"{rig}_{motion}.bvh" for rig in BUILDS for motion in MOTIONS
+    }
+    for path in written.values():
+        files.claim(path, force=force)
+    for name, build in BUILDS.items():
+        rig = sample_rig(name)
+        for motion in MOTIONS:
+            made = sample_motion(motion, rig, build.fps)
+            write_bvh(encode_new(made, unit=build.unit, up=build.up), written[name, motion])
+    return tuple(written.values())
+
+
+def _clip(clip: Clip | File) -> Clip:
+    return clip if isinstance(clip, Clip) else load(clip)

@@ -1,0 +1,52 @@
+"""`spark-sim inspect`: what is understood of a file."""
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from spark_sim.commands.options import add_corrections, add_force, add_json, load
+
+SUMMARY = "show what is understood of a file"
+USAGE = "FILE... [--save-map TOML] [options]"
+DESCRIPTION = """\
+Show what is understood of each FILE: unit, up axis, frame rate, and the body:
+which joint is what, how sure that is and why, the body parts, and how far the
+rest pose is from a T-pose. What is wrong can be corrected: save the map, edit
+it, and give it back with --map."""
+EXAMPLES = """\
+examples:
+  spark-sim inspect mutant.bvh
+  spark-sim inspect mutant.bvh --save-map mutant.toml
+  spark-sim inspect mutant.bvh --map mutant.toml   # after editing
+  spark-sim retarget walk.bvh --to mutant.bvh --to-map mutant.toml
+"""
+
+
+def configure(parser: ArgumentParser) -> None:
+    parser.add_argument("files", metavar="FILE", nargs="+", help="BVH files")
+    parser.add_argument("--save-map", metavar="TOML", help="write the roles of FILE for editing")
+    add_force(parser)
+    add_json(parser, "one line for each FILE")
+    add_corrections(parser, "FILE")
+
+
+def run(args: Namespace) -> int:
+    from spark.errors import OutputError
+    from spark_sim import console, files, rolemap
+    from spark_sim.describe import describe, text
+
+    out = None if args.save_map is None else Path(args.save_map)
+    if out is not None:
+        if len(args.files) > 1:
+            raise OutputError("--save-map takes one FILE; each rig has a map of its own")
+        files.claim(out, force=args.force)
+    for path in args.files:
+        clip = load(args, path, humanoid=False)
+        described = describe(clip)
+        if args.json:
+            console.emit_json(described)
+        else:
+            console.say(text(described))
+        if out is not None:
+            rolemap.write(clip.rig, out)
+            console.note(f"{out}: edit it, then give it back with --map {out}")
+    return 0

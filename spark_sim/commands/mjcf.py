@@ -1,0 +1,37 @@
+"""`spark-sim mjcf`: a MuJoCo body from a BVH skeleton."""
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+from spark_sim.commands.options import add_corrections, add_force, load
+
+SUMMARY = "make a MuJoCo body from a BVH skeleton"
+USAGE = "RIG [-o OUT] [options]"
+DESCRIPTION = """\
+Write a MuJoCo model (MJCF) of the skeleton in RIG: one body a bone with a ball
+joint, capsules along the bones, boxes under the feet, human masses, and a free
+joint that carries it all. OUT holds the body alone; OUT_scene.xml, beside it,
+puts it on a floor and is the one to open in a viewer."""
+EXAMPLES = """\
+examples:
+  spark-sim mjcf mutant.bvh            # writes mutant.xml, mutant_scene.xml
+  spark-sim mjcf mutant.bvh -o models/m.xml
+"""
+
+
+def configure(parser: ArgumentParser) -> None:
+    parser.add_argument("rig", metavar="RIG", help="a BVH file; its motion is not needed")
+    parser.add_argument(
+        "-o", "--output", metavar="OUT", help="the file to write (default: RIG.xml, here)"
+    )
+    add_force(parser)
+    add_corrections(parser, "RIG")
+
+
+def run(args: Namespace) -> int:
+    from spark_sim import console
+
+    out = Path(args.output or f"{Path(args.rig).stem}.xml")
+    for path in load(args, args.rig).save_mjcf(out, force=args.force):
+        console.say(str(path))
+    return 0

@@ -1,0 +1,142 @@
+"""`spark-sim retarget`: motions onto another body."""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from spark_sim.commands.options import add_corrections, add_force, add_json, load
+
+if TYPE_CHECKING:
+    from spark_sim.clip import Clip
+
+SUMMARY = "put motions on another body"
+USAGE = "SRC... --to TARGET [-o OUT] [options]"
+DESCRIPTION = """\
+Put the motion of each SRC on the body of TARGET. Both may be any humanoid rig:
+joints are matched by what they are, not by name or order, and rest poses,
+axes, units and proportions may differ. The result is a BVH in TARGET's own
+hierarchy, channels, unit and axes."""
+EXAMPLES = """\
+examples:
+  spark-sim retarget walk.bvh --to mutant.bvh       # writes walk_on_mutant.bvh
+  spark-sim retarget walk.bvh --to mutant.bvh -o out.bvh
+  spark-sim retarget takes/ --to mutant.bvh -o out/ # every BVH below takes/
+"""
+
+
+def configure(parser: ArgumentParser) -> None:
+    parser.add_argument("sources", metavar="SRC", nargs="+", help="BVH files, or folders of them")
+    parser.add_argument(
+        "--to", metavar="TARGET", required=True, help="a BVH file: the body to put the motion on"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT",
+        help="the file to write; a folder for several motions "
+        "(default: SRC_on_TARGET.bvh in the current folder)",
+    )
+    parser.add_argument(
+        "--method",
+        choices=("copy",),
+        default="copy",
+        help="copy: each joint turns as its counterpart does, in world axes (default)",
+    )
+    add_force(parser)
+    add_json(parser, "one line for each result")
+    add_corrections(parser, "SRC")
+    add_corrections(parser, "TARGET", "to-")
+
+
+def run(args: Namespace) -> int:
+    from spark.errors import SparkSimError
+    from spark_sim import console, files
+
+    jobs = _jobs(args.sources, Path(args.to), args.output)
+    for _, out in jobs:
+        files.check_free(out, force=args.force)
+    target = load(args, args.to, "to-")
+    failures = 0
+    for source, out in console.progress(jobs, "retarget"):
+        try:
+            summary = _retarget(args, source, target, out)
+        except (SparkSimError, OSError) as error:
+            if len(jobs) == 1:
+                raise
+            failures += 1
+            console.error(str(error))
+            summary = {"source": str(source), "output": None, "error": str(error)}
+        if args.json:
+            console.emit_json(summary)
+        elif summary["output"] is not None:
+            console.say(
+                "{output}: {frames} frames, {fps:.6g} fps, {source_joints} -> {joints} joints, "
+                "size x {scale:.3g}".format(**summary)
+            )
+    if failures:
+        console.error(f"{failures} of {len(jobs)} motions could not be retargeted")
+    return 2 if failures else 0
+
+
+def _retarget(args: Namespace, source: Path, target: "Clip", out: Path) -> dict[str, Any]:
+    from spark_sim import console
+    from spark_sim.clip import retarget
+
+    clip = load(args, str(source))
+    result = retarget(clip, target, method=args.method)
+    console.notes(out, result.recording.notes)
+    result.save(out, force=args.force)
+    return {
+        "source": str(source),
+        "target": args.to,
+        "output": str(out),
+        "method": args.method,
+        "frames": len(result.motion),
+        "fps": result.motion.fps,
+        "source_joints": len(clip.motion.skeleton),
+        "joints": len(result.motion.skeleton),
+        "scale": result.rig.hip_height / clip.rig.hip_height,
+        "notes": [*clip.notes, *result.notes],
+    }
+
+
+def _jobs(sources: Sequence[str], target: Path, output: str | None) -> list[tuple[Path, Path]]:
+    """Pairs of a file to read and the file to write. Raises `OutputError` where two would collide.
+
+    Below a folder given as a source the tree of folders is kept.
+    """
+    from spark.errors import OutputError
+
+    found: list[tuple[Path, Path]] = []
+    for source in map(Path, sources):
+        if source.is_dir():
+            found += [(path, path.parent.relative_to(source)) for path in _bvh_files(source)]
+        else:
+            found.append((source, Path()))
+    several = len(found) > 1 or any(Path(source).is_dir() for source in sources)
+    if output is not None and not several and not _names_folder(output):
+        return [(found[0][0], Path(output))]
+    folder = Path(output or ".")
+    if folder.is_file():
+        raise OutputError(f"{folder}: is a file; expected a folder for {len(found)} motions")
+    jobs = [(path, folder / below / f"{path.stem}_on_{target.stem}.bvh") for path, below in found]
+    outputs: dict[Path, Path] = {}
+    for path, out in jobs:
+        other = outputs.setdefault(out, path)
+        if other != path:
+            raise OutputError(f"{path} and {other} would both be written to {out}; rename one")
+    return jobs
+
+
+def _names_folder(output: str) -> bool:
+    return output.endswith("/") or Path(output).is_dir()
+
+
+def _bvh_files(folder: Path) -> list[Path]:
+    from spark.errors import FileFormatError
+
+    files = sorted(path for path in folder.rglob("*") if path.suffix.lower() == ".bvh")
+    if not files:
+        raise FileFormatError(folder, None, "holds no .bvh file; expected one or more")
+    return files

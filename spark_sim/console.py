@@ -1,0 +1,64 @@
+"""What the program says: results on stdout; notes, errors and progress on stderr."""
+
+import json
+import os
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TextIO, TypeVar
+
+T = TypeVar("T")
+
+PROGRAM = "spark-sim"
+
+
+def say(text: str) -> None:
+    """A result, for people."""
+    _line(text, sys.stdout)
+
+
+def emit_json(value: Mapping[str, Any]) -> None:
+    """A result, for scripts: one object on one line, so that several make JSON lines."""
+    _line(json.dumps(value, ensure_ascii=False, allow_nan=False), sys.stdout)
+
+
+def notes(path: str | Path, notes: Sequence[str]) -> None:
+    """What was assumed of a file."""
+    if notes:
+        note(f"{Path(path).name}: {'; '.join(notes)}")
+
+
+def note(text: str) -> None:
+    """What should be known."""
+    _line(f"{PROGRAM}: note: {text}", sys.stderr)
+
+
+def error(text: str) -> None:
+    """What went wrong."""
+    _line(f"{PROGRAM}: error: {text}", sys.stderr)
+
+
+def _line(text: str, stream: TextIO) -> None:
+    """One flushed line, so that stdout and stderr keep their order; above a bar where one is up."""
+    if "tqdm" in sys.modules:
+        sys.modules["tqdm"].tqdm.write(text, file=stream)
+        stream.flush()
+    else:
+        print(text, file=stream, flush=True)
+
+
+def uses_color() -> bool:
+    """Whether stdout is a terminal whose user did not turn colours off (no-color.org)."""
+    wanted = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    return wanted and sys.stdout.isatty()
+
+
+def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterator[T]:
+    """`items`, with a bar on stderr while they are worked through; none where it is no terminal."""
+    if not sys.stderr.isatty():
+        yield from items
+        return
+    from tqdm import tqdm
+
+    # Short work needs no bar.
+    yield from tqdm(items, label, total, leave=False, dynamic_ncols=True, delay=0.5)

@@ -1,0 +1,99 @@
+"""What is understood of a clip: as data, and as text for people."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from spark.errors import SkeletonError
+from spark.rotation import quat_angle, quat_identity
+from spark_sim.clip import Clip
+
+
+def describe(clip: Clip) -> dict[str, Any]:
+    """Facts of the file and of the body, ready for JSON. Angles are degrees.
+
+    A body that is no humanoid has `"body": None` and the reason under `"refused"`.
+    """
+    motion, convention = clip.motion, clip.recording.convention
+    facts: dict[str, Any] = {
+        "file": clip.name,
+        "frames": len(motion),
+        "fps": motion.fps,
+        "frame_time": motion.frame_time,
+        "duration": motion.duration,
+        "unit": convention.unit,
+        "unit_m": convention.unit_m,
+        "up": convention.up,
+        "joints": len(motion.skeleton),
+        "body": None,
+        "refused": None,
+    }
+    try:
+        rig = clip.rig
+    except SkeletonError as error:
+        return facts | {"refused": str(error), "notes": list(clip.recording.notes)}
+    turned = np.degrees(quat_angle(quat_identity(rig.tpose), rig.tpose))
+    roles = rig.roles
+    joints = [
+        {
+            "joint": name,
+            "role": None if (role := roles.roles[j]) is None else str(role),
+            "confidence": round(roles.confidence[j], 3),
+            "reason": roles.reasons[j],
+            "groups": sorted(map(str, rig.groups[j])),
+            "tpose_angle": round(float(turned[j]), 1),
+        }
+        for j, name in enumerate(rig.skeleton.names)
+    ]
+    body = {
+        "hip_height": rig.hip_height,
+        "carrier": rig.skeleton.names[rig.carrier],
+        "joints": joints,
+    }
+    return facts | {"body": body, "notes": list(clip.notes)}
+
+
+def text(facts: dict[str, Any]) -> str:
+    """`describe`'s facts as lines for a terminal."""
+    head = [
+        facts["file"],
+        f"  {facts['frames']} frames, {facts['fps']:.6g} fps, {facts['duration']:.4g} s, "
+        f"{facts['joints']} joints",
+        f"  unit {facts['unit']} ({100 * facts['unit_m']:.4g} cm), {facts['up'].upper()} up",
+    ]
+    body = facts["body"]
+    if body is None:
+        return "\n".join([*head, f"  no body that motions can be put on: {facts['refused']}"])
+    held = [joint for joint in body["joints"] if joint["role"] is not None]
+    others = [joint["joint"] for joint in body["joints"] if joint["role"] is None]
+    rows = [("role", "joint", "sure", "T-pose", "parts", "because")]
+    rows += [
+        (
+            joint["role"],
+            joint["joint"],
+            f"{joint['confidence']:.0%}",
+            f"{joint['tpose_angle']:.0f}°",
+            ", ".join(joint["groups"]),
+            joint["reason"],
+        )
+        for joint in held
+    ]
+    lines = [
+        *head,
+        f"  hips {body['hip_height']:.3g} m above the soles; {body['carrier']} carries the body",
+        "",
+        *_columns(rows),
+    ]
+    if others:
+        lines += ["", f"  follow their parents: {', '.join(others)}"]
+    return "\n".join(lines)
+
+
+def _columns(rows: Sequence[tuple[str, ...]]) -> list[str]:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  "
+        + "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]

@@ -1,0 +1,26 @@
+"""Where results go: nothing is overwritten unasked, and that is said before the work, not after."""
+
+import os
+from pathlib import Path
+
+from spark.errors import OutputError
+
+
+def check_free(path: Path, *, force: bool) -> None:
+    """Raise `OutputError` where `path` is a folder, or exists and `force` is not given."""
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder; expected the name of a file to write")
+    if path.exists() and not force:
+        raise OutputError(f"{path}: exists; give another name, or overwrite it with --force")
+
+
+def claim(path: Path, *, force: bool) -> None:
+    """Make the folders on the way to `path`. Raises `OutputError` where it is not free, or can't be
+    written."""
+    check_free(path, force=force)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{path}: can't make its folder ({error.strerror})") from error
+    if not os.access(path.parent, os.W_OK):
+        raise OutputError(f"{path}: can't be written, its folder is read-only")

@@ -1,0 +1,125 @@
+"""The user's own map of a body, in TOML: which joint holds which role.
+
+    pelvis = "Hips"
+    spine = ["Spine", "Spine1"]     # from the pelvis outwards
+    left_toe = []                   # the body has none
+
+Roles that a map leaves out are inferred. A name that several joints share is numbered in the order
+of the file: `Bone`, `Bone#2`, `Bone#3`.
+"""
+
+import json
+import re
+import tomllib
+from difflib import get_close_matches
+from pathlib import Path
+
+from spark.errors import FileFormatError
+from spark.files import write_atomically
+from spark.naming import Override
+from spark.rig import Rig
+from spark.roles import Role
+from spark.skeleton import Skeleton
+
+_SEVERAL = (Role.SPINE, Role.NECK)
+
+_HEADER = """\
+# Which joint is what. Correct what is wrong; roles that are left out are inferred.
+# spine and neck may be several joints, from the pelvis outwards; [] where the body has none.
+"""
+
+
+def write(rig: Rig, path: str | Path) -> None:
+    """Write the roles of `rig`, and in a comment the joints that hold none."""
+    labels = _labels(rig.skeleton)
+    lines = [_HEADER]
+    for role in Role:
+        held = [labels[j] for j in rig.roles.joints(role)]
+        value = held[0] if len(held) == 1 and role not in _SEVERAL else held
+        lines.append(f"{role} = {json.dumps(value, ensure_ascii=False)}")
+    free = [label for label, role in zip(labels, rig.roles.roles, strict=True) if role is None]
+    if free:
+        lines += ["", "# The other joints follow their parents:"]
+        lines += [f"#   {json.dumps(label, ensure_ascii=False)}" for label in free]
+    write_atomically(Path(path), "\n".join([*lines, ""]).encode())
+
+
+def read(path: str | Path, skeleton: Skeleton) -> Override:
+    """The map in the file at `path`, for `skeleton`. Raises `FileFormatError` with the line."""
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        table = tomllib.loads(text)
+    except OSError as error:
+        raise FileFormatError(path, None, f"can't be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise FileFormatError(path, None, "is no text; expected TOML in UTF-8") from error
+    except tomllib.TOMLDecodeError as error:
+        found = re.search(r"\(at line (\d+)", str(error))
+        raise FileFormatError(
+            path,
+            int(found[1]) if found else None,
+            f'{error}; expected lines such as pelvis = "Hips"',
+        ) from error
+    reader = _Reader(path, text, skeleton)
+    roles = {reader.role(key): value for key, value in table.items()}
+    override = {role: reader.joints(role, value) for role, value in roles.items()}
+    reader.check_once(override)
+    return override
+
+
+class _Reader:
+    """Values of one file against one skeleton, with errors that name the line."""
+
+    def __init__(self, path: Path, text: str, skeleton: Skeleton) -> None:
+        self.path, self.text = path, text
+        self.labels = _labels(skeleton)
+
+    def role(self, key: str) -> Role:
+        if key not in tuple(Role):
+            raise self.error(key, f"role {key!r} is not known; expected one of {', '.join(Role)}")
+        return Role(key)
+
+    def joints(self, role: Role, value: object) -> tuple[int, ...]:
+        names = [value] if isinstance(value, str) else value
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            raise self.error(role, f"{role} is {value!r}; expected a joint's name, or a list")
+        if len(names) > 1 and role not in _SEVERAL:
+            raise self.error(role, f"{role} is {len(names)} joints; expected one, or [] for none")
+        return tuple(self.joint(role, name) for name in names)
+
+    def joint(self, role: Role, name: str) -> int:
+        if name not in self.labels:
+            near = get_close_matches(name, self.labels, n=3, cutoff=0.5) or self.labels[:3]
+            raise self.error(
+                role,
+                f"the skeleton has no joint {name!r}; it has {', '.join(map(repr, near))}, "
+                f"... ({len(self.labels)} joints)",
+            )
+        return self.labels.index(name)
+
+    def check_once(self, override: Override) -> None:
+        holders: dict[int, Role] = {}
+        for role, joints in override.items():
+            for j in joints:
+                if j in holders:
+                    raise self.error(
+                        role, f"{self.labels[j]!r} is {holders[j]} already; expected one role"
+                    )
+                holders[j] = role
+
+    def error(self, key: str, message: str) -> FileFormatError:
+        pattern = re.compile(rf"""\s*["']?{re.escape(key)}["']?\s*=""")
+        lines = enumerate(self.text.splitlines(), start=1)
+        line = next((number for number, line in lines if pattern.match(line)), None)
+        return FileFormatError(self.path, line, message)
+
+
+def _labels(skeleton: Skeleton) -> list[str]:
+    """A name for each joint that no other has."""
+    seen: dict[str, int] = {}
+    labels = []
+    for name in skeleton.names:
+        seen[name] = seen.get(name, 0) + 1
+        labels.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
+    return labels
