@@ -79,32 +79,32 @@ def make_skeleton(build: Build) -> Skeleton:
         return len(roles) - 1
 
     ankle = 0.039
-    pelvis = add(Role.PELVIS, -1, 0, 0, ankle + build.leg + 0.03)
+    pelvis = add(Role.PELVIS, -1, 0.0, 0.0, ankle + build.leg + 0.03)
     trunk = 0.818 - ankle - build.leg - 0.03
     below = pelvis
     for _ in range(build.spine):
-        below = add(Role.SPINE, below, 0, 0, 0.75 * trunk / build.spine)
+        below = add(Role.SPINE, below, 0.0, 0.0, 0.75 * trunk / build.spine)
     top = below
     for _ in range(build.neck):
-        below = add(Role.NECK, below, 0, 0, (0.25 * trunk + 0.052) / (build.neck + 1))
-    head = add(Role.HEAD, below, 0.005, 0, (0.25 * trunk + 0.052) / (build.neck + 1))
-    ends.append((head, (0, 0, 0.12 * h)))
+        below = add(Role.NECK, below, 0.0, 0.0, (0.25 * trunk + 0.052) / (build.neck + 1))
+    head = add(Role.HEAD, below, 0.005, 0.0, (0.25 * trunk + 0.052) / (build.neck + 1))
+    ends.append((head, (0.0, 0.0, 0.12 * h)))
     down = np.radians(build.arms_below_level)
     for side, sign in ((Group.LEFT_ARM, 1.0), (Group.RIGHT_ARM, -1.0)):
         clavicle, upper, fore, hand = LIMBS[side]
         out, drop = sign * np.cos(down), -np.sin(down)
-        at = add(clavicle, top, 0, sign * 0.02, 0.2 * trunk)
-        at = add(upper, at, 0, sign * 0.088, 0)
-        at = add(fore, at, 0, 0.172 * out, 0.172 * drop)
-        at = add(hand, at, 0, 0.157 * out, 0.157 * drop)
-        ends.append((at, (0, 0.10 * h * out, 0.10 * h * drop)))
+        at = add(clavicle, top, 0.0, sign * 0.02, 0.2 * trunk)
+        at = add(upper, at, 0.0, sign * 0.088, 0.0)
+        at = add(fore, at, 0.0, 0.172 * out, 0.172 * drop)
+        at = add(hand, at, 0.0, 0.157 * out, 0.157 * drop)
+        ends.append((at, (0.0, 0.10 * h * out, 0.10 * h * drop)))
     for side, sign in ((Group.LEFT_LEG, 1.0), (Group.RIGHT_LEG, -1.0)):
         upper, lower, foot, toe = LIMBS[side]
-        at = add(upper, pelvis, 0, sign * 0.052, -0.03)
-        at = add(lower, at, 0, 0, -0.5 * build.leg)
-        at = add(foot, at, 0, 0, -0.5 * build.leg)
-        at = add(toe, at, 0.075, 0, -ankle + 0.01)
-        ends.append((at, (0.04 * h, 0, -0.01 * h)))
+        at = add(upper, pelvis, 0.0, sign * 0.052, -0.03)
+        at = add(lower, at, 0.0, 0.0, -0.5 * build.leg)
+        at = add(foot, at, 0.0, 0.0, -0.5 * build.leg)
+        at = add(toe, at, 0.075, 0.0, -ankle + 0.01)
+        ends.append((at, (0.04 * h, 0.0, -0.01 * h)))
     return Skeleton(
         tuple(name_joints(roles, build.convention)),
         np.array(parents),
@@ -201,7 +201,7 @@ def _walk(rig: Rig, fps: float) -> CanonicalMotion:
     actor.turn(Role.SPINE, "x", np.radians(3) * np.sin(swing))
     actor.turn(Role.SPINE, "y", np.full(frames, np.radians(3)))
     actor.turn(Role.NECK, "z", np.radians(-6) * np.cos(swing))
-    _arms_down(actor, 82)
+    _arms_down(actor, 82.0)
     for sign, group in ((1.0, Group.LEFT_ARM), (-1.0, Group.RIGHT_ARM)):
         _, upper, fore, _ = LIMBS[group]
         forward = -sign * np.cos(swing)

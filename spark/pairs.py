@@ -1,0 +1,197 @@
+"""Training pairs with exact answers: one motion on two random skeletons, made while training runs.
+
+A clip is kept on its own skeleton in canonical form. For a batch, windows of it are put onto two
+random variants of that skeleton; on both, the feet are planted again where the recording's feet
+were. The network gets the first, its analytic transfer to the second, and must find the second.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from spark.features import BodyFeatures
+from spark.kinematics import local_rotations, world_positions
+from spark.plant import Leg, bend_leg, stance_correction
+from spark.roles import LIMBS, Group, Role
+from spark.rotation import quat_from_yaw, quat_mul, quat_rotate, sixd_from_quat, yaw_from_quat
+from spark.transfer import Correspondence, correspond
+from spark.variants import Variant, random_variant
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """A recording in canonical form on the network's view of its own body, at 30 fps.
+
+    `rotations` are world rotations since the T-pose, `hips` the hips' path over the floor in hip
+    heights, `planted` whether the left and the right foot stand.
+    """
+
+    name: str
+    body: BodyFeatures
+    rotations: Float[np.ndarray, "T K 4"]
+    hips: Float[np.ndarray, "T 3"]
+    planted: Bool[np.ndarray, "T 2"]
+    frame_time: float
+
+
+class Windows(NamedTuple):
+    """W windows of T frames on one body: local 6D rotations, root, and what loss terms need."""
+
+    body: BodyFeatures
+    rotations: Float[np.ndarray, "W T K 6"]
+    root: Float[np.ndarray, "W T 3"]
+
+
+class Pairs(NamedTuple):
+    """W windows on two bodies; `start` is the analytic transfer of `source` to the target."""
+
+    source: Windows
+    target: Windows
+    start: Windows
+    planted: Bool[np.ndarray, "W T 2"]
+    frame_time: float
+
+
+class PairMaker:
+    """Draws pairs from clips; the same seed gives the same pairs.
+
+    Variants are drawn anew all the time but used more than once: a pool for each body, of which one
+    is replaced a batch, keeps their making out of the way.
+    """
+
+    def __init__(
+        self, clips: Sequence[Clip], *, window: int = 64, pool: int = 24, seed: int = 0
+    ) -> None:
+        self.window, self.pool = window, pool
+        self.rng = np.random.default_rng(seed)
+        by_body: dict[int, list[Clip]] = {}
+        for clip in clips:
+            if len(clip.hips) >= window:
+                by_body.setdefault(id(clip.body), []).append(clip)
+        self._bodies = list(by_body.values())
+        frames = np.array([sum(len(c.hips) for c in group) for group in self._bodies], float)
+        self._weights = frames / frames.sum()
+        self._pools: list[list[_Stage]] = [[] for _ in self._bodies]
+        self._links: dict[tuple[int, int], Correspondence] = {}
+
+    def __iter__(self) -> Iterator[Pairs]:
+        while True:
+            yield self.draw(8)
+
+    def draw(self, windows: int) -> Pairs:
+        """`windows` windows of one body's clips on one pair of its variants."""
+        k = int(self.rng.choice(len(self._bodies), p=self._weights))
+        rotations, hips, planted = self._cut(self._bodies[k], windows)
+        source, target = self._pick(k), self._pick(k)
+        on_source = source.place(rotations, hips, planted)
+        on_target = target.place(rotations, hips, planted)
+        link = self._link(source, target)
+        copied = link.rotations(on_source, target.variant.body.rig)
+        frame_time = self._bodies[k][0].frame_time
+        return Pairs(
+            _windows(source.variant.body, on_source, hips),
+            _windows(target.variant.body, on_target, hips),
+            _windows(target.variant.body, copied, hips),
+            planted,
+            frame_time,
+        )
+
+    def _cut(
+        self, clips: list[Clip], windows: int
+    ) -> tuple[Float[np.ndarray, "W T K 4"], Float[np.ndarray, "W T 3"], Bool[np.ndarray, "W T 2"]]:
+        lengths = np.array([len(c.hips) for c in clips], float)
+        chosen = self.rng.choice(len(clips), windows, p=lengths / lengths.sum())
+        cuts = []
+        for i in chosen.tolist():
+            clip = clips[i]
+            at = int(self.rng.integers(0, len(clip.hips) - self.window + 1))
+            span = slice(at, at + self.window)
+            cuts.append((clip.rotations[span], clip.hips[span], clip.planted[span]))
+        rotations, hips, planted = (np.stack(part) for part in zip(*cuts, strict=True))
+        return rotations, hips, planted
+
+    def _pick(self, k: int) -> "_Stage":
+        pool = self._pools[k]
+        if len(pool) < self.pool or self.rng.random() < 0.25:
+            stage = _Stage(random_variant(self._bodies[k][0].body, self.rng))
+            if len(pool) < self.pool:
+                pool.append(stage)
+            else:
+                pool[int(self.rng.integers(len(pool)))] = stage
+            return stage
+        return pool[int(self.rng.integers(len(pool)))]
+
+    def _link(self, source: "_Stage", target: "_Stage") -> Correspondence:
+        key = (id(source), id(target))
+        if key not in self._links:
+            if len(self._links) > 4096:
+                self._links.clear()
+            self._links[key] = correspond(source.variant.body.rig, target.variant.body.rig)
+        return self._links[key]
+
+
+@dataclass(frozen=True, eq=False)
+class _Stage:
+    """A variant and what putting motion onto it needs."""
+
+    variant: Variant
+
+    @cached_property
+    def legs(self) -> tuple[Leg, ...]:
+        return tuple(leg_of(self.variant.body, g) for g in (Group.LEFT_LEG, Group.RIGHT_LEG))
+
+    def place(
+        self,
+        base: Float[np.ndarray, "W T K 4"],
+        hips: Float[np.ndarray, "W T 3"],
+        planted: Bool[np.ndarray, "W T 2"],
+    ) -> Float[np.ndarray, "W T J 4"]:
+        """The base's rotations on this body, with the planted feet planted."""
+        rotations = self.variant.rotations(base)
+        skeleton = self.variant.body.skeleton
+        positions = world_positions(skeleton, rotations, hips)
+        for side, leg in enumerate(self.legs):
+            move = np.stack(
+                [
+                    stance_correction(path, flags)
+                    for path, flags in zip(
+                        positions[:, :, leg.contact], planted[..., side], strict=True
+                    )
+                ]
+            )
+            rotations = bend_leg(rotations, positions, leg, move)
+        return rotations
+
+
+def leg_of(body: BodyFeatures, group: Group) -> Leg:
+    """The joints of one leg in the network's numbering."""
+    roles = [body.rig.roles.roles[j] for j in body.joints.tolist()]
+    upper, lower, foot, toe = LIMBS[group]
+    place: dict[Role, int] = {role: roles.index(role) for role in LIMBS[group] if role in roles}
+    thigh, shank, ankle = place[upper], place[lower], place[foot]
+    below_knee = set(body.skeleton.subtree(shank))
+    below_ankle = set(body.skeleton.subtree(ankle))
+    leg = set(body.skeleton.subtree(thigh))
+    return Leg(
+        thigh,
+        shank,
+        ankle,
+        place.get(toe, ankle),
+        tuple(sorted(leg - below_knee)),
+        tuple(sorted(below_knee - below_ankle)),
+    )
+
+
+def _windows(
+    body: BodyFeatures, world: Float[np.ndarray, "W T K 4"], hips: Float[np.ndarray, "W T 3"]
+) -> Windows:
+    """Seen from each window's first frame, as `spark.features.pose_features` sees one."""
+    local = local_rotations(body.skeleton, world)
+    back = quat_from_yaw(-yaw_from_quat(world[:, :1, 0]))
+    local[..., 0, :] = quat_mul(back, world[..., 0, :])
+    origin = hips[:, :1] * np.array([1.0, 1, 0])
+    return Windows(body, sixd_from_quat(local), quat_rotate(back, hips - origin))

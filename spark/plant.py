@@ -1,0 +1,83 @@
+"""Planted feet: move each stance foot to one place and bend the leg after it.
+
+Works on rotations since the T-pose in world axes, for any leading batch axes. A foot's point of
+contact (its toe, or its ankle where there is no toe) is held at its mean place over each stance;
+between stances the correction blends from one to the next, so nothing jumps. The leg follows by
+two-bone inverse kinematics in its own bending plane; the foot keeps its rotation in the world.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from spark.rotation import quat_between, quat_from_rotvec, quat_mul, quat_rotate
+
+# A leg is never stretched to more than this share of its length: the knee would lock and flip.
+_REACH = 0.999
+
+
+class Leg(NamedTuple):
+    """Joints of one leg, thigh to contact point, and the joints that turn with thigh and shank."""
+
+    upper_leg: int
+    lower_leg: int
+    foot: int
+    contact: int
+    with_thigh: tuple[int, ...]
+    with_shank: tuple[int, ...]
+
+
+def stance_correction(
+    contact_pos: Float[np.ndarray, "T 3"], planted: Bool[np.ndarray, "T"]
+) -> Float[np.ndarray, "T 3"]:
+    """What must be added to a contact point's path so that it rests while planted [same unit]."""
+    frames = np.flatnonzero(planted)
+    if not len(frames):
+        return np.zeros_like(contact_pos)
+    starts = np.flatnonzero(np.diff(frames, prepend=-2) > 1)
+    counts = np.diff(starts, append=len(frames))
+    means = np.add.reduceat(contact_pos[frames], starts) / counts[:, None]
+    held = np.repeat(means, counts, axis=0) - contact_pos[frames]
+    time = np.arange(len(planted))
+    return np.stack([np.interp(time, frames, held[:, axis]) for axis in range(3)], axis=-1)
+
+
+def bend_leg(
+    rotations: Float[np.ndarray, "*n J 4"],
+    positions: Float[np.ndarray, "*n J 3"],
+    leg: Leg,
+    move: Float[np.ndarray, "*n 3"],
+) -> Float[np.ndarray, "*n J 4"]:
+    """Rotations with the ankle moved by `move`, or as near to it as the leg reaches."""
+    hip, knee, ankle = (positions[..., j, :] for j in leg[:3])
+    thigh, shank = knee - hip, ankle - knee
+    a, b = np.linalg.norm(thigh, axis=-1), np.linalg.norm(shank, axis=-1)
+    goal = ankle + move - hip
+    reach = np.clip(np.linalg.norm(goal, axis=-1), abs(a - b) * 1.01 + 1e-9, (a + b) * _REACH)
+
+    lateral = quat_rotate(rotations[..., leg.upper_leg, :], np.array([0.0, 1, 0]))
+    axis = np.cross(thigh, shank)
+    # A straight leg bends about the body's lateral axis, backwards.
+    straight = np.linalg.norm(axis, axis=-1, keepdims=True) < 0.02 * (a * b)[..., None]
+    axis = np.where(straight, lateral, axis)
+    axis = axis / np.linalg.norm(axis, axis=-1, keepdims=True)
+    now = _flexion(np.linalg.norm(ankle - hip, axis=-1), a, b)
+    turn = quat_from_rotvec(axis * (_flexion(reach, a, b) - now)[..., None])
+    bent = thigh + quat_rotate(turn, shank)
+    swing = quat_between(bent, goal)
+
+    out = rotations.copy()
+    for j in leg.with_thigh:
+        out[..., j, :] = quat_mul(swing, rotations[..., j, :])
+    for j in leg.with_shank:
+        out[..., j, :] = quat_mul(swing, quat_mul(turn, rotations[..., j, :]))
+    return out
+
+
+def _flexion(
+    reach: Float[np.ndarray, "*n"], a: Float[np.ndarray, "*n"], b: Float[np.ndarray, "*n"]
+) -> Float[np.ndarray, "*n"]:
+    """The knee's angle from straight, by the law of cosines."""
+    cos = (reach**2 - a**2 - b**2) / (2 * a * b)
+    return np.arccos(np.clip(cos, -1.0, 1.0))

@@ -1,0 +1,184 @@
+"""Random skeletons that carry a known motion: training pairs with exact answers.
+
+Nobody has one motion on many skeletons by measurement. But a motion on a *changed copy* of its own
+skeleton is known exactly: bones scaled, joints split (as SAN does) or merged, toes, collarbones and
+hands dropped, everything renamed after another rig's convention. Rotations since the T-pose stay
+what they were, a new joint's lie between its neighbours', and only the feet need to be planted
+again (`spark.plant`).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from spark.features import BodyFeatures, body_features
+from spark.groups import groups_of
+from spark.rig import Rig
+from spark.rig_names import CONVENTIONS, HELD_OUT, name_joints, split_side
+from spark.roles import Role, RoleMap
+from spark.rotation import quat_slerp
+from spark.skeleton import Skeleton
+
+_LOG_SCALE = {  # standard deviation of the logarithm of each segment's length factor
+    "leg": 0.12,
+    "foot": 0.15,
+    "torso": 0.12,
+    "arm": 0.15,
+    "width": 0.15,
+    "head": 0.15,
+}
+_SEGMENT = {  # the bone that *ends* at a joint of this kind
+    "spine": "torso",
+    "neck": "torso",
+    "head": "head",
+    "clavicle": "width",
+    "upper_arm": "width",
+    "forearm": "arm",
+    "hand": "arm",
+    "upper_leg": "width",
+    "lower_leg": "leg",
+    "foot": "leg",
+    "toe": "foot",
+}
+_DROP = {"toe": 0.15, "clavicle": 0.15, "hand": 0.1, "spine": 0.3, "neck": 0.3}
+_SPLIT = {"spine": 0.3, "neck": 0.1, "upper_arm": 0.15, "forearm": 0.1, "lower_leg": 0.1}
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """A changed copy of a body: joint k turns from `first[k]` towards `second[k]` by `mix[k]`."""
+
+    body: BodyFeatures
+    first: Int[np.ndarray, "K"]
+    second: Int[np.ndarray, "K"]
+    mix: Float[np.ndarray, "K"]
+
+    def rotations(self, base: Float[np.ndarray, "*n J 4"]) -> Float[np.ndarray, "*n K 4"]:
+        """World rotations since the T-pose on this skeleton, from those on the base's."""
+        turned = base[..., self.first, :].copy()
+        between = np.flatnonzero(self.mix)
+        if len(between):
+            turned[..., between, :] = quat_slerp(
+                base[..., self.first[between], :],
+                base[..., self.second[between], :],
+                np.broadcast_to(self.mix[between], (*base.shape[:-2], len(between))),
+            )
+        return turned
+
+
+@dataclass
+class _Node:
+    parent: "_Node | None"
+    offset: Float[np.ndarray, "3"]
+    role: Role | None
+    first: int
+    second: int
+    mix: float = 0.0
+
+    @property
+    def kind(self) -> str:
+        return split_side(self.role)[1] if self.role else ""
+
+
+def random_variant(
+    base: BodyFeatures, rng: np.random.Generator, convention: str | None = None
+) -> Variant:
+    """A random skeleton made from `base`, named after `convention` or after a random one."""
+    if convention is None:
+        convention = str(rng.choice([name for name in CONVENTIONS if name not in HELD_OUT]))
+    nodes = _nodes(base)
+    nodes = _drop(nodes, rng)
+    nodes = _split(nodes, rng)
+    _scale(nodes, rng)
+    return _finish(nodes, base, convention)
+
+
+def _nodes(base: BodyFeatures) -> list[_Node]:
+    nodes: list[_Node] = []
+    for k, j in enumerate(base.joints.tolist()):
+        parent = None if k == 0 else nodes[int(base.skeleton.parents[k])]
+        role = base.rig.roles.roles[j]
+        nodes.append(_Node(parent, base.skeleton.offsets[k].copy(), role, k, k))
+    return nodes
+
+
+def _drop(nodes: list[_Node], rng: np.random.Generator) -> list[_Node]:
+    """Merge joints into their parents; both sides of a pair go together."""
+    whole_kind = {k: bool(rng.random() < p) for k, p in _DROP.items() if k not in ("spine", "neck")}
+    spines = [node for node in nodes if node.role is Role.SPINE]
+    dropped: list[_Node] = []
+    for node in nodes:
+        if node.parent is None or node is (spines[-1] if spines else None):
+            continue
+        chance = _DROP.get(node.kind, 0.0)
+        if (node.role is None and rng.random() < 0.5) or (
+            whole_kind[node.kind] if node.kind in whole_kind else rng.random() < chance
+        ):
+            dropped.append(node)
+            for child in nodes:
+                if child.parent is node:
+                    child.parent, child.offset = node.parent, child.offset + node.offset
+    return [node for node in nodes if not any(node is gone for gone in dropped)]
+
+
+def _split(nodes: list[_Node], rng: np.random.Generator) -> list[_Node]:
+    """Put a joint into the middle of bones. In the trunk it bends halfway, in a limb it follows."""
+    whole_kind = {kind: bool(rng.random() < p) for kind, p in _SPLIT.items()}
+    out: list[_Node] = []
+    for node in nodes:
+        if node.parent is not None and whole_kind.get(node.kind, False):
+            trunk = node.kind in ("spine", "neck")
+            role = node.role if trunk else None
+            middle = _Node(node.parent, node.offset / 2, role, node.parent.first, node.first)
+            if trunk and not (node.parent.mix or node.mix):
+                middle.mix = 0.5
+            node.parent, node.offset = middle, node.offset / 2
+            out.append(middle)
+        out.append(node)
+    return out
+
+
+def _scale(nodes: list[_Node], rng: np.random.Generator) -> None:
+    """Lengthen and shorten bones, both sides alike."""
+    factors = {name: float(np.exp(rng.normal(0, sd))) for name, sd in _LOG_SCALE.items()}
+    shares = {kind: float(np.exp(rng.normal(0, 0.06))) for kind in _SEGMENT}
+    for node in nodes:
+        kind = node.kind or (node.parent.kind if node.parent else "")
+        if kind in _SEGMENT:
+            node.offset = node.offset * factors[_SEGMENT[kind]] * shares[kind]
+
+
+def _finish(nodes: list[_Node], base: BodyFeatures, convention: str) -> Variant:
+    """Sort, measure and name: a `Rig` whose T-pose is its rest pose and whose hips are 1 high."""
+    place = {id(node): k for k, node in enumerate(nodes)}
+    parents = np.array([-1 if node.parent is None else place[id(node.parent)] for node in nodes])
+    offsets = np.stack([node.offset for node in nodes])
+    positions = offsets.copy()
+    for k in range(1, len(nodes)):
+        positions[k] += positions[parents[k]]
+    ankles = [k for k, node in enumerate(nodes) if node.kind == "foot"]
+    base_roles = [base.rig.roles.roles[j] for j in base.joints.tolist()]
+    base_ankles = [k for k, role in enumerate(base_roles) if role and split_side(role)[1] == "foot"]
+    ankle_height = 1 + base.skeleton.rest_positions[base_ankles, 2].mean()
+    hips = [k for k, node in enumerate(nodes) if node.kind == "upper_leg"]
+    height = positions[hips, 2].mean() - positions[ankles, 2].mean() + ankle_height
+    roles = tuple(node.role for node in nodes)
+    ones = (1.0,) * len(nodes)
+    role_map = RoleMap(roles, ones, ("made",) * len(nodes))
+    skeleton = Skeleton(
+        tuple(name_joints(roles, convention)),
+        parents,
+        offsets / height,
+        np.arange(len(nodes)) == 0,
+    )
+    tpose = np.tile([1.0, 0, 0, 0], (len(nodes), 1))
+    rig = Rig(skeleton, role_map, groups_of(skeleton, role_map), tpose, 0, 1.0)
+    body = body_features(rig)
+    kept = body.joints
+    return Variant(
+        body,
+        np.array([nodes[k].first for k in kept]),
+        np.array([nodes[k].second for k in kept]),
+        np.array([nodes[k].mix for k in kept]),
+    )
