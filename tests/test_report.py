@@ -99,6 +99,19 @@ def test_a_foot_that_slides_at_0_4_metres_a_second_is_reported_at_that() -> None
     np.testing.assert_allclose(slid, 0.4, atol=0.02)
 
 
+def test_one_foot_that_slides_flat_is_named_though_the_other_could_carry_the_body() -> None:
+    rig = stick_rig()
+    still = standing(rig, 120)
+    # The hip swings the straight leg by a few degrees, 0.8 m above the ankle, which stays level.
+    moving = standing(rig, 120)
+    swing = 0.15 * np.sin(0.3 / 0.8 / 0.15 * seconds(still))
+    moving.rotations[:, joint(Role.LEFT_UPPER_LEG)] = quat_about("y", -swing)
+    moving.rotations[:, joint(Role.LEFT_FOOT)] = quat_about("y", swing)
+    report = judge(moving, rig, source=(still, rig))
+    assert report.json()["clip"]["fastest_skate_m_s"] == pytest.approx(0.3, rel=0.05)
+    assert {f.where for f in report.findings if f.measure == "skating"} == {"left foot"}
+
+
 def test_a_slow_slide_is_drift_but_no_skating() -> None:
     rig = stick_rig()
     still = standing(rig, 120)

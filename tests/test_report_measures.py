@@ -12,7 +12,6 @@ from sim.report.measures import (
     horizontal_speed,
     penetration_depth,
     root_drift,
-    skating,
     spans,
 )
 from spark.roles import Role
@@ -61,12 +60,6 @@ def test_speed_is_horizontal_and_per_second() -> None:
     times = np.arange(60) / 60
     points = np.stack([0.3 * times, 0.4 * times, 5 * times], axis=-1)[:, None]
     np.testing.assert_allclose(horizontal_speed(points, 1 / 60, 0.05), 0.5, rtol=1e-9)
-
-
-def test_skating_is_low_and_fast() -> None:
-    heights = np.array([[0.02, 0.03, 0.02]])
-    speeds = np.array([[0.31, 0.31, 0.29]])
-    np.testing.assert_array_equal(skating(heights, speeds, 0.025, 0.3), [[True, False, False]])
 
 
 def test_spans_are_half_open_and_small_gaps_close() -> None:

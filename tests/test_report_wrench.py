@@ -7,6 +7,8 @@ import pytest
 from sim.anthropometry import Segments
 from sim.body import build_body
 from sim.pose import qpos_from_motion
+from sim.report.support import Support
+from sim.report.thresholds import PLAUSIBILITY_V1
 from sim.report.track import track
 from sim.report.wrench import angular_momentum, required_wrench, unexplained
 from spark.motion import Motion
@@ -129,3 +131,43 @@ def test_friction_ends_at_the_cone() -> None:
     # a body as long as this. On the cone's edge f = s (1, 0, 1): s = 1.5 leaves (0.5, 0, -0.5).
     force, _ = residual([2, 0, 1, 0, 0, 0], [[0.0, 0.0, -1e-6]], length=1e3)
     assert force == pytest.approx(np.sqrt(0.5))
+
+
+def swinging(com_y: float, heel_height: float, toe_speed: float) -> np.ndarray:
+    """Which feet skate: one rests flat at y = 0, the other passes 1.5 cm over the floor at y = 0.2.
+
+    The centre of mass hangs 0.9 m high at `com_y`.
+    """
+    corners = np.array([[x, y, 0.0] for x in (-0.05, 0.13, 0.2) for y in (-0.04, 0.04)])
+    feet = np.concatenate([corners, corners + np.array([0.0, 0.2, 0.0])])
+    heights = np.zeros(12)
+    heights[6:] = [heel_height, heel_height, 0.015, 0.015, 0.015, 0.015]
+    speeds = np.repeat([0.0, toe_speed], 6)
+    support = Support(
+        thresholds=PLAUSIBILITY_V1,
+        soles=12,
+        heights=heights[None],
+        speeds=speeds[None],
+        arms=(feet - np.array([0.1, com_y, 0.9]))[None],
+        touching=np.ones((1, 12), dtype=bool),
+        wrench=np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]]),
+        blur=0,
+        length=1.0,
+    )
+    return support.skating()[0].reshape(2, 6).any(axis=1)
+
+
+def test_a_foot_that_swings_by_low_does_not_skate() -> None:
+    assert swinging(com_y=0.0, heel_height=0.08, toe_speed=1.2).tolist() == [False, False]
+
+
+def test_a_foot_skates_when_the_body_stands_on_it() -> None:
+    assert swinging(com_y=0.2, heel_height=0.08, toe_speed=1.2).tolist() == [False, True]
+
+
+def test_a_foot_that_lies_flat_skates_whatever_stands_on_it() -> None:
+    assert swinging(com_y=0.0, heel_height=0.02, toe_speed=1.2).tolist() == [False, True]
+
+
+def test_a_foot_slower_than_the_threshold_does_not_skate() -> None:
+    assert swinging(com_y=0.2, heel_height=0.0, toe_speed=0.19).tolist() == [False, False]

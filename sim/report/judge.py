@@ -1,7 +1,6 @@
 """Judge a motion: how plausible it is, and how it differs from the motion it was made from."""
 
 import numpy as np
-from jaxtyping import Float
 
 from sim.report.derivatives import derivative
 from sim.report.findings import find
@@ -9,18 +8,15 @@ from sim.report.limits import limit_excess
 from sim.report.measures import (
     Drift,
     at_times,
-    blurred,
     floating,
     floor_height,
-    horizontal_speed,
     penetration_depth,
     root_drift,
-    skating,
 )
 from sim.report.result import Measured, Report
-from sim.report.thresholds import HUMAN_HIP_HEIGHT, PLAUSIBILITY_V1, Thresholds
+from sim.report.support import support
+from sim.report.thresholds import PLAUSIBILITY_V1
 from sim.report.track import Track, track
-from sim.report.wrench import required_wrench, unexplained
 from spark.errors import SkeletonError
 from spark.motion import Motion
 from spark.rig import Rig
@@ -54,13 +50,12 @@ def judge(motion: Motion, rig: Rig, *, source: tuple[Motion, Rig] | None = None)
 def _measure(track: Track, floor_z: float) -> Measured:
     thresholds = PLAUSIBILITY_V1.scaled(track.rig.hip_height)
     frame_time, window = track.motion.frame_time, thresholds.window
-    soles = track.points[..., 2] - floor_z
+    held = support(track, floor_z, thresholds)
     joints = track.joints[..., 2] - floor_z
-    depth = penetration_depth(np.concatenate([soles, joints], axis=1))
-    clearance = np.minimum(soles.min(axis=1), (joints - track.flesh).min(axis=1))
-    speeds = horizontal_speed(track.points, frame_time, window)
-    wrench = _unexplained(track, floor_z, thresholds)
-    skates = skating(soles, speeds, thresholds.skate_height, thresholds.skate_speed)
+    depth = penetration_depth(np.concatenate([held.heights[:, : held.soles], joints], axis=1))
+    clearance = held.heights.min(axis=1)
+    skates = held.skating()
+    wrench = held.unexplained()
     return Measured(
         frame_time=frame_time,
         floor_z=floor_z,
@@ -72,7 +67,7 @@ def _measure(track: Track, floor_z: float) -> Measured:
                 derivative(track.com[:, 2], frame_time, 2, window),
                 thresholds.floating,
                 thresholds.free_fall,
-                blur=round(window / frame_time),
+                held.blur,
             ),
             "S": np.any(skates, axis=1),
             "R": (wrench[:, 0] > thresholds.wrench_force)
@@ -82,30 +77,10 @@ def _measure(track: Track, floor_z: float) -> Measured:
         depth_names=(*track.sides, *track.joint_names),
         clearance=clearance,
         skating=skates,
-        speeds=speeds,
+        speeds=held.speeds[:, : held.soles],
         sides=track.sides,
         unexplained=wrench,
         limits=limit_excess(track.since_tpose, track.rig),
-    )
-
-
-def _unexplained(track: Track, floor_z: float, thresholds: Thresholds) -> Float[np.ndarray, "T 2"]:
-    frame_time, window = track.motion.frame_time, thresholds.window
-    below = np.array([0.0, 0.0, 1.0])
-    points = np.concatenate([track.points, track.joints - track.flesh[:, None] * below], axis=1)
-    # The wrench is a mean over the window: what touched within it may have given it.
-    touching = blurred(
-        points[..., 2] - floor_z < thresholds.contact_height, round(window / frame_time)
-    )
-    wrench = required_wrench(
-        track.segment_coms, track.world[:, track.body.joints], track.body, frame_time, window
-    )
-    return unexplained(
-        wrench,
-        points - track.com[:, None],
-        touching,
-        thresholds.friction,
-        track.rig.hip_height / HUMAN_HIP_HEIGHT,
     )
 
 

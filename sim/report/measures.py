@@ -50,16 +50,6 @@ def horizontal_speed(
     return np.linalg.norm(derivative(points[..., :2], frame_time, 1, window), axis=-1)
 
 
-def skating(
-    heights: Float[np.ndarray, "T P"],
-    speeds: Float[np.ndarray, "T P"],
-    height: float,
-    speed: float,
-) -> Bool[np.ndarray, "T P"]:
-    """S: points lower than `height` [m] over the floor that move along it faster than `speed`."""
-    return (heights < height) & (speeds > speed)
-
-
 def spans(flags: Bool[np.ndarray, "T"], gap: int = 0) -> list[tuple[int, int]]:
     """The runs of True as [start, stop); runs that at most `gap` frames separate are one."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))

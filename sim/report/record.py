@@ -36,6 +36,7 @@ _UNITS = {
     "free_fall": "m_s2",
     "skate_height": "m",
     "skate_speed": "m_s",
+    "skate_load": "bw",
     "wrench_force": "bw",
     "wrench_torque": "bw_m",
     "contact_height": "m",

@@ -17,9 +17,12 @@ class Thresholds:
     # vertical acceleration differs from gravity's by more than this [m/s²] all over the window.
     floating: float = 0.04
     free_fall: float = 4.0
-    # S: a support point lower than this [m] moves along the floor faster than this [m/s].
+    # S: a sole's corner lower than this [m] moves along the floor faster than this [m/s], and its
+    # foot lies flat (all corners within `contact_height`), or the points at rest leave more than
+    # this of the body's weight to it [body weights, body weights x 1 m].
     skate_height: float = 0.025
-    skate_speed: float = 0.3
+    skate_speed: float = 0.2
+    skate_load: float = 0.1
     # R: the force [body weights] or torque [body weights x 1 m] that the floor can't give, with
     # friction cones of this coefficient at the points lower than this [m].
     wrench_force: float = 0.15

@@ -1,0 +1,80 @@
+"""What holds the body up: the points near the floor, which of them rest, and what they can give."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from sim.report.measures import blurred, horizontal_speed
+from sim.report.thresholds import HUMAN_HIP_HEIGHT, Thresholds
+from sim.report.track import Track
+from sim.report.wrench import required_wrench, unexplained
+from spark.feet import SOLE_POINTS
+
+
+@dataclass(frozen=True, eq=False)
+class Support:
+    """The soles' corners, then the lowest points of the flesh around the other joints.
+
+    `heights` [m] over the floor and `speeds` [m/s] along it; `arms` [m] from the centre of mass.
+    `touching` is what may push: a point that is near the floor at some time within the window, for
+    `wrench`, the force and torque that the body needs, is a mean over it.
+    """
+
+    thresholds: Thresholds
+    soles: int
+    heights: Float[np.ndarray, "T P"]
+    speeds: Float[np.ndarray, "T P"]
+    arms: Float[np.ndarray, "T P 3"]
+    touching: Bool[np.ndarray, "T P"]
+    wrench: Float[np.ndarray, "T 6"]
+    blur: int
+    length: float
+
+    def unexplained(self) -> Float[np.ndarray, "T 2"]:
+        """Force [body weights] and torque [body weights x 1 m] that the floor can't give."""
+        return unexplained(
+            self.wrench, self.arms, self.touching, self.thresholds.friction, self.length
+        )
+
+    def skating(self) -> Bool[np.ndarray, "T S"]:
+        """S: the sole corners that slide under load, not those of a foot that swings by low.
+
+        They are low and fast, and the foot lies flat, or the points at rest can't hold the body.
+        """
+        limits, count = self.thresholds, self.soles
+        heights = self.heights[:, :count]
+        fast = self.speeds > limits.skate_speed
+        low_fast = (heights < limits.skate_height) & fast[:, :count]
+        feet = heights.reshape(len(heights), -1, len(SOLE_POINTS))
+        flat = np.repeat((feet < limits.contact_height).all(axis=2), len(SOLE_POINTS), axis=1)
+        loaded = np.zeros(len(heights), dtype=bool)
+        asked = low_fast.any(axis=1)
+        resting = self.touching & blurred(~fast, self.blur)
+        missing = unexplained(
+            self.wrench[asked], self.arms[asked], resting[asked], limits.friction, self.length
+        )
+        loaded[asked] = (missing > limits.skate_load * np.array([1.0, self.length])).any(axis=1)
+        return low_fast & (flat | loaded[:, None])
+
+
+def support(track: Track, floor_z: float, thresholds: Thresholds) -> Support:
+    """The support of a body whose soles' corners are the first points."""
+    frame_time, window = track.motion.frame_time, thresholds.window
+    flesh = track.joints - track.flesh[:, None] * np.array([0.0, 0.0, 1.0])
+    points = np.concatenate([track.points, flesh], axis=1)
+    heights = points[..., 2] - floor_z
+    blur = round(window / frame_time)
+    return Support(
+        thresholds=thresholds,
+        soles=track.points.shape[1],
+        heights=heights,
+        speeds=horizontal_speed(points, frame_time, window),
+        arms=points - track.com[:, None],
+        touching=blurred(heights < thresholds.contact_height, blur),
+        wrench=required_wrench(
+            track.segment_coms, track.world[:, track.body.joints], track.body, frame_time, window
+        ),
+        blur=blur,
+        length=track.rig.hip_height / HUMAN_HIP_HEIGHT,
+    )
