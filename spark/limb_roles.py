@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from itertools import combinations
 from math import log
 
+import numpy as np
+from jaxtyping import Float
+
 from spark.name_hints import NameHint
 from spark.stance import Stance
 
@@ -12,7 +15,8 @@ LEG = ("upper_leg", "lower_leg", "foot", "toe")
 ARM = ("clavicle", "upper_arm", "forearm", "hand")
 
 _NAME = 3.0  # what a sure name weighs against the geometry's few units
-_LONGEST = 14  # joints of a chain that are looked at: a hand's fingers are beyond
+_BENDS = 0.2  # a chain that bends less than this [rad] in a motion says nothing
+_LONGEST = 10  # joints of a chain that are looked at: a hand's fingers are beyond
 
 
 @dataclass(frozen=True)
@@ -50,11 +54,13 @@ def _best(
         for i in free
     }
     along = [_arc_lengths(stance, chain) for chain in chains]
+    stiff = np.mean([_stiffness(stance, chain) for chain in chains], axis=0)
     shape = _leg_shape if parts is LEG else _arm_shape
     best = Labels({}, float("-inf"))
     for places in _placements(free, parts):
         score = _NAME * sum(names[part, i] for part, i in places.items())
         score += sum(shape(places, at) for at in along) / len(chains)
+        score -= stiff[places["lower_leg" if parts is LEG else "forearm"]]
         if score > best.score + 1e-9:
             best = Labels(places, score)
     return best
@@ -80,6 +86,13 @@ def _arc_lengths(stance: Stance, chain: tuple[int, ...]) -> list[float]:
     for joint in chain[1:]:
         at.append(at[-1] + float(stance.bones[joint]))
     return [*at, at[-1] + float(stance.end_reach[chain[-1]])]
+
+
+def _stiffness(stance: Stance, chain: tuple[int, ...]) -> Float[np.ndarray, "_"]:
+    """1 for joints that never bend in a motion in which others of the chain do, 0 otherwise."""
+    bending = stance.bending(chain)
+    most = np.nanmax(bending, initial=0.0)
+    return np.where((most > _BENDS) & (bending < 0.05 * most), 1.0, 0.0)
 
 
 def _leg_shape(places: Mapping[str, int], at: list[float]) -> float:
@@ -111,7 +124,10 @@ def _arm_shape(places: Mapping[str, int], at: list[float]) -> float:
 
 
 def _near(length: float, other: float, ratio: float, spread: float) -> float:
-    """Log of a Gaussian on the log of length/other, no worse than -4."""
+    """Log of a Gaussian on the log of length/other, no worse than -4.
+
+    A last segment without a length has no End Site to tell it: that says little.
+    """
     if min(length, other) < 1e-6:
-        return -4.0 if max(length, other) > 1e-6 else -1.0
+        return -0.9 if other > 1e-6 else -4.0
     return max(-4.0, -0.5 * (log(length / (ratio * other)) / spread) ** 2)

@@ -1,18 +1,18 @@
 """The role of every joint of a rig, from its names, its build and its motion."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from spark.body_plan import BodyPlan, plan_body
 from spark.errors import SkeletonError
 from spark.facing import LabelledPair
 from spark.motion import Motion
 from spark.name_hints import NameHint, read_names
+from spark.override import Override, check_chains, check_override
 from spark.roles import Role, RoleMap
 from spark.skeleton import Skeleton
 from spark.stance import measure
 
-Override = Mapping[Role, Sequence[int]]
-"""Roles given by the user: their joints from the pelvis outwards; none where nobody holds one."""
+__all__ = ["Override", "assign_roles"]
 
 # How often each kind of evidence alone is right.
 _BY_NAME, _BY_CHAIN, _BY_SHAPE = 0.85, 0.6, 0.6
@@ -29,19 +29,30 @@ def assign_roles(
     SkeletonError with the reason where the body does not walk on two legs.
     """
     override = override or {}
+    check_override(skeleton, override)
     hints = read_names(skeleton.names)
     try:
         found = _infer(skeleton, motion, hints)
-    except SkeletonError:
-        if not all(override.get(role) for role in _NEEDED):
+    except SkeletonError as error:
+        missing = [role.value for role in _NEEDED if not override.get(role)]
+        if override and missing:
+            raise SkeletonError(f"{error}; the one given lacks {', '.join(missing)}") from error
+        if missing:
             raise
         found = {}
-    return _merge(skeleton, hints, found, override)
+    roles = _merge(skeleton, hints, found, override)
+    if override:
+        check_chains(skeleton, roles)
+    return roles
 
 
-_NEEDED = {Role.PELVIS} | {
-    Role(f"{side}_{part}_leg") for side in ("left", "right") for part in ("upper", "lower")
-}
+_NEEDED = (
+    Role.PELVIS,
+    Role.LEFT_UPPER_LEG,
+    Role.LEFT_LOWER_LEG,
+    Role.RIGHT_UPPER_LEG,
+    Role.RIGHT_LOWER_LEG,
+)
 
 Found = dict[int, tuple[Role, float, str]]
 

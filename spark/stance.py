@@ -1,5 +1,6 @@
 """How a skeleton is built and stands, measured on the frames of a motion."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -67,6 +68,19 @@ class Stance:
         """Frames in which the skeleton is taller than wide."""
         size = np.ptp(self.joints, axis=1)
         return size[:, 2] >= np.max(size[:, :2], axis=1)
+
+    def bending(self, chain: Sequence[int]) -> Float[np.ndarray, "_"]:
+        """How much [rad] the bones before and after each joint of a chain turn against each other
+        over the frames. A twist bone's joint, on the straight line between two others, does not.
+        """
+        joints = [int(self.skeleton.parents[chain[0]]), *chain]
+        points = np.concatenate([self.joints[:, joints], self.tip(chain[-1])[:, None]], axis=1)
+        bones = np.diff(points, axis=1)
+        lengths = np.linalg.norm(bones, axis=-1)
+        bones = bones / np.maximum(lengths, 1e-9)[..., None]
+        angles = np.arccos(np.clip((bones[:, 1:] * bones[:, :-1]).sum(-1), -1.0, 1.0))
+        short = lengths.min(axis=0) < 1e-6
+        return np.where(short[1:] | short[:-1], np.nan, np.ptp(angles, axis=0))
 
     def tip(self, joint: int) -> Float[np.ndarray, "T 3"]:
         """The point farthest along the bones below `joint`: its own End Site, or a joint."""
