@@ -134,12 +134,12 @@ def test_friction_ends_at_the_cone() -> None:
 
 
 def swinging(com_y: float, heel_height: float, toe_speed: float) -> np.ndarray:
-    """Which feet skate: one rests flat at y = 0, the other passes 1.5 cm over the floor at y = 0.2.
+    """Which feet skate: one rests flat at y = 0, the other passes 1.5 cm over the floor at y = 0.4.
 
     The centre of mass hangs 0.9 m high at `com_y`.
     """
     corners = np.array([[x, y, 0.0] for x in (-0.05, 0.13, 0.2) for y in (-0.04, 0.04)])
-    feet = np.concatenate([corners, corners + np.array([0.0, 0.2, 0.0])])
+    feet = np.concatenate([corners, corners + np.array([0.0, 0.4, 0.0])])
     heights = np.zeros(12)
     heights[6:] = [heel_height, heel_height, 0.015, 0.015, 0.015, 0.015]
     speeds = np.repeat([0.0, toe_speed], 6)
@@ -162,7 +162,7 @@ def test_a_foot_that_swings_by_low_does_not_skate() -> None:
 
 
 def test_a_foot_skates_when_the_body_stands_on_it() -> None:
-    assert swinging(com_y=0.2, heel_height=0.08, toe_speed=1.2).tolist() == [False, True]
+    assert swinging(com_y=0.4, heel_height=0.08, toe_speed=1.2).tolist() == [False, True]
 
 
 def test_a_foot_that_lies_flat_skates_whatever_stands_on_it() -> None:
@@ -170,4 +170,4 @@ def test_a_foot_that_lies_flat_skates_whatever_stands_on_it() -> None:
 
 
 def test_a_foot_slower_than_the_threshold_does_not_skate() -> None:
-    assert swinging(com_y=0.2, heel_height=0.0, toe_speed=0.19).tolist() == [False, False]
+    assert swinging(com_y=0.4, heel_height=0.0, toe_speed=0.19).tolist() == [False, False]
