@@ -28,7 +28,7 @@ _DETAIL = 0.006  # fingers, face and helpers
 _HEAD = np.array([0.055, 0.045, 0.068])  # half axes of the head
 _FOOT = 0.022  # half the height of a foot's box
 
-LEFT_RGBA = (0.93, 0.55, 0.42, 1.0)
+LEFT_RGBA = (0.93, 0.52, 0.36, 1.0)
 RIGHT_RGBA = (0.40, 0.60, 0.86, 1.0)
 MIDDLE_RGBA = (0.82, 0.82, 0.80, 1.0)
 

@@ -2,7 +2,7 @@
 
 import time
 
-from sim.render import has_display
+from sim import has_display
 from sim.scene import Scene
 from spark.errors import DependencyError
 
@@ -26,7 +26,7 @@ def open_window(scene: Scene) -> None:
     data = mujoco.MjData(scene.model)
     frame = 0
     with mujoco.viewer.launch_passive(scene.model, data, key_callback=on_key) as viewer:
-        viewer.cam.distance = 1.0 + 1.3 * scene.extent
+        viewer.cam.distance = 1.5 * max(scene.width, scene.height)
         viewer.cam.lookat[:] = scene.centers[0]
         while viewer.is_running():
             started = time.monotonic()

@@ -209,20 +209,24 @@ def _walk(rig: Rig, fps: float) -> CanonicalMotion:
         actor.turn(upper, "y", np.radians(-6 - 20 * forward))
         actor.turn(fore, "z", -sign * np.radians(12 + 10 * forward))
     for start, group in ((0.0, Group.LEFT_LEG), (0.5, Group.RIGHT_LEG)):
-        _step(actor, group, phase - start, stride)
+        _step(actor, group, phase, start, stride)
     return actor.finish(fps)
 
 
-def _step(actor: _Actor, group: Group, phase: Float[np.ndarray, "T"], stride: float) -> None:
-    """One foot through its strides: roll over heel, sole and ball, then swing."""
+def _step(
+    actor: _Actor, group: Group, phase: Float[np.ndarray, "T"], start: float, stride: float
+) -> None:
+    """One foot, whose strides begin at phase `start`: roll over heel, sole and toes, then swing."""
     rig = actor.rig
     sole = sole_corners(rig)[0 if group is Group.LEFT_LEG else 1]
     foot = int(sole.joints[0])
     ankle = actor.tpose[foot]
     points = actor.tpose[sole.joints] + quat_rotate(rig.tpose[sole.joints], sole.offsets)
-    heel, ball = points[:2].mean(0) - ankle, points[2:4].mean(0) - ankle
-    count = np.floor(phase)
-    u = phase - count
+    heel = points[:2].mean(0) - ankle
+    toe = rig.roles.joint(LIMBS[group][3])
+    ball = (points[2:4].mean(0) if toe is None else actor.tpose[toe]) - ankle
+    count = np.floor(phase - start)
+    u = phase - start - count
     # The foot stands where the body passes over it in mid stance.
     flat = np.array([0.25 * stride, ankle[1], ankle[2]])
     pitch = np.select(
@@ -240,7 +244,7 @@ def _step(actor: _Actor, group: Group, phase: Float[np.ndarray, "T"], stride: fl
     lift = np.array([0.0, 0, 0.07 * rig.hip_height]) * (4 * s * (1 - s)) ** 2
     swing = flat + off + (strike + np.array([stride, 0, 0]) - off) * _ease(s) + lift
     path = np.where((u < _TOE_OFF)[:, None], path, swing)
-    path[:, 0] += count * stride
+    path[:, 0] += (count + start) * stride
     actor.place_foot(group, path, pitch)
 
 
