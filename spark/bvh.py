@@ -7,6 +7,7 @@ turns them into SI.
 
 import re
 import stat
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import chain, pairwise
 from pathlib import Path
@@ -141,9 +142,9 @@ def write_bvh(bvh: Bvh, path: str | Path) -> None:
     write_atomically(Path(path), text.encode())
 
 
-def _text(numbers: list[float] | Vector) -> str:
+def _text(numbers: Iterable[float]) -> str:
     # One repr of the list is faster than one a number; many readers know no exponents.
-    text = repr(list(numbers))[1:-1].replace(",", "")
+    text = repr([*map(float, numbers)])[1:-1].replace(",", "")
     if "e" in text:
         text = " ".join(
             np.format_float_positional(float(word), trim="-") if "e" in word else word
@@ -327,7 +328,7 @@ def _parse_rows(rows: bytes, frames: int, channels: int) -> Float[np.ndarray, "T
 
 def _diagnose(scanner: Scanner, frames: int, channels: int) -> NoReturn:
     """Say why `_parse_rows` gave up: a slow second pass over the text."""
-    rows = [(line, words) for line, words in scanner.lines() if words]
+    rows = [(at, words) for at, words in scanner.lines() if words]
     for line, words in rows:
         for word in words:
             if number(word) is None:
@@ -337,7 +338,7 @@ def _diagnose(scanner: Scanner, frames: int, channels: int) -> NoReturn:
                     f"expected a finite number, at most 1e12, found {shown(word)}",
                 )
     found, needed = sum(len(words) for _, words in rows), frames * channels
-    odd = [(line, len(words)) for line, words in rows if len(words) != channels]
+    odd = [(at, len(words)) for at, words in rows if len(words) != channels]
     if found == needed:
         at, width = odd[0]
         raise FileFormatError(
@@ -350,10 +351,10 @@ def _diagnose(scanner: Scanner, frames: int, channels: int) -> NoReturn:
         else f" ({found // channels} whole frames); fetch or export the file again"
     )
     # A few odd rows are the fault; many are rows wrapped over lines.
-    at = odd[0][0] if 0 < len(odd) < max(2, len(rows) // 2) else rows[-1][0] if rows else None
+    end = rows[-1][0] if rows else None
     raise FileFormatError(
         scanner.path,
-        at,
+        odd[0][0] if 0 < len(odd) < max(2, len(rows) // 2) else end,
         f"the motion is {fault}: Frames: {frames} with {channels} channels each need {needed} "
         f"values, not {found}{remedy}",
     )

@@ -138,9 +138,10 @@ def infer_up(motion: Motion) -> tuple[Up, tuple[str, ...]]:
 
     standing = _above_feet(motion, positions)
     # Log-probabilities. X-up files hardly exist; bodies that lie down and odd rest poses do, but
-    # seldom straight along an axis all the time: hence the cubes.
+    # seldom straight along an axis all the time: hence the cubes. Some stand on their heads.
     chances = np.array([-4.0, 0.0, -1.0])
-    chances += 5.0 * standing**3 + 2.5 * _above_feet(motion, rest) ** 3
+    chances += np.where(standing > 0, 5.0, -2.0) * standing**3
+    chances += 2.5 * _above_feet(motion, rest) ** 3
     chances += 2.0 * (np.abs(floor) < 0.03)
     best, second = np.argsort(-chances)[:2].tolist()
     up = UPS[best]
