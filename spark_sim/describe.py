@@ -67,7 +67,7 @@ def text(facts: dict[str, Any]) -> str:
         return "\n".join([*head, f"  no body that motions can be put on: {facts['refused']}"])
     held = [joint for joint in body["joints"] if joint["role"] is not None]
     others = [joint["joint"] for joint in body["joints"] if joint["role"] is None]
-    rows = [("role", "joint", "sure", "T-pose", "parts", "because")]
+    rows = [("role", "joint", "sure", "rest to T", "parts", "because")]
     rows += [
         (
             joint["role"],
