@@ -1,0 +1,113 @@
+"""The Python API: what the README shows, and its laws."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import spark_sim
+from spark.errors import ConventionError, OutputError, SkeletonError
+from spark.kinematics import forward
+from spark.rotation import quat_angle
+
+
+@pytest.fixture(scope="module")
+def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("samples")
+    spark_sim.sample(folder)
+    return folder
+
+
+def test_import_is_light() -> None:
+    code = (
+        "import sys, spark_sim\n"
+        "assert not {'numpy', 'mujoco', 'torch', 'spark_sim.clip'} & set(sys.modules)\n"
+        "spark_sim.load\n"
+        "assert 'numpy' in sys.modules and not {'mujoco', 'torch'} & set(sys.modules)\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_names() -> None:
+    for name in spark_sim.__all__:
+        assert getattr(spark_sim, name).__name__ == name
+    assert set(spark_sim.__all__) < set(dir(spark_sim))
+    with pytest.raises(AttributeError, match="nonsense"):
+        _ = spark_sim.nonsense
+
+
+def test_a_saved_result_reads_back_as_the_same_motion(samples: Path, tmp_path: Path) -> None:
+    out = spark_sim.retarget(samples / "walker_walk.bvh", samples / "dancer_wave.bvh")
+    back = spark_sim.load(out.save(tmp_path / "deep" / "out.bvh"), unit="m", up="z")
+    np.testing.assert_allclose(forward(back.motion)[0], forward(out.motion)[0], atol=1e-6)
+
+
+def test_onto_its_own_body_a_motion_stays(samples: Path) -> None:
+    walk = spark_sim.load(samples / "walker_walk.bvh")
+    same = spark_sim.retarget(walk, walk)
+    np.testing.assert_allclose(forward(same.motion)[0], forward(walk.motion)[0], atol=1e-6)
+    assert quat_angle(same.motion.rotations, walk.motion.rotations).max() < 1e-6
+
+
+def test_there_and_back(samples: Path) -> None:
+    """Another body with as many spine joints loses nothing of the limbs' motion."""
+    walk = spark_sim.load(samples / "walker_walk.bvh")
+    there = spark_sim.retarget(walk, samples / "dancer_wave.bvh")
+    back = spark_sim.retarget(there, walk)
+    limbs = [j for j, n in enumerate(walk.motion.skeleton.names) if "Leg" in n or "Arm" in n]
+    ours, theirs = forward(walk.motion)[1][:, limbs], forward(back.motion)[1][:, limbs]
+    assert quat_angle(ours, theirs).max() < 1e-5
+
+
+def test_paths_and_clips_are_alike(samples: Path) -> None:
+    walk, wave = samples / "walker_walk.bvh", samples / "dancer_wave.bvh"
+    by_path = spark_sim.retarget(str(walk), wave)
+    by_clip = spark_sim.retarget(spark_sim.load(walk), spark_sim.load(wave))
+    np.testing.assert_array_equal(by_path.motion.rotations, by_clip.motion.rotations)
+    assert by_path.name == by_clip.name == "walker_walk on dancer_wave"
+
+
+def test_nothing_is_overwritten_unasked(samples: Path, tmp_path: Path) -> None:
+    walk = spark_sim.load(samples / "walker_walk.bvh")
+    walk.save(tmp_path / "a.bvh")
+    with pytest.raises(OutputError, match=r"a\.bvh: exists"):
+        walk.save(tmp_path / "a.bvh")
+    walk.save(tmp_path / "a.bvh", force=True)
+    (tmp_path / "b_scene.xml").touch()
+    with pytest.raises(OutputError, match=r"b_scene\.xml: exists"):
+        walk.save_mjcf(tmp_path / "b.xml")
+    assert not (tmp_path / "b.xml").exists()
+    for wanted in ("video", "html", "strip"):
+        with pytest.raises(OutputError, match="exists"):
+            spark_sim.play(walk, **{wanted: tmp_path / "a.bvh"})
+
+
+def test_reports(samples: Path) -> None:
+    walk = spark_sim.load(samples / "walker_walk.bvh")
+    alone, beside = spark_sim.report(walk), spark_sim.report(walk, source=walk)
+    assert alone.source is None
+    assert beside.source is not None
+    assert beside.implausible == float(beside.source.implausible.mean())
+
+
+def test_a_result_keeps_what_is_known_of_its_body(samples: Path) -> None:
+    target = spark_sim.load(samples / "dancer_wave.bvh")
+    assert spark_sim.retarget(samples / "walker_walk.bvh", target).rig is target.rig
+
+
+def test_unknown_method(samples: Path) -> None:
+    with pytest.raises(ConventionError, match="'magic' is not known; expected 'copy'"):
+        spark_sim.retarget(samples / "walker_walk.bvh", samples / "dancer_wave.bvh", method="magic")
+
+
+def test_errors_of_a_body_name_its_file(tmp_path: Path) -> None:
+    path = tmp_path / "stick.bvh"
+    path.write_text(
+        "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Zrotation\nEnd Site\n{\nOFFSET 0 1 0\n}\n}\n"
+        "MOTION\nFrames: 1\nFrame Time: 0.1\n0\n"
+    )
+    clip = spark_sim.load(path)
+    with pytest.raises(SkeletonError, match=r"stick\.bvh: not a humanoid"):
+        _ = clip.rig
