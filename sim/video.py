@@ -24,29 +24,35 @@ def write_video(
 ) -> None:
     """An H.264 video of the whole scene at its own frame rate. `progress` wraps the frames."""
     path = Path(path)
+    if not path.parent.is_dir():
+        raise OutputError(f"{path}: there is no folder {path.parent}; make it first")
+    unfinished = path.with_name(f".{path.name}.part")
     encoder = [
         *(_ffmpeg(), "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24"),
         *("-s", f"{width}x{height}", "-r", f"{1 / scene.frame_time:.6f}", "-i", "-"),
         *("-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p"),
-        *("-movflags", "+faststart", "-f", "mp4", str(path)),
+        *("-movflags", "+faststart", "-f", "mp4", str(unfinished)),
     ]
-    process = subprocess.Popen(encoder, stdin=subprocess.PIPE, stderr=subprocess.PIPE)
-    assert process.stdin is not None
-    assert process.stderr is not None
-    try:
-        picked = progress(range(len(scene.qpos)))
-        for picture in frames(scene, picked, width=width, height=height):
-            process.stdin.write(picture.tobytes())
-        process.stdin.close()
-    except BrokenPipeError:
-        pass  # the encoder has given up; its own words follow
-    except BaseException:
-        process.kill()
-        path.unlink(missing_ok=True)
-        raise
-    message = process.stderr.read().decode(errors="replace").strip()
-    if process.wait():
+    with subprocess.Popen(encoder, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdin is not None
+        assert process.stderr is not None
+        try:
+            picked = progress(range(len(scene.qpos)))
+            for picture in frames(scene, picked, width=width, height=height):
+                process.stdin.write(picture.tobytes())
+            process.stdin.close()
+            message = process.stderr.read().decode(errors="replace").strip()
+        except BrokenPipeError:  # the encoder has given up; its own words say why
+            message = process.stderr.read().decode(errors="replace").strip()
+        except BaseException:
+            process.kill()
+            process.wait()
+            unfinished.unlink(missing_ok=True)
+            raise
+    if process.returncode:
+        unfinished.unlink(missing_ok=True)
         raise OutputError(f"{path}: the video encoder failed: {message}")
+    unfinished.replace(path)
 
 
 def write_strip(

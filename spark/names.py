@@ -148,7 +148,7 @@ class T5Names:
             ) from error
         try:
             tokenizer = AutoTokenizer.from_pretrained(self.model)
-            model = T5EncoderModel.from_pretrained(self.model).eval()
+            model = T5EncoderModel.from_pretrained(self.model).train(False)
         except (OSError, ValueError) as error:
             raise DependencyError(f"no T5 model at {self.model!r}: {error}") from error
         tokens = tokenizer(names, padding=True, return_tensors="pt")

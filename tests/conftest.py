@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+import sim  # noqa: F401  (it chooses how MuJoCo draws before a test imports MuJoCo)
+
 DATA = Path(__file__).parents[2] / "shared" / "data"
 
 

@@ -1,6 +1,7 @@
 """Scenes, pictures, videos and the page: what a person looks at."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -34,6 +35,7 @@ def draw(scene: Scene, picked: list[int]) -> list[np.ndarray]:
     try:
         return [picture.copy() for picture in frames(scene, picked, width=320, height=240)]
     except DependencyError as error:
+        assert "CI" not in os.environ, error
         pytest.skip(f"no OpenGL: {error}")
 
 
@@ -54,10 +56,9 @@ def test_fast_clips_are_thinned_not_slowed() -> None:
 
 def test_pictures_show_two_bodies_that_move(scene: Scene) -> None:
     rest, raised = draw(scene, [0, 60])
-    background = np.median(rest.reshape(-1, 3), axis=0)
-    drawn = np.abs(rest.astype(int) - background).sum(-1) > 60
-    assert 0.01 < drawn.mean() < 0.6
-    columns = np.flatnonzero(drawn.any(0))
+    limbs = np.ptp(rest.astype(int), axis=-1) > 60  # limbs are orange and blue, the rest is grey
+    assert 0.01 < limbs.mean() < 0.6
+    columns = np.flatnonzero(limbs.any(0))
     assert np.diff(columns).max() > 3, "a gap between the two"
     assert np.abs(raised.astype(int) - rest).max() > 60
 
@@ -65,7 +66,7 @@ def test_pictures_show_two_bodies_that_move(scene: Scene) -> None:
 def test_video_and_strip(scene: Scene, tmp_path: Path) -> None:
     draw(scene, [0])
     short = Scene(
-        scene.model, scene.qpos[:8], scene.frame_time, scene.centers, scene.width, scene.height
+        scene.model, scene.qpos[:8], scene.frame_time, scene.centers[:8], scene.width, scene.height
     )
     write_video(short, tmp_path / "out.mp4", width=160, height=120)
     assert (tmp_path / "out.mp4").read_bytes()[4:8] == b"ftyp"
@@ -93,6 +94,7 @@ def test_page_moves_in_a_browser(tmp_path: Path) -> None:
     """Headless Chromium draws it without an error, and another moment looks different."""
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is None:
+        assert "CI" not in os.environ, "CI installs chromium"
         pytest.skip("chromium is not installed")
     text = page(figures(), title="test")
     # The page reports on itself: errors, and a checksum of what it drew at two times.
