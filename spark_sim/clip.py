@@ -11,7 +11,7 @@ from spark.canonical import from_canonical, to_canonical
 from spark.encoding import encode, encode_new
 from spark.errors import ConventionError, FileFormatError, SkeletonError
 from spark.motion import Motion
-from spark.naming import Override
+from spark.override import Override
 from spark.recording import Recording, read_recording
 from spark.rig import Rig, understand
 from spark.transfer import transfer

@@ -4,8 +4,8 @@
     spine = ["Spine", "Spine1"]     # from the pelvis outwards
     left_toe = []                   # the body has none
 
-Roles that a map leaves out are inferred. A name that several joints share is numbered in the order
-of the file: `Bone`, `Bone#2`, `Bone#3`.
+Roles that a map leaves out are inferred. Joints that share a name are told apart as
+`spark.recording` numbers them: `spark-sim inspect` shows it.
 """
 
 import json
@@ -14,9 +14,9 @@ import tomllib
 from difflib import get_close_matches
 from pathlib import Path
 
-from spark.errors import FileFormatError
+from spark.errors import FileFormatError, SkeletonError
 from spark.files import write_atomically
-from spark.naming import Override
+from spark.override import Override, check_override
 from spark.rig import Rig
 from spark.roles import Role
 from spark.skeleton import Skeleton
@@ -31,16 +31,16 @@ _HEADER = """\
 
 def write(rig: Rig, path: str | Path) -> None:
     """Write the roles of `rig`, and in a comment the joints that hold none."""
-    labels = _labels(rig.skeleton)
+    names = rig.skeleton.names
     lines = [_HEADER]
     for role in Role:
-        held = [labels[j] for j in rig.roles.joints(role)]
+        held = [names[j] for j in rig.roles.joints(role)]
         value = held[0] if len(held) == 1 and role not in _SEVERAL else held
         lines.append(f"{role} = {json.dumps(value, ensure_ascii=False)}")
-    free = [label for label, role in zip(labels, rig.roles.roles, strict=True) if role is None]
+    free = [name for name, role in zip(names, rig.roles.roles, strict=True) if role is None]
     if free:
         lines += ["", "# The other joints follow their parents:"]
-        lines += [f"#   {json.dumps(label, ensure_ascii=False)}" for label in free]
+        lines += [f"#   {json.dumps(name, ensure_ascii=False)}" for name in free]
     write_atomically(Path(path), "\n".join([*lines, ""]).encode())
 
 
@@ -64,7 +64,10 @@ def read(path: str | Path, skeleton: Skeleton) -> Override:
     reader = _Reader(path, text, skeleton)
     roles = {reader.role(key): value for key, value in table.items()}
     override = {role: reader.joints(role, value) for role, value in roles.items()}
-    reader.check_once(override)
+    try:
+        check_override(skeleton, override)
+    except SkeletonError as error:
+        raise FileFormatError(path, None, str(error)) from error
     return override
 
 
@@ -73,7 +76,7 @@ class _Reader:
 
     def __init__(self, path: Path, text: str, skeleton: Skeleton) -> None:
         self.path, self.text = path, text
-        self.labels = _labels(skeleton)
+        self.names = skeleton.names
 
     def role(self, key: str) -> Role:
         if key not in tuple(Role):
@@ -84,42 +87,20 @@ class _Reader:
         names = [value] if isinstance(value, str) else value
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
             raise self.error(role, f"{role} is {value!r}; expected a joint's name, or a list")
-        if len(names) > 1 and role not in _SEVERAL:
-            raise self.error(role, f"{role} is {len(names)} joints; expected one, or [] for none")
         return tuple(self.joint(role, name) for name in names)
 
     def joint(self, role: Role, name: str) -> int:
-        if name not in self.labels:
-            near = get_close_matches(name, self.labels, n=3, cutoff=0.5) or self.labels[:3]
+        if name not in self.names:
+            near = get_close_matches(name, self.names, n=3, cutoff=0.5) or self.names[:3]
             raise self.error(
                 role,
                 f"the skeleton has no joint {name!r}; it has {', '.join(map(repr, near))}, "
-                f"... ({len(self.labels)} joints)",
+                f"... ({len(self.names)} joints)",
             )
-        return self.labels.index(name)
-
-    def check_once(self, override: Override) -> None:
-        holders: dict[int, Role] = {}
-        for role, joints in override.items():
-            for j in joints:
-                if j in holders:
-                    raise self.error(
-                        role, f"{self.labels[j]!r} is {holders[j]} already; expected one role"
-                    )
-                holders[j] = role
+        return self.names.index(name)
 
     def error(self, key: str, message: str) -> FileFormatError:
         pattern = re.compile(rf"""\s*["']?{re.escape(key)}["']?\s*=""")
         lines = enumerate(self.text.splitlines(), start=1)
         line = next((number for number, line in lines if pattern.match(line)), None)
         return FileFormatError(self.path, line, message)
-
-
-def _labels(skeleton: Skeleton) -> list[str]:
-    """A name for each joint that no other has."""
-    seen: dict[str, int] = {}
-    labels = []
-    for name in skeleton.names:
-        seen[name] = seen.get(name, 0) + 1
-        labels.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
-    return labels
