@@ -13,9 +13,8 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import ConventionError
-from spark.kinematics import end_positions, forward, world_positions
+from spark.kinematics import end_positions, forward
 from spark.motion import Motion
-from spark.rotation import quat_identity
 
 Up = Literal["x", "y", "z"]
 UPS: tuple[Up, ...] = get_args(Up)
@@ -131,7 +130,7 @@ def infer_up(motion: Motion) -> tuple[Up, tuple[str, ...]]:
     """
     skeleton = motion.skeleton
     positions, world = forward(motion)
-    rest = world_positions(skeleton, quat_identity(world[:1]), motion.root_pos[:1])
+    rest = skeleton.rest_positions[None]
     points = np.concatenate([positions, end_positions(skeleton, positions, world)], axis=1)
     size = max(float(np.max(np.median(np.ptp(points, axis=1), axis=0))), 1e-300)
     floor = np.median(np.min(points, axis=1), axis=0) / size

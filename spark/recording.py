@@ -93,20 +93,23 @@ def _decode(bvh: Bvh) -> tuple[Motion, bool, tuple[str, ...]]:
         values = np.zeros((1, values.shape[1]))
         values[0, columns] = offsets[placed, axes]
 
-    adds_offset = _adds_offset(np.median(values[:, columns], axis=0), offsets[placed, axes], placed)
-    local = np.repeat(offsets[None], len(values), axis=0)
+    places = values[:, columns]
+    child = placed > 0
+    middle = np.median(places, axis=0)
+    adds_offset = _adds_offset(middle, offsets[placed, axes], placed)
     if adds_offset:
         notes.append("position channels of child joints are small: read as additions to the OFFSET")
-        values = values.copy()
-        values[:, columns] += np.where(placed > 0, offsets[placed, axes], 0.0)
-    local[:, placed, axes] = values[:, columns]
-
-    translating = np.zeros(len(joints), dtype=bool)
-    translating[placed] = translating[0] = True
-    middle = np.median(local, axis=0)
-    middle[0] = offsets[0]
-    still = _STILL * np.linalg.norm(middle, axis=-1).max()
-    moves = bool(np.any(np.ptp(local[:, 1:], axis=0) > still))
+        start = np.where(child, offsets[placed, axes], 0.0)
+        places, middle = places + start, middle + start
+    root_pos = np.repeat(offsets[:1], len(values), axis=0)
+    root_pos[:, axes[~child]] = places[:, ~child]
+    rest = offsets.copy()
+    rest[placed[child], axes[child]] = middle[child]
+    still = _STILL * np.linalg.norm(rest[1:], axis=-1).max(initial=0.0)
+    translations = None
+    if np.any(np.ptp(places[:, child], axis=0) > still):
+        translations = np.repeat(offsets[None], len(values), axis=0)
+        translations[:, placed, axes] = places
 
     rotations = np.repeat(quat_identity(offsets)[None], len(values), axis=0)
     for order, (members, angle_columns) in bvh.rotation_channels.items():
@@ -116,17 +119,16 @@ def _decode(bvh: Bvh) -> tuple[Motion, bool, tuple[str, ...]]:
     renamed = [name for name, joint in zip(names, joints, strict=True) if name != joint.name]
     if renamed:
         notes.append(f"repeated joint names got numbers: {name_list(renamed)}")
-    end_parents = [j for j, joint in enumerate(joints) for _ in joint.ends]
-    end_offsets = [end for joint in joints for end in joint.ends]
+    ends = [(j, end) for j, joint in enumerate(joints) for end in joint.ends]
     skeleton = Skeleton(
         names,
         np.array([joint.parent for joint in joints]),
-        middle,
-        translating,
-        np.array(end_parents, dtype=np.int64),
-        np.array(end_offsets, dtype=np.float64).reshape(-1, 3),
+        rest,
+        np.isin(np.arange(len(joints)), [0, *placed]),
+        np.array([j for j, _ in ends], dtype=np.int64),
+        np.array([end for _, end in ends], dtype=np.float64).reshape(-1, 3),
     )
-    motion = Motion(skeleton, bvh.frame_time, local[:, 0], rotations, local if moves else None)
+    motion = Motion(skeleton, bvh.frame_time, root_pos, rotations, translations)
     return motion, adds_offset, tuple(notes)
 
 
