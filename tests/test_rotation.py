@@ -1,0 +1,174 @@
+"""Rotations against scipy, in both libraries and both precisions, and where they are delicate."""
+
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation, Slerp
+
+from spark import rotation as r
+
+ORDERS = ["".join(p) for p in permutations("xyz")]
+KINDS = [
+    pytest.param(np.asarray, np.float64, 1e-12, id="numpy64"),
+    pytest.param(np.asarray, np.float32, 2e-6, id="numpy32"),
+    pytest.param(torch.as_tensor, np.float64, 1e-12, id="torch64"),
+    pytest.param(torch.as_tensor, np.float32, 2e-6, id="torch32"),
+]
+CASES = Rotation.random(200, random_state=1) * Rotation.identity()
+
+
+def wxyz(rotation: Rotation) -> np.ndarray:
+    return np.roll(rotation.as_quat(), 1, axis=-1)
+
+
+def as_matrix(q: Any) -> np.ndarray:
+    return Rotation.from_quat(np.roll(np.asarray(q, dtype=np.float64), -1, axis=-1)).as_matrix()
+
+
+@pytest.mark.parametrize(("make", "dtype", "eps"), KINDS)
+def test_conversions_agree_with_scipy(make: Any, dtype: Any, eps: float) -> None:
+    q = make(wxyz(CASES).astype(dtype))
+    other = make(wxyz(CASES[::-1]).astype(dtype))
+    v = make(np.random.default_rng(0).normal(size=(200, 3)).astype(dtype))
+    close = {"atol": 20 * eps, "rtol": 0}
+    np.testing.assert_allclose(np.asarray(r.matrix_from_quat(q)), CASES.as_matrix(), **close)
+    np.testing.assert_allclose(np.asarray(r.rotvec_from_quat(q)), CASES.as_rotvec(), **close)
+    np.testing.assert_allclose(np.asarray(r.quat_rotate(q, v)), CASES.apply(np.asarray(v)), **close)
+    for result, expected in (
+        (r.quat_from_rotvec(make(CASES.as_rotvec().astype(dtype))), CASES),
+        (r.quat_from_matrix(make(CASES.as_matrix().astype(dtype))), CASES),
+        (r.quat_from_sixd(r.sixd_from_quat(q)), CASES),
+        (r.quat_mul(q, other), CASES * CASES[::-1]),
+        (r.quat_conj(q), CASES.inv()),
+    ):
+        assert result.dtype == q.dtype
+        np.testing.assert_allclose(as_matrix(result), expected.as_matrix(), **close)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize(("make", "dtype", "eps"), KINDS)
+def test_euler_angles_are_intrinsic_as_scipys_capitals(
+    make: Any, dtype: Any, eps: float, order: str
+) -> None:
+    angles = CASES.as_euler(order.upper())
+    q = r.quat_from_euler(make(angles.astype(dtype)), order)
+    np.testing.assert_allclose(as_matrix(q), CASES.as_matrix(), atol=20 * eps)
+    back = np.asarray(r.euler_from_quat(q, order), dtype=np.float64)
+    away = np.abs(np.abs(angles[:, 1]) - np.pi / 2) > 0.05
+    np.testing.assert_allclose(back[away], angles[away], atol=400 * eps)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("middle", [np.pi / 2, -np.pi / 2])
+def test_euler_angles_at_the_singularity_give_the_same_rotation(order: str, middle: float) -> None:
+    rng = np.random.default_rng(0)
+    angles = rng.uniform(-3, 3, (50, 3))
+    angles[:, 1] = middle
+    q = r.quat_from_euler(angles, order)
+    back = r.euler_from_quat(q, order)
+    assert np.all(back[:, 2] == 0)
+    assert r.quat_angle(r.quat_from_euler(back, order), q).max() < 1e-6
+
+
+@pytest.mark.parametrize("order", ["xy", "xxy", "abc", ""])
+def test_euler_orders_that_are_none_are_refused(order: str) -> None:
+    with pytest.raises(ValueError, match="permutation"):
+        r.quat_from_euler(np.zeros(3), order)
+
+
+def test_slerp_agrees_with_scipy() -> None:
+    ends = Rotation.random(2, random_state=3)
+    fractions = np.linspace(0, 1, 11)
+    expected = Slerp([0, 1], ends)(fractions)
+    q0, q1 = (np.broadcast_to(q, (11, 4)) for q in wxyz(ends))
+    np.testing.assert_allclose(
+        as_matrix(r.quat_slerp(q0, q1, fractions)), expected.as_matrix(), atol=1e-12
+    )
+    np.testing.assert_allclose(
+        as_matrix(r.quat_slerp(q0, -q1, fractions)), expected.as_matrix(), atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_values_and_gradients_at_zero_are_finite_and_right(dtype: torch.dtype) -> None:
+    zero = torch.zeros(2, 3, dtype=dtype, requires_grad=True)
+    out = r.rotvec_from_quat(r.quat_from_rotvec(zero))
+    assert torch.equal(out, torch.zeros_like(out))
+    out.sum().backward()
+    torch.testing.assert_close(zero.grad, torch.ones_like(zero))
+
+
+@pytest.mark.parametrize("size", [1e-9, 9.99e-4, 1.001e-3, 0.5, 3.0])
+def test_gradients_agree_with_differences(size: float) -> None:
+    """On both sides of the point where the series takes over, too."""
+    direction = torch.tensor([[0.6, -0.48, 0.64]], dtype=torch.float64)
+    rotvec = (size * direction).requires_grad_()
+    assert torch.autograd.gradcheck(r.quat_from_rotvec, (rotvec,), atol=1e-6)
+    q = r.quat_from_rotvec(rotvec.detach()).requires_grad_()
+    assert torch.autograd.gradcheck(
+        lambda q: r.rotvec_from_quat(r.quat_normalize(q)), (q,), atol=1e-6
+    )
+
+
+def test_sixd_gradient_survives_degenerate_columns() -> None:
+    sixd = torch.zeros(1, 6, requires_grad=True)
+    r.matrix_from_sixd(sixd).sum().backward()
+    assert sixd.grad is not None
+    assert torch.isfinite(sixd.grad).all()
+
+
+unit = st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: sum(x * x for x in v) > 1e-3)
+
+
+@given(unit, unit)
+def test_quat_between_takes_one_direction_to_the_other(a: tuple[float], b: tuple[float]) -> None:
+    u, v = np.array(a), np.array(b)
+    u, v = u / np.linalg.norm(u), v / np.linalg.norm(v)
+    q = r.quat_between(u, v)
+    np.testing.assert_allclose(r.quat_rotate(q, u), v, atol=1e-6)
+    # The smallest such rotation: by the angle between them.
+    angle = r.quat_angle(np.array([1.0, 0, 0, 0]), q)
+    assert angle == pytest.approx(np.arctan2(np.linalg.norm(np.cross(u, v)), u @ v), abs=1e-5)
+
+
+@pytest.mark.parametrize("axis", np.eye(3))
+def test_quat_between_opposites_and_zero(axis: np.ndarray) -> None:
+    np.testing.assert_allclose(r.quat_rotate(r.quat_between(axis, -axis), axis), -axis, atol=1e-9)
+    np.testing.assert_array_equal(r.quat_between(axis, np.zeros(3)), [1, 0, 0, 0])
+
+
+@given(unit, st.integers(0, 199))
+def test_swing_twist_recomposes(a: tuple[float], case: int) -> None:
+    axis = np.array(a) / np.linalg.norm(a)
+    q = wxyz(CASES)[case]
+    swing, twist = r.quat_swing_twist(q, axis)
+    np.testing.assert_allclose(r.quat_mul(swing, twist), q, atol=1e-9)
+    np.testing.assert_allclose(np.cross(twist[1:], axis), 0, atol=1e-9)
+    assert swing[1:] @ axis == pytest.approx(0, abs=1e-9)
+
+
+@given(st.floats(-3.1, 3.1))
+def test_yaw(yaw: float) -> None:
+    q = r.quat_from_yaw(np.array([yaw]))
+    assert r.yaw_from_quat(q)[0] == pytest.approx(yaw, abs=1e-9)
+    assert r.yaw_from_quat(-q)[0] == pytest.approx(yaw, abs=1e-9)
+
+
+def test_continuous_signs() -> None:
+    angles = np.linspace(0, 12, 100)
+    q = r.quat_about("x", angles)
+    broken = np.where(np.arange(100)[:, None] % 3 == 0, -q, q)
+    mended = r.quat_continuous(broken)
+    assert (np.sum(mended[1:] * mended[:-1], axis=-1) > 0).all()
+    assert r.quat_angle(mended, q).max() < 1e-7
+
+
+def test_a_wrong_shape_is_refused_under_test() -> None:
+    """The shapes in the signatures are checked here; if they were not, this would pass silently."""
+    with pytest.raises(Exception, match=r"[Tt]ype"):
+        r.quat_mul(np.zeros((2, 3)), np.zeros((2, 4)))
