@@ -20,6 +20,22 @@ from spark.rotation import matrix_from_quat, quat_conj, quat_rotate
 _Vector = Float[np.ndarray, "3"]
 _Tensor = Float[np.ndarray, "3 3"]
 
+# Half the thickness of the flesh around a joint's bones, as fractions of the standing height.
+RADII: dict[str, float] = {
+    "pelvis": 0.055,
+    "spine": 0.055,
+    "neck": 0.030,
+    "head": 0.045,
+    "clavicle": 0.030,
+    "upper_arm": 0.026,
+    "forearm": 0.021,
+    "hand": 0.016,
+    "upper_leg": 0.043,
+    "lower_leg": 0.031,
+    "foot": 0.020,
+    "toe": 0.016,
+}
+
 # Fractions of body mass.
 PELVIS_MASS = 0.118
 TRUNK_MASS = 0.312

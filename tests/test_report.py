@@ -289,3 +289,57 @@ def test_a_tiptoe_stands_on_its_toes() -> None:
     heel = 0.25 * FOOT_LENGTH * standing_height(rig)
     flat = along(tiptoe, 2, -heel * 0.3)
     assert shares(judge(flat, rig, source=(standing(rig, 60), rig)))["P"] == 1
+
+
+def test_a_hand_in_the_chest_is_named() -> None:
+    rig = stick_rig()
+    still = standing(rig, 60)
+    pierced = standing(rig, 60)
+    # The upper arm points forward and inwards, the forearm folds back onto the breast bone.
+    upper = quat_from_yaw(np.array(-np.radians(110.0)))
+    pierced.rotations[:, joint(Role.LEFT_UPPER_ARM)] = upper
+    pierced.rotations[:, joint(Role.LEFT_FOREARM)] = quat_from_yaw(np.array(-np.radians(150.0)))
+    report = judge(pierced, rig, source=(still, rig))
+    assert any(
+        {"chest"} < set(f.where.split(", ")) and "left" in f.where
+        for f in report.findings
+        if f.measure == "self-penetration"
+    )
+    assert report.json()["clip"]["self_penetration_share"] == 1
+    # What the source does too is not held against the motion.
+    again = judge(pierced, rig, source=(pierced, rig))
+    assert again.json()["clip"]["self_penetration_share"] == 0
+    assert again.json()["source"]["self_penetration_share"] == 1
+
+
+def test_contacts_are_compared_at_the_same_times_whatever_the_frame_rates() -> None:
+    rig = stick_rig()
+
+    def hops(fps: float) -> Motion:
+        still = standing(rig, int(4 * fps), fps)
+        return along(still, 2, 0.3 * np.maximum(np.sin(2 * np.pi * seconds(still)), 0))
+
+    same = judge(hops(30), rig, source=(hops(120), rig)).contacts
+    assert same is not None
+    assert same.f1 == pytest.approx(1, abs=0.05)
+    never = judge(along(hops(30), 0, 2 * seconds(hops(30))), rig, source=(hops(120), rig)).contacts
+    assert never is not None
+    assert never.recall == 0
+
+
+def test_a_statue_beside_its_feet_is_out_of_balance() -> None:
+    rig = stick_rig()
+    still = standing(rig, 60)
+    assert judge(still, rig).clip.unbalanced_share == 0
+    leaning = standing(rig, 60)
+    angle = np.radians(30.0)
+    leaning.rotations[:, 0] = quat_about("y", angle)
+    for side in ("left", "right"):
+        leaning.rotations[:, joint(Role(f"{side}_foot"))] = quat_about("y", -angle)
+    leaning = along(leaning, 2, -0.8 * (1 - np.cos(angle)))
+    report = judge(leaning, rig, source=(still, rig))
+    assert report.clip.unbalanced_share == 1
+    # The ankles lie 0.8 sin 30° behind the hips, the toes 0.2 ahead of them; the centre of mass is
+    # a little above the hips.
+    height = report.clip.imbalance[0]
+    assert height == pytest.approx(0.8 * np.sin(angle) - 0.2 + 0.07 * np.sin(angle), abs=0.05)

@@ -7,13 +7,18 @@ from sim.report.derivatives import derivative
 from sim.report.limits import limit_excess, swing_and_twist
 from sim.report.measures import (
     at_times,
+    contact_match,
     floating,
     floor_height,
     horizontal_speed,
+    outside_hull,
     penetration_depth,
     root_drift,
     spans,
 )
+from sim.report.selfcollision import segment_distance
+from sim.report.smoothness import joint_rates
+from spark.kinematics import forward
 from spark.roles import Role
 from spark.rotation import quat_about, quat_mul
 from tests.stick import joint, standing, stick_rig
@@ -93,6 +98,72 @@ def test_swing_and_twist_add_up_for_a_turn_about_one_axis() -> None:
         turn = quat_about(axis, np.array([0.4]))
         for bone in range(3):
             np.testing.assert_allclose(swing_and_twist(turn, bone)[0], expected, atol=1e-12)
+
+
+def test_distance_from_a_square_of_support() -> None:
+    square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [9.0, 9.0]]] * 4)
+    use = np.array([[True, True, True, True, False]] * 4)
+    place = np.array([[0.5, 0.5], [1.3, 0.5], [2.0, 2.0], [0.5, -0.2]])
+    expected = [0, 0.3, np.sqrt(2), 0.2]
+    np.testing.assert_allclose(outside_hull(place, square, use), expected, rtol=1e-3)
+    assert outside_hull(place[:1], square[:1], ~use[:1] & False) == [np.inf]
+
+
+def test_contacts_precision_recall_and_f1() -> None:
+    ours = np.array([[1, 1], [1, 0], [0, 0], [1, 0]], dtype=bool)
+    theirs = np.array([[1, 0], [1, 0], [1, 0], [0, 1]], dtype=bool)
+    match = contact_match(ours, theirs)  # 2 right of 4 found and of 4 true
+    assert (match.precision, match.recall, match.f1) == (0.5, 0.5, 0.5)
+    nothing = contact_match(~ours & False, ~ours & False)
+    assert (nothing.precision, nothing.recall, nothing.f1) == (None, None, None)
+
+
+# Each: two segments, their distance.
+SEGMENTS = [
+    (((0, 0, 0), (2, 0, 0)), ((1, 1, 0), (1, 3, 0)), 1.0),
+    (((0, 0, 0), (2, 0, 0)), ((1, -1, 0.5), (1, 1, 0.5)), 0.5),
+    (((0, 0, 0), (2, 0, 0)), ((3, 0, 4), (9, 0, 4)), np.sqrt(17)),
+    (((0, 0, 0), (2, 0, 0)), ((5, 1, 0), (4, 1, 0)), np.sqrt(5)),
+    (((1, 1, 1), (1, 1, 1)), ((1, 1, 3), (1, 1, 3)), 2.0),
+    (((0, 0, 0), (0, 0, 4)), ((3, 0, 2), (3, 0, 2)), 3.0),
+    (((3, 0, 2), (3, 0, 2)), ((0, 0, 0), (0, 0, 4)), 3.0),
+]
+
+
+@pytest.mark.parametrize(("one", "other", "expected"), SEGMENTS)
+def test_distances_of_segments(one: object, other: object, expected: float) -> None:
+    first, second = np.array([one], dtype=float), np.array([other], dtype=float)
+    assert segment_distance(first, second) == pytest.approx(expected)
+    assert segment_distance(second, first) == pytest.approx(expected)
+
+
+def test_segment_distance_is_the_least_over_all_pairs_of_points() -> None:
+    rng = np.random.default_rng(1)
+    one, other = rng.normal(size=(2, 50, 2, 3))
+    s, t = np.meshgrid(np.linspace(0, 1, 101), np.linspace(0, 1, 101))
+    points = one[:, :1] + s.reshape(-1, 1) * (one[:, 1:] - one[:, :1])
+    others = other[:, :1] + t.reshape(-1, 1) * (other[:, 1:] - other[:, :1])
+    sampled = np.linalg.norm(points - others, axis=-1).min(axis=1)
+    exact = segment_distance(one, other)
+    assert (exact <= sampled + 1e-9).all()
+    np.testing.assert_allclose(exact, sampled, atol=0.03)
+
+
+@pytest.mark.parametrize("fps", [30.0, 60.0, 120.0])
+def test_speed_and_jerk_of_a_swinging_elbow(fps: float) -> None:
+    # angle = 0.5 sin 6t: speed 3 |cos 6t|, jerk 0.5 · 6³ |cos 6t| = 108 |cos 6t|.
+    rig = stick_rig()
+    motion = standing(rig, int(4 * fps), fps)
+    times = np.arange(len(motion)) / fps
+    motion.rotations[:, joint(Role.LEFT_FOREARM)] = quat_about("z", 0.5 * np.sin(6 * times))
+    names, speed, jerk = joint_rates(forward(motion)[1], rig, 1 / fps, 0.05)
+    elbow = names.index("left forearm")
+    inside = slice(len(times) // 10, -len(times) // 10)
+    # The window damps 6 rad/s by a percent or two, in both derivatives.
+    cosine = np.abs(np.cos(6 * times))[inside]
+    np.testing.assert_allclose(speed[inside, elbow], 3 * cosine, atol=0.06)
+    np.testing.assert_allclose(jerk[inside, elbow], 108 * cosine, atol=4)
+    assert speed[:, [k for k in range(len(names)) if k != elbow]].max() < 1e-9
 
 
 # Turns of one joint away from the T-pose, and the only excess they give [deg].

@@ -151,6 +151,7 @@ def swinging(com_y: float, heel_height: float, toe_speed: float) -> np.ndarray:
         arms=(feet - np.array([0.1, com_y, 0.9]))[None],
         touching=np.ones((1, 12), dtype=bool),
         wrench=np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]]),
+        static=np.ones(1, dtype=bool),
         blur=0,
         length=1.0,
     )

@@ -1,6 +1,7 @@
 """The physical plausibility report."""
 
 from sim.report.judge import judge
-from sim.report.result import Finding, Measured, Report
+from sim.report.measured import Measured
+from sim.report.result import Finding, Report
 
 __all__ = ["Finding", "Measured", "Report", "judge"]

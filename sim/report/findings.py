@@ -4,8 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from sim.report.measured import Measured
 from sim.report.measures import Drift, spans
-from sim.report.result import Finding, Measured
+from sim.report.result import Finding
 
 # Flags of one kind that are no further apart than this [s] are one event.
 _GAP = 0.1
@@ -14,14 +15,8 @@ _GAP = 0.1
 def find(clip: Measured, drift: Drift | None) -> tuple[Finding, ...]:
     """All events of a clip, the gravest of each measure first."""
     gap = int(_GAP / clip.frame_time)
-    found = [
-        *_sinking(clip, gap),
-        *_floating(clip, gap),
-        *_sliding(clip, gap),
-        *_bending(clip, gap),
-    ]
-    order = {name: i for i, name in enumerate(dict.fromkeys(f.measure for f in found))}
-    found.sort(key=lambda f: (order[f.measure], -f.amount))
+    kinds = (_sinking, _floating, _sliding, _pushed, _bending, _piercing, _tipping)
+    found = (f for kind in kinds for f in sorted(kind(clip, gap), key=lambda f: -f.amount))
     return (*found, *(_straying(drift) if drift else ()))
 
 
@@ -70,6 +65,23 @@ def _bending(clip: Measured, gap: int) -> Iterator[Finding]:
                 amount = float(excess[start:stop].max())
                 sentence = f"{limit.joint} {movement} {np.degrees(amount):.0f}° beyond its limit"
                 yield Finding("joint limit", limit.joint, start, stop, amount, "rad", sentence)
+
+
+def _piercing(clip: Measured, gap: int) -> Iterator[Finding]:
+    for (one, other), depth in zip(clip.self_pairs, clip.self_depth.T, strict=True):
+        for start, stop in spans(depth > clip.thresholds.self_penetration, gap):
+            amount = float(depth[start:stop].max())
+            where = f"{one}, {other}"
+            sentence = f"{one} and {other} go {100 * amount:.1f} cm into each other"
+            yield Finding("self-penetration", where, start, stop, amount, "m", sentence)
+
+
+def _tipping(clip: Measured, gap: int) -> Iterator[Finding]:
+    outside = np.nan_to_num(clip.imbalance)
+    for start, stop in spans(outside > clip.thresholds.balance, gap):
+        amount = float(outside[start:stop].max())
+        sentence = f"the body stands still {100 * amount:.1f} cm beside its feet, and would tip"
+        yield Finding("balance", "body", start, stop, amount, "m", sentence)
 
 
 def _straying(drift: Drift) -> Iterator[Finding]:

@@ -1,22 +1,23 @@
 """Judge a motion: how plausible it is, and how it differs from the motion it was made from."""
 
-import numpy as np
+from dataclasses import replace
 
-from sim.report.derivatives import derivative
+import numpy as np
+from jaxtyping import Bool, Float
+
 from sim.report.findings import find
-from sim.report.limits import limit_excess
+from sim.report.measured import Measured, measure
 from sim.report.measures import (
+    ContactMatch,
     Drift,
     at_times,
-    floating,
+    contact_match,
     floor_height,
-    penetration_depth,
     root_drift,
 )
-from sim.report.result import Measured, Report
-from sim.report.support import support
-from sim.report.thresholds import PLAUSIBILITY_V1
+from sim.report.result import Report
 from sim.report.track import Track, track
+from spark.contacts import planted_feet
 from spark.errors import SkeletonError
 from spark.motion import Motion
 from spark.rig import Rig
@@ -30,58 +31,33 @@ def judge(motion: Motion, rig: Rig, *, source: tuple[Motion, Rig] | None = None)
 
     The floor is the source's (the 5th percentile of its lowest sole point), scaled by the hip
     heights' ratio; without a source it is the motion's own, and a motion that floats or sinks as a
-    whole can't be told. Raises SkeletonError for a body without feet and for a clip without frames.
+    whole can't be told. The source is compared at the same times; its frame rate may be another.
+    Raises SkeletonError for a body without feet and for a clip without frames.
     """
-    if not len(motion):
-        raise SkeletonError("the motion has no frames: nothing to judge")
-    clip_track = track(motion, rig)
+    clip_track = _track(motion, rig, "the motion")
     if source is None:
-        clip = _measure(clip_track, floor_height(clip_track.lowest_point))
+        clip = measure(clip_track, floor_height(clip_track.lowest_point))
         note = "the floor is the clip's own: one that floats or sinks as a whole can't be told"
-        return Report(clip, None, None, find(clip, None), (note,))
-    source_track = track(*source)
+        return Report(clip, None, None, None, find(clip, None), (note,))
+    source_track = _track(*source, "the source")
     source_floor = floor_height(source_track.lowest_point)
     floor, notes = _floor_from_source(clip_track, source_track.rig, source_floor)
-    clip = _measure(clip_track, floor)
-    drift = _drift(clip_track, source_track)
-    return Report(clip, _measure(source_track, source_floor), drift, find(clip, drift), notes)
+    source_clip = measure(source_track, source_floor)
+    times = np.arange(len(clip_track)) * motion.frame_time
+    scale = rig.hip_height / source_track.rig.hip_height
+    clip = _beyond_source(measure(clip_track, floor), source_clip, times, scale)
+    drift = _drift(clip_track, source_track, times, scale)
+    contacts = _contacts(clip_track, source_track, times)
+    difference = abs(source_track.motion.duration - motion.duration)
+    if difference > max(0.1, 2 * motion.frame_time):
+        notes += (f"the source's duration differs by {difference:.1f} s: frames may not match",)
+    return Report(clip, source_clip, drift, contacts, find(clip, drift), notes)
 
 
-def _measure(track: Track, floor_z: float) -> Measured:
-    thresholds = PLAUSIBILITY_V1.scaled(track.rig.hip_height)
-    frame_time, window = track.motion.frame_time, thresholds.window
-    held = support(track, floor_z, thresholds)
-    joints = track.joints[..., 2] - floor_z
-    depth = penetration_depth(np.concatenate([held.heights[:, : held.soles], joints], axis=1))
-    clearance = held.heights.min(axis=1)
-    skates = held.skating()
-    wrench = held.unexplained()
-    return Measured(
-        frame_time=frame_time,
-        floor_z=floor_z,
-        thresholds=thresholds,
-        flags={
-            "P": depth.max(axis=1) > thresholds.penetration,
-            "F": floating(
-                clearance,
-                derivative(track.com[:, 2], frame_time, 2, window),
-                thresholds.floating,
-                thresholds.free_fall,
-                held.blur,
-            ),
-            "S": np.any(skates, axis=1),
-            "R": (wrench[:, 0] > thresholds.wrench_force)
-            | (wrench[:, 1] > thresholds.wrench_torque),
-        },
-        depth=depth,
-        depth_names=(*track.sides, *track.joint_names),
-        clearance=clearance,
-        skating=skates,
-        speeds=held.speeds[:, : held.soles],
-        sides=track.sides,
-        unexplained=wrench,
-        limits=limit_excess(track.since_tpose, track.rig),
-    )
+def _track(motion: Motion, rig: Rig, name: str) -> Track:
+    if not len(motion):
+        raise SkeletonError(f"{name} has no frames: nothing to judge")
+    return track(motion, rig)
 
 
 def _floor_from_source(
@@ -98,13 +74,45 @@ def _floor_from_source(
     )
 
 
-def _drift(track: Track, source: Track) -> Drift:
-    times = np.arange(len(track)) * track.motion.frame_time
-    source_time = source.motion.frame_time
+def _beyond_source(
+    clip: Measured, source: Measured, times: Float[np.ndarray, "T"], scale: float
+) -> Measured:
+    """Self-penetration only counts as far as it goes beyond the source's own."""
+    theirs = at_times(source.self_depth, source.frame_time, times) * scale
+    column = {pair: k for k, pair in enumerate(source.self_pairs)}
+    known = [k for k, pair in enumerate(clip.self_pairs) if pair in column]
+    depth = clip.self_depth.copy()
+    depth[:, known] -= theirs[:, [column[clip.self_pairs[k]] for k in known]]
+    return replace(clip, self_depth=np.maximum(depth, 0.0))
+
+
+def _drift(track: Track, source: Track, times: Float[np.ndarray, "T"], scale: float) -> Drift:
+    frame_time = source.motion.frame_time
     return root_drift(
         track.hips,
         track.heading,
-        at_times(source.hips, source_time, times),
-        at_times(source.heading, source_time, times),
-        track.rig.hip_height / source.rig.hip_height,
+        at_times(source.hips, frame_time, times),
+        at_times(source.heading, frame_time, times),
+        scale,
     )
+
+
+def _contacts(track: Track, source: Track, times: Float[np.ndarray, "T"]) -> ContactMatch:
+    ours, theirs = _planted(track), _planted(source)
+    sides = [side for side in ours if side in theirs]
+    frame_time = source.motion.frame_time
+    return contact_match(
+        np.stack([ours[side] for side in sides], axis=1),
+        at_times(
+            np.stack([theirs[side] for side in sides], axis=1).astype(float), frame_time, times
+        )
+        > 0.5,
+    )
+
+
+def _planted(track: Track) -> dict[str, Bool[np.ndarray, "T"]]:
+    """When each foot stands, by side."""
+    rig = track.rig
+    sides = [str(rig.roles.roles[j]).split("_")[0] for j in rig.contact_joints]
+    planted = planted_feet(rig, track.positions, track.motion.frame_time)
+    return dict(zip(sides, planted.T, strict=True))

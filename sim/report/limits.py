@@ -122,12 +122,17 @@ LIMITS: tuple[JointLimit, ...] = (
 
 @dataclass(frozen=True, eq=False)
 class LimitExcess:
-    """How far one joint ("left knee") goes beyond its ranges [rad]: `excess[t, e]` is 0 inside;
-    `movements[e]` says which end of which range e is."""
+    """How far one joint ("left knee") is beyond the ends of its ranges [rad]: `beyond[t, e]` is
+    negative inside; `movements[e]` says which end of which range e is."""
 
     joint: str
-    excess: Float[np.ndarray, "T 6"]
+    beyond: Float[np.ndarray, "T 6"]
     movements: tuple[str, ...]
+
+    @property
+    def excess(self) -> Float[np.ndarray, "T 6"]:
+        """How far outside its ranges the joint is [rad]; 0 inside."""
+        return np.maximum(self.beyond, 0.0)
 
 
 def limit_excess(since_tpose: Float[np.ndarray, "T J 4"], rig: Rig) -> tuple[LimitExcess, ...]:
@@ -150,7 +155,7 @@ def limit_excess(since_tpose: Float[np.ndarray, "T J 4"], rig: Rig) -> tuple[Lim
             found.append(
                 LimitExcess(
                     f"{side} {limit.name}".strip(),
-                    _excess(swing_and_twist(turn, limit.bone), np.radians(limit.ranges)),
+                    _beyond(swing_and_twist(turn, limit.bone), np.radians(limit.ranges)),
                     tuple(word for words in limit.movements for word in words),
                 )
             )
@@ -163,11 +168,10 @@ def swing_and_twist(turn: Float[np.ndarray, "T 4"], bone: int) -> Float[np.ndarr
     return rotvec_from_quat(swing) + rotvec_from_quat(twist)
 
 
-def _excess(
+def _beyond(
     angles: Float[np.ndarray, "T 3"], ranges: Float[np.ndarray, "3 2"]
 ) -> Float[np.ndarray, "T 6"]:
-    beyond = np.stack([ranges[:, 0] - angles, angles - ranges[:, 1]], axis=-1)
-    return np.maximum(beyond, 0).reshape(-1, 6)
+    return np.stack([ranges[:, 0] - angles, angles - ranges[:, 1]], axis=-1).reshape(-1, 6)
 
 
 def _joint(rig: Rig, side: str, role: str) -> int | None:

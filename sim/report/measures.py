@@ -104,3 +104,44 @@ def at_times(
     second = np.minimum(first + 1, len(values) - 1)
     fraction = (frames - first).reshape(-1, *(1,) * (values.ndim - 1))
     return (1 - fraction) * values[first] + fraction * values[second]
+
+
+def outside_hull(
+    place: Float[np.ndarray, "T 2"],
+    points: Float[np.ndarray, "T P 2"],
+    use: Bool[np.ndarray, "T P"],
+) -> Float[np.ndarray, "T"]:
+    """How far a place lies outside the convex hull of the points in use [m]; 0 inside.
+
+    The distance to a convex set is the largest over all directions of how much further the place
+    lies than the set; here over 72. Without points it is infinite.
+    """
+    angle = 2 * np.pi * np.arange(72) / 72
+    directions = np.stack([np.cos(angle), np.sin(angle)])
+    reach = np.where(use[..., None], (points - place[:, None]) @ directions, -np.inf).max(axis=1)
+    return np.maximum(-reach.min(axis=1), 0.0)
+
+
+@dataclass(frozen=True)
+class ContactMatch:
+    """How a motion's foot contacts agree with the source's, over feet and frames, in [0, 1].
+
+    None where there is nothing to be right about: no contact found, none in the source.
+    """
+
+    precision: float | None
+    recall: float | None
+    f1: float | None
+
+
+def contact_match(
+    contacts: Bool[np.ndarray, "T F"], source_contacts: Bool[np.ndarray, "T F"]
+) -> ContactMatch:
+    """Precision, recall and F1 of `contacts` where `source_contacts` is the truth."""
+    right = float((contacts & source_contacts).sum())
+    found, true = float(contacts.sum()), float(source_contacts.sum())
+    return ContactMatch(
+        right / found if found else None,
+        right / true if true else None,
+        2 * right / (found + true) if found + true else None,
+    )

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from sim.report.measured import FLAGS, Measured
 from sim.report.measures import Drift, spans
-from sim.report.result import FLAGS, Finding, Measured, Report
+from sim.report.result import Finding, Report
 
 SCHEMA = "spark-sim report 1"
 
@@ -18,13 +19,14 @@ def record(report: Report) -> dict[str, Any]:
         "schema": SCHEMA,
         "thresholds": clip.thresholds.version,
         "threshold_values": _threshold_values(clip),
-        "frames": len(clip.clearance),
+        "frames": len(clip),
         "frame_time_s": clip.frame_time,
         "implausible_share": report.implausible,
         "clip": _measured(clip),
         "source": None if report.source is None else _measured(report.source),
         "difference_to_source": None if report.source is None else _difference(report),
         "root_drift": None if report.drift is None else _drift(report.drift),
+        "foot_contacts": None if report.contacts is None else asdict(report.contacts),
         "findings": [_finding(finding, clip.frame_time) for finding in report.findings],
         "notes": list(report.notes),
     }
@@ -41,6 +43,11 @@ _UNITS = {
     "wrench_torque": "bw_m",
     "contact_height": "m",
     "friction": "",
+    "self_penetration": "m",
+    "limit_margin": "rad",
+    "static_speed": "m_s",
+    "static_acceleration": "m_s2",
+    "balance": "m",
     "window": "s",
 }
 
@@ -52,7 +59,7 @@ def _threshold_values(clip: Measured) -> dict[str, float]:
 
 def _measured(clip: Measured) -> dict[str, Any]:
     return {
-        "implausible_share": float(clip.implausible.mean()),
+        "implausible_share": clip.implausible_share,
         "floor_z_m": clip.floor_z,
         "flags": {
             FLAGS[letter]: {
@@ -66,6 +73,14 @@ def _measured(clip: Measured) -> dict[str, Any]:
         "fastest_skate_m_s": float(np.where(clip.skating, clip.speeds, 0.0).max()),
         "largest_unexplained_force_bw": float(clip.unexplained[:, 0].max()),
         "largest_unexplained_torque_bw_m": float(clip.unexplained[:, 1].max()),
+        "joint_limit_share": clip.limit_share,
+        "at_limit_share": clip.at_limit_share,
+        "self_penetration_share": float(clip.self_penetration.mean()),
+        "deepest_self_penetration_m": float(clip.self_depth.max(initial=0.0)),
+        "unbalanced_share_of_static": clip.unbalanced_share,
+        "static_share": float(np.isfinite(clip.imbalance).mean()),
+        "largest_joint_speed_rad_s": float(clip.joint_speed.max(initial=0.0)),
+        "joint_jerk_rms_rad_s3": clip.jerk_rms,
         "joint_limits": {
             limit.joint: {
                 "share": clip.limit_shares[limit.joint],
@@ -80,8 +95,7 @@ def _difference(report: Report) -> dict[str, float]:
     assert report.source is not None
     ours, theirs = report.clip.shares, report.source.shares
     shares = {f"{FLAGS[letter]}_share": ours[letter] - theirs[letter] for letter in ours}
-    source = float(report.source.implausible.mean())
-    return {"implausible_share": report.implausible - source, **shares}
+    return {"implausible_share": report.implausible - report.source.implausible_share, **shares}
 
 
 def _drift(drift: Drift) -> dict[str, Any]:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sim.report.measures import blurred, horizontal_speed
+from sim.report.derivatives import derivative
+from sim.report.measures import blurred, horizontal_speed, outside_hull
 from sim.report.thresholds import HUMAN_HIP_HEIGHT, Thresholds
 from sim.report.track import Track
 from sim.report.wrench import required_wrench, unexplained
@@ -18,7 +19,8 @@ class Support:
 
     `heights` [m] over the floor and `speeds` [m/s] along it; `arms` [m] from the centre of mass.
     `touching` is what may push: a point that is near the floor at some time within the window, for
-    `wrench`, the force and torque that the body needs, is a mean over it.
+    `wrench`, the force and torque that the body needs, is a mean over it. `static` frames are those
+    in which the centre of mass hardly moves.
     """
 
     thresholds: Thresholds
@@ -28,6 +30,7 @@ class Support:
     arms: Float[np.ndarray, "T P 3"]
     touching: Bool[np.ndarray, "T P"]
     wrench: Float[np.ndarray, "T 6"]
+    static: Bool[np.ndarray, "T"]
     blur: int
     length: float
 
@@ -57,6 +60,13 @@ class Support:
         loaded[asked] = (missing > limits.skate_load * np.array([1.0, self.length])).any(axis=1)
         return low_fast & (flat | loaded[:, None])
 
+    def imbalance(self) -> Float[np.ndarray, "T"]:
+        """How far the centre of mass lies outside what it stands on [m]; nan in frames that move,
+        and where nothing is near the floor."""
+        near = self.heights < self.thresholds.contact_height
+        outside = outside_hull(np.zeros((len(near), 2)), self.arms[..., :2], near)
+        return np.where(self.static & near.any(axis=1), outside, np.nan)
+
 
 def support(track: Track, floor_z: float, thresholds: Thresholds) -> Support:
     """The support of a body whose soles' corners are the first points."""
@@ -65,6 +75,8 @@ def support(track: Track, floor_z: float, thresholds: Thresholds) -> Support:
     points = np.concatenate([track.points, flesh], axis=1)
     heights = points[..., 2] - floor_z
     blur = round(window / frame_time)
+    speed = np.linalg.norm(derivative(track.com, frame_time, 1, window), axis=1)
+    acceleration = np.linalg.norm(derivative(track.com, frame_time, 2, window), axis=1)
     return Support(
         thresholds=thresholds,
         soles=track.points.shape[1],
@@ -75,6 +87,7 @@ def support(track: Track, floor_z: float, thresholds: Thresholds) -> Support:
         wrench=required_wrench(
             track.segment_coms, track.world[:, track.body.joints], track.body, frame_time, window
         ),
+        static=(speed < thresholds.static_speed) & (acceleration < thresholds.static_acceleration),
         blur=blur,
         length=track.rig.hip_height / HUMAN_HIP_HEIGHT,
     )

@@ -1,8 +1,11 @@
 """The report as text."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from sim.report.result import FLAGS, Finding, Report
+from sim.report.measured import FLAGS, Measured
+from sim.report.result import Finding, Report
 
 _RED, _YELLOW, _GREEN, _DIM, _BOLD = 31, 33, 32, 2, 1
 _SHOWN = 3  # of the findings of one measure
@@ -18,33 +21,19 @@ def render(report: Report, *, color: bool) -> str:
         return paint(text, _GREEN if share <= 0.01 else _YELLOW if share <= 0.05 else _RED)
 
     clip, source = report.clip, report.source
-    frames = len(clip.clearance)
+    duration = (len(clip) - 1) * clip.frame_time
     headline = f"{_percent(report.implausible)} of the frames are implausible"
+    beside = "" if source is None else f"; of the source's {_percent(source.implausible_share)}"
     lines = [
-        paint(graded(report.implausible, headline), _BOLD)
-        + f"  ({frames} frames, {(frames - 1) * clip.frame_time:.1f} s)"
+        f"{paint(graded(report.implausible, headline), _BOLD)}{beside}",
+        paint(f"{len(clip)} frames, {duration:.1f} s", _DIM),
+        "",
     ]
-    if source is not None:
-        lines[0] += f"; of the source's {_percent(float(source.implausible.mean()))}"
-    lines.append("")
-    for letter, name in FLAGS.items():
-        if letter not in clip.flags:
-            continue
-        share = clip.shares[letter]
-        line = f"  {name:<14}{graded(share, f'{_percent(share):>8}')}"
-        lines.append(line + ("" if source is None else _beside(source.shares[letter])))
-    beyond = max(clip.limit_shares.values(), default=0.0)
-    line = f"  {'joint limits':<14}{graded(beyond, f'{_percent(beyond):>8}')}"
-    if source is not None:
-        line += _beside(max(source.limit_shares.values(), default=0.0))
-    lines.append(line + paint("  the worst joint", _DIM))
-    if report.drift is not None:
-        drift = report.drift
-        lines.append(
-            f"  {'root drift':<14}{drift.distance.max():>6.2f} m  at most, "
-            f"{drift.distance[-1]:.2f} m at the end of a path of {drift.path_length:.1f} m; "
-            f"heading {np.degrees(np.abs(drift.heading).max()):.0f}° at most"
-        )
+    theirs = {} if source is None else dict(_shares(source))
+    for name, share in _shares(clip):
+        line = f"  {name:<18}{graded(share, f'{_percent(share):>8}')}"
+        lines.append(line + (f"   source {_percent(theirs[name]):>8}" if name in theirs else ""))
+    lines += [f"  {name:<18}{words}" for name, words in _figures(report)]
     lines += ["", *_verdict(report.findings, clip.frame_time)]
     if report.notes:
         lines += ["", *(paint(f"note: {note}", _DIM) for note in report.notes)]
@@ -67,5 +56,32 @@ def _percent(share: float) -> str:
     return f"{100 * share:.1f} %"
 
 
-def _beside(source_share: float) -> str:
-    return f"   source {_percent(source_share):>7}"
+def _shares(clip: Measured) -> Iterator[tuple[str, float]]:
+    for letter, name in FLAGS.items():
+        yield name, clip.shares[letter]
+    yield "joint limits", clip.limit_share
+    yield "self-penetration", float(clip.self_penetration.mean())
+    if clip.unbalanced_share is not None:
+        yield "out of balance", clip.unbalanced_share
+
+
+def _figures(report: Report) -> Iterator[tuple[str, str]]:
+    clip, source, drift, contacts = report.clip, report.source, report.drift, report.contacts
+    if contacts is not None and contacts.f1 is not None:
+        missed = 0.0 if contacts.recall is None else 1 - contacts.recall
+        words = f"{contacts.f1:>8.2f}   F1 against the source; {_percent(missed)} missed"
+        yield "foot contacts", words
+    if drift is not None:
+        yield (
+            "root drift",
+            f"{drift.distance.max():>6.2f} m   at most; {drift.distance[-1]:.2f} m at the end of a "
+            f"path of {drift.path_length:.1f} m; heading "
+            f"{np.degrees(np.abs(drift.heading).max()):.0f}° at most",
+        )
+    for name, unit, value in (
+        ("joint speed", "rad/s", lambda clip: float(clip.joint_speed.max(initial=0.0))),
+        ("joint jerk", "rad/s³", lambda clip: clip.jerk_rms),
+    ):
+        beside = "" if source is None else f"   source {value(source):.0f}"
+        kind = "at most" if name == "joint speed" else "RMS"
+        yield name, f"{value(clip):>8.0f} {unit} {kind}{beside}"

@@ -29,6 +29,16 @@ class Thresholds:
     wrench_torque: float = 0.15
     contact_height: float = 0.04
     friction: float = 1.0
+    # Self-penetration: a part of the body is deeper in another, no neighbour, than this [m] beyond
+    # what it is in the source.
+    self_penetration: float = 0.02
+    # At its limit: a joint is within this [rad] of its limit, or beyond.
+    limit_margin: float = 0.0087
+    # Balance, in frames in which the centre of mass is slower than this [m/s] and accelerates less
+    # than this [m/s²]: it lies further outside the points near the floor than this [m].
+    static_speed: float = 0.1
+    static_acceleration: float = 0.5
+    balance: float = 0.03
     # Time [s] over which velocities and accelerations are taken, whatever the frame rate.
     window: float = 0.05
 
@@ -46,6 +56,9 @@ class Thresholds:
             skate_speed=self.skate_speed * scale,
             wrench_torque=self.wrench_torque * scale,
             contact_height=self.contact_height * scale,
+            self_penetration=self.self_penetration * scale,
+            static_speed=self.static_speed * scale,
+            balance=self.balance * scale,
         )
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from sim.anthropometry import Segments, segments
+from sim.anthropometry import RADII, Segments, segments
 from spark.errors import SkeletonError
 from spark.feet import SOLE_POINTS, sole_corners, sole_positions, standing_height
 from spark.kinematics import forward
@@ -14,19 +14,8 @@ from spark.rig import Rig
 from spark.roles import Role
 from spark.rotation import quat_conj, quat_mul, quat_rotate, yaw_from_quat
 
-# Flesh around a joint, as a fraction of the standing height: how far above the floor the joint of a
-# body that lies, sits or kneels comes to rest. Feet have soles instead.
-_FLESH = {
-    Role.PELVIS: 0.060,
-    Role.SPINE: 0.060,
-    Role.NECK: 0.040,
-    Role.HEAD: 0.060,
-    "upper_arm": 0.035,
-    "forearm": 0.025,
-    "hand": 0.020,
-    "upper_leg": 0.050,
-    "lower_leg": 0.035,
-}
+# They have soles, or lie inside other flesh.
+_NO_FLESH = ("foot", "toe", "clavicle")
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +69,9 @@ def track(motion: Motion, rig: Rig) -> Track:
     coms = positions[:, body.joints] + quat_rotate(world[:, body.joints], body.coms)
     height = standing_height(rig)
     others = [
-        (j, role, flesh)
+        (j, role)
         for j, role in enumerate(rig.roles.roles)
-        if role is not None and (flesh := _flesh(role)) is not None
+        if role is not None and kind_of(role) not in _NO_FLESH
     ]
     return Track(
         motion=motion,
@@ -90,9 +79,9 @@ def track(motion: Motion, rig: Rig) -> Track:
         points=np.concatenate([sole_positions(s, positions, world) for s in soles], axis=1),
         point_names=tuple(f"{sole.side} {name}" for sole in soles for name in SOLE_POINTS),
         sides=tuple(f"{sole.side} foot" for sole in soles for _ in SOLE_POINTS),
-        joints=positions[:, [j for j, _, _ in others]],
-        joint_names=tuple(role.replace("_", " ") for _, role, _ in others),
-        flesh=height * np.array([flesh for _, _, flesh in others]),
+        joints=positions[:, [j for j, _ in others]],
+        joint_names=tuple(role.replace("_", " ") for _, role in others),
+        flesh=height * np.array([RADII[kind_of(role)] for _, role in others]),
         segment_coms=coms,
         com=np.einsum("s,tsx->tx", body.masses, coms),
         hips=positions[:, rig.hips].mean(axis=1),
@@ -104,5 +93,6 @@ def track(motion: Motion, rig: Rig) -> Track:
     )
 
 
-def _flesh(role: Role) -> float | None:
-    return _FLESH.get(role, _FLESH.get(role.split("_", 1)[-1]))
+def kind_of(role: Role) -> str:
+    """`left_foot` to `foot`."""
+    return role.removeprefix("left_").removeprefix("right_")

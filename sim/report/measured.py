@@ -1,0 +1,153 @@
+"""One clip's measures over time, all of them, without regard to any other clip."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from sim.report.derivatives import derivative
+from sim.report.limits import LimitExcess, limit_excess
+from sim.report.measures import floating, penetration_depth
+from sim.report.selfcollision import capsules, self_penetration
+from sim.report.smoothness import joint_rates
+from sim.report.support import support
+from sim.report.thresholds import PLAUSIBILITY_V1, Thresholds
+from sim.report.track import Track
+
+FLAGS = {"P": "penetration", "F": "floating", "S": "skating", "R": "root wrench"}
+"""The per-frame flags: letter and name."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """One clip's measures over time; heights are above the floor [m].
+
+    `flags` holds one row per letter of `FLAGS`.
+    `depth` [m]: how deep the parts `depth_names` (feet, joints) lie under the floor.
+    `clearance` [m]: the height of the body's lowest point.
+    `skating`, `speeds` [m/s]: of the soles' corners, on the feet `sides`.
+    `unexplained`: the force [body weights] and torque [body weights x m] the floor can't give.
+    `imbalance` [m]: how far the centre of mass lies outside the support; nan in frames that move.
+    `self_depth` [m]: how deep the parts of each of `self_pairs` are in each other.
+    `joint_speed` [rad/s], `joint_jerk` [rad/s³]: of the joints `joint_names`.
+    """
+
+    frame_time: float
+    floor_z: float
+    thresholds: Thresholds
+    flags: dict[str, Bool[np.ndarray, "T"]]
+    depth: Float[np.ndarray, "T N"]
+    depth_names: tuple[str, ...]
+    clearance: Float[np.ndarray, "T"]
+    skating: Bool[np.ndarray, "T P"]
+    speeds: Float[np.ndarray, "T P"]
+    sides: tuple[str, ...]
+    unexplained: Float[np.ndarray, "T 2"]
+    imbalance: Float[np.ndarray, "T"]
+    limits: tuple[LimitExcess, ...]
+    self_pairs: tuple[tuple[str, str], ...]
+    self_depth: Float[np.ndarray, "T K"]
+    joint_names: tuple[str, ...]
+    joint_speed: Float[np.ndarray, "T B"]
+    joint_jerk: Float[np.ndarray, "T B"]
+
+    def __len__(self) -> int:
+        return len(self.clearance)
+
+    @property
+    def implausible(self) -> Bool[np.ndarray, "T"]:
+        """Frames with any flag."""
+        return np.any(list(self.flags.values()), axis=0)
+
+    @property
+    def implausible_share(self) -> float:
+        """The share of frames with any flag."""
+        return float(self.implausible.mean())
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """The share of frames with each flag, by letter."""
+        return {letter: float(flag.mean()) for letter, flag in self.flags.items()}
+
+    @property
+    def limit_shares(self) -> dict[str, float]:
+        """The share of frames beyond the limits, by joint."""
+        return {each.joint: float((each.beyond > 0).any(axis=1).mean()) for each in self.limits}
+
+    @property
+    def limit_share(self) -> float:
+        """The share of frames in which any joint is beyond its limits."""
+        return self._limits_over(0.0)
+
+    @property
+    def at_limit_share(self) -> float:
+        """The share of frames in which any joint is at a limit or beyond."""
+        return self._limits_over(-self.thresholds.limit_margin)
+
+    @property
+    def self_penetration(self) -> Bool[np.ndarray, "T"]:
+        """Frames in which the body goes through itself."""
+        return np.any(self.self_depth > self.thresholds.self_penetration, axis=1)
+
+    @property
+    def unbalanced_share(self) -> float | None:
+        """The share of the static frames in which the body would tip; None without static ones."""
+        static = np.isfinite(self.imbalance)
+        if not static.any():
+            return None
+        return float((self.imbalance[static] > self.thresholds.balance).mean())
+
+    @property
+    def jerk_rms(self) -> float:
+        """Over all joints and frames [rad/s³]; 0 without joints."""
+        return float(np.sqrt(np.mean(self.joint_jerk**2))) if self.joint_names else 0.0
+
+    def _limits_over(self, bound: float) -> float:
+        over = [(each.beyond > bound).any(axis=1) for each in self.limits]
+        return float(np.any(over, axis=0).mean()) if over else 0.0
+
+
+def measure(track: Track, floor_z: float) -> Measured:
+    """All measures of a motion over a floor at `floor_z` [m]."""
+    thresholds = PLAUSIBILITY_V1.scaled(track.rig.hip_height)
+    frame_time, window = track.motion.frame_time, thresholds.window
+    held = support(track, floor_z, thresholds)
+    joints = track.joints[..., 2] - floor_z
+    depth = penetration_depth(np.concatenate([held.heights[:, : held.soles], joints], axis=1))
+    clearance = held.heights.min(axis=1)
+    skates = held.skating()
+    wrench = held.unexplained()
+    pairs, self_depth = self_penetration(capsules(track))
+    joint_names, joint_speed, joint_jerk = joint_rates(track.world, track.rig, frame_time, window)
+    return Measured(
+        frame_time=frame_time,
+        floor_z=floor_z,
+        thresholds=thresholds,
+        flags={
+            "P": depth.max(axis=1) > thresholds.penetration,
+            "F": floating(
+                clearance,
+                derivative(track.com[:, 2], frame_time, 2, window),
+                thresholds.floating,
+                thresholds.free_fall,
+                held.blur,
+            ),
+            "S": np.any(skates, axis=1),
+            "R": (wrench[:, 0] > thresholds.wrench_force)
+            | (wrench[:, 1] > thresholds.wrench_torque),
+        },
+        depth=depth,
+        depth_names=(*track.sides, *track.joint_names),
+        clearance=clearance,
+        skating=skates,
+        speeds=held.speeds[:, : held.soles],
+        sides=track.sides,
+        unexplained=wrench,
+        imbalance=held.imbalance(),
+        limits=limit_excess(track.since_tpose, track.rig),
+        self_pairs=pairs,
+        self_depth=self_depth,
+        joint_names=joint_names,
+        joint_speed=joint_speed,
+        joint_jerk=joint_jerk,
+    )

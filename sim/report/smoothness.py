@@ -1,0 +1,31 @@
+"""Joint speed and jerk, over time and not over frames."""
+
+import numpy as np
+from jaxtyping import Float
+
+from sim.report.derivatives import derivative
+from spark.rig import Rig
+from spark.rotation import quat_conj, quat_continuous, quat_mul
+
+
+def joint_rates(
+    world: Float[np.ndarray, "T J 4"], rig: Rig, frame_time: float, window: float
+) -> tuple[tuple[str, ...], Float[np.ndarray, "T B"], Float[np.ndarray, "T B"]]:
+    """Names, angular speeds [rad/s] and jerks [rad/s³] of the joints with a role.
+
+    A joint turns against the next joint above it that has a role, so that helpers between them do
+    not matter; the topmost is left out. The jerk is the second derivative of the angular velocity.
+    """
+    roles, skeleton = rig.roles.roles, rig.skeleton
+    pairs = [
+        (j, above)
+        for j, role in enumerate(roles)
+        if role is not None
+        and (above := next((k for k in skeleton.ancestors(j)[1:] if roles[k]), None)) is not None
+    ]
+    names = tuple(str(roles[j]).replace("_", " ") for j, _ in pairs)
+    joints, parents = [j for j, _ in pairs], [above for _, above in pairs]
+    turn = quat_continuous(quat_mul(quat_conj(world[:, parents]), world[:, joints]))
+    omega = 2 * quat_mul(derivative(turn, frame_time, 1, window), quat_conj(turn))[..., 1:]
+    jerk = derivative(omega, frame_time, 2, window)
+    return names, np.linalg.norm(omega, axis=-1), np.linalg.norm(jerk, axis=-1)
