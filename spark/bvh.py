@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
+import orjson
 from jaxtyping import Float, Int
 
 from spark.errors import FileFormatError, SkeletonError
@@ -300,6 +301,10 @@ def _parse_motion(scanner: Scanner, channels: int) -> tuple[float, Float[np.ndar
     return frame_time, values
 
 
+# Bytes that a table of numbers may hold.
+_NUMERIC = np.isin(np.arange(256), np.frombuffer(b"0123456789+-.eE \t\r\n\v\f", dtype=np.uint8))
+
+
 def _parse_rows(rows: bytes, frames: int, channels: int) -> Float[np.ndarray, "T C"] | None:
     """The values, or None where they are not `frames` rows of finite numbers."""
     letters = np.frombuffer(rows, dtype=np.uint8)
@@ -316,10 +321,18 @@ def _parse_rows(rows: bytes, frames: int, channels: int) -> Float[np.ndarray, "T
         return None  # one value too many here and one too few there, not wrapped rows
     if frames == 0:
         return np.zeros((0, channels))
-    try:
-        values = np.fromstring(rows, sep=" ")
-    except (ValueError, DeprecationWarning):
+    if not _NUMERIC[letters].all():
         return None
+    try:
+        # A JSON reader is three times as fast as numpy's, but takes no "+1", ".5" or "01".
+        listed = letters.copy()
+        listed[starts[1:] - 1] = ord(",")
+        values = np.array(orjson.loads(b"[" + listed.tobytes() + b"]"), dtype=np.float64)
+    except orjson.JSONDecodeError:
+        try:
+            values = np.fromstring(rows, sep=" ")
+        except (ValueError, DeprecationWarning):
+            return None
     # `fromstring` also reads "1.2.3" as two numbers: only as many as there are words will do.
     if len(values) != len(starts) or not np.all(np.abs(values) <= LARGEST):
         return None
