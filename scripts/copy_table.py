@@ -1,0 +1,34 @@
+"""How plausible motions are before and after `copy` puts them on other bodies, as Markdown.
+
+Usage: python scripts/copy_table.py FOLDER TARGET... (a folder of BVH sources, BVH targets)
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import spark_sim
+from sim.report.measured import FLAGS, Measured
+
+
+def row(name: str, clips: list[Measured]) -> str:
+    """Shares over the frames of all clips together."""
+    flags = [np.concatenate([clip.flags[letter] for clip in clips]) for letter in FLAGS]
+    shares = [np.any(flags, axis=0), *flags]
+    return f"| {name} | " + " | ".join(f"{100 * share.mean():.1f} %" for share in shares) + " |"
+
+
+def main(folder: str, *targets: str) -> None:
+    sources = [spark_sim.load(path) for path in sorted(Path(folder).glob("*.bvh"))]
+    frames = sum(len(source.motion) for source in sources)
+    print(f"{len(sources)} clips, {frames} frames\n")
+    print(f"| | implausible | {' | '.join(FLAGS.values())} |\n|---|{'---|' * (len(FLAGS) + 1)}")
+    print(row("the source itself", [spark_sim.report(s).clip for s in sources]))
+    for target in map(spark_sim.load, targets):
+        results = [spark_sim.report(spark_sim.retarget(s, target), source=s) for s in sources]
+        print(row(f"copy onto {target.name}", [result.clip for result in results]))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
