@@ -207,7 +207,8 @@ MALFORMED = {
     "overflow": (swap("0 91 0", "0 1e999 0"), 29, "found '1e999'"),
     "a word": (swap("0 91 0", "0 91cm 0"), 29, "found '91cm'"),
     "decimal commas": (swap("0 91 0", "0 9,1 0"), 29, "found '9,1'"),
-    "two points": (swap("0 91 0", "0 9.1.0"), 29, "found '9.1.0'"),
+    "two points": (swap("0 91 0", "0 9.1.5 0"), 29, "found '9.1.5'"),
+    "numbers run together": (swap("0 91 0", "0 91-4 0"), 29, "found '91-4'"),
     "underscores": (swap("0 91 0", "0 9_1 0"), 29, "found '9_1'"),
     "NUL": (swap("0 91 0", "0 9\x001 0"), 29, "found '9"),
     "no channels at all": (
