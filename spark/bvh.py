@@ -333,7 +333,7 @@ def _parse_rows(rows: bytes, frames: int, channels: int) -> Float[np.ndarray, "T
             values = np.fromstring(rows, sep=" ")
         except (ValueError, DeprecationWarning):
             return None
-    # `fromstring` also reads "1.2.3" as two numbers: only as many as there are words will do.
+    # Older numpy stops at a word that is no number, with a warning alone.
     if len(values) != len(starts) or not np.all(np.abs(values) <= LARGEST):
         return None
     return values.reshape(frames, channels)
