@@ -56,7 +56,7 @@ MEANINGS: dict[str, dict[str, float]] = {
     "radius": {"forearm": 1.0},
     "ulna": {"forearm": 0.7},
     "wrist": {"hand": 1.0},
-    "hand": {"hand": 0.9},
+    "hand": {"hand": 0.7},
     "palm": {"hand": 0.6},
     "sided hip": {"upper_leg": 0.9},
     "hip joint": {"upper_leg": 0.2},

@@ -41,12 +41,14 @@ class BodyPlan:
 def plan_body(stance: Stance, hints: Sequence[NameHint]) -> BodyPlan:
     """The plan of a two-legged body; SkeletonError with the reason where it is none."""
     skeleton = stance.skeleton
+    if stance.reach[0] <= 0:
+        raise SkeletonError(f"all bones of the skeleton ({len(skeleton)} joints) are 0 m long")
     pairs = mirrored_pairs(stance, hints, 0.12 * float(stance.reach[0]))
     legs = named_pair(stance, hints, frozenset(LEG), _SURE)
     arms = named_pair(stance, hints, frozenset((*ARM, "wing")), 0.5 * _SURE)
     human_arms = arms is not None and _human(hints, arms)
     if legs is None:
-        legs = _legs_by_shape(stance, pairs, arms)
+        legs = _legs_by_shape(stance, hints, pairs, arms)
     if legs is None:
         raise SkeletonError(_no_legs(skeleton, hints, arms))
     others = _others(stance, skeleton, pairs, legs)
@@ -96,22 +98,32 @@ def _others(stance: Stance, skeleton: Skeleton, pairs: Sequence[Pair], legs: Pai
     ]
 
 
-def _legs_by_shape(stance: Stance, pairs: Sequence[Pair], arms: Pair | None) -> Pair | None:
-    """The pair of limbs that reaches lowest while the body is up."""
+def _legs_by_shape(
+    stance: Stance, hints: Sequence[NameHint], pairs: Sequence[Pair], arms: Pair | None
+) -> Pair | None:
+    """The pair of limbs that is lowest while the body is up, in the motion and at rest.
+
+    Where that leaves it open (a body that only lies), build tells: segment lengths and the place in
+    the tree.
+    """
     taken = set() if arms is None else {*arms.first, *arms.second}
     able = [p for p in pairs if not taken & set(p.roots) and min(len(p.first), len(p.second)) >= 2]
-    if not able:
-        return None
-    frames = stance.upright if stance.upright.any() else np.ones(len(stance.joints), dtype=bool)
-    floor = stance.lowest[frames, 0]
-    height = np.maximum(stance.joints[frames, :, 2].max(axis=1) - floor, 1e-9)
+    rest = rest_stance(stance.skeleton)
 
-    def lift(pair: Pair) -> float:
-        lowest = stance.lowest[frames][:, pair.roots].mean(axis=1)
-        return float(((lowest - floor) / height).mean())
+    def height(pair: Pair) -> float:
+        lifts = [lift for seen in (stance, rest) if not np.isnan(lift := seen.lift(pair.roots))]
+        return float(np.mean(lifts)) if lifts else 0.5
 
-    legs = min(able, key=lift)
-    return legs if lift(legs) < 0.4 else None
+    def unlike(pair: Pair) -> float:
+        as_leg, as_arm = (
+            label_limb(stance, hints, (pair.first, pair.second), parts)[0].score
+            for parts in (LEG, ARM)
+        )
+        fit = float(np.clip(as_leg - as_arm, -4, 4))
+        return height(pair) - 0.05 * fit + 0.02 * len(stance.skeleton.ancestors(pair.carrier))
+
+    legs = min(able, key=unlike, default=None)
+    return legs if legs is not None and height(legs) <= 0.5 else None
 
 
 def _no_legs(skeleton: Skeleton, hints: Sequence[NameHint], arms: Pair | None) -> str:
@@ -173,7 +185,7 @@ def _trunk(
     skeleton = stance.skeleton
     limbs = {j for p in (legs, arms) if p is not None for r in p.roots for j in skeleton.subtree(r)}
     top = pelvis if arms is None else arms.carrier
-    head = _head(stance, hints, pelvis, top, limbs)
+    head = _head(stance, hints, pelvis, top, legs, limbs)
     spine = list(_between(stance, pelvis, top))
     if top != pelvis:
         spine.append(top)
@@ -209,8 +221,9 @@ def _between(stance: Stance, pelvis: int, top: int) -> tuple[int, ...]:
 
 
 def _head(
-    stance: Stance, hints: Sequence[NameHint], pelvis: int, top: int, limbs: set[int]
+    stance: Stance, hints: Sequence[NameHint], pelvis: int, top: int, legs: Pair, limbs: set[int]
 ) -> int | None:
+    """The joint named head, or the end of the chain that leaves the arms' carrier upwards."""
     skeleton = stance.skeleton
     named = [
         j
@@ -222,7 +235,7 @@ def _head(
     # From the joint that carries the arms, the chain that is no limb and leads up.
     trunk = set(skeleton.ancestors(pelvis))
     starts = [c for c in skeleton.children[top] if c not in limbs and c not in trunk]
-    starts = [c for c in starts if not hints[c].aside and _rises(stance, c, pelvis)]
+    starts = [c for c in starts if not hints[c].aside and _rises(stance, c, pelvis, top, legs)]
     if not starts:
         return None
     chain = chain_below(stance, max(starts, key=lambda c: stance.reach[c] + stance.bones[c]))
@@ -234,11 +247,12 @@ def _head(
     return chain[-2] if nub else chain[-1]
 
 
-def _rises(stance: Stance, joint: int, pelvis: int) -> bool:
-    """Whether a chain leaves the trunk upwards, in most frames."""
-    frames = stance.upright if stance.upright.any() else np.ones(len(stance.joints), dtype=bool)
-    tip, start = stance.tip(joint)[frames, 2], stance.joints[frames, pelvis, 2]
-    return bool(np.mean(tip > start) >= 0.5)
+def _rises(stance: Stance, joint: int, pelvis: int, top: int, legs: Pair) -> bool:
+    """Whether a chain leaves the trunk away from the legs, in most frames."""
+    at = stance.joints
+    below = at[:, pelvis] if top != pelvis else np.mean([stance.tip(j) for j in legs.roots], axis=0)
+    up = at[:, top] - below
+    return bool(np.mean(((stance.tip(joint) - at[:, top]) * up).sum(-1) > 0) >= 0.5)
 
 
 def _same_side(stance: Stance, legs: LabelledPair, arms: LabelledPair) -> LabelledPair:

@@ -33,13 +33,16 @@ def first_is_left(
     """Evidence that the pairs' `first` limbs are the left ones: sure at 0.3, against below 0.
 
     Feet point forward, knees bend forward and elbows backward; `above` is a joint of the upper
-    body. The frame is the body's own, so the pose may sit, lie or hang.
+    body, if there is one. The frame is the body's own, so the pose may sit, lie or hang.
     """
     at = stance.joints
     hips = [legs.joint(side, "upper_leg") or 0 for side in (0, 1)]
     across = at[:, hips[0]] - at[:, hips[1]]
     middle = at[:, hips].mean(axis=1)
-    up = np.broadcast_to([0.0, 0.0, 1.0], across.shape) if above is None else at[:, above] - middle
+    if above is None:
+        up = middle - np.mean([stance.tip(root) for root in legs.pair.roots], axis=0)
+    else:
+        up = at[:, above] - middle
     forward = np.cross(across, up)
     forward /= np.maximum(np.linalg.norm(forward, axis=-1, keepdims=True), 1e-9)
 

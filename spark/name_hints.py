@@ -106,6 +106,8 @@ def _read(pieces: tuple[str, ...], axes: bool) -> NameHint:
         if word in ASIDE and not ("neck" in words and word == "twist"):
             return NameHint(side, aside=ASIDE[word])
     parts, foreleg = _parts(words, bool(side))
+    if axes and "shoulder" in words:
+        parts = {"upper_arm": 0.9}  # its hinges: robots have no clavicles
     if side and set(parts) <= {"pelvis", "spine", "neck", "head"}:
         return NameHint(side, aside="beside the midline") if parts else NameHint(side)
     if "foot" in parts and numbers and numbers[0] > 0:

@@ -117,7 +117,7 @@ def _merge(
     reasons: list[str] = []
     for j in range(len(skeleton)):
         if j in given:
-            entry: tuple[Role | None, float, str] = (given[j], 1.0, "given")
+            entry: tuple[Role | None, float, str] = (given[j], 1.0, "given by the map")
         elif j in found and found[j][0] not in override:
             entry = found[j]
         elif hints[j].aside:

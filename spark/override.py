@@ -1,6 +1,7 @@
 """Roles that the user gives: what makes sense on a skeleton and what does not."""
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 from spark.errors import SkeletonError
 from spark.roles import LIMBS, Role, RoleMap
@@ -37,7 +38,7 @@ def check_chains(skeleton: Skeleton, roles: RoleMap) -> None:
     """Raise SkeletonError where a limb's joints do not follow each other down the skeleton."""
     for limb in LIMBS.values():
         held = [(role, j) for role in limb for j in roles.joints(role)]
-        for (upper_role, upper), (lower_role, lower) in zip(held, held[1:], strict=False):
+        for (upper_role, upper), (lower_role, lower) in pairwise(held):
             if upper not in skeleton.ancestors(lower):
                 raise SkeletonError(
                     f"{lower_role} {skeleton.names[lower]!r} ({roles.reasons[lower]}) is not below "

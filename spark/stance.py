@@ -65,9 +65,19 @@ class Stance:
 
     @cached_property
     def upright(self) -> Bool[np.ndarray, "T"]:
-        """Frames in which the skeleton is taller than wide."""
+        """Frames in which the skeleton is about taller than wide, and no single line of bones."""
         size = np.ptp(self.joints, axis=1)
-        return size[:, 2] >= np.max(size[:, :2], axis=1)
+        width = np.max(size[:, :2], axis=1)
+        return (size[:, 2] >= 0.8 * width) & (width >= 0.1 * size[:, 2])
+
+    def lift(self, joints: Sequence[int]) -> float:
+        """How high the lowest points below `joints` are in upright frames: 0 on the floor, 1 at the
+        top; NaN where no frame is upright."""
+        if not self.upright.any():
+            return float("nan")
+        lowest = self.lowest[self.upright]
+        height = self.joints[self.upright, :, 2].max(axis=1) - lowest[:, 0]
+        return float(((lowest[:, list(joints)].mean(axis=1) - lowest[:, 0]) / height).mean())
 
     def bending(self, chain: Sequence[int]) -> Float[np.ndarray, "_"]:
         """How much [rad] the bones before and after each joint of a chain turn against each other

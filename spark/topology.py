@@ -1,10 +1,9 @@
 """The limbs of a skeleton: found by what the names say, or by mirrored pairs of chains."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
 from spark.name_hints import NameHint
 from spark.skeleton import Skeleton
@@ -53,30 +52,23 @@ def common_ancestor(skeleton: Skeleton, a: int, b: int) -> int:
     return next(j for j in skeleton.ancestors(a) if j in others)
 
 
-def best_paths(
-    skeleton: Skeleton, hints: Sequence[NameHint], score: Callable[[NameHint], float]
-) -> Float[np.ndarray, "J"]:
-    """The sum of `score` over each joint and its ancestors: the best limb ends at the maximum."""
-    total = np.array([score(hint) for hint in hints])
-    for j in range(1, len(skeleton)):
-        total[j] += total[skeleton.parents[j]]
-    return total
-
-
 def named_pair(
     stance: Stance, hints: Sequence[NameHint], parts: frozenset[str], least: float
 ) -> Pair | None:
-    """The left and right limb whose joints' names mean `parts`, at least `least` in all a side."""
+    """The left and right limb whose joints' names mean `parts`, at least `least` in all a side.
+
+    On the way from the root to a joint each part counts once, as its surest name means it.
+    """
     skeleton = stance.skeleton
     tips: list[int] = []
     for side in ("left", "right"):
-
-        def score(hint: NameHint, side: str = side) -> float:
-            if hint.side != side:
-                return 0.0
-            return max((s for part, s in hint.parts.items() if part in parts), default=0.0)
-
-        total = best_paths(skeleton, hints, score)
+        met: list[dict[str, float]] = []
+        for j, hint in enumerate(hints):
+            so_far = met[skeleton.parents[j]] if j else {}
+            own = {p: s for p, s in hint.parts.items() if p in parts and hint.side == side}
+            raised = {p: s for p, s in own.items() if s > so_far.get(p, 0.0)}
+            met.append({**so_far, **raised} if raised else so_far)
+        total = [sum(scores.values()) for scores in met]
         tip = int(np.argmax(total))
         if total[tip] < least:
             return None
@@ -107,12 +99,15 @@ def mirrored_pairs(stance: Stance, hints: Sequence[NameHint], shortest: float) -
     for carrier in range(len(skeleton)):
         if carrier in inside:
             continue
-        chains = [
-            chain_below(stance, child)
+        starts = [
+            child
             for child in skeleton.children[carrier]
-            if not hints[child].aside.startswith(_NEVER_LIMBS)
+            if hints[child].aside not in _NEVER_LIMBS
             and stance.reach[child] + stance.bones[child] >= shortest
         ]
+        # No body carries more limbs at one joint; a star of bones must not cost its cube.
+        starts.sort(key=lambda child: -(stance.reach[child] + stance.bones[child]))
+        chains = [chain_below(stance, child) for child in starts[:12]] if len(starts) > 1 else []
         while len(chains) >= 2:
             a, b, difference = min(
                 (

@@ -133,7 +133,8 @@ RIGS = {
         Robot_Hips > Robot_Spine S > Robot_Spine1 S > Robot_Spine2 S > Robot_Spine3 S
         Robot_Spine3 > Robot_Neck N > Robot_Head H
         Robot_Spine3 > Robot_{Left}Shoulder C > Robot_{Left}Arm U > Robot_{Left}ForeArm F
-        Robot_{Left}ForeArm > Robot_{Left}Hand W > Robot_{Left}InHandIndex - > Robot_{Left}HandIndex1 -
+        Robot_{Left}ForeArm > Robot_{Left}Hand W > Robot_{Left}InHandIndex -
+        Robot_{Left}InHandIndex > Robot_{Left}HandIndex1 -
         Robot_{Left}Hand > Robot_{Left}HandThumb1 -
         """,
     "xsens": """
@@ -166,7 +167,8 @@ RIGS = {
         pelvis P > {left}_hip T > {left}_knee K > {left}_ankle A > {left}_foot B
         pelvis > spine1 S > spine2 S > spine3 S > neck N > head H > jaw -
         head > {left}_eye_smplhf -
-        spine3 > {left}_collar C > {left}_shoulder U > {left}_elbow F > {left}_wrist W > {left}_index1 -
+        spine3 > {left}_collar C > {left}_shoulder U > {left}_elbow F > {left}_wrist W
+        {left}_wrist > {left}_index1 -
         {left}_wrist > {left}_thumb1 -
         """,
     "daz genesis 3": """
@@ -226,7 +228,8 @@ RIGS = {
     "mikumikudance": """
         全ての親 - > センター - > 下半身 P > {左}足 T > {左}ひざ K > {左}足首 A > {左}つま先 B
         センター > 上半身 S > 上半身2 S > 首 N > 頭 H > {左}目 -
-        上半身2 > {左}肩 C > {左}腕 U > {左}腕捩 - > {左}ひじ F > {左}手捩 - > {左}手首 W > {左}親指１ -
+        上半身2 > {左}肩 C > {左}腕 U > {左}腕捩 - > {左}ひじ F > {左}手捩 -
+        {左}手捩 > {左}手首 W > {左}親指１ -
         全ての親 > {左}足ＩＫ - > {左}つま先ＩＫ -
         下半身 > スカート_0_0 - > スカート_0_1 -
         """,
@@ -331,7 +334,7 @@ def _places(rows: _Rows) -> np.ndarray:
     for j, (_, _, code, side) in enumerate(rows):
         if code in PLACES:
             places[j] = np.multiply(PLACES[code], (1, side or 1, 1))
-    for j, (_, parent, code, side) in enumerate(rows):
+    for j, (_, parent, _, side) in enumerate(rows):
         if not np.isnan(places[j, 0]):
             continue
         steps, below = 1, [k for k, row in enumerate(rows) if row[1] == j]
