@@ -17,14 +17,14 @@ $(BIN)/python:
 	  echo "spark-sim needs Python 3.11 or newer; name one: make PYTHON=python3.12" >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 
-# Two environments in one folder: the demo does not wait for torch and the test tools.
+# Two environments in one folder, so that the demo need not wait for torch and the test tools.
 $(VENV)/.video: $(BIN)/python pyproject.toml constraints.txt
 	$(PIP) install --quiet -c constraints.txt -e ".[video]"
 	@touch $@
 
 $(VENV)/.dev: $(BIN)/python pyproject.toml constraints.txt
 	$(PIP) install --quiet -c constraints.txt -e ".[dev]"
-	@touch $@
+	@touch $(VENV)/.video $@
 
 $(VENV)/.gl: $(VENV)/.video scripts/headless_gl.sh
 	bash scripts/headless_gl.sh $(BIN)/python
@@ -34,7 +34,7 @@ demo: $(VENV)/.video $(VENV)/.gl
 	bash scripts/demo.sh $(BIN)/spark-sim out
 
 test: $(VENV)/.dev $(VENV)/.gl
-	$(BIN)/pytest -n 2 -m "not bench"
+	$(BIN)/pytest -n 2 -rs -m "not bench"
 
 check: $(VENV)/.dev
 	$(BIN)/ruff check
