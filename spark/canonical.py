@@ -45,6 +45,14 @@ def to_canonical(motion: Motion, rig: Rig) -> CanonicalMotion:
     )
 
 
+def canonical_positions(canonical: CanonicalMotion) -> Float[np.ndarray, "T J 3"]:
+    """Where the joints are [m, world]; those above the carrier as if they were rigid with it."""
+    rig = canonical.rig
+    world = quat_mul(canonical.rotations, rig.tpose)
+    positions = world_positions(rig.skeleton, world, np.zeros((len(canonical), 3)))
+    return positions + (canonical.hips - positions[:, rig.hips].mean(1))[:, None]
+
+
 def from_canonical(canonical: CanonicalMotion) -> Motion:
     """The motion on the rig's own skeleton: the inverse of `to_canonical`.
 

@@ -76,7 +76,7 @@ class PairMaker:
         frames = np.array([sum(len(c.hips) for c in group) for group in self._bodies], float)
         self._weights = frames / frames.sum()
         self._pools: list[list[_Stage]] = [[] for _ in self._bodies]
-        self._links: dict[tuple[int, int], Correspondence] = {}
+        self._links: dict[tuple[_Stage, _Stage], Correspondence] = {}
 
     def __iter__(self) -> Iterator[Pairs]:
         while True:
@@ -126,9 +126,9 @@ class PairMaker:
         return pool[int(self.rng.integers(len(pool)))]
 
     def _link(self, source: "_Stage", target: "_Stage") -> Correspondence:
-        key = (id(source), id(target))
+        key = (source, target)
         if key not in self._links:
-            if len(self._links) > 4096:
+            if len(self._links) > 1024:
                 self._links.clear()
             self._links[key] = correspond(source.variant.body.rig, target.variant.body.rig)
         return self._links[key]

@@ -9,7 +9,7 @@ two-bone inverse kinematics in its own bending plane; the foot keeps its rotatio
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from spark.rotation import quat_between, quat_from_rotvec, quat_mul, quat_rotate
 
@@ -39,8 +39,20 @@ def stance_correction(
     counts = np.diff(starts, append=len(frames))
     means = np.add.reduceat(contact_pos[frames], starts) / counts[:, None]
     held = np.repeat(means, counts, axis=0) - contact_pos[frames]
-    time = np.arange(len(planted))
-    return np.stack([np.interp(time, frames, held[:, axis]) for axis in range(3)], axis=-1)
+    return blend_between(held, frames, len(planted))
+
+
+def blend_between(
+    values: Float[np.ndarray, "P 3"], frames: Int[np.ndarray, "P"], count: int
+) -> Float[np.ndarray, "T 3"]:
+    """Values at some frames carried over to all: eased from one to the next, held at both ends."""
+    time = np.arange(count)
+    after = np.clip(np.searchsorted(frames, time), 0, len(frames) - 1)
+    before = np.maximum(after - (frames[after] > time), 0)
+    span = np.maximum(frames[after] - frames[before], 1)
+    u = np.clip((time - frames[before]) / span, 0, 1)[:, None]
+    ease = u * u * (3 - 2 * u)
+    return values[before] + ease * (values[after] - values[before])
 
 
 def bend_leg(

@@ -13,6 +13,7 @@ from spark.errors import ConventionError, FileFormatError, SkeletonError
 from spark.motion import Motion
 from spark.override import Override
 from spark.recording import Recording, read_recording
+from spark.refine import refine as hold_feet
 from spark.rig import Rig, understand
 from spark.transfer import transfer
 from spark_sim import files, rolemap
@@ -100,15 +101,21 @@ def load(
     return Clip(recording, path.stem, names)
 
 
-def retarget(source: Clip | File, target: Clip | File, *, method: str = "copy") -> Clip:
+def retarget(
+    source: Clip | File, target: Clip | File, *, method: str = "copy", refine: bool = True
+) -> Clip:
     """The motion of `source` on the body of `target`, in the hierarchy and units of its file.
 
-    Both are clips, or paths of BVH files. Raises `SkeletonError` where one is no humanoid.
+    Both are clips, or paths of BVH files. With `refine`, feet are held where the source's stand.
+    Raises `SkeletonError` where one is no humanoid.
     """
     if method != "copy":
         raise ConventionError(f"method {method!r} is not known; expected 'copy'")
     source, target = _clip(source), _clip(target)
-    moved = transfer(to_canonical(source.motion, source.rig), target.rig)
+    canonical = to_canonical(source.motion, source.rig)
+    moved = transfer(canonical, target.rig)
+    if refine:
+        moved = hold_feet(canonical, moved)
     motion = from_canonical(moved)
     bvh, lost = encode(motion, target.recording)
     recording = replace(target.recording, bvh=bvh, motion=motion, notes=(*moved.notes, *lost))

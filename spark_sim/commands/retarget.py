@@ -43,6 +43,12 @@ def configure(parser: ArgumentParser) -> None:
         default="copy",
         help="copy: each joint turns as its counterpart does, in world axes (default)",
     )
+    parser.add_argument(
+        "--no-refine",
+        dest="refine",
+        action="store_false",
+        help="leave the feet as the method puts them, instead of holding them where SRC's stand",
+    )
     add_force(parser)
     add_json(parser, "one line for each result")
     add_corrections(parser, "SRC")
@@ -84,7 +90,7 @@ def _retarget(args: Namespace, source: Path, target: "Clip", out: Path) -> dict[
     from spark_sim.clip import retarget
 
     clip = load(args, str(source))
-    result = retarget(clip, target, method=args.method)
+    result = retarget(clip, target, method=args.method, refine=args.refine)
     console.notes(out, result.recording.notes)
     result.save(out, force=args.force)
     return {

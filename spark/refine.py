@@ -1,0 +1,109 @@
+"""Feet that stay where the source's feet stay: what copied rotations alone cannot promise.
+
+Copied rotations on legs of other proportions make standing feet slide, float or sink. Here each
+foot's point of contact (its toe, or its ankle where one of the two rigs has no toe) is held while
+the source's stands: over the ground at the mean place of that stance, in height as far above its
+sole as the source's is above its own. In between the correction blends. What a source's foot
+wobbles while it stands is capture noise and goes; what it drifts beyond that is motion and stays.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from spark.canonical import CanonicalMotion, canonical_positions
+from spark.contacts import planted_points
+from spark.feet import standing_height
+from spark.kinematics import world_positions
+from spark.plant import Leg, bend_leg, blend_between
+from spark.rig import Rig
+from spark.roles import LIMBS, Group, Role
+
+# A foot that stands for less [s] is passing by.
+_SHORTEST_STANCE = 0.1
+# A standing foot that strays less than this [hip heights] from its mean place has not moved.
+_WOBBLE = 0.03
+
+
+def refine(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
+    """`moved`, the transfer of `source`, with its feet standing where the source's stand."""
+    scale = moved.rig.hip_height / source.rig.hip_height
+    theirs, own = canonical_positions(source), canonical_positions(moved)
+    rotations = moved.rotations
+    for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
+        leg, contact = _leg(moved.rig, group), _contact(source.rig, moved.rig, group)
+        if leg is None or contact is None:
+            continue
+        from_joint, to_joint = contact
+        path = theirs[:, from_joint] - [0, 0, source.floor_z]
+        stance = _stances(
+            planted_points(path, source.frame_time, standing_height(source.rig)),
+            source.frame_time,
+        )
+        frames = np.flatnonzero(stance)
+        if not len(frames):
+            continue
+        wanted = path[frames] * scale
+        wanted[:, 2] -= scale * _rest_height(source.rig, from_joint)
+        here = own[frames, to_joint] - [0, 0, moved.floor_z + _rest_height(moved.rig, to_joint)]
+        wanted[:, :2] = _without_mean(wanted[:, :2], frames)
+        wanted[:, :2] -= _small_part(wanted[:, :2], _WOBBLE * moved.rig.hip_height)
+        here[:, :2] = _without_mean(here[:, :2], frames)
+        error = wanted - here
+        rotations = bend_leg(rotations, own, leg, blend_between(error, frames, len(own)))
+    return replace(moved, rotations=rotations)
+
+
+def _without_mean(
+    path: Float[np.ndarray, "P 2"], frames: Int[np.ndarray, "P"]
+) -> Float[np.ndarray, "P 2"]:
+    """A path over stances, each seen from its own mean place."""
+    starts = np.flatnonzero(np.diff(frames, prepend=-2) > 1)
+    counts = np.diff(starts, append=len(frames))
+    means = np.add.reduceat(path, starts) / counts[:, None]
+    return path - np.repeat(means, counts, axis=0)
+
+
+def _small_part(path: Float[np.ndarray, "P 2"], radius: float) -> Float[np.ndarray, "P 2"]:
+    """What of each vector lies within `radius` of zero."""
+    length = np.linalg.norm(path, axis=-1, keepdims=True)
+    return path * np.minimum(1.0, radius / np.maximum(length, 1e-12))
+
+
+def _stances(planted: Bool[np.ndarray, "T"], frame_time: float) -> Bool[np.ndarray, "T"]:
+    """Without the stances that are too short to be one."""
+    edges = np.flatnonzero(np.diff(planted.astype(np.int8), prepend=0, append=0))
+    kept = planted.copy()
+    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        if (stop - start) * frame_time < _SHORTEST_STANCE:
+            kept[start:stop] = False
+    return kept
+
+
+def _leg(rig: Rig, group: Group) -> Leg | None:
+    upper, lower, foot, _ = (rig.roles.joint(role) for role in LIMBS[group])
+    if upper is None or lower is None or foot is None:
+        return None
+    skeleton = rig.skeleton
+    below_knee, below_ankle = set(skeleton.subtree(lower)), set(skeleton.subtree(foot))
+    thigh = set(skeleton.subtree(upper)) - below_knee
+    return Leg(
+        upper, lower, foot, foot, tuple(sorted(thigh)), tuple(sorted(below_knee - below_ankle))
+    )
+
+
+def _contact(source: Rig, target: Rig, group: Group) -> tuple[int, int] | None:
+    """The source's and the target's joint that touch the floor."""
+    roles: tuple[Role, ...] = LIMBS[group][:1:-1]
+    for role in roles:
+        a, b = source.roles.joint(role), target.roles.joint(role)
+        if a is not None and b is not None:
+            return a, b
+    return None
+
+
+def _rest_height(rig: Rig, joint: int) -> float:
+    """A joint's height [m] above the sole in the T-pose."""
+    rest: Float[np.ndarray, "J 3"] = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
+    return float(rest[joint, 2] - rest[rig.hips, 2].mean() + rig.hip_height)
