@@ -74,7 +74,7 @@ MEANINGS: dict[str, dict[str, float]] = {
     "foot": {"foot": 0.9, "toe": 0.5},
     "feet": {"foot": 0.8, "toe": 0.5},
     "toe": {"toe": 1.0},
-    "ball": {"toe": 0.9},
+    "ball": {"toe": 1.0},
     "wing": {"wing": 1.0},
 }
 
@@ -163,7 +163,7 @@ ASIDE: dict[str, str] = {
     for word in words.split()
 }
 
-MODIFIERS = _set("upper lower front hind rear base bend bone center c")
+MODIFIERS = _set("upper lower front hind rear base bend bone center c m x stretch")
 NOISE = _set("jnt joint bn jt link def org bind skin sk rig j b bip biped valve mixamorig")
 # A robot's hinge axes: "roll" is a twist bone elsewhere.
 AXES = _set("pitch roll yaw")

@@ -11,14 +11,8 @@ from spark.limb_roles import ARM, LEG, label_limb
 from spark.name_hints import NameHint
 from spark.skeleton import Skeleton
 from spark.stance import Stance, rest_stance
-from spark.topology import (
-    Pair,
-    chain_below,
-    common_ancestor,
-    mirrored_pairs,
-    named_pair,
-    path_between,
-)
+from spark.topology import Pair, mirrored_pairs, named_pair
+from spark.trunk import find_pelvis, find_trunk
 
 _SURE = 1.5  # names that mean a limb's parts this much in all settle which limb it is
 _REMEDY = "a map file can say which joint is what (spark-sim inspect --help)"
@@ -61,20 +55,20 @@ def plan_body(stance: Stance, hints: Sequence[NameHint]) -> BodyPlan:
     labelled_legs = LabelledPair(legs, (leg_labels[0], leg_labels[-1]))
     if any("lower_leg" not in label.places for label in leg_labels):
         raise SkeletonError(
-            f"the limbs that begin at {skeleton.names[legs.first[0]]!r} and "
-            f"{skeleton.names[legs.second[0]]!r} are no legs: they have no knee; {_REMEDY}"
+            f"not a humanoid: the limbs that begin at {skeleton.names[legs.first[0]]!r} and "
+            f"{skeleton.names[legs.second[0]]!r} have no knees; {_REMEDY}"
         )
     labelled_arms = None
     if arms is not None:
         arm_labels = label_limb(stance, hints, (arms.first, arms.second), ARM)
         if all("forearm" in label.places for label in arm_labels):
             labelled_arms = LabelledPair(arms, (arm_labels[0], arm_labels[-1]))
-    pelvis = _pelvis(skeleton, hints, legs)
-    spine, neck, head = _trunk(stance, hints, pelvis, legs, arms if labelled_arms else None)
+    pelvis = find_pelvis(skeleton, hints, legs)
+    spine, neck, head = find_trunk(stance, hints, pelvis, legs, arms if labelled_arms else None)
+    if labelled_arms is not None:
+        labelled_legs, labelled_arms = _align(stance, labelled_legs, labelled_arms)
     above = next((j for j in (head, *reversed(neck), *reversed(spine)) if j is not None), None)
     sides = first_is_left(stance, labelled_legs, labelled_arms, above)
-    if not legs.sided and labelled_arms is not None:
-        labelled_arms = _same_side(stance, labelled_legs, labelled_arms)
     mirrored = frozenset(j for p in pairs for j in (*p.first, *p.second))
     return BodyPlan(pelvis, spine, neck, head, labelled_legs, labelled_arms, sides, mirrored)
 
@@ -169,99 +163,25 @@ def _refuse_other_plans(
         )
 
 
-def _pelvis(skeleton: Skeleton, hints: Sequence[NameHint], legs: Pair) -> int:
-    """The joint that carries the legs; 3ds Max hangs them on the spine's first joint."""
-    carrier = legs.carrier
-    parent = int(skeleton.parents[carrier])
-    if "spine" in hints[carrier].parts and parent >= 0:
-        return parent if hints[parent].parts.get("pelvis", 0.0) > 0.5 else carrier
-    return carrier
-
-
-def _trunk(
-    stance: Stance, hints: Sequence[NameHint], pelvis: int, legs: Pair, arms: Pair | None
-) -> tuple[tuple[int, ...], tuple[int, ...], int | None]:
-    """Spine and neck from the pelvis upwards, and the head."""
-    skeleton = stance.skeleton
-    limbs = {j for p in (legs, arms) if p is not None for r in p.roots for j in skeleton.subtree(r)}
-    top = pelvis if arms is None else arms.carrier
-    head = _head(stance, hints, pelvis, top, legs, limbs)
-    spine = list(_between(stance, pelvis, top))
-    if top != pelvis:
-        spine.append(top)
-    rising: list[int] = []
-    if head is not None:
-        under = set(skeleton.ancestors(common_ancestor(skeleton, top, head)))
-        rising = [j for j in reversed(skeleton.ancestors(head)[1:]) if j not in under]
-    # 3ds Max hangs the arms on the neck; elsewhere spine joints go on above the arms.
-    while arms is not None and len(spine) > 1 and "neck" in hints[spine[-1]].parts:
-        rising.insert(0, spine.pop())
-    first_neck = next((i for i, j in enumerate(rising) if "neck" in hints[j].parts), None)
-    if first_neck is None and arms is None:
-        first_neck = max(0, len(rising) - 1)
-    if first_neck:
-        spine += rising[:first_neck]
-        rising = rising[first_neck:]
-    return tuple(spine), tuple(rising), head
-
-
-def _between(stance: Stance, pelvis: int, top: int) -> tuple[int, ...]:
-    """The trunk's joints between two others.
-
-    A common ancestor of both that lies at the pelvis only carries them (MakeHuman's Root).
-    """
-    skeleton = stance.skeleton
-    if pelvis == top:
-        return ()
-    joint = common_ancestor(skeleton, pelvis, top)
-    way = stance.joints[:, top] - stance.joints[:, pelvis]
-    part = ((stance.joints[:, joint] - stance.joints[:, pelvis]) * way).sum(-1)
-    inside = np.median(part / np.maximum((way**2).sum(-1), 1e-12)) > 0.15
-    return tuple(j for j in path_between(skeleton, pelvis, top) if j != joint or inside)
-
-
-def _head(
-    stance: Stance, hints: Sequence[NameHint], pelvis: int, top: int, legs: Pair, limbs: set[int]
-) -> int | None:
-    """The joint named head, or the end of the chain that leaves the arms' carrier upwards."""
-    skeleton = stance.skeleton
-    named = [
-        j
-        for j in range(len(skeleton))
-        if j not in limbs and hints[j].parts.get("head", 0.0) > 0.3 and j != pelvis
-    ]
-    if named:
-        return max(named, key=lambda j: (hints[j].parts["head"], -j))
-    # From the joint that carries the arms, the chain that is no limb and leads up.
-    trunk = set(skeleton.ancestors(pelvis))
-    starts = [c for c in skeleton.children[top] if c not in limbs and c not in trunk]
-    starts = [c for c in starts if not hints[c].aside and _rises(stance, c, pelvis, top, legs)]
-    if not starts:
-        return None
-    chain = chain_below(stance, max(starts, key=lambda c: stance.reach[c] + stance.bones[c]))
-    for j in chain:
-        if len(skeleton.children[j]) > 1:
-            return j
-    # A leaf without an End Site, where other leaves have one, is the crown and no joint.
-    nub = len(chain) > 1 and not stance.end_reach[chain[-1]] and len(skeleton.end_parents) > 0
-    return chain[-2] if nub else chain[-1]
-
-
-def _rises(stance: Stance, joint: int, pelvis: int, top: int, legs: Pair) -> bool:
-    """Whether a chain leaves the trunk away from the legs, in most frames."""
-    at = stance.joints
-    below = at[:, pelvis] if top != pelvis else np.mean([stance.tip(j) for j in legs.roots], axis=0)
-    up = at[:, top] - below
-    return bool(np.mean(((stance.tip(joint) - at[:, top]) * up).sum(-1) > 0) >= 0.5)
-
-
-def _same_side(stance: Stance, legs: LabelledPair, arms: LabelledPair) -> LabelledPair:
-    """`arms` in the order of the legs: the first of each on one side of the body."""
-    if arms.pair.sided:
-        return arms
+def _align(
+    stance: Stance, legs: LabelledPair, arms: LabelledPair
+) -> tuple[LabelledPair, LabelledPair]:
+    """Both with the limbs of one side first; where names tell one pair's sides, both know them."""
+    if legs.pair.sided and arms.pair.sided:
+        return legs, arms
     across = np.subtract(*(stance.joints[:, legs.joint(i, "upper_leg") or 0] for i in (0, 1)))
     between = np.subtract(*(stance.joints[:, arms.joint(i, "upper_arm") or 0] for i in (0, 1)))
-    if (across * between).sum(-1).mean() >= 0:
-        return arms
-    pair = Pair(arms.pair.carrier, arms.pair.second, arms.pair.first, sided=False)
-    return LabelledPair(pair, (arms.labels[1], arms.labels[0]))
+    crossed = bool((across * between).sum(-1).mean() < 0)
+    if legs.pair.sided:
+        return legs, _ordered(arms, crossed, sided=True)
+    if arms.pair.sided:
+        return _ordered(legs, crossed, sided=True), arms
+    return legs, _ordered(arms, crossed, sided=False)
+
+
+def _ordered(limbs: LabelledPair, swap: bool, sided: bool) -> LabelledPair:
+    pair, labels = limbs.pair, limbs.labels
+    first, second = (pair.second, pair.first) if swap else (pair.first, pair.second)
+    return LabelledPair(
+        Pair(pair.carrier, first, second, sided), (labels[1], labels[0]) if swap else labels
+    )

@@ -24,6 +24,7 @@ from spark.aliases import (
     SPELLINGS,
 )
 
+_ON_THE_MIDLINE = {"spine", "neck", "chest", "back", "waist"}
 _VERTEBRA = re.compile(r"([lct])(\d{1,2})")
 _PIECES = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+|[^\W\d_A-Za-z]+")
 
@@ -101,9 +102,9 @@ def _read(pieces: tuple[str, ...], axes: bool) -> NameHint:
     words -= LEFT | RIGHT
     if axes:
         words -= AXES
-    for word in sorted(words):
-        # "NeckTwist" is the neck itself on the rigs that have it.
-        if word in ASIDE and not ("neck" in words and word == "twist"):
+    for word in sorted(words & ASIDE.keys()):
+        # "NeckTwist" and "SpineMiddle" are the neck and the spine themselves.
+        if not (words & _ON_THE_MIDLINE and word in ("twist", "middle")):
             return NameHint(side, aside=ASIDE[word])
     parts, foreleg = _parts(words, bool(side))
     if axes and "shoulder" in words:

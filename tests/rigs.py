@@ -241,6 +241,61 @@ RIGS = {
     "robot without arms": """
         base - > torso_link P > {L}_HAA T > {L}_KFE K > {L}_AFE A
         """,
+    "unreal 5": """
+        root - > pelvis P > spine_01 S > spine_02 S > spine_03 S > spine_04 S > spine_05 S
+        spine_05 > neck_01 N > neck_02 N > head H
+        spine_05 > clavicle_{l} C > upperarm_{l} U > lowerarm_{l} F > hand_{l} W
+        hand_{l} > index_metacarpal_{l} - > index_01_{l} -
+        hand_{l} > wrist_inner_{l} -
+        clavicle_{l} > clavicle_pec_{l} -
+        upperarm_{l} > upperarm_correctiveRoot_{l} - > upperarm_bck_{l} -
+        upperarm_{l} > upperarm_twist_01_{l} - > upperarm_bicep_{l} -
+        lowerarm_{l} > lowerarm_correctiveRoot_{l} - > lowerarm_out_{l} -
+        pelvis > thigh_{l} T > calf_{l} K > foot_{l} A > ball_{l} B > bigtoe_01_{l} -
+        foot_{l} > ankle_bck_{l} -
+        calf_{l} > calf_correctiveRoot_{l} - > calf_kneeBack_{l} -
+        root > ik_foot_root - > ik_foot_{l} -
+        root > center_of_mass -
+        """,
+    "synty": """
+        Root - > Hips P > Spine_01 S > Spine_02 S > Spine_03 S > Neck N > Head H > Eyebrows -
+        Spine_03 > Clavicle_{L} C > Shoulder_{L} U > Elbow_{L} F > Hand_{L} W > Thumb_01_{L} -
+        Hand_{L} > IndexFinger_01_{L} -
+        Hips > UpperLeg_{L} T > LowerLeg_{L} K > Ankle_{L} A > Ball_{L} B > Toes_{L} -
+        """,
+    "roblox": """
+        HumanoidRootPart - > LowerTorso P > UpperTorso S > Head H
+        UpperTorso > {Left}UpperArm U > {Left}LowerArm F > {Left}Hand W
+        LowerTorso > {Left}UpperLeg T > {Left}LowerLeg K > {Left}Foot A
+        """,
+    "poser": """
+        hip P > abdomen S > chest S > neck N > head H > {left}Eye -
+        chest > {l}Collar C > {l}Shldr U > {l}ForeArm F > {l}Hand W > {l}Thumb1 -
+        hip > {l}Buttock - > {l}Thigh T > {l}Shin K > {l}Foot A
+        """,
+    "advanced skeleton": """
+        Root_M P > Spine1_M S > Chest_M S > Neck_M N > Head_M H > HeadEnd_M -
+        Chest_M > Scapula_{L} C > Shoulder_{L} U > ShoulderPart1_{L} - > Elbow_{L} F
+        Elbow_{L} > Wrist_{L} W > MiddleFinger1_{L} -
+        Root_M > Hip_{L} T > HipPart1_{L} - > Knee_{L} K > Ankle_{L} A > Toes_{L} B > ToesEnd_{L} -
+        Ankle_{L} > Heel_{L} -
+        """,
+    "auto-rig pro": """
+        root.x P > spine_01.x S > spine_02.x S > spine_03.x S > neck.x N > head.x H > jawbone.x -
+        spine_03.x > shoulder.{l} C > arm_stretch.{l} U > forearm_stretch.{l} F > hand.{l} W
+        arm_stretch.{l} > arm_twist.{l} -
+        spine_03.x > breast_01.{l} -
+        root.x > thigh_stretch.{l} T > leg_stretch.{l} K > foot.{l} A > toes_01.{l} B
+        thigh_stretch.{l} > thigh_twist.{l} -
+        leg_stretch.{l} > leg_twist.{l} -
+        """,
+    "headset": """
+        Root - > Hips P > SpineLower S > SpineMiddle S > SpineUpper S > Chest S > Neck N > Head H
+        Chest > {Left}Scapula C > {Left}ArmUpper U > {Left}ArmLower F > {Left}HandWrist W
+        {Left}HandWrist > {Left}HandPalm -
+        {Left}HandWrist > {Left}HandIndexMetacarpal -
+        Hips > {Left}UpperLeg T > {Left}LowerLeg K > {Left}FootAnkle A > {Left}FootBall B
+        """,
     "capitals": """
         HIPS P > SPINE S > CHEST S > NECK N > HEAD H
         CHEST > {LEFT}_SHOULDER U > {LEFT}_ELBOW F > {LEFT}_WRIST W

@@ -229,8 +229,10 @@ def test_prefixes_say_nothing(prefix: str) -> None:
     assert wrong(skeleton, assign_roles(skeleton), right) == {}
 
 
-# What hangs on what can't be told from these without names: arms on the neck, one joint on a head.
-OPEN_WITHOUT_NAMES = ("biped", "biped, legs on the spine", "iclone", "source engine")
+# Without names these are open: arms that hang on the neck, legs on the spine...
+OPEN_WITHOUT_NAMES = ("biped", "biped, legs on the spine")
+# ... and the head, where one joint (a jaw, eyebrows) follows it as it follows the neck.
+OPEN_HEADS = ("iclone", "source engine", "synty", "advanced skeleton", "auto-rig pro")
 
 
 @pytest.mark.parametrize("pose", ["walks", "lies on its back", "lies on its face", "on its side"])
@@ -243,7 +245,10 @@ def test_meaningless_names(convention: str, pose: str) -> None:
     rotations = motion.rotations.copy()
     rotations[:, 0] = quat_mul(turn, rotations[:, 0])
     motion = replace(motion, rotations=rotations)
-    assert wrong(skeleton, assign_roles(skeleton, motion), right) == {}
+    found = wrong(skeleton, assign_roles(skeleton, motion), right)
+    if convention in OPEN_HEADS:
+        found = {n: pair for n, pair in found.items() if not {"neck", "head"} & {*pair}}
+    assert found == {}
 
 
 def mirrored(motion: Motion) -> Motion:
@@ -274,6 +279,19 @@ def test_sides_come_from_the_front_where_names_say_nothing() -> None:
     motion = mirrored(walk(skeleton, right))
     swapped = tuple(map(swap, right))
     assert wrong(motion.skeleton, assign_roles(motion.skeleton, motion), swapped) == {}
+
+
+@pytest.mark.parametrize("part", ["Leg|Foot|Toe", "Arm|Hand|Shoulder"])
+def test_sides_that_names_give_to_one_pair_hold_for_the_other(part: str) -> None:
+    skeleton, right = build(RIGS["lafan1"])
+    names = tuple(
+        name if any(word in name for word in part.split("|")) else f"joint_{j}"
+        for j, name in enumerate(skeleton.names)
+    )
+    named = replace(skeleton, names=names)
+    assert wrong(named, assign_roles(named, walk(named, right)), right) == {}
+    motion = mirrored(walk(named, right))
+    assert wrong(motion.skeleton, assign_roles(motion.skeleton, motion), right) == {}
 
 
 def test_a_name_on_the_other_side_of_the_body_is_doubted() -> None:

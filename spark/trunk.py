@@ -1,0 +1,96 @@
+"""Pelvis, spine, neck and head: what lies between the limbs."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from spark.name_hints import NameHint
+from spark.skeleton import Skeleton
+from spark.stance import Stance
+from spark.topology import Pair, chain_below, common_ancestor, path_between
+
+
+def find_pelvis(skeleton: Skeleton, hints: Sequence[NameHint], legs: Pair) -> int:
+    """The joint that carries the legs; 3ds Max hangs them on the spine's first joint."""
+    carrier = legs.carrier
+    parent = int(skeleton.parents[carrier])
+    if "spine" in hints[carrier].parts and parent >= 0:
+        return parent if hints[parent].parts.get("pelvis", 0.0) > 0.5 else carrier
+    return carrier
+
+
+def find_trunk(
+    stance: Stance, hints: Sequence[NameHint], pelvis: int, legs: Pair, arms: Pair | None
+) -> tuple[tuple[int, ...], tuple[int, ...], int | None]:
+    """Spine and neck from the pelvis upwards, and the head."""
+    skeleton = stance.skeleton
+    limbs = {j for p in (legs, arms) if p is not None for r in p.roots for j in skeleton.subtree(r)}
+    top = pelvis if arms is None else arms.carrier
+    head = _head(stance, hints, pelvis, top, legs, limbs)
+    spine = list(_between(stance, pelvis, top))
+    if top != pelvis:
+        spine.append(top)
+    rising: list[int] = []
+    if head is not None:
+        under = set(skeleton.ancestors(common_ancestor(skeleton, top, head)))
+        rising = [j for j in reversed(skeleton.ancestors(head)[1:]) if j not in under]
+    # 3ds Max hangs the arms on the neck; elsewhere spine joints go on above the arms.
+    while arms is not None and len(spine) > 1 and "neck" in hints[spine[-1]].parts:
+        rising.insert(0, spine.pop())
+    first_neck = next((i for i, j in enumerate(rising) if "neck" in hints[j].parts), None)
+    if first_neck is None and arms is None:
+        first_neck = max(0, len(rising) - 1)
+    if first_neck:
+        spine += rising[:first_neck]
+        rising = rising[first_neck:]
+    return tuple(spine), tuple(rising), head
+
+
+def _between(stance: Stance, pelvis: int, top: int) -> tuple[int, ...]:
+    """The trunk's joints between two others.
+
+    A common ancestor of both that lies at the pelvis only carries them (MakeHuman's Root).
+    """
+    skeleton = stance.skeleton
+    if pelvis == top:
+        return ()
+    joint = common_ancestor(skeleton, pelvis, top)
+    way = stance.joints[:, top] - stance.joints[:, pelvis]
+    part = ((stance.joints[:, joint] - stance.joints[:, pelvis]) * way).sum(-1)
+    inside = np.median(part / np.maximum((way**2).sum(-1), 1e-12)) > 0.15
+    return tuple(j for j in path_between(skeleton, pelvis, top) if j != joint or inside)
+
+
+def _head(
+    stance: Stance, hints: Sequence[NameHint], pelvis: int, top: int, legs: Pair, limbs: set[int]
+) -> int | None:
+    """The joint named head, or the end of the chain that leaves the arms' carrier upwards."""
+    skeleton = stance.skeleton
+    named = [
+        j
+        for j in range(len(skeleton))
+        if j not in limbs and hints[j].parts.get("head", 0.0) > 0.3 and j != pelvis
+    ]
+    if named:
+        return max(named, key=lambda j: (hints[j].parts["head"], -j))
+    # From the joint that carries the arms, the chain that is no limb and leads up.
+    trunk = set(skeleton.ancestors(pelvis))
+    starts = [c for c in skeleton.children[top] if c not in limbs and c not in trunk]
+    starts = [c for c in starts if not hints[c].aside and _rises(stance, c, pelvis, top, legs)]
+    if not starts:
+        return None
+    chain = chain_below(stance, max(starts, key=lambda c: stance.reach[c] + stance.bones[c]))
+    for j in chain:
+        if len(skeleton.children[j]) > 1:
+            return j
+    # A leaf without an End Site, where other leaves have one, is the crown and no joint.
+    nub = len(chain) > 1 and not stance.end_reach[chain[-1]] and len(skeleton.end_parents) > 0
+    return chain[-2] if nub else chain[-1]
+
+
+def _rises(stance: Stance, joint: int, pelvis: int, top: int, legs: Pair) -> bool:
+    """Whether a chain leaves the trunk away from the legs, in most frames."""
+    at = stance.joints
+    below = at[:, pelvis] if top != pelvis else np.mean([stance.tip(j) for j in legs.roots], axis=0)
+    up = at[:, top] - below
+    return bool(np.mean(((stance.tip(joint) - at[:, top]) * up).sum(-1) > 0) >= 0.5)
