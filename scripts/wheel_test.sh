@@ -19,6 +19,20 @@ spark_sim=$work/env/bin/spark-sim
 set -x
 "$spark_sim" --version
 "$spark_sim" sample motions
-"$spark_sim" inspect motions/*.bvh
+"$spark_sim" inspect motions/*.bvh >/dev/null
+"$spark_sim" retarget motions/walker_walk.bvh --to motions/dancer_wave.bvh -o out.bvh
+"$spark_sim" report out.bvh --source motions/walker_walk.bvh --json > report.json
+"$spark_sim" mjcf motions/dancer_wave.bvh
+"$spark_sim" play motions/walker_walk.bvh out.bvh --html out.html
 set +x
+for file in out.bvh report.json dancer_wave.xml out.html; do
+  [ -s "$file" ] || { echo "wheel: $file was not written" >&2; exit 1; }
+done
+code=0
+"$spark_sim" play out.bvh --strip out.png 2>error.txt || code=$?
+if [ $code != 2 ] || ! grep -q "pip install 'spark-sim\[video\]'" error.txt; then
+  echo "wheel: without the extra [video], --strip must say how to get it" >&2
+  cat error.txt >&2
+  exit 1
+fi
 echo "wheel: works from a foreign folder"

@@ -105,7 +105,8 @@ def test_unknown_method(samples: Path) -> None:
 def test_errors_of_a_body_name_its_file(tmp_path: Path) -> None:
     path = tmp_path / "stick.bvh"
     path.write_text(
-        "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Zrotation\nEnd Site\n{\nOFFSET 0 1 0\n}\n}\n"
+        "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 1 Zrotation\n"
+        "End Site\n{\nOFFSET 0 1 0\n}\n}\n"
         "MOTION\nFrames: 1\nFrame Time: 0.1\n0\n"
     )
     clip = spark_sim.load(path)

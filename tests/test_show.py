@@ -35,7 +35,8 @@ def draw(scene: Scene, picked: list[int]) -> list[np.ndarray]:
     try:
         return [picture.copy() for picture in frames(scene, picked, width=320, height=240)]
     except DependencyError as error:
-        assert "CI" not in os.environ, error
+        if "CI" in os.environ:
+            raise
         pytest.skip(f"no OpenGL: {error}")
 
 
