@@ -56,14 +56,19 @@ def write_video(
 
 
 def write_strip(
-    scene: Scene, path: str | Path, *, count: int = 6, width: int = 300, height: int = 330
+    scene: Scene, path: str | Path, *, count: int = 5, width: int | None = None, height: int = 330
 ) -> None:
-    """One PNG of `count` moments, evenly spread from the first frame to the last."""
+    """One PNG of `count` moments, evenly spread from the first frame to the last.
+
+    Each is `width` x `height` pixels; without a width, just wide enough for the figures.
+    """
     try:
         from PIL import Image
     except ImportError as error:
         raise DependencyError("pictures need Pillow: pip install 'spark-sim[video]'") from error
     path = Path(path)
+    if width is None:
+        width = round(height * max(0.6, 0.7 * scene.width / scene.height))
     picked = np.linspace(0, len(scene.qpos) - 1, count).round().astype(int).tolist()
     pictures = list(frames(scene, picked, width=width, height=height))
     try:
