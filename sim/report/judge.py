@@ -13,12 +13,15 @@ from sim.report.measures import (
     at_times,
     contact_match,
     floor_height,
+    horizontal_speed,
     root_drift,
 )
 from sim.report.result import Report
+from sim.report.thresholds import PLAUSIBILITY_V1
 from sim.report.track import Track, track
-from spark.contacts import planted_feet
+from spark.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED
 from spark.errors import SkeletonError
+from spark.feet import standing_height
 from spark.motion import Motion
 from spark.rig import Rig
 
@@ -111,8 +114,12 @@ def _contacts(track: Track, source: Track, times: Float[np.ndarray, "T"]) -> Con
 
 
 def _planted(track: Track) -> dict[str, Bool[np.ndarray, "T"]]:
-    """When each foot stands, by side."""
-    rig = track.rig
+    """When each foot stands, by side: as `spark.contacts` has it, with speeds over the window."""
+    rig, frame_time = track.rig, track.motion.frame_time
+    toes = track.positions[:, rig.contact_joints]
+    scale = standing_height(rig) / ADULT_HEIGHT
+    low = np.percentile(toes[..., 2], 1, axis=0)
+    near = toes[..., 2] < low + PLANTED_HEIGHT * scale
+    slow = horizontal_speed(toes, frame_time, PLAUSIBILITY_V1.window) < PLANTED_SPEED * scale
     sides = [str(rig.roles.roles[j]).split("_")[0] for j in rig.contact_joints]
-    planted = planted_feet(rig, track.positions, track.motion.frame_time)
-    return dict(zip(sides, planted.T, strict=True))
+    return dict(zip(sides, (near & slow).T, strict=True))

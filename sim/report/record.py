@@ -47,6 +47,7 @@ _UNITS = {
     "limit_margin": "rad",
     "static_speed": "m_s",
     "static_acceleration": "m_s2",
+    "static_time": "s",
     "balance": "m",
     "window": "s",
 }

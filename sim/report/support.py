@@ -74,9 +74,10 @@ def support(track: Track, floor_z: float, thresholds: Thresholds) -> Support:
     flesh = track.joints - track.flesh[:, None] * np.array([0.0, 0.0, 1.0])
     points = np.concatenate([track.points, flesh], axis=1)
     heights = points[..., 2] - floor_z
-    blur = round(window / frame_time)
+    blur = int(window / frame_time + 1e-6)
     speed = np.linalg.norm(derivative(track.com, frame_time, 1, window), axis=1)
     acceleration = np.linalg.norm(derivative(track.com, frame_time, 2, window), axis=1)
+    moves = (speed > thresholds.static_speed) | (acceleration > thresholds.static_acceleration)
     return Support(
         thresholds=thresholds,
         soles=track.points.shape[1],
@@ -87,7 +88,7 @@ def support(track: Track, floor_z: float, thresholds: Thresholds) -> Support:
         wrench=required_wrench(
             track.segment_coms, track.world[:, track.body.joints], track.body, frame_time, window
         ),
-        static=(speed < thresholds.static_speed) & (acceleration < thresholds.static_acceleration),
+        static=~blurred(moves, round(thresholds.static_time / frame_time)),
         blur=blur,
         length=track.rig.hip_height / HUMAN_HIP_HEIGHT,
     )

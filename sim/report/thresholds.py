@@ -34,10 +34,12 @@ class Thresholds:
     self_penetration: float = 0.02
     # At its limit: a joint is within this [rad] of its limit, or beyond.
     limit_margin: float = 0.0087
-    # Balance, in frames in which the centre of mass is slower than this [m/s] and accelerates less
-    # than this [m/s²]: it lies further outside the points near the floor than this [m].
+    # Balance, where the centre of mass is slower than this [m/s] and accelerates less than this
+    # [m/s²] for this time [s] before and after: it lies further outside the points near the floor
+    # than this [m].
     static_speed: float = 0.1
     static_acceleration: float = 0.5
+    static_time: float = 0.2
     balance: float = 0.03
     # Time [s] over which velocities and accelerations are taken, whatever the frame rate.
     window: float = 0.05

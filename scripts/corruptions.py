@@ -1,0 +1,213 @@
+"""Ways to spoil a motion, each as retargeting tools do it, with the size known."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from sim.report.measures import at_times
+from spark.canonical import CanonicalMotion, from_canonical, to_canonical
+from spark.kinematics import forward, local_rotations
+from spark.motion import Motion
+from spark.rig import Rig
+from spark.roles import Role
+from spark.rotation import (
+    quat_about,
+    quat_between,
+    quat_conj,
+    quat_from_rotvec,
+    quat_from_yaw,
+    quat_mul,
+    quat_rotate,
+    quat_slerp,
+    yaw_from_quat,
+)
+
+Corruption = Callable[[Motion, Rig, np.random.Generator], Motion]
+
+
+def raised(motion: Motion, rig: Rig, rng: np.random.Generator, *, height: float) -> Motion:
+    """Moved up by `height` [m] throughout."""
+    return _displaced(motion, np.tile([0.0, 0.0, height], (len(motion), 1)))
+
+
+def sliding(motion: Motion, rig: Rig, rng: np.random.Generator, *, speed: float) -> Motion:
+    """The root drifts at `speed` [m/s] in a direction drawn by lot."""
+    angle = rng.uniform(0, 2 * np.pi)
+    times = np.arange(len(motion)) * motion.frame_time
+    return _displaced(
+        motion, speed * times[:, None] * np.array([np.cos(angle), np.sin(angle), 0.0])
+    )
+
+
+def in_place(motion: Motion, rig: Rig, rng: np.random.Generator) -> Motion:
+    """The hips stay where they are horizontally."""
+    hips = forward(motion)[0][:, rig.hips].mean(axis=1)
+    return _displaced(motion, (hips[0] - hips) * np.array([1.0, 1.0, 0.0]))
+
+
+def jittering(motion: Motion, rig: Rig, rng: np.random.Generator, *, degrees: float) -> Motion:
+    """Every joint turned at random in every frame: normal, `degrees` about each axis."""
+    noise = np.radians(degrees) * rng.normal(size=(*motion.rotations.shape[:2], 3))
+    return replace(motion, rotations=quat_mul(motion.rotations, quat_from_rotvec(noise)))
+
+
+def leaning(motion: Motion, rig: Rig, rng: np.random.Generator, *, degrees: float) -> Motion:
+    """The whole body tipped forward about the point of the floor below the hips."""
+    positions, world = forward(motion)
+    pivot = positions[:, rig.hips].mean(axis=1)
+    pivot[:, 2] = to_canonical(motion, rig).floor_z
+    heading = quat_from_yaw(
+        yaw_from_quat(quat_mul(world[:, rig.pelvis], quat_conj(rig.tpose[rig.pelvis])))
+    )
+    tip = quat_about("y", np.radians(degrees))
+    tilt = quat_mul(quat_mul(heading, tip), quat_conj(heading))
+    rotations = motion.rotations.copy()
+    rotations[:, 0] = quat_mul(tilt, rotations[:, 0])
+    root = pivot + quat_rotate(tilt, motion.root_pos - pivot)
+    return _displaced(replace(motion, rotations=rotations), root - motion.root_pos)
+
+
+def faster(motion: Motion, rig: Rig, rng: np.random.Generator, *, factor: float) -> Motion:
+    """Played `factor` times as fast."""
+    return replace(motion, frame_time=motion.frame_time / factor)
+
+
+def resampled(motion: Motion, rig: Rig, rng: np.random.Generator, *, fps: float) -> Motion:
+    """The same motion at another frame rate."""
+    times = np.arange(int(motion.duration * fps + 1e-9) + 1) / fps
+    frames = np.clip(times / motion.frame_time, 0, len(motion) - 1)
+    first = np.minimum(frames.astype(np.int64), max(len(motion) - 2, 0))
+    second = np.minimum(first + 1, len(motion) - 1)
+    place = partial(at_times, frame_time=motion.frame_time, times=times)
+    return replace(
+        motion,
+        frame_time=1 / fps,
+        root_pos=place(motion.root_pos),
+        rotations=quat_slerp(
+            motion.rotations[first], motion.rotations[second], (frames - first)[:, None]
+        ),
+        translations=None if motion.translations is None else place(motion.translations),
+    )
+
+
+def mirrored(motion: Motion, rig: Rig, rng: np.random.Generator) -> Motion:
+    """Left and right exchanged."""
+    canonical = to_canonical(motion, rig)
+    swapped = canonical.rotations[:, _opposite(rig)]
+    return from_canonical(
+        CanonicalMotion(
+            rig,
+            motion.frame_time,
+            swapped * np.array([1.0, -1.0, 1.0, -1.0]),
+            canonical.hips * np.array([1.0, -1.0, 1.0]),
+        )
+    )
+
+
+def knee_backwards(motion: Motion, rig: Rig, rng: np.random.Generator, *, degrees: float) -> Motion:
+    """The left knee bent backwards throughout."""
+    world = forward(motion)[1]
+    thigh, shank = (rig.roles.require(r) for r in (Role.LEFT_UPPER_LEG, Role.LEFT_LOWER_LEG))
+    turned = quat_mul(world[:, thigh], quat_conj(rig.tpose[thigh]))
+    turned = quat_mul(turned, quat_about("y", np.radians(-degrees)))
+    return _turned(motion, rig, world, {shank: quat_mul(turned, rig.tpose[shank])})
+
+
+def hand_in_chest(motion: Motion, rig: Rig, rng: np.random.Generator) -> Motion:
+    """The left wrist inside the breast bone throughout."""
+    positions, world = forward(motion)
+    shoulder, elbow, wrist = (
+        rig.roles.require(role) for role in (Role.LEFT_UPPER_ARM, Role.LEFT_FOREARM, Role.LEFT_HAND)
+    )
+    upper, lower = (
+        float(np.linalg.norm(positions[0, b] - positions[0, a]))
+        for a, b in ((shoulder, elbow), (elbow, wrist))
+    )
+    hips = positions[:, rig.hips].mean(axis=1)
+    spine = rig.roles.joints(Role.SPINE)[-1]
+    neck = rig.roles.joint(Role.NECK)
+    top = positions[:, spine if neck is None else neck]
+    toward = hips + 0.75 * (top - hips) - positions[:, shoulder]
+    distance = np.linalg.norm(toward, axis=1, keepdims=True)
+    toward = toward / distance
+    reach = np.clip(distance, 1.05 * abs(upper - lower), 0.95 * (upper + lower))
+    # The elbow goes out to the side: the triangle of shoulder, elbow and wrist.
+    along = (upper**2 - lower**2 + reach**2) / (2 * reach)
+    chest = quat_mul(world[:, spine], quat_conj(rig.tpose[spine]))
+    out = quat_rotate(chest, np.array([0.3, 1.0, -0.3]))
+    out = out - np.sum(out * toward, axis=1, keepdims=True) * toward
+    out = out / np.linalg.norm(out, axis=1, keepdims=True)
+    to_elbow = along * toward + np.sqrt(np.maximum(upper**2 - along**2, 0)) * out
+    to_wrist = reach * toward - to_elbow
+    arm = quat_mul(
+        quat_between(positions[:, elbow] - positions[:, shoulder], to_elbow), world[:, shoulder]
+    )
+    forearm = quat_mul(
+        quat_between(positions[:, wrist] - positions[:, elbow], to_wrist), world[:, elbow]
+    )
+    return _turned(motion, rig, world, {shoulder: arm, elbow: forearm})
+
+
+CORRUPTIONS: dict[str, Corruption] = {
+    "float 5 cm": partial(raised, height=0.05),
+    "sink 3 cm": partial(raised, height=-0.03),
+    "slide 0.3 m/s": partial(sliding, speed=0.3),
+    "in place": in_place,
+    "jitter 0.5°": partial(jittering, degrees=0.5),
+    "jitter 2°": partial(jittering, degrees=2.0),
+    "lean 15°": partial(leaning, degrees=15.0),
+    "twice as fast": partial(faster, factor=2.0),
+    "15 fps": partial(resampled, fps=15.0),
+    "60 fps": partial(resampled, fps=60.0),
+    "120 fps": partial(resampled, fps=120.0),
+    "mirrored": mirrored,
+    "knee backwards 40°": partial(knee_backwards, degrees=40.0),
+    "hand in chest": hand_in_chest,
+    "drift 10 cm/s": partial(sliding, speed=0.1),
+}
+"""What the test-bench does to clips; the frame rates and the mirror change nothing that matters."""
+
+HARMLESS = ("15 fps", "60 fps", "120 fps", "mirrored")
+
+
+def _displaced(motion: Motion, path: Float[np.ndarray, "T 3"]) -> Motion:
+    translations = motion.translations
+    if translations is not None:
+        translations = translations.copy()
+        translations[:, 0] += path
+    return replace(motion, root_pos=motion.root_pos + path, translations=translations)
+
+
+def _turned(
+    motion: Motion,
+    rig: Rig,
+    world: Float[np.ndarray, "T J 4"],
+    joints: dict[int, Float[np.ndarray, "T 4"]],
+) -> Motion:
+    """The motion with joints' world rotations set, parents first; what hangs on them follows."""
+    world = world.copy()
+    for joint, wanted in joints.items():
+        turn = quat_mul(wanted, quat_conj(world[:, joint]))[:, None]
+        below = list(rig.skeleton.subtree(joint))
+        world[:, below] = quat_mul(turn, world[:, below])
+    return replace(motion, rotations=local_rotations(motion.skeleton, world))
+
+
+def _opposite(rig: Rig) -> Int[np.ndarray, "J"]:
+    """The joint on the other side of each; a joint without a role follows the nearest above."""
+    roles = rig.roles
+    opposite = np.arange(len(rig.skeleton))
+    for j, role in enumerate(roles.roles):
+        if role is None:
+            parent = int(rig.skeleton.parents[j])
+            opposite[j] = opposite[parent] if parent >= 0 else j
+            continue
+        side, _, part = role.partition("_")
+        other = {"left": f"right_{part}", "right": f"left_{part}"}.get(side, role)
+        rank = roles.joints(role).index(j)
+        partners = roles.joints(Role(other))
+        opposite[j] = partners[rank] if rank < len(partners) else j
+    return opposite
