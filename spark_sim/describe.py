@@ -32,7 +32,10 @@ def describe(clip: Clip) -> dict[str, Any]:
     try:
         rig = clip.rig
     except SkeletonError as error:
-        return facts | {"refused": str(error), "notes": list(clip.recording.notes)}
+        return facts | {
+            "refused": str(error.__cause__ or error),
+            "notes": list(clip.recording.notes),
+        }
     turned = np.degrees(quat_angle(quat_identity(rig.tpose), rig.tpose))
     roles = rig.roles
     joints = [
@@ -64,7 +67,7 @@ def text(facts: dict[str, Any]) -> str:
     ]
     body = facts["body"]
     if body is None:
-        return "\n".join([*head, f"  no body that motions can be put on: {facts['refused']}"])
+        return "\n".join([*head, f"  {facts['refused']}"])
     held = [joint for joint in body["joints"] if joint["role"] is not None]
     others = [joint["joint"] for joint in body["joints"] if joint["role"] is None]
     rows = [("role", "joint", "sure", "rest to T", "parts", "because")]

@@ -17,8 +17,7 @@ from pathlib import Path
 from spark.errors import FileFormatError, SkeletonError
 from spark.files import write_atomically
 from spark.override import Override, check_override
-from spark.rig import Rig
-from spark.roles import Role
+from spark.roles import Role, RoleMap
 from spark.skeleton import Skeleton
 
 _SEVERAL = (Role.SPINE, Role.NECK)
@@ -29,19 +28,22 @@ _HEADER = """\
 """
 
 
-def write(rig: Rig, path: str | Path) -> None:
-    """Write the roles of `rig`, and in a comment the joints that hold none."""
-    names = rig.skeleton.names
+def write(skeleton: Skeleton, roles: RoleMap | None, path: str | Path) -> None:
+    """Write the roles, and as comments the joints that hold none; without roles, a form."""
     lines = [_HEADER]
     for role in Role:
-        held = [names[j] for j in rig.roles.joints(role)]
+        held = [skeleton.names[j] for j in roles.joints(role)] if roles else []
         value = held[0] if len(held) == 1 and role not in _SEVERAL else held
-        lines.append(f"{role} = {json.dumps(value, ensure_ascii=False)}")
-    free = [name for name, role in zip(names, rig.roles.roles, strict=True) if role is None]
+        lines.append(f"{'' if roles else '# '}{role} = {_quoted(value)}")
+    free = [name for j, name in enumerate(skeleton.names) if not roles or roles.roles[j] is None]
     if free:
         lines += ["", "# The other joints follow their parents:"]
-        lines += [f"#   {json.dumps(name, ensure_ascii=False)}" for name in free]
+        lines += [f"#   {_quoted(name)}" for name in free]
     write_atomically(Path(path), "\n".join([*lines, ""]).encode())
+
+
+def _quoted(value: str | list[str]) -> str:
+    return json.dumps(value, ensure_ascii=False)
 
 
 def read(path: str | Path, skeleton: Skeleton) -> Override:

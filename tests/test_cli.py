@@ -301,7 +301,10 @@ def test_inspect_of_what_is_no_humanoid(tmp_path: Path) -> None:
     assert facts["joints"] == 2
     assert facts["body"] is None
     assert "not a humanoid" in facts["refused"]
-    assert facts["refused"] in good("inspect", "snake.bvh", cwd=tmp_path)
+    assert facts["refused"] in good("inspect", "snake.bvh", "--save-map", "s.toml", cwd=tmp_path)
+    form = (tmp_path / "s.toml").read_text()
+    assert "\n# pelvis = []\n" in form
+    assert '\n#   "b"\n' in form
 
 
 def test_map_is_saved_edited_and_given_back(here: Path) -> None:

@@ -47,6 +47,7 @@ def run(args: Namespace) -> int:
         else:
             console.say(text(described))
         if out is not None:
-            rolemap.write(clip.rig, out)
+            known = clip.rig.roles if described["body"] is not None else None
+            rolemap.write(clip.motion.skeleton, known, out)
             console.note(f"{out}: edit it, then give it back with --map {out}")
     return 0
