@@ -11,6 +11,7 @@ from sim.report.measures import (
     floating,
     floor_height,
     horizontal_speed,
+    least_within,
     outside_hull,
     penetration_depth,
     root_drift,
@@ -53,12 +54,17 @@ def test_depth_is_how_far_a_point_is_under_the_floor() -> None:
 
 
 def test_floating_needs_height_and_no_free_fall() -> None:
-    clearance = np.array([0.03, 0.05, 0.05, 0.05, 0.05])
-    acceleration = np.array([0.0, 0.0, 0.0, -9.81, -6.0])
-    expected = [False, True, True, False, False]  # -6 + 9.81 = 3.81 is still within 4 m/s²
-    np.testing.assert_array_equal(floating(clearance, acceleration, 0.04, 4.0, 0), expected)
-    expected = [False, True, False, False, False]  # the frame beside the fall is in its blur
-    np.testing.assert_array_equal(floating(clearance, acceleration, 0.04, 4.0, 1), expected)
+    clearance = np.array([0.03, 0.05, 0.05])
+    fall_error = np.array([9.81, 9.81, 3.9])
+    np.testing.assert_array_equal(floating(clearance, fall_error, 0.04, 4.0), [False, True, False])
+
+
+@pytest.mark.parametrize("frame_time", [1.0, 0.5, 0.25])
+def test_the_least_of_a_slope_within_a_window_lies_at_its_edge(frame_time: float) -> None:
+    slope = 2.0 * np.arange(int(10 / frame_time)) * frame_time
+    least = least_within(slope, frame_time, 0.6)
+    np.testing.assert_allclose(least, np.maximum(slope - 2 * 0.6, 0))
+    np.testing.assert_allclose(least_within(-slope, frame_time, 0.6)[0], -2 * 0.6)
 
 
 def test_speed_is_horizontal_and_per_second() -> None:

@@ -150,9 +150,9 @@ def swinging(com_y: float, heel_height: float, toe_speed: float) -> np.ndarray:
         speeds=speeds[None],
         arms=(feet - np.array([0.1, com_y, 0.9]))[None],
         touching=np.ones((1, 12), dtype=bool),
+        resting=(speeds < 0.2)[None],
         wrench=np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]]),
         static=np.ones(1, dtype=bool),
-        blur=0,
         length=1.0,
     )
     return support.skating()[0].reshape(2, 6).any(axis=1)

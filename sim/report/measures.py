@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.ndimage import maximum_filter1d
+from scipy.ndimage import minimum_filter1d
 
 from sim.report.derivatives import derivative
-from sim.report.thresholds import GRAVITY
 
 
 def floor_height(lowest: Float[np.ndarray, "T"]) -> float:
@@ -22,25 +21,30 @@ def penetration_depth(heights: Float[np.ndarray, "T N"]) -> Float[np.ndarray, "T
 
 def floating(
     clearance: Float[np.ndarray, "T"],
-    com_acceleration_z: Float[np.ndarray, "T"],
+    fall_error: Float[np.ndarray, "T"],
     height: float,
     free_fall: float,
-    blur: int,
 ) -> Bool[np.ndarray, "T"]:
     """F: nothing of the body is within `height` [m] of the floor, and yet it does not fall.
 
-    `clearance` [m] is the height of the body's lowest point. Free fall is a vertical acceleration
-    of the centre of mass within `free_fall` [m/s²] of gravity's, up to `blur` frames away: take-off
-    and landing are smeared over that many by the window the acceleration is taken with.
+    `clearance` [m] is the height of the body's lowest point; `fall_error` [m/s²] is how far the
+    vertical acceleration of the centre of mass is from gravity's, up to `free_fall` in free fall.
     """
-    falls = np.abs(com_acceleration_z + GRAVITY) <= free_fall
-    return (clearance > height) & ~blurred(falls, blur)
+    return (clearance > height) & (fall_error > free_fall)
 
 
-def blurred(flags: Bool[np.ndarray, "T *n"], frames: int) -> Bool[np.ndarray, "T *n"]:
-    """True where the flag is up at most `frames` frames away."""
-    grown = maximum_filter1d(flags.astype(np.uint8), 2 * frames + 1, axis=0, mode="nearest")
-    return grown.astype(bool)
+def least_within(
+    values: Float[np.ndarray, "T *n"], frame_time: float, window: float
+) -> Float[np.ndarray, "T *n"]:
+    """The least value from `window` seconds before each frame to as long after it.
+
+    Between frames values are linear, so that the frame rate doesn't matter.
+    """
+    times = np.arange(len(values)) * frame_time
+    least = minimum_filter1d(values, 2 * int(window / frame_time) + 1, axis=0, mode="nearest")
+    for edge in (-window, window):
+        least = np.minimum(least, at_times(values, frame_time, times + edge))
+    return least
 
 
 def horizontal_speed(

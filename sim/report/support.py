@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from sim.report.derivatives import derivative
-from sim.report.measures import blurred, horizontal_speed, outside_hull
+from sim.report.measures import horizontal_speed, least_within, outside_hull
 from sim.report.thresholds import HUMAN_HIP_HEIGHT, Thresholds
 from sim.report.track import Track
 from sim.report.wrench import required_wrench, unexplained
@@ -19,8 +19,8 @@ class Support:
 
     `heights` [m] over the floor and `speeds` [m/s] along it; `arms` [m] from the centre of mass.
     `touching` is what may push: a point that is near the floor at some time within the window, for
-    `wrench`, the force and torque that the body needs, is a mean over it. `static` frames are those
-    in which the centre of mass hardly moves.
+    `wrench`, the force and torque that the body needs, is a mean over it. `resting` points are slow
+    at some time within it. `static` frames are those in which the centre of mass hardly moves.
     """
 
     thresholds: Thresholds
@@ -29,9 +29,9 @@ class Support:
     speeds: Float[np.ndarray, "T P"]
     arms: Float[np.ndarray, "T P 3"]
     touching: Bool[np.ndarray, "T P"]
+    resting: Bool[np.ndarray, "T P"]
     wrench: Float[np.ndarray, "T 6"]
     static: Bool[np.ndarray, "T"]
-    blur: int
     length: float
 
     def unexplained(self) -> Float[np.ndarray, "T 2"]:
@@ -47,13 +47,13 @@ class Support:
         """
         limits, count = self.thresholds, self.soles
         heights = self.heights[:, :count]
-        fast = self.speeds > limits.skate_speed
-        low_fast = (heights < limits.skate_height) & fast[:, :count]
+        fast = self.speeds[:, :count] > limits.skate_speed
+        low_fast = (heights < limits.skate_height) & fast
         feet = heights.reshape(len(heights), -1, len(SOLE_POINTS))
         flat = np.repeat((feet < limits.contact_height).all(axis=2), len(SOLE_POINTS), axis=1)
         loaded = np.zeros(len(heights), dtype=bool)
         asked = low_fast.any(axis=1)
-        resting = self.touching & blurred(~fast, self.blur)
+        resting = self.touching & self.resting
         missing = unexplained(
             self.wrench[asked], self.arms[asked], resting[asked], limits.friction, self.length
         )
@@ -74,21 +74,24 @@ def support(track: Track, floor_z: float, thresholds: Thresholds) -> Support:
     flesh = track.joints - track.flesh[:, None] * np.array([0.0, 0.0, 1.0])
     points = np.concatenate([track.points, flesh], axis=1)
     heights = points[..., 2] - floor_z
-    blur = int(window / frame_time + 1e-6)
-    speed = np.linalg.norm(derivative(track.com, frame_time, 1, window), axis=1)
-    acceleration = np.linalg.norm(derivative(track.com, frame_time, 2, window), axis=1)
-    moves = (speed > thresholds.static_speed) | (acceleration > thresholds.static_acceleration)
+    speeds = horizontal_speed(points, frame_time, window)
+    com_speed = np.linalg.norm(derivative(track.com, frame_time, 1, window), axis=1)
+    com_acceleration = np.linalg.norm(derivative(track.com, frame_time, 2, window), axis=1)
+    # How far below both bounds at once, as a share of each; positive where the body stands still.
+    still = 1 - np.maximum(
+        com_speed / thresholds.static_speed, com_acceleration / thresholds.static_acceleration
+    )
     return Support(
         thresholds=thresholds,
         soles=track.points.shape[1],
         heights=heights,
-        speeds=horizontal_speed(points, frame_time, window),
+        speeds=speeds,
         arms=points - track.com[:, None],
-        touching=blurred(heights < thresholds.contact_height, blur),
+        touching=least_within(heights, frame_time, window) < thresholds.contact_height,
+        resting=least_within(speeds, frame_time, window) <= thresholds.skate_speed,
         wrench=required_wrench(
             track.segment_coms, track.world[:, track.body.joints], track.body, frame_time, window
         ),
-        static=~blurred(moves, round(thresholds.static_time / frame_time)),
-        blur=blur,
+        static=least_within(still, frame_time, thresholds.static_time) > 0,
         length=track.rig.hip_height / HUMAN_HIP_HEIGHT,
     )
