@@ -114,11 +114,11 @@ def _defaults(spec: mujoco.MjSpec) -> None:
     visual.geom.group = 2
     visual.geom.mass = 0
     collision = spec.add_default("collision", main)
-    collision.geom.group = 3
+    collision.geom.group = 2  # without meshes it is what one sees; viewers hide group 3
     collision.geom.mass = 0
     collision.geom.friction = [1.0, 0.005, 0.0001]
     foot = spec.add_default("foot", collision)
-    foot.geom.group = 3
+    foot.geom.group = 2
     foot.geom.mass = 0
     foot.geom.condim = 4
 

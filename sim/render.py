@@ -13,8 +13,7 @@ from spark.errors import DependencyError
 if TYPE_CHECKING:
     from mujoco import Renderer
 
-# Elements are drawn from geom groups: 2 is seen, 3 collides and is seen, sites are not.
-_AZIMUTH, _ELEVATION = 150.0, -10.0
+AZIMUTH, ELEVATION = 150.0, -10.0
 _FIELD_OF_VIEW = 35.0
 
 
@@ -28,13 +27,12 @@ def frames(
     renderer = _renderer(scene, width, height)
     data = mujoco.MjData(scene.model)
     option = mujoco.MjvOption()
-    option.geomgroup[:] = (1, 1, 1, 1, 0, 0)
     option.sitegroup[:] = 0
     camera = mujoco.MjvCamera()
-    camera.azimuth, camera.elevation = _AZIMUTH, _ELEVATION
+    camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
     half = np.tan(np.radians(_FIELD_OF_VIEW / 2))
     # The row of figures is seen at an angle: its near end stands closer than its middle.
-    near = 0.5 * (scene.width - scene.height) * np.sin(np.radians(_AZIMUTH))
+    near = 0.5 * (scene.width - scene.height) * np.sin(np.radians(AZIMUTH))
     camera.distance = max(scene.width * height / width, scene.height) * 0.6 / half + near
     scene.model.vis.global_.fovy = _FIELD_OF_VIEW
     try:

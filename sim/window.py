@@ -3,6 +3,7 @@
 import time
 
 from sim import has_display
+from sim.render import AZIMUTH, ELEVATION
 from sim.scene import Scene
 from spark.errors import DependencyError
 
@@ -25,14 +26,22 @@ def open_window(scene: Scene) -> None:
 
     data = mujoco.MjData(scene.model)
     frame = 0
-    with mujoco.viewer.launch_passive(scene.model, data, key_callback=on_key) as viewer:
+    with mujoco.viewer.launch_passive(
+        scene.model, data, key_callback=on_key, show_left_ui=False, show_right_ui=False
+    ) as viewer:
+        viewer.cam.azimuth, viewer.cam.elevation = AZIMUTH, ELEVATION
         viewer.cam.distance = 1.5 * max(scene.width, scene.height)
         viewer.cam.lookat[:] = scene.centers[0]
+        viewer.opt.sitegroup[:] = 0
         while viewer.is_running():
             started = time.monotonic()
             data.qpos[:] = scene.qpos[frame]
             mujoco.mj_kinematics(scene.model, data)
+            mujoco.mj_camlight(scene.model, data)
             viewer.sync()
             if not paused:
-                frame = (frame + 1) % len(scene.qpos)
+                following = (frame + 1) % len(scene.qpos)
+                # Moved, not set: the view that the user chose goes along with the figures.
+                viewer.cam.lookat[:] += scene.centers[following] - scene.centers[frame]
+                frame = following
             time.sleep(max(0.0, scene.frame_time - (time.monotonic() - started)))
