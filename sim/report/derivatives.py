@@ -27,11 +27,9 @@ def derivative(
     times = np.arange(count) * frame_time
     centres = np.clip(times, half, duration - half)
     spline = make_interp_spline(times, values.reshape(count, -1), k=min(3, count - 1))
-    samples = spline((centres[:, None] + half * _OFFSETS).ravel())
     weights = _WEIGHTS[order] / half**order
-    return np.einsum("k,tkn->tn", weights, samples.reshape(count, len(_OFFSETS), -1)).reshape(
-        values.shape
-    )
+    total = sum(w * spline(centres + half * x) for w, x in zip(weights, _OFFSETS, strict=True))
+    return np.asarray(total).reshape(values.shape)
 
 
 def _fit_weights() -> Float[np.ndarray, "3 K"]:

@@ -82,7 +82,7 @@ def unexplained(
             axis=1,
         )
         A = columns.transpose(1, 0, 2).reshape(6, -1)
-        forces, _ = nnls(A, wanted[t])
+        forces, _ = nnls(A, wanted[t], maxiter=50 * A.shape[1])
         residual[t] = wanted[t] - A @ forces
     return np.stack(
         [
