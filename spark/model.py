@@ -13,7 +13,7 @@ Axes: B batch, T frames, J joints, G = 6 groups, N joints of a group (padded), D
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import torch
 import torch.nn.functional as nnf
@@ -37,7 +37,7 @@ class Config:
     heads: int = 4
     encoder_blocks: int = 4
     decoder_blocks: int = 4
-    name_width: int = 128
+    name_width: int = 130  # of the name encoder, and two for the side
     max_group: int = 16
     mask_joints: float = 0.1  # share of joints zeroed before pooling, in training
     drop_names: float = 0.0  # share of skeletons whose names are withheld, in training
@@ -51,12 +51,12 @@ class Config:
     decoder_time: bool = False  # the decoder's joints look along time too
 
     @classmethod
-    def paper(cls) -> Self:
+    def paper(cls) -> "Config":
         """The published network."""
         return cls()
 
     @classmethod
-    def default(cls) -> Self:
+    def default(cls) -> "Config":
         """A residual on the analytic transfer: starts equal to it."""
         return cls(
             mask_joints=0.0,
@@ -376,7 +376,8 @@ def forward_kinematics(pose: Pose, body: Body) -> Float[Tensor, "B T J 3"]:
 
 def _take(x: Tensor, joints: Int[Tensor, "B J"]) -> Tensor:
     """`x[b, :, joints[b]]` for each b."""
-    index = joints.view(len(joints), 1, -1, *([1] * (x.ndim - 3))).expand(-1, *x.shape[1:])
+    index = joints.view(len(joints), 1, -1, *([1] * (x.ndim - 3)))
+    index = index.expand(-1, x.shape[1], -1, *x.shape[3:])
     return torch.gather(x, 2, index)
 
 

@@ -5,7 +5,7 @@ random variants of that skeleton; on both, the feet are planted again where the 
 were. The network gets the first, its analytic transfer to the second, and must find the second.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
+from spark.errors import SkeletonError
 from spark.features import BodyFeatures
 from spark.kinematics import local_rotations, world_positions
 from spark.plant import Leg, bend_leg, stance_correction
@@ -57,78 +58,71 @@ class Pairs(NamedTuple):
 
 
 class PairMaker:
-    """Draws pairs from clips; the same seed gives the same pairs.
+    """Draws pairs from clips. Draw `n` of a seed is always the same, whatever was drawn before.
 
-    Variants are drawn anew all the time but used more than once: a pool for each body, of which one
-    is replaced a batch, keeps their making out of the way.
+    Making a skeleton costs as much as using it many times, so each body has a fixed set of
+    `variants`, made when they are first met.
     """
 
     def __init__(
-        self, clips: Sequence[Clip], *, window: int = 64, pool: int = 24, seed: int = 0
+        self, clips: Sequence[Clip], *, window: int = 64, variants: int = 256, seed: int = 0
     ) -> None:
-        self.window, self.pool = window, pool
-        self.rng = np.random.default_rng(seed)
+        self.window, self.variants, self.seed = window, variants, seed
         by_body: dict[int, list[Clip]] = {}
         for clip in clips:
             if len(clip.hips) >= window:
                 by_body.setdefault(id(clip.body), []).append(clip)
         self._bodies = list(by_body.values())
+        if not self._bodies:
+            raise SkeletonError(f"no clip has {window} frames: expected at least one to train on")
         frames = np.array([sum(len(c.hips) for c in group) for group in self._bodies], float)
         self._weights = frames / frames.sum()
-        self._pools: list[list[_Stage]] = [[] for _ in self._bodies]
+        self._stages: dict[tuple[int, int], _Stage] = {}
         self._links: dict[tuple[_Stage, _Stage], Correspondence] = {}
 
-    def __iter__(self) -> Iterator[Pairs]:
-        while True:
-            yield self.draw(8)
-
-    def draw(self, windows: int) -> Pairs:
-        """`windows` windows of one body's clips on one pair of its variants."""
-        k = int(self.rng.choice(len(self._bodies), p=self._weights))
-        rotations, hips, planted = self._cut(self._bodies[k], windows)
-        source, target = self._pick(k), self._pick(k)
+    def draw(self, n: int, windows: int) -> Pairs:
+        """Draw number `n`: `windows` windows of one body's clips on one pair of its variants."""
+        rng = np.random.default_rng((self.seed, n))
+        k = int(rng.choice(len(self._bodies), p=self._weights))
+        rotations, hips, planted = self._cut(self._bodies[k], windows, rng)
+        source, target = self._stage(k, rng), self._stage(k, rng)
         on_source = source.place(rotations, hips, planted)
         on_target = target.place(rotations, hips, planted)
         link = self._link(source, target)
         copied = link.rotations(on_source, target.variant.body.rig)
-        frame_time = self._bodies[k][0].frame_time
         return Pairs(
             _windows(source.variant.body, on_source, hips),
             _windows(target.variant.body, on_target, hips),
             _windows(target.variant.body, copied, hips),
             planted,
-            frame_time,
+            self._bodies[k][0].frame_time,
         )
 
     def _cut(
-        self, clips: list[Clip], windows: int
+        self, clips: list[Clip], windows: int, rng: np.random.Generator
     ) -> tuple[Float[np.ndarray, "W T K 4"], Float[np.ndarray, "W T 3"], Bool[np.ndarray, "W T 2"]]:
         lengths = np.array([len(c.hips) for c in clips], float)
-        chosen = self.rng.choice(len(clips), windows, p=lengths / lengths.sum())
+        chosen = rng.choice(len(clips), windows, p=lengths / lengths.sum())
         cuts = []
         for i in chosen.tolist():
             clip = clips[i]
-            at = int(self.rng.integers(0, len(clip.hips) - self.window + 1))
+            at = int(rng.integers(0, len(clip.hips) - self.window + 1))
             span = slice(at, at + self.window)
             cuts.append((clip.rotations[span], clip.hips[span], clip.planted[span]))
         rotations, hips, planted = (np.stack(part) for part in zip(*cuts, strict=True))
         return rotations, hips, planted
 
-    def _pick(self, k: int) -> "_Stage":
-        pool = self._pools[k]
-        if len(pool) < self.pool or self.rng.random() < 0.25:
-            stage = _Stage(random_variant(self._bodies[k][0].body, self.rng))
-            if len(pool) < self.pool:
-                pool.append(stage)
-            else:
-                pool[int(self.rng.integers(len(pool)))] = stage
-            return stage
-        return pool[int(self.rng.integers(len(pool)))]
+    def _stage(self, k: int, rng: np.random.Generator) -> "_Stage":
+        key = (k, int(rng.integers(self.variants)))
+        if key not in self._stages:
+            own = np.random.default_rng((self.seed, *key))
+            self._stages[key] = _Stage(random_variant(self._bodies[k][0].body, own))
+        return self._stages[key]
 
     def _link(self, source: "_Stage", target: "_Stage") -> Correspondence:
         key = (source, target)
         if key not in self._links:
-            if len(self._links) > 1024:
+            if len(self._links) > 4096:
                 self._links.clear()
             self._links[key] = correspond(source.variant.body.rig, target.variant.body.rig)
         return self._links[key]

@@ -1,0 +1,132 @@
+"""Bodies and motions as the network's tensors: padded, stacked, with their names embedded."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+
+from spark.features import BodyFeatures
+from spark.model import Body, Pose
+from spark.pairs import Pairs, Windows, leg_of
+from spark.rig_names import split_side
+from spark.roles import Group
+
+Names = Callable[[Sequence[str]], Float[Tensor, "S E"]]
+
+
+class Batch(NamedTuple):
+    """B windows: what is known, where it goes, what must come out, and what the losses weigh."""
+
+    source: Body
+    target: Body
+    pose: Pose
+    truth: Pose
+    start: Pose
+    planted: Bool[Tensor, "B T J"]
+    effectors: Bool[Tensor, "B J"]
+    frame_time: float
+
+
+class Collator:
+    """Makes batches; a body's tensors are made once and kept while the body lives."""
+
+    def __init__(self, names: Names) -> None:
+        self._names = names
+        self._bodies: WeakKeyDictionary[BodyFeatures, Body] = WeakKeyDictionary()
+
+    def batch(self, draws: Sequence[Pairs]) -> Batch:
+        """Draws stacked into one batch, padded to the largest body."""
+        counts = [len(draw.source.root) for draw in draws]
+        targets = [draw.target.body for draw in draws]
+        J = max(len(body.joints) for body in targets)
+        planted = torch.zeros(sum(counts), draws[0].source.root.shape[1], J, dtype=torch.bool)
+        row = 0
+        for draw, count in zip(draws, counts, strict=True):
+            for side, group in enumerate((Group.LEFT_LEG, Group.RIGHT_LEG)):
+                contact = leg_of(draw.target.body, group).contact
+                planted[row : row + count, :, contact] = torch.as_tensor(draw.planted[..., side])
+            row += count
+        effectors = [torch.as_tensor(body.effectors > 0) for body in targets]
+        return Batch(
+            self.bodies([draw.source.body for draw in draws], counts),
+            self.bodies(targets, counts),
+            _poses([draw.source for draw in draws]),
+            _poses([draw.target for draw in draws]),
+            _poses([draw.start for draw in draws]),
+            planted,
+            _stack(effectors, counts),
+            draws[0].frame_time,
+        )
+
+    def bodies(self, bodies: Sequence[BodyFeatures], counts: Sequence[int]) -> Body:
+        """Each body repeated as often as `counts` says."""
+        made = [self._body(body) for body in bodies]
+        J = max(body.valid.shape[1] for body in made)
+        parts = []
+        for field in Body._fields:
+            tensors = [getattr(body, field)[0] for body in made]
+            if field == "parents":  # a padding joint is its own parent
+                tensors = [torch.cat([t, torch.arange(len(t), J)]) for t in tensors]
+            fill = -1 if field == "groups" else 0
+            parts.append(_stack(tensors, counts, fill))
+        return Body(*parts)
+
+    def _body(self, features: BodyFeatures) -> Body:
+        if features not in self._bodies:
+            self._bodies[features] = self._make(features)
+        return self._bodies[features]
+
+    def _make(self, features: BodyFeatures) -> Body:
+        longest = max(map(len, features.groups))
+        groups = torch.full((len(features.groups), longest), -1)
+        arcs = torch.zeros(groups.shape)
+        for g, (joints, arc) in enumerate(zip(features.groups, features.arcs, strict=True)):
+            groups[g, : len(joints)] = torch.as_tensor(joints)
+            arcs[g, : len(joints)] = _float(arc)
+        sides = torch.zeros(len(features.joints), 2)
+        for k, j in enumerate(features.joints.tolist()):
+            role = features.rig.roles.roles[j]
+            side = split_side(role)[0] if role else ""
+            if side:
+                sides[k, int(side == "right")] = 1
+        parents = torch.as_tensor(features.skeleton.parents).clamp(min=0)
+        return Body(
+            torch.cat([self._names(features.skeleton.names), sides], -1)[None],
+            _float(features.tpose)[None],
+            _float(features.shape)[None],
+            groups[None],
+            arcs[None],
+            torch.ones(1, len(features.joints), dtype=torch.bool),
+            parents[None],
+            _float(features.skeleton.offsets)[None],
+        )
+
+
+def _poses(windows: Sequence[Windows]) -> Pose:
+    J = max(w.rotations.shape[2] for w in windows)
+    rotations = []
+    for w in windows:
+        identity = np.broadcast_to(
+            np.array([1.0, 0, 0, 0, 1, 0]), (*w.rotations.shape[:2], J - w.rotations.shape[2], 6)
+        )
+        rotations.append(_float(np.concatenate([w.rotations, identity], axis=2)))
+    return Pose(torch.cat(rotations), torch.cat([_float(w.root) for w in windows]))
+
+
+def _stack(tensors: Sequence[Tensor], counts: Sequence[int], fill: int = 0) -> Tensor:
+    """Tensors padded to a common shape along each axis, each repeated."""
+    shape = [max(sizes) for sizes in zip(*(t.shape for t in tensors), strict=True)]
+    out = tensors[0].new_full((sum(counts), *shape), fill)
+    row = 0
+    for tensor, count in zip(tensors, counts, strict=True):
+        out[(slice(row, row + count), *map(slice, tensor.shape))] = tensor
+        row += count
+    return out
+
+
+def _float(array: Float[np.ndarray, "..."]) -> Float[Tensor, "..."]:
+    return torch.as_tensor(array, dtype=torch.float32)
