@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.report import Report, judge
+from sim.report import Finding, Report, compare, judge
 from spark.errors import SkeletonError
 from spark.feet import FOOT_LENGTH, standing_height
 from spark.motion import Motion
@@ -343,3 +343,31 @@ def test_a_statue_beside_its_feet_is_out_of_balance() -> None:
     # a little above the hips.
     height = report.clip.imbalance[0]
     assert height == pytest.approx(0.8 * np.sin(angle) - 0.2 + 0.07 * np.sin(angle), abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "place"),
+    [
+        (57, 58, "at frame 57 (0.95 s)"),
+        (148, 150, "in frames 148-149 (2.47-2.48 s)"),
+        (212, 241, "in frames 212-240 (3.5-4.0 s)"),
+    ],
+)
+def test_places_are_as_fine_as_they_are_short(start: int, stop: int, place: str) -> None:
+    assert Finding("skating", "left foot", start, stop, 0.1, "m", "").place(1 / 60) == place
+
+
+def test_results_stand_beside_each_other_with_the_least_marked() -> None:
+    rig = stick_rig()
+    still = standing(rig, 60)
+    table = compare(
+        {
+            "good": judge(still, rig, source=(still, rig)),
+            "floats": judge(along(still, 2, 0.05), rig, source=(still, rig)),
+        }
+    ).splitlines()
+    assert table[0].split() == ["good", "floats"]
+    rows = {line[:26].strip(): line[26:].split() for line in table[1:]}
+    assert rows["implausible [%]"] == ["0.0*", "100.0"]
+    assert rows["penetration [%]"] == ["0.0", "0.0"]
+    assert rows["out of balance [%]"] == ["0.0", "-"]

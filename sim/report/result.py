@@ -25,11 +25,12 @@ class Finding:
 
     def place(self, frame_time: float) -> str:
         """`in frames 212-240 (3.5-4.0 s)`, or `at frame 57 (0.95 s)`."""
+        first, last = self.start * frame_time, (self.stop - 1) * frame_time
         if self.stop - self.start == 1:
-            return f"at frame {self.start} ({self.start * frame_time:.2f} s)"
-        last = self.stop - 1
-        seconds = f"{self.start * frame_time:.1f}-{last * frame_time:.1f} s"
-        return f"in frames {self.start}-{last} ({seconds})"
+            return f"at frame {self.start} ({first:.2f} s)"
+        digits = 1 if last - first >= 0.2 else 2
+        seconds = f"{first:.{digits}f}-{last:.{digits}f} s"
+        return f"in frames {self.start}-{self.stop - 1} ({seconds})"
 
 
 @dataclass(frozen=True, eq=False)
