@@ -62,11 +62,11 @@ def understand(motion: Motion, override: Override | None = None) -> Rig:
     """
     skeleton = motion.skeleton
     roles = assign_roles(skeleton, motion, override)
-    tpose = find_tpose(motion, roles)
+    tpose, notes = find_tpose(motion, roles)
     pelvis = roles.require(Role.PELVIS)
     carrier = carrier_of(skeleton, pelvis)
     height = hip_height(skeleton, roles, tpose)
-    return Rig(skeleton, roles, groups_of(skeleton, roles), tpose, carrier, height)
+    return Rig(skeleton, roles, groups_of(skeleton, roles), tpose, carrier, height, notes)
 
 
 def hip_height(skeleton: Skeleton, roles: RoleMap, tpose: Float[np.ndarray, "J 4"]) -> float:

@@ -5,87 +5,87 @@ not follow from a direction: it is that of the rest pose, brought into the T by 
 rotations from the body outwards. Hanging arms then rise sideways and their palms turn down. Trunk,
 neck and head keep the posture that the rig's artist gave them.
 
-Some rigs' rest pose is no pose at all (LAFAN1, Rokoko: every bone along one local axis). There the
+Some files' rest pose is no pose at all (LAFAN1, Rokoko: every bone along one local axis). There the
 mean pose of the motion stands in for it, and the axes that knees and elbows bend about settle the
-twist; such axes are a joint's coordinate axes, so that all clips of a rig give the same T-pose.
+twist. Such rigs are built with their joint axes at right angles, so twists are rounded to them:
+all clips of a rig give the same T-pose.
 """
 
-from itertools import product
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
 
-from spark.kinematics import forward
+from spark.bones import Pose
 from spark.motion import Motion
-from spark.roles import LIMBS, Group, Role, RoleMap
+from spark.observed import bend_axis, standing_slope
+from spark.reference import GROUP_OF, TRUNK_TILT, Reference, pelvis_frame, reference_of, snap
+from spark.roles import Group, Role, RoleMap
 from spark.rotation import (
+    quat_angle,
     quat_between,
+    quat_conj,
     quat_from_matrix,
     quat_from_rotvec,
+    quat_from_yaw,
     quat_identity,
     quat_mul,
     quat_rotate,
-    rotvec_from_quat,
 )
 from spark.skeleton import Skeleton
 
-_SNAP = np.cos(np.radians(25))  # a direction this near to a coordinate axis is meant to be it
-_BENDS = np.radians(10)  # a joint that bends less than this in a clip does not show its axis
-_TINY = 1e-6  # bones shorter than this [m] have no direction
+_ROLL = np.radians(100)  # a forearm is seldom rolled further than this from its middle
+_STEEP = np.radians(-75)  # a foot that points further down than this at rest does not stand
 
+_LEFT, _UP = np.eye(3)[1:]
 _FEET = (Role.LEFT_FOOT, Role.RIGHT_FOOT)
-_BENT = {  # upper segment: the lower one, and the axis that it bends about in the T-pose
-    Role.LEFT_UPPER_LEG: (Role.LEFT_LOWER_LEG, np.array([0.0, 1, 0])),
-    Role.RIGHT_UPPER_LEG: (Role.RIGHT_LOWER_LEG, np.array([0.0, 1, 0])),
-    Role.LEFT_UPPER_ARM: (Role.LEFT_FOREARM, np.array([0.0, 0, -1])),
-    Role.RIGHT_UPPER_ARM: (Role.RIGHT_FOREARM, np.array([0.0, 0, 1])),
+_TOES = (Role.LEFT_TOE, Role.RIGHT_TOE)
+_HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
+_CLAVICLES = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE)
+_BENT = {  # the segment below, and the axis that it bends about in the T-pose
+    Role.LEFT_UPPER_LEG: (Role.LEFT_LOWER_LEG, _LEFT),
+    Role.RIGHT_UPPER_LEG: (Role.RIGHT_LOWER_LEG, _LEFT),
+    Role.LEFT_UPPER_ARM: (Role.LEFT_FOREARM, -_UP),
+    Role.RIGHT_UPPER_ARM: (Role.RIGHT_FOREARM, _UP),
 }
-
-# The 24 turns of a cube: rigs are built with joint axes at right angles.
-_RIGHT_ANGLES = np.array(
-    [
-        q / np.linalg.norm(q)
-        for q in np.array(list(product((-1, 0, 1), repeat=4)), dtype=np.float64)
-        if tuple(q) > (0, 0, 0, 0) and np.count_nonzero(q) in (1, 2, 4)
-    ]
-)
+_ROLLING = (Role.LEFT_FOREARM, Role.RIGHT_FOREARM, *_HANDS)
+_OUT = {Group.LEFT_ARM: _LEFT, Group.RIGHT_ARM: -_LEFT}
 
 Vector = Float[np.ndarray, "3"]
 Quat = Float[np.ndarray, "4"]
 
 
-def find_tpose(motion: Motion, roles: RoleMap) -> Float[np.ndarray, "J 4"]:
-    """Each joint's `q_world_joint` in the T-pose.
+def find_tpose(motion: Motion, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"], tuple[str, ...]]:
+    """Each joint's `q_world_joint` in the T-pose, and notes on what was assumed.
 
     Pelvis upright facing +X, legs straight down, arms straight along +-Y with palms down, feet
     towards +X with their soles flat. Joints above the one that carries the body stay as they rest.
+    Raises SkeletonError where the rig has no lateral axis or no legs.
     """
     skeleton = motion.skeleton
+    reference = reference_of(motion, roles)
+    tpose = quat_identity(np.zeros((len(skeleton), 1)))
     pelvis = roles.require(Role.PELVIS)
-    frame = _pelvis_frame(skeleton, roles)
-    posed = _legs_hang(skeleton, roles, frame)
-    q_pelvis = quat_from_matrix(frame)
-    identity = quat_identity(np.zeros((len(skeleton), 1)))
-    reference = identity if posed else _typical_rotations(motion.rotations)
-    goals = _goals(motion, roles, posed, q_pelvis)
-
-    tpose = identity.copy()
+    tpose[pelvis] = quat_from_matrix(pelvis_frame(reference))
+    above = skeleton.ancestors(pelvis)
     carrier = carrier_of(skeleton, pelvis)
+    for child, j in pairwise(above):
+        if j >= carrier:
+            tpose[j] = quat_mul(tpose[child], quat_conj(reference.pose.local[child]))
+    notes = list(reference.notes)
     for j in range(len(skeleton)):
-        if j in skeleton.ancestors(pelvis):
-            tpose[j] = q_pelvis if j >= carrier else identity[j]
+        if j in above:
             continue
+        parent = tpose[int(skeleton.parents[j])]
+        q = quat_mul(parent, reference.pose.local[j])
         role = roles.roles[j]
-        q = quat_mul(tpose[int(skeleton.parents[j])], reference[j])
-        if posed and role in _FEET:
-            q = q_pelvis  # the sole is as flat as in the rest pose, wherever the leg went
-        if j in goals:
-            bone, goal = goals[j]
-            q = quat_mul(quat_between(quat_rotate(q, bone), goal), q)
-            if not posed and role in _BENT:
-                q = quat_mul(_twist_to_bend(motion, roles, role, q, goal), q)
+        if role in _FEET or role in _TOES:
+            q = _place_foot(reference, j, role, q, tpose[pelvis])
+        elif role is not None and role in GROUP_OF:
+            q, note = _place(reference, j, role, q, parent)
+            notes += note
         tpose[j] = q
-    return tpose
+    return tpose, tuple(notes)
 
 
 def carrier_of(skeleton: Skeleton, pelvis: int) -> int:
@@ -94,125 +94,92 @@ def carrier_of(skeleton: Skeleton, pelvis: int) -> int:
     return next((j for j in skeleton.ancestors(pelvis) if skeleton.translating[j]), 0)
 
 
-def bone_vector(skeleton: Skeleton, roles: RoleMap, joint: int) -> Vector | None:
-    """The rest vector [m] of a limb joint's bone: to the next joint of its limb, or, at the end of
-    the limb, to the middle of all that hangs there. None where nothing shows a direction."""
-    rest = skeleton.rest_positions
-    role = roles.roles[joint]
-    for limb in LIMBS.values():
-        if role not in limb:
-            continue
-        for after in limb[limb.index(role) + 1 :]:
-            for j in roles.joints(after):
-                vector = rest[j] - rest[joint]
-                if joint in skeleton.ancestors(j) and np.linalg.norm(vector) > _TINY:
-                    return vector
-    below = list(skeleton.subtree(joint))
-    tips = np.isin(skeleton.end_parents, below)
-    points = np.concatenate(
-        [rest[below[1:]], rest[skeleton.end_parents[tips]] + skeleton.end_offsets[tips]]
-    )
-    if not len(points):
-        return None
-    vector = points.mean(0) - rest[joint]
-    return vector if np.linalg.norm(vector) > _TINY else None
+def _place(
+    reference: Reference, joint: int, role: Role, q: Quat, q_parent: Quat
+) -> tuple[Quat, tuple[str, ...]]:
+    """A limb joint's rotation in the T-pose, from `q`, where its parent and the pose take it."""
+    bone = reference.pose.bone(joint)
+    if bone is None or (role in _CLAVICLES and reference.posed):
+        return q, ()
+    goal = _OUT.get(GROUP_OF[role], -_UP)
+    if reference.square and role in _HANDS:
+        bone = snap(bone, TRUNK_TILT)
+    q = quat_mul(quat_between(quat_rotate(q, bone), goal), q)
+    if role in _BENT and not reference.posed:
+        q = quat_mul(_twist_to_bend(reference, joint, bone, role, q, goal), q)
+    if reference.square:
+        straight = quat_mul(quat_between(quat_rotate(q_parent, bone), goal), q_parent)
+        if role in _ROLLING and quat_angle(q, straight) < _ROLL:
+            q = straight
+        q = _square(q, goal, _UP if GROUP_OF[role] in _OUT else _LEFT)
+    if role in _HANDS:
+        return _palm_down(reference.pose, joint, q)
+    return q, ()
 
 
-def _goals(
-    motion: Motion, roles: RoleMap, posed: bool, q_pelvis: Quat
-) -> dict[int, tuple[Vector, Vector]]:
-    """For each limb joint its bone in the rest pose, and where that bone points in the T-pose."""
-    goals: dict[int, tuple[Vector, Vector]] = {}
-    for group, limb in LIMBS.items():
-        arm = group in (Group.LEFT_ARM, Group.RIGHT_ARM)
-        out = np.array([0.0, 1.0 if group is Group.LEFT_ARM else -1.0, 0.0])
-        for place, role in enumerate(limb):
-            for j in roles.joints(role):
-                bone = bone_vector(motion.skeleton, roles, j)
-                if bone is None:
-                    continue
-                if arm and (place > 0 or not posed):
-                    goals[j] = bone, out
-                elif not arm and place < 2:
-                    goals[j] = bone, np.array([0.0, 0, -1])
-                elif role in _FEET:
-                    goals[j] = bone, _foot_goal(motion, j, bone, q_pelvis if posed else None)
-    return goals
+def _place_foot(reference: Reference, joint: int, role: Role, q: Quat, q_pelvis: Quat) -> Quat:
+    """Straight ahead, with the slope that the foot has at rest, or when it stands; toes level."""
+    if reference.posed and role in _TOES:
+        return q
+    bone = reference.pose.bone(joint)
+    if reference.posed:
+        q = q_pelvis  # the sole is as flat as at rest, wherever the leg went
+        if bone is None:
+            return q
+        x, y, z = quat_rotate(q, bone)
+        if np.arctan2(z, np.hypot(x, y)) > _STEEP:
+            return quat_mul(quat_from_yaw(-np.arctan2(y, x)), q)
+    if bone is None:
+        return q
+    slope = _standing_slope(reference) if role in _FEET else 0.0
+    goal = np.array([np.cos(slope), 0.0, np.sin(slope)])
+    q = quat_mul(quat_between(quat_rotate(q, bone), goal), q)
+    return _square(q, goal, _LEFT) if reference.square else q
 
 
-def _foot_goal(motion: Motion, foot: int, bone: Vector, q_rest: Quat | None) -> Vector:
-    """Straight ahead, with the slope that the foot has in the rest pose, or when it is low."""
-    if q_rest is not None:
-        along = quat_rotate(q_rest, bone)
-    else:
-        positions, world = forward(motion)
-        height = positions[:, foot, 2]
-        low = height <= np.percentile(height, 30)
-        steps = quat_rotate(world[low, foot], bone)
-        flat = np.hypot(steps[:, 0], steps[:, 1])
-        along = np.array([np.median(flat), 0, np.median(steps[:, 2])])
-    return np.array([np.hypot(along[0], along[1]), 0.0, along[2]])
+def _standing_slope(reference: Reference) -> float:
+    """The slope of standing feet [rad]: a body's two feet are alike."""
+    feet = [j for role in _FEET for j in reference.pose.roles.joints(role)[:1]]
+    bones = {j: bone for j in feet if (bone := reference.pose.bone(j)) is not None}
+    return float(np.mean([standing_slope(reference.motion, j, bone) for j, bone in bones.items()]))
 
 
-def _twist_to_bend(motion: Motion, roles: RoleMap, role: Role, q: Quat, bone: Vector) -> Quat:
-    """The rotation about `bone` after which the joint below bends about the T-pose's axis."""
-    still = np.array([1.0, 0, 0, 0])
-    lower_role, goal = _BENT[role]
-    lower = roles.joint(lower_role)
-    if lower is None:
-        return still
-    turns = rotvec_from_quat(motion.rotations[:, lower])
-    if np.percentile(np.linalg.norm(turns, axis=-1), 95) < _BENDS:
-        return still
-    axis = np.linalg.eigh(turns.T @ turns)[1][:, -1]
-    axis = _snap(axis if axis @ turns.sum(0) >= 0 else -axis)
-    seen = quat_rotate(q, axis)
-    seen = seen - bone * (seen @ bone)
-    if np.linalg.norm(seen) < 0.3:  # it twists more than it bends
-        return still
-    return quat_from_rotvec(bone * np.arctan2(np.cross(seen, goal) @ bone, seen @ goal))
+def _twist_to_bend(
+    reference: Reference, upper: int, bone: Vector, role: Role, q: Quat, goal: Vector
+) -> Quat:
+    """The rotation about `goal` after which the joint below bends about the T-pose's axis."""
+    lower_role, axis = _BENT[role]
+    lower = reference.pose.roles.joint(lower_role)
+    lower_bone = None if lower is None else reference.pose.bone(lower)
+    if lower is None or lower_bone is None:
+        return quat_identity(goal)
+    bent = bend_axis(reference.motion, upper, lower, bone, lower_bone)
+    return quat_identity(goal) if bent is None else _turn(quat_rotate(q, bent), axis, goal)
 
 
-def _pelvis_frame(skeleton: Skeleton, roles: RoleMap) -> Float[np.ndarray, "3 3"]:
-    """`R_T_rest` of the pelvis: rows forward, left and up of the rest pose."""
-    rest = skeleton.rest_positions
-    left = rest[roles.require(Role.LEFT_UPPER_LEG)]
-    right = rest[roles.require(Role.RIGHT_UPPER_LEG)]
-    tops = [j for role in (Role.HEAD, Role.NECK, Role.SPINE) for j in roles.joints(role)]
-    middle = (left + right) / 2
-    trunk = rest[tops[0]] - middle if tops else np.array([0.0, 0, 1])
-    lateral = _snap(left - right)
-    lateral = lateral / np.linalg.norm(lateral)
-    up = _snap(trunk - lateral * (trunk @ lateral))
-    up = up - lateral * (up @ lateral)
-    up = up / np.linalg.norm(up)
-    return np.stack([np.cross(lateral, up), lateral, up])
+def _square(q: Quat, about: Vector, side: Vector) -> Quat:
+    """`q` turned about a vector until the nearest of its axes points to a side."""
+    axes = quat_rotate(q, np.concatenate([np.eye(3), -np.eye(3)]))
+    across = axes - np.outer(axes @ about, about)
+    nearest = across[np.argmax(across @ side)]
+    return quat_mul(_turn(nearest, side, about), q)
 
 
-def _legs_hang(skeleton: Skeleton, roles: RoleMap, frame: Float[np.ndarray, "3 3"]) -> bool:
-    """Whether the rest pose is a pose: both legs below the trunk."""
-    rest = skeleton.rest_positions
-    for upper, (lower, _) in list(_BENT.items())[:2]:
-        thigh = frame @ (rest[roles.require(lower)] - rest[roles.require(upper)])
-        if thigh[2] > -0.5 * np.linalg.norm(thigh):
-            return False
-    return True
+def _palm_down(pose: Pose, hand: int, q: Quat) -> tuple[Quat, tuple[str, ...]]:
+    """`q`, turned by right angles where thumb or fingers say that the palm faces elsewhere."""
+    found = pose.thumb_side(hand)
+    if found is None:
+        return q, ()
+    side, droop = found
+    seen = quat_rotate(q, side)
+    turns = round((np.arctan2(-seen[2], seen[0]) - droop) / (np.pi / 2))
+    if turns == 0:
+        return q, ()
+    note = f"{pose.skeleton.names[hand]} is turned by {90 * turns} degrees: palms face down"
+    return quat_mul(quat_from_rotvec(-_LEFT * (turns * np.pi / 2)), q), (note,)
 
 
-def _typical_rotations(rotations: Float[np.ndarray, "T J 4"]) -> Float[np.ndarray, "J 4"]:
-    """The mean rotation of each joint over time (Markley et al. 2007), or the turn by right angles
-    that it is near to: that is then how the rig was built, and the rest how the actor stood."""
-    moments = np.einsum("tji,tjk->jik", rotations, rotations)
-    mean = np.linalg.eigh(moments)[1][..., -1]
-    near = np.abs(mean @ _RIGHT_ANGLES.T)
-    best = near.argmax(-1)
-    built = near.max(-1) > np.cos(np.radians(35) / 2)
-    return np.where(built[:, None], _RIGHT_ANGLES[best], mean)
-
-
-def _snap(v: Vector) -> Vector:
-    """`v`, or the coordinate axis that it is near to."""
-    k = int(np.argmax(np.abs(v)))
-    if abs(v[k]) > _SNAP * np.linalg.norm(v):
-        return np.eye(3)[k] * np.sign(v[k])
-    return v
+def _turn(start: Vector, end: Vector, about: Vector) -> Quat:
+    """The rotation about a unit vector that brings `start` as near to `end` as it can."""
+    start = start - about * (start @ about)
+    return quat_from_rotvec(about * np.arctan2(np.cross(start, end) @ about, start @ end))

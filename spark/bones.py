@@ -1,0 +1,90 @@
+"""Where a rig's bones point, in the pose that its T-pose is found from."""
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from spark.kinematics import end_positions, world_positions, world_rotations
+from spark.roles import LIMBS, RoleMap
+from spark.rotation import quat_conj, quat_rotate
+from spark.skeleton import Skeleton
+
+SHORT = 1e-6  # vectors shorter than this [m] have no direction
+_THUMB = re.compile(r"thumb|親指|finger_?0|finger1-", re.IGNORECASE)
+_INDEX = re.compile(r"index|人指|人差指|finger2-", re.IGNORECASE)
+_LITTLE = re.compile(r"pink|little|小指|finger5-", re.IGNORECASE)
+_THUMB_DROOP = np.radians(20)
+
+Vector = Float[np.ndarray, "3"]
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """A skeleton in one pose, given by local rotations. Bones are in the axes of their joint."""
+
+    skeleton: Skeleton
+    roles: RoleMap
+    local: Float[np.ndarray, "J 4"]
+
+    @cached_property
+    def world(self) -> Float[np.ndarray, "J 4"]:
+        """`q_world_joint` of each joint."""
+        return world_rotations(self.skeleton, self.local)
+
+    @cached_property
+    def positions(self) -> Float[np.ndarray, "J 3"]:
+        """Joint positions [m] from the root."""
+        return world_positions(self.skeleton, self.world, np.zeros(3))
+
+    @cached_property
+    def tips(self) -> Float[np.ndarray, "E 3"]:
+        """Positions [m] of the End Sites from the root."""
+        return end_positions(self.skeleton, self.positions, self.world)
+
+    def seen_from(self, joint: int, vector: Vector) -> Vector:
+        """A vector of the pose's world in the axes of `joint`."""
+        return quat_rotate(quat_conj(self.world[joint]), vector)
+
+    def bone(self, joint: int) -> Vector | None:
+        """The vector [m] from `joint` to the next joint of its limb or, at the limb's end, to the
+        middle of what hangs there, thumbs aside. None where nothing shows a direction."""
+        role = self.roles.roles[joint]
+        below = self.skeleton.subtree(joint)
+        for limb in LIMBS.values():
+            for after in limb[limb.index(role) + 1 :] if role in limb else ():
+                for j in self.roles.joints(after):
+                    if j in below and (vector := self._vector(joint, [j], [])) is not None:
+                        return vector
+        thumbs = {k for j in self._named(joint, _THUMB) for k in self.skeleton.subtree(j)}
+        fingers = [j for j in below if j not in thumbs]
+        return self._vector(joint, fingers[1:], fingers)
+
+    def thumb_side(self, hand: int) -> tuple[Vector, float] | None:
+        """The vector towards the thumb's side of a hand, and how far [rad] it points below the
+        plane of the palm: a thumb hangs a little, a row of fingers doesn't. None where the
+        fingers have no known names."""
+        index, little = self._named(hand, _INDEX), self._named(hand, _LITTLE)
+        if index and little:
+            across = self.positions[index[0]] - self.positions[little[0]]
+            if np.linalg.norm(across) > SHORT:
+                return self.seen_from(hand, across), 0.0
+        thumb = self._named(hand, _THUMB)
+        joints = list(self.skeleton.subtree(thumb[0])) if thumb else []
+        vector = self._vector(hand, joints, joints) if joints else None
+        return None if vector is None else (vector, _THUMB_DROOP)
+
+    def _named(self, hand: int, pattern: re.Pattern[str]) -> list[int]:
+        below = self.skeleton.subtree(hand)[1:]
+        return [j for j in below if pattern.search(self.skeleton.names[j])]
+
+    def _vector(self, joint: int, joints: list[int], tipped: list[int]) -> Vector | None:
+        """From `joint` to the middle of other joints and of the End Sites on `tipped`."""
+        tips = self.tips[np.isin(self.skeleton.end_parents, tipped)]
+        points = np.concatenate([self.positions[joints], tips])
+        if not len(points):
+            return None
+        vector = points.mean(0) - self.positions[joint]
+        return self.seen_from(joint, vector) if np.linalg.norm(vector) > SHORT else None

@@ -1,0 +1,89 @@
+"""What a motion shows of the rig under it, asked where the rest pose of a file is none."""
+
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from spark.motion import Motion
+from spark.rotation import quat_identity, quat_mul, quat_normalize, quat_rotate
+
+# A joint that never bends further than this does not show which way it bends.
+_BEND = np.sin(np.radians(25))
+
+# The 24 turns of a cube: motion capture systems build rigs with joint axes at right angles.
+_RIGHT_ANGLES = quat_normalize(
+    np.array(
+        [
+            q
+            for q in product((-1.0, 0.0, 1.0), repeat=4)
+            if q > (0, 0, 0, 0) and np.count_nonzero(q) in (1, 2, 4)
+        ]
+    )
+)
+
+
+def mean_rotations(rotations: Float[np.ndarray, "T *n 4"]) -> Float[np.ndarray, "*n 4"]:
+    """The mean over time, blind to the signs of quaternions (Markley et al. 2007)."""
+    moments = np.einsum("t...i,t...k->...ik", rotations, rotations)
+    return np.linalg.eigh(moments)[1][..., -1]
+
+
+def nearest_right_angle(q: Float[np.ndarray, "*n 4"]) -> Float[np.ndarray, "*n 4"]:
+    """The turn by right angles that is nearest to each rotation."""
+    return _RIGHT_ANGLES[np.abs(q @ _RIGHT_ANGLES.T).argmax(-1)]
+
+
+def bend_axis(
+    motion: Motion,
+    upper: int,
+    lower: int,
+    upper_bone: Float[np.ndarray, "3"],
+    lower_bone: Float[np.ndarray, "3"],
+) -> Float[np.ndarray, "3"] | None:
+    """The unit axis, in `upper`'s own axes, about which `lower` bends; None where it hardly does.
+
+    Bones are vectors in their own joint's axes. Only their directions are looked at: what a joint
+    twists about its bone does not count.
+    """
+    between = _chain(motion, lower)[_chain(motion, upper).size :]
+    turned = quat_rotate(_rotations_along(motion, between), lower_bone)
+    length = np.linalg.norm(upper_bone) * np.linalg.norm(lower_bone)
+    sines = np.cross(upper_bone, turned) / length
+    axis = np.linalg.eigh(sines.T @ sines)[1][:, -1]
+    along = sines @ axis
+    if np.percentile(np.abs(along), 95) < _BEND:
+        return None
+    # Deep bends tell the sign: a knee may be stretched a little beyond straight.
+    return axis if (along * np.abs(along)).sum() > 0 else -axis
+
+
+def standing_slope(motion: Motion, joint: int, bone: Float[np.ndarray, "3"]) -> float:
+    """The angle [rad] of a bone of the foot over the floor while the foot is low and slow."""
+    chain = _chain(motion, joint)
+    world, position = quat_identity(motion.root_pos[:, :1]), np.zeros_like(motion.root_pos)
+    for j in chain:
+        local = motion.skeleton.offsets[j] if j else motion.root_pos
+        if j and motion.translations is not None:
+            local = motion.translations[:, j]
+        position = position + quat_rotate(world, local)
+        world = quat_mul(world, motion.rotations[:, j])
+    low = np.flatnonzero(position[:, 2] <= np.percentile(position[:, 2], 30))
+    speed = np.zeros(len(motion))
+    if len(motion) > 1:
+        speed = np.linalg.norm(np.gradient(position, axis=0), axis=-1)
+    slow = low[speed[low] <= np.median(speed[low])]
+    steps = quat_rotate(world[slow], bone)
+    return float(np.median(np.arctan2(steps[:, 2], np.linalg.norm(steps[:, :2], axis=-1))))
+
+
+def _chain(motion: Motion, joint: int) -> Int[np.ndarray, "_"]:
+    """The joints from the root down to `joint`."""
+    return np.array(motion.skeleton.ancestors(joint)[::-1])
+
+
+def _rotations_along(motion: Motion, joints: Int[np.ndarray, "_"]) -> Float[np.ndarray, "T 4"]:
+    q = quat_identity(motion.root_pos[:, :1])
+    for j in joints:
+        q = quat_mul(q, motion.rotations[:, j])
+    return q

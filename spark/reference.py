@@ -1,0 +1,138 @@
+"""The pose that a T-pose is found from: the rest pose, or what a motion makes of it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from spark.bones import SHORT, Pose
+from spark.errors import SkeletonError
+from spark.motion import Motion
+from spark.observed import mean_rotations, nearest_right_angle
+from spark.roles import LIMBS, Group, Role, RoleMap
+from spark.rotation import quat_identity
+
+TRUNK_TILT = np.radians(35)  # a trunk this near to an axis stands along it
+_HIPS_TILT = np.radians(10)
+_BUILT = np.radians(10)  # bones this near to their joint's axes were put there on purpose
+
+_UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
+_UPPER_ARMS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
+_HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
+_ENDS = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE, Role.LEFT_TOE, Role.RIGHT_TOE)
+
+_SIDES = {Group.LEFT_ARM: 1.0, Group.RIGHT_ARM: -1.0}
+GROUP_OF = {role: group for group, limb in LIMBS.items() for role in limb}
+"""The limb that each limb role belongs to."""
+
+Vector = Float[np.ndarray, "3"]
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """The pose from which a T-pose is found.
+
+    `posed`: it is the rest pose; else the mean pose of the motion stands in for it, and `square`
+    tells that limb bones lie along their joints' coordinate axes.
+    """
+
+    motion: Motion
+    pose: Pose
+    posed: bool
+    square: bool
+    notes: tuple[str, ...]
+
+
+def reference_of(motion: Motion, roles: RoleMap) -> Reference:
+    """The rest pose where it is a pose. Where it is none, the mean pose over the frames; on a
+    square rig rounded to right angles, with straight fingers."""
+    skeleton = motion.skeleton
+    rest = Pose(skeleton, roles, quat_identity(np.zeros((len(skeleton), 1))))
+    if _stands(rest):
+        return Reference(motion, rest, True, False, ())
+    square = _at_right_angles(rest)
+    local = mean_rotations(motion.rotations)
+    if square:
+        turned = nearest_right_angle(local)
+        for j, role in enumerate(roles.roles):
+            if role not in GROUP_OF:
+                local[j] = turned[j]
+        for hand in (j for role in _HANDS for j in roles.joints(role)):
+            local[list(skeleton.subtree(hand)[1:])] = rest.local[0]
+    note = "the rest pose is not a pose: the T-pose is found from the motion"
+    return Reference(motion, Pose(skeleton, roles, local), False, square, (note,))
+
+
+def _stands(rest: Pose) -> bool:
+    """Whether the rest pose is a pose: legs hang down from the trunk, arms don't cross it."""
+    lateral = _lateral(rest)
+    up = _upwards(rest, from_feet=False)
+    for group in LIMBS:
+        chain = _limb(rest.roles, group)
+        limb = rest.positions[chain[-1]] - rest.positions[chain[0]] if chain else np.zeros(3)
+        side = _SIDES.get(group)
+        goal, least = (-up, 0.5) if side is None else (side * lateral, -0.5)
+        if limb @ goal < least * np.linalg.norm(limb):
+            return False
+    return True
+
+
+def _at_right_angles(rest: Pose) -> bool:
+    """Whether all limb bones lie along coordinate axes of their joints."""
+    bones = (rest.bone(j) for group in LIMBS for j in _limb(rest.roles, group)[:-1])
+    return all(bone is None or tilt(bone) < _BUILT for bone in bones)
+
+
+def pelvis_frame(reference: Reference) -> Float[np.ndarray, "3 3"]:
+    """`R_T_pelvis`: rows forward, left and up, in the pelvis's own axes."""
+    pose = reference.pose
+    pelvis = pose.roles.require(Role.PELVIS)
+    lateral = pose.seen_from(pelvis, _lateral(pose))
+    up = pose.seen_from(pelvis, _upwards(pose, from_feet=reference.posed))
+    # Artists build along the axes; so do motion capture systems.
+    if reference.posed or reference.square:
+        lateral = snap(lateral, _HIPS_TILT if reference.posed else np.pi)
+        up = snap(up - lateral * (up @ lateral), TRUNK_TILT)
+    up = up - lateral * (up @ lateral)
+    length = np.linalg.norm(up)
+    if length < SHORT:
+        raise SkeletonError("the trunk lies along the line of the hips: no direction is up")
+    up = up / length
+    return np.stack([np.cross(lateral, up), lateral, up])
+
+
+def _lateral(pose: Pose) -> Vector:
+    """The unit vector from the right hip to the left one, or between the shoulders."""
+    for pair in (_UPPER_LEGS, _UPPER_ARMS):
+        left, right = (pose.roles.joint(role) for role in pair)
+        if left is not None and right is not None:
+            across = pose.positions[left] - pose.positions[right]
+            if np.linalg.norm(across) > SHORT:
+                return across / np.linalg.norm(across)
+    raise SkeletonError("hips and shoulders lie in one point each: no direction is left")
+
+
+def _upwards(pose: Pose, *, from_feet: bool) -> Vector:
+    """The unit vector along the trunk, or along the whole body: a crouching body leans less."""
+    at, roles = pose.positions, pose.roles
+    hips = np.mean([at[roles.require(role)] for role in _UPPER_LEGS], axis=0)
+    feet = np.mean([at[_limb(roles, GROUP_OF[role])[-1]] for role in _UPPER_LEGS], axis=0)
+    tops = [j for role in (Role.HEAD, Role.NECK, Role.SPINE) for j in roles.joints(role)[-1:]]
+    up = (at[tops[0]] if tops else hips) - (feet if from_feet or not tops else hips)
+    return up / max(float(np.linalg.norm(up)), SHORT)
+
+
+def _limb(roles: RoleMap, group: Group) -> list[int]:
+    """The joints of a limb from hip or shoulder to ankle or wrist."""
+    return [j for role in LIMBS[group] if role not in _ENDS for j in roles.joints(role)]
+
+
+def snap(v: Vector, tolerance: float) -> Vector:
+    """The coordinate axis that is nearest to `v`, or `v` itself where none is that near."""
+    k = int(np.argmax(np.abs(v)))
+    return np.eye(3)[k] * np.sign(v[k]) if tilt(v) < tolerance else v
+
+
+def tilt(v: Vector) -> float:
+    """The angle [rad] between a vector and the nearest coordinate axis."""
+    return float(np.arccos(min(np.abs(v).max() / max(np.linalg.norm(v), SHORT), 1.0)))
