@@ -116,17 +116,19 @@ def test_the_default_network_starts_as_the_analytic_transfer(batch: Batch) -> No
 def test_one_step_learns_and_every_weight_takes_part(config: Config, batch: Batch) -> None:
     torch.manual_seed(0)
     model = Spark(config)
-    optimiser = torch.optim.AdamW(model.parameters(), lr=1e-3)
+    optimiser = torch.optim.AdamW(model.parameters(), lr=3e-3)
     start = start_of(config, batch)
+    # Far from the analytic transfer, so that a residual network has something to learn at once.
+    truth = Pose(batch.truth.rotations, batch.truth.root + 0.2)
     seen: dict[str, bool] = {}
     errors = []
-    for _ in range(60):
+    for _ in range(30):
         out = model(batch.pose, batch.source, batch.target, start)
-        positions = (forward_kinematics(p, batch.target) for p in (out, batch.truth))
-        loss = losses.reconstruction(out, batch.truth, batch.target) + 100 * losses.positions(
+        positions = (forward_kinematics(p, batch.target) for p in (out, truth))
+        loss = losses.reconstruction(out, truth, batch.target) + 100 * losses.positions(
             *positions, batch.target
         )
-        loss = loss + 7 * losses.root(out, batch.truth)
+        loss = loss + 7 * losses.root(out, truth)
         optimiser.zero_grad()
         loss.backward()
         for name, parameter in model.named_parameters():
@@ -134,7 +136,7 @@ def test_one_step_learns_and_every_weight_takes_part(config: Config, batch: Batc
             seen[name] = seen.get(name, False) or moved
         optimiser.step()
         errors.append(loss.item())
-    assert min(errors[-5:]) < 0.8 * errors[0]
+    assert errors[-1] < 0.5 * errors[0]
     unused = {name for name, moved in seen.items() if not moved}
     # Keys' biases shift all scores alike and cannot matter; the paper's decoder has no query.
     assert all("query" in name or "arc" in name for name in unused), unused
