@@ -43,7 +43,10 @@ check: $(VENV)/.dev
 	$(BIN)/pytest tests/test_architecture.py
 
 bench: $(VENV)/.dev
-	$(BIN)/pytest -m bench -n 0 --benchmark-columns=min,median,stddev,rounds
+	@mkdir -p out
+	$(BIN)/pytest tests/bench -m bench -o addopts= -q --benchmark-json=out/bench.json \
+	  --benchmark-columns=min,median,stddev,rounds
+	$(BIN)/python scripts/bench_table.py out/bench.json
 
 wheel: $(VENV)/.dev
 	bash scripts/wheel_test.sh $(BIN)/python
