@@ -1,4 +1,4 @@
-"""The recordings of humanoids: one clip a rig, and every clip of the rigs that have several."""
+"""The recordings of humanoids."""
 
 ONE_A_RIG = (
     "zoo/ad_cmu1.bvh",
@@ -14,12 +14,16 @@ ONE_A_RIG = (
     "zoo/makehuman_walk.bvh",
     "zoo/reactidle_blender.bvh",
 )
-"""A humanoid rig each; the first twelve of zoo that differ."""
+"""A humanoid rig each."""
 
-CLIPS_OF_ONE_RIG = {
-    "cmu_asf subject 01": "cmu_asf/cmu_01_*.bvh",
-    "cmu_asf subject 02": "cmu_asf/cmu_02_*.bvh",
-    "cmu_expmap": "cmu_expmap/test_*.bvh",
-    "fair1": "animateddrawings/[dwjz]*[bdoe].bvh",
-    "rokoko": "*/*rokoko*.bvh",
-}
+EVERY_BODY = (
+    *ONE_A_RIG,
+    "zoo/makehuman_zombie.bvh",
+    "cmu_asf/cmu_*_01.bvh",
+    "cmu_expmap/test_walking_1.bvh",
+    "reactidle/*.bvh",
+    "animateddrawings/*.bvh",
+    "mesh2motion/human*.bvh",
+    "makehuman/*.bvh",
+)
+"""Every humanoid body of the recordings, at least once: subjects differ in their bones."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from conftest import recordings
-from humanoids import ONE_A_RIG
+from humanoids import EVERY_BODY, ONE_A_RIG
 
 from spark.canonical import to_canonical
 from spark.kinematics import local_rotations, world_positions
@@ -50,7 +50,7 @@ def assert_is_t(rig: Rig) -> None:
     assert rig.hip_height > 0
 
 
-@pytest.mark.parametrize("path", recordings(*ONE_A_RIG))
+@pytest.mark.parametrize("path", recordings(*EVERY_BODY))
 def test_tpose_is_a_t(path: object) -> None:
     assert_is_t(rig_of(path))
 
