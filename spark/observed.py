@@ -1,5 +1,6 @@
 """What a motion shows of the rig under it, asked where the rest pose of a file is none."""
 
+from collections.abc import Mapping
 from itertools import product
 
 import numpy as np
@@ -58,23 +59,40 @@ def bend_axis(
     return axis if (along * np.abs(along)).sum() > 0 else -axis
 
 
-def standing_slope(motion: Motion, joint: int, bone: Float[np.ndarray, "3"]) -> float:
-    """The angle [rad] of a bone of the foot over the floor while the foot is low and slow."""
-    chain = _chain(motion, joint)
+def standing_slope(motion: Motion, feet: Mapping[int, Float[np.ndarray, "3"]]) -> float:
+    """The angle [rad] of the feet over the floor where they stand: low and slow.
+
+    `feet` holds each foot's bone, in the axes of its joint; both are taken to be alike.
+    """
+    heights, speeds, slopes = [], [], []
+    for foot, bone in feet.items():
+        position, world = _path(motion, foot)
+        along = quat_rotate(world, bone)
+        heights.append(position[:, 2])
+        speeds.append(_speed(position))
+        slopes.append(np.arctan2(along[:, 2], np.linalg.norm(along[:, :2], axis=-1)))
+    height, speed, slope = (np.concatenate(x) for x in (heights, speeds, slopes))
+    low = height <= np.percentile(height, 30)
+    return float(np.median(slope[low & (speed <= np.median(speed[low]))]))
+
+
+def _path(motion: Motion, joint: int) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 4"]]:
+    """World position [m] and rotation of one joint."""
     world, position = quat_identity(motion.root_pos[:, :1]), np.zeros_like(motion.root_pos)
-    for j in chain:
+    for j in _chain(motion, joint):
         local = motion.skeleton.offsets[j] if j else motion.root_pos
         if j and motion.translations is not None:
             local = motion.translations[:, j]
         position = position + quat_rotate(world, local)
         world = quat_mul(world, motion.rotations[:, j])
-    low = np.flatnonzero(position[:, 2] <= np.percentile(position[:, 2], 30))
-    speed = np.zeros(len(motion))
-    if len(motion) > 1:
-        speed = np.linalg.norm(np.gradient(position, axis=0), axis=-1)
-    slow = low[speed[low] <= np.median(speed[low])]
-    steps = quat_rotate(world[slow], bone)
-    return float(np.median(np.arctan2(steps[:, 2], np.linalg.norm(steps[:, :2], axis=-1))))
+    return position, world
+
+
+def _speed(position: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T"]:
+    """How far a point moves from frame to frame [m]."""
+    if len(position) < 2:
+        return np.zeros(len(position))
+    return np.linalg.norm(np.gradient(position, axis=0), axis=-1)
 
 
 def _chain(motion: Motion, joint: int) -> Int[np.ndarray, "_"]:

@@ -131,17 +131,14 @@ def _place_foot(reference: Reference, joint: int, role: Role, q: Quat, q_pelvis:
             return quat_mul(quat_from_yaw(-np.arctan2(y, x)), q)
     if bone is None:
         return q
-    slope = _standing_slope(reference) if role in _FEET else 0.0
+    slope = 0.0
+    if role in _FEET:
+        feet = [j for foot in _FEET for j in reference.pose.roles.joints(foot)]
+        bones = {j: vector for j in feet if (vector := reference.pose.bone(j)) is not None}
+        slope = standing_slope(reference.motion, bones)
     goal = np.array([np.cos(slope), 0.0, np.sin(slope)])
     q = quat_mul(quat_between(quat_rotate(q, bone), goal), q)
     return _square(q, goal, _LEFT) if reference.square else q
-
-
-def _standing_slope(reference: Reference) -> float:
-    """The slope of standing feet [rad]: a body's two feet are alike."""
-    feet = [j for role in _FEET for j in reference.pose.roles.joints(role)[:1]]
-    bones = {j: bone for j in feet if (bone := reference.pose.bone(j)) is not None}
-    return float(np.mean([standing_slope(reference.motion, j, bone) for j, bone in bones.items()]))
 
 
 def _twist_to_bend(

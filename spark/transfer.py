@@ -1,9 +1,9 @@
 """Analytic transfer: a motion in canonical form onto another rig, without learning.
 
-Joints of the same role turn alike. Spine and neck may have other numbers of joints: their rotations
-are interpolated by normalised arc length, with the pelvis at 0 and the topmost spine joint (for the
-neck: the head) at 1. Whatever else the target has follows its parent. This is the row "copy" of
-every table.
+Joints of the same role turn alike. Where spine or neck have another number of joints, rotations are
+interpolated by normalised arc length, with the pelvis at 0 and the topmost spine joint at 1 (for
+the neck: topmost spine joint and head). Joints without a role copy those of the same name in the
+same place, or follow their parent. This is the row "copy" of every table.
 """
 
 from dataclasses import dataclass
@@ -12,12 +12,19 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.canonical import CanonicalMotion
+from spark.kinematics import world_positions
 from spark.rig import Rig
-from spark.roles import LIMBS, Role
+from spark.roles import Role
 from spark.rotation import quat_conj, quat_slerp
 
 # A floor further than this from z = 0, in hip heights, is moved to 0.
 _FLOOR_TOLERANCE = 0.1
+
+# Roles that several joints hold, and the roles between which they lie.
+_CHAINS: dict[Role, tuple[Role, Role | None]] = {
+    Role.SPINE: (Role.PELVIS, None),
+    Role.NECK: (Role.SPINE, Role.HEAD),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,43 +66,40 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
         first[j] = second[j] = from_joint
         known[j] = True
 
-    copy(target.pelvis, source.pelvis)
-    for limb in LIMBS.values():
-        for role in limb:
-            theirs, own = source.roles.joint(role), target.roles.joint(role)
-            if theirs is not None and own is not None:
-                copy(own, theirs)
-    for role, start, end in (
-        (Role.SPINE, Role.PELVIS, None),
-        (Role.NECK, Role.SPINE, Role.HEAD),
-    ):
-        theirs_chain, at = _chain(source, role, start, end)
-        own_chain, want = _chain(target, role, start, end)
-        for j, u in zip(own_chain[1:], want[1:].tolist(), strict=True):
-            k = min(int(np.searchsorted(at, u, side="right")) - 1, len(at) - 1)
-            after = min(k + 1, len(at) - 1)
-            span = at[after] - at[k]
-            first[j], second[j] = theirs_chain[k], theirs_chain[after]
-            mix[j] = (u - at[k]) / span if span > 0 else 0.0
-            known[j] = True
+    for role in Role:
+        theirs, own = source.roles.joints(role), target.roles.joints(role)
+        if len(theirs) == len(own) or role not in _CHAINS:
+            for from_joint, j in zip(theirs, own, strict=False):
+                copy(j, from_joint)
+    for role, (start, end) in _CHAINS.items():
+        joints, at = _chain(source, role, start, end)
+        for j, u in zip(*_chain(target, role, start, end), strict=True):
+            if not known[j]:
+                k = int(np.searchsorted(at, u, side="right")) - 1
+                after = min(k + 1, len(at) - 1)
+                span = at[after] - at[k]
+                first[j], second[j] = joints[k], joints[after]
+                mix[j] = (u - at[k]) / span if span > 0 else 0.0
+                known[j] = True
 
     names = {name: j for j, name in enumerate(source.skeleton.names)}
-    between = target.skeleton.ancestors(target.pelvis)[1:]
+    above = target.skeleton.ancestors(target.pelvis)[1:]
     for j in range(size):
-        parent = int(target.skeleton.parents[j])
         if known[j]:
             continue
-        if j in between:
-            if j >= target.carrier:
-                copy(j, source.pelvis)
-            continue
         same = names.get(target.skeleton.names[j])
-        if same is not None and source.roles.roles[same] is None:
-            above = int(source.skeleton.parents[same])
-            if not mix[parent] and _rigid_with(source, above, int(first[parent])):
-                copy(j, same)
-                continue
-        first[j], second[j], mix[j] = first[parent], second[parent], mix[parent]
+        if same is not None and source.roles.roles[same] is not None:
+            same = None
+        if j in above:
+            if j >= target.carrier:
+                carried = same in source.skeleton.ancestors(source.pelvis)[1:]
+                copy(j, same if same is not None and carried else source.pelvis)
+            continue
+        parent = int(target.skeleton.parents[j])
+        if same is not None and not mix[parent] and _hangs(source, same, int(first[parent])):
+            copy(j, same)
+        else:
+            first[j], second[j], mix[j] = first[parent], second[parent], mix[parent]
     return Correspondence(first, second, mix)
 
 
@@ -121,24 +125,23 @@ def _chain(
     rig: Rig, role: Role, start: Role, end: Role | None
 ) -> tuple[list[int], Float[np.ndarray, "_"]]:
     """The joints from the last one of `start` over those of `role` to `end`, and their normalised
-    arc lengths. A chain of one joint lies at 0."""
+    arc lengths in the T-pose. A chain of one joint lies at 0."""
     begin = rig.roles.joints(start)[-1:] or (rig.pelvis,)
     tail = rig.roles.joints(end)[:1] if end is not None else ()
     joints = [*begin, *rig.roles.joints(role), *tail]
-    steps = np.linalg.norm(np.diff(rig.skeleton.rest_positions[joints], axis=0), axis=1)
-    arc = np.concatenate([[0.0], np.cumsum(steps)])
-    if arc[-1] > 0:
-        arc /= arc[-1]
-    arc[-1] = 1.0 if len(joints) > 1 else 0.0
+    positions = world_positions(rig.skeleton, rig.tpose, np.zeros(3))[joints]
+    arc = np.cumsum(np.linalg.norm(np.diff(positions, axis=0, prepend=positions[:1]), axis=1))
+    if len(joints) > 1:
+        arc = arc / arc[-1] if arc[-1] > 0 else arc
+        arc[-1] = 1.0
     return joints, arc
 
 
-def _rigid_with(rig: Rig, joint: int, ancestor: int) -> bool:
-    """Whether `joint` is `ancestor` or hangs below it over joints without a role."""
-    while joint >= 0:
+def _hangs(rig: Rig, joint: int, ancestor: int) -> bool:
+    """Whether `joint` hangs below `ancestor` over joints without a role."""
+    while (joint := int(rig.skeleton.parents[joint])) >= 0:
         if joint == ancestor:
             return True
         if rig.roles.roles[joint] is not None:
             return False
-        joint = int(rig.skeleton.parents[joint])
     return False
