@@ -4,19 +4,34 @@ import base64
 import html
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
 
 from sim.scene import Figure, Scene, build_scene
 from spark.errors import OutputError
+from spark.kinematics import forward
 
 _Point = tuple[int, Float[np.ndarray, "3"]]  # a geom, and a place in its own axes
 _STEPS = 32000  # positions are kept as 16-bit integers
+
+
+@dataclass(frozen=True, eq=False)
+class Marks:
+    """What to draw on a figure besides its body, in every frame of its own motion.
+
+    `points` [m, world, where the motion has them] are dots: 0 hidden, 1 stands, 2 slides, 3 sinks.
+    `flags` is written over the figure's head.
+    """
+
+    points: Float[np.ndarray, "T M 3"]
+    states: UInt8[np.ndarray, "T M"]
+    flags: tuple[str, ...]
 
 
 def write_page(figures: Sequence[Figure], path: str | Path, *, title: str) -> None:
@@ -28,16 +43,27 @@ def write_page(figures: Sequence[Figure], path: str | Path, *, title: str) -> No
         raise OutputError(f"{path}: can't be written ({error.strerror or error})") from error
 
 
-def page(figures: Sequence[Figure], *, title: str) -> str:
-    """The page as text. Frames are thinned to at most 30 a second: the page blends between them."""
+def page(
+    figures: Sequence[Figure], *, title: str, marks: Sequence[Marks | None] | None = None
+) -> str:
+    """The page as text. Frames are thinned to at most 30 a second: the page blends between them.
+
+    `marks` has one entry for each figure. Inside another page's frame, a message `{seek: seconds}`
+    sets the time, and messages `{time: seconds}` tell it.
+    """
     scene = build_scene(figures, max_fps=30.0)
     colors: list[list[int]] = []
     data = {
         "frames": len(scene.qpos),
         "frame_time": scene.frame_time,
-        "distance": 1.5 * max(scene.width, scene.height),
+        "distance": 1.65 * max(scene.width, scene.height),
         "height": scene.height,
-        "figures": [_figure(scene, k, figure.label, colors) for k, figure in enumerate(figures)],
+        "figures": [
+            _figure(scene, k, figure, mark, colors)
+            for k, (figure, mark) in enumerate(
+                zip(figures, marks or [None] * len(figures), strict=True)
+            )
+        ],
         "colors": colors,
     }
     template = (files("sim") / "page.html").read_text(encoding="utf-8")
@@ -45,7 +71,9 @@ def page(figures: Sequence[Figure], *, title: str) -> str:
     return template.replace("__TITLE__", html.escape(title)).replace("__DATA__", packed)
 
 
-def _figure(scene: Scene, k: int, label: str, colors: list[list[int]]) -> dict[str, Any]:
+def _figure(
+    scene: Scene, k: int, figure: Figure, marks: Marks | None, colors: list[list[int]]
+) -> dict[str, Any]:
     """One figure's bones as pairs of points, and the paths of these points."""
     model = scene.model
     geoms = [
@@ -70,14 +98,27 @@ def _figure(scene: Scene, k: int, label: str, colors: list[list[int]]) -> dict[s
             soles.append(list(range(1 + len(local), 5 + len(local))))
             local += [(g, size * np.array([x, y, -1])) for x, y in corners]
     positions = _paths(scene, geoms[0], local)
+    out = {"label": figure.label, "bones": bones, "soles": soles, **_packed(positions)}
+    if marks is not None:
+        root = forward(figure.motion.frames(0, 1))[0][0, figure.rig.carrier]
+        times = np.arange(len(scene.qpos)) * scene.frame_time
+        frames = np.round(times / figure.motion.frame_time).astype(int)
+        frames = np.minimum(frames, len(figure.motion) - 1)
+        out["marks"] = {
+            **_packed(marks.points[frames] + (positions[0, 0] - root)),
+            "states": base64.b64encode(marks.states[frames].tobytes()).decode(),
+            "flags": [marks.flags[t] for t in frames],
+        }
+    return out
+
+
+def _packed(positions: Float[np.ndarray, "T P 3"]) -> dict[str, Any]:
+    """Positions as 16-bit integers: `origin + scale * integer`."""
     low, high = positions.min((0, 1)), positions.max((0, 1))
     scale = float(max((high - low).max() / (2 * _STEPS), 1e-9))
     origin = (low + high) / 2
     whole = np.round((positions - origin) / scale).astype("<i2")
     return {
-        "label": label,
-        "bones": bones,
-        "soles": soles,
         "scale": scale,
         "origin": [round(float(v), 5) for v in origin],
         "positions": base64.b64encode(whole.tobytes()).decode(),

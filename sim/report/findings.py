@@ -10,6 +10,8 @@ from sim.report.result import Finding
 
 # Flags of one kind that are no further apart than this [s] are one event.
 _GAP = 0.1
+# A joint beyond its limit by less than this [rad] is nothing to mend.
+_LEAST_BEND = np.radians(1.0)
 
 
 def find(clip: Measured, drift: Drift | None) -> tuple[Finding, ...]:
@@ -63,6 +65,8 @@ def _bending(clip: Measured, gap: int) -> Iterator[Finding]:
         for excess, movement in zip(limit.excess.T, limit.movements, strict=True):
             for start, stop in spans(excess > 0, gap):
                 amount = float(excess[start:stop].max())
+                if amount < _LEAST_BEND:
+                    continue
                 sentence = f"{limit.joint} {movement} {np.degrees(amount):.0f}° beyond its limit"
                 yield Finding("joint limit", limit.joint, start, stop, amount, "rad", sentence)
 

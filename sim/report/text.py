@@ -29,11 +29,11 @@ def render(report: Report, *, color: bool) -> str:
         paint(f"{len(clip)} frames, {duration:.1f} s", _DIM),
         "",
     ]
-    theirs = {} if source is None else dict(_shares(source))
-    for name, share in _shares(clip):
+    theirs = {} if source is None else dict(shares(source))
+    for name, share in shares(clip):
         line = f"  {name:<18}{graded(share, f'{_percent(share):>8}')}"
         lines.append(line + (f"   source {_percent(theirs[name]):>8}" if name in theirs else ""))
-    lines += [f"  {name:<18}{words}" for name, words in _figures(report)]
+    lines += [f"  {name:<18}{words}" for name, words in figures(report)]
     lines += ["", *_verdict(report.findings, clip.frame_time)]
     if report.notes:
         lines += ["", *(paint(f"note: {note}", _DIM) for note in report.notes)]
@@ -56,7 +56,8 @@ def _percent(share: float) -> str:
     return f"{100 * share:.1f} %"
 
 
-def _shares(clip: Measured) -> Iterator[tuple[str, float]]:
+def shares(clip: Measured) -> Iterator[tuple[str, float]]:
+    """The measures that are shares of frames, by name."""
     for letter, name in FLAGS.items():
         yield name, clip.shares[letter]
     yield "joint limits", clip.limit_share
@@ -65,23 +66,23 @@ def _shares(clip: Measured) -> Iterator[tuple[str, float]]:
         yield "out of balance", clip.unbalanced_share
 
 
-def _figures(report: Report) -> Iterator[tuple[str, str]]:
+def figures(report: Report) -> Iterator[tuple[str, str]]:
+    """The other measures, by name, in words."""
     clip, source, drift, contacts = report.clip, report.source, report.drift, report.contacts
     if contacts is not None and contacts.f1 is not None:
         missed = 0.0 if contacts.recall is None else 1 - contacts.recall
-        words = f"{contacts.f1:>8.2f}   F1 against the source; {_percent(missed)} missed"
+        words = f"{contacts.f1:>6.2f}          F1 against the source; {_percent(missed)} missed"
         yield "foot contacts", words
     if drift is not None:
         yield (
             "root drift",
-            f"{drift.distance.max():>6.2f} m   at most; {drift.distance[-1]:.2f} m at the end of a "
-            f"path of {drift.path_length:.1f} m; heading "
+            f"{drift.distance.max():>6.2f} m        at most; {drift.distance[-1]:.2f} m at the end "
+            f"of a path of {drift.path_length:.1f} m; heading "
             f"{np.degrees(np.abs(drift.heading).max()):.0f}° at most",
         )
-    for name, unit, value in (
-        ("joint speed", "rad/s", lambda clip: float(clip.joint_speed.max(initial=0.0))),
-        ("joint jerk", "rad/s³", lambda clip: clip.jerk_rms),
+    for name, unit, kind, value in (
+        ("joint speed", "rad/s", "at most", lambda clip: float(clip.joint_speed.max(initial=0.0))),
+        ("joint jerk", "rad/s³", "RMS", lambda clip: clip.jerk_rms),
     ):
-        beside = "" if source is None else f"   source {value(source):.0f}"
-        kind = "at most" if name == "joint speed" else "RMS"
-        yield name, f"{value(clip):>8.0f} {unit} {kind}{beside}"
+        beside = "" if source is None else f"; source {value(source):.0f}"
+        yield name, f"{value(clip):>6.0f} {unit:<6}   {kind}{beside}"

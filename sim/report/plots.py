@@ -1,0 +1,158 @@
+"""A report's measures over time, as inline SVG: no script, no library, any zoom."""
+
+import html
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from sim.report.measured import FLAGS, Measured
+from sim.report.measures import spans
+from sim.report.result import Report
+
+WIDTH, _HEIGHT, _STRIP = 1000.0, 88, 14
+_POINTS = 500  # of a line: more can't be seen
+
+
+@dataclass(frozen=True, eq=False)
+class Plot:
+    """One measure: what it is called, its unit, its values, which frames are flagged, where it
+    is too much, and the source's values at times of their own."""
+
+    name: str
+    unit: str
+    values: Float[np.ndarray, "T"]
+    flagged: Bool[np.ndarray, "T"]
+    limit: float | None
+    source: Float[np.ndarray, "S"] | None = None
+    lowest: bool = False  # of many points in one pixel, show the least
+
+
+def plots(report: Report) -> list[Plot]:
+    """What is worth a look over time."""
+    clip, source, limits = report.clip, report.source, report.clip.thresholds
+    flags = clip.flags
+    made = [
+        Plot(
+            "lowest point above the floor",
+            "cm",
+            100 * _lowest(clip),
+            flags["P"] | flags["F"],
+            -100 * limits.penetration,
+            None if source is None else 100 * _lowest(source),
+            lowest=True,
+        ),
+        Plot(
+            "sliding foot",
+            "m/s",
+            _sliding(clip),
+            flags["S"],
+            None,
+            None if source is None else _sliding(source),
+        ),
+        Plot(
+            "force that nothing gives",
+            "body weights",
+            clip.unexplained[:, 0],
+            flags["R"],
+            limits.wrench_force,
+            None if source is None else source.unexplained[:, 0],
+        ),
+        Plot(
+            "joints beyond their limits",
+            "°",
+            _beyond(clip),
+            _beyond(clip) > 0,
+            None,
+            None if source is None else _beyond(source),
+        ),
+        Plot(
+            "body parts in each other",
+            "cm",
+            100 * clip.self_depth.max(axis=1, initial=0.0),
+            clip.self_penetration,
+            100 * limits.self_penetration,
+        ),
+        Plot(
+            "fastest joint",
+            "rad/s",
+            clip.joint_speed.max(axis=1, initial=0.0),
+            np.zeros(len(clip), dtype=bool),
+            None,
+            None if source is None else source.joint_speed.max(axis=1, initial=0.0),
+        ),
+    ]
+    if report.drift is not None:
+        never = np.zeros(len(clip), dtype=bool)
+        made.append(Plot("root drift", "cm", 100 * report.drift.distance, never, None))
+    return made
+
+
+def svg(plot: Plot, duration: float, source_duration: float) -> str:
+    """One plot, `duration` [s] wide: flagged frames shaded, the source behind, the limit dashed."""
+    series = [plot.values] + ([] if plot.source is None else [plot.source])
+    # One spike must not flatten the rest.
+    top = max(1.2 * max(float(np.percentile(v, 99.5)) for v in series), plot.limit or 0.0, 1e-6)
+    bottom = min(0.0, 1.2 * min(float(v.min()) for v in series), 1.5 * (plot.limit or 0.0))
+
+    def y(value: Float[np.ndarray, "N"] | float) -> Float[np.ndarray, "N"]:
+        inside = np.clip(np.atleast_1d(value), bottom, top)
+        return (1 - (inside - bottom) / (top - bottom)) * (_HEIGHT - 4) + 2
+
+    parts = [_shades(plot.flagged, _HEIGHT)]
+    parts.append(f'<path class="zero" d="M0 {y(0.0)[0]:.1f}H{WIDTH:g}"/>')
+    if plot.limit is not None:
+        parts.append(f'<path class="limit" d="M0 {y(plot.limit)[0]:.1f}H{WIDTH:g}"/>')
+    if plot.source is not None:
+        across = WIDTH * (source_duration / duration if duration else 1.0)
+        parts.append(_line(y(plot.source), across, plot.lowest, "source"))
+    parts.append(_line(y(plot.values), WIDTH, plot.lowest, "clip"))
+    return (
+        f"<figure><figcaption>{html.escape(plot.name)} <small>[{plot.unit}], "
+        f"{bottom:.3g} to {top:.3g}</small></figcaption>"
+        f'<svg viewBox="0 0 {WIDTH:g} {_HEIGHT}" preserveAspectRatio="none">{"".join(parts)}'
+        "</svg></figure>"
+    )
+
+
+def flag_strips(clip: Measured) -> str:
+    """When each flag is up: one strip a flag."""
+    return "".join(
+        f"<figure class=strip><figcaption>{letter} {html.escape(name)}</figcaption>"
+        f'<svg viewBox="0 0 {WIDTH:g} {_STRIP}" preserveAspectRatio="none">'
+        f"{_shades(clip.flags[letter], _STRIP)}</svg></figure>"
+        for letter, name in FLAGS.items()
+    )
+
+
+def _shades(flags: Bool[np.ndarray, "T"], height: int) -> str:
+    step = WIDTH / max(len(flags), 1)
+    return "".join(
+        f'<rect x="{start * step:.1f}" width="{max((stop - start) * step, 1.5):.1f}" y="0" '
+        f'height="{height}"/>'
+        for start, stop in spans(flags)
+    )
+
+
+def _line(y: Float[np.ndarray, "T"], across: float, lowest: bool, kind: str) -> str:
+    """A path of at most `_POINTS` points; the worst of the frames that fall on one is shown."""
+    size = max(1, -(-len(y) // _POINTS))
+    padded = np.pad(y, (0, -len(y) % size), mode="edge").reshape(-1, size)
+    worst = padded.max(axis=1) if lowest else padded.min(axis=1)  # y points down
+    x = np.linspace(0, across, len(worst))
+    points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, worst, strict=True))
+    return f'<polyline class="{kind}" points="{points}"/>'
+
+
+def _lowest(clip: Measured) -> Float[np.ndarray, "T"]:
+    return np.where(clip.depth.max(axis=1) > 0, -clip.depth.max(axis=1), clip.clearance)
+
+
+def _sliding(clip: Measured) -> Float[np.ndarray, "T"]:
+    return np.where(clip.skating, clip.speeds, 0.0).max(axis=1)
+
+
+def _beyond(clip: Measured) -> Float[np.ndarray, "T"]:
+    if not clip.limits:
+        return np.zeros(len(clip))
+    return np.degrees(np.max([limit.excess.max(axis=1) for limit in clip.limits], axis=0))

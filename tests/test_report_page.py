@@ -1,0 +1,117 @@
+"""The report's page: one file, opens offline, and its replay, list and plots work together."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sim.report import Report, judge
+from sim.report.page import report_page, write_report_page
+from sim.report.plots import Plot, svg
+from spark.errors import OutputError
+from spark.motion import Motion
+from spark.rig import Rig
+from tests.stick import standing, stick_rig
+
+
+def stumbling() -> tuple[Report, tuple[Motion, Rig], tuple[Motion, Rig]]:
+    """Stands for a second, sinks for one, slides for one."""
+    rig = stick_rig()
+    still = standing(rig, 180)
+    path = np.zeros((180, 3))
+    path[60:120, 2] = -0.05
+    path[120:, 0] = 0.5 * np.arange(60) / 60
+    moved = replace(still, root_pos=still.root_pos + path)
+    return judge(moved, rig, source=(still, rig)), (moved, rig), (still, rig)
+
+
+@pytest.fixture(scope="module")
+def text() -> str:
+    report, motion, source = stumbling()
+    return report_page(report, motion, source, title="a & b __X__ </script>")
+
+
+def test_it_is_one_file_that_asks_for_nothing(text: str) -> None:
+    assert not re.search(r"(src|href)\s*=\s*[\"']?(https?:)?//", text)
+    assert "a &amp; b __X__ &lt;/script&gt;" in text
+    assert "of the frames are implausible" in text
+    assert "left foot sinks 5.0 cm under the floor" in text
+
+
+def test_it_holds_the_whole_record(text: str) -> None:
+    found = re.search(r'<script id="report" type="application/json">(.*?)</script>', text, re.S)
+    assert found
+    assert json.loads(found[1]) == json.loads(json.dumps(stumbling()[0].json()))
+
+
+def test_a_line_shows_the_worst_of_the_frames_that_share_a_pixel() -> None:
+    values = np.zeros(20000)
+    values[12345] = 1.0
+    never = np.zeros(20000, dtype=bool)
+    for lowest, spike in ((False, values), (True, -values)):
+        drawn = svg(Plot("x", "m", spike, never, None, lowest=lowest), 1.0, 1.0)
+        points = re.search(r'class="clip" points="([^"]*)"', drawn)
+        assert points
+        y = [float(point.split(",")[1]) for point in points[1].split()]
+        assert len(y) <= 501
+        assert np.ptp(y) > 50
+
+
+def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
+    report, motion, source = stumbling()
+    with pytest.raises(OutputError, match="nowhere"):
+        write_report_page(report, tmp_path / "nowhere" / "r.html", motion, source, title="t")
+
+
+def test_it_works_in_a_browser(text: str, tmp_path: Path) -> None:
+    """Headless Chromium: no error; a finding sets the replay's time; the replay looks different."""
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    if chromium is None:
+        assert "CI" not in os.environ, "CI installs chromium"
+        pytest.skip("chromium is not installed")
+    probe = """<script>
+      const seen = []; onerror = m => seen.push(String(m)); console.error = onerror;
+      const out = { seen, times: [], pictures: [] };
+      // Virtual time hardly ever draws frames: the replay is told to.
+      const inside = code => replay.contentWindow.eval(code);
+      const note = () => { inside("draw()"); out.times.push(inside("view.time"));
+        const c = replay.contentDocument.getElementById("view");
+        const d = c.getContext("2d").getImageData(0, 0, c.width, c.height).data;
+        let s = 0; for (let i = 0; i < d.length; i += 4) s = (s * 31 + d[i]) % 1000003;
+        out.pictures.push(s); };
+      const steps = [() => seek(0), note, () => document.querySelector("#findings button").click(),
+        note, () => { const b = plots.getBoundingClientRect();
+          plots.onclick({ clientX: b.left + 0.75 * b.width }); }, note,
+        () => { out.cursor = now.style.left; now.style.left = ""; inside("told = null; tick(0)"); },
+        () => { out.told = now.style.left; document.body.dataset.result = JSON.stringify(out); }];
+      steps.forEach((step, i) => setTimeout(() => {
+        try { step(); } catch (e) { seen.push(String(e)); } }, 1000 * (i + 1)));
+      </script></html>"""
+    path = tmp_path / "probe.html"
+    head, _, tail = text.rpartition("</html>")
+    path.write_text(head + probe + tail)
+    quiet = (
+        "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-sync "
+        "--disable-background-networking --disable-component-update --virtual-time-budget=12000"
+    )
+    ran = subprocess.run(
+        [chromium, *quiet.split(), f"--user-data-dir={tmp_path}", "--dump-dom", path.as_uri()],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    found = re.search(r'data-result="([^"]*)"', ran.stdout)
+    assert found, ran.stderr[-500:]
+    result = json.loads(found[1].replace("&quot;", '"'))
+    assert result["seen"] == []
+    np.testing.assert_allclose(result["times"], [0, 1, 0.75 * 179 / 60], atol=0.01)
+    assert len(set(result["pictures"])) == 3
+    assert float(result["cursor"].removesuffix("%")) == pytest.approx(75, abs=1)
+    assert result["told"] == pytest.approx(result["cursor"])
