@@ -10,6 +10,8 @@ from spark.rig import Rig
 PLANTED_SPEED = 0.15
 PLANTED_HEIGHT = 0.06
 ADULT_HEIGHT = 1.75
+# The span [s] that a speed is measured over: two frames at 30 fps.
+SPEED_WINDOW = 1 / 15
 
 
 def floor_height(
@@ -27,11 +29,16 @@ def floor_height(
 
 
 def speeds(positions: Float[np.ndarray, "T *n 3"], frame_time: float) -> Float[np.ndarray, "T *n"]:
-    """Horizontal speed [m/s] by central differences; a single frame stands still."""
-    if len(positions) < 2:
-        return np.zeros(positions.shape[:-1])
-    velocity = np.gradient(positions[..., :2], frame_time, axis=0)
-    return np.linalg.norm(velocity, axis=-1)
+    """Horizontal speed [m/s], over the same span of time at every frame rate.
+
+    One-sided at the ends; a single frame stands still.
+    """
+    reach = max(1, round(SPEED_WINDOW / 2 / frame_time))
+    frames = np.arange(len(positions))
+    before, after = np.maximum(frames - reach, 0), np.minimum(frames + reach, len(positions) - 1)
+    way = np.linalg.norm(positions[after, ..., :2] - positions[before, ..., :2], axis=-1)
+    time = np.maximum(after - before, 1) * frame_time
+    return way / time.reshape(-1, *[1] * (way.ndim - 1))
 
 
 def planted_points(
