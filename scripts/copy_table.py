@@ -1,4 +1,4 @@
-"""How plausible motions are before and after `copy` puts them on other bodies, as Markdown.
+"""How plausible motions are before and after they are put on other bodies, as Markdown.
 
 Usage: python scripts/copy_table.py FOLDER TARGET... (a folder of BVH sources, BVH targets)
 """
@@ -26,8 +26,10 @@ def main(folder: str, *targets: str) -> None:
     print(f"| | implausible | {' | '.join(FLAGS.values())} |\n|---|{'---|' * (len(FLAGS) + 1)}")
     print(row("the source itself", [spark_sim.report(s).clip for s in sources]))
     for target in map(spark_sim.load, targets):
-        results = [spark_sim.report(spark_sim.retarget(s, target), source=s) for s in sources]
-        print(row(f"copy onto {target.name}", [result.clip for result in results]))
+        for name, refine in (("`copy` alone", False), ("`copy`, feet held", True)):
+            moved = ((s, spark_sim.retarget(s, target, refine=refine)) for s in sources)
+            results = [spark_sim.report(clip, source=source).clip for source, clip in moved]
+            print(row(f"{name}, onto {target.name}", results))
 
 
 if __name__ == "__main__":
