@@ -123,15 +123,32 @@ def retarget(
     return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig)
 
 
-def report(clip: Clip | File, *, source: Clip | File | None = None) -> "Report":
-    """How believable a motion is; with `source`, beside the motion it was made from."""
+def report(
+    clip: Clip | File,
+    *,
+    source: Clip | File | None = None,
+    html: File | None = None,
+    force: bool = False,
+) -> "Report":
+    """How believable a motion is; with `source`, beside the motion it was made from.
+
+    With `html`, also written as a web page. Raises `OutputError` where that exists, unless forced.
+    """
     from sim.report import judge
 
+    if html is not None:
+        files.claim(Path(html), force=force)
     clip = _clip(clip)
-    if source is None:
-        return judge(clip.motion, clip.rig)
-    source = _clip(source)
-    return judge(clip.motion, clip.rig, source=(source.motion, source.rig))
+    motion, origin, names = (clip.motion, clip.rig), None, (clip.name, "source")
+    if source is not None:
+        source = _clip(source)
+        origin, names = (source.motion, source.rig), (clip.name, source.name)
+    judged = judge(*motion, source=origin)
+    if html is not None:
+        from sim.report.page import write_report_page
+
+        write_report_page(judged, html, motion, origin, title=clip.name, names=names)
+    return judged
 
 
 def play(

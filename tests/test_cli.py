@@ -344,6 +344,18 @@ def test_report(here: Path) -> None:
     assert "implausible" in good("report", WALK, "--source", WALK, cwd=here)
 
 
+def test_report_as_a_page_and_beside_others(here: Path) -> None:
+    args = ("report", WALK, "--source", WALK, "--html", "out/report.html")
+    good(*args, cwd=here)
+    assert "of the frames are implausible" in (here / "out/report.html").read_text()
+    assert "exists" in bad(*args, cwd=here)
+    good(*args, "--force", cwd=here)
+    table = good("report", WALK, "--compare", TARGET, "--source", WALK, cwd=here).splitlines()
+    assert table[0].split() == [Path(WALK).stem, Path(TARGET).stem]
+    both = json.loads(good("report", WALK, "--compare", TARGET, "--json", cwd=here))
+    assert set(both) == {WALK, TARGET}
+
+
 @pytest.mark.parametrize(("limit", "code"), [("0%", 1), ("100", 0)])
 def test_fail_over(limit: str, code: int, here: Path, samples: Path) -> None:
     """Half of the frames are put 30 cm under the floor."""

@@ -2,18 +2,22 @@
 
 import re
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from pathlib import Path
 
-from spark_sim.commands.options import add_corrections, add_json, load
+from spark_sim.commands.options import add_corrections, add_force, add_json, load
 
 SUMMARY = "measure how believable a motion is"
-USAGE = "FILE [--source SRC] [--fail-over PERCENT] [options]"
+USAGE = "FILE [--source SRC] [--html OUT] [options]"
 DESCRIPTION = """\
 Measure the physical plausibility of the motion in FILE: feet below the floor,
-floating, skating, joint limits; with --source also what the motion it came
-from does, and how far the root drifts from it."""
+floating, skating, forces that the floor can't give, joint limits, the body in
+itself; with --source also what the motion it came from does, how well the foot
+contacts agree, and how far the root drifts from it."""
 EXAMPLES = """\
 examples:
   spark-sim report walk_on_mutant.bvh --source walk.bvh
+  spark-sim report walk_on_mutant.bvh --source walk.bvh --html report.html
+  spark-sim report ours.bvh --compare theirs.bvh --source walk.bvh
   spark-sim report walk_on_mutant.bvh --json > report.json
   spark-sim report walk_on_mutant.bvh --fail-over 5%
 """
@@ -23,12 +27,23 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="a BVH file")
     parser.add_argument("--source", metavar="SRC", help="the motion that FILE was made from")
     parser.add_argument(
+        "--html", metavar="OUT", help="write a page too: replay, worst moments, plots over time"
+    )
+    parser.add_argument(
+        "--compare",
+        metavar="OTHER",
+        nargs="+",
+        default=[],
+        help="judge these files too, with the same options, and print one table",
+    )
+    parser.add_argument(
         "--fail-over",
         metavar="PERCENT",
         type=_percentage,
         help="exit with code 1 where more of the frames are implausible",
     )
     add_json(parser, "the report")
+    add_force(parser)
     add_corrections(parser, "FILE")
     add_corrections(parser, "SRC", "source-")
 
@@ -37,15 +52,27 @@ def run(args: Namespace) -> int:
     from spark_sim import clip, console
 
     judged = load(args, args.file)
+    others = {path: load(args, path) for path in args.compare}
     source = None if args.source is None else load(args, args.source, "source-")
-    report = clip.report(judged, source=source)
+    report = clip.report(judged, source=source, html=args.html, force=args.force)
+    reports = {args.file: report}
+    reports |= {path: clip.report(other, source=source) for path, other in others.items()}
     if args.json:
-        console.emit_json(report.json())
+        records = {path: each.json() for path, each in reports.items()}
+        console.emit_json(records if others else records[args.file])
+    elif others:
+        from sim.report import compare
+
+        stems = [Path(path).stem for path in reports]
+        names = stems if len({*stems}) == len(stems) else list(reports)
+        table = dict(zip(names, reports.values(), strict=True))
+        console.say(compare(table, color=console.uses_color()))
     else:
         console.say(report.text(color=console.uses_color()))
-    if args.fail_over is not None and 100 * report.implausible > args.fail_over:
+    worst = max(each.implausible for each in reports.values())
+    if args.fail_over is not None and 100 * worst > args.fail_over:
         console.error(
-            f"{100 * report.implausible:.3g} % of the frames are implausible, "
+            f"{100 * worst:.3g} % of the frames are implausible, "
             f"--fail-over allows {args.fail_over:.4g} %"
         )
         return 1
