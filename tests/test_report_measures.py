@@ -10,6 +10,7 @@ from sim.report.measures import (
     contact_match,
     floating,
     floor_height,
+    floor_slope,
     horizontal_speed,
     least_within,
     outside_hull,
@@ -113,6 +114,19 @@ def test_distance_from_a_square_of_support() -> None:
     expected = [0, 0.3, np.sqrt(2), 0.2]
     np.testing.assert_allclose(outside_hull(place, square, use), expected, rtol=1e-3)
     assert outside_hull(place[:1], square[:1], ~use[:1] & False) == [np.inf]
+
+
+def test_the_slope_of_the_floor_and_how_far_it_rises() -> None:
+    ground = np.random.default_rng(2).uniform(0, [3.0, 1.0], (50, 2))
+    ground[:2] = [[0, 0], [3, 1]]
+    height = 0.02 * ground[:, 0]  # 2 cm a metre along X, from 0 to 6 cm
+    angle, rise = floor_slope(np.column_stack([ground, height]))
+    assert angle == pytest.approx(np.arctan(0.02))
+    assert rise == pytest.approx(0.06)
+    stairs = np.column_stack([ground, 0.1 * (np.arange(50) % 2)])
+    assert floor_slope(stairs) == (0, 0)
+    assert floor_slope(np.zeros((2, 3))) == (0, 0)
+    assert floor_slope(np.ones((9, 3))) == (0, 0)
 
 
 def test_contacts_precision_recall_and_f1() -> None:

@@ -13,6 +13,7 @@ from sim.report.measures import (
     at_times,
     contact_match,
     floor_height,
+    floor_slope,
     horizontal_speed,
     root_drift,
 )
@@ -41,7 +42,8 @@ def judge(motion: Motion, rig: Rig, *, source: tuple[Motion, Rig] | None = None)
     if source is None:
         clip = measure(clip_track, floor_height(clip_track.lowest_point))
         note = "the floor is the clip's own: one that floats or sinks as a whole can't be told"
-        return Report(clip, None, None, None, find(clip, None), (note,))
+        notes = (note, *_slope(clip_track, "the"))
+        return Report(clip, None, None, None, find(clip, None), notes)
     source_track = _track(*source, "the source")
     source_floor = floor_height(source_track.lowest_point)
     floor, notes = _floor_from_source(clip_track, source_track.rig, source_floor)
@@ -51,6 +53,7 @@ def judge(motion: Motion, rig: Rig, *, source: tuple[Motion, Rig] | None = None)
     clip = _beyond_source(measure(clip_track, floor), source_clip, times, scale)
     drift = _drift(clip_track, source_track, times, scale)
     contacts = _contacts(clip_track, source_track, times)
+    notes += _slope(source_track, "the source's")
     difference = abs(source_track.motion.duration - motion.duration)
     if difference > max(0.1, 2 * motion.frame_time):
         notes += (f"the source's duration differs by {difference:.1f} s: frames may not match",)
@@ -110,6 +113,19 @@ def _contacts(track: Track, source: Track, times: Float[np.ndarray, "T"]) -> Con
             np.stack([theirs[side] for side in sides], axis=1).astype(float), frame_time, times
         )
         > 0.5,
+    )
+
+
+def _slope(track: Track, whose: str) -> tuple[str, ...]:
+    """A note where the feet stand on a slope: recorded floors are off level by a degree or two."""
+    lowest = track.points[np.arange(len(track)), track.points[..., 2].argmin(axis=1)]
+    planted = np.any(list(_planted(track).values()), axis=0)
+    angle, rise = floor_slope(lowest[planted])
+    if rise < PLAUSIBILITY_V1.scaled(track.rig.hip_height).floating / 2:
+        return ()
+    return (
+        f"{whose} floor slopes by {np.degrees(angle):.1f}°: the feet stand {100 * rise:.0f} cm "
+        "higher at one end of it, and there count as floating",
     )
 
 

@@ -149,3 +149,21 @@ def contact_match(
         right / true if true else None,
         2 * right / (found + true) if found + true else None,
     )
+
+
+def floor_slope(places: Float[np.ndarray, "N 3"]) -> tuple[float, float]:
+    """Slope [rad] and rise [m] of the floor on which feet stood at `places`.
+
+    The plane of least squares, level across the path where the feet keep to a line; its rise is
+    that between its lowest place and its highest. Both are 0 where a plane does not explain the
+    heights much better than a level does.
+    """
+    if len(places) < 3:
+        return 0.0, 0.0
+    ground = places[:, :2] - places[:, :2].mean(axis=0)
+    level = places[:, 2] - places[:, 2].mean()
+    gradient, *_ = np.linalg.lstsq(ground, level, rcond=0.3)
+    plane = ground @ gradient
+    if np.std(level - plane) > 0.5 * np.std(level):
+        return 0.0, 0.0
+    return float(np.arctan(np.linalg.norm(gradient))), float(np.ptp(plane))
