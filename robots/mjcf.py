@@ -1,0 +1,227 @@
+"""MJCF files of humanoids: any that MuJoCo can compile, with a free joint where it has none.
+
+Only the kinematics matter here, so a file whose meshes are missing is read without them.
+"""
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from spark.errors import FileFormatError, SkeletonError
+
+FREE, BALL, SLIDE, HINGE = (
+    int(kind)
+    for kind in (
+        mujoco.mjtJoint.mjJNT_FREE,
+        mujoco.mjtJoint.mjJNT_BALL,
+        mujoco.mjtJoint.mjJNT_SLIDE,
+        mujoco.mjtJoint.mjJNT_HINGE,
+    )
+)
+_MESH = mujoco.mjtGeom.mjGEOM_MESH
+_LEAST_MASS, _LEAST_INERTIA = 1e-4, 1e-8
+_SECOND = 0.5  # a second tree with this share of the joints is another robot
+
+
+@dataclass(frozen=True, eq=False)
+class Mjcf:
+    """A compiled model in which `root` is the body with the free joint of the one humanoid."""
+
+    model: mujoco.MjModel
+    root: int
+    path: Path
+    notes: tuple[str, ...] = ()
+
+    @property
+    def free_joint(self) -> int:
+        """The joint that takes the root through the world."""
+        return int(self.model.body_jntadr[self.root])
+
+    def bodies(self) -> list[int]:
+        """The root and all bodies below it, parents first."""
+        inside = {self.root}
+        for body in range(self.root + 1, self.model.nbody):
+            if int(self.model.body_parentid[body]) in inside:
+                inside.add(body)
+        return sorted(inside)
+
+    def joints(self) -> list[int]:
+        """The hinges and balls of the robot in the order of the tree."""
+        model = self.model
+        return [
+            joint
+            for body in self.bodies()
+            for joint in range(
+                int(model.body_jntadr[body]), int(model.body_jntadr[body] + model.body_jntnum[body])
+            )
+            if int(model.jnt_type[joint]) in (HINGE, BALL)
+        ]
+
+    def joint_name(self, joint: int) -> str:
+        """The joint's name, or where it sits if it has none."""
+        return self.model.joint(joint).name or f"joint {joint} of {self.body_name(self._at(joint))}"
+
+    def body_name(self, body: int) -> str:
+        """The body's name, or its number if it has none."""
+        return self.model.body(body).name or f"body {body}"
+
+    def _at(self, joint: int) -> int:
+        return int(self.model.jnt_bodyid[joint])
+
+
+def read_mjcf(path: str | Path, *, visuals: bool = True) -> Mjcf:
+    """Read and compile an MJCF (or a scene that includes one).
+
+    Without `visuals`, meshes that are only looked at are left out: coordinates are the same, and
+    reading is several times faster. Raises FileFormatError where MuJoCo can't compile the file, and
+    SkeletonError where it holds no robot or several.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileFormatError(path, None, "no such file; expected an MJCF (.xml)")
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+    except (ValueError, RuntimeError) as error:
+        raise FileFormatError(path, None, f"MuJoCo can't read it: {_first(error)}") from error
+    notes: list[str] = []
+    if not visuals:
+        _drop_visuals(spec)
+    root = _find_root(spec, path, notes)
+    _free_root(spec, root, path, notes)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of attributes of the file that MuJoCo calls deprecated
+        model = _compile(spec, path, notes)
+    _say_what_is_ignored(model, notes)
+    if not np.isfinite(model.body_pos).all() or not np.isfinite(model.jnt_axis).all():
+        raise FileFormatError(path, None, "a body's place is not a finite number")
+    return Mjcf(model, int(model.body(root).id), path, tuple(notes))
+
+
+def _drop_visuals(spec: mujoco.MjSpec) -> None:
+    """Delete the meshes that don't collide, of bodies that have other shapes or a mass given."""
+    for body in spec.bodies:
+        if body.name == "world":
+            continue
+        seen = [
+            g for g in body.geoms if g.type == _MESH and not int(g.contype) | int(g.conaffinity)
+        ]
+        if len(seen) < len(list(body.geoms)) and body.explicitinertial:
+            for geom in seen:
+                spec.delete(geom)
+    used = {g.meshname for g in spec.geoms if g.type == _MESH}
+    skins = bool(list(spec.skins))
+    for mesh in list(spec.meshes):
+        if mesh.name and mesh.name not in used and not skins:
+            spec.delete(mesh)
+
+
+def _find_root(spec: mujoco.MjSpec, path: Path, notes: list[str]) -> str:
+    """The name of the world's child that carries the humanoid; unnamed bodies get names."""
+    for number, body in enumerate(spec.bodies):
+        if not body.name:
+            body.name = f"body_{number}"
+    counts = {body.name: _hinges_below(body) for body in spec.worldbody.bodies}
+    ranked = sorted((name for name in counts if counts[name]), key=lambda n: -counts[n])
+    if not ranked:
+        raise SkeletonError(f"{path}: the model has no joints; expected a humanoid with hinges")
+    first, others = ranked[0], ranked[1:]
+    rivals = [n for n in others if counts[n] >= _SECOND * counts[first]]
+    if rivals:
+        both = ", ".join(repr(n) for n in (first, *rivals))
+        if any(_is_free(j) for n in (first, *rivals) for j in spec.body(n).joints):
+            what = "holds several robots; expected one: keep one of them in the file"
+        else:
+            what = "has limbs that hang on the world itself; give the trunk a body that holds them"
+        raise SkeletonError(f"{path}: the model {what} (bodies {both})")
+    if others:
+        notes.append(f"beside the robot {first!r}, other moving bodies stay where they are")
+    return first
+
+
+def _hinges_below(body: mujoco.MjsBody) -> int:
+    own = sum(not _is_free(joint) for joint in body.joints)
+    return own + sum(_hinges_below(child) for child in body.bodies)
+
+
+def _is_free(joint: mujoco.MjsJoint) -> bool:
+    return int(joint.type) == FREE
+
+
+def _free_root(spec: mujoco.MjSpec, root: str, path: Path, notes: list[str]) -> None:
+    """Give the root a free joint: it has none, or moves by a chain of slides and hinges."""
+    body = spec.body(root)
+    joints = list(body.joints)
+    if any(_is_free(joint) for joint in joints):
+        return
+    if joints and not any(int(joint.type) == SLIDE for joint in joints):
+        raise SkeletonError(
+            f"{path}: the root {root!r} turns about {joints[0].name!r} but can't move; expected a "
+            "free joint, or none"
+        )
+    if joints:
+        gone = {joint.name for joint in joints}
+        names = ", ".join(repr(joint.name) for joint in joints)
+        for actuator in list(spec.actuators):
+            if actuator.target in gone:
+                spec.delete(actuator)
+        for key in list(spec.keys):
+            spec.delete(key)
+        for joint in joints:
+            spec.delete(joint)
+        notes.append(f"the root {root!r} moves by {names}; in qpos a free joint stands for them")
+    else:
+        for key in list(spec.keys):
+            spec.delete(key)
+        notes.append(f"no free joint: one was given to {root!r}, the first 7 numbers of qpos")
+    body.add_freejoint(name=f"{root}_free")
+
+
+def _compile(spec: mujoco.MjSpec, path: Path, notes: list[str]) -> mujoco.MjModel:
+    try:
+        return spec.compile()
+    except (ValueError, RuntimeError) as error:
+        message = _first(error)
+    assets = [mesh.file for mesh in spec.meshes if mesh.file]
+    if not (assets or list(spec.textures) or list(spec.hfields)):
+        raise FileFormatError(path, None, f"MuJoCo can't compile it: {message}")
+    _drop_assets(spec)
+    try:
+        model = spec.compile()
+    except (ValueError, RuntimeError) as again:
+        raise FileFormatError(
+            path, None, f"MuJoCo can't compile it: {message}; nor without meshes: {_first(again)}"
+        ) from again
+    notes.append(f"read without meshes and textures ({message}): shapes and masses are incomplete")
+    return model
+
+
+def _drop_assets(spec: mujoco.MjSpec) -> None:
+    """Delete whatever needs a file, and give massless bodies a little mass."""
+    for geom in list(spec.geoms):
+        if geom.meshname or geom.hfieldname:
+            spec.delete(geom)
+        else:
+            geom.material = ""
+    for site in spec.sites:
+        site.material = ""
+    for kind in ("skins", "materials", "textures", "hfields", "meshes"):
+        for element in list(getattr(spec, kind)):
+            spec.delete(element)
+    spec.compiler.boundmass = _LEAST_MASS
+    spec.compiler.boundinertia = _LEAST_INERTIA
+
+
+def _say_what_is_ignored(model: mujoco.MjModel, notes: list[str]) -> None:
+    slides = [model.joint(j).name for j in range(model.njnt) if int(model.jnt_type[j]) == SLIDE]
+    if slides:
+        notes.append(f"{len(slides)} sliding joints stay at 0 ({slides[0]!r}, ...)")
+    if model.neq:
+        notes.append(f"{model.neq} equality constraints between joints or bodies are ignored")
+
+
+def _first(error: Exception) -> str:
+    """MuJoCo's message on one line."""
+    return " ".join(str(error).split())

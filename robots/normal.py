@@ -1,0 +1,109 @@
+"""Least squares over whole trajectories: normal equations a frame, coupled by smoothness in time.
+
+A problem's unknowns are a step in D columns for each of T frames. Its residuals see one frame each;
+only the accelerations tie neighbours together. So the normal equations are banded, of width 2 D,
+and a banded Cholesky solves them in time linear in T (Golub and Van Loan, section 4.3).
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.linalg import solveh_banded
+
+REACH = 2  # an acceleration ties a frame to the two next
+
+
+class Normal:
+    """Normal equations `H step = -g` being added up; `cost` is half the sum of squares."""
+
+    def __init__(self, frames: int, columns: int) -> None:
+        self.H = np.zeros((frames, columns, columns))
+        self.g = np.zeros((frames, columns))
+        self.cost = np.zeros(frames)
+
+    def add(
+        self,
+        columns: list[int],
+        rows: Float[np.ndarray, "C M T"],
+        residuals: Float[np.ndarray, "M T"],
+    ) -> None:
+        """M weighted residuals a frame, and how fast they grow with some columns."""
+        J = np.ascontiguousarray(rows.transpose(2, 0, 1))  # T C M
+        at = np.asarray(columns)
+        self.H[:, at[:, None], at] += J @ J.transpose(0, 2, 1)
+        self.g[:, at] += (J @ residuals.T[:, :, None])[:, :, 0]
+        self.cost += 0.5 * np.einsum("mt,mt->t", residuals, residuals)
+
+    def add_diagonal(
+        self, rows: Float[np.ndarray, "T D"], residuals: Float[np.ndarray, "T D"]
+    ) -> None:
+        """One residual for each column, that grows with no other."""
+        at = np.arange(self.g.shape[1])
+        self.H[:, at, at] += rows**2
+        self.g += rows * residuals
+        self.cost += 0.5 * (residuals**2).sum(1)
+
+    def pin(self, pinned: Bool[np.ndarray, "T D"]) -> None:
+        """Keep some columns from moving."""
+        free = np.where(pinned, 0.0, 1.0)
+        self.H *= free[:, :, None] * free[:, None]
+        at = np.arange(free.shape[1])
+        self.H[:, at, at] += 1.0 - free
+        self.g *= free
+
+    def solve_apart(self, damping: float) -> Float[np.ndarray, "T D"]:
+        """The step, each frame for itself."""
+        D = self.g.shape[1]
+        return -np.linalg.solve(self.H + damping * np.eye(D), self.g[..., None])[..., 0]
+
+    def solve_together(
+        self,
+        weights: Float[np.ndarray, "D"],
+        accelerations: Float[np.ndarray, "A D"],
+        damping: float,
+    ) -> Float[np.ndarray, "T D"]:
+        """The step that also lessens the weighted squares of `accelerations`, the second
+        differences of the columns (A = T - 2)."""
+        T, D = self.g.shape
+        stencil = _stencil(T)
+        band = np.zeros((REACH * D + 1, T, D))
+        for i in range(D):
+            for k in range(D - i):
+                band[k, :, i] = self.H[:, i + k, i]
+        for lag in range(REACH + 1):
+            band[lag * D] += stencil[lag, :, None] * weights**2
+        band[0] += damping
+        g = self.g + weights**2 * spread(accelerations, T)
+        step = solveh_banded(
+            band.reshape(REACH * D + 1, T * D), g.ravel(), lower=True, check_finite=False
+        )
+        return -step.reshape(T, D)
+
+
+def second_differences(values: Float[np.ndarray, "T *n"]) -> Float[np.ndarray, "A *n"]:
+    """Over the first axis; empty for fewer than three."""
+    if len(values) < 3:
+        return np.zeros((0, *values.shape[1:]))
+    return values[2:] - 2 * values[1:-1] + values[:-2]
+
+
+def spread(accelerations: Float[np.ndarray, "A D"], frames: int) -> Float[np.ndarray, "T D"]:
+    """The transpose of `second_differences`."""
+    out = np.zeros((frames, accelerations.shape[1]))
+    if len(accelerations):
+        out[:-2] += accelerations
+        out[1:-1] -= 2 * accelerations
+        out[2:] += accelerations
+    return out
+
+
+def _stencil(frames: int) -> Float[np.ndarray, "3 T"]:
+    """Diagonals of `spread(second_differences)` as a matrix: [lag, t] ties t to t + lag."""
+    out = np.zeros((REACH + 1, frames))
+    if frames < 3:
+        return out
+    coefficients = (1.0, -2.0, 1.0)
+    for first in range(3):
+        for second in range(first, 3):
+            at = slice(first, frames - 2 + first)
+            out[second - first, at] += coefficients[first] * coefficients[second]
+    return out

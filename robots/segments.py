@@ -1,0 +1,216 @@
+"""Hinge chains collapsed into one joint a limb segment: three hinges of a hip are one hip.
+
+Real hinges miss each other by centimetres and are anchored anywhere along their axes, so a joint's
+centre is the point nearest to all of its axes.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from robots.mjcf import BALL, Mjcf
+from robots.tree import ROOT, Tree
+
+_PARALLEL = np.cos(np.radians(30))  # hinges nearer to parallel than this are two joints: a knee
+_MISS_OF_SIZE = 0.025  # how far axes of one joint may be from its centre, of the robot's size,
+_MISS_OF_LIMB = 0.1  # or of the limb's length below it
+_MOST = 3  # degrees of freedom of a joint
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """A rigid part of the robot and the joints by which it hangs on `parent` (-1: it is the root).
+
+    `link` is the tree's link that moves it; a part that is welded on has no joints and its parent's
+    link. `center` [m] is the joint's place in the rest pose. `names` are what the file calls it.
+    """
+
+    parent: int
+    joints: tuple[int, ...]
+    link: int
+    body: int
+    center: Float[np.ndarray, "3"]
+    names: tuple[str, ...]
+
+
+def tree_of(mjcf: Mjcf) -> tuple[Tree, list[int]]:
+    """The robot's joints as a tree, and the MuJoCo joint behind each of them."""
+    model = mjcf.model
+    data = mujoco.MjData(model)
+    data.qpos[:] = model.qpos0
+    mujoco.mj_kinematics(model, data)
+    joints = mjcf.joints()
+    last: dict[int, int] = {mjcf.root: ROOT}
+    parents = []
+    for i, joint in enumerate(joints):
+        body = int(model.jnt_bodyid[joint])
+        above = body
+        while above not in last:
+            above = int(model.body_parentid[above])
+        parents.append(last[above])
+        last[body] = i
+    limited = model.jnt_limited[joints].astype(bool)
+    ranges = model.jnt_range[joints] - model.qpos0[model.jnt_qposadr[joints]][:, None]
+    tree = Tree(
+        parents=np.array(parents, dtype=np.int64),
+        anchors=data.xanchor[joints].reshape(-1, 3).copy(),
+        axes=data.xaxis[joints].reshape(-1, 3).copy(),
+        balls=np.array([int(model.jnt_type[j]) == BALL for j in joints], dtype=bool),
+        lower=np.where(limited, ranges[:, 0], -np.inf),
+        upper=np.where(limited, ranges[:, 1], np.inf),
+        base=data.xpos[mjcf.root].copy(),
+    )
+    return tree, joints
+
+
+def segments_of(mjcf: Mjcf, tree: Tree, joints: Sequence[int]) -> list[Segment]:
+    """The robot's parts, parents first; the root is the first."""
+    model = mjcf.model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    groups = _groups(tree, [int(body) for body in model.jnt_bodyid[joints]])
+    centers = _centers(tree, groups)
+    segments = [Segment(-1, (), ROOT, mjcf.root, tree.base, (mjcf.body_name(mjcf.root),))]
+    of_link = {ROOT: 0}
+    of_body = {mjcf.root: 0}
+    for group, center in zip(groups, centers, strict=True):
+        body = int(model.jnt_bodyid[joints[group[-1]]])
+        first = int(model.jnt_bodyid[joints[group[0]]])
+        parent = of_link[int(tree.parents[group[0]])]
+        of_link[group[-1]] = of_body[body] = len(segments)
+        names = (
+            mjcf.body_name(body),
+            model.joint(joints[group[0]]).name,
+            mjcf.body_name(first),
+        )
+        segments.append(Segment(parent, group, group[-1], body, center, names))
+    welded = _welded(mjcf, of_body)
+    for body in welded:
+        parent = of_body[int(model.body_parentid[body])]
+        name = (mjcf.body_name(body),)
+        segments.append(
+            Segment(parent, (), segments[parent].link, body, data.xpos[body].copy(), name)
+        )
+    return segments
+
+
+def _welded(mjcf: Mjcf, of_body: dict[int, int]) -> list[int]:
+    """Bodies with a shape that are fixed to a moving one and carry nothing: hands, feet, a head."""
+    model = mjcf.model
+    carrying = {int(model.body_parentid[body]) for body in mjcf.bodies()}
+    return [
+        body
+        for body in mjcf.bodies()
+        if body not in of_body
+        and not model.body_jntnum[body]
+        and model.body_geomnum[body]
+        and int(model.body_parentid[body]) in of_body
+        and body not in carrying
+        and model.body(body).name
+    ]
+
+
+def _groups(tree: Tree, bodies: Sequence[int]) -> list[tuple[int, ...]]:
+    """Consecutive joints that turn about nearly one point, at most three degrees of freedom; those
+    of one body belong together in any case."""
+    reaches = _reaches(tree)
+    size = float(np.linalg.norm(np.ptp(tree.anchors, axis=0))) if len(tree) else 0.0
+    units: list[list[int]] = []
+    for i, body in enumerate(bodies):
+        if i and bodies[i - 1] == body:
+            units[-1].append(i)
+        else:
+            units.append([i])
+    carried = np.bincount(tree.parents[[unit[0] for unit in units]] + 1, minlength=len(tree) + 1)
+    groups: list[list[int]] = []
+    of_joint: dict[int, int] = {}
+    for unit in units:
+        parent = int(tree.parents[unit[0]])
+        at = of_joint.get(parent)
+        both = [*groups[at], *unit] if at is not None else unit
+        if at is not None and carried[parent + 1] == 1 and len(both) <= _MOST:
+            parallel = abs(tree.axes[unit[0]] @ tree.axes[parent]) > _PARALLEL
+            _, miss = nearest_point(tree.anchors[both], tree.axes[both])
+            least = max(_MISS_OF_SIZE * size, _MISS_OF_LIMB * reaches[unit[-1]])
+            if not parallel and miss <= least and not tree.balls[both].any():
+                groups[at] = both
+                of_joint.update(dict.fromkeys(unit, at))
+                continue
+        of_joint.update(dict.fromkeys(unit, len(groups)))
+        groups.append(unit)
+    return [tuple(group) for group in groups]
+
+
+def nearest_point(
+    anchors: Float[np.ndarray, "N 3"], axes: Float[np.ndarray, "N 3"]
+) -> tuple[Float[np.ndarray, "3"], float]:
+    """The point with the least squared distance to some lines, and its largest distance [m].
+
+    Where the lines leave it open (a single line), it is the one nearest to their anchors.
+    """
+    across = np.eye(3) - axes[:, :, None] * axes[:, None]
+    middle = anchors.mean(0)
+    right = (across @ (anchors - middle)[:, :, None])[..., 0].sum(0)
+    point = middle + np.linalg.lstsq(across.sum(0), right, rcond=1e-3)[0]
+    away = (across @ (point - anchors)[:, :, None])[..., 0]
+    return point, float(np.linalg.norm(away, axis=-1).max())
+
+
+def _centers(tree: Tree, groups: Sequence[tuple[int, ...]]) -> list[Float[np.ndarray, "3"]]:
+    """The centre of each group. A single hinge leaves its place along the axis open: there it lies
+    nearest to the middle of its neighbours."""
+    fixed = {
+        g: tree.anchors[group[0]]
+        if tree.balls[group[0]]
+        else nearest_point(tree.anchors[list(group)], tree.axes[list(group)])[0]
+        for g, group in enumerate(groups)
+        if len(group) > 1 or tree.balls[group[0]]
+    }
+    of_joint = {j: g for g, group in enumerate(groups) for j in group}
+    above = [of_joint.get(int(tree.parents[group[0]]), -1) for group in groups]
+    centers = []
+    for g, group in enumerate(groups):
+        if g in fixed:
+            centers.append(fixed[g])
+            continue
+        up = above[g]
+        while up >= 0 and up not in fixed:
+            up = above[up]
+        known = [fixed[up]] if up >= 0 else _fixed_below(-1, above, fixed, but=g)
+        known += _fixed_below(g, above, fixed)
+        anchor, axis = tree.anchors[group[0]], tree.axes[group[0]]
+        aim = np.mean(known, axis=0) if known else anchor
+        centers.append(anchor + axis * (axis @ (aim - anchor)))
+    return centers
+
+
+def _fixed_below(
+    g: int, above: Sequence[int], fixed: dict[int, Float[np.ndarray, "3"]], but: int | None = None
+) -> list[Float[np.ndarray, "3"]]:
+    """The middle of the nearest groups below g whose centres are known; nothing without any."""
+    found = []
+    waiting = [g]
+    while waiting:
+        group = waiting.pop()
+        for child, parent in enumerate(above):
+            if parent != group or child == but:
+                continue
+            if child in fixed:
+                found.append(fixed[child])
+            else:
+                waiting.append(child)
+    return [np.mean(found, axis=0)] if found else []
+
+
+def _reaches(tree: Tree) -> Float[np.ndarray, "N"]:
+    """How far [m] the farthest joint below each joint is, along the chain."""
+    reach = np.zeros(len(tree))
+    for i in range(len(tree) - 1, -1, -1):
+        parent = int(tree.parents[i])
+        if parent >= 0:
+            step = float(np.linalg.norm(tree.anchors[i] - tree.anchors[parent]))
+            reach[parent] = max(reach[parent], reach[i] + step)
+    return reach

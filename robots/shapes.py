@@ -1,0 +1,115 @@
+"""Where a robot's parts end: points on the surface of its shapes, in the rest pose's world."""
+
+from collections.abc import Iterable
+from itertools import product
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.spatial import ConvexHull, QhullError
+
+from robots.mjcf import Mjcf
+from spark.rotation import quat_between
+
+_NEAR_LOWEST = 0.08  # of the foot's length: points this low belong to the sole
+_TILTED, _COPLANAR = np.radians(40), np.radians(3)
+_LONG = 0.7  # a sole's width as a share of its length, up to which its length is known
+_PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)
+
+# Towards the faces, edges and corners of a cube.
+_DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+_DIRECTIONS /= np.linalg.norm(_DIRECTIONS, axis=1, keepdims=True)
+
+
+def surface(mjcf: Mjcf, bodies: Iterable[int]) -> Float[np.ndarray, "P 3"]:
+    """Points on the shapes of some bodies: of those that collide, or of all where none does."""
+    model = mjcf.model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    geoms = np.flatnonzero(np.isin(model.geom_bodyid, list(bodies)))
+    colliding = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
+    points = [np.zeros((0, 3))]
+    for geom in colliding or list(geoms):
+        rotation = data.geom_xmat[geom].reshape(3, 3)
+        points.append(_corners(model, int(geom)) @ rotation.T + data.geom_xpos[geom])
+    return np.concatenate(points)
+
+
+def corners(points: Float[np.ndarray, "P 3"]) -> list[int]:
+    """Which points are the corners of a sole that stands on the floor, facing +X: heel right and
+    left, toe right and left."""
+    low = _lowest(points)
+    middle = (points[low].max(0) + points[low].min(0)) / 2
+    size = np.maximum(np.ptp(points[low], axis=0), 1e-9)
+    inside = (points[low] - middle)[:, :2] / size[:2]
+    return [int(low[np.argmax(inside @ np.array(way))]) for way in product((-1.0, 1.0), repeat=2)]
+
+
+def flattening(points: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "4"]:
+    """The smallest rotation that lays the largest flat side below a foot on the floor; none where
+    no side within `_TILTED` of the floor stands out, as on a ball."""
+    still = np.array([1.0, 0.0, 0.0, 0.0])
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError):  # fewer than four points, or all in a plane
+        return still
+    normals = hull.equations[:, :3]
+    sides = points[hull.simplices]
+    areas = (
+        np.linalg.norm(np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0]), axis=1) / 2
+    )
+    below = np.flatnonzero(-normals[:, 2] > np.cos(_TILTED))
+    together = normals[below] @ normals[below].T > np.cos(_COPLANAR)
+    covered = together @ areas[below]
+    if not len(below):
+        return still
+    best = int(np.argmax(covered))
+    others = covered[~together[best]].max(initial=0.0)
+    if covered[best] < max(0.1 * hull.area, 1.5 * others):
+        return still
+    largest = below[best]
+    same = normals @ normals[largest] > np.cos(_COPLANAR)
+    return quat_between(areas[same] @ normals[same], np.array([0.0, 0.0, -1.0]))
+
+
+def sole_heading(points: Float[np.ndarray, "P 3"]) -> float:
+    """The angle [rad] from X to the long side of a sole; 0 where no side is clearly the long one,
+    or it points more to the side than ahead."""
+    flat = points[_lowest(points), :2]
+    flat = flat - (flat.max(0) + flat.min(0)) / 2
+    spread, ways = np.linalg.eigh(flat.T @ flat)
+    if spread[0] > _LONG**2 * spread[1]:
+        return 0.0
+    x, y = ways[:, 1] * np.sign(ways[0, 1] or 1.0)
+    angle = float(np.arctan2(y, x))
+    return angle if abs(angle) < np.radians(45) else 0.0
+
+
+def _lowest(points: Float[np.ndarray, "P 3"]) -> Int[np.ndarray, "_"]:
+    length = float(np.ptp(points[:, 0]))
+    return np.flatnonzero(points[:, 2] <= points[:, 2].min() + _NEAR_LOWEST * length)
+
+
+def _corners(model: mujoco.MjModel, geom: int) -> Float[np.ndarray, "P 3"]:
+    """Outermost points of a shape in its own frame."""
+    kind, size = int(model.geom_type[geom]), model.geom_size[geom]
+    if kind == _SPHERE:
+        return _DIRECTIONS * size[0]
+    if kind == _CAPSULE:
+        ends = np.array([[0, 0, size[1]], [0, 0, -size[1]]])
+        return np.concatenate([_DIRECTIONS * size[0] + end for end in ends])
+    if kind == _ELLIPSOID:
+        scaled = _DIRECTIONS * size
+        return scaled * size / np.linalg.norm(scaled, axis=1, keepdims=True)
+    if kind == _CYLINDER:
+        angle = np.arange(12) * np.pi / 6
+        ring = np.stack([size[0] * np.cos(angle), size[0] * np.sin(angle)], axis=1)
+        return np.concatenate([np.insert(ring, 2, z, axis=1) for z in (-size[1], size[1])])
+    if kind == _BOX:
+        return np.array(list(product((-1.0, 1.0), repeat=3))) * size
+    if kind == _MESH:
+        mesh = int(model.geom_dataid[geom])
+        start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+        vertices = model.mesh_vert[start : start + count].astype(np.float64)
+        return vertices[np.unique((vertices @ _DIRECTIONS.T).argmax(0))]
+    return np.zeros((0, 3))

@@ -1,0 +1,82 @@
+"""Residuals of poses and how fast they grow: the terms that objectives are made of.
+
+Rows are `C M T`: the M residuals' derivatives by C columns, over T frames, both already weighted.
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+from robots.tree import Coordinates, Frames, Tree, cross
+
+Rows = tuple[Float[np.ndarray, "C M T"], Float[np.ndarray, "M T"]]
+
+
+def direction_rows(
+    now: Float[np.ndarray, "3 T"],
+    wanted: Float[np.ndarray, "3 T"],
+    axes: Float[np.ndarray, "C 3 T"],
+    weight: float | Float[np.ndarray, "T"],
+) -> Rows:
+    """A unit vector of a link that should point somewhere: its chord, nearly the angle [rad]."""
+    rows = np.empty_like(axes)
+    for column, axis in enumerate(axes):
+        cross(axis, now, rows[column])
+    return rows * weight, (now - wanted) * weight
+
+
+def turn_rows(
+    now: Float[np.ndarray, "3 3 T"],
+    wanted: Float[np.ndarray, "3 3 T"],
+    axes: Float[np.ndarray, "C 3 T"],
+    weight: float | Float[np.ndarray, "T"],
+) -> Rows:
+    """A link that should be turned some way: the sine of the angle between, about its axis [rad].
+
+    Bounded, and zero at a half turn: for errors up to a right angle.
+    """
+    # The axial vector of now wanted^T.
+    between = np.einsum("ikt,jkt->ijt", now, wanted)
+    axial = 0.5 * np.stack(
+        [
+            between[2, 1] - between[1, 2],
+            between[0, 2] - between[2, 0],
+            between[1, 0] - between[0, 1],
+        ]
+    )
+    return axes * weight, axial * weight
+
+
+def point_rows(
+    frames: Frames,
+    chain: tuple[int, ...],
+    axes: Float[np.ndarray, "C 3 T"],
+    point: Float[np.ndarray, "3 T"],
+    wanted: Float[np.ndarray, "3 T"],
+    weight: Float[np.ndarray, "#T"] | Float[np.ndarray, "3 #T"],
+) -> Rows:
+    """A point of a link that should be somewhere [m]. `axes` begin with the base's three; columns
+    are the base's six, then the chain's."""
+    count = point.shape[1]
+    rows = np.empty((3 + len(axes), 3, count))
+    rows[:3] = np.eye(3)[:, :, None]
+    arm = point - frames.places[-1]
+    for k in range(3):
+        cross(axes[k], arm, rows[3 + k])
+    rows[6:] = frames.point_columns(chain, axes[3:], point)
+    return rows * weight, (point - wanted) * weight
+
+
+def limit_rows(
+    tree: Tree, q: Coordinates, *, margin: float, weight: float
+) -> tuple[Float[np.ndarray, "T D"], Float[np.ndarray, "T D"]]:
+    """Hinges nearer than `margin` [rad] to a limit (less where the range is small), diagonal."""
+    rows, residuals = np.zeros((2, len(q), tree.size))
+    hinges = ~tree.balls
+    at = tree.starts[hinges]
+    lower, upper = tree.lower[hinges], tree.upper[hinges]
+    near = np.minimum(margin, 0.1 * (upper - lower))
+    angles = q.angles[:, hinges]
+    over = np.maximum(angles - (upper - near), 0.0) + np.minimum(angles - (lower + near), 0.0)
+    rows[:, at] = np.where(over != 0, weight, 0.0)
+    residuals[:, at] = weight * over
+    return rows, residuals

