@@ -14,15 +14,13 @@ from sim.report.measures import (
     contact_match,
     floor_height,
     floor_slope,
-    horizontal_speed,
     root_drift,
 )
 from sim.report.result import Report
 from sim.report.thresholds import PLAUSIBILITY_V1
 from sim.report.track import Track, track
-from spark.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED
+from spark.contacts import planted_feet
 from spark.errors import SkeletonError
-from spark.feet import standing_height
 from spark.motion import Motion
 from spark.rig import Rig
 
@@ -130,12 +128,8 @@ def _slope(track: Track, whose: str) -> tuple[str, ...]:
 
 
 def _planted(track: Track) -> dict[str, Bool[np.ndarray, "T"]]:
-    """When each foot stands, by side: as `spark.contacts` has it, with speeds over the window."""
-    rig, frame_time = track.rig, track.motion.frame_time
-    toes = track.positions[:, rig.contact_joints]
-    scale = standing_height(rig) / ADULT_HEIGHT
-    low = np.percentile(toes[..., 2], 1, axis=0)
-    near = toes[..., 2] < low + PLANTED_HEIGHT * scale
-    slow = horizontal_speed(toes, frame_time, PLAUSIBILITY_V1.window) < PLANTED_SPEED * scale
+    """When each foot stands, by side."""
+    rig = track.rig
     sides = [str(rig.roles.roles[j]).split("_")[0] for j in rig.contact_joints]
-    return dict(zip(sides, (near & slow).T, strict=True))
+    planted = planted_feet(rig, track.positions, track.motion.frame_time)
+    return dict(zip(sides, planted.T, strict=True))
