@@ -4,27 +4,13 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from sim.anthropometry import RADII
 from spark.feet import sole_corners, sole_positions, standing_height
 from spark.kinematics import world_positions
 from spark.rig import Rig
 from spark.rotation import quat_conj, quat_rotate
 
-# Radii as fractions of the standing height.
-_RADII: dict[str, float] = {
-    "pelvis": 0.055,
-    "spine": 0.055,
-    "neck": 0.030,
-    "head": 0.045,
-    "clavicle": 0.030,
-    "upper_arm": 0.026,
-    "forearm": 0.021,
-    "hand": 0.016,
-    "upper_leg": 0.043,
-    "lower_leg": 0.031,
-    "foot": 0.020,
-    "toe": 0.016,
-}
-_DETAIL = 0.006  # fingers, face and helpers
+_DETAIL = 0.006  # radius of fingers, face and helpers, as a fraction of the standing height
 _HEAD = np.array([0.055, 0.045, 0.068])  # half axes of the head
 _FOOT = 0.022  # half the height of a foot's box
 
@@ -44,7 +30,7 @@ def add_shapes(spec: mujoco.MjSpec, bodies: dict[int, mujoco.MjsBody], rig: Rig)
         if kind == "head":
             _add_head(spec, body, rig, j, height)
             continue
-        radius = _RADII.get(kind, _DETAIL) * height
+        radius = RADII.get(kind, _DETAIL) * height
         for tip in _bone_tips(rig, j):
             _add_capsule(spec, body, rig, j, tip, radius, collides=bool(kind))
     _add_feet(spec, bodies, rig, height)
@@ -123,7 +109,7 @@ def _add_feet(
         _add_box(spec, bodies[foot], rig, foot, points[:4] - positions[foot], height)
         _add_box(spec, bodies[toe], rig, toe, points[2:] - positions[toe], height)
         instep = quat_rotate(quat_conj(rig.tpose[foot]), positions[toe] - positions[foot])
-        _add_capsule(spec, bodies[foot], rig, foot, instep, _RADII["foot"] * height, collides=False)
+        _add_capsule(spec, bodies[foot], rig, foot, instep, RADII["foot"] * height, collides=False)
 
 
 def _add_box(

@@ -2,17 +2,20 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from sim.report import Finding, Report, compare, judge
-from spark.errors import SkeletonError
+from spark.errors import SkeletonError, SparkSimError
 from spark.feet import FOOT_LENGTH, standing_height
 from spark.motion import Motion
-from spark.rig import Rig
+from spark.recording import read_recording
+from spark.rig import Rig, understand
 from spark.roles import Role, RoleMap
 from spark.rotation import quat_about, quat_from_yaw, quat_mul, quat_rotate
+from tests.conftest import recordings
 from tests.stick import joint, standing, stick_rig
 
 FPS = 60.0
@@ -371,3 +374,18 @@ def test_results_stand_beside_each_other_with_the_least_marked() -> None:
     assert rows["implausible [%]"] == ["0.0*", "100.0"]
     assert rows["penetration [%]"] == ["0.0", "0.0"]
     assert rows["out of balance [%]"] == ["0.0", "-"]
+
+
+@pytest.mark.parametrize("path", recordings("zoo/*.bvh", "makehuman/*.bvh", "reactidle/00*.bvh"))
+def test_every_recorded_body_is_judged_or_was_refused(path: Path) -> None:
+    try:
+        motion = read_recording(path).motion.frames(0, 60)
+        rig = understand(motion)
+    except SparkSimError:
+        return
+    report = judge(motion, rig, source=(motion, rig))
+    json.dumps(report.json(), allow_nan=False)
+    assert report.text()
+    assert report.drift is not None
+    assert report.drift.distance.max() < 1e-6
+    assert report.clip.self_depth.max(initial=0.0) < 1e-9
