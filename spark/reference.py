@@ -12,7 +12,7 @@ from spark.observed import mean_rotations, nearest_right_angle
 from spark.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import quat_identity
 
-TRUNK_TILT = np.radians(35)  # a trunk this near to an axis stands along it
+_LEAN = np.radians(35)  # a body this near to an axis stands along it
 _HIPS_TILT = np.radians(10)
 _BUILT = np.radians(10)  # bones this near to their joint's axes were put there on purpose
 
@@ -64,15 +64,13 @@ def reference_of(motion: Motion, roles: RoleMap) -> Reference:
 
 
 def _stands(rest: Pose) -> bool:
-    """Whether the rest pose is a pose: legs hang down from the trunk, arms don't cross it."""
-    lateral = _lateral(rest)
-    up = _upwards(rest, from_feet=False)
+    """Whether the rest pose is a pose: legs don't point up along the trunk, arms don't cross it."""
+    lateral, up = _lateral(rest), _trunk(rest)
     for group in LIMBS:
         chain = _limb(rest.roles, group)
         limb = rest.positions[chain[-1]] - rest.positions[chain[0]] if chain else np.zeros(3)
-        side = _SIDES.get(group)
-        goal, least = (-up, 0.5) if side is None else (side * lateral, -0.5)
-        if limb @ goal < least * np.linalg.norm(limb):
+        wrong = up if group not in _SIDES else -_SIDES[group] * lateral
+        if limb @ wrong > 0.5 * np.linalg.norm(limb) * np.linalg.norm(wrong):
             return False
     return True
 
@@ -87,13 +85,17 @@ def pelvis_frame(reference: Reference) -> Float[np.ndarray, "3 3"]:
     """`R_T_pelvis`: rows forward, left and up, in the pelvis's own axes."""
     pose = reference.pose
     pelvis = pose.roles.require(Role.PELVIS)
-    lateral = pose.seen_from(pelvis, _lateral(pose))
-    up = pose.seen_from(pelvis, _upwards(pose, from_feet=reference.posed))
-    # Artists build along the axes; so do motion capture systems.
-    if reference.posed or reference.square:
-        lateral = snap(lateral, _HIPS_TILT if reference.posed else np.pi)
-        up = snap(up - lateral * (up @ lateral), TRUNK_TILT)
-    up = up - lateral * (up @ lateral)
+    lateral, up = pose.seen_from(pelvis, _lateral(pose)), pose.seen_from(pelvis, _trunk(pose))
+    # Artists build along the axes, whichever way the trunk leans; so do motion capture systems.
+    if reference.posed:
+        lateral = snap(lateral, _HIPS_TILT)
+        feet, *higher = _landmarks(pose)
+        body = min((_across(pose.seen_from(pelvis, v - feet), lateral) for v in higher), key=tilt)
+        up = snap(body, _LEAN) if tilt(body) < _LEAN else up
+    elif reference.square:
+        lateral = snap(lateral, np.pi)
+        up = snap(_across(up, lateral), _LEAN)
+    up = _across(up, lateral)
     length = np.linalg.norm(up)
     if length < SHORT:
         raise SkeletonError("the trunk lies along the line of the hips: no direction is up")
@@ -112,14 +114,23 @@ def _lateral(pose: Pose) -> Vector:
     raise SkeletonError("hips and shoulders lie in one point each: no direction is left")
 
 
-def _upwards(pose: Pose, *, from_feet: bool) -> Vector:
-    """The unit vector along the trunk, or along the whole body: a crouching body leans less."""
+def _trunk(pose: Pose) -> Vector:
+    """The vector [m] from the hips to the head; without a trunk, from the feet to the hips."""
+    *_, below, top = _landmarks(pose)
+    return top - below
+
+
+def _landmarks(pose: Pose) -> list[Vector]:
+    """The feet's middle, the hips' middle, and the head or the trunk's topmost joint if any."""
     at, roles = pose.positions, pose.roles
     hips = np.mean([at[roles.require(role)] for role in _UPPER_LEGS], axis=0)
     feet = np.mean([at[_limb(roles, GROUP_OF[role])[-1]] for role in _UPPER_LEGS], axis=0)
     tops = [j for role in (Role.HEAD, Role.NECK, Role.SPINE) for j in roles.joints(role)[-1:]]
-    up = (at[tops[0]] if tops else hips) - (feet if from_feet or not tops else hips)
-    return up / max(float(np.linalg.norm(up)), SHORT)
+    return [feet, hips, *(at[j] for j in tops[:1])]
+
+
+def _across(v: Vector, lateral: Vector) -> Vector:
+    return v - lateral * (v @ lateral)
 
 
 def _limb(roles: RoleMap, group: Group) -> list[int]:

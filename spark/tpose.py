@@ -19,7 +19,7 @@ from jaxtyping import Float
 from spark.bones import Pose
 from spark.motion import Motion
 from spark.observed import bend_axis, standing_slope
-from spark.reference import GROUP_OF, TRUNK_TILT, Reference, pelvis_frame, reference_of, snap
+from spark.reference import GROUP_OF, Reference, pelvis_frame, reference_of, snap
 from spark.roles import Group, Role, RoleMap
 from spark.rotation import (
     quat_angle,
@@ -35,6 +35,7 @@ from spark.rotation import (
 from spark.skeleton import Skeleton
 
 _ROLL = np.radians(100)  # a forearm is seldom rolled further than this from its middle
+_SPREAD = np.radians(35)  # fingers this near to an axis of the hand lie along it
 _STEEP = np.radians(-75)  # a foot that points further down than this at rest does not stand
 
 _LEFT, _UP = np.eye(3)[1:]
@@ -82,7 +83,9 @@ def find_tpose(motion: Motion, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"]
         if role in _FEET or role in _TOES:
             q = _place_foot(reference, j, role, q, tpose[pelvis])
         elif role is not None and role in GROUP_OF:
-            q, note = _place(reference, j, role, q, parent)
+            q = _place(reference, j, role, q, parent)
+        if role in _HANDS:
+            q, note = _palm_down(reference.pose, j, q)
             notes += note
         tpose[j] = q
     return tpose, tuple(notes)
@@ -94,16 +97,14 @@ def carrier_of(skeleton: Skeleton, pelvis: int) -> int:
     return next((j for j in skeleton.ancestors(pelvis) if skeleton.translating[j]), 0)
 
 
-def _place(
-    reference: Reference, joint: int, role: Role, q: Quat, q_parent: Quat
-) -> tuple[Quat, tuple[str, ...]]:
+def _place(reference: Reference, joint: int, role: Role, q: Quat, q_parent: Quat) -> Quat:
     """A limb joint's rotation in the T-pose, from `q`, where its parent and the pose take it."""
     bone = reference.pose.bone(joint)
     if bone is None or (role in _CLAVICLES and reference.posed):
-        return q, ()
+        return q
     goal = _OUT.get(GROUP_OF[role], -_UP)
     if reference.square and role in _HANDS:
-        bone = snap(bone, TRUNK_TILT)
+        bone = snap(bone, _SPREAD)
     q = quat_mul(quat_between(quat_rotate(q, bone), goal), q)
     if role in _BENT and not reference.posed:
         q = quat_mul(_twist_to_bend(reference, joint, bone, role, q, goal), q)
@@ -112,9 +113,7 @@ def _place(
         if role in _ROLLING and quat_angle(q, straight) < _ROLL:
             q = straight
         q = _square(q, goal, _UP if GROUP_OF[role] in _OUT else _LEFT)
-    if role in _HANDS:
-        return _palm_down(reference.pose, joint, q)
-    return q, ()
+    return q
 
 
 def _place_foot(reference: Reference, joint: int, role: Role, q: Quat, q_pelvis: Quat) -> Quat:

@@ -1,11 +1,13 @@
 """Laws of the canonical form and of the analytic transfer."""
 
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
 import pytest
 from conftest import DATA, recordings
 from humanoids import ONE_A_RIG
+from stick import joint, standing, stick_rig
 
 from spark.canonical import from_canonical, to_canonical
 from spark.contacts import floor_height, planted_feet
@@ -13,9 +15,10 @@ from spark.kinematics import forward
 from spark.motion import Motion
 from spark.recording import read_recording
 from spark.rig import Rig, understand
-from spark.roles import LIMBS, Group, Role
-from spark.rotation import quat_about, quat_angle, quat_mul, quat_rotate
+from spark.roles import LIMBS, Group, Role, RoleMap
+from spark.rotation import quat_about, quat_angle, quat_mul, quat_normalize, quat_rotate
 from spark.sample import BUILDS, MOTIONS, sample_motion, sample_rig
+from spark.skeleton import Skeleton
 from spark.transfer import correspond, transfer
 
 
@@ -146,3 +149,117 @@ def test_planted_feet_of_a_walk() -> None:
     planted = planted_feet(rig, forward(motion)[0], motion.frame_time)
     assert ((planted.mean(0) > 0.4) & (planted.mean(0) < 0.7)).all()
     assert planted.any(1).mean() > 0.9, "one foot stands at all times"
+
+
+def with_fingers(names: tuple[str, str]) -> Rig:
+    """The stick man with a joint on each hand."""
+    rig = stick_rig()
+    skeleton = rig.skeleton
+    hands = [joint(Role.LEFT_HAND), joint(Role.RIGHT_HAND)]
+    return replace(
+        rig,
+        skeleton=Skeleton(
+            (*skeleton.names, *names),
+            np.append(skeleton.parents, hands),
+            np.concatenate([skeleton.offsets, [[0.0, 0.1, 0], [0.0, -0.1, 0]]]),
+            np.append(skeleton.translating, [False, False]),
+            skeleton.end_parents,
+            skeleton.end_offsets,
+        ),
+        roles=RoleMap((*rig.roles.roles, None, None), (1.0,) * 20, ("",) * 20),
+        tpose=np.tile([1.0, 0, 0, 0], (20, 1)),
+    )
+
+
+def test_joints_without_a_role_copy_their_namesakes_or_follow() -> None:
+    source = with_fingers(("LeftIndex1", "RightIndex1"))
+    rotations = np.tile([1.0, 0, 0, 0], (4, 20, 1))
+    rotations[:, 18] = quat_about("x", np.array(0.7))
+    canonical = to_canonical(
+        replace(standing(source, 4), rotations=rotations, skeleton=source.skeleton), source
+    )
+    same = transfer(canonical, with_fingers(("LeftIndex1", "Tail")))
+    other = transfer(canonical, with_fingers(("Strap", "Tail")))
+    assert np.allclose(same.rotations[:, 18], rotations[:, 18])
+    assert np.allclose(same.rotations[:, 19], [1, 0, 0, 0])
+    assert np.allclose(other.rotations[:, 18], [1, 0, 0, 0])
+
+
+def without(rig: Rig, *gone: Role) -> Rig:
+    """The rig, under names of its own, where the joints of some roles have none."""
+    roles = tuple(None if role in gone else role for role in rig.roles.roles)
+    names = tuple(f"j{j}" for j in range(len(roles)))
+    skeleton = replace(rig.skeleton, names=names)
+    return replace(rig, skeleton=skeleton, roles=replace(rig.roles, roles=roles))
+
+
+def test_what_the_source_lacks_follows_or_lies_between() -> None:
+    """A hand goes with its forearm; a neck shares the way from trunk to head."""
+    rig = stick_rig()
+    bare = (Role.LEFT_HAND, Role.RIGHT_HAND, Role.NECK, Role.LEFT_TOE, Role.RIGHT_TOE)
+    rotations = quat_normalize(np.random.default_rng(0).normal(size=(5, len(rig.skeleton), 4)))
+    motion = replace(standing(rig, 5), rotations=rotations)
+    full = to_canonical(motion, rig)
+    missing = transfer(to_canonical(motion, without(rig, *bare)), rig)
+    assert np.allclose(
+        missing.rotations[:, joint(Role.LEFT_HAND)], full.rotations[:, joint(Role.LEFT_FOREARM)]
+    )
+    assert np.allclose(missing.rotations[:, joint(Role.HEAD)], full.rotations[:, joint(Role.HEAD)])
+    trunk, neck, head = (missing.rotations[:, joint(r)] for r in (Role.SPINE, Role.NECK, Role.HEAD))
+    there = quat_angle(trunk, neck) + quat_angle(neck, head)
+    assert np.allclose(there, quat_angle(trunk, head))
+
+
+def test_joints_between_carrier_and_pelvis_move_as_the_sources_do() -> None:
+    """Trunk and legs may hang side by side on the joint that carries the body."""
+    rig = stick_rig()
+    skeleton = rig.skeleton
+    order = [joint(Role.PELVIS), joint(Role.SPINE)]
+    parents = np.concatenate([[-1], np.where(skeleton.parents < 0, -1, skeleton.parents) + 1])
+    parents[order[1] + 1] = 0
+    offsets = np.concatenate([[[0.0, 0, 0.9]], skeleton.offsets])
+    offsets[1] = 0
+    split = replace(
+        rig,
+        skeleton=Skeleton(
+            ("centre", *skeleton.names),
+            parents,
+            offsets,
+            np.arange(19) == 0,
+            skeleton.end_parents + 1,
+            skeleton.end_offsets,
+        ),
+        roles=RoleMap((None, *rig.roles.roles), (1.0,) * 19, ("",) * 19),
+        tpose=np.tile([1.0, 0, 0, 0], (19, 1)),
+    )
+    rng = np.random.default_rng(1)
+    rotations = quat_normalize(rng.normal(size=(6, 19, 4)))
+    motion = Motion(split.skeleton, 1 / 30, rng.normal(size=(6, 3)), rotations)
+    same = from_canonical(replace(transfer(to_canonical(motion, split), split), notes=()))
+    shift = forward(motion)[0] - forward(same)[0]
+    assert np.ptp(shift[..., :2]) < 1e-9
+    assert np.ptp(shift[..., 2]) < 1e-9, "but for the floor, which may be moved"
+
+
+@pytest.mark.parametrize("path", recordings("cmu_asf/cmu_02_01.bvh"))
+def test_a_rig_with_half_as_long_legs_walks_on_the_same_floor(path: object) -> None:
+    motion = read_recording(str(path)).motion
+    rig = understand(motion)
+    legs = [
+        j
+        for thigh in (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
+        for j in rig.skeleton.subtree(rig.roles.require(thigh))[1:]
+    ]
+    offsets = rig.skeleton.offsets.copy()
+    offsets[legs] *= 0.5
+    ends = rig.skeleton.end_offsets.copy()
+    ends[np.isin(rig.skeleton.end_parents, legs)] *= 0.5
+    short = understand(
+        replace(motion, skeleton=replace(rig.skeleton, offsets=offsets, end_offsets=ends))
+    )
+    assert short.hip_height == pytest.approx(0.5 * rig.hip_height)
+    moved = from_canonical(transfer(to_canonical(motion, rig), short))
+    way, shorter = (np.ptp(m.root_pos[:, :2], axis=0) for m in (motion, moved))
+    assert np.allclose(shorter, 0.5 * way, atol=0.02)
+    floor = floor_height(rig, *forward(motion))
+    assert abs(floor_height(short, *forward(moved)) - 0.5 * floor) < 0.01
