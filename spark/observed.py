@@ -7,7 +7,14 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.motion import Motion
-from spark.rotation import quat_identity, quat_mul, quat_normalize, quat_rotate
+from spark.rotation import (
+    quat_angle,
+    quat_continuous,
+    quat_identity,
+    quat_mul,
+    quat_normalize,
+    quat_rotate,
+)
 
 # A joint that never bends further than this does not show which way it bends.
 _BEND = np.sin(np.radians(25))
@@ -57,6 +64,28 @@ def bend_axis(
         return None
     # Deep bends tell the sign: a knee may be stretched a little beyond straight.
     return axis if (along * np.abs(along)).sum() > 0 else -axis
+
+
+def resting_slope(
+    motion: Motion, foot: int, bone: Float[np.ndarray, "3"], shank: Float[np.ndarray, "3"]
+) -> float | None:
+    """The angle [rad] of a foot over the floor below an upright shank, where the ankle is at rest.
+
+    `shank` is the bone above, in its own axes. None unless the ankle keeps still for most of the
+    time that the leg moves: many systems do not capture it, and leave it as the rig was built.
+    """
+    rest, still = _resting(motion.rotations[:, foot])
+    _, stiff = _resting(motion.rotations[:, int(motion.skeleton.parents[foot])])
+    if still < 0.5 or stiff > 0.5:
+        return None
+    down = quat_rotate(rest, bone) @ shank / (np.linalg.norm(bone) * np.linalg.norm(shank))
+    return -float(np.arcsin(np.clip(down, -1.0, 1.0)))
+
+
+def _resting(q: Float[np.ndarray, "T 4"]) -> tuple[Float[np.ndarray, "4"], float]:
+    """The median rotation, and for which part of the frames it holds within a degree."""
+    median = quat_normalize(np.median(quat_continuous(q), axis=0))
+    return median, float(np.mean(quat_angle(q, median) < np.radians(1)))
 
 
 def standing_slope(motion: Motion, feet: Mapping[int, Float[np.ndarray, "3"]]) -> float:

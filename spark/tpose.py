@@ -18,7 +18,7 @@ from jaxtyping import Float
 
 from spark.bones import Pose
 from spark.motion import Motion
-from spark.observed import bend_axis, standing_slope
+from spark.observed import bend_axis, resting_slope, standing_slope
 from spark.reference import GROUP_OF, Reference, pelvis_frame, reference_of, snap
 from spark.roles import Group, Role, RoleMap
 from spark.rotation import (
@@ -117,7 +117,7 @@ def _place(reference: Reference, joint: int, role: Role, q: Quat, q_parent: Quat
 
 
 def _place_foot(reference: Reference, joint: int, role: Role, q: Quat, q_pelvis: Quat) -> Quat:
-    """Straight ahead, with the slope that the foot has at rest, or when it stands; toes level."""
+    """Straight ahead, sloped as at rest or as the motion shows it; toes level."""
     if reference.posed and role in _TOES:
         return q
     bone = reference.pose.bone(joint)
@@ -130,14 +130,24 @@ def _place_foot(reference: Reference, joint: int, role: Role, q: Quat, q_pelvis:
             return quat_mul(quat_from_yaw(-np.arctan2(y, x)), q)
     if bone is None:
         return q
-    slope = 0.0
-    if role in _FEET:
-        feet = [j for foot in _FEET for j in reference.pose.roles.joints(foot)]
-        bones = {j: vector for j in feet if (vector := reference.pose.bone(j)) is not None}
-        slope = standing_slope(reference.motion, bones)
+    slope = _slope(reference) if role in _FEET else 0.0
     goal = np.array([np.cos(slope), 0.0, np.sin(slope)])
     q = quat_mul(quat_between(quat_rotate(q, bone), goal), q)
     return _square(q, goal, _LEFT) if reference.square else q
+
+
+def _slope(reference: Reference) -> float:
+    """The slope [rad] of the feet: of ankles at rest, else of standing feet; both are alike."""
+    pose, motion = reference.pose, reference.motion
+    feet = [j for role in _FEET for j in pose.roles.joints(role)]
+    bones = {j: bone for j in feet if (bone := pose.bone(j)) is not None}
+    resting = []
+    for j, bone in bones.items():
+        shank = pose.bone(int(motion.skeleton.parents[j]))
+        if shank is not None:
+            resting.append(resting_slope(motion, j, bone, shank))
+    found = [slope for slope in resting if slope is not None]
+    return float(np.mean(found)) if found else standing_slope(motion, bones)
 
 
 def _twist_to_bend(

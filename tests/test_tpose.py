@@ -146,6 +146,18 @@ def test_rest_poses_without_a_pose_lead_to_the_tpose(name: str, quarters: tuple[
     assert_is_t(replace(rig, skeleton=lined_up.skeleton, tpose=tpose))
 
 
+def test_ankles_that_were_not_captured_show_how_feet_were_built() -> None:
+    """Where the ankle keeps still while the leg moves, the foot is flat below an upright shank."""
+    rig = sample_rig("walker")
+    motion = sample_motion("walk", rig, 30.0)
+    feet = [rig.roles.require(role) for role in (Role.LEFT_FOOT, Role.RIGHT_FOOT)]
+    motion.rotations[:, feet] = [1.0, 0, 0, 0]
+    axes = along_x(rig, (0, 2))
+    tpose, _ = find_tpose(rerig(motion, axes), rig.roles)
+    error = np.degrees(quat_angle(tpose, quat_mul(rig.tpose, axes)))
+    assert error[feet].max() < 1e-3
+
+
 LINED_UP = ("cmu_asf/cmu_02_01.bvh", "cmu_asf/cmu_02_05.bvh", "animateddrawings/jumping.bvh")
 
 
