@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 from robots.mjcf import Mjcf, read_mjcf
 from robots.segments import Segment, segments_of, tree_of
 from robots.shapes import corners, flattening, sole_heading, surface
-from robots.tpose import TPose, search_tpose
+from robots.tpose import TPose, rest_pose, search_tpose
 from robots.tree import Coordinates, Tree, forward
 from spark.errors import SkeletonError
 from spark.groups import groups_of
@@ -78,6 +78,17 @@ class Morphology:
         return tuple(self.mjcf.joint_name(joint) for joint in self.mj_joints)
 
     @cached_property
+    def bones(self) -> dict[Role, Float[np.ndarray, "3"]]:
+        """Unit directions, in the rest pose, of the bones of joints with a role that have one."""
+        pose = rest_pose(self.rig.skeleton, self.rig.roles)
+        found = {}
+        for j, role in enumerate(self.rig.roles.roles):
+            bone = None if role is None or role in found else pose.bone(j)
+            if role is not None and bone is not None:
+                found[role] = bone / np.linalg.norm(bone)
+        return found
+
+    @cached_property
     def _addresses(self) -> Int[np.ndarray, "N"]:
         return np.asarray(self.mjcf.model.jnt_qposadr[list(self.mj_joints)], dtype=np.int64)
 
@@ -126,6 +137,15 @@ class Morphology:
         return Coordinates(
             qpos[:, base : base + 3].copy(), quat_mul(quat, quat_conj(root_quat)), angles, turns
         )
+
+    def standing_sole(self, sole: Sole) -> Float[np.ndarray, "4 3"]:
+        """The corners of a sole in the T-pose [m, from the pelvis]."""
+        rig = self.rig
+        at = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
+        below = rig.skeleton.subtree(sole.foot)
+        j = np.array([next(j for j in below if self.links[j] == link) for link in sole.links])
+        rest = rig.skeleton.rest_positions
+        return at[j] + quat_rotate(rig.tpose[j], sole.points - rest[j])
 
     def motion(self, q: Coordinates, frame_time: float) -> Motion:
         """The same motion on the rig's skeleton. Axes that miss each other move the joints' centres

@@ -27,7 +27,15 @@ class Normal:
         residuals: Float[np.ndarray, "M T"],
     ) -> None:
         """M weighted residuals a frame, and how fast they grow with some columns."""
-        J = np.ascontiguousarray(rows.transpose(2, 0, 1))  # T C M
+        self.add_stacked(columns, np.ascontiguousarray(rows.transpose(2, 0, 1)), residuals)
+
+    def add_stacked(
+        self,
+        columns: list[int],
+        J: Float[np.ndarray, "T C M"],
+        residuals: Float[np.ndarray, "M T"],
+    ) -> None:
+        """The same, with time as the first axis of the rows."""
         at = np.asarray(columns)
         self.H[:, at[:, None], at] += J @ J.transpose(0, 2, 1)
         self.g[:, at] += (J @ residuals.T[:, :, None])[:, :, 0]
@@ -41,6 +49,13 @@ class Normal:
         self.H[:, at, at] += rows**2
         self.g += rows * residuals
         self.cost += 0.5 * (residuals**2).sum(1)
+
+    def only(self, columns: list[int]) -> "Normal":
+        """The same equations in some of the columns, the others standing still."""
+        out = Normal(0, 0)
+        at = np.asarray(columns)
+        out.H, out.g, out.cost = self.H[:, at[:, None], at], self.g[:, at], self.cost
+        return out
 
     def pin(self, pinned: Bool[np.ndarray, "T D"]) -> None:
         """Keep some columns from moving."""

@@ -1,0 +1,173 @@
+"""Wanted rotations laid on real hinges, each joint for itself: where the solver starts, and all
+that a plain copy would be.
+
+One hinge takes the twist about its axis; two take the best pair of angles, a singular value problem
+in half angles; three are solved exactly (Paden and Kahan's subproblems, as in Murray, Li and
+Sastry, "A Mathematical Introduction to Robotic Manipulation", ch. 3), with the branch chosen that
+is within the limits and does not jump.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from robots.morphology import Morphology
+from robots.tree import Coordinates, Frames, Tree, forward
+from spark.rotation import (
+    quat_conj,
+    quat_from_rotvec,
+    quat_mul,
+    quat_rotate,
+)
+
+_BEYOND = 10.0  # what leaving the limits costs against jumping, both in squared radians
+
+
+def project(
+    robot: Morphology, world: Float[np.ndarray, "T J 4"], hips: Float[np.ndarray, "T 3"]
+) -> Coordinates:
+    """Coordinates within the limits whose links turn as `world` wants them (`q_world_joint` of the
+    rig's joints), as far as their hinges can; the middle of the hips follows `hips` [m]."""
+    tree = robot.tree
+    count = len(world)
+    wanted = {int(link): world[:, j] for j, link in reversed(list(enumerate(robot.links)))}
+    angles = np.zeros((count, len(tree)))
+    turns = np.tile([1.0, 0, 0, 0], (count, len(tree), 1)) if tree.balls.any() else None
+    links = {-1: wanted.get(-1, np.tile([1.0, 0, 0, 0], (count, 1)))}
+    for group in _groups(robot):
+        above = links[int(tree.parents[group[0]])]
+        target = wanted[group[-1]]
+        local = quat_mul(quat_conj(above), target)
+        if tree.balls[group[0]]:
+            assert turns is not None
+            turns[:, group[0]] = local
+            links[group[-1]] = target
+            continue
+        found = _solve(tree, group, local)
+        angles[:, group] = np.clip(found, tree.lower[list(group)], tree.upper[list(group)])
+        turned = above
+        for j in group:
+            turned = quat_mul(turned, quat_from_rotvec(tree.axes[j] * angles[:, [j]]))
+        links[group[-1]] = turned
+    q = Coordinates(np.tile(tree.base, (count, 1)), links[-1], angles, turns)
+    return Coordinates(q.pos + hips - hips_of(robot, forward(tree, q)), q.quat, angles, turns)
+
+
+def hips_of(robot: Morphology, frames: Frames) -> Float[np.ndarray, "T 3"]:
+    """The path [m] of the middle of the hip joints."""
+    pelvis = int(robot.links[robot.rig.pelvis])
+    places = [frames.point(pelvis, robot.centers[j]).T for j in robot.rig.hips]
+    return np.mean(places, axis=0)
+
+
+def _groups(robot: Morphology) -> list[tuple[int, ...]]:
+    """The tree's joints by the part of the rig that they move together, parents first."""
+    ends = {int(link) for link in robot.links}
+    groups: list[tuple[int, ...]] = []
+    for link in sorted(ends - {-1}):
+        group = [link]
+        while (above := int(robot.tree.parents[group[0]])) >= 0 and above not in ends:
+            group.insert(0, above)
+        groups.append(tuple(group))
+    return groups
+
+
+def _solve(
+    tree: Tree, group: Sequence[int], local: Float[np.ndarray, "T 4"]
+) -> Float[np.ndarray, "T K"]:
+    """Angles of a group of hinges that turn by `local`, as nearly as they can."""
+    axes = tree.axes[list(group)]
+    middle = (tree.lower[list(group)] + tree.upper[list(group)]) / 2
+    if len(group) == 1:
+        found = _twist(local, axes[0])[:, None]
+    elif len(group) == 2:
+        found = _two(local, axes)
+    elif len(group) == 3:
+        branches = np.stack([_wrapped(b, middle) for b in _three(local, axes)])
+        return _steadiest(branches, tree.lower[list(group)], tree.upper[list(group)])
+    else:
+        # More hinges than a rotation needs: the first ones stay at rest.
+        found = np.zeros((len(local), len(group)))
+        rest = _solve(tree, group[-3:], local)
+        found[:, -3:] = rest
+        return found
+    return _wrapped(found, middle)
+
+
+def _wrapped(
+    angles: Float[np.ndarray, "T K"], middle: Float[np.ndarray, "K"]
+) -> Float[np.ndarray, "T K"]:
+    """The same angles within half a turn of the middle of their ranges."""
+    return middle + np.remainder(angles - middle + np.pi, 2 * np.pi) - np.pi
+
+
+def _twist(q: Float[np.ndarray, "T 4"], axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "T"]:
+    return 2 * np.arctan2(q[:, 1:] @ axis, q[:, 0])
+
+
+def _two(q: Float[np.ndarray, "T 4"], axes: Float[np.ndarray, "2 3"]) -> Float[np.ndarray, "T 2"]:
+    """The pair of angles whose product comes nearest to `q`.
+
+    The inner product of q with q1(a) q2(b) is bilinear in (cos a/2, sin a/2) and (cos b/2, sin
+    b/2): its largest value is a singular value.
+    """
+    one = np.array([1.0, 0, 0, 0])
+    first, second = (one, np.array([0.0, *axes[0]])), (one, np.array([0.0, *axes[1]]))
+    matrix = np.stack(
+        [np.stack([q @ quat_mul(a, b) for b in second], axis=-1) for a in first], axis=-2
+    )
+    u, _, vt = np.linalg.svd(matrix)
+    return np.stack(
+        [2 * np.arctan2(u[:, 1, 0], u[:, 0, 0]), 2 * np.arctan2(vt[:, 0, 1], vt[:, 0, 0])], axis=-1
+    )
+
+
+def _three(
+    q: Float[np.ndarray, "T 4"], axes: Float[np.ndarray, "3 3"]
+) -> list[Float[np.ndarray, "T 3"]]:
+    """Both solutions of three angles; the nearest where the axes reach no exact one."""
+    a1, a2, a3 = axes
+    moved = quat_rotate(q, a3)
+    cosine = a1 @ (a3 - (a2 @ a3) * a2)
+    sine = a1 @ np.cross(a2, a3)
+    reach = max(float(np.hypot(cosine, sine)), 1e-9)
+    offset = (moved @ a1 - (a2 @ a3) * (a1 @ a2)) / reach
+    solutions = []
+    for sign in (1.0, -1.0):
+        second = np.arctan2(sine, cosine) + sign * np.arccos(np.clip(offset, -1.0, 1.0))
+        q2 = quat_from_rotvec(a2 * second[:, None])
+        before = quat_rotate(q2, a3)
+        flat_before = before - (before @ a1)[:, None] * a1
+        flat_after = moved - (moved @ a1)[:, None] * a1
+        first = np.arctan2(
+            np.cross(flat_before, flat_after) @ a1, (flat_before * flat_after).sum(1)
+        )
+        q12 = quat_mul(quat_from_rotvec(a1 * first[:, None]), q2)
+        third = _twist(quat_mul(quat_conj(q12), q), a3)
+        solutions.append(np.stack([first, second, third], axis=-1))
+    return solutions
+
+
+def _steadiest(
+    branches: Float[np.ndarray, "2 T K"],
+    lower: Float[np.ndarray, "K"],
+    upper: Float[np.ndarray, "K"],
+) -> Float[np.ndarray, "T K"]:
+    """In each frame one of two branches, so that limits and jumps cost least in all (Viterbi)."""
+    beyond = np.maximum(branches - upper, 0.0) + np.maximum(lower - branches, 0.0)
+    stays = _BEYOND * (beyond**2).sum(-1)  # 2 T
+    jumps = ((branches[:, None, 1:] - branches[None, :, :-1]) ** 2).sum(-1)  # to, from, T - 1
+    (s0, s1), ((j00, j01), (j10, j11)) = stays.tolist(), jumps.tolist()
+    best0, best1 = s0[0], s1[0]
+    came0, came1 = [0] * len(s0), [0] * len(s0)
+    for t in range(1, len(s0)):
+        stay0, cross0 = best0 + j00[t - 1], best1 + j01[t - 1]
+        cross1, stay1 = best0 + j10[t - 1], best1 + j11[t - 1]
+        came0[t], came1[t] = int(cross0 < stay0), int(stay1 <= cross1)
+        best0, best1 = min(stay0, cross0) + s0[t], min(stay1, cross1) + s1[t]
+    path = [0] * len(s0)
+    path[-1] = int(best1 < best0)
+    for t in range(len(s0) - 1, 0, -1):
+        path[t - 1] = (came0, came1)[path[t]][t]
+    return branches[np.array(path), np.arange(len(path))]

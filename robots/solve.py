@@ -1,0 +1,127 @@
+"""Retargeting onto a robot: the whole trajectory at once.
+
+Gauss-Newton over the coordinates of all frames: every frame's pose against its targets, planted
+feet, the floor, limits; neighbours tied by their accelerations (`robots.objective`,
+`robots.normal`). It runs in two stages, each with everything below it free: base, trunk and legs,
+which the feet tie together, then arms and head, which hang on the trunk and don't move it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from robots.footing import Footing, plan_footing
+from robots.morphology import Morphology
+from robots.normal import second_differences
+from robots.objective import PATH, SMOOTH, Stage, linearize
+from robots.project import project
+from robots.targets import Targets, chest_of, targets_of
+from robots.tree import BASE, Coordinates, forward
+from spark.canonical import CanonicalMotion
+from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
+
+_STEPS = (6, 5)  # Gauss-Newton steps of the stages
+_LONGEST = 0.5  # [rad, m] a column moves in one of them
+_DAMPING = 1e-3
+_SHORT_OF_LIMIT = np.radians(0.75)
+
+
+@dataclass(frozen=True, eq=False)
+class Retargeted:
+    """A motion on a robot, with what was assumed on the way."""
+
+    robot: Morphology
+    coordinates: Coordinates
+    frame_time: float
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.coordinates)
+
+    @property
+    def qpos(self) -> Float[np.ndarray, "T nq"]:
+        """MuJoCo's coordinates: position, quaternion wxyz, joints."""
+        return self.robot.to_qpos(self.coordinates)
+
+
+def copy(source: CanonicalMotion, robot: Morphology) -> Retargeted:
+    """Each joint turned as its counterpart is, as far as its hinges can, and nothing more: the row
+    to compare with."""
+    targets = targets_of(source, robot)
+    q = project(robot, targets.world, targets.hips)
+    return Retargeted(robot, q, source.frame_time, targets.notes)
+
+
+def retarget(source: CanonicalMotion, robot: Morphology) -> Retargeted:
+    """The motion of `source` on a robot, its feet planted where the source's are, within limits."""
+    targets = targets_of(source, robot)
+    q = project(robot, targets.world, targets.hips)
+    footing = plan_footing(robot, forward(robot.tree, q), targets.contacts, targets.frame_time)
+    for stage, steps in zip(stages_of(robot), _STEPS, strict=True):
+        if stage.joints or stage.base:
+            for _ in range(steps):
+                q = _step(robot, targets, footing, q, stage)
+    return Retargeted(robot, q, source.frame_time, (*robot.notes, *targets.notes))
+
+
+def stages_of(robot: Morphology) -> tuple[Stage, Stage]:
+    """Base, trunk and legs; then the rest."""
+    tree = robot.tree
+    links = {int(robot.links[chest_of(robot.rig)])}
+    links |= {int(link) for sole in robot.soles for link in sole.links}
+    links |= {int(robot.links[j]) for j in robot.rig.contact_joints}
+    first = sorted({j for link in links for j in tree.chain(link)})
+    rest = tuple(j for j in range(len(tree)) if j not in first)
+    return Stage(tuple(first), True), Stage(rest, False)
+
+
+def _step(
+    robot: Morphology, targets: Targets, footing: list[Footing], q: Coordinates, stage: Stage
+) -> Coordinates:
+    tree = robot.tree
+    normal = linearize(robot, targets, footing, q, stage)
+    columns = [*(range(BASE) if stage.base else ()), *tree.columns(stage.joints)]
+    weights = smoothness(robot)[columns] / targets.frame_time**2
+    some = normal.only(columns)
+    found = some.solve_together(weights, accelerations(robot, q)[:, columns], _DAMPING)
+    step = np.zeros((len(q), tree.size))
+    step[:, columns] = np.clip(found, -_LONGEST, _LONGEST)
+    return _within(robot, q.moved(tree, step))
+
+
+def smoothness(robot: Morphology) -> Float[np.ndarray, "D"]:
+    """How accelerations weigh [s²], so that what is faster than `SMOOTH` fades."""
+    weights = np.full(robot.tree.size, 1.0 / (2 * np.pi * SMOOTH) ** 2)
+    weights[:3] *= PATH
+    return weights
+
+
+def accelerations(robot: Morphology, q: Coordinates) -> Float[np.ndarray, "A D"]:
+    """Second differences of all columns; of rotations, the change of the turn from frame to frame."""
+    tree = robot.tree
+    out = np.zeros((max(len(q) - 2, 0), tree.size))
+    out[:, :3] = second_differences(q.pos)
+    out[:, 3:6] = _turn_differences(q.quat)
+    hinges = ~tree.balls
+    out[:, tree.starts[hinges]] = second_differences(q.angles[:, hinges])
+    for j in np.flatnonzero(tree.balls):
+        assert q.turns is not None
+        at = tree.starts[j]
+        out[:, at : at + 3] = _turn_differences(q.turns[:, j])
+    return out
+
+
+def _turn_differences(q: Float[np.ndarray, "T 4"]) -> Float[np.ndarray, "A 3"]:
+    if len(q) < 3:
+        return np.zeros((0, 3))
+    return np.diff(rotvec_from_quat(quat_mul(q[1:], quat_conj(q[:-1]))), axis=0)
+
+
+def _within(robot: Morphology, q: Coordinates) -> Coordinates:
+    tree = robot.tree
+    short = np.minimum(_SHORT_OF_LIMIT, 0.05 * (tree.upper - tree.lower))
+    angles = np.where(
+        tree.balls, q.angles, np.clip(q.angles, tree.lower + short, tree.upper - short)
+    )
+    return Coordinates(q.pos, q.quat, angles, q.turns)

@@ -1,0 +1,147 @@
+"""What a robot is asked to do: the source's pose, path and contacts in the robot's own measures."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.ndimage import uniform_filter1d
+
+from robots.morphology import Morphology
+from spark.canonical import CanonicalMotion, canonical_positions
+from spark.contacts import planted_points
+from spark.feet import sole_corners, sole_positions, standing_height
+from spark.rig import Rig
+from spark.roles import LIMBS, Group, Role
+from spark.rotation import quat_mul, quat_rotate
+from spark.transfer import transfer
+
+_GAP = 0.08  # contacts and breaks shorter than this [s] are noise
+_BONES = (  # the limbs' segments, by the roles at their ends
+    (Role.LEFT_UPPER_LEG, Role.LEFT_LOWER_LEG),
+    (Role.LEFT_LOWER_LEG, Role.LEFT_FOOT),
+    (Role.RIGHT_UPPER_LEG, Role.RIGHT_LOWER_LEG),
+    (Role.RIGHT_LOWER_LEG, Role.RIGHT_FOOT),
+    (Role.LEFT_UPPER_ARM, Role.LEFT_FOREARM),
+    (Role.LEFT_FOREARM, Role.LEFT_HAND),
+    (Role.RIGHT_UPPER_ARM, Role.RIGHT_FOREARM),
+    (Role.RIGHT_FOREARM, Role.RIGHT_HAND),
+)
+_OUT = {
+    **{
+        role: np.array([0.0, 0, -1]) for g in (Group.LEFT_LEG, Group.RIGHT_LEG) for role in LIMBS[g]
+    },
+    **{role: np.array([0.0, 1, 0]) for role in LIMBS[Group.LEFT_ARM]},
+    **{role: np.array([0.0, -1, 0]) for role in LIMBS[Group.RIGHT_ARM]},
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """Over frames, floor at z = 0: `world`, the rig's joints' rotations (`q_world_joint`); `chest`,
+    that of the topmost part of the trunk; `hips`, the path of the hips' middle [m]; `bones`, unit
+    directions by the role at a segment's upper end; `contacts`, whether heel and toe of each of the
+    robot's soles stand; `hands`, from the right hand to the left [m].
+    """
+
+    frame_time: float
+    world: Float[np.ndarray, "T J 4"]
+    chest: Float[np.ndarray, "T 4"]
+    hips: Float[np.ndarray, "T 3"]
+    bones: dict[Role, Float[np.ndarray, "T 3"]]
+    contacts: Bool[np.ndarray, "T S 2"]
+    hands: Float[np.ndarray, "T 3"] | None
+    notes: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.hips)
+
+
+def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
+    """The targets that `source` sets for `robot`."""
+    moved = transfer(source, robot.rig)
+    positions = canonical_positions(source)
+    rig = source.rig
+    chest = (*rig.roles.joints(Role.SPINE), rig.pelvis)
+    chest_joint = chest[-2] if len(chest) > 1 else chest[-1]
+    own_chest = chest_of(robot.rig)
+    return Targets(
+        frame_time=source.frame_time,
+        world=quat_mul(moved.rotations, robot.rig.tpose),
+        chest=quat_mul(source.rotations[:, chest_joint], robot.rig.tpose[own_chest]),
+        hips=moved.hips - np.array([0.0, 0.0, moved.floor_z]),
+        bones=bone_directions(rig, positions, source.rotations),
+        contacts=_contacts(source, positions, robot),
+        hands=_between_hands(rig, positions, robot),
+        notes=moved.notes,
+    )
+
+
+def chest_of(rig: Rig) -> int:
+    """The topmost joint of the trunk."""
+    return (rig.pelvis, *rig.roles.joints(Role.SPINE))[-1]
+
+
+def bone_directions(
+    rig: Rig, positions: Float[np.ndarray, "T J 3"], rotations: Float[np.ndarray, "T J 4"]
+) -> dict[Role, Float[np.ndarray, "T 3"]]:
+    """Where the segments of arms and legs point: from joint to joint, or, where the joint at the
+    far end is missing, as its rotation since the T-pose says."""
+    out = {}
+    for upper, lower in _BONES:
+        a, b = rig.roles.joint(upper), rig.roles.joint(lower)
+        if a is None:
+            continue
+        if b is not None:
+            bone = positions[:, b] - positions[:, a]
+            length = np.linalg.norm(bone, axis=-1, keepdims=True)
+            if length.min() > 1e-6:
+                out[upper] = bone / length
+                continue
+        out[upper] = quat_rotate(rotations[:, a], _OUT[upper])
+    return out
+
+
+def _contacts(
+    source: CanonicalMotion, positions: Float[np.ndarray, "T J 3"], robot: Morphology
+) -> Bool[np.ndarray, "T S 2"]:
+    """Whether the source's heel and toe stand, for each of the robot's soles."""
+    rig = source.rig
+    height = standing_height(rig)
+    world = quat_mul(source.rotations, rig.tpose)
+    out = np.zeros((len(positions), len(robot.soles), 2), dtype=bool)
+    theirs = {sole.side: sole for sole in sole_corners(rig)}
+    for s, sole in enumerate(robot.soles):
+        side = "left" if robot.rig.roles.roles[sole.foot] is Role.LEFT_FOOT else "right"
+        if side not in theirs:
+            continue
+        toe = rig.roles.joint(Role(f"{side}_toe"))
+        foot = rig.roles.require(Role(f"{side}_foot"))
+        points = sole_positions(theirs[side], positions, world)
+        paths = np.stack([points[:, :2].mean(1), positions[:, foot if toe is None else toe]], 1)
+        out[:, s] = planted_points(paths, source.frame_time, height)
+    return _without_flicker(out, max(1, round(_GAP / source.frame_time)))
+
+
+def _without_flicker(mask: Bool[np.ndarray, "T S 2"], frames: int) -> Bool[np.ndarray, "T S 2"]:
+    """The majority over a short window."""
+    return uniform_filter1d(mask.astype(np.float64), frames, axis=0, mode="nearest") > 0.5
+
+
+def _between_hands(
+    rig: Rig, positions: Float[np.ndarray, "T J 3"], robot: Morphology
+) -> Float[np.ndarray, "T 3"] | None:
+    """From the right hand to the left, in the robot's arm lengths; None where a hand is missing."""
+    roles = (Role.LEFT_HAND, Role.RIGHT_HAND)
+    hands = [rig.roles.joint(role) for role in roles]
+    if None in hands or None in [robot.rig.roles.joint(role) for role in roles]:
+        return None
+    scale = arm_length(robot.rig) / arm_length(rig)
+    return scale * (positions[:, hands[0]] - positions[:, hands[1]])
+
+
+def arm_length(rig: Rig) -> float:
+    """From shoulder to wrist [m], along the bones."""
+    joints = [rig.roles.joint(role) for role in LIMBS[Group.LEFT_ARM][1:]]
+    rest = rig.skeleton.rest_positions
+    chain = [rest[j] for j in joints if j is not None]
+    return float(np.linalg.norm(np.diff(chain, axis=0), axis=1).sum())

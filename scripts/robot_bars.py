@@ -1,0 +1,192 @@
+"""Measure retargeting onto robots: a table of each clip, and of plain copy beside it.
+
+    python scripts/robot_bars.py --data DIR --robots g1.xml h1.xml [--clips 'cmu_asf/*.bvh' ...]
+
+A foot is planted while the source's toe moves along the floor at less than 0.15 m/s, lower than
+6 cm above its own 1st percentile.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from robots.morphology import Morphology, understand_robot
+from robots.solve import Retargeted, copy, retarget
+from robots.targets import bone_directions
+from spark.canonical import CanonicalMotion, canonical_positions, to_canonical
+from spark.recording import read_recording
+from spark.rig import understand
+from spark.roles import Role
+
+COLUMNS = {  # name: format
+    "sunk %": "6.2f",
+    "deep cm": "7.2f",
+    "float %": "7.2f",
+    "skate": "6.2f",
+    "(src)": "6.2f",
+    "limbs": "6.2f",
+    "limit %": "7.1f",
+    "rad/s": "6.1f",
+    "jerk": "7.0f",
+    "self %": "6.2f",
+    "fps": "6.0f",
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", type=Path, required=True)
+    parser.add_argument("--robots", nargs="+", required=True)
+    parser.add_argument("--clips", nargs="+", default=["cmu_asf/*", "animateddrawings/*", "reactidle/*"])
+    parser.add_argument("--quiet", action="store_true", help="means only")
+    parser.add_argument("--no-collisions", action="store_true")
+    args = parser.parse_args()
+    clips = sorted(path for pattern in args.clips for path in args.data.glob(f"{pattern}"))
+    sources = {}
+    for path in clips:
+        if path.suffix == ".bvh":
+            motion = read_recording(path).motion
+            sources[path.stem] = to_canonical(motion, understand(motion))
+    for name in args.robots:
+        robot = understand_robot(name)
+        print(f"\n{Path(name).stem}: {len(robot.mj_joints)} joints")
+        print(" " * 22 + " ".join(f"{c:>{int(f.split('.')[0])}}" for c, f in COLUMNS.items()))
+        for method in (copy, retarget):
+            rows, weights = [], []
+            for clip, source in sources.items():
+                start = time.perf_counter()
+                result = method(source, robot)
+                fps = len(source) / (time.perf_counter() - start)
+                rows.append([*measure(source, result, not args.no_collisions), fps])
+                weights.append(len(source))
+                if not args.quiet and method is retarget:
+                    show(clip, rows[-1])
+            mean = np.average(rows, axis=0, weights=weights)
+            mean[1], mean[7] = np.max(rows, axis=0)[[1, 7]]
+            show(f"{method.__name__}: mean", mean)
+
+
+def show(label: str, row: list[float]) -> None:
+    cells = " ".join(f"{v:{f}}" for v, f in zip(row, COLUMNS.values(), strict=True))
+    print(f"{label:<21} {cells}", flush=True)
+
+
+def measure(source: CanonicalMotion, result: Retargeted, collisions: bool) -> list[float]:
+    """The table's columns but for the last."""
+    robot, dt = result.robot, source.frame_time
+    theirs = canonical_positions(source)
+    toes = theirs[:, source.rig.contact_joints]
+    speed = np.linalg.norm(np.gradient(toes[..., :2], dt, axis=0), axis=-1)
+    low = np.percentile(toes[..., 2], 1, axis=0)
+    planted = (speed < 0.15) & (toes[..., 2] < low + 0.06)
+    corners = sole_corners_by_mujoco(result)  # T S C 3
+    z = corners[..., 2]
+    lowest = z.min(-1)
+    corner_speed = np.linalg.norm(np.gradient(corners[..., :2], dt, axis=0), axis=-1)
+    at = z.argmin(-1)
+    skate = np.take_along_axis(corner_speed, at[..., None], -1)[..., 0]
+    feet = planted[:, : lowest.shape[1]]
+    n = max(int(feet.sum()), 1)
+    angles = result.coordinates.angles
+    tree = robot.tree
+    near = np.minimum(angles - tree.lower, tree.upper - angles) < np.radians(0.5)
+    velocity = np.diff(angles, axis=0) / dt
+    jerk = np.diff(angles, 3, axis=0) / dt**3
+    return [
+        100 * float((lowest.min(1) < -0.01).mean()),
+        100 * float(max(0.0, -lowest.min())),
+        100 * float((feet & (lowest > 0.02)).sum() / n),
+        100 * float(skate[feet].sum() / n),
+        100 * float(speed[planted].sum() / max(int(planted.sum()), 1)),
+        limb_error(source, theirs, result),
+        100 * float(near.any(1).mean()),
+        float(np.abs(velocity).max(initial=0.0)),
+        float(np.sqrt((jerk**2).mean())) if len(jerk) else 0.0,
+        100 * self_collision(result) if collisions else np.nan,
+    ]
+
+
+def sole_corners_by_mujoco(result: Retargeted) -> np.ndarray:
+    """The soles' corners as MuJoCo's kinematics place them."""
+    robot, model = result.robot, result.robot.mjcf.model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    local = []
+    for sole in robot.soles:
+        for link, point in zip(sole.links, sole.points, strict=True):
+            body = int(model.jnt_bodyid[robot.mj_joints[link]])
+            local.append((body, data.xmat[body].reshape(3, 3).T @ (point - data.xpos[body])))
+    out = np.empty((len(result), len(local), 3))
+    for t, qpos in enumerate(result.qpos):
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(model, data)
+        for k, (body, point) in enumerate(local):
+            out[t, k] = data.xpos[body] + data.xmat[body].reshape(3, 3) @ point
+    return out.reshape(len(result), len(robot.soles), -1, 3)
+
+
+def limb_error(source: CanonicalMotion, theirs: np.ndarray, result: Retargeted) -> float:
+    """Mean angle [deg] between the limbs' segments, after one yaw."""
+    robot = result.robot
+    wanted = bone_directions(source.rig, theirs, source.rotations)
+    motion = robot.motion(result.coordinates, source.frame_time)
+    from spark.kinematics import forward
+
+    positions, world = forward(motion)
+    own = bone_directions(robot.rig, positions, world)
+    has = robot.rig.roles
+    roles = [r for r in wanted if r in own and next_joint(has, r) is not None]
+    a = np.stack([wanted[r] for r in roles], 1)
+    b = np.stack([own[r] for r in roles], 1)
+    yaw = np.arctan2(
+        (b[..., 0] * a[..., 1] - b[..., 1] * a[..., 0]).sum(),
+        (b[..., 0] * a[..., 0] + b[..., 1] * a[..., 1]).sum(),
+    )
+    c, s = np.cos(yaw), np.sin(yaw)
+    b = b @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    return float(np.degrees(np.arccos(np.clip((a * b).sum(-1), -1, 1))).mean())
+
+
+def next_joint(roles: object, role: Role) -> int | None:
+    order = {
+        "upper_leg": "lower_leg",
+        "lower_leg": "foot",
+        "upper_arm": "forearm",
+        "forearm": "hand",
+    }
+    side, part = role.value.split("_", 1)
+    return roles.joint(Role(f"{side}_{order[part]}"))  # type: ignore[attr-defined]
+
+
+def self_collision(result: Retargeted) -> float:
+    """Share of frames in which two bodies, not joined and not touching in the T-pose, are deeper
+    than 1 cm in each other."""
+    robot: Morphology = result.robot
+    model = robot.mjcf.model
+    data = mujoco.MjData(model)
+
+    def deep() -> set[tuple[int, int]]:
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_collision(model, data)
+        found = set()
+        for k in range(data.ncon):
+            contact = data.contact[k]
+            bodies = sorted(int(model.geom_bodyid[g]) for g in contact.geom)
+            if contact.dist < -0.01 and bodies[0] > 0:
+                found.add((bodies[0], bodies[1]))
+        return found
+
+    data.qpos[:] = robot.to_qpos(robot.tpose)[0]
+    always = deep()
+    bad = 0
+    for qpos in result.qpos:
+        data.qpos[:] = qpos
+        bad += bool(deep() - always)
+    return bad / len(result)
+
+
+if __name__ == "__main__":
+    main()
