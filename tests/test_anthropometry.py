@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from stick import joint, standing, stick_rig
 
 from sim.anthropometry import Segments, segments
 from spark.errors import SkeletonError
@@ -12,7 +13,6 @@ from spark.kinematics import forward
 from spark.rig import Rig
 from spark.roles import Role, RoleMap
 from spark.rotation import quat_rotate
-from tests.stick import joint, standing, stick_rig
 
 
 def coms_world(rig: Rig, parts: Segments) -> np.ndarray:

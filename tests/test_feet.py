@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from stick import joint, standing, stick_rig
 
 from spark.feet import FOOT_LENGTH, FOOT_WIDTH, sole_corners, sole_positions, standing_height
 from spark.kinematics import forward
@@ -11,7 +12,6 @@ from spark.motion import Motion
 from spark.rig import Rig
 from spark.roles import Role, RoleMap
 from spark.rotation import quat_about, quat_rotate
-from tests.stick import joint, standing, stick_rig
 
 
 def soles_of(rig: Rig, motion: Motion) -> np.ndarray:

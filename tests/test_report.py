@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import recordings
+from stick import joint, standing, stick_rig
 
 from sim.report import Finding, Report, compare, judge
 from spark.errors import SkeletonError, SparkSimError
@@ -15,8 +17,6 @@ from spark.recording import read_recording
 from spark.rig import Rig, understand
 from spark.roles import Role, RoleMap
 from spark.rotation import quat_about, quat_from_yaw, quat_mul, quat_rotate
-from tests.conftest import recordings
-from tests.stick import joint, standing, stick_rig
 
 FPS = 60.0
 

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from conftest import recording
+from stick import joint, standing, stick_rig
 
 from scripts.corruptions import CORRUPTIONS, HARMLESS
 from scripts.report_bench import auc, scores, table
@@ -13,8 +15,6 @@ from spark.recording import read_recording
 from spark.rig import Rig, understand
 from spark.roles import Role
 from spark.rotation import quat_about, quat_angle, quat_slerp
-from tests.conftest import recording
-from tests.stick import joint, standing, stick_rig
 
 
 def spoilt(kind: str, motion: Motion, rig: Rig) -> Motion:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from stick import joint, standing, stick_rig
 
 from sim.report.derivatives import derivative
 from sim.report.limits import limit_excess, swing_and_twist
@@ -23,7 +24,6 @@ from sim.report.smoothness import joint_rates
 from spark.kinematics import forward
 from spark.roles import Role
 from spark.rotation import quat_about, quat_mul
-from tests.stick import joint, standing, stick_rig
 
 
 @pytest.mark.parametrize("fps", [15, 24, 29.97, 60, 120])

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from stick import standing, stick_rig
 
 from sim.report import Report, judge
 from sim.report.page import report_page, write_report_page
@@ -17,7 +18,6 @@ from sim.report.plots import Plot, svg
 from spark.errors import OutputError
 from spark.motion import Motion
 from spark.rig import Rig
-from tests.stick import standing, stick_rig
 
 
 def stumbling() -> tuple[Report, tuple[Motion, Rig], tuple[Motion, Rig]]:

@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
+from stick import standing, stick_rig
 
 from sim.anthropometry import Segments
 from sim.body import build_body
@@ -13,7 +14,6 @@ from sim.report.track import track
 from sim.report.wrench import angular_momentum, required_wrench, unexplained
 from spark.motion import Motion
 from spark.rotation import quat_about, quat_from_rotvec, quat_mul
-from tests.stick import standing, stick_rig
 
 G = 9.81
 
