@@ -75,7 +75,7 @@ def read_recording(
         up_axis, found = infer_up(sample)
         notes += found
     convention = Convention(unit_m, up_axis)
-    return Recording(bvh, _to_si(motion, convention), convention, notes, adds_offset)
+    return Recording(bvh, in_si(motion, convention), convention, notes, adds_offset)
 
 
 def _decode(bvh: Bvh) -> tuple[Motion, bool, tuple[str, ...]]:
@@ -115,10 +115,8 @@ def _decode(bvh: Bvh) -> tuple[Motion, bool, tuple[str, ...]]:
     for order, (members, angle_columns) in bvh.rotation_channels.items():
         rotations[:, members] = quat_from_angles(np.radians(values[:, angle_columns]), order)
 
-    names = _unique_names([joint.name for joint in joints])
-    renamed = [name for name, joint in zip(names, joints, strict=True) if name != joint.name]
-    if renamed:
-        notes.append(f"repeated joint names got numbers: {name_list(renamed)}")
+    names, renamed = unique_names([joint.name for joint in joints])
+    notes += renamed
     ends = [(j, end) for j, joint in enumerate(joints) for end in joint.ends]
     skeleton = Skeleton(
         names,
@@ -144,7 +142,8 @@ def _adds_offset(
     return bool(np.sum(lengths(middle) < near) > np.sum(lengths(middle - offsets) < near))
 
 
-def _to_si(motion: Motion, convention: Convention) -> Motion:
+def in_si(motion: Motion, convention: Convention) -> Motion:
+    """A motion in file units and axes, in metres and internal axes."""
     skeleton, translations = motion.skeleton, motion.translations
     return replace(
         motion,
@@ -159,8 +158,8 @@ def _to_si(motion: Motion, convention: Convention) -> Motion:
     )
 
 
-def _unique_names(names: list[str]) -> tuple[str, ...]:
-    """Repeated names with a number: Toe, Toe.2, Toe.3."""
+def unique_names(names: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Repeated names with a number (Toe, Toe.2, Toe.3), and a note on them."""
     taken = set(names)
     repeats = Counter[str]()
     unique: list[str] = []
@@ -172,4 +171,6 @@ def _unique_names(names: list[str]) -> tuple[str, ...]:
             repeats[name] += candidate in taken
         taken.add(candidate)
         unique.append(candidate)
-    return tuple(unique)
+    renamed = [name for name, before in zip(unique, names, strict=True) if name != before]
+    notes = (f"repeated joint names got numbers: {name_list(renamed)}",) if renamed else ()
+    return tuple(unique), notes

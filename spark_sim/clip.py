@@ -10,6 +10,7 @@ from spark.bvh import write_bvh
 from spark.canonical import from_canonical, to_canonical
 from spark.encoding import encode, encode_new
 from spark.errors import ConventionError, FileFormatError, SkeletonError
+from spark.fbx import read_fbx
 from spark.motion import Motion
 from spark.override import Override
 from spark.recording import Recording, read_recording
@@ -24,11 +25,10 @@ if TYPE_CHECKING:
 File = str | Path
 
 _NOT_YET = {
-    ".xml": "MuJoCo models can't be read yet; expected a BVH file",
-    ".fbx": "FBX files can't be read yet; expected a BVH file (Blender converts one to the other)",
-    ".glb": "glTF files can't be read yet; expected a BVH file",
-    ".gltf": "glTF files can't be read yet; expected a BVH file",
-    ".amc": "AMC files can't be read yet; expected a BVH file",
+    ".xml": "MuJoCo models can't be read yet; expected a BVH or FBX file",
+    ".glb": "glTF files can't be read yet; expected a BVH or FBX file",
+    ".gltf": "glTF files can't be read yet; expected a BVH or FBX file",
+    ".amc": "AMC files can't be read yet; expected a BVH or FBX file",
 }
 
 
@@ -88,7 +88,7 @@ class Clip:
 def load(
     path: File, *, unit: str | float | None = None, up: str | None = None, roles: File | None = None
 ) -> Clip:
-    """Read a BVH file. What is not given is inferred, and said in the clip's `notes`.
+    """Read a BVH or FBX file. What is not given is inferred, and said in the clip's `notes`.
 
     `unit` is m, dm, cm, mm, inch, cmu or a number of metres; `up` is x, y or z; `roles` is a map of
     joints in TOML, as `spark-sim inspect --save-map` writes it.
@@ -96,7 +96,8 @@ def load(
     path = Path(path)
     if path.suffix.lower() in _NOT_YET:
         raise FileFormatError(path, None, _NOT_YET[path.suffix.lower()])
-    recording = read_recording(path, unit=unit, up=up)
+    read = read_fbx if path.suffix.lower() == ".fbx" else read_recording
+    recording = read(path, unit=unit, up=up)
     names = None if roles is None else rolemap.read(roles, recording.motion.skeleton)
     return Clip(recording, path.stem, names)
 
@@ -117,8 +118,11 @@ def retarget(
     if refine:
         moved = hold_feet(canonical, moved)
     motion = from_canonical(moved)
-    bvh, lost = encode(motion, target.recording)
-    recording = replace(target.recording, bvh=bvh, motion=motion, notes=(*moved.notes, *lost))
+    bvh, notes = encode(motion, target.recording)
+    file = target.recording.bvh.path
+    if file is not None and file.suffix.lower() == ".fbx":
+        notes += ("written as a BVH of its own; FBX files are read only",)
+    recording = replace(target.recording, bvh=bvh, motion=motion, notes=(*moved.notes, *notes))
     # The rig is given: what is known of a body does not depend on the motion that it makes.
     return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig)
 

@@ -1,0 +1,197 @@
+"""The nodes of an FBX file and how they move, evaluated by ufbx (the package pufbx)."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from spark.errors import DependencyError, FileFormatError, name_list
+from spark.rotation import matrix_from_quat, quat_slerp
+
+# Frames times nodes that a file may ask for: 12 hours of a body with fingers at 30 fps.
+_LARGEST = 100_000_000
+
+
+@dataclass(frozen=True)
+class FbxJoint:
+    """A node that is read as a joint: its name, and the joint that it hangs on (-1: none)."""
+
+    node: int
+    name: str
+    parent: int
+
+
+class FbxScene:
+    """An open FBX file; nodes are numbered in the library's order, the scene's own root first.
+
+    Raises `FileFormatError` for anything that is no FBX file, `DependencyError` without pufbx.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            import pufbx
+        except ImportError as error:
+            raise DependencyError(
+                "reading FBX needs a package that isn't installed: pip install 'spark-sim[fbx]'"
+            ) from error
+        self.path = path
+        self._library = pufbx
+        try:
+            self._scene: Any = pufbx.load_fbx(str(path))
+        except (RuntimeError, ValueError) as error:
+            raise FileFormatError(
+                path, None, f"is no FBX file that can be read ({error}); expected FBX 6.1 to 7.7"
+            ) from error
+        self._nodes: list[Any] = list(self._scene.nodes)
+        self._parents = [-1 if n.parent is None else n.parent.typed_id for n in self._nodes]
+
+    def joints(self) -> tuple[list[FbxJoint], tuple[str, ...]]:
+        """Bones, and other nodes that lie between them, depth-first below one root; and notes.
+
+        In a file without bones its empty nodes. Of several skeletons the largest.
+        """
+        notes: tuple[str, ...] = ()
+        bones = [i for i, node in enumerate(self._nodes) if node.bone is not None]
+        if not bones:
+            bones = [i for i in range(1, len(self._nodes)) if self._is_empty(self._nodes[i])]
+            notes += ("no node is a bone: its empty nodes are read as joints",)
+        if not bones:
+            raise FileFormatError(self.path, None, "holds no skeleton; expected bones")
+        lines = [self._line(i) for i in bones]
+        tops = [line[0] for line in lines]
+        top = max(tops, key=tops.count)
+        others = sorted({self._nodes[i].name for i in tops if i != top})
+        if others:
+            notes += (f"of several skeletons the largest is read, not {name_list(others)}",)
+        lines = [line for line in lines if line[0] == top]
+        shared = 0
+        while all(len(line) > shared + 1 for line in lines) and (
+            len({line[shared + 1] for line in lines}) == 1
+        ):
+            shared += 1
+        children: dict[int, list[int]] = {}
+        for i in sorted({i for line in lines for i in line[shared + 1 :]}):
+            children.setdefault(self._parents[i], []).append(i)
+        joints: list[FbxJoint] = []
+        stack = [(lines[0][shared], -1)]
+        while stack:
+            node, parent = stack.pop()
+            stack += [(child, len(joints)) for child in reversed(children.get(node, []))]
+            joints.append(FbxJoint(node, self._nodes[node].name or f"node{node}", parent))
+        return joints, notes
+
+    def animation(self, frame_time: float) -> tuple[Any, Float[np.ndarray, "T"], tuple[str, ...]]:
+        """The animation to read, the times [s] of its frames, and notes.
+
+        Of several the one that moves the most nodes, the longest of those: exporters leave empty
+        ones beside it. None and one frame where nothing moves.
+        """
+        stacks = list(self._scene.anim_stacks)
+        baked = [
+            self._library.bake_anim(
+                self._scene, s.anim, resample_rate=1 / frame_time, max_keyframe_segments=100_000
+            )
+            for s in stacks
+        ]
+        best = max(
+            range(len(stacks)),
+            key=lambda i: (len(baked[i].modified_nodes), baked[i].key_time_max),
+            default=None,
+        )
+        if best is None or not len(baked[best].modified_nodes):
+            return (
+                None,
+                np.zeros(1),
+                ("nothing moves in the file: its rest pose is the only frame",),
+            )
+        notes: tuple[str, ...] = ()
+        if len(stacks) > 1:
+            others = [stack.name for i, stack in enumerate(stacks) if i != best]
+            notes += (f"animation {stacks[best].name!r} is read, not {name_list(others)}",)
+        begin, end = baked[best].key_time_min, baked[best].key_time_max
+        count = int((end - begin) / frame_time + 1e-3) + 1
+        if not 0 < count * len(self._nodes) < _LARGEST:
+            raise FileFormatError(
+                self.path, None, f"has keys from {begin:g} s to {end:g} s; expected hours at most"
+            )
+        return baked[best], begin + frame_time * np.arange(count), notes
+
+    def world(
+        self, joints: list[FbxJoint], baked: Any, times: Float[np.ndarray, "T"]
+    ) -> tuple[Float[np.ndarray, "T J 3"], Float[np.ndarray, "T J 3 3"]]:
+        """Where the joints are and how their axes lie (with scale) at `times`, in file units and
+        axes. Without `baked` that of the nodes' own transforms."""
+        moved = {} if baked is None else {node.typed_id: node for node in baked.modified_nodes}
+        position: dict[int, Any] = {}
+        linear: dict[int, Any] = {}
+        turn: dict[int, Any] = {}
+        for joint in joints:
+            for i in self._line(joint.node):
+                if i in position:
+                    continue
+                at, rotation, scale = self._local(i, moved.get(i), times)
+                own = matrix_from_quat(rotation)
+                above = self._parents[i]
+                if above > 0:
+                    at = position[above] + np.einsum("tij,tj->ti", linear[above], at)
+                    alone = self._nodes[i].inherit_mode.name == "IGNORE_PARENT_SCALE"
+                    within = turn[above] if alone else linear[above]
+                    turn[i] = turn[above] @ own
+                    own = within @ own
+                else:
+                    turn[i] = own
+                position[i], linear[i] = at, own * scale[:, None, :]
+        nodes = [joint.node for joint in joints]
+        return np.stack([position[i] for i in nodes], 1), np.stack([linear[i] for i in nodes], 1)
+
+    def _local(
+        self, i: int, baked: Any, times: Float[np.ndarray, "T"]
+    ) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 4"], Float[np.ndarray, "T 3"]]:
+        """Translation, rotation and scale of a node in its parent."""
+        own = self._nodes[i].local_transform
+        at = np.tile(list(own.translation), (len(times), 1))
+        quat = np.tile(np.roll(list(own.rotation), 1), (len(times), 1))  # xyzw to wxyz
+        scale = np.tile(list(own.scale), (len(times), 1))
+        if baked is not None:
+            at = _vectors_at(baked.translation_keys, times, at)
+            scale = _vectors_at(baked.scale_keys, times, scale)
+            quat = _quats_at(baked.rotation_keys, times, quat)
+        # A scale of zero hides things; as a map it would have no inverse.
+        return at, quat, np.where(np.abs(scale) < 1e-9, 1.0, scale)
+
+    def _line(self, node: int) -> list[int]:
+        """The nodes from below the scene's own root to `node`."""
+        line = [node]
+        while self._parents[line[-1]] > 0:
+            line.append(self._parents[line[-1]])
+        return line[::-1]
+
+    @staticmethod
+    def _is_empty(node: Any) -> bool:
+        return node.mesh is None and node.light is None and node.camera is None
+
+
+def _vectors_at(
+    keys: Any, times: Float[np.ndarray, "T"], otherwise: Float[np.ndarray, "T 3"]
+) -> Float[np.ndarray, "T 3"]:
+    """Keyed vectors at `times`; the first and last key hold beyond the ends."""
+    if not len(keys):
+        return otherwise
+    columns = [np.interp(times, keys["time"], keys["value"][axis]) for axis in "xyz"]
+    return np.stack(columns, axis=-1)
+
+
+def _quats_at(
+    keys: Any, times: Float[np.ndarray, "T"], otherwise: Float[np.ndarray, "T 4"]
+) -> Float[np.ndarray, "T 4"]:
+    """Keyed rotations at `times`, between keys along the shorter arc."""
+    if not len(keys):
+        return otherwise
+    quats = np.stack([keys["value"][axis] for axis in "wxyz"], axis=-1)
+    after = np.clip(np.searchsorted(keys["time"], times, side="right"), 1, max(len(keys) - 1, 1))
+    before, after = after - 1, np.minimum(after, len(keys) - 1)
+    start, end = keys["time"][before], keys["time"][after]
+    share = np.clip((times - start) / np.where(end > start, end - start, 1.0), 0.0, 1.0)
+    return quat_slerp(quats[before], quats[after], share)
