@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from robots.morphology import Morphology, Sole
 from robots.tree import Frames
@@ -17,7 +17,7 @@ _WOBBLE = (
     0.05  # hip heights that a standing foot may stray from its mean place without having moved
 )
 _TURN = np.radians(12)  # and how far it may turn
-_EASE = 0.06  # [s] over which a foot is taken hold of and let go
+_EASE = 0.05  # [s] over which a foot is taken hold of and let go
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +69,13 @@ def _footing(
     for corner, (x, y) in enumerate(own):
         places[corner, 0] = held[:, 0] + cos * x - sin * y
         places[corner, 1] = held[:, 1] + sin * x + cos * y
-    ease = max(1, round(_EASE / frame_time))
-    soft = uniform_filter1d(contacts.astype(np.float64), ease, axis=0, mode="nearest")
-    return Footing(places, soft.T[[0, 0, 1, 1]])
+    return Footing(places, _eased(contacts, max(1, round(_EASE / frame_time)))[[0, 0, 1, 1]])
+
+
+def _eased(contacts: Bool[np.ndarray, "T 2"], frames: int) -> Float[np.ndarray, "2 T"]:
+    """1 during contacts, and ramps of some frames before and after them."""
+    wider = maximum_filter1d(contacts.astype(np.float64), 2 * frames + 1, axis=0, mode="nearest")
+    return uniform_filter1d(wider, 2 * frames + 1, axis=0, mode="nearest").T
 
 
 def _flat_sole(robot: Morphology, sole: Sole) -> Float[np.ndarray, "4 2"]:

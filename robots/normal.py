@@ -74,10 +74,13 @@ class Normal:
         self,
         weights: Float[np.ndarray, "D"],
         accelerations: Float[np.ndarray, "A D"],
+        rush: Float[np.ndarray, "V D"],
+        rush_weight: float,
         damping: float,
     ) -> Float[np.ndarray, "T D"]:
         """The step that also lessens the weighted squares of `accelerations`, the second
-        differences of the columns (A = T - 2)."""
+        differences of the columns (A = T - 2), and of `rush`, by how much the first differences
+        (V = T - 1) are too large; 0 where they are not."""
         T, D = self.g.shape
         stencil = _stencil(T)
         band = np.zeros((REACH * D + 1, T, D))
@@ -88,6 +91,13 @@ class Normal:
             band[lag * D] += stencil[lag, :, None] * weights**2
         band[0] += damping
         g = self.g + weights**2 * spread(accelerations, T)
+        if len(rush):
+            fast = np.where(rush != 0, rush_weight**2, 0.0)
+            band[0, :-1] += fast
+            band[0, 1:] += fast
+            band[D, :-1] -= fast
+            g[:-1] -= rush_weight**2 * rush
+            g[1:] += rush_weight**2 * rush
         step = solveh_banded(
             band.reshape(REACH * D + 1, T * D), g.ravel(), lower=True, check_finite=False
         )

@@ -13,7 +13,7 @@ from robots.footing import Footing
 from robots.morphology import Morphology
 from robots.normal import Normal
 from robots.targets import Targets, chest_of
-from robots.terms import Rows, direction_rows, limit_rows, point_rows, turn_rows
+from robots.terms import Rows, direction_rows, limit_rows, one_sided, point_rows, turn_rows
 from robots.tree import BASE, Coordinates, Frames, forward
 from spark.roles import Role
 from spark.rotation import matrix_from_quat
@@ -32,12 +32,13 @@ TURNS = {  # how a part is turned: beside the directions, little matters but wha
 TURN = 0.08  # the rest
 PATH = np.array([1.5, 1.5, 1.5])  # of the hips [1 / m]
 STAND = np.array([25.0, 25.0, 40.0])  # of a sole's corner [1 / m]
-SINK = 40.0  # of a sole's corner below the floor [1 / m]
+SINK, SINK_EASE = 40.0, 0.004  # of a sole's corner below the floor [1 / m]; [m]
 LIMIT, MARGIN = 8.0, np.radians(2.0)  # of a hinge near its limit
 CLAP, NEAR = 4.0, 0.12  # of hands [1 / m] that are as near as this [m]
 TOUCH = 15.0  # of parts that run into each other [1 / m]
 IDLE = 0.02  # of hinges that nothing else asks for: stay as in the T-pose
 SMOOTH = 6.0  # [Hz] above which a limb's motion fades
+FAST, RUSH = 10.0, 0.15  # [rad/s] above which a hinge is held back, and how much [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,12 +210,11 @@ def _stand(
             assert foot_block is not None
             point = frames.point(int(link), rest)
             weight = STAND[:, None] * foot.holds[c]
-            wanted = foot.places[c].copy()
+            foot_block.point(int(link), point, foot.places[c], weight)
             # Not below the floor, whether it stands or not.
-            sinking = (point[2] < 0) & (weight[2] < SINK)
-            weight[2] = np.where(sinking, SINK, weight[2])
-            wanted[2] = np.where(sinking, 0.0, wanted[2])
-            foot_block.point(int(link), point, wanted, weight)
+            depth, slope = one_sided(-point[2], SINK_EASE)
+            up = np.stack([np.zeros(count), np.zeros(count), -SINK * slope])
+            foot_block.point(int(link), point, point + depth / np.maximum(slope, 1e-9), up)
 
 
 def _clap(

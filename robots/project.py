@@ -21,7 +21,7 @@ from spark.rotation import (
     quat_rotate,
 )
 
-_BEYOND = 10.0  # what leaving the limits costs against jumping, both in squared radians
+_BEYOND = 1.0  # what leaving the limits costs against jumping, both in squared radians
 
 
 def project(
@@ -44,8 +44,7 @@ def project(
             turns[:, group[0]] = local
             links[group[-1]] = target
             continue
-        found = _solve(tree, group, local)
-        angles[:, group] = np.clip(found, tree.lower[list(group)], tree.upper[list(group)])
+        angles[:, group] = _solve(tree, group, local)
         turned = above
         for j in group:
             turned = quat_mul(turned, quat_from_rotvec(tree.axes[j] * angles[:, [j]]))
@@ -76,30 +75,41 @@ def _groups(robot: Morphology) -> list[tuple[int, ...]]:
 def _solve(
     tree: Tree, group: Sequence[int], local: Float[np.ndarray, "T 4"]
 ) -> Float[np.ndarray, "T K"]:
-    """Angles of a group of hinges that turn by `local`, as nearly as they can."""
-    axes = tree.axes[list(group)]
-    middle = (tree.lower[list(group)] + tree.upper[list(group)]) / 2
+    """Angles within the limits of a group of hinges that turn by `local`, as nearly as they can."""
+    axes, lower, upper = (part[list(group)] for part in (tree.axes, tree.lower, tree.upper))
     if len(group) == 1:
-        found = _twist(local, axes[0])[:, None]
-    elif len(group) == 2:
-        found = _two(local, axes)
-    elif len(group) == 3:
-        branches = np.stack([_wrapped(b, middle) for b in _three(local, axes)])
-        return _steadiest(branches, tree.lower[list(group)], tree.upper[list(group)])
-    else:
-        # More hinges than a rotation needs: the first ones stay at rest.
-        found = np.zeros((len(local), len(group)))
-        rest = _solve(tree, group[-3:], local)
-        found[:, -3:] = rest
-        return found
-    return _wrapped(found, middle)
+        return _limited(_twist(local, axes[0])[:, None], lower, upper)[0]
+    if len(group) == 2:
+        return _limited(_two(local, axes), lower, upper)[0]
+    if len(group) == 3:
+        branches = [_limited(branch, lower, upper) for branch in _three(local, axes)]
+        return _steadiest(*(np.stack(part) for part in zip(*branches, strict=True)))
+    # More hinges than a rotation needs: the first ones stay at rest.
+    out = np.zeros((len(local), len(group)))
+    out[:, -3:] = _solve(tree, group[-3:], local)
+    return out
 
 
-def _wrapped(
-    angles: Float[np.ndarray, "T K"], middle: Float[np.ndarray, "K"]
-) -> Float[np.ndarray, "T K"]:
-    """The same angles within half a turn of the middle of their ranges."""
-    return middle + np.remainder(angles - middle + np.pi, 2 * np.pi) - np.pi
+def _limited(
+    angles: Float[np.ndarray, "T K"], lower: Float[np.ndarray, "K"], upper: Float[np.ndarray, "K"]
+) -> tuple[Float[np.ndarray, "T K"], Float[np.ndarray, "T K"]]:
+    """The angles within their limits, and how far they were from them.
+
+    What is out of reach stays at the limit that it left by: the one on the other side may be
+    nearer around the back, but to get there is a jump.
+    """
+    middle = (lower + upper) / 2
+    angles = middle + np.remainder(angles - middle + np.pi, 2 * np.pi) - np.pi
+    inside = np.clip(angles, lower, upper)
+    beyond = np.abs(angles - inside)
+    for k in range(angles.shape[1]):
+        reached = np.flatnonzero(beyond[:, k] == 0)
+        if 0 < len(reached) < len(angles):
+            last = np.searchsorted(reached, np.arange(len(angles)), side="right") - 1
+            left = angles[reached[np.maximum(last, 0)], k] > middle[k]
+            out = beyond[:, k] > 0
+            inside[out, k] = np.where(left[out], upper[k], lower[k])
+    return inside, beyond
 
 
 def _twist(q: Float[np.ndarray, "T 4"], axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "T"]:
@@ -150,12 +160,9 @@ def _three(
 
 
 def _steadiest(
-    branches: Float[np.ndarray, "2 T K"],
-    lower: Float[np.ndarray, "K"],
-    upper: Float[np.ndarray, "K"],
+    branches: Float[np.ndarray, "2 T K"], beyond: Float[np.ndarray, "2 T K"]
 ) -> Float[np.ndarray, "T K"]:
     """In each frame one of two branches, so that limits and jumps cost least in all (Viterbi)."""
-    beyond = np.maximum(branches - upper, 0.0) + np.maximum(lower - branches, 0.0)
     stays = _BEYOND * (beyond**2).sum(-1)  # 2 T
     jumps = ((branches[:, None, 1:] - branches[None, :, :-1]) ** 2).sum(-1)  # to, from, T - 1
     (s0, s1), ((j00, j01), (j10, j11)) = stays.tolist(), jumps.tolist()

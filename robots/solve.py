@@ -14,14 +14,14 @@ from jaxtyping import Float
 from robots.footing import Footing, plan_footing
 from robots.morphology import Morphology
 from robots.normal import second_differences
-from robots.objective import PATH, SMOOTH, Stage, linearize
+from robots.objective import FAST, PATH, RUSH, SMOOTH, Stage, linearize
 from robots.project import project
 from robots.targets import Targets, chest_of, targets_of
 from robots.tree import BASE, Coordinates, forward
 from spark.canonical import CanonicalMotion
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 
-_STEPS = (6, 5)  # Gauss-Newton steps of the stages
+_STEPS = (10, 8)  # Gauss-Newton steps of the stages
 _LONGEST = 0.5  # [rad, m] a column moves in one of them
 _DAMPING = 1e-3
 _SHORT_OF_LIMIT = np.radians(0.75)
@@ -84,7 +84,13 @@ def _step(
     columns = [*(range(BASE) if stage.base else ()), *tree.columns(stage.joints)]
     weights = smoothness(robot)[columns] / targets.frame_time**2
     some = normal.only(columns)
-    found = some.solve_together(weights, accelerations(robot, q)[:, columns], _DAMPING)
+    found = some.solve_together(
+        weights,
+        accelerations(robot, q)[:, columns],
+        rush(robot, q, targets.frame_time)[:, columns],
+        RUSH / targets.frame_time,
+        _DAMPING,
+    )
     step = np.zeros((len(q), tree.size))
     step[:, columns] = np.clip(found, -_LONGEST, _LONGEST)
     return _within(robot, q.moved(tree, step))
@@ -98,7 +104,7 @@ def smoothness(robot: Morphology) -> Float[np.ndarray, "D"]:
 
 
 def accelerations(robot: Morphology, q: Coordinates) -> Float[np.ndarray, "A D"]:
-    """Second differences of all columns; of rotations, the change of the turn from frame to frame."""
+    """Second differences of all columns; of rotations, the change of the turn between frames."""
     tree = robot.tree
     out = np.zeros((max(len(q) - 2, 0), tree.size))
     out[:, :3] = second_differences(q.pos)
@@ -109,6 +115,17 @@ def accelerations(robot: Morphology, q: Coordinates) -> Float[np.ndarray, "A D"]
         assert q.turns is not None
         at = tree.starts[j]
         out[:, at : at + 3] = _turn_differences(q.turns[:, j])
+    return out
+
+
+def rush(robot: Morphology, q: Coordinates, frame_time: float) -> Float[np.ndarray, "V D"]:
+    """By how much [rad] hinges turn further from frame to frame than they should."""
+    tree = robot.tree
+    out = np.zeros((max(len(q) - 1, 0), tree.size))
+    hinges = ~tree.balls
+    steps = np.diff(q.angles[:, hinges], axis=0)
+    most = FAST * frame_time
+    out[:, tree.starts[hinges]] = steps - np.clip(steps, -most, most)
     return out
 
 

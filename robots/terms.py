@@ -66,6 +66,17 @@ def point_rows(
     return rows * weight, (point - wanted) * weight
 
 
+def one_sided(
+    over: Float[np.ndarray, "*n"], ease: float
+) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
+    """A residual that grows with what is over zero, and its slope; bent over a width of `ease`.
+
+    A sharp bend would let Gauss-Newton step over it back and forth.
+    """
+    root = np.sqrt(over**2 + ease**2)
+    return (root + over) / 2, (1 + over / root) / 2
+
+
 def limit_rows(
     tree: Tree, q: Coordinates, *, margin: float, weight: float
 ) -> tuple[Float[np.ndarray, "T D"], Float[np.ndarray, "T D"]]:
@@ -76,7 +87,8 @@ def limit_rows(
     lower, upper = tree.lower[hinges], tree.upper[hinges]
     near = np.minimum(margin, 0.1 * (upper - lower))
     angles = q.angles[:, hinges]
-    over = np.maximum(angles - (upper - near), 0.0) + np.minimum(angles - (lower + near), 0.0)
-    rows[:, at] = np.where(over != 0, weight, 0.0)
-    residuals[:, at] = weight * over
+    above, rising = one_sided(angles - (upper - near), margin / 4)
+    below, falling = one_sided(lower + near - angles, margin / 4)
+    rows[:, at] = weight * (rising + falling)
+    residuals[:, at] = weight * (above - below)
     return rows, residuals
