@@ -1,6 +1,8 @@
 """Training losses: the paper's section 4.5, one function an equation, and the default preset's own.
 
 Rotations are compared as 6D features, positions in hip heights. Padding joints count nowhere.
+Every window counts the same, so that a batch's gradient is the mean of its parts' on any number of
+processes.
 """
 
 import torch
@@ -44,7 +46,7 @@ def contact(
     """Squared speed [hip heights / s] of joints in the frames in which they are planted."""
     speed = torch.diff(predicted, dim=1) / frame_time
     held = (planted[:, 1:] & planted[:, :-1] & body.valid[:, None]).to(predicted.dtype)
-    return ((speed**2).sum(-1) * held).sum() / held.sum().clamp(min=1)
+    return (((speed**2).sum(-1) * held).sum((1, 2)) / held.sum((1, 2)).clamp(min=1)).mean()
 
 
 def end_effectors(
@@ -58,4 +60,4 @@ def end_effectors(
 
 def _mean(values: Float[Tensor, "B T J"], joints: Bool[Tensor, "B J"]) -> Scalar:
     weights = joints[:, None].to(values.dtype).expand_as(values)
-    return (values * weights).sum() / weights.sum().clamp(min=1)
+    return ((values * weights).sum((1, 2)) / weights.sum((1, 2)).clamp(min=1)).mean()

@@ -26,6 +26,9 @@ N_GROUPS = 6
 QUERIES_PER_GROUP = 4
 N_TOKENS = N_GROUPS * QUERIES_PER_GROUP
 TPOSE_FEATURES = 13
+# A step of Adam moves a head's output by about rate times width, whatever is still missing. What a
+# residual has to say is small (a few degrees); unscaled, steps overshoot it and learn nothing.
+RESIDUAL_SCALE = 0.1
 SHAPE_FEATURES = 6  # bone offset, depth, leaf flag, degrees of freedom
 
 
@@ -302,9 +305,11 @@ class Decoder(nn.Module):
         if start is None:
             return Pose(sixd, root)
         identity = sixd.new_tensor([1.0, 0, 0, 0, 1, 0])
-        turned = matrix_from_sixd(sixd + identity) @ matrix_from_sixd(start.rotations)
+        turned = matrix_from_sixd(RESIDUAL_SCALE * sixd + identity) @ matrix_from_sixd(
+            start.rotations
+        )
         columns = turned[..., :2].transpose(-1, -2).flatten(-2)
-        return Pose(columns, start.root + root)
+        return Pose(columns, start.root + RESIDUAL_SCALE * root)
 
 
 class Spark(nn.Module):

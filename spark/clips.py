@@ -1,0 +1,113 @@
+"""Recordings as training clips: any tree of BVH files, at one frame rate, in canonical form."""
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from spark.canonical import CanonicalMotion, canonical_positions, to_canonical
+from spark.contacts import planted_feet
+from spark.errors import FileFormatError, SkeletonError, SparkSimError
+from spark.features import BodyFeatures, body_features
+from spark.pairs import Clip
+from spark.recording import read_recording
+from spark.rig import understand
+from spark.rotation import quat_slerp
+from spark.skeleton import Skeleton
+
+FRAME_TIME = 1 / 30
+
+
+def read_clips(
+    paths: Sequence[Path], progress: Callable[[Iterable[Path]], Iterable[Path]] = iter
+) -> tuple[list[Clip], tuple[str, ...]]:
+    """The humanoid recordings among `paths` and below them as clips, and notes on the others.
+
+    Files of one skeleton share one body, so that training draws from them together. Raises
+    `FileFormatError` where a path holds no BVH file, `SkeletonError` where none is usable.
+    """
+    bodies: dict[tuple[object, ...], BodyFeatures] = {}
+    clips: list[Clip] = []
+    notes: list[str] = []
+    for path in progress([file for given in paths for file in _files(given)]):
+        try:
+            motion = read_recording(path).motion
+            key = _key(motion.skeleton)
+            if key not in bodies:
+                bodies[key] = body_features(understand(motion))
+            clips.append(_clip(path.stem, to_canonical(motion, bodies[key].rig), bodies[key]))
+        except SparkSimError as error:
+            notes.append(f"{path}: left out: {error}")
+    if not clips:
+        raise SkeletonError(
+            f"{', '.join(map(str, paths))}: no recording of a humanoid to train on; {notes[0]}"
+        )
+    return clips, tuple(notes)
+
+
+def at_frame_time(canonical: CanonicalMotion, frame_time: float) -> CanonicalMotion:
+    """`canonical` at another frame rate: rotations by slerp, the path linearly; the first frame
+    stays. A motion that has this frame time already is given back as it is."""
+    if abs(canonical.frame_time - frame_time) < 1e-3 * frame_time:
+        return canonical
+    last = len(canonical) - 1
+    times = np.arange(int(last * canonical.frame_time / frame_time + 1e-6) + 1) * frame_time
+    at = times / canonical.frame_time
+    return CanonicalMotion(
+        canonical.rig,
+        frame_time,
+        rotations_at(canonical.rotations, at),
+        positions_at(canonical.hips, at),
+        canonical.floor_z,
+        canonical.notes,
+    )
+
+
+def rotations_at(
+    rotations: Float[np.ndarray, "T J 4"], at: Float[np.ndarray, "N"]
+) -> Float[np.ndarray, "N J 4"]:
+    """Rotations at fractional frames; the first and last frame hold beyond the ends."""
+    low, high, share = _neighbours(at, len(rotations))
+    mix = np.broadcast_to(share[:, None], (len(at), rotations.shape[1]))
+    return quat_slerp(rotations[low], rotations[high], mix)
+
+
+def positions_at(
+    path: Float[np.ndarray, "T 3"], at: Float[np.ndarray, "N"]
+) -> Float[np.ndarray, "N 3"]:
+    """A path at fractional frames; the first and last frame hold beyond the ends."""
+    low, high, share = _neighbours(at, len(path))
+    return path[low] + share[:, None] * (path[high] - path[low])
+
+
+def _neighbours(
+    at: Float[np.ndarray, "N"], count: int
+) -> tuple[np.ndarray, np.ndarray, Float[np.ndarray, "N"]]:
+    at = np.clip(at, 0, count - 1)
+    low = np.minimum(at.astype(int), max(count - 2, 0))
+    return low, np.minimum(low + 1, count - 1), at - low
+
+
+def _clip(name: str, canonical: CanonicalMotion, body: BodyFeatures) -> Clip:
+    rig = canonical.rig
+    canonical = at_frame_time(canonical, FRAME_TIME)
+    hips = canonical.hips - np.array([0, 0, canonical.floor_z])
+    planted = planted_feet(rig, canonical_positions(canonical), FRAME_TIME)
+    if planted.shape[1] != 2:
+        raise SkeletonError("has no two feet; pairs for training need them")
+    rotations = canonical.rotations[:, body.joints]
+    return Clip(name, body, rotations, hips / rig.hip_height, planted, FRAME_TIME)
+
+
+def _key(skeleton: Skeleton) -> tuple[object, ...]:
+    return (skeleton.names, skeleton.parents.tobytes(), skeleton.offsets.round(5).tobytes())
+
+
+def _files(path: Path) -> list[Path]:
+    if path.is_file():
+        return [path]
+    found = sorted(p for p in path.rglob("*") if p.suffix.lower() == ".bvh")
+    if not found:
+        raise FileFormatError(path, None, "holds no .bvh file; expected one or more")
+    return found

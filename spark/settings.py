@@ -1,0 +1,127 @@
+"""What a training run is: everything that `spark-sim train` can be told. No torch here."""
+
+import tomllib
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from spark.errors import ConventionError, FileFormatError
+
+PRESETS = ("default", "paper", "tiny")
+ABLATIONS = ("share", "mask", "pos", "fk")
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """A training run. `tiny` is the default preset, small enough for minutes on a CPU.
+
+    `ablate` names switches of the paper's table 2 to throw: share and mask are left out, pos gives
+    the encoder joint positions too (or takes them away where the preset has them), fk drops the
+    loss on positions. `batch` windows a step are drawn `per_body` at a time from one pair of
+    bodies, of which each recorded body has `variants`. The rate rises over `warmup` steps and then
+    falls along a cosine to a tenth at `steps`.
+    """
+
+    preset: str = "default"
+    ablate: tuple[str, ...] = ()
+    data: tuple[str, ...] = ()
+    steps: int = 100_000
+    batch: int = 16
+    per_body: int = 4
+    window: int = 64
+    variants: int = 256
+    rate: float = 1e-4
+    warmup: int = 500
+    weight_decay: float = 0.01
+    seed: int = 0
+    workers: int = 0
+    save_every: int = 1000
+    log_every: int = 20
+    name_steps: int = 1500
+    t5: str = ""
+
+    def __post_init__(self) -> None:
+        _one_of("preset", self.preset, PRESETS)
+        for switch in self.ablate:
+            _one_of("ablate", switch, ABLATIONS)
+        for name, lowest in _LOWEST.items():
+            if getattr(self, name) < lowest:
+                raise ConventionError(
+                    f"{name} = {getattr(self, name)}: expected {lowest} or more in a training run"
+                )
+        if self.batch % self.per_body:
+            raise ConventionError(
+                f"batch = {self.batch} is no multiple of per_body = {self.per_body}; "
+                "a step's windows are drawn that many at a time"
+            )
+
+    @classmethod
+    def of(cls, preset: str) -> "TrainConfig":
+        """The preset's own settings."""
+        if preset == "tiny":
+            return cls(preset, steps=1000, window=32, variants=16, rate=1e-3, warmup=20)
+        return cls(preset)
+
+    def changed(self, where: object, **values: Any) -> "TrainConfig":
+        """These settings with others in their place. Raises `ConventionError` for unknown ones."""
+        known = {f.name: f.type for f in fields(self)}
+        for name, value in values.items():
+            if name not in known:
+                raise ConventionError(
+                    f"{where}: {name!r} is no setting; expected one of {', '.join(sorted(known))}"
+                )
+            if not _fits(value, getattr(self, name)):
+                raise ConventionError(
+                    f"{where}: {name} = {value!r}: expected a value such as {getattr(self, name)!r}"
+                )
+        lists = {k: tuple(v) for k, v in values.items() if isinstance(v, list | tuple)}
+        return replace(self, **{**values, **lists})
+
+    @property
+    def draws(self) -> int:
+        """Draws that make up one step."""
+        return self.batch // self.per_body
+
+
+_LOWEST = {
+    **dict.fromkeys(("steps", "batch", "per_body", "variants", "save_every", "log_every"), 1),
+    **dict.fromkeys(("seed", "workers", "warmup", "weight_decay", "rate", "name_steps"), 0),
+    "window": 2,
+}
+
+
+def read_settings(path: Path) -> dict[str, Any]:
+    """The settings in a TOML file. Raises `FileFormatError` where it isn't one."""
+    try:
+        return tomllib.loads(path.read_text())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise FileFormatError(path, None, f"is no TOML ({error})") from error
+
+
+def toml(config: TrainConfig) -> str:
+    """`config` as a file that `read_settings` reads."""
+    return "".join(f"{name} = {_literal(value)}\n" for name, value in asdict(config).items())
+
+
+def _literal(value: Any) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_literal, value))}]"
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return f'"{escaped}"'
+    return str(value)
+
+
+def _fits(value: Any, example: Any) -> bool:
+    if isinstance(value, bool):
+        return False
+    if isinstance(example, tuple):
+        return isinstance(value, list | tuple) and all(isinstance(v, str) for v in value)
+    if isinstance(example, float):
+        return isinstance(value, int | float)
+    return isinstance(value, type(example))
+
+
+def _one_of(name: str, value: str, allowed: tuple[str, ...]) -> None:
+    if value not in allowed:
+        raise ConventionError(f"{name} = {value!r}: expected one of {', '.join(allowed)}")

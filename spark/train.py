@@ -1,0 +1,285 @@
+"""Training: the paper's unpaired objective, and the default preset's on pairs with exact answers.
+
+Step n of a seed is always the same step, whatever ran before: its windows are draws by number, its
+rate and its random numbers are functions of n. So a run that stops and resumes is, on a CPU, the
+run that never stopped, to the bit. Under `torchrun` every process takes its share of each step's
+draws; losses are means over windows, so the processes' mean gradient is that of one process.
+"""
+
+import json
+import math
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
+from dataclasses import asdict, replace
+from pathlib import Path
+from time import perf_counter
+from typing import TextIO
+
+import torch
+import torch.distributed as dist
+from jaxtyping import Float
+from torch import Tensor, nn
+from torch.nn.parallel import DistributedDataParallel
+from torch.utils.data import DataLoader, Dataset
+
+from spark import losses
+from spark.batch import Batch, Collator, Names
+from spark.checkpoint import (
+    Checkpoint,
+    optimizer_tensors,
+    restore_optimizer,
+    save_checkpoint,
+)
+from spark.model import Config, Spark, forward_kinematics
+from spark.names import NameEncoder, T5Names
+from spark.pairs import Clip, PairMaker
+from spark.settings import TrainConfig
+
+BETAS = (0.9, 0.99)
+PAPER_WEIGHTS = {"rec": 1.0, "cyc": 20.0, "root": 7.0, "fk": 100.0}
+PAIR_WEIGHTS = {"rec": 1.0, "root": 7.0, "fk": 100.0, "contact": 1.0, "ends": 100.0}
+NAME_CACHE = Path.home() / ".cache" / "spark-sim" / "names.pt"
+TINY = {"width": 48, "heads": 2, "encoder_blocks": 2, "decoder_blocks": 2}
+
+Terms = dict[str, Float[Tensor, ""]]
+
+
+def network(config: TrainConfig, name_width: int) -> Config:
+    """The network of a training run: the preset's, with the ablations' switches thrown."""
+    preset = Config.paper() if config.preset == "paper" else Config.default()
+    if config.preset == "tiny":
+        preset = replace(preset, **TINY)
+    return replace(
+        preset,
+        name_width=name_width + 2,
+        share_joints="share" not in config.ablate,
+        mask_joints=0.0 if "mask" in config.ablate else preset.mask_joints,
+        positions_in=preset.positions_in ^ ("pos" in config.ablate),
+    )
+
+
+class Objective(nn.Module):
+    """A network with its loss: what one step makes smaller."""
+
+    def __init__(self, model: Spark, config: TrainConfig) -> None:
+        super().__init__()
+        self.model = model
+        weights = PAIR_WEIGHTS if model.config.residual else PAPER_WEIGHTS
+        self.weights = {k: w for k, w in weights.items() if k != "fk" or "fk" not in config.ablate}
+
+    def forward(self, batch: Batch) -> tuple[Float[Tensor, ""], Terms]:
+        """The weighted sum of the terms, and each of them without its weight."""
+        terms = self._paired(batch) if self.model.config.residual else self._unpaired(batch)
+        return torch.stack([w * terms[k] for k, w in self.weights.items()]).sum(), terms
+
+    def _unpaired(self, batch: Batch) -> Terms:
+        """Section 4.5: A reconstructs A; what A becomes on B is encoded as A was."""
+        latent = self.model.encode(batch.pose, batch.source)
+        same = self.model.decode(latent, batch.source)
+        moved = self.model.decode(latent, batch.target)
+        return {
+            "rec": losses.reconstruction(same, batch.pose, batch.source),
+            "cyc": losses.cycle(latent, self.model.encode(moved, batch.target)),
+            "root": losses.root(same, batch.pose),
+            "fk": losses.positions(
+                forward_kinematics(same, batch.source),
+                forward_kinematics(batch.pose, batch.source),
+                batch.source,
+            ),
+        }
+
+    def _paired(self, batch: Batch) -> Terms:
+        """Against the exact answer on B, with the feet and the ends of limbs on top."""
+        moved = self.model(batch.pose, batch.source, batch.target, batch.start)
+        positions = forward_kinematics(moved, batch.target)
+        truth = forward_kinematics(batch.truth, batch.target)
+        return {
+            "rec": losses.reconstruction(moved, batch.truth, batch.target),
+            "root": losses.root(moved, batch.truth),
+            "fk": losses.positions(positions, truth, batch.target),
+            "contact": losses.contact(positions, batch.planted, batch.frame_time, batch.target),
+            "ends": losses.end_effectors(positions, truth, batch.effectors),
+        }
+
+
+class Steps(Dataset[Batch]):
+    """Item n: this process's share of step n's windows."""
+
+    def __init__(
+        self, clips: Sequence[Clip], names: Names, config: TrainConfig, rank: int, world: int
+    ) -> None:
+        self.config, self.rank, self.world = config, rank, world
+        self.maker = PairMaker(
+            clips, window=config.window, variants=config.variants, seed=config.seed
+        )
+        self.collator = Collator(names)
+
+    def __getitem__(self, n: int) -> Batch:
+        first = n * self.config.draws
+        mine = range(first + self.rank, first + self.config.draws, self.world)
+        return self.collator.batch([self.maker.draw(k, self.config.per_body) for k in mine])
+
+
+def optimiser_of(model: nn.Module, config: TrainConfig) -> torch.optim.AdamW:
+    """AdamW; weight decay on matrices alone, not on norms, biases, queries and places."""
+    matrices = [p for m in model.modules() if isinstance(m, nn.Linear) for p in [m.weight]]
+    decayed = {id(p) for p in matrices}
+    others = [p for p in model.parameters() if id(p) not in decayed]
+    return torch.optim.AdamW(
+        [
+            {"params": matrices, "weight_decay": config.weight_decay},
+            {"params": others, "weight_decay": 0.0},
+        ],
+        lr=config.rate,
+        betas=BETAS,
+        fused=True,
+    )
+
+
+def rate_at(step: int, config: TrainConfig) -> float:
+    """The learning rate of a step: up in a line, then down a cosine to a tenth."""
+    if step < config.warmup:
+        return config.rate * (step + 1) / config.warmup
+    done = (step - config.warmup) / max(config.steps - config.warmup, 1)
+    return config.rate * (0.55 + 0.45 * math.cos(math.pi * min(done, 1.0)))
+
+
+Watch = Callable[[int, dict[str, float]], None]
+
+
+def train(
+    clips: Sequence[Clip],
+    config: TrainConfig,
+    out: Path,
+    *,
+    start: Checkpoint,
+    watch: Watch = lambda step, terms: None,
+) -> Checkpoint:
+    """Train from `start` to `config.steps`; `out/checkpoint.safetensors` and `out/log.jsonl` grow.
+
+    `watch` is told the loss terms after each step that is logged. On a GPU the network is compiled
+    and computes in bf16. Under `torchrun` the first process writes.
+    """
+    rank, world, device = _place()
+    model = start.model.to(device)
+    objective = Objective(model, config).to(device)
+    optimiser = optimiser_of(model, config)
+    restore_optimizer(optimiser, model, start.optimizer)
+    runner: nn.Module = DistributedDataParallel(objective) if world > 1 else objective
+    if device.type == "cuda":
+        runner = torch.compile(runner, dynamic=True)  # type: ignore[assignment]
+    steps = Steps(clips, name_vectors(start.names), config, rank, world)
+    checkpoint = start
+    model.train()
+    began = perf_counter()
+    with _log(out, start.step, rank) as log:
+        for n, batch in zip(
+            range(start.step, config.steps), _batches(steps, start.step), strict=True
+        ):
+            terms = take_step(runner, optimiser, _to(batch, device), n, config, rank)
+            if rank:
+                continue
+            done = n + 1
+            if done % config.log_every == 0 or done == config.steps:
+                values = {k: float(v) for k, v in terms.items()}
+                entry = {"step": done, "seconds": round(perf_counter() - began, 3), **values}
+                log.write(json.dumps(entry) + "\n")
+                log.flush()
+                watch(done, values)
+            if done % config.save_every == 0 or done == config.steps:
+                checkpoint = Checkpoint(
+                    model, start.names, done, asdict(config), optimizer_tensors(optimiser, model)
+                )
+                save_checkpoint(checkpoint, out / "checkpoint.safetensors")
+    return checkpoint
+
+
+def take_step(
+    runner: nn.Module,
+    optimiser: torch.optim.Optimizer,
+    batch: Batch,
+    n: int,
+    config: TrainConfig,
+    rank: int = 0,
+) -> Terms:
+    """Step number `n`: one batch, one update; the loss terms, and the `loss` that they make."""
+    torch.manual_seed(hash((config.seed, n, rank)))
+    for group in optimiser.param_groups:
+        group["lr"] = rate_at(n, config)
+    with _precision(batch.pose.root.device):
+        loss, terms = runner(batch)
+    optimiser.zero_grad()
+    loss.backward()
+    optimiser.step()
+    return {"loss": loss.detach(), **{k: v.detach() for k, v in terms.items()}}
+
+
+def _precision(device: torch.device) -> "torch.autocast | nullcontext[None]":
+    """bf16 products on a GPU; float32 on a CPU, where a resumed run must be the same run."""
+    return torch.autocast("cuda", torch.bfloat16) if device.type == "cuda" else nullcontext()
+
+
+def _place() -> tuple[int, int, torch.device]:
+    """This process's rank, how many there are, and its device; joins what torchrun started."""
+    world = int(os.environ.get("WORLD_SIZE", "1"))
+    cuda = torch.cuda.is_available()
+    if world > 1 and not dist.is_initialized():
+        dist.init_process_group("nccl" if cuda else "gloo")
+    rank = dist.get_rank() if world > 1 else 0
+    local = int(os.environ.get("LOCAL_RANK", "0"))
+    return rank, world, torch.device("cuda", local) if cuda else torch.device("cpu")
+
+
+def name_vectors(names: NameEncoder | str) -> Names:
+    """What turns joint names into vectors: our own encoder, or the T5 of that name."""
+    if isinstance(names, NameEncoder):
+        return names.cpu().encode
+    return T5Names(names, NAME_CACHE).encode
+
+
+def _batches(steps: Steps, start: int) -> Iterator[Batch]:
+    config = steps.config
+    return iter(
+        DataLoader(
+            steps,
+            batch_size=None,
+            sampler=range(start, config.steps),
+            num_workers=config.workers,
+            collate_fn=_as_it_is,
+            pin_memory=torch.cuda.is_available(),
+        )
+    )
+
+
+def _as_it_is(batch: Batch) -> Batch:
+    return batch
+
+
+def _to(batch: Batch, device: torch.device) -> Batch:
+    if device.type == "cpu":
+        return batch
+    moved = [
+        part.to(device, non_blocking=True)
+        if isinstance(part, Tensor)
+        else type(part)(*(t.to(device, non_blocking=True) for t in part))
+        if isinstance(part, tuple)
+        else part
+        for part in batch
+    ]
+    return Batch(*moved)
+
+
+def _log(out: Path, step: int, rank: int) -> TextIO:
+    """The log, cut back to what had happened by `step`; nothing on other processes than the first.
+
+    A run that died between two checkpoints has logged steps that are now taken again.
+    """
+    if rank:
+        return open(os.devnull, "w")
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / "log.jsonl"
+    lines = path.read_text().splitlines() if path.exists() else []
+    kept = [line for line in lines if json.loads(line)["step"] <= step] if step else []
+    path.write_text("".join(f"{line}\n" for line in kept))
+    return path.open("a")
