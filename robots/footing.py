@@ -1,7 +1,7 @@
 """Where a robot's feet stand: one footprint for each time that a foot is on the floor.
 
-The places come from the copied motion; what a standing foot wobbles there is lost, what it drifts
-beyond that is motion and stays.
+The places come from the copied motion. What the source's foot wobbles while it stands is lost, what
+it drifts beyond that is motion and stays.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,10 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from robots.morphology import Morphology, Sole
+from robots.targets import Targets
 from robots.tree import Frames
+from spark.kinematics import world_positions
+from spark.rotation import quat_rotate
 
 _WOBBLE = (
     0.05  # hip heights that a standing foot may stray from its mean place without having moved
@@ -28,14 +31,13 @@ class Footing:
     holds: Float[np.ndarray, "4 T"]
 
 
-def plan_footing(
-    robot: Morphology, frames: Frames, contacts: Bool[np.ndarray, "T S 2"], frame_time: float
-) -> list[Footing]:
-    """Footprints for the poses `frames`, whose feet `contacts` (heel, toe) tell to stand."""
-    return [
-        _footing(robot, sole, frames, contacts[:, s], frame_time)
-        for s, sole in enumerate(robot.soles)
-    ]
+def plan_footing(robot: Morphology, targets: Targets) -> list[Footing]:
+    """Footprints where the wanted pose, free of the hinges' limits, would stand on average."""
+    skeleton = robot.rig.skeleton
+    still = np.zeros((len(targets), 3))
+    positions = world_positions(skeleton, targets.world, still)
+    positions += (targets.hips - positions[:, robot.rig.hips].mean(1))[:, None]
+    return [_footing(robot, targets, positions, s) for s in range(len(robot.soles))]
 
 
 def corners_of(frames: Frames, sole: Sole) -> Float[np.ndarray, "4 3 T"]:
@@ -45,31 +47,63 @@ def corners_of(frames: Frames, sole: Sole) -> Float[np.ndarray, "4 3 T"]:
 
 
 def _footing(
-    robot: Morphology,
-    sole: Sole,
-    frames: Frames,
-    contacts: Bool[np.ndarray, "T 2"],
-    frame_time: float,
+    robot: Morphology, targets: Targets, positions: Float[np.ndarray, "T J 3"], s: int
 ) -> Footing:
-    at = corners_of(frames, sole)[:, :2]  # 4 2 T
-    heel, toe = at[:2].mean(0), at[2:].mean(0)
+    sole, contacts, frame_time = robot.soles[s], targets.contacts[:, s], targets.frame_time
+    j, offsets = robot.sole_offsets(sole)
+    at = positions[:, j, :2] + quat_rotate(targets.world[:, j], offsets)[..., :2]  # T 4 2
+    heel, toe = at[:, :2].mean(1), at[:, 2:].mean(1)
     along = toe - heel
-    heading = np.unwrap(np.arctan2(along[1], along[0]))
+    heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
     flat = _flat_sole(robot, sole)
     length = float(np.linalg.norm(flat[2:].mean(0) - flat[:2].mean(0)))
-    # The toe is the pivot; while only the heel stands, it is where the toe will come down.
-    ahead = np.stack([np.cos(heading), np.sin(heading)])
-    pivot = np.where(contacts[:, 1], toe, heel + length * ahead)
-    standing = contacts[:, 0] | contacts[:, 1]
-    held = _held(pivot.T, standing, _WOBBLE * robot.rig.hip_height)
-    heading = _held(heading[:, None], standing, _TURN)[:, 0]
-    cos, sin = np.cos(heading), np.sin(heading)
-    own = flat - flat[2:].mean(0)
-    places = np.zeros((4, 3, len(heading)))
-    for corner, (x, y) in enumerate(own):
-        places[corner, 0] = held[:, 0] + cos * x - sin * y
-        places[corner, 1] = held[:, 1] + sin * x + cos * y
+    ahead = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    pivot, turn = toe.copy(), heading.copy()
+    stances = _stances(contacts, round(2 * _EASE / frame_time))
+    for (start, stop), (before, after) in stances:
+        # The toe is the pivot; where only the heel stands, it is where the toe will come down.
+        on_toe = np.flatnonzero(contacts[start:stop, 1]) + start
+        frames = on_toe if len(on_toe) else np.arange(start, stop)
+        own = toe[frames] if len(on_toe) else (heel + length * ahead)[frames]
+        moved = _beyond(
+            targets.feet[frames, s, int(len(on_toe) > 0)], _WOBBLE * robot.rig.hip_height
+        )
+        turned = _beyond(heading[frames, None], _TURN)[:, 0]
+        time = np.arange(before, after)
+        for axis in range(2):
+            place = own[:, axis].mean() + moved[:, axis]
+            pivot[before:after, axis] = np.interp(time, frames, place)
+        turn[before:after] = np.interp(time, frames, heading[frames].mean() + turned)
+    cos, sin = np.cos(turn), np.sin(turn)
+    places = np.zeros((4, 3, len(turn)))
+    for corner, (x, y) in enumerate(flat - flat[2:].mean(0)):
+        places[corner, 0] = pivot[:, 0] + cos * x - sin * y
+        places[corner, 1] = pivot[:, 1] + sin * x + cos * y
     return Footing(places, _eased(contacts, max(1, round(_EASE / frame_time)))[[0, 0, 1, 1]])
+
+
+def _stances(
+    contacts: Bool[np.ndarray, "T 2"], around: int
+) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+    """The stretches in which heel or toe stand; each with the frames around it that are nearer to
+    it than to others, up to some number."""
+    standing = contacts[:, 0] | contacts[:, 1]
+    edges = np.flatnonzero(np.diff(standing.astype(np.int8), prepend=0, append=0)).tolist()
+    spans = list(zip(edges[::2], edges[1::2], strict=True))
+    out = []
+    for k, (start, stop) in enumerate(spans):
+        before = (spans[k - 1][1] + start) // 2 if k else 0
+        after = (stop + spans[k + 1][0]) // 2 if k + 1 < len(spans) else len(standing)
+        around_it = max(before, start - around), min(after, stop + around)
+        out.append(((start, stop), around_it))
+    return out
+
+
+def _beyond(path: Float[np.ndarray, "P D"], radius: float) -> Float[np.ndarray, "P D"]:
+    """How far a path is from its mean, but for what of that lies within a radius."""
+    away = path - path.mean(0)
+    far = np.linalg.norm(away, axis=1, keepdims=True)
+    return away * np.maximum(1.0 - radius / np.maximum(far, 1e-12), 0.0)
 
 
 def _eased(contacts: Bool[np.ndarray, "T 2"], frames: int) -> Float[np.ndarray, "2 T"]:
@@ -85,16 +119,3 @@ def _flat_sole(robot: Morphology, sole: Sole) -> Float[np.ndarray, "4 2"]:
     angle = np.arctan2(along[1], along[0]) if np.linalg.norm(along) > 1e-6 else 0.0
     cos, sin = np.cos(angle), np.sin(angle)
     return at @ np.array([[cos, -sin], [sin, cos]])
-
-
-def _held(
-    path: Float[np.ndarray, "T D"], standing: Bool[np.ndarray, "T"], radius: float
-) -> Float[np.ndarray, "T D"]:
-    """The path with each stretch of standing drawn to its mean, but for what is further away."""
-    out = path.copy()
-    edges = np.flatnonzero(np.diff(standing.astype(np.int8), prepend=0, append=0))
-    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        away = path[start:stop] - path[start:stop].mean(0)
-        far = np.linalg.norm(away, axis=1, keepdims=True)
-        out[start:stop] -= away * np.minimum(1.0, radius / np.maximum(far, 1e-12))
-    return out

@@ -138,14 +138,20 @@ class Morphology:
             qpos[:, base : base + 3].copy(), quat_mul(quat, quat_conj(root_quat)), angles, turns
         )
 
+    def sole_offsets(self, sole: Sole) -> tuple[Int[np.ndarray, "4"], Float[np.ndarray, "4 3"]]:
+        """The rig's joint that each corner of a sole turns with, and its place in that joint's axes
+        [m]."""
+        skeleton = self.rig.skeleton
+        below = skeleton.subtree(sole.foot)
+        j = np.array([next(j for j in below if self.links[j] == link) for link in sole.links])
+        return j, sole.points - skeleton.rest_positions[j]
+
     def standing_sole(self, sole: Sole) -> Float[np.ndarray, "4 3"]:
         """The corners of a sole in the T-pose [m, from the pelvis]."""
         rig = self.rig
         at = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
-        below = rig.skeleton.subtree(sole.foot)
-        j = np.array([next(j for j in below if self.links[j] == link) for link in sole.links])
-        rest = rig.skeleton.rest_positions
-        return at[j] + quat_rotate(rig.tpose[j], sole.points - rest[j])
+        j, offsets = self.sole_offsets(sole)
+        return at[j] + quat_rotate(rig.tpose[j], offsets)
 
     def motion(self, q: Coordinates, frame_time: float) -> Motion:
         """The same motion on the rig's skeleton. Axes that miss each other move the joints' centres

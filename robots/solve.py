@@ -17,7 +17,7 @@ from robots.normal import second_differences
 from robots.objective import FAST, PATH, RUSH, SMOOTH, Stage, linearize
 from robots.project import project
 from robots.targets import Targets, chest_of, targets_of
-from robots.tree import BASE, Coordinates, forward
+from robots.tree import BASE, Coordinates
 from spark.canonical import CanonicalMotion
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 
@@ -57,7 +57,7 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> Retargeted:
     """The motion of `source` on a robot, its feet planted where the source's are, within limits."""
     targets = targets_of(source, robot)
     q = project(robot, targets.world, targets.hips)
-    footing = plan_footing(robot, forward(robot.tree, q), targets.contacts, targets.frame_time)
+    footing = plan_footing(robot, targets)
     for stage, steps in zip(stages_of(robot), _STEPS, strict=True):
         if stage.joints or stage.base:
             for _ in range(steps):

@@ -40,7 +40,8 @@ class Targets:
     """Over frames, floor at z = 0: `world`, the rig's joints' rotations (`q_world_joint`); `chest`,
     that of the topmost part of the trunk; `hips`, the path of the hips' middle [m]; `bones`, unit
     directions by the role at a segment's upper end; `contacts`, whether heel and toe of each of the
-    robot's soles stand; `hands`, from the right hand to the left [m].
+    robot's soles stand; `feet`, the paths of the source's heels and toes over the floor [m];
+    `hands`, from the right hand to the left [m].
     """
 
     frame_time: float
@@ -49,6 +50,7 @@ class Targets:
     hips: Float[np.ndarray, "T 3"]
     bones: dict[Role, Float[np.ndarray, "T 3"]]
     contacts: Bool[np.ndarray, "T S 2"]
+    feet: Float[np.ndarray, "T S 2 2"]
     hands: Float[np.ndarray, "T 3"] | None
     notes: tuple[str, ...]
 
@@ -64,13 +66,16 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
     chest = (*rig.roles.joints(Role.SPINE), rig.pelvis)
     chest_joint = chest[-2] if len(chest) > 1 else chest[-1]
     own_chest = chest_of(robot.rig)
+    paths, contacts = _contacts(source, positions, robot)
+    scale = robot.rig.hip_height / rig.hip_height
     return Targets(
         frame_time=source.frame_time,
         world=quat_mul(moved.rotations, robot.rig.tpose),
         chest=quat_mul(source.rotations[:, chest_joint], robot.rig.tpose[own_chest]),
         hips=moved.hips - np.array([0.0, 0.0, moved.floor_z]),
         bones=bone_directions(rig, positions, source.rotations),
-        contacts=_contacts(source, positions, robot),
+        contacts=contacts,
+        feet=scale * paths[..., :2],
         hands=_between_hands(rig, positions, robot),
         notes=moved.notes,
     )
@@ -103,12 +108,13 @@ def bone_directions(
 
 def _contacts(
     source: CanonicalMotion, positions: Float[np.ndarray, "T J 3"], robot: Morphology
-) -> Bool[np.ndarray, "T S 2"]:
-    """Whether the source's heel and toe stand, for each of the robot's soles."""
+) -> tuple[Float[np.ndarray, "T S 2 3"], Bool[np.ndarray, "T S 2"]]:
+    """The source's heel and toe [m] for each of the robot's soles, and whether they stand."""
     rig = source.rig
     height = standing_height(rig)
     world = quat_mul(source.rotations, rig.tpose)
-    out = np.zeros((len(positions), len(robot.soles), 2), dtype=bool)
+    paths = np.zeros((len(positions), len(robot.soles), 2, 3))
+    stands = np.zeros(paths.shape[:-1], dtype=bool)
     theirs = {sole.side: sole for sole in sole_corners(rig)}
     for s, sole in enumerate(robot.soles):
         side = "left" if robot.rig.roles.roles[sole.foot] is Role.LEFT_FOOT else "right"
@@ -117,9 +123,10 @@ def _contacts(
         toe = rig.roles.joint(Role(f"{side}_toe"))
         foot = rig.roles.require(Role(f"{side}_foot"))
         points = sole_positions(theirs[side], positions, world)
-        paths = np.stack([points[:, :2].mean(1), positions[:, foot if toe is None else toe]], 1)
-        out[:, s] = planted_points(paths, source.frame_time, height)
-    return _without_flicker(out, max(1, round(_GAP / source.frame_time)))
+        paths[:, s, 0] = points[:, :2].mean(1)
+        paths[:, s, 1] = positions[:, foot if toe is None else toe]
+        stands[:, s] = planted_points(paths[:, s], source.frame_time, height)
+    return paths, _without_flicker(stands, max(1, round(_GAP / source.frame_time)))
 
 
 def _without_flicker(mask: Bool[np.ndarray, "T S 2"], frames: int) -> Bool[np.ndarray, "T S 2"]:
