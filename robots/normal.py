@@ -5,10 +5,13 @@ only the accelerations tie neighbours together. So the normal equations are band
 and a banded Cholesky solves them in time linear in T (Golub and Van Loan, section 4.3).
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.linalg import solveh_banded
 
+_IMMOVABLE = 1e8
 REACH = 2  # an acceleration ties a frame to the two next
 
 
@@ -72,36 +75,60 @@ class Normal:
 
     def solve_together(
         self,
-        weights: Float[np.ndarray, "D"],
-        accelerations: Float[np.ndarray, "A D"],
-        rush: Float[np.ndarray, "V D"],
-        rush_weight: float,
-        damping: float,
+        ties: "Ties",
+        damping: Float[np.ndarray, "T"],
+        limits: Float[np.ndarray, "T D"],
     ) -> Float[np.ndarray, "T D"]:
-        """The step that also lessens the weighted squares of `accelerations`, the second
-        differences of the columns (A = T - 2), and of `rush`, by how much the first differences
-        (V = T - 1) are too large; 0 where they are not."""
+        """The step that also lessens what ties neighbours together. Columns with `limits` of 1 (-1)
+        are at their upper (lower) one, and don't move where that would take them beyond."""
         T, D = self.g.shape
         stencil = _stencil(T)
         band = np.zeros((REACH * D + 1, T, D))
         for i in range(D):
             for k in range(D - i):
                 band[k, :, i] = self.H[:, i + k, i]
+        weights = ties.smoothness**2
         for lag in range(REACH + 1):
-            band[lag * D] += stencil[lag, :, None] * weights**2
-        band[0] += damping
-        g = self.g + weights**2 * spread(accelerations, T)
-        if len(rush):
-            fast = np.where(rush != 0, rush_weight**2, 0.0)
+            band[lag * D] += stencil[lag, :, None] * weights
+        g = self.g + weights * spread(ties.accelerations, T)
+        if len(ties.rush):
+            fast = np.where(ties.rush != 0, ties.rush_weight**2, 0.0)
             band[0, :-1] += fast
             band[0, 1:] += fast
             band[D, :-1] -= fast
-            g[:-1] -= rush_weight**2 * rush
-            g[1:] += rush_weight**2 * rush
+            g[:-1] -= ties.rush_weight**2 * ties.rush
+            g[1:] += ties.rush_weight**2 * ties.rush
+        held = limits * g < 0
+        band[0] += np.where(held, _IMMOVABLE, damping[:, None])
         step = solveh_banded(
-            band.reshape(REACH * D + 1, T * D), g.ravel(), lower=True, check_finite=False
+            band.reshape(REACH * D + 1, T * D),
+            np.where(held, 0.0, g).ravel(),
+            lower=True,
+            overwrite_ab=True,
+            check_finite=False,
         )
         return -step.reshape(T, D)
+
+
+@dataclass(frozen=True, eq=False)
+class Ties:
+    """What ties frames to their neighbours: weighted squares of `accelerations`, the columns'
+    second differences (A = T - 2), and of `rush`, by how much their first differences (V = T - 1)
+    are too large; 0 where they are not."""
+
+    smoothness: Float[np.ndarray, "D"]
+    accelerations: Float[np.ndarray, "A D"]
+    rush_weight: float
+    rush: Float[np.ndarray, "V D"]
+
+    def cost(self, frames: int) -> Float[np.ndarray, "T"]:
+        """Half the weighted squares, told by frame."""
+        out = np.zeros(frames)
+        if len(self.accelerations):
+            out[1:-1] += 0.5 * ((self.smoothness * self.accelerations) ** 2).sum(1)
+        if len(self.rush):
+            out[1:] += 0.5 * self.rush_weight**2 * (self.rush**2).sum(1)
+        return out
 
 
 def second_differences(values: Float[np.ndarray, "T *n"]) -> Float[np.ndarray, "A *n"]:

@@ -31,8 +31,8 @@ TURNS = {  # how a part is turned: beside the directions, little matters but wha
 }
 TURN = 0.08  # the rest
 PATH = np.array([1.5, 1.5, 1.5])  # of the hips [1 / m]
-STAND = np.array([25.0, 25.0, 40.0])  # of a sole's corner [1 / m]
-SINK, SINK_EASE = 40.0, 0.004  # of a sole's corner below the floor [1 / m]; [m]
+STAND = np.array([25.0, 25.0, 20.0])  # of a sole's corner [1 / m]
+SINK, SINK_EASE = 80.0, 0.004  # of a sole's corner below the floor [1 / m]; [m]
 LIMIT, MARGIN = 8.0, np.radians(2.0)  # of a hinge near its limit
 CLAP, NEAR = 4.0, 0.12  # of hands [1 / m] that are as near as this [m]
 TOUCH = 15.0  # of parts that run into each other [1 / m]

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from robots.footing import Footing, plan_footing
 from robots.morphology import Morphology
-from robots.normal import second_differences
+from robots.normal import Normal, Ties, second_differences
 from robots.objective import FAST, PATH, RUSH, SMOOTH, Stage, linearize
 from robots.project import project
 from robots.targets import Targets, chest_of, targets_of
@@ -21,8 +22,10 @@ from robots.tree import BASE, Coordinates
 from spark.canonical import CanonicalMotion
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 
-_STEPS = (10, 8)  # Gauss-Newton steps of the stages
-_LONGEST = 0.5  # [rad, m] a column moves in one of them
+_STEPS = (12, 10)  # Gauss-Newton steps of the stages, at most
+_STILL = 2e-3  # [rad] a stage ends where no hinge moves further
+_AROUND = 0.15  # [s] before and after a frame in which a step must not do harm
+_LONGEST = 1.0  # [rad, m] a column moves in one of them
 _DAMPING = 1e-3
 _SHORT_OF_LIMIT = np.radians(0.75)
 
@@ -60,8 +63,7 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> Retargeted:
     footing = plan_footing(robot, targets)
     for stage, steps in zip(stages_of(robot), _STEPS, strict=True):
         if stage.joints or stage.base:
-            for _ in range(steps):
-                q = _step(robot, targets, footing, q, stage)
+            q = solve_stage(robot, targets, footing, q, stage, steps)
     return Retargeted(robot, q, source.frame_time, (*robot.notes, *targets.notes))
 
 
@@ -76,24 +78,67 @@ def stages_of(robot: Morphology) -> tuple[Stage, Stage]:
     return Stage(tuple(first), True), Stage(rest, False)
 
 
-def _step(
-    robot: Morphology, targets: Targets, footing: list[Footing], q: Coordinates, stage: Stage
+def solve_stage(
+    robot: Morphology,
+    targets: Targets,
+    footing: list[Footing],
+    q: Coordinates,
+    stage: Stage,
+    most: int,
 ) -> Coordinates:
+    """Gauss-Newton in the stage's columns, from `q`, damped where it would do harm.
+
+    A step is judged where it is taken: frames whose surroundings get worse keep their place, and
+    are damped more from then on (Levenberg and Marquardt's rule, a frame).
+    """
     tree = robot.tree
-    normal = linearize(robot, targets, footing, q, stage)
     columns = [*(range(BASE) if stage.base else ()), *tree.columns(stage.joints)]
-    weights = smoothness(robot)[columns] / targets.frame_time**2
-    some = normal.only(columns)
-    found = some.solve_together(
-        weights,
+    window = max(1, 2 * round(_AROUND / targets.frame_time) + 1)
+    damping = np.full(len(q), _DAMPING)
+
+    def look(q: Coordinates) -> tuple[Normal, Ties, Float[np.ndarray, "T"]]:
+        normal = linearize(robot, targets, footing, q, stage)
+        ties = ties_of(robot, q, targets.frame_time, columns)
+        cost = uniform_filter1d(normal.cost + ties.cost(len(q)), window, mode="nearest")
+        return normal.only(columns), ties, cost
+
+    normal, ties, cost = look(q)
+    for _ in range(most):
+        limits = q.at_limits(tree, _SHORT_OF_LIMIT)[:, columns]
+        step = np.zeros((len(q), tree.size))
+        step[:, columns] = normal.solve_together(ties, damping, limits)
+        long = np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(1), 1e-9))
+        step *= eased(long, window)[:, None]
+        trial = q.moved(tree, step).clipped(tree, _SHORT_OF_LIMIT)
+        after = look(trial)
+        worse = after[2] > cost * (1 + 1e-3) + 1e-9
+        damping = np.where(worse, damping * 10, np.maximum(damping / 5, _DAMPING))
+        if worse.any():
+            trial = q.moved(tree, step * eased(1.0 - worse, window)[:, None]).clipped(
+                tree, _SHORT_OF_LIMIT
+            )
+            after = look(trial)
+        moved = np.abs(trial.angles - q.angles).max(initial=0.0)
+        q, (normal, ties, cost) = trial, after
+        if moved < _STILL:
+            break
+    return q
+
+
+def eased(scale: Float[np.ndarray, "T"], window: int) -> Float[np.ndarray, "T"]:
+    """A smooth curve that nowhere exceeds `scale`."""
+    least = minimum_filter1d(scale, window, mode="nearest")
+    return uniform_filter1d(least, window, mode="nearest")
+
+
+def ties_of(robot: Morphology, q: Coordinates, frame_time: float, columns: list[int]) -> Ties:
+    """What ties the frames of `q` together, in some columns."""
+    return Ties(
+        smoothness(robot)[columns] / frame_time**2,
         accelerations(robot, q)[:, columns],
-        rush(robot, q, targets.frame_time)[:, columns],
-        RUSH / targets.frame_time,
-        _DAMPING,
+        RUSH / frame_time,
+        rush(robot, q, frame_time)[:, columns],
     )
-    step = np.zeros((len(q), tree.size))
-    step[:, columns] = np.clip(found, -_LONGEST, _LONGEST)
-    return _within(robot, q.moved(tree, step))
 
 
 def smoothness(robot: Morphology) -> Float[np.ndarray, "D"]:
@@ -133,12 +178,3 @@ def _turn_differences(q: Float[np.ndarray, "T 4"]) -> Float[np.ndarray, "A 3"]:
     if len(q) < 3:
         return np.zeros((0, 3))
     return np.diff(rotvec_from_quat(quat_mul(q[1:], quat_conj(q[:-1]))), axis=0)
-
-
-def _within(robot: Morphology, q: Coordinates) -> Coordinates:
-    tree = robot.tree
-    short = np.minimum(_SHORT_OF_LIMIT, 0.05 * (tree.upper - tree.lower))
-    angles = np.where(
-        tree.balls, q.angles, np.clip(q.angles, tree.lower + short, tree.upper - short)
-    )
-    return Coordinates(q.pos, q.quat, angles, q.turns)

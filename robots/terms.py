@@ -49,7 +49,7 @@ def turn_rows(
 def point_rows(
     frames: Frames,
     chain: tuple[int, ...],
-    axes: Float[np.ndarray, "C 3 T"],
+    axes: Float[np.ndarray, "A 3 T"],
     point: Float[np.ndarray, "3 T"],
     wanted: Float[np.ndarray, "3 T"],
     weight: Float[np.ndarray, "#T"] | Float[np.ndarray, "3 #T"],

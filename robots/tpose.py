@@ -52,9 +52,9 @@ def search_tpose(
     damping = 1e-2
     for _ in range(_STEPS):
         normal = _linearize(tree, q, roles, links, ideal, goals, skeleton)
-        normal.pin(q.pressed(tree, normal.g))
+        normal.pin(q.at_limits(tree, 0.0) * normal.g < 0)
         step = normal.solve_apart(damping)
-        after = _clipped(tree, q.moved(tree, np.clip(step, -0.3, 0.3)))
+        after = q.moved(tree, np.clip(step, -0.3, 0.3)).clipped(tree, 0.0)
         moved = max(np.abs(after.angles - q.angles).max(initial=0.0), np.abs(step[:, 3:6]).max())
         q = after
         if moved < _STILL:
@@ -199,7 +199,3 @@ def _bend_sign(
         # As wide to both sides: the way it is bent already, or else as the file turns it.
         return -1.0 if straight > 0.05 else 1.0
     return 1.0 if above > below else -1.0
-
-
-def _clipped(tree: Tree, q: Coordinates) -> Coordinates:
-    return Coordinates(q.pos, q.quat, np.clip(q.angles, tree.lower, tree.upper), q.turns)

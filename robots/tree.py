@@ -48,6 +48,12 @@ class Tree:
         """The number of columns."""
         return BASE + int(np.where(self.balls, 3, 1).sum())
 
+    def within(self, short: float) -> tuple[Float[np.ndarray, "N"], Float[np.ndarray, "N"]]:
+        """The limits drawn in by some angle [rad], or by a twentieth of a small range."""
+        with np.errstate(invalid="ignore"):
+            kept = np.minimum(short, 0.05 * (self.upper - self.lower))
+        return self.lower + kept, self.upper - kept
+
     def chain(self, link: int) -> tuple[int, ...]:
         """The joints from the base out to `link`."""
         joints: list[int] = []
@@ -75,15 +81,23 @@ class Coordinates:
     def __len__(self) -> int:
         return len(self.pos)
 
-    def pressed(self, tree: Tree, g: Float[np.ndarray, "T D"]) -> Bool[np.ndarray, "T D"]:
-        """Columns of hinges that stand at a limit and that descent along -g would push beyond."""
-        out = np.zeros(g.shape, dtype=bool)
+    def at_limits(self, tree: Tree, short: float) -> Float[np.ndarray, "T D"]:
+        """For each column 1 where its hinge stands `short` [rad] of its upper limit or beyond (less
+        where its range is small), -1 at the lower, 0 elsewhere."""
+        out = np.zeros((len(self), tree.size))
         hinges = ~tree.balls
-        at, angles = tree.starts[hinges], self.angles[:, hinges]
-        up = (angles >= tree.upper[hinges] - 1e-9) & (g[:, at] < 0)
-        down = (angles <= tree.lower[hinges] + 1e-9) & (g[:, at] > 0)
-        out[:, at] = up | down
+        lower, upper = tree.within(short)
+        angles = self.angles[:, hinges]
+        out[:, tree.starts[hinges]] = (angles >= upper[hinges] - 1e-9) * 1.0 - (
+            angles <= lower[hinges] + 1e-9
+        )
         return out
+
+    def clipped(self, tree: Tree, short: float) -> "Coordinates":
+        """The same with hinges no nearer to their limits than `short` [rad]."""
+        lower, upper = tree.within(short)
+        angles = np.where(tree.balls, self.angles, np.clip(self.angles, lower, upper))
+        return Coordinates(self.pos, self.quat, angles, self.turns)
 
     def moved(self, tree: Tree, step: Float[np.ndarray, "T D"]) -> "Coordinates":
         """The trajectory after a small step in the tree's columns."""
