@@ -85,7 +85,9 @@ def _answers(
     poses = [
         Pose(
             *(
-                torch.as_tensor(np.stack([w[i] for w in windows]), dtype=torch.float32).to(device)
+                torch.as_tensor(
+                    np.stack([np.asarray(w[i]) for w in windows]), dtype=torch.float32
+                ).to(device)
                 for i in (0, 1)
             )
         )

@@ -37,7 +37,7 @@ class TrainConfig:
     workers: int = 0
     save_every: int = 1000
     log_every: int = 20
-    name_steps: int = 1500
+    name_steps: int = 200
     t5: str = ""
 
     def __post_init__(self) -> None:

@@ -14,7 +14,7 @@ from contextlib import nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
-from typing import TextIO
+from typing import Any, TextIO
 
 import torch
 import torch.distributed as dist
@@ -35,12 +35,13 @@ from spark.model import Config, Spark, forward_kinematics
 from spark.names import NameEncoder, T5Names
 from spark.pairs import Clip, PairMaker
 from spark.settings import TrainConfig
+from spark.train_names import train_names
 
 BETAS = (0.9, 0.99)
 PAPER_WEIGHTS = {"rec": 1.0, "cyc": 20.0, "root": 7.0, "fk": 100.0}
 PAIR_WEIGHTS = {"rec": 1.0, "root": 7.0, "fk": 100.0, "contact": 1.0, "ends": 100.0}
 NAME_CACHE = Path.home() / ".cache" / "spark-sim" / "names.pt"
-TINY = {"width": 48, "heads": 2, "encoder_blocks": 2, "decoder_blocks": 2}
+TINY: dict[str, Any] = {"width": 48, "heads": 2, "encoder_blocks": 2, "decoder_blocks": 2}
 
 Terms = dict[str, Float[Tensor, ""]]
 
@@ -57,6 +58,17 @@ def network(config: TrainConfig, name_width: int) -> Config:
         mask_joints=0.0 if "mask" in config.ablate else preset.mask_joints,
         positions_in=preset.positions_in ^ ("pos" in config.ablate),
     )
+
+
+def fresh_checkpoint(config: TrainConfig) -> Checkpoint:
+    """Where a run begins: names learned (or a T5's), the network as its seed makes it.
+
+    Every process makes the same one.
+    """
+    names: NameEncoder | str = config.t5 or train_names(config.name_steps, seed=config.seed)
+    width = name_vectors(names)(["Hips"]).shape[-1]
+    torch.manual_seed(config.seed)
+    return Checkpoint(Spark(network(config, width)), names)
 
 
 class Objective(nn.Module):
@@ -252,22 +264,20 @@ def _batches(steps: Steps, start: int) -> Iterator[Batch]:
     )
 
 
-def _as_it_is(batch: Batch) -> Batch:
+def _as_it_is(batch: Any) -> Any:
     return batch
 
 
 def _to(batch: Batch, device: torch.device) -> Batch:
     if device.type == "cpu":
         return batch
-    moved = [
-        part.to(device, non_blocking=True)
-        if isinstance(part, Tensor)
-        else type(part)(*(t.to(device, non_blocking=True) for t in part))
-        if isinstance(part, tuple)
-        else part
-        for part in batch
-    ]
-    return Batch(*moved)
+
+    def move(part: Any) -> Any:
+        if isinstance(part, Tensor):
+            return part.to(device, non_blocking=True)
+        return type(part)(*map(move, part)) if isinstance(part, tuple) else part
+
+    return Batch(*map(move, batch))
 
 
 def _log(out: Path, step: int, rank: int) -> TextIO:

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from spark.bvh import write_bvh
-from spark.canonical import from_canonical, to_canonical
+from spark.canonical import CanonicalMotion, from_canonical, to_canonical
 from spark.encoding import encode, encode_new
-from spark.errors import ConventionError, FileFormatError, SkeletonError
+from spark.errors import ConventionError, DependencyError, FileFormatError, SkeletonError
 from spark.fbx import read_fbx
 from spark.motion import Motion
 from spark.override import Override
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from sim.report import Report
 
 File = str | Path
+METHODS = ("copy", "spark")
 
 _NOT_YET = {
     ".xml": "MuJoCo models can't be read yet; expected a BVH or FBX file",
@@ -103,18 +104,29 @@ def load(
 
 
 def retarget(
-    source: Clip | File, target: Clip | File, *, method: str = "copy", refine: bool = True
+    source: Clip | File,
+    target: Clip | File,
+    *,
+    method: str = "copy",
+    checkpoint: File | None = None,
+    refine: bool = True,
 ) -> Clip:
     """The motion of `source` on the body of `target`, in the hierarchy and units of its file.
 
-    Both are clips, or paths of BVH files. With `refine`, feet are held where the source's stand.
+    Both are clips, or paths of BVH files. Method "spark" is the network of `checkpoint`.
+    With `refine`, feet are held where the source's stand.
     Raises `SkeletonError` where one is no humanoid.
     """
-    if method != "copy":
-        raise ConventionError(f"method {method!r} is not known; expected 'copy'")
+    if method not in METHODS:
+        raise ConventionError(f"method {method!r} is not known; expected 'copy' or 'spark'")
+    if (method == "spark") != (checkpoint is not None):
+        raise ConventionError("a checkpoint goes with method 'spark', and with no other")
     source, target = _clip(source), _clip(target)
     canonical = to_canonical(source.motion, source.rig)
-    moved = transfer(canonical, target.rig)
+    if checkpoint is None:
+        moved = transfer(canonical, target.rig)
+    else:
+        moved = _learned(canonical, target.rig, Path(checkpoint))
     if refine:
         moved = hold_feet(canonical, moved)
     motion = from_canonical(moved)
@@ -125,6 +137,17 @@ def retarget(
     recording = replace(target.recording, bvh=bvh, motion=motion, notes=(*moved.notes, *notes))
     # The rig is given: what is known of a body does not depend on the motion that it makes.
     return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig)
+
+
+def _learned(canonical: CanonicalMotion, target: Rig, checkpoint: Path) -> CanonicalMotion:
+    try:
+        from spark.checkpoint import load_checkpoint
+        from spark.retarget import retarget as by_network
+    except ImportError as error:
+        raise DependencyError(
+            f"method 'spark' needs {error.name}: pip install 'spark-sim[train]'"
+        ) from error
+    return by_network(canonical, target, load_checkpoint(checkpoint))
 
 
 def report(

@@ -3,7 +3,8 @@
 import json
 import os
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO, TypeVar
 
@@ -62,3 +63,22 @@ def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterat
 
     # Short work needs no bar.
     yield from tqdm(items, label, total, leave=False, dynamic_ncols=True, delay=0.5)
+
+
+@contextmanager
+def meter(
+    total: int, done: int, label: str
+) -> Iterator[Callable[[int, Mapping[str, float]], None]]:
+    """A bar for long work, with figures beside it and the time that is left; on terminals alone."""
+    if not sys.stderr.isatty():
+        yield lambda step, figures: None
+        return
+    from tqdm import tqdm
+
+    with tqdm(total=total, initial=done, desc=label, dynamic_ncols=True) as bar:
+
+        def tell(step: int, figures: Mapping[str, float]) -> None:
+            bar.set_postfix({name: f"{value:.3g}" for name, value in figures.items()})
+            bar.update(step - bar.n)
+
+        yield tell

@@ -26,6 +26,7 @@ from spark.rotation import quat_angle
 from spark.sample import sample_motion, sample_rig
 from spark.settings import TrainConfig, read_settings, toml
 from spark.train import Objective, Steps, network, optimiser_of, take_step, train
+from spark.train_names import score_names, train_names
 from spark.transfer import transfer
 from spark_sim import sample
 
@@ -292,3 +293,49 @@ def test_windows_agree_with_the_whole(clips: list[Clip], tmp_path: Path) -> None
     assert np.abs(canonical_positions(whole) - canonical_positions(copied)).max() > 1e-4
     apart = np.abs(canonical_positions(whole) - canonical_positions(chunks)).max()
     assert apart < 1e-3 * 2 * target.hip_height
+
+
+def test_the_command_line_trains_resumes_and_retargets(tmp_path: Path) -> None:
+    sample(tmp_path / "samples")
+    settings = replace(TINY, steps=1, name_steps=2)
+    (tmp_path / "tiny.toml").write_text(toml(settings))
+
+    def command(*args: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, "-m", "spark_sim", *args],
+            cwd=tmp_path,
+            env=os.environ | {"PYTHONPATH": str(CHECKOUT)},
+            capture_output=True,
+            text=True,
+        )
+
+    run = ("train", "samples", "-o", "run", "--config", "tiny.toml")
+    assert command(*run).returncode == 0
+    refused = command(*run)
+    assert refused.returncode == 2
+    assert "--resume" in refused.stderr
+    resumed = command("train", "-o", "run", "--resume", "--steps", "2")
+    assert "2 steps on 6 clips" in resumed.stdout, resumed.stderr
+    path = tmp_path / "run" / "checkpoint.safetensors"
+    assert load_checkpoint(path).step == 2
+    assert read_settings(tmp_path / "run" / "config.toml")["steps"] == 2
+    walk, target = "samples/walker_walk.bvh", "samples/dancer_wave.bvh"
+    made = command(
+        *("retarget", walk, "--to", target, "--method", "spark", "--checkpoint", str(path))
+    )
+    assert made.returncode == 0, made.stderr
+    assert (tmp_path / "walker_walk_on_dancer_wave.bvh").exists()
+    lost = command("retarget", walk, "--to", target, "--method", "spark", "--force")
+    assert lost.returncode == 2
+    assert "checkpoint goes with" in lost.stderr
+
+
+def test_names_are_learned() -> None:
+    """More roles are found on conventions never seen than by an encoder that learned nothing."""
+    config = NameConfig(width=48, heads=4, blocks=2)
+    torch.manual_seed(0)
+    blank = score_names(NameEncoder(config))
+    learned = score_names(train_names(120, config=config))
+    assert learned.total == blank.total == 4 * 23
+    assert learned.right > blank.right + 5
+    assert learned.sides_confused == 0

@@ -1,7 +1,7 @@
 """`spark-sim retarget`: motions onto another body."""
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,13 +22,17 @@ examples:
   spark-sim retarget walk.bvh --to mutant.bvh       # writes walk_on_mutant.bvh
   spark-sim retarget walk.bvh --to mutant.bvh -o out.bvh
   spark-sim retarget takes/ --to mutant.bvh -o out/ # every BVH below takes/
+  spark-sim retarget walk.bvh --to g1.xml           # a robot: walk_on_g1.npz
 """
 
 
 def configure(parser: ArgumentParser) -> None:
     parser.add_argument("sources", metavar="SRC", nargs="+", help="BVH files, or folders of them")
     parser.add_argument(
-        "--to", metavar="TARGET", required=True, help="a BVH file: the body to put the motion on"
+        "--to",
+        metavar="TARGET",
+        required=True,
+        help="the body to put the motion on: a BVH or FBX file, or a humanoid robot's MJCF (.xml)",
     )
     parser.add_argument(
         "-o",
@@ -39,10 +43,12 @@ def configure(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--method",
-        choices=("copy",),
+        choices=("copy", "spark"),
         default="copy",
-        help="copy: each joint turns as its counterpart does, in world axes (default)",
+        help="copy: each joint turns as its counterpart does, in world axes (default); "
+        "spark: the network of --checkpoint",
     )
+    parser.add_argument("--checkpoint", metavar="FILE", help="what `spark-sim train` wrote")
     parser.add_argument(
         "--no-refine",
         dest="refine",
@@ -62,11 +68,12 @@ def run(args: Namespace) -> int:
     jobs = _jobs(args.sources, Path(args.to), args.output)
     for _, out in jobs:
         files.check_free(out, force=args.force)
-    target = load(args, args.to, "to-")
+    robot = Path(args.to).suffix.lower() == ".xml"
+    onto = _robot(args) if robot else _body(args)
     failures = 0
     for source, out in console.progress(jobs, "retarget"):
         try:
-            summary = _retarget(args, source, target, out)
+            summary = onto(source, out)
         except (SparkSimError, OSError) as error:
             if len(jobs) == 1:
                 raise
@@ -85,12 +92,51 @@ def run(args: Namespace) -> int:
     return 2 if failures else 0
 
 
+Onto = Callable[[Path, Path], dict[str, Any]]
+
+
+def _body(args: Namespace) -> Onto:
+    """Onto a character: the target is read once."""
+    target = load(args, args.to, "to-")
+    return lambda source, out: _retarget(args, source, target, out)
+
+
+def _robot(args: Namespace) -> Onto:
+    """Onto a robot: what its model is is found once."""
+    from spark_sim import console
+    from spark_sim.robot import load_robot, retarget_to_robot, save
+
+    robot = load_robot(args.to)
+    console.notes(args.to, robot.notes)
+
+    def onto(source: Path, out: Path) -> dict[str, Any]:
+        clip = load(args, str(source))
+        result = retarget_to_robot(clip, robot)
+        save(result, out, force=args.force)
+        return {
+            "source": str(source),
+            "target": args.to,
+            "output": str(out),
+            "method": "trajectory",
+            "frames": len(result),
+            "fps": clip.motion.fps,
+            "source_joints": len(clip.motion.skeleton),
+            "joints": len(robot.joint_names),
+            "scale": robot.rig.hip_height / clip.rig.hip_height,
+            "notes": [*clip.notes, *result.notes],
+        }
+
+    return onto
+
+
 def _retarget(args: Namespace, source: Path, target: "Clip", out: Path) -> dict[str, Any]:
     from spark_sim import console
     from spark_sim.clip import retarget
 
     clip = load(args, str(source))
-    result = retarget(clip, target, method=args.method, refine=args.refine)
+    result = retarget(
+        clip, target, method=args.method, checkpoint=args.checkpoint, refine=args.refine
+    )
     console.notes(out, result.recording.notes)
     result.save(out, force=args.force)
     return {
@@ -126,7 +172,9 @@ def _jobs(sources: Sequence[str], target: Path, output: str | None) -> list[tupl
     folder = Path(output or ".")
     if folder.is_file():
         raise OutputError(f"{folder}: is a file; expected a folder for {len(found)} motions")
-    jobs = [(path, folder / below / f"{path.stem}_on_{target.stem}.bvh") for path, below in found]
+    suffix = ".npz" if target.suffix.lower() == ".xml" else ".bvh"
+    made = f"_on_{target.stem}{suffix}"
+    jobs = [(path, folder / below / f"{path.stem}{made}") for path, below in found]
     outputs: dict[Path, Path] = {}
     for path, out in jobs:
         other = outputs.setdefault(out, path)

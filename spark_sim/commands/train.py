@@ -1,0 +1,79 @@
+"""`spark-sim train`: a network of your own."""
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+
+SUMMARY = "train the network that retargets"
+USAGE = "DATA... -o DIR [--config TOML] [--resume] [options]"
+DESCRIPTION = """\
+Train on the BVH files below each DATA. Writes DIR/checkpoint.safetensors, the
+settings as DIR/config.toml and the loss of each step as DIR/log.jsonl."""
+EXAMPLES = """\
+examples:
+  spark-sim train motions/ -o run --preset tiny
+  spark-sim train motions/ -o run --config run.toml --steps 20000
+  spark-sim train -o run --resume      # goes on where run stopped
+  torchrun --nproc-per-node 4 -m spark_sim train motions/ -o run
+"""
+_FLAGS = ("steps", "batch", "window", "rate", "seed", "workers")
+
+
+def configure(parser: ArgumentParser) -> None:
+    parser.add_argument("data", metavar="DATA", nargs="*", help="BVH files, or folders of them")
+    parser.add_argument("-o", "--output", metavar="DIR", required=True, help="where the run lies")
+    parser.add_argument("--config", metavar="TOML", help="settings, as DIR/config.toml has them")
+    parser.add_argument("--resume", action="store_true", help="go on from DIR's checkpoint")
+    parser.add_argument("--preset", metavar="NAME", help="default, paper or tiny")
+    parser.add_argument(
+        "--ablate",
+        metavar="SWITCH",
+        action="append",
+        help="leave out share, mask or fk, or switch pos; may be repeated",
+    )
+    for name in _FLAGS:
+        parser.add_argument(f"--{name}", metavar="N", type=float if name == "rate" else int)
+    parser.add_argument("--t5", metavar="MODEL", help="a T5 for names: a folder or a hub name")
+    parser.add_argument("--force", action="store_true", help="overwrite the run in DIR")
+
+
+def run(args: Namespace) -> int:
+    from spark.errors import ConventionError, DependencyError, OutputError
+    from spark.files import write_atomically
+    from spark.settings import TrainConfig, read_settings, toml
+    from spark_sim import console
+
+    out = Path(args.output)
+    path = out / "checkpoint.safetensors"
+    file = out / "config.toml" if args.resume else args.config and Path(args.config)
+    given = {n: getattr(args, n) for n in (*_FLAGS, "preset", "ablate", "t5")}
+    given = {n: v for n, v in given.items() if v is not None} | (
+        {"data": args.data} if args.data else {}
+    )
+    stored = read_settings(file) if file else {}
+    preset = given.get("preset", stored.get("preset", "default"))
+    config = TrainConfig.of(preset).changed(file, **stored).changed("command line", **given)
+    if not config.data:
+        raise ConventionError("no DATA to train on; expected BVH files or folders of them")
+    if path.exists() and not (args.resume or args.force):
+        raise OutputError(f"{path}: exists; go on with --resume, or overwrite it with --force")
+    try:
+        from spark.checkpoint import load_checkpoint
+        from spark.clips import read_clips
+        from spark.train import fresh_checkpoint, train
+    except ImportError as error:
+        raise DependencyError(
+            f"training needs {error.name}: pip install 'spark-sim[train]'"
+        ) from error
+    start = load_checkpoint(path) if args.resume else None
+    clips, notes = read_clips(
+        [Path(p) for p in config.data], lambda files: console.progress(files, "reading")
+    )
+    for note in notes:
+        console.note(note)
+    start = start or fresh_checkpoint(config)
+    out.mkdir(parents=True, exist_ok=True)
+    write_atomically(out / "config.toml", toml(config).encode())
+    with console.meter(config.steps, start.step, "training") as tell:
+        done = train(clips, config, out, start=start, watch=tell)
+    console.say(f"{path}: {done.step} steps on {len(clips)} clips")
+    return 0
