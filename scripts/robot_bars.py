@@ -40,7 +40,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--robots", nargs="+", required=True)
-    parser.add_argument("--clips", nargs="+", default=["cmu_asf/*", "animateddrawings/*", "reactidle/*"])
+    folders = ["cmu_asf/*", "animateddrawings/*", "reactidle/*"]
+    parser.add_argument("--clips", nargs="+", default=folders)
     parser.add_argument("--quiet", action="store_true", help="means only")
     parser.add_argument("--no-collisions", action="store_true")
     args = parser.parse_args()
