@@ -5,7 +5,9 @@ only the accelerations tie neighbours together. So the normal equations are band
 and a banded Cholesky solves them in time linear in T (Golub and Van Loan, section 4.3).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -18,47 +20,39 @@ REACH = 2  # an acceleration ties a frame to the two next
 class Normal:
     """Normal equations `H step = -g` being added up; `cost` is half the sum of squares."""
 
-    def __init__(self, frames: int, columns: int) -> None:
-        self.H = np.zeros((frames, columns, columns))
-        self.g = np.zeros((frames, columns))
+    def __init__(self, frames: int, columns: int, rows: bool = True) -> None:
+        self.rows = rows
+        self.H = np.zeros((frames, columns, columns) if rows else (0, 0, 0))
+        self.g = np.zeros((frames, columns) if rows else (0, 0))
         self.cost = np.zeros(frames)
 
     def add(
         self,
-        columns: list[int],
-        rows: Float[np.ndarray, "C M T"],
-        residuals: Float[np.ndarray, "M T"],
-    ) -> None:
-        """M weighted residuals a frame, and how fast they grow with some columns."""
-        self.add_stacked(columns, np.ascontiguousarray(rows.transpose(2, 0, 1)), residuals)
-
-    def add_stacked(
-        self,
-        columns: list[int],
+        columns: Sequence[int],
         J: Float[np.ndarray, "T C M"],
         residuals: Float[np.ndarray, "M T"],
     ) -> None:
-        """The same, with time as the first axis of the rows."""
-        at = np.asarray(columns)
-        self.H[:, at[:, None], at] += J @ J.transpose(0, 2, 1)
-        self.g[:, at] += (J @ residuals.T[:, :, None])[:, :, 0]
+        """M weighted residuals a frame, and how fast they grow with some columns."""
         self.cost += 0.5 * np.einsum("mt,mt->t", residuals, residuals)
+        if not self.rows or not len(columns):
+            return
+        H = J @ J.transpose(0, 2, 1)
+        g = (J @ residuals.T[:, :, None])[:, :, 0]
+        runs = _runs(columns)
+        for here, there in runs:
+            self.g[:, there] += g[:, here]
+            for here2, there2 in runs:
+                self.H[:, there, there2] += H[:, here, here2]
 
     def add_diagonal(
         self, rows: Float[np.ndarray, "T D"], residuals: Float[np.ndarray, "T D"]
     ) -> None:
         """One residual for each column, that grows with no other."""
-        at = np.arange(self.g.shape[1])
-        self.H[:, at, at] += rows**2
-        self.g += rows * residuals
         self.cost += 0.5 * (residuals**2).sum(1)
-
-    def only(self, columns: list[int]) -> "Normal":
-        """The same equations in some of the columns, the others standing still."""
-        out = Normal(0, 0)
-        at = np.asarray(columns)
-        out.H, out.g, out.cost = self.H[:, at[:, None], at], self.g[:, at], self.cost
-        return out
+        if self.rows:
+            at = np.arange(self.g.shape[1])
+            self.H[:, at, at] += rows**2
+            self.g += rows * residuals
 
     def pin(self, pinned: Bool[np.ndarray, "T D"]) -> None:
         """Keep some columns from moving."""
@@ -129,6 +123,16 @@ class Ties:
         if len(self.rush):
             out[1:] += 0.5 * self.rush_weight**2 * (self.rush**2).sum(1)
         return out
+
+
+def _runs(columns: Sequence[int]) -> list[tuple[slice, slice]]:
+    """Columns that follow each other, as slices of the list and of what it indexes."""
+    breaks = np.flatnonzero(np.diff(columns) != 1) + 1
+    edges = [0, *breaks.tolist(), len(columns)]
+    return [
+        (slice(a, b), slice(columns[a], columns[a] + b - a))
+        for a, b in pairwise(edges)
+    ]
 
 
 def second_differences(values: Float[np.ndarray, "T *n"]) -> Float[np.ndarray, "A *n"]:

@@ -5,6 +5,7 @@ Residuals are angles [rad] of weight 1 for a limb's direction; lengths [m] are w
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
@@ -13,8 +14,8 @@ from robots.footing import Footing
 from robots.morphology import Morphology
 from robots.normal import Normal
 from robots.targets import Targets, chest_of
-from robots.terms import Rows, direction_rows, limit_rows, one_sided, point_rows, turn_rows
-from robots.tree import BASE, Coordinates, Frames, forward
+from robots.terms import Rows, direction_rows, limit_rows, one_sided, point_columns, turn_rows
+from robots.tree import BASE, Coordinates, Frames, Tree, forward
 from spark.roles import Role
 from spark.rotation import matrix_from_quat
 
@@ -45,44 +46,57 @@ FAST, RUSH = 10.0, 0.15  # [rad/s] above which a hinge is held back, and how muc
 class Stage:
     """Part of the columns: those that are solved for while the others are given.
 
-    `joints` are the tree's joints; `base` says whether the base is free, too.
+    `joints` are the tree's joints, in order; `base` says whether the base is free, too.
     """
 
+    tree: Tree
     joints: tuple[int, ...]
     base: bool
 
-    def suffix(self, chain: tuple[int, ...]) -> tuple[int, ...]:
-        """The free joints of a chain; all that are free lie at its end."""
-        free = set(self.joints)
-        return tuple(j for j in chain if j in free)
+    @cached_property
+    def columns(self) -> list[int]:
+        """The tree's columns that are the stage's."""
+        return self._of(self.joints)
+
+    def local(self, joints: tuple[int, ...]) -> list[int]:
+        """Where the columns of some joints, and the base's if it is free, are among the stage's."""
+        return [self.columns.index(column) for column in self._of(joints)]
+
+    def free(self, link: int) -> tuple[int, ...]:
+        """The free joints on the way to a link."""
+        return tuple(j for j in self.tree.chain(link) if j in self._free)
+
+    @cached_property
+    def _free(self) -> frozenset[int]:
+        return frozenset(self.joints)
+
+    def _of(self, joints: tuple[int, ...]) -> list[int]:
+        return [*(range(BASE) if self.base else ()), *self.tree.columns(joints)]
 
 
 class Block:
-    """Residuals that grow with the columns of one chain alone, added up in one go."""
+    """Residuals that grow with the columns of one chain alone, added up in one go.
 
-    def __init__(self, robot: Morphology, stage: Stage, frames: Frames, link: int) -> None:
-        tree = robot.tree
-        self.frames = frames
-        self.joints = stage.suffix(tree.chain(link))
-        self.columns = [*(range(BASE) if stage.base else ()), *tree.columns(self.joints)]
-        self.first = 3 if stage.base else 0  # the first column that turns
-        count = frames.places.shape[2]
-        turning = frames.turn_columns(self.joints)
-        if stage.base:
-            turning = np.concatenate([np.eye(3)[:, :, None].repeat(count, 2), turning])
-        self.axes = turning
-        self.base = stage.base
-        self.rows: list[tuple[int, Rows]] = []
+    Without `rows` only the residuals count: then there are no columns to look at.
+    """
+
+    def __init__(self, stage: Stage, frames: Frames, link: int, rows: bool) -> None:
+        self.stage, self.frames = stage, frames
+        self.base = stage.base and rows
+        self.joints = stage.free(link) if rows else ()
+        self.axes = frames.turn_columns(self.joints)
+        if self.base:
+            self.axes = np.concatenate([_base_axes(frames), self.axes])
+        self.parts: list[tuple[int, Rows]] = []
 
     def turning(self, link: int) -> Float[np.ndarray, "C 3 T"]:
-        """The columns' axes, as far as `link`."""
-        chain = self.frames.tree.chain(link)
-        kept = len(self.frames.tree.columns(tuple(j for j in self.joints if j in chain)))
+        """The axes of the columns that turn a link of the chain."""
+        kept = len(self.frames.tree.columns(self._until(link)))
         return self.axes[: kept + (3 if self.base else 0)]
 
     def turn(self, rows: Rows) -> None:
         """Residuals of a direction or a rotation."""
-        self.rows.append((self.first, rows))
+        self.parts.append((3 if self.base else 0, rows))
 
     def point(
         self,
@@ -92,31 +106,27 @@ class Block:
         weight: Float[np.ndarray, "3 T"],
     ) -> None:
         """Residuals of a point's place."""
-        axes = self.turning(link)
-        if self.base:
-            chain = self.joints[: len(self.joints)]
-            chain = tuple(j for j in chain if j in self.frames.tree.chain(link))
-            self.rows.append((0, point_rows(self.frames, chain, axes, point, wanted, weight)))
-            return
-        chain = tuple(j for j in self.joints if j in self.frames.tree.chain(link))
-        moved = self.frames.point_columns(chain, axes, point)
-        self.rows.append((0, (moved * weight, (point - wanted) * weight)))
+        chain, axes = self._until(link), self.turning(link)
+        moved = point_columns(self.frames, chain, axes, point, base=self.base)
+        self.parts.append((0, (moved * weight, (point - wanted) * weight)))
 
     def add_to(self, normal: Normal) -> None:
-        """Into the normal equations of all of the tree's columns."""
-        if not self.rows or not self.columns:
+        """Into the stage's normal equations."""
+        if not self.parts:
             return
-        count = self.frames.places.shape[2]
-        total = sum(residual.shape[0] for _, (_, residual) in self.rows)
-        J = np.zeros((count, len(self.columns), total))
-        r = np.empty((total, count))
+        residuals = np.concatenate([residual for _, (_, residual) in self.parts])
+        columns = self.stage.local(self.joints) if self.base or self.joints else []
+        J = np.zeros((residuals.shape[1], len(columns), len(residuals)))
         row = 0
-        for start, (rows, residual) in self.rows:
-            M = residual.shape[0]
+        for start, (rows, residual) in self.parts:
+            M = len(residual)
             J[:, start : start + len(rows), row : row + M] = rows.transpose(2, 0, 1)
-            r[row : row + M] = residual
             row += M
-        normal.add_stacked(self.columns, J, r)
+        normal.add(columns, J, residuals)
+
+    def _until(self, link: int) -> tuple[int, ...]:
+        chain = self.frames.tree.chain(link)
+        return tuple(j for j in self.joints if j in chain)
 
 
 def linearize(
@@ -125,21 +135,22 @@ def linearize(
     footing: Sequence[Footing],
     q: Coordinates,
     stage: Stage,
+    *,
+    rows: bool = True,
 ) -> Normal:
-    """The normal equations of a stage at `q`, in all of the tree's columns."""
+    """The normal equations of a stage at `q`; without `rows` nothing but what it costs."""
     tree, rig = robot.tree, robot.rig
     frames = forward(tree, q)
-    normal = Normal(len(q), tree.size)
-    blocks = {link: Block(robot, stage, frames, link) for link in _ends(robot, stage)}
+    normal = Normal(len(q), len(stage.columns), rows)
+    blocks = {link: Block(stage, frames, link, rows) for link in _ends(robot, stage)}
     chest = chest_of(rig)
     for j, role in enumerate(rig.roles.roles):
         link = int(robot.links[j])
         block = _block_of(blocks, robot, link)
         if role is None or block is None:
             continue
-        parent = int(rig.skeleton.parents[j])
-        own = j == 0 or link != robot.links[parent]
-        if own and (link in block.joints or (link < 0 and stage.base) or j == rig.pelvis):
+        own = j == 0 or link != robot.links[int(rig.skeleton.parents[j])]
+        if own and (link in stage.joints or (stage.base and (link < 0 or j == rig.pelvis))):
             _follow(robot, targets, frames, block, j, role)
         if j == chest and stage.base:
             wanted = np.moveaxis(matrix_from_quat(targets.chest), 0, -1)
@@ -147,17 +158,22 @@ def linearize(
     if stage.base:
         _stand(robot, targets, footing, frames, blocks)
     elif targets.hands is not None:
-        _clap(robot, targets, frames, stage, normal)
+        _clap(robot, targets, frames, stage, normal, rows)
     for block in blocks.values():
         block.add_to(normal)
-    normal.add_diagonal(*limit_rows(tree, q, margin=MARGIN, weight=LIMIT))
-    idle = np.full((len(q), tree.size), 1e-3)
-    away = np.zeros_like(idle)
+    over, slope = limit_rows(tree, q, margin=MARGIN, weight=LIMIT)
+    normal.add_diagonal(slope[:, stage.columns], over[:, stage.columns])
+    idle, away = np.full((2, len(q), tree.size), 1e-3)
+    away[:] = 0.0
     hinges = ~tree.balls
     idle[:, tree.starts[hinges]] = IDLE
     away[:, tree.starts[hinges]] = IDLE * (q.angles - robot.tpose.angles)[:, hinges]
-    normal.add_diagonal(idle, away)
+    normal.add_diagonal(idle[:, stage.columns], away[:, stage.columns])
     return normal
+
+
+def _base_axes(frames: Frames) -> Float[np.ndarray, "3 3 T"]:
+    return np.broadcast_to(np.eye(3)[:, :, None], (3, 3, frames.places.shape[2]))
 
 
 def _ends(robot: Morphology, stage: Stage) -> list[int]:
@@ -218,22 +234,27 @@ def _stand(
 
 
 def _clap(
-    robot: Morphology, targets: Targets, frames: Frames, stage: Stage, normal: Normal
+    robot: Morphology,
+    targets: Targets,
+    frames: Frames,
+    stage: Stage,
+    normal: Normal,
+    rows: bool,
 ) -> None:
     """Hands that are near each other stay as near."""
     assert targets.hands is not None
     hands = [robot.rig.roles.require(role) for role in (Role.LEFT_HAND, Role.RIGHT_HAND)]
-    near = np.exp(-((np.linalg.norm(targets.hands, axis=1) / NEAR) ** 2))
-    weight = CLAP * near
-    columns: list[int] = []
+    weight = CLAP * np.exp(-((np.linalg.norm(targets.hands, axis=1) / NEAR) ** 2))
     parts, places = [], []
+    joints: tuple[int, ...] = ()
     for sign, j in zip((1.0, -1.0), hands, strict=True):
         link = int(robot.links[j])
-        joints = stage.suffix(robot.tree.chain(link))
+        own = stage.free(link) if rows else ()
         place = frames.point(link, robot.centers[j])
-        moved = frames.point_columns(joints, frames.turn_columns(joints), place)
-        columns += robot.tree.columns(joints)
+        moved = point_columns(frames, own, frames.turn_columns(own), place, base=False)
+        joints += own
         parts.append(sign * moved * weight)
         places.append(place)
     residual = (places[0] - places[1] - targets.hands.T) * weight
-    normal.add(columns, np.concatenate(parts), residual)
+    J = np.ascontiguousarray(np.concatenate(parts).transpose(2, 0, 1))
+    normal.add(stage.local(joints), J, residual)

@@ -18,7 +18,7 @@ from robots.normal import Normal, Ties, second_differences
 from robots.objective import FAST, PATH, RUSH, SMOOTH, Stage, linearize
 from robots.project import project
 from robots.targets import Targets, chest_of, targets_of
-from robots.tree import BASE, Coordinates
+from robots.tree import Coordinates
 from spark.canonical import CanonicalMotion
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 
@@ -75,7 +75,7 @@ def stages_of(robot: Morphology) -> tuple[Stage, Stage]:
     links |= {int(robot.links[j]) for j in robot.rig.contact_joints}
     first = sorted({j for link in links for j in tree.chain(link)})
     rest = tuple(j for j in range(len(tree)) if j not in first)
-    return Stage(tuple(first), True), Stage(rest, False)
+    return Stage(tree, tuple(first), True), Stage(tree, rest, False)
 
 
 def solve_stage(
@@ -92,34 +92,29 @@ def solve_stage(
     are damped more from then on (Levenberg and Marquardt's rule, a frame).
     """
     tree = robot.tree
-    columns = [*(range(BASE) if stage.base else ()), *tree.columns(stage.joints)]
     window = max(1, 2 * round(_AROUND / targets.frame_time) + 1)
     damping = np.full(len(q), _DAMPING)
 
-    def look(q: Coordinates) -> tuple[Normal, Ties, Float[np.ndarray, "T"]]:
-        normal = linearize(robot, targets, footing, q, stage)
-        ties = ties_of(robot, q, targets.frame_time, columns)
-        cost = uniform_filter1d(normal.cost + ties.cost(len(q)), window, mode="nearest")
-        return normal.only(columns), ties, cost
+    def look(q: Coordinates, rows: bool) -> tuple[Normal, Ties, Float[np.ndarray, "T"]]:
+        normal = linearize(robot, targets, footing, q, stage, rows=rows)
+        ties = ties_of(robot, q, targets.frame_time, stage.columns)
+        return normal, ties, uniform_filter1d(normal.cost + ties.cost(len(q)), window)
 
-    normal, ties, cost = look(q)
     for _ in range(most):
-        limits = q.at_limits(tree, _SHORT_OF_LIMIT)[:, columns]
+        normal, ties, cost = look(q, rows=True)
+        limits = q.at_limits(tree, _SHORT_OF_LIMIT)[:, stage.columns]
         step = np.zeros((len(q), tree.size))
-        step[:, columns] = normal.solve_together(ties, damping, limits)
+        step[:, stage.columns] = normal.solve_together(ties, damping, limits)
         long = np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(1), 1e-9))
         step *= eased(long, window)[:, None]
         trial = q.moved(tree, step).clipped(tree, _SHORT_OF_LIMIT)
-        after = look(trial)
-        worse = after[2] > cost * (1 + 1e-3) + 1e-9
+        worse = look(trial, rows=False)[2] > cost * (1 + 1e-3) + 1e-9
         damping = np.where(worse, damping * 10, np.maximum(damping / 5, _DAMPING))
         if worse.any():
-            trial = q.moved(tree, step * eased(1.0 - worse, window)[:, None]).clipped(
-                tree, _SHORT_OF_LIMIT
-            )
-            after = look(trial)
+            step *= eased(1.0 - worse, window)[:, None]
+            trial = q.moved(tree, step).clipped(tree, _SHORT_OF_LIMIT)
         moved = np.abs(trial.angles - q.angles).max(initial=0.0)
-        q, (normal, ties, cost) = trial, after
+        q = trial
         if moved < _STILL:
             break
     return q

@@ -46,24 +46,27 @@ def turn_rows(
     return axes * weight, axial * weight
 
 
-def point_rows(
+def point_columns(
     frames: Frames,
     chain: tuple[int, ...],
-    axes: Float[np.ndarray, "A 3 T"],
+    axes: Float[np.ndarray, "C 3 T"],
     point: Float[np.ndarray, "3 T"],
-    wanted: Float[np.ndarray, "3 T"],
-    weight: Float[np.ndarray, "#T"] | Float[np.ndarray, "3 #T"],
-) -> Rows:
-    """A point of a link that should be somewhere [m]. `axes` begin with the base's three; columns
-    are the base's six, then the chain's."""
-    count = point.shape[1]
-    rows = np.empty((3 + len(axes), 3, count))
-    rows[:3] = np.eye(3)[:, :, None]
+    *,
+    base: bool,
+) -> Float[np.ndarray, "K 3 T"]:
+    """How fast a point of a link moves with the columns of a chain of joints; `axes` are theirs.
+
+    With `base` the base's six come before them, and its three axes before theirs.
+    """
+    if not base:
+        return frames.point_columns(chain, axes, point)
+    columns = np.empty((3 + len(axes), 3, point.shape[1]))
+    columns[:3] = np.eye(3)[:, :, None]
     arm = point - frames.places[-1]
     for k in range(3):
-        cross(axes[k], arm, rows[3 + k])
-    rows[6:] = frames.point_columns(chain, axes[3:], point)
-    return rows * weight, (point - wanted) * weight
+        cross(axes[k], arm, columns[3 + k])
+    columns[6:] = frames.point_columns(chain, axes[3:], point)
+    return columns
 
 
 def one_sided(
@@ -80,7 +83,8 @@ def one_sided(
 def limit_rows(
     tree: Tree, q: Coordinates, *, margin: float, weight: float
 ) -> tuple[Float[np.ndarray, "T D"], Float[np.ndarray, "T D"]]:
-    """Hinges nearer than `margin` [rad] to a limit (less where the range is small), diagonal."""
+    """Hinges nearer than `margin` [rad] to a limit (less where the range is small): a residual for
+    each column, and how fast it grows with that column."""
     rows, residuals = np.zeros((2, len(q), tree.size))
     hinges = ~tree.balls
     at = tree.starts[hinges]
@@ -91,4 +95,4 @@ def limit_rows(
     below, falling = one_sided(lower + near - angles, margin / 4)
     rows[:, at] = weight * (rising + falling)
     residuals[:, at] = weight * (above - below)
-    return rows, residuals
+    return residuals, rows

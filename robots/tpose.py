@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from robots.normal import Normal
-from robots.terms import direction_rows, limit_rows, turn_rows
+from robots.terms import Rows, direction_rows, limit_rows, turn_rows
 from robots.tree import BASE, Coordinates, Tree, forward
 from spark.bones import Pose
 from spark.roles import LIMBS, Group, Role, RoleMap
@@ -145,12 +145,12 @@ def _linearize(
         trunk = role in (Role.PELVIS, Role.SPINE, Role.NECK, Role.HEAD)
         weight = _TRUNK if trunk else _FOOT if str(role).endswith("foot") else _TURN
         target = matrix_from_quat(ideal[j])[:, :, None].repeat(count, 2)
-        normal.add(columns, *turn_rows(frames.turns[link], target, axes, weight))
+        _add(normal, columns, turn_rows(frames.turns[link], target, axes, weight))
         if j in goals:
             bone, goal = goals[j]
             wanted = goal[:, None].repeat(count, 1)
             now = frames.direction(link, bone)
-            normal.add(columns, *direction_rows(now, wanted, axes, _BONE))
+            _add(normal, columns, direction_rows(now, wanted, axes, _BONE))
         if role in _BENDING and not tree.balls[chain[-1]]:
             first = _own_first(tree, skeleton, links, j)
             flex = tree.axes[first] * _bend_sign(tree, skeleton, roles, links, j, first)
@@ -158,15 +158,21 @@ def _linearize(
             above = tree.chain(int(tree.parents[first]))
             n = 3 + len(tree.columns(above))
             axis = frames.direction(int(tree.parents[first]), flex)
-            normal.add(columns[:n], *direction_rows(axis, wanted, axes[:n], _HINGE))
+            _add(normal, columns[:n], direction_rows(axis, wanted, axes[:n], _HINGE))
     at_rest = np.zeros((count, tree.size))
     hinges = tree.starts[~tree.balls]
     at_rest[:, hinges] = _REST * q.angles[:, ~tree.balls]
     damped = np.full(at_rest.shape, 1e-3)
     damped[:, BASE:] = _REST
     normal.add_diagonal(damped, at_rest)
-    normal.add_diagonal(*limit_rows(tree, q, margin=np.radians(1.0), weight=3.0))
+    over, slope = limit_rows(tree, q, margin=np.radians(1.0), weight=3.0)
+    normal.add_diagonal(slope, over)
     return normal
+
+
+def _add(normal: Normal, columns: list[int], rows: Rows) -> None:
+    J, residuals = rows
+    normal.add(columns, np.ascontiguousarray(J.transpose(2, 0, 1)), residuals)
 
 
 def _own_first(tree: Tree, skeleton: Skeleton, links: Int[np.ndarray, "J"], j: int) -> int:
