@@ -221,7 +221,7 @@ def test_the_answer_stands_where_the_copy_slides(maker: PairMaker) -> None:
             speeds[name].append(
                 losses.contact(positions, made.planted, made.frame_time, made.target).item()
             )
-    assert np.mean(speeds["truth"]) < 0.25 * np.mean(speeds["start"])
+    assert np.mean(speeds["truth"]) < 0.5 * np.mean(speeds["start"])
 
 
 def test_rotations_of_pairs_are_rotations(batch: Batch) -> None:
