@@ -1,4 +1,4 @@
-"""Recordings as training clips: any tree of BVH files, at one frame rate, in canonical form."""
+"""Recordings as training clips: any tree of motion files, at one frame rate, in canonical form."""
 
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -8,10 +8,10 @@ from jaxtyping import Float
 
 from spark.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.contacts import planted_feet
-from spark.errors import FileFormatError, SkeletonError, SparkSimError
+from spark.errors import SkeletonError, SparkSimError
 from spark.features import BodyFeatures, body_features
 from spark.pairs import Clip
-from spark.recording import read_recording
+from spark.reading import motion_files, read_motion
 from spark.rig import understand
 from spark.rotation import quat_slerp
 from spark.skeleton import Skeleton
@@ -25,18 +25,18 @@ def read_clips(
     """The humanoid recordings among `paths` and below them as clips, and notes on the others.
 
     Files of one skeleton share one body, so that training draws from them together. Raises
-    `FileFormatError` where a path holds no BVH file, `SkeletonError` where none is usable.
+    `FileFormatError` where a path holds no motion file, `SkeletonError` where none is usable.
     """
     bodies: dict[tuple[object, ...], BodyFeatures] = {}
     clips: list[Clip] = []
     notes: list[str] = []
-    for path in progress([file for given in paths for file in _files(given)]):
+    for path in progress([file for given in paths for file in motion_files(given)]):
         try:
-            motion = read_recording(path).motion
+            motion = read_motion(path).motion
             key = _key(motion.skeleton)
             if key not in bodies:
                 bodies[key] = body_features(understand(motion))
-            clips.append(_clip(path.stem, to_canonical(motion, bodies[key].rig), bodies[key]))
+            clips.append(clip_of(path.stem, to_canonical(motion, bodies[key].rig), bodies[key]))
         except SparkSimError as error:
             notes.append(f"{path}: left out: {error}")
     if not clips:
@@ -89,7 +89,8 @@ def _neighbours(
     return low, np.minimum(low + 1, count - 1), at - low
 
 
-def _clip(name: str, canonical: CanonicalMotion, body: BodyFeatures) -> Clip:
+def clip_of(name: str, canonical: CanonicalMotion, body: BodyFeatures) -> Clip:
+    """A motion on `body`'s rig as a clip. Raises `SkeletonError` without two feet."""
     rig = canonical.rig
     canonical = at_frame_time(canonical, FRAME_TIME)
     hips = canonical.hips - np.array([0, 0, canonical.floor_z])
@@ -102,12 +103,3 @@ def _clip(name: str, canonical: CanonicalMotion, body: BodyFeatures) -> Clip:
 
 def _key(skeleton: Skeleton) -> tuple[object, ...]:
     return (skeleton.names, skeleton.parents.tobytes(), skeleton.offsets.round(5).tobytes())
-
-
-def _files(path: Path) -> list[Path]:
-    if path.is_file():
-        return [path]
-    found = sorted(p for p in path.rglob("*") if p.suffix.lower() == ".bvh")
-    if not found:
-        raise FileFormatError(path, None, "holds no .bvh file; expected one or more")
-    return found

@@ -42,7 +42,10 @@ class FbxScene:
             self._scene: Any = pufbx.load_fbx(str(path))
         except (RuntimeError, ValueError) as error:
             raise FileFormatError(
-                path, None, f"is no FBX file that can be read ({error}); expected FBX 6.1 to 7.7"
+                path,
+                None,
+                f"is no FBX file that can be read ({' '.join(str(error).split())}); "
+                "expected FBX 6.1 to 7.7",
             ) from error
         self._nodes: list[Any] = list(self._scene.nodes)
         self._parents = [-1 if n.parent is None else n.parent.typed_id for n in self._nodes]

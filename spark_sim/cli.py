@@ -8,9 +8,9 @@ from typing import Any, NoReturn
 
 from spark.errors import SparkSimError
 from spark_sim import console
-from spark_sim.commands import inspect, mjcf, play, report, retarget, sample, train
+from spark_sim.commands import inspect, mjcf, play, prepare, report, retarget, sample, train
 
-COMMANDS = (retarget, inspect, report, play, mjcf, sample, train)
+COMMANDS = (retarget, inspect, report, play, mjcf, sample, prepare, train)
 
 DESCRIPTION = "Put a human motion on another body and measure how believable the result is."
 

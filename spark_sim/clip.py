@@ -10,10 +10,10 @@ from spark.bvh import write_bvh
 from spark.canonical import CanonicalMotion, from_canonical, to_canonical
 from spark.encoding import encode, encode_new
 from spark.errors import ConventionError, DependencyError, FileFormatError, SkeletonError
-from spark.fbx import read_fbx
 from spark.motion import Motion
 from spark.override import Override
-from spark.recording import Recording, read_recording
+from spark.reading import read_motion
+from spark.recording import Recording
 from spark.refine import refine as hold_feet
 from spark.rig import Rig, understand
 from spark.transfer import transfer
@@ -97,8 +97,7 @@ def load(
     path = Path(path)
     if path.suffix.lower() in _NOT_YET:
         raise FileFormatError(path, None, _NOT_YET[path.suffix.lower()])
-    read = read_fbx if path.suffix.lower() == ".fbx" else read_recording
-    recording = read(path, unit=unit, up=up)
+    recording = read_motion(path, unit=unit, up=up)
     names = None if roles is None else rolemap.read(roles, recording.motion.skeleton)
     return Clip(recording, path.stem, names)
 

@@ -22,7 +22,7 @@ examples:
 
 
 def configure(parser: ArgumentParser) -> None:
-    parser.add_argument("files", metavar="FILE", nargs="+", help="BVH files")
+    parser.add_argument("files", metavar="FILE", nargs="+", help="BVH or FBX files")
     parser.add_argument("--save-map", metavar="TOML", help="write the roles of FILE for editing")
     add_force(parser)
     add_json(parser, "one line for each FILE")

@@ -20,7 +20,7 @@ examples:
 
 
 def configure(parser: ArgumentParser) -> None:
-    parser.add_argument("rig", metavar="RIG", help="a BVH file; its motion is not needed")
+    parser.add_argument("rig", metavar="RIG", help="a BVH or FBX file; its motion is not needed")
     parser.add_argument(
         "-o", "--output", metavar="OUT", help="the file to write (default: RIG.xml, here)"
     )

@@ -21,7 +21,7 @@ examples:
 
 
 def configure(parser: ArgumentParser) -> None:
-    parser.add_argument("files", metavar="FILE", nargs="+", help="BVH files")
+    parser.add_argument("files", metavar="FILE", nargs="+", help="BVH or FBX files")
     parser.add_argument("--video", metavar="MP4", help="write a video")
     parser.add_argument("--html", metavar="HTML", help="write one web page with a 3D replay")
     parser.add_argument("--strip", metavar="PNG", help="write a strip of moments as one picture")

@@ -24,7 +24,7 @@ examples:
 
 
 def configure(parser: ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help="a BVH file")
+    parser.add_argument("file", metavar="FILE", help="a BVH or FBX file")
     parser.add_argument("--source", metavar="SRC", help="the motion that FILE was made from")
     parser.add_argument(
         "--html", metavar="OUT", help="write a page too: replay, worst moments, plots over time"

@@ -21,13 +21,13 @@ EXAMPLES = """\
 examples:
   spark-sim retarget walk.bvh --to mutant.bvh       # writes walk_on_mutant.bvh
   spark-sim retarget walk.bvh --to mutant.bvh -o out.bvh
-  spark-sim retarget takes/ --to mutant.bvh -o out/ # every BVH below takes/
+  spark-sim retarget takes/ --to mutant.bvh -o out/ # every file below takes/
   spark-sim retarget walk.bvh --to g1.xml           # a robot: walk_on_g1.npz
 """
 
 
 def configure(parser: ArgumentParser) -> None:
-    parser.add_argument("sources", metavar="SRC", nargs="+", help="BVH files, or folders of them")
+    parser.add_argument("sources", metavar="SRC", nargs="+", help="BVH or FBX files, or folders")
     parser.add_argument(
         "--to",
         metavar="TARGET",
@@ -159,11 +159,12 @@ def _jobs(sources: Sequence[str], target: Path, output: str | None) -> list[tupl
     Below a folder given as a source the tree of folders is kept.
     """
     from spark.errors import OutputError
+    from spark.reading import motion_files
 
     found: list[tuple[Path, Path]] = []
     for source in map(Path, sources):
         if source.is_dir():
-            found += [(path, path.parent.relative_to(source)) for path in _bvh_files(source)]
+            found += [(path, path.parent.relative_to(source)) for path in motion_files(source)]
         else:
             found.append((source, Path()))
     several = len(found) > 1 or any(Path(source).is_dir() for source in sources)
@@ -185,12 +186,3 @@ def _jobs(sources: Sequence[str], target: Path, output: str | None) -> list[tupl
 
 def _names_folder(output: str) -> bool:
     return output.endswith("/") or Path(output).is_dir()
-
-
-def _bvh_files(folder: Path) -> list[Path]:
-    from spark.errors import FileFormatError
-
-    files = sorted(path for path in folder.rglob("*") if path.suffix.lower() == ".bvh")
-    if not files:
-        raise FileFormatError(folder, None, "holds no .bvh file; expected one or more")
-    return files

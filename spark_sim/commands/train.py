@@ -6,8 +6,9 @@ from pathlib import Path
 SUMMARY = "train the network that retargets"
 USAGE = "DATA... -o DIR [--config TOML] [--resume] [options]"
 DESCRIPTION = """\
-Train on the BVH files below each DATA. Writes DIR/checkpoint.safetensors, the
-settings as DIR/config.toml and the loss of each step as DIR/log.jsonl."""
+Train on each DATA: a dataset that `spark-sim prepare` made, or the BVH and FBX
+files below a folder. Writes DIR/checkpoint.safetensors, the settings as
+DIR/config.toml and the loss of each step as DIR/log.jsonl."""
 EXAMPLES = """\
 examples:
   spark-sim train motions/ -o run --preset tiny
@@ -19,7 +20,7 @@ _FLAGS = ("steps", "batch", "window", "rate", "seed", "workers")
 
 
 def configure(parser: ArgumentParser) -> None:
-    parser.add_argument("data", metavar="DATA", nargs="*", help="BVH files, or folders of them")
+    parser.add_argument("data", metavar="DATA", nargs="*", help="datasets, or folders of files")
     parser.add_argument("-o", "--output", metavar="DIR", required=True, help="where the run lies")
     parser.add_argument("--config", metavar="TOML", help="settings, as DIR/config.toml has them")
     parser.add_argument("--resume", action="store_true", help="go on from DIR's checkpoint")
@@ -53,19 +54,19 @@ def run(args: Namespace) -> int:
     preset = given.get("preset", stored.get("preset", "default"))
     config = TrainConfig.of(preset).changed(file, **stored).changed("command line", **given)
     if not config.data:
-        raise ConventionError("no DATA to train on; expected BVH files or folders of them")
+        raise ConventionError("no DATA to train on; expected datasets or folders of motion files")
     if path.exists() and not (args.resume or args.force):
         raise OutputError(f"{path}: exists; go on with --resume, or overwrite it with --force")
     try:
         from spark.checkpoint import load_checkpoint
-        from spark.clips import read_clips
+        from spark.dataset import training_clips
         from spark.train import fresh_checkpoint, train
     except ImportError as error:
         raise DependencyError(
             f"training needs {error.name}: pip install 'spark-sim[train]'"
         ) from error
     start = load_checkpoint(path) if args.resume else None
-    clips, notes = read_clips(
+    clips, notes = training_clips(
         [Path(p) for p in config.data], lambda files: console.progress(files, "reading")
     )
     for note in notes:

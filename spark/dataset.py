@@ -1,0 +1,280 @@
+"""Datasets: motion files made ready for training, in one folder that is mapped into memory.
+
+    index.json     bodies and clips (whose, in which cell, where in the arrays), every file with its
+                   SHA-256, and what was left out and why
+    numbers.npy    float32: of each clip its rotations (T, K, 4), then its hips' path (T, 3)
+    planted.npy    bool (frames, 2): whether the left and the right foot stand
+    parts/         what each file gave (`spark.dataset_parts`): a run that stopped goes on, and one
+                   with more files reads only those
+
+A clip is what `spark.pairs.Clip` says: canonical, at 30 fps, on the network's view of its body.
+"""
+
+import json
+import os
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from spark.clips import FRAME_TIME, read_clips
+from spark.dataset_parts import Part, make_part, read_part
+from spark.errors import FileFormatError, SkeletonError, SparkSimError
+from spark.features import BodyFeatures, body_features
+from spark.files import write_atomically
+from spark.pairs import Clip
+from spark.reading import motion_files
+from spark.rig import Rig
+from spark.rig_json import rig_from_json, rig_to_json
+from spark.rotation import quat_conj, quat_mul
+from spark.splits import cell, seen_characters, seen_motions
+
+FORMAT, VERSION = "spark-sim dataset", 1
+
+# Skeletons whose bones differ by less than this, in hip heights, are one body.
+_SAME = 1e-3
+
+Index = dict[str, Any]
+Progress = Callable[[Iterable[tuple[Path, str]], int], Iterable[tuple[Path, str]]]
+
+
+def prepare(
+    sources: Sequence[Path],
+    out: Path,
+    *,
+    seed: int = 0,
+    workers: int = 1,
+    progress: Progress = lambda items, total: items,
+) -> Index:
+    """Write the dataset of the motion files in and below `sources` into the folder `out`; gives its
+    index.
+
+    A motion is a file's name. A body is a skeleton, named after the folder of its first file.
+    The same files and seed give the same bytes. Raises `FileFormatError` where a source holds no
+    motion file, `SkeletonError` where none is of a humanoid.
+    """
+    files = sorted({path.resolve() for source in sources for path in motion_files(source)})
+    parts = out / "parts"
+    parts.mkdir(parents=True, exist_ok=True)
+    digests = dict(progress(_made(files, parts, workers), len(files)))
+    index = _index({path: digests[path] for path in files}, parts, seed)
+    if not index["clips"]:
+        why = "; ".join(f"{left['file']}: {left['why']}" for left in index["left_out"][:3])
+        raise SkeletonError(f"no recording of a humanoid among {len(files)} files: {why}")
+    # An index that is there tells of arrays that are whole.
+    (out / "index.json").unlink(missing_ok=True)
+    _write_arrays(out, index, parts)
+    write_atomically(out / "index.json", _lines(index).encode())
+    return index
+
+
+def training_clips(
+    paths: Sequence[Path], progress: Callable[[Iterable[Path]], Iterable[Path]] = iter
+) -> tuple[list[Clip], tuple[str, ...]]:
+    """The clips to train on in datasets and in trees of motion files, and notes on what was left
+    out. Raises what `read_dataset` and `spark.clips.read_clips` raise."""
+    clips = [clip for path in paths if is_dataset(path) for clip in read_dataset(path)]
+    trees = [path for path in paths if not is_dataset(path)]
+    if not trees:
+        return clips, ()
+    others, notes = read_clips(trees, progress)
+    return clips + others, notes
+
+
+def is_dataset(path: Path) -> bool:
+    """Whether `path` is a folder that `prepare` wrote."""
+    return (path / "index.json").is_file() and (path / "numbers.npy").is_file()
+
+
+def read_dataset(path: Path, cell: str | None = "sc+sm") -> list[Clip]:
+    """The clips of one cell of a dataset, by default the one to train on (None: of all), mapped
+    into memory.
+
+    Raises `FileFormatError` where `path` is no dataset of this version, or a damaged one.
+    """
+    try:
+        index = json.loads((path / "index.json").read_bytes())
+        if (index["format"], index["version"]) != (FORMAT, VERSION):
+            raise ValueError(f"it says {index['format']!r}, version {index['version']!r}")
+        numbers = np.load(path / "numbers.npy", mmap_mode="r")
+        planted = np.load(path / "planted.npy", mmap_mode="r")
+        bodies = [body_features(rig_from_json(body["rig"])) for body in index["bodies"]]
+        return [
+            _mapped(clip, bodies[clip["body"]], numbers, planted)
+            for clip in index["clips"]
+            if cell in (None, clip["cell"])
+        ]
+    except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
+        raise FileFormatError(
+            path,
+            None,
+            f"is no dataset of version {VERSION} ({error}); `spark-sim prepare` makes one",
+        ) from error
+
+
+def _mapped(
+    clip: dict[str, Any],
+    body: BodyFeatures,
+    numbers: Float[np.ndarray, "N"],
+    planted: Bool[np.ndarray, "F 2"],
+) -> Clip:
+    at, frames, joints = clip["at"], clip["frames"], len(body.joints)
+    path = at + frames * joints * 4
+    return Clip(
+        clip["motion"],
+        body,
+        numbers[at:path].reshape(frames, joints, 4),
+        numbers[path : path + frames * 3].reshape(frames, 3),
+        planted[clip["first_frame"] : clip["first_frame"] + frames],
+        FRAME_TIME,
+    )
+
+
+def _made(files: list[Path], parts: Path, workers: int) -> Iterator[tuple[Path, str]]:
+    """The files with their hashes, as their parts get ready."""
+    if workers <= 1:
+        for path in files:
+            yield path, make_part(path, parts)
+        return
+    # A fresh interpreter each: forking one that has threads can hang.
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        waiting = {pool.submit(make_part, path, parts): path for path in files}
+        try:
+            for done in as_completed(waiting):
+                yield waiting[done], done.result()
+        except BrokenProcessPool as error:
+            raise SparkSimError(
+                "a worker died, perhaps for want of memory; what is read is kept: run it again, "
+                "with fewer --workers"
+            ) from error
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _index(digests: dict[Path, str], parts: Path, seed: int) -> Index:
+    """All that there is to say of a dataset, before its arrays are written."""
+    top = Path(os.path.commonpath([path.parent for path in digests]))
+    seen: dict[str, str] = {}
+    bodies: list[dict[str, Any]] = []
+    clips: list[dict[str, Any]] = []
+    left_out: list[dict[str, str]] = []
+    at = first_frame = 0
+    for path, digest in digests.items():
+        file = path.relative_to(top).as_posix()
+        part = read_part(parts, digest)
+        if digest in seen:
+            left_out.append({"file": file, "sha256": digest, "why": f"same as {seen[digest]}"})
+            continue
+        if not isinstance(part, Part):
+            why = "its part can't be read back" if part is None else part.why
+            left_out.append({"file": file, "sha256": digest, "why": why})
+            continue
+        seen[digest] = file
+        frames, joints = part.rotations.shape[:2]
+        body = _body_of(part.rig, bodies, path.parent.name)
+        if frames > bodies[body]["frames"]:
+            # What a longer clip tells of a T-pose is better founded.
+            bodies[body] |= {"rig": part.rig, "frames": frames}
+        clips.append(
+            {
+                "motion": path.stem,
+                "body": body,
+                "file": file,
+                "sha256": digest,
+                "source_fps": part.fps,
+                "frames": frames,
+                "at": at,
+                "first_frame": first_frame,
+            }
+        )
+        at += frames * (joints * 4 + 3)
+        first_frame += frames
+    characters = seen_characters((body["character"] for body in bodies), seed)
+    motions = seen_motions((clip["motion"] for clip in clips), seed)
+    for clip in clips:
+        seen_body = characters[bodies[clip["body"]]["character"]]
+        clip["cell"] = cell(seen_body, motions[clip["motion"]])
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "frame_time": FRAME_TIME,
+        "seed": seed,
+        "cells": dict(sorted(Counter(clip["cell"] for clip in clips).items())),
+        "bodies": [
+            {"character": body["character"], "rig": rig_to_json(body["rig"])} for body in bodies
+        ],
+        "clips": clips,
+        "left_out": left_out,
+    }
+
+
+def _body_of(rig: Rig, bodies: list[dict[str, Any]], folder: str) -> int:
+    """The place of this rig's body among `bodies`, which it joins where it is new."""
+    skeleton = rig.skeleton
+    for i, body in enumerate(bodies):
+        other: Rig = body["rig"]
+        if (
+            other.skeleton.names == skeleton.names
+            and np.array_equal(other.skeleton.parents, skeleton.parents)
+            and other.roles.roles == rig.roles.roles
+            and np.allclose(
+                other.skeleton.offsets[1:], skeleton.offsets[1:], 0.0, _SAME * rig.hip_height
+            )
+        ):
+            return i
+    taken = {body["character"] for body in bodies}
+    names = (folder if n == 1 else f"{folder} {n}" for n in range(1, len(bodies) + 2))
+    character = next(name for name in names if name not in taken)
+    bodies.append({"character": character, "rig": rig, "frames": 0})
+    return len(bodies) - 1
+
+
+def _write_arrays(out: Path, index: Index, parts: Path) -> None:
+    """Both arrays, through neighbours that then take their names."""
+    rigs = [rig_from_json(body["rig"]) for body in index["bodies"]]
+    frames = sum(clip["frames"] for clip in index["clips"])
+    joints = [len(body_features(rig).joints) for rig in rigs]
+    size = sum(clip["frames"] * (joints[clip["body"]] * 4 + 3) for clip in index["clips"])
+    shapes = {"numbers": ((size,), np.float32), "planted": ((frames, 2), np.bool_)}
+    arrays = {
+        name: np.lib.format.open_memmap(out / f".{name}.part", "w+", dtype, shape)
+        for name, (shape, dtype) in shapes.items()
+    }
+    for clip in index["clips"]:
+        part = read_part(parts, clip["sha256"])
+        if not isinstance(part, Part):
+            raise FileFormatError(parts, None, "changed while it was read; run it again")
+        numbers = _on_body(part, rigs[clip["body"]])
+        arrays["numbers"][clip["at"] : clip["at"] + len(numbers)] = numbers
+        first = clip["first_frame"]
+        arrays["planted"][first : first + clip["frames"]] = part.planted
+    for name, array in arrays.items():
+        array.flush()
+        (out / f".{name}.part").replace(out / f"{name}.npy")
+
+
+def _on_body(part: Part, rig: Rig) -> Float[np.ndarray, "N"]:
+    """The numbers of a clip, counted from its body's T-pose and hip height: what one clip alone
+    tells of a body differs a little from what another tells."""
+    joints = body_features(rig).joints
+    turn = quat_mul(part.rig.tpose[joints], quat_conj(rig.tpose[joints]))
+    rotations = quat_mul(part.rotations.astype(np.float64), turn)
+    hips = part.hips * (part.rig.hip_height / rig.hip_height)
+    return np.concatenate([rotations.ravel(), hips.ravel()])
+
+
+def _lines(index: Index) -> str:
+    """JSON with one body, clip or file a line."""
+    parts = []
+    for key, value in index.items():
+        text = json.dumps(value)
+        if isinstance(value, list) and value:
+            text = "[\n" + ",\n".join(json.dumps(item) for item in value) + "\n]"
+        parts.append(f"{json.dumps(key)}: {text}")
+    return "{\n" + ",\n".join(parts) + "\n}\n"

@@ -1,0 +1,107 @@
+"""What one motion file gives to a dataset, kept by the hash of its content.
+
+A part depends on its file alone, so that files can be read in any order, in several processes, and
+only once.
+"""
+
+import hashlib
+import io
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from spark.canonical import to_canonical
+from spark.clips import clip_of
+from spark.errors import SparkSimError
+from spark.features import body_features
+from spark.files import write_atomically
+from spark.reading import read_motion
+from spark.rig import Rig, understand
+from spark.rig_json import rig_from_json, rig_to_json
+
+# Goes up whenever the same file gives another part.
+VERSION = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A file as a `spark.pairs.Clip` on its own rig, at 30 fps, and its own frame rate."""
+
+    rig: Rig
+    rotations: Float[np.ndarray, "T K 4"]
+    hips: Float[np.ndarray, "T 3"]
+    planted: Bool[np.ndarray, "T 2"]
+    fps: float
+
+
+@dataclass(frozen=True)
+class Refused:
+    """Why a file gives nothing."""
+
+    why: str
+
+
+def make_part(path: Path, parts: Path) -> str:
+    """The SHA-256 of the file at `path`; its part lies in `parts` then, as it may have before.
+
+    A file that can't be used is a part too, so that it is not tried again. Raises `OutputError`
+    where a part can't be written.
+    """
+    try:
+        digest = hashlib.sha256(path.suffix.lower().encode() + path.read_bytes()).hexdigest()
+    except OSError as error:
+        digest = hashlib.sha256(f"{path}: {error}".encode()).hexdigest()
+    if read_part(parts, digest) is None:
+        write_atomically(_place(parts, digest), _encoded(_understood(path)))
+    return digest
+
+
+def read_part(parts: Path, digest: str) -> Part | Refused | None:
+    """The part of a file; None where there is none, or only a damaged one."""
+    try:
+        file = io.BytesIO(_place(parts, digest).read_bytes())
+        with np.load(file, allow_pickle=False) as stored:
+            about = json.loads(stored["about"].tobytes())
+            if "why" in about:
+                return Refused(about["why"])
+            rig = rig_from_json(about["rig"])
+            return Part(rig, stored["rotations"], stored["hips"], stored["planted"], about["fps"])
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+        return None
+
+
+def _understood(path: Path) -> Part | Refused:
+    try:
+        motion = read_motion(path).motion
+        rig = understand(motion)
+        if len(motion) < 2:
+            return Refused("holds a single frame; expected a motion")
+        clip = clip_of(path.stem, to_canonical(motion, rig), body_features(rig))
+    except SparkSimError as error:
+        return Refused(str(error).replace(str(path), path.name))
+    return Part(
+        rig, clip.rotations.astype(np.float32), clip.hips.astype(np.float32), clip.planted,
+        motion.fps,
+    )  # fmt: skip
+
+
+def _encoded(part: Part | Refused) -> bytes:
+    about: dict[str, Any] = {}
+    arrays: dict[str, Any] = {}
+    if isinstance(part, Refused):
+        about = {"why": part.why}
+    else:
+        about = {"rig": rig_to_json(part.rig), "fps": part.fps}
+        arrays = {"rotations": part.rotations, "hips": part.hips, "planted": part.planted}
+    file = io.BytesIO()
+    np.savez(file, about=np.frombuffer(json.dumps(about).encode(), np.uint8), **arrays)
+    return file.getvalue()
+
+
+def _place(parts: Path, digest: str) -> Path:
+    return parts / f"{digest[:32]}_v{VERSION}.npz"
