@@ -129,10 +129,7 @@ def _runs(columns: Sequence[int]) -> list[tuple[slice, slice]]:
     """Columns that follow each other, as slices of the list and of what it indexes."""
     breaks = np.flatnonzero(np.diff(columns) != 1) + 1
     edges = [0, *breaks.tolist(), len(columns)]
-    return [
-        (slice(a, b), slice(columns[a], columns[a] + b - a))
-        for a, b in pairwise(edges)
-    ]
+    return [(slice(a, b), slice(columns[a], columns[a] + b - a)) for a, b in pairwise(edges)]
 
 
 def second_differences(values: Float[np.ndarray, "T *n"]) -> Float[np.ndarray, "A *n"]:
