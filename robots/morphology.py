@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from robots.collision import Collisions, find_collisions
 from robots.mjcf import Mjcf, read_mjcf
 from robots.segments import Segment, segments_of, tree_of
 from robots.shapes import corners, flattening, sole_heading, surface
@@ -87,6 +88,11 @@ class Morphology:
             if role is not None and bone is not None:
                 found[role] = bone / np.linalg.norm(bone)
         return found
+
+    @cached_property
+    def collisions(self) -> Collisions:
+        """The pairs of the robot's shapes that must not run into each other."""
+        return find_collisions(self.mjcf, self.tree, self.mj_joints, self.tpose)
 
     @cached_property
     def _addresses(self) -> Int[np.ndarray, "N"]:

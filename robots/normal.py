@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy.linalg import solveh_banded
 
 _IMMOVABLE = 1e8
@@ -43,6 +43,19 @@ class Normal:
             self.g[:, there] += g[:, here]
             for here2, there2 in runs:
                 self.H[:, there, there2] += H[:, here, here2]
+
+    def add_some(
+        self,
+        frames: Int[np.ndarray, "S"],
+        columns: Sequence[int],
+        J: Float[np.ndarray, "C S"],
+        residuals: Float[np.ndarray, "S"],
+    ) -> None:
+        """One weighted residual in some of the frames."""
+        self.cost[frames] += 0.5 * residuals**2
+        at = np.asarray(columns)
+        self.g[frames[:, None], at] += (J * residuals).T
+        self.H[frames[:, None, None], at[:, None], at] += np.einsum("cs,ds->scd", J, J)
 
     def add_diagonal(
         self, rows: Float[np.ndarray, "T D"], residuals: Float[np.ndarray, "T D"]

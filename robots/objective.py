@@ -4,18 +4,18 @@ Residuals are angles [rad] of weight 1 for a limb's direction; lengths [m] are w
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 
+from robots.collision import Near
 from robots.footing import Footing
 from robots.morphology import Morphology
 from robots.normal import Normal
+from robots.stage import Stage
 from robots.targets import Targets, chest_of
 from robots.terms import Rows, direction_rows, limit_rows, one_sided, point_columns, turn_rows
-from robots.tree import BASE, Coordinates, Frames, Tree, forward
+from robots.tree import Coordinates, Frames, forward
 from spark.roles import Role
 from spark.rotation import matrix_from_quat
 
@@ -36,42 +36,10 @@ STAND = np.array([25.0, 25.0, 20.0])  # of a sole's corner [1 / m]
 SINK, SINK_EASE = 80.0, 0.004  # of a sole's corner below the floor [1 / m]; [m]
 LIMIT, MARGIN = 8.0, np.radians(2.0)  # of a hinge near its limit
 CLAP, NEAR = 4.0, 0.12  # of hands [1 / m] that are as near as this [m]
-TOUCH = 15.0  # of parts that run into each other [1 / m]
+TOUCH = 40.0  # of parts that run into each other [1 / m]
 IDLE = 0.02  # of hinges that nothing else asks for: stay as in the T-pose
 SMOOTH = 6.0  # [Hz] above which a limb's motion fades
 FAST, RUSH = 10.0, 0.15  # [rad/s] above which a hinge is held back, and how much [s]
-
-
-@dataclass(frozen=True, eq=False)
-class Stage:
-    """Part of the columns: those that are solved for while the others are given.
-
-    `joints` are the tree's joints, in order; `base` says whether the base is free, too.
-    """
-
-    tree: Tree
-    joints: tuple[int, ...]
-    base: bool
-
-    @cached_property
-    def columns(self) -> list[int]:
-        """The tree's columns that are the stage's."""
-        return self._of(self.joints)
-
-    def local(self, joints: tuple[int, ...]) -> list[int]:
-        """Where the columns of some joints, and the base's if it is free, are among the stage's."""
-        return [self.columns.index(column) for column in self._of(joints)]
-
-    def free(self, link: int) -> tuple[int, ...]:
-        """The free joints on the way to a link."""
-        return tuple(j for j in self.tree.chain(link) if j in self._free)
-
-    @cached_property
-    def _free(self) -> frozenset[int]:
-        return frozenset(self.joints)
-
-    def _of(self, joints: tuple[int, ...]) -> list[int]:
-        return [*(range(BASE) if self.base else ()), *self.tree.columns(joints)]
 
 
 class Block:
@@ -135,6 +103,7 @@ def linearize(
     footing: Sequence[Footing],
     q: Coordinates,
     stage: Stage,
+    nears: Sequence[Near],
     *,
     rows: bool = True,
 ) -> Normal:
@@ -161,6 +130,7 @@ def linearize(
         _clap(robot, targets, frames, stage, normal, rows)
     for block in blocks.values():
         block.add_to(normal)
+    robot.collisions.add_to(normal, frames, stage, nears, TOUCH)
     over, slope = limit_rows(tree, q, margin=MARGIN, weight=LIMIT)
     normal.add_diagonal(slope[:, stage.columns], over[:, stage.columns])
     idle, away = np.full((2, len(q), tree.size), 1e-3)

@@ -17,8 +17,8 @@ _LONG = 0.7  # a sole's width as a share of its length, up to which its length i
 _PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)
 
 # Towards the faces, edges and corners of a cube.
-_DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
-_DIRECTIONS /= np.linalg.norm(_DIRECTIONS, axis=1, keepdims=True)
+DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1, keepdims=True)
 
 
 def surface(mjcf: Mjcf, bodies: Iterable[int]) -> Float[np.ndarray, "P 3"]:
@@ -30,9 +30,14 @@ def surface(mjcf: Mjcf, bodies: Iterable[int]) -> Float[np.ndarray, "P 3"]:
     colliding = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
     points = [np.zeros((0, 3))]
     for geom in colliding or list(geoms):
-        rotation = data.geom_xmat[geom].reshape(3, 3)
-        points.append(_corners(model, int(geom)) @ rotation.T + data.geom_xpos[geom])
+        points.append(surface_of(model, data, int(geom)))
     return np.concatenate(points)
+
+
+def surface_of(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Float[np.ndarray, "P 3"]:
+    """Points on one shape, where `data` places it; none for what has no surface of its own."""
+    rotation = data.geom_xmat[geom].reshape(3, 3)
+    return _corners(model, geom) @ rotation.T + data.geom_xpos[geom]
 
 
 def corners(points: Float[np.ndarray, "P 3"]) -> list[int]:
@@ -94,12 +99,12 @@ def _corners(model: mujoco.MjModel, geom: int) -> Float[np.ndarray, "P 3"]:
     """Outermost points of a shape in its own frame."""
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
     if kind == _SPHERE:
-        return _DIRECTIONS * size[0]
+        return DIRECTIONS * size[0]
     if kind == _CAPSULE:
         ends = np.array([[0, 0, size[1]], [0, 0, -size[1]]])
-        return np.concatenate([_DIRECTIONS * size[0] + end for end in ends])
+        return np.concatenate([DIRECTIONS * size[0] + end for end in ends])
     if kind == _ELLIPSOID:
-        scaled = _DIRECTIONS * size
+        scaled = DIRECTIONS * size
         return scaled * size / np.linalg.norm(scaled, axis=1, keepdims=True)
     if kind == _CYLINDER:
         angle = np.arange(12) * np.pi / 6
@@ -111,5 +116,5 @@ def _corners(model: mujoco.MjModel, geom: int) -> Float[np.ndarray, "P 3"]:
         mesh = int(model.geom_dataid[geom])
         start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
         vertices = model.mesh_vert[start : start + count].astype(np.float64)
-        return vertices[np.unique((vertices @ _DIRECTIONS.T).argmax(0))]
+        return vertices[np.unique((vertices @ DIRECTIONS.T).argmax(0))]
     return np.zeros((0, 3))

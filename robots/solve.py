@@ -15,17 +15,19 @@ from scipy.ndimage import minimum_filter1d, uniform_filter1d
 from robots.footing import Footing, plan_footing
 from robots.morphology import Morphology
 from robots.normal import Normal, Ties, second_differences
-from robots.objective import FAST, PATH, RUSH, SMOOTH, Stage, linearize
+from robots.objective import FAST, PATH, RUSH, SMOOTH, linearize
 from robots.project import project
+from robots.stage import Stage
 from robots.targets import Targets, chest_of, targets_of
-from robots.tree import Coordinates
+from robots.tree import Coordinates, forward
 from spark.canonical import CanonicalMotion
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 
 _STEPS = (12, 10)  # Gauss-Newton steps of the stages, at most
-_STILL = 2e-3  # [rad] a stage ends where no hinge moves further
+_LITTLE = 0.01  # a stage ends where a step lessens the cost by less than this share
 _AROUND = 0.15  # [s] before and after a frame in which a step must not do harm
 _LONGEST = 1.0  # [rad, m] a column moves in one of them
+_LOOK = 0.06  # [s] from one look for collisions to the next
 _DAMPING = 1e-3
 _SHORT_OF_LIMIT = np.radians(0.75)
 
@@ -96,11 +98,15 @@ def solve_stage(
     damping = np.full(len(q), _DAMPING)
 
     def look(q: Coordinates, rows: bool) -> tuple[Normal, Ties, Float[np.ndarray, "T"]]:
-        normal = linearize(robot, targets, footing, q, stage, rows=rows)
+        normal = linearize(robot, targets, footing, q, stage, nears, rows=rows)
         ties = ties_of(robot, q, targets.frame_time, stage.columns)
         return normal, ties, uniform_filter1d(normal.cost + ties.cost(len(q)), window)
 
-    for _ in range(most):
+    last = np.inf
+    stride = max(1, round(_LOOK / targets.frame_time))
+    for k in range(most):
+        if k % 3 == 0:
+            nears = robot.collisions.near(forward(tree, q), stage, stride)
         normal, ties, cost = look(q, rows=True)
         limits = q.at_limits(tree, _SHORT_OF_LIMIT)[:, stage.columns]
         step = np.zeros((len(q), tree.size))
@@ -113,10 +119,10 @@ def solve_stage(
         if worse.any():
             step *= eased(1.0 - worse, window)[:, None]
             trial = q.moved(tree, step).clipped(tree, _SHORT_OF_LIMIT)
-        moved = np.abs(trial.angles - q.angles).max(initial=0.0)
         q = trial
-        if moved < _STILL:
+        if cost.sum() > (1 - _LITTLE) * last:
             break
+        last = float(cost.sum())
     return q
 
 

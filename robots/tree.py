@@ -6,6 +6,7 @@ axes need not meet in a point, and no body frames are needed.
 Time is the last axis of every array in here: numpy then runs over long contiguous rows.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -124,6 +125,17 @@ class Frames:
     tree: Tree
     turns: Float[np.ndarray, "L 3 3 T"]
     places: Float[np.ndarray, "L 3 T"]
+
+    def at(self, frames: Int[np.ndarray, "S"], links: Iterable[int] | None = None) -> "Frames":
+        """The same in some of the frames; only `links` where they are named."""
+        if links is None:
+            return Frames(self.tree, self.turns[..., frames], self.places[..., frames])
+        turns = np.empty((*self.turns.shape[:-1], len(frames)))
+        places = np.empty((*self.places.shape[:-1], len(frames)))
+        for link in links:
+            turns[link] = self.turns[link][..., frames]
+            places[link] = self.places[link][..., frames]
+        return Frames(self.tree, turns, places)
 
     def point(self, link: int, rest: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 T"]:
         """A point of a link, given where it is in the rest pose [m, world]."""
