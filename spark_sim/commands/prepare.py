@@ -9,10 +9,10 @@ USAGE = "SRC... -o DATASET [options]"
 DESCRIPTION = """\
 Read every BVH and FBX file below each SRC and write one dataset: 30 frames a
 second, bodies without fingers, hair and clothes, canonical rotations. Made for
-a folder of Mixamo downloads, one folder a character, and good for any tree of
-files. Characters and motions are split into those that training sees and those
-it doesn't: the paper's characters by name, all others drawn. A run that stopped
-goes on where it was."""
+Mixamo downloads, one folder a character, and good for any tree of files.
+Characters and motions are split into those that training sees and the others:
+the paper's characters by name, the rest drawn. A run that stopped goes on
+where it was."""
 EXAMPLES = """\
 examples:
   spark-sim prepare mixamo/ -o dataset
