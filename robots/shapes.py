@@ -29,8 +29,7 @@ def surface(mjcf: Mjcf, bodies: Iterable[int]) -> Float[np.ndarray, "P 3"]:
     geoms = np.flatnonzero(np.isin(model.geom_bodyid, list(bodies)))
     colliding = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
     points = [np.zeros((0, 3))]
-    for geom in colliding or list(geoms):
-        points.append(surface_of(model, data, int(geom)))
+    points.extend(surface_of(model, data, int(geom)) for geom in colliding or list(geoms))
     return np.concatenate(points)
 
 

@@ -246,7 +246,15 @@ SCENE = """\
 
 LEG_JOINTS = ("hip_pitch", "hip_roll", "hip_yaw", "knee", "ankle_pitch", "ankle_roll")
 WAIST_JOINTS = ("waist_yaw", "waist_roll", "waist_pitch")
-ARM_JOINTS = ("shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll", "wrist_pitch", "wrist_yaw")
+ARM_JOINTS = (
+    "shoulder_pitch",
+    "shoulder_roll",
+    "shoulder_yaw",
+    "elbow",
+    "wrist_roll",
+    "wrist_pitch",
+    "wrist_yaw",
+)
 CLASSES = {"hip": "leg", "knee": "leg", "ankle": "ankle", "waist": "waist", "wrist": "wrist"}
 
 

@@ -2,8 +2,9 @@
 
 Quaternions are wxyz, unit, Hamilton; matrices act on column vectors; angles are radians. `q_a_b`
 and `R_a_b` map b-coordinates into a, so `quat_mul(q_a_b, q_b_c)` is `q_a_c`. All functions
-broadcast over leading axes, keep the dtype and the device, and have finite values and gradients
-everywhere but where a rotation is truly undefined (the zero vector).
+broadcast over leading axes, keep the dtype and the device, and have finite values everywhere.
+Gradients are finite too, but for those of angles where these are undefined: Euler angles at their
+singularity, the heading of a body upside down.
 
 Sources: Shoemake 1985 (slerp); Shepperd 1978 (matrix to quaternion); Zhou et al. 2019, arXiv
 1812.07035 (6D); Dobrowolski 2015, arXiv 1506.05481 (swing and twist).
@@ -87,8 +88,7 @@ def quat_angle(q_a_b: Float[Any, "*#n 4"], q_a_c: Float[Any, "*#n 4"]) -> Float[
     """The angle in [0, pi] between two rotations, exact near 0 and near pi."""
     xp = array_namespace(q_a_b, q_a_c)
     relative = quat_mul(quat_conj(q_a_b), q_a_c)
-    vector = xp.sqrt(xp.sum(relative[..., 1:] ** 2, axis=-1))
-    return 2 * xp.atan2(vector, xp.abs(relative[..., 0]))
+    return 2 * xp.atan2(_norm(relative[..., 1:])[..., 0], xp.abs(relative[..., 0]))
 
 
 def quat_from_rotvec(rotvec: Float[Any, "*n 3"]) -> Float[Any, "*n 4"]:
@@ -129,26 +129,25 @@ def quat_slerp(
 def quat_between(u: Float[Any, "*#n 3"], v: Float[Any, "*#n 3"]) -> Float[Any, "*n 4"]:
     """The smallest rotation that takes the direction of `u` to that of `v`.
 
-    Opposite directions turn by pi about an axis orthogonal to `u`, chosen by `u` alone. A zero
-    vector gives the identity.
+    Opposite directions turn by pi about an axis orthogonal to `u`, chosen by `u` alone. Vectors
+    shorter than 1e-12 have no direction: the identity.
     """
     xp = array_namespace(u, v)
     u, v = xp.broadcast_arrays(u, v)
-    norm_u = xp.sqrt(xp.sum(u * u, axis=-1, keepdims=True))
-    norm_v = xp.sqrt(xp.sum(v * v, axis=-1, keepdims=True))
-    undefined = (norm_u == 0) | (norm_v == 0)
-    u = u / xp.where(norm_u == 0, xp.ones_like(norm_u), norm_u)
-    v = v / xp.where(norm_v == 0, xp.ones_like(norm_v), norm_v)
-    w = 1 + xp.sum(u * v, axis=-1, keepdims=True)
-    opposite = w < 1e-12
+    u, v = _unit(u), _unit(v)
+    short = xp.minimum(_norm(u), _norm(v)) < 0.5  # what `_unit` left alone
+    # (1 + u.v, u x v) by way of the sum, which keeps its digits where the two nearly cancel.
+    between = u + v
+    squared = xp.sum(between * between, axis=-1, keepdims=True)
+    opposite = squared < (16 * xp.finfo(u.dtype).eps) ** 2
     x, y, z = u[..., :1], u[..., 1:2], u[..., 2:]
     zero = xp.zeros_like(x)
     orthogonal = xp.where(
         xp.abs(x) > xp.abs(z), xp.concat([-y, x, zero], axis=-1), xp.concat([zero, -z, y], axis=-1)
     )
-    axis = xp.where(opposite, orthogonal, _cross(u, v))
-    q = xp.concat([xp.where(opposite, zero, w), axis], axis=-1)
-    return xp.where(undefined, quat_identity(q), quat_normalize(q))
+    axis = xp.where(opposite, orthogonal, _cross(u, between))
+    q = xp.concat([xp.where(opposite, zero, squared / 2), axis], axis=-1)
+    return xp.where(short, quat_identity(q), quat_normalize(q))
 
 
 def quat_swing_twist(
@@ -297,7 +296,16 @@ def _cross(u: Float[Any, "*n 3"], v: Float[Any, "*n 3"]) -> Float[Any, "*n 3"]:
     return xp.stack([b * f - c * e, c * d - a * f, a * e - b * d], axis=-1)
 
 
+def _norm(v: Float[Any, "*n k"]) -> Float[Any, "*n 1"]:
+    """The length; its gradient at zero is zero."""
+    xp = array_namespace(v)
+    squared = xp.sum(v * v, axis=-1, keepdims=True)
+    zero = squared == 0
+    return xp.where(zero, squared, xp.sqrt(xp.where(zero, xp.ones_like(squared), squared)))
+
+
 def _unit(v: Float[Any, "*n 3"]) -> Float[Any, "*n 3"]:
+    """The direction; vectors shorter than 1e-12 stay as they are."""
     xp = array_namespace(v)
     squared = xp.sum(v * v, axis=-1, keepdims=True)
     tiny = squared < 1e-24
