@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from robots.solve import Retargeted
+from robots.motion import RobotMotion
 from spark.files import write_atomically
 
 SCHEMA = "spark-sim qpos 1"
 
 
-def write_npz(motion: Retargeted, path: str | Path) -> None:
+def write_npz(motion: RobotMotion, path: str | Path) -> None:
     """Write MuJoCo's coordinates and what they mean; no pickle.
 
     `qpos` [T, nq] is position [m], quaternion wxyz, then joints [rad] in `joint_names`' order;

@@ -28,9 +28,11 @@ _SECOND = 0.5  # a second tree with this share of the joints is another robot
 
 @dataclass(frozen=True, eq=False)
 class Mjcf:
-    """A compiled model in which `root` is the body with the free joint of the one humanoid."""
+    """A compiled model and the spec it comes from; `root` is the body with the free joint of the
+    one humanoid."""
 
     model: mujoco.MjModel
+    spec: mujoco.MjSpec
     root: int
     path: Path
     notes: tuple[str, ...] = ()
@@ -97,7 +99,7 @@ def read_mjcf(path: str | Path, *, visuals: bool = True) -> Mjcf:
     _say_what_is_ignored(model, notes)
     if not np.isfinite(model.body_pos).all() or not np.isfinite(model.jnt_axis).all():
         raise FileFormatError(path, None, "a body's place is not a finite number")
-    return Mjcf(model, int(model.body(root).id), path, tuple(notes))
+    return Mjcf(model, spec, int(model.body(root).id), path, tuple(notes))
 
 
 def _drop_visuals(spec: mujoco.MjSpec) -> None:

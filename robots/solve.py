@@ -6,14 +6,13 @@ feet, the floor, limits; neighbours tied by their accelerations (`robots.objecti
 which the feet tie together, then arms and head, which hang on the trunk and don't move it.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from robots.footing import Footing, plan_footing
 from robots.morphology import Morphology
+from robots.motion import RobotMotion
 from robots.normal import Normal, Ties, second_differences
 from robots.objective import FAST, PATH, RUSH, SMOOTH, linearize
 from robots.project import project
@@ -32,33 +31,15 @@ _DAMPING = 1e-3
 _SHORT_OF_LIMIT = np.radians(0.75)
 
 
-@dataclass(frozen=True, eq=False)
-class Retargeted:
-    """A motion on a robot, with what was assumed on the way."""
-
-    robot: Morphology
-    coordinates: Coordinates
-    frame_time: float
-    notes: tuple[str, ...] = ()
-
-    def __len__(self) -> int:
-        return len(self.coordinates)
-
-    @property
-    def qpos(self) -> Float[np.ndarray, "T nq"]:
-        """MuJoCo's coordinates: position, quaternion wxyz, joints."""
-        return self.robot.to_qpos(self.coordinates)
-
-
-def copy(source: CanonicalMotion, robot: Morphology) -> Retargeted:
+def copy(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     """Each joint turned as its counterpart is, as far as its hinges can, and nothing more: the row
     to compare with."""
     targets = targets_of(source, robot)
     q = project(robot, targets.world, targets.hips)
-    return Retargeted(robot, q, source.frame_time, targets.notes)
+    return RobotMotion(robot, q, source.frame_time, targets.notes)
 
 
-def retarget(source: CanonicalMotion, robot: Morphology) -> Retargeted:
+def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     """The motion of `source` on a robot, its feet planted where the source's are, within limits."""
     targets = targets_of(source, robot)
     q = project(robot, targets.world, targets.hips)
@@ -66,7 +47,7 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> Retargeted:
     for stage, steps in zip(stages_of(robot), _STEPS, strict=True):
         if stage.joints or stage.base:
             q = solve_stage(robot, targets, footing, q, stage, steps)
-    return Retargeted(robot, q, source.frame_time, (*robot.notes, *targets.notes))
+    return RobotMotion(robot, q, source.frame_time, (*robot.notes, *targets.notes))
 
 
 def stages_of(robot: Morphology) -> tuple[Stage, Stage]:

@@ -14,7 +14,8 @@ import mujoco
 import numpy as np
 
 from robots.morphology import Morphology, understand_robot
-from robots.solve import Retargeted, copy, retarget
+from robots.motion import RobotMotion
+from robots.solve import copy, retarget
 from robots.targets import bone_directions
 from spark.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.recording import read_recording
@@ -75,7 +76,7 @@ def show(label: str, row: list[float]) -> None:
     print(f"{label:<21} {cells}", flush=True)
 
 
-def measure(source: CanonicalMotion, result: Retargeted, collisions: bool) -> list[float]:
+def measure(source: CanonicalMotion, result: RobotMotion, collisions: bool) -> list[float]:
     """The table's columns but for the last."""
     robot, dt = result.robot, source.frame_time
     theirs = canonical_positions(source)
@@ -110,7 +111,7 @@ def measure(source: CanonicalMotion, result: Retargeted, collisions: bool) -> li
     ]
 
 
-def sole_corners_by_mujoco(result: Retargeted) -> np.ndarray:
+def sole_corners_by_mujoco(result: RobotMotion) -> np.ndarray:
     """The soles' corners as MuJoCo's kinematics place them."""
     robot, model = result.robot, result.robot.mjcf.model
     data = mujoco.MjData(model)
@@ -129,7 +130,7 @@ def sole_corners_by_mujoco(result: Retargeted) -> np.ndarray:
     return out.reshape(len(result), len(robot.soles), -1, 3)
 
 
-def limb_error(source: CanonicalMotion, theirs: np.ndarray, result: Retargeted) -> float:
+def limb_error(source: CanonicalMotion, theirs: np.ndarray, result: RobotMotion) -> float:
     """Mean angle [deg] between the limbs' segments, after one yaw."""
     robot = result.robot
     wanted = bone_directions(source.rig, theirs, source.rotations)
@@ -162,7 +163,7 @@ def next_joint(roles: object, role: Role) -> int | None:
     return roles.joint(Role(f"{side}_{order[part]}"))  # type: ignore[attr-defined]
 
 
-def self_collision(result: Retargeted) -> float:
+def self_collision(result: RobotMotion) -> float:
     """Share of frames in which two bodies, not joined and not touching in the T-pose, are deeper
     than 1 cm in each other."""
     robot: Morphology = result.robot

@@ -51,6 +51,10 @@ class Clip:
         """The motion in SI units, Z up."""
         return self.recording.motion
 
+    @property
+    def body(self) -> None:
+        """A recording comes without a MuJoCo model: one is built from its rig."""
+
     @cached_property
     def rig(self) -> Rig:
         """Roles, groups and T-pose. Raises `SkeletonError` where the body is no humanoid."""

@@ -1,14 +1,51 @@
 """Robots as targets: any humanoid MuJoCo model."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from robots.formats import write_npz
 from robots.morphology import Morphology, understand_robot
-from robots.solve import Retargeted, retarget
+from robots.motion import RobotMotion
+from robots.solve import retarget
+from sim.given import GivenBody
 from spark.canonical import to_canonical
 from spark.errors import OutputError
+from spark.motion import Motion
+from spark.rig import Rig
 from spark_sim import files
 from spark_sim.clip import Clip, File, load
+
+
+@dataclass(frozen=True, eq=False)
+class RobotClip:
+    """A motion on a robot, with all that a `Clip` of a recording has."""
+
+    on_robot: RobotMotion
+    name: str
+
+    @property
+    def motion(self) -> Motion:
+        """The motion on the robot's rig."""
+        return self.on_robot.motion
+
+    @property
+    def rig(self) -> Rig:
+        """The robot as a rig."""
+        return self.on_robot.robot.rig
+
+    @property
+    def body(self) -> GivenBody:
+        """The robot's own model."""
+        return self.on_robot.body
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was assumed on the way."""
+        return self.on_robot.notes
+
+    def save(self, path: File, *, force: bool = False) -> Path:
+        """Write it as npz. Raises `OutputError` where `path` exists, unless forced."""
+        return save(self.on_robot, path, force=force)
 
 
 def load_robot(model: File) -> Morphology:
@@ -19,7 +56,7 @@ def load_robot(model: File) -> Morphology:
     return understand_robot(Path(model))
 
 
-def retarget_to_robot(source: Clip | File, robot: Morphology | File) -> Retargeted:
+def retarget_to_robot(source: Clip | File, robot: Morphology | File) -> RobotMotion:
     """The motion of `source` on a robot, within its limits, feet planted where the source's are.
 
     `qpos` of the result holds MuJoCo's coordinates: position [m], quaternion wxyz, joints [rad].
@@ -29,7 +66,7 @@ def retarget_to_robot(source: Clip | File, robot: Morphology | File) -> Retarget
     return retarget(to_canonical(source.motion, source.rig), robot)
 
 
-def save(motion: Retargeted, path: File, *, force: bool = False) -> Path:
+def save(motion: RobotMotion, path: File, *, force: bool = False) -> Path:
     """Write a robot's motion as npz. Raises `OutputError` where `path` exists, unless forced."""
     path = Path(path)
     if path.suffix.lower() != ".npz":

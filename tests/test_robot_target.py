@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import spark_sim
-from robots.solve import Retargeted
+from robots.motion import RobotMotion
 from spark.canonical import to_canonical
 from spark.errors import OutputError, SparkSimError
 from spark_sim.robot import load_robot, retarget_to_robot, save
@@ -70,12 +70,12 @@ def walk(tmp_path_factory: pytest.TempPathFactory) -> spark_sim.Clip:
 
 
 @pytest.fixture(scope="module")
-def moved(walk: spark_sim.Clip, model: Path) -> Retargeted:
+def moved(walk: spark_sim.Clip, model: Path) -> RobotMotion:
     return retarget_to_robot(walk, model)
 
 
 def test_a_walk_onto_hinges(
-    walk: spark_sim.Clip, moved: Retargeted, model: Path, tmp_path: Path
+    walk: spark_sim.Clip, moved: RobotMotion, model: Path, tmp_path: Path
 ) -> None:
     written = save(moved, tmp_path / "walk.npz")
     with np.load(written, allow_pickle=False) as stored:
@@ -128,7 +128,7 @@ def test_what_is_no_robot_is_refused(tmp_path: Path) -> None:
             load_robot(path)
 
 
-def test_only_npz_is_written(moved: Retargeted, tmp_path: Path) -> None:
+def test_only_npz_is_written(moved: RobotMotion, tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="npz"):
         save(moved, tmp_path / "walk.bvh")
     save(moved, tmp_path / "walk.npz")
