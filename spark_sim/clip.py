@@ -4,8 +4,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias, overload
 
+from robots import formats, registry
 from spark.bvh import write_bvh
 from spark.canonical import CanonicalMotion, from_canonical, to_canonical
 from spark.encoding import encode, encode_new
@@ -21,12 +22,13 @@ from spark_sim import files, rolemap
 
 if TYPE_CHECKING:
     from sim.report import Report
+    from spark_sim.robot import RobotClip
 
 File = str | Path
+AnyClip: TypeAlias = "Clip | RobotClip"  # the second is imported where it is needed
 METHODS = ("copy", "spark")
 
 _NOT_YET = {
-    ".xml": "MuJoCo models can't be read yet; expected a BVH or FBX file",
     ".glb": "glTF files can't be read yet; expected a BVH or FBX file",
     ".gltf": "glTF files can't be read yet; expected a BVH or FBX file",
     ".amc": "AMC files can't be read yet; expected a BVH or FBX file",
@@ -50,6 +52,11 @@ class Clip:
     def motion(self) -> Motion:
         """The motion in SI units, Z up."""
         return self.recording.motion
+
+    @property
+    def path(self) -> Path | None:
+        """The file that it was read from; None where it is a result."""
+        return None if self.given_rig is not None else self.recording.bvh.path
 
     @property
     def body(self) -> None:
@@ -91,14 +98,36 @@ class Clip:
 
 
 def load(
-    path: File, *, unit: str | float | None = None, up: str | None = None, roles: File | None = None
-) -> Clip:
-    """Read a BVH or FBX file. What is not given is inferred, and said in the clip's `notes`.
+    path: File,
+    *,
+    unit: str | float | None = None,
+    up: str | None = None,
+    roles: File | None = None,
+    robot: File | None = None,
+    quat: str | None = None,
+    fps: float | None = None,
+) -> AnyClip:
+    """Read a motion, or a body. What is not given is inferred, and said in the clip's `notes`.
 
-    `unit` is m, dm, cm, mm, inch, cmu or a number of metres; `up` is x, y or z; `roles` is a map of
-    joints in TOML, as `spark-sim inspect --save-map` writes it.
+    Of a BVH or FBX file, `unit` is m, dm, cm, mm, inch, cmu or a number of metres; `up` is x, y or
+    z; `roles` is a map of joints in TOML, as `spark-sim inspect --save-map` writes it.
+    Of a robot's own motion (.npz, .csv, .pkl), `robot` is its name or MJCF; `quat`, xyzw or wxyz,
+    and `fps` are what a CSV does not say.
+    A robot's name or MJCF alone yields one frame, in its T-pose.
     """
     path = Path(path)
+    given = {"unit": unit, "up": up, "roles": roles, "robot": robot, "quat": quat, "fps": fps}
+    for name, value in given.items():
+        if value is not None and name not in takes(path):
+            raise ConventionError(f"{path}: {name} can't be told of such a file; leave it out")
+    if registry.is_robot(path):
+        from spark_sim.robot import load_robot
+
+        return load_robot(path)
+    if path.suffix.lower() in formats.SUFFIXES:
+        from spark_sim.robot import load_motion
+
+        return load_motion(path, robot=robot, quat=quat, fps=fps)
     if path.suffix.lower() in _NOT_YET:
         raise FileFormatError(path, None, _NOT_YET[path.suffix.lower()])
     recording = read_motion(path, unit=unit, up=up)
@@ -106,18 +135,46 @@ def load(
     return Clip(recording, path.stem, names)
 
 
+def takes(path: File) -> tuple[str, ...]:
+    """What `load` can be told of such a file."""
+    if registry.is_robot(path):
+        return ()
+    suffix = Path(path).suffix.lower()
+    if suffix in formats.SUFFIXES:
+        return ("robot", "quat", "fps") if suffix == ".csv" else ("robot",)
+    return ("unit", "up", "roles")
+
+
+@overload
 def retarget(
-    source: Clip | File,
-    target: Clip | File,
+    source: "AnyClip | File",
+    target: Clip,
     *,
     method: str = "copy",
     checkpoint: File | None = None,
     refine: bool = True,
-) -> Clip:
+) -> Clip: ...
+@overload
+def retarget(
+    source: "AnyClip | File",
+    target: "AnyClip | File",
+    *,
+    method: str = "copy",
+    checkpoint: File | None = None,
+    refine: bool = True,
+) -> AnyClip: ...
+def retarget(
+    source: "AnyClip | File",
+    target: "AnyClip | File",
+    *,
+    method: str = "copy",
+    checkpoint: File | None = None,
+    refine: bool = True,
+) -> AnyClip:
     """The motion of `source` on the body of `target`, in the hierarchy and units of its file.
 
-    Both are clips, or paths of BVH files. Method "spark" is the network of `checkpoint`.
-    With `refine`, feet are held where the source's stand.
+    Both are clips, or what `load` takes: `target` may be a robot's name or MJCF. Method "spark" is
+    the network of `checkpoint`. With `refine`, feet are held where the source's stand.
     Raises `SkeletonError` where one is no humanoid.
     """
     if method not in METHODS:
@@ -125,6 +182,12 @@ def retarget(
     if (method == "spark") != (checkpoint is not None):
         raise ConventionError("a checkpoint goes with method 'spark', and with no other")
     source, target = _clip(source), _clip(target)
+    if not isinstance(target, Clip):
+        if checkpoint is not None:
+            raise ConventionError("method 'spark' is for characters; robots are solved for")
+        from spark_sim.robot import onto_robot
+
+        return onto_robot(source, target, refine=refine)
     canonical = to_canonical(source.motion, source.rig)
     if checkpoint is None:
         moved = transfer(canonical, target.rig)
@@ -154,9 +217,9 @@ def _learned(canonical: CanonicalMotion, target: Rig, checkpoint: Path) -> Canon
 
 
 def report(
-    clip: Clip | File,
+    clip: "AnyClip | File",
     *,
-    source: Clip | File | None = None,
+    source: "AnyClip | File | None" = None,
     html: File | None = None,
     force: bool = False,
 ) -> "Report":
@@ -182,7 +245,7 @@ def report(
 
 
 def play(
-    *clips: Clip | File,
+    *clips: "AnyClip | File",
     video: File | None = None,
     html: File | None = None,
     strip: File | None = None,
@@ -245,5 +308,5 @@ def sample(folder: File = "samples", *, force: bool = False) -> tuple[Path, ...]
     return tuple(written.values())
 
 
-def _clip(clip: Clip | File) -> Clip:
-    return clip if isinstance(clip, Clip) else load(clip)
+def _clip(clip: "AnyClip | File") -> AnyClip:
+    return load(clip) if isinstance(clip, str | Path) else clip

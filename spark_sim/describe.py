@@ -5,17 +5,19 @@ from typing import Any
 
 import numpy as np
 
+from spark.convention import Convention
 from spark.errors import SkeletonError
 from spark.rotation import quat_angle, quat_identity
-from spark_sim.clip import Clip
+from spark_sim.clip import AnyClip, Clip
 
 
-def describe(clip: Clip) -> dict[str, Any]:
+def describe(clip: "AnyClip") -> dict[str, Any]:
     """Facts of the file and of the body, ready for JSON. Angles are degrees.
 
     A body that is no humanoid has `"body": None` and the reason under `"refused"`.
     """
-    motion, convention = clip.motion, clip.recording.convention
+    motion = clip.motion
+    convention = clip.recording.convention if isinstance(clip, Clip) else Convention(1.0, "z")
     facts: dict[str, Any] = {
         "file": clip.name,
         "frames": len(motion),
@@ -34,7 +36,7 @@ def describe(clip: Clip) -> dict[str, Any]:
     except SkeletonError as error:
         return facts | {
             "refused": str(error.__cause__ or error),
-            "notes": list(clip.recording.notes),
+            "notes": list(clip.recording.notes) if isinstance(clip, Clip) else [],
         }
     turned = np.degrees(quat_angle(quat_identity(rig.tpose), rig.tpose))
     roles = rig.roles

@@ -1,27 +1,30 @@
-"""Robots as targets: any humanoid MuJoCo model."""
+"""Robots: any humanoid MuJoCo model, as a target or with a motion of its own."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
-from robots.formats import write_npz
-from robots.morphology import Morphology, understand_robot
+from robots import registry
+from robots.formats import dispatch, format_of
+from robots.morphology import understand_robot
 from robots.motion import RobotMotion
-from robots.solve import retarget
+from robots.solve import copy, retarget
 from sim.given import GivenBody
 from spark.canonical import to_canonical
-from spark.errors import OutputError
 from spark.motion import Motion
 from spark.rig import Rig
 from spark_sim import files
-from spark_sim.clip import Clip, File, load
+from spark_sim.clip import AnyClip, File
 
 
 @dataclass(frozen=True, eq=False)
 class RobotClip:
-    """A motion on a robot, with all that a `Clip` of a recording has."""
+    """A motion on a robot, with all that a `Clip` of a recording has. `path` is the file that the
+    motion comes from."""
 
     on_robot: RobotMotion
     name: str
+    path: Path | None = None
 
     @property
     def motion(self) -> Motion:
@@ -33,7 +36,7 @@ class RobotClip:
         """The robot as a rig."""
         return self.on_robot.robot.rig
 
-    @property
+    @cached_property
     def body(self) -> GivenBody:
         """The robot's own model."""
         return self.on_robot.body
@@ -43,34 +46,47 @@ class RobotClip:
         """What was assumed on the way."""
         return self.on_robot.notes
 
-    def save(self, path: File, *, force: bool = False) -> Path:
-        """Write it as npz. Raises `OutputError` where `path` exists, unless forced."""
-        return save(self.on_robot, path, force=force)
+    def save(self, path: File, *, force: bool = False, format: str | None = None) -> Path:
+        """Write it in one of `robots.formats.FORMATS`, or in the one that the ending says.
+
+        Raises `OutputError` where `path` exists, unless forced, or has another ending.
+        """
+        self.write(path, force=force, format=format)
+        return Path(path)
+
+    def write(
+        self, path: File, *, force: bool = False, format: str | None = None
+    ) -> tuple[str, ...]:
+        """`save`, with notes of what the file itself doesn't say."""
+        path = Path(path)
+        format_of(path, format)
+        files.claim(path, force=force)
+        return dispatch.write(self.on_robot, path, format=format, source=self.path)
 
 
-def load_robot(model: File) -> Morphology:
-    """What the humanoid of an MJCF file is; no configuration.
+def load_robot(robot: File) -> RobotClip:
+    """A robot by its name or its MJCF file: one frame, in its T-pose.
 
-    Raises `SparkSimError` where it does not compile, has no legs, or can't stand in a T-pose.
+    Raises `SparkSimError` where none is called that, or where its model does not compile, has no
+    legs, or can't stand in a T-pose.
     """
-    return understand_robot(Path(model))
+    found = understand_robot(registry.find(robot))
+    return RobotClip(RobotMotion(found, found.tpose, 1.0, found.notes), Path(robot).stem)
 
 
-def retarget_to_robot(source: Clip | File, robot: Morphology | File) -> RobotMotion:
-    """The motion of `source` on a robot, within its limits, feet planted where the source's are.
-
-    `qpos` of the result holds MuJoCo's coordinates: position [m], quaternion wxyz, joints [rad].
-    """
-    source = source if isinstance(source, Clip) else load(source)
-    robot = robot if isinstance(robot, Morphology) else load_robot(robot)
-    return retarget(to_canonical(source.motion, source.rig), robot)
-
-
-def save(motion: RobotMotion, path: File, *, force: bool = False) -> Path:
-    """Write a robot's motion as npz. Raises `OutputError` where `path` exists, unless forced."""
+def load_motion(
+    path: File, *, robot: File | None = None, quat: str | None = None, fps: float | None = None
+) -> RobotClip:
+    """A robot's own motion, of a file in any of `robots.formats`."""
     path = Path(path)
-    if path.suffix.lower() != ".npz":
-        raise OutputError(f"{path}: a robot's motion is written as .npz; name it so")
-    files.claim(path, force=force)
-    write_npz(motion, path)
-    return path
+    known = None if robot is None else understand_robot(registry.find(robot))
+    return RobotClip(dispatch.read(path, known, quat=quat, fps=fps), path.stem, path)
+
+
+def onto_robot(source: AnyClip, target: RobotClip, *, refine: bool) -> RobotClip:
+    """The motion of `source` on a robot: solved for as a whole, within limits, feet planted where
+    the source's are; without `refine`, only projected on the robot's hinges."""
+    canonical = to_canonical(source.motion, source.rig)
+    robot = target.on_robot.robot
+    moved = retarget(canonical, robot) if refine else copy(canonical, robot)
+    return RobotClip(moved, f"{source.name} on {target.name}", source.path)

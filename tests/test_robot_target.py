@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 import spark_sim
-from robots.motion import RobotMotion
 from spark.canonical import to_canonical
-from spark.errors import OutputError, SparkSimError
-from spark_sim.robot import load_robot, retarget_to_robot, save
+from spark.errors import SparkSimError
+from spark_sim.robot import RobotClip
 
 # A humanoid of hinges, 1.2 m high: hips and shoulders of three, knees, elbows and ankles.
 LEG = """
@@ -70,14 +69,16 @@ def walk(tmp_path_factory: pytest.TempPathFactory) -> spark_sim.Clip:
 
 
 @pytest.fixture(scope="module")
-def moved(walk: spark_sim.Clip, model: Path) -> RobotMotion:
-    return retarget_to_robot(walk, model)
+def moved(walk: spark_sim.Clip, model: Path) -> RobotClip:
+    result = spark_sim.retarget(walk, model)
+    assert isinstance(result, RobotClip)
+    return result
 
 
 def test_a_walk_onto_hinges(
-    walk: spark_sim.Clip, moved: RobotMotion, model: Path, tmp_path: Path
+    walk: spark_sim.Clip, moved: RobotClip, model: Path, tmp_path: Path
 ) -> None:
-    written = save(moved, tmp_path / "walk.npz")
+    written = moved.save(tmp_path / "walk.npz")
     with np.load(written, allow_pickle=False) as stored:
         qpos = stored["qpos"]
         about = json.loads(str(stored["about"]))
@@ -125,12 +126,4 @@ def test_what_is_no_robot_is_refused(tmp_path: Path) -> None:
         path = tmp_path / "bad.xml"
         path.write_text(text)
         with pytest.raises(SparkSimError, match=r"bad\.xml"):
-            load_robot(path)
-
-
-def test_only_npz_is_written(moved: RobotMotion, tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="npz"):
-        save(moved, tmp_path / "walk.bvh")
-    save(moved, tmp_path / "walk.npz")
-    with pytest.raises(OutputError, match="exists"):
-        save(moved, tmp_path / "walk.npz")
+            spark_sim.load(path)

@@ -29,9 +29,14 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
+    from spark.errors import SkeletonError
     from spark_sim import console
+    from spark_sim.clip import Clip
 
     out = Path(args.output or f"{Path(args.rig).stem}.xml")
-    for path in load(args, args.rig).save_mjcf(out, force=args.force):
+    rig = load(args, args.rig)
+    if not isinstance(rig, Clip):
+        raise SkeletonError(f"{args.rig}: a robot has a model already; expected a BVH or FBX file")
+    for path in rig.save_mjcf(out, force=args.force):
         console.say(str(path))
     return 0

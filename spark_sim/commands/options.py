@@ -4,7 +4,7 @@ from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from spark_sim.clip import Clip
+    from spark_sim.clip import AnyClip
 
 
 def add_corrections(parser: ArgumentParser, file: str, prefix: str = "") -> None:
@@ -31,19 +31,52 @@ def add_corrections(parser: ArgumentParser, file: str, prefix: str = "") -> None
     )
 
 
-def load(args: Namespace, path: str, prefix: str = "", *, humanoid: bool = True) -> "Clip":
+def add_robot_motion(parser: ArgumentParser, file: str, prefix: str = "") -> None:
+    """`--robot`, `--quat` and `--fps`: what `file` doesn't say where it is a robot's own motion.
+
+    A file that comes with the option `--NAME` has `--NAME-robot`, `--NAME-quat`, `--NAME-fps`.
+    """
+    dest = prefix.replace("-", "_")
+    group = parser.add_argument_group(f"for {file} of a robot (.npz, .csv, .pkl)")
+    group.add_argument(
+        f"--{prefix}robot",
+        dest=f"{dest}robot",
+        metavar="ROBOT",
+        help="the robot that moves: a name (`spark-sim robots`) or an MJCF; our .npz say it",
+    )
+    group.add_argument(
+        f"--{prefix}quat",
+        dest=f"{dest}quat",
+        choices=("xyzw", "wxyz"),
+        help="the order of a CSV's quaternions; Unitree's are xyzw",
+    )
+    group.add_argument(
+        f"--{prefix}fps", dest=f"{dest}fps", metavar="N", type=float, help="a CSV's frame rate"
+    )
+
+
+def load(args: Namespace, path: str, prefix: str = "", *, humanoid: bool = True) -> "AnyClip":
     """The clip of `path`, read with the corrections given; its notes go to stderr.
 
+    Options go to the kinds of file that they are for, so that one command takes several kinds.
     Raises `SkeletonError` where the body is no `humanoid` and must be one.
     """
     from spark_sim import clip, console
 
     given: dict[str, Any] = vars(args)
-    dest = prefix.replace("-", "_")
-    loaded = clip.load(
-        path, unit=given[f"{dest}unit"], up=given[f"{dest}up"], roles=given[f"{dest}map"]
-    )
-    console.notes(path, loaded.notes if humanoid else loaded.recording.notes)
+    wanted: dict[str, Any] = {}
+    for name in ("unit", "up", "roles", "robot", "quat", "fps"):
+        option = f"{prefix}{'map' if name == 'roles' else name}"
+        value = given.get(option.replace("-", "_"))
+        if value is not None and name in clip.takes(path):
+            wanted[name] = value
+        elif value is not None:
+            console.note(f"{path}: --{option} is not for such a file")
+    loaded = clip.load(path, **wanted)
+    if isinstance(loaded, clip.Clip) and not humanoid:
+        console.notes(path, loaded.recording.notes)
+    else:
+        console.notes(path, loaded.notes)
     return loaded
 
 

@@ -1,45 +1,65 @@
 """`spark-sim retarget`: motions onto another body."""
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from spark_sim.commands.options import add_corrections, add_force, add_json, load
+from robots.formats import FORMATS
+from spark_sim.commands.options import (
+    add_corrections,
+    add_force,
+    add_json,
+    add_robot_motion,
+    load,
+)
 
 if TYPE_CHECKING:
-    from spark_sim.clip import Clip
+    from spark_sim.clip import AnyClip
 
 SUMMARY = "put motions on another body"
 USAGE = "SRC... --to TARGET [-o OUT] [options]"
 DESCRIPTION = """\
-Put the motion of each SRC on the body of TARGET. Both may be any humanoid rig:
-joints are matched by what they are, not by name or order, and rest poses,
-axes, units and proportions may differ. The result is a BVH in TARGET's own
-hierarchy, channels, unit and axes."""
+Put the motion of each SRC on the body of TARGET. Both may be any humanoid rig
+or robot: joints are matched by what they are, not by name or order, and rest
+poses, axes, units and proportions may differ. The result is a BVH in TARGET's
+own hierarchy, channels, unit and axes; of a robot, its coordinates (.npz,
+.csv, .pkl)."""
 EXAMPLES = """\
 examples:
   spark-sim retarget walk.bvh --to mutant.bvh       # writes walk_on_mutant.bvh
   spark-sim retarget walk.bvh --to mutant.bvh -o out.bvh
   spark-sim retarget takes/ --to mutant.bvh -o out/ # every file below takes/
-  spark-sim retarget walk.bvh --to g1.xml           # a robot: walk_on_g1.npz
+  spark-sim retarget walk.bvh --to robot            # writes walk_on_robot.npz
+  spark-sim retarget walk.bvh --to unitree_g1 -o walk.csv
+  spark-sim retarget g1.csv --robot unitree_g1 --quat xyzw --fps 60 --to t1.xml
 """
 
 
 def configure(parser: ArgumentParser) -> None:
-    parser.add_argument("sources", metavar="SRC", nargs="+", help="BVH or FBX files, or folders")
+    parser.add_argument(
+        "sources", metavar="SRC", nargs="+", help="motions, or folders of BVH and FBX files"
+    )
     parser.add_argument(
         "--to",
         metavar="TARGET",
         required=True,
-        help="the body to put the motion on: a BVH or FBX file, or a humanoid robot's MJCF (.xml)",
+        help="the body to put the motion on: a BVH or FBX file, a robot's name "
+        "(`spark-sim robots`), or any humanoid robot's MJCF (.xml)",
     )
     parser.add_argument(
         "-o",
         "--output",
         metavar="OUT",
         help="the file to write; a folder for several motions "
-        "(default: SRC_on_TARGET.bvh in the current folder)",
+        "(default: SRC_on_TARGET.bvh, or .npz of a robot, in the current folder)",
+    )
+    parser.add_argument(
+        "--format",
+        choices=tuple(FORMATS),
+        metavar="NAME",
+        help="of a robot's motion, where the ending leaves it open: npz (default), mjlab (the npz "
+        "of BeyondMimic and mjlab), csv (Unitree's, xyzw; default), csv-wxyz, gmr (.pkl)",
     )
     parser.add_argument(
         "--method",
@@ -58,22 +78,30 @@ def configure(parser: ArgumentParser) -> None:
     add_force(parser)
     add_json(parser, "one line for each result")
     add_corrections(parser, "SRC")
+    add_robot_motion(parser, "SRC")
     add_corrections(parser, "TARGET", "to-")
 
 
 def run(args: Namespace) -> int:
-    from spark.errors import SparkSimError
+    from robots.formats import SUFFIXES, format_of
+    from robots.registry import is_robot
+    from spark.errors import OutputError, SparkSimError
     from spark_sim import console, files
 
-    jobs = _jobs(args.sources, Path(args.to), args.output)
+    robot = is_robot(args.to) or Path(args.to).suffix.lower() in SUFFIXES
+    if args.format is not None and not robot:
+        raise OutputError(f"--format is for robots; {args.to} is a character")
+    ending = FORMATS[args.format or "npz"] if robot else ".bvh"
+    jobs = _jobs(args.sources, Path(args.to), args.output, ending)
     for _, out in jobs:
         files.check_free(out, force=args.force)
-    robot = Path(args.to).suffix.lower() == ".xml"
-    onto = _robot(args) if robot else _body(args)
+        if robot:
+            format_of(out, args.format)
+    target = load(args, args.to, "to-")
     failures = 0
     for source, out in console.progress(jobs, "retarget"):
         try:
-            summary = onto(source, out)
+            summary = _retarget(args, source, target, out)
         except (SparkSimError, OSError) as error:
             if len(jobs) == 1:
                 raise
@@ -92,68 +120,45 @@ def run(args: Namespace) -> int:
     return 2 if failures else 0
 
 
-Onto = Callable[[Path, Path], dict[str, Any]]
-
-
-def _body(args: Namespace) -> Onto:
-    """Onto a character: the target is read once."""
-    target = load(args, args.to, "to-")
-    return lambda source, out: _retarget(args, source, target, out)
-
-
-def _robot(args: Namespace) -> Onto:
-    """Onto a robot: what its model is is found once."""
+def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> dict[str, Any]:
     from spark_sim import console
-    from spark_sim.robot import load_robot, retarget_to_robot, save
-
-    robot = load_robot(args.to)
-    console.notes(args.to, robot.notes)
-
-    def onto(source: Path, out: Path) -> dict[str, Any]:
-        clip = load(args, str(source))
-        result = retarget_to_robot(clip, robot)
-        save(result, out, force=args.force)
-        return {
-            "source": str(source),
-            "target": args.to,
-            "output": str(out),
-            "method": "trajectory",
-            "frames": len(result),
-            "fps": clip.motion.fps,
-            "source_joints": len(clip.motion.skeleton),
-            "joints": len(robot.joint_names),
-            "scale": robot.rig.hip_height / clip.rig.hip_height,
-            "notes": [*clip.notes, *result.notes],
-        }
-
-    return onto
-
-
-def _retarget(args: Namespace, source: Path, target: "Clip", out: Path) -> dict[str, Any]:
-    from spark_sim import console
-    from spark_sim.clip import retarget
+    from spark_sim.clip import Clip, retarget
 
     clip = load(args, str(source))
     result = retarget(
         clip, target, method=args.method, checkpoint=args.checkpoint, refine=args.refine
     )
-    console.notes(out, result.recording.notes)
-    result.save(out, force=args.force)
+    if isinstance(result, Clip):
+        console.notes(out, result.recording.notes)
+        result.save(out, force=args.force)
+    else:
+        console.notes(out, result.write(out, force=args.force, format=args.format))
     return {
         "source": str(source),
         "target": args.to,
         "output": str(out),
-        "method": args.method,
+        "method": args.method if isinstance(result, Clip) else "trajectory",
         "frames": len(result.motion),
         "fps": result.motion.fps,
-        "source_joints": len(clip.motion.skeleton),
-        "joints": len(result.motion.skeleton),
+        "source_joints": _joints(clip),
+        "joints": _joints(result),
         "scale": result.rig.hip_height / clip.rig.hip_height,
         "notes": [*clip.notes, *result.notes],
     }
 
 
-def _jobs(sources: Sequence[str], target: Path, output: str | None) -> list[tuple[Path, Path]]:
+def _joints(clip: "AnyClip") -> int:
+    """The joints of a skeleton, or the hinges of a robot."""
+    from spark_sim.clip import Clip
+
+    if isinstance(clip, Clip):
+        return len(clip.motion.skeleton)
+    return len(clip.on_robot.robot.joint_names)
+
+
+def _jobs(
+    sources: Sequence[str], target: Path, output: str | None, ending: str
+) -> list[tuple[Path, Path]]:
     """Pairs of a file to read and the file to write. Raises `OutputError` where two would collide.
 
     Below a folder given as a source the tree of folders is kept.
@@ -173,8 +178,7 @@ def _jobs(sources: Sequence[str], target: Path, output: str | None) -> list[tupl
     folder = Path(output or ".")
     if folder.is_file():
         raise OutputError(f"{folder}: is a file; expected a folder for {len(found)} motions")
-    suffix = ".npz" if target.suffix.lower() == ".xml" else ".bvh"
-    made = f"_on_{target.stem}{suffix}"
+    made = f"_on_{target.stem}{ending}"
     jobs = [(path, folder / below / f"{path.stem}{made}") for path, below in found]
     outputs: dict[Path, Path] = {}
     for path, out in jobs:

@@ -1,0 +1,157 @@
+"""Our own npz: MuJoCo's coordinates, and all that is needed to read them again."""
+
+import hashlib
+import io
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from robots import registry
+from robots.formats.arrays import number_array, scalar
+from robots.formats.qpos import check_finite, of_qpos, unit
+from robots.morphology import Morphology, understand_robot
+from robots.motion import RobotMotion
+from spark.errors import FileFormatError
+from spark.files import write_atomically
+
+SCHEMA = "spark-sim qpos 1"
+_INCLUDE = re.compile(rb"<include\s+file\s*=\s*[\"']([^\"']+)")
+
+
+def write_npz(motion: RobotMotion, path: Path, *, source: Path | None = None) -> None:
+    """Write MuJoCo's coordinates and what they mean; no pickle.
+
+    `qpos` [T, nq] is position [m], quaternion wxyz, then joints [rad] in `joint_names`' order;
+    `qvel` [T, nv] is the base's linear velocity in world axes, its angular one in its own, then the
+    joints', by central differences; `frame_time` [s] is the step. `about` is JSON: the robot's
+    name, its model and `source` with their SHA-256, the conventions, and what was assumed.
+    Raises `OutputError` where `path` can't be written.
+    """
+    model = motion.robot.mjcf.path
+    about = {
+        "schema": SCHEMA,
+        "robot": registry.name_of(model),
+        "model": str(model),
+        "model_sha256": model_sha256(model),
+        "source": None if source is None else source.name,
+        "source_sha256": None if source is None else _sha256(source),
+        "quaternion": "wxyz",
+        "length_unit": "m",
+        "angle_unit": "rad",
+        "up_axis": "z",
+        "qvel": "linear velocity in world axes, angular velocity in the body's",
+        "notes": motion.notes,
+    }
+    mjcf = motion.robot.mjcf
+    out = io.BytesIO()
+    np.savez_compressed(
+        out,
+        qpos=motion.qpos,
+        qvel=velocities(mjcf.model, motion.qpos, motion.frame_time),
+        frame_time=np.array(motion.frame_time),
+        fps=np.array(1 / motion.frame_time),
+        joint_names=np.array(motion.robot.joint_names),
+        body_names=np.array([mjcf.body_name(body) for body in mjcf.bodies()]),
+        about=np.array(json.dumps(about)),
+    )
+    write_atomically(path, out.getvalue())
+
+
+def read_npz(
+    arrays: dict[str, np.ndarray], path: Path, robot: Morphology | None = None
+) -> RobotMotion:
+    """The motion in the arrays of `path`, on `robot`, or on the one that it names.
+
+    A model that has changed since is noted; where it has other joints, `FileFormatError` is raised.
+    """
+    about = _about(arrays, path)
+    if robot is None:
+        robot = understand_robot(_model(about, path))
+    names = arrays.get("joint_names", np.array([])).tolist()
+    if names != list(robot.joint_names):
+        other = next((n for n in names if n not in robot.joint_names), None)
+        differs = f"its joint {other!r} is not there" if other else "the joints differ"
+        raise FileFormatError(
+            path,
+            None,
+            f"was made for {about.get('model')!r}, not for {str(robot.mjcf.path)!r}: {differs}",
+        )
+    model = robot.mjcf.model
+    qpos = number_array(arrays, "qpos", path, (None, int(model.nq)))
+    check_finite(path, qpos=qpos)
+    base = int(model.jnt_qposadr[robot.mjcf.free_joint])
+    turned, said = unit(qpos[:, base + 3 : base + 7], path)
+    qpos[:, base + 3 : base + 7] = turned
+    if about.get("model_sha256") != model_sha256(robot.mjcf.path):
+        said += (f"the model {robot.mjcf.path.name} has changed since this was written",)
+    frame_time = scalar(arrays, "frame_time", path)
+    if not (np.isfinite(frame_time) and frame_time > 0):
+        raise FileFormatError(path, None, f"frame_time is {frame_time:g} s, no time")
+    return of_qpos(qpos, robot, frame_time, path, said)
+
+
+def is_native(arrays: dict[str, np.ndarray]) -> bool:
+    """Whether an npz is one of ours."""
+    return "about" in arrays and "qpos" in arrays
+
+
+def velocities(
+    model: mujoco.MjModel, qpos: Float[np.ndarray, "T nq"], frame_time: float
+) -> Float[np.ndarray, "T nv"]:
+    """MuJoCo's qvel by central differences; at the ends, by the difference to the neighbour."""
+    qvel = np.zeros((len(qpos), model.nv))
+    for t in range(len(qpos)):
+        before, after = max(t - 1, 0), min(t + 1, len(qpos) - 1)
+        if after > before:
+            mujoco.mj_differentiatePos(
+                model, qvel[t], (after - before) * frame_time, qpos[before], qpos[after]
+            )
+    return qvel
+
+
+def model_sha256(path: Path) -> str:
+    """Of the MJCF and the files that it includes."""
+    return hashlib.sha256(b"".join(_with_included(path, set()))).hexdigest()
+
+
+def _with_included(path: Path, seen: set[Path]) -> list[bytes]:
+    if path in seen or not path.is_file():
+        return []
+    seen.add(path)
+    text = path.read_bytes()
+    included = [path.parent / name.decode(errors="replace") for name in _INCLUDE.findall(text)]
+    return [text, *(part for file in included for part in _with_included(file, seen))]
+
+
+def _sha256(path: Path) -> str | None:
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None
+
+
+def _about(arrays: dict[str, np.ndarray], path: Path) -> dict[str, Any]:
+    try:
+        about = json.loads(str(arrays["about"]))
+    except (KeyError, ValueError) as error:
+        raise FileFormatError(
+            path, None, "has no JSON under 'about'; expected one of ours"
+        ) from error
+    if not isinstance(about, dict) or about.get("schema") != SCHEMA:
+        schema = about.get("schema") if isinstance(about, dict) else None
+        raise FileFormatError(path, None, f"has the schema {schema!r}; expected {SCHEMA!r}")
+    return about
+
+
+def _model(about: dict[str, Any], path: Path) -> Path:
+    """The file of the robot that the motion was made for."""
+    name, model = about.get("robot"), about.get("model")
+    if isinstance(name, str):
+        return registry.find(name)
+    if isinstance(model, str) and Path(model).is_file():
+        return Path(model)
+    raise FileFormatError(
+        path, None, f"was made for the robot {model!r}, which is not there; name it with --robot"
+    )

@@ -1,0 +1,129 @@
+"""What all files of a robot's motion hold: a base, its rotation, and the angles of the hinges."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from robots.morphology import Morphology
+from robots.motion import RobotMotion
+from spark.errors import FileFormatError, OutputError
+
+_NOTED, _REFUSED = 1e-3, 0.05  # how far the norm of a quaternion may be from 1
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """A motion as tables have it: `pos` [m, world], `quat` (wxyz) of the root's body, and `angles`
+    [rad] of the hinges in the order of the MJCF; `frame_time` [s]."""
+
+    pos: Float[np.ndarray, "T 3"]
+    quat: Float[np.ndarray, "T 4"]
+    angles: Float[np.ndarray, "T N"]
+    frame_time: float
+
+
+def columns_of(motion: RobotMotion, path: Path) -> Columns:
+    """The motion as columns. Raises `OutputError` where the robot has ball joints."""
+    robot = motion.robot
+    if robot.tree.balls.any():
+        raise OutputError(
+            f"{path}: the robot has ball joints, and this format has hinges only; write our .npz"
+        )
+    base, joints = _addresses(robot)
+    qpos = motion.qpos
+    return Columns(
+        qpos[:, base : base + 3], qpos[:, base + 3 : base + 7], qpos[:, joints], motion.frame_time
+    )
+
+
+def motion_of(
+    columns: Columns, robot: Morphology, path: Path, notes: tuple[str, ...] = ()
+) -> RobotMotion:
+    """The motion on `robot`. Raises `FileFormatError` where a value is broken, or the columns are
+    not this robot's."""
+    joints = len(robot.joint_names)
+    if columns.angles.shape[1] != joints:
+        raise FileFormatError(
+            path,
+            None,
+            f"moves {columns.angles.shape[1]} joints; the robot {robot.mjcf.path.stem!r} has "
+            f"{joints}. Is it of another robot?",
+        )
+    check_finite(path, pos=columns.pos, quat=columns.quat, angles=columns.angles)
+    quat, said = unit(columns.quat, path)
+    base, at = _addresses(robot)
+    qpos = np.tile(robot.mjcf.model.qpos0, (len(quat), 1))
+    qpos[:, base : base + 3] = columns.pos
+    qpos[:, base + 3 : base + 7] = quat
+    qpos[:, at] = columns.angles
+    return of_qpos(qpos, robot, columns.frame_time, path, (*notes, *said))
+
+
+def of_qpos(
+    qpos: Float[np.ndarray, "T nq"],
+    robot: Morphology,
+    frame_time: float,
+    path: Path,
+    notes: tuple[str, ...] = (),
+) -> RobotMotion:
+    """The motion of MuJoCo's coordinates, with what is remarkable about them as notes."""
+    if not len(qpos):
+        raise FileFormatError(path, None, "holds no frames")
+    q = robot.from_qpos(qpos)
+    over = np.maximum(robot.tree.lower - q.angles, q.angles - robot.tree.upper)
+    over[:, robot.tree.balls] = 0.0
+    if over.size and over.max() > np.radians(1):
+        j = int(over.max(0).argmax())
+        notes += (
+            f"{robot.joint_names[j]!r} goes {np.degrees(over[:, j].max()):.0f} degrees beyond its "
+            "limit",
+        )
+    return RobotMotion(robot, q, frame_time, (*robot.notes, *notes))
+
+
+def frame_time_of(fps: float, path: Path) -> float:
+    """Seconds a frame. Raises `FileFormatError` where `fps` is no rate."""
+    if not (np.isfinite(fps) and 0 < fps < 1e6):
+        raise FileFormatError(path, None, f"fps is {fps:g}; expected a positive number")
+    return 1.0 / fps
+
+
+def check_finite(path: Path, **arrays: Float[np.ndarray, "T ..."]) -> None:
+    """Raise `FileFormatError` at the first value that is no finite number."""
+    for name, array in arrays.items():
+        bad = np.argwhere(~np.isfinite(array))
+        if len(bad):
+            frame, *place = bad[0].tolist()
+            raise FileFormatError(
+                path, None, f"{name}{place} is {array[tuple(bad[0])]} in frame {frame}"
+            )
+
+
+def unit(
+    quat: Float[np.ndarray, "T 4"], path: Path
+) -> tuple[Float[np.ndarray, "T 4"], tuple[str, ...]]:
+    """The quaternions at length 1, and a note where they were not. Raises `FileFormatError` where
+    they can't be rotations."""
+    norm = np.linalg.norm(quat, axis=1)
+    off = np.abs(norm - 1)
+    worst = int(off.argmax()) if len(off) else 0
+    if len(off) and off[worst] > _REFUSED:
+        raise FileFormatError(
+            path,
+            None,
+            f"the quaternion of frame {worst} has length {norm[worst]:.3g}; expected 1. Are "
+            "columns missing, or in another order?",
+        )
+    notes: tuple[str, ...] = ()
+    if len(off) and off[worst] > _NOTED:
+        notes = (f"quaternions are up to {off[worst]:.2g} off unit length: normalised",)
+    return quat / norm[:, None], notes
+
+
+def _addresses(robot: Morphology) -> tuple[int, list[int]]:
+    """Where the base and the hinges are in qpos."""
+    model = robot.mjcf.model
+    base = int(model.jnt_qposadr[robot.mjcf.free_joint])
+    return base, [int(model.jnt_qposadr[joint]) for joint in robot.mj_joints]
