@@ -21,20 +21,22 @@ from robots.tree import Coordinates, Frames, Tree, forward
 _APART = 0.006  # [m] that shapes keep between them; less where the T-pose has less
 _EASE = 0.003  # [m]
 _NEAR = 0.03  # [m] within which shapes are watched
-_MOST_SPHERES = 6
+_MOST_SPHERES = 6  # along a shape
+_ALL_SPHERES = 24
+_CORNER, _OUTSTANDING = 0.008, 0.006  # [m]
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
     """A shape that link `link` moves, in the rest pose's world [m]: inside all half-spaces
-    `sides . x <= reach`, covered by spheres, all of it within `bound` of `center`."""
+    `sides . x <= reach`, roughly covered by spheres, all of it within `bound` of `center`."""
 
     link: int
     body: int
     geom: int
     reach: Float[np.ndarray, "26"]
     spheres: Float[np.ndarray, "S 3"]
-    radius: float
+    radii: Float[np.ndarray, "S"]
     center: Float[np.ndarray, "3"]
     bound: float
 
@@ -66,7 +68,7 @@ class Collisions:
 
     def near(self, frames: Frames, stage: Stage, stride: int) -> list[Near]:
         """The pairs that the stage moves against each other, where they are near; looked for in
-        every `stride`-th frame."""
+        every `stride`-th frame. Parts that a later stage moves have to give way in that one."""
         count = frames.places.shape[2]
         some = frames.at(np.arange(0, count, stride))
         found = []
@@ -76,7 +78,8 @@ class Collisions:
         for pair in self.pairs:
             a, b = free[pair.small.link], free[pair.large.link]
             moves = tuple(j for j in a if j not in b), tuple(j for j in b if j not in a)
-            if not (moves[0] or moves[1]):
+            later = any(not stage.moves(link) for link in (pair.small.link, pair.large.link))
+            if not (moves[0] or moves[1]) or (stage.base and later):
                 continue
             reach = pair.small.bound + pair.apart + _NEAR
             between = centers[pair.small.geom] - centers[pair.large.geom]
@@ -86,8 +89,9 @@ class Collisions:
             middle = pair.small.center[None]
             looked = looked[_distance(self.tree, some, pair, middle, looked)[0][0] < reach]
             if len(looked):
-                over = _distance(self.tree, some, pair, pair.small.spheres, looked)[0].min(0)
-                looked = looked[over - pair.small.radius < pair.apart + _NEAR]
+                over = _distance(self.tree, some, pair, pair.small.spheres, looked)[0]
+                over = (over - pair.small.radii[:, None]).min(0)
+                looked = looked[over < pair.apart + _NEAR]
             if len(looked):
                 around = (looked[:, None] * stride + np.arange(-stride, stride + 1)).ravel()
                 found.append(Near(pair, moves, np.unique(np.clip(around, 0, count - 1))))
@@ -105,7 +109,7 @@ class Collisions:
         for near in nears:
             pair, at = near.pair, near.frames
             distance, side = _distance(self.tree, frames, pair, pair.small.spheres, at)
-            over = pair.apart + pair.small.radius - distance
+            over = pair.apart + pair.small.radii[:, None] - distance
             joints = (*near.moves[0], *near.moves[1])
             links = {pair.small.link, pair.large.link, *joints}
             links |= {int(self.tree.parents[j]) for j in joints}
@@ -184,7 +188,7 @@ def find_collisions(
             small, large = (a, b) if len(tree.chain(a.link)) >= len(tree.chain(b.link)) else (b, a)
             pair = Pair(small, large, _APART)
             now = _distance(tree, frames, pair, small.spheres, np.zeros(1, dtype=np.int64))[0]
-            pairs.append(replace(pair, apart=min(_APART, float(now.min()) - small.radius)))
+            pairs.append(replace(pair, apart=min(_APART, float((now[:, 0] - small.radii).min()))))
     return Collisions(tree, tuple(pairs))
 
 
@@ -227,16 +231,36 @@ def _shape(link: int, body: int, geom: int, points: Float[np.ndarray, "P 3"]) ->
         grids.append(np.linspace(-spare, spare, count) if count > 1 else np.zeros(1))
     across, along = (grid.ravel() for grid in np.meshgrid(*grids))
     spheres = center + np.outer(across, axes[:, order[1]]) + np.outer(along, axes[:, order[2]])
+    reach = (DIRECTIONS @ points.T).max(1)
+    spheres, radii = _with_corners(spheres, np.full(len(spheres), radius), points, reach)
     return Shape(
         link=link,
         body=body,
         geom=geom,
-        reach=(DIRECTIONS @ points.T).max(1),
+        reach=reach,
         spheres=spheres,
-        radius=radius,
+        radii=radii,
         center=center,
         bound=float(np.linalg.norm(half)),
     )
+
+
+def _with_corners(
+    spheres: Float[np.ndarray, "S 3"],
+    radii: Float[np.ndarray, "S"],
+    points: Float[np.ndarray, "P 3"],
+    reach: Float[np.ndarray, "26"],
+) -> tuple[Float[np.ndarray, "R 3"], Float[np.ndarray, "R"]]:
+    """With small spheres where the shape stands out from the ones that it has."""
+    while len(spheres) < _ALL_SPHERES:
+        short = reach - ((DIRECTIONS @ spheres.T) + radii).max(1)
+        side = int(short.argmax())
+        if short[side] < _OUTSTANDING:
+            break
+        corner = points[int((points @ DIRECTIONS[side]).argmax())]
+        spheres = np.concatenate([spheres, [corner - _CORNER * DIRECTIONS[side]]])
+        radii = np.append(radii, _CORNER)
+    return spheres, radii
 
 
 def _meet(mjcf: Mjcf, a: Shape, b: Shape) -> bool:

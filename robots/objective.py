@@ -38,8 +38,9 @@ LIMIT, MARGIN = 8.0, np.radians(2.0)  # of a hinge near its limit
 CLAP, NEAR = 4.0, 0.12  # of hands [1 / m] that are as near as this [m]
 TOUCH = 40.0  # of parts that run into each other [1 / m]
 IDLE = 0.02  # of hinges that nothing else asks for: stay as in the T-pose
-SMOOTH = 6.0  # [Hz] above which a limb's motion fades
-FAST, RUSH = 10.0, 0.15  # [rad/s] above which a hinge is held back, and how much [s]
+SMOOTH = 4.5  # [Hz] above which a limb's motion fades
+CALM = 2.0  # [Hz] above which a limb that gives way to another does not
+FAST, RUSH = 12.0, 0.3  # [rad/s] above which a hinge is held back, and how much [s]
 
 
 class Block:

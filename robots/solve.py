@@ -10,11 +10,12 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
+from robots.collision import Near
 from robots.footing import Footing, plan_footing
 from robots.morphology import Morphology
 from robots.motion import RobotMotion
 from robots.normal import Normal, Ties, second_differences
-from robots.objective import FAST, PATH, RUSH, SMOOTH, linearize
+from robots.objective import CALM, FAST, PATH, RUSH, SMOOTH, linearize
 from robots.project import project
 from robots.stage import Stage
 from robots.targets import Targets, chest_of, targets_of
@@ -42,11 +43,12 @@ def copy(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
 def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     """The motion of `source` on a robot, its feet planted where the source's are, within limits."""
     targets = targets_of(source, robot)
-    q = project(robot, targets.world, targets.hips)
+    q = unhurried(robot, project(robot, targets.world, targets.hips), targets.frame_time)
     footing = plan_footing(robot, targets)
     for stage, steps in zip(stages_of(robot), _STEPS, strict=True):
         if stage.joints or stage.base:
-            q = solve_stage(robot, targets, footing, q, stage, steps)
+            q = solve_stage(robot, targets, footing, q, stage, steps, apart=False)
+            q = solve_stage(robot, targets, footing, q, stage, steps, apart=True)
     return RobotMotion(robot, q, source.frame_time, (*robot.notes, *targets.notes))
 
 
@@ -68,8 +70,13 @@ def solve_stage(
     q: Coordinates,
     stage: Stage,
     most: int,
+    *,
+    apart: bool,
 ) -> Coordinates:
     """Gauss-Newton in the stage's columns, from `q`, damped where it would do harm.
+
+    With `apart`, parts that run into each other give way, without haste: what changes `q` is
+    smoother than `q`.
 
     A step is judged where it is taken: frames whose surroundings get worse keep their place, and
     are damped more from then on (Levenberg and Marquardt's rule, a frame).
@@ -78,16 +85,21 @@ def solve_stage(
     window = max(1, 2 * round(_AROUND / targets.frame_time) + 1)
     damping = np.full(len(q), _DAMPING)
 
+    start = q if apart else None
+    nears: list[Near] = []
+
     def look(q: Coordinates, rows: bool) -> tuple[Normal, Ties, Float[np.ndarray, "T"]]:
         normal = linearize(robot, targets, footing, q, stage, nears, rows=rows)
-        ties = ties_of(robot, q, targets.frame_time, stage.columns)
+        ties = ties_of(robot, q, start, targets.frame_time, stage.columns)
         return normal, ties, uniform_filter1d(normal.cost + ties.cost(len(q)), window)
 
     last = np.inf
     stride = max(1, round(_LOOK / targets.frame_time))
     for k in range(most):
-        if k % 3 == 0:
+        if apart and k % 3 == 0:
             nears = robot.collisions.near(forward(tree, q), stage, stride)
+            if not nears:
+                break
         normal, ties, cost = look(q, rows=True)
         limits = q.at_limits(tree, _SHORT_OF_LIMIT)[:, stage.columns]
         step = np.zeros((len(q), tree.size))
@@ -113,14 +125,41 @@ def eased(scale: Float[np.ndarray, "T"], window: int) -> Float[np.ndarray, "T"]:
     return uniform_filter1d(least, window, mode="nearest")
 
 
-def ties_of(robot: Morphology, q: Coordinates, frame_time: float, columns: list[int]) -> Ties:
-    """What ties the frames of `q` together, in some columns."""
+def ties_of(
+    robot: Morphology,
+    q: Coordinates,
+    start: Coordinates | None,
+    frame_time: float,
+    columns: list[int],
+) -> Ties:
+    """What ties the frames of `q` together, in some columns: it is smooth and, where there is a
+    `start`, its difference to that is smoother still."""
+    weights = smoothness(robot)[columns] / frame_time**2
+    bends = accelerations(robot, q)[:, columns]
+    if start is not None:
+        # Two squares, w² |a|² + c² |a - a0|², are one around c² / (w² + c²) a0.
+        share = 1.0 / (1.0 + (CALM / SMOOTH) ** 4)
+        weights = weights / np.sqrt(1.0 - share)
+        bends -= share * accelerations(robot, start)[:, columns]
     return Ties(
-        smoothness(robot)[columns] / frame_time**2,
-        accelerations(robot, q)[:, columns],
+        weights,
+        bends,
         RUSH / frame_time,
         rush(robot, q, frame_time)[:, columns],
     )
+
+
+def unhurried(robot: Morphology, q: Coordinates, frame_time: float) -> Coordinates:
+    """The nearest hinge angles that turn at most `FAST`: the mean of what is as fast above and
+    below. Jumps from one limit to the other become ramps, which the solver can bend."""
+    time = FAST * frame_time * np.arange(len(q))[:, None]
+
+    def below(angles: Float[np.ndarray, "T N"]) -> Float[np.ndarray, "T N"]:
+        ahead = np.minimum.accumulate(angles - time) + time
+        return np.minimum.accumulate((ahead + time)[::-1])[::-1] - time
+
+    angles = np.where(robot.tree.balls, q.angles, (below(q.angles) - below(-q.angles)) / 2)
+    return Coordinates(q.pos, q.quat, angles, q.turns)
 
 
 def smoothness(robot: Morphology) -> Float[np.ndarray, "D"]:

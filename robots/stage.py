@@ -30,6 +30,10 @@ class Stage:
         """The free joints on the way to a link."""
         return tuple(j for j in self.tree.chain(link) if j in self._free)
 
+    def moves(self, link: int) -> bool:
+        """Whether all joints on the way to a link are free."""
+        return len(self.free(link)) == len(self.tree.chain(link))
+
     def turning(self, joints: tuple[int, ...]) -> list[int]:
         """Where the columns of some joints are among the stage's."""
         return [self.columns.index(column) for column in self.tree.columns(joints)]
