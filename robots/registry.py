@@ -56,7 +56,7 @@ def _menagerie(name: str, joints: int, height: float, licence: str, file: str) -
 
 
 ENTRIES = (
-    Entry(DEFAULT, 29, 1.32, "MIT", "spark-sim", "robots", "ember/ember.xml", "spark-sim"),
+    Entry(DEFAULT, 29, 1.32, "MIT", "spark-sim: Ember", "robots", "ember/ember.xml", "spark-sim"),
     _menagerie("unitree_g1", 29, 1.32, "BSD-3-Clause", "unitree_g1/g1.xml"),
     _menagerie("unitree_h1", 19, 1.80, "BSD-3-Clause", "unitree_h1/h1.xml"),
     _menagerie("booster_t1", 23, 1.17, "Apache-2.0", "booster_t1/t1.xml"),

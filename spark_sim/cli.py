@@ -8,9 +8,9 @@ from typing import Any, NoReturn
 
 from spark.errors import SparkSimError
 from spark_sim import console
-from spark_sim.commands import inspect, mjcf, play, prepare, report, retarget, sample, train
+from spark_sim.commands import inspect, mjcf, play, prepare, report, retarget, robots, sample, train
 
-COMMANDS = (retarget, inspect, report, play, mjcf, sample, prepare, train)
+COMMANDS = (retarget, robots, inspect, report, play, mjcf, sample, prepare, train)
 
 DESCRIPTION = "Put a human motion on another body and measure how believable the result is."
 
@@ -18,6 +18,7 @@ EXAMPLES = """\
 examples:
   spark-sim sample                              # demo motions to play with
   spark-sim retarget walk.bvh --to mutant.bvh   # another body, any rig
+  spark-sim retarget walk.bvh --to robot        # a humanoid robot
   spark-sim play walk.bvh walk_on_mutant.bvh    # watch both, side by side
   spark-sim report walk_on_mutant.bvh --source walk.bvh
 

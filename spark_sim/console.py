@@ -48,6 +48,16 @@ def _line(text: str, stream: TextIO) -> None:
         print(text, file=stream, flush=True)
 
 
+def columns(rows: Sequence[tuple[str, ...]]) -> list[str]:
+    """Lines of a table, each column as wide as its widest cell."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  "
+        + "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
 def uses_color() -> bool:
     """Whether stdout is a terminal whose user did not turn colours off (no-color.org)."""
     wanted = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"

@@ -1,6 +1,5 @@
 """What is understood of a clip: as data, and as text for people."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,7 @@ from spark.convention import Convention
 from spark.errors import SkeletonError
 from spark.rotation import quat_angle, quat_identity
 from spark_sim.clip import AnyClip, Clip
+from spark_sim.console import columns
 
 
 def describe(clip: "AnyClip") -> dict[str, Any]:
@@ -88,17 +88,8 @@ def text(facts: dict[str, Any]) -> str:
         *head,
         f"  hips {body['hip_height']:.3g} m above the soles; {body['carrier']} carries the body",
         "",
-        *_columns(rows),
+        *columns(rows),
     ]
     if others:
         lines += ["", f"  follow their parents: {', '.join(others)}"]
     return "\n".join(lines)
-
-
-def _columns(rows: Sequence[tuple[str, ...]]) -> list[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  "
-        + "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
