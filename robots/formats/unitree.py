@@ -18,6 +18,7 @@ from spark.files import write_atomically
 ORDERS = ("xyzw", "wxyz")
 _BASE = 7
 _UPRIGHT = 0.5  # cosine of the mean tilt of a trunk that mostly stands
+_CLEARLY = 0.3  # how much less it is where quaternions are read in the wrong order
 
 
 def write_csv(motion: RobotMotion, path: Path, *, quat: str = "xyzw") -> None:
@@ -36,20 +37,25 @@ def read_csv(path: Path, robot: Morphology, *, quat: str, fps: float) -> RobotMo
         raise ConventionError(f"quaternion order {quat!r} is not known; expected xyzw or wxyz")
     table = _table(path)
     notes: tuple[str, ...] = ()
-    other = ORDERS[1 - ORDERS.index(quat)]
-    if uprightness(table, quat) < -_UPRIGHT and uprightness(table, other) > _UPRIGHT:
-        notes = (f"read as {quat} the robot is upside down, as {other} upright: is it {other}?",)
+    likely = upright_order(table)
+    if likely not in (quat, None):
+        notes = (f"read as {quat} the robot does not stand upright, as {likely} it does",)
     turned = _wxyz(table, quat)
     columns = Columns(table[:, :3], turned, table[:, _BASE:], frame_time_of(fps, path))
     return motion_of(columns, robot, path, notes)
 
 
 def likely_order(path: Path) -> str | None:
-    """The order in which the trunk stands upright, where it does not in the other one."""
-    table = _table(path)
+    """What `upright_order` says of a file."""
+    return upright_order(_table(path))
+
+
+def upright_order(table: Float[np.ndarray, "T C"]) -> str | None:
+    """The order in which the trunk mostly stands upright, where it does not in the other one."""
     upright = {order: uprightness(table, order) for order in ORDERS}
     best, other = sorted(ORDERS, key=lambda order: -upright[order])
-    return best if upright[best] > _UPRIGHT > upright[other] else None
+    clear = upright[best] > _UPRIGHT and upright[best] - upright[other] > _CLEARLY
+    return best if clear else None
 
 
 def uprightness(table: Float[np.ndarray, "T C"], quat: str) -> float:
