@@ -1,4 +1,7 @@
-"""One self-contained web page with a 3D replay: opens offline, in any browser, on a phone too."""
+"""One self-contained web page with a 3D replay: opens offline, in any browser, on a phone too.
+
+It holds the scene's bodies, shapes and joint coordinates; the page does the kinematics and draws.
+"""
 
 import base64
 import html
@@ -13,12 +16,18 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from sim.scene import Figure, Scene, build_scene
+from sim.scene import Figure, Placed, Scene, build_scene
 from spark.errors import OutputError
-from spark.kinematics import forward
 
-_Point = tuple[int, Float[np.ndarray, "3"]]  # a geom, and a place in its own axes
-_STEPS = 32000  # positions are kept as 16-bit integers
+_STEPS = 32000  # coordinates are kept as 16-bit integers
+_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+_PRIMITIVES = {
+    int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
+    int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",
+    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): "ellipsoid",
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
+    int(mujoco.mjtGeom.mjGEOM_BOX): "box",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,19 +61,19 @@ def page(
     sets the time, and messages `{time: seconds}` tell it.
     """
     scene = build_scene(figures, max_fps=30.0)
-    colors: list[list[int]] = []
+    meshes: dict[bytes, dict[str, Any]] = {}
     data = {
         "frames": len(scene.qpos),
         "frame_time": scene.frame_time,
         "distance": 1.65 * max(scene.width, scene.height),
         "height": scene.height,
         "figures": [
-            _figure(scene, k, figure, mark, colors)
-            for k, (figure, mark) in enumerate(
-                zip(figures, marks or [None] * len(figures), strict=True)
+            _figure(scene, placed, figure, mark, meshes)
+            for placed, figure, mark in zip(
+                scene.placed, figures, marks or [None] * len(figures), strict=True
             )
         ],
-        "colors": colors,
+        "meshes": list(meshes.values()),
     }
     template = (files("sim") / "page.html").read_text(encoding="utf-8")
     packed = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
@@ -72,81 +81,104 @@ def page(
 
 
 def _figure(
-    scene: Scene, k: int, figure: Figure, marks: Marks | None, colors: list[list[int]]
+    scene: Scene,
+    placed: Placed,
+    figure: Figure,
+    marks: Marks | None,
+    meshes: dict[bytes, dict[str, Any]],
 ) -> dict[str, Any]:
-    """One figure's bones as pairs of points, and the paths of these points."""
-    model = scene.model
-    geoms = [
-        g
-        for g in range(model.ngeom)
-        if model.geom(g).bodyid[0]
-        and model.body(int(model.geom(g).bodyid[0])).name.startswith(f"{k}_")
-    ]
-    local: list[_Point] = []
-    bones: list[tuple[int, int, float, int]] = []
-    soles: list[list[int]] = []
-    for g in geoms:
-        kind, size = int(model.geom_type[g]), model.geom_size[g]
-        color = [round(255 * float(c)) for c in model.geom_rgba[g][:3]]
-        if color not in colors:
-            colors.append(color)
-        along, radius = _axis(kind, size)
-        bones.append((1 + len(local), 2 + len(local), round(radius, 4), colors.index(color)))
-        local += [(g, -along), (g, along)]
-        if kind == int(mujoco.mjtGeom.mjGEOM_BOX):
-            corners = ((1, 1), (1, -1), (-1, -1), (-1, 1))
-            soles.append(list(range(1 + len(local), 5 + len(local))))
-            local += [(g, size * np.array([x, y, -1])) for x, y in corners]
-    positions = _paths(scene, geoms[0], local)
-    out = {"label": figure.label, "bones": bones, "soles": soles, **_packed(positions)}
+    """A figure's tree of bodies, what they look like, and its coordinates in every frame."""
+    model, bodies = scene.model, placed.bodies
+    qpos = scene.qpos[:, placed.columns]
+    angles = float(max(np.abs(qpos[:, 3:]).max(), 1.0)) / _STEPS
+    whole = np.round(qpos[:, 3:] / angles).astype("<i2")
+    out = {
+        "label": figure.label,
+        "alpha": float(model.geom_rgba[model.geom_bodyid == bodies[0], 3].min(initial=1.0)),
+        "bodies": [_body(model, b, bodies[0], placed.columns.start) for b in bodies],
+        "geoms": [
+            _geom(model, g, bodies[0], meshes)
+            for g in range(model.ngeom)
+            if int(model.geom_bodyid[g]) in bodies
+        ],
+        "root": _packed(qpos[:, :3]),
+        "angles": angles,
+        "joints": base64.b64encode(whole.tobytes()).decode(),
+    }
     if marks is not None:
-        root = forward(figure.motion.frames(0, 1))[0][0, figure.rig.carrier]
         times = np.arange(len(scene.qpos)) * scene.frame_time
         frames = np.round(times / figure.motion.frame_time).astype(int)
         frames = np.minimum(frames, len(figure.motion) - 1)
         out["marks"] = {
-            **_packed(marks.points[frames] + (positions[0, 0] - root)),
+            **_packed(placed(marks.points[frames])),
             "states": base64.b64encode(marks.states[frames].tobytes()).decode(),
             "flags": [marks.flags[t] for t in frames],
         }
     return out
 
 
-def _packed(positions: Float[np.ndarray, "T P 3"]) -> dict[str, Any]:
-    """Positions as 16-bit integers: `origin + scale * integer`."""
-    low, high = positions.min((0, 1)), positions.max((0, 1))
-    scale = float(max((high - low).max() / (2 * _STEPS), 1e-9))
-    origin = (low + high) / 2
-    whole = np.round((positions - origin) / scale).astype("<i2")
+def _body(model: mujoco.MjModel, body: int, root: int, column: int) -> dict[str, Any]:
+    """A body in its parent, -1 for the world, and the joints that move it; `at` counts the figure's
+    own coordinates."""
     return {
-        "scale": scale,
-        "origin": [round(float(v), 5) for v in origin],
-        "positions": base64.b64encode(whole.tobytes()).decode(),
+        "parent": int(model.body_parentid[body]) - root if body > root else -1,
+        "pos": _short(model.body_pos[body]),
+        "quat": _short(model.body_quat[body]),
+        "joints": [
+            {
+                "type": int(model.jnt_type[j]),
+                "pos": _short(model.jnt_pos[j]),
+                "axis": _short(model.jnt_axis[j]),
+                "ref": float(model.qpos0[model.jnt_qposadr[j]]),
+                "at": int(model.jnt_qposadr[j]) - column,
+            }
+            for j in range(model.njnt)
+            if int(model.jnt_bodyid[j]) == body
+        ],
     }
 
 
-def _axis(kind: int, size: Float[np.ndarray, "3"]) -> tuple[Float[np.ndarray, "3"], float]:
-    """Half of the line that a shape is drawn as, in its own axes, and how thick."""
-    if kind == int(mujoco.mjtGeom.mjGEOM_CAPSULE):
-        return np.array([0, 0, float(size[1])]), float(size[0])
-    if kind == int(mujoco.mjtGeom.mjGEOM_BOX):
-        radius = float(max(size[2], 0.5 * size[1]))
-        return np.array([max(float(size[0]) - radius, 0.0), 0, 0]), radius
-    radius = float(size[:2].mean())
-    return np.array([0, 0, max(float(size[2]) - radius, 0.0)]), radius
+def _geom(
+    model: mujoco.MjModel, geom: int, root: int, meshes: dict[bytes, dict[str, Any]]
+) -> dict[str, Any]:
+    kind = int(model.geom_type[geom])
+    out = {
+        "body": int(model.geom_bodyid[geom]) - root,
+        "pos": _short(model.geom_pos[geom]),
+        "quat": _short(model.geom_quat[geom]),
+        "rgb": [round(255 * float(c)) for c in model.geom_rgba[geom][:3]],
+    }
+    if kind != _MESH:
+        return {**out, "shape": _PRIMITIVES[kind], "size": _short(model.geom_size[geom])}
+    mesh = int(model.geom_dataid[geom])
+    start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+    first, number = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+    vertices = model.mesh_vert[start : start + count].astype(float)
+    faces = model.mesh_face[first : first + number].astype("<u4" if count > 65535 else "<u2")
+    # The same mesh of several figures is kept once.
+    key = vertices.tobytes() + faces.tobytes()
+    if key not in meshes:
+        meshes[key] = {
+            **_packed(vertices),
+            "faces": base64.b64encode(faces.tobytes()).decode(),
+            "wide": count > 65535,
+        }
+    return {**out, "shape": "mesh", "mesh": list(meshes).index(key)}
 
 
-def _paths(scene: Scene, first: int, local: list[_Point]) -> Float[np.ndarray, "T P 3"]:
-    """Where the points are in every frame; the figure's root first."""
-    model, data = scene.model, mujoco.MjData(scene.model)
-    geoms = np.array([g for g, _ in local])
-    offsets = np.array([offset for _, offset in local])
-    root = int(model.body_rootid[model.geom_bodyid[first]])
-    out = np.empty((len(scene.qpos), 1 + len(local), 3))
-    for t, qpos in enumerate(scene.qpos):
-        data.qpos[:] = qpos
-        mujoco.mj_kinematics(model, data)
-        out[t, 0] = data.xpos[root]
-        rotations = data.geom_xmat[geoms].reshape(-1, 3, 3)
-        out[t, 1:] = data.geom_xpos[geoms] + np.einsum("pij,pj->pi", rotations, offsets)
-    return out
+def _short(values: Float[np.ndarray, "N"]) -> list[float]:
+    return [round(float(v), 6) for v in values]
+
+
+def _packed(points: Float[np.ndarray, "*N 3"]) -> dict[str, Any]:
+    """Points as 16-bit integers: `origin + scale * integer`."""
+    axes = tuple(range(points.ndim - 1))
+    low, high = points.min(axes), points.max(axes)
+    scale = float(max((high - low).max() / (2 * _STEPS), 1e-9))
+    origin = (low + high) / 2
+    whole = np.round((points - origin) / scale).astype("<i2")
+    return {
+        "scale": scale,
+        "origin": _short(origin),
+        "points": base64.b64encode(whole.tobytes()).decode(),
+    }

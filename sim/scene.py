@@ -5,27 +5,55 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from sim.body import build_body
+from sim.display import add_display
+from sim.given import GivenBody
 from sim.pose import qpos_from_motion
 from spark.errors import SkeletonError
 from spark.feet import standing_height
+from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig import Rig
-from spark.rotation import quat_slerp
+from spark.rotation import quat_about, quat_conj, quat_mul, quat_rotate, quat_slerp
 
-_SPACING = 0.8  # of standing heights, between neighbours
+_SPACING = 0.8  # of the mean of two neighbours' standing heights, between them
+_HINGE_LIKE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+_FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """A motion on its rig, with what to call it and where its floor is [m]."""
+    """A motion on its rig, with what to call it and where its floor is [m].
+
+    Where `body` is given it is what is seen, else a body is built from the rig. A `ghost` is seen
+    through, and stands where the figure before it stands.
+    """
 
     rig: Rig
     motion: Motion
     label: str
     floor_z: float = 0.0
+    body: GivenBody | None = None
+    ghost: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """How a figure's own world lies in the scene's: turned about Z by `turn`, then moved [m].
+
+    Its coordinates are `columns` of the scene's; its bodies are `bodies`, its root the first.
+    """
+
+    turn: Float[np.ndarray, "4"]
+    shift: Float[np.ndarray, "3"]
+    columns: slice
+    bodies: range
+
+    def __call__(self, points: Float[np.ndarray, "*N 3"]) -> Float[np.ndarray, "*N 3"]:
+        """The figure's own points in the scene."""
+        return quat_rotate(self.turn, points) + self.shift
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,13 +70,15 @@ class Scene:
     centers: Float[np.ndarray, "T 3"]
     width: float
     height: float
+    placed: tuple[Placed, ...]
 
 
 def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
     """The scene of some figures that move together, left to right as they are given.
 
-    Frames are those of the first figure, thinned to at most `max_fps`; the others are read at the
-    same times and rest in their last frame when theirs is over.
+    All are turned by one angle, so that the first faces +X at first. Frames are those of the first
+    figure, thinned to at most `max_fps`; the others are read at the same times and rest in their
+    last frame when theirs is over.
     """
     if not figures:
         raise SkeletonError("nothing to show: expected at least one motion")
@@ -58,56 +88,101 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
     frame_time = first.frame_time * step
     longest = max(figure.motion.duration for figure in figures)
     times = np.arange(int(np.floor(longest / frame_time + 1e-6)) + 1) * frame_time
-    height = max(standing_height(figure.rig) for figure in figures)
-    coordinates, paths = [], []
+    heights = [standing_height(figure.rig) for figure in figures]
+    lanes = _lanes(figures, heights)
+    turn = _turn(figures[0])
+    coordinates: list[Float[np.ndarray, "T n"]] = []
+    placed: list[Placed] = []
+    column = 0
     for k, figure in enumerate(figures):
-        spec = build_body(figure.rig)
-        model = spec.compile()
-        qpos = _at_times(
-            qpos_from_motion(model, figure.motion, figure.rig), figure.motion.frame_time, times
-        )
-        qpos[:, :2] -= qpos[0, :2].copy()
-        qpos[:, 1] += (k - (len(figures) - 1) / 2) * _SPACING * height
-        qpos[:, 2] -= figure.floor_z
+        body = figure.body or _built(figure)
+        first_body = len(list(world.bodies))
+        columns = add_display(world, body, f"{k}_", ghost=figure.ghost)
+        qpos = _at_times(body, figure.motion.frame_time, times)[:, columns]
+        if figure.ghost and placed:
+            shift = placed[-1].shift
+        else:
+            start = quat_rotate(turn, qpos[0, :3])
+            shift = np.array([-start[0], lanes[k] - start[1], -figure.floor_z])
+        qpos[:, :3] = quat_rotate(turn, qpos[:, :3]) + shift
+        qpos[:, 3:7] = quat_mul(turn, qpos[:, 3:7])
         coordinates.append(qpos)
-        paths.append(qpos[:, :3])
-        for key in list(spec.keys):
-            spec.delete(key)
-        for actuator in list(spec.actuators):
-            spec.delete(actuator)
-        world.attach(spec, prefix=f"{k}_", frame=world.worldbody.add_frame())
-    centers = np.mean(paths, axis=0)
+        following = column + len(columns)
+        bodies = range(first_body, len(list(world.bodies)))
+        placed.append(Placed(turn, shift, slice(column, following), bodies))
+        column = following
+    return _seen(world.compile(), coordinates, frame_time, heights, tuple(placed))
+
+
+def _lanes(figures: Sequence[Figure], heights: Sequence[float]) -> Float[np.ndarray, "K"]:
+    """Where each figure stands, from left to right as the camera sees them; the middle is 0."""
+    lanes = np.zeros(len(figures))
+    for k in range(1, len(figures)):
+        gap = 0.0 if figures[k].ghost else _SPACING * (heights[k - 1] + heights[k]) / 2
+        lanes[k] = lanes[k - 1] + gap
+    return lanes - lanes[-1] / 2
+
+
+def _turn(figure: Figure) -> Float[np.ndarray, "4"]:
+    """The turn about Z after which the figure faces +X in its first frame."""
+    rig = figure.rig
+    pelvis = forward(figure.motion.frames(0, 1))[1][0, rig.carrier]
+    ahead = quat_rotate(quat_mul(pelvis, quat_conj(rig.tpose[rig.carrier])), np.array([1.0, 0, 0]))
+    if np.hypot(ahead[0], ahead[1]) < 0.3:  # lies: where it looks says nothing
+        return np.array([1.0, 0, 0, 0])
+    return quat_about("z", np.array(-np.arctan2(ahead[1], ahead[0])))
+
+
+def _built(figure: Figure) -> GivenBody:
+    spec = build_body(figure.rig)
+    model = spec.compile()
+    root = int(model.body(figure.rig.skeleton.names[figure.rig.carrier]).id)
+    return GivenBody(spec, model, root, qpos_from_motion(model, figure.motion, figure.rig))
+
+
+def _seen(
+    model: mujoco.MjModel,
+    coordinates: Sequence[Float[np.ndarray, "T n"]],
+    frame_time: float,
+    heights: Sequence[float],
+    placed: tuple[Placed, ...],
+) -> Scene:
+    paths = np.stack([qpos[:, :3] for qpos in coordinates])
+    height = max(heights)
+    centers = (paths.min(0) + paths.max(0)) / 2
     centers[:, 2] = 0.48 * height
-    return Scene(
-        world.compile(),
-        np.concatenate(coordinates, axis=1),
-        frame_time,
-        centers,
-        height * (0.9 + _SPACING * (len(figures) - 1)),
-        height,
-    )
+    apart = np.linalg.norm((paths - centers)[..., :2], axis=-1).max()
+    qpos = np.concatenate(coordinates, axis=1)
+    return Scene(model, qpos, frame_time, centers, 0.9 * height + 2 * float(apart), height, placed)
 
 
 def _at_times(
-    qpos: Float[np.ndarray, "T nq"], frame_time: float, times: Float[np.ndarray, "S"]
+    body: GivenBody, frame_time: float, times: Float[np.ndarray, "S"]
 ) -> Float[np.ndarray, "S nq"]:
-    """Positions interpolated linearly, rotations on the sphere."""
+    """Positions and angles interpolated linearly, rotations on the sphere."""
+    qpos = body.qpos
     place = np.clip(times / frame_time, 0, len(qpos) - 1)
     before = np.minimum(np.floor(place + 1e-6).astype(int), len(qpos) - 1)
     after = np.minimum(before + 1, len(qpos) - 1)
     share = np.clip(place - before, 0, 1)
-    out = qpos[before].copy()
-    out[:, :3] += share[:, None] * (qpos[after, :3] - qpos[before, :3])
-    turns = qpos[:, 3:].reshape(len(qpos), -1, 4)
-    between = share > 1e-6
-    if between.any():
-        mixed = quat_slerp(
-            turns[before[between]],
-            turns[after[between]],
-            np.broadcast_to(share[between, None], (int(between.sum()), turns.shape[1])),
-        )
-        out[between, 3:] = mixed.reshape(len(mixed), -1)
+    out = qpos[before] + share[:, None] * (qpos[after] - qpos[before])
+    turns, between = _quaternions(body.model), np.flatnonzero(share > 1e-6)[:, None, None]
+    out[between, turns] = quat_slerp(
+        qpos[before[between], turns],
+        qpos[after[between], turns],
+        np.broadcast_to(share[between[..., 0]], (len(between), len(turns))),
+    )
     return out
+
+
+def _quaternions(model: mujoco.MjModel) -> Int[np.ndarray, "Q 4"]:
+    """The columns of the coordinates that hold quaternions."""
+    starts = [
+        int(model.jnt_qposadr[j]) + (3 if int(model.jnt_type[j]) == _FREE else 0)
+        for j in range(model.njnt)
+        if int(model.jnt_type[j]) not in _HINGE_LIKE
+    ]
+    return np.array(starts, dtype=int)[:, None] + np.arange(4)
 
 
 def _world() -> mujoco.MjSpec:

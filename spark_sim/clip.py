@@ -89,7 +89,7 @@ class Clip:
 
         Raises `OutputError` where one of them exists, unless forced.
         """
-        from sim.body import write_mjcf
+        from sim.mjcf import write_mjcf
 
         path = Path(path)
         for written in (path, path.with_name(f"{path.stem}_scene.xml")):
@@ -267,7 +267,10 @@ def play(
             files.claim(Path(path), force=force)
     shown = [_clip(clip) for clip in clips]
     figures = [
-        Figure(c.rig, c.motion, c.name, floor_height(c.rig, *forward(c.motion))) for c in shown
+        Figure(c.rig, c.motion, c.name, floor_height(c.rig, *forward(c.motion)))
+        if c.body is None
+        else Figure(c.rig, c.motion, c.name, body=c.body)
+        for c in shown
     ]
     scene = build_scene(figures)
     if video is not None:

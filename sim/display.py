@@ -1,0 +1,148 @@
+"""What is seen of a compiled model, as bodies of another spec.
+
+They are made anew from the compiled model's numbers: shapes, colours and the joints that move them.
+So floors, lights, keyframes, actuators, sensors and defaults of its file stay behind, and it does
+not matter where its meshes lie.
+"""
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+
+from sim.given import GivenBody
+from sim.simplify import area, cell_for, simplify
+
+FACES = 30_000  # of one figure's meshes
+GHOST_RGBA = (0.35, 0.42, 0.55, 0.3)
+
+_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+_SHOWN = (
+    int(mujoco.mjtGeom.mjGEOM_SPHERE),
+    int(mujoco.mjtGeom.mjGEOM_CAPSULE),
+    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID),
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER),
+    int(mujoco.mjtGeom.mjGEOM_BOX),
+    _MESH,
+)
+_GROUPS = 3  # viewers show the groups below this one
+_UNSET_RGBA = (0.5, 0.5, 0.5, 1.0)
+_WIDTHS = {int(mujoco.mjtJoint.mjJNT_FREE): 7, int(mujoco.mjtJoint.mjJNT_BALL): 4}
+
+
+def add_display(
+    spec: mujoco.MjSpec, body: GivenBody, prefix: str, *, ghost: bool = False
+) -> Int[np.ndarray, "n"]:
+    """Add the body's root and all below it to the spec's world; names begin with `prefix`.
+
+    Yields the columns of `body.qpos` that move it, in the order of the spec's coordinates. A
+    `ghost` is seen through, in one colour.
+    """
+    model = body.model
+    inside = _subtree(model, body.root)
+    shown = [g for g in range(model.ngeom) if int(model.geom_bodyid[g]) in inside]
+    shown = [g for g in shown if int(model.geom_type[g]) in _SHOWN]
+    visible = [g for g in shown if int(model.geom_group[g]) < _GROUPS]
+    meshes = _add_meshes(spec, model, visible or shown, prefix)
+    columns: list[int] = []
+    bodies: dict[int, mujoco.MjsBody] = {}
+    for b in inside:
+        parent = spec.worldbody if b == body.root else bodies[int(model.body_parentid[b])]
+        bodies[b] = parent.add_body(
+            name=f"{prefix}{b}", pos=model.body_pos[b], quat=model.body_quat[b]
+        )
+        bodies[b].explicitinertial = True  # nothing here is simulated, but must compile
+        bodies[b].mass, bodies[b].inertia = 1.0, [1.0] * 3
+        for j in range(model.njnt):
+            if int(model.jnt_bodyid[j]) == b:
+                columns += _add_joint(bodies[b], model, j)
+    for g in visible or shown:
+        _add_geom(bodies[int(model.geom_bodyid[g])], model, g, meshes, ghost=ghost)
+    return np.array(columns)
+
+
+def _subtree(model: mujoco.MjModel, root: int) -> list[int]:
+    inside = {root}
+    for b in range(root + 1, model.nbody):
+        if int(model.body_parentid[b]) in inside:
+            inside.add(b)
+    return sorted(inside)
+
+
+def _add_joint(body: mujoco.MjsBody, model: mujoco.MjModel, joint: int) -> list[int]:
+    kind, address = int(model.jnt_type[joint]), int(model.jnt_qposadr[joint])
+    width = _WIDTHS.get(kind, 1)
+    body.add_joint(
+        type=mujoco.mjtJoint(kind),
+        pos=model.jnt_pos[joint],
+        axis=model.jnt_axis[joint],
+        ref=float(model.qpos0[address]) if width == 1 else 0.0,
+    )
+    return list(range(address, address + width))
+
+
+def _add_geom(
+    body: mujoco.MjsBody, model: mujoco.MjModel, geom: int, meshes: dict[int, str], *, ghost: bool
+) -> None:
+    kind = int(model.geom_type[geom])
+    made = body.add_geom(
+        type=mujoco.mjtGeom(kind),
+        pos=model.geom_pos[geom],
+        quat=model.geom_quat[geom],
+        rgba=GHOST_RGBA if ghost else rgba_of(model, geom),
+        contype=0,
+        conaffinity=0,
+        mass=0,
+    )
+    if kind == _MESH:
+        made.meshname = meshes[int(model.geom_dataid[geom])]
+    else:
+        made.size = model.geom_size[geom]
+
+
+def rgba_of(model: mujoco.MjModel, geom: int) -> Float[np.ndarray, "4"]:
+    """The colour that a viewer shows: the geom's own where it has one, else its material's, times
+    the mean of the material's texture."""
+    own, material = model.geom_rgba[geom].astype(float), int(model.geom_matid[geom])
+    if material < 0 or not np.allclose(own, _UNSET_RGBA):
+        return own
+    rgba = model.mat_rgba[material].astype(float)
+    texture = int(model.mat_texid[material, int(mujoco.mjtTextureRole.mjTEXROLE_RGB)])
+    if texture >= 0:
+        channels = int(model.tex_nchannel[texture])
+        start = int(model.tex_adr[texture])
+        pixels = int(model.tex_width[texture]) * int(model.tex_height[texture])
+        data = model.tex_data[start : start + pixels * channels].reshape(-1, channels)
+        if channels >= 3:
+            rgba[:3] *= data[:, :3].mean(0) / 255
+    return rgba
+
+
+def _add_meshes(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: list[int], prefix: str
+) -> dict[int, str]:
+    """The meshes of some geoms, with at most about `FACES` faces in all, and their names."""
+    used = sorted({int(model.geom_dataid[g]) for g in geoms if int(model.geom_type[g]) == _MESH})
+    found = {mesh: _mesh(model, mesh) for mesh in used}
+    if sum(len(faces) for _, faces in found.values()) > FACES:
+        cell = cell_for(sum(area(*mesh) for mesh in found.values()), FACES)
+        found = {mesh: simplify(*arrays, cell) for mesh, arrays in found.items()}
+    names = {mesh: f"{prefix}mesh{mesh}" for mesh in used}
+    for mesh, (vertices, faces) in found.items():
+        spec.add_mesh(
+            name=names[mesh],
+            uservert=vertices.ravel(),
+            userface=faces.ravel(),
+            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+        )
+    return names
+
+
+def _mesh(
+    model: mujoco.MjModel, mesh: int
+) -> tuple[Float[np.ndarray, "V 3"], Int[np.ndarray, "F 3"]]:
+    start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+    first, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+    return (
+        model.mesh_vert[start : start + count].astype(float),
+        model.mesh_face[first : first + faces].astype(np.int64),
+    )
