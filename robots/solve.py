@@ -24,7 +24,7 @@ from spark.canonical import CanonicalMotion
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 
 _STEPS = (12, 10)  # Gauss-Newton steps of the stages, at most
-_LITTLE = 0.01  # a stage ends where a step lessens the cost by less than this share
+_LITTLE = 0.02  # a stage ends where a step lessens the cost by less than this share
 _AROUND = 0.15  # [s] before and after a frame in which a step must not do harm
 _LONGEST = 1.0  # [rad, m] a column moves in one of them
 _LOOK = 0.06  # [s] from one look for collisions to the next

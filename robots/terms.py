@@ -34,15 +34,11 @@ def turn_rows(
 
     Bounded, and zero at a half turn: for errors up to a right angle.
     """
-    # The axial vector of now wanted^T.
-    between = np.einsum("ikt,jkt->ijt", now, wanted)
-    axial = 0.5 * np.stack(
-        [
-            between[2, 1] - between[1, 2],
-            between[0, 2] - between[2, 0],
-            between[1, 0] - between[0, 1],
-        ]
-    )
+    axial = np.zeros_like(now[0])
+    crossed = np.empty_like(axial)
+    for k in range(3):  # the axial vector of now wanted^T
+        cross(wanted[:, k], now[:, k], crossed)
+        axial += 0.5 * crossed
     return axes * weight, axial * weight
 
 
