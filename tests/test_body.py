@@ -6,7 +6,8 @@ import pytest
 from conftest import DATA, recordings
 from humanoids import ONE_A_RIG
 
-from sim.body import build_body, write_mjcf
+from sim.body import build_body
+from sim.mjcf import write_mjcf
 from sim.pose import qpos_from_motion
 from spark.canonical import from_canonical, to_canonical
 from spark.errors import SkeletonError

@@ -1,0 +1,89 @@
+"""Position servos: how strong each kind of joint is, and what their controls are.
+
+A kind's strength is the torque that its heaviest duty takes: to hold what hangs on it out
+horizontally, or, in a leg, to stand on the tip of one foot. The servo is so stiff that this duty
+bends it by `SAG`, and may push `PEAK` times as hard before it gives way.
+"""
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from sim.inertia import Inertias, held_torques
+from sim.parts import DETAIL, joint_kind_of, kept_joints, side_of
+from spark.feet import FOOT_LENGTH, standing_height
+from spark.rig import Rig
+
+SAG = np.radians(1.0)
+PEAK = 4.0
+_FREQUENCY = 300.0  # [rad/s] of a servo that turns nothing but its own armature
+_PASSIVE = 0.01  # passive damping [N m s/rad] for each N m of strength
+_LEAST = 0.003  # strength, in body weights times height: what is light is not weak
+_ANKLE_TO_TIP, _BALL_TO_TIP = 0.75 * FOOT_LENGTH, 0.25 * FOOT_LENGTH
+
+MIRROR = np.array([-1.0, 1.0, -1.0])
+"""A rotation axis of a left limb, mirrored in the XZ plane: the same movement of the right one."""
+
+
+def strengths(rig: Rig, bodies: Inertias) -> dict[str, float]:
+    """The strength [N m] of each kind of joint: that of the one with the heaviest duty."""
+    held = held_torques(rig, bodies)
+    weight, height = 9.81 * bodies.masses.sum(), standing_height(rig)
+    found: dict[str, float] = {}
+    for j in kept_joints(rig):
+        kind = joint_kind_of(rig, j)
+        if j == rig.carrier or kind == DETAIL:
+            continue
+        duty = max(float(held[j]), _LEAST * weight * height)
+        if kind == "toe":
+            duty = max(duty, weight * height * _BALL_TO_TIP)
+        elif any(joint_kind_of(rig, k) == "ankle" for k in rig.skeleton.subtree(j)):
+            duty = max(duty, weight * height * _ANKLE_TO_TIP)
+        found[kind] = max(found.get(kind, 0.0), duty)
+    return found
+
+
+def set_strength(default: mujoco.MjsDefault, strength: float) -> None:
+    """Give the joints and servos of a class the stiffness that goes with their strength [N m]."""
+    kp = _rounded(strength / SAG)
+    default.actuator.set_to_position(kp=kp, dampratio=1.0)
+    default.actuator.forcerange = np.array([-1.0, 1.0]) * _rounded(PEAK * strength)
+    default.joint.armature = _rounded(kp / _FREQUENCY**2)
+    default.joint.damping[0] = _rounded(_PASSIVE * strength)
+
+
+def add_ball_servos(spec: mujoco.MjSpec, rig: Rig) -> None:
+    """Three servos a ball joint, about the axes X, Y and Z of the bone above it, in the T-pose;
+    those of right limbs are mirrored, so that a control moves both sides alike.
+
+    A control is a component of the rotation vector [rad] from the T-pose. The axes belong to the
+    parent: they stay when the joint turns.
+    """
+    for j in kept_joints(rig):
+        kind = joint_kind_of(rig, j)
+        if j == rig.carrier or kind == DETAIL:
+            continue
+        name = rig.skeleton.names[j]
+        for k, letter in enumerate("xyz"):
+            gear = np.zeros(6)
+            gear[k] = MIRROR[k] if side_of(rig, j) == "right" else 1.0
+            spec.add_actuator(
+                spec.find_default(kind),
+                name=f"{name}_{letter}",
+                target=name,
+                trntype=mujoco.mjtTrn.mjTRN_JOINTINPARENT,
+                gear=gear,
+            )
+
+
+def ctrl_of_qpos(model: mujoco.MjModel, qpos: Float[np.ndarray, "nq"]) -> Float[np.ndarray, "nu"]:
+    """The controls with which the servos hold a pose of the model."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_fwdPosition(model, data)
+    return np.array(data.actuator_length)
+
+
+def _rounded(value: float) -> float:
+    """To three digits: the XML is to be read."""
+    return float(f"{value:.3g}")

@@ -1,0 +1,61 @@
+"""Mass, centre and inertia of each joint's body in the T-pose, in world axes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from sim.anthropometry import segments
+from spark.kinematics import world_positions
+from spark.rig import Rig
+from spark.rotation import matrix_from_quat
+
+LEAST_MASS = 1e-3  # [kg] of fingers and helpers: MuJoCo needs some
+_LEAST_SPREAD = 0.01  # [m], radius of gyration of what has the least mass
+
+
+@dataclass(frozen=True, eq=False)
+class Inertias:
+    """One rigid body a joint: `masses` [kg], `coms` [m] from the joint, `tensors` [kg m²] about
+    them; both in T-pose world axes."""
+
+    masses: Float[np.ndarray, "J"]
+    coms: Float[np.ndarray, "J 3"]
+    tensors: Float[np.ndarray, "J 3 3"]
+
+
+def inertias(rig: Rig, total: float) -> Inertias:
+    """How a human of `total` [kg] is spread over the joints of a rig; those that carry nothing of
+    it get `LEAST_MASS`."""
+    pieces = segments(rig)
+    count = len(rig.skeleton)
+    R = matrix_from_quat(rig.tpose[pieces.joints])
+    piece_coms = np.einsum("sik,sk->si", R, pieces.coms)
+    masses, moments = np.zeros(count), np.zeros((count, 3))
+    np.add.at(masses, pieces.joints, pieces.masses * total)
+    np.add.at(moments, pieces.joints, (pieces.masses * total)[:, None] * piece_coms)
+    light = masses < LEAST_MASS
+    masses[light], moments[light] = LEAST_MASS, 0.0
+    coms = moments / masses[:, None]
+
+    away = piece_coms - coms[pieces.joints]
+    spread = (away**2).sum(-1)[:, None, None] * np.eye(3) - away[:, :, None] * away[:, None]
+    about_com = R @ pieces.inertias @ R.swapaxes(-1, -2) + spread
+    tensors = np.zeros((count, 3, 3))
+    np.add.at(tensors, pieces.joints, (pieces.masses * total)[:, None, None] * about_com)
+    tensors[light] = 0.0
+    tensors += LEAST_MASS * _LEAST_SPREAD**2 * np.eye(3)
+    return Inertias(masses, coms, tensors)
+
+
+def held_torques(rig: Rig, bodies: Inertias) -> Float[np.ndarray, "J"]:
+    """The torque [N m] with which gravity pulls at each joint of the T-pose when all that hangs on
+    it is held out horizontally."""
+    positions = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
+    masses = bodies.masses.copy()
+    moments = bodies.masses[:, None] * (positions + bodies.coms)
+    for j in reversed(range(1, len(masses))):
+        parent = int(rig.skeleton.parents[j])
+        masses[parent] += masses[j]
+        moments[parent] += moments[j]
+    return 9.81 * np.linalg.norm(moments - masses[:, None] * positions, axis=1)
