@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from robots import registry
 from robots.formats import dispatch, format_of
-from robots.morphology import understand_robot
+from robots.known import known
 from robots.motion import RobotMotion
 from robots.solve import copy, retarget
 from sim.given import GivenBody
@@ -70,7 +69,7 @@ def load_robot(robot: File) -> RobotClip:
     Raises `SparkSimError` where none is called that, or where its model does not compile, has no
     legs, or can't stand in a T-pose.
     """
-    found = understand_robot(registry.find(robot))
+    found = known(robot)
     return RobotClip(RobotMotion(found, found.tpose, 1.0, found.notes), Path(robot).stem)
 
 
@@ -79,8 +78,8 @@ def load_motion(
 ) -> RobotClip:
     """A robot's own motion, of a file in any of `robots.formats`."""
     path = Path(path)
-    known = None if robot is None else understand_robot(registry.find(robot))
-    return RobotClip(dispatch.read(path, known, quat=quat, fps=fps), path.stem, path)
+    moving = None if robot is None else known(robot)
+    return RobotClip(dispatch.read(path, moving, quat=quat, fps=fps), path.stem, path)
 
 
 def onto_robot(source: AnyClip, target: RobotClip, *, refine: bool) -> RobotClip:

@@ -1,5 +1,6 @@
 """Files of named arrays: npz, read without pickle, and checked."""
 
+import io
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -13,7 +14,7 @@ from spark.errors import FileFormatError
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
     """All arrays of an npz. Raises `FileFormatError` where it is none, or needs pickle."""
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             if not hasattr(stored, "files"):
                 raise FileFormatError(path, None, "is a single array; expected an npz of several")
             return {name: stored[name] for name in stored.files}

@@ -3,7 +3,6 @@
 import hashlib
 import io
 import json
-import re
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +13,13 @@ from jaxtyping import Float
 from robots import registry
 from robots.formats.arrays import number_array, scalar
 from robots.formats.qpos import check_finite, of_qpos, unit
-from robots.morphology import Morphology, understand_robot
+from robots.known import known, model_sha256
+from robots.morphology import Morphology
 from robots.motion import RobotMotion
 from spark.errors import FileFormatError
 from spark.files import write_atomically
 
 SCHEMA = "spark-sim qpos 1"
-_INCLUDE = re.compile(rb"<include\s+file\s*=\s*[\"']([^\"']+)")
 
 
 def write_npz(motion: RobotMotion, path: Path, *, source: Path | None = None) -> None:
@@ -71,7 +70,7 @@ def read_npz(
     """
     about = _about(arrays, path)
     if robot is None:
-        robot = understand_robot(_model(about, path))
+        robot = known(_model(about, path))
     names = arrays.get("joint_names", np.array([])).tolist()
     if names != list(robot.joint_names):
         other = next((n for n in names if n not in robot.joint_names), None)
@@ -97,7 +96,7 @@ def read_npz(
 
 def is_native(arrays: dict[str, np.ndarray]) -> bool:
     """Whether an npz is one of ours."""
-    return "about" in arrays and "qpos" in arrays
+    return "about" in arrays
 
 
 def velocities(
@@ -112,20 +111,6 @@ def velocities(
                 model, qvel[t], (after - before) * frame_time, qpos[before], qpos[after]
             )
     return qvel
-
-
-def model_sha256(path: Path) -> str:
-    """Of the MJCF and the files that it includes."""
-    return hashlib.sha256(b"".join(_with_included(path, set()))).hexdigest()
-
-
-def _with_included(path: Path, seen: set[Path]) -> list[bytes]:
-    if path in seen or not path.is_file():
-        return []
-    seen.add(path)
-    text = path.read_bytes()
-    included = [path.parent / name.decode(errors="replace") for name in _INCLUDE.findall(text)]
-    return [text, *(part for file in included for part in _with_included(file, seen))]
 
 
 def _sha256(path: Path) -> str | None:
@@ -145,11 +130,11 @@ def _about(arrays: dict[str, np.ndarray], path: Path) -> dict[str, Any]:
     return about
 
 
-def _model(about: dict[str, Any], path: Path) -> Path:
-    """The file of the robot that the motion was made for."""
+def _model(about: dict[str, Any], path: Path) -> str | Path:
+    """The robot that the motion was made for."""
     name, model = about.get("robot"), about.get("model")
     if isinstance(name, str):
-        return registry.find(name)
+        return name
     if isinstance(model, str) and Path(model).is_file():
         return Path(model)
     raise FileFormatError(
