@@ -9,8 +9,8 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from spark.bodies import Body, Pose
 from spark.features import BodyFeatures
-from spark.model import Body, Pose
 from spark.pairs import Pairs, Windows, leg_of
 from spark.rig_names import split_side
 from spark.roles import Group

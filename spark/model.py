@@ -13,13 +13,14 @@ Axes: B batch, T frames, J joints, G = 6 groups, N joints of a group (padded), D
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import torch
-import torch.nn.functional as nnf
 from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
+from spark.attention import Attention, Feedforward, TemporalBlock, sinusoids
+from spark.bodies import Body, Pose, forward_kinematics, take
+from spark.precision import exactly
 from spark.rotation import matrix_from_sixd
 
 N_GROUPS = 6
@@ -73,80 +74,6 @@ class Config:
         )
 
 
-class Body(NamedTuple):
-    """A batch of skeletons as the network sees them, padded to J joints; root = joint 0."""
-
-    names: Float[Tensor, "B J E"]  # name embeddings; zero where a name is withheld
-    tpose: Float[Tensor, "B J 13"]  # position, 6D rotation, velocity, foot contact
-    shape: Float[Tensor, "B J 6"]
-    groups: Int[Tensor, "B 6 N"]  # joints of each group from root to leaf; -1 pads
-    arc: Float[Tensor, "B 6 N"]  # normalised arc length of those joints along their group
-    valid: Bool[Tensor, "B J"]
-    parents: Int[Tensor, "B J"]  # the root's parent is itself, and so is a padding joint's
-    offsets: Float[Tensor, "B J 3"]  # canonical bone offsets in hip heights
-
-
-class Pose(NamedTuple):
-    """A batch of motions on a `Body`, in canonical form."""
-
-    rotations: Float[Tensor, "B T J 6"]  # local, since the T-pose
-    root: Float[Tensor, "B T 3"]  # hip heights, relative to the window's first heading
-
-
-class Attention(nn.Module):
-    """Multi-head attention over the second-to-last axis, with optional rotary positions."""
-
-    def __init__(self, width: int, heads: int, rotary: bool = False, causal: bool = False) -> None:
-        super().__init__()
-        self.heads, self.rotary, self.causal = heads, rotary, causal
-        self.q = nn.Linear(width, width)
-        self.kv = nn.Linear(width, 2 * width)
-        self.out = nn.Linear(width, width)
-
-    def forward(
-        self,
-        x: Float[Tensor, "M Q D"],
-        context: Float[Tensor, "M K D"],
-        mask: Bool[Tensor, "M #Q K"] | None = None,
-    ) -> Float[Tensor, "M Q D"]:
-        """`x` looks at `context` where `mask` is True."""
-        q = self._split(self.q(x))
-        k, v = (self._split(part) for part in self.kv(context).chunk(2, dim=-1))
-        if self.rotary:
-            q, k = _rotary(q), _rotary(k)
-        attended = nnf.scaled_dot_product_attention(
-            q, k, v, attn_mask=None if mask is None else mask[:, None], is_causal=self.causal
-        )
-        return self.out(attended.transpose(1, 2).flatten(2))
-
-    def _split(self, x: Float[Tensor, "M K D"]) -> Float[Tensor, "M H K C"]:
-        return x.view(*x.shape[:-1], self.heads, -1).transpose(1, 2)
-
-
-class Feedforward(nn.Sequential):
-    """Position-wise network, four times as wide inside."""
-
-    def __init__(self, width: int) -> None:
-        super().__init__(nn.Linear(width, 4 * width), nn.GELU(), nn.Linear(4 * width, width))
-
-
-class TemporalBlock(nn.Module):
-    """One of the encoder's blocks: each token looks along time (eq. 2 and 3)."""
-
-    def __init__(self, config: Config) -> None:
-        super().__init__()
-        width = config.width
-        self.norm_time, self.norm_ff = nn.LayerNorm(width), nn.LayerNorm(width)
-        self.time = Attention(width, config.heads, config.relative_time, config.causal)
-        self.ff = Feedforward(width)
-
-    def forward(self, x: Float[Tensor, "M T D"]) -> Float[Tensor, "M T D"]:
-        """M tokens, each along its T frames."""
-        normed = self.norm_time(x)
-        x = x + self.time(normed, normed)
-        return x + self.ff(self.norm_ff(x))
-
-
 class DecoderBlock(nn.Module):
     """Joints of a frame look at one another, at its 24 tokens and, as a switch, along time."""
 
@@ -158,7 +85,7 @@ class DecoderBlock(nn.Module):
         self.self_attention = Attention(width, heads)
         self.cross_attention = Attention(width, heads)
         self.ff = Feedforward(width)
-        self.along_time = TemporalBlock(config) if config.decoder_time else None
+        self.along_time = _temporal_block(config) if config.decoder_time else None
 
     def forward(
         self,
@@ -170,8 +97,7 @@ class DecoderBlock(nn.Module):
         B, T, J, _ = y.shape
         frames = y.flatten(0, 1)
         mask = valid[:, None, None].expand(B, T, 1, J).flatten(0, 1)
-        normed = self.norm_self(frames)
-        frames = frames + self.self_attention(normed, normed, mask)
+        frames = frames + self.self_attention(self.norm_self(frames), mask=mask)
         frames = frames + self.cross_attention(self.norm_cross(frames), latent.flatten(0, 1))
         frames = frames + self.ff(self.norm_ff(frames))
         y = frames.unflatten(0, (B, T))
@@ -216,7 +142,7 @@ class Encoder(nn.Module):
         self.root = nn.Linear(3 + (3 if config.positions_in else 0), width)
         self.queries = nn.Parameter(torch.rand(N_GROUPS, QUERIES_PER_GROUP, width) - 0.5)
         self.pool = Attention(width, config.heads)
-        self.time = nn.ModuleList(TemporalBlock(config) for _ in range(config.encoder_blocks))
+        self.time = nn.ModuleList(_temporal_block(config) for _ in range(config.encoder_blocks))
         self.norm = nn.LayerNorm(width)  # on H: without it the cycle loss shrinks H to zero
 
     def forward(
@@ -229,7 +155,7 @@ class Encoder(nn.Module):
         if not self.config.share_joints:
             in_group = in_group & _first_owner(body.groups)
         B, T, _, D = x.shape
-        groups = _take(x, index.flatten(1)).view(B, T, *index.shape[1:], D)
+        groups = take(x, index.flatten(1)).view(B, T, *index.shape[1:], D)
         groups = groups + embedding.places(body)[:, None]
         if self.training and self.config.mask_joints:
             kept = torch.rand(B, T, *index.shape[1:], 1, device=x.device) >= self.config.mask_joints
@@ -238,17 +164,20 @@ class Encoder(nn.Module):
         empty = ~in_group.any(-1, keepdim=True)
         groups = groups * (~empty)[:, None, :, :, None]
         in_group = torch.cat([in_group[..., :1] | empty, in_group[..., 1:]], -1)
-        z = self.pool(
-            self.queries.expand(B, T, -1, -1, -1).flatten(0, 2),
-            groups.flatten(0, 2),
+        q = self.pool.queries(self.queries)  # of the six groups: the same in all frames
+        k, v = self.pool.keys_and_values(groups.flatten(0, 2))
+        z = self.pool.look(
+            q.expand(B * T, *q.shape).flatten(0, 1),
+            k,
+            v,
             in_group[:, None, :, None].expand(B, T, -1, -1, -1).flatten(0, 2),
         ).view(B, T, N_TOKENS, D)
         tokens = z.transpose(1, 2).flatten(0, 1)
         if not self.config.relative_time:
-            tokens = tokens + _sinusoids(T, D, tokens)
+            tokens = tokens + sinusoids(T, D, tokens)
         for block in self.time:
             tokens = block(tokens)
-        return self.norm(tokens.unflatten(0, (B, N_TOKENS)).transpose(1, 2))
+        return self.norm(tokens.view(B, N_TOKENS, T, D).transpose(1, 2))
 
     def _joint_features(self, pose: Pose, body: Body) -> Float[Tensor, "B T J D"]:
         joints, root = pose.rotations, pose.root
@@ -301,15 +230,9 @@ class Decoder(nn.Module):
         for block in self.blocks:
             y = block(y, latent, body.valid)
         y = self.norm(y)
-        sixd, root = self.rotation(y), self.root(y[:, :, 0])
-        if start is None:
-            return Pose(sixd, root)
-        identity = sixd.new_tensor([1.0, 0, 0, 0, 1, 0])
-        turned = matrix_from_sixd(RESIDUAL_SCALE * sixd + identity) @ matrix_from_sixd(
-            start.rotations
-        )
-        columns = turned[..., :2].transpose(-1, -2).flatten(-2)
-        return Pose(columns, start.root + RESIDUAL_SCALE * root)
+        with exactly(y):
+            sixd, root = self.rotation(y.float()), self.root(y[:, :, 0].float())
+            return Pose(sixd, root) if start is None else _on_top(start, sixd, root)
 
 
 class Spark(nn.Module):
@@ -347,43 +270,18 @@ class Spark(nn.Module):
         return body._replace(names=body.names * kept)
 
 
-def forward_kinematics(pose: Pose, body: Body) -> Float[Tensor, "B T J 3"]:
-    """Joint positions in hip heights; a padding joint lies at the root.
-
-    Rotations are chained by pointer jumping: in step k every joint takes in its 2^k-th ancestor, so
-    a tree of depth 16 needs 4 batched products, whatever the skeletons in the batch.
-    """
-    B, J = body.valid.shape
-    world = matrix_from_sixd(pose.rotations)
-    parents = body.parents
-    own = torch.arange(J, device=parents.device).expand(B, J)
-    pending = parents != own
-    pointer = parents
-    steps = max(1, (max(J - 1, 1)).bit_length())
-    for _ in range(steps):
-        upper = _take(world, pointer)
-        world = torch.where(pending[:, None, :, None, None], upper @ world, world)
-        nearer = torch.gather(pointer, 1, pointer)
-        pending = pending & torch.gather(pending, 1, pointer)
-        pointer = nearer
-    bones = (_take(world, parents) @ body.offsets[:, None, :, :, None]).squeeze(-1)
-    moves = (parents != own)[:, None, :, None]
-    positions = bones * moves
-    pointer = parents
-    pending = parents != own
-    for _ in range(steps):
-        upper = _take(positions, pointer)
-        positions = torch.where(pending[:, None, :, None], positions + upper, positions)
-        pending = pending & torch.gather(pending, 1, pointer)
-        pointer = torch.gather(pointer, 1, pointer)
-    return positions + pose.root[:, :, None]
+def _temporal_block(config: Config) -> TemporalBlock:
+    return TemporalBlock(
+        config.width, config.heads, rotary=config.relative_time, causal=config.causal
+    )
 
 
-def _take(x: Tensor, joints: Int[Tensor, "B J"]) -> Tensor:
-    """`x[b, :, joints[b]]` for each b."""
-    index = joints.view(len(joints), 1, -1, *([1] * (x.ndim - 3)))
-    index = index.expand(-1, x.shape[1], -1, *x.shape[3:])
-    return torch.gather(x, 2, index)
+def _on_top(start: Pose, sixd: Float[Tensor, "B T J 6"], root: Float[Tensor, "B T 3"]) -> Pose:
+    """`start`, turned and moved a little."""
+    little = RESIDUAL_SCALE * sixd + sixd.new_tensor([1.0, 0, 0, 0, 1, 0])
+    turned = matrix_from_sixd(little) @ matrix_from_sixd(start.rotations)
+    columns = turned[..., :2].transpose(-1, -2).flatten(-2)
+    return Pose(columns, start.root + RESIDUAL_SCALE * root)
 
 
 def _first_owner(groups: Int[Tensor, "B G N"]) -> Bool[Tensor, "B G N"]:
@@ -402,19 +300,3 @@ def _scatter_places(places: Float[Tensor, "B G N D"], body: Body) -> Float[Tenso
     out = places.new_zeros(B, J + 1, places.shape[-1])
     index = target[..., None].expand(-1, -1, places.shape[-1])
     return out.scatter(1, index, places.flatten(1, 2))[:, :J]
-
-
-def _sinusoids(T: int, D: int, like: Tensor) -> Float[Tensor, "T D"]:
-    time = torch.arange(T, device=like.device, dtype=torch.float32)[:, None]
-    rate = torch.exp(torch.arange(0, D, 2, device=like.device) * (-9.21034 / D))
-    return torch.cat([torch.sin(time * rate), torch.cos(time * rate)], -1).to(like.dtype)
-
-
-def _rotary(x: Float[Tensor, "M H T C"]) -> Float[Tensor, "M H T C"]:
-    """Rotary positions (Su et al. 2021): attention then depends on differences of time alone."""
-    half = x.shape[-1] // 2
-    time = torch.arange(x.shape[-2], device=x.device, dtype=torch.float32)[:, None]
-    rate = torch.exp(torch.arange(half, device=x.device) * (-6.9078 / half))
-    cos, sin = torch.cos(time * rate).to(x.dtype), torch.sin(time * rate).to(x.dtype)
-    a, b = x[..., :half], x[..., half:]
-    return torch.cat([a * cos - b * sin, a * sin + b * cos], -1)

@@ -20,7 +20,7 @@ from spark.plant import Leg, bend_leg, stance_correction
 from spark.roles import LIMBS, Group, Role
 from spark.rotation import quat_from_yaw, quat_mul, quat_rotate, sixd_from_quat, yaw_from_quat
 from spark.transfer import Correspondence, correspond
-from spark.variants import Variant, random_variant
+from spark.variants import Variant, random_variant, same_body, split_body
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +61,22 @@ class PairMaker:
     """Draws pairs from clips. Draw `n` of a seed is always the same, whatever was drawn before.
 
     Making a skeleton costs as much as using it many times, so each body has a fixed set of
-    `variants`, made when they are first met.
+    `variants`, made when they are first met: itself, itself with joints split as in SAN, and random
+    ones. With `distinct`, no two of them have a motion in common as a source (the paper's training
+    set); without, any of them may perform any of the body's clips.
     """
 
     def __init__(
-        self, clips: Sequence[Clip], *, window: int = 64, variants: int = 256, seed: int = 0
+        self,
+        clips: Sequence[Clip],
+        *,
+        window: int = 64,
+        variants: int = 256,
+        seed: int = 0,
+        distinct: bool = False,
     ) -> None:
         self.window, self.variants, self.seed = window, variants, seed
+        self.distinct = distinct
         by_body: dict[int, list[Clip]] = {}
         for clip in clips:
             if len(clip.hips) >= window:
@@ -84,8 +93,13 @@ class PairMaker:
         """Draw number `n`: `windows` windows of one body's clips on one pair of its variants."""
         rng = np.random.default_rng((self.seed, n))
         k = int(rng.choice(len(self._bodies), p=self._weights))
-        rotations, hips, planted = self._cut(self._bodies[k], windows, rng)
-        source, target = self._stage(k, rng), self._stage(k, rng)
+        performer, receiver = rng.integers(self.variants, size=2).tolist()
+        clips = self._bodies[k]
+        if self.distinct:
+            performer %= min(self.variants, len(clips))
+            clips = clips[performer :: self.variants]
+        rotations, hips, planted = self._cut(clips, windows, rng)
+        source, target = self._stage(k, performer), self._stage(k, receiver)
         on_source = source.place(rotations, hips, planted)
         on_target = target.place(rotations, hips, planted)
         link = self._link(source, target)
@@ -112,11 +126,15 @@ class PairMaker:
         rotations, hips, planted = (np.stack(part) for part in zip(*cuts, strict=True))
         return rotations, hips, planted
 
-    def _stage(self, k: int, rng: np.random.Generator) -> "_Stage":
-        key = (k, int(rng.integers(self.variants)))
+    def _stage(self, k: int, number: int) -> "_Stage":
+        key = (k, number)
         if key not in self._stages:
-            own = np.random.default_rng((self.seed, *key))
-            self._stages[key] = _Stage(random_variant(self._bodies[k][0].body, own))
+            body = self._bodies[k][0].body
+            if number < 2:
+                variant = (same_body, split_body)[number](body)
+            else:
+                variant = random_variant(body, np.random.default_rng((self.seed, *key)))
+            self._stages[key] = _Stage(variant)
         return self._stages[key]
 
     def _link(self, source: "_Stage", target: "_Stage") -> Correspondence:

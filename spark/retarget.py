@@ -12,11 +12,11 @@ import numpy as np
 import torch
 
 from spark.batch import Collator
+from spark.bodies import Pose
 from spark.canonical import CanonicalMotion
 from spark.checkpoint import Checkpoint
 from spark.clips import FRAME_TIME, at_frame_time, positions_at, rotations_at
 from spark.features import body_features, canonical_from_features, pose_features
-from spark.model import Pose
 from spark.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_normalize
 from spark.train import name_vectors

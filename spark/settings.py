@@ -8,7 +8,7 @@ from typing import Any
 from spark.errors import ConventionError, FileFormatError
 
 PRESETS = ("default", "paper", "tiny")
-ABLATIONS = ("share", "mask", "pos", "fk")
+ABLATIONS = ("share", "mask", "pos", "fk", "mix")
 
 
 @dataclass(frozen=True)
@@ -17,14 +17,19 @@ class TrainConfig:
 
     `ablate` names switches of the paper's table 2 to throw: share and mask are left out, pos gives
     the encoder joint positions too (or takes them away where the preset has them), fk drops the
-    loss on positions. `batch` windows a step are drawn `per_body` at a time from one pair of
-    bodies, of which each recorded body has `variants`. The rate rises over `warmup` steps and then
-    falls along a cosine to a tenth at `steps`.
+    loss on positions, mix lets the paper's characters share motions (table 2b). Encoder and decoder
+    have `blocks` blocks each. `batch` windows a
+    step are drawn `per_body` at a time from one pair of bodies, of which each recorded body has
+    `variants`. The rate rises over `warmup` steps and then falls along a cosine to a tenth at
+    `steps`. With `bf16`, matrix products are in bfloat16 where the processor has them.
     """
 
     preset: str = "default"
     ablate: tuple[str, ...] = ()
     data: tuple[str, ...] = ()
+    width: int = 128
+    heads: int = 4
+    blocks: int = 4
     steps: int = 100_000
     batch: int = 16
     per_body: int = 4
@@ -35,6 +40,7 @@ class TrainConfig:
     weight_decay: float = 0.01
     seed: int = 0
     workers: int = 0
+    bf16: bool = True
     save_every: int = 1000
     log_every: int = 20
     name_steps: int = 200
@@ -49,6 +55,10 @@ class TrainConfig:
                 raise ConventionError(
                     f"{name} = {getattr(self, name)}: expected {lowest} or more in a training run"
                 )
+        if self.width % (2 * self.heads):
+            raise ConventionError(
+                f"width = {self.width}: expected a multiple of twice the heads ({self.heads})"
+            )
         if self.batch % self.per_body:
             raise ConventionError(
                 f"batch = {self.batch} is no multiple of per_body = {self.per_body}; "
@@ -59,7 +69,17 @@ class TrainConfig:
     def of(cls, preset: str) -> "TrainConfig":
         """The preset's own settings."""
         if preset == "tiny":
-            return cls(preset, steps=1000, window=32, variants=16, rate=1e-3, warmup=20)
+            return cls(
+                preset,
+                width=48,
+                heads=2,
+                blocks=2,
+                steps=1000,
+                window=32,
+                variants=16,
+                rate=1e-3,
+                warmup=20,
+            )
         return cls(preset)
 
     def changed(self, where: object, **values: Any) -> "TrainConfig":
@@ -84,7 +104,8 @@ class TrainConfig:
 
 
 _LOWEST = {
-    **dict.fromkeys(("steps", "batch", "per_body", "variants", "save_every", "log_every"), 1),
+    **dict.fromkeys(("width", "heads", "blocks", "steps", "batch", "per_body", "variants"), 1),
+    **dict.fromkeys(("save_every", "log_every"), 1),
     **dict.fromkeys(("seed", "workers", "warmup", "weight_decay", "rate", "name_steps"), 0),
     "window": 2,
 }
@@ -109,12 +130,14 @@ def _literal(value: Any) -> str:
     if isinstance(value, str):
         escaped = value.replace("\\", "\\\\").replace('"', '\\"')
         return f'"{escaped}"'
+    if isinstance(value, bool):
+        return str(value).lower()
     return str(value)
 
 
 def _fits(value: Any, example: Any) -> bool:
-    if isinstance(value, bool):
-        return False
+    if isinstance(value, bool) or isinstance(example, bool):
+        return isinstance(value, bool) and isinstance(example, bool)
     if isinstance(example, tuple):
         return isinstance(value, list | tuple) and all(isinstance(v, str) for v in value)
     if isinstance(example, float):

@@ -10,7 +10,6 @@ import json
 import math
 import os
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
@@ -25,15 +24,17 @@ from torch.utils.data import DataLoader, Dataset
 
 from spark import losses
 from spark.batch import Batch, Collator, Names
+from spark.bodies import forward_kinematics
 from spark.checkpoint import (
     Checkpoint,
     optimizer_tensors,
     restore_optimizer,
     save_checkpoint,
 )
-from spark.model import Config, Spark, forward_kinematics
+from spark.model import Config, Spark
 from spark.names import NameEncoder, T5Names
 from spark.pairs import Clip, PairMaker
+from spark.precision import fast_products
 from spark.settings import TrainConfig
 from spark.train_names import train_names
 
@@ -41,7 +42,6 @@ BETAS = (0.9, 0.99)
 PAPER_WEIGHTS = {"rec": 1.0, "cyc": 20.0, "root": 7.0, "fk": 100.0}
 PAIR_WEIGHTS = {"rec": 1.0, "root": 7.0, "fk": 100.0, "contact": 1.0, "ends": 100.0}
 NAME_CACHE = Path.home() / ".cache" / "spark-sim" / "names.pt"
-TINY: dict[str, Any] = {"width": 48, "heads": 2, "encoder_blocks": 2, "decoder_blocks": 2}
 
 Terms = dict[str, Float[Tensor, ""]]
 
@@ -49,10 +49,12 @@ Terms = dict[str, Float[Tensor, ""]]
 def network(config: TrainConfig, name_width: int) -> Config:
     """The network of a training run: the preset's, with the ablations' switches thrown."""
     preset = Config.paper() if config.preset == "paper" else Config.default()
-    if config.preset == "tiny":
-        preset = replace(preset, **TINY)
     return replace(
         preset,
+        width=config.width,
+        heads=config.heads,
+        encoder_blocks=config.blocks,
+        decoder_blocks=config.blocks,
         name_width=name_width + 2,
         share_joints="share" not in config.ablate,
         mask_joints=0.0 if "mask" in config.ablate else preset.mask_joints,
@@ -123,7 +125,11 @@ class Steps(Dataset[Batch]):
     ) -> None:
         self.config, self.rank, self.world = config, rank, world
         self.maker = PairMaker(
-            clips, window=config.window, variants=config.variants, seed=config.seed
+            clips,
+            window=config.window,
+            variants=config.variants,
+            seed=config.seed,
+            distinct=config.preset == "paper" and "mix" not in config.ablate,
         )
         self.collator = Collator(names)
 
@@ -219,17 +225,12 @@ def take_step(
     torch.manual_seed(hash((config.seed, n, rank)))
     for group in optimiser.param_groups:
         group["lr"] = rate_at(n, config)
-    with _precision(batch.pose.root.device):
+    with fast_products(batch.pose.root.device, config.bf16):
         loss, terms = runner(batch)
     optimiser.zero_grad()
     loss.backward()
     optimiser.step()
     return {"loss": loss.detach(), **{k: v.detach() for k, v in terms.items()}}
-
-
-def _precision(device: torch.device) -> "torch.autocast | nullcontext[None]":
-    """bf16 products on a GPU; float32 on a CPU, where a resumed run must be the same run."""
-    return torch.autocast("cuda", torch.bfloat16) if device.type == "cuda" else nullcontext()
 
 
 def _place() -> tuple[int, int, torch.device]:

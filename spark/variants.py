@@ -75,6 +75,7 @@ class _Node:
     first: int
     second: int
     mix: float = 0.0
+    name: str = ""
 
     @property
     def kind(self) -> str:
@@ -94,12 +95,48 @@ def random_variant(
     return _finish(nodes, base, convention)
 
 
+def same_body(base: BodyFeatures) -> Variant:
+    """The body itself, under its own names, as a variant: all that a network sees of it."""
+    return _finish(_nodes(base), base)
+
+
+def scaled_body(base: BodyFeatures, rng: np.random.Generator) -> Variant:
+    """The body with other bone lengths: the same joints under the same names."""
+    nodes = _nodes(base)
+    _scale(nodes, rng)
+    return _finish(nodes, base)
+
+
+def split_body(base: BodyFeatures) -> Variant:
+    """The body with joints split as Aberman et al. (2020) do for their second group of characters:
+    the second spine joint and both shoulders move to the middle of their bones, and a joint that
+    does not turn takes the place of each."""
+    nodes = _nodes(base)
+    spines = [node for node in nodes if node.kind == "spine"]
+    chosen = [*spines[:2][-1:], *(node for node in nodes if node.kind == "clavicle")]
+    out = []
+    for node in nodes:
+        out.append(node)
+        if any(node is one for one in chosen) and node.parent is not None:
+            node.offset = node.offset / 2
+            role = node.role if node.kind == "spine" else None
+            after = _Node(
+                node, node.offset, role, node.first, node.second, 0.0, f"{node.name}_split"
+            )
+            for child in nodes:
+                if child.parent is node:
+                    child.parent = after
+            out.append(after)
+    return _finish(out, base)
+
+
 def _nodes(base: BodyFeatures) -> list[_Node]:
     nodes: list[_Node] = []
     for k, j in enumerate(base.joints.tolist()):
         parent = None if k == 0 else nodes[int(base.skeleton.parents[k])]
         role = base.rig.roles.roles[j]
-        nodes.append(_Node(parent, base.skeleton.offsets[k].copy(), role, k, k))
+        offset, name = base.skeleton.offsets[k].copy(), base.skeleton.names[k]
+        nodes.append(_Node(parent, offset, role, k, k, name=name))
     return nodes
 
 
@@ -149,8 +186,9 @@ def _scale(nodes: list[_Node], rng: np.random.Generator) -> None:
             node.offset = node.offset * factors[_SEGMENT[kind]] * shares[kind]
 
 
-def _finish(nodes: list[_Node], base: BodyFeatures, convention: str) -> Variant:
-    """Sort, measure and name: a `Rig` whose T-pose is its rest pose and whose hips are 1 high."""
+def _finish(nodes: list[_Node], base: BodyFeatures, convention: str | None = None) -> Variant:
+    """Measure and name: a `Rig` whose T-pose is its rest pose and whose hips are 1 high. Without a
+    convention joints keep their names."""
     place = {id(node): k for k, node in enumerate(nodes)}
     parents = np.array([-1 if node.parent is None else place[id(node.parent)] for node in nodes])
     offsets = np.stack([node.offset for node in nodes])
@@ -167,7 +205,7 @@ def _finish(nodes: list[_Node], base: BodyFeatures, convention: str) -> Variant:
     ones = (1.0,) * len(nodes)
     role_map = RoleMap(roles, ones, ("made",) * len(nodes))
     skeleton = Skeleton(
-        tuple(name_joints(roles, convention)),
+        tuple(name_joints(roles, convention) if convention else (node.name for node in nodes)),
         parents,
         offsets / height,
         np.arange(len(nodes)) == 0,

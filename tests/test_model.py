@@ -6,12 +6,13 @@ import torch
 
 from spark import losses
 from spark.batch import Batch, Collator
+from spark.bodies import Body, Pose, forward_kinematics
 from spark.canonical import to_canonical
 from spark.contacts import planted_feet
 from spark.features import body_features, canonical_from_features, pose_features
 from spark.kinematics import forward
-from spark.model import Body, Config, Pose, Spark, forward_kinematics
-from spark.names import NameEncoder, T5Names, tokenize
+from spark.model import Config, Spark
+from spark.names import NameEncoder
 from spark.pairs import Clip, PairMaker
 from spark.rig_names import CONVENTIONS, name_joints
 from spark.roles import Role
@@ -237,33 +238,3 @@ def test_conventions_name_every_joint_apart(convention: str) -> None:
     roles = [Role.PELVIS, Role.SPINE, Role.SPINE, Role.NECK, *list(Role)[3:]]
     names = name_joints(roles, convention)
     assert len(set(names)) == len(names)
-
-
-def test_tokens_are_byt5s() -> None:
-    np.testing.assert_array_equal(tokenize(["Ab", "é"]), [[68, 101, 1], [198, 172, 1]])
-
-
-def test_padding_does_not_change_a_names_vector() -> None:
-    torch.manual_seed(0)
-    encoder = NameEncoder()
-    alone, among = encoder.encode(["Hips"])[0], encoder.encode(["Hips", "mixamorig:LeftForeArm"])[0]
-    torch.testing.assert_close(alone, among, atol=1e-6, rtol=0)
-
-
-def test_t5_from_a_folder_and_its_cache(tmp_path: object) -> None:
-    """A tiny T5 with a byte tokenizer, written to disk; a second reading needs no transformers."""
-    transformers = pytest.importorskip("transformers", reason="extra t5 is not installed")
-    folder = tmp_path / "t5"  # type: ignore[operator]
-    config = transformers.T5Config(
-        vocab_size=384, d_model=16, d_kv=8, d_ff=32, num_layers=1, num_heads=2
-    )
-    transformers.T5EncoderModel(config).save_pretrained(folder)
-    transformers.ByT5Tokenizer().save_pretrained(folder)
-    cache = tmp_path / "cache" / "names.pt"  # type: ignore[operator]
-    first = T5Names(str(folder), cache).encode(["LeftArm", "RightArm", "LeftArm"])
-    assert first.shape == (3, 16)
-    torch.testing.assert_close(first[0], first[2])
-    assert (first[0] - first[1]).abs().max() > 1e-4
-    again = T5Names(str(folder), cache)
-    again._run = None  # type: ignore[assignment,method-assign]
-    torch.testing.assert_close(again.encode(["RightArm"])[0], first[1])

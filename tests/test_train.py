@@ -14,11 +14,12 @@ from safetensors.torch import save_file
 
 from spark import losses
 from spark.batch import Batch
+from spark.bodies import forward_kinematics
 from spark.canonical import canonical_positions, to_canonical
 from spark.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from spark.clips import at_frame_time, read_clips
 from spark.errors import ConventionError, FileFormatError, SkeletonError
-from spark.model import Spark, forward_kinematics
+from spark.model import Spark
 from spark.names import NameConfig, NameEncoder
 from spark.pairs import Clip
 from spark.retarget import retarget
@@ -26,7 +27,6 @@ from spark.rotation import quat_angle
 from spark.sample import sample_motion, sample_rig
 from spark.settings import TrainConfig, read_settings, toml
 from spark.train import Objective, Steps, network, optimiser_of, take_step, train
-from spark.train_names import score_names, train_names
 from spark.transfer import transfer
 from spark_sim import sample
 
@@ -144,7 +144,7 @@ def test_settings_survive_their_file(tmp_path: Path) -> None:
         ({"steps": "many"}, "steps = 'many'"),
         ({"steps": 0}, "steps = 0"),
         ({"batch": 6, "per_body": 4}, "no multiple"),
-        ({"ablate": ["feet"]}, "expected one of share, mask, pos, fk"),
+        ({"ablate": ["feet"]}, "expected one of share, mask, pos, fk, mix"),
         ({"preset": "huge"}, "expected one of default, paper, tiny"),
         ({"seed": True}, "seed = True"),
     ],
@@ -328,14 +328,3 @@ def test_the_command_line_trains_resumes_and_retargets(tmp_path: Path) -> None:
     lost = command("retarget", walk, "--to", target, "--method", "spark", "--force")
     assert lost.returncode == 2
     assert "checkpoint goes with" in lost.stderr
-
-
-def test_names_are_learned() -> None:
-    """More roles are found on conventions never seen than by an encoder that learned nothing."""
-    config = NameConfig(width=48, heads=4, blocks=2)
-    torch.manual_seed(0)
-    blank = score_names(NameEncoder(config))
-    learned = score_names(train_names(120, config=config))
-    assert learned.total == blank.total == 4 * 23
-    assert learned.right > blank.right + 5
-    assert learned.sides_confused == 0

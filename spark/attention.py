@@ -1,0 +1,108 @@
+"""The transformer's parts: attention, the blocks along time, positions in time.
+
+SDPA is torch's fused attention: no scores of all frames are ever kept. On CPUs it is slower in
+bfloat16 than in float32, so that there it reads float32 whatever the products around it use.
+
+Axes: M sequences, L = Q or K their tokens, H heads, C features of a head, D width.
+"""
+
+import torch
+import torch.nn.functional as nnf
+from jaxtyping import Bool, Float
+from torch import Tensor, nn
+
+from spark.precision import exactly
+
+Heads = Float[Tensor, "M H _ C"]  # of any number of tokens
+
+
+class Attention(nn.Module):
+    """Multi-head attention over the second-to-last axis, with optional rotary positions."""
+
+    def __init__(self, width: int, heads: int, rotary: bool = False, causal: bool = False) -> None:
+        super().__init__()
+        self.width, self.heads, self.rotary, self.causal = width, heads, rotary, causal
+        self.qkv = nn.Linear(width, 3 * width)
+        self.out = nn.Linear(width, width)
+
+    def forward(
+        self,
+        x: Float[Tensor, "M Q D"],
+        context: Float[Tensor, "M K D"] | None = None,
+        mask: Bool[Tensor, "M #Q K"] | None = None,
+    ) -> Float[Tensor, "M Q D"]:
+        """`x` looks at `context`, or at itself, where `mask` is True."""
+        if context is None:
+            q, k, v = self._split(self.qkv(x), 3)
+        else:
+            q, (k, v) = self.queries(x), self.keys_and_values(context)
+        if self.rotary:
+            q, k = _rotary(q), _rotary(k)
+        return self.look(q, k, v, mask)
+
+    def queries(self, x: Float[Tensor, "M Q D"]) -> Heads:
+        """What `x` asks for."""
+        weight, bias = self.qkv.weight[: self.width], self.qkv.bias[: self.width]
+        return self._split(nnf.linear(x, weight, bias), 1)[0]
+
+    def keys_and_values(self, context: Float[Tensor, "M K D"]) -> tuple[Heads, Heads]:
+        """What `context` answers to, and with."""
+        weight, bias = self.qkv.weight[self.width :], self.qkv.bias[self.width :]
+        k, v = self._split(nnf.linear(context, weight, bias), 2)
+        return k, v
+
+    def look(
+        self, q: Heads, k: Heads, v: Heads, mask: Bool[Tensor, "M #Q K"] | None
+    ) -> Float[Tensor, "M Q D"]:
+        """The values at the keys that fit the queries."""
+        allowed = None if mask is None else mask[:, None]
+        if q.device.type == "cpu":
+            with exactly(q):
+                attended = nnf.scaled_dot_product_attention(
+                    q.float(), k.float(), v.float(), allowed, is_causal=self.causal
+                )
+        else:
+            attended = nnf.scaled_dot_product_attention(q, k, v, allowed, is_causal=self.causal)
+        return self.out(attended.transpose(1, 2).flatten(2))
+
+    def _split(self, x: Float[Tensor, "M L PD"], parts: int) -> tuple[Heads, ...]:
+        return x.view(*x.shape[:-1], parts, self.heads, -1).transpose(1, 3).unbind(2)
+
+
+class Feedforward(nn.Sequential):
+    """Position-wise network, four times as wide inside."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__(nn.Linear(width, 4 * width), nn.GELU(), nn.Linear(4 * width, width))
+
+
+class TemporalBlock(nn.Module):
+    """One of the encoder's blocks: each token looks along time (eq. 2 and 3)."""
+
+    def __init__(self, width: int, heads: int, *, rotary: bool, causal: bool) -> None:
+        super().__init__()
+        self.norm_time, self.norm_ff = nn.LayerNorm(width), nn.LayerNorm(width)
+        self.time = Attention(width, heads, rotary, causal)
+        self.ff = Feedforward(width)
+
+    def forward(self, x: Float[Tensor, "M T D"]) -> Float[Tensor, "M T D"]:
+        """M tokens, each along its T frames."""
+        x = x + self.time(self.norm_time(x))
+        return x + self.ff(self.norm_ff(x))
+
+
+def sinusoids(T: int, D: int, like: Tensor) -> Float[Tensor, "T D"]:
+    """Absolute positions in time (Vaswani et al. 2017)."""
+    time = torch.arange(T, device=like.device, dtype=torch.float32)[:, None]
+    rate = torch.exp(torch.arange(0, D, 2, device=like.device) * (-9.21034 / D))
+    return torch.cat([torch.sin(time * rate), torch.cos(time * rate)], -1).to(like.dtype)
+
+
+def _rotary(x: Float[Tensor, "M H T C"]) -> Float[Tensor, "M H T C"]:
+    """Rotary positions (Su et al. 2021): attention then depends on differences of time alone."""
+    half = x.shape[-1] // 2
+    time = torch.arange(x.shape[-2], device=x.device, dtype=torch.float32)[:, None]
+    rate = torch.exp(torch.arange(half, device=x.device) * (-6.9078 / half))
+    cos, sin = torch.cos(time * rate).to(x.dtype), torch.sin(time * rate).to(x.dtype)
+    a, b = x[..., :half], x[..., half:]
+    return torch.cat([a * cos - b * sin, a * sin + b * cos], -1)
