@@ -4,20 +4,28 @@ Our own has T5's encoder architecture (pre-norm with RMS norms and no biases, re
 buckets shared by all layers; Raffel et al. 2020) and ByT5's tokens (a byte plus 3; Xue et al.
 2022), so that it needs no vocabulary file and reads any language. It ships inside the checkpoint.
 
+A word means one joint in one rig and another in the next: above an "arm" a "shoulder" is a
+clavicle, above an "elbow" it is an upper arm. So the names of a rig are read together: after each
+name's bytes, blocks of the same kind, without positions, let every name attend to the others.
+
 Text embeddings confuse left and right, so the side stands beside them as two features of its own.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 import torch
 import torch.nn.functional as nnf
 from jaxtyping import Float, Int
 from torch import Tensor, nn
+from torch.nn.utils.rnn import pad_sequence
 
 from spark.errors import DependencyError, FileFormatError
+from spark.files import write_atomically
+from spark.name_words import rig_words
 
 PAD, END, BYTE_OFFSET = 0, 1, 3
 MAX_BYTES = 48
@@ -25,11 +33,12 @@ MAX_BYTES = 48
 
 @dataclass(frozen=True)
 class NameConfig:
-    """Sizes of our own encoder."""
+    """Sizes of our own encoder: `blocks` read a name's bytes, `rig_blocks` the names of a rig."""
 
     width: int = 128
     heads: int = 4
     blocks: int = 3
+    rig_blocks: int = 2
     buckets: int = 32
     max_distance: int = 64
 
@@ -41,8 +50,15 @@ def tokenize(names: Sequence[str]) -> Int[Tensor, "S L"]:
     return torch.tensor([row + [PAD] * (length - len(row)) for row in rows]).view(-1, length)
 
 
+def tokenize_rigs(rigs: Sequence[Sequence[str]]) -> Int[Tensor, "R N L"]:
+    """The tokens of each rig's names, by their words; the smaller rigs are padded with 0."""
+    counts = [len(rig) for rig in rigs]
+    tokens = tokenize([words for rig in rigs for words in rig_words(rig)])
+    return pad_sequence(list(torch.split(tokens, counts)), batch_first=True, padding_value=PAD)
+
+
 class NameEncoder(nn.Module):
-    """Bytes of a name to a unit vector."""
+    """The names of a rig to unit vectors, whatever their order."""
 
     def __init__(self, config: NameConfig = NameConfig()) -> None:
         super().__init__()
@@ -51,24 +67,33 @@ class NameEncoder(nn.Module):
         self.bias = nn.Embedding(config.buckets, config.heads)
         self.blocks = nn.ModuleList(_Block(config) for _ in range(config.blocks))
         self.norm = nn.RMSNorm(config.width, eps=1e-6)
+        self.rig_blocks = nn.ModuleList(_Block(config) for _ in range(config.rig_blocks))
+        self.rig_norm = nn.RMSNorm(config.width, eps=1e-6)
 
-    def forward(self, tokens: Int[Tensor, "S L"]) -> Float[Tensor, "S D"]:
-        """The mean over a name's tokens, normalised."""
+    def forward(self, tokens: Int[Tensor, "R N L"]) -> Float[Tensor, "R N D"]:
+        """Of `tokenize_rigs`; the rows of padding mean nothing."""
+        named = (tokens != PAD).any(-1)
+        x = tokens.new_zeros((*named.shape, self.config.width), dtype=self.embed.weight.dtype)
+        x = x.index_put(named.nonzero(as_tuple=True), self._names(tokens[named]))
+        bias = torch.where(named, 0.0, float("-inf"))[:, None, None]
+        for block in self.rig_blocks:
+            x = block(x, bias)
+        return nnf.normalize(self.rig_norm(x), dim=-1)
+
+    @torch.no_grad()
+    def encode(self, names: Sequence[str]) -> Float[Tensor, "S D"]:
+        """The vectors of `names`: the joints of one rig."""
+        return self(tokenize_rigs([names]).to(self.embed.weight.device))[0]
+
+    def _names(self, tokens: Int[Tensor, "S L"]) -> Float[Tensor, "S D"]:
+        """Each name by itself: the mean over its tokens."""
         real = tokens != PAD
         x = self.embed(tokens)
         bias = self._relative_bias(tokens.shape[1])
         bias = bias + torch.where(real, 0.0, float("-inf"))[:, None, None]
         for block in self.blocks:
             x = block(x, bias)
-        x = (self.norm(x) * real[..., None]).sum(1) / real.sum(1, keepdim=True)
-        return nnf.normalize(x, dim=-1)
-
-    @torch.no_grad()
-    def encode(self, names: Sequence[str]) -> Float[Tensor, "S D"]:
-        """The vectors of `names`, each distinct name read once."""
-        distinct = sorted(set(names))
-        vectors = self(tokenize(distinct).to(self.embed.weight.device))
-        return vectors[[distinct.index(name) for name in names]]
+        return (self.norm(x) * real[..., None]).sum(1) / real.sum(1, keepdim=True)
 
     def _relative_bias(self, length: int) -> Float[Tensor, "1 H L L"]:
         """T5's buckets: half a direction each, exact when near and logarithmic further away."""
@@ -99,7 +124,7 @@ class _Block(nn.Module):
         self.narrow = nn.Linear(4 * width, width, bias=False)
 
     def forward(
-        self, x: Float[Tensor, "S L D"], bias: Float[Tensor, "S H L L"]
+        self, x: Float[Tensor, "S L D"], bias: Float[Tensor, "S #H #L L"]
     ) -> Float[Tensor, "S L D"]:
         S, L, D = x.shape
         qkv = self.qkv(self.norm_attention(x)).view(S, L, 3, self.heads, -1)
@@ -113,29 +138,24 @@ class _Block(nn.Module):
 class T5Names:
     """A T5 encoder from a local directory or a hub name, frozen, its vectors kept on disk.
 
-    `transformers` is imported when a name is met that the cache does not hold, and not before.
+    `transformers` is imported when a name is met that the cache does not hold, and not before. A
+    directory whose files have changed is another model.
     """
 
     def __init__(self, model: str, cache: Path) -> None:
         self.model, self.cache = model, cache
-        self._vectors: dict[str, Tensor] = {}
-        if cache.exists():
-            try:
-                stored = torch.load(cache, weights_only=True)
-            except Exception as error:
-                raise FileFormatError(
-                    cache, None, f"not a cache of name embeddings ({error}); delete it to go on"
-                ) from error
-            self._vectors = stored.get(model, {})
+        self._key = _identity(model)
+        self._vectors = _cached(cache).get(self._key, {})
 
     def encode(self, names: Sequence[str]) -> Float[Tensor, "S D"]:
         """The mean of T5's last hidden states over each name's tokens, normalised."""
         missing = sorted(set(names) - set(self._vectors))
         if missing:
             self._vectors |= dict(zip(missing, self._run(missing), strict=True))
-            stored = torch.load(self.cache, weights_only=True) if self.cache.exists() else {}
             self.cache.parent.mkdir(parents=True, exist_ok=True)
-            torch.save({**stored, self.model: self._vectors}, self.cache)
+            data = BytesIO()
+            torch.save({**_cached(self.cache), self._key: self._vectors}, data)
+            write_atomically(self.cache, data.getvalue())
         return torch.stack([self._vectors[name] for name in names])
 
     @torch.no_grad()
@@ -155,3 +175,24 @@ class T5Names:
         hidden = model(**tokens).last_hidden_state
         weight = tokens.attention_mask[..., None].to(hidden.dtype)
         return list(nnf.normalize((hidden * weight).sum(1) / weight.sum(1), dim=-1))
+
+
+def _identity(model: str) -> str:
+    """A hub name, or a directory and when its files were last changed."""
+    folder = Path(model)
+    if not folder.is_dir():
+        return model
+    return f"{folder.resolve()}@{max((f.stat().st_mtime_ns for f in folder.iterdir()), default=0)}"
+
+
+def _cached(cache: Path) -> dict[str, dict[str, Tensor]]:
+    """The vectors of names by model; none where there is no cache yet."""
+    if not cache.exists():
+        return {}
+    try:
+        stored = torch.load(cache, weights_only=True)
+        return {str(model): dict(vectors) for model, vectors in stored.items()}
+    except Exception as error:
+        raise FileFormatError(
+            cache, None, "is no cache of name embeddings; delete it to go on"
+        ) from error

@@ -1,59 +1,69 @@
 """Training of our own name encoder: names of one kind of joint near one another, whoever named it.
 
-Classification by cosine over the kinds of joints (upper arm, spine, ...; the side stands beside the
-vector as two bits), on names of all conventions but the held-out ones, spoilt as exporters do:
-prefixes, case, separators.
+Classification by cosine over the kinds of joints (upper arm, spine, ..., none of them; the side
+stands beside the vector as two bits), on made-up rigs whose words are those of all conventions but
+the held-out ones.
 """
 
-import re
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import torch
 import torch.nn.functional as nnf
-from jaxtyping import Float
-from torch import Tensor
 
-from spark.names import NameConfig, NameEncoder, tokenize
+from spark.name_hints import read_names
+from spark.name_rigs import KINDS, OTHER, Named, made_up_rig, rig_of
+from spark.names import NameConfig, NameEncoder, tokenize_rigs
 from spark.rig_names import CONVENTIONS, HELD_OUT, name_joints, split_side
 from spark.roles import Role
 
+LEARNED = tuple(c for c in CONVENTIONS if c not in HELD_OUT)
 _ROLES = [*list(Role), Role.SPINE, Role.SPINE, Role.NECK]
-_KINDS = sorted({split_side(role)[1] for role in Role})
-_PREFIXES = ("", "", "", "Character1_", "rig:", "Armature|", "mixamorig1:", "Hero_", "b_", "jnt ")
-_SEPARATORS = ("", "_", "-", ".", " ")
+_CLASSES = (*KINDS, OTHER)
 _TEMPERATURE = 0.1
+_RATE = 1e-3
+
+
+class Failure(NamedTuple):
+    """A name whose role was not found, and the role that was found instead."""
+
+    name: str
+    role: str
+    found: str
 
 
 class NameScore(NamedTuple):
-    """Of `total` names, how many found a name of their role; how many one of the other side."""
+    """Of `total` names, how many lie nearest their role; how many nearest one of the other side."""
 
     total: int
     right: int
     sides_confused: int
+    failures: tuple[Failure, ...]
 
 
 def train_names(
     steps: int,
     *,
     config: NameConfig | None = None,
+    conventions: Sequence[str] = LEARNED,
+    rigs: int = 16,
     seed: int = 0,
     watch: Callable[[int, float], None] = lambda step, loss: None,
 ) -> NameEncoder:
-    """An encoder that has learned from the conventions that are not held out; frozen."""
+    """An encoder that has learned from the words of `conventions`, `rigs` rigs a step; frozen."""
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
     encoder = NameEncoder(config or NameConfig())
-    kinds = torch.nn.Parameter(0.1 * torch.randn(len(_KINDS), encoder.config.width))
-    optimiser = torch.optim.AdamW([*encoder.parameters(), kinds], lr=1e-3, fused=True)
-    known = named(tuple(c for c in CONVENTIONS if c not in HELD_OUT))
+    kinds = torch.nn.Parameter(0.1 * torch.randn(len(_CLASSES), encoder.config.width))
+    optimiser = torch.optim.AdamW([*encoder.parameters(), kinds], lr=_RATE, fused=True)
     for step in range(steps):
         for group in optimiser.param_groups:
-            group["lr"] = 1e-3 * min(1.0, (step + 1) / 20) * (1 - 0.95 * step / steps)
-        chosen = [known[i] for i in rng.integers(len(known), size=48).tolist()]
-        vectors = encoder(tokenize([spoil(name, rng) for name, _ in chosen]))
-        wanted = torch.tensor([_KINDS.index(split_side(role)[1]) for _, role in chosen])
+            group["lr"] = _RATE * min(1.0, (step + 1) / 20) * (1 - 0.95 * step / steps)
+        drawn = [made_up_rig(rng, conventions) for _ in range(rigs)]
+        tokens = tokenize_rigs([[name for name, _, _ in rig] for rig in drawn])
+        vectors = encoder(tokens)[tokens.any(-1)]
+        wanted = torch.tensor([_CLASSES.index(kind) for rig in drawn for _, _, kind in rig])
         scores = vectors @ nnf.normalize(kinds, dim=-1).T / _TEMPERATURE
         loss = nnf.cross_entropy(scores, wanted)
         optimiser.zero_grad()
@@ -64,39 +74,35 @@ def train_names(
 
 
 def score_names(encoder: NameEncoder, conventions: Sequence[str] = HELD_OUT) -> NameScore:
-    """Retrieval over conventions: the nearest name of the learned ones, sides beside as bits."""
-    known = named(tuple(c for c in CONVENTIONS if c not in HELD_OUT))
-    asked = named(tuple(conventions))
-    nearest = (_vectors(encoder, asked) @ _vectors(encoder, known).T).argmax(-1).tolist()
-    found = [known[i][1] for i in nearest]
-    pairs = [
-        (split_side(role), split_side(other)) for (_, role), other in zip(asked, found, strict=True)
-    ]
-    return NameScore(
-        len(pairs),
-        sum(own == other for own, other in pairs),
-        sum({own[0], other[0]} == {"left", "right"} for own, other in pairs),
-    )
+    """Retrieval over conventions that the encoder has not learned."""
+    return score_rigs(encoder, [rig_of(c, _ROLES) for c in conventions])
 
 
-def named(conventions: Sequence[str]) -> list[tuple[str, Role]]:
-    """Every role's names in these conventions."""
-    return [pair for c in conventions for pair in zip(name_joints(_ROLES, c), _ROLES, strict=True)]
+def score_rigs(
+    encoder: NameEncoder, rigs: Sequence[Sequence[Named]], learned: Sequence[str] = LEARNED
+) -> NameScore:
+    """Retrieval of the joints that have a role: the nearest role among those of the name's side.
 
-
-def spoil(name: str, rng: np.random.Generator) -> str:
-    """A name as another exporter would write it: other prefix, case and separators."""
-    if rng.random() < 0.3:
-        name = re.split(r"[:|]", name)[-1]
-    if rng.random() < 0.5:
-        words = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", name)
-        name = _SEPARATORS[rng.integers(len(_SEPARATORS))].join(words) or name
-    case = rng.integers(6)
-    name = (name.lower(), name.upper(), name.title())[case] if case < 3 else name
-    return _PREFIXES[rng.integers(len(_PREFIXES))] + name
-
-
-def _vectors(encoder: NameEncoder, names: Sequence[tuple[str, Role]]) -> Float[Tensor, "S D"]:
-    sides = [split_side(role)[0] for _, role in names]
-    bits = torch.tensor([[side == "left", side == "right"] for side in sides], dtype=torch.float32)
-    return torch.cat([encoder.encode([name for name, _ in names]), bits], -1)
+    A role's place is the mean over the `learned` conventions. A name's side is the one that
+    `read_names` finds in it, as the bit beside it says in use; not its role's.
+    """
+    roles = list(Role)
+    places = torch.stack([encoder.encode(name_joints(roles, c)) for c in learned]).mean(0)
+    failures: list[Failure] = []
+    total = confused = 0
+    for rig in rigs:
+        names = [name for name, _, _ in rig]
+        near = encoder.encode(names) @ nnf.normalize(places, dim=-1).T
+        hints = read_names(names)
+        for (name, side, kind), hint, row in zip(rig, hints, near.tolist(), strict=True):
+            if kind == OTHER:
+                continue
+            total += 1
+            found = max(
+                (role for role in roles if split_side(role)[0] == hint.side),
+                key=lambda role: row[roles.index(role)],
+            )
+            if split_side(found) != (side, kind):
+                confused += {side, hint.side} == {"left", "right"}
+                failures.append(Failure(name, f"{side} {kind}".strip(), found.value))
+    return NameScore(total, total - len(failures), confused, tuple(failures))
