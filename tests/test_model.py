@@ -6,11 +6,12 @@ import torch
 
 from spark import losses
 from spark.batch import Batch, Collator
+from spark.bodies import Body, Pose, forward_kinematics
 from spark.canonical import to_canonical
 from spark.contacts import planted_feet
 from spark.features import body_features, canonical_from_features, pose_features
 from spark.kinematics import forward
-from spark.model import Body, Config, Pose, Spark, forward_kinematics
+from spark.model import Config, Spark
 from spark.names import NameEncoder
 from spark.pairs import Clip, PairMaker
 from spark.rig_names import CONVENTIONS, name_joints

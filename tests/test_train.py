@@ -14,11 +14,12 @@ from safetensors.torch import save_file
 
 from spark import losses
 from spark.batch import Batch
+from spark.bodies import forward_kinematics
 from spark.canonical import canonical_positions, to_canonical
 from spark.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from spark.clips import at_frame_time, read_clips
 from spark.errors import ConventionError, FileFormatError, SkeletonError
-from spark.model import Spark, forward_kinematics
+from spark.model import Spark
 from spark.names import NameConfig, NameEncoder
 from spark.pairs import Clip
 from spark.retarget import retarget
@@ -143,7 +144,7 @@ def test_settings_survive_their_file(tmp_path: Path) -> None:
         ({"steps": "many"}, "steps = 'many'"),
         ({"steps": 0}, "steps = 0"),
         ({"batch": 6, "per_body": 4}, "no multiple"),
-        ({"ablate": ["feet"]}, "expected one of share, mask, pos, fk"),
+        ({"ablate": ["feet"]}, "expected one of share, mask, pos, fk, mix"),
         ({"preset": "huge"}, "expected one of default, paper, tiny"),
         ({"seed": True}, "seed = True"),
     ],
