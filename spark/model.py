@@ -126,8 +126,10 @@ class JointEmbedding(nn.Module):
         return self.name(body.names) + self.tpose(features)
 
     def places(self, body: Body) -> Float[Tensor, "B 6 N D"]:
-        """E_pos of each place in each group."""
-        place = self.position[:, : body.groups.shape[-1]].expand(len(body.groups), -1, -1, -1)
+        """E_pos of each place in each group; places beyond the last known one share it."""
+        number = torch.arange(body.groups.shape[-1], device=body.groups.device)
+        place = self.position[:, number.clamp(max=self.position.shape[1] - 1)]
+        place = place.expand(len(body.groups), -1, -1, -1)
         return place + self.arc(body.arc[..., None]) if self.arc_length else place
 
 

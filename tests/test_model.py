@@ -238,3 +238,20 @@ def test_conventions_name_every_joint_apart(convention: str) -> None:
     roles = [Role.PELVIS, Role.SPINE, Role.SPINE, Role.NECK, *list(Role)[3:]]
     names = name_joints(roles, convention)
     assert len(set(names)) == len(names)
+
+
+def test_a_group_may_have_more_joints_than_places(batch: Batch) -> None:
+    """A face of many bones in one group: the last place stands for all that come after it."""
+    longest = batch.source.groups.shape[-1]
+    torch.manual_seed(0)
+    config = Config(**{**vars(Config.paper()), **SMALL, "noise": False})
+    short = Spark(Config(**{**vars(config), "max_group": 2})).eval()
+    long = Spark(Config(**{**vars(config), "max_group": longest})).eval()
+    weights = short.state_dict()
+    places = weights["embedding.position"]
+    more = places[:, -1:].expand(-1, longest - 2, -1)
+    weights["embedding.position"] = torch.cat([places, more], 1)
+    long.load_state_dict(weights)
+    with torch.no_grad():
+        a, b = (m(batch.pose, batch.source, batch.target) for m in (short, long))
+    torch.testing.assert_close(a.rotations, b.rotations)
