@@ -4,6 +4,8 @@ Only the kinematics matter here, so a file whose meshes are missing is read with
 """
 
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +25,7 @@ FREE, BALL, SLIDE, HINGE = (
 )
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
 _LEAST_MASS, _LEAST_INERTIA = 1e-4, 1e-8
+_FAR = 1e4  # [m]
 _SECOND = 0.5  # a second tree with this share of the joints is another robot
 
 
@@ -83,23 +86,42 @@ def read_mjcf(path: str | Path, *, visuals: bool = True) -> Mjcf:
     """
     path = Path(path)
     if not path.is_file():
-        raise FileFormatError(path, None, "no such file; expected an MJCF (.xml)")
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-    except (ValueError, RuntimeError) as error:
-        raise FileFormatError(path, None, f"MuJoCo can't read it: {_first(error)}") from error
+        what = "is a folder" if path.is_dir() else "no such file"
+        raise FileFormatError(path, None, f"{what}; expected an MJCF (.xml)")
     notes: list[str] = []
-    if not visuals:
-        _drop_visuals(spec)
-    root = _find_root(spec, path, notes)
-    _free_root(spec, root, path, notes)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of attributes of the file that MuJoCo calls deprecated
+    with _warnings_as(notes):
+        try:
+            spec = mujoco.MjSpec.from_file(str(path))
+        except (ValueError, RuntimeError) as error:
+            raise FileFormatError(path, None, f"MuJoCo can't read it: {_first(error)}") from error
+        if not visuals:
+            _drop_visuals(spec)
+        root = _find_root(spec, path, notes)
+        _free_root(spec, root, path, notes)
         model = _compile(spec, path, notes)
     _say_what_is_ignored(model, notes)
-    if not np.isfinite(model.body_pos).all() or not np.isfinite(model.jnt_axis).all():
-        raise FileFormatError(path, None, "a body's place is not a finite number")
+    if not (np.abs(model.body_pos) < _FAR).all() or not np.isfinite(model.jnt_axis).all():
+        raise FileFormatError(path, None, f"a body's place is no number of metres below {_FAR:g}")
     return Mjcf(model, spec, int(model.body(root).id), path, tuple(notes))
+
+
+@contextmanager
+def _warnings_as(notes: list[str]) -> Iterator[None]:
+    """What MuJoCo warns of as notes, each once: by itself it prints them, and leaves a log file in
+    the current folder."""
+
+    def note(message: str) -> None:
+        said = f"MuJoCo warns: {message}"
+        if said not in notes:
+            notes.append(said)
+
+    mujoco.set_mju_user_warning(note)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of attributes that MuJoCo calls deprecated
+            yield
+    finally:
+        mujoco.set_mju_user_warning(None)
 
 
 def _drop_visuals(spec: mujoco.MjSpec) -> None:

@@ -177,7 +177,7 @@ class Morphology:
 
 
 def understand_robot(source: Mjcf | str | Path, override: Override | None = None) -> Morphology:
-    """What any humanoid MJCF is; no configuration. `override` is a role map by body names.
+    """What any humanoid MJCF is; no configuration. `override` gives roles to `parts_of` it.
 
     Raises SkeletonError where it has no legs, or limits that forbid a T-pose.
     """
@@ -189,6 +189,14 @@ def understand_robot(source: Mjcf | str | Path, override: Override | None = None
         return _understand(mjcf, tree, joints, override)
     except SkeletonError as error:
         raise SkeletonError(f"{mjcf.path}: {error}") from error
+
+
+def parts_of(mjcf: Mjcf) -> Skeleton:
+    """The robot's parts, called as their bodies are: what an `override` of roles counts."""
+    tree, joints = tree_of(mjcf)
+    segments = segments_of(mjcf, tree, joints)
+    points = [surface(mjcf, _rigid_with(mjcf, segment.body, segments)) for segment in segments]
+    return _skeleton(segments, points, tuple(segment.names[0] for segment in segments))
 
 
 def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | None) -> Morphology:

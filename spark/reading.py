@@ -21,14 +21,16 @@ def read_motion(
     return read(path, unit=unit, up=up)
 
 
-def motion_files(path: Path) -> list[Path]:
-    """The BVH and FBX files below a folder, in order of their names; a file itself.
+def motion_files(path: Path, suffixes: tuple[str, ...] = SUFFIXES) -> list[Path]:
+    """The files of some endings below a folder, in order of their names; a file itself.
 
     Raises `FileFormatError` where there is none.
     """
     if path.is_file():
         return [path]
-    found = sorted(p for p in path.rglob("*") if p.suffix.lower() in SUFFIXES and p.is_file())
+    found = sorted(p for p in path.rglob("*") if p.suffix.lower() in suffixes and p.is_file())
     if not found:
-        raise FileFormatError(path, None, "holds no .bvh or .fbx file; expected one or more")
+        raise FileFormatError(
+            path, None, f"holds no {' or '.join(suffixes)} file; expected one or more"
+        )
     return found

@@ -113,7 +113,7 @@ def load(
     z; `roles` is a map of joints in TOML, as `spark-sim inspect --save-map` writes it.
     Of a robot's own motion (.npz, .csv, .pkl), `robot` is its name or MJCF; `quat`, xyzw or wxyz,
     and `fps` are what a CSV does not say.
-    A robot's name or MJCF alone yields one frame, in its T-pose.
+    A robot's name or MJCF alone yields one frame, in its T-pose; `roles` is then a map by bodies.
     """
     path = Path(path)
     given = {"unit": unit, "up": up, "roles": roles, "robot": robot, "quat": quat, "fps": fps}
@@ -123,7 +123,7 @@ def load(
     if registry.is_robot(path):
         from spark_sim.robot import load_robot
 
-        return load_robot(path)
+        return load_robot(path, roles=roles)
     if path.suffix.lower() in formats.SUFFIXES:
         from spark_sim.robot import load_motion
 
@@ -138,7 +138,7 @@ def load(
 def takes(path: File) -> tuple[str, ...]:
     """What `load` can be told of such a file."""
     if registry.is_robot(path):
-        return ()
+        return ("roles",)
     suffix = Path(path).suffix.lower()
     if suffix in formats.SUFFIXES:
         return ("robot", "quat", "fps") if suffix == ".csv" else ("robot",)
@@ -220,10 +220,12 @@ def report(
     clip: "AnyClip | File",
     *,
     source: "AnyClip | File | None" = None,
+    truth: "AnyClip | File | None" = None,
     html: File | None = None,
     force: bool = False,
 ) -> "Report":
-    """How believable a motion is; with `source`, beside the motion it was made from.
+    """How believable a motion is; with `source`, beside the motion it was made from, and with
+    `truth`, on the same skeleton, how far from what it should have been.
 
     With `html`, also written as a web page. Raises `OutputError` where that exists, unless forced.
     """
@@ -232,14 +234,16 @@ def report(
     if html is not None:
         files.claim(Path(html), force=force)
     clip = _clip(clip)
-    motion, origin, names = (clip.motion, clip.rig), None, (clip.name, "source")
+    origin, names = None, (clip.name, "source")
     if source is not None:
         source = _clip(source)
-        origin, names = (source.motion, source.rig), (clip.name, source.name)
-    judged = judge(*motion, source=origin)
+        origin, names = (source.motion, source.rig, source.body), (clip.name, source.name)
+    known = None if truth is None else _clip(truth).motion
+    judged = judge(clip.motion, clip.rig, source=origin, body=clip.body, truth=known)
     if html is not None:
         from sim.report.page import write_report_page
 
+        motion = clip.motion, clip.rig, clip.body
         write_report_page(judged, html, motion, origin, title=clip.name, names=names)
     return judged
 

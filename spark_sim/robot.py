@@ -4,15 +4,18 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from robots import registry
 from robots.formats import dispatch, format_of
 from robots.known import known
+from robots.mjcf import read_mjcf
+from robots.morphology import parts_of, understand_robot
 from robots.motion import RobotMotion
 from robots.solve import copy, retarget
 from sim.given import GivenBody
 from spark.canonical import to_canonical
 from spark.motion import Motion
 from spark.rig import Rig
-from spark_sim import files
+from spark_sim import files, rolemap
 from spark_sim.clip import AnyClip, File
 
 
@@ -63,13 +66,17 @@ class RobotClip:
         return dispatch.write(self.on_robot, path, format=format, source=self.path)
 
 
-def load_robot(robot: File) -> RobotClip:
-    """A robot by its name or its MJCF file: one frame, in its T-pose.
+def load_robot(robot: File, *, roles: File | None = None) -> RobotClip:
+    """A robot by its name or its MJCF file: one frame, in its T-pose. `roles` is a map by bodies.
 
     Raises `SparkSimError` where none is called that, or where its model does not compile, has no
     legs, or can't stand in a T-pose.
     """
-    found = known(robot)
+    if roles is None:
+        found = known(robot)
+    else:
+        mjcf = read_mjcf(registry.find(robot), visuals=False)
+        found = understand_robot(mjcf, rolemap.read(roles, parts_of(mjcf)))
     return RobotClip(RobotMotion(found, found.tpose, 1.0, found.notes), Path(robot).stem)
 
 

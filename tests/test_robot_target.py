@@ -1,7 +1,11 @@
 """A motion onto a robot, from file to file: within limits, feet on the floor, in MuJoCo's words."""
 
 import json
+import re
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from tempfile import TemporaryFile
 
 import mujoco
 import numpy as np
@@ -9,7 +13,10 @@ import pytest
 
 import spark_sim
 from spark.canonical import to_canonical
-from spark.errors import SparkSimError
+from spark.errors import ConventionError
+from spark.kinematics import forward
+from spark.roles import Role
+from spark_sim.cli import run
 from spark_sim.robot import RobotClip
 
 # A humanoid of hinges, 1.2 m high: hips and shoulders of three, knees, elbows and ankles.
@@ -62,10 +69,17 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def walk(tmp_path_factory: pytest.TempPathFactory) -> spark_sim.Clip:
+def walk_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("samples")
     spark_sim.sample(folder)
-    return spark_sim.load(folder / "walker_walk.bvh")
+    return folder / "walker_walk.bvh"
+
+
+@pytest.fixture(scope="module")
+def walk(walk_path: Path) -> spark_sim.Clip:
+    clip = spark_sim.load(walk_path)
+    assert isinstance(clip, spark_sim.Clip)
+    return clip
 
 
 @pytest.fixture(scope="module")
@@ -121,9 +135,158 @@ def test_a_walk_onto_hinges(
     assert np.median(lowest) < 0.02
 
 
-def test_what_is_no_robot_is_refused(tmp_path: Path) -> None:
-    for text in ("<mujoco><worldbody/></mujoco>", "<mujoco>", "not xml", ""):
-        path = tmp_path / "bad.xml"
-        path.write_text(text)
-        with pytest.raises(SparkSimError, match=r"bad\.xml"):
-            spark_sim.load(path)
+def on_command_line(*args: object) -> tuple[int, list[str], list[str]]:
+    """Exit code, and the lines of stdout and stderr, of one command."""
+    with TemporaryFile("w+") as out, TemporaryFile("w+") as err:
+        with redirect_stdout(out), redirect_stderr(err):
+            code = run([str(arg) for arg in args])
+        out.seek(0)
+        err.seek(0)
+        return code, out.read().splitlines(), err.read().splitlines()
+
+
+CHAIN = "".join(
+    f'<body name="link{k}" pos="0 0 .1"><joint axis="0 1 0"/><geom size=".05"/>' for k in range(8)
+)
+SNAKE = (
+    '<mujoco><worldbody><body name="base"><freejoint/><geom size=".1"/>'
+    f"{CHAIN}{'</body>' * 8}</body></worldbody></mujoco>"
+)
+BODY = ROBOT[ROBOT.index("<body") : ROBOT.rindex("</body>") + len("</body>")]
+BAD = {
+    "no XML": ("not xml", "MuJoCo can't read it"),
+    "empty": ("", "MuJoCo can't read it"),
+    "cut off": (ROBOT[:900], "MuJoCo can't read it"),
+    "a web page": ("<html><body>404</body></html>", "MuJoCo can't read it"),
+    "does not compile": (ROBOT.replace('"0.7"', '"x"').replace("capsule", "bag"), "MuJoCo can't"),
+    "includes itself": ('<mujoco><include file="bad.xml"/></mujoco>', "already included"),
+    "no robot": ("<mujoco><worldbody/></mujoco>", "the model has no joints; expected a humanoid"),
+    "no legs": (SNAKE, "not a humanoid"),
+    "two robots": (
+        ROBOT.replace(BODY, BODY + BODY.replace('name="', 'name="twin_')),
+        "holds several robots; expected one: keep one of them in the file (bodies 'pelvis', "
+        "'twin_pelvis')",
+    ),
+    "no T-pose": (
+        ROBOT.replace('range="-2.2 1.6"', 'range="1.2 1.6"'),
+        "the joint limits forbid a T-pose (legs down, arms out)",
+    ),
+    "no number": (ROBOT.replace('pos="0 0 0.7"', 'pos="0 0 nan"'), "a body's place is no number"),
+    "too far": (ROBOT.replace('pos="0 0 0.7"', 'pos="0 0 1e30"'), "a body's place is no number"),
+}
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_what_is_no_robot_is_refused(what: str, walk_path: Path, tmp_path: Path) -> None:
+    text, says = BAD[what]
+    bad = tmp_path / "bad.xml"
+    bad.write_text(text)
+    out = tmp_path / "out.npz"
+    code, stdout, stderr = on_command_line("retarget", walk_path, "--to", bad, "-o", out)
+    assert (code, stdout) == (2, [])
+    assert stderr[-1].startswith(f"spark-sim: error: {bad}: ")
+    assert says in stderr[-1]
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.xml"]
+
+
+def test_a_folder_is_no_robot(walk_path: Path, tmp_path: Path) -> None:
+    (tmp_path / "g1.xml").mkdir()
+    code, _, stderr = on_command_line("retarget", walk_path, "--to", tmp_path / "g1.xml")
+    assert code == 2
+    assert "g1.xml: is a folder; expected an MJCF (.xml)" in stderr[-1]
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda text: re.sub(' range="[^"]*"', "", text), "22 hinges have no limits: taken as 180"),
+        (lambda text: text.replace("<freejoint/>", ""), "no free joint: one was given to 'pelvis'"),
+        (
+            lambda text: text.replace(
+                'name="waist_yaw" axis', 'name="waist_yaw" damping="nan" axis'
+            ),
+            "MuJoCo warns: XML contains a 'NaN'",
+        ),
+    ],
+)
+def test_what_is_assumed_of_a_robot_is_said(
+    change: Callable[[str], str],
+    says: str,
+    walk_path: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("odd.xml").write_text(change(ROBOT))
+    code, stdout, stderr = on_command_line("retarget", walk_path, "--to", "odd.xml")
+    assert (code, len(stdout)) == (0, 1)
+    assert any(line.startswith("spark-sim: note: odd.xml: ") and says in line for line in stderr)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "odd.xml",
+        "walker_walk_on_odd.npz",
+    ]
+
+
+def test_a_map_corrects_a_robot(model: Path, walk_path: Path, tmp_path: Path) -> None:
+    toml = tmp_path / "map.toml"
+    assert on_command_line("inspect", model, "--save-map", toml)[0] == 0
+    text = toml.read_text()
+    assert 'left_forearm = "left_elbow"' in text
+    unchanged = spark_sim.load(model, roles=toml).rig.roles.roles
+    assert unchanged == spark_sim.load(model).rig.roles.roles
+    toml.write_text(text.replace('head = "head"', "head = []"))
+    roles = spark_sim.load(model, roles=toml).rig.roles
+    assert roles.joint(Role.HEAD) is None
+    assert roles.joint(Role.LEFT_FOREARM) is not None
+
+
+def test_a_robot_s_motion_goes_on_to_other_bodies(
+    moved: RobotClip, walk: spark_sim.Clip, tmp_path: Path
+) -> None:
+    """Through a file, to another robot and back to a character, legs as they were."""
+    written = moved.save(tmp_path / "takes" / "walk.csv")
+    told = ("--robot", moved.on_robot.robot.mjcf.path, "--quat", "xyzw", "--fps", walk.motion.fps)
+    command = ("retarget", tmp_path / "takes", *told, "-o", tmp_path / "out")
+    assert on_command_line(*command, "--to", "robot")[0] == 0
+    on_ember = spark_sim.load(tmp_path / "out" / "walk_on_robot.npz")
+    assert isinstance(on_ember, RobotClip)
+    assert on_ember.motion.frame_time == pytest.approx(walk.motion.frame_time, rel=1e-6)
+    back = spark_sim.retarget(on_ember, walk)
+    knee = back.rig.roles.require(Role.LEFT_LOWER_LEG)
+    path, original = (
+        forward(c.motion)[0][:, knee] - forward(c.motion)[0][:, c.rig.pelvis] for c in (back, walk)
+    )
+    assert np.linalg.norm(path - original, axis=1).mean() < 0.1
+    assert written.exists()
+
+
+def test_options_that_a_file_does_not_have_are_said(walk_path: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.npz"
+    command = ("retarget", walk_path, "--to", "robot", "--to-unit", "cm", "--quat", "xyzw")
+    code, _, stderr = on_command_line(*command, "-o", out)
+    assert code == 0
+    assert "spark-sim: note: robot: --to-unit is not for such a file" in stderr
+    assert f"spark-sim: note: {walk_path}: --quat is not for such a file" in stderr
+    with pytest.raises(ConventionError, match="quat can't be told"):
+        spark_sim.load(walk_path, quat="xyzw")
+
+
+def test_formats_are_for_robots(walk_path: Path, tmp_path: Path) -> None:
+    command = ("retarget", walk_path, "--to", walk_path, "--format", "gmr")
+    code, _, stderr = on_command_line(*command)
+    assert code == 2
+    assert "--format is for robots" in stderr[-1]
+    out = tmp_path / "out.npz"
+    command = ("retarget", walk_path, "--to", "robot", "--format", "gmr", "-o", out)
+    code, _, stderr = on_command_line(*command)
+    assert code == 2
+    assert "the format 'gmr' is written as .pkl" in stderr[-1]
+
+
+def test_without_refining_the_pose_is_only_projected(walk: spark_sim.Clip, model: Path) -> None:
+    plain = spark_sim.retarget(walk, model, refine=False)
+    assert isinstance(plain, RobotClip)
+    solved = spark_sim.retarget(walk, model)
+    assert np.abs(plain.motion.rotations - solved.motion.rotations).max() > 0.01
+    with pytest.raises(ConventionError, match="robots are solved for"):
+        spark_sim.retarget(walk, model, method="spark", checkpoint="none")

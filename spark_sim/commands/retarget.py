@@ -38,7 +38,10 @@ examples:
 
 def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
-        "sources", metavar="SRC", nargs="+", help="motions, or folders of BVH and FBX files"
+        "sources",
+        metavar="SRC",
+        nargs="+",
+        help="motions, or folders of them (BVH and FBX; with --robot, a robot's own too)",
     )
     parser.add_argument(
         "--to",
@@ -86,13 +89,15 @@ def run(args: Namespace) -> int:
     from robots.formats import SUFFIXES, format_of
     from robots.registry import is_robot
     from spark.errors import OutputError, SparkSimError
+    from spark.reading import SUFFIXES as CHARACTERS
     from spark_sim import console, files
 
     robot = is_robot(args.to) or Path(args.to).suffix.lower() in SUFFIXES
     if args.format is not None and not robot:
         raise OutputError(f"--format is for robots; {args.to} is a character")
+    suffixes = CHARACTERS if args.robot is None else (*CHARACTERS, *SUFFIXES)
     ending = FORMATS[args.format or "npz"] if robot else ".bvh"
-    jobs = _jobs(args.sources, Path(args.to), args.output, ending)
+    jobs = _jobs(args.sources, Path(args.to), args.output, ending, suffixes)
     for _, out in jobs:
         files.check_free(out, force=args.force)
         if robot:
@@ -157,11 +162,15 @@ def _joints(clip: "AnyClip") -> int:
 
 
 def _jobs(
-    sources: Sequence[str], target: Path, output: str | None, ending: str
+    sources: Sequence[str],
+    target: Path,
+    output: str | None,
+    ending: str,
+    suffixes: tuple[str, ...],
 ) -> list[tuple[Path, Path]]:
     """Pairs of a file to read and the file to write. Raises `OutputError` where two would collide.
 
-    Below a folder given as a source the tree of folders is kept.
+    Below a folder given as a source the tree of folders is kept, of files with these endings.
     """
     from spark.errors import OutputError
     from spark.reading import motion_files
@@ -169,7 +178,9 @@ def _jobs(
     found: list[tuple[Path, Path]] = []
     for source in map(Path, sources):
         if source.is_dir():
-            found += [(path, path.parent.relative_to(source)) for path in motion_files(source)]
+            found += [
+                (path, path.parent.relative_to(source)) for path in motion_files(source, suffixes)
+            ]
         else:
             found.append((source, Path()))
     several = len(found) > 1 or any(Path(source).is_dir() for source in sources)
