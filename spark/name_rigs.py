@@ -26,7 +26,7 @@ _MIDLINE = (Role.PELVIS, Role.SPINE, Role.NECK, Role.HEAD)
 # How often a rig is without a kind of joint.
 _ABSENT = {"clavicle": 0.2, "toe": 0.2, "hand": 0.05, "neck": 0.1, "head": 0.03}
 _OTHERS = (
-    *("root", "reference", "end", "nub", "tip", "sub", "eye", "ear"),
+    *("end", "nub", "tip", "sub", "eye", "ear"),
     *("jaw", "hair", "finger", "thumb", "breast", "buttock", "heel", "prop"),
     *("weapon", "camera", "tail", "twist", "roll", "helper", "joint", "marker"),
 )
@@ -80,14 +80,30 @@ def made_up_rig(rng: np.random.Generator, conventions: Sequence[str]) -> list[Na
         stems = _mixed(stems, conventions, rng)
     stems = _unclear(stems, conventions, rng)
     style = _Style.draw(rng)
+    chains = {kind: _chain(kind, stems[kind], conventions, rng) for kind in ("spine", "neck")}
     rig: list[Named] = []
     counts: dict[Role, int] = {}
     for role in roles:
         side, kind = split_side(role)
         count = counts[role] = counts.get(role, -1) + 1
-        chain = kind in ("spine", "neck")
-        rig.append((style.write(stems[kind], side, count if chain else None), side, kind))
+        if kind in chains:
+            words, number = chains[kind][count % len(chains[kind])], count // len(chains[kind])
+            rig.append((style.write(words, side, number), side, kind))
+        else:
+            rig.append((style.write(stems[kind], side, None), side, kind))
     return rig + _others(stems, style, rng)
+
+
+def _chain(kind: str, word: str, conventions: Sequence[str], rng: np.random.Generator) -> list[str]:
+    """The words of the joints of one chain: one, several (Spine, Chest), or its parts."""
+    how = rng.random()
+    if how < 0.6:
+        return [word]
+    if how < 0.8:
+        others = [_stems(_pick(conventions, rng))[kind] for _ in range(3)]
+        return list(dict.fromkeys([word, *others]))
+    parts = _pick((("lower", "upper"), ("low", "mid", "up"), ("Lower", "Middle", "Upper")), rng)
+    return [f"{part} {word}" if how < 0.9 else f"{word} {part}" for part in parts]
 
 
 def _roles(rng: np.random.Generator) -> list[Role]:

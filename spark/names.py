@@ -37,8 +37,8 @@ class NameConfig:
 
     width: int = 128
     heads: int = 4
-    blocks: int = 3
-    rig_blocks: int = 2
+    blocks: int = 2
+    rig_blocks: int = 3
     buckets: int = 32
     max_distance: int = 64
 
@@ -73,8 +73,9 @@ class NameEncoder(nn.Module):
     def forward(self, tokens: Int[Tensor, "R N L"]) -> Float[Tensor, "R N D"]:
         """Of `tokenize_rigs`; the rows of padding mean nothing."""
         named = (tokens != PAD).any(-1)
-        x = tokens.new_zeros((*named.shape, self.config.width), dtype=self.embed.weight.dtype)
-        x = x.index_put(named.nonzero(as_tuple=True), self._names(tokens[named]))
+        own = self._names(tokens[named])
+        x = own.new_zeros((*named.shape, own.shape[-1]))
+        x = x.index_put(named.nonzero(as_tuple=True), own)
         bias = torch.where(named, 0.0, float("-inf"))[:, None, None]
         for block in self.rig_blocks:
             x = block(x, bias)

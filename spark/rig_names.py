@@ -43,6 +43,7 @@ bandai     | Hips | Spine{m} | Neck{m} | Head | Shoulder_{L} | UpperArm_{L} | Lo
 neuron     | Robot_Hips | Robot_Spine{m} | Robot_Neck{m} | Robot_Head | Robot_{Left}Shoulder | Robot_{Left}Arm | Robot_{Left}ForeArm | Robot_{Left}Hand | Robot_{Left}UpLeg | Robot_{Left}Leg | Robot_{Left}Foot | Robot_{Left}ToeBase
 valve      | ValveBiped.Bip01_Pelvis | ValveBiped.Bip01_Spine{m} | ValveBiped.Bip01_Neck{n} | ValveBiped.Bip01_Head1 | ValveBiped.Bip01_{L}_Clavicle | ValveBiped.Bip01_{L}_UpperArm | ValveBiped.Bip01_{L}_Forearm | ValveBiped.Bip01_{L}_Hand | ValveBiped.Bip01_{L}_Thigh | ValveBiped.Bip01_{L}_Calf | ValveBiped.Bip01_{L}_Foot | ValveBiped.Bip01_{L}_Toe0
 plain      | hips | spine{m} | neck{m} | head | shoulder_{left} | upper_arm_{left} | lower_arm_{left} | hand_{left} | upper_leg_{left} | lower_leg_{left} | foot_{left} | toes_{left}
+rigify_spine | DEF-spine | DEF-spine.00{n} | DEF-neck{m} | DEF-head | DEF-shoulder.{L} | DEF-upper_arm.{L} | DEF-forearm.{L} | DEF-hand.{L} | DEF-thigh.{L} | DEF-shin.{L} | DEF-foot.{L} | DEF-toe.{L}
 genesis9 | hip | spine{n} | neck{n} | head | {l}_shoulder | {l}_upperarm | {l}_forearm | {l}_hand | {l}_thigh | {l}_shin | {l}_foot | {l}_toes
 poser | hip | abdomen{m} | neck{m} | head | {l}Collar | {l}Shldr | {l}ForeArm | {l}Hand | {l}Thigh | {l}Shin | {l}Foot | {l}Toe
 optitrack | Hip | Chest{m} | Neck{m} | Head | {L}Shoulder | {L}UArm | {L}FArm | {L}Hand | {L}Thigh | {L}Shin | {L}Foot | {L}Toe

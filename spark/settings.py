@@ -21,7 +21,9 @@ class TrainConfig:
     have `blocks` blocks each. `batch` windows a
     step are drawn `per_body` at a time from one pair of bodies, of which each recorded body has
     `variants`. The rate rises over `warmup` steps and then falls along a cosine to a tenth at
-    `steps`. With `bf16`, matrix products are in bfloat16 where the processor has them.
+    `steps`. With `bf16`, matrix products are in bfloat16 where the processor has them. The encoder
+    of joint names is learned first, in `name_steps`; `names` is a file with one that has been, and
+    `t5` a T5 instead.
     """
 
     preset: str = "default"
@@ -44,6 +46,7 @@ class TrainConfig:
     save_every: int = 1000
     log_every: int = 20
     name_steps: int = 200
+    names: str = ""
     t5: str = ""
 
     def __post_init__(self) -> None:
@@ -58,6 +61,10 @@ class TrainConfig:
         if self.width % (2 * self.heads):
             raise ConventionError(
                 f"width = {self.width}: expected a multiple of twice the heads ({self.heads})"
+            )
+        if self.names and self.t5:
+            raise ConventionError(
+                f"names = {self.names!r} and t5 = {self.t5!r}: expected one of them, or none"
             )
         if self.batch % self.per_body:
             raise ConventionError(

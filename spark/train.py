@@ -32,6 +32,7 @@ from spark.checkpoint import (
     save_checkpoint,
 )
 from spark.model import Config, Spark
+from spark.name_file import load_names
 from spark.names import NameEncoder, T5Names
 from spark.pairs import Clip, PairMaker
 from spark.precision import fast_products
@@ -63,14 +64,20 @@ def network(config: TrainConfig, name_width: int) -> Config:
 
 
 def fresh_checkpoint(config: TrainConfig) -> Checkpoint:
-    """Where a run begins: names learned (or a T5's), the network as its seed makes it.
+    """Where a run begins: names learned (or read, or a T5's), the network as its seed makes it.
 
     Every process makes the same one.
     """
-    names: NameEncoder | str = config.t5 or train_names(config.name_steps, seed=config.seed)
+    names: NameEncoder | str = config.t5 or _own_names(config)
     width = name_vectors(names)(["Hips"]).shape[-1]
     torch.manual_seed(config.seed)
     return Checkpoint(Spark(network(config, width)), names)
+
+
+def _own_names(config: TrainConfig) -> NameEncoder:
+    if config.names:
+        return load_names(Path(config.names))
+    return train_names(config.name_steps, seed=config.seed)
 
 
 class Objective(nn.Module):

@@ -15,6 +15,7 @@ import torch.nn.functional as nnf
 from spark.name_hints import read_names
 from spark.name_rigs import KINDS, OTHER, Named, made_up_rig, rig_of
 from spark.names import NameConfig, NameEncoder, tokenize_rigs
+from spark.precision import fast_products
 from spark.rig_names import CONVENTIONS, HELD_OUT, name_joints, split_side
 from spark.roles import Role
 
@@ -62,9 +63,10 @@ def train_names(
             group["lr"] = _RATE * min(1.0, (step + 1) / 20) * (1 - 0.95 * step / steps)
         drawn = [made_up_rig(rng, conventions) for _ in range(rigs)]
         tokens = tokenize_rigs([[name for name, _, _ in rig] for rig in drawn])
-        vectors = encoder(tokens)[tokens.any(-1)]
         wanted = torch.tensor([_CLASSES.index(kind) for rig in drawn for _, _, kind in rig])
-        scores = vectors @ nnf.normalize(kinds, dim=-1).T / _TEMPERATURE
+        with fast_products(tokens.device):
+            vectors = encoder(tokens)[tokens.any(-1)]
+        scores = vectors.float() @ nnf.normalize(kinds, dim=-1).T / _TEMPERATURE
         loss = nnf.cross_entropy(scores, wanted)
         optimiser.zero_grad()
         torch.autograd.backward(loss)

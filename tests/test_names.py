@@ -11,8 +11,11 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 from rigs import RIGS, build
+from safetensors.torch import save_file
 
-from spark.errors import DependencyError, FileFormatError
+from spark.checkpoint import load_checkpoint, save_checkpoint
+from spark.errors import ConventionError, DependencyError, FileFormatError
+from spark.name_file import load_names, save_names
 from spark.name_rigs import KINDS, OTHER, made_up_rig, rig_of
 from spark.name_words import rig_words
 from spark.names import (
@@ -25,6 +28,8 @@ from spark.names import (
 )
 from spark.rig_names import CONVENTIONS, HELD_OUT, name_joints
 from spark.roles import Role
+from spark.settings import TrainConfig
+from spark.train import fresh_checkpoint
 from spark.train_names import LEARNED, score_names, train_names
 
 SMALL = NameConfig(width=48, heads=4, blocks=1, rig_blocks=1)
@@ -241,3 +246,49 @@ def test_what_is_no_t5_and_what_is_no_cache_is_refused(t5: Path, tmp_path: Path)
         cache.write_bytes(content)
         with pytest.raises(FileFormatError, match=r"names\.pt.*delete it"):
             T5Names(str(t5), cache)
+
+
+# Files
+
+
+def test_a_learned_encoder_is_kept_in_a_file(encoder: NameEncoder, tmp_path: Path) -> None:
+    path = tmp_path / "names.safetensors"
+    save_names(encoder, path)
+    names = name_joints(ROLES, "xsens")
+    torch.testing.assert_close(load_names(path).encode(names), encoder.encode(names))
+
+
+def test_what_is_no_name_encoder_is_refused(encoder: NameEncoder, tmp_path: Path) -> None:
+    path = tmp_path / "names.safetensors"
+    save_names(encoder, path)
+    whole = path.read_bytes()
+    for content in (
+        b"",
+        b"nonsense",
+        whole[:-4],
+        whole.replace(b'\\"blocks\\": 1', b'\\"blocks\\": 2'),
+    ):
+        assert content != whole
+        path.write_bytes(content)
+        with pytest.raises(FileFormatError, match=r"names\.safetensors: is no name encoder"):
+            load_names(path)
+    save_file({"a": torch.zeros(1)}, path)
+    with pytest.raises(FileFormatError, match="not 'spark-sim names'"):
+        load_names(path)
+    with pytest.raises(FileFormatError, match="no such file"):
+        load_names(tmp_path / "none.safetensors")
+
+
+def test_training_begins_with_the_names_of_a_file(encoder: NameEncoder, tmp_path: Path) -> None:
+    path = tmp_path / "names.safetensors"
+    save_names(encoder, path)
+    config = TrainConfig.of("tiny").changed("test", names=str(path))
+    begun = fresh_checkpoint(config)
+    save_checkpoint(begun, tmp_path / "run.safetensors")
+    read = load_checkpoint(tmp_path / "run.safetensors")
+    assert isinstance(read.names, NameEncoder)
+    names = name_joints(ROLES, "xsens")
+    torch.testing.assert_close(read.names.encode(names), encoder.encode(names))
+    assert read.model.config.name_width == SMALL.width + 2
+    with pytest.raises(ConventionError, match="expected one of them"):
+        config.changed("test", t5="t5-small")

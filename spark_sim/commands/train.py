@@ -33,6 +33,7 @@ def configure(parser: ArgumentParser) -> None:
     )
     for name in _FLAGS:
         parser.add_argument(f"--{name}", metavar="N", type=float if name == "rate" else int)
+    parser.add_argument("--names", metavar="FILE", help="a learned encoder of joint names")
     parser.add_argument("--t5", metavar="MODEL", help="a T5 for names: a folder or a hub name")
     parser.add_argument("--force", action="store_true", help="overwrite the run in DIR")
 
@@ -46,7 +47,7 @@ def run(args: Namespace) -> int:
     out = Path(args.output)
     path = out / "checkpoint.safetensors"
     file = out / "config.toml" if args.resume else args.config and Path(args.config)
-    given = {n: getattr(args, n) for n in (*_FLAGS, "preset", "ablate", "t5")}
+    given = {n: getattr(args, n) for n in (*_FLAGS, "preset", "ablate", "names", "t5")}
     given = {n: v for n, v in given.items() if v is not None} | (
         {"data": args.data} if args.data else {}
     )
