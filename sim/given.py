@@ -1,18 +1,47 @@
-"""A motion on a MuJoCo model that exists already, where none is to be built from a rig."""
+"""A motion on a MuJoCo model: one that exists already, or one that is built from a rig."""
 
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
+
+from sim.body import build_body
+from sim.pose import qpos_from_motion
+from spark.motion import Motion
+from spark.rig import Rig
+
+
+@dataclass(frozen=True, eq=False)
+class GivenSole:
+    """The corners of one foot's sole: `bodies[c]` of the model carries corner c, which is at
+    `points[c]` [m] in that body's axes."""
+
+    side: str
+    bodies: Int[np.ndarray, "C"]
+    points: Float[np.ndarray, "C 3"]
 
 
 @dataclass(frozen=True, eq=False)
 class GivenBody:
     """`spec` compiles to `model`; `root` is the humanoid's body with the free joint; `qpos` holds
-    MuJoCo's coordinates of each frame (position [m], quaternion wxyz, joints [rad])."""
+    MuJoCo's coordinates of each frame (position [m], quaternion wxyz, joints [rad]).
+
+    `soles`, left before right, and `tpose`, the coordinates of the T-pose, are what a report needs
+    to know of the model, where they are known.
+    """
 
     spec: mujoco.MjSpec
     model: mujoco.MjModel
     root: int
     qpos: Float[np.ndarray, "T nq"]
+    soles: tuple[GivenSole, ...] = ()
+    tpose: Float[np.ndarray, "nq"] | None = None
+
+
+def given(rig: Rig, motion: Motion) -> GivenBody:
+    """The motion on the body that `sim.body.build_body` makes of its rig."""
+    spec = build_body(rig)
+    model = spec.compile()
+    root = int(model.body(rig.skeleton.names[rig.carrier]).id)
+    return GivenBody(spec, model, root, qpos_from_motion(model, motion, rig))

@@ -5,22 +5,19 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from sim.body import build_body
 from sim.display import add_display
-from sim.given import GivenBody
-from sim.pose import qpos_from_motion
+from sim.given import GivenBody, given
+from sim.interpolate import at_times
 from spark.errors import SkeletonError
 from spark.feet import standing_height
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig import Rig
-from spark.rotation import quat_about, quat_conj, quat_mul, quat_rotate, quat_slerp
+from spark.rotation import quat_about, quat_conj, quat_mul, quat_rotate
 
 _SPACING = 0.8  # of the mean of two neighbours' standing heights, between them
-_HINGE_LIKE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
-_FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,10 +92,10 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
     placed: list[Placed] = []
     column = 0
     for k, figure in enumerate(figures):
-        body = figure.body or _built(figure)
+        body = figure.body or given(figure.rig, figure.motion)
         first_body = len(list(world.bodies))
         columns = add_display(world, body, f"{k}_", ghost=figure.ghost)
-        qpos = _at_times(body, figure.motion.frame_time, times)[:, columns]
+        qpos = at_times(body.model, body.qpos, figure.motion.frame_time, times)[:, columns]
         if figure.ghost and placed:
             shift = placed[-1].shift
         else:
@@ -133,13 +130,6 @@ def _turn(figure: Figure) -> Float[np.ndarray, "4"]:
     return quat_about("z", np.array(-np.arctan2(ahead[1], ahead[0])))
 
 
-def _built(figure: Figure) -> GivenBody:
-    spec = build_body(figure.rig)
-    model = spec.compile()
-    root = int(model.body(figure.rig.skeleton.names[figure.rig.carrier]).id)
-    return GivenBody(spec, model, root, qpos_from_motion(model, figure.motion, figure.rig))
-
-
 def _seen(
     model: mujoco.MjModel,
     coordinates: Sequence[Float[np.ndarray, "T n"]],
@@ -154,35 +144,6 @@ def _seen(
     apart = np.linalg.norm((paths - centers)[..., :2], axis=-1).max()
     qpos = np.concatenate(coordinates, axis=1)
     return Scene(model, qpos, frame_time, centers, 0.9 * height + 2 * float(apart), height, placed)
-
-
-def _at_times(
-    body: GivenBody, frame_time: float, times: Float[np.ndarray, "S"]
-) -> Float[np.ndarray, "S nq"]:
-    """Positions and angles interpolated linearly, rotations on the sphere."""
-    qpos = body.qpos
-    place = np.clip(times / frame_time, 0, len(qpos) - 1)
-    before = np.minimum(np.floor(place + 1e-6).astype(int), len(qpos) - 1)
-    after = np.minimum(before + 1, len(qpos) - 1)
-    share = np.clip(place - before, 0, 1)
-    out = qpos[before] + share[:, None] * (qpos[after] - qpos[before])
-    turns, between = _quaternions(body.model), np.flatnonzero(share > 1e-6)[:, None, None]
-    out[between, turns] = quat_slerp(
-        qpos[before[between], turns],
-        qpos[after[between], turns],
-        np.broadcast_to(share[between[..., 0]], (len(between), len(turns))),
-    )
-    return out
-
-
-def _quaternions(model: mujoco.MjModel) -> Int[np.ndarray, "Q 4"]:
-    """The columns of the coordinates that hold quaternions."""
-    starts = [
-        int(model.jnt_qposadr[j]) + (3 if int(model.jnt_type[j]) == _FREE else 0)
-        for j in range(model.njnt)
-        if int(model.jnt_type[j]) not in _HINGE_LIKE
-    ]
-    return np.array(starts, dtype=int)[:, None] + np.arange(4)
 
 
 def _world() -> mujoco.MjSpec:

@@ -23,6 +23,7 @@ from spark_sim import files, rolemap
 if TYPE_CHECKING:
     from sim.report import Report
     from spark_sim.robot import RobotClip
+    from spark_sim.show import Simulated
 
 File = str | Path
 AnyClip: TypeAlias = "Clip | RobotClip"  # the second is imported where it is needed
@@ -249,7 +250,7 @@ def report(
 
 
 def play(
-    *clips: "AnyClip | File",
+    *clips: "AnyClip | Simulated | File",
     video: File | None = None,
     html: File | None = None,
     strip: File | None = None,
@@ -257,25 +258,20 @@ def play(
     progress: Callable[[Iterable[int]], Iterable[int]] = iter,
 ) -> None:
     """Show motions side by side: as a video (MP4), a web page or a strip of moments (PNG), as many
-    of them as are named; in a window where none is.
+    of them as are named; in a window where none is. What `simulate` yields is shown with its target
+    as a ghost.
 
     `progress` wraps the frames of the video. Raises `DependencyError` where there is no display, or
     nothing to draw or encode with, and `OutputError` where a file exists, unless forced.
     """
-    from sim.scene import Figure, build_scene
-    from spark.contacts import floor_height
-    from spark.kinematics import forward
+    from sim.scene import build_scene
+    from spark_sim.show import figures_of
 
     for path in (video, html, strip):
         if path is not None:
             files.claim(Path(path), force=force)
-    shown = [_clip(clip) for clip in clips]
-    figures = [
-        Figure(c.rig, c.motion, c.name, floor_height(c.rig, *forward(c.motion)))
-        if c.body is None
-        else Figure(c.rig, c.motion, c.name, body=c.body)
-        for c in shown
-    ]
+    shown = [_clip(c) if isinstance(c, str | Path) else c for c in clips]
+    figures = [figure for clip in shown for figure in figures_of(clip)]
     scene = build_scene(figures)
     if video is not None:
         from sim.video import write_video

@@ -1,0 +1,56 @@
+"""MuJoCo coordinates between frames."""
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+
+from spark.rotation import quat_slerp
+
+_FREE, _BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
+
+
+def at_times(
+    model: mujoco.MjModel,
+    qpos: Float[np.ndarray, "T nq"],
+    frame_time: float,
+    times: Float[np.ndarray, "S"],
+) -> Float[np.ndarray, "S nq"]:
+    """Positions and angles interpolated linearly, rotations on the sphere; the first and the last
+    frame hold beyond the ends."""
+    place = np.clip(times / frame_time, 0, len(qpos) - 1)
+    before = np.minimum(np.floor(place + 1e-6).astype(int), len(qpos) - 1)
+    after = np.minimum(before + 1, len(qpos) - 1)
+    share = np.clip(place - before, 0, 1)
+    out = qpos[before] + share[:, None] * (qpos[after] - qpos[before])
+    turns, between = quaternions(model), np.flatnonzero(share > 1e-6)[:, None, None]
+    out[between, turns] = quat_slerp(
+        qpos[before[between], turns],
+        qpos[after[between], turns],
+        np.broadcast_to(share[between[..., 0]], (len(between), len(turns))),
+    )
+    return out
+
+
+def velocities(
+    model: mujoco.MjModel, qpos: Float[np.ndarray, "T nq"], frame_time: float
+) -> Float[np.ndarray, "T nv"]:
+    """MuJoCo's `qvel` of each frame: central differences, one-sided at the ends."""
+    out = np.zeros((len(qpos), model.nv))
+    for t in range(len(qpos)):
+        before, after = max(t - 1, 0), min(t + 1, len(qpos) - 1)
+        if after > before:
+            mujoco.mj_differentiatePos(
+                model, out[t], (after - before) * frame_time, qpos[before], qpos[after]
+            )
+    return out
+
+
+def quaternions(model: mujoco.MjModel) -> Int[np.ndarray, "Q 4"]:
+    """The columns of the coordinates that hold quaternions."""
+    kinds = {_FREE: 3, _BALL: 0}
+    starts = [
+        int(model.jnt_qposadr[j]) + kinds[int(model.jnt_type[j])]
+        for j in range(model.njnt)
+        if int(model.jnt_type[j]) in kinds
+    ]
+    return np.array(starts, dtype=int)[:, None] + np.arange(4)

@@ -1,0 +1,323 @@
+"""A motion tracked in simulation: position servos on the joints, contacts with the floor.
+
+What comes out measures the servos as much as the motion: docs/playback.md says what can be
+concluded from it.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float
+
+from sim.given import GivenBody
+from sim.interpolate import at_times, velocities
+from sim.servos import with_servos
+from spark.errors import SkeletonError
+
+FALL_DROP = 0.2  # of the standing height: how much lower than its target the root is
+FALL_TILT = 60.0  # [deg] between what is upward in the root and in its target
+_FREQUENCY = 10.0  # [rad/s] of the assisting spring, critically damped
+_GYRATION = 0.25  # of the height: radius of gyration that the assisting torque reckons with
+_AT_LIMIT = 0.999
+_BLOCK = 256  # frames whose targets are laid out at once
+_BAD = tuple(
+    int(kind)
+    for kind in (
+        mujoco.mjtWarning.mjWARN_BADQPOS,
+        mujoco.mjtWarning.mjWARN_BADQVEL,
+        mujoco.mjtWarning.mjWARN_BADQACC,
+    )
+)
+
+
+@dataclass(frozen=True)
+class Assist:
+    """A wrench on the root that pulls it towards its target: a damped spring, cut off at `force`
+    [body weights] and `torque` [body weights times height]."""
+
+    force: float = 1.0
+    torque: float = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """What happened in each frame; efforts are those of the steps since the frame before.
+
+    `points` [m] are the origins of the bodies that have joints, the root first. `peak` [N m] and
+    `square` [N² m², a mean] are of the torque of each joint's servos, `saturated` the share of the
+    steps in which they gave all they can. `wrench` is the mean assist on the root, [N] and [N m] in
+    world axes; `work` [J] its mechanical work, positive and negative counted alike. `loads` [N] is
+    how hard each body presses on the floor.
+    """
+
+    qpos: Float[np.ndarray, "T nq"]
+    points: Float[np.ndarray, "T B 3"]
+    peak: Float[np.ndarray, "T njnt"]
+    square: Float[np.ndarray, "T njnt"]
+    saturated: Float[np.ndarray, "T njnt"]
+    wrench: Float[np.ndarray, "T 6"]
+    work: Float[np.ndarray, "T"]
+    loads: Float[np.ndarray, "T nbody"]
+    fallen: Bool[np.ndarray, "T"]
+
+
+@dataclass(frozen=True, eq=False)
+class Tracked:
+    """A simulated motion, and the target that it followed, on one body.
+
+    `model` is what was simulated. From frame `diverged` on, where there is one, the simulation gave
+    no finite numbers and the body stands still.
+    """
+
+    model: mujoco.MjModel
+    target: GivenBody
+    target_points: Float[np.ndarray, "T B 3"]
+    record: Record
+    frame_time: float
+    height: float
+    mass: float
+    assist: Assist | None
+    diverged: int | None
+    notes: tuple[str, ...]
+
+    @property
+    def body(self) -> GivenBody:
+        """The body as it moved in the simulation."""
+        return replace(self.target, qpos=self.record.qpos)
+
+
+def track(
+    target: GivenBody,
+    frame_time: float,
+    *,
+    height: float,
+    floor_z: float = 0.0,
+    assist: Assist | None = None,
+) -> Tracked:
+    """Simulate the body of `target` while its servos follow the target's coordinates.
+
+    It begins in the first frame, with its velocity. `height` [m] is that of the standing body.
+    The same input gives the same output, to the bit.
+    """
+    if not np.isfinite(target.qpos).all():
+        raise SkeletonError("the motion has coordinates that are no finite numbers")
+    model, notes = with_servos(target, height=height, floor_z=floor_z)
+    steps = int(np.ceil(frame_time / model.opt.timestep - 1e-6))
+    model.opt.timestep = frame_time / steps
+    root = int(model.body(target.model.body(target.root).name).id)
+    simulation = _Simulation(model, root, height, assist)
+    record, target_points, diverged = simulation.run(target.qpos, frame_time, steps)
+    return Tracked(
+        model,
+        target,
+        target_points,
+        record,
+        frame_time,
+        height,
+        simulation.mass,
+        assist,
+        diverged,
+        notes,
+    )
+
+
+class _Simulation:
+    """The stepping: servos, the assist, and what is noted down."""
+
+    def __init__(
+        self, model: mujoco.MjModel, root: int, height: float, assist: Assist | None
+    ) -> None:
+        self.model, self.data, self.root = model, mujoco.MjData(model), root
+        self.mass = float(model.body_subtreemass[root])
+        self.assist = assist
+        self.height = height
+        self.weight = self.mass * float(np.linalg.norm(model.opt.gravity))
+        start = int(model.jnt_dofadr[model.body_jntadr[root]])
+        self.root_dofs = slice(start, start + 6)
+        inside = {root}
+        for b in range(root + 1, model.nbody):
+            if int(model.body_parentid[b]) in inside:
+                inside.add(b)
+        self.points = [b for b in sorted(inside) if int(model.body_jntnum[b])]
+        self.on_joint = np.array([_joint_of(model, a) for a in range(model.nu)], dtype=int)
+        limited = np.asarray(model.actuator_forcelimited, dtype=bool)
+        self.force_limit = np.where(limited, model.actuator_forcerange[:, 1], np.inf)
+        limited = np.asarray(model.jnt_actfrclimited, dtype=bool)
+        self.joint_limit = np.where(limited, model.jnt_actfrcrange[:, 1], np.inf)
+        self.lag = model.actuator_biasprm[:, 2] / model.actuator_biasprm[:, 1]  # kv / kp [s]
+        self.moment = np.zeros((model.nu, model.nv))
+        self.error = np.zeros(model.nv)
+        self.wrench = np.zeros(6)
+
+    def run(
+        self, target: Float[np.ndarray, "T nq"], frame_time: float, steps: int
+    ) -> tuple[Record, Float[np.ndarray, "T B 3"], int | None]:
+        """The record, where the target has the record's points, and the frame that diverged."""
+        model, data, frames = self.model, self.data, len(target)
+        record = self._empty(frames)
+        target_points = np.zeros((frames, len(self.points), 3))
+        ups = np.zeros((frames, 3))  # what is upward in the target, in its root's own axes
+        for t in range(frames):
+            data.qpos[:] = target[t]
+            mujoco.mj_kinematics(model, data)
+            target_points[t] = data.xpos[self.points]
+            ups[t] = data.xmat[self.root].reshape(3, 3)[2]
+        speeds = velocities(model, target, frame_time)
+        mujoco.mj_resetData(model, data)
+        data.qpos[:], data.qvel[:] = target[0], speeds[0]
+        diverged = None
+        with _without_messages():
+            self._note(record, 0, target_points, ups)
+            for t, qpos, qvel in _laid_out(model, target, speeds, frame_time, steps):
+                self._frame(record, t, qpos, qvel)
+                if self._is_bad():
+                    diverged = t
+                    break
+                self._note(record, t, target_points, ups)
+        if diverged is not None:
+            for held in (record.qpos, record.points):
+                held[diverged:] = held[diverged - 1]
+            for efforts in (record.peak, record.square, record.saturated, record.wrench):
+                efforts[diverged:] = 0.0
+            record.work[diverged:], record.fallen[diverged:] = 0.0, True
+        return record, target_points, diverged
+
+    def _empty(self, frames: int) -> Record:
+        model = self.model
+        return Record(
+            qpos=np.zeros((frames, model.nq)),
+            points=np.zeros((frames, len(self.points), 3)),
+            peak=np.zeros((frames, model.njnt)),
+            square=np.zeros((frames, model.njnt)),
+            saturated=np.zeros((frames, model.njnt)),
+            wrench=np.zeros((frames, 6)),
+            work=np.zeros(frames),
+            loads=np.zeros((frames, model.nbody)),
+            fallen=np.zeros(frames, dtype=bool),
+        )
+
+    def _frame(
+        self,
+        record: Record,
+        t: int,
+        qpos: Float[np.ndarray, "K nq"],
+        qvel: Float[np.ndarray, "K nv"],
+    ) -> None:
+        """The steps that lead to frame `t`."""
+        model, data = self.model, self.data
+        share = 1.0 / len(qpos)
+        for wanted, speed in zip(qpos, qvel, strict=True):
+            mujoco.mj_step1(model, data)
+            mujoco.mj_differentiatePos(model, self.error, 1.0, data.qpos, wanted)
+            self._drive(speed)
+            if self.assist is not None:
+                self._help(self.assist, speed)
+                record.wrench[t] += share * self.wrench
+                power = self.wrench[:3] @ data.qvel[self.root_dofs][:3]
+                power += data.qfrc_applied[self.root_dofs][3:] @ data.qvel[self.root_dofs][3:]
+                record.work[t] += abs(power) * model.opt.timestep
+            mujoco.mj_step2(model, data)
+            given = data.qfrc_actuator**2
+            torque = np.sqrt(np.add.reduceat(given, model.jnt_dofadr))
+            record.peak[t] = np.maximum(record.peak[t], torque)
+            record.square[t] += share * torque**2
+            full = torque >= _AT_LIMIT * self.joint_limit
+            full[self.on_joint[np.abs(data.actuator_force) >= _AT_LIMIT * self.force_limit]] = True
+            record.saturated[t] += share * full
+
+    def _drive(self, speed: Float[np.ndarray, "nv"]) -> None:
+        """Controls with which every servo sees its error along the joints' own rotations, which a
+        ball joint's rotation vector only is for small angles, and damps what the target's velocity
+        leaves."""
+        data = self.data
+        mujoco.mju_sparse2dense(
+            self.moment,
+            data.actuator_moment,
+            data.moment_rownnz,
+            data.moment_rowadr,
+            data.moment_colind,
+        )
+        data.ctrl[:] = data.actuator_length + self.moment @ self.error
+        data.ctrl += self.lag * (self.moment @ speed)
+
+    def _help(self, assist: Assist, speed: Float[np.ndarray, "nv"]) -> None:
+        """The assist on the free joint: a force in world axes and a torque in the root's own."""
+        data, dofs = self.data, self.root_dofs
+        pull = _FREQUENCY**2 * self.error[dofs] + 2 * _FREQUENCY * (speed - data.qvel)[dofs]
+        force = _capped(self.mass * pull[:3], assist.force * self.weight)
+        inertia = self.mass * (_GYRATION * self.height) ** 2
+        torque = _capped(inertia * pull[3:], assist.torque * self.weight * self.height)
+        data.qfrc_applied[dofs] = np.concatenate([force, torque])
+        self.wrench = np.concatenate([force, data.xmat[self.root].reshape(3, 3) @ torque])
+
+    def _note(
+        self,
+        record: Record,
+        t: int,
+        target_points: Float[np.ndarray, "T B 3"],
+        ups: Float[np.ndarray, "T 3"],
+    ) -> None:
+        """Where the body is in frame `t`, whether it has fallen, and what stands on the floor."""
+        model, data = self.model, self.data
+        mujoco.mj_kinematics(model, data)
+        record.qpos[t] = data.qpos
+        record.points[t] = data.xpos[self.points]
+        tilt = data.xmat[self.root].reshape(3, 3)[2] @ ups[t]
+        drop = target_points[t, 0, 2] - record.points[t, 0, 2]
+        record.fallen[t] = drop > FALL_DROP * self.height or tilt < np.cos(np.radians(FALL_TILT))
+        force = np.zeros(6)
+        for k in range(data.ncon):
+            bodies = model.geom_bodyid[data.contact[k].geom]
+            if not bodies.min():
+                mujoco.mj_contactForce(model, data, k, force)
+                record.loads[t, bodies.max()] += force[0]
+
+    def _is_bad(self) -> bool:
+        warned = any(self.data.warning[kind].number for kind in _BAD)
+        return warned or not np.isfinite(self.data.qpos).all()
+
+
+def _joint_of(model: mujoco.MjModel, actuator: int) -> int:
+    """The joint that an actuator turns; the root's own where it is no single one."""
+    kinds = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+    single = int(model.actuator_trntype[actuator]) in kinds
+    return int(model.actuator_trnid[actuator, 0]) if single else 0
+
+
+def _capped(vector: Float[np.ndarray, "3"], most: float) -> Float[np.ndarray, "3"]:
+    return vector * min(1.0, most / max(float(np.linalg.norm(vector)), 1e-12))
+
+
+def _laid_out(
+    model: mujoco.MjModel,
+    target: Float[np.ndarray, "T nq"],
+    speeds: Float[np.ndarray, "T nv"],
+    frame_time: float,
+    steps: int,
+) -> Iterator[tuple[int, Float[np.ndarray, "K nq"], Float[np.ndarray, "K nv"]]]:
+    """Each frame but the first, with its targets at the end of each step that leads to it."""
+    for start in range(0, len(target) - 1, _BLOCK):
+        frames = slice(start, start + _BLOCK + 1)
+        count = len(target[frames]) - 1
+        place = np.arange(1, count * steps + 1) / steps
+        qpos = at_times(model, target[frames], 1.0, place)
+        before = np.minimum(place.astype(int), count - 1)
+        share = (place - before)[:, None]
+        own = speeds[frames]
+        qvel = (1 - share) * own[before] + share * own[before + 1]
+        for k in range(count):
+            rows = slice(k * steps, (k + 1) * steps)
+            yield start + k + 1, qpos[rows], qvel[rows]
+
+
+@contextmanager
+def _without_messages() -> Iterator[None]:
+    """MuJoCo writes warnings to the terminal and a file; here they are results."""
+    mujoco.set_mju_user_warning(lambda message: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(None)

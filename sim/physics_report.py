@@ -1,0 +1,168 @@
+"""What a simulated motion shows: numbers for scripts, and the same in words."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from sim.interpolate import quaternions
+from sim.physics import Tracked
+from sim.servos import GRAVITY
+from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
+
+SCHEMA = "spark-sim physics 1"
+LIMITS = (
+    "This measures the servos as much as the motion: a fall shows that these servos don't keep "
+    "this motion up, not that no controller could; an assist that carries weight hides feet in the "
+    "air. Compare only what the same servos tracked."
+)
+_HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
+_LISTED = 8
+
+
+def summary(tracked: Tracked) -> dict[str, Any]:
+    """The measures as JSON: lengths in cm, angles in degrees, efforts as shares of body weight (and
+    height), torques in N m. Errors are those before the fall."""
+    record, model = tracked.record, tracked.model
+    frames = len(record.fallen)
+    weight = tracked.mass * GRAVITY
+    falls = np.flatnonzero(record.fallen)
+    fall = int(falls[0]) if len(falls) else None
+    upright = slice(0, max(fall, 1) if fall is not None else frames)
+    apart = record.points[upright] - tracked.target_points[upright]
+    forces, torques = np.split(record.wrench[1:], 2, axis=1)
+    assist = None
+    if tracked.assist is not None:
+        assist = {
+            "cap_force": tracked.assist.force,
+            "cap_torque": tracked.assist.torque,
+            "force": _mean_and_max(forces / weight),
+            "carried": _finite(record.wrench[1:, 2] / weight, np.mean),
+            "torque": _mean_and_max(torques / (weight * tracked.height)),
+            "work_j": round(float(record.work.sum()), 3),
+        }
+    loads = record.loads / weight
+    return {
+        "schema": SCHEMA,
+        "frames": frames,
+        "frame_time": tracked.frame_time,
+        "mass_kg": round(tracked.mass, 3),
+        "height_m": round(tracked.height, 4),
+        "stays_up_s": round((fall if fall is not None else frames - 1) * tracked.frame_time, 4),
+        "fall_frame": fall,
+        "diverged_frame": tracked.diverged,
+        "error": {
+            "joints_deg": _root_mean_square(np.degrees(_joint_errors(tracked, upright))),
+            "mpjpe_cm": _mean_length(100 * apart),
+            "mpjpe_root_cm": _mean_length(100 * (apart - apart[:, :1])),
+        },
+        "assist": assist,
+        "joints": [
+            {
+                "name": model.joint(j).name,
+                "peak_nm": round(float(record.peak[:, j].max()), 3),
+                "rms_nm": round(float(np.sqrt(_finite(record.square[1:, j], np.mean))), 3),
+                "saturated": _finite(record.saturated[1:, j], np.mean),
+            }
+            for j in np.argsort(-record.peak.max(0), kind="stable")
+            if record.peak[:, j].max() > 0
+        ],
+        "floor": [
+            {
+                "body": model.body(b).name,
+                "share": round(float((loads[:, b] > 0).mean()), 4),
+                "peak": round(float(loads[:, b].max()), 4),
+            }
+            for b in np.argsort(-loads.sum(0), kind="stable")
+            if loads[:, b].any()
+        ],
+        "notes": list(tracked.notes),
+        "limits": LIMITS,
+    }
+
+
+def text(found: dict[str, Any], name: str) -> str:
+    """A summary in words."""
+    assist, error = found["assist"], found["error"]
+    end = (found["frames"] - 1) * found["frame_time"]
+    if found["diverged_frame"] is not None:
+        stays = f"the simulation diverged at frame {found['diverged_frame']}; no numbers after it"
+    elif found["fall_frame"] is None:
+        stays = f"all {end:.2f} s"
+    else:
+        stays = f"{found['stays_up_s']:.2f} s of {end:.2f} s: falls at frame {found['fall_frame']}"
+    lines = [
+        f"{name}: tracked in simulation, {'with' if assist else 'without'} assist",
+        f"  stays up  {stays}",
+        f"  error     {error['joints_deg']:.1f} deg RMS of the joints; joints "
+        f"{error['mpjpe_cm']:.1f} cm away, {error['mpjpe_root_cm']:.1f} cm relative to the root"
+        + ("" if found["fall_frame"] is None else " (until the fall)"),
+    ]
+    if assist:
+        force, torque = assist["force"], assist["torque"]
+        lines += [
+            f"  assist    force {100 * force['mean']:.0f} % of body weight, at most "
+            f"{100 * force['max']:.0f} % (cap {100 * assist['cap_force']:.0f} %); it carries "
+            f"{100 * assist['carried']:.0f} %",
+            f"            torque {100 * torque['mean']:.1f} % of body weight x height, at most "
+            f"{100 * torque['max']:.1f} % (cap {100 * assist['cap_torque']:.0f} %); work "
+            f"{assist['work_j']:.0f} J",
+        ]
+    touched = found["floor"]
+    for k, each in enumerate(touched[:_LISTED]):
+        lines.append(
+            f"  {'floor' if not k else '':<9} {each['body']:<26} {100 * each['share']:5.1f} % of "
+            f"frames, up to {each['peak']:.1f} body weights"
+        )
+    if not touched:
+        lines.append("  floor     not touched")
+    rows = found["joints"][:_LISTED]
+    if rows:
+        lines.append(f"  torque    {'joint':<26} {'peak N m':>9} {'RMS N m':>9} {'at limit':>9}")
+    lines += [
+        f"            {row['name']:<26} {row['peak_nm']:>9.1f} {row['rms_nm']:>9.1f} "
+        f"{100 * row['saturated']:>7.1f} %"
+        for row in rows
+    ]
+    if len(found["joints"]) > len(rows):
+        lines.append(f"            and {len(found['joints']) - len(rows)} joints with less")
+    return "\n".join(lines)
+
+
+def _joint_errors(tracked: Tracked, frames: slice) -> Float[np.ndarray, "T N"]:
+    """How far each hinge and each ball is from its target [rad]."""
+    model = tracked.model
+    made, wanted = tracked.record.qpos[frames], tracked.target.qpos[frames]
+    inside = _moved(tracked)
+    hinges = [int(model.jnt_qposadr[j]) for j in inside if int(model.jnt_type[j]) == _HINGE]
+    starts = {int(model.jnt_qposadr[j]) for j in inside if int(model.jnt_type[j]) == _BALL}
+    balls = np.array([q for q in quaternions(model) if int(q[0]) in starts], dtype=int)
+    balls = balls.reshape(-1, 4)
+    turns = rotvec_from_quat(quat_mul(quat_conj(wanted[:, balls]), made[:, balls]))
+    angles = np.abs(made[:, hinges] - wanted[:, hinges])
+    return np.concatenate([angles, np.linalg.norm(turns, axis=-1)], axis=1)
+
+
+def _moved(tracked: Tracked) -> list[int]:
+    """The joints that have a servo."""
+    model = tracked.model
+    return sorted({int(model.actuator_trnid[a, 0]) for a in range(model.nu)})
+
+
+def _mean_and_max(vectors: Float[np.ndarray, "T 3"]) -> dict[str, float]:
+    sizes = np.linalg.norm(vectors, axis=-1)
+    return {"mean": _finite(sizes, np.mean), "max": _finite(sizes, np.max)}
+
+
+def _mean_length(vectors: Float[np.ndarray, "T B 3"]) -> float:
+    return round(float(np.linalg.norm(vectors, axis=-1).mean()), 4)
+
+
+def _root_mean_square(values: Float[np.ndarray, "T N"]) -> float:
+    return round(float(np.sqrt((values**2).mean())), 4) if values.size else 0.0
+
+
+def _finite(values: Float[np.ndarray, "T"], of: Any) -> float:
+    """Of one frame alone there are no efforts: 0."""
+    return round(float(of(values)), 5) if len(values) else 0.0

@@ -1,0 +1,142 @@
+"""The model that a motion is simulated on: a floor, and servos that follow joint positions."""
+
+import mujoco
+import numpy as np
+
+from sim.given import GivenBody
+from spark.errors import SkeletonError
+
+SOFTNESS = 0.1  # [rad] from the target at which a servo of ours gives all that its motor can
+GRAVITY = 9.81  # [m/s²]
+STRENGTH = 0.1  # torque of a joint whose limit is not told, in body weights times height
+_RESOLVED = 0.5  # servos of ours are no faster than this many radians of their swing a step
+_HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
+_SLOWEST_STEP = 0.002  # [s]
+
+
+def with_servos(
+    body: GivenBody, *, height: float, floor_z: float
+) -> tuple[mujoco.MjModel, tuple[str, ...]]:
+    """The body's model on a floor, with a position servo where it has an actuator, and what was
+    assumed on the way.
+
+    A model's own position servos stay as they are. Motors are replaced by servos with the torque
+    limits of the motors, and a model without actuators gets servos on all its joints.
+    """
+    spec = body.spec.copy()
+    notes: list[str] = []
+    _drop_what_is_only_seen(spec)
+    if not any(g.type == mujoco.mjtGeom.mjGEOM_PLANE for g in spec.worldbody.geoms):
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            size=[0, 0, 1],
+            pos=[0, 0, floor_z],
+            contype=1 | _bits(body.model, "conaffinity"),
+            conaffinity=1 | _bits(body.model, "contype"),
+        )
+    timestep = min(float(body.model.opt.timestep), _SLOWEST_STEP)
+    _replace_motors(spec, body.model, height, timestep, notes)
+    spec.option.timestep, spec.option.gravity = timestep, [0.0, 0.0, -GRAVITY]
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    model = spec.compile()
+    if not any(_collides(model, g) for g in range(model.ngeom) if model.geom_bodyid[g]):
+        raise SkeletonError("no shape of the model collides: it would fall through the floor")
+    # What a target asks for is cut off by the torque that a joint has, not by the control's range.
+    model.actuator_ctrllimited[:] = 0
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return model, tuple(notes)
+
+
+def _drop_what_is_only_seen(spec: mujoco.MjSpec) -> None:
+    """Delete shapes that don't collide, if no mass comes from them: meshes are slow to compile."""
+    for body in spec.bodies:
+        if body.name != "world" and body.explicitinertial:
+            for geom in list(body.geoms):
+                if not int(geom.contype) | int(geom.conaffinity):
+                    spec.delete(geom)
+    used = {geom.meshname for geom in spec.geoms}
+    for mesh in list(spec.meshes):
+        if mesh.name not in used and not list(spec.skins):
+            spec.delete(mesh)
+
+
+def _bits(model: mujoco.MjModel, field: str) -> int:
+    return int(np.bitwise_or.reduce(getattr(model, f"geom_{field}"), initial=0))
+
+
+def _collides(model: mujoco.MjModel, geom: int) -> bool:
+    return bool(int(model.geom_contype[geom]) | int(model.geom_conaffinity[geom]))
+
+
+def is_servo(model: mujoco.MjModel, actuator: int) -> bool:
+    """Whether an actuator's force is kp (control - length) - kv velocity."""
+    kp = float(model.actuator_gainprm[actuator, 0])
+    return (
+        int(model.actuator_dyntype[actuator]) == int(mujoco.mjtDyn.mjDYN_NONE)
+        and int(model.actuator_gaintype[actuator]) == int(mujoco.mjtGain.mjGAIN_FIXED)
+        and int(model.actuator_biastype[actuator]) == int(mujoco.mjtBias.mjBIAS_AFFINE)
+        and kp > 0
+        and float(model.actuator_biasprm[actuator, 1]) == -kp
+    )
+
+
+def _replace_motors(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, height: float, timestep: float, notes: list[str]
+) -> None:
+    servos = [a for a in range(model.nu) if is_servo(model, a)]
+    if model.nu and len(servos) == model.nu:
+        return
+    moved = {_joint(model, a): a for a in range(model.nu) if a not in servos}
+    joints = [j for j in range(model.njnt) if int(model.jnt_type[j]) in (_HINGE, _BALL)]
+    if model.nu:
+        joints = [j for j in joints if j in moved]
+    limits = {j: _torque(model, j, moved.get(j), height) for j in joints}
+    for a, actuator in enumerate(list(spec.actuators)):
+        if a not in servos:
+            spec.delete(actuator)
+    elements = list(spec.joints)
+    for j in joints:
+        start = int(model.jnt_dofadr[j])
+        width = 3 if int(model.jnt_type[j]) == _BALL else 1
+        inertia = float(model.dof_M0[start : start + width].mean())
+        kp = min(limits[j] / SOFTNESS, inertia * (_RESOLVED / timestep) ** 2)
+        if not elements[j].name:
+            elements[j].name = f"joint_{j}"
+        for axis in range(width):
+            servo = spec.add_actuator(
+                name=f"servo_{j}_{axis}",
+                target=elements[j].name,
+                trntype=mujoco.mjtTrn.mjTRN_JOINT,
+                gear=np.eye(6)[axis],
+            )
+            servo.set_to_position(kp=kp, kv=2 * float(np.sqrt(kp * inertia)))
+            servo.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+            servo.forcerange = [-limits[j], limits[j]]
+    what = "its motors" if model.nu else "joints without actuators"
+    notes.append(
+        f"{what} are driven by servos of ours: full torque at {SOFTNESS:g} rad from the target"
+    )
+
+
+def _joint(model: mujoco.MjModel, actuator: int) -> int:
+    """The joint that an actuator turns; -1 where it is no single one."""
+    kinds = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+    if int(model.actuator_trntype[actuator]) not in kinds:
+        return -1
+    return int(model.actuator_trnid[actuator, 0])
+
+
+def _torque(model: mujoco.MjModel, joint: int, motor: int | None, height: float) -> float:
+    """The most that a joint gives [N m], as far as its file says."""
+    told = []
+    if model.jnt_actfrclimited[joint]:
+        told.append(np.abs(model.jnt_actfrcrange[joint]).max())
+    if motor is not None:
+        gear = float(np.abs(model.actuator_gear[motor]).max())
+        if model.actuator_forcelimited[motor]:
+            told.append(gear * np.abs(model.actuator_forcerange[motor]).max())
+        if model.actuator_ctrllimited[motor]:
+            gain = abs(float(model.actuator_gainprm[motor, 0]))
+            told.append(gear * gain * np.abs(model.actuator_ctrlrange[motor]).max())
+    weight = float(model.body_mass.sum()) * GRAVITY
+    return float(min(told)) if told else STRENGTH * weight * height
