@@ -1,6 +1,6 @@
 """Write Ember, the humanoid that ships with spark-sim: robots/ember/ember.xml and scene.xml.
 
-1.3 m, 35 kg and 29 joints, as today's small humanoids have; segment lengths are a human's
+1.32 m, 34 kg and 29 joints, as today's small humanoids have; segment lengths are a human's
 (Drillis and Contini 1966) at that height, masses about de Leva's (1996) shares. No meshes.
 """
 
@@ -10,7 +10,7 @@ FOLDER = Path(__file__).parents[1] / "robots" / "ember"
 
 HEAD = """\
 <mujoco model="ember">
-  <!-- Ember: 1.30 m, 35 kg, 29 hinges, no meshes. Written by scripts/make_ember.py.
+  <!-- Ember: 1.32 m, 34 kg, 29 hinges, no meshes. Written by scripts/make_ember.py.
        At zero it stands with its arms down, facing +X; positive angles: see the axes. -->
   <compiler angle="radian" autolimits="true"/>
   <option integrator="implicitfast"/>
@@ -26,7 +26,7 @@ HEAD = """\
       </default>
       <default class="ankle">
         <joint armature="0.02"/>
-        <position kp="60" forcerange="-50 50"/>
+        <position kp="400" forcerange="-50 50"/>
       </default>
       <default class="waist">
         <position kp="150" forcerange="-80 80"/>
@@ -219,8 +219,8 @@ TAIL = """\
   </contact>
 
   <keyframe>
-    <key name="home" qpos="{home}"/>
-    <key name="tpose" qpos="{tpose}"/>
+    {home}
+    {tpose}
   </keyframe>
 </mujoco>
 """
@@ -267,14 +267,16 @@ def joint_names() -> list[str]:
     ]
 
 
-def pose(**angles: float) -> str:
-    """A keyframe's coordinates; angles of both sides alike, rolls and yaws mirrored."""
+def key(name: str, **angles: float) -> str:
+    """A keyframe that its servos hold; angles of both sides alike, rolls and yaws mirrored."""
     values = []
-    for name in joint_names():
-        side, _, joint = name.partition("_")
-        mirrored = side == "right" and joint.endswith(("roll", "yaw"))
-        values.append((-1 if mirrored else 1) * angles.get(joint if side != "waist" else name, 0))
-    return " ".join(f"{value:g}" for value in (0, 0, 0.74, 1, 0, 0, 0, *values))
+    for joint_name in joint_names():
+        side, _, part = joint_name.partition("_")
+        mirrored = side == "right" and part.endswith(("roll", "yaw"))
+        angle = angles.get(joint_name if side == "waist" else part, 0)
+        values.append(-angle if mirrored else angle)
+    joints = " ".join(f"{value:g}" for value in values)
+    return f'<key name="{name}" qpos="0 0 0.74 1 0 0 0 {joints}" ctrl="{joints}"/>'
 
 
 def ember() -> str:
@@ -291,6 +293,7 @@ def ember() -> str:
         for side in ("left", "right")
         for one, other in (
             ("pelvis", f"{side}_hip_roll_link"),
+            ("pelvis", f"{side}_thigh"),
             (f"{side}_hip_pitch_link", f"{side}_thigh"),
             (f"{side}_shin", f"{side}_foot"),
             ("torso", f"{side}_shoulder_roll_link"),
@@ -323,8 +326,8 @@ def ember() -> str:
     tail = TAIL.format(
         actuators="\n".join(actuators),
         excludes="\n".join(excludes),
-        home=pose(shoulder_pitch=0.2, shoulder_roll=0.25, elbow=-0.6),
-        tpose=pose(shoulder_roll=1.5708),
+        home=key("home", shoulder_pitch=0.2, shoulder_roll=0.25, elbow=-0.6),
+        tpose=key("tpose", shoulder_roll=1.5708),
     )
     return HEAD + legs + TORSO + arms + tail
 
