@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.inertia import Inertias, held_torques
+from sim.joints import Axis, mirrored
 from sim.parts import DETAIL, joint_kind_of, kept_joints, side_of
 from spark.feet import FOOT_LENGTH, standing_height
 from spark.rig import Rig
@@ -19,10 +20,8 @@ PEAK = 4.0
 _FREQUENCY = 300.0  # [rad/s] of a servo that turns nothing but its own armature
 _PASSIVE = 0.01  # passive damping [N m s/rad] for each N m of strength
 _LEAST = 0.003  # strength, in body weights times height: what is light is not weak
+_AXES: dict[str, Axis] = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
 _ANKLE_TO_TIP, _BALL_TO_TIP = 0.75 * FOOT_LENGTH, 0.25 * FOOT_LENGTH
-
-MIRROR = np.array([-1.0, 1.0, -1.0])
-"""A rotation axis of a left limb, mirrored in the XZ plane: the same movement of the right one."""
 
 
 def strengths(rig: Rig, bodies: Inertias) -> dict[str, float]:
@@ -52,28 +51,30 @@ def set_strength(default: mujoco.MjsDefault, strength: float) -> None:
     default.joint.damping[0] = _rounded(_PASSIVE * strength)
 
 
-def add_ball_servos(spec: mujoco.MjSpec, rig: Rig) -> None:
-    """Three servos a ball joint, about the axes X, Y and Z of the bone above it, in the T-pose;
-    those of right limbs are mirrored, so that a control moves both sides alike.
+def add_servos(spec: mujoco.MjSpec, rig: Rig) -> None:
+    """A servo for each hinge; three for each ball joint, details aside.
 
-    A control is a component of the rotation vector [rad] from the T-pose. The axes belong to the
-    parent: they stay when the joint turns.
+    Those of a ball turn it about the axes X, Y and Z of the bone above it, in the T-pose, where
+    right limbs' are mirrored, so that a control moves both sides alike. A control is a component
+    of the rotation vector [rad] from the T-pose. The axes stay with the bone above when the joint
+    turns.
     """
-    for j in kept_joints(rig):
-        kind = joint_kind_of(rig, j)
-        if j == rig.carrier or kind == DETAIL:
-            continue
-        name = rig.skeleton.names[j]
-        for k, letter in enumerate("xyz"):
-            gear = np.zeros(6)
-            gear[k] = MIRROR[k] if side_of(rig, j) == "right" else 1.0
+    for joint in spec.joints:
+        default = joint.classname
+        if joint.type == mujoco.mjtJoint.mjJNT_HINGE:
             spec.add_actuator(
-                spec.find_default(kind),
-                name=f"{name}_{letter}",
-                target=name,
-                trntype=mujoco.mjtTrn.mjTRN_JOINTINPARENT,
-                gear=gear,
+                default, name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
             )
+        elif joint.type == mujoco.mjtJoint.mjJNT_BALL and default.name != DETAIL:
+            side = side_of(rig, rig.skeleton.names.index(joint.name))
+            for letter, axis in _AXES.items():
+                spec.add_actuator(
+                    default,
+                    name=f"{joint.name}_{letter}",
+                    target=joint.name,
+                    trntype=mujoco.mjtTrn.mjTRN_JOINTINPARENT,
+                    gear=[*mirrored(axis, side), 0.0, 0.0, 0.0],
+                )
 
 
 def ctrl_of_qpos(model: mujoco.MjModel, qpos: Float[np.ndarray, "nq"]) -> Float[np.ndarray, "nu"]:

@@ -1,22 +1,24 @@
-"""A MuJoCo body for any rig: one MuJoCo body a joint, ball joints, masses and shapes of a human.
+"""A MuJoCo body for any rig: one MuJoCo body a joint, with the masses and shapes of a human.
 
 At its zero pose the body stands in the T-pose and all its frames are parallel to the world's (X
 forward, Y left, Z up), whatever the axes of the rig's joints: a ball joint's coordinates are the
 rotation since the T-pose, relative to the parent's. Body origins are the rig's joints, so that
 MuJoCo's `xpos` is our forward kinematics. Joints above the rig's carrier do not move the body and
-are left out; the carrier takes the free joint.
+are left out; the carrier takes the free joint. With hinges in place of balls, joints without a role
+are fixed.
 """
 
 import mujoco
 import numpy as np
 
-from sim.actuators import add_ball_servos, ctrl_of_qpos, set_strength, strengths
+from sim.actuators import add_servos, ctrl_of_qpos, set_strength, strengths
 from sim.inertia import Inertias, inertias
-from sim.joints import CONES
-from sim.parts import DETAIL, LINK, joint_kind_of, kept_joints, kind_of
-from sim.pose import arms_down, qpos_of_pose, standing_position
+from sim.joints import CONES, HINGES, JointType, mirrored
+from sim.parts import DETAIL, LINK, hinges_of, joint_kind_of, kept_joints, kind_of, side_of
+from sim.pose import qpos_of_pose
 from sim.sensors import add_sensors, add_sites
 from sim.shapes import add_materials, add_shapes
+from sim.stance import arms_down, balanced, standing_position
 from spark.errors import SkeletonError
 from spark.feet import standing_height
 from spark.kinematics import world_positions
@@ -27,10 +29,11 @@ _NEAR = 3  # joints
 _ROOT = "body"  # the class of everything
 
 
-def build_body(rig: Rig, *, mass: float | None = None) -> mujoco.MjSpec:
+def build_body(rig: Rig, *, mass: float | None = None, joints: JointType = "ball") -> mujoco.MjSpec:
     """The model of a rig, T-posed at the origin with its soles at z = 0.
 
     `mass` [kg] is that of the whole body; where it is not given it follows from the height.
+    `joints` are balls, or "hinge": one at elbow and knee, three elsewhere (`sim.joints.HINGES`).
     Its keyframes, `tpose` and `home` (arms lowered), have the controls that hold them.
     """
     if mass is not None and not (np.isfinite(mass) and mass > 0):
@@ -42,46 +45,67 @@ def build_body(rig: Rig, *, mass: float | None = None) -> mujoco.MjSpec:
     spec.compiler.savecompiled = False  # keeps all digits: 6 would move the feet by micrometres
     spec.compiler.degree = True
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    _add_defaults(spec, rig, masses)
+    _add_defaults(spec, rig, masses, joints)
     add_materials(spec)
-    bodies = _add_bodies(spec, rig, masses)
+    bodies = _add_bodies(spec, rig, masses, joints)
     add_shapes(spec, bodies, rig)
     add_sites(bodies, rig, masses)
-    add_ball_servos(spec, rig)
+    add_servos(spec, rig)
     add_sensors(spec, bodies, rig)
-    _add_excludes(spec, rig)
     model = spec.compile()
     for name, world in (("tpose", rig.tpose), ("home", arms_down(rig))):
-        qpos = qpos_of_pose(model, rig, world)
+        qpos = qpos_of_pose(model, rig, balanced(rig, world, masses))
         spec.add_key(name=name, qpos=qpos, ctrl=ctrl_of_qpos(model, qpos))
+    _add_excludes(spec, rig)
     return spec
 
 
-def _add_defaults(spec: mujoco.MjSpec, rig: Rig, masses: Inertias) -> None:
+def _add_defaults(spec: mujoco.MjSpec, rig: Rig, masses: Inertias, joints: JointType) -> None:
     """A class for what is seen, what collides and the soles, and one for each kind of joint."""
     root = spec.add_default(_ROOT, spec.default)
-    root.joint.type = mujoco.mjtJoint.mjJNT_BALL
-    for name, group in (("visual", 2), ("collision", 2)):  # without meshes both are what one sees
+    for name in ("visual", "collision"):
         default = spec.add_default(name, root)
-        default.geom.group = group
+        default.geom.group = 2  # without meshes both are what one sees
         default.geom.mass = 0
     visual, collision = spec.find_default("visual"), spec.find_default("collision")
     visual.geom.contype = visual.geom.conaffinity = 0
     collision.geom.friction = [1.0, 0.005, 0.0001]
-    foot = spec.add_default("foot", collision)
-    foot.geom.condim = 4
+    spec.add_default("foot", collision).geom.condim = 4
+    if joints == "ball":
+        root.joint.type = mujoco.mjtJoint.mjJNT_BALL
+        detail = spec.add_default(DETAIL, root)
+        detail.joint.armature = 2e-4
+        detail.joint.stiffness[0], detail.joint.damping[0] = 0.2, 0.01
     for kind, strength in strengths(rig, masses).items():
-        default = spec.add_default(kind, root)
-        set_strength(default, strength)
-        default.joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
-        default.joint.range = [0.0, CONES[kind]]
-        default.actuator.ctrlrange = np.radians([-CONES[kind], CONES[kind]])
-    detail = spec.add_default(DETAIL, root)
-    detail.joint.armature = 2e-4
-    detail.joint.stiffness[0], detail.joint.damping[0] = 0.2, 0.01
+        if joints == "ball":
+            default = spec.add_default(kind, root)
+            set_strength(default, strength)
+            _set_range(default, (0.0, CONES[kind]), (-CONES[kind], CONES[kind]))
+        elif kind in HINGES:
+            default = spec.add_default(kind, root)
+            set_strength(default, strength)
+            hinges = HINGES[kind]
+            for hinge in hinges:
+                one = (
+                    default
+                    if len(hinges) == 1
+                    else spec.add_default(f"{kind}_{hinge.name}", default)
+                )
+                one.joint.axis = hinge.axis
+                _set_range(one, hinge.range_deg, hinge.range_deg)
 
 
-def _add_bodies(spec: mujoco.MjSpec, rig: Rig, masses: Inertias) -> dict[int, mujoco.MjsBody]:
+def _set_range(
+    default: mujoco.MjsDefault, joint_deg: tuple[float, float], ctrl_deg: tuple[float, float]
+) -> None:
+    default.joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+    default.joint.range = joint_deg
+    default.actuator.ctrlrange = np.radians(ctrl_deg)
+
+
+def _add_bodies(
+    spec: mujoco.MjSpec, rig: Rig, masses: Inertias, joints: JointType
+) -> dict[int, mujoco.MjsBody]:
     positions = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
     bodies: dict[int, mujoco.MjsBody] = {}
     for j in kept_joints(rig):
@@ -93,7 +117,7 @@ def _add_bodies(spec: mujoco.MjSpec, rig: Rig, masses: Inertias) -> dict[int, mu
         else:
             parent = int(rig.skeleton.parents[j])
             body = bodies[parent].add_body(name=name, pos=positions[j] - positions[parent])
-            body.add_joint(spec.find_default(joint_kind_of(rig, j)), name=name)
+            _add_joints(spec, body, rig, j, joints)
         body.explicitinertial = True
         body.mass = masses.masses[j]
         body.ipos = masses.coms[j]
@@ -103,9 +127,23 @@ def _add_bodies(spec: mujoco.MjSpec, rig: Rig, masses: Inertias) -> dict[int, mu
     return bodies
 
 
+def _add_joints(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, rig: Rig, joint: int, joints: JointType
+) -> None:
+    kind = joint_kind_of(rig, joint)
+    if joints == "ball":
+        body.add_joint(spec.find_default(kind), name=rig.skeleton.names[joint])
+        return
+    hinges = hinges_of(rig, joint)
+    for name, hinge in hinges:
+        default = spec.find_default(kind if len(hinges) == 1 else f"{kind}_{hinge.name}")
+        body.add_joint(default, name=name, axis=mirrored(hinge.axis, side_of(rig, joint)))
+
+
 def _add_excludes(spec: mujoco.MjSpec, rig: Rig) -> None:
-    """Parts within three joints of each other touch all the time and must not push. MuJoCo itself
-    lets parent and child be; links count as parts of what they hang on."""
+    """Parts within three joints of each other touch all the time and must not push, nor must what
+    overlaps in a keyframe. MuJoCo itself lets parent and child be; links count as parts of what
+    they hang on."""
     skeleton = rig.skeleton
     solid = [j for j in kept_joints(rig) if kind_of(rig, j) != DETAIL]
     above = {j: set(skeleton.ancestors(j)) & set(solid) for j in solid}
@@ -115,3 +153,12 @@ def _add_excludes(spec: mujoco.MjSpec, rig: Rig) -> None:
             apart = len((above[j] ^ above[k]) & moving)
             if apart <= _NEAR and int(skeleton.parents[k]) != j:
                 spec.add_exclude(bodyname1=skeleton.names[j], bodyname2=skeleton.names[k])
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    overlapping = set()
+    for key in range(model.nkey):
+        mujoco.mj_resetDataKeyframe(model, data, key)
+        mujoco.mj_fwdPosition(model, data)
+        overlapping |= {tuple(sorted(pair)) for pair in model.geom_bodyid[data.contact.geom]}
+    for first, second in sorted(overlapping):
+        spec.add_exclude(bodyname1=model.body(first).name, bodyname2=model.body(second).name)

@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 import mujoco
 
 from sim.body import build_body
+from sim.joints import JointType
 from spark.errors import OutputError
 from spark.rig import Rig
 
@@ -31,10 +32,12 @@ _SCENE = """<mujoco model="{name} scene">
 """
 
 
-def write_mjcf(rig: Rig, path: str | Path, *, mass: float | None = None) -> tuple[Path, Path]:
+def write_mjcf(
+    rig: Rig, path: str | Path, *, mass: float | None = None, joints: JointType = "ball"
+) -> tuple[Path, Path]:
     """Write the body, and beside it `NAME_scene.xml` with floor and light, as Menagerie does."""
     path = Path(path)
-    spec = build_body(rig, mass=mass)
+    spec = build_body(rig, mass=mass, joints=joints)
     spec.modelname = path.stem
     scene = path.with_name(f"{path.stem}_scene.xml")
     try:

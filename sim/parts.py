@@ -1,6 +1,6 @@
 """Which joints of a rig move its body, and what each of them is called on it."""
 
-from sim.joints import JOINTS
+from sim.joints import HINGES, JOINTS, Hinge
 from spark.rig import Rig
 
 LINK = "link"
@@ -36,3 +36,15 @@ def side_of(rig: Rig, joint: int) -> str:
             side = role.value.split("_")[0]
             return side if side in ("left", "right") else ""
     return ""
+
+
+def hinges_of(rig: Rig, joint: int) -> tuple[tuple[str, Hinge], ...]:
+    """The hinges of a joint on a body of hinges, outermost first, and their names on it; none for
+    the carrier and for joints without a role."""
+    if joint == rig.carrier:
+        return ()
+    hinges = HINGES.get(joint_kind_of(rig, joint), ())
+    name = rig.skeleton.names[joint]
+    if len(hinges) == 1:
+        return ((name, hinges[0]),)
+    return tuple((f"{name}_{hinge.name}", hinge) for hinge in hinges)

@@ -38,7 +38,7 @@ def material_of(rig: Rig, joint: int) -> str:
 
 
 def add_shapes(spec: mujoco.MjSpec, bodies: dict[int, mujoco.MjsBody], rig: Rig) -> None:
-    """Give every body its geoms; those of details are only seen, the others collide."""
+    """Give every body its geoms. Those of details, and what lies in a foot, are only seen."""
     shapes = _Shapes(spec, bodies, rig)
     for j in bodies:
         kind = kind_of(rig, j)
@@ -61,10 +61,12 @@ class _Shapes:
     def bones(self, joint: int, kind: str) -> None:
         """A capsule along each of the joint's bones; a shank's ends above the sole."""
         radius = RADII.get(kind, _DETAIL) * self.height
+        above = self.rig.skeleton.ancestors(joint)
+        foot = any(kind_of(self.rig, k) == "foot" for k in above)  # what carries it are the soles
         for tip in self._tips(joint):
             if kind == "lower_leg":
                 tip = tip * max(0.5, 1.0 - radius / float(np.linalg.norm(tip)))
-            self._capsule(joint, tip, radius, "visual" if kind == DETAIL else "collision")
+            self._capsule(joint, tip, radius, "visual" if foot or kind == DETAIL else "collision")
 
     def head(self, joint: int) -> None:
         """An ellipsoid, upright on its joint."""
