@@ -72,13 +72,14 @@ def test_it_moves_freely_where_people_do() -> None:
     data = mujoco.MjData(model)
     for angles in (
         {"hip_pitch": -1.6, "knee": 2.2, "ankle_pitch": -0.7},
-        {"shoulder_pitch": -2.9},
+        {"shoulder_pitch": -2.8, "shoulder_roll": 0.7},
         {"shoulder_pitch": -1.5},
         {"elbow": -2.0},
     ):
         mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
-        for side in ("left", "right"):
-            for joint, angle in angles.items():
+        for side, sign in (("left", 1), ("right", -1)):
+            for joint, value in angles.items():
+                angle = sign * value if joint.endswith("roll") else value
                 low, high = model.joint(f"{side}_{joint}").range
                 assert low <= angle <= high
                 data.joint(f"{side}_{joint}").qpos = angle
