@@ -13,7 +13,7 @@ import numpy as np
 
 from sim.actuators import add_servos, ctrl_of_qpos, set_strength, strengths
 from sim.inertia import Inertias, inertias
-from sim.joints import CONES, HINGES, JointType, mirrored
+from sim.joints import CONES, HINGES, JointType, Range, mirrored
 from sim.parts import DETAIL, LINK, hinges_of, joint_kind_of, kept_joints, kind_of, side_of
 from sim.pose import qpos_of_pose
 from sim.sensors import add_sensors, add_sites
@@ -80,7 +80,7 @@ def _add_defaults(spec: mujoco.MjSpec, rig: Rig, masses: Inertias, joints: Joint
         if joints == "ball":
             default = spec.add_default(kind, root)
             set_strength(default, strength)
-            _set_range(default, (0.0, CONES[kind]), (-CONES[kind], CONES[kind]))
+            _set_range(default, (0, CONES[kind]), (-CONES[kind], CONES[kind]))
         elif kind in HINGES:
             default = spec.add_default(kind, root)
             set_strength(default, strength)
@@ -95,9 +95,7 @@ def _add_defaults(spec: mujoco.MjSpec, rig: Rig, masses: Inertias, joints: Joint
                 _set_range(one, hinge.range_deg, hinge.range_deg)
 
 
-def _set_range(
-    default: mujoco.MjsDefault, joint_deg: tuple[float, float], ctrl_deg: tuple[float, float]
-) -> None:
+def _set_range(default: mujoco.MjsDefault, joint_deg: Range, ctrl_deg: Range) -> None:
     default.joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
     default.joint.range = joint_deg
     default.actuator.ctrlrange = np.radians(ctrl_deg)

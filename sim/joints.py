@@ -10,7 +10,7 @@ from typing import Literal
 
 JointType = Literal["ball", "hinge"]
 _Number = int | float
-_Range = tuple[_Number, _Number]
+Range = tuple[_Number, _Number]
 Axis = tuple[_Number, _Number, _Number]
 
 JOINTS: dict[str, str] = {
@@ -25,7 +25,7 @@ JOINTS: dict[str, str] = {
 
 # Half the opening [deg] of the one cone, about the T-pose, that a MuJoCo ball joint has. Generous:
 # it also holds the twist; the report's own limits tell swing from twist.
-CONES: dict[str, float] = {
+CONES: dict[str, int] = {
     "pelvis": 60,
     "spine": 70,
     "neck": 80,
@@ -48,10 +48,10 @@ class Hinge:
 
     name: str
     axis: Axis
-    range_deg: _Range
+    range_deg: Range
 
 
-def _trunk(flex: _Range, side: float, twist: float) -> tuple[Hinge, ...]:
+def _trunk(flex: Range, side: _Number, twist: _Number) -> tuple[Hinge, ...]:
     return (
         Hinge("flex", (0, 1, 0), flex),
         Hinge("side", (1, 0, 0), (-side, side)),
