@@ -21,11 +21,13 @@ set -x
 "$spark_sim" sample motions
 "$spark_sim" inspect motions/*.bvh >/dev/null
 "$spark_sim" retarget motions/walker_walk.bvh --to motions/dancer_wave.bvh -o out.bvh
+"$spark_sim" robots
+"$spark_sim" retarget motions/walker_walk.bvh --to robot -o robot.npz
 "$spark_sim" report out.bvh --source motions/walker_walk.bvh --json > report.json
 "$spark_sim" mjcf motions/dancer_wave.bvh
 "$spark_sim" play motions/walker_walk.bvh out.bvh --html out.html
 set +x
-for file in out.bvh report.json dancer_wave.xml out.html; do
+for file in out.bvh robot.npz report.json dancer_wave.xml out.html; do
   [ -s "$file" ] || { echo "wheel: $file was not written" >&2; exit 1; }
 done
 code=0
