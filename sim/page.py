@@ -16,9 +16,11 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from sim.camera import distance
 from sim.scene import Figure, Placed, Scene, build_scene
 from spark.errors import OutputError
 
+_HALF_VIEW = 0.26  # tan of half the page's angle, less what its bar and labels take
 _STEPS = 32000  # coordinates are kept as 16-bit integers
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 _PRIMITIVES = {
@@ -65,7 +67,7 @@ def page(
     data = {
         "frames": len(scene.qpos),
         "frame_time": scene.frame_time,
-        "distance": 1.65 * max(scene.width, scene.height),
+        "distance": distance(scene, half_view=_HALF_VIEW, aspect=1.6),
         "height": scene.height,
         "figures": [
             _figure(scene, placed, figure, mark, meshes)

@@ -7,14 +7,12 @@ import mujoco
 import numpy as np
 from jaxtyping import UInt8
 
+from sim.camera import AZIMUTH, ELEVATION, FIELD_OF_VIEW, distance
 from sim.scene import Scene
 from spark.errors import DependencyError
 
 if TYPE_CHECKING:
     from mujoco import Renderer
-
-AZIMUTH, ELEVATION = 150.0, -10.0
-_FIELD_OF_VIEW = 35.0
 
 
 def frames(
@@ -30,11 +28,8 @@ def frames(
     option.sitegroup[:] = 0
     camera = mujoco.MjvCamera()
     camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
-    half = np.tan(np.radians(_FIELD_OF_VIEW / 2))
-    # The row of figures is seen at an angle: its near end stands closer than its middle.
-    near = 0.5 * (scene.width - scene.height) * np.sin(np.radians(AZIMUTH))
-    camera.distance = max(scene.width * height / width, scene.height) * 0.6 / half + near
-    scene.model.vis.global_.fovy = _FIELD_OF_VIEW
+    camera.distance = distance(scene, aspect=width / height)
+    scene.model.vis.global_.fovy = FIELD_OF_VIEW
     try:
         for frame in picked:
             data.qpos[:] = scene.qpos[frame]

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -40,13 +41,15 @@ class Figure:
 class Placed:
     """How a figure's own world lies in the scene's: turned about Z by `turn`, then moved [m].
 
-    Its coordinates are `columns` of the scene's; its bodies are `bodies`, its root the first.
+    Its coordinates are `columns` of the scene's; its bodies are `bodies`, its root the first. Its
+    standing `height` is in metres.
     """
 
     turn: Float[np.ndarray, "4"]
     shift: Float[np.ndarray, "3"]
     columns: slice
     bodies: range
+    height: float
 
     def __call__(self, points: Float[np.ndarray, "*N 3"]) -> Float[np.ndarray, "*N 3"]:
         """The figure's own points in the scene."""
@@ -55,19 +58,29 @@ class Placed:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """One model of all figures and their coordinates over common frames; floor at z = 0.
-
-    `centers` is the path of the figures' middle, for a camera to follow; `width` and `height` [m]
-    are what it must show around it.
-    """
+    """One model of all figures and their coordinates over common frames; floor at z = 0."""
 
     model: mujoco.MjModel
     qpos: Float[np.ndarray, "T nq"]
     frame_time: float
-    centers: Float[np.ndarray, "T 3"]
-    width: float
-    height: float
     placed: tuple[Placed, ...]
+
+    @property
+    def height(self) -> float:
+        """The standing height [m] of the tallest figure."""
+        return max(placed.height for placed in self.placed)
+
+    @cached_property
+    def centers(self) -> Float[np.ndarray, "T 3"]:
+        """The path of the figures' middle, for a camera to follow."""
+        paths = np.stack([self.path(placed) for placed in self.placed])
+        centers = (paths.min(0) + paths.max(0)) / 2
+        centers[:, 2] = 0.48 * self.height
+        return centers
+
+    def path(self, placed: Placed) -> Float[np.ndarray, "T 3"]:
+        """Where a figure's root is."""
+        return self.qpos[:, placed.columns][:, :3]
 
 
 def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
@@ -106,9 +119,10 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
         coordinates.append(qpos)
         following = column + len(columns)
         bodies = range(first_body, len(list(world.bodies)))
-        placed.append(Placed(turn, shift, slice(column, following), bodies))
+        placed.append(Placed(turn, shift, slice(column, following), bodies, heights[k]))
         column = following
-    return _seen(world.compile(), coordinates, frame_time, heights, tuple(placed))
+    qpos = np.concatenate(coordinates, axis=1)
+    return Scene(world.compile(), qpos, frame_time, tuple(placed))
 
 
 def _lanes(figures: Sequence[Figure], heights: Sequence[float]) -> Float[np.ndarray, "K"]:
@@ -128,22 +142,6 @@ def _turn(figure: Figure) -> Float[np.ndarray, "4"]:
     if np.hypot(ahead[0], ahead[1]) < 0.3:  # lies: where it looks says nothing
         return np.array([1.0, 0, 0, 0])
     return quat_about("z", np.array(-np.arctan2(ahead[1], ahead[0])))
-
-
-def _seen(
-    model: mujoco.MjModel,
-    coordinates: Sequence[Float[np.ndarray, "T n"]],
-    frame_time: float,
-    heights: Sequence[float],
-    placed: tuple[Placed, ...],
-) -> Scene:
-    paths = np.stack([qpos[:, :3] for qpos in coordinates])
-    height = max(heights)
-    centers = (paths.min(0) + paths.max(0)) / 2
-    centers[:, 2] = 0.48 * height
-    apart = np.linalg.norm((paths - centers)[..., :2], axis=-1).max()
-    qpos = np.concatenate(coordinates, axis=1)
-    return Scene(model, qpos, frame_time, centers, 0.9 * height + 2 * float(apart), height, placed)
 
 
 def _world() -> mujoco.MjSpec:
@@ -181,7 +179,7 @@ def _world() -> mujoco.MjSpec:
     spec.worldbody.add_geom(
         name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05], material="floor"
     )
-    for direction, strength in (([-0.5, 0.3, -1.0], 0.45), ([0.3, -0.6, -0.4], 0.2)):
+    for direction, strength in (([-0.5, -0.3, -1.0], 0.45), ([0.3, 0.6, -0.4], 0.2)):
         spec.worldbody.add_light(
             type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
             dir=direction,

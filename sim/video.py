@@ -7,6 +7,7 @@ from shutil import which
 
 import numpy as np
 
+from sim.camera import fitting_aspect
 from sim.render import frames
 from sim.scene import Scene
 from spark.errors import DependencyError, OutputError
@@ -68,7 +69,7 @@ def write_strip(
         raise DependencyError("pictures need Pillow: pip install 'spark-sim[video]'") from error
     path = Path(path)
     if width is None:
-        width = round(height * max(0.6, 0.7 * scene.width / scene.height))
+        width = round(height * fitting_aspect(scene))
     picked = np.linspace(0, len(scene.qpos) - 1, count).round().astype(int).tolist()
     pictures = list(frames(scene, picked, width=width, height=height))
     try:

@@ -3,9 +3,11 @@
 import time
 
 from sim import has_display
-from sim.render import AZIMUTH, ELEVATION
+from sim.camera import AZIMUTH, ELEVATION, distance
 from sim.scene import Scene
 from spark.errors import DependencyError
+
+_HALF_VIEW = 0.4  # tan of half of the viewer's 45 degrees, and a margin
 
 
 def open_window(scene: Scene) -> None:
@@ -30,7 +32,7 @@ def open_window(scene: Scene) -> None:
         scene.model, data, key_callback=on_key, show_left_ui=False, show_right_ui=False
     ) as viewer:
         viewer.cam.azimuth, viewer.cam.elevation = AZIMUTH, ELEVATION
-        viewer.cam.distance = 1.5 * max(scene.width, scene.height)
+        viewer.cam.distance = distance(scene, half_view=_HALF_VIEW, aspect=1.5)
         viewer.cam.lookat[:] = scene.centers[0]
         viewer.opt.sitegroup[:] = 0
         while viewer.is_running():
