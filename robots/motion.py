@@ -3,14 +3,17 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from robots.mjcf import read_mjcf
-from robots.morphology import Morphology
+from robots.morphology import Morphology, Sole
 from robots.tree import Coordinates
-from sim.given import GivenBody
+from sim.given import GivenBody, GivenSole
 from spark.motion import Motion
+from spark.roles import Role
+from spark.rotation import quat_conj, quat_rotate
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,5 +41,24 @@ class RobotMotion:
     @cached_property
     def body(self) -> GivenBody:
         """The model with all its shapes, and the coordinates: what is shown and judged."""
-        mjcf = read_mjcf(self.robot.mjcf.path)
-        return GivenBody(mjcf.spec, mjcf.model, mjcf.root, self.qpos)
+        mjcf, robot = read_mjcf(self.robot.mjcf.path), self.robot
+        return GivenBody(
+            spec=mjcf.spec,
+            model=mjcf.model,
+            root=mjcf.root,
+            qpos=self.qpos,
+            soles=tuple(self._sole(sole) for sole in robot.soles),
+            tpose=robot.to_qpos(robot.tpose)[0],
+        )
+
+    def _sole(self, sole: Sole) -> GivenSole:
+        """A sole in the axes of the model's bodies."""
+        robot = self.robot
+        model = robot.mjcf.model
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        joints = [robot.mj_joints[link] for link in sole.links]
+        bodies = model.jnt_bodyid[joints].astype(np.int64)
+        q_body_world = quat_conj(data.xquat[bodies])
+        side = "left" if robot.rig.roles.roles[sole.foot] == Role.LEFT_FOOT else "right"
+        return GivenSole(side, bodies, quat_rotate(q_body_world, sole.points - data.xpos[bodies]))

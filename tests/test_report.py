@@ -132,6 +132,7 @@ def test_a_knee_bent_backwards_is_named() -> None:
     report = judge(bent, rig)
     assert report.json()["clip"]["joint_limits"]["left knee"] == {
         "share": pytest.approx(20 / 60),
+        "at_limit_share": pytest.approx(20 / 60),
         "largest_excess_rad": pytest.approx(np.radians(35)),
     }
     assert "left knee bends backwards 35° beyond its limit in frames 20-39 (0.3-0.7 s)" in texts(
@@ -370,7 +371,7 @@ def test_results_stand_beside_each_other_with_the_least_marked() -> None:
         }
     ).splitlines()
     assert table[0].split() == ["good", "floats"]
-    rows = {line[:26].strip(): line[26:].split() for line in table[1:]}
+    rows = {line[:34].strip(): line[34:].split() for line in table[1:]}
     assert rows["implausible [%]"] == ["0.0*", "100.0"]
     assert rows["penetration [%]"] == ["0.0", "0.0"]
     assert rows["out of balance [%]"] == ["0.0", "-"]

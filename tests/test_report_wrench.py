@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from stick import standing, stick_rig
 
-from sim.anthropometry import Segments
 from sim.body import build_body
 from sim.pose import qpos_from_motion
+from sim.report.mass import Mass
 from sim.report.support import Support
 from sim.report.thresholds import PLAUSIBILITY_V1
 from sim.report.track import track
@@ -18,36 +18,35 @@ from spark.rotation import quat_about, quat_from_rotvec, quat_mul
 G = 9.81
 
 
-def rod() -> Segments:
+def rod(path: np.ndarray, turns: np.ndarray) -> Mass:
     """One body of unit mass with moments 1, 2, 3 m²."""
-    return Segments(np.array([0]), np.ones(1), np.zeros((1, 3)), np.diag([1.0, 2.0, 3.0])[None])
+    return Mass(np.ones(1), np.diag([1.0, 2.0, 3.0])[None], path[:, None], turns[:, None])
 
 
 def test_the_momentum_of_a_spinning_body_is_inertia_times_rate() -> None:
     times = np.arange(200) / 1000
     tilt = quat_about("y", np.array(np.pi / 2))  # the body's X axis points down, Z along world X
-    spin = quat_mul(quat_about("z", 2.0 * times), tilt)[:, None]
-    momentum = angular_momentum(np.zeros((200, 1, 3)), spin, rod(), 1e-3)
+    spin = quat_mul(quat_about("z", 2.0 * times), tilt)
+    momentum = angular_momentum(rod(np.zeros((200, 3)), spin), 1e-3)
     # About world Z turns the body's X axis: its moment is 1.
     np.testing.assert_allclose(momentum[50:-50], [[0, 0, 2.0]] * 100, atol=1e-4)
 
 
 def test_two_masses_on_a_turning_arm() -> None:
     # 1/4 and 3/4 of the mass, 4 m apart, turning at 0.5 rad/s: reduced mass 3/16, L = 3/16·16·0.5.
-    parts = Segments(
-        np.zeros(2, int), np.array([0.25, 0.75]), np.zeros((2, 3)), np.zeros((2, 3, 3))
-    )
     angle = 0.5 * np.arange(100) / 1000
     arm = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
     places = np.stack([0 * arm, 4 * arm], axis=1) + np.array([3.0, 1.0, 2.0])
-    momentum = angular_momentum(places, np.tile([1.0, 0, 0, 0], (100, 2, 1)), parts, 1e-3)
+    still = np.tile([1.0, 0, 0, 0], (100, 2, 1))
+    parts = Mass(np.array([0.25, 0.75]), np.zeros((2, 3, 3)), places, still)
+    momentum = angular_momentum(parts, 1e-3)
     np.testing.assert_allclose(momentum[1:-1], [[0, 0, 1.5]] * 98, atol=1e-6)
 
 
 def test_the_floor_carries_the_weight_and_what_accelerates_it() -> None:
     times = np.arange(200) / 1000
-    places = np.stack([2 * times**2, 0 * times, 0.5 * times**2], axis=-1)[:, None]
-    wrench = required_wrench(places, np.tile([1.0, 0, 0, 0], (200, 1, 1)), rod(), 1e-3, 0.01)
+    path = np.stack([2 * times**2, 0 * times, 0.5 * times**2], axis=-1)
+    wrench = required_wrench(rod(path, np.tile([1.0, 0, 0, 0], (200, 1))), 1e-3, 0.01)
     expected = [4 / G, 0, (G + 1) / G, 0, 0, 0]
     np.testing.assert_allclose(wrench, [expected] * 200, atol=1e-6)
 
@@ -65,9 +64,7 @@ def test_required_wrench_is_the_root_of_mujocos_inverse_dynamics() -> None:
     turns = np.stack([wave(len(rig.skeleton), 0.4) for _ in range(3)], axis=-1)
     motion = Motion(rig.skeleton, dt, still.root_pos + wave(3, 0.2), quat_from_rotvec(turns))
     followed = track(motion, rig)
-    ours = required_wrench(
-        followed.segment_coms, followed.world[:, followed.body.joints], followed.body, dt, 0.004
-    )
+    ours = required_wrench(followed.mass, dt, 0.004)
 
     model = build_body(rig).compile()
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
@@ -145,7 +142,7 @@ def swinging(com_y: float, heel_height: float, toe_speed: float) -> np.ndarray:
     speeds = np.repeat([0.0, toe_speed], 6)
     support = Support(
         thresholds=PLAUSIBILITY_V1,
-        soles=12,
+        feet=("right foot",) * 6 + ("left foot",) * 6,
         heights=heights[None],
         speeds=speeds[None],
         arms=(feet - np.array([0.1, com_y, 0.9]))[None],

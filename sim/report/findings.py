@@ -73,7 +73,7 @@ def _bending(clip: Measured, gap: int) -> Iterator[Finding]:
 
 def _piercing(clip: Measured, gap: int) -> Iterator[Finding]:
     for (one, other), depth in zip(clip.self_pairs, clip.self_depth.T, strict=True):
-        for start, stop in spans(depth > clip.thresholds.self_penetration, gap):
+        for start, stop in spans(depth > clip.self_bound, gap):
             amount = float(depth[start:stop].max())
             where = f"{one}, {other}"
             sentence = f"{one} and {other} go {100 * amount:.1f} cm into each other"

@@ -1,10 +1,12 @@
 """Judge a motion: how plausible it is, and how it differs from the motion it was made from."""
 
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Bool, Float
 
+from sim.given import GivenBody
 from sim.report.findings import find
 from sim.report.measured import Measured, measure
 from sim.report.measures import (
@@ -19,6 +21,7 @@ from sim.report.measures import (
 from sim.report.result import Report
 from sim.report.thresholds import PLAUSIBILITY_V1
 from sim.report.track import Track, track
+from sim.report.truth import accuracy
 from spark.contacts import planted_feet
 from spark.errors import SkeletonError
 from spark.motion import Motion
@@ -28,23 +31,45 @@ from spark.rig import Rig
 _FLOOR_AT_ZERO = 0.1
 
 
-def judge(motion: Motion, rig: Rig, *, source: tuple[Motion, Rig] | None = None) -> Report:
+Source: TypeAlias = tuple[Motion, Rig] | tuple[Motion, Rig, GivenBody | None]
+
+
+def judge(
+    motion: Motion,
+    rig: Rig,
+    *,
+    source: Source | None = None,
+    body: GivenBody | None = None,
+    truth: Motion | None = None,
+) -> Report:
     """The plausibility report of `motion`, and its difference to `source` where that is given.
 
-    The floor is the source's (the 5th percentile of its lowest sole point), scaled by the hip
-    heights' ratio; without a source it is the motion's own, and a motion that floats or sinks as a
-    whole can't be told. The source is compared at the same times; its frame rate may be another.
-    Raises SkeletonError for a body without feet and for a clip without frames.
+    With `body`, a model that moves as `motion` does, its own masses, shapes, soles and joint limits
+    count, otherwise a human's on the rig's bones. `truth` is what the motion should have been.
+
+    The floor of a given body is at z = 0, as in its simulator. Else it is the source's (the 5th
+    percentile of its lowest sole point), scaled by the hip heights' ratio; without a source it is
+    the motion's own, and a motion that floats or sinks as a whole can't be told. The source is
+    compared at the same times; its frame rate may be another.
+    Raises SkeletonError for a body without feet, for a clip without frames, and for a truth that is
+    on another skeleton or has other frames.
     """
-    clip_track = _track(motion, rig, "the motion")
+    clip_track = _track("the motion", motion, rig, body)
+    known = None if truth is None else accuracy(motion, truth, rig)
+    notes = _about_model(clip_track)
     if source is None:
-        clip = measure(clip_track, floor_height(clip_track.lowest_point))
-        note = "the floor is the clip's own: one that floats or sinks as a whole can't be told"
-        notes = (note, *_slope(clip_track, "the"))
-        return Report(clip, None, None, None, find(clip, None), notes)
-    source_track = _track(*source, "the source")
-    source_floor = floor_height(source_track.lowest_point)
-    floor, notes = _floor_from_source(clip_track, source_track.rig, source_floor)
+        clip = measure(clip_track, _own_floor(clip_track))
+        if body is None:
+            notes = (
+                "the floor is the clip's own: one that floats or sinks as a whole can't be told",
+            )
+        notes += _slope(clip_track, "the")
+        return Report(clip, None, None, None, find(clip, None), notes, known)
+    source_track = _track("the source", *source)
+    source_floor = _own_floor(source_track)
+    floor = 0.0
+    if body is None:
+        floor, notes = _floor_from_source(clip_track, source_track.rig, source_floor)
     source_clip = measure(source_track, source_floor)
     times = np.arange(len(clip_track)) * motion.frame_time
     scale = rig.hip_height / source_track.rig.hip_height
@@ -55,13 +80,34 @@ def judge(motion: Motion, rig: Rig, *, source: tuple[Motion, Rig] | None = None)
     difference = abs(source_track.motion.duration - motion.duration)
     if difference > max(0.1, 2 * motion.frame_time):
         notes += (f"the source's duration differs by {difference:.1f} s: frames may not match",)
-    return Report(clip, source_clip, drift, contacts, find(clip, drift), notes)
+    return Report(clip, source_clip, drift, contacts, find(clip, drift), notes, known)
 
 
-def _track(motion: Motion, rig: Rig, name: str) -> Track:
+def _track(name: str, motion: Motion, rig: Rig, body: GivenBody | None = None) -> Track:
     if not len(motion):
         raise SkeletonError(f"{name} has no frames: nothing to judge")
-    return track(motion, rig)
+    return track(motion, rig, body)
+
+
+def _about_model(track: Track) -> tuple[str, ...]:
+    """Notes where a model has nothing that collides, and where its floor seems to be elsewhere."""
+    body, notes = track.body, []
+    if body is None:
+        return ()
+    own = body.model.body_rootid[body.model.geom_bodyid] == body.root
+    if not ((body.model.geom_contype | body.model.geom_conaffinity)[own] != 0).any():
+        notes.append("none of the model's shapes collide: self-penetration is not measured")
+    height = floor_height(track.lowest_point)
+    if abs(height) > PLAUSIBILITY_V1.scaled(track.rig.hip_height).penetration:
+        notes.append(
+            f"the model's floor is at z = 0; the clip's own (the 5th percentile of its lowest sole "
+            f"point) is {100 * abs(height):.1f} cm {'above' if height > 0 else 'below'} that"
+        )
+    return tuple(notes)
+
+
+def _own_floor(track: Track) -> float:
+    return floor_height(track.lowest_point) if track.body is None else 0.0
 
 
 def _floor_from_source(

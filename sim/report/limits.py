@@ -123,16 +123,20 @@ LIMITS: tuple[JointLimit, ...] = (
 @dataclass(frozen=True, eq=False)
 class LimitExcess:
     """How far one joint ("left knee") is beyond the ends of its ranges [rad]: `beyond[t, e]` is
-    negative inside; `movements[e]` says which end of which range e is."""
+    negative inside; `movements[e]` says what a turn beyond end e is called."""
 
     joint: str
-    beyond: Float[np.ndarray, "T 6"]
+    beyond: Float[np.ndarray, "T E"]
     movements: tuple[str, ...]
 
     @property
-    def excess(self) -> Float[np.ndarray, "T 6"]:
+    def excess(self) -> Float[np.ndarray, "T E"]:
         """How far outside its ranges the joint is [rad]; 0 inside."""
         return np.maximum(self.beyond, 0.0)
+
+    def share(self, bound: float) -> float:
+        """The share of frames in which the joint is further beyond an end than `bound` [rad]."""
+        return float((self.beyond > bound).any(axis=1).mean())
 
 
 def limit_excess(since_tpose: Float[np.ndarray, "T J 4"], rig: Rig) -> tuple[LimitExcess, ...]:

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from sim.report.derivatives import derivative
+from sim.report.hinges import hinge_excess, hinge_rates
 from sim.report.limits import LimitExcess, limit_excess
 from sim.report.measures import floating, least_within, penetration_depth
 from sim.report.selfcollision import capsules, self_penetration
@@ -23,12 +24,13 @@ class Measured:
     """One clip's measures over time; heights are above the floor [m].
 
     `flags` holds one row per letter of `FLAGS`.
-    `depth` [m]: how deep the parts `depth_names` (feet, joints) lie under the floor.
+    `depth` [m]: how deep the parts `depth_names` (feet, then others) lie under the floor.
     `clearance` [m]: the height of the body's lowest point.
     `skating`, `speeds` [m/s]: of the soles' corners, on the feet `sides`.
     `unexplained`: the force [body weights] and torque [body weights x m] the floor can't give.
     `imbalance` [m]: how far the centre of mass lies outside the support; nan in frames that move.
-    `self_depth` [m]: how deep the parts of each of `self_pairs` are in each other.
+    `self_depth` [m]: how deep the parts of each of `self_pairs` are in each other; more than
+    `self_bound` is too deep.
     `joint_speed` [rad/s], `joint_jerk` [rad/s³]: of the joints `joint_names`.
     """
 
@@ -47,6 +49,7 @@ class Measured:
     limits: tuple[LimitExcess, ...]
     self_pairs: tuple[tuple[str, str], ...]
     self_depth: Float[np.ndarray, "T K"]
+    self_bound: float
     joint_names: tuple[str, ...]
     joint_speed: Float[np.ndarray, "T B"]
     joint_jerk: Float[np.ndarray, "T B"]
@@ -70,9 +73,9 @@ class Measured:
         return {letter: float(flag.mean()) for letter, flag in self.flags.items()}
 
     @property
-    def limit_shares(self) -> dict[str, float]:
-        """The share of frames beyond the limits, by joint."""
-        return {each.joint: float((each.beyond > 0).any(axis=1).mean()) for each in self.limits}
+    def at_limit_shares(self) -> dict[str, float]:
+        """The share of frames at a limit or beyond, by joint."""
+        return {each.joint: each.share(-self.thresholds.limit_margin) for each in self.limits}
 
     @property
     def limit_share(self) -> float:
@@ -87,7 +90,7 @@ class Measured:
     @property
     def self_penetration(self) -> Bool[np.ndarray, "T"]:
         """Frames in which the body goes through itself."""
-        return np.any(self.self_depth > self.thresholds.self_penetration, axis=1)
+        return np.any(self.self_depth > self.self_bound, axis=1)
 
     @property
     def unbalanced_share(self) -> float | None:
@@ -112,16 +115,26 @@ def measure(track: Track, floor_z: float) -> Measured:
     thresholds = PLAUSIBILITY_V1.scaled(track.rig.hip_height)
     frame_time, window = track.motion.frame_time, thresholds.window
     held = support(track, floor_z, thresholds)
-    joints = track.joints[..., 2] - floor_z
-    depth = penetration_depth(np.concatenate([held.heights[:, : held.soles], joints], axis=1))
+    soles = len(held.feet)
+    parts = track.parts[..., 2] - floor_z
+    depth = penetration_depth(np.concatenate([held.heights[:, :soles], parts], axis=1))
     clearance = held.heights.min(axis=1)
-    acceleration = derivative(track.com[:, 2], frame_time, 2, window)
+    acceleration = derivative(track.mass.com[:, 2], frame_time, 2, window)
     # The window smears take-off and landing over itself.
     fall_error = least_within(np.abs(acceleration + GRAVITY), frame_time, window)
     skates = held.skating()
     wrench = held.unexplained()
-    pairs, self_depth = self_penetration(capsules(track))
-    joint_names, joint_speed, joint_jerk = joint_rates(track.world, track.rig, frame_time, window)
+    if track.body is None or track.poses is None:
+        limits = limit_excess(track.since_tpose, track.rig)
+        pairs, self_depth = self_penetration(capsules(track))
+        rates = joint_rates(track.world, track.rig, frame_time, window)
+        self_bound = thresholds.self_penetration
+    else:
+        limits = hinge_excess(track.body)
+        pairs, self_depth = track.poses.pairs, track.poses.depth
+        rates = hinge_rates(track.body, frame_time, window)
+        self_bound = thresholds.shape_penetration
+    joint_names, joint_speed, joint_jerk = rates
     return Measured(
         frame_time=frame_time,
         floor_z=floor_z,
@@ -134,16 +147,17 @@ def measure(track: Track, floor_z: float) -> Measured:
             | (wrench[:, 1] > thresholds.wrench_torque),
         },
         depth=depth,
-        depth_names=(*track.sides, *track.joint_names),
+        depth_names=(*track.sides, *track.part_names),
         clearance=clearance,
         skating=skates,
-        speeds=held.speeds[:, : held.soles],
+        speeds=held.speeds[:, :soles],
         sides=track.sides,
         unexplained=wrench,
         imbalance=held.imbalance(),
-        limits=limit_excess(track.since_tpose, track.rig),
+        limits=limits,
         self_pairs=pairs,
         self_depth=self_depth,
+        self_bound=self_bound,
         joint_names=joint_names,
         joint_speed=joint_speed,
         joint_jerk=joint_jerk,

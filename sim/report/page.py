@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
+from sim.given import GivenBody
 from sim.page import Marks, page
 from sim.render import frames
+from sim.report.judge import Source
 from sim.report.measured import FLAGS, Measured
 from sim.report.plots import flag_strips, plots, svg
 from sim.report.result import Finding, Report
@@ -29,8 +31,8 @@ _STANDS, _SLIDES, _SINKS = 1, 2, 3
 def write_report_page(
     report: Report,
     path: str | Path,
-    motion: tuple[Motion, Rig],
-    source: tuple[Motion, Rig] | None = None,
+    motion: Source,
+    source: Source | None = None,
     *,
     title: str,
     names: tuple[str, str] = ("motion", "source"),
@@ -45,8 +47,8 @@ def write_report_page(
 
 def report_page(
     report: Report,
-    motion: tuple[Motion, Rig],
-    source: tuple[Motion, Rig] | None = None,
+    motion: Source,
+    source: Source | None = None,
     *,
     title: str,
     names: tuple[str, str] = ("motion", "source"),
@@ -56,8 +58,11 @@ def report_page(
     shown = [(motion, report.clip, names[0])]
     if source is not None and report.source is not None:
         shown.append((source, report.source, names[1]))
-    bodies = [Figure(rig, clip, name, m.floor_z) for (clip, rig), m, name in shown]
-    marks = [_marks(m, *body) for body, m, _ in shown]
+    bodies = [
+        Figure(rig, clip, name, measured.floor_z, body[0] if body else None)
+        for (clip, rig, *body), measured, name in shown
+    ]
+    marks = [_marks(measured, *judged) for judged, measured, _ in shown]
     clip, frame_time = report.clip, report.clip.frame_time
     duration = (len(clip) - 1) * frame_time
     source_duration = motion[0].duration if source is None else source[0].duration
@@ -90,8 +95,8 @@ def report_page(
     )
 
 
-def _marks(measured: Measured, motion: Motion, rig: Rig) -> Marks:
-    followed = track(motion, rig)
+def _marks(measured: Measured, motion: Motion, rig: Rig, body: GivenBody | None = None) -> Marks:
+    followed = track(motion, rig, body)
     heights = followed.points[..., 2] - measured.floor_z
     states = np.zeros(heights.shape, dtype=np.uint8)
     states[heights < measured.thresholds.skate_height] = _STANDS

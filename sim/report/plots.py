@@ -71,7 +71,7 @@ def plots(report: Report) -> list[Plot]:
             "cm",
             100 * clip.self_depth.max(axis=1, initial=0.0),
             clip.self_penetration,
-            100 * limits.self_penetration,
+            100 * clip.self_bound,
         ),
         Plot(
             "fastest joint",
@@ -85,6 +85,11 @@ def plots(report: Report) -> list[Plot]:
     if report.drift is not None:
         never = np.zeros(len(clip), dtype=bool)
         made.append(Plot("root drift", "cm", 100 * report.drift.distance, never, None))
+    if report.truth is not None:
+        never = np.zeros(len(clip), dtype=bool)
+        made.append(
+            Plot("distance from the truth", "% of height", report.truth.errors, never, None)
+        )
     return made
 
 

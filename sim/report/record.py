@@ -8,6 +8,7 @@ import numpy as np
 from sim.report.measured import FLAGS, Measured
 from sim.report.measures import Drift, spans
 from sim.report.result import Finding, Report
+from sim.report.truth import Accuracy
 
 SCHEMA = "spark-sim report 1"
 
@@ -27,6 +28,7 @@ def record(report: Report) -> dict[str, Any]:
         "difference_to_source": None if report.source is None else _difference(report),
         "root_drift": None if report.drift is None else _drift(report.drift),
         "foot_contacts": None if report.contacts is None else asdict(report.contacts),
+        "ground_truth": None if report.truth is None else _truth(report.truth),
         "findings": [_finding(finding, clip.frame_time) for finding in report.findings],
         "notes": list(report.notes),
     }
@@ -44,6 +46,7 @@ _UNITS = {
     "contact_height": "m",
     "friction": "",
     "self_penetration": "m",
+    "shape_penetration": "m",
     "limit_margin": "rad",
     "static_speed": "m_s",
     "static_acceleration": "m_s2",
@@ -84,7 +87,8 @@ def _measured(clip: Measured) -> dict[str, Any]:
         "joint_jerk_rms_rad_s3": clip.jerk_rms,
         "joint_limits": {
             limit.joint: {
-                "share": clip.limit_shares[limit.joint],
+                "share": limit.share(0.0),
+                "at_limit_share": limit.share(-clip.thresholds.limit_margin),
                 "largest_excess_rad": float(limit.excess.max()),
             }
             for limit in clip.limits
@@ -108,6 +112,15 @@ def _drift(drift: Drift) -> dict[str, Any]:
         "final_share_of_path": float(drift.distance[-1] / length) if length > 0 else None,
         "largest_heading_rad": float(np.abs(drift.heading).max()),
         "final_heading_rad": float(drift.heading[-1]),
+    }
+
+
+def _truth(truth: Accuracy) -> dict[str, float]:
+    return {
+        "mse": truth.mse,
+        "root_relative_mse": truth.relative_mse,
+        "mpjpe_percent_of_height": truth.mpjpe,
+        "largest_error_percent_of_height": float(truth.errors.max()),
     }
 
 

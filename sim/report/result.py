@@ -5,6 +5,7 @@ from typing import Any
 
 from sim.report.measured import Measured
 from sim.report.measures import ContactMatch, Drift
+from sim.report.truth import Accuracy
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,8 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """How believable a motion is, beside the motion it was made from where there is one.
+    """How believable a motion is, beside the motion it was made from where there is one, and how
+    far from the ground truth where that is known.
 
     `clip.self_depth` is then what goes beyond the source's own self-penetration.
     """
@@ -46,6 +48,7 @@ class Report:
     contacts: ContactMatch | None
     findings: tuple[Finding, ...]
     notes: tuple[str, ...]
+    truth: Accuracy | None = None
 
     @property
     def implausible(self) -> float:

@@ -25,7 +25,16 @@ def joint_rates(
     ]
     names = tuple(str(roles[j]).replace("_", " ") for j, _ in pairs)
     joints, parents = [j for j, _ in pairs], [above for _, above in pairs]
-    turn = quat_continuous(quat_mul(quat_conj(world[:, parents]), world[:, joints]))
+    turn = quat_mul(quat_conj(world[:, parents]), world[:, joints])
+    return names, *turning(turn, frame_time, window)
+
+
+def turning(
+    turn: Float[np.ndarray, "T B 4"], frame_time: float, window: float
+) -> tuple[Float[np.ndarray, "T B"], Float[np.ndarray, "T B"]]:
+    """The angular speed [rad/s] of rotations over time, and the size of the angular velocity's
+    second derivative [rad/s³]."""
+    turn = quat_continuous(turn)
     omega = 2 * quat_mul(derivative(turn, frame_time, 1, window), quat_conj(turn))[..., 1:]
     jerk = derivative(omega, frame_time, 2, window)
-    return names, np.linalg.norm(omega, axis=-1), np.linalg.norm(jerk, axis=-1)
+    return np.linalg.norm(omega, axis=-1), np.linalg.norm(jerk, axis=-1)

@@ -10,12 +10,11 @@ from sim.report.measures import horizontal_speed, least_within, outside_hull
 from sim.report.thresholds import HUMAN_HIP_HEIGHT, Thresholds
 from sim.report.track import Track
 from sim.report.wrench import required_wrench, unexplained
-from spark.feet import SOLE_POINTS
 
 
 @dataclass(frozen=True, eq=False)
 class Support:
-    """The soles' corners, then the lowest points of the flesh around the other joints.
+    """The soles' corners, each of the foot in `feet`, then the lowest points of the other parts.
 
     `heights` [m] over the floor and `speeds` [m/s] along it; `arms` [m] from the centre of mass.
     `touching` is what may push: a point that is near the floor at some time within the window, for
@@ -24,7 +23,7 @@ class Support:
     """
 
     thresholds: Thresholds
-    soles: int
+    feet: tuple[str, ...]
     heights: Float[np.ndarray, "T P"]
     speeds: Float[np.ndarray, "T P"]
     arms: Float[np.ndarray, "T P 3"]
@@ -45,12 +44,12 @@ class Support:
 
         They are low and fast, and the foot lies flat, or the points at rest can't hold the body.
         """
-        limits, count = self.thresholds, self.soles
+        limits, count = self.thresholds, len(self.feet)
         heights = self.heights[:, :count]
         fast = self.speeds[:, :count] > limits.skate_speed
         low_fast = (heights < limits.skate_height) & fast
-        feet = heights.reshape(len(heights), -1, len(SOLE_POINTS))
-        flat = np.repeat((feet < limits.contact_height).all(axis=2), len(SOLE_POINTS), axis=1)
+        near = heights < limits.contact_height
+        flat = np.stack([near[:, own].all(axis=1) for own in self._corners()], axis=1)
         loaded = np.zeros(len(heights), dtype=bool)
         asked = low_fast.any(axis=1)
         resting = self.touching & self.resting
@@ -59,6 +58,10 @@ class Support:
         )
         loaded[asked] = (missing > limits.skate_load * np.array([1.0, self.length])).any(axis=1)
         return low_fast & (flat | loaded[:, None])
+
+    def _corners(self) -> list[list[int]]:
+        """For each corner, those of its foot."""
+        return [[k for k, other in enumerate(self.feet) if other == foot] for foot in self.feet]
 
     def imbalance(self) -> Float[np.ndarray, "T"]:
         """How far the centre of mass lies outside what it stands on [m]; nan in frames that move,
@@ -71,27 +74,26 @@ class Support:
 def support(track: Track, floor_z: float, thresholds: Thresholds) -> Support:
     """The support of a body whose soles' corners are the first points."""
     frame_time, window = track.motion.frame_time, thresholds.window
-    flesh = track.joints - track.flesh[:, None] * np.array([0.0, 0.0, 1.0])
+    flesh = track.parts - track.flesh[:, None] * np.array([0.0, 0.0, 1.0])
     points = np.concatenate([track.points, flesh], axis=1)
+    com = track.mass.com
     heights = points[..., 2] - floor_z
     speeds = horizontal_speed(points, frame_time, window)
-    com_speed = np.linalg.norm(derivative(track.com, frame_time, 1, window), axis=1)
-    com_acceleration = np.linalg.norm(derivative(track.com, frame_time, 2, window), axis=1)
+    com_speed = np.linalg.norm(derivative(com, frame_time, 1, window), axis=1)
+    com_acceleration = np.linalg.norm(derivative(com, frame_time, 2, window), axis=1)
     # How far below both bounds at once, as a share of each; positive where the body stands still.
     still = 1 - np.maximum(
         com_speed / thresholds.static_speed, com_acceleration / thresholds.static_acceleration
     )
     return Support(
         thresholds=thresholds,
-        soles=track.points.shape[1],
+        feet=track.sides,
         heights=heights,
         speeds=speeds,
-        arms=points - track.com[:, None],
+        arms=points - com[:, None],
         touching=least_within(heights, frame_time, window) < thresholds.contact_height,
         resting=least_within(speeds, frame_time, window) <= thresholds.skate_speed,
-        wrench=required_wrench(
-            track.segment_coms, track.world[:, track.body.joints], track.body, frame_time, window
-        ),
+        wrench=required_wrench(track.mass, frame_time, window),
         static=least_within(still, frame_time, thresholds.static_time) > 0,
         length=track.rig.hip_height / HUMAN_HIP_HEIGHT,
     )

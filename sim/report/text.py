@@ -61,6 +61,7 @@ def shares(clip: Measured) -> Iterator[tuple[str, float]]:
     for letter, name in FLAGS.items():
         yield name, clip.shares[letter]
     yield "joint limits", clip.limit_share
+    yield "at a limit", clip.at_limit_share
     yield "self-penetration", float(clip.self_penetration.mean())
     if clip.unbalanced_share is not None:
         yield "out of balance", clip.unbalanced_share
@@ -69,6 +70,10 @@ def shares(clip: Measured) -> Iterator[tuple[str, float]]:
 def figures(report: Report) -> Iterator[tuple[str, str]]:
     """The other measures, by name, in words."""
     clip, source, drift, contacts = report.clip, report.source, report.drift, report.contacts
+    often = sorted(((share, joint) for joint, share in clip.at_limit_shares.items() if share > 0))
+    if often:
+        most = ", ".join(f"{joint} {_percent(share)}" for share, joint in often[: -_SHOWN - 1 : -1])
+        yield "most at a limit", most
     if contacts is not None and contacts.f1 is not None:
         missed = 0.0 if contacts.recall is None else 1 - contacts.recall
         words = f"{contacts.f1:>6.2f}          F1 against the source; {_percent(missed)} missed"
@@ -79,6 +84,13 @@ def figures(report: Report) -> Iterator[tuple[str, str]]:
             f"{drift.distance.max():>6.2f} m        at most; {drift.distance[-1]:.2f} m at the end "
             f"of a path of {drift.path_length:.1f} m; heading "
             f"{np.degrees(np.abs(drift.heading).max()):.0f}° at most",
+        )
+    if report.truth is not None:
+        truth = report.truth
+        yield (
+            "ground truth",
+            f"{truth.mpjpe:>6.2f} %        of the height away in the mean; MSE {truth.mse:.2g}, "
+            f"root-relative {truth.relative_mse:.2g}",
         )
     for name, unit, kind, value in (
         ("joint speed", "rad/s", "at most", lambda clip: float(clip.joint_speed.max(initial=0.0))),

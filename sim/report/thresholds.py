@@ -32,6 +32,8 @@ class Thresholds:
     # Self-penetration: a part of the body is deeper in another, no neighbour, than this [m] beyond
     # what it is in the source.
     self_penetration: float = 0.02
+    # The same for the shapes of a model that was given: they are hard [m].
+    shape_penetration: float = 0.01
     # At its limit: a joint is within this [rad] of its limit, or beyond.
     limit_margin: float = 0.0087
     # Balance, where the centre of mass is slower than this [m/s] and accelerates less than this
@@ -59,6 +61,7 @@ class Thresholds:
             wrench_torque=self.wrench_torque * scale,
             contact_height=self.contact_height * scale,
             self_penetration=self.self_penetration * scale,
+            shape_penetration=self.shape_penetration * scale,
             static_speed=self.static_speed * scale,
             balance=self.balance * scale,
         )

@@ -1,13 +1,17 @@
-"""What the measures look at: a motion's points, centre of mass and path, computed once."""
+"""What the measures look at: a motion's points, mass and path, computed once."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
-from sim.anthropometry import RADII, Segments, segments
+from sim.anthropometry import RADII
+from sim.given import GivenBody, GivenSole
+from sim.report.lowest import lowest_points
+from sim.report.mass import Mass, human_mass, model_mass
+from sim.report.poses import Poses, follow
 from spark.errors import SkeletonError
-from spark.feet import SOLE_POINTS, sole_corners, sole_positions, standing_height
+from spark.feet import SOLE_POINTS, Sole, sole_corners, sole_positions, standing_height
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig import Rig
@@ -22,33 +26,32 @@ _NO_FLESH = ("foot", "toe", "clavicle")
 class Track:
     """A motion's points over time [m, world].
 
-    `points` are the soles' corners, named by `point_names` ("left heel inner") and `sides` ("left
-    foot"); `joints` are the other joints with a role, named by `joint_names`, inside a sphere of
-    flesh of radius `flesh` [m]. `com` is the centre of mass, `segment_coms` are those of the pieces
-    of `body`; `hips` is the middle of the hip joints, `heading` [rad] the pelvis's turn about Z
-    since the T-pose, without jumps. `positions` and `world` are the joints' as `forward` gives
-    them; `since_tpose` is G, each joint's rotation since the T-pose in world axes.
+    `points` are the soles' corners, each of the foot in `sides` ("left foot"). `parts` are what may
+    touch the floor besides, named by `part_names`: the other joints with a role, inside spheres of
+    flesh of radius `flesh` [m], or the lowest points of a given body's own shapes. `hips` is the
+    middle of the hip joints, `heading` [rad] the pelvis's turn about Z since the T-pose, without
+    jumps. `positions` and `world` are the joints' as `forward` gives them; `since_tpose` is G, each
+    joint's rotation since the T-pose in world axes. `poses` is there where a body is given.
     """
 
     motion: Motion
     rig: Rig
     points: Float[np.ndarray, "T P 3"]
-    point_names: tuple[str, ...]
     sides: tuple[str, ...]
-    joints: Float[np.ndarray, "T B 3"]
-    joint_names: tuple[str, ...]
+    parts: Float[np.ndarray, "T B 3"]
+    part_names: tuple[str, ...]
     flesh: Float[np.ndarray, "B"]
-    segment_coms: Float[np.ndarray, "T S 3"]
-    com: Float[np.ndarray, "T 3"]
+    mass: Mass
     hips: Float[np.ndarray, "T 3"]
     heading: Float[np.ndarray, "T"]
     positions: Float[np.ndarray, "T J 3"]
     world: Float[np.ndarray, "T J 4"]
     since_tpose: Float[np.ndarray, "T J 4"]
-    body: Segments
+    body: GivenBody | None
+    poses: Poses | None
 
     def __len__(self) -> int:
-        return len(self.com)
+        return len(self.hips)
 
     @property
     def lowest_point(self) -> Float[np.ndarray, "T"]:
@@ -56,43 +59,80 @@ class Track:
         return self.points[..., 2].min(axis=1)
 
 
-def track(motion: Motion, rig: Rig) -> Track:
-    """Follow the motion. Raises SkeletonError where the rig has no foot or no leg to stand on."""
-    soles = sole_corners(rig)
-    if not soles:
-        raise SkeletonError(
-            "the body has no foot: floor contact can't be measured; name its feet in a role map"
-        )
+def track(motion: Motion, rig: Rig, body: GivenBody | None = None) -> Track:
+    """Follow the motion, on `body` where that is given.
+
+    Raises SkeletonError where the rig has no foot or no leg to stand on, and where the body has
+    another number of frames.
+    """
     positions, world = forward(motion)
     since_tpose = quat_mul(world, quat_conj(rig.tpose))
-    body = segments(rig)
-    coms = positions[:, body.joints] + quat_rotate(world[:, body.joints], body.coms)
-    height = standing_height(rig)
-    others = [
-        (j, role)
-        for j, role in enumerate(rig.roles.roles)
-        if role is not None and kind_of(role) not in _NO_FLESH
-    ]
+    if body is None:
+        poses, mass = None, human_mass(rig, positions, world)
+        part_names, parts, flesh = _flesh(rig, positions)
+    else:
+        if len(body.qpos) != len(motion):
+            raise SkeletonError(
+                f"the body has {len(body.qpos)} frames, the motion {len(motion)}; expected as many"
+            )
+        poses = follow(body)
+        mass = model_mass(body, poses)
+        part_names, parts = lowest_points(body, poses)
+        flesh = np.zeros(len(part_names))
+    if poses is not None and body is not None and body.soles:
+        sides = tuple(f"{sole.side} foot" for sole in body.soles for _ in sole.bodies)
+        points = np.concatenate([_given_corners(sole, poses) for sole in body.soles], axis=1)
+    else:
+        soles = _soles(rig)
+        sides = tuple(f"{sole.side} foot" for sole in soles for _ in SOLE_POINTS)
+        points = np.concatenate([sole_positions(s, positions, world) for s in soles], axis=1)
     return Track(
         motion=motion,
         rig=rig,
-        points=np.concatenate([sole_positions(s, positions, world) for s in soles], axis=1),
-        point_names=tuple(f"{sole.side} {name}" for sole in soles for name in SOLE_POINTS),
-        sides=tuple(f"{sole.side} foot" for sole in soles for _ in SOLE_POINTS),
-        joints=positions[:, [j for j, _ in others]],
-        joint_names=tuple(role.replace("_", " ") for _, role in others),
-        flesh=height * np.array([RADII[kind_of(role)] for _, role in others]),
-        segment_coms=coms,
-        com=np.einsum("s,tsx->tx", body.masses, coms),
+        points=points,
+        sides=sides,
+        parts=parts,
+        part_names=part_names,
+        flesh=flesh,
+        mass=mass,
         hips=positions[:, rig.hips].mean(axis=1),
         heading=np.unwrap(yaw_from_quat(since_tpose[:, rig.pelvis])),
         positions=positions,
         world=world,
         since_tpose=since_tpose,
         body=body,
+        poses=poses,
     )
 
 
 def kind_of(role: Role) -> str:
     """`left_foot` to `foot`."""
     return role.removeprefix("left_").removeprefix("right_")
+
+
+def _flesh(
+    rig: Rig, positions: Float[np.ndarray, "T J 3"]
+) -> tuple[tuple[str, ...], Float[np.ndarray, "T B 3"], Float[np.ndarray, "B"]]:
+    """The joints with flesh around them: names, places, radii."""
+    others = [
+        (j, role)
+        for j, role in enumerate(rig.roles.roles)
+        if role is not None and kind_of(role) not in _NO_FLESH
+    ]
+    radii = standing_height(rig) * np.array([RADII[kind_of(role)] for _, role in others])
+    names = tuple(role.replace("_", " ") for _, role in others)
+    return names, positions[:, [j for j, _ in others]], radii
+
+
+def _soles(rig: Rig) -> tuple[Sole, ...]:
+    soles = sole_corners(rig)
+    if not soles:
+        raise SkeletonError(
+            "the body has no foot: floor contact can't be measured; name its feet in a role map"
+        )
+    return soles
+
+
+def _given_corners(sole: GivenSole, poses: Poses) -> Float[np.ndarray, "T C 3"]:
+    turned = quat_rotate(poses.quat[:, sole.bodies], sole.points)
+    return poses.pos[:, sole.bodies] + turned

@@ -9,49 +9,35 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.optimize import nnls
 
-from sim.anthropometry import Segments
 from sim.report.derivatives import derivative
+from sim.report.mass import Mass
 from sim.report.thresholds import GRAVITY
 from spark.rotation import matrix_from_quat, quat_conj, quat_continuous, quat_mul
 
 _EDGES = 8  # of the pyramid in a friction cone
 
 
-def required_wrench(
-    segment_coms: Float[np.ndarray, "T S 3"],
-    q_world: Float[np.ndarray, "T S 4"],
-    body: Segments,
-    frame_time: float,
-    window: float,
-) -> Float[np.ndarray, "T 6"]:
-    """Force [body weights] and torque about the centre of mass [body weights x 1 m] of the floor.
-
-    `q_world` are the rotations of the segments' joints.
-    """
-    com = np.einsum("s,tsx->tx", body.masses, segment_coms)
-    force = derivative(com, frame_time, 2, window)
+def required_wrench(mass: Mass, frame_time: float, window: float) -> Float[np.ndarray, "T 6"]:
+    """What the floor must give: force [body weights], torque about the centre of mass [body weights
+    x 1 m]."""
+    force = derivative(mass.com, frame_time, 2, window)
     force[:, 2] += GRAVITY
-    momentum = angular_momentum(segment_coms, q_world, body, frame_time)
+    momentum = angular_momentum(mass, frame_time)
     torque = derivative(momentum, frame_time, 1, window)
     return np.concatenate([force, torque], axis=1) / GRAVITY
 
 
-def angular_momentum(
-    segment_coms: Float[np.ndarray, "T S 3"],
-    q_world: Float[np.ndarray, "T S 4"],
-    body: Segments,
-    frame_time: float,
-) -> Float[np.ndarray, "T 3"]:
+def angular_momentum(mass: Mass, frame_time: float) -> Float[np.ndarray, "T 3"]:
     """About the centre of mass, for a body of unit mass [m²/s], world axes."""
-    if len(q_world) < 2:
-        return np.zeros((len(q_world), 3))
-    arms = segment_coms - np.einsum("s,tsx->tx", body.masses, segment_coms)[:, None]
+    if len(mass.turns) < 2:
+        return np.zeros((len(mass.turns), 3))
+    arms = mass.coms - mass.com[:, None]
     orbital = np.cross(arms, np.gradient(arms, frame_time, axis=0))
-    q = quat_continuous(q_world)
+    q = quat_continuous(mass.turns)
     omega = 2 * quat_mul(np.gradient(q, frame_time, axis=0), quat_conj(q))[..., 1:]
-    R = matrix_from_quat(q_world)
-    spin = np.einsum("tsij,sjk,tslk,tsl->tsi", R, body.inertias, R, omega, optimize=True)
-    return np.einsum("s,tsx->tx", body.masses, orbital + spin)
+    R = matrix_from_quat(mass.turns)
+    spin = np.einsum("tsij,sjk,tslk,tsl->tsi", R, mass.inertias, R, omega, optimize=True)
+    return np.einsum("s,tsx->tx", mass.fractions, orbital + spin)
 
 
 def unexplained(

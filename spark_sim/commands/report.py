@@ -4,7 +4,13 @@ import re
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 
-from spark_sim.commands.options import add_corrections, add_force, add_json, load
+from spark_sim.commands.options import (
+    add_corrections,
+    add_force,
+    add_json,
+    add_robot_motion,
+    load,
+)
 
 SUMMARY = "measure how believable a motion is"
 USAGE = "FILE [--source SRC] [--html OUT] [options]"
@@ -12,20 +18,27 @@ DESCRIPTION = """\
 Measure the physical plausibility of the motion in FILE: feet below the floor,
 floating, skating, forces that the floor can't give, joint limits, the body in
 itself; with --source also what the motion it came from does, how well the foot
-contacts agree, and how far the root drifts from it."""
+contacts agree, and how far the root drifts from it; with --truth how far it is
+from what it should have been. A robot's motion, of any tool, is judged on the
+robot's own model: its masses, shapes, soles and joint limits."""
 EXAMPLES = """\
 examples:
   spark-sim report walk_on_mutant.bvh --source walk.bvh
   spark-sim report walk_on_mutant.bvh --source walk.bvh --html report.html
   spark-sim report ours.bvh --compare theirs.bvh --source walk.bvh
-  spark-sim report walk_on_mutant.bvh --json > report.json
+  spark-sim report walk_on_g1.npz --source walk.bvh
+  spark-sim report theirs.csv --robot unitree_g1 --quat xyzw --fps 60
+  spark-sim report walk_on_mutant.bvh --truth mutant_walk.bvh --json
   spark-sim report walk_on_mutant.bvh --fail-over 5%
 """
 
 
 def configure(parser: ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help="a BVH or FBX file")
+    parser.add_argument("file", metavar="FILE", help="a BVH or FBX file, or a robot's motion")
     parser.add_argument("--source", metavar="SRC", help="the motion that FILE was made from")
+    parser.add_argument(
+        "--truth", metavar="TRUTH", help="what FILE should have been, on the same body"
+    )
     parser.add_argument(
         "--html", metavar="OUT", help="write a page too: replay, worst moments, plots over time"
     )
@@ -45,7 +58,9 @@ def configure(parser: ArgumentParser) -> None:
     add_json(parser, "the report")
     add_force(parser)
     add_corrections(parser, "FILE")
+    add_robot_motion(parser, "FILE")
     add_corrections(parser, "SRC", "source-")
+    add_robot_motion(parser, "SRC", "source-")
 
 
 def run(args: Namespace) -> int:
@@ -54,9 +69,12 @@ def run(args: Namespace) -> int:
     judged = load(args, args.file)
     others = {path: load(args, path) for path in args.compare}
     source = None if args.source is None else load(args, args.source, "source-")
-    report = clip.report(judged, source=source, html=args.html, force=args.force)
+    truth = None if args.truth is None else load(args, args.truth)
+    report = clip.report(judged, source=source, truth=truth, html=args.html, force=args.force)
     reports = {args.file: report}
-    reports |= {path: clip.report(other, source=source) for path, other in others.items()}
+    reports |= {
+        path: clip.report(other, source=source, truth=truth) for path, other in others.items()
+    }
     if args.json:
         records = {path: each.json() for path, each in reports.items()}
         console.emit_json(records if others else records[args.file])

@@ -1,0 +1,72 @@
+"""A model's own joints: how far they are beyond their limits, and how fast they move."""
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from sim.given import GivenBody
+from sim.report.derivatives import derivative
+from sim.report.limits import LimitExcess
+from sim.report.smoothness import turning
+from spark.rotation import quat_normalize, rotvec_from_quat
+
+_HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
+# Files round: a joint on its limit may be written this far [rad] beyond.
+_ROUNDING = 1e-4
+
+
+def hinge_excess(body: GivenBody) -> tuple[LimitExcess, ...]:
+    """How far each hinge is beyond its range in the file, and each ball beyond its cone.
+
+    Joints without limits are left out.
+    """
+    model, found = body.model, []
+    for joint in _joints(body):
+        if not model.jnt_limited[joint]:
+            continue
+        low, high = model.jnt_range[joint]
+        name, at = _name(model, joint), int(model.jnt_qposadr[joint])
+        if int(model.jnt_type[joint]) == _HINGE:
+            angle = body.qpos[:, at]
+            beyond = np.stack([low - angle, angle - high], axis=1)
+            words: tuple[str, ...] = ("turns back", "turns on")
+        else:
+            turn = rotvec_from_quat(quat_normalize(body.qpos[:, at : at + 4]))
+            beyond = np.linalg.norm(turn, axis=1, keepdims=True) - high
+            words = ("turns",)
+        found.append(LimitExcess(name, beyond - _ROUNDING, words))
+    return tuple(found)
+
+
+def hinge_rates(
+    body: GivenBody, frame_time: float, window: float
+) -> tuple[tuple[str, ...], Float[np.ndarray, "T B"], Float[np.ndarray, "T B"]]:
+    """Names, angular speeds [rad/s] and jerks [rad/s³] of the model's joints."""
+    model, joints = body.model, _joints(body)
+    hinges = [j for j in joints if int(model.jnt_type[j]) == _HINGE]
+    balls = [j for j in joints if int(model.jnt_type[j]) == _BALL]
+    velocity = derivative(body.qpos[:, model.jnt_qposadr[hinges]], frame_time, 1, window)
+    jerk = derivative(velocity, frame_time, 2, window)
+    turns = body.qpos[:, model.jnt_qposadr[balls][:, None] + np.arange(4)]
+    ball_speed, ball_jerk = turning(quat_normalize(turns), frame_time, window)
+    return (
+        tuple(_name(model, joint) for joint in (*hinges, *balls)),
+        np.concatenate([np.abs(velocity), ball_speed], axis=1),
+        np.concatenate([np.abs(jerk), ball_jerk], axis=1),
+    )
+
+
+def _joints(body: GivenBody) -> list[int]:
+    """The humanoid's hinges and balls."""
+    model = body.model
+    return [
+        joint
+        for joint in range(model.njnt)
+        if int(model.body_rootid[model.jnt_bodyid[joint]]) == body.root
+        and int(model.jnt_type[joint]) in (_HINGE, _BALL)
+    ]
+
+
+def _name(model: mujoco.MjModel, joint: int) -> str:
+    at = int(model.jnt_bodyid[joint])
+    return model.joint(joint).name or f"joint {joint} of {model.body(at).name or f'body {at}'}"

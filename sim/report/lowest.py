@@ -1,0 +1,100 @@
+"""The lowest points of a model's parts."""
+
+from itertools import product
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+
+from sim.given import GivenBody
+from sim.report.poses import Poses, part_name
+from spark.rotation import matrix_from_quat, quat_rotate
+
+_PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)
+_RING = 16  # points on a cylinder's edge
+
+
+def lowest_points(
+    body: GivenBody, poses: Poses
+) -> tuple[tuple[str, ...], Float[np.ndarray, "T B 3"]]:
+    """The names of the model's parts but the feet, and the lowest point of each [m, world].
+
+    They are those of the shapes that collide, or of all where none does; of round meshes to within
+    a millimetre or so.
+    """
+    model = body.model
+    weld = model.body_weldid
+    feet = {int(weld[b]) for sole in body.soles for b in sole.bodies}
+    geoms = [
+        int(g)
+        for g in np.flatnonzero(np.isin(model.geom_bodyid, poses.bodies))
+        if int(weld[model.geom_bodyid[g]]) not in feet
+    ]
+    colliding = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
+    outlines: dict[int, list[tuple[int, Float[np.ndarray, "P 3"], float]]] = {}
+    for g in colliding or geoms:
+        points, radius = _outline(model, g)
+        if len(points):
+            at = int(model.geom_bodyid[g])
+            placed = quat_rotate(model.geom_quat[g], points) + model.geom_pos[g]
+            outlines.setdefault(int(weld[at]), []).append((at, placed, radius))
+    names = tuple(part_name(model, part) for part in outlines)
+    lowest = np.empty((len(body.qpos), len(outlines), 3))
+    for k, pieces in enumerate(outlines.values()):
+        owner = np.concatenate([np.full(len(points), at) for at, points, _ in pieces])
+        points = np.concatenate([points for _, points, _ in pieces])
+        radii = np.concatenate([np.full(len(points), r) for _, points, r in pieces])
+        lowest[:, k] = _lowest(poses, owner, points, radii)
+    return names, lowest
+
+
+def _lowest(
+    poses: Poses,
+    owner: Int[np.ndarray, "P"],
+    points: Float[np.ndarray, "P 3"],
+    radii: Float[np.ndarray, "P"],
+) -> Float[np.ndarray, "T 3"]:
+    """The lowest of all balls about `points` on the bodies `owner`."""
+    rows = matrix_from_quat(poses.quat)[:, :, 2]
+    heights = np.einsum("tpi,pi->tp", rows[:, owner], points) + poses.pos[:, owner, 2] - radii
+    best = heights.argmin(axis=1)
+    frames = np.arange(len(best))
+    body = owner[best]
+    place = poses.pos[frames, body] + quat_rotate(poses.quat[frames, body], points[best])
+    place[:, 2] -= radii[best]
+    return place
+
+
+def _outline(model: mujoco.MjModel, geom: int) -> tuple[Float[np.ndarray, "P 3"], float]:
+    """Points in the shape's own axes and the radius [m] around them; none for a plane."""
+    kind, size = int(model.geom_type[geom]), model.geom_size[geom]
+    if kind == _SPHERE:
+        return np.zeros((1, 3)), float(size[0])
+    if kind == _CAPSULE:
+        return np.array([[0, 0, size[1]], [0, 0, -size[1]]]), float(size[0])
+    if kind == _ELLIPSOID:
+        scaled = _DIRECTIONS * size
+        return scaled * size / np.linalg.norm(scaled, axis=1, keepdims=True), 0.0
+    if kind == _CYLINDER:
+        angle = 2 * np.pi * np.arange(_RING) / _RING
+        ring = np.stack([size[0] * np.cos(angle), size[0] * np.sin(angle)], axis=1)
+        return np.concatenate([np.insert(ring, 2, z, axis=1) for z in (-size[1], size[1])]), 0.0
+    if kind == _BOX:
+        return np.array(list(product((-1.0, 1.0), repeat=3))) * size, 0.0
+    if kind == _MESH:
+        mesh = int(model.geom_dataid[geom])
+        start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+        vertices = model.mesh_vert[start : start + count].astype(np.float64)
+        return vertices[np.unique((vertices @ _DIRECTIONS.T).argmax(axis=0))], 0.0
+    return np.zeros((0, 3)), 0.0
+
+
+def _sphere(count: int) -> Float[np.ndarray, "N 3"]:
+    """Evenly spread directions: a Fibonacci lattice."""
+    k = np.arange(count) + 0.5
+    z, angle = 1 - 2 * k / count, np.pi * (1 + np.sqrt(5)) * k
+    across = np.sqrt(1 - z**2)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
+
+
+_DIRECTIONS = _sphere(100)
