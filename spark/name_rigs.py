@@ -159,7 +159,8 @@ def _unclear(
         if rng.random() < filled:
             out[kind] = f"{filler} {out[kind]}" if before else f"{out[kind]} {filler}"
     if rng.random() < 0.5:
-        for kind in rng.choice(KINDS, size=rng.integers(1, 4), replace=False).tolist():
+        unknown = _pick((1, 1, 1, 2, 3), rng)
+        for kind in rng.choice(KINDS, size=unknown, replace=False).tolist():
             out[kind] = _nonsense(rng)
     return out
 

@@ -29,6 +29,7 @@ from spark.name_words import rig_words
 
 PAD, END, BYTE_OFFSET = 0, 1, 3
 MAX_BYTES = 48
+_CHUNKS = 4
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,13 @@ class NameEncoder(nn.Module):
         return self(tokenize_rigs([names]).to(self.embed.weight.device))[0]
 
     def _names(self, tokens: Int[Tensor, "S L"]) -> Float[Tensor, "S D"]:
-        """Each name by itself: the mean over its tokens."""
+        """Each name by itself: the mean over its tokens. In chunks of names of similar length."""
+        lengths = (tokens != PAD).sum(1)
+        chunks = lengths.argsort(stable=True).chunk(_CHUNKS)
+        parts = [self._alike(tokens[rows, : int(lengths[rows].max())]) for rows in chunks]
+        return torch.cat(parts)[torch.cat(chunks).argsort()]
+
+    def _alike(self, tokens: Int[Tensor, "S L"]) -> Float[Tensor, "S D"]:
         real = tokens != PAD
         x = self.embed(tokens)
         bias = self._relative_bias(tokens.shape[1])

@@ -37,7 +37,7 @@ smpl       | Pelvis | Spine{n} | Neck{m} | Head | {L}_Collar | {L}_Shoulder | {L
 daz        | hip | abdomen{m} | neck{m} | head | {l}Collar | {l}ShldrBend | {l}ForearmBend | {l}Hand | {l}ThighBend | {l}Shin | {l}Foot | {l}Toe
 iclone     | CC_Base_Hip | CC_Base_Spine0{n} | CC_Base_NeckTwist0{n} | CC_Base_Head | CC_Base_{L}_Clavicle | CC_Base_{L}_Upperarm | CC_Base_{L}_Forearm | CC_Base_{L}_Hand | CC_Base_{L}_Thigh | CC_Base_{L}_Calf | CC_Base_{L}_Foot | CC_Base_{L}_ToeBase
 makehuman  | Hips | Spine{n} | Neck{m} | Head | Clavicle_{L} | UpArm_{L} | LoArm_{L} | Hand_{L} | UpLeg_{L} | LoLeg_{L} | Foot_{L} | Toe_{L}
-robot      | pelvis | torso_link{m} | neck_link{m} | head_link | {left}_shoulder_pitch_link | {left}_shoulder_yaw_link | {left}_elbow_link | {left}_wrist_yaw_link | {left}_hip_pitch_link | {left}_knee_link | {left}_ankle_roll_link | {left}_toe_link
+robot      | pelvis | torso_link{m} | neck_link{m} | head_link | {left}_clavicle_link | {left}_shoulder_pitch_link | {left}_elbow_link | {left}_wrist_yaw_link | {left}_hip_pitch_link | {left}_knee_link | {left}_ankle_roll_link | {left}_toe_link
 xsens      | Pelvis | T{n} | Neck{m} | Head | {Left}Shoulder | {Left}UpperArm | {Left}ForeArm | {Left}Hand | {Left}UpperLeg | {Left}LowerLeg | {Left}Foot | {Left}Toe
 bandai     | Hips | Spine{m} | Neck{m} | Head | Shoulder_{L} | UpperArm_{L} | LowerArm_{L} | Hand_{L} | UpperLeg_{L} | LowerLeg_{L} | Foot_{L} | Toes_{L}
 neuron     | Robot_Hips | Robot_Spine{m} | Robot_Neck{m} | Robot_Head | Robot_{Left}Shoulder | Robot_{Left}Arm | Robot_{Left}ForeArm | Robot_{Left}Hand | Robot_{Left}UpLeg | Robot_{Left}Leg | Robot_{Left}Foot | Robot_{Left}ToeBase
