@@ -67,7 +67,7 @@ def test_pictures_show_two_bodies_that_move(scene: Scene) -> None:
 
 def test_video_and_strip(scene: Scene, tmp_path: Path) -> None:
     draw(scene, [0])
-    short = replace(scene, qpos=scene.qpos[:8], centers=scene.centers[:8])
+    short = replace(scene, qpos=scene.qpos[:8])
     write_video(short, tmp_path / "out.mp4", width=160, height=120)
     assert (tmp_path / "out.mp4").read_bytes()[4:8] == b"ftyp"
     write_strip(short, tmp_path / "out.png", count=3, width=80, height=90)
