@@ -147,6 +147,7 @@ def _turn(figure: Figure) -> Float[np.ndarray, "4"]:
 def _world() -> mujoco.MjSpec:
     """A light grey floor with a grid, lit from above; shadows cost ten times the rest."""
     spec = mujoco.MjSpec()
+    spec.compiler.degree = False
     spec.visual.headlight.diffuse = [0.0, 0.0, 0.0]
     spec.visual.headlight.ambient = [0.55, 0.55, 0.55]
     spec.visual.headlight.specular = [0.0, 0.0, 0.0]

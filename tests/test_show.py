@@ -1,5 +1,6 @@
 """Scenes, pictures, videos and the page: what a person looks at."""
 
+import html
 import json
 import os
 import re
@@ -7,15 +8,23 @@ import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 
+from sim.given import GivenBody
+from sim.interpolate import at_times
 from sim.page import page, write_page
 from sim.render import frames
 from sim.scene import Figure, Scene, build_scene
+from sim.simplify import area, cell_for, simplify
 from sim.video import write_strip, write_video
 from spark.errors import DependencyError, OutputError
+from spark.motion import Motion
+from spark.rig import Rig
+from spark.rotation import quat_mul, quat_rotate
 from spark.sample import sample_motion, sample_rig
 
 
@@ -90,29 +99,36 @@ def test_page_is_one_file_and_small(tmp_path: Path) -> None:
     assert [f["label"] for f in data["figures"]] == ["walker", "dancer"]
 
 
-def test_page_moves_in_a_browser(tmp_path: Path) -> None:
-    """Headless Chromium draws it without an error, and another moment looks different."""
+PROBE = """<script>
+  const seen = []; onerror = console.error = console.warn = m => seen.push(String(m));
+  requestAnimationFrame = () => 0; // frames are drawn when asked for, not as time goes by
+  setTimeout(() => {
+    const look = time => { play(false); view.time = time; draw(); let sum = 0, ink = 0;
+      const d = ctx.getImageData(0, 0, canvas.width, canvas.height).data;
+      for (let i = 0; i < d.length; i += 4) {
+        sum = (sum * 31 + d[i]) % 1000003; if (Math.abs(d[i] - d[i + 2]) > 60) ink++; }
+      return { sum, ink, bodies: DATA.figures.map(f => poses(f).map(b => [...b.p, ...b.q])) }; };
+    const looks = TIMES.map(look);
+    play(true); tick(1000); view.time = 0; tick(1500);
+    document.body.dataset.result = JSON.stringify({ seen, looks, time: view.time });
+  }, 100);
+</script></html>"""
+QUIET = (
+    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-sync "
+    "--disable-background-networking --disable-component-update --virtual-time-budget=1000"
+)
+
+
+def in_browser(text: str, times: list[float], folder: Path) -> dict[str, Any]:
+    """What the page says of itself in headless Chromium: errors, and what it drew at some times."""
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is None:
         assert "CI" not in os.environ, "CI installs chromium"
         pytest.skip("chromium is not installed")
-    text = page(figures(), title="test")
-    # The page reports on itself: errors, and a checksum of what it drew at two times.
-    probe = """<script>
-      const seen = []; onerror = console.error = m => seen.push(String(m));
-      setTimeout(() => { const sum = () => { draw(); let s = 0; const d = ctx.getImageData(0, 0,
-        canvas.width, canvas.height).data; for (let i = 0; i < d.length; i += 4) s = (s * 31 + d[i])
-        % 1000003; return s; }; play(false); view.time = 0; const a = sum(); view.time = 2;
-        const b = sum(); document.body.dataset.result = JSON.stringify({ seen, a, b }); }, 500);
-      </script></html>"""
-    path = tmp_path / "probe.html"
-    path.write_text(text.replace("</html>", probe))
-    quiet = (
-        "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-sync "
-        "--disable-background-networking --disable-component-update --virtual-time-budget=3000"
-    )
+    path = folder / "probe.html"
+    path.write_text(text.replace("</html>", PROBE.replace("TIMES", json.dumps(times))))
     ran = subprocess.run(
-        [chromium, *quiet.split(), f"--user-data-dir={tmp_path}", "--dump-dom", path.as_uri()],
+        [chromium, *QUIET.split(), f"--user-data-dir={folder}", "--dump-dom", path.as_uri()],
         capture_output=True,
         text=True,
         timeout=120,
@@ -120,6 +136,180 @@ def test_page_moves_in_a_browser(tmp_path: Path) -> None:
     )
     found = re.search(r'data-result="([^"]*)"', ran.stdout)
     assert found, ran.stderr[-500:]
-    result = json.loads(found[1].replace("&quot;", '"'))
+    return json.loads(html.unescape(found[1]))
+
+
+def test_page_moves_in_a_browser(tmp_path: Path) -> None:
+    """Headless Chromium draws it without an error; it has our colours, and another moment looks
+    different; the page's kinematics are MuJoCo's."""
+    robot, motion, body = machine(tmp_path)
+    shown = [*figures(), Figure(robot, motion, "machine", body=body)]
+    result = in_browser(page(shown, title="test"), [0.0, 2.0], tmp_path)
     assert result["seen"] == []
-    assert result["a"] != result["b"]
+    assert result["time"] == pytest.approx(0.5), "it plays"
+    first, second = result["looks"]
+    assert first["sum"] != second["sum"]
+    assert first["ink"] > 1000, "limbs are orange and blue"
+    scene = build_scene(shown, max_fps=30.0)
+    data = mujoco.MjData(scene.model)
+    for look, time in ((first, 0.0), (second, 2.0)):
+        data.qpos[:] = scene.qpos[round(time / scene.frame_time)]
+        mujoco.mj_kinematics(scene.model, data)
+        poses = np.concatenate([np.array(bodies) for bodies in look["bodies"]])
+        np.testing.assert_allclose(poses[:, :3], data.xpos[1:], atol=2e-3)
+        agree = np.abs((poses[:, 3:] * data.xquat[1:]).sum(1))
+        np.testing.assert_allclose(agree, 1, atol=1e-5)
+
+
+MACHINE = """
+<mujoco>
+  <compiler meshdir="{folder}" angle="degree"/>
+  <option gravity="0 0 -3"/>
+  <default><geom rgba="1 0 0 1"/><default class="seen"><geom contype="0" conaffinity="0"/></default>
+  </default>
+  <asset><mesh name="block" file="block.obj"/><material name="blue" rgba="0.1 0.2 0.9 1"/></asset>
+  <worldbody>
+    <light name="theirs" pos="0 0 3"/>
+    <geom name="their_floor" type="plane" size="1 1 1"/>
+    <body name="table" pos="2 0 0"><freejoint/><geom size="0.2"/></body>
+    <body name="base" pos="0 0 0.9">
+      <freejoint name="free"/>
+      <geom class="seen" type="mesh" mesh="block" material="blue" rgba="0.5 0.5 0.5 1"
+        pos="0.1 0 0" euler="0 30 0"/>
+      <geom name="hidden" group="3" type="box" size="0.3 0.3 0.3"/>
+      <body name="slider" pos="0 0.2 0.3" euler="0 0 40">
+        <joint type="slide" name="lift" axis="0 0 1" ref="0.1"/>
+        <geom class="seen" type="cylinder" size="0.05 0.2"/>
+        <body name="arm" pos="0 0 0.4">
+          <joint name="a" axis="0 1 0" pos="0.05 0 0" ref="20"/>
+          <joint name="b" axis="1 0 1" pos="0 0.1 0"/>
+          <geom class="seen" type="ellipsoid" size="0.1 0.05 0.2" pos="0 0 0.2"/>
+          <body name="ball" pos="0 0 0.4">
+            <joint type="ball" name="c" pos="0 0 0.02"/>
+            <geom class="seen" type="sphere" size="0.07"/>
+          </body>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <actuator><motor joint="a"/></actuator>
+  <sensor><jointpos joint="a"/></sensor>
+  <equality><joint joint1="a" joint2="b"/></equality>
+  <keyframe><key name="theirs"/></keyframe>
+</mujoco>"""
+FACES = ((1, 3, 2), (1, 2, 4), (1, 4, 3), (2, 3, 4))
+
+
+def machine(folder: Path) -> tuple[Rig, Motion, GivenBody]:
+    """A model with every kind of joint, off its zero; its motion lends the time alone."""
+    corners = ((0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.5))
+    lines = [f"v {x} {y} {z}" for x, y, z in corners] + [f"f {a} {b} {c}" for a, b, c in FACES]
+    (folder / "block.obj").write_text("\n".join(lines))
+    spec = mujoco.MjSpec.from_string(MACHINE.format(folder=folder))
+    model = spec.compile()
+    rig = sample_rig("walker")
+    motion = sample_motion("wave", rig, 30.0)
+    qpos = np.tile(model.qpos0, (len(motion), 1))
+    turn = np.linspace(0, 3, len(motion))
+    qpos[:, 7:10] += np.stack([turn, 0.3 * turn, 0.2 * np.sin(turn)], -1)
+    qpos[:, 14] += 0.1 * turn
+    qpos[:, 15:17] += np.stack([turn, -turn], -1)
+    qpos[:, 17], qpos[:, 19] = np.cos(turn), np.sin(turn)
+    return rig, motion, GivenBody(spec, model, int(model.body("base").id), qpos)
+
+
+def test_a_given_model_is_shown_and_nothing_else_of_its_file(tmp_path: Path) -> None:
+    rig, motion, body = machine(tmp_path)
+    scene = build_scene([Figure(rig, motion, "machine", body=body)])
+    model, own = scene.model, body.model
+    assert (model.nu, model.nsensor, model.neq, model.nkey) == (0, 0, 0, 0)
+    assert (model.nlight, model.ngeom, model.nbody) == (2, 5, 5)
+    assert model.nq == own.nq - 7, "the table is not the robot's"
+    np.testing.assert_allclose(model.geom_rgba[1], [0.1, 0.2, 0.9, 1], err_msg="its material's")
+    np.testing.assert_allclose(model.geom_rgba[2], [1, 0, 0, 1], err_msg="its class's")
+    # Every shape is where the model itself has it, after the figure was placed.
+    ours, theirs = mujoco.MjData(model), mujoco.MjData(own)
+    seen = [g for g in range(own.ngeom) if own.geom_bodyid[g] > 1 and own.geom_group[g] < 3]
+    for t in (0, 40, len(motion) - 1):
+        ours.qpos[:], theirs.qpos[:] = scene.qpos[t], body.qpos[t]
+        mujoco.mj_kinematics(model, ours)
+        mujoco.mj_kinematics(own, theirs)
+        placed = scene.placed[0](theirs.geom_xpos[seen[1:]])
+        np.testing.assert_allclose(ours.geom_xpos[2:], placed, atol=1e-6)
+        # A mesh's frame is its own affair; its corners are not.
+        block = scene.placed[0](corners_of(own, theirs, seen[0]))
+        apart = np.linalg.norm(corners_of(model, ours, 1)[:, None] - block, axis=-1)
+        np.testing.assert_allclose(apart.min(1), 0, atol=1e-6)
+
+
+def corners_of(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.ndarray:
+    """The vertices of a geom's mesh in the world."""
+    start = int(model.mesh_vertadr[model.geom_dataid[geom]])
+    count = int(model.mesh_vertnum[model.geom_dataid[geom]])
+    vertices = model.mesh_vert[start : start + count]
+    return vertices @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+
+
+def test_a_ghost_stands_where_its_figure_stands() -> None:
+    first, second = figures()
+    ghost = replace(first, ghost=True)
+    scene = build_scene([first, ghost, second])
+    here, there = (scene.path(scene.placed[k]) for k in (0, 1))
+    np.testing.assert_allclose(here, there)
+    alphas = [{float(a) for a in scene.model.geom_rgba[g, 3]} for g in shapes_of(scene)]
+    assert [max(a) < 0.5 for a in alphas] == [False, True, False]
+
+
+def shapes_of(scene: Scene) -> list[list[int]]:
+    """The shapes of each figure."""
+    owners = scene.model.geom_bodyid
+    return [[g for g, b in enumerate(owners) if b in placed.bodies] for placed in scene.placed]
+
+
+def test_all_face_the_camera_and_stay_in_its_picture() -> None:
+    """A motion that walks off sideways is turned to face +X, and is seen whole at all times."""
+    rig = sample_rig("walker")
+    motion = sample_motion("walk", rig, 30.0)
+    turn = np.array([np.sqrt(0.5), 0, 0, np.sqrt(0.5)])
+    rotations = motion.rotations.copy()
+    rotations[:, 0] = quat_mul(turn, rotations[:, 0])
+    aside = replace(motion, rotations=rotations, root_pos=quat_rotate(turn, motion.root_pos))
+    for figure in (Figure(rig, motion, "ahead"), Figure(rig, aside, "aside")):
+        path = build_scene([figure]).path(build_scene([figure]).placed[0])
+        gone = path[-1] - path[0]
+        assert gone[0] > 1.0
+        assert abs(gone[1]) < 0.1 * gone[0]
+    scene = build_scene([Figure(rig, motion, "walks"), Figure(rig, motion.frames(0, 2), "stays")])
+    for picture in draw(scene, [0, len(scene.qpos) - 1]):
+        limbs = np.ptp(picture.astype(int), axis=-1) > 60
+        edge = np.concatenate([limbs[0], limbs[-1], limbs[:, 0], limbs[:, -1]])
+        assert limbs.any()
+        assert not edge.any()
+
+
+def test_large_meshes_are_thinned_but_keep_their_shape() -> None:
+    turn, rise = np.meshgrid(np.linspace(0, 2 * np.pi, 401)[:-1], np.linspace(-1.5, 1.5, 201))
+    ball = np.stack([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)], -1)
+    k = np.arange(200 * 400)
+    right = k - k % 400 + (k + 1) % 400
+    faces = np.concatenate(
+        [np.stack([k, right, right + 400], -1), np.stack([k, right + 400, k + 400], -1)]
+    )
+    vertices = ball.reshape(-1, 3)
+    cell = cell_for(area(vertices, faces), 5000)
+    fewer, kept = simplify(vertices, faces, cell)
+    assert 3000 < len(kept) < 8000
+    np.testing.assert_allclose(np.linalg.norm(fewer, axis=1), 1, atol=cell)
+    assert area(fewer, kept) == pytest.approx(area(vertices, faces), rel=0.03)
+    a, b, c = (fewer[kept[:, k]] for k in range(3))
+    assert ((np.cross(b - a, c - a) * (a + b + c)).sum(1) > 0).mean() > 0.99, "faces look outwards"
+
+
+def test_coordinates_between_frames(tmp_path: Path) -> None:
+    _, _, body = machine(tmp_path)
+    frames = body.qpos[[0, 60]]
+    halfway = at_times(body.model, frames, 1.0, np.array([0.0, 0.5, 1.0, 7.0]))
+    np.testing.assert_array_equal(halfway[[0, 2, 3]], frames[[0, 1, 1]])
+    np.testing.assert_allclose(halfway[1, 7:10], frames[:, 7:10].mean(0))
+    np.testing.assert_allclose(halfway[1, 15:17], frames[:, 15:17].mean(0))
+    np.testing.assert_allclose(halfway[1, 17:], [np.cos(0.75), 0, np.sin(0.75), 0], atol=1e-12)
