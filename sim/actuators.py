@@ -18,7 +18,7 @@ from spark.rig import Rig
 SAG = np.radians(1.0)
 PEAK = 4.0
 _FREQUENCY = 300.0  # [rad/s] of a servo that turns nothing but its own armature
-_PASSIVE = 0.01  # passive damping [N m s/rad] for each N m of strength
+_SPEED = 40.0  # [rad/s] at which passive damping takes all that a servo can push
 _LEAST = 0.003  # strength, in body weights times height: what is light is not weak
 _AXES: dict[str, Axis] = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
 _ANKLE_TO_TIP, _BALL_TO_TIP = 0.75 * FOOT_LENGTH, 0.25 * FOOT_LENGTH
@@ -48,7 +48,7 @@ def set_strength(default: mujoco.MjsDefault, strength: float) -> None:
     default.actuator.set_to_position(kp=kp, dampratio=1.0)
     default.actuator.forcerange = np.array([-1.0, 1.0]) * _rounded(PEAK * strength)
     default.joint.armature = _rounded(kp / _FREQUENCY**2)
-    default.joint.damping[0] = _rounded(_PASSIVE * strength)
+    default.joint.damping[0] = _rounded(PEAK * strength / _SPEED)
 
 
 def add_servos(spec: mujoco.MjSpec, rig: Rig) -> None:
