@@ -52,9 +52,11 @@ class Pair:
 
 @dataclass(frozen=True, eq=False)
 class Near:
-    """Frames in which a pair of shapes is near, and the joints that move each of the two."""
+    """Frames in which a pair of shapes is near, the small one's spheres that are, and the joints
+    that move each of the two."""
 
     pair: Pair
+    spheres: Int[np.ndarray, "N"]
     moves: tuple[tuple[int, ...], tuple[int, ...]]
     frames: Int[np.ndarray, "S"]
 
@@ -88,13 +90,14 @@ class Collisions:
                 continue
             middle = pair.small.center[None]
             looked = looked[_distance(self.tree, some, pair, middle, looked)[0][0] < reach]
-            if len(looked):
-                over = _distance(self.tree, some, pair, pair.small.spheres, looked)[0]
-                over = (over - pair.small.radii[:, None]).min(0)
-                looked = looked[over < pair.apart + _NEAR]
-            if len(looked):
-                around = (looked[:, None] * stride + np.arange(-stride, stride + 1)).ravel()
-                found.append(Near(pair, moves, np.unique(np.clip(around, 0, count - 1))))
+            if not len(looked):
+                continue
+            over = _distance(self.tree, some, pair, pair.small.spheres, looked)[0]
+            near = over - pair.small.radii[:, None] < pair.apart + _NEAR
+            if near.any():
+                around = looked[near.any(0), None] * stride + np.arange(-stride, stride + 1)
+                frames_near = np.unique(np.clip(around, 0, count - 1))
+                found.append(Near(pair, np.flatnonzero(near.any(1)), moves, frames_near))
         return found
 
     def add_to(
@@ -108,13 +111,14 @@ class Collisions:
         """Add how deep shapes are in each other."""
         for near in nears:
             pair, at = near.pair, near.frames
-            distance, side = _distance(self.tree, frames, pair, pair.small.spheres, at)
-            over = pair.apart + pair.small.radii[:, None] - distance
+            spheres = pair.small.spheres[near.spheres]
+            distance, side = _distance(self.tree, frames, pair, spheres, at)
+            over = pair.apart + pair.small.radii[near.spheres, None] - distance
             joints = (*near.moves[0], *near.moves[1])
             links = {pair.small.link, pair.large.link, *joints}
             links |= {int(self.tree.parents[j]) for j in joints}
             columns = stage.turning(joints)
-            for s, sphere in enumerate(pair.small.spheres):
+            for s, sphere in enumerate(spheres):
                 deep = np.flatnonzero(over[s] > -3 * _EASE)
                 if not len(deep):
                     continue

@@ -30,6 +30,10 @@ class Footing:
     places: Float[np.ndarray, "4 3 T"]
     holds: Float[np.ndarray, "4 T"]
 
+    def every(self, stride: int) -> "Footing":
+        """That of every `stride`-th frame."""
+        return Footing(self.places[..., ::stride], self.holds[:, ::stride])
+
 
 def plan_footing(robot: Morphology, targets: Targets) -> list[Footing]:
     """Footprints where the wanted pose, free of the hinges' limits, would stand on average."""

@@ -36,11 +36,11 @@ STAND = np.array([25.0, 25.0, 20.0])  # of a sole's corner [1 / m]
 SINK, SINK_EASE = 80.0, 0.004  # of a sole's corner below the floor [1 / m]; [m]
 LIMIT, MARGIN = 8.0, np.radians(2.0)  # of a hinge near its limit
 CLAP, NEAR = 4.0, 0.12  # of hands [1 / m] that are as near as this [m]
-TOUCH = 70.0  # of parts that run into each other [1 / m]
+TOUCH, TOUCH_LEGS = 45.0, 90.0  # of parts that run into each other [1 / m]
 IDLE = 0.02  # of hinges that nothing else asks for: stay as in the T-pose
 SMOOTH = 4.2  # [Hz] above which a limb's motion fades
 CALM = 2.0  # [Hz] above which a limb that gives way to another does not
-FAST, RUSH = 12.0, 0.3  # [rad/s] above which a hinge is held back, and how much [s]
+FAST, RUSH = 12.0, 0.5  # [rad/s] above which a hinge is held back, and how much [s]
 
 
 class Block:
@@ -131,7 +131,8 @@ def linearize(
         _clap(robot, targets, frames, stage, normal, rows)
     for block in blocks.values():
         block.add_to(normal)
-    robot.collisions.add_to(normal, frames, stage, nears, TOUCH)
+    touch = TOUCH_LEGS if stage.base else TOUCH
+    robot.collisions.add_to(normal, frames, stage, nears, touch)
     over, slope = limit_rows(tree, q, margin=MARGIN, weight=LIMIT)
     normal.add_diagonal(slope[:, stage.columns], over[:, stage.columns])
     idle, away = np.full((2, len(q), tree.size), 1e-3)

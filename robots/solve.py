@@ -24,7 +24,8 @@ from spark.canonical import CanonicalMotion
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 
 _STEPS = (12, 10)  # Gauss-Newton steps of the stages, at most
-_LITTLE = 0.02  # a stage ends where a step lessens the cost by less than this share
+_LITTLE = (0.02, 0.05)  # a stage ends where a step lessens the cost by less than this share
+_COARSE = 1 / 20  # [s] between the frames that are solved first
 _AROUND = 0.15  # [s] before and after a frame in which a step must not do harm
 _LONGEST = 1.0  # [rad, m] a column moves in one of them
 _LOOK = 0.06  # [s] from one look for collisions to the next
@@ -41,15 +42,44 @@ def copy(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
 
 
 def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
-    """The motion of `source` on a robot, its feet planted where the source's are, within limits."""
+    """The motion of `source` on a robot, its feet planted where the source's are, within limits.
+
+    Fast recordings are solved in some of their frames first; splines between these are the start.
+    """
     targets = targets_of(source, robot)
-    q = unhurried(robot, project(robot, targets.world, targets.hips), targets.frame_time)
     footing = plan_footing(robot, targets)
-    for stage, steps in zip(stages_of(robot), _STEPS, strict=True):
-        if stage.joints or stage.base:
-            q = solve_stage(robot, targets, footing, q, stage, steps, apart=False)
-            q = solve_stage(robot, targets, footing, q, stage, steps, apart=True)
+    q = unhurried(robot, project(robot, targets.world, targets.hips), targets.frame_time)
+    stride = min(max(1, round(_COARSE / targets.frame_time)), max(len(q) // 4, 1))
+    if stride > 1:
+        few, places = targets.every(stride), [foot.every(stride) for foot in footing]
+        q = solve(robot, few, places, q.every(stride)).between(stride, len(targets))
+    q = solve(robot, targets, footing, q, polish=stride > 1)
     return RobotMotion(robot, q, source.frame_time, (*robot.notes, *targets.notes))
+
+
+def solve(
+    robot: Morphology,
+    targets: Targets,
+    footing: list[Footing],
+    q: Coordinates,
+    *,
+    polish: bool = False,
+) -> Coordinates:
+    """Stage by stage, from `q`: first as if parts could run through each other, then apart. To
+    polish what is nearly solved, the second is enough."""
+    for stage, steps, little in zip(stages_of(robot), _STEPS, _LITTLE, strict=True):
+        if not stage.columns:
+            continue
+        if not polish:
+            q = solve_stage(robot, targets, footing, q, stage, steps, little, apart=False)
+        if polish or robot.collisions.near(forward(robot.tree, q), stage, stride_of(targets)):
+            q = solve_stage(robot, targets, footing, q, stage, steps, little, apart=True)
+    return q
+
+
+def stride_of(targets: Targets) -> int:
+    """The frames from one look for collisions to the next."""
+    return max(1, round(_LOOK / targets.frame_time))
 
 
 def stages_of(robot: Morphology) -> tuple[Stage, Stage]:
@@ -70,6 +100,7 @@ def solve_stage(
     q: Coordinates,
     stage: Stage,
     most: int,
+    little: float,
     *,
     apart: bool,
 ) -> Coordinates:
@@ -94,12 +125,9 @@ def solve_stage(
         return normal, ties, uniform_filter1d(normal.cost + ties.cost(len(q)), window)
 
     last = np.inf
-    stride = max(1, round(_LOOK / targets.frame_time))
     for k in range(most):
         if apart and k % 3 == 0:
-            nears = robot.collisions.near(forward(tree, q), stage, stride)
-            if not nears:
-                break
+            nears = robot.collisions.near(forward(tree, q), stage, stride_of(targets))
         normal, ties, cost = look(q, rows=True)
         limits = q.at_limits(tree, _SHORT_OF_LIMIT)[:, stage.columns]
         step = np.zeros((len(q), tree.size))
@@ -113,7 +141,7 @@ def solve_stage(
             step *= eased(1.0 - worse, window)[:, None]
             trial = q.moved(tree, step).clipped(tree, _SHORT_OF_LIMIT)
         q = trial
-        if cost.sum() > (1 - _LITTLE) * last:
+        if cost.sum() > (1 - little) * last:
             break
         last = float(cost.sum())
     return q

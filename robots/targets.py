@@ -1,6 +1,6 @@
 """What a robot is asked to do: the source's pose, path and contacts in the robot's own measures."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -56,6 +56,20 @@ class Targets:
 
     def __len__(self) -> int:
         return len(self.hips)
+
+    def every(self, stride: int) -> "Targets":
+        """Those of every `stride`-th frame."""
+        return replace(
+            self,
+            frame_time=stride * self.frame_time,
+            world=self.world[::stride],
+            chest=self.chest[::stride],
+            hips=self.hips[::stride],
+            bones={role: bone[::stride] for role, bone in self.bones.items()},
+            contacts=self.contacts[::stride],
+            feet=self.feet[::stride],
+            hands=None if self.hands is None else self.hands[::stride],
+        )
 
 
 def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:

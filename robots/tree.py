@@ -12,8 +12,15 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.interpolate import CubicSpline
 
-from spark.rotation import matrix_from_quat, quat_from_rotvec, quat_mul
+from spark.rotation import (
+    matrix_from_quat,
+    quat_continuous,
+    quat_from_rotvec,
+    quat_mul,
+    quat_normalize,
+)
 
 BASE = 6  # columns of the base: its position, then its rotation, both in world axes
 ROOT = -1  # the base as a link
@@ -99,6 +106,26 @@ class Coordinates:
         lower, upper = tree.within(short)
         angles = np.where(tree.balls, self.angles, np.clip(self.angles, lower, upper))
         return Coordinates(self.pos, self.quat, angles, self.turns)
+
+    def every(self, stride: int) -> "Coordinates":
+        """Those of every `stride`-th frame."""
+        turns = None if self.turns is None else self.turns[::stride]
+        return Coordinates(self.pos[::stride], self.quat[::stride], self.angles[::stride], turns)
+
+    def between(self, stride: int, frames: int) -> "Coordinates":
+        """The cubic splines through these, for `stride` times as many frames."""
+        time = np.arange(frames) / stride
+
+        def spline(values: Float[np.ndarray, "K *n"]) -> Float[np.ndarray, "T *n"]:
+            return CubicSpline(np.arange(len(values)), values, bc_type="natural")(time)
+
+        turns = self.turns
+        return Coordinates(
+            spline(self.pos),
+            quat_normalize(spline(quat_continuous(self.quat))),
+            spline(self.angles),
+            None if turns is None else quat_normalize(spline(quat_continuous(turns))),
+        )
 
     def moved(self, tree: Tree, step: Float[np.ndarray, "T D"]) -> "Coordinates":
         """The trajectory after a small step in the tree's columns."""
