@@ -14,13 +14,13 @@ from spark.errors import SparkSimError
 from spark.settings import TrainConfig, toml
 
 ROWS = {
-    "default": TrainConfig("default"),
     "paper": TrainConfig("paper"),
     "w/o share": TrainConfig("paper", ("share",)),
     "w/o mask": TrainConfig("paper", ("mask",)),
     "w/ pos": TrainConfig("paper", ("pos",)),
     "w/o FK": TrainConfig("paper", ("fk",)),
     "mixed": TrainConfig("paper", ("mix",)),
+    "default": TrainConfig("default"),
 }
 SCHEDULE = {
     "width": 48,
@@ -30,7 +30,7 @@ SCHEDULE = {
     "batch": 8,
     "per_body": 2,
     "variants": 16,
-    "steps": 1200,
+    "steps": 600,
     "rate": 1e-3,
     "warmup": 50,
     "name_steps": 100,

@@ -1,7 +1,8 @@
 """Datasets: motion files made ready for training, in one folder that is mapped into memory.
 
-    index.json     bodies and clips (whose, in which cell, where in the arrays), every file with its
-                   SHA-256, and what was left out and why
+    index.json     bodies (with the joints that SAN's protocol splits) and clips (whose, in which
+                   cell, where in the arrays, on which floor), every file with its SHA-256, what was
+                   left out of the dataset and why
     numbers.npy    float32: of each clip its rotations (T, K, 4), then its hips' path (T, 3)
     planted.npy    bool (frames, 2): whether the left and the right foot stand
     parts/         what each file gave (`spark.dataset_parts`): a run that stopped goes on, and one
@@ -16,6 +17,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -34,8 +36,9 @@ from spark.rig import Rig
 from spark.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_conj, quat_mul
 from spark.splits import cell, seen_characters, seen_motions
+from spark.variants import split_joints
 
-FORMAT, VERSION = "spark-sim dataset", 1
+FORMAT, VERSION = "spark-sim dataset", 2
 
 # Skeletons whose bones differ by less than this, in hip heights, are one body.
 _SAME = 1e-3
@@ -94,7 +97,12 @@ def is_dataset(path: Path) -> bool:
 
 def read_dataset(path: Path, cell: str | None = "sc+sm") -> list[Clip]:
     """The clips of one cell of a dataset, by default the one to train on (None: of all), mapped
-    into memory.
+    into memory. Raises what `read_performances` raises."""
+    return [p.clip for p in read_performances(path) if cell in (None, p.cell)]
+
+
+def read_performances(path: Path) -> "list[Performance]":
+    """All clips of a dataset with what its index tells of them.
 
     Raises `FileFormatError` where `path` is no dataset of this version, or a damaged one.
     """
@@ -106,9 +114,13 @@ def read_dataset(path: Path, cell: str | None = "sc+sm") -> list[Clip]:
         planted = np.load(path / "planted.npy", mmap_mode="r")
         bodies = [body_features(rig_from_json(body["rig"])) for body in index["bodies"]]
         return [
-            _mapped(clip, bodies[clip["body"]], numbers, planted)
+            Performance(
+                _mapped(clip, bodies[clip["body"]], numbers, planted),
+                index["bodies"][clip["body"]]["character"],
+                clip["cell"],
+                clip["floor_m"],
+            )
             for clip in index["clips"]
-            if cell in (None, clip["cell"])
         ]
     except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
         raise FileFormatError(
@@ -116,6 +128,17 @@ def read_dataset(path: Path, cell: str | None = "sc+sm") -> list[Clip]:
             None,
             f"is no dataset of version {VERSION} ({error}); `spark-sim prepare` makes one",
         ) from error
+
+
+@dataclass(frozen=True)
+class Performance:
+    """A clip of a dataset, named after its motion: whose it is, in which cell of the split, and the
+    height [m] of its floor in its file."""
+
+    clip: Clip
+    character: str
+    cell: str
+    floor_z: float
 
 
 def _mapped(
@@ -188,6 +211,7 @@ def _index(digests: dict[Path, str], parts: Path, seed: int) -> Index:
                 "file": file,
                 "sha256": digest,
                 "source_fps": part.fps,
+                "floor_m": part.floor_z,
                 "frames": frames,
                 "at": at,
                 "first_frame": first_frame,
@@ -207,7 +231,12 @@ def _index(digests: dict[Path, str], parts: Path, seed: int) -> Index:
         "seed": seed,
         "cells": dict(sorted(Counter(clip["cell"] for clip in clips).items())),
         "bodies": [
-            {"character": body["character"], "rig": rig_to_json(body["rig"])} for body in bodies
+            {
+                "character": body["character"],
+                "split": split_joints(body_features(body["rig"])),
+                "rig": rig_to_json(body["rig"]),
+            }
+            for body in bodies
         ],
         "clips": clips,
         "left_out": left_out,

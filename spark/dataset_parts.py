@@ -25,18 +25,20 @@ from spark.rig import Rig, understand
 from spark.rig_json import rig_from_json, rig_to_json
 
 # Goes up whenever the same file gives another part.
-VERSION = 1
+VERSION = 2
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A file as a `spark.pairs.Clip` on its own rig, at 30 fps, and its own frame rate."""
+    """A file as a `spark.pairs.Clip` on its own rig, at 30 fps; its own frame rate, and the height
+    [m] of the floor that its feet stand on, which the path counts from."""
 
     rig: Rig
     rotations: Float[np.ndarray, "T K 4"]
     hips: Float[np.ndarray, "T 3"]
     planted: Bool[np.ndarray, "T 2"]
     fps: float
+    floor_z: float
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,14 @@ def read_part(parts: Path, digest: str) -> Part | Refused | None:
             if "why" in about:
                 return Refused(about["why"])
             rig = rig_from_json(about["rig"])
-            return Part(rig, stored["rotations"], stored["hips"], stored["planted"], about["fps"])
+            return Part(
+                rig,
+                stored["rotations"],
+                stored["hips"],
+                stored["planted"],
+                about["fps"],
+                about["floor_z"],
+            )
     except (OSError, ValueError, KeyError, EOFError, BadZipFile):
         return None
 
@@ -81,13 +90,18 @@ def _understood(path: Path) -> Part | Refused:
         rig = understand(motion)
         if len(motion) < 2:
             return Refused("holds a single frame; expected a motion")
-        clip = clip_of(path.stem, to_canonical(motion, rig), body_features(rig))
+        canonical = to_canonical(motion, rig)
+        clip = clip_of(path.stem, canonical, body_features(rig))
     except SparkSimError as error:
         return Refused(str(error).replace(str(path), path.name))
     return Part(
-        rig, clip.rotations.astype(np.float32), clip.hips.astype(np.float32), clip.planted,
+        rig,
+        clip.rotations.astype(np.float32),
+        clip.hips.astype(np.float32),
+        clip.planted,
         motion.fps,
-    )  # fmt: skip
+        canonical.floor_z,
+    )
 
 
 def _encoded(part: Part | Refused) -> bytes:
@@ -96,7 +110,7 @@ def _encoded(part: Part | Refused) -> bytes:
     if isinstance(part, Refused):
         about = {"why": part.why}
     else:
-        about = {"rig": rig_to_json(part.rig), "fps": part.fps}
+        about = {"rig": rig_to_json(part.rig), "fps": part.fps, "floor_z": part.floor_z}
         arrays = {"rotations": part.rotations, "hips": part.hips, "planted": part.planted}
     file = io.BytesIO()
     np.savez(file, about=np.frombuffer(json.dumps(about).encode(), np.uint8), **arrays)

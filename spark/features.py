@@ -30,7 +30,8 @@ from spark.skeleton import Skeleton
 # The paper leaves out joints by such words (section 5, "Datasets").
 _LEFT_OUT = re.compile(
     r"finger|thumb|index|middle|ring|pinky|hair|cloth|skirt|cape|eye|jaw|tongue|lip|brow|face|breast"
-    r"|metacarp|twist|weapon|sword|shield|prop|ik_|_ik",
+    r"|metacarp|twist|weapon|sword|shield|prop|ik_|_ik|sleeve|collar|hood|hat$|visor|armou?r|belt"
+    r"|pouch|bag|strap|scarf|ribbon|coat|dress|robe|feather|belly|butt|peck|whistle|facial",
     re.IGNORECASE,
 )
 _FEET = (Role.LEFT_FOOT, Role.LEFT_TOE, Role.RIGHT_FOOT, Role.RIGHT_TOE)

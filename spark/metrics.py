@@ -47,19 +47,29 @@ def score(result: CanonicalMotion, truth: CanonicalMotion) -> Score:
             f"{result.rotations.shape[:2]} frames and joints against {truth.rotations.shape[:2]}; "
             "expected the same clip on the same body"
         )
-    joints = body_features(rig).joints
     own, theirs = canonical_positions(result), canonical_positions(truth)
-    height, frame_time = san_height(rig), truth.frame_time
-    planted = planted_feet(rig, theirs, frame_time)
+    return score_positions(own, theirs, rig, truth.frame_time, san_height(rig))
+
+
+def score_positions(
+    own: Float[np.ndarray, "T J 3"],
+    truth: Float[np.ndarray, "T J 3"],
+    rig: Rig,
+    frame_time: float,
+    height: float,
+) -> Score:
+    """Positions on `rig` against the true ones; lengths in one unit, that of `height` too."""
+    joints = body_features(rig).joints
+    planted = planted_feet(rig, truth, frame_time)
     feet, pelvis = rig.contact_joints, rig.pelvis
     return Score(
-        san_mse(own[:, joints], theirs[:, joints], height),
-        san_mse(_relative(own, pelvis)[:, joints], _relative(theirs, pelvis)[:, joints], height),
-        mpjpe(own[:, joints], theirs[:, joints], height),
+        san_mse(own[:, joints], truth[:, joints], height),
+        san_mse(_relative(own, pelvis)[:, joints], _relative(truth, pelvis)[:, joints], height),
+        mpjpe(own[:, joints], truth[:, joints], height),
         foot_speed(own[:, feet], planted, frame_time, height),
-        foot_speed(theirs[:, feet], planted, frame_time, height),
+        foot_speed(truth[:, feet], planted, frame_time, height),
         jerk(own[:, joints], frame_time, height),
-        jerk(theirs[:, joints], frame_time, height),
+        jerk(truth[:, joints], frame_time, height),
     )
 
 
@@ -117,7 +127,8 @@ def source_sensitivity(
 
     pairs = [(i, k) for i in range(len(truths)) for k in range(i)]
     wanted = sum(apart(truths, i, k) for i, k in pairs)
-    return sum(apart(results, i, k) for i, k in pairs) / wanted if wanted > 0 else float("nan")
+    found = sum(apart(results, i, k) for i, k in pairs)
+    return float(found / wanted) if wanted > 0 else float("nan")
 
 
 def san_height(rig: Rig) -> float:

@@ -86,8 +86,8 @@ class PairMaker:
             raise SkeletonError(f"no clip has {window} frames: expected at least one to train on")
         frames = np.array([sum(len(c.hips) for c in group) for group in self._bodies], float)
         self._weights = frames / frames.sum()
-        self._stages: dict[tuple[int, int], _Stage] = {}
-        self._links: dict[tuple[_Stage, _Stage], Correspondence] = {}
+        self._stages: dict[tuple[int, int], Stage] = {}
+        self._links: dict[tuple[Stage, Stage], Correspondence] = {}
 
     def draw(self, n: int, windows: int) -> Pairs:
         """Draw number `n`: `windows` windows of one body's clips on one pair of its variants."""
@@ -126,7 +126,7 @@ class PairMaker:
         rotations, hips, planted = (np.stack(part) for part in zip(*cuts, strict=True))
         return rotations, hips, planted
 
-    def _stage(self, k: int, number: int) -> "_Stage":
+    def _stage(self, k: int, number: int) -> "Stage":
         key = (k, number)
         if key not in self._stages:
             body = self._bodies[k][0].body
@@ -134,10 +134,10 @@ class PairMaker:
                 variant = (same_body, split_body)[number](body)
             else:
                 variant = random_variant(body, np.random.default_rng((self.seed, *key)))
-            self._stages[key] = _Stage(variant)
+            self._stages[key] = Stage(variant)
         return self._stages[key]
 
-    def _link(self, source: "_Stage", target: "_Stage") -> Correspondence:
+    def _link(self, source: "Stage", target: "Stage") -> Correspondence:
         key = (source, target)
         if key not in self._links:
             if len(self._links) > 4096:
@@ -147,7 +147,7 @@ class PairMaker:
 
 
 @dataclass(frozen=True, eq=False)
-class _Stage:
+class Stage:
     """A variant and what putting motion onto it needs."""
 
     variant: Variant

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from spark.features import BodyFeatures, body_features
+from spark.features import BodyFeatures
 from spark.groups import groups_of
 from spark.rig import Rig
 from spark.rig_names import CONVENTIONS, HELD_OUT, name_joints, split_side
@@ -108,26 +108,31 @@ def scaled_body(base: BodyFeatures, rng: np.random.Generator) -> Variant:
 
 
 def split_body(base: BodyFeatures) -> Variant:
-    """The body with joints split as Aberman et al. (2020) do for their second group of characters:
-    the second spine joint and both shoulders move to the middle of their bones, and a joint that
-    does not turn takes the place of each."""
+    """The body with `split_joints` split: each moves to the middle of its bone, and a joint that
+    does not turn takes its place."""
     nodes = _nodes(base)
-    spines = [node for node in nodes if node.kind == "spine"]
-    chosen = [*spines[:2][-1:], *(node for node in nodes if node.kind == "clavicle")]
-    out = []
+    chosen = split_joints(base)
+    out: list[_Node] = []
     for node in nodes:
         out.append(node)
-        if any(node is one for one in chosen) and node.parent is not None:
+        if node.name in chosen:
             node.offset = node.offset / 2
-            role = node.role if node.kind == "spine" else None
-            after = _Node(
-                node, node.offset, role, node.first, node.second, 0.0, f"{node.name}_split"
-            )
+            role = node.role if node.role is Role.SPINE else None
+            name = f"{node.name}_split"
+            after = _Node(node, node.offset, role, node.first, node.second, name=name)
             for child in nodes:
-                if child.parent is node:
-                    child.parent = after
+                child.parent = after if child.parent is node else child.parent
             out.append(after)
     return _finish(out, base)
+
+
+def split_joints(base: BodyFeatures) -> list[str]:
+    """The joints that Aberman et al. (2020) split to get characters of another structure: the
+    second joint of the spine and both shoulders."""
+    roles = base.rig.roles
+    chosen = [*roles.joints(Role.SPINE)[:2][-1:]]
+    chosen += [*roles.joints(Role.LEFT_CLAVICLE)[:1], *roles.joints(Role.RIGHT_CLAVICLE)[:1]]
+    return [base.rig.skeleton.names[j] for j in chosen]
 
 
 def _nodes(base: BodyFeatures) -> list[_Node]:
@@ -212,11 +217,9 @@ def _finish(nodes: list[_Node], base: BodyFeatures, convention: str | None = Non
     )
     tpose = np.tile([1.0, 0, 0, 0], (len(nodes), 1))
     rig = Rig(skeleton, role_map, groups_of(skeleton, role_map), tpose, 0, 1.0)
-    body = body_features(rig)
-    kept = body.joints
     return Variant(
-        body,
-        np.array([nodes[k].first for k in kept]),
-        np.array([nodes[k].second for k in kept]),
-        np.array([nodes[k].mix for k in kept]),
+        BodyFeatures(rig, np.arange(len(nodes)), skeleton),
+        np.array([node.first for node in nodes]),
+        np.array([node.second for node in nodes]),
+        np.array([node.mix for node in nodes]),
     )

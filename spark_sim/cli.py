@@ -8,9 +8,20 @@ from typing import Any, NoReturn
 
 from spark.errors import SparkSimError
 from spark_sim import console
-from spark_sim.commands import inspect, mjcf, play, prepare, report, retarget, robots, sample, train
+from spark_sim.commands import (
+    evaluate,
+    inspect,
+    mjcf,
+    play,
+    prepare,
+    report,
+    retarget,
+    robots,
+    sample,
+    train,
+)
 
-COMMANDS = (retarget, robots, inspect, report, play, mjcf, sample, prepare, train)
+COMMANDS = (retarget, robots, inspect, report, play, mjcf, sample, prepare, train, evaluate)
 
 DESCRIPTION = "Put a human motion on another body and measure how believable the result is."
 

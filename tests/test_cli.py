@@ -18,7 +18,10 @@ import spark_sim
 
 GOLDENS = Path(__file__).parent / "goldens"
 CHECKOUT = Path(__file__).parents[1]
-COMMANDS = ("retarget", "robots", "inspect", "report", "play", "mjcf", "sample", "prepare", "train")
+COMMANDS = (
+    *("retarget", "robots", "inspect", "report", "play", "mjcf", "sample"),
+    *("prepare", "train", "evaluate"),
+)
 WALK, TARGET = "walker_walk.bvh", "dancer_wave.bvh"
 RESULT = "walker_walk_on_dancer_wave.bvh"
 

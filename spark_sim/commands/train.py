@@ -29,7 +29,7 @@ def configure(parser: ArgumentParser) -> None:
         "--ablate",
         metavar="SWITCH",
         action="append",
-        help="leave out share, mask or fk, or switch pos; may be repeated",
+        help="leave out share, mask or fk, switch pos, or mix motions; may be repeated",
     )
     for name in _FLAGS:
         parser.add_argument(f"--{name}", metavar="N", type=float if name == "rate" else int)

@@ -1,0 +1,200 @@
+"""Methods against ground truths: the rows of the paper's tables 1 and 2, with copy on top.
+
+A method is whatever puts a case's source on its target: the analytic transfer, a checkpoint's
+network, or another tool, whose results are read from a folder.
+"""
+
+import re
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Float
+
+from spark.canonical import canonical_positions, to_canonical
+from spark.clips import FRAME_TIME, at_frame_time
+from spark.errors import FileFormatError, SkeletonError, name_list
+from spark.evaluation_cases import SPARE_FRAMES, STRUCTURES, Case, Structure
+from spark.metrics import Score, mean_score, score_positions, source_sensitivity
+from spark.reading import SUFFIXES, read_motion
+from spark.refine import refine
+from spark.rig import understand
+from spark.transfer import transfer
+
+if TYPE_CHECKING:
+    from spark.checkpoint import Checkpoint
+
+Positions = Float[np.ndarray, "_ _ 3"]  # frames, joints
+Method = Callable[[Case], Positions]
+
+# Cells in the paper's order; a dataset without a split has one without a name.
+CELLS = ("sc+sm", "sc+um", "uc+sm", "uc+um")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The mean score of one method over a structure's cases of one cell."""
+
+    score: Score
+    cases: int
+
+
+@dataclass(frozen=True)
+class Row:
+    """One method: its scores by structure and cell, and over all cases of a structure together.
+
+    `settings` are those of the training of a checkpoint. `sensitivity`: `source_sensitivity`, the
+    mean over targets that receive several motions; NaN where there is none.
+    """
+
+    name: str
+    cells: Mapping[tuple[Structure, str], Cell]
+    sensitivity: Mapping[Structure, float]
+    settings: Mapping[str, object] = field(default_factory=dict)
+
+    def mean(self, structure: Structure) -> Score:
+        """The mean over the cells of a structure."""
+        of_one = [cell.score for (kind, _), cell in self.cells.items() if kind == structure]
+        return mean_score({str(i): [score] for i, score in enumerate(of_one)})
+
+
+def evaluate(
+    name: str,
+    method: Method,
+    cases: Sequence[Case],
+    *,
+    settings: Mapping[str, object] | None = None,
+    progress: Callable[[Iterable[Case]], Iterable[Case]] = iter,
+) -> Row:
+    """The row of one method. Means go over a character's clips first, then over characters."""
+    scores: dict[tuple[Structure, str], dict[str, list[Score]]] = defaultdict(
+        lambda: defaultdict(list)
+    )
+    received: dict[tuple[Structure, str, str], list[tuple[Positions, Positions]]] = defaultdict(
+        list
+    )
+    for case in progress(cases):
+        truth = canonical_positions(case.truth)
+        own = method(case)
+        rig = case.truth.rig
+        scored = score_positions(own, truth, rig, case.truth.frame_time, case.height)
+        scores[case.structure, case.cell][case.target].append(scored)
+        received[case.structure, case.target, case.performer].append(
+            (_relative(own), _relative(truth))
+        )
+    return Row(
+        name,
+        {
+            key: Cell(mean_score(of_one), sum(map(len, of_one.values())))
+            for key, of_one in sorted(scores.items(), key=lambda item: _place(*item[0]))
+        },
+        {structure: _sensitivity(structure, received) for structure in STRUCTURES},
+        settings or {},
+    )
+
+
+def copied(case: Case) -> Positions:
+    """The analytic transfer: the bar."""
+    return canonical_positions(transfer(case.source, case.truth.rig))
+
+
+def copied_feet_held(case: Case) -> Positions:
+    """The analytic transfer with its feet held where the source's stand, as `retarget` does."""
+    moved = transfer(case.source, case.truth.rig)
+    return canonical_positions(refine(case.source, moved))
+
+
+def learned(checkpoint: "Checkpoint") -> Method:
+    """The network of a checkpoint."""
+    from spark.retarget import retarget
+
+    return lambda case: canonical_positions(retarget(case.source, case.truth.rig, checkpoint))
+
+
+def results_in(folder: Path) -> Method:
+    """Another tool's results: FOLDER/TARGET/SOURCE/MOTION.bvh (or .fbx), named after characters and
+    motion, on the target's skeleton.
+
+    Heights count from the floor of the truth's file. Raises `FileFormatError` where a result is
+    missing or unlike its truth.
+    """
+
+    def read(case: Case) -> Positions:
+        answer = case.answer
+        if answer is None:
+            raise SkeletonError(
+                f"{case.motion} on {case.target}: its answer is made here, so that no other tool "
+                "can have a result for it"
+            )
+        path = _result(folder / case.target / case.performer, case.motion)
+        motion = read_motion(path).motion
+        try:
+            rig = understand(motion)
+        except SkeletonError as error:
+            raise SkeletonError(f"{path}: {error}") from error
+        positions = canonical_positions(at_frame_time(to_canonical(motion, rig), FRAME_TIME))
+        frames = len(case.truth)
+        if abs(len(positions) - frames) > SPARE_FRAMES:
+            raise FileFormatError(
+                path,
+                None,
+                f"{len(positions)} frames at 30 fps; expected {frames}, as the ground truth has",
+            )
+        own = answer.clip.body
+        joints = _same_joints(path, rig.skeleton.names, own.skeleton.names)
+        positions = positions[np.minimum(np.arange(frames), len(positions) - 1)]
+        hips = positions[:, rig.hips].mean(1)
+        positions = positions[:, joints]
+        positions[:, 0] = hips
+        return (positions - [0, 0, answer.floor_z]) / own.rig.hip_height
+
+    return read
+
+
+def _result(folder: Path, motion: str) -> Path:
+    paths = [folder / (motion + suffix) for suffix in SUFFIXES]
+    found = next((path for path in paths if path.is_file()), None)
+    if found is None:
+        raise FileFormatError(paths[0], None, "no such result; expected one for each pair")
+    return found
+
+
+def _same_joints(path: Path, names: Sequence[str], wanted: Sequence[str]) -> list[int]:
+    """Where the truth's joints are in a result; a prefix (`mixamorig:`) may have been lost."""
+    plain = {_plain(name): j for j, name in reversed(list(enumerate(names)))}
+    missing = [name for name in wanted if _plain(name) not in plain]
+    if missing:
+        raise FileFormatError(
+            path,
+            None,
+            f"lacks the joints {name_list(missing)} of the ground truth's skeleton; expected a "
+            "motion on that skeleton",
+        )
+    return [plain[_plain(name)] for name in wanted]
+
+
+def _plain(name: str) -> str:
+    return re.split(r"[:|]", name)[-1].replace(" ", "_").lower()
+
+
+def _relative(positions: Positions) -> Positions:
+    return positions - positions[:, :1]
+
+
+def _sensitivity(
+    structure: Structure,
+    received: Mapping[tuple[Structure, str, str], Sequence[tuple[Positions, Positions]]],
+) -> float:
+    found = [
+        source_sensitivity(*zip(*pairs, strict=True))
+        for (kind, _, _), pairs in received.items()
+        if kind == structure and len(pairs) > 1
+    ]
+    return sum(found) / len(found) if found else float("nan")
+
+
+def _place(structure: Structure, cell: str) -> tuple[int, int]:
+    return STRUCTURES.index(structure), CELLS.index(cell) if cell in CELLS else 0

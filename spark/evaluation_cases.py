@@ -1,0 +1,187 @@
+"""What a method is asked for and what the answer is: pairs of one motion on two bodies.
+
+Everything is as the network sees bodies (`spark.features`), in hip heights of the body in question.
+A case is *intra-structural* where both bodies have the same roles, each in as many joints, and
+*cross-structural* else.
+"""
+
+import zlib
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Literal
+
+import numpy as np
+
+from spark.canonical import CanonicalMotion
+from spark.dataset import Performance, is_dataset, prepare, read_performances
+from spark.errors import SkeletonError
+from spark.features import BodyFeatures
+from spark.metrics import san_height
+from spark.pairs import Clip, Stage
+from spark.roles import Role
+from spark.variants import Variant, random_variant, same_body, scaled_body, split_body
+
+Structure = Literal["intra", "cross"]
+STRUCTURES: tuple[Structure, ...] = ("intra", "cross")
+
+# Of one motion on two characters a frame or two may be lost in resampling; more is another motion.
+SPARE_FRAMES = 3
+# Made targets of each body and structure: its clips share them, so that results can be compared.
+_TARGETS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """`source` is to be put on `truth.rig`; `truth` is the answer.
+
+    `height` is the target's in SAN's metric [hip heights], `answer` the clip that the truth is
+    where it was recorded and not made, `performer` the source's character.
+    """
+
+    motion: str
+    performer: str
+    target: str
+    cell: str
+    structure: Structure
+    source: CanonicalMotion
+    truth: CanonicalMotion
+    height: float
+    answer: Performance | None = None
+
+
+def performances(path: Path, workers: int = 1) -> list[Performance]:
+    """The clips of a dataset, or of a folder with one folder a character, which has no cells.
+
+    Raises what `spark.dataset.prepare` and `read_performances` raise.
+    """
+    if is_dataset(path):
+        return read_performances(path)
+    with TemporaryDirectory() as folder:
+        prepare([path], Path(folder), workers=workers)
+        found = read_performances(Path(folder))
+        return [replace(p, clip=_in_memory(p.clip), cell="") for p in found]
+
+
+def recorded_cases(found: Sequence[Performance]) -> tuple[list[Case], list[str]]:
+    """A case for each motion that is on two characters, both ways round, and notes on those that
+    can't be one. Where both have the same structure, the target with its joints split as in SAN
+    makes a second, cross-structural one.
+
+    Raises `SkeletonError` where there is none.
+    """
+    by_motion: dict[str, list[Performance]] = defaultdict(list)
+    for one in found:
+        by_motion[one.clip.name].append(one)
+    cases: list[Case] = []
+    notes: list[str] = []
+    for motion, ones in sorted(by_motion.items()):
+        for source in ones:
+            for target in ones:
+                lengths = len(source.clip.hips), len(target.clip.hips)
+                if source.character == target.character:
+                    continue
+                if abs(lengths[0] - lengths[1]) > SPARE_FRAMES:
+                    notes.append(
+                        f"{motion}: {source.character} and {target.character} differ by "
+                        f"{abs(lengths[0] - lengths[1])} frames: not taken as one motion"
+                    )
+                    continue
+                cases += _recorded(motion, source, target, min(lengths))
+    if not cases:
+        raise SkeletonError(
+            f"no motion is on two characters among {len(found)} clips ("
+            f"{len(by_motion)} motions); expected files of one name in the folders of two "
+            "characters, or --made for answers made by changing each clip's skeleton"
+        )
+    return cases, notes
+
+
+def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = None) -> list[Case]:
+    """Each clip with two targets that are changed copies of its own body, on which the answer is
+    known (`spark.pairs`): one with other bone lengths, and one with other joints and names too.
+
+    Of each cell at most `limit` clips, drawn by `seed`. Training does not meet these targets,
+    whatever its seed: it draws other ones.
+    """
+    stages: dict[tuple[int, Structure, int], Stage] = {}
+    cases = []
+    for i, one in _drawn(found, seed, limit):
+        body = one.clip.body
+        for structure in STRUCTURES:
+            number = i % _TARGETS
+            key = (id(body), structure, number)
+            if key not in stages:
+                name = zlib.crc32(one.character.encode())
+                rng = np.random.default_rng((seed, name, number, STRUCTURES.index(structure)))
+                make = {"intra": scaled_body, "cross": random_variant}[structure]
+                stages[key] = Stage(make(body, rng))
+            stage = stages[key]
+            source = _canonical(one.clip, same_body(body), len(one.clip.hips))
+            turned = stage.place(
+                source.rotations[None], source.hips[None], np.asarray(one.clip.planted)[None]
+            )[0]
+            rig = stage.variant.body.rig
+            truth = CanonicalMotion(rig, source.frame_time, turned, source.hips)
+            target = f"{one.character} {structure} {number}"
+            cases.append(
+                Case(
+                    *(one.clip.name, one.character, target, one.cell, structure, source, truth),
+                    san_height(rig),
+                )
+            )
+    return cases
+
+
+def _recorded(motion: str, source: Performance, target: Performance, frames: int) -> list[Case]:
+    own, theirs = source.clip.body, target.clip.body
+    height = san_height(theirs.rig) / theirs.rig.hip_height
+    given = _canonical(source.clip, same_body(own), frames)
+    targets: dict[Structure, Variant] = {"cross": same_body(theirs)}
+    if _structure(own) == _structure(theirs):
+        targets = {"intra": same_body(theirs), "cross": split_body(theirs)}
+    return [
+        Case(
+            *(motion, source.character, target.character, target.cell, structure, given),
+            _canonical(target.clip, variant, frames),
+            height,
+            target if variant.body.skeleton.names == theirs.skeleton.names else None,
+        )
+        for structure, variant in targets.items()
+    ]
+
+
+def _structure(body: BodyFeatures) -> Counter[Role | None]:
+    """What makes two bodies alike: clothes and ends of limbs, which follow, do not."""
+    found = Counter(body.rig.roles.roles[j] for j in body.joints.tolist())
+    found.pop(None, None)
+    return found
+
+
+def _in_memory(clip: Clip) -> Clip:
+    rotations, hips, planted = map(np.array, (clip.rotations, clip.hips, clip.planted))
+    return replace(clip, rotations=rotations, hips=hips, planted=planted)
+
+
+def _canonical(clip: Clip, variant: Variant, frames: int) -> CanonicalMotion:
+    rotations = variant.rotations(np.asarray(clip.rotations[:frames], np.float64))
+    hips = np.asarray(clip.hips[:frames], np.float64)
+    return CanonicalMotion(variant.body.rig, clip.frame_time, rotations, hips)
+
+
+def _drawn(
+    found: Sequence[Performance], seed: int, limit: int | None
+) -> list[tuple[int, Performance]]:
+    by_cell: dict[str, list[tuple[int, Performance]]] = defaultdict(list)
+    for numbered in enumerate(found):
+        by_cell[numbered[1].cell].append(numbered)
+    if limit is None:
+        return [numbered for of_cell in by_cell.values() for numbered in of_cell]
+    rng = np.random.default_rng(seed)
+    return [
+        of_cell[k]
+        for _, of_cell in sorted(by_cell.items())
+        for k in sorted(rng.permutation(len(of_cell))[:limit].tolist())
+    ]

@@ -1,0 +1,149 @@
+"""`spark-sim evaluate`: methods against ground truths, as the paper's tables."""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from spark_sim.commands.options import add_force
+
+if TYPE_CHECKING:
+    from spark.evaluate import Row
+    from spark.evaluation_cases import Case
+
+SUMMARY = "measure methods against a ground truth"
+USAGE = "DATA [--checkpoint RUN]... [--result NAME=DIR]..."
+DESCRIPTION = """\
+Put motions on other bodies and measure how far that is from what is known to
+be right. DATA is a dataset that `spark-sim prepare` made, or a folder with one
+folder a character, as Mixamo downloads lie: a motion that is there on two
+characters is one with a known answer. Rows: copy (the analytic transfer), copy
+with feet held, each --checkpoint, each --result. Columns: the paper's tables 1
+and 2; the metrics of docs/evaluation.md."""
+EXAMPLES = """\
+examples:
+  spark-sim evaluate mixamo/
+  spark-sim evaluate mixamo/ --checkpoint run -o table.md
+  spark-sim evaluate mixamo/ --result mine=results/   # results/TARGET/SOURCE/
+                                                      # MOTION.bvh
+  spark-sim evaluate dataset --made --checkpoint run
+"""
+
+
+def configure(parser: ArgumentParser) -> None:
+    parser.add_argument("data", metavar="DATA", help="a dataset, or a folder of characters")
+    parser.add_argument(
+        "--checkpoint",
+        metavar="[NAME=]RUN",
+        action="append",
+        default=[],
+        help="a folder that `spark-sim train` wrote, or the checkpoint in it",
+    )
+    parser.add_argument(
+        "--result",
+        metavar="NAME=DIR",
+        action="append",
+        default=[],
+        help="another tool's motions: DIR/TARGET/SOURCE/MOTION.bvh on TARGET's skeleton",
+    )
+    parser.add_argument(
+        "--made",
+        action="store_true",
+        help="answers on changed copies of each clip's own body, where no two bodies share motions",
+    )
+    parser.add_argument(
+        "--limit", metavar="N", type=int, help="with --made: N clips of each cell, drawn"
+    )
+    parser.add_argument(
+        "--seed", metavar="N", type=int, default=0, help="of what is made and drawn (default 0)"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="also write it: .md, .json or .csv; may be repeated",
+    )
+    add_force(parser)
+
+
+def run(args: Namespace) -> int:
+    from spark.errors import ConventionError
+    from spark.evaluate import copied, copied_feet_held, evaluate, results_in
+    from spark.evaluation_cases import made_cases, performances, recorded_cases
+    from spark.evaluation_tables import markdown
+    from spark.files import write_atomically
+    from spark_sim import console, files
+
+    outputs = [Path(output) for output in args.output]
+    for path in outputs:
+        if path.suffix.lower() not in (".md", ".json", ".csv"):
+            raise ConventionError(f"{path}: expected a name that ends in .md, .json or .csv")
+        files.check_free(path, force=args.force)
+    if args.limit is not None and (args.limit < 1 or not args.made):
+        raise ConventionError(f"--limit {args.limit}: expected 1 or more, together with --made")
+    results = dict(_named(result) for result in args.result)
+    if results and args.made:
+        raise ConventionError("--result goes with recorded answers: no tool was given those --made")
+    checkpoints = dict(_checkpoint(given) for given in args.checkpoint)
+    found = performances(Path(args.data))
+    if args.made:
+        cases = made_cases(found, args.seed, args.limit)
+    else:
+        cases, notes = recorded_cases(found)
+        for note in notes:
+            console.note(note)
+
+    def row(name: str, method: "Callable[[Case], Any]", of: "Sequence[Case]", **more: Any) -> "Row":
+        return evaluate(
+            name, method, of, progress=lambda it: console.progress(it, name, len(of)), **more
+        )
+
+    rows = [row("copy", copied, cases), row("copy, feet held", copied_feet_held, cases)]
+    for name, checkpoint in checkpoints.items():
+        from spark.evaluate import learned
+
+        rows.append(row(name, learned(checkpoint), cases, settings=checkpoint.settings))
+    for name, folder in results.items():
+        answered = [case for case in cases if case.answer is not None]
+        rows.append(row(name, results_in(Path(folder)), answered))
+    console.say(markdown(rows).rstrip("\n"))
+    about = {"data": args.data, "made": args.made, "seed": args.seed, "limit": args.limit}
+    for path in outputs:
+        write_atomically(path, _text(path, rows, about).encode())
+    return 0
+
+
+def _text(path: Path, rows: "Sequence[Row]", about: dict[str, Any]) -> str:
+    from spark.evaluation_tables import as_csv, as_json, markdown
+
+    if path.suffix.lower() == ".json":
+        return as_json(rows, about)
+    return as_csv(rows) if path.suffix.lower() == ".csv" else markdown(rows)
+
+
+def _named(given: str) -> tuple[str, str]:
+    from spark.errors import ConventionError
+
+    name, equals, rest = given.partition("=")
+    if not (name and equals and Path(rest).is_dir()):
+        raise ConventionError(f"--result {given}: expected NAME=DIR, and DIR a folder of results")
+    return name, rest
+
+
+def _checkpoint(given: str) -> tuple[str, Any]:
+    from spark.errors import DependencyError
+
+    try:
+        from spark.checkpoint import load_checkpoint
+    except ImportError as error:
+        raise DependencyError(
+            f"--checkpoint needs {error.name}: pip install 'spark-sim[train]'"
+        ) from error
+    name, equals, rest = given.partition("=")
+    path = Path(rest if equals and not Path(given).exists() else given)
+    if path.is_dir():
+        path = path / "checkpoint.safetensors"
+    named = equals and not Path(given).exists()
+    return name if named else path.resolve().parent.name, load_checkpoint(path)
