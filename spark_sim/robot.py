@@ -53,17 +53,11 @@ class RobotClip:
 
         Raises `OutputError` where `path` exists, unless forced, or has another ending.
         """
-        self.write(path, force=force, format=format)
-        return Path(path)
-
-    def write(
-        self, path: File, *, force: bool = False, format: str | None = None
-    ) -> tuple[str, ...]:
-        """`save`, with notes of what the file itself doesn't say."""
         path = Path(path)
         format_of(path, format)
         files.claim(path, force=force)
-        return dispatch.write(self.on_robot, path, format=format, source=self.path)
+        dispatch.write(self.on_robot, path, format=format, source=self.path)
+        return path
 
 
 def load_robot(robot: File, *, roles: File | None = None) -> RobotClip:

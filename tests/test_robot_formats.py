@@ -249,7 +249,7 @@ def rows(qpos: Float[np.ndarray, "T nq"]) -> list[str]:
         (lambda r: [*r[:3], r[3] + ",0", *r[4:]], r"clip\.csv:4: has 37 columns, .* have 36"),
         (lambda r: [r[0], "", "nan" + r[1][8:]], r"clip\.csv:3: column 1 is nan"),
         (lambda r: [*r[:5], r[5].replace(",", ";")], r"clip\.csv:6: column 1 is '"),
-        (lambda r: [row + ",0" for row in r], r"moves 30 joints; .* has 29"),
+        (lambda r: [row + ",0" for row in r], r"moves 30 joints; the robot 'ember' has 29"),
         (lambda r: ["0," + row for row in r], "moves 30 joints"),
         (lambda r: [row[: row.index(",", 40)] for row in r], r"columns; expected 7|joints; "),
         (lambda r: ["0,0,1,1,1,1,1" + ",0" * 29], "frame 0 has length 2; expected 1"),
@@ -428,6 +428,20 @@ def test_limits_that_are_left_are_said(
     (tmp_path / "clip.csv").write_text("\n".join(rows(far)))
     read = load_motion(tmp_path / "clip.csv", robot="robot", quat="xyzw", fps=FPS)
     assert any("'left_knee' goes 29 degrees beyond" in note for note in read.notes)
+
+
+def test_other_units_and_robots_are_suspected(
+    qpos: Float[np.ndarray, "T nq"], tmp_path: Path
+) -> None:
+    path = tmp_path / "clip.csv"
+    far = qpos.copy()
+    far[:, :3] *= 100
+    path.write_text("\n".join(rows(far)))
+    read = load_motion(path, robot="robot", quat="xyzw", fps=FPS)
+    assert any("the base is 70 m high: positions are read as metres" in n for n in read.notes)
+    path.write_text("\n".join(row.rsplit(",", 10)[0] for row in rows(qpos)))
+    with pytest.raises(FileFormatError, match="of another robot, such as 'unitree_h1'"):
+        load_motion(path, robot="robot", quat="xyzw", fps=FPS)
 
 
 @pytest.mark.parametrize("path", recordings("g1moves/M_ShortMove1*.csv"))

@@ -10,6 +10,19 @@ from spark.errors import OutputError
 SUFFIXES = (".npz", ".csv", ".pkl")
 FORMATS = {"npz": ".npz", "mjlab": ".npz", "csv": ".csv", "csv-wxyz": ".csv", "gmr": ".pkl"}
 """The formats by name, and the ending of their files. The first of an ending is its default."""
+QUATERNIONS = {"npz": "wxyz", "mjlab": "wxyz", "csv": "xyzw", "csv-wxyz": "wxyz", "gmr": "xyzw"}
+
+
+def unsaid(format: str, fps: float) -> tuple[str, ...]:
+    """What a file in this format does not say, but has to be known."""
+    if FORMATS[format] == ".csv":
+        order = QUATERNIONS[format]
+        return (
+            f"x y z [m], quaternion {order}, joints [rad]; {fps:.6g} fps, which it doesn't say",
+        )
+    if format == "mjlab":
+        return (f"{fps:.6g} fps, the source's; trackers may expect another rate, often 50",)
+    return ()
 
 
 def format_of(path: Path, format: str | None = None) -> str:

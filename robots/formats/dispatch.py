@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from robots.formats import format_of
+from robots.formats import QUATERNIONS, format_of
 from robots.formats.arrays import read_arrays
 from robots.formats.gmr import read_pkl, write_pkl
 from robots.formats.mjlab import read_mjlab, write_mjlab
@@ -15,24 +15,20 @@ from spark.errors import ConventionError, FileFormatError
 
 def write(
     motion: RobotMotion, path: Path, *, format: str | None = None, source: Path | None = None
-) -> tuple[str, ...]:
-    """Write a motion in `format`, or in the one that the ending says; notes of what the file itself
-    doesn't say. Raises `OutputError` where the ending is not the format's.
+) -> None:
+    """Write a motion in `format`, or in the one that the ending says.
+
+    Raises `OutputError` where the ending is not the format's.
     """
     match format_of(path, format):
         case "npz":
             write_npz(motion, path, source=source)
         case "mjlab":
             write_mjlab(motion, path)
-            fps = 1 / motion.frame_time
-            return (f"{fps:.6g} fps, the source's; trackers expect their policy's rate, often 50",)
         case "gmr":
             write_pkl(motion, path)
         case name:
-            order = "wxyz" if name == "csv-wxyz" else "xyzw"
-            write_csv(motion, path, quat=order)
-            return (f"columns: x y z [m], quaternion {order}, joints [rad]; no header, no fps",)
-    return ()
+            write_csv(motion, path, quat=QUATERNIONS[name])
 
 
 def read(

@@ -8,8 +8,10 @@ from jaxtyping import Float
 
 from robots.morphology import Morphology
 from robots.motion import RobotMotion
+from robots.registry import ENTRIES
 from spark.errors import FileFormatError, OutputError
 
+_HIGH = 10  # hip heights at which a robot hardly walks
 _NOTED, _REFUSED = 1e-3, 0.05  # how far the norm of a quaternion may be from 1
 
 
@@ -45,11 +47,13 @@ def motion_of(
     not this robot's."""
     joints = len(robot.joint_names)
     if columns.angles.shape[1] != joints:
+        moves = columns.angles.shape[1]
+        others = " or ".join(repr(entry.name) for entry in ENTRIES if entry.joints == moves)
         raise FileFormatError(
             path,
             None,
-            f"moves {columns.angles.shape[1]} joints; the robot {robot.mjcf.path.stem!r} has "
-            f"{joints}. Is it of another robot?",
+            f"moves {moves} joints; the robot {robot.mjcf.path.stem!r} has {joints}. Is it of "
+            f"another robot{f', such as {others}' if others else ''}?",
         )
     check_finite(path, pos=columns.pos, quat=columns.quat, angles=columns.angles)
     quat, said = unit(columns.quat, path)
@@ -80,6 +84,9 @@ def of_qpos(
             f"{robot.joint_names[j]!r} goes {np.degrees(over[:, j].max()):.0f} degrees beyond its "
             "limit",
         )
+    height = float(np.median(q.pos[:, 2]))
+    if height > _HIGH * robot.rig.hip_height:
+        notes += (f"the base is {height:.3g} m high: positions are read as metres",)
     return RobotMotion(robot, q, frame_time, (*robot.notes, *notes))
 
 

@@ -3,7 +3,13 @@
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from spark_sim.commands.options import add_corrections, add_force, add_json, load
+from spark_sim.commands.options import (
+    add_corrections,
+    add_force,
+    add_json,
+    add_robot_motion,
+    load,
+)
 
 SUMMARY = "show what is understood of a file"
 USAGE = "FILE... [--save-map TOML] [options]"
@@ -22,11 +28,12 @@ examples:
 
 
 def configure(parser: ArgumentParser) -> None:
-    parser.add_argument("files", metavar="FILE", nargs="+", help="BVH or FBX files")
+    parser.add_argument("files", metavar="FILE", nargs="+", help="motions, or robots")
     parser.add_argument("--save-map", metavar="TOML", help="write the roles of FILE for editing")
     add_force(parser)
     add_json(parser, "one line for each FILE")
     add_corrections(parser, "FILE")
+    add_robot_motion(parser, "FILE")
 
 
 def run(args: Namespace) -> int:

@@ -126,6 +126,7 @@ def run(args: Namespace) -> int:
 
 
 def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> dict[str, Any]:
+    from robots.formats import format_of, unsaid
     from spark_sim import console
     from spark_sim.clip import Clip, retarget
 
@@ -137,7 +138,8 @@ def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> di
         console.notes(out, result.recording.notes)
         result.save(out, force=args.force)
     else:
-        console.notes(out, result.write(out, force=args.force, format=args.format))
+        console.notes(out, unsaid(format_of(out, args.format), result.motion.fps))
+        result.save(out, force=args.force, format=args.format)
     return {
         "source": str(source),
         "target": args.to,
