@@ -6,6 +6,7 @@
     out = spark_sim.retarget(walk, "mutant.bvh")
     out.save("out.bvh")
     print(spark_sim.report(out, source=walk).text())
+    spark_sim.retarget(walk, "robot").save("robot.npz")
 
 Names are loaded when they are first used, so that the import itself costs nothing.
 """
@@ -17,8 +18,10 @@ DISTRIBUTION = "spark-sim"
 if TYPE_CHECKING:
     from spark.errors import SparkSimError
     from spark_sim.clip import Clip, load, play, report, retarget, sample
+    from spark_sim.robot import RobotClip
 
-__all__ = ["Clip", "SparkSimError", "load", "play", "report", "retarget", "sample"]
+__all__ = ["Clip", "RobotClip", "SparkSimError", "load", "play", "report", "retarget", "sample"]
+_ELSEWHERE = {"SparkSimError": "spark.errors", "RobotClip": "spark_sim.robot"}
 
 
 def __getattr__(name: str) -> Any:
@@ -30,8 +33,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    module = import_module("spark.errors" if name == "SparkSimError" else "spark_sim.clip")
-    return getattr(module, name)
+    return getattr(import_module(_ELSEWHERE.get(name, "spark_sim.clip")), name)
 
 
 def __dir__() -> list[str]:
