@@ -375,8 +375,8 @@ def _soles(
         own = np.concatenate([points[j] for j in parts])
         standing = at[owner] + quat_rotate(ideal[owner], own - rest[owner])
         chosen = corners(standing)
-        # All corners lie on the floor under the lowest of them.
-        standing[chosen, 2] = standing[chosen, 2].min()
+        # All corners lie on the floor under the foot: those of a rounded one are higher themselves.
+        standing[chosen, 2] = standing[:, 2].min()
         j = owner[chosen]
         placed = rest[j] + quat_rotate(quat_conj(ideal[j]), standing[chosen] - at[j])
         soles.append(Sole(foot, links[j], placed))

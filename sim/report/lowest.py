@@ -17,19 +17,15 @@ _RING = 16  # points on a cylinder's edge
 def lowest_points(
     body: GivenBody, poses: Poses
 ) -> tuple[tuple[str, ...], Float[np.ndarray, "T B 3"]]:
-    """The names of the model's parts but the feet, and the lowest point of each [m, world].
+    """The names of the model's parts, and the lowest point of each [m, world].
 
     They are those of the shapes that collide, or of all where none does; of round meshes to within
-    a millimetre or so.
+    a millimetre or so. What carries a sole is called a foot, as the soles are.
     """
     model = body.model
     weld = model.body_weldid
-    feet = {int(weld[b]) for sole in body.soles for b in sole.bodies}
-    geoms = [
-        int(g)
-        for g in np.flatnonzero(np.isin(model.geom_bodyid, poses.bodies))
-        if int(weld[model.geom_bodyid[g]]) not in feet
-    ]
+    feet = {int(weld[b]): f"{sole.side} foot" for sole in body.soles for b in sole.bodies}
+    geoms = [int(g) for g in np.flatnonzero(np.isin(model.geom_bodyid, poses.bodies))]
     colliding = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
     outlines: dict[int, list[tuple[int, Float[np.ndarray, "P 3"], float]]] = {}
     for g in colliding or geoms:
@@ -38,7 +34,7 @@ def lowest_points(
             at = int(model.geom_bodyid[g])
             placed = quat_rotate(model.geom_quat[g], points) + model.geom_pos[g]
             outlines.setdefault(int(weld[at]), []).append((at, placed, radius))
-    names = tuple(part_name(model, part) for part in outlines)
+    names = tuple(feet.get(part) or part_name(model, part) for part in outlines)
     lowest = np.empty((len(body.qpos), len(outlines), 3))
     for k, pieces in enumerate(outlines.values()):
         owner = np.concatenate([np.full(len(points), at) for at, points, _ in pieces])
@@ -97,4 +93,4 @@ def _sphere(count: int) -> Float[np.ndarray, "N 3"]:
     return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
 
 
-_DIRECTIONS = _sphere(100)
+_DIRECTIONS = _sphere(200)

@@ -69,6 +69,6 @@ def _contacts(
     touching = model.geom_bodyid[data.contact.geom]
     for (a, b), distance in zip(touching, data.contact.dist, strict=True):
         if distance < 0 and a in bodies and b in bodies:
-            one, other = sorted((part_name(model, a), part_name(model, b)))
+            one, other = sorted((part_name(model, int(a)), part_name(model, int(b))))
             found[one, other] = max(found.get((one, other), 0.0), -float(distance))
     return found

@@ -70,10 +70,10 @@ def shares(clip: Measured) -> Iterator[tuple[str, float]]:
 def figures(report: Report) -> Iterator[tuple[str, str]]:
     """The other measures, by name, in words."""
     clip, source, drift, contacts = report.clip, report.source, report.drift, report.contacts
-    often = sorted(((share, joint) for joint, share in clip.at_limit_shares.items() if share > 0))
-    if often:
-        most = ", ".join(f"{joint} {_percent(share)}" for share, joint in often[: -_SHOWN - 1 : -1])
-        yield "most at a limit", most
+    often = sorted(clip.at_limit_shares.items(), key=lambda item: -item[1])[:_SHOWN]
+    if often and often[0][1] > 0:
+        others = "".join(f"; {joint} {_percent(share)}" for joint, share in often[1:] if share > 0)
+        yield "most at a limit", f"{100 * often[0][1]:>6.1f} %        {often[0][0]}{others}"
     if contacts is not None and contacts.f1 is not None:
         missed = 0.0 if contacts.recall is None else 1 - contacts.recall
         words = f"{contacts.f1:>6.2f}          F1 against the source; {_percent(missed)} missed"
