@@ -22,6 +22,7 @@ FALL_TILT = 60.0  # [deg] between what is upward in the root and in its target
 _FREQUENCY = 10.0  # [rad/s] of the assisting spring, critically damped
 _GYRATION = 0.25  # of the height: radius of gyration that the assisting torque reckons with
 _AT_LIMIT = 0.999
+_JUMP = 30.0  # [rad/s], [m/s]: a first frame that is left faster is another pose, not a motion
 _BLOCK = 256  # frames whose targets are laid out at once
 _BAD = tuple(
     int(kind)
@@ -99,8 +100,8 @@ def track(
 ) -> Tracked:
     """Simulate the body of `target` while its servos follow the target's coordinates.
 
-    It begins in the first frame, with its velocity. `height` [m] is that of the standing body.
-    The same input gives the same output, to the bit.
+    It begins in the first frame, with its velocity, or at rest where that is a jump. `height` [m]
+    is that of the standing body. The same input gives the same output, to the bit.
     """
     if not np.isfinite(target.qpos).all():
         raise SkeletonError("the motion has coordinates that are no finite numbers")
@@ -109,7 +110,12 @@ def track(
     model.opt.timestep = frame_time / steps
     root = int(model.body(target.model.body(target.root).name).id)
     simulation = _Simulation(model, root, height, assist)
-    record, target_points, diverged = simulation.run(target.qpos, frame_time, steps)
+    speeds = velocities(model, target.qpos, frame_time)
+    start, fastest = speeds[0], float(np.abs(speeds[0]).max())
+    if fastest > _JUMP:
+        start = np.zeros_like(start)
+        notes += (f"the first frame is left at {fastest:.0f} rad/s: the simulation begins at rest",)
+    record, target_points, diverged = simulation.run(target.qpos, speeds, start, frame_time, steps)
     return Tracked(
         model,
         target,
@@ -153,9 +159,15 @@ class _Simulation:
         self.wrench = np.zeros(6)
 
     def run(
-        self, target: Float[np.ndarray, "T nq"], frame_time: float, steps: int
+        self,
+        target: Float[np.ndarray, "T nq"],
+        speeds: Float[np.ndarray, "T nv"],
+        start: Float[np.ndarray, "nv"],
+        frame_time: float,
+        steps: int,
     ) -> tuple[Record, Float[np.ndarray, "T B 3"], int | None]:
-        """The record, where the target has the record's points, and the frame that diverged."""
+        """The record, where the target has the record's points, and the frame that diverged. The
+        velocities are those of the target, and that of the body at first."""
         model, data, frames = self.model, self.data, len(target)
         record = self._empty(frames)
         target_points = np.zeros((frames, len(self.points), 3))
@@ -165,9 +177,8 @@ class _Simulation:
             mujoco.mj_kinematics(model, data)
             target_points[t] = data.xpos[self.points]
             ups[t] = data.xmat[self.root].reshape(3, 3)[2]
-        speeds = velocities(model, target, frame_time)
         mujoco.mj_resetData(model, data)
-        data.qpos[:], data.qvel[:] = target[0], speeds[0]
+        data.qpos[:], data.qvel[:] = target[0], start
         diverged = None
         with _without_messages():
             self._note(record, 0, target_points, ups)

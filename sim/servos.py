@@ -12,6 +12,7 @@ STRENGTH = 0.1  # torque of a joint whose limit is not told, in body weights tim
 _RESOLVED = 0.5  # servos of ours are no faster than this many radians of their swing a step
 _HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
 _SLOWEST_STEP = 0.002  # [s]
+_COLLISION_GROUP = 3  # by custom; viewers don't show it
 
 
 def with_servos(
@@ -25,7 +26,7 @@ def with_servos(
     """
     spec = body.spec.copy()
     notes: list[str] = []
-    _drop_what_is_only_seen(spec)
+    _let_something_collide(spec, notes)
     if not any(g.type == mujoco.mjtGeom.mjGEOM_PLANE for g in spec.worldbody.geoms):
         spec.worldbody.add_geom(
             type=mujoco.mjtGeom.mjGEOM_PLANE,
@@ -39,33 +40,28 @@ def with_servos(
     spec.option.timestep, spec.option.gravity = timestep, [0.0, 0.0, -GRAVITY]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     model = spec.compile()
-    if not any(_collides(model, g) for g in range(model.ngeom) if model.geom_bodyid[g]):
-        raise SkeletonError("no shape of the model collides: it would fall through the floor")
     # What a target asks for is cut off by the torque that a joint has, not by the control's range.
     model.actuator_ctrllimited[:] = 0
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return model, tuple(notes)
 
 
-def _drop_what_is_only_seen(spec: mujoco.MjSpec) -> None:
-    """Delete shapes that don't collide, if no mass comes from them: meshes are slow to compile."""
-    for body in spec.bodies:
-        if body.name != "world" and body.explicitinertial:
-            for geom in list(body.geoms):
-                if not int(geom.contype) | int(geom.conaffinity):
-                    spec.delete(geom)
-    used = {geom.meshname for geom in spec.geoms}
-    for mesh in list(spec.meshes):
-        if mesh.name not in used and not list(spec.skins):
-            spec.delete(mesh)
+def _let_something_collide(spec: mujoco.MjSpec, notes: list[str]) -> None:
+    """Some files leave contacts to the scene that includes them: with the floor at least."""
+    shapes = [geom for body in spec.bodies if body.name != "world" for geom in body.geoms]
+    if any(int(geom.contype) | int(geom.conaffinity) for geom in shapes):
+        return
+    if not shapes:
+        raise SkeletonError("the model has no shapes: it would fall through the floor")
+    meant = [geom for geom in shapes if int(geom.group) >= _COLLISION_GROUP]
+    for geom in meant or shapes:
+        geom.conaffinity = 1
+    what = f"those of group {_COLLISION_GROUP} and above" if meant else "all of them"
+    notes.append(f"no shape of the model is set to collide: {what} do here, with the floor alone")
 
 
 def _bits(model: mujoco.MjModel, field: str) -> int:
     return int(np.bitwise_or.reduce(getattr(model, f"geom_{field}"), initial=0))
-
-
-def _collides(model: mujoco.MjModel, geom: int) -> bool:
-    return bool(int(model.geom_contype[geom]) | int(model.geom_conaffinity[geom]))
 
 
 def is_servo(model: mujoco.MjModel, actuator: int) -> bool:
