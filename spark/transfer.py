@@ -111,7 +111,7 @@ def transfer(source: CanonicalMotion, target: Rig) -> CanonicalMotion:
     """
     rotations = correspond(source.rig, target).rotations(source.rotations, target)
     scale = target.hip_height / source.rig.hip_height
-    notes = source.notes
+    notes = (*source.notes, *_without_arms(source.rig, target))
     lift = 0.0
     if abs(source.floor_z) > _FLOOR_TOLERANCE * source.rig.hip_height:
         lift = source.floor_z
@@ -119,6 +119,19 @@ def transfer(source: CanonicalMotion, target: Rig) -> CanonicalMotion:
     hips = (source.hips - np.array([0, 0, lift])) * scale
     floor_z = (source.floor_z - lift) * scale
     return CanonicalMotion(target, source.frame_time, rotations, hips, floor_z, notes)
+
+
+def _without_arms(source: Rig, target: Rig) -> tuple[str, ...]:
+    """What is left out or stays still where one of the two bodies has legs only."""
+    theirs, own = (
+        bool(rig.roles.joints(Role.LEFT_UPPER_ARM) or rig.roles.joints(Role.RIGHT_UPPER_ARM))
+        for rig in (source, target)
+    )
+    if theirs and not own:
+        return ("the target has no arms: what the source's do is left out",)
+    if own and not theirs:
+        return ("the source has no arms: the target's stay out to the sides, as in the T-pose",)
+    return ()
 
 
 def _chain(

@@ -289,6 +289,35 @@ def test_a_robot_s_motion_goes_on_to_other_bodies(
     assert written.exists()
 
 
+def test_a_robot_without_arms_moves_its_legs_and_says_so(
+    moved: RobotClip, walk_path: Path, tmp_path: Path
+) -> None:
+    start = ROBOT.index('<body name="torso"')
+    legs = tmp_path / "legs.xml"
+    legs.write_text(ROBOT[:start] + ROBOT[ROBOT.rindex("</body></worldbody>") :])
+    out = tmp_path / "out.npz"
+    code, _, stderr = on_command_line("retarget", walk_path, "--to", legs, "-o", out)
+    assert code == 0
+    assert any("out.npz: the target has no arms: what the source's do" in line for line in stderr)
+    result = spark_sim.load(out)
+    assert isinstance(result, RobotClip)
+    assert len(result.on_robot.robot.joint_names) == 12
+    back = spark_sim.retarget(result, moved)
+    assert any("the source has no arms" in note for note in back.notes)
+
+
+def test_onto_itself_a_robot_moves_as_it_does(moved: RobotClip) -> None:
+    """Projection alone gives every hinge back; the solver stays near it."""
+    own = moved.on_robot.qpos
+    same = spark_sim.retarget(moved, moved, refine=False)
+    assert isinstance(same, RobotClip)
+    np.testing.assert_allclose(same.on_robot.qpos[:, 7:], own[:, 7:], atol=1e-6)
+    np.testing.assert_allclose(same.on_robot.qpos[:, :2], own[:, :2], atol=1e-6)
+    solved = spark_sim.retarget(moved, moved)
+    assert isinstance(solved, RobotClip)
+    assert np.degrees(np.abs(solved.on_robot.qpos[:, 7:] - own[:, 7:])).mean() < 6
+
+
 def test_options_that_a_file_does_not_have_are_said(walk_path: Path, tmp_path: Path) -> None:
     out = tmp_path / "out.npz"
     command = ("retarget", walk_path, "--to", "robot", "--to-unit", "cm", "--quat", "xyzw")

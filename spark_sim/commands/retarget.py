@@ -138,7 +138,8 @@ def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> di
         console.notes(out, result.recording.notes)
         result.save(out, force=args.force)
     else:
-        console.notes(out, unsaid(format_of(out, args.format), result.motion.fps))
+        new = [note for note in result.notes if note not in target.notes]
+        console.notes(out, [*new, *unsaid(format_of(out, args.format), result.motion.fps)])
         result.save(out, force=args.force, format=args.format)
     return {
         "source": str(source),
