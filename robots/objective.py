@@ -35,11 +35,11 @@ PATH = np.array([1.5, 1.5, 1.5])  # of the hips [1 / m]
 STAND = np.array([25.0, 25.0, 20.0])  # of a sole's corner [1 / m]
 SINK, SINK_EASE = 80.0, 0.004  # of a sole's corner below the floor [1 / m]; [m]
 LIMIT, MARGIN = 8.0, np.radians(2.0)  # of a hinge near its limit
-CLAP, NEAR = 4.0, 0.12  # of hands [1 / m] that are as near as this [m]
+CLAP, NEAR = 12.0, 0.12  # of hands [1 / m] that are as near as this [m]
 TOUCH, TOUCH_LEGS = 45.0, 90.0  # of parts that run into each other [1 / m]
 IDLE = 0.02  # of hinges that nothing else asks for: stay as in the T-pose
 SMOOTH = 4.2  # [Hz] above which a limb's motion fades
-CALM = 2.0  # [Hz] above which a limb that gives way to another does not
+CALM = 2.2  # [Hz] above which a limb that gives way to another does not
 FAST, RUSH = 12.0, 0.5  # [rad/s] above which a hinge is held back, and how much [s]
 
 

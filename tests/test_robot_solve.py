@@ -1,0 +1,251 @@
+"""Whole trajectories on robots: the equations against plain ones, and what the result must keep."""
+
+import mujoco
+import numpy as np
+import pytest
+from conftest import recording
+
+from robots.footing import plan_footing
+from robots.morphology import Morphology
+from robots.motion import RobotMotion
+from robots.normal import Normal, Ties, second_differences
+from robots.objective import linearize
+from robots.project import project
+from robots.registry import find
+from robots.solve import copy, retarget, stages_of, unhurried
+from robots.targets import targets_of
+from robots.tree import Coordinates, forward
+from scripts.robot_bars import COLUMNS, measure
+from spark.canonical import CanonicalMotion, canonical_positions, to_canonical
+from spark.kinematics import world_positions
+from spark.recording import read_recording
+from spark.rig import Rig, understand
+from spark.roles import Role
+from spark.rotation import quat_from_rotvec, quat_from_yaw, quat_mul, quat_rotate
+from spark.sample import sample_motion, sample_rig
+from spark_sim.robot import load_robot
+
+
+@pytest.fixture(scope="module")
+def ember() -> Morphology:
+    return load_robot(find("robot")).on_robot.robot
+
+
+@pytest.fixture(scope="module")
+def walk() -> CanonicalMotion:
+    rig = sample_rig("walker")
+    return to_canonical(sample_motion("walk", rig, 60.0), rig)
+
+
+@pytest.fixture(scope="module")
+def walked(walk: CanonicalMotion, ember: Morphology) -> RobotMotion:
+    return retarget(walk, ember)
+
+
+def part(source: CanonicalMotion, frames: slice) -> CanonicalMotion:
+    return CanonicalMotion(
+        source.rig,
+        source.frame_time,
+        source.rotations[frames],
+        source.hips[frames],
+        source.floor_z,
+    )
+
+
+def turned(source: CanonicalMotion, yaw: float) -> CanonicalMotion:
+    q = quat_from_yaw(np.array(yaw))
+    return CanonicalMotion(
+        source.rig,
+        source.frame_time,
+        quat_mul(q, source.rotations),
+        quat_rotate(q, source.hips),
+        source.floor_z,
+    )
+
+
+def clap(rig: Rig, apart: np.ndarray) -> CanonicalMotion:
+    """Upper arms point ahead, forearms close until the wrists are `apart` [m]."""
+    at = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
+    rotations = np.tile([1.0, 0, 0, 0], (len(apart), len(rig.skeleton), 1))
+    about_z = np.array([0.0, 0.0, 1.0])
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        upper, fore, hand = (
+            rig.roles.require(Role(f"{side}_{name}")) for name in ("upper_arm", "forearm", "hand")
+        )
+        inward = np.arcsin((abs(at[upper, 1]) - apart / 2) / np.linalg.norm(at[hand] - at[fore]))
+        ahead = np.full(len(apart), np.pi / 2)
+        for joint, angle in ((upper, ahead), (fore, ahead + inward)):
+            below = list(rig.skeleton.subtree(joint))
+            rotations[:, below] = quat_from_rotvec(-sign * angle[:, None] * about_z)[:, None]
+    hips = np.tile([0.0, 0.0, rig.hip_height], (len(apart), 1))
+    return CanonicalMotion(rig, 1 / 60, rotations, hips, 0.0)
+
+
+@pytest.mark.parametrize("stage", [0, 1])
+def test_the_gradient_is_that_of_the_cost(
+    walk: CanonicalMotion, ember: Morphology, stage: int
+) -> None:
+    source = part(walk, slice(0, 4))
+    targets = targets_of(source, ember)
+    footing = plan_footing(ember, targets)
+    rng = np.random.default_rng(0)
+    tree = ember.tree
+    q = project(ember, targets.world, targets.hips)
+    q = q.moved(tree, rng.normal(size=(4, tree.size)) * 0.05).clipped(tree, 0.05)
+    which = stages_of(ember)[stage]
+    nears = ember.collisions.near(forward(tree, q), which, 1)
+    normal = linearize(ember, targets, footing, q, which, nears)
+    for k, column in enumerate(which.columns):
+        step = np.zeros((4, tree.size))
+        step[:, column] = 1e-6
+        after, before = (
+            linearize(ember, targets, footing, q.moved(tree, s * step), which, nears, rows=False)
+            for s in (1, -1)
+        )
+        slope = (after.cost - before.cost) / 2e-6
+        # What turns links is told for small errors: these are 0.05 rad.
+        np.testing.assert_allclose(normal.g[:, k], slope, rtol=1e-2, atol=5e-3)
+
+
+def test_frames_are_tied_as_by_one_large_matrix() -> None:
+    rng = np.random.default_rng(1)
+    T, D = 7, 3
+    normal = Normal(T, D)
+    J = rng.normal(size=(T, D, 5))
+    normal.add([0, 1, 2], J, rng.normal(size=(5, T)))
+    smooth, values = rng.uniform(1, 2, D), rng.normal(size=(T, D))
+    ties = Ties(smooth, second_differences(values), 1.0, np.zeros((T - 1, D)))
+    step = normal.solve_together(ties, np.full(T, 0.1), np.zeros((T, D)))
+    A = np.zeros((T - 2, T))
+    for row in range(T - 2):
+        A[row, row : row + 3] = 1, -2, 1
+    W = np.kron(A.T @ A, np.diag(smooth**2))
+    H = W + 0.1 * np.eye(T * D)
+    for t in range(T):
+        H[t * D : (t + 1) * D, t * D : (t + 1) * D] += J[t] @ J[t].T
+    g = normal.g.ravel() + W @ values.ravel()
+    np.testing.assert_allclose(step.ravel(), -np.linalg.solve(H, g), atol=1e-10)
+
+
+def test_a_column_at_its_limit_does_not_go_beyond() -> None:
+    normal = Normal(3, 2)
+    normal.add_diagonal(np.ones((3, 2)), -np.ones((3, 2)))
+    ties = Ties(np.zeros(2), np.zeros((1, 2)), 0.0, np.zeros((2, 2)))
+    limits = np.array([[1.0, 0], [-1, 0], [0, 0]])
+    step = normal.solve_together(ties, np.zeros(3), limits)
+    np.testing.assert_allclose(step, [[0, 1], [1, 1], [1, 1]], atol=1e-6)
+
+
+def test_unhurried_angles_turn_no_faster_and_slow_ones_stay(ember: Morphology) -> None:
+    count, fast = 60, 12.0
+    angles = np.zeros((count, len(ember.tree)))
+    angles[30:, 0] = 3.0
+    angles[:, 1] = np.sin(np.arange(count) / 10)
+    still = np.tile([1.0, 0, 0, 0], (count, 1))
+    q = unhurried(ember, Coordinates(np.zeros((count, 3)), still, angles), 1 / 60)
+    assert np.abs(np.diff(q.angles, axis=0)).max() * 60 < fast + 1e-9
+    np.testing.assert_allclose(q.angles[:, 1], angles[:, 1], atol=1e-12)
+    assert q.angles[0, 0] == 0
+    assert q.angles[-1, 0] == 3
+
+
+def test_the_bars_hold_on_the_walk(walk: CanonicalMotion, walked: RobotMotion) -> None:
+    row = dict(zip(COLUMNS, measure(walk, walked, collisions=True), strict=False))
+    assert row["sunk %"] == 0
+    assert row["float %"] <= 1.5
+    assert row["skate"] <= 4
+    assert row["limbs"] <= 6
+    assert row["limit %"] == 0
+    assert row["rad/s"] <= 15
+    assert row["jerk"] <= 800
+    assert row["self %"] == 0
+
+
+def test_copy_breaks_the_bars_that_the_solver_keeps(
+    walk: CanonicalMotion, ember: Morphology
+) -> None:
+    row = dict(zip(COLUMNS, measure(walk, copy(walk, ember), collisions=False), strict=False))
+    assert row["skate"] > 4 or row["float %"] > 1.5 or row["sunk %"] > 1
+
+
+def test_the_world_has_no_preferred_heading(
+    walk: CanonicalMotion, walked: RobotMotion, ember: Morphology
+) -> None:
+    other = retarget(turned(walk, 2.0), ember)
+    np.testing.assert_allclose(other.coordinates.angles, walked.coordinates.angles, atol=2e-3)
+    moved = quat_rotate(quat_from_yaw(np.array(2.0)), walked.coordinates.pos)
+    np.testing.assert_allclose(other.coordinates.pos, moved, atol=2e-3)
+
+
+def test_the_first_frame_is_as_good_as_any(
+    walk: CanonicalMotion, walked: RobotMotion, ember: Morphology
+) -> None:
+    """Started in the middle of a stride, the same poses come out, from the first frame on."""
+    later = retarget(part(walk, slice(35, None)), ember).coordinates.angles
+    whole = walked.coordinates.angles[35:]
+    assert np.abs(later - whole)[0].max() < np.radians(8)
+    assert np.sqrt(((later - whole) ** 2).mean()) < np.radians(1.5)
+    speed = np.abs(np.diff(later, axis=0))
+    assert speed[0].max() < 1.5 * speed.max(axis=1).mean() + 0.02
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3, 5])
+def test_short_clips_are_clips(walk: CanonicalMotion, ember: Morphology, frames: int) -> None:
+    result = retarget(part(walk, slice(0, frames)), ember)
+    assert result.qpos.shape == (frames, ember.mjcf.model.nq)
+    assert np.isfinite(result.qpos).all()
+
+
+def test_hands_that_touch_still_touch(ember: Morphology) -> None:
+    """Palms meet where the source's wrists are 4 cm apart, and are apart where these are."""
+    time = np.arange(120) / 60
+    apart = 0.04 + 0.3 * (1 - np.cos(2 * np.pi * time))
+    source = clap(sample_rig("walker"), apart)
+    wrists = [source.rig.roles.require(r) for r in (Role.LEFT_HAND, Role.RIGHT_HAND)]
+    left, right = canonical_positions(source)[:, wrists].transpose(1, 0, 2)
+    np.testing.assert_allclose(np.linalg.norm(left - right, axis=1), apart, atol=0.01)
+    result = retarget(source, ember)
+    gap = between_hands(result)
+    assert gap[apart < 0.05].max() < 0.03
+    assert gap.min() > -0.01
+    assert gap[apart > 0.5].min() > 0.2
+
+
+def between_hands(result: RobotMotion) -> np.ndarray:
+    """The distance [m] between the surfaces of the two hands, by MuJoCo."""
+    robot, model = result.robot, result.robot.mjcf.model
+    data = mujoco.MjData(model)
+    geoms = []
+    for role in (Role.LEFT_HAND, Role.RIGHT_HAND):
+        link = int(robot.links[robot.rig.roles.require(role)])
+        body = int(model.jnt_bodyid[robot.mj_joints[link]])
+        geoms.append([g for g in range(model.ngeom) if body == int(model.geom_bodyid[g])])
+    out = []
+    for qpos in result.qpos:
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(model, data)
+        out.append(
+            min(
+                mujoco.mj_geomDistance(model, data, a, b, 2.0, None)
+                for a in geoms[0]
+                for b in geoms[1]
+            )
+        )
+    return np.array(out)
+
+
+@pytest.mark.parametrize("robot", ["unitree_g1", "unitree_h1", "booster_t1"])
+@pytest.mark.parametrize("clip", ["cmu_asf/cmu_02_01.bvh", "animateddrawings/jumping.bvh"])
+def test_the_bars_hold_on_real_clips(robot: str, clip: str) -> None:
+    motion = read_recording(recording(clip)).motion
+    source = to_canonical(motion, understand(motion))
+    result = retarget(source, load_robot(find(robot)).on_robot.robot)
+    row = dict(zip(COLUMNS, measure(source, result, collisions=True), strict=False))
+    assert row["sunk %"] <= 1
+    assert row["float %"] <= 1.5
+    assert row["skate"] <= 4
+    assert row["limbs"] <= 6
+    assert row["limit %"] <= 4
+    assert row["rad/s"] <= 15
+    assert row["jerk"] <= 800
+    assert row["self %"] <= 0.2
