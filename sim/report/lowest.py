@@ -4,11 +4,11 @@ from itertools import product
 
 import mujoco
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from sim.given import GivenBody
 from sim.report.poses import Poses, part_name
-from spark.rotation import matrix_from_quat, quat_rotate
+from spark.rotation import quat_conj, quat_rotate
 
 _PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)
 _RING = 16  # points on a cylinder's edge
@@ -35,30 +35,23 @@ def lowest_points(
             placed = quat_rotate(model.geom_quat[g], points) + model.geom_pos[g]
             outlines.setdefault(int(weld[at]), []).append((at, placed, radius))
     names = tuple(feet.get(part) or part_name(model, part) for part in outlines)
-    lowest = np.empty((len(body.qpos), len(outlines), 3))
+    lowest = np.zeros((len(body.qpos), len(outlines), 3))
     for k, pieces in enumerate(outlines.values()):
-        owner = np.concatenate([np.full(len(points), at) for at, points, _ in pieces])
-        points = np.concatenate([points for _, points, _ in pieces])
-        radii = np.concatenate([np.full(len(points), r) for _, points, r in pieces])
-        lowest[:, k] = _lowest(poses, owner, points, radii)
+        least = np.full(len(body.qpos), np.inf)
+        for at, points, radius in pieces:
+            place = _lowest(poses.pos[:, at], poses.quat[:, at], points)
+            place[:, 2] -= radius
+            better = place[:, 2] < least
+            lowest[better, k], least[better] = place[better], place[better, 2]
     return names, lowest
 
 
 def _lowest(
-    poses: Poses,
-    owner: Int[np.ndarray, "P"],
-    points: Float[np.ndarray, "P 3"],
-    radii: Float[np.ndarray, "P"],
+    pos: Float[np.ndarray, "T 3"], quat: Float[np.ndarray, "T 4"], points: Float[np.ndarray, "P 3"]
 ) -> Float[np.ndarray, "T 3"]:
-    """The lowest of all balls about `points` on the bodies `owner`."""
-    rows = matrix_from_quat(poses.quat)[:, :, 2]
-    heights = np.einsum("tpi,pi->tp", rows[:, owner], points) + poses.pos[:, owner, 2] - radii
-    best = heights.argmin(axis=1)
-    frames = np.arange(len(best))
-    body = owner[best]
-    place = poses.pos[frames, body] + quat_rotate(poses.quat[frames, body], points[best])
-    place[:, 2] -= radii[best]
-    return place
+    """The lowest of a body's points [m, world]."""
+    up = quat_rotate(quat_conj(quat), np.array([0.0, 0.0, 1.0]))
+    return pos + quat_rotate(quat, points[(up @ points.T).argmin(axis=1)])
 
 
 def _outline(model: mujoco.MjModel, geom: int) -> tuple[Float[np.ndarray, "P 3"], float]:
@@ -69,7 +62,7 @@ def _outline(model: mujoco.MjModel, geom: int) -> tuple[Float[np.ndarray, "P 3"]
     if kind == _CAPSULE:
         return np.array([[0, 0, size[1]], [0, 0, -size[1]]]), float(size[0])
     if kind == _ELLIPSOID:
-        scaled = _DIRECTIONS * size
+        scaled = _sphere(200) * size
         return scaled * size / np.linalg.norm(scaled, axis=1, keepdims=True), 0.0
     if kind == _CYLINDER:
         angle = 2 * np.pi * np.arange(_RING) / _RING
@@ -81,7 +74,7 @@ def _outline(model: mujoco.MjModel, geom: int) -> tuple[Float[np.ndarray, "P 3"]
         mesh = int(model.geom_dataid[geom])
         start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
         vertices = model.mesh_vert[start : start + count].astype(np.float64)
-        return vertices[np.unique((vertices @ _DIRECTIONS.T).argmax(axis=0))], 0.0
+        return vertices[np.unique((vertices @ _sphere(100).T).argmax(axis=0))], 0.0
     return np.zeros((0, 3)), 0.0
 
 
@@ -91,6 +84,3 @@ def _sphere(count: int) -> Float[np.ndarray, "N 3"]:
     z, angle = 1 - 2 * k / count, np.pi * (1 + np.sqrt(5)) * k
     across = np.sqrt(1 - z**2)
     return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
-
-
-_DIRECTIONS = _sphere(200)

@@ -31,8 +31,10 @@ def follow(body: GivenBody) -> Poses:
 
     Shapes collide as the file says: by its bits, excludes and pairs, never with their parents.
     """
-    model = copy.copy(body.model)
-    model.opt.disableflags = 0  # a file may switch contacts off for its simulation
+    model = body.model
+    if model.opt.disableflags:  # a file may switch contacts off for its simulation
+        model = copy.copy(model)
+        model.opt.disableflags = 0
     data = mujoco.MjData(model)
     bodies = np.flatnonzero(model.body_rootid == body.root)
     ignored = set() if body.tpose is None else set(_contacts(model, data, body.tpose, bodies))

@@ -67,8 +67,11 @@ class Support:
         """How far the centre of mass lies outside what it stands on [m]; nan in frames that move,
         and where nothing is near the floor."""
         near = self.heights < self.thresholds.contact_height
-        outside = outside_hull(np.zeros((len(near), 2)), self.arms[..., :2], near)
-        return np.where(self.static & near.any(axis=1), outside, np.nan)
+        asked = self.static & near.any(axis=1)
+        outside = np.full(len(near), np.nan)
+        below = np.zeros((int(asked.sum()), 2))
+        outside[asked] = outside_hull(below, self.arms[asked][..., :2], near[asked])
+        return outside
 
 
 def support(track: Track, floor_z: float, thresholds: Thresholds) -> Support:
