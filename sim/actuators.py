@@ -15,7 +15,7 @@ from sim.parts import DETAIL, joint_kind_of, kept_joints, side_of
 from spark.feet import FOOT_LENGTH, standing_height
 from spark.rig import Rig
 
-SAG = np.radians(1.0)
+SAG = np.radians(0.8)
 PEAK = 4.0
 _FREQUENCY = 300.0  # [rad/s] of a servo that turns nothing but its own armature
 _SPEED = 40.0  # [rad/s] at which passive damping takes all that a servo can push

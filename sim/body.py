@@ -18,7 +18,7 @@ from sim.parts import DETAIL, LINK, hinges_of, joint_kind_of, kept_joints, kind_
 from sim.pose import qpos_of_pose
 from sim.sensors import add_sensors, add_sites
 from sim.shapes import add_materials, add_shapes
-from sim.stance import arms_down, balanced, standing_position
+from sim.stance import arms_down, balanced, lean, standing_position
 from spark.errors import SkeletonError
 from spark.feet import standing_height
 from spark.kinematics import world_positions
@@ -52,12 +52,31 @@ def build_body(rig: Rig, *, mass: float | None = None, joints: JointType = "ball
     add_sites(bodies, rig, masses)
     add_servos(spec, rig)
     add_sensors(spec, bodies, rig)
+    _add_keyframes(spec, rig, masses)
+    _add_excludes(spec, rig)
+    spec.comment = "\n".join(_notes(rig, masses, joints)).replace("--", "- -")
+    return spec
+
+
+def _notes(rig: Rig, masses: Inertias, joints: JointType) -> list[str]:
+    """What its user should know of the body."""
+    notes = []
+    if (angle := lean(rig, rig.tpose, masses)) != 0.0:
+        notes.append(
+            f"the body's weight would not lie above its soles: in the keyframes it leans "
+            f"{np.degrees(abs(angle)):.0f} degrees {'forward' if angle > 0 else 'back'}"
+        )
+    fixed = [j for j in kept_joints(rig)[1:] if not hinges_of(rig, j)]
+    if joints == "hinge" and fixed:
+        notes.append(f"{len(fixed)} joints without a role are fixed")
+    return notes
+
+
+def _add_keyframes(spec: mujoco.MjSpec, rig: Rig, masses: Inertias) -> None:
     model = spec.compile()
     for name, world in (("tpose", rig.tpose), ("home", arms_down(rig))):
         qpos = qpos_of_pose(model, rig, balanced(rig, world, masses))
         spec.add_key(name=name, qpos=qpos, ctrl=ctrl_of_qpos(model, qpos))
-    _add_excludes(spec, rig)
-    return spec
 
 
 def _add_defaults(spec: mujoco.MjSpec, rig: Rig, masses: Inertias, joints: JointType) -> None:

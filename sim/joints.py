@@ -8,6 +8,9 @@ of the mobile (AAOS, "Joint Motion"; Kapandji), with room for T-poses that are n
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+from jaxtyping import Float
+
 JointType = Literal["ball", "hinge"]
 _Number = int | float
 Range = tuple[_Number, _Number]
@@ -106,7 +109,6 @@ HINGES: dict[str, tuple[Hinge, ...]] = {
 }
 
 
-def mirrored(axis: Axis, side: str) -> Axis:
+def mirrored(axis: Axis, side: str) -> Float[np.ndarray, "3"]:
     """The axis of the same movement on a side: a right limb's is mirrored in the XZ plane."""
-    x, y, z = axis
-    return (-x, y, -z) if side == "right" else axis
+    return np.array(axis, dtype=float) * ([-1, 1, -1] if side == "right" else 1)

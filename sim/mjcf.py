@@ -5,10 +5,7 @@ from xml.etree import ElementTree
 
 import mujoco
 
-from sim.body import build_body
-from sim.joints import JointType
 from spark.errors import OutputError
-from spark.rig import Rig
 
 _DIGITS = 9  # of every number: nanometres on a body
 _ZERO = 1e-12
@@ -32,26 +29,46 @@ _SCENE = """<mujoco model="{name} scene">
 """
 
 
-def write_mjcf(
-    rig: Rig, path: str | Path, *, mass: float | None = None, joints: JointType = "ball"
-) -> tuple[Path, Path]:
-    """Write the body, and beside it `NAME_scene.xml` with floor and light, as Menagerie does."""
+def paths_of(spec: mujoco.MjSpec, path: str | Path) -> tuple[Path, ...]:
+    """What `write_mjcf` writes: the body, its scene, and an OBJ file for each of its meshes."""
     path = Path(path)
-    spec = build_body(rig, mass=mass, joints=joints)
+    meshes = [_mesh_file(path, mesh.name) for mesh in spec.meshes]
+    return path, path.with_name(f"{path.stem}_scene.xml"), *meshes
+
+
+def write_mjcf(spec: mujoco.MjSpec, path: str | Path) -> tuple[Path, Path]:
+    """Write a body, and beside it `NAME_scene.xml` with floor and light, as Menagerie does, and
+    the meshes it has in a folder `NAME_meshes`. Gives the paths of body and scene."""
+    path = Path(path)
     spec.modelname = path.stem
-    scene = path.with_name(f"{path.stem}_scene.xml")
+    root = _tree(spec)
+    body, scene, *_ = paths_of(spec, path)
     try:
-        path.write_text(to_xml(spec))
+        for mesh in root.iter("mesh"):
+            _move_to_file(mesh, path)
+        body.write_text(_text(root))
         scene.write_text(_SCENE.format(name=path.stem, file=path.name))
     except OSError as error:
-        raise OutputError(f"{path}: can't be written ({error.strerror})") from error
-    return path, scene
+        raise OutputError(
+            f"{error.filename or path}: can't be written ({error.strerror})"
+        ) from error
+    return body, scene
 
 
 def to_xml(spec: mujoco.MjSpec) -> str:
     """The MJCF of a body: MuJoCo's own, with servos called `position` and numbers without noise."""
+    return _text(_tree(spec))
+
+
+def notes_of(spec: mujoco.MjSpec) -> tuple[str, ...]:
+    """What was assumed of a body; it is also the comment at the head of its file."""
+    return tuple(filter(None, spec.comment.split("\n")))
+
+
+def _tree(spec: mujoco.MjSpec) -> ElementTree.Element:
     spec.compile()
-    root = ElementTree.fromstring(spec.to_xml())
+    parser = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
+    root = ElementTree.fromstring(spec.to_xml(), parser)
     for servo in root.iter("general"):
         servo.tag = "position"
         attributes = servo.attrib
@@ -63,6 +80,10 @@ def to_xml(spec: mujoco.MjSpec) -> str:
     for element in root.iter():
         for key, value in element.items():
             element.set(key, _tidy(value))
+    return root
+
+
+def _text(root: ElementTree.Element) -> str:
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode").replace(" />", "/>") + "\n"
 
@@ -74,3 +95,20 @@ def _tidy(value: str) -> str:
     except ValueError:
         return value
     return " ".join(f"{0.0 if abs(x) < _ZERO else x:.{_DIGITS}g}" for x in numbers) or value
+
+
+def _mesh_file(path: Path, mesh: str) -> Path:
+    safe = "".join(c if c.isalnum() or c in "-_." else "_" for c in mesh)
+    return path.with_name(f"{path.stem}_meshes") / f"{safe}.obj"
+
+
+def _move_to_file(mesh: ElementTree.Element, path: Path) -> None:
+    """Put a mesh that the XML holds as numbers into a file."""
+    file = _mesh_file(path, mesh.attrib["name"])
+    vertices = mesh.attrib.pop("vertex").split()
+    faces = [int(word) + 1 for word in mesh.attrib.pop("face").split()]
+    lines = [f"v {' '.join(vertices[k : k + 3])}" for k in range(0, len(vertices), 3)]
+    lines += [f"f {' '.join(map(str, faces[k : k + 3]))}" for k in range(0, len(faces), 3)]
+    file.parent.mkdir(exist_ok=True)
+    file.write_text("\n".join(lines) + "\n")
+    mesh.set("file", f"{file.parent.name}/{file.name}")

@@ -118,7 +118,7 @@ class _Projector:
             return asked
         lower, end = limb
         ((_, hinge),) = hinges_of(self.rig, lower)
-        axis = np.array(mirrored(hinge.axis, side_of(self.rig, lower)))
+        axis = mirrored(hinge.axis, side_of(self.rig, lower))
         upper_rest, lower_rest = (
             self._bone(self.rest, joint, lower),
             self._bone(self.rest, lower, end),

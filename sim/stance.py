@@ -39,20 +39,27 @@ def standing_position(rig: Rig, world: Float[np.ndarray, "J 4"]) -> Float[np.nda
 def balanced(
     rig: Rig, world: Float[np.ndarray, "J 4"], masses: Inertias
 ) -> Float[np.ndarray, "J 4"]:
-    """The pose, leaning at the ankles where its weight would not lie above the soles.
+    """The pose, leaning at the ankles where its weight would not lie above the soles."""
+    return _leaning(rig, world, lean(rig, world, masses))
 
-    A pose on feet whose weight does is returned as it is, and so is one without feet.
-    """
-    share = _weight(rig, world, masses)
-    if share is None or _WITHIN[0] <= share[0] <= _WITHIN[1]:
-        return world
-    feet = [k for s in sole_corners(rig) for k in rig.skeleton.subtree(int(s.joints[0]))]
-    leaning, angle = world, 0.0
+
+def lean(rig: Rig, world: Float[np.ndarray, "J 4"], masses: Inertias) -> float:
+    """The angle [rad] forward that brings the weight above the soles; 0 where it lies there, and
+    for a body without feet."""
+    found = _weight(rig, world, masses)
+    if found is None or _WITHIN[0] <= found[0] <= _WITHIN[1]:
+        return 0.0
+    angle = 0.0
     for _ in range(4):  # the body is an inverted pendulum: nearly linear
-        at, height = _weight(rig, leaning, masses) or share
+        at, height = _weight(rig, _leaning(rig, world, angle), masses) or found
         angle += (_AIM - at) / height
-        leaning = quat_mul(quat_about("y", np.array(angle)), world)
-        leaning[feet] = world[feet]
+    return angle
+
+
+def _leaning(rig: Rig, world: Float[np.ndarray, "J 4"], angle: float) -> Float[np.ndarray, "J 4"]:
+    leaning = quat_mul(quat_about("y", np.array(angle)), world)
+    feet = [k for sole in sole_corners(rig) for k in rig.skeleton.subtree(int(sole.joints[0]))]
+    leaning[feet] = world[feet]
     return leaning
 
 

@@ -21,6 +21,7 @@ from spark.transfer import transfer
 from spark_sim import files, rolemap
 
 if TYPE_CHECKING:
+    from sim.joints import JointType
     from sim.report import Report
     from spark_sim.robot import RobotClip
     from spark_sim.show import Simulated
@@ -85,17 +86,25 @@ class Clip:
         write_bvh(self.recording.bvh, path)
         return path
 
-    def save_mjcf(self, path: File, *, force: bool = False) -> tuple[Path, Path]:
+    def save_mjcf(
+        self,
+        path: File,
+        *,
+        joints: "JointType" = "ball",
+        force: bool = False,
+    ) -> tuple[tuple[Path, Path], tuple[str, ...]]:
         """Write a MuJoCo model of the body, and `NAME_scene.xml` beside it, with a floor and light.
 
-        Raises `OutputError` where one of them exists, unless forced.
+        Gives both paths, and notes on what was assumed. Raises `OutputError` where one of the files
+        exists, unless forced.
         """
-        from sim.mjcf import write_mjcf
+        from sim.body import build_body
+        from sim.mjcf import notes_of, paths_of, write_mjcf
 
-        path = Path(path)
-        for written in (path, path.with_name(f"{path.stem}_scene.xml")):
+        spec = build_body(self.rig, joints=joints)
+        for written in paths_of(spec, path):
             files.claim(written, force=force)
-        return write_mjcf(self.rig, path)
+        return write_mjcf(spec, path), notes_of(spec)
 
 
 def load(

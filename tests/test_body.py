@@ -1,26 +1,34 @@
-"""MuJoCo bodies: they are the rig, they stand on their soles, and MuJoCo steps them."""
+"""MuJoCo bodies: they are the rig, on any axes, with a human's mass, and their files are read."""
+
+from pathlib import Path
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 import pytest
-from conftest import DATA, recordings
+from bodies import at_key, rig_of, scene_of
+from conftest import recording, recordings
 from humanoids import ONE_A_RIG
+from stick import stick_rig
 
 from sim.body import build_body
-from sim.mjcf import write_mjcf
+from sim.mjcf import notes_of, to_xml, write_mjcf
 from sim.pose import qpos_from_motion
 from spark.canonical import from_canonical, to_canonical
-from spark.errors import SkeletonError
+from spark.errors import OutputError, SkeletonError
 from spark.kinematics import forward
 from spark.motion import Motion
-from spark.recording import read_recording
+from spark.reading import read_motion
 from spark.rig import Rig, understand
+from spark.rotation import quat_angle, quat_conj, quat_mul
 from spark.sample import BUILDS, sample_motion, sample_rig
 
+JOINT_TYPES = ("ball", "hinge")
 
-def rigid(path: object) -> tuple[Motion, Rig]:
+
+def rigid(path: Path) -> tuple[Motion, Rig]:
     """A recording without what its file stretches."""
-    motion = read_recording(str(path)).motion
+    motion = read_motion(path).motion
     rig = understand(motion)
     return from_canonical(to_canonical(motion, rig)), rig
 
@@ -40,9 +48,9 @@ def worst_error(model: mujoco.MjModel, motion: Motion, rig: Rig) -> float:
 
 
 @pytest.mark.parametrize("path", recordings(*ONE_A_RIG))
-def test_mujoco_agrees_with_our_kinematics(path: object, tmp_path: object) -> None:
+def test_mujoco_agrees_with_our_kinematics(path: Path, tmp_path: Path) -> None:
     motion, rig = rigid(path)
-    written, _ = write_mjcf(rig, tmp_path / "body.xml")  # type: ignore[operator]
+    written, _ = write_mjcf(build_body(rig), tmp_path / "body.xml")
     model = mujoco.MjModel.from_xml_path(str(written))
     assert worst_error(model, motion, rig) < 1e-6
 
@@ -51,33 +59,26 @@ def test_the_comparison_sees_a_wrong_bone() -> None:
     rig = sample_rig("walker")
     motion = sample_motion("walk", rig, 10.0)
     spec = build_body(rig)
-    spec.body(rig.skeleton.names[3]).pos = rig.skeleton.offsets[3] + [0, 0, 1e-4]
+    knee = spec.body(rig.skeleton.names[3])
+    knee.pos[2] += 1e-4
     assert worst_error(spec.compile(), motion, rig) > 5e-5
 
 
-@pytest.mark.parametrize("path", recordings(*ONE_A_RIG))
-def test_bodies_stand_on_their_soles_and_step(path: object, tmp_path: object) -> None:
-    _, rig = rigid(path)
-    _, scene = write_mjcf(rig, tmp_path / "body.xml")  # type: ignore[operator]
-    model = mujoco.MjModel.from_xml_path(str(scene))
+@pytest.mark.parametrize("path", recordings("zoo/ad_rokoko_mixamo.bvh", "zoo/m2m_human.bvh"))
+def test_coordinates_are_rotations_since_the_tpose(path: Path) -> None:
+    """Whatever the axes of the file's joints: zero is the T-pose, a body's `xquat` is G."""
+    motion, rig = rigid(path)
+    model = build_body(rig).compile()
+    assert np.all(model.body_quat == [1, 0, 0, 0])
+    at_zero = at_key(model, "tpose").qpos
+    np.testing.assert_allclose(at_zero[3:], np.tile([1, 0, 0, 0], (model.nq - 3) // 4), atol=1e-12)
     data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("tpose").id)
+    data.qpos[:] = qpos_from_motion(model, motion, rig)[0]
     mujoco.mj_kinematics(model, data)
-    boxes = np.flatnonzero(model.geom_type == int(mujoco.mjtGeom.mjGEOM_BOX))
-    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    lowest = min(
-        (data.geom_xpos[g] + (corners * model.geom_size[g]) @ data.geom_xmat[g].reshape(3, 3).T)[
-            :, 2
-        ].min()
-        for g in boxes
-    )
-    assert abs(lowest) < 1e-6
-    rng = np.random.default_rng(0)
-    while data.time < 1.0:
-        data.ctrl[:] = rng.uniform(-0.3, 0.3, model.nu)
-        mujoco.mj_step(model, data)
-    assert not [w.number for w in data.warning if w.number]
-    assert np.isfinite(data.qpos).all()
+    since_tpose = quat_mul(forward(motion)[1][0], quat_conj(rig.tpose))
+    for j in rig.skeleton.subtree(rig.carrier):
+        xquat = data.xquat[model.body(rig.skeleton.names[j]).id]
+        assert quat_angle(xquat, since_tpose[j]) < 1e-7
 
 
 @pytest.mark.parametrize("build", BUILDS)
@@ -92,10 +93,97 @@ def test_mass(build: str) -> None:
 
 
 def test_a_static_root_is_no_body() -> None:
-    if not DATA.exists():
-        pytest.skip("zoo/m2m_human.bvh: no recordings beside the checkout")
-    _, rig = rigid(DATA / "zoo/m2m_human.bvh")
-    model = build_body(rig).compile()
+    model = build_body(rig_of(recording("zoo/m2m_human.bvh"))).compile()
     names = {model.body(b).name for b in range(model.nbody)}
     assert "root" not in names
     assert "DEF-hips" in names
+
+
+@pytest.mark.parametrize("joints", JOINT_TYPES)
+def test_keyframes_are_within_ranges_and_held_by_their_controls(joints: str) -> None:
+    model = scene_of(sample_rig("walker"), joints)  # type: ignore[arg-type]
+    low, high = model.actuator_ctrlrange.T
+    for key in ("tpose", "home"):
+        data = at_key(model, key)
+        np.testing.assert_allclose(data.actuator_length, data.ctrl, atol=1e-9)
+        np.testing.assert_allclose(data.actuator_force, 0.0, atol=1e-6)
+        assert np.all((low <= data.ctrl) & (data.ctrl <= high))
+        assert data.nefc == 0 or not np.any(
+            data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT)
+        )
+    arms = [model.body(f"mixamorig:{side}Hand").id for side in ("Left", "Right")]
+    down, out = (at_key(model, key).xpos[arms] for key in ("home", "tpose"))
+    assert np.all(down[:, 2] < out[:, 2] - 0.3)
+
+
+@pytest.mark.parametrize("joints", JOINT_TYPES)
+def test_everything_that_can_be_named_has_a_name_and_every_joint_a_servo(joints: str) -> None:
+    model = scene_of(sample_rig("walker"), joints)  # type: ignore[arg-type]
+    named = [
+        (model.nbody, model.body),
+        (model.njnt, model.joint),
+        (model.nu, model.actuator),
+        (model.nsensor, model.sensor),
+        (model.nsite, model.site),
+        (model.nkey, model.key),
+        (model.nmat, model.material),
+    ]
+    for count, of in named:
+        names = [of(i).name for i in range(count)]
+        assert all(names)
+        assert len(set(names)) == count
+    driven = {int(j) for j in model.actuator_trnid[:, 0]}
+    assert driven == set(range(1, model.njnt))
+    assert np.all(model.actuator_ctrllimited)
+    assert np.all(model.actuator_forcelimited)
+
+
+@pytest.mark.parametrize("path", recordings(*ONE_A_RIG))
+def test_masses_and_inertias_are_those_of_bodies(path: Path) -> None:
+    model = build_body(rig_of(path)).compile()
+    assert np.all(model.body_mass[1:] > 0)
+    moments = np.sort(model.body_inertia[1:], axis=1)
+    assert np.all(moments[:, 0] > 0)
+    assert np.all(moments[:, 2] <= moments[:, :2].sum(1) + 1e-9)
+
+
+@pytest.mark.parametrize("joints", JOINT_TYPES)
+def test_the_file_is_written_to_be_read(joints: str) -> None:
+    """What joints and servos are like is said once, in their class."""
+    root = ElementTree.fromstring(to_xml(build_body(stick_rig(), joints=joints)))  # type: ignore[arg-type]
+    classes = {default.get("class") for default in root.find("default").iter("default")}  # type: ignore[union-attr]
+    assert {"body", "visual", "collision", "foot", "hip", "knee", "shoulder"} <= classes
+    world = root.find("worldbody")
+    actuators = root.find("actuator")
+    assert world is not None
+    assert actuators is not None
+    assert {e.get("class") for e in (*world.iter("joint"), *actuators)} <= classes
+    for joint in world.iter("joint"):
+        assert set(joint.keys()) <= {"name", "class", "axis"}
+    for servo in actuators:
+        assert servo.tag == "position"
+        assert set(servo.keys()) <= {"name", "class", "joint", "jointinparent", "gear"}
+    for geom in world.iter("geom"):
+        assert not {"rgba", "group", "contype", "friction", "mass"} & set(geom.keys())
+    numbers = [
+        word
+        for element in root.iter()
+        for value in element.attrib.values()
+        for word in value.split()
+        if word[-1].isdigit() and word[0] in "-0123456789"
+    ]
+    assert len(numbers) > 500
+    assert max(map(len, numbers)) <= len("-0.123456789e-05")
+
+
+def test_a_body_that_can_not_be_written_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="can't be written"):
+        write_mjcf(build_body(stick_rig()), tmp_path / "missing" / "b.xml")
+
+
+def test_notes_are_the_comment_of_the_file() -> None:
+    rig = rig_of(recording("mesh2motion/kaiju_Idle.bvh"))
+    spec = build_body(rig, joints="hinge")
+    assert notes_of(spec)[0].startswith("the body's weight")
+    assert all(note in to_xml(spec) for note in notes_of(spec))
+    assert notes_of(build_body(stick_rig())) == ()

@@ -8,14 +8,15 @@ from spark_sim.commands.options import add_corrections, add_force, load
 SUMMARY = "make a MuJoCo body from a BVH skeleton"
 USAGE = "RIG [-o OUT] [options]"
 DESCRIPTION = """\
-Write a MuJoCo model (MJCF) of the skeleton in RIG: one body a bone with a ball
-joint, capsules along the bones, boxes under the feet, human masses, and a free
-joint that carries it all. OUT holds the body alone; OUT_scene.xml, beside it,
-puts it on a floor and is the one to open in a viewer."""
+Write a MuJoCo model (MJCF) of the skeleton in RIG: one body a bone, capsules
+along the bones, boxes under the feet, human masses, servos that are strong
+enough to stand, sensors, and a free joint that carries it all. OUT holds the
+body alone; OUT_scene.xml, beside it, puts it on a floor and is the one to open
+in a viewer."""
 EXAMPLES = """\
 examples:
   spark-sim mjcf mutant.bvh            # writes mutant.xml, mutant_scene.xml
-  spark-sim mjcf mutant.bvh -o models/m.xml
+  spark-sim mjcf mutant.bvh --joints hinge -o models/m.xml
 """
 
 
@@ -23,6 +24,12 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument("rig", metavar="RIG", help="a BVH or FBX file; its motion is not needed")
     parser.add_argument(
         "-o", "--output", metavar="OUT", help="the file to write (default: RIG.xml, here)"
+    )
+    parser.add_argument(
+        "--joints",
+        choices=("ball", "hinge"),
+        default="ball",
+        help="ball joints (default), or hinges: one at elbows and knees, else three",
     )
     add_force(parser)
     add_corrections(parser, "RIG")
@@ -37,6 +44,8 @@ def run(args: Namespace) -> int:
     rig = load(args, args.rig)
     if not isinstance(rig, Clip):
         raise SkeletonError(f"{args.rig}: a robot has a model already; expected a BVH or FBX file")
-    for path in rig.save_mjcf(out, force=args.force):
+    written, notes = rig.save_mjcf(out, joints=args.joints, force=args.force)
+    console.notes(out, notes)
+    for path in written:
         console.say(str(path))
     return 0
