@@ -5,6 +5,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryFile
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from conftest import recording
 from jaxtyping import Float
 
+import spark_sim
 from robots import registry
 from robots.formats.unitree import write_csv
 from robots.morphology import Morphology, understand_robot
@@ -25,10 +27,11 @@ from sim.report.poses import follow
 from sim.report.track import track
 from sim.report.wrench import required_wrench
 from spark.canonical import to_canonical
-from spark.errors import SkeletonError, SparkSimError
+from spark.errors import FileFormatError, SkeletonError, SparkSimError
 from spark.recording import read_recording
 from spark.rig import understand
 from spark_sim.cli import run
+from spark_sim.robot import RobotClip
 
 FPS, FRAMES = 60.0, 90
 G = 9.81
@@ -300,3 +303,38 @@ def test_results_of_other_tools_are_judged_and_compared(robot: Morphology, tmp_p
     assert rows["ground-truth MSE [1e-4]"][1] == "0.00*"
     assert on_command_line("report", good, *of_robot, "--fail-over", "1%")[0] == 0
     assert on_command_line("report", lifted, *of_robot, "--fail-over", "1%")[0] == 1
+
+
+def test_qpos_of_any_script_is_read(robot: Morphology, tmp_path: Path) -> None:
+    qpos = standing(robot, 30)
+    rates: tuple[dict[str, Any], ...] = ({"fps": 50}, {"dt": 0.02}, {"frame_time": [0.02]})
+    for k, rate in enumerate(rates):
+        path = tmp_path / f"{k}.npz"
+        np.savez(path, qpos=qpos, **rate)
+        clip = spark_sim.load(path, robot="robot")
+        assert isinstance(clip, RobotClip)
+        assert clip.motion.frame_time == pytest.approx(0.02)
+        np.testing.assert_allclose(clip.body.qpos, qpos, atol=1e-12)
+        assert spark_sim.report(clip).implausible == 0
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"fps": 0}, "fps is 0"),
+        ({"dt": 0}, "expected a positive number"),
+        ({}, "has no 'fps'"),
+        ({"fps": 50, "qpos": np.zeros((3, 40))}, "40 columns; the robot 'ember' has 36"),
+        ({"fps": 50, "qpos": np.zeros((3, 36))}, "length 0; expected 1"),
+        ({"fps": 50, "qpos": np.full((3, 36), np.nan)}, "is nan in frame 0"),
+        ({"fps": 50, "qpos": np.zeros(36)}, "expected any x any"),
+    ],
+)
+def test_qpos_that_is_broken_is_refused(
+    robot: Morphology, tmp_path: Path, wrong: dict[str, object], message: str
+) -> None:
+    path = tmp_path / "broken.npz"
+    arrays: dict[str, Any] = {"qpos": standing(robot, 3)} | wrong
+    np.savez(path, **arrays)
+    with pytest.raises(FileFormatError, match=message):
+        spark_sim.load(path, robot="robot")

@@ -7,6 +7,7 @@ from robots.formats.arrays import read_arrays
 from robots.formats.gmr import read_pkl, write_pkl
 from robots.formats.mjlab import read_mjlab, write_mjlab
 from robots.formats.native import is_native, read_npz, write_npz
+from robots.formats.plain import is_plain, read_plain
 from robots.formats.unitree import ORDERS, likely_order, read_csv, write_csv
 from robots.morphology import Morphology
 from robots.motion import RobotMotion
@@ -57,7 +58,9 @@ def read(
         return read_npz(arrays, path, robot)
     if robot is None:
         raise ConventionError(f"{path}: doesn't say which robot moves; name it with --robot")
-    return read_pkl(path, robot) if arrays is None else read_mjlab(arrays, path, robot)
+    if arrays is None:
+        return read_pkl(path, robot)
+    return read_plain(arrays, path, robot) if is_plain(arrays) else read_mjlab(arrays, path, robot)
 
 
 def _need(path: Path, robot: Morphology | None, quat: str | None, fps: float | None) -> None:

@@ -1,0 +1,50 @@
+"""The npz that scripts with MuJoCo write: `qpos` and a rate, nothing else said.
+
+`qpos` (T, nq) is MuJoCo's own: position [m], quaternion wxyz, joints [rad]. The rate is `fps`, or
+the seconds between frames: `frame_time` or `dt`.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from robots.formats.arrays import number_array, scalar
+from robots.formats.qpos import check_finite, frame_time_of, of_qpos, unit
+from robots.morphology import Morphology
+from robots.motion import RobotMotion
+from spark.errors import FileFormatError
+
+_STEPS = ("frame_time", "dt")
+
+
+def is_plain(arrays: dict[str, np.ndarray]) -> bool:
+    """Whether an npz holds MuJoCo's coordinates."""
+    return "qpos" in arrays
+
+
+def read_plain(arrays: dict[str, np.ndarray], path: Path, robot: Morphology) -> RobotMotion:
+    """The motion on `robot`. Raises `FileFormatError` where its columns are not the robot's, or the
+    file has no rate."""
+    qpos = number_array(arrays, "qpos", path, (None, None))
+    expected = robot.mjcf.model.nq
+    if qpos.shape[1] != expected:
+        raise FileFormatError(
+            path,
+            None,
+            f"'qpos' has {qpos.shape[1]} columns; the robot {robot.mjcf.path.stem!r} has {expected}"
+            ". Is it of another robot, or are there objects beside it?",
+        )
+    check_finite(path, qpos=qpos)
+    base = int(robot.mjcf.model.jnt_qposadr[robot.mjcf.free_joint])
+    rotation = slice(base + 3, base + 7)
+    qpos[:, rotation], said = unit(qpos[:, rotation], path)
+    notes = ("qpos is read as MuJoCo's: metres, quaternion wxyz, radians", *said)
+    return of_qpos(qpos, robot, _frame_time(arrays, path), path, notes)
+
+
+def _frame_time(arrays: dict[str, np.ndarray], path: Path) -> float:
+    step = next((name for name in _STEPS if name in arrays), None)
+    if "fps" in arrays or step is None:
+        return frame_time_of(scalar(arrays, "fps", path), path)
+    seconds = scalar(arrays, step, path)
+    return frame_time_of(1 / seconds if seconds else np.inf, path)
