@@ -48,10 +48,12 @@ def search_tpose(
     turns of everything else. The search starts from several poses at once.
     """
     q = _starts(tree)
-    goals = _bone_goals(skeleton, roles, links)
+    pose = rest_pose(skeleton, roles)
+    goals = _bone_goals(pose, links)
+    flexes = _flexes(tree, pose, links)
     damping = 1e-2
     for _ in range(_STEPS):
-        normal = _linearize(tree, q, roles, links, ideal, goals, skeleton)
+        normal = _linearize(tree, q, roles, links, ideal, goals, flexes, skeleton)
         normal.pin(q.at_limits(tree, 0.0) * normal.g < 0)
         step = normal.solve_apart(damping)
         after = q.moved(tree, np.clip(step, -0.3, 0.3)).clipped(tree, 0.0)
@@ -59,7 +61,7 @@ def search_tpose(
         q = after
         if moved < _STILL:
             break
-    best = int(np.argmin(_linearize(tree, q, roles, links, ideal, goals, skeleton).cost))
+    best = int(np.argmin(_linearize(tree, q, roles, links, ideal, goals, flexes, skeleton).cost))
     one = Coordinates(
         q.pos[[best]],
         q.quat[[best]],
@@ -100,19 +102,18 @@ def _starts(tree: Tree) -> Coordinates:
 
 
 def _bone_goals(
-    skeleton: Skeleton, roles: RoleMap, links: Int[np.ndarray, "J"]
+    rest: Pose, links: Int[np.ndarray, "J"]
 ) -> dict[int, tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]]:
     """For each joint of arms and legs that can turn: its bone in the rest pose and where it points
     in the T-pose."""
     goals = {}
-    pose = rest_pose(skeleton, roles)
     for group, limb in LIMBS.items():
         arm = group in (Group.LEFT_ARM, Group.RIGHT_ARM)
         out = np.array([0.0, 1.0 if group is Group.LEFT_ARM else -1.0, 0.0])
         for role in limb[1:] if arm else limb[:2]:
-            for j in roles.joints(role):
-                bone = pose.bone(j)
-                parent = int(skeleton.parents[j])
+            for j in rest.roles.joints(role):
+                bone = rest.bone(j)
+                parent = int(rest.skeleton.parents[j])
                 if bone is not None and links[j] != links[parent]:
                     goals[j] = bone / np.linalg.norm(bone), out if arm else np.array([0.0, 0, -1])
     return goals
@@ -130,6 +131,7 @@ def _linearize(
     links: Int[np.ndarray, "J"],
     ideal: Float[np.ndarray, "J 4"],
     goals: dict[int, tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]],
+    flexes: dict[int, tuple[int, Float[np.ndarray, "3"]]],
     skeleton: Skeleton,
 ) -> Normal:
     count = len(q)
@@ -151,9 +153,8 @@ def _linearize(
             wanted = goal[:, None].repeat(count, 1)
             now = frames.direction(link, bone)
             _add(normal, columns, direction_rows(now, wanted, axes, _BONE))
-        if role in _BENDING and not tree.balls[chain[-1]]:
-            first = _own_first(tree, skeleton, links, j)
-            flex = tree.axes[first] * _bend_sign(tree, skeleton, roles, links, j, first)
+        if role in _BENDING and j in flexes:
+            first, flex = flexes[j]
             wanted = _BENDING[role][:, None].repeat(count, 1)
             above = tree.chain(int(tree.parents[first]))
             n = 3 + len(tree.columns(above))
@@ -175,6 +176,22 @@ def _add(normal: Normal, columns: list[int], rows: Rows) -> None:
     normal.add(columns, np.ascontiguousarray(J.transpose(2, 0, 1)), residuals)
 
 
+def _flexes(
+    tree: Tree, rest: Pose, links: Int[np.ndarray, "J"]
+) -> dict[int, tuple[int, Float[np.ndarray, "3"]]]:
+    """For each knee and elbow with hinges: the one that bends it, and the axis about which it
+    bends by growing angles, in the rest pose."""
+    out = {}
+    for role in _BENDING:
+        for j in rest.roles.joints(role):
+            link = int(links[j])
+            moves = link >= 0 and link != links[int(rest.skeleton.parents[j])]
+            if moves and not tree.balls[link]:
+                first = _own_first(tree, rest.skeleton, links, j)
+                out[j] = first, tree.axes[first] * _bend_sign(tree, rest, j, first)
+    return out
+
+
 def _own_first(tree: Tree, skeleton: Skeleton, links: Int[np.ndarray, "J"], j: int) -> int:
     """The first of a joint's own hinges: the one that bends a knee or an elbow."""
     above = int(links[int(skeleton.parents[j])])
@@ -184,17 +201,9 @@ def _own_first(tree: Tree, skeleton: Skeleton, links: Int[np.ndarray, "J"], j: i
     return own
 
 
-def _bend_sign(
-    tree: Tree,
-    skeleton: Skeleton,
-    roles: RoleMap,
-    links: Int[np.ndarray, "J"],
-    j: int,
-    hinge: int,
-) -> float:
+def _bend_sign(tree: Tree, rest: Pose, j: int, hinge: int) -> float:
     """+1 where a growing angle bends the joint: to the side where its range is larger."""
-    pose = rest_pose(skeleton, roles)
-    upper, lower = pose.bone(int(skeleton.parents[j])), pose.bone(j)
+    upper, lower = rest.bone(int(rest.skeleton.parents[j])), rest.bone(j)
     if upper is None or lower is None:
         return 1.0
     axis = tree.axes[hinge]
