@@ -1,5 +1,9 @@
 """Each measure of the report against an answer worked out by hand."""
 
+import re
+from dataclasses import asdict
+from pathlib import Path
+
 import numpy as np
 import pytest
 from stick import joint, standing, stick_rig
@@ -21,6 +25,7 @@ from sim.report.measures import (
 )
 from sim.report.selfcollision import segment_distance
 from sim.report.smoothness import joint_rates
+from sim.report.thresholds import PLAUSIBILITY_V1
 from spark.kinematics import forward
 from spark.roles import Role
 from spark.rotation import quat_about, quat_mul
@@ -227,3 +232,13 @@ def test_limits_name_the_joint_the_movement_and_the_excess(
         assert found == {}
     else:
         assert found == {movement: pytest.approx(excess)}
+
+
+def test_the_documents_tell_the_thresholds() -> None:
+    text = (Path(__file__).parents[1] / "docs" / "report.md").read_text(encoding="utf-8")
+    told = {
+        name: float(value) for name, value in re.findall(r"^\| `(\w+)` \| ([\d.]+) ", text, re.M)
+    }
+    used = asdict(PLAUSIBILITY_V1)
+    assert used.pop("version") in text
+    assert told == used
