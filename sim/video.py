@@ -57,9 +57,15 @@ def write_video(
 
 
 def write_strip(
-    scene: Scene, path: str | Path, *, count: int = 5, width: int | None = None, height: int = 330
+    scene: Scene,
+    path: str | Path,
+    *,
+    count: int | None = None,
+    width: int | None = None,
+    height: int = 330,
 ) -> None:
-    """One PNG of `count` moments, evenly spread from the first frame to the last.
+    """One PNG of `count` moments, evenly spread from the first frame to the last: five, or three of
+    many figures.
 
     Each is `width` x `height` pixels; without a width, just wide enough for the figures.
     """
@@ -70,6 +76,7 @@ def write_strip(
     path = Path(path)
     if width is None:
         width = round(height * fitting_aspect(scene))
+    count = count or (5 if width < 1.2 * height else 3)
     picked = np.linspace(0, len(scene.qpos) - 1, count).round().astype(int).tolist()
     pictures = list(frames(scene, picked, width=width, height=height))
     try:

@@ -19,9 +19,26 @@ if TYPE_CHECKING:
     from spark.errors import SparkSimError
     from spark_sim.clip import Clip, load, play, report, retarget, sample
     from spark_sim.robot import RobotClip
+    from spark_sim.show import Simulated, simulate
 
-__all__ = ["Clip", "RobotClip", "SparkSimError", "load", "play", "report", "retarget", "sample"]
-_ELSEWHERE = {"SparkSimError": "spark.errors", "RobotClip": "spark_sim.robot"}
+__all__ = [
+    "Clip",
+    "RobotClip",
+    "Simulated",
+    "SparkSimError",
+    "load",
+    "play",
+    "report",
+    "retarget",
+    "sample",
+    "simulate",
+]
+_ELSEWHERE = {
+    "SparkSimError": "spark.errors",
+    "RobotClip": "spark_sim.robot",
+    "Simulated": "spark_sim.show",
+    "simulate": "spark_sim.show",
+}
 
 
 def __getattr__(name: str) -> Any:
