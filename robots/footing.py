@@ -4,6 +4,7 @@ The places come from the copied motion. What the source's foot wobbles while it 
 it drifts beyond that is motion and stays.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from robots.morphology import Morphology, Sole
 from robots.targets import Targets
-from robots.tree import Frames
+from robots.tree import Coordinates, Frames, forward
 from spark.kinematics import world_positions
 from spark.rotation import quat_rotate
 
@@ -42,6 +43,33 @@ def plan_footing(robot: Morphology, targets: Targets) -> list[Footing]:
     positions = world_positions(skeleton, targets.world, still)
     positions += (targets.hips - positions[:, robot.rig.hips].mean(1))[:, None]
     return [_footing(robot, targets, positions, s) for s in range(len(robot.soles))]
+
+
+def within_reach(robot: Morphology, footing: Sequence[Footing], q: Coordinates) -> list[Footing]:
+    """Footprints where the feet of `q` stand on average: hips may not open as wide, or turn as far,
+    as the planned ones ask."""
+    frames = forward(robot.tree, q)
+    return [
+        _moved(f, corners_of(frames, sole)) for f, sole in zip(footing, robot.soles, strict=True)
+    ]
+
+
+def _moved(foot: Footing, corners: Float[np.ndarray, "4 3 T"]) -> Footing:
+    """Each footprint shifted and turned, over the floor, as the sole's corners are on average."""
+    places = foot.places.copy()
+    held = foot.holds.max(0)
+    edges = np.flatnonzero(np.diff(held > 0, prepend=False, append=False)).tolist()
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        weight = held[start:stop] / held[start:stop].sum()
+        here = slice(start, stop)
+        flat = [points[:, 0, here] + 1j * points[:, 1, here] for points in (places, corners)]
+        planned, stood = (points - points.mean(0) for points in flat)
+        turn = complex(((stood * planned.conj()).sum(0) * weight).sum())
+        turn /= max(abs(turn), 1e-12)
+        shift = ((flat[1] - flat[0]).mean(0) * weight).sum()
+        moved = flat[0].mean(0) + shift + turn * planned
+        places[:, 0, start:stop], places[:, 1, start:stop] = moved.real, moved.imag
+    return Footing(places, foot.holds)
 
 
 def corners_of(frames: Frames, sole: Sole) -> Float[np.ndarray, "4 3 T"]:

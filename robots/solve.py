@@ -11,7 +11,7 @@ from jaxtyping import Float
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from robots.collision import Near
-from robots.footing import Footing, plan_footing
+from robots.footing import Footing, plan_footing, within_reach
 from robots.morphology import Morphology
 from robots.motion import RobotMotion
 from robots.normal import Normal, Ties, second_differences
@@ -72,6 +72,8 @@ def solve(
             continue
         if not polish:
             q = solve_stage(robot, targets, footing, q, stage, steps, little, apart=False)
+        if stage.base:
+            footing = within_reach(robot, footing, q)
         if polish or robot.collisions.near(forward(robot.tree, q), stage, stride_of(targets)):
             q = solve_stage(robot, targets, footing, q, stage, steps, little, apart=True)
     return q
