@@ -161,7 +161,7 @@ def test_isaac_lab_s_order_is_seen(
     np.savez(tmp_path / "isaac.npz", **arrays)
     back = load_motion(tmp_path / "isaac.npz", robot="robot")
     np.testing.assert_allclose(back.on_robot.qpos[:, 7:], qpos[:, 7:], atol=1e-6)
-    assert any(f"breadth-first order, quaternions {quat}" in note for note in back.notes)
+    assert any(f"breadth-first order, quaternions as {quat}" in note for note in back.notes)
 
 
 def test_mjlab_of_another_robot_is_refused(clip: RobotClip, tmp_path: Path) -> None:
@@ -170,6 +170,17 @@ def test_mjlab_of_another_robot_is_refused(clip: RobotClip, tmp_path: Path) -> N
     np.savez(tmp_path / "other.npz", **arrays)
     with pytest.raises(FileFormatError, match="of another robot"):
         load_motion(tmp_path / "other.npz", robot="robot")
+
+
+def test_few_bodies_may_leave_the_order_open(clip: RobotClip, tmp_path: Path) -> None:
+    """Trackers keep some of the bodies: feet and hands tell the order, the root alone doesn't."""
+    arrays = dict(np.load(clip.save(tmp_path / "clip.npz", format="mjlab")))
+    for kept, says in (([0, 6, 12, 29], "as the bodies' places show"), ([0], "don't show it")):
+        few = {k: v[:, kept] if k.startswith("body") else v for k, v in arrays.items()}
+        np.savez(tmp_path / "few.npz", **few)
+        read = load_motion(tmp_path / "few.npz", robot="robot")
+        np.testing.assert_allclose(read.on_robot.qpos[:, 7:], clip.on_robot.qpos[:, 7:], atol=1e-6)
+        assert any("depth-first" in note and says in note for note in read.notes)
 
 
 def test_gmr_s_entries(clip: RobotClip, qpos: Float[np.ndarray, "T nq"], tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ from spark.files import write_atomically
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 
 _SAME_PLACE = 0.02  # [m] within which a body of the file is the robot's
+_TELLING = 1e-3  # [m] by which the right order has to be nearer
 _LOOKS = 25  # frames in which that is looked at
 
 
@@ -62,28 +63,28 @@ def read_mjlab(arrays: dict[str, np.ndarray], path: Path, robot: Morphology) -> 
     check_finite(path, joint_pos=angles, body_pos_w=pos, body_quat_w=quat)
     frame_time = frame_time_of(scalar(arrays, "fps", path), path)
     columns = Columns(pos[:, 0], quat[:, 0], angles, frame_time)
-    best, off = columns, np.inf
-    said = ""
-    for order, ids in (
-        ("depth", np.arange(angles.shape[1])),
-        ("breadth", breadth_first(robot.tree)),
-    ):
-        for convention, shift in (("wxyz", 0), ("xyzw", 1)):
-            read = np.zeros_like(angles)
-            read[:, ids] = angles
-            tried = replace(columns, quat=np.roll(quat[:, 0], shift, axis=1), angles=read)
-            miss = _distance(tried, pos, robot, path)
-            if miss < off - 1e-6:
-                best, off = tried, miss
-                said = f"joints are in {order}-first order, quaternions {convention}"
-    if off > _SAME_PLACE:
+    readings = {
+        (order, convention): replace(columns, quat=np.roll(quat[:, 0], shift, 1), angles=read)
+        for order, read in _orders(angles, robot.tree).items()
+        for convention, shift in (("wxyz", 0), ("xyzw", 1))
+    }
+    off = {how: _distance(reading, pos, robot, path) for how, reading in readings.items()}
+    best = min(off, key=lambda how: off[how])
+    if off[best] > _SAME_PLACE:
         raise FileFormatError(
             path,
             None,
-            f"its bodies are up to {100 * off:.3g} cm from where the robot "
+            f"its bodies are up to {100 * off[best]:.3g} cm from where the robot "
             f"{robot.mjcf.path.stem!r} has them, in any order of joints; is it of another robot?",
         )
-    return motion_of(best, robot, path, (f"{said}, as the bodies' places show",))
+    order, convention = best
+    rival = next(how for how in off if how[0] != order and how[1] == convention)
+    unclear = off[rival] < off[best] + _TELLING and not np.allclose(
+        readings[rival].angles, readings[best].angles
+    )
+    why = "though the bodies' places don't show it" if unclear else "as the bodies' places show"
+    said = f"joints are read in {order}-first order, quaternions as {convention}, {why}"
+    return motion_of(readings[best], robot, path, (said,))
 
 
 def body_poses(
@@ -106,14 +107,23 @@ def breadth_first(tree: Tree) -> Int[np.ndarray, "N"]:
     return np.argsort(depth, kind="stable")
 
 
+def _orders(angles: Float[np.ndarray, "T N"], tree: Tree) -> dict[str, Float[np.ndarray, "T N"]]:
+    """The angles by hinge, where the file has them in either order."""
+    breadth = np.zeros_like(angles)
+    breadth[:, breadth_first(tree)] = angles
+    return {"depth": angles, "breadth": breadth}
+
+
 def _distance(
     columns: Columns, pos: Float[np.ndarray, "T B 3"], robot: Morphology, path: Path
 ) -> float:
-    """How far [m] the robot's bodies are at most from the file's nearest ones."""
+    """How far [m] bodies of the robot and of the file are apart at most: each of the fewer from the
+    nearest of the others."""
     at = np.unique(np.linspace(0, len(pos) - 1, min(_LOOKS, len(pos))).round().astype(int))
     few = Columns(columns.pos[at], columns.quat[at], columns.angles[at], columns.frame_time)
     own, _ = body_poses(robot, motion_of(few, robot, path).qpos)
-    return float(np.linalg.norm(own[:, :, None] - pos[at][:, None], axis=-1).min(-1).max())
+    apart = np.linalg.norm(own[:, :, None] - pos[at][:, None], axis=-1)
+    return float(apart.min(2 if own.shape[1] <= pos.shape[1] else 1).max())
 
 
 def _gradient(values: Float[np.ndarray, "T ..."], dt: float) -> Float[np.ndarray, "T ..."]:
