@@ -12,6 +12,9 @@ import numpy as np
 import pytest
 from stick import standing, stick_rig
 
+from robots import registry
+from robots.morphology import understand_robot
+from robots.motion import RobotMotion
 from sim.report import Report, judge
 from sim.report.page import report_page, write_report_page
 from sim.report.plots import Plot, svg
@@ -19,22 +22,39 @@ from spark.errors import OutputError
 from spark.motion import Motion
 from spark.rig import Rig
 
+# Stands for a second, sinks for one, slides for one.
+PATH = np.zeros((180, 3))
+PATH[60:120, 2] = -0.05
+PATH[120:, 0] = 0.5 * np.arange(60) / 60
+TITLE = "a & b __X__ </script>"
+
 
 def stumbling() -> tuple[Report, tuple[Motion, Rig], tuple[Motion, Rig]]:
-    """Stands for a second, sinks for one, slides for one."""
     rig = stick_rig()
     still = standing(rig, 180)
-    path = np.zeros((180, 3))
-    path[60:120, 2] = -0.05
-    path[120:, 0] = 0.5 * np.arange(60) / 60
-    moved = replace(still, root_pos=still.root_pos + path)
+    moved = replace(still, root_pos=still.root_pos + PATH)
     return judge(moved, rig, source=(still, rig)), (moved, rig), (still, rig)
 
 
 @pytest.fixture(scope="module")
 def text() -> str:
     report, motion, source = stumbling()
-    return report_page(report, motion, source, title="a & b __X__ </script>")
+    return report_page(report, motion, source, title=TITLE)
+
+
+@pytest.fixture(scope="module")
+def robot_text() -> str:
+    """The same of a robot, beside the stick man."""
+    robot = understand_robot(registry.find("robot"))
+    qpos = np.tile(robot.to_qpos(robot.tpose)[0], (180, 1))
+    lowest = min(robot.standing_sole(sole)[:, 2].min() for sole in robot.soles)
+    pelvis = robot.motion(robot.from_qpos(qpos[:1]), 1.0).root_pos[0, 2]
+    qpos[:, :3] += PATH - np.array([0.0, 0.0, lowest + pelvis])
+    moved = RobotMotion(robot, robot.from_qpos(qpos), 1 / 60)
+    source = standing(stick_rig(), 180), stick_rig()
+    motion = moved.motion, robot.rig, moved.body
+    report = judge(moved.motion, robot.rig, source=source, body=moved.body)
+    return report_page(report, motion, source, title=TITLE)
 
 
 def test_it_is_one_file_that_asks_for_nothing(text: str) -> None:
@@ -69,8 +89,10 @@ def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
         write_report_page(report, tmp_path / "nowhere" / "r.html", motion, source, title="t")
 
 
-def test_it_works_in_a_browser(text: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("body", ["text", "robot_text"])
+def test_it_works_in_a_browser(body: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
     """Headless Chromium: no error; a finding sets the replay's time; the replay looks different."""
+    text: str = request.getfixturevalue(body)
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is None:
         assert "CI" not in os.environ, "CI installs chromium"
