@@ -7,6 +7,8 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import uniform_filter1d
 
 from robots.morphology import Morphology
+from robots.shapes import surface
+from robots.tree import forward
 from spark.canonical import CanonicalMotion, canonical_positions
 from spark.contacts import planted_points
 from spark.feet import sole_corners, sole_positions, standing_height
@@ -151,13 +153,27 @@ def _without_flicker(mask: Bool[np.ndarray, "T S 2"], frames: int) -> Bool[np.nd
 def _between_hands(
     rig: Rig, positions: Float[np.ndarray, "T J 3"], robot: Morphology
 ) -> Float[np.ndarray, "T 3"] | None:
-    """From the right hand to the left, in the robot's arm lengths; None where a hand is missing."""
+    """From the right hand to the left, in the robot's arm lengths, and no nearer than its palms
+    allow; None where a hand is missing."""
     roles = (Role.LEFT_HAND, Role.RIGHT_HAND)
     hands = [rig.roles.joint(role) for role in roles]
     if None in hands or None in [robot.rig.roles.joint(role) for role in roles]:
         return None
     scale = arm_length(robot.rig) / arm_length(rig)
-    return scale * (positions[:, hands[0]] - positions[:, hands[1]])
+    between = scale * (positions[:, hands[0]] - positions[:, hands[1]])
+    distance = np.linalg.norm(between, axis=1, keepdims=True)
+    least = sum(palm_thickness(robot, role) for role in roles)
+    return between * (np.maximum(distance, least) / np.maximum(distance, 1e-9))
+
+
+def palm_thickness(robot: Morphology, role: Role) -> float:
+    """How far [m] a hand reaches below its wrist's centre in the T-pose, where palms look down."""
+    j = robot.rig.roles.require(role)
+    link = int(robot.links[j])
+    body = int(robot.mjcf.model.jnt_bodyid[robot.mj_joints[link]])
+    points = surface(robot.mjcf, [body]) - robot.centers[j]
+    down = -forward(robot.tree, robot.tpose).turns[link][2, :, 0]
+    return float(np.max(points @ down, initial=0.0))
 
 
 def arm_length(rig: Rig) -> float:
