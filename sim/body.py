@@ -8,12 +8,15 @@ are left out; the carrier takes the free joint. With hinges in place of balls, j
 are fixed.
 """
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 
 from sim.actuators import add_servos, ctrl_of_qpos, set_strength, strengths
 from sim.inertia import Inertias, inertias
 from sim.joints import CONES, HINGES, JointType, Range, mirrored
+from sim.mesh import hulls_of
 from sim.parts import DETAIL, LINK, hinges_of, joint_kind_of, kept_joints, kind_of, side_of
 from sim.pose import qpos_of_pose
 from sim.sensors import add_sensors, add_sites
@@ -29,17 +32,25 @@ _NEAR = 3  # joints
 _ROOT = "body"  # the class of everything
 
 
-def build_body(rig: Rig, *, mass: float | None = None, joints: JointType = "ball") -> mujoco.MjSpec:
+def build_body(
+    rig: Rig,
+    *,
+    mass: float | None = None,
+    joints: JointType = "ball",
+    mesh: str | Path | None = None,
+) -> mujoco.MjSpec:
     """The model of a rig, T-posed at the origin with its soles at z = 0.
 
     `mass` [kg] is that of the whole body; where it is not given it follows from the height.
     `joints` are balls, or "hinge": one at elbow and knee, three elsewhere (`sim.joints.HINGES`).
+    `mesh` is a glTF file of a skin on the same skeleton: its hulls replace the capsules.
     Its keyframes, `tpose` and `home` (arms lowered), have the controls that hold them.
     """
     if mass is not None and not (np.isfinite(mass) and mass > 0):
         raise SkeletonError(f"mass is {mass} kg; expected a positive number")
     height = standing_height(rig)
     masses = inertias(rig, BODY_MASS_INDEX * height**2 if mass is None else mass)
+    hulls, mesh_notes = ({}, ()) if mesh is None else hulls_of(mesh, rig)
     spec = mujoco.MjSpec()
     spec.modelname = "body"
     spec.compiler.savecompiled = False  # keeps all digits: 6 would move the feet by micrometres
@@ -48,13 +59,13 @@ def build_body(rig: Rig, *, mass: float | None = None, joints: JointType = "ball
     _add_defaults(spec, rig, masses, joints)
     add_materials(spec)
     bodies = _add_bodies(spec, rig, masses, joints)
-    add_shapes(spec, bodies, rig)
+    add_shapes(spec, bodies, rig, hulls)
     add_sites(bodies, rig, masses)
     add_servos(spec, rig)
     add_sensors(spec, bodies, rig)
     _add_keyframes(spec, rig, masses)
     _add_excludes(spec, rig)
-    spec.comment = "\n".join(_notes(rig, masses, joints)).replace("--", "- -")
+    spec.comment = "\n".join([*mesh_notes, *_notes(rig, masses, joints)]).replace("--", "- -")
     return spec
 
 

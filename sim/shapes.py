@@ -3,11 +3,14 @@
 All of it is placed in T-pose world axes, from the joint that carries it: those are a body's axes.
 """
 
+from collections.abc import Mapping
+
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from sim.anthropometry import RADII
+from sim.mesh import Hull
 from sim.parts import DETAIL, kind_of, side_of
 from spark.feet import sole_corners, sole_positions, standing_height
 from spark.kinematics import end_positions, world_positions
@@ -37,16 +40,24 @@ def material_of(rig: Rig, joint: int) -> str:
     return side_of(rig, joint) or "middle"
 
 
-def add_shapes(spec: mujoco.MjSpec, bodies: dict[int, mujoco.MjsBody], rig: Rig) -> None:
-    """Give every body its geoms. Those of details, and what lies in a foot, are only seen."""
+def add_shapes(
+    spec: mujoco.MjSpec,
+    bodies: dict[int, mujoco.MjsBody],
+    rig: Rig,
+    hulls: Mapping[int, Hull],
+) -> None:
+    """Give every body its geoms: its hull where it has one, else simple ones. Those of details, and
+    what lies in a foot, are only seen: feet stand on boxes, which a foot's hull hides."""
     shapes = _Shapes(spec, bodies, rig)
     for j in bodies:
         kind = kind_of(rig, j)
-        if kind == "head":
+        if j in hulls:
+            shapes.hull(j, hulls[j])
+        elif kind == "head":
             shapes.head(j)
         elif kind not in ("foot", "toe"):
             shapes.bones(j, kind)
-    shapes.feet()
+    shapes.feet(hulls)
 
 
 class _Shapes:
@@ -61,12 +72,23 @@ class _Shapes:
     def bones(self, joint: int, kind: str) -> None:
         """A capsule along each of the joint's bones; a shank's ends above the sole."""
         radius = RADII.get(kind, _DETAIL) * self.height
-        above = self.rig.skeleton.ancestors(joint)
-        foot = any(kind_of(self.rig, k) == "foot" for k in above)  # what carries it are the soles
         for tip in self._tips(joint):
             if kind == "lower_leg":
                 tip = tip * max(0.5, 1.0 - radius / float(np.linalg.norm(tip)))
-            self._capsule(joint, tip, radius, "visual" if foot or kind == DETAIL else "collision")
+            self._capsule(joint, tip, radius, self._class(joint))
+
+    def hull(self, joint: int, hull: Hull) -> None:
+        """A convex mesh."""
+        name = self.rig.skeleton.names[joint]
+        self.spec.add_mesh(
+            name=name, uservert=hull.vertices.ravel(), userface=hull.faces.astype(np.int32).ravel()
+        )
+        self.bodies[joint].add_geom(
+            self.spec.find_default(self._class(joint)),
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=name,
+            material=material_of(self.rig, joint),
+        )
 
     def head(self, joint: int) -> None:
         """An ellipsoid, upright on its joint."""
@@ -78,18 +100,20 @@ class _Shapes:
             material=material_of(self.rig, joint),
         )
 
-    def feet(self) -> None:
-        """A box under each foot and one under its toes, with their lower faces on the soles."""
+    def feet(self, hulls: Mapping[int, Hull]) -> None:
+        """A box under each foot and one under its toes, with their lower faces on the soles; out of
+        sight where the foot has a hull."""
         for sole in sole_corners(self.rig):
             foot, toe = int(sole.joints[0]), int(sole.joints[-1])
             points = sole_positions(sole, self.pos, self.rig.tpose)
             if toe == foot:
-                self._box(foot, points)
+                self._box(foot, points, hidden=foot in hulls)
                 continue
-            self._box(foot, points[:4])
-            self._box(toe, points[2:])
-            instep = self.pos[toe] - self.pos[foot]
-            self._capsule(foot, instep, RADII["foot"] * self.height, "visual")
+            self._box(foot, points[:4], hidden=foot in hulls)
+            self._box(toe, points[2:], hidden=toe in hulls)
+            if foot not in hulls:
+                instep = self.pos[toe] - self.pos[foot]
+                self._capsule(foot, instep, RADII["foot"] * self.height, "visual")
 
     def _tips(self, joint: int) -> list[Float[np.ndarray, "3"]]:
         """Where the bones of a joint end: at children that carry on the body, or, at the end of a
@@ -115,15 +139,22 @@ class _Shapes:
             material=material_of(self.rig, joint),
         )
 
-    def _box(self, joint: int, points: Float[np.ndarray, "P 3"]) -> None:
+    def _class(self, joint: int) -> str:
+        above = self.rig.skeleton.ancestors(joint)
+        foot = any(kind_of(self.rig, k) == "foot" for k in above)
+        return "visual" if foot or kind_of(self.rig, joint) == DETAIL else "collision"
+
+    def _box(self, joint: int, points: Float[np.ndarray, "P 3"], *, hidden: bool) -> None:
         """A flat box over points of the sole; thinner than the joint is high."""
         low, high = points.min(0) - self.pos[joint], points.max(0) - self.pos[joint]
         half = (high - low) / 2
         half[2] = min(_FOOT * self.height, max(-low[2], 0.01)) / 2
-        self.bodies[joint].add_geom(
+        box = self.bodies[joint].add_geom(
             self.spec.find_default("foot"),
             type=mujoco.mjtGeom.mjGEOM_BOX,
             pos=(low + high) / 2 + [0, 0, half[2]],
             size=half,
             material=material_of(self.rig, joint),
         )
+        if hidden:
+            box.group = 3

@@ -91,17 +91,19 @@ class Clip:
         path: File,
         *,
         joints: "JointType" = "ball",
+        mesh: File | None = None,
         force: bool = False,
     ) -> tuple[tuple[Path, Path], tuple[str, ...]]:
         """Write a MuJoCo model of the body, and `NAME_scene.xml` beside it, with a floor and light.
 
-        Gives both paths, and notes on what was assumed. Raises `OutputError` where one of the files
-        exists, unless forced.
+        `joints` and `mesh` are those of `sim.body.build_body`; hulls of a mesh go into a folder
+        `NAME_meshes`. Gives both paths, and notes on what was assumed. Raises `OutputError` where
+        one of the files exists, unless forced.
         """
         from sim.body import build_body
         from sim.mjcf import notes_of, paths_of, write_mjcf
 
-        spec = build_body(self.rig, joints=joints)
+        spec = build_body(self.rig, joints=joints, mesh=mesh)
         for written in paths_of(spec, path):
             files.claim(written, force=force)
         return write_mjcf(spec, path), notes_of(spec)

@@ -17,6 +17,7 @@ EXAMPLES = """\
 examples:
   spark-sim mjcf mutant.bvh            # writes mutant.xml, mutant_scene.xml
   spark-sim mjcf mutant.bvh --joints hinge -o models/m.xml
+  spark-sim mjcf mutant.bvh --mesh mutant.glb
 """
 
 
@@ -31,6 +32,12 @@ def configure(parser: ArgumentParser) -> None:
         default="ball",
         help="ball joints (default), or hinges: one at elbows and knees, else three",
     )
+    parser.add_argument(
+        "--mesh",
+        metavar="GLB",
+        help="a skinned mesh on the same skeleton (.glb, .gltf): its convex hulls replace the "
+        "capsules",
+    )
     add_force(parser)
     add_corrections(parser, "RIG")
 
@@ -44,7 +51,7 @@ def run(args: Namespace) -> int:
     rig = load(args, args.rig)
     if not isinstance(rig, Clip):
         raise SkeletonError(f"{args.rig}: a robot has a model already; expected a BVH or FBX file")
-    written, notes = rig.save_mjcf(out, joints=args.joints, force=args.force)
+    written, notes = rig.save_mjcf(out, joints=args.joints, mesh=args.mesh, force=args.force)
     console.notes(out, notes)
     for path in written:
         console.say(str(path))
