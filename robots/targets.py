@@ -18,7 +18,7 @@ from spark.rotation import quat_mul, quat_rotate
 from spark.transfer import transfer
 
 _GAP = 0.08  # contacts and breaks shorter than this [s] are noise
-_BONES = (  # the limbs' segments, by the roles at their ends
+BONES = (  # the limbs' segments, by the roles at their ends
     (Role.LEFT_UPPER_LEG, Role.LEFT_LOWER_LEG),
     (Role.LEFT_LOWER_LEG, Role.LEFT_FOOT),
     (Role.RIGHT_UPPER_LEG, Role.RIGHT_LOWER_LEG),
@@ -28,7 +28,7 @@ _BONES = (  # the limbs' segments, by the roles at their ends
     (Role.RIGHT_UPPER_ARM, Role.RIGHT_FOREARM),
     (Role.RIGHT_FOREARM, Role.RIGHT_HAND),
 )
-_OUT = {
+OUT = {
     **{
         role: np.array([0.0, 0, -1]) for g in (Group.LEFT_LEG, Group.RIGHT_LEG) for role in LIMBS[g]
     },
@@ -108,7 +108,7 @@ def bone_directions(
     """Where the segments of arms and legs point: from joint to joint, or, where the joint at the
     far end is missing, as its rotation since the T-pose says."""
     out = {}
-    for upper, lower in _BONES:
+    for upper, lower in BONES:
         a, b = rig.roles.joint(upper), rig.roles.joint(lower)
         if a is None:
             continue
@@ -118,7 +118,7 @@ def bone_directions(
             if length.min() > 1e-6:
                 out[upper] = bone / length
                 continue
-        out[upper] = quat_rotate(rotations[:, a], _OUT[upper])
+        out[upper] = quat_rotate(rotations[:, a], OUT[upper])
     return out
 
 

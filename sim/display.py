@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from sim.given import GivenBody
-from sim.simplify import area, cell_for, simplify
+from sim.simplify import Mesh, simplify_together
 
-FACES = 30_000  # of one figure's meshes
+FACES = 40_000  # of one figure's meshes
 GHOST_RGBA = (0.35, 0.42, 0.55, 0.3)
 
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
@@ -122,10 +122,7 @@ def _add_meshes(
 ) -> dict[int, str]:
     """The meshes of some geoms, with at most about `FACES` faces in all, and their names."""
     used = sorted({int(model.geom_dataid[g]) for g in geoms if int(model.geom_type[g]) == _MESH})
-    found = {mesh: _mesh(model, mesh) for mesh in used}
-    if sum(len(faces) for _, faces in found.values()) > FACES:
-        cell = cell_for(sum(area(*mesh) for mesh in found.values()), FACES)
-        found = {mesh: simplify(*arrays, cell) for mesh, arrays in found.items()}
+    found = simplify_together({mesh: _mesh(model, mesh) for mesh in used}, FACES)
     names = {mesh: f"{prefix}mesh{mesh}" for mesh in used}
     for mesh, (vertices, faces) in found.items():
         spec.add_mesh(
@@ -137,9 +134,7 @@ def _add_meshes(
     return names
 
 
-def _mesh(
-    model: mujoco.MjModel, mesh: int
-) -> tuple[Float[np.ndarray, "V 3"], Int[np.ndarray, "F 3"]]:
+def _mesh(model: mujoco.MjModel, mesh: int) -> Mesh:
     start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
     first, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
     return (

@@ -6,13 +6,26 @@ Rossignac and Borrel, "Multi-resolution 3D approximations for rendering complex 
 import numpy as np
 from jaxtyping import Float, Int
 
-# Of the faces that a surface of area A has after clustering, about this many fall on cell² of it.
+Mesh = tuple[Float[np.ndarray, "_ 3"], Int[np.ndarray, "_ 3"]]
+
+# A grid's cells leave about this many faces on cell² of a smooth surface; of others more.
 _FACES_A_CELL = 2.5
+_TRIES = 5
 
 
-def cell_for(area: float, faces: int) -> float:
-    """The edge of the grid's cells that leaves about `faces` faces on a surface of `area`."""
-    return float(np.sqrt(_FACES_A_CELL * area / faces))
+def simplify_together(meshes: dict[int, Mesh], faces: int) -> dict[int, Mesh]:
+    """The meshes on one grid that leaves them no more than `faces` faces in all, or hardly more."""
+    count = sum(len(mesh[1]) for mesh in meshes.values())
+    if count <= faces:
+        return meshes
+    cell = np.sqrt(_FACES_A_CELL * sum(area(*mesh) for mesh in meshes.values()) / faces)
+    for _ in range(_TRIES):
+        fewer = {key: simplify(*mesh, float(cell)) for key, mesh in meshes.items()}
+        count = sum(len(mesh[1]) for mesh in fewer.values())
+        if count <= faces:
+            break
+        cell *= 1.05 * np.sqrt(count / faces)
+    return fewer
 
 
 def area(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> float:
@@ -25,12 +38,14 @@ def simplify(
     vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"], cell: float
 ) -> tuple[Float[np.ndarray, "W 3"], Int[np.ndarray, "G 3"]]:
     """The mesh on a grid of cells with this edge; every vertex of it is the mean of those it stands
-    for. Faces that shrink to a line are dropped, and of equal ones all but one. A mesh of which
-    nothing would be left stays as it is; cells are at most an eighth of its extent."""
+    for. Vertices that face other ways stay apart, so that the two sides of a thin shell do. Faces
+    that shrink to a line are dropped, and of equal ones all but one. A mesh of which nothing would
+    be left stays as it is; cells are at most an eighth of its extent."""
     cell = min(cell, float(np.ptp(vertices, axis=0).max()) / 8)
     place = np.floor((vertices - vertices.min(0)) / cell).astype(np.int64)
     width = place.max(0) + 1
     key = (place[:, 0] * width[1] + place[:, 1]) * width[2] + place[:, 2]
+    key = 6 * key + _sides(vertices, faces)
     kept, merged = np.unique(key, return_inverse=True)
     counts = np.bincount(merged, minlength=len(kept))
     sums = np.stack(
@@ -51,3 +66,20 @@ def simplify(
     if len(used) < 4:
         return vertices, faces
     return sums[used] / counts[used, None], renumbered.reshape(-1, 3)
+
+
+def _sides(
+    vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]
+) -> Int[np.ndarray, "V"]:
+    """Which of the six directions along the axes each vertex faces most."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    across = np.cross(b - a, c - a)
+    normals = np.stack(
+        [
+            np.bincount(faces.ravel(), weights=np.repeat(across[:, k], 3), minlength=len(vertices))
+            for k in range(3)
+        ],
+        axis=-1,
+    )
+    axis = np.abs(normals).argmax(1)
+    return 2 * axis + (np.take_along_axis(normals, axis[:, None], 1)[:, 0] > 0)

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float
 
 from spark.errors import SkeletonError
 from spark.features import BodyFeatures
-from spark.kinematics import local_rotations, world_positions
+from spark.kinematics import local_rotations
 from spark.plant import Leg, bend_leg, stance_correction
 from spark.roles import LIMBS, Group, Role
 from spark.rotation import quat_from_yaw, quat_mul, quat_rotate, sixd_from_quat, yaw_from_quat
@@ -165,16 +165,12 @@ class Stage:
         """The base's rotations on this body, with the planted feet planted."""
         rotations = self.variant.rotations(base)
         skeleton = self.variant.body.skeleton
-        positions = world_positions(skeleton, rotations, hips)
+        positions = np.empty((*rotations.shape[:-1], 3))
         for side, leg in enumerate(self.legs):
-            move = np.stack(
-                [
-                    stance_correction(path, flags)
-                    for path, flags in zip(
-                        positions[:, :, leg.contact], planted[..., side], strict=True
-                    )
-                ]
-            )
+            chain = list(skeleton.ancestors(leg.contact)[::-1])
+            bones = quat_rotate(rotations[..., chain[:-1], :], skeleton.offsets[chain[1:]])
+            positions[..., chain[1:], :] = hips[..., None, :] + bones.cumsum(-2)
+            move = stance_correction(positions[..., leg.contact, :], planted[..., side])
             rotations = bend_leg(rotations, positions, leg, move)
         return rotations
 

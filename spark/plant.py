@@ -29,17 +29,29 @@ class Leg(NamedTuple):
 
 
 def stance_correction(
-    contact_pos: Float[np.ndarray, "T 3"], planted: Bool[np.ndarray, "T"]
-) -> Float[np.ndarray, "T 3"]:
-    """What must be added to a contact point's path so that it rests while planted [same unit]."""
-    frames = np.flatnonzero(planted)
-    if not len(frames):
-        return np.zeros_like(contact_pos)
-    starts = np.flatnonzero(np.diff(frames, prepend=-2) > 1)
-    counts = np.diff(starts, append=len(frames))
-    means = np.add.reduceat(contact_pos[frames], starts) / counts[:, None]
-    held = np.repeat(means, counts, axis=0) - contact_pos[frames]
-    return blend_between(held, frames, len(planted))
+    contact_pos: Float[np.ndarray, "*n T 3"], planted: Bool[np.ndarray, "*n T"]
+) -> Float[np.ndarray, "*n T 3"]:
+    """What must be added to contact points' paths so that they rest while planted [same unit];
+    in between as `blend_between` does it."""
+    count = planted.shape[-1]
+    time = np.arange(count)
+    begins = planted & ~np.concatenate([np.zeros_like(planted[..., :1]), planted[..., :-1]], -1)
+    stance = begins.cumsum().reshape(planted.shape)  # a number for each stance of each path
+    frames = planted.nonzero()
+    counts = np.maximum(np.bincount(stance[frames]), 1)
+    held = np.zeros(contact_pos.shape)
+    for axis in range(3):
+        path = contact_pos[..., axis][frames]
+        means = np.bincount(stance[frames], path) / counts if len(path) else counts
+        held[..., axis][frames] = means[stance[frames]] - path
+    before = np.maximum.accumulate(np.where(planted, time, -1), -1)
+    after = np.minimum.accumulate(np.where(planted, time, count)[..., ::-1], -1)[..., ::-1]
+    before = np.where(before < 0, after, before) % count  # without any stance `held` is 0
+    after = np.where(after == count, before, after)
+    u = np.clip((time - before) / np.maximum(after - before, 1), 0, 1)[..., None]
+    ease = u * u * (3 - 2 * u)
+    last, following = (np.take_along_axis(held, k[..., None], -2) for k in (before, after))
+    return last + ease * (following - last)
 
 
 def blend_between(
@@ -80,10 +92,9 @@ def bend_leg(
     swing = quat_between(bent, goal)
 
     out = rotations.copy()
-    for j in leg.with_thigh:
-        out[..., j, :] = quat_mul(swing, rotations[..., j, :])
-    for j in leg.with_shank:
-        out[..., j, :] = quat_mul(swing, quat_mul(turn, rotations[..., j, :]))
+    parts = ((list(leg.with_thigh), swing), (list(leg.with_shank), quat_mul(swing, turn)))
+    for joints, turned in parts:
+        out[..., joints, :] = quat_mul(turned[..., None, :], rotations[..., joints, :])
     return out
 
 

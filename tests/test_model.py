@@ -1,6 +1,7 @@
 """Laws of the network: what padding, initialisation and time must not change."""
 
 import numpy as np
+import plain_spark
 import pytest
 import torch
 
@@ -255,3 +256,30 @@ def test_a_group_may_have_more_joints_than_places(batch: Batch) -> None:
     with torch.no_grad():
         a, b = (m(batch.pose, batch.source, batch.target) for m in (short, long))
     torch.testing.assert_close(a.rotations, b.rotations)
+
+
+@pytest.mark.parametrize("config", PRESETS)
+@pytest.mark.parametrize("share", [True, False], ids=["shared", "disjoint"])
+def test_the_network_is_its_equations(config: Config, share: bool, maker: PairMaker) -> None:
+    """A batch of unlike skeletons, padded and fused, against one skeleton at a time in plain loops.
+
+    The noise that the paper's decoder starts from is switched off.
+    """
+    torch.manual_seed(0)
+    model = Spark(Config(**{**vars(config), "noise": False, "share_joints": share})).eval()
+    for head in (model.decoder.rotation, model.decoder.root):
+        torch.nn.init.normal_(head.weight, std=0.3)
+    collator = Collator(NameEncoder().encode)
+    draws = [maker.draw(n, 1) for n in range(3)]
+    batch = collator.batch(draws)
+    assert len({len(draw.target.body.joints) for draw in draws}) > 1
+    with torch.no_grad():
+        fused = model(batch.pose, batch.source, batch.target, start_of(config, batch))
+        for k, draw in enumerate(draws):
+            one = collator.batch([draw])
+            plain = plain_spark.retargeted(
+                model, one.pose, one.source, one.target, start_of(config, one)
+            )
+            J = plain.rotations.shape[2]
+            assert (fused.rotations[k : k + 1, :, :J] - plain.rotations).abs().max() < 1e-5
+            assert (fused.root[k : k + 1] - plain.root).abs().max() < 1e-5

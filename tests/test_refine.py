@@ -84,3 +84,17 @@ def test_corrections_blend_without_a_jump() -> None:
     values = np.array([[0.0, 0, 0], [1.0, 0, 0]])
     out = blend_between(values, np.array([2, 6]), 9)[:, 0]
     np.testing.assert_allclose(out, [0, 0, 0, 5 / 32, 0.5, 27 / 32, 1, 1, 1])
+
+
+def test_many_paths_at_once_are_each_by_itself() -> None:
+    """Stances that touch a window's ends, none at all, and all: held at means, eased in between."""
+    rng = np.random.default_rng(0)
+    paths = rng.normal(size=(5, 30, 3))
+    planted = rng.random((5, 30)) < np.array([0.2, 0.5, 0.9, 0.0, 1.0])[:, None]
+    together = stance_correction(paths, planted)
+    for path, flags, made in zip(paths, planted, together, strict=True):
+        frames = np.flatnonzero(flags)
+        stances = np.split(frames, np.flatnonzero(np.diff(frames) > 1) + 1)
+        held = [path[stance].mean(0) - path[stance] for stance in stances if len(stance)]
+        wanted = blend_between(np.concatenate(held), frames, 30) if held else np.zeros((30, 3))
+        np.testing.assert_allclose(made, wanted, atol=1e-12)
