@@ -1,6 +1,7 @@
-"""Train the rows of the evaluation's tables on one reduced schedule, one after the other.
+"""Train the rows of the evaluation's tables on one reduced schedule, and print the tables.
 
-Usage: python scripts/ablations.py DATASET RUNS (a dataset of `spark-sim prepare`; a folder)
+Usage: python scripts/ablations.py DATASET RUNS NAMES
+(a dataset of `spark-sim prepare`; a folder; a name encoder of scripts/train_names.py)
 
 Rows that are done are left alone, one that was stopped goes on. Each is a run of `spark-sim train`
 on the settings below: small, and the same for all. OMP_NUM_THREADS says how many cores it takes.
@@ -30,10 +31,9 @@ SCHEDULE = {
     "batch": 8,
     "per_body": 2,
     "variants": 16,
-    "steps": 600,
+    "steps": 1200,
     "rate": 1e-3,
     "warmup": 50,
-    "name_steps": 100,
     "save_every": 100,
     "log_every": 10,
 }
@@ -44,19 +44,29 @@ def folder_of(row: str) -> str:
     return row.replace("w/o", "without").replace("w/", "with").replace(" ", "_").lower()
 
 
-def main(dataset: str, runs: str) -> None:
+def main(dataset: str, runs: str, names: str) -> None:
+    checkpoints = []
     for row, config in ROWS.items():
         out = Path(runs) / folder_of(row)
         settings = Path(runs) / f"{out.name}.toml"
         out.mkdir(parents=True, exist_ok=True)
-        settings.write_text(toml(config.changed(row, **SCHEDULE, data=[dataset])))
+        settings.write_text(toml(config.changed(row, **SCHEDULE, data=[dataset], names=names)))
         if (out / "checkpoint.safetensors").exists():
             given = ["--resume"]
         else:
             given = ["--config", str(settings), "--force"]
-        command = [sys.executable, "-m", "spark_sim", "train", "-o", str(out), *given]
-        print(f"{row}: {' '.join(command)}", flush=True)
-        subprocess.run(command, check=True)
+        print(row, flush=True)
+        spark_sim("train", "-o", str(out), *given)
+        checkpoints += ["--checkpoint", f"{row}={out}"]
+    outputs = [
+        f for kind in ("md", "json", "csv") for f in ("-o", str(Path(runs) / f"table.{kind}"))
+    ]
+    spark_sim("evaluate", dataset, "--made", *checkpoints, *outputs, "--force")
+
+
+def spark_sim(*arguments: str) -> None:
+    """Run one of its commands in a process of its own."""
+    subprocess.run([sys.executable, "-m", "spark_sim", *arguments], check=True)
 
 
 if __name__ == "__main__":
