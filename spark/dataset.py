@@ -27,7 +27,13 @@ from jaxtyping import Bool, Float
 
 from spark.clips import FRAME_TIME, read_clips
 from spark.dataset_parts import Part, make_part, read_part
-from spark.errors import FileFormatError, SkeletonError, SparkSimError
+from spark.errors import (
+    FileFormatError,
+    OutputError,
+    SkeletonError,
+    SparkSimError,
+    name_list,
+)
 from spark.features import BodyFeatures, body_features
 from spark.files import write_atomically
 from spark.pairs import Clip
@@ -53,15 +59,19 @@ def prepare(
     *,
     seed: int = 0,
     workers: int = 1,
+    force: bool = False,
     progress: Progress = lambda items, total: items,
 ) -> Index:
     """Write the dataset of the motion files in and below `sources` into the folder `out`; gives its
     index.
 
     A motion is a file's name. A body is a skeleton, named after the folder of its first file.
-    The same files and seed give the same bytes. Raises `FileFormatError` where a source holds no
-    motion file, `SkeletonError` where none is of a humanoid.
+    The same files and seed give the same bytes. A dataset that is there takes more files; it loses
+    one, or gets another seed, only with `force`. Raises `OutputError` there, and where `out` holds
+    something else, `FileFormatError` where a source holds no motion file, `SkeletonError` where
+    none is of a humanoid.
     """
+    before = {} if force else _clips_there(out, seed)
     files = sorted({path.resolve() for source in sources for path in motion_files(source)})
     parts = out / "parts"
     parts.mkdir(parents=True, exist_ok=True)
@@ -70,6 +80,12 @@ def prepare(
     if not index["clips"]:
         why = "; ".join(f"{left['file']}: {left['why']}" for left in index["left_out"][:3])
         raise SkeletonError(f"no recording of a humanoid among {len(files)} files: {why}")
+    lost = [name for digest, name in before.items() if digest not in digests.values()]
+    if lost:
+        raise OutputError(
+            f"{out}: holds clips that are not among these files: {name_list(lost)}; give another "
+            "folder, or overwrite it with --force"
+        )
     # An index that is there tells of arrays that are whole.
     (out / "index.json").unlink(missing_ok=True)
     _write_arrays(out, index, parts)
@@ -157,6 +173,28 @@ def _mapped(
         planted[clip["first_frame"] : clip["first_frame"] + frames],
         FRAME_TIME,
     )
+
+
+def _clips_there(out: Path, seed: int) -> dict[str, str]:
+    """The files in the dataset that `out` holds by their hashes; none where it holds nothing."""
+    try:
+        index = json.loads((out / "index.json").read_bytes())
+        if index["format"] != FORMAT:
+            raise ValueError
+        there, clips = index["seed"], {clip["sha256"]: clip["file"] for clip in index["clips"]}
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise OutputError(
+            f"{out}: holds an index.json that is no dataset's; give another folder, or overwrite "
+            "it with --force"
+        ) from error
+    if there != seed:
+        raise OutputError(
+            f"{out}: is a dataset of seed {there}, not {seed}; give another folder, or overwrite "
+            "it with --force"
+        )
+    return clips
 
 
 def _made(files: list[Path], parts: Path, workers: int) -> Iterator[tuple[Path, str]]:

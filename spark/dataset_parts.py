@@ -93,7 +93,8 @@ def _understood(path: Path) -> Part | Refused:
         canonical = to_canonical(motion, rig)
         clip = clip_of(path.stem, canonical, body_features(rig))
     except SparkSimError as error:
-        return Refused(str(error).replace(str(path), path.name))
+        why = str(error).removeprefix(f"{path}: ").replace(f"{path}:", "line ")
+        return Refused(why.replace(str(path), path.name))
     return Part(
         rig,
         clip.rotations.astype(np.float32),

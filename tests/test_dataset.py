@@ -1,6 +1,7 @@
 """Datasets: what comes out is what the files hold, whoever read them and how often."""
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -18,10 +19,10 @@ from spark.clips import clip_of
 from spark.dataset import _on_body, is_dataset, prepare, read_dataset, training_clips
 from spark.dataset_parts import Part
 from spark.encoding import encode_new
-from spark.errors import FileFormatError, SkeletonError
+from spark.errors import FileFormatError, OutputError, SkeletonError
 from spark.features import body_features
 from spark.pairs import PairMaker
-from spark.reading import read_motion
+from spark.reading import motion_files, read_motion
 from spark.rig import understand
 from spark.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_about, quat_angle, quat_conj, quat_mul
@@ -123,6 +124,8 @@ def test_what_is_left_out_and_why(tree: Path, tmp_path: Path) -> None:
     reasons = {left["file"]: left["why"] for left in index["left_out"]}
     assert list(reasons) == ["b_twin.bvh", "c_cut.bvh", "d_text.fbx", "e_still.bvh"]
     assert reasons["b_twin.bvh"] == "same as a.bvh"
+    assert re.match(r"line \d+: the motion is cut short", reasons["c_cut.bvh"])
+    assert reasons["d_text.fbx"].startswith("is no FBX file")
     assert "single frame" in reasons["e_still.bvh"]
     assert str(tmp_path) not in json.dumps(index)
 
@@ -259,3 +262,31 @@ def test_mixamo_downloads(tmp_path: Path) -> None:
     frames = {clip["file"]: clip["frames"] for clip in index["clips"]}
     assert frames["Kaya/silly_dancing_115f.fbx"] == 115
     assert frames["Michelle/silly_dancing_115f.fbx"] == 116
+
+
+def test_what_is_there_is_not_lost_unasked(tree: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    whole = prepare([tree], out)
+    before = (out / "index.json").read_bytes()
+    with pytest.raises(OutputError, match=r"not among these files: 'dancer/.*--force"):
+        prepare([tree / "walker"], out)
+    with pytest.raises(OutputError, match="is a dataset of seed 0, not 1"):
+        prepare([tree], out, seed=1)
+    assert (out / "index.json").read_bytes() == before
+    assert len(prepare([tree / "walker"], out, force=True)["clips"]) < len(whole["clips"])
+    (out / "index.json").write_text('{"name": "my page"}')
+    with pytest.raises(OutputError, match="no dataset's"):
+        prepare([tree], out)
+    assert prepare([tree], out, force=True) == whole
+
+
+def test_linked_folders_are_read_once(tree: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "links"
+    folder.mkdir()
+    (folder / "a").symlink_to(tree / "walker")
+    (folder / "b").symlink_to(tree / "walker")
+    (folder / "c").symlink_to(folder)
+    names = [path.relative_to(folder).as_posix() for path in motion_files(folder)]
+    assert names == [f"a/{name}.bvh" for name in ("squat", "walk", "wave")]
+    with pytest.raises(FileFormatError, match="nowhere: no such file or folder"):
+        motion_files(tmp_path / "nowhere")

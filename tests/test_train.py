@@ -319,6 +319,14 @@ def test_the_command_line_trains_resumes_and_retargets(tmp_path: Path) -> None:
     path = tmp_path / "run" / "checkpoint.safetensors"
     assert load_checkpoint(path).step == 2
     assert read_settings(tmp_path / "run" / "config.toml")["steps"] == 2
+    for refused, why in (
+        (("run", "--resume", "--preset", "paper"), "trained with preset = 'tiny', not 'paper'"),
+        (("run", "--resume", "--config", "tiny.toml"), "not from --config"),
+        (("none", "--resume"), "no run to resume"),
+    ):
+        done = command("train", "-o", *refused)
+        assert done.returncode == 2
+        assert why in done.stderr
     walk, target = "samples/walker_walk.bvh", "samples/dancer_wave.bvh"
     made = command(
         *("retarget", walk, "--to", target, "--method", "spark", "--checkpoint", str(path))

@@ -4,6 +4,8 @@ import os
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
+from spark_sim.commands.options import add_force
+
 SUMMARY = "make a dataset to train on"
 USAGE = "SRC... -o DATASET [options]"
 DESCRIPTION = """\
@@ -12,7 +14,7 @@ second, bodies without fingers, hair and clothes, canonical rotations. Made for
 Mixamo downloads, one folder a character, and good for any tree of files.
 Characters and motions are split into those that training sees and the others:
 the paper's characters by name, the rest drawn. A run that stopped goes on
-where it was."""
+where it was; run again with more files, it reads only those."""
 EXAMPLES = """\
 examples:
   spark-sim prepare mixamo/ -o dataset
@@ -28,18 +30,24 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--workers", metavar="N", type=int, help="processes (default: one for each core)"
     )
+    add_force(parser)
 
 
 def run(args: Namespace) -> int:
     from spark.dataset import prepare
+    from spark.errors import ConventionError
     from spark_sim import console
 
     out = Path(args.output)
+    workers = os.cpu_count() or 1 if args.workers is None else args.workers
+    if workers < 1:
+        raise ConventionError(f"--workers {workers}: expected 1 or more")
     index = prepare(
         [Path(source) for source in args.sources],
         out,
         seed=args.seed,
-        workers=args.workers or os.cpu_count() or 1,
+        workers=workers,
+        force=args.force,
         progress=lambda files, total: console.progress(files, "preparing", total),
     )
     for left in index["left_out"]:

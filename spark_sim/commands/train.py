@@ -1,7 +1,12 @@
 """`spark-sim train`: a network of your own."""
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from spark.settings import TrainConfig
 
 SUMMARY = "train the network that retargets"
 USAGE = "DATA... -o DIR [--config TOML] [--resume] [options]"
@@ -17,6 +22,8 @@ examples:
   torchrun --nproc-per-node 4 -m spark_sim train motions/ -o run
 """
 _FLAGS = ("steps", "batch", "window", "rate", "seed", "workers")
+# What the weights in a checkpoint were made for.
+_OF_THE_NETWORK = ("preset", "ablate", "width", "heads", "blocks", "names", "t5")
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -46,6 +53,10 @@ def run(args: Namespace) -> int:
 
     out = Path(args.output)
     path = out / "checkpoint.safetensors"
+    if args.resume and args.config:
+        raise ConventionError("--resume takes its settings from DIR/config.toml, not from --config")
+    if args.resume and not path.exists():
+        raise OutputError(f"{path}: no such file, so there is no run to resume")
     file = out / "config.toml" if args.resume else args.config and Path(args.config)
     given = {n: getattr(args, n) for n in (*_FLAGS, "preset", "ablate", "names", "t5")}
     given = {n: v for n, v in given.items() if v is not None} | (
@@ -67,6 +78,8 @@ def run(args: Namespace) -> int:
             f"training needs {error.name}: pip install 'spark-sim[train]'"
         ) from error
     start = load_checkpoint(path) if args.resume else None
+    if start:
+        _check_same_network(path, start.settings, config)
     clips, notes = training_clips(
         [Path(p) for p in config.data], lambda files: console.progress(files, "reading")
     )
@@ -79,3 +92,17 @@ def run(args: Namespace) -> int:
         done = train(clips, config, out, start=start, watch=tell)
     console.say(f"{path}: {done.step} steps on {len(clips)} clips")
     return 0
+
+
+def _check_same_network(path: Path, trained: Mapping[str, object], config: "TrainConfig") -> None:
+    """Raise `ConventionError` where a resumed run is asked for another network than it has."""
+    from spark.errors import ConventionError
+
+    for name in _OF_THE_NETWORK:
+        before, now = trained.get(name), getattr(config, name)
+        before = tuple(before) if isinstance(before, list) else before
+        if name in trained and before != now:
+            raise ConventionError(
+                f"{path}: was trained with {name} = {before!r}, not {now!r}; --resume goes on with "
+                "the network that is there"
+            )
