@@ -31,7 +31,7 @@ SCHEDULE = {
     "batch": 8,
     "per_body": 2,
     "variants": 16,
-    "steps": 1200,
+    "steps": 600,
     "rate": 1e-3,
     "warmup": 50,
     "save_every": 100,
@@ -61,7 +61,7 @@ def main(dataset: str, runs: str, names: str) -> None:
     outputs = [
         f for kind in ("md", "json", "csv") for f in ("-o", str(Path(runs) / f"table.{kind}"))
     ]
-    spark_sim("evaluate", dataset, "--made", *checkpoints, *outputs, "--force")
+    spark_sim("evaluate", dataset, "--made", "--limit", "10", *checkpoints, *outputs, "--force")
 
 
 def spark_sim(*arguments: str) -> None:

@@ -56,7 +56,7 @@ class Row:
     settings: Mapping[str, object] = field(default_factory=dict)
 
     def mean(self, structure: Structure) -> Score:
-        """The mean over the cells of a structure."""
+        """The mean over the cells of a structure; NaN where there is none."""
         of_one = [cell.score for (kind, _), cell in self.cells.items() if kind == structure]
         return mean_score({str(i): [score] for i, score in enumerate(of_one)})
 

@@ -6,7 +6,7 @@ nothing aligned; then the mean over a character's clips, then over characters.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, fields
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -74,9 +74,11 @@ def score_positions(
 
 
 def mean_score(scores: Mapping[str, Sequence[Score]]) -> Score:
-    """The mean over each character's clips, then over the characters; NaN is left out."""
+    """The mean over each character's clips, then over the characters; NaN is left out, and the mean
+    of nothing."""
     clips = [np.array([astuple(s) for s in of_one]) for of_one in scores.values()]
-    return Score(*_mean(np.array([_mean(values) for values in clips])).tolist())
+    of_characters = np.array([_mean(values) for values in clips]).reshape(-1, len(fields(Score)))
+    return Score(*_mean(of_characters).tolist())
 
 
 def san_mse(

@@ -158,7 +158,7 @@ def _unclear(
             out[kind] += f" {_stems(_pick(conventions, rng))[kind]}"
         if rng.random() < filled:
             out[kind] = f"{filler} {out[kind]}" if before else f"{out[kind]} {filler}"
-    if rng.random() < 0.5:
+    if rng.random() < 0.8:
         unknown = _pick((1, 1, 1, 2, 3), rng)
         for kind in rng.choice(KINDS, size=unknown, replace=False).tolist():
             out[kind] = _nonsense(rng)

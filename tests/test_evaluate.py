@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 import re
 import shutil
 import subprocess
@@ -105,6 +106,10 @@ def test_the_same_body_twice_is_both_structures_and_copy_is_right(
     assert sorted(c.structure for c in cases) == ["cross", "cross", "intra", "intra"]
     row = evaluate("copy", copied, [c for c in cases if c.structure == "intra"])
     assert row.mean("intra").mse < 1e-12
+    # A tool's results know no split targets.
+    assert math.isnan(row.mean("cross").mse)
+    table = markdown([evaluate("copy", copied, cases), replace(row, name="results")])
+    assert re.search(r"^\| results \| \S+ \| - \|$", table, re.M)
     split = next(c for c in cases if c.structure == "cross")
     assert split.answer is None
     assert len(split.truth.rig.skeleton) > len(split.source.rig.skeleton)
