@@ -1,8 +1,9 @@
 """Position servos: how strong each kind of joint is, and what their controls are.
 
 A kind's strength is the torque that its heaviest duty takes: to hold what hangs on it out
-horizontally, or, in a leg, to stand on the tip of one foot. The servo is so stiff that this duty
-bends it by `SAG`, and may push `PEAK` times as hard before it gives way.
+horizontally, or, in a leg, to stand on the tip of one foot: the rig's own, or a human's where that
+is longer. The servo is so stiff that this duty bends it by `SAG`, and may push `PEAK` times as hard
+before it gives way.
 """
 
 import mujoco
@@ -12,7 +13,8 @@ from jaxtyping import Float
 from sim.inertia import Inertias, held_torques
 from sim.joints import Axis, mirrored
 from sim.parts import DETAIL, joint_kind_of, kept_joints, side_of
-from spark.feet import FOOT_LENGTH, standing_height
+from spark.feet import FOOT_LENGTH, sole_corners, sole_positions, standing_height
+from spark.kinematics import world_positions
 from spark.rig import Rig
 
 SAG = np.radians(0.8)
@@ -28,6 +30,7 @@ def strengths(rig: Rig, bodies: Inertias) -> dict[str, float]:
     """The strength [N m] of each kind of joint: that of the one with the heaviest duty."""
     held = held_torques(rig, bodies)
     weight, height = 9.81 * bodies.masses.sum(), standing_height(rig)
+    levers = _levers(rig)
     found: dict[str, float] = {}
     for j in kept_joints(rig):
         kind = joint_kind_of(rig, j)
@@ -35,11 +38,26 @@ def strengths(rig: Rig, bodies: Inertias) -> dict[str, float]:
             continue
         duty = max(float(held[j]), _LEAST * weight * height)
         if kind == "toe":
-            duty = max(duty, weight * height * _BALL_TO_TIP)
+            duty = max(duty, weight * levers["toe"])
         elif any(joint_kind_of(rig, k) == "ankle" for k in rig.skeleton.subtree(j)):
-            duty = max(duty, weight * height * _ANKLE_TO_TIP)
+            duty = max(duty, weight * levers["ankle"])
         found[kind] = max(found.get(kind, 0.0), duty)
     return found
+
+
+def _levers(rig: Rig) -> dict[str, float]:
+    """How far [m] the tips of the toes lie from ankle and ball, along the floor of the T-pose; at
+    least as far as a human's."""
+    positions = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
+    height = standing_height(rig)
+    levers = {"ankle": height * _ANKLE_TO_TIP, "toe": height * _BALL_TO_TIP}
+    for sole in sole_corners(rig):
+        tip = sole_positions(sole, positions, rig.tpose)[4:, :2].mean(0)
+        for joint in {int(sole.joints[0]), int(sole.joints[-1])}:
+            kind = joint_kind_of(rig, joint)
+            length = float(np.linalg.norm(tip - positions[joint, :2]))
+            levers[kind] = max(levers[kind], length)
+    return levers
 
 
 def set_strength(default: mujoco.MjsDefault, strength: float) -> None:

@@ -93,6 +93,8 @@ def _add_keyframes(spec: mujoco.MjSpec, rig: Rig, masses: Inertias) -> None:
 def _add_defaults(spec: mujoco.MjSpec, rig: Rig, masses: Inertias, joints: JointType) -> None:
     """A class for what is seen, what collides and the soles, and one for each kind of joint."""
     root = spec.add_default(_ROOT, spec.default)
+    if joints == "ball":
+        root.joint.type = mujoco.mjtJoint.mjJNT_BALL
     for name in ("visual", "collision"):
         default = spec.add_default(name, root)
         default.geom.group = 2  # without meshes both are what one sees
@@ -102,7 +104,6 @@ def _add_defaults(spec: mujoco.MjSpec, rig: Rig, masses: Inertias, joints: Joint
     collision.geom.friction = [1.0, 0.005, 0.0001]
     spec.add_default("foot", collision).geom.condim = 4
     if joints == "ball":
-        root.joint.type = mujoco.mjtJoint.mjJNT_BALL
         detail = spec.add_default(DETAIL, root)
         detail.joint.armature = 2e-4
         detail.joint.stiffness[0], detail.joint.damping[0] = 0.2, 0.01

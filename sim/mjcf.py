@@ -17,6 +17,8 @@ _SCENE = """<mujoco model="{name} scene">
     <global azimuth="140" elevation="-20"/>
   </visual>
   <asset>
+    <texture type="skybox" builtin="gradient" rgb1="0.98 0.98 0.98" rgb2="0.72 0.78 0.85"
+      width="256" height="1536"/>
     <texture type="2d" name="floor" builtin="checker" mark="edge" rgb1="0.93 0.93 0.93"
       rgb2="0.87 0.87 0.87" markrgb="0.8 0.8 0.8" width="300" height="300"/>
     <material name="floor" texture="floor" texuniform="true" texrepeat="5 5"/>

@@ -14,7 +14,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int, UInt8
 
 from sim.camera import distance
 from sim.scene import Figure, Placed, Scene, build_scene
@@ -67,6 +67,7 @@ def page(
     data = {
         "frames": len(scene.qpos),
         "frame_time": scene.frame_time,
+        "file_frame_time": figures[0].motion.frame_time,
         "distance": distance(scene, half_view=_HALF_VIEW, aspect=1.6),
         "height": scene.height,
         "figures": [
@@ -108,15 +109,31 @@ def _figure(
         "joints": base64.b64encode(whole.tobytes()).decode(),
     }
     if marks is not None:
-        times = np.arange(len(scene.qpos)) * scene.frame_time
-        frames = np.round(times / figure.motion.frame_time).astype(int)
-        frames = np.minimum(frames, len(figure.motion) - 1)
+        frames, states, flags = _thinned(marks, figure.motion.frame_time, scene)
         out["marks"] = {
             **_packed(placed(marks.points[frames])),
-            "states": base64.b64encode(marks.states[frames].tobytes()).decode(),
-            "flags": [marks.flags[t] for t in frames],
+            "states": base64.b64encode(states.tobytes()).decode(),
+            "flags": flags,
         }
     return out
+
+
+def _thinned(
+    marks: Marks, frame_time: float, scene: Scene
+) -> tuple[Int[np.ndarray, "F"], UInt8[np.ndarray, "F M"], list[str]]:
+    """The motion's frames that the scene's are nearest to, and the marks of all frames around
+    each: what lasts for one frame is not lost."""
+    count, last = len(scene.qpos), len(marks.flags) - 1
+    times = np.arange(count) * scene.frame_time
+    frames = np.minimum(np.round(times / frame_time).astype(int), last)
+    nearest = np.round(np.arange(last + 1) * frame_time / scene.frame_time).astype(int)
+    nearest = np.minimum(nearest, count - 1)
+    states = marks.states[frames]
+    np.maximum.at(states, nearest, marks.states)
+    flags = [{*marks.flags[t].split()} for t in frames]
+    for t, frame in enumerate(nearest):
+        flags[frame] |= {*marks.flags[t].split()}
+    return frames, states, [" ".join(sorted(each)) for each in flags]
 
 
 def _body(model: mujoco.MjModel, body: int, root: int, column: int) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from spark.rig import Rig, understand
 STANDING = (
     *ONE_A_RIG,
     "mesh2motion/kaiju_Idle.bvh",
+    "zoo/m2m_bird.bvh",
     "mixamo/Kaya/rumba*.fbx",
     "mixamo/Warrok*/*.fbx",
 )

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from bodies import STANDING, at_key, joint_errors_deg, rig_of, run, scene_of
 from conftest import recordings
-from humanoids import ONE_A_RIG
 from stick import joint, stick_rig
 
 from sim.actuators import ctrl_of_qpos
@@ -65,7 +64,7 @@ def one_leg_lifted(rig: Rig) -> np.ndarray:
 
 
 @pytest.mark.parametrize("joints", JOINT_TYPES)
-@pytest.mark.parametrize("path", recordings(*ONE_A_RIG))
+@pytest.mark.parametrize("path", recordings(*STANDING))
 def test_an_unbalanced_pose_is_held_as_it_tips(path: Path, joints: str) -> None:
     rig = rig_of(path)
     model = scene_of(rig, joints)  # type: ignore[arg-type]

@@ -16,7 +16,7 @@ from sim.report.judge import Source
 from sim.report.measured import FLAGS, Measured
 from sim.report.plots import flag_strips, plots, svg
 from sim.report.result import Finding, Report
-from sim.report.text import figures, shares
+from sim.report.text import figures, of_which, shares
 from sim.report.track import track
 from sim.scene import Figure, build_scene
 from spark.errors import DependencyError, OutputError
@@ -114,6 +114,7 @@ def _cards(report: Report) -> str:
         f'<div class="card"><small>{html.escape(name)}</small>'
         f'<b class="{_grade(share)}">{100 * share:.1f} %</b>'
         + (f"<small>source {100 * theirs[name]:.1f} %</small>" if name in theirs else "")
+        + (f"<small>{rest}</small>" if (rest := of_which(report.clip, name)) else "")
         + "</div>"
         for name, share in shares(report.clip)
     ]

@@ -17,7 +17,7 @@ _POINTS = 500  # of a line: more can't be seen
 @dataclass(frozen=True, eq=False)
 class Plot:
     """One measure: what it is called, its unit, its values, which frames are flagged, where it
-    is too much, and the source's values at times of their own."""
+    is too much, the source's values at times of their own, and the least range that is drawn."""
 
     name: str
     unit: str
@@ -26,6 +26,7 @@ class Plot:
     limit: float | None
     source: Float[np.ndarray, "S"] | None = None
     lowest: bool = False  # of many points in one pixel, show the least
+    least: float = 1.0
 
 
 def plots(report: Report) -> list[Plot]:
@@ -49,6 +50,7 @@ def plots(report: Report) -> list[Plot]:
             flags["S"],
             None,
             None if source is None else _sliding(source),
+            least=limits.skate_speed,
         ),
         Plot(
             "force that nothing gives",
@@ -96,8 +98,7 @@ def plots(report: Report) -> list[Plot]:
 def svg(plot: Plot, duration: float, source_duration: float) -> str:
     """One plot, `duration` [s] wide: flagged frames shaded, the source behind, the limit dashed."""
     series = [plot.values] + ([] if plot.source is None else [plot.source])
-    # One spike must not flatten the rest.
-    top = max(1.2 * max(float(np.percentile(v, 99.5)) for v in series), plot.limit or 0.0, 1e-6)
+    top = max(1.2 * max(_high(v) for v in series), plot.limit or 0.0, plot.least)
     bottom = min(0.0, 1.2 * min(float(v.min()) for v in series), 1.5 * (plot.limit or 0.0))
 
     def y(value: Float[np.ndarray, "N"] | float) -> Float[np.ndarray, "N"]:
@@ -118,6 +119,11 @@ def svg(plot: Plot, duration: float, source_duration: float) -> str:
         f'<svg viewBox="0 0 {WIDTH:g} {_HEIGHT}" preserveAspectRatio="none">{"".join(parts)}'
         "</svg></figure>"
     )
+
+
+def _high(values: Float[np.ndarray, "N"]) -> float:
+    """The 99.5th percentile of what is above zero: one spike must not flatten the rest."""
+    return float(np.percentile(values[values > 0], 99.5)) if np.any(values > 0) else 0.0
 
 
 def flag_strips(clip: Measured) -> str:

@@ -32,7 +32,8 @@ def render(report: Report, *, color: bool) -> str:
     theirs = {} if source is None else dict(shares(source))
     for name, share in shares(clip):
         line = f"  {name:<18}{graded(share, f'{_percent(share):>8}')}"
-        lines.append(line + (f"   source {_percent(theirs[name]):>8}" if name in theirs else ""))
+        line += f"   source {_percent(theirs[name]):>8}" if name in theirs else ""
+        lines.append(line + (f"   {rest}" if (rest := of_which(clip, name)) else ""))
     lines += [f"  {name:<18}{words}" for name, words in figures(report)]
     lines += ["", *_verdict(report.findings, clip.frame_time)]
     if report.notes:
@@ -67,6 +68,13 @@ def shares(clip: Measured) -> Iterator[tuple[str, float]]:
         yield "out of balance", clip.unbalanced_share
 
 
+def of_which(clip: Measured, name: str) -> str:
+    """What a share is of, where that isn't all frames."""
+    if name != "out of balance":
+        return ""
+    return f"of those at rest, {_percent(float(np.isfinite(clip.imbalance).mean()))} of all"
+
+
 def figures(report: Report) -> Iterator[tuple[str, str]]:
     """The other measures, by name, in words."""
     clip, source, drift, contacts = report.clip, report.source, report.drift, report.contacts
@@ -75,9 +83,9 @@ def figures(report: Report) -> Iterator[tuple[str, str]]:
         others = "".join(f"; {joint} {_percent(share)}" for joint, share in often[1:] if share > 0)
         yield "most at a limit", f"{100 * often[0][1]:>6.1f} %        {often[0][0]}{others}"
     if contacts is not None and contacts.f1 is not None:
-        missed = 0.0 if contacts.recall is None else 1 - contacts.recall
-        words = f"{contacts.f1:>6.2f}          F1 against the source; {_percent(missed)} missed"
-        yield "foot contacts", words
+        parts = (("precision", contacts.precision), ("recall", contacts.recall))
+        words = "".join(f"; {name} {part:.2f}" for name, part in parts if part is not None)
+        yield "foot contacts", f"{contacts.f1:>6.2f}          F1 against the source{words}"
     if drift is not None:
         yield (
             "root drift",
