@@ -70,10 +70,11 @@ class Attention(nn.Module):
 
 
 class Feedforward(nn.Sequential):
-    """Position-wise network, four times as wide inside."""
+    """Position-wise network of one hidden layer."""
 
-    def __init__(self, width: int) -> None:
-        super().__init__(nn.Linear(width, 4 * width), nn.GELU(), nn.Linear(4 * width, width))
+    def __init__(self, given: int, hidden: int, width: int) -> None:
+        gelu = nn.GELU(approximate="tanh")
+        super().__init__(nn.Linear(given, hidden), gelu, nn.Linear(hidden, width))
 
 
 class TemporalBlock(nn.Module):
@@ -83,7 +84,7 @@ class TemporalBlock(nn.Module):
         super().__init__()
         self.norm_time, self.norm_ff = nn.LayerNorm(width), nn.LayerNorm(width)
         self.time = Attention(width, heads, rotary, causal)
-        self.ff = Feedforward(width)
+        self.ff = Feedforward(width, 4 * width, width)
 
     def forward(self, x: Float[Tensor, "M T D"]) -> Float[Tensor, "M T D"]:
         """M tokens, each along its T frames."""

@@ -9,10 +9,9 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from spark.bodies import Body, Pose
+from spark.bodies import Body, Pose, Start
 from spark.features import BodyFeatures
 from spark.pairs import Pairs, Windows, leg_of
-from spark.rig_names import split_side
 from spark.roles import Group
 
 Names = Callable[[Sequence[str]], Float[Tensor, "S E"]]
@@ -25,7 +24,7 @@ class Batch(NamedTuple):
     target: Body
     pose: Pose
     truth: Pose
-    start: Pose
+    start: Start
     planted: Bool[Tensor, "B T J"]
     effectors: Bool[Tensor, "B J"]
     frame_time: float
@@ -56,7 +55,10 @@ class Collator:
             self.bodies(targets, counts),
             _poses([draw.source for draw in draws]),
             _poses([draw.target for draw in draws]),
-            _poses([draw.start for draw in draws]),
+            Start(
+                *_poses([draw.start for draw in draws]),
+                _stack([torch.as_tensor(draw.guess) for draw in draws], counts, -1),
+            ),
             planted,
             _stack(effectors, counts),
             draws[0].frame_time,
@@ -87,15 +89,9 @@ class Collator:
         for g, (joints, arc) in enumerate(zip(features.groups, features.arcs, strict=True)):
             groups[g, : len(joints)] = torch.as_tensor(joints)
             arcs[g, : len(joints)] = _float(arc)
-        sides = torch.zeros(len(features.joints), 2)
-        for k, j in enumerate(features.joints.tolist()):
-            role = features.rig.roles.roles[j]
-            side = split_side(role)[0] if role else ""
-            if side:
-                sides[k, int(side == "right")] = 1
         parents = torch.as_tensor(features.skeleton.parents).clamp(min=0)
         return Body(
-            torch.cat([self._names(features.skeleton.names), sides], -1)[None],
+            torch.cat([self._names(features.skeleton.names), _float(features.sides)], -1)[None],
             _float(features.tpose)[None],
             _float(features.shape)[None],
             groups[None],

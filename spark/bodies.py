@@ -3,6 +3,7 @@
 Axes: B batch, T frames, J joints, N joints of one of the six groups (padded).
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import torch
@@ -33,6 +34,21 @@ class Pose(NamedTuple):
     root: Float[Tensor, "B T 3"]  # hip heights, relative to the window's first heading
 
 
+class Start(NamedTuple):
+    """The analytic transfer, where a residual network starts."""
+
+    rotations: Float[Tensor, "B T J 6"]
+    root: Float[Tensor, "B T 3"]
+    guess: Int[
+        Tensor, "B J"
+    ]  # `Correspondence.guess`: the joint whose correction moves each; or -1
+
+    @property
+    def pose(self) -> Pose:
+        """The motion alone."""
+        return Pose(self.rotations, self.root)
+
+
 def forward_kinematics(pose: Pose, body: Body) -> Float[Tensor, "B T J 3"]:
     """Joint positions in hip heights; a padding joint lies at the root.
 
@@ -40,34 +56,34 @@ def forward_kinematics(pose: Pose, body: Body) -> Float[Tensor, "B T J 3"]:
     a tree of depth 16 needs 4 batched products, whatever the skeletons in the batch.
     """
     with exactly(pose.root):
-        return _positions(pose, body)
+        world = world_matrices(pose.rotations, body.parents)
+        bones = (take(world, body.parents) @ body.offsets[:, None, :, :, None]).squeeze(-1)
+        moves = (body.parents != _own(body.parents))[:, None, :, None]
+        return _chained(bones * moves, body.parents, torch.add) + pose.root[:, :, None]
 
 
-def _positions(pose: Pose, body: Body) -> Float[Tensor, "B T J 3"]:
-    B, J = body.valid.shape
-    world = matrix_from_sixd(pose.rotations)
-    parents = body.parents
-    own = torch.arange(J, device=parents.device).expand(B, J)
-    pending = parents != own
-    pointer = parents
-    steps = max(1, (max(J - 1, 1)).bit_length())
-    for _ in range(steps):
-        upper = take(world, pointer)
-        world = torch.where(pending[:, None, :, None, None], upper @ world, world)
-        nearer = torch.gather(pointer, 1, pointer)
-        pending = pending & torch.gather(pending, 1, pointer)
-        pointer = nearer
-    bones = (take(world, parents) @ body.offsets[:, None, :, :, None]).squeeze(-1)
-    moves = (parents != own)[:, None, :, None]
-    positions = bones * moves
-    pointer = parents
-    pending = parents != own
-    for _ in range(steps):
-        upper = take(positions, pointer)
-        positions = torch.where(pending[:, None, :, None], positions + upper, positions)
+def world_matrices(
+    rotations: Float[Tensor, "B T J 6"], parents: Int[Tensor, "B J"]
+) -> Float[Tensor, "B T J 3 3"]:
+    """World rotations from local ones."""
+    return _chained(matrix_from_sixd(rotations), parents, torch.matmul)
+
+
+def _chained(
+    local: Tensor, parents: Int[Tensor, "B J"], join: Callable[[Tensor, Tensor], Tensor]
+) -> Tensor:
+    """Each joint's `local`, joined to those of all its ancestors."""
+    out, pointer, pending = local, parents, parents != _own(parents)
+    shape = (len(parents), 1, -1, *([1] * (local.ndim - 3)))
+    for _ in range(max(1, (max(parents.shape[1] - 1, 1)).bit_length())):
+        out = torch.where(pending.view(shape), join(take(out, pointer), out), out)
         pending = pending & torch.gather(pending, 1, pointer)
         pointer = torch.gather(pointer, 1, pointer)
-    return positions + pose.root[:, :, None]
+    return out
+
+
+def _own(parents: Int[Tensor, "B J"]) -> Int[Tensor, "B J"]:
+    return torch.arange(parents.shape[1], device=parents.device).expand_as(parents)
 
 
 def take(x: Tensor, joints: Int[Tensor, "B J"]) -> Tensor:

@@ -1,9 +1,7 @@
-"""Checkpoints: one safetensors file with the weights, what they mean, and what resuming needs.
+"""Checkpoints: one file (`spark.weights`) with weights, settings and what resuming needs.
 
-The header's metadata carries a format version and, as JSON, the settings of the network, of the
-name encoder and of the training; tensors are named `model.*`, `names.*` and `optimizer.*`. No
-pickle: reading one runs no code. Draws and noise are functions of the step's number, so the step
-is all that there is of the state of random numbers.
+Draws and noise are functions of the step's number, so the step is all that there is of the state
+of random numbers.
 """
 
 import json
@@ -12,17 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor
 
-from spark.errors import FileFormatError
+from spark.config import Config
 from spark.files import write_atomically
-from spark.model import Config, Spark
+from spark.model import Spark
 from spark.names import NameConfig, NameEncoder
-
-FORMAT = "spark-sim checkpoint"
-VERSION = 1
+from spark.weights import FORMAT, VERSION, Tensors, read_weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,39 +56,21 @@ def save_checkpoint(checkpoint: Checkpoint, path: Path) -> None:
 
 def load_checkpoint(path: Path) -> Checkpoint:
     """Read a checkpoint onto the CPU. Raises `FileFormatError` for anything that is not one."""
-    if not path.is_file():
-        raise FileFormatError(path, None, "no such file; expected a spark-sim checkpoint")
+    weights = read_weights(path)
     try:
-        with safe_open(path, framework="pt") as file:
-            metadata = file.metadata() or {}
-            if metadata.get("format") != FORMAT:
-                raise FileFormatError(path, None, "holds tensors, but is no spark-sim checkpoint")
-            if metadata.get("version") != str(VERSION):
-                raise FileFormatError(
-                    path,
-                    None,
-                    f"is a checkpoint of version {metadata.get('version')!r}; this spark-sim reads "
-                    f"version {VERSION}",
-                )
-            tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
-    except (SafetensorError, OSError) as error:
-        raise FileFormatError(path, None, f"is no safetensors file ({error})") from error
-    try:
-        header = json.loads(metadata["config"])
-        model = Spark(Config(**header["network"]))
-        model.load_state_dict(_below("model.", tensors))
+        model = Spark(Config(**weights.network))
+        model.load_state_dict(_tensors(weights.below("model.")))
         names: NameEncoder | str
-        if "t5" in header["names"]:
-            names = str(header["names"]["t5"])
+        if "t5" in weights.names:
+            names = str(weights.names["t5"])
         else:
-            names = NameEncoder(NameConfig(**header["names"]))
-            names.load_state_dict(_below("names.", tensors))
+            names = NameEncoder(NameConfig(**weights.names))
+            names.load_state_dict(_tensors(weights.below("names.")))
             names.requires_grad_(False)
-        step, settings = int(header["step"]), dict(header["settings"])
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        reason = str(error).splitlines()[0]
-        raise FileFormatError(path, None, f"is a damaged checkpoint ({reason})") from error
-    return Checkpoint(model, names, step, settings, _below("optimizer.", tensors))
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise weights.damaged(error) from error
+    optimizer = _tensors(weights.below("optimizer."))
+    return Checkpoint(model, names, weights.step, weights.settings, optimizer)
 
 
 def optimizer_tensors(
@@ -118,5 +95,5 @@ def restore_optimizer(
             optimizer.state[parameter] = {k: v.to(parameter.device) for k, v in state.items()}
 
 
-def _below(prefix: str, tensors: dict[str, Tensor]) -> dict[str, Tensor]:
-    return {k.removeprefix(prefix): v for k, v in tensors.items() if k.startswith(prefix)}
+def _tensors(arrays: Tensors) -> dict[str, Tensor]:
+    return {name: torch.as_tensor(array) for name, array in arrays.items()}

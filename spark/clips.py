@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
 from spark.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.contacts import planted_feet
@@ -12,8 +11,8 @@ from spark.errors import SkeletonError, SparkSimError
 from spark.features import BodyFeatures, body_features
 from spark.pairs import Clip
 from spark.reading import motion_files, read_motion
+from spark.resample import positions_at, rotations_at
 from spark.rig import understand
-from spark.rotation import quat_slerp
 from spark.skeleton import Skeleton
 
 FRAME_TIME = 1 / 30
@@ -62,31 +61,6 @@ def at_frame_time(canonical: CanonicalMotion, frame_time: float) -> CanonicalMot
         canonical.floor_z,
         canonical.notes,
     )
-
-
-def rotations_at(
-    rotations: Float[np.ndarray, "T J 4"], at: Float[np.ndarray, "N"]
-) -> Float[np.ndarray, "N J 4"]:
-    """Rotations at fractional frames; the first and last frame hold beyond the ends."""
-    low, high, share = _neighbours(at, len(rotations))
-    mix = np.broadcast_to(share[:, None], (len(at), rotations.shape[1]))
-    return quat_slerp(rotations[low], rotations[high], mix)
-
-
-def positions_at(
-    path: Float[np.ndarray, "T 3"], at: Float[np.ndarray, "N"]
-) -> Float[np.ndarray, "N 3"]:
-    """A path at fractional frames; the first and last frame hold beyond the ends."""
-    low, high, share = _neighbours(at, len(path))
-    return path[low] + share[:, None] * (path[high] - path[low])
-
-
-def _neighbours(
-    at: Float[np.ndarray, "N"], count: int
-) -> tuple[np.ndarray, np.ndarray, Float[np.ndarray, "N"]]:
-    at = np.clip(at, 0, count - 1)
-    low = np.minimum(at.astype(int), max(count - 2, 0))
-    return low, np.minimum(low + 1, count - 1), at - low
 
 
 def clip_of(name: str, canonical: CanonicalMotion, body: BodyFeatures) -> Clip:

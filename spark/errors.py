@@ -21,6 +21,10 @@ class SkeletonError(SparkSimError):
     """A skeleton lacks what the task needs (no legs, a cycle, mismatching joint counts)."""
 
 
+class FrameError(SparkSimError):
+    """A frame of a stream is broken; what came before it stays valid."""
+
+
 class OutputError(SparkSimError):
     """A result can't be written where it was asked for."""
 

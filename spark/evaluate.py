@@ -9,7 +9,6 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
@@ -21,11 +20,9 @@ from spark.evaluation_cases import SPARE_FRAMES, STRUCTURES, Case, Structure
 from spark.metrics import Score, mean_score, score_positions, source_sensitivity
 from spark.reading import SUFFIXES, read_motion
 from spark.refine import refine
+from spark.retarget import Learned
 from spark.rig import understand
 from spark.transfer import transfer
-
-if TYPE_CHECKING:
-    from spark.checkpoint import Checkpoint
 
 Positions = Float[np.ndarray, "_ _ 3"]  # frames, joints
 Method = Callable[[Case], Positions]
@@ -107,11 +104,19 @@ def copied_feet_held(case: Case) -> Positions:
     return canonical_positions(refine(case.source, moved))
 
 
-def learned(checkpoint: "Checkpoint") -> Method:
-    """The network of a checkpoint."""
-    from spark.retarget import retarget
+def learned(network: Learned) -> Method:
+    """A trained network."""
+    return lambda case: canonical_positions(network(case.source, case.truth.rig))
 
-    return lambda case: canonical_positions(retarget(case.source, case.truth.rig, checkpoint))
+
+def learned_feet_held(network: Learned) -> Method:
+    """A trained network, then feet held where the source's stand, as `retarget` does."""
+
+    def run(case: Case) -> Positions:
+        moved = network(case.source, case.truth.rig)
+        return canonical_positions(refine(case.source, moved))
+
+    return run
 
 
 def results_in(folder: Path) -> Method:

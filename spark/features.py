@@ -15,6 +15,7 @@ from jaxtyping import Float, Int
 from spark.canonical import CanonicalMotion
 from spark.kinematics import local_rotations, world_positions, world_rotations
 from spark.rig import Rig
+from spark.rig_names import split_side
 from spark.roles import Group, Role
 from spark.rotation import (
     quat_conj,
@@ -92,6 +93,13 @@ class BodyFeatures:
         features[:, 4] = [not children for children in self.skeleton.children]
         features[:, 5] = 1
         return features
+
+    @cached_property
+    def sides(self) -> Float[np.ndarray, "K 2"]:
+        """1 at the joints of the left and of the right side."""
+        roles = [self.rig.roles.roles[j] for j in self.joints.tolist()]
+        sides = [split_side(role)[0] if role else "" for role in roles]
+        return np.array([[side == "left", side == "right"] for side in sides], dtype=float)
 
     @cached_property
     def effectors(self) -> Float[np.ndarray, "K"]:

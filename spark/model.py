@@ -5,73 +5,34 @@ part into 4 tokens by attention (6 parts, 24 tokens), and lets each token look a
 decoder starts from one query a target joint and frame, lets the joints of a frame look at one
 another and at that frame's 24 tokens, and gives each joint a rotation and the root a position.
 
-Two presets of one network. `Config.paper()` is the paper; `Config.default()` predicts a residual on
-the analytic transfer, zero at the start, so that before the first step it *is* the analytic
-transfer. Each difference is a field of `Config`, so each ablation is one of them too.
+Two presets of one network. `Config.paper()` is the paper; `Config.default()` corrects the analytic
+transfer where that has to guess, because the source lacks a joint of the target's spine, neck or
+shoulders. The correction is zero at the start, so that before the first step it *is* the analytic
+transfer, and what the transfer knows stays as it is. Each difference is a field of `Config`, so
+each ablation is one of them too.
 
 Axes: B batch, T frames, J joints, G = 6 groups, N joints of a group (padded), D width.
 """
-
-from dataclasses import dataclass
 
 import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from spark.attention import Attention, Feedforward, TemporalBlock, sinusoids
-from spark.bodies import Body, Pose, forward_kinematics, take
+from spark.bodies import Body, Pose, Start, forward_kinematics, take, world_matrices
+from spark.config import (
+    N_GROUPS,
+    N_TOKENS,
+    NO_ROTATION,
+    QUERIES_PER_GROUP,
+    RESIDUAL_SCALE,
+    ROTATION_GAIN,
+    SHAPE_FEATURES,
+    TPOSE_FEATURES,
+    Config,
+)
 from spark.precision import exactly
 from spark.rotation import matrix_from_sixd
-
-N_GROUPS = 6
-QUERIES_PER_GROUP = 4
-N_TOKENS = N_GROUPS * QUERIES_PER_GROUP
-TPOSE_FEATURES = 13
-# A step of Adam moves a head's output by about rate times width, whatever is still missing. What a
-# residual has to say is small (a few degrees); unscaled, steps overshoot it and learn nothing.
-RESIDUAL_SCALE = 0.1
-SHAPE_FEATURES = 6  # bone offset, depth, leaf flag, degrees of freedom
-
-
-@dataclass(frozen=True)
-class Config:
-    """Everything that makes one network differ from another."""
-
-    width: int = 128
-    heads: int = 4
-    encoder_blocks: int = 4
-    decoder_blocks: int = 4
-    name_width: int = 130  # of the name encoder, and two for the side
-    max_group: int = 16
-    mask_joints: float = 0.1  # share of joints zeroed before pooling, in training
-    drop_names: float = 0.0  # share of skeletons whose names are withheld, in training
-    share_joints: bool = True  # False: the ablation "w/o share"
-    positions_in: bool = False  # True: the ablation "w/ pos"
-    residual: bool = False  # predict a rotation on top of the analytic transfer
-    noise: bool = True  # decoder starts from noise, as in the paper, or from a learned query
-    shape_features: bool = False
-    relative_time: bool = False  # rotary positions along time instead of absolute ones
-    causal: bool = False  # a frame sees the past alone: for streaming
-    decoder_time: bool = False  # the decoder's joints look along time too
-
-    @classmethod
-    def paper(cls) -> "Config":
-        """The published network."""
-        return cls()
-
-    @classmethod
-    def default(cls) -> "Config":
-        """A residual on the analytic transfer: starts equal to it."""
-        return cls(
-            mask_joints=0.0,
-            drop_names=0.1,
-            positions_in=True,
-            residual=True,
-            noise=False,
-            shape_features=True,
-            relative_time=True,
-            decoder_time=True,
-        )
 
 
 class DecoderBlock(nn.Module):
@@ -84,7 +45,7 @@ class DecoderBlock(nn.Module):
         self.norm_ff = nn.LayerNorm(width)
         self.self_attention = Attention(width, heads)
         self.cross_attention = Attention(width, heads)
-        self.ff = Feedforward(width)
+        self.ff = Feedforward(width, 4 * width, width)
         self.along_time = _temporal_block(config) if config.decoder_time else None
 
     def forward(
@@ -118,7 +79,7 @@ class JointEmbedding(nn.Module):
         self.position = nn.Parameter(0.02 * torch.randn(N_GROUPS, config.max_group, width))
         self.arc = nn.Linear(1, width, bias=False)
         self.name = nn.Linear(config.name_width, width)
-        self.tpose = nn.Sequential(nn.Linear(features, width), nn.GELU(), nn.Linear(width, width))
+        self.tpose = Feedforward(features, width, width)
 
     def joints(self, body: Body) -> Float[Tensor, "B J D"]:
         """E_name + MLP(T-pose) of each joint."""
@@ -184,6 +145,7 @@ class Encoder(nn.Module):
     def _joint_features(self, pose: Pose, body: Body) -> Float[Tensor, "B T J D"]:
         joints, root = pose.rotations, pose.root
         if self.config.positions_in:
+            joints = _seen(joints)
             relative = forward_kinematics(pose, body) - pose.root[:, :, None]
             joints = torch.cat([joints, relative], -1)
             velocity = torch.diff(root, dim=1, prepend=root[:, :1])
@@ -201,40 +163,71 @@ class Decoder(nn.Module):
         self.config = config
         self.query = nn.Parameter(torch.rand(width) - 0.5)
         self.start = nn.Linear(6, width) if config.residual else None
-        self.start_root = nn.Linear(3, width) if config.residual else None
         self.blocks = nn.ModuleList(DecoderBlock(config) for _ in range(config.decoder_blocks))
         self.norm = nn.LayerNorm(width)
         self.rotation = nn.Linear(width, 6)
-        self.root = nn.Linear(width, 3)
+        self.root = None if config.residual else nn.Linear(width, 3)
         if config.residual:
-            for head in (self.rotation, self.root):
-                nn.init.zeros_(head.weight)
-                nn.init.zeros_(head.bias)
+            nn.init.zeros_(self.rotation.weight)
+            nn.init.zeros_(self.rotation.bias)
 
     def forward(
         self,
         latent: Float[Tensor, "B T 24 D"],
         body: Body,
         embedding: JointEmbedding,
-        start: Pose | None = None,
+        start: Start | None = None,
     ) -> Pose:
         """The motion on `body`; a residual network corrects `start`, the analytic transfer."""
         B, T = latent.shape[:2]
-        J = body.valid.shape[1]
         y = embedding.joints(body) + _scatter_places(embedding.places(body), body)
+        if start is not None:
+            return self._correct(start, y, latent, body)
+        J = body.valid.shape[1]
         if self.config.noise:
             y = y[:, None] + torch.rand(B, T, J, y.shape[-1], device=y.device, dtype=y.dtype) - 0.5
         else:
             y = (y + self.query)[:, None].expand(B, T, J, -1)
-        if start is not None and self.start is not None and self.start_root is not None:
-            y = y + self.start(start.rotations)
-            y = torch.cat([y[:, :, :1] + self.start_root(start.root)[:, :, None], y[:, :, 1:]], 2)
-        for block in self.blocks:
-            y = block(y, latent, body.valid)
-        y = self.norm(y)
+        y = self._read(y, latent, body.valid)
+        assert self.root is not None
         with exactly(y):
-            sixd, root = self.rotation(y.float()), self.root(y[:, :, 0].float())
-            return Pose(sixd, root) if start is None else _on_top(start, sixd, root)
+            return Pose(self.rotation(y.float()), self.root(y[:, :, 0].float()))
+
+    def _correct(
+        self,
+        start: Start,
+        known: Float[Tensor, "B J D"],
+        latent: Float[Tensor, "B T 24 D"],
+        body: Body,
+    ) -> Pose:
+        """`start` with its guesses corrected: they alone are decoded."""
+        guessed = start.guess == torch.arange(start.guess.shape[1], device=known.device)
+        count = max(1, int(guessed.sum(1).max()))
+        joints = guessed.int().argsort(dim=1, descending=True, stable=True)[:, :count]
+        valid = torch.gather(guessed, 1, joints)
+        assert self.start is not None
+        y = (
+            take(known[:, None], joints)
+            + self.query
+            + self.start(_seen(take(start.rotations, joints)))
+        )
+        y = self._read(y, latent, valid | ~valid.any(1, keepdim=True))
+        with exactly(y):
+            sixd = self.rotation(y.float()) * valid[:, None, :, None]
+            index = joints[:, None, :, None].expand_as(sixd)
+            return _corrected(
+                start, torch.zeros_like(start.rotations).scatter(2, index, sixd), body
+            )
+
+    def _read(
+        self,
+        y: Float[Tensor, "B T N D"],
+        latent: Float[Tensor, "B T 24 D"],
+        valid: Bool[Tensor, "B N"],
+    ) -> Float[Tensor, "B T N D"]:
+        for block in self.blocks:
+            y = block(y, latent, valid)
+        return self.norm(y)
 
 
 class Spark(nn.Module):
@@ -252,7 +245,7 @@ class Spark(nn.Module):
         return self.encoder(pose, self._withhold(body), self.embedding)
 
     def decode(
-        self, latent: Float[Tensor, "B T 24 D"], body: Body, start: Pose | None = None
+        self, latent: Float[Tensor, "B T 24 D"], body: Body, start: Start | None = None
     ) -> Pose:
         """The motion that H describes, on `body`. A residual network must be given its `start`."""
         if self.config.residual and start is None:
@@ -261,7 +254,7 @@ class Spark(nn.Module):
             latent, self._withhold(body), self.embedding, start if self.config.residual else None
         )
 
-    def forward(self, pose: Pose, source: Body, target: Body, start: Pose | None = None) -> Pose:
+    def forward(self, pose: Pose, source: Body, target: Body, start: Start | None = None) -> Pose:
         """Retarget `pose` from `source` to `target` (figure 2b)."""
         return self.decode(self.encode(pose, source), target, start)
 
@@ -278,12 +271,22 @@ def _temporal_block(config: Config) -> TemporalBlock:
     )
 
 
-def _on_top(start: Pose, sixd: Float[Tensor, "B T J 6"], root: Float[Tensor, "B T 3"]) -> Pose:
-    """`start`, turned and moved a little."""
-    little = RESIDUAL_SCALE * sixd + sixd.new_tensor([1.0, 0, 0, 0, 1, 0])
-    turned = matrix_from_sixd(little) @ matrix_from_sixd(start.rotations)
-    columns = turned[..., :2].transpose(-1, -2).flatten(-2)
-    return Pose(columns, start.root + RESIDUAL_SCALE * root)
+def _seen(rotations: Float[Tensor, "B T J 6"]) -> Float[Tensor, "B T J 6"]:
+    """What a rotation is besides none at all, in numbers of the size of 1."""
+    return ROTATION_GAIN * (rotations - rotations.new_tensor(NO_ROTATION))
+
+
+def _corrected(start: Start, sixd: Float[Tensor, "B T J 6"], body: Body) -> Pose:
+    """`start` with its guesses turned a little, each in its own axes. What follows a guess goes
+    with it; every other joint keeps its rotation in the world."""
+    world = world_matrices(start.rotations, body.parents)
+    little = matrix_from_sixd(RESIDUAL_SCALE * sixd + sixd.new_tensor(NO_ROTATION))
+    turn = take(world @ little @ world.mT, start.guess.clamp(min=0))
+    world = torch.where((start.guess >= 0)[:, None, :, None, None], turn @ world, world)
+    upper = take(world, body.parents)
+    is_root = (body.parents == torch.arange(world.shape[2], device=world.device))[:, None, :]
+    local = torch.where(is_root[..., None, None], world, upper.mT @ world)
+    return Pose(local[..., :2].transpose(-1, -2).flatten(-2), start.root)
 
 
 def _first_owner(groups: Int[Tensor, "B G N"]) -> Bool[Tensor, "B G N"]:

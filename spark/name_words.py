@@ -1,4 +1,5 @@
-"""What exporters do to names, undone: namespaces, separators, case, what all names of a rig share.
+"""Names as the name encoder reads them: what exporters do to them undone (namespaces, separators,
+case, what all names of a rig share), then bytes.
 
 By form and by counting alone. No word is known here, so that what the name encoder makes of a word
 it has not learned can be measured.
@@ -9,7 +10,12 @@ import unicodedata
 from collections import Counter
 from collections.abc import Sequence
 
+import numpy as np
+from jaxtyping import Int
+
 _PIECES = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+|[^\W\d_A-Za-z]+")
+PAD, END, BYTE_OFFSET = 0, 1, 3
+_MAX_BYTES = 48
 _FEW = 6
 _SHARED = 0.7
 
@@ -29,6 +35,24 @@ def rig_words(names: Sequence[str]) -> list[str]:
                     if len(pieces) > 1 and pieces[end] == shared:
                         pieces.pop(end)
     return [" ".join(pieces) for pieces in cut]
+
+
+def name_tokens(words: str) -> list[int]:
+    """ByT5's tokens: UTF-8 bytes plus 3 and an end mark; the last 48 bytes count."""
+    return [byte + BYTE_OFFSET for byte in words.encode()[-_MAX_BYTES:]] + [END]
+
+
+def relative_buckets(length: int, buckets: int, max_distance: int) -> Int[np.ndarray, "L L"]:
+    """T5's buckets of the way from each place to each other one: half of them a direction, exact
+    when near and logarithmic further away."""
+    place = np.arange(length)
+    offset = place[None, :] - place[:, None]
+    half = buckets // 2
+    exact = half // 2
+    distance = np.abs(offset)
+    ratio = np.log(np.maximum(distance, 1) / exact) / np.log(max_distance / exact)
+    far = np.minimum(exact + (ratio * (half - exact)).astype(int), half - 1)
+    return np.where(distance < exact, distance, far) + half * (offset > 0)
 
 
 def _local(name: str) -> str:

@@ -11,7 +11,6 @@ name's bytes, blocks of the same kind, without positions, let every name attend 
 Text embeddings confuse left and right, so the side stands beside them as two features of its own.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
@@ -25,10 +24,9 @@ from torch.nn.utils.rnn import pad_sequence
 
 from spark.errors import DependencyError, FileFormatError
 from spark.files import write_atomically
-from spark.name_words import rig_words
+from spark.name_words import BYTE_OFFSET, PAD, name_tokens, relative_buckets, rig_words
 
-PAD, END, BYTE_OFFSET = 0, 1, 3
-MAX_BYTES = 48
+NAME_CACHE = Path.home() / ".cache" / "spark-sim" / "names.pt"
 _CHUNKS = 4
 
 
@@ -45,8 +43,8 @@ class NameConfig:
 
 
 def tokenize(names: Sequence[str]) -> Int[Tensor, "S L"]:
-    """ByT5's tokens: UTF-8 bytes plus 3, an end mark, padded with 0; the last 48 bytes count."""
-    rows = [[b + BYTE_OFFSET for b in name.encode()[-MAX_BYTES:]] + [END] for name in names]
+    """`name_tokens` of each name, padded with 0."""
+    rows = [name_tokens(name) for name in names]
     length = max(map(len, rows), default=1)
     return torch.tensor([row + [PAD] * (length - len(row)) for row in rows]).view(-1, length)
 
@@ -104,18 +102,8 @@ class NameEncoder(nn.Module):
         return (self.norm(x) * real[..., None]).sum(1) / real.sum(1, keepdim=True)
 
     def _relative_bias(self, length: int) -> Float[Tensor, "1 H L L"]:
-        """T5's buckets: half a direction each, exact when near and logarithmic further away."""
-        place = torch.arange(length, device=self.embed.weight.device)
-        offset = place[None, :] - place[:, None]
-        half = self.config.buckets // 2
-        exact = half // 2
-        distance = offset.abs()
-        far = exact + (
-            torch.log(distance.clamp(min=1) / exact)
-            / math.log(self.config.max_distance / exact)
-            * (half - exact)
-        ).long().clamp(max=half - exact - 1)
-        bucket = torch.where(distance < exact, distance, far) + half * (offset > 0)
+        buckets = relative_buckets(length, self.config.buckets, self.config.max_distance)
+        bucket = torch.as_tensor(buckets, device=self.embed.weight.device)
         return self.bias(bucket).permute(2, 0, 1)[None]
 
 

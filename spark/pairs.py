@@ -11,16 +11,20 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from spark.errors import SkeletonError
 from spark.features import BodyFeatures
 from spark.kinematics import local_rotations
+from spark.mirror import mirrored_body, mirrored_motion
 from spark.plant import Leg, bend_leg, stance_correction
+from spark.resample import positions_at, rotations_at
 from spark.roles import LIMBS, Group, Role
 from spark.rotation import quat_from_yaw, quat_mul, quat_rotate, sixd_from_quat, yaw_from_quat
 from spark.transfer import Correspondence, correspond
 from spark.variants import Variant, random_variant, same_body, split_body
+
+_PACE = 0.3  # of the logarithm of a motion's speed
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +52,13 @@ class Windows(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """W windows on two bodies; `start` is the analytic transfer of `source` to the target."""
+    """W windows on two bodies; `start` is the analytic transfer of `source` to the target, and
+    `guess` its `Correspondence.guess`."""
 
     source: Windows
     target: Windows
     start: Windows
+    guess: Int[np.ndarray, "J"]
     planted: Bool[np.ndarray, "W T 2"]
     frame_time: float
 
@@ -63,7 +69,10 @@ class PairMaker:
     Making a skeleton costs as much as using it many times, so each body has a fixed set of
     `variants`, made when they are first met: itself, itself with joints split as in SAN, and random
     ones. With `distinct`, no two of them have a motion in common as a source (the paper's training
-    set); without, any of them may perform any of the body's clips.
+    set); without, any of them may perform any of the body's clips. With `varied`, half of the draws
+    are seen in a mirror, and half are slowed down or sped up by up to a third.
+
+    Bodies are drawn by the square root of their frames: long recordings of one count for less.
     """
 
     def __init__(
@@ -74,9 +83,10 @@ class PairMaker:
         variants: int = 256,
         seed: int = 0,
         distinct: bool = False,
+        varied: bool = False,
     ) -> None:
         self.window, self.variants, self.seed = window, variants, seed
-        self.distinct = distinct
+        self.distinct, self.varied = distinct, varied
         by_body: dict[int, list[Clip]] = {}
         for clip in clips:
             if len(clip.hips) >= window:
@@ -84,9 +94,10 @@ class PairMaker:
         self._bodies = list(by_body.values())
         if not self._bodies:
             raise SkeletonError(f"no clip has {window} frames: expected at least one to train on")
-        frames = np.array([sum(len(c.hips) for c in group) for group in self._bodies], float)
-        self._weights = frames / frames.sum()
-        self._stages: dict[tuple[int, int], Stage] = {}
+        weights = np.sqrt([sum(len(c.hips) for c in group) for group in self._bodies])
+        self._weights = weights / weights.sum()
+        self._seen: dict[tuple[int, bool], BodyFeatures] = {}
+        self._stages: dict[tuple[int, bool, int], Stage] = {}
         self._links: dict[tuple[Stage, Stage], Correspondence] = {}
 
     def draw(self, n: int, windows: int) -> Pairs:
@@ -99,7 +110,10 @@ class PairMaker:
             performer %= min(self.variants, len(clips))
             clips = clips[performer :: self.variants]
         rotations, hips, planted = self._cut(clips, windows, rng)
-        source, target = self._stage(k, performer), self._stage(k, receiver)
+        mirrored = self.varied and bool(rng.random() < 0.5)
+        if mirrored:
+            rotations, hips, planted = mirrored_motion(rotations, hips, planted)
+        source, target = (self._stage(k, mirrored, number) for number in (performer, receiver))
         on_source = source.place(rotations, hips, planted)
         on_target = target.place(rotations, hips, planted)
         link = self._link(source, target)
@@ -108,6 +122,7 @@ class PairMaker:
             _windows(source.variant.body, on_source, hips),
             _windows(target.variant.body, on_target, hips),
             _windows(target.variant.body, copied, hips),
+            link.guess,
             planted,
             self._bodies[k][0].frame_time,
         )
@@ -120,16 +135,31 @@ class PairMaker:
         cuts = []
         for i in chosen.tolist():
             clip = clips[i]
-            at = int(rng.integers(0, len(clip.hips) - self.window + 1))
-            span = slice(at, at + self.window)
-            cuts.append((clip.rotations[span], clip.hips[span], clip.planted[span]))
+            speed = float(np.exp(rng.uniform(-_PACE, _PACE)))
+            frames = int(np.ceil((self.window - 1) * speed)) + 1
+            if not self.varied or rng.random() < 0.5 or frames > len(clip.hips):
+                frames, speed = self.window, 1.0
+            at = int(rng.integers(0, len(clip.hips) - frames + 1))
+            span = slice(at, at + frames)
+            cut = clip.rotations[span], clip.hips[span], clip.planted[span]
+            if speed != 1:
+                times = np.arange(self.window) * speed
+                nearest = np.minimum(times.round().astype(int), frames - 1)
+                cut = rotations_at(cut[0], times), positions_at(cut[1], times), cut[2][nearest]
+            cuts.append(cut)
         rotations, hips, planted = (np.stack(part) for part in zip(*cuts, strict=True))
         return rotations, hips, planted
 
-    def _stage(self, k: int, number: int) -> "Stage":
-        key = (k, number)
-        if key not in self._stages:
+    def _body(self, k: int, mirrored: bool) -> BodyFeatures:
+        if (k, mirrored) not in self._seen:
             body = self._bodies[k][0].body
+            self._seen[k, mirrored] = mirrored_body(same_body(body).body) if mirrored else body
+        return self._seen[k, mirrored]
+
+    def _stage(self, k: int, mirrored: bool, number: int) -> "Stage":
+        key = (k, mirrored, number)
+        if key not in self._stages:
+            body = self._body(k, mirrored)
             if number < 2:
                 variant = (same_body, split_body)[number](body)
             else:

@@ -6,101 +6,151 @@ and falling linearly. The windows lie on a fixed grid, so how many are worked on
 nothing. What was found at 30 fps is carried to the motion's own frame rate.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
-import torch
+from jaxtyping import Float, Int
 
-from spark.batch import Collator
-from spark.bodies import Pose
 from spark.canonical import CanonicalMotion
-from spark.checkpoint import Checkpoint
-from spark.clips import FRAME_TIME, at_frame_time, positions_at, rotations_at
-from spark.features import body_features, canonical_from_features, pose_features
+from spark.clips import FRAME_TIME, at_frame_time
+from spark.errors import DependencyError, name_list
+from spark.features import BodyFeatures, body_features, canonical_from_features, pose_features
+from spark.name_network import NameNetwork
+from spark.network import Network
+from spark.pairs import Windows
+from spark.resample import positions_at, rotations_at
 from spark.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_normalize
-from spark.train import name_vectors
-from spark.transfer import transfer
+from spark.transfer import correspond, transfer
+from spark.weights import Weights
 
 _AT_A_TIME = 32
 
 
-def retarget(
-    source: CanonicalMotion, target: Rig, checkpoint: Checkpoint, *, window: int | None = None
-) -> CanonicalMotion:
-    """`source`'s motion on `target` by the network of `checkpoint`; any length, 1 frame too.
+class Learned:
+    """The network of a checkpoint, ready to run. Raises `FileFormatError` where it is damaged."""
 
-    `window` [frames at 30 fps] is the training's where it is not given.
-    """
-    window = window or int(checkpoint.settings.get("window", 64))
-    start = transfer(source, target)
-    slow_source, slow_start = (at_frame_time(c, FRAME_TIME) for c in (source, start))
-    slow = _blended(slow_source, slow_start, checkpoint, window)
-    if slow_start is start:
-        return slow
-    turned = quat_mul(slow.rotations, quat_conj(slow_start.rotations))
-    at = np.arange(len(start)) * start.frame_time / FRAME_TIME
-    return replace(
-        start,
-        rotations=quat_mul(rotations_at(turned, at), start.rotations),
-        hips=start.hips + positions_at(slow.hips - slow_start.hips, at),
-    )
+    def __init__(self, weights: Weights) -> None:
+        try:
+            self.network = Network(weights)
+            self._encode = _names_of(weights)
+            self.window = int(weights.settings.get("window", 64))
+        except (KeyError, TypeError, ValueError) as error:
+            raise weights.damaged(error) from error
 
+    def __call__(
+        self, source: CanonicalMotion, target: Rig, *, window: int | None = None
+    ) -> CanonicalMotion:
+        """`source`'s motion on `target`; any length, 1 frame too.
 
-def _blended(
-    source: CanonicalMotion, start: CanonicalMotion, checkpoint: Checkpoint, window: int
-) -> CanonicalMotion:
-    """The windows' answers laid over one another; quaternions are averaged as vectors."""
-    count, size = len(start), min(window, len(start))
-    hop = max(size // 2, 1)
-    firsts = sorted({*range(0, count - size + 1, hop), count - size})
-    rise = np.minimum(np.arange(size) + 1, np.arange(size)[::-1] + 1).astype(np.float64)
-    rotations, hips = np.zeros_like(start.rotations), np.zeros_like(start.hips)
-    total = np.zeros(count)
-    for k in range(0, len(firsts), _AT_A_TIME):
-        spans = [slice(at, at + size) for at in firsts[k : k + _AT_A_TIME]]
-        answers = _answers(
-            [_cut(source, s) for s in spans], [_cut(start, s) for s in spans], checkpoint
+        `window` [frames at 30 fps] is the training's where it is not given. Where the transfer has
+        nothing to guess, what corrects its guesses leaves it as it is.
+        """
+        start = transfer(source, target)
+        bodies = body_features(source.rig), body_features(target)
+        guess = guesses(source.rig, bodies[1])
+        if self.network.config.residual and not (guess >= 0).any():
+            return start
+        if self.network.config.residual:
+            names = [
+                target.skeleton.names[bodies[1].joints[j]] for j in np.unique(guess[guess >= 0])
+            ]
+            note = f"no counterpart in the source: {name_list(names)}; the network fills them in"
+            start = replace(start, notes=(*start.notes, note))
+        slow_source, slow_start = (at_frame_time(c, FRAME_TIME) for c in (source, start))
+        slow = self._blended(slow_source, slow_start, bodies, guess, window or self.window)
+        if slow_start is start:
+            return slow
+        turned = quat_mul(slow.rotations, quat_conj(slow_start.rotations))
+        at = np.arange(len(start)) * start.frame_time / FRAME_TIME
+        return replace(
+            start,
+            rotations=quat_mul(rotations_at(turned, at), start.rotations),
+            hips=start.hips + positions_at(slow.hips - slow_start.hips, at),
         )
-        for span, answer in zip(spans, answers, strict=True):
-            same = np.sign((answer.rotations * start.rotations[span]).sum(-1, keepdims=True))
-            rotations[span] += rise[:, None, None] * np.where(same < 0, -1, 1) * answer.rotations
-            hips[span] += rise[:, None] * answer.hips
-            total[span] += rise
-    return replace(start, rotations=quat_normalize(rotations), hips=hips / total[:, None])
 
+    def _blended(
+        self,
+        source: CanonicalMotion,
+        start: CanonicalMotion,
+        bodies: tuple[BodyFeatures, BodyFeatures],
+        guess: Int[np.ndarray, "J"],
+        window: int,
+    ) -> CanonicalMotion:
+        """The windows' answers laid over one another; quaternions are averaged as vectors."""
+        count, size = len(start), min(window, len(start))
+        hop = max(size // 2, 1)
+        firsts = sorted({*range(0, count - size + 1, hop), count - size})
+        rise = np.minimum(np.arange(size) + 1, np.arange(size)[::-1] + 1).astype(np.float64)
+        rotations, hips = np.zeros_like(start.rotations), np.zeros_like(start.hips)
+        total = np.zeros(count)
+        for k in range(0, len(firsts), _AT_A_TIME):
+            spans = [slice(at, at + size) for at in firsts[k : k + _AT_A_TIME]]
+            given = [_cut(source, span) for span in spans]
+            copied = [_cut(start, span) for span in spans]
+            answers = self._answers(given, copied, bodies, guess)
+            for span, answer in zip(spans, answers, strict=True):
+                same = np.sign((answer.rotations * start.rotations[span]).sum(-1, keepdims=True))
+                rotations[span] += (
+                    rise[:, None, None] * np.where(same < 0, -1, 1) * answer.rotations
+                )
+                hips[span] += rise[:, None] * answer.hips
+                total[span] += rise
+        return replace(start, rotations=quat_normalize(rotations), hips=hips / total[:, None])
 
-@torch.no_grad()
-def _answers(
-    sources: list[CanonicalMotion], starts: list[CanonicalMotion], checkpoint: Checkpoint
-) -> list[CanonicalMotion]:
-    """What the network makes of windows of one length."""
-    model = checkpoint.model.eval()
-    device = next(model.parameters()).device
-    source_body, target_body = body_features(sources[0].rig), body_features(starts[0].rig)
-    read = [pose_features(window, source_body) for window in sources]
-    copied = [pose_features(window, target_body) for window in starts]
-    collator = Collator(name_vectors(checkpoint.names))
-    bodies = [collator.bodies([body], [len(sources)]) for body in (source_body, target_body)]
-    poses = [
-        Pose(
-            *(
-                torch.as_tensor(
-                    np.stack([np.asarray(w[i]) for w in windows]), dtype=torch.float32
-                ).to(device)
-                for i in (0, 1)
-            )
+    def _answers(
+        self,
+        sources: list[CanonicalMotion],
+        starts: list[CanonicalMotion],
+        bodies: tuple[BodyFeatures, BodyFeatures],
+        guess: Int[np.ndarray, "J"],
+    ) -> list[CanonicalMotion]:
+        """What the network makes of windows of one length."""
+        given, asked = bodies
+        read = [pose_features(window, given) for window in sources]
+        copied = [pose_features(window, asked) for window in starts]
+        known, wanted = (
+            np.concatenate([self._encode(body.skeleton.names), body.sides], -1) for body in bodies
         )
-        for windows in (read, copied)
-    ]
-    source, target = (type(body)(*(t.to(device) for t in body)) for body in bodies)
-    torch.manual_seed(0)  # the paper's decoder starts from noise: the same for the same motion
-    out = model(poses[0], source, target, poses[1])
-    sixd, root = (t.double().cpu().numpy() for t in out)
-    return [
-        canonical_from_features(sixd[w], root[w], copied[w][2], target_body, starts[w])
-        for w in range(len(starts))
-    ]
+        latent = self.network.encode(_windows(given, read), known)
+        if self.network.config.residual:
+            out = self.network.correct(latent, wanted, _windows(asked, copied), guess)
+        else:
+            out = self.network.decode(latent, wanted, asked)
+        return [
+            canonical_from_features(out.rotations[w], out.root[w], copied[w][2], asked, starts[w])
+            for w in range(len(starts))
+        ]
+
+
+def guesses(source: Rig, target: BodyFeatures) -> Int[np.ndarray, "J"]:
+    """`Correspondence.guess` in the network's numbering of the target's joints."""
+    place = {int(j): k for k, j in enumerate(target.joints)}
+    found = correspond(source, target.rig).guess[target.joints]
+    return np.array([place.get(int(j), -1) for j in found])
+
+
+def _names_of(weights: Weights) -> Callable[[Sequence[str]], Float[np.ndarray, "_ E"]]:
+    """What turns a rig's names into vectors, each rig's once."""
+    encode: Callable[[tuple[str, ...]], Float[np.ndarray, "_ E"]]
+    if "t5" in weights.names:
+        try:
+            from spark.names import NAME_CACHE, T5Names
+        except ImportError as error:
+            raise DependencyError(
+                f"a network with T5's names needs {error.name}: pip install 'spark-sim[t5]'"
+            ) from error
+        t5 = T5Names(str(weights.names["t5"]), NAME_CACHE)
+        encode = cache(lambda names: t5.encode(names).numpy())
+    else:
+        encode = cache(NameNetwork(weights).encode)
+    return lambda names: encode(tuple(names))
+
+
+def _windows(body: BodyFeatures, read: Sequence[tuple[np.ndarray, np.ndarray, object]]) -> Windows:
+    return Windows(body, np.stack([r[0] for r in read]), np.stack([r[1] for r in read]))
 
 
 def _cut(canonical: CanonicalMotion, span: slice) -> CanonicalMotion:

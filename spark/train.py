@@ -31,9 +31,10 @@ from spark.checkpoint import (
     restore_optimizer,
     save_checkpoint,
 )
-from spark.model import Config, Spark
+from spark.config import Config
+from spark.model import Spark
 from spark.name_file import load_names
-from spark.names import NameEncoder, T5Names
+from spark.names import NAME_CACHE, NameEncoder, T5Names
 from spark.pairs import Clip, PairMaker
 from spark.precision import fast_products
 from spark.settings import TrainConfig
@@ -42,7 +43,6 @@ from spark.train_names import train_names
 BETAS = (0.9, 0.99)
 PAPER_WEIGHTS = {"rec": 1.0, "cyc": 20.0, "root": 7.0, "fk": 100.0}
 PAIR_WEIGHTS = {"rec": 1.0, "root": 7.0, "fk": 100.0, "contact": 1.0, "ends": 100.0}
-NAME_CACHE = Path.home() / ".cache" / "spark-sim" / "names.pt"
 
 Terms = dict[str, Float[Tensor, ""]]
 
@@ -137,6 +137,7 @@ class Steps(Dataset[Batch]):
             variants=config.variants,
             seed=config.seed,
             distinct=config.preset == "paper" and "mix" not in config.ablate,
+            varied=config.preset != "paper",
         )
         self.collator = Collator(names)
 

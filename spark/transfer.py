@@ -17,8 +17,13 @@ from spark.rig import Rig
 from spark.roles import Role
 from spark.rotation import quat_conj, quat_slerp
 
+_EXACT = 1e-3  # nearer to a source's joint than this, by arc length, is that joint's place
+_SAME_PLACE = 0.1  # joints of equally long chains, taken one by one, may lie this far apart
+
 # A floor further than this from z = 0, in hip heights, is moved to 0.
 _FLOOR_TOLERANCE = 0.1
+
+_SHOULDERS = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE)
 
 # Roles that several joints hold, and the roles between which they lie.
 _CHAINS: dict[Role, tuple[Role, Role | None]] = {
@@ -31,12 +36,15 @@ _CHAINS: dict[Role, tuple[Role, Role | None]] = {
 class Correspondence:
     """Target joint j turns `mix[j]` of the way from source joint `first[j]` to `second[j]`.
 
-    -1 in `first` marks joints above the target's carrier: they stay as they rest.
+    -1 in `first` marks joints above the target's carrier: they stay as they rest. `guess[j]` is j
+    where that is a guess, since the source has no joint at this place and the body around it tells
+    what j does (spine, neck, collarbones); the guess that j follows where it only follows; else -1.
     """
 
     first: Int[np.ndarray, "J"]
     second: Int[np.ndarray, "J"]
     mix: Float[np.ndarray, "J"]
+    guess: Int[np.ndarray, "J"]
 
     def rotations(
         self, source: Float[np.ndarray, "*n S 4"], target: Rig
@@ -59,7 +67,7 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
     """Which joints of `source` each joint of `target` takes its rotation from."""
     size = len(target.skeleton)
     first, mix = np.full(size, -1), np.zeros(size)
-    second = first.copy()
+    second, guess = first.copy(), first.copy()
     known = np.zeros(size, dtype=bool)
 
     def copy(j: int, from_joint: int) -> None:
@@ -74,6 +82,9 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
     for role, (start, end) in _CHAINS.items():
         joints, at = _chain(source, role, start, end)
         for j, u in zip(*_chain(target, role, start, end), strict=True):
+            if known[j] and target.roles.roles[j] is role:
+                elsewhere = abs(at[joints.index(int(first[j]))] - u) > _SAME_PLACE
+                guess[j] = j if elsewhere else -1
             if not known[j]:
                 k = int(np.searchsorted(at, u, side="right")) - 1
                 after = min(k + 1, len(at) - 1)
@@ -81,6 +92,9 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
                 first[j], second[j] = joints[k], joints[after]
                 mix[j] = (u - at[k]) / span if span > 0 else 0.0
                 known[j] = True
+                nearest = joints[after if mix[j] > 0.5 else k]
+                beside = min(mix[j], 1 - mix[j]) > _EXACT
+                guess[j] = j if beside or source.roles.roles[nearest] is not role else -1
 
     names = {name: j for j, name in enumerate(source.skeleton.names)}
     above = target.skeleton.ancestors(target.pelvis)[1:]
@@ -100,7 +114,8 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
             copy(j, same)
         else:
             first[j], second[j], mix[j] = first[parent], second[parent], mix[parent]
-    return Correspondence(first, second, mix)
+            guess[j] = j if target.roles.roles[j] in _SHOULDERS else guess[parent]
+    return Correspondence(first, second, mix, guess)
 
 
 def transfer(source: CanonicalMotion, target: Rig) -> CanonicalMotion:

@@ -42,6 +42,7 @@ _SEGMENT = {  # the bone that *ends* at a joint of this kind
     "toe": "foot",
 }
 _DROP = {"toe": 0.15, "clavicle": 0.15, "hand": 0.1, "spine": 0.3, "neck": 0.3}
+_SPARSE = 0.15  # share of skeletons that have as little as a robot: one joint of each kind at most
 _SPLIT = {"spine": 0.3, "neck": 0.1, "upper_arm": 0.15, "forearm": 0.1, "lower_leg": 0.1}
 
 
@@ -147,13 +148,16 @@ def _nodes(base: BodyFeatures) -> list[_Node]:
 
 def _drop(nodes: list[_Node], rng: np.random.Generator) -> list[_Node]:
     """Merge joints into their parents; both sides of a pair go together."""
-    whole_kind = {k: bool(rng.random() < p) for k, p in _DROP.items() if k not in ("spine", "neck")}
+    sparse = bool(rng.random() < _SPARSE)
+    whole_kind = {
+        k: sparse or bool(rng.random() < p) for k, p in _DROP.items() if k not in ("spine", "neck")
+    }
     spines = [node for node in nodes if node.role is Role.SPINE]
     dropped: list[_Node] = []
     for node in nodes:
         if node.parent is None or node is (spines[-1] if spines else None):
             continue
-        chance = _DROP.get(node.kind, 0.0)
+        chance = max(_DROP[node.kind], sparse) if node.kind in _DROP else 0.0
         if (node.role is None and rng.random() < 0.5) or (
             whole_kind[node.kind] if node.kind in whole_kind else rng.random() < chance
         ):

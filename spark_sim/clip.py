@@ -2,15 +2,15 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, overload
 
 from robots import formats, registry
 from spark.bvh import write_bvh
-from spark.canonical import CanonicalMotion, from_canonical, to_canonical
+from spark.canonical import from_canonical, to_canonical
 from spark.encoding import encode, encode_new
-from spark.errors import ConventionError, DependencyError, FileFormatError, SkeletonError
+from spark.errors import ConventionError, FileFormatError, SkeletonError
 from spark.motion import Motion
 from spark.override import Override
 from spark.reading import read_motion
@@ -23,12 +23,14 @@ from spark_sim import files, rolemap
 if TYPE_CHECKING:
     from sim.joints import JointType
     from sim.report import Report
+    from spark.retarget import Learned
     from spark_sim.robot import RobotClip
     from spark_sim.show import Simulated
 
 File = str | Path
 AnyClip: TypeAlias = "Clip | RobotClip"  # the second is imported where it is needed
-METHODS = ("copy", "spark")
+METHODS = ("spark", "copy")
+_PAGE = (".html", ".htm")
 
 _NOT_YET = {
     ".glb": "glTF files can't be read yet; expected a BVH or FBX file",
@@ -104,7 +106,9 @@ class Clip:
         from sim.mjcf import notes_of, paths_of, write_mjcf
 
         spec = build_body(self.rig, joints=joints, mesh=mesh)
-        for written in paths_of(spec, path):
+        body, *beside = paths_of(spec, path)
+        files.claim(body, force=force, endings=(".xml",))
+        for written in beside:
             files.claim(written, force=force)
         return write_mjcf(spec, path), notes_of(spec)
 
@@ -162,7 +166,7 @@ def retarget(
     source: "AnyClip | File",
     target: Clip,
     *,
-    method: str = "copy",
+    method: str = "spark",
     checkpoint: File | None = None,
     refine: bool = True,
 ) -> Clip: ...
@@ -171,7 +175,7 @@ def retarget(
     source: "AnyClip | File",
     target: "AnyClip | File",
     *,
-    method: str = "copy",
+    method: str = "spark",
     checkpoint: File | None = None,
     refine: bool = True,
 ) -> AnyClip: ...
@@ -179,19 +183,21 @@ def retarget(
     source: "AnyClip | File",
     target: "AnyClip | File",
     *,
-    method: str = "copy",
+    method: str = "spark",
     checkpoint: File | None = None,
     refine: bool = True,
 ) -> AnyClip:
     """The motion of `source` on the body of `target`, in the hierarchy and units of its file.
 
-    Both are clips, or what `load` takes: `target` may be a robot's name or MJCF. Method "spark" is
-    the network of `checkpoint`. With `refine`, feet are held where the source's stand.
-    Raises `SkeletonError` where one is no humanoid.
+    Both are clips, or what `load` takes: `target` may be a robot's name or MJCF. Each joint turns
+    as its counterpart does, in world axes; what the source has no counterpart of is filled in by a
+    trained network (method "spark": that of `checkpoint`, or the one that ships) or by
+    interpolation ("copy"). Robots are solved for. With `refine`, feet are held where the source's
+    stand. Raises `SkeletonError` where one is no humanoid.
     """
     if method not in METHODS:
         raise ConventionError(f"method {method!r} is not known; expected 'copy' or 'spark'")
-    if (method == "spark") != (checkpoint is not None):
+    if method != "spark" and checkpoint is not None:
         raise ConventionError("a checkpoint goes with method 'spark', and with no other")
     source, target = _clip(source), _clip(target)
     if not isinstance(target, Clip):
@@ -201,10 +207,10 @@ def retarget(
 
         return onto_robot(source, target, refine=refine)
     canonical = to_canonical(source.motion, source.rig)
-    if checkpoint is None:
+    if method == "copy":
         moved = transfer(canonical, target.rig)
     else:
-        moved = _learned(canonical, target.rig, Path(checkpoint))
+        moved = _learned(checkpoint)(canonical, target.rig)
     if refine:
         moved = hold_feet(canonical, moved)
     motion = from_canonical(moved)
@@ -217,15 +223,20 @@ def retarget(
     return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig)
 
 
-def _learned(canonical: CanonicalMotion, target: Rig, checkpoint: Path) -> CanonicalMotion:
-    try:
-        from spark.checkpoint import load_checkpoint
-        from spark.retarget import retarget as by_network
-    except ImportError as error:
-        raise DependencyError(
-            f"method 'spark' needs {error.name}: pip install 'spark-sim[train]'"
-        ) from error
-    return by_network(canonical, target, load_checkpoint(checkpoint))
+def _learned(checkpoint: File | None) -> "Learned":
+    """The network of a checkpoint, or the one that ships."""
+    from spark.retarget import Learned
+    from spark.weights import read_weights
+
+    return _shipped() if checkpoint is None else Learned(read_weights(Path(checkpoint)))
+
+
+@cache
+def _shipped() -> "Learned":
+    from spark.retarget import Learned
+    from spark.weights import SHIPPED, read_weights
+
+    return Learned(read_weights(SHIPPED))
 
 
 def report(
@@ -244,7 +255,7 @@ def report(
     from sim.report import judge
 
     if html is not None:
-        files.claim(Path(html), force=force)
+        files.claim(Path(html), force=force, endings=_PAGE)
     clip = _clip(clip)
     origin, names = None, (clip.name, "source")
     if source is not None:
@@ -278,9 +289,9 @@ def play(
     from sim.scene import build_scene
     from spark_sim.show import figures_of
 
-    for path in (video, html, strip):
+    for path, endings in ((video, (".mp4",)), (html, _PAGE), (strip, (".png",))):
         if path is not None:
-            files.claim(Path(path), force=force)
+            files.claim(Path(path), force=force, endings=endings)
     shown = [_clip(c) if isinstance(c, str | Path) else c for c in clips]
     figures = [figure for clip in shown for figure in figures_of(clip)]
     scene = build_scene(figures)

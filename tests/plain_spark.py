@@ -7,12 +7,13 @@ import torch
 from torch import Tensor
 
 from spark.attention import Attention, TemporalBlock
-from spark.bodies import Body, Pose
-from spark.model import RESIDUAL_SCALE, Spark
+from spark.bodies import Body, Pose, Start
+from spark.config import NO_ROTATION, RESIDUAL_SCALE, ROTATION_GAIN
+from spark.model import Spark
 from spark.rotation import matrix_from_sixd
 
 
-def retargeted(model: Spark, pose: Pose, source: Body, target: Body, start: Pose | None) -> Pose:
+def retargeted(model: Spark, pose: Pose, source: Body, target: Body, start: Start | None) -> Pose:
     """What `model` must give for a batch of one without padding, in evaluation."""
     latent = encode(model, pose, source)
     return decode(model, latent, target, start)
@@ -74,6 +75,7 @@ def encode(model: Spark, pose: Pose, body: Body) -> Tensor:
     config, encoder = model.config, model.encoder
     joints, root = pose.rotations[0], pose.root[0]
     if config.positions_in:
+        joints = ROTATION_GAIN * (joints - torch.tensor(NO_ROTATION))
         joints = torch.cat([joints, positions(pose, body) - root[:, None]], -1)
         root = torch.cat([root, torch.cat([root[:1] * 0, root[1:] - root[:-1]])], -1)
     x = encoder.motion(joints)
@@ -104,16 +106,21 @@ def encode(model: Spark, pose: Pose, body: Body) -> Tensor:
     return encoder.norm(latent)
 
 
-def decode(model: Spark, latent: Tensor, body: Body, start: Pose | None) -> Pose:
-    """The motion on `body`; the decoder begins with its learned query."""
+def decode(model: Spark, latent: Tensor, body: Body, start: Start | None) -> Pose:
+    """The motion on `body`; the decoder begins with its learned query. A residual network decodes
+    the guesses of its start, one window's at a time, and moves them and what follows them."""
     decoder = model.decoder
     known, places = joint_embeddings(model, body)
     for j in range(len(known)):
         known[j] += next(group[j] for group in places if j in group)
     y = (known + decoder.query).repeat(len(latent), 1, 1)
     if start is not None:
-        y = y + decoder.start(start.rotations[0])
-        y[:, 0] += decoder.start_root(start.root[0])
+        guess = start.guess[0].tolist()
+        guessed = [j for j in range(len(known)) if guess[j] == j]
+        if not guessed:
+            return start.pose
+        seen = ROTATION_GAIN * (start.rotations[0][:, guessed] - torch.tensor(NO_ROTATION))
+        y = y[:, guessed] + decoder.start(seen)
     for block in decoder.blocks:
         for t in range(len(y)):
             normed = block.norm_self(y[t])
@@ -123,13 +130,23 @@ def decode(model: Spark, latent: Tensor, body: Body, start: Pose | None) -> Pose
         if block.along_time is not None:
             y = torch.stack([along_time(block.along_time, y[:, j]) for j in range(y.shape[1])], 1)
     y = decoder.norm(y)
-    sixd, root = decoder.rotation(y), decoder.root(y[:, 0])
-    if start is not None:
-        little = matrix_from_sixd(RESIDUAL_SCALE * sixd + torch.tensor([1.0, 0, 0, 0, 1, 0]))
-        turned = little @ matrix_from_sixd(start.rotations[0])
-        sixd = torch.cat([turned[..., 0], turned[..., 1]], -1)
-        root = start.root[0] + RESIDUAL_SCALE * root
-    return Pose(sixd[None], root[None])
+    sixd = decoder.rotation(y)
+    if start is None:
+        return Pose(sixd[None], decoder.root(y[:, 0])[None])
+    little = matrix_from_sixd(RESIDUAL_SCALE * sixd + torch.tensor(NO_ROTATION))
+    parents = body.parents[0].tolist()
+    local = matrix_from_sixd(start.rotations[0])
+    before = [local[:, 0]]
+    for j in range(1, len(known)):
+        before.append(before[parents[j]] @ local[:, j])
+    after = list(before)
+    for j in range(len(known)):
+        if guess[j] >= 0:
+            own = before[guess[j]]
+            after[j] = own @ little[:, guessed.index(guess[j])] @ own.mT @ before[j]
+    out = [after[0]] + [after[parents[j]].mT @ after[j] for j in range(1, len(known))]
+    turned = torch.stack(out, 1)
+    return Pose(torch.cat([turned[..., 0], turned[..., 1]], -1)[None], start.root)
 
 
 def positions(pose: Pose, body: Body) -> Tensor:

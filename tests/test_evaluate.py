@@ -10,6 +10,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import nets
 import numpy as np
 import pytest
 import torch
@@ -21,7 +22,16 @@ from spark.checkpoint import Checkpoint, save_checkpoint
 from spark.contacts import planted_feet, speeds
 from spark.dataset import Performance
 from spark.errors import FileFormatError, SkeletonError, SparkSimError
-from spark.evaluate import Cell, Row, copied, evaluate, learned, results_in
+from spark.evaluate import (
+    Cell,
+    Row,
+    copied,
+    copied_feet_held,
+    evaluate,
+    learned,
+    learned_feet_held,
+    results_in,
+)
 from spark.evaluation_cases import Case, made_cases, performances, recorded_cases
 from spark.evaluation_tables import as_csv, as_json, markdown
 from spark.features import body_features
@@ -178,14 +188,17 @@ def test_made_answers_stand_where_copies_slide(found: list[Performance]) -> None
     assert np.median(slow) < 0.02
 
 
-def test_a_new_network_is_copy(found: list[Performance]) -> None:
+def test_a_new_network_is_copy(found: list[Performance], tmp_path: Path) -> None:
     names = NameEncoder(NameConfig(width=16, heads=2, blocks=1))
     config = TrainConfig.of("tiny")
     torch.manual_seed(0)
     checkpoint = Checkpoint(Spark(network(config, 16)), names, settings={"window": 32})
     cases = made_cases(found, limit=2)
-    copy, new = (evaluate("", m, cases).mean("cross") for m in (copied, learned(checkpoint)))
-    assert new.mse == pytest.approx(copy.mse, rel=1e-3)
+    run = nets.learned(checkpoint, tmp_path)
+    pairs = (copied, learned(run)), (copied_feet_held, learned_feet_held(run))
+    for plain, new in pairs:
+        copy, own = (evaluate("", m, cases).mean("cross") for m in (plain, new))
+        assert own.mse == pytest.approx(copy.mse, rel=1e-3)
 
 
 def test_ignoring_the_source_is_seen(found: list[Performance]) -> None:
@@ -277,8 +290,8 @@ def test_command(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     command = [sys.executable, "-m", "spark_sim", "evaluate", tree, "--checkpoint", "run", *outputs]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    rows = [line.split("|")[1].strip() for line in done.stdout.splitlines()[2:5]]
-    assert rows == ["copy", "copy, feet held", "run"]
+    rows = [line.split("|")[1].strip() for line in done.stdout.splitlines()[2:6]]
+    assert rows == ["copy", "copy, feet held", "run", "run, feet held"]
     assert (tmp_path / "t.md").read_text() == done.stdout
     assert json.loads((tmp_path / "t.json").read_text())["data"] == str(tree)
     assert (tmp_path / "t.csv").read_text().startswith("method,")

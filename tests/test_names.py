@@ -17,9 +17,8 @@ from spark.checkpoint import load_checkpoint, save_checkpoint
 from spark.errors import ConventionError, DependencyError, FileFormatError
 from spark.name_file import load_names, save_names
 from spark.name_rigs import KINDS, OTHER, made_up_rig, rig_of
-from spark.name_words import rig_words
+from spark.name_words import PAD, rig_words
 from spark.names import (
-    PAD,
     NameConfig,
     NameEncoder,
     T5Names,

@@ -10,24 +10,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from nets import learned
 from safetensors.torch import save_file
 
-from spark import losses
-from spark.batch import Batch
-from spark.bodies import forward_kinematics
 from spark.canonical import canonical_positions, to_canonical
 from spark.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from spark.clips import at_frame_time, read_clips
 from spark.errors import ConventionError, FileFormatError, SkeletonError
-from spark.model import Spark
+from spark.model import Spark, _corrected
 from spark.names import NameConfig, NameEncoder
 from spark.pairs import Clip
-from spark.retarget import retarget
 from spark.rotation import quat_angle
 from spark.sample import sample_motion, sample_rig
 from spark.settings import TrainConfig, read_settings, toml
 from spark.train import Objective, Steps, network, optimiser_of, take_step, train
 from spark.transfer import transfer
+from spark.weights import VERSION
 from spark_sim import sample
 
 CHECKOUT = Path(__file__).parents[1]
@@ -117,7 +115,7 @@ def test_what_is_no_checkpoint_is_refused(tmp_path: Path) -> None:
     save_file({"a": torch.zeros(1)}, path)
     with pytest.raises(FileFormatError, match="no spark-sim checkpoint"):
         load_checkpoint(path)
-    for version, message in (("0", "version '0'"), ("1", "damaged")):
+    for version, message in (("1", "version '1'"), (str(VERSION), "damaged")):
         metadata = {"format": "spark-sim checkpoint", "version": version, "config": "{}"}
         save_file({"a": torch.zeros(1)}, path, metadata)
         with pytest.raises(FileFormatError, match=message):
@@ -195,9 +193,8 @@ from spark.train import Objective, Steps, _place
 folder, out = Path(sys.argv[1]), Path(sys.argv[2])
 rank, world, _ = _place()
 checkpoint = fresh(TINY).__class__(fresh(TINY).model.eval(), fresh(TINY).names)
-for head in (checkpoint.model.decoder.rotation, checkpoint.model.decoder.root):
-    torch.manual_seed(1)
-    torch.nn.init.normal_(head.weight, std=0.1)
+torch.manual_seed(1)
+torch.nn.init.normal_(checkpoint.model.decoder.rotation.weight, std=0.1)
 objective = Objective(checkpoint.model, TINY)
 runner = DistributedDataParallel(objective) if world > 1 else objective
 batch = Steps(read_clips([folder])[0], checkpoint.names.encode, TINY, rank, world)[0]
@@ -245,36 +242,32 @@ def test_nothing_to_train_on(tmp_path: Path) -> None:
 
 
 def test_a_handful_of_pairs_is_learned_by_heart(clips: list[Clip]) -> None:
-    """Feet stop sliding, and joints come nearer to the answer than the analytic transfer puts them.
-
-    Fails where the residual's scale is 1: a step then overshoots what is missing.
-    """
-    config = TINY.changed("test", rate=3e-3, steps=250, batch=2, variants=16)
+    """Where the answer is that the guesses turn as the source walks on, they come to do so."""
+    config = TINY.changed("test", rate=3e-3, steps=120, batch=2, variants=16)
     checkpoint = fresh(config)
     assert isinstance(checkpoint.names, NameEncoder)
     steps = Steps(clips, checkpoint.names.encode, config, 0, 1)
-    batch = max((steps[n] for n in range(12)), key=copy_error)  # where there is something to learn
+    batch = max((steps[n] for n in range(12)), key=lambda b: int((b.start.guess >= 0).sum()))
+    bent = torch.zeros_like(batch.truth.rotations)
+    bent[..., 1] = 2 + 5 * batch.pose.root[:, :, None, 0]
+    bent[..., 3] = -bent[..., 1]
+    batch = batch._replace(truth=_corrected(batch.start, bent, batch.target))
     model = checkpoint.model.eval()
     objective, optimiser = Objective(model, config), optimiser_of(model, config)
     terms = [take_step(objective, optimiser, batch, n, config) for n in range(config.steps)]
-    assert terms[-1]["loss"] < 0.4 * terms[0]["loss"]
-    assert terms[-1]["contact"] < 0.15 * terms[0]["contact"]
-    assert terms[-1]["fk"] < copy_error(batch)
-
-
-def copy_error(batch: Batch) -> float:
-    """L_FK of the analytic transfer."""
-    positions = (forward_kinematics(pose, batch.target) for pose in (batch.start, batch.truth))
-    return losses.positions(*positions, batch.target).item()
+    assert terms[-1]["fk"] < 0.1 * terms[0]["fk"]
+    assert terms[-1]["rec"] < 0.1 * terms[0]["rec"]
 
 
 @pytest.mark.parametrize("frames", [1, 2, 12, 13, 80])
 @pytest.mark.parametrize("fps", [30.0, 60.0])
-def test_an_untrained_residual_is_the_analytic_transfer(frames: int, fps: float) -> None:
+def test_an_untrained_residual_is_the_analytic_transfer(
+    frames: int, fps: float, tmp_path: Path
+) -> None:
     source, target = sample_rig("walker"), sample_rig("dancer")
     motion = sample_motion("walk", source, fps).frames(0, frames)
     canonical = to_canonical(motion, source)
-    moved = retarget(canonical, target, fresh(TINY), window=12)
+    moved = learned(fresh(TINY), tmp_path)(canonical, target, window=12)
     copied = transfer(canonical, target)
     assert len(moved) == frames
     assert quat_angle(moved.rotations, copied.rotations).max() < 2e-3
@@ -284,11 +277,11 @@ def test_an_untrained_residual_is_the_analytic_transfer(frames: int, fps: float)
 def test_windows_agree_with_the_whole(clips: list[Clip], tmp_path: Path) -> None:
     """Chunks, as long clips need them, against the clip in one piece: within 1e-3 of the height."""
     config = TINY.changed("test", steps=25, rate=1e-3, window=48, batch=4, save_every=100)
-    trained = train(clips, config, tmp_path, start=fresh(config))
+    trained = learned(train(clips, config, tmp_path, start=fresh(config)), tmp_path)
     source, target = sample_rig("walker"), sample_rig("dancer")
     canonical = to_canonical(sample_motion("walk", source, 30.0), source)
-    whole = retarget(canonical, target, trained, window=len(canonical))
-    chunks = retarget(canonical, target, trained)
+    whole = trained(canonical, target, window=len(canonical))
+    chunks = trained(canonical, target)
     copied = transfer(canonical, target)
     assert np.abs(canonical_positions(whole) - canonical_positions(copied)).max() > 1e-4
     apart = np.abs(canonical_positions(whole) - canonical_positions(chunks)).max()
@@ -333,6 +326,9 @@ def test_the_command_line_trains_resumes_and_retargets(tmp_path: Path) -> None:
     )
     assert made.returncode == 0, made.stderr
     assert (tmp_path / "walker_walk_on_dancer_wave.bvh").exists()
-    lost = command("retarget", walk, "--to", target, "--method", "spark", "--force")
+    lost = command(
+        *("retarget", walk, "--to", target, "--force", "--method", "copy"),
+        *("--checkpoint", str(path)),
+    )
     assert lost.returncode == 2
     assert "checkpoint goes with" in lost.stderr

@@ -101,10 +101,15 @@ def run(args: Namespace) -> int:
         )
 
     rows = [row("copy", copied, cases), row("copy, feet held", copied_feet_held, cases)]
-    for name, checkpoint in checkpoints.items():
-        from spark.evaluate import learned
+    for name, weights in checkpoints.items():
+        from spark.evaluate import learned, learned_feet_held
+        from spark.retarget import Learned
 
-        rows.append(row(name, learned(checkpoint), cases, settings=checkpoint.settings))
+        network = Learned(weights)
+        rows.append(row(name, learned(network), cases, settings=weights.settings))
+        if network.network.config.residual:
+            held = learned_feet_held(network)
+            rows.append(row(f"{name}, feet held", held, cases, settings=weights.settings))
     for name, folder in results.items():
         answered = [case for case in cases if case.answer is not None]
         rows.append(row(name, results_in(Path(folder)), answered))
@@ -133,17 +138,11 @@ def _named(given: str) -> tuple[str, str]:
 
 
 def _checkpoint(given: str) -> tuple[str, Any]:
-    from spark.errors import DependencyError
+    from spark.weights import read_weights
 
-    try:
-        from spark.checkpoint import load_checkpoint
-    except ImportError as error:
-        raise DependencyError(
-            f"--checkpoint needs {error.name}: pip install 'spark-sim[train]'"
-        ) from error
     name, equals, rest = given.partition("=")
     path = Path(rest if equals and not Path(given).exists() else given)
     if path.is_dir():
         path = path / "checkpoint.safetensors"
     named = equals and not Path(given).exists()
-    return name if named else path.resolve().parent.name, load_checkpoint(path)
+    return name if named else path.resolve().parent.name, read_weights(path)

@@ -66,12 +66,16 @@ def configure(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--method",
-        choices=("copy", "spark"),
-        default="copy",
-        help="copy: each joint turns as its counterpart does, in world axes (default); "
-        "spark: the network of --checkpoint",
+        choices=("spark", "copy"),
+        default="spark",
+        help="how joints turn that SRC has no counterpart of; the others turn as theirs do, in "
+        "world axes. spark: as a trained network says (default); copy: in between their neighbours",
     )
-    parser.add_argument("--checkpoint", metavar="FILE", help="what `spark-sim train` wrote")
+    parser.add_argument(
+        "--checkpoint",
+        metavar="FILE",
+        help="what `spark-sim train` wrote, instead of the network that ships",
+    )
     parser.add_argument(
         "--no-refine",
         dest="refine",

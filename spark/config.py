@@ -1,0 +1,58 @@
+"""What makes one SPARK network differ from another. No torch here: inference needs none."""
+
+from dataclasses import dataclass
+
+N_GROUPS = 6
+QUERIES_PER_GROUP = 4
+N_TOKENS = N_GROUPS * QUERIES_PER_GROUP
+TPOSE_FEATURES = 13
+SHAPE_FEATURES = 6  # bone offset, depth, leaf flag, degrees of freedom
+# A step of Adam moves a head's output by about rate times width, whatever is still missing. What a
+# residual has to say is small (some degrees); unscaled, steps overshoot it and learn nothing.
+RESIDUAL_SCALE = 0.1
+
+NO_ROTATION = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)  # in 6D
+ROTATION_GAIN = (
+    4.0  # brings the deviations from it, mostly small, to the size of the other features
+)
+
+
+@dataclass(frozen=True)
+class Config:
+    """Everything that makes one network differ from another."""
+
+    width: int = 128
+    heads: int = 4
+    encoder_blocks: int = 4
+    decoder_blocks: int = 4
+    name_width: int = 130  # of the name encoder, and two for the side
+    max_group: int = 16
+    mask_joints: float = 0.1  # share of joints zeroed before pooling, in training
+    drop_names: float = 0.0  # share of skeletons whose names are withheld, in training
+    share_joints: bool = True  # False: the ablation "w/o share"
+    positions_in: bool = False  # True: the ablation "w/ pos"
+    residual: bool = False  # correct the analytic transfer's guesses
+    noise: bool = True  # decoder starts from noise, as in the paper, or from a learned query
+    shape_features: bool = False
+    relative_time: bool = False  # rotary positions along time instead of absolute ones
+    causal: bool = False  # a frame sees the past alone: for streaming
+    decoder_time: bool = False  # the decoder's joints look along time too
+
+    @classmethod
+    def paper(cls) -> "Config":
+        """The published network."""
+        return cls()
+
+    @classmethod
+    def default(cls) -> "Config":
+        """Corrects the analytic transfer's guesses: starts equal to it."""
+        return cls(
+            mask_joints=0.0,
+            drop_names=0.1,
+            positions_in=True,
+            residual=True,
+            noise=False,
+            shape_features=True,
+            relative_time=True,
+            decoder_time=True,
+        )

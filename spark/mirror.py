@@ -1,0 +1,52 @@
+"""Left and right exchanged: a recording counts twice."""
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from spark.features import BodyFeatures
+from spark.groups import groups_of
+from spark.rig import Rig
+from spark.rig_names import split_side
+from spark.roles import Role, RoleMap
+from spark.skeleton import Skeleton
+
+_ACROSS = np.array([1.0, -1.0, 1.0])  # y points left
+_TURNED = np.array([1.0, -1.0, 1.0, -1.0])  # a rotation seen in a mirror
+
+
+def mirrored_body(body: BodyFeatures) -> BodyFeatures:
+    """`body` seen in a mirror: every joint keeps its number, and takes role and name of the one on
+    the other side. `body` must be a variant (`spark.variants.same_body`)."""
+    rig, skeleton = body.rig, body.skeleton
+    roles = tuple(_other_side(role) for role in rig.roles.roles)
+    names = list(skeleton.names)
+    for j, role in enumerate(roles):
+        partners = rig.roles.joints(role) if role is not None else ()
+        if len(partners) == 1:
+            names[j] = skeleton.names[partners[0]]
+    role_map = RoleMap(roles, rig.roles.confidence, rig.roles.reasons)
+    flipped = Skeleton(
+        tuple(names), skeleton.parents, skeleton.offsets * _ACROSS, np.arange(len(names)) == 0
+    )
+    groups = groups_of(flipped, role_map)
+    return BodyFeatures(
+        Rig(flipped, role_map, groups, rig.tpose, rig.carrier, rig.hip_height),
+        body.joints,
+        flipped,
+    )
+
+
+def mirrored_motion(
+    rotations: Float[np.ndarray, "*n J 4"],
+    hips: Float[np.ndarray, "*n 3"],
+    planted: Bool[np.ndarray, "*n 2"],
+) -> tuple[Float[np.ndarray, "*n J 4"], Float[np.ndarray, "*n 3"], Bool[np.ndarray, "*n 2"]]:
+    """What a body's motion is in the mirror, on the mirrored body."""
+    return rotations * _TURNED, hips * _ACROSS, planted[..., ::-1]
+
+
+def _other_side(role: Role | None) -> Role | None:
+    side, kind = split_side(role) if role is not None else ("", "")
+    if not side:
+        return role
+    return Role(f"{'right' if side == 'left' else 'left'}_{kind}")

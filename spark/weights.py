@@ -1,0 +1,72 @@
+"""What a checkpoint's file holds, as arrays: one safetensors file, read without torch.
+
+The header's metadata carries a format version and, as JSON, the settings of the network, of the
+name encoder and of the training; tensors are named `model.*`, `names.*` and `optimizer.*`. No
+pickle: reading one runs no code.
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Shaped
+from safetensors import SafetensorError, safe_open
+
+from spark.errors import FileFormatError
+
+FORMAT = "spark-sim checkpoint"
+VERSION = 2
+SHIPPED = Path(__file__).parent / "shipped" / "spark.safetensors"
+
+Tensors = dict[str, Shaped[np.ndarray, "..."]]
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """A file's tensors and settings. `names` are the settings of our own encoder of names, or
+    `{"t5": ...}` with the directory or hub name of a T5."""
+
+    path: Path
+    network: dict[str, Any]
+    names: dict[str, Any]
+    step: int
+    settings: dict[str, Any]
+    tensors: Tensors
+
+    def below(self, prefix: str) -> Tensors:
+        """The tensors whose names begin with `prefix`, without it."""
+        return {k.removeprefix(prefix): v for k, v in self.tensors.items() if k.startswith(prefix)}
+
+    def damaged(self, error: Exception) -> FileFormatError:
+        """What to raise where tensors and settings don't fit together."""
+        reason = next(iter(str(error).splitlines()), type(error).__name__)
+        return FileFormatError(self.path, None, f"is a damaged checkpoint ({reason})")
+
+
+def read_weights(path: Path) -> Weights:
+    """Raises `FileFormatError` for anything that is not a checkpoint."""
+    if not path.is_file():
+        raise FileFormatError(path, None, "no such file; expected a spark-sim checkpoint")
+    try:
+        with safe_open(path, framework="np") as file:
+            metadata = file.metadata() or {}
+            if metadata.get("format") != FORMAT:
+                raise FileFormatError(path, None, "holds tensors, but is no spark-sim checkpoint")
+            if metadata.get("version") != str(VERSION):
+                raise FileFormatError(
+                    path,
+                    None,
+                    f"is a checkpoint of version {metadata.get('version')!r}; this spark-sim reads "
+                    f"version {VERSION}",
+                )
+            tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
+    except (SafetensorError, OSError, TypeError) as error:
+        raise FileFormatError(path, None, f"is no safetensors file ({error})") from error
+    try:
+        header = json.loads(metadata["config"])
+        network, names = dict(header["network"]), dict(header["names"])
+        return Weights(path, network, names, int(header["step"]), dict(header["settings"]), tensors)
+    except (KeyError, TypeError, ValueError) as error:
+        raise FileFormatError(path, None, f"is a damaged checkpoint ({error!r})") from error

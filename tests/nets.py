@@ -1,0 +1,13 @@
+"""Networks as `retarget` runs them."""
+
+from pathlib import Path
+
+from spark.checkpoint import Checkpoint, save_checkpoint
+from spark.retarget import Learned
+from spark.weights import read_weights
+
+
+def learned(checkpoint: Checkpoint, folder: Path) -> Learned:
+    """What is read back from the file that a checkpoint is saved in."""
+    save_checkpoint(checkpoint, folder / "saved.safetensors")
+    return Learned(read_weights(folder / "saved.safetensors"))
