@@ -19,7 +19,7 @@ from robots.terms import one_sided
 from robots.tree import Coordinates, Frames, Tree, forward
 
 _APART = 0.006  # [m] that shapes keep between them; less where the T-pose has less
-_EASE = 0.003  # [m]
+EASE = 0.003  # [m]
 _NEAR = 0.03  # [m] within which shapes are watched
 _MOST_SPHERES = 6  # along a shape
 _ALL_SPHERES = 24
@@ -119,11 +119,11 @@ class Collisions:
             links |= {int(self.tree.parents[j]) for j in joints}
             columns = stage.turning(joints)
             for s, sphere in enumerate(spheres):
-                deep = np.flatnonzero(over[s] > -3 * _EASE)
+                deep = np.flatnonzero(over[s] > -3 * EASE)
                 if not len(deep):
                     continue
                 here = at[deep]
-                residual, slope = one_sided(over[s, deep], _EASE)
+                residual, slope = one_sided(over[s, deep], EASE)
                 if not normal.rows:
                     normal.cost[here] += 0.5 * (weight * residual) ** 2
                     continue

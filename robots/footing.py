@@ -17,11 +17,9 @@ from robots.tree import Coordinates, Frames, forward
 from spark.kinematics import world_positions
 from spark.rotation import quat_rotate
 
-_WOBBLE = (
-    0.05  # hip heights that a standing foot may stray from its mean place without having moved
-)
-_TURN = np.radians(12)  # and how far it may turn
-_EASE = 0.05  # [s] over which a foot is taken hold of and let go
+WOBBLE = 0.05  # hip heights that a standing foot may stray from its mean place without having moved
+TURN = np.radians(12)  # and how far it may turn
+EASE = 0.05  # [s] over which a foot is taken hold of and let go
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,20 +85,20 @@ def _footing(
     heel, toe = at[:, :2].mean(1), at[:, 2:].mean(1)
     along = toe - heel
     heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
-    flat = _flat_sole(robot, sole)
+    flat = flat_sole(robot, sole)
     length = float(np.linalg.norm(flat[2:].mean(0) - flat[:2].mean(0)))
     ahead = np.stack([np.cos(heading), np.sin(heading)], axis=1)
     pivot, turn = toe.copy(), heading.copy()
-    stances = _stances(contacts, round(2 * _EASE / frame_time))
+    stances = _stances(contacts, round(2 * EASE / frame_time))
     for (start, stop), (before, after) in stances:
         # The toe is the pivot; where only the heel stands, it is where the toe will come down.
         on_toe = np.flatnonzero(contacts[start:stop, 1]) + start
         frames = on_toe if len(on_toe) else np.arange(start, stop)
         own = toe[frames] if len(on_toe) else (heel + length * ahead)[frames]
         moved = _beyond(
-            targets.feet[frames, s, int(len(on_toe) > 0)], _WOBBLE * robot.rig.hip_height
+            targets.feet[frames, s, int(len(on_toe) > 0)], WOBBLE * robot.rig.hip_height
         )
-        turned = _beyond(heading[frames, None], _TURN)[:, 0]
+        turned = _beyond(heading[frames, None], TURN)[:, 0]
         time = np.arange(before, after)
         for axis in range(2):
             place = own[:, axis].mean() + moved[:, axis]
@@ -111,7 +109,7 @@ def _footing(
     for corner, (x, y) in enumerate(flat - flat[2:].mean(0)):
         places[corner, 0] = pivot[:, 0] + cos * x - sin * y
         places[corner, 1] = pivot[:, 1] + sin * x + cos * y
-    return Footing(places, _eased(contacts, max(1, round(_EASE / frame_time)))[[0, 0, 1, 1]])
+    return Footing(places, _eased(contacts, max(1, round(EASE / frame_time)))[[0, 0, 1, 1]])
 
 
 def _stances(
@@ -144,7 +142,7 @@ def _eased(contacts: Bool[np.ndarray, "T 2"], frames: int) -> Float[np.ndarray, 
     return uniform_filter1d(wider, 2 * frames + 1, axis=0, mode="nearest").T
 
 
-def _flat_sole(robot: Morphology, sole: Sole) -> Float[np.ndarray, "4 2"]:
+def flat_sole(robot: Morphology, sole: Sole) -> Float[np.ndarray, "4 2"]:
     """The corners on the floor, heading along X, as the T-pose has them."""
     at = robot.standing_sole(sole)[:, :2]
     along = at[2:].mean(0) - at[:2].mean(0)

@@ -30,7 +30,7 @@ _AROUND = 0.15  # [s] before and after a frame in which a step must not do harm
 _LONGEST = 1.0  # [rad, m] a column moves in one of them
 _LOOK = 0.06  # [s] from one look for collisions to the next
 _DAMPING = 1e-3
-_SHORT_OF_LIMIT = np.radians(0.75)
+SHORT_OF_LIMIT = np.radians(0.75)
 
 
 def copy(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
@@ -131,17 +131,17 @@ def solve_stage(
         if apart and k % 3 == 0:
             nears = robot.collisions.near(forward(tree, q), stage, stride_of(targets))
         normal, ties, cost = look(q, rows=True)
-        limits = q.at_limits(tree, _SHORT_OF_LIMIT)[:, stage.columns]
+        limits = q.at_limits(tree, SHORT_OF_LIMIT)[:, stage.columns]
         step = np.zeros((len(q), tree.size))
         step[:, stage.columns] = normal.solve_together(ties, damping, limits)
         long = np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(1), 1e-9))
         step *= eased(long, window)[:, None]
-        trial = q.moved(tree, step).clipped(tree, _SHORT_OF_LIMIT)
+        trial = q.moved(tree, step).clipped(tree, SHORT_OF_LIMIT)
         worse = look(trial, rows=False)[2] > cost * (1 + 1e-3) + 1e-9
         damping = np.where(worse, damping * 10, np.maximum(damping / 5, _DAMPING))
         if worse.any():
             step *= eased(1.0 - worse, window)[:, None]
-            trial = q.moved(tree, step).clipped(tree, _SHORT_OF_LIMIT)
+            trial = q.moved(tree, step).clipped(tree, SHORT_OF_LIMIT)
         q = trial
         if cost.sum() > (1 - little) * last:
             break

@@ -6,12 +6,12 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import uniform_filter1d
 
-from robots.morphology import Morphology
+from robots.morphology import Morphology, Sole
 from robots.shapes import surface
 from robots.tree import forward
 from spark.canonical import CanonicalMotion, canonical_positions
 from spark.contacts import planted_points
-from spark.feet import sole_corners, sole_positions, standing_height
+from spark.feet import Side, sole_corners, sole_positions, standing_height
 from spark.rig import Rig
 from spark.roles import LIMBS, Group, Role
 from spark.rotation import quat_mul, quat_rotate
@@ -79,18 +79,16 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
     moved = transfer(source, robot.rig)
     positions = canonical_positions(source)
     rig = source.rig
-    chest = (*rig.roles.joints(Role.SPINE), rig.pelvis)
-    chest_joint = chest[-2] if len(chest) > 1 else chest[-1]
     own_chest = chest_of(robot.rig)
-    paths, contacts = _contacts(source, positions, robot)
+    paths = feet_of(source, positions, robot)
     scale = robot.rig.hip_height / rig.hip_height
     return Targets(
         frame_time=source.frame_time,
         world=quat_mul(moved.rotations, robot.rig.tpose),
-        chest=quat_mul(source.rotations[:, chest_joint], robot.rig.tpose[own_chest]),
+        chest=quat_mul(source.rotations[:, chest_of(rig)], robot.rig.tpose[own_chest]),
         hips=moved.hips - np.array([0.0, 0.0, moved.floor_z]),
         bones=bone_directions(rig, positions, source.rotations),
-        contacts=contacts,
+        contacts=_contacts(source, paths),
         feet=scale * paths[..., :2],
         hands=_between_hands(rig, positions, robot),
         notes=moved.notes,
@@ -122,27 +120,38 @@ def bone_directions(
     return out
 
 
-def _contacts(
+def feet_of(
     source: CanonicalMotion, positions: Float[np.ndarray, "T J 3"], robot: Morphology
-) -> tuple[Float[np.ndarray, "T S 2 3"], Bool[np.ndarray, "T S 2"]]:
-    """The source's heel and toe [m] for each of the robot's soles, and whether they stand."""
+) -> Float[np.ndarray, "T S 2 3"]:
+    """The source's heel and toe [m] for each of the robot's soles; 0 where it has no such foot."""
     rig = source.rig
-    height = standing_height(rig)
     world = quat_mul(source.rotations, rig.tpose)
     paths = np.zeros((len(positions), len(robot.soles), 2, 3))
-    stands = np.zeros(paths.shape[:-1], dtype=bool)
     theirs = {sole.side: sole for sole in sole_corners(rig)}
     for s, sole in enumerate(robot.soles):
-        side = "left" if robot.rig.roles.roles[sole.foot] is Role.LEFT_FOOT else "right"
+        side = side_of(robot, sole)
         if side not in theirs:
             continue
         toe = rig.roles.joint(Role(f"{side}_toe"))
         foot = rig.roles.require(Role(f"{side}_foot"))
-        points = sole_positions(theirs[side], positions, world)
-        paths[:, s, 0] = points[:, :2].mean(1)
+        paths[:, s, 0] = sole_positions(theirs[side], positions, world)[:, :2].mean(1)
         paths[:, s, 1] = positions[:, foot if toe is None else toe]
-        stands[:, s] = planted_points(paths[:, s], source.frame_time, height)
-    return paths, _without_flicker(stands, max(1, round(_GAP / source.frame_time)))
+    return paths
+
+
+def side_of(robot: Morphology, sole: Sole) -> Side:
+    """Whose foot a sole is."""
+    return "left" if robot.rig.roles.roles[sole.foot] is Role.LEFT_FOOT else "right"
+
+
+def _contacts(
+    source: CanonicalMotion, paths: Float[np.ndarray, "T S 2 3"]
+) -> Bool[np.ndarray, "T S 2"]:
+    """Whether heels and toes stand."""
+    stands = np.zeros(paths.shape[:-1], dtype=bool)
+    for s in np.flatnonzero(paths.any(axis=(0, 2, 3))).tolist():
+        stands[:, s] = planted_points(paths[:, s], source.frame_time, standing_height(source.rig))
+    return _without_flicker(stands, max(1, round(_GAP / source.frame_time)))
 
 
 def _without_flicker(mask: Bool[np.ndarray, "T S 2"], frames: int) -> Bool[np.ndarray, "T S 2"]:

@@ -107,10 +107,14 @@ class Coordinates:
         angles = np.where(tree.balls, self.angles, np.clip(self.angles, lower, upper))
         return Coordinates(self.pos, self.quat, angles, self.turns)
 
+    def at(self, frames: slice | Int[np.ndarray, "S"]) -> "Coordinates":
+        """Those of some frames."""
+        turns = None if self.turns is None else self.turns[frames]
+        return Coordinates(self.pos[frames], self.quat[frames], self.angles[frames], turns)
+
     def every(self, stride: int) -> "Coordinates":
         """Those of every `stride`-th frame."""
-        turns = None if self.turns is None else self.turns[::stride]
-        return Coordinates(self.pos[::stride], self.quat[::stride], self.angles[::stride], turns)
+        return self.at(slice(None, None, stride))
 
     def between(self, stride: int, frames: int) -> "Coordinates":
         """The cubic splines through these, for `stride` times as many frames."""

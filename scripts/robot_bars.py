@@ -1,6 +1,6 @@
 """Measure retargeting onto robots: a table of each clip, and of plain copy beside it.
 
-    python scripts/robot_bars.py --data DIR --robots g1.xml h1.xml [--clips 'cmu_asf/*.bvh' ...]
+    python scripts/robot_bars.py --data DIR --robots unitree_g1 h1.xml [--clips 'cmu_asf/*.bvh' ...]
 
 A foot is planted while the source's toe moves along the floor at less than 0.15 m/s, lower than
 6 cm above its own 1st percentile.
@@ -13,11 +13,14 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from robots.morphology import Morphology, understand_robot
+from robots.known import known
+from robots.morphology import Morphology
 from robots.motion import RobotMotion
 from robots.solve import copy, retarget
+from robots.stream import LATENCY, Stream
+from robots.stream_targets import Frame, ground_of
 from robots.targets import bone_directions
-from spark.canonical import CanonicalMotion, canonical_positions, to_canonical
+from spark.canonical import CanonicalMotion, canonical_positions, from_canonical, to_canonical
 from spark.recording import read_recording
 from spark.rig import understand
 from spark.roles import Role
@@ -45,6 +48,7 @@ def main() -> None:
     parser.add_argument("--clips", nargs="+", default=folders)
     parser.add_argument("--quiet", action="store_true", help="means only")
     parser.add_argument("--no-collisions", action="store_true")
+    parser.add_argument("--stream", action="store_true", help="frame by frame, not whole clips")
     args = parser.parse_args()
     clips = sorted(path for pattern in args.clips for path in args.data.glob(f"{pattern}"))
     sources = {}
@@ -53,10 +57,10 @@ def main() -> None:
             motion = read_recording(path).motion
             sources[path.stem] = to_canonical(motion, understand(motion))
     for name in args.robots:
-        robot = understand_robot(name)
+        robot = known(name)
         print(f"\n{Path(name).stem}: {len(robot.mj_joints)} joints")
         print(" " * 22 + " ".join(f"{c:>{int(f.split('.')[0])}}" for c, f in COLUMNS.items()))
-        for method in (copy, retarget):
+        for method in (copy, follow if args.stream else retarget):
             rows, weights = [], []
             for clip, source in sources.items():
                 start = time.perf_counter()
@@ -64,11 +68,21 @@ def main() -> None:
                 fps = len(source) / (time.perf_counter() - start)
                 rows.append([*measure(source, result, not args.no_collisions), fps])
                 weights.append(len(source))
-                if not args.quiet and method is retarget:
+                if not args.quiet and method is not copy:
                     show(clip, rows[-1])
             mean = np.average(rows, axis=0, weights=weights)
             mean[1], mean[7] = np.max(rows, axis=0)[[1, 7]]
-            show(f"{method.__name__}: mean", mean)
+            show(f"{method.__name__}: mean", mean.tolist())
+
+
+def follow(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
+    """Frame by frame, each answer beside the frame that it is for."""
+    motion = from_canonical(source)
+    stream = Stream(source.rig, robot, motion.frame_time, ground_of(source, robot))
+    places = [None] * len(motion) if motion.translations is None else motion.translations
+    frames = [Frame(*part) for part in zip(motion.root_pos, motion.rotations, places, strict=True)]
+    qpos = [stream.step(frame) for frame in [*frames, *frames[-1:] * LATENCY]]
+    return RobotMotion(robot, robot.from_qpos(np.array(qpos[LATENCY:])), motion.frame_time)
 
 
 def show(label: str, row: list[float]) -> None:

@@ -18,11 +18,12 @@ DISTRIBUTION = "spark-sim"
 if TYPE_CHECKING:
     from spark.errors import SparkSimError
     from spark_sim.clip import Clip, load, play, report, retarget, sample
-    from spark_sim.robot import RobotClip
+    from spark_sim.robot import Retargeter, RobotClip
     from spark_sim.show import Simulated, simulate
 
 __all__ = [
     "Clip",
+    "Retargeter",
     "RobotClip",
     "Simulated",
     "SparkSimError",
@@ -35,6 +36,7 @@ __all__ = [
 ]
 _ELSEWHERE = {
     "SparkSimError": "spark.errors",
+    "Retargeter": "spark_sim.robot",
     "RobotClip": "spark_sim.robot",
     "Simulated": "spark_sim.show",
     "simulate": "spark_sim.show",

@@ -1,0 +1,86 @@
+"""Retargeting onto a robot while the source moves: for teleoperation.
+
+What `robots.solve` does for a whole clip, over the last frames alone: two frames that are gone,
+which the next ones are tied to by their accelerations, and three that are still free. Every new
+frame moves the window on by one, and what leaves it is the answer: `LATENCY` frames old, by what
+has been seen since a better one.
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+from robots.morphology import Morphology
+from robots.project import project
+from robots.stream_footing import Feet
+from robots.stream_targets import Frame, FrameTargets, Ground, Watcher, together
+from robots.window import Window
+from robots.window_terms import Stance, Terms
+from spark.errors import FrameError
+from spark.rig import Rig
+from spark.rotation import quat_from_matrix
+
+LATENCY = 2  # [frames]
+_GONE = 2  # frames before the free ones
+_FRAMES = _GONE + LATENCY + 1
+_ONWARD = np.array([*range(1, _FRAMES), _FRAMES - 1])
+_FIRST_STEPS = 20
+
+
+class Stream:
+    """A robot that follows the frames of a source on `source`, `frame_time` [s] apart.
+
+    It takes each frame once, in order; no later one changes what it has said.
+    """
+
+    def __init__(self, source: Rig, robot: Morphology, frame_time: float, ground: Ground) -> None:
+        self.robot, self.frame_time = robot, frame_time
+        self._watcher = Watcher(source, robot, ground)
+        self._terms = Terms(robot, self._watcher.bones, self._watcher.hands is not None)
+        self._window = Window(robot, self._terms, frame_time, gone=_GONE, free=LATENCY + 1)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what has been seen: the next frame is a first one."""
+        self._count = 0
+        self._targets: list[FrameTargets] = []
+        self._q = np.zeros((_FRAMES, self.robot.mjcf.model.nq))
+        self._feet = Feet(self._watcher, self.frame_time, LATENCY)
+
+    def step(self, frame: Frame) -> Float[np.ndarray, "nq"]:
+        """The next frame of the source; MuJoCo's coordinates of the robot `LATENCY` frames before
+        it. Before its first frame, a source is taken to have stood still.
+
+        Raises `FrameError` where the frame is broken; it is then as if it had not been there.
+        """
+        try:
+            targets = self._watcher.targets(frame)
+        except FrameError as error:
+            raise FrameError(f"frame {self._count} of the stream: {error}") from error
+        if self._count:
+            q = self._q[_ONWARD]
+            self._targets = [*self._targets[1:], targets]
+            stance = self._feet.look(targets, self._corners(q))
+            self._q = self._window.solve(q, together(self._targets), stance)
+        else:
+            self._targets = [targets] * (LATENCY + 1)
+            self._q = self._first(targets)
+        self._count += 1
+        return self._q[_GONE].copy()
+
+    def _first(self, targets: FrameTargets) -> Float[np.ndarray, "W nq"]:
+        """A pose at rest: first as it comes, then with the feet that stand where they are in it."""
+        robot, wanted = self.robot, together(self._targets)
+        projected = project(robot, quat_from_matrix(targets.world)[None], targets.hips[None])
+        q = robot.to_qpos(projected)[np.zeros(_FRAMES, dtype=int)]
+        soles = len(robot.soles)
+        stance = Stance(np.zeros((soles, 4, 3)), np.zeros((soles, 4)))
+        for held in (False, True):
+            if held:
+                stance = self._feet.look(targets, self._corners(q))
+            q = self._window.settle(q, wanted, stance, _FIRST_STEPS)
+            q[:] = q[-1]
+        return q
+
+    def _corners(self, q: Float[np.ndarray, "W nq"]) -> Float[np.ndarray, "S 4 3"]:
+        """Of the soles, in the frame that is next to be said."""
+        return self._terms.corners(self._terms.poses(q[_GONE : _GONE + 1]))[0]

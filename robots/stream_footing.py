@@ -1,0 +1,111 @@
+"""Which feet stand, told as frames come in, and where they are held.
+
+A foot is held where it comes down. What the source's foot wobbles while it stands is lost, what it
+drifts beyond that is motion and stays; as in `robots.footing`, which sees the whole clip.
+"""
+
+from collections import deque
+
+import numpy as np
+from jaxtyping import Float
+
+from robots.footing import EASE, TURN, WOBBLE, flat_sole
+from robots.stream_targets import FrameTargets, Watcher
+from robots.window_terms import Stance
+from spark.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
+from spark.feet import standing_height
+
+_LET_GO = 1.5  # times the speed and height at which a foot comes to stand: there it is let go
+
+
+class Feet:
+    """The contacts of a stream's feet and the robot's footprints, `ahead` frames after they
+    happen: so much is known of what comes next."""
+
+    def __init__(self, watcher: Watcher, frame_time: float, ahead: int) -> None:
+        self._robot, self._scale = watcher.robot, watcher.scale
+        self._low = watcher.ground.low
+        self._frame_time, self._ahead = frame_time, ahead
+        size = standing_height(watcher.source) / ADULT_HEIGHT
+        self._slow, self._near = PLANTED_SPEED * size, PLANTED_HEIGHT * size
+        self._reach = max(1, round(SPEED_WINDOW / 2 / frame_time))
+        self._known = watcher.has_feet[:, None]
+        self._flat = [flat_sole(self._robot, sole) for sole in self._robot.soles]
+        self._length = self._reach + ahead + 1
+        self._seen: deque[FrameTargets] = deque(maxlen=self._length)
+        soles = len(self._robot.soles)
+        self._stands = np.zeros((soles, 2), dtype=bool)
+        self._holds = np.zeros((soles, 2))
+        self._prints = [Footprint() for _ in range(soles)]
+
+    def look(self, targets: FrameTargets, corners: Float[np.ndarray, "S 4 3"]) -> Stance:
+        """Takes in the newest frame, and says how the feet stand `ahead` frames before it, when
+        the robot's are at `corners`."""
+        first = not self._seen
+        self._seen.extend([targets] * (self._length if first else 1))
+        here = len(self._seen) - 1 - self._ahead
+        now, before = self._seen[here], self._seen[here - 1]
+        after = min(self._reach, self._ahead)
+        way = self._seen[here + after].feet - self._seen[here - self._reach].feet
+        speed = np.hypot(way[..., 0], way[..., 1]) / ((self._reach + after) * self._frame_time)
+        height = now.feet[..., 2] - self._low
+        more = np.where(self._stands, _LET_GO, 1.0)
+        self._stands = self._known & (speed < more * self._slow) & (height < more * self._near)
+        ramp = 1.0 if first else self._frame_time / EASE
+        step = np.clip(self._stands - self._holds, -ramp, ramp)
+        places = np.zeros_like(corners)
+        for s, (sole, mark) in enumerate(zip(self._robot.soles, self._prints, strict=True)):
+            point = int(self._stands[s, 1] or not self._stands[s, 0])
+            if not self._holds[s].any():
+                mark.put(corners[s], self._flat[s], on_toe=point == 1)
+            else:
+                moved = self._scale * (now.feet - before.feet)[s, point, :2]
+                turn = _turn(before.world[sole.foot], now.world[sole.foot])
+                wobble = WOBBLE * self._robot.rig.hip_height
+                mark.follow(moved, turn, float(self._holds[s].max()), wobble)
+            places[s, :, :2] = mark.places(self._flat[s])
+        self._holds = self._holds + step
+        return Stance(places, np.repeat(self._holds, 2, axis=1))
+
+
+class Footprint:
+    """Where one foot is held: the middle of its toes' edge, and its heading."""
+
+    def __init__(self) -> None:
+        self._pivot, self._away = np.zeros((2, 2))
+        self._heading = self._turned = 0.0
+
+    def put(
+        self, corners: Float[np.ndarray, "4 3"], flat: Float[np.ndarray, "4 2"], *, on_toe: bool
+    ) -> None:
+        """Where the foot is; on its heel, where its toes will come down."""
+        heel, toe = corners[:2, :2].mean(0), corners[2:, :2].mean(0)
+        along = toe - heel
+        self._heading = float(np.arctan2(along[1], along[0]))
+        ahead = np.array([np.cos(self._heading), np.sin(self._heading)])
+        length = flat[2:].mean(0)[0] - flat[:2].mean(0)[0]
+        self._pivot = toe if on_toe else heel + length * ahead
+        self._away, self._turned = np.zeros(2), 0.0
+
+    def follow(
+        self, moved: Float[np.ndarray, "2"], turned: float, hold: float, wobble: float
+    ) -> None:
+        """Go along with the source's foot where it is not firmly held, and beyond its wobble."""
+        away = self._away + hold * moved
+        far = float(np.hypot(*away))
+        self._away = away * min(1.0, wobble / max(far, 1e-12))
+        self._pivot = self._pivot + (1 - hold) * moved + (away - self._away)
+        turn = self._turned + hold * turned
+        self._turned = float(np.clip(turn, -TURN, TURN))
+        self._heading += (1 - hold) * turned + (turn - self._turned)
+
+    def places(self, flat: Float[np.ndarray, "4 2"]) -> Float[np.ndarray, "4 2"]:
+        """Where the corners of the sole stand."""
+        cos, sin = np.cos(self._heading), np.sin(self._heading)
+        return self._pivot + (flat - flat[2:].mean(0)) @ np.array([[cos, sin], [-sin, cos]])
+
+
+def _turn(before: Float[np.ndarray, "3 3"], now: Float[np.ndarray, "3 3"]) -> float:
+    """By how much [rad] something turned about the vertical."""
+    R = now @ before.T
+    return float(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]))

@@ -1,0 +1,233 @@
+"""One frame of a source as a robot's targets: what `robots.targets` makes of a clip, without what
+only a clip can tell, in a tenth of its time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from robots.morphology import Morphology
+from robots.targets import (
+    BONES,
+    OUT,
+    arm_length,
+    chest_of,
+    feet_of,
+    palm_thickness,
+    side_of,
+)
+from spark.canonical import CanonicalMotion, canonical_positions
+from spark.errors import FrameError
+from spark.feet import sole_corners
+from spark.rig import Rig
+from spark.roles import Role
+from spark.rotation import matrix_from_quat, quat_conj
+from spark.transfer import correspond
+
+_UNIT = 0.05  # by how much a quaternion's length may differ from 1
+
+
+class Frame(NamedTuple):
+    """One frame of a source, as `spark.motion.Motion` has them: the root's place [m, world, Z up],
+    local rotations (`q_parent_joint`, wxyz) of all joints and, where these move against their
+    parents, all joints' local places [m]."""
+
+    root_pos: Float[np.ndarray, "3"]
+    rotations: Float[np.ndarray, "N 4"]
+    translations: Float[np.ndarray, "N 3"] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """What a clip says about the floor: its height [m], and how low [m] heel and toe of the feet
+    that each of the robot's soles follows come (1st percentile)."""
+
+    z: float
+    low: Float[np.ndarray, "S 2"]
+
+
+@dataclass(frozen=True, eq=False)
+class FrameTargets:
+    """`robots.targets.Targets` of one frame, or of some (T), floor at z = 0, turns as matrices
+    (`R_world_joint`).
+
+    `bones` are in the order of `Watcher.bones`. `feet` are the source's heel and toe of each of the
+    robot's soles [m, the source's own world].
+    """
+
+    world: Float[np.ndarray, "*T J 3 3"]
+    chest: Float[np.ndarray, "*T 3 3"]
+    hips: Float[np.ndarray, "*T 3"]
+    bones: Float[np.ndarray, "*T B 3"]
+    hands: Float[np.ndarray, "*T 3"]
+    feet: Float[np.ndarray, "*T S 2 3"]
+
+
+def together(targets: Sequence[FrameTargets]) -> FrameTargets:
+    """Those of some frames in one."""
+    names = [field.name for field in fields(FrameTargets)]
+    return FrameTargets(*(np.stack([getattr(one, name) for one in targets]) for name in names))
+
+
+def ground_of(source: CanonicalMotion, robot: Morphology) -> Ground:
+    """The floor of a clip; of a T-pose alone, its soles' height."""
+    feet = feet_of(source, canonical_positions(source), robot)
+    return Ground(source.floor_z, np.percentile(feet[..., 2], 1, axis=0))
+
+
+class Watcher:
+    """Reads frames of motions on one rig as targets for one robot."""
+
+    def __init__(self, source: Rig, robot: Morphology, ground: Ground) -> None:
+        self.source, self.robot, self.ground = source, robot, ground
+        self.scale = robot.rig.hip_height / source.hip_height
+        self._parents = source.skeleton.parents.tolist()
+        self._untpose = matrix_from_quat(quat_conj(source.tpose))
+        self._tpose = matrix_from_quat(robot.rig.tpose)
+        self._chest = chest_of(source)
+        self._turns = correspond(source, robot.rig)
+        self._held = np.flatnonzero(self._turns.first < 0)
+        self._between = np.flatnonzero((self._turns.mix != 0) & (self._turns.first >= 0))
+        self._watch_feet()
+        self._watch_bones()
+        self._watch_hands()
+
+    def targets(self, frame: Frame) -> FrameTargets:
+        """What a frame asks of the robot.
+
+        Raises `FrameError` where it is not a frame of the source's skeleton.
+        """
+        world, joints = self._world(frame)
+        turns = world @ self._untpose
+        bones = joints[self._lower] - joints[self._upper]
+        bones /= np.maximum(np.sqrt((bones * bones).sum(1, keepdims=True)), 1e-12)
+        for row, joint, out in self._blind:
+            bones[row] = turns[joint] @ out
+        hips = joints[self.source.hips].mean(0)
+        hips[2] -= self.ground.z
+        own = self._own(turns)
+        return FrameTargets(
+            world=own @ self._tpose,
+            chest=turns[self._chest] @ self._tpose[chest_of(self.robot.rig)],
+            hips=self.scale * hips,
+            bones=bones,
+            hands=self._between_hands(joints),
+            feet=self._feet(world, joints),
+        )
+
+    def _world(self, frame: Frame) -> tuple[Float[np.ndarray, "N 3 3"], Float[np.ndarray, "N 3"]]:
+        """Rotations and places [m] of the source's joints."""
+        root, rotations, translations = Frame(*frame)
+        names, offsets = self.source.skeleton.names, self.source.skeleton.offsets
+        local = offsets if translations is None else translations
+        for what, given, like in (
+            ("root_pos", root, offsets[0]),
+            ("rotations", rotations, self.source.tpose),
+            ("translations", local, offsets),
+        ):
+            if np.shape(given) != like.shape:
+                raise FrameError(
+                    f"{what} has shape {np.shape(given)}; expected {like.shape}, as the source's "
+                    "skeleton has it"
+                )
+            if not np.isfinite(given).all():
+                where = f" of joint {names[_first_bad(given)]!r}" * (like.ndim - 1)
+                raise FrameError(f"{what}{where} is not finite; leave the frame out")
+        length = np.sqrt((rotations * rotations).sum(1))
+        if np.abs(length - 1).max() > _UNIT:
+            j = int(np.abs(length - 1).argmax())
+            raise FrameError(
+                f"the quaternion of joint {names[j]!r} has length {length[j]:.3g}; expected 1"
+            )
+        turns = matrix_from_quat(rotations / length[:, None])
+        places = np.empty_like(local)
+        places[0] = root
+        for j, parent in enumerate(self._parents):
+            if parent >= 0:
+                places[j] = places[parent] + turns[parent] @ local[j]
+                turns[j] = turns[parent] @ turns[j]
+        return turns, places
+
+    def _own(self, turns: Float[np.ndarray, "N 3 3"]) -> Float[np.ndarray, "J 3 3"]:
+        """How the robot's joints turn since the T-pose: as `Correspondence.rotations` says."""
+        first, second, mix = self._turns.first, self._turns.second, self._turns.mix
+        out = turns[first]
+        for j in self._between.tolist():
+            a, b, toward, matrix = np.empty(4), np.empty(4), np.empty(3), np.empty(9)
+            mujoco.mju_mat2Quat(a, turns[first[j]].ravel())
+            mujoco.mju_mat2Quat(b, turns[second[j]].ravel())
+            mujoco.mju_subQuat(toward, b, a)
+            mujoco.mju_quatIntegrate(a, toward, mix[j])
+            mujoco.mju_quat2Mat(matrix, a)
+            out[j] = matrix.reshape(3, 3)
+        out[self._held] = self._tpose[self._held].transpose(0, 2, 1)
+        return out
+
+    def _feet(
+        self, world: Float[np.ndarray, "N 3 3"], joints: Float[np.ndarray, "N 3"]
+    ) -> Float[np.ndarray, "S 2 3"]:
+        feet = np.zeros((len(self.has_feet), 2, 3))
+        heels = (world[self._heels] @ self._heel_offsets[:, :, None])[..., 0]
+        feet[self.has_feet, 0] = joints[self._heels] + heels
+        feet[self.has_feet, 1] = joints[self._toes]
+        return feet
+
+    def _between_hands(self, joints: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "3"]:
+        if self.hands is None:
+            return np.zeros(3)
+        (left, right), scale, least = self.hands
+        between = scale * (joints[left] - joints[right])
+        distance = float(np.sqrt(between @ between))
+        return between * (max(distance, least) / max(distance, 1e-9))
+
+    def _watch_feet(self) -> None:
+        """The source's heels and toes that the robot's soles follow."""
+        source, robot = self.source, self.robot
+        theirs = {sole.side: sole for sole in sole_corners(source)}
+        sides = [side_of(robot, sole) for sole in robot.soles]
+        self.has_feet = np.array([side in theirs for side in sides], dtype=bool)
+        heels, offsets, toes = [], [], []
+        for side in (side for side in sides if side in theirs):
+            foot, toe = source.roles.require(Role(f"{side}_foot")), Role(f"{side}_toe")
+            heels.append(foot)
+            offsets.append(theirs[side].offsets[:2].mean(0))
+            toes.append(next(iter(source.roles.joints(toe)), foot))
+        self._heels, self._toes = np.array(heels, dtype=int), np.array(toes, dtype=int)
+        self._heel_offsets = np.array(offsets).reshape(-1, 3)
+
+    def _watch_bones(self) -> None:
+        """The segments of the limbs that both have, and between which joints they point; where the
+        far one is missing, the rotation says it."""
+        roles, rest = self.source.roles, self.source.skeleton.rest_positions
+        self.bones: list[Role] = []
+        upper, lower, self._blind = [], [], []
+        for role, far in BONES:
+            a, b = roles.joint(role), roles.joint(far)
+            if a is None or role not in self.robot.bones:
+                continue
+            if b is None or np.linalg.norm(rest[b] - rest[a]) < 1e-6:
+                self._blind.append((len(self.bones), a, OUT[role]))
+                b = a
+            self.bones.append(role)
+            upper.append(a)
+            lower.append(b)
+        self._upper, self._lower = np.array(upper, dtype=int), np.array(lower, dtype=int)
+
+    def _watch_hands(self) -> None:
+        """The wrists of a source and a robot that have both, in which scale, and how near [m] the
+        robot's may come."""
+        roles = (Role.LEFT_HAND, Role.RIGHT_HAND)
+        theirs = [self.source.roles.joint(role) for role in roles]
+        own = [self.robot.rig.roles.joint(role) for role in roles]
+        self.hands: tuple[list[int], float, float] | None = None
+        if None not in (*theirs, *own):
+            scale = arm_length(self.robot.rig) / arm_length(self.source)
+            least = sum(palm_thickness(self.robot, role) for role in roles)
+            self.hands = [int(j) for j in theirs if j is not None], scale, least
+
+
+def _first_bad(values: Float[np.ndarray, "N *D"]) -> int:
+    return int(np.flatnonzero(~np.isfinite(values).reshape(len(values), -1).all(1))[0])

@@ -1,0 +1,135 @@
+"""Gauss-Newton over the last few frames of a robot's trajectory."""
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.linalg.lapack import dposv
+
+from robots import objective
+from robots.morphology import Morphology
+from robots.objective import FAST, RUSH
+from robots.solve import SHORT_OF_LIMIT, smoothness
+from robots.stream_targets import FrameTargets
+from robots.window_terms import Stance, Terms
+
+SMOOTH = 7.0  # [Hz] above which a motion fades: more than in hindsight, or it would lag behind
+_DAMPING = 1e-3
+_CAREFUL = 0.02  # where nothing else keeps steps small
+_IMMOVABLE = 1e8
+_LONGEST = 0.5  # [rad, m] a column moves in one step
+_STEPS = 2  # at most,
+_SHORT = 0.1  # [rad, m] and none after one that is shorter
+
+
+class Window:
+    """Solves for the last frames of a trajectory in `qpos`: `free` ones, after some that are
+    `gone`, which they are tied to."""
+
+    def __init__(
+        self, robot: Morphology, terms: Terms, frame_time: float, *, gone: int, free: int
+    ) -> None:
+        self._terms, self._frame_time, self._free = terms, frame_time, free
+        self._model, tree = robot.mjcf.model, robot.tree
+        starts = self._model.jnt_dofadr[list(robot.mj_joints)]
+        base = int(self._model.jnt_dofadr[robot.mjcf.free_joint])
+        dofs = [*range(base, base + 6)]
+        for start, ball in zip(starts.tolist(), tree.balls, strict=True):
+            dofs += range(start, start + (3 if ball else 1))
+        self._dofs = np.array(dofs)
+        hinges = ~tree.balls
+        self._columns = tree.starts[hinges]
+        self._angles = self._model.jnt_qposadr[np.array(robot.mj_joints)[hinges]]
+        lower, upper = tree.within(SHORT_OF_LIMIT)
+        rest = self._model.qpos0[self._angles]
+        self._lower, self._upper = lower[hinges] + rest, upper[hinges] + rest
+        # What ties frames together: as `robots.normal.Ties`, those that are gone immovable.
+        weights = smoothness(robot) * (objective.SMOOTH / SMOOTH / frame_time) ** 2
+        self._stiff = weights**2
+        second, self._first = (np.diff(np.eye(gone + free), k, axis=0)[:, gone:] for k in (2, 1))
+        self._second = second
+        self._ties = np.kron(second.T @ second, np.diag(self._stiff))
+        self._rush = (RUSH / frame_time) ** 2
+        self._most = np.full(tree.size, np.inf)
+        self._most[self._columns] = FAST * frame_time
+
+    def solve(
+        self, q: Float[np.ndarray, "T nq"], targets: FrameTargets, stance: Stance
+    ) -> Float[np.ndarray, "T nq"]:
+        """`q` with its free frames, those that have targets, as these and the others want them."""
+        near = self._terms.near(q[-1:])
+        for _ in range(_STEPS):
+            q, length = self._step(q, targets, stance, near)
+            if length < _SHORT:
+                break
+        return q
+
+    def settle(
+        self, q: Float[np.ndarray, "T nq"], targets: FrameTargets, stance: Stance, steps: int
+    ) -> Float[np.ndarray, "T nq"]:
+        """`q` with its free frames as their targets want them, each for itself."""
+        for _ in range(steps):
+            near = self._terms.near(q[-1:])
+            q, _ = self._step(q, targets, stance, near, alone=_CAREFUL)
+        return q
+
+    def _step(
+        self,
+        q: Float[np.ndarray, "T nq"],
+        targets: FrameTargets,
+        stance: Stance,
+        near: Int[np.ndarray, "K"],
+        *,
+        alone: float | None = None,
+    ) -> tuple[Float[np.ndarray, "T nq"], float]:
+        """One step, and how long it was; `alone`, damped by so much, without the ties."""
+        model, free = self._model, self._free
+        H, g = self._terms.linearize(q[-free:], targets, stance, near)
+        D = g.shape[1]
+        whole = self._ties * (alone is None)
+        blocks = whole.reshape(free, D, free, D)
+        for t in range(free):
+            blocks[t, :, t] += H[t]
+        if alone is None:
+            self._tie(q, blocks, g)
+        held = self._at_limits(q[-free:], g)
+        g[held] = 0.0
+        whole.reshape(-1)[:: free * D + 1] += np.where(held, _IMMOVABLE, alone or _DAMPING).ravel()
+        _, step, _ = dposv(whole.T, g.ravel(), overwrite_a=True)
+        length = float(np.abs(step).max())
+        moved = np.zeros((free, model.nv))
+        moved[:, self._dofs] = -min(1.0, _LONGEST / max(length, 1e-9)) * step.reshape(free, D)
+        q = q.copy()
+        for t in range(free):
+            mujoco.mj_integratePos(model, q[t - free], moved[t], 1.0)
+        q[:, self._angles] = np.clip(q[:, self._angles], self._lower, self._upper)
+        return q, length
+
+    def _tie(
+        self,
+        q: Float[np.ndarray, "T nq"],
+        blocks: Float[np.ndarray, "F D F D"],
+        g: Float[np.ndarray, "F D"],
+    ) -> None:
+        """Add the pull of the accelerations, and hold back hinges that turn too fast."""
+        steps = np.empty((len(q) - 1, self._model.nv))
+        for t in range(len(q) - 1):
+            mujoco.mj_differentiatePos(self._model, steps[t], 1.0, q[t], q[t + 1])
+        steps = steps[:, self._dofs]
+        g += self._stiff * (self._second.T @ (steps[1:] - steps[:-1]))
+        haste = steps - np.clip(steps, -self._most, self._most)
+        if haste.any():
+            first, at = self._first, np.arange(g.shape[1])
+            g += self._rush * (first.T @ haste)
+            ties = np.einsum("vs,vt,vd->std", first, first, self._rush * (haste != 0))
+            for s, t in np.ndindex(ties.shape[:2]):
+                blocks[s, at, t, at] += ties[s, t]
+
+    def _at_limits(
+        self, q: Float[np.ndarray, "F nq"], g: Float[np.ndarray, "F D"]
+    ) -> Bool[np.ndarray, "F D"]:
+        """Hinges at their limits that would go beyond."""
+        held = np.zeros(g.shape, dtype=bool)
+        angles, push = q[:, self._angles], g[:, self._columns]
+        below, above = angles <= self._lower + 1e-9, angles >= self._upper - 1e-9
+        held[:, self._columns] = (above & (push < 0)) | (below & (push > 0))
+        return held

@@ -1,0 +1,270 @@
+"""The objective of a few frames, in a few tenths of a millisecond.
+
+The terms and weights are those of `robots.objective`, and so is the order: arms and head hang on
+base, trunk and legs, and don't move them. There every term walks its own chain, over thousands of
+frames; here MuJoCo says where bodies are, and all columns of all terms are made at once. The
+columns are MuJoCo's degrees of freedom, in the order of `robots.tree`: the base turns about its own
+axes, and so do balls.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from robots import objective
+from robots.morphology import Morphology
+from robots.objective import TURN, TURNS
+from robots.solve import stages_of
+from robots.stream_targets import FrameTargets
+from robots.targets import chest_of
+from robots.terms import one_sided
+from robots.tree import BASE
+from robots.window_touch import Poses, Touch
+from spark.roles import Role
+
+Linear = tuple[Float[np.ndarray, "T R 3 D"], Float[np.ndarray, "T R 3"], Float[np.ndarray, "T R 3"]]
+
+
+@dataclass(frozen=True, eq=False)
+class Stance:
+    """For each corner of each sole: where it should stand [m], and how firmly (0 to 1)."""
+
+    places: Float[np.ndarray, "S 4 3"]
+    holds: Float[np.ndarray, "S 4"]
+
+
+class Terms:
+    """What the poses of a robot cost. `bones` are those whose directions are known, `hands` says
+    whether the way between both is."""
+
+    def __init__(self, robot: Morphology, bones: Sequence[Role], hands: bool) -> None:
+        self.robot, tree = robot, robot.tree
+        self._model = robot.mjcf.model
+        self._data = mujoco.MjData(self._model)
+        mujoco.mj_kinematics(self._model, self._data)
+        self._rest = self._data.xmat.reshape(-1, 3, 3).copy(), self._data.xpos.copy()
+        self._first = np.zeros(len(tree) + 1, dtype=bool)  # of the links, and -1
+        self._first[[*stages_of(robot)[0].joints, -1]] = True
+        joints = np.array(robot.mj_joints, dtype=int)
+        self._joints = np.repeat(joints, np.where(tree.balls, 3, 1))
+        self._hinge_columns = tree.starts[~tree.balls]
+        hinges = joints[~tree.balls]
+        self._hinge_qpos = self._model.jnt_qposadr[hinges]
+        rest = self._model.qpos0[self._hinge_qpos]
+        lower, upper = (limit[~tree.balls] + rest for limit in (tree.lower, tree.upper))
+        margin = np.minimum(objective.MARGIN, 0.1 * (upper - lower))
+        self._soft = lower + margin, upper - margin
+        self._relaxed = robot.tpose.angles[0, ~tree.balls] + rest
+        self._idle = np.full(tree.size, 1e-3)
+        self._idle[self._hinge_columns] = objective.IDLE
+        bodies = np.array([self._body(link) for link in (*range(len(tree)), -1)])
+        self._touch = Touch(robot, bodies, self._rest, np.flatnonzero(self._first[:-1]))
+        self._watch_turns()
+        self._watch_bones(bones)
+        self._watch_points(hands)
+
+    def poses(self, q: Float[np.ndarray, "T nq"]) -> Poses:
+        """Where everything is in the frames of a `qpos`."""
+        model, data, count = self._model, self._data, len(q)
+        turns, places = np.empty((count, model.nbody, 9)), np.empty((count, model.nbody, 3))
+        axes, anchors = np.empty((2, count, model.njnt, 3))
+        for t in range(count):
+            data.qpos = q[t]
+            mujoco.mj_kinematics(model, data)
+            turns[t], places[t] = data.xmat, data.xpos
+            axes[t], anchors[t] = data.xaxis, data.xanchor
+        return Poses(turns.reshape(count, -1, 3, 3), places, axes, anchors)
+
+    def corners(self, poses: Poses) -> Float[np.ndarray, "T S 4 3"]:
+        """The corners of the soles [m, world]."""
+        soles = len(self.robot.soles)
+        return self._points(poses)[:, : 4 * soles].reshape(-1, soles, 4, 3)
+
+    def near(self, q: Float[np.ndarray, "T nq"]) -> Int[np.ndarray, "K"]:
+        """Which parts may run into each other, in these poses and others that are not far away."""
+        return self._touch.near(self.poses(q))
+
+    def linearize(
+        self,
+        q: Float[np.ndarray, "T nq"],
+        targets: FrameTargets,
+        stance: Stance,
+        near: Int[np.ndarray, "K"],
+    ) -> tuple[Float[np.ndarray, "T D D"], Float[np.ndarray, "T D"]]:
+        """The normal equations of each frame for itself: `H step = -g`. `near` is what `near` says
+        of such poses."""
+        poses = self.poses(q)
+        axes, anchors = self._columns(poses)
+        # Parts that should be turned some way: an axial vector each (`robots.terms.turn_rows`).
+        wanted = np.concatenate([targets.world[:, self._followed], targets.chest[:, None]], axis=1)
+        M = poses.turns[:, self._turned] @ (wanted @ self._turned_rest).transpose(0, 1, 3, 2)
+        axial = np.empty((*M.shape[:2], 3))
+        np.subtract(M[..., 2, 1], M[..., 1, 2], out=axial[..., 0])
+        np.subtract(M[..., 0, 2], M[..., 2, 0], out=axial[..., 1])
+        np.subtract(M[..., 1, 0], M[..., 0, 1], out=axial[..., 2])
+        H = self._turn_gram * (axes @ axes.transpose(0, 2, 1))
+        g = 0.5 * (axes * (self._turn_mask @ axial)).sum(2)
+        J, weights, forces = self._rows(poses, axes, anchors, targets, stance)
+        rows = J.reshape(len(q), -1, J.shape[3])
+        across = rows.transpose(0, 2, 1)
+        H += across @ (rows * weights.reshape(len(q), -1, 1))
+        g += (across @ forces.reshape(len(q), -1, 1))[..., 0]
+        self._touch.add_to(poses, axes, anchors, near, H, g)
+        self._limit(q, H, g)
+        return H, g
+
+    def _columns(
+        self, poses: Poses
+    ) -> tuple[Float[np.ndarray, "T D 3"], Float[np.ndarray, "T D 3"]]:
+        """The columns' axes, none for a shift, and what these turn about."""
+        root = self.robot.mjcf.root
+        axes, anchors = np.zeros((2, len(poses.places), BASE + len(self._joints), 3))
+        axes[:, 3:BASE] = poses.turns[:, root].transpose(0, 2, 1)
+        anchors[:, 3:BASE] = poses.places[:, None, root]
+        axes[:, BASE:] = poses.axes[:, self._joints]
+        anchors[:, BASE:] = poses.anchors[:, self._joints]
+        for link in np.flatnonzero(self.robot.tree.balls).tolist():
+            at = int(self.robot.tree.starts[link])
+            axes[:, at : at + 3] = poses.turns[:, self._body(link)].transpose(0, 2, 1)
+        return axes, anchors
+
+    def _points(self, poses: Poses) -> Float[np.ndarray, "T P 3"]:
+        turns = poses.turns[:, self._point_bodies]
+        return (turns @ self._arms[:, :, None])[..., 0] + poses.places[:, self._point_bodies]
+
+    def _rows(
+        self,
+        poses: Poses,
+        axes: Float[np.ndarray, "T D 3"],
+        anchors: Float[np.ndarray, "T D 3"],
+        targets: FrameTargets,
+        stance: Stance,
+    ) -> Linear:
+        """How directions and points grow with all columns, the squares of their weights, and
+        residuals times these."""
+        points = self._points(poses)
+        bones = (poses.turns[:, self._bone_bodies] @ self._bones[:, :, None])[..., 0]
+        (count, B, _), P, D = bones.shape, points.shape[1], axes.shape[1]
+        arms = np.empty((3, count, B + P, D))
+        arms[:, :, :B] = bones.transpose(2, 0, 1)[..., None]
+        across = anchors.transpose(2, 0, 1)[:, :, None]
+        np.subtract(points.transpose(2, 0, 1)[..., None], across, out=arms[:, :, B:])
+        (ax, ay, az), (x, y, z) = axes.transpose(2, 0, 1)[:, :, None], arms
+        J = np.empty((count, B + P, 3, D))
+        np.subtract(ay * z, az * y, out=J[:, :, 0])
+        np.subtract(az * x, ax * z, out=J[:, :, 1])
+        np.subtract(ax * y, ay * x, out=J[:, :, 2])
+        J[:, B:, :, :3] = np.eye(3)
+        J *= self._row_mask
+        weights, forces = np.empty((2, count, B + P, 3))
+        weights[:, :B] = objective.DIRECTION**2
+        forces[:, :B] = objective.DIRECTION**2 * (bones - targets.bones)
+        self._weigh_soles(points, stance, weights[:, B:], forces[:, B:])
+        hips = B + 4 * len(self.robot.soles)
+        weights[:, hips] = objective.PATH**2
+        forces[:, hips] = objective.PATH**2 * (points[:, hips - B] - targets.hips)
+        if self._hands:
+            # Of two points the difference: that of the rows.
+            far = (targets.hands**2).sum(1, keepdims=True)
+            weight = (objective.CLAP * np.exp(-far / objective.NEAR**2)) ** 2
+            J[:, hips + 1] -= J[:, hips + 2]
+            weights[:, hips + 1], weights[:, hips + 2] = weight, 0.0
+            between = points[:, -2] - points[:, -1] - targets.hands
+            forces[:, hips + 1], forces[:, hips + 2] = weight * between, 0.0
+        return J, weights, forces
+
+    def _weigh_soles(
+        self,
+        points: Float[np.ndarray, "T P 3"],
+        stance: Stance,
+        weights: Float[np.ndarray, "T P 3"],
+        forces: Float[np.ndarray, "T P 3"],
+    ) -> None:
+        """Corners stand where they should, and none is below the floor."""
+        count = 4 * len(self.robot.soles)
+        firm = (objective.STAND * stance.holds.reshape(-1, 1)) ** 2
+        weights[:, :count] = firm
+        forces[:, :count] = firm * (points[:, :count] - stance.places.reshape(-1, 3))
+        depth, slope = one_sided(-points[:, :count, 2], objective.SINK_EASE)
+        weights[:, :count, 2] += (objective.SINK * slope) ** 2
+        forces[:, :count, 2] -= objective.SINK**2 * slope * depth
+
+    def _limit(
+        self,
+        q: Float[np.ndarray, "T nq"],
+        H: Float[np.ndarray, "T D D"],
+        g: Float[np.ndarray, "T D"],
+    ) -> None:
+        """Keep hinges from their limits, and what nothing else asks for as in the T-pose."""
+        angles = q[:, self._hinge_qpos]
+        lower, upper = self._soft
+        above, rising = one_sided(angles - upper, objective.MARGIN / 4)
+        below, falling = one_sided(lower - angles, objective.MARGIN / 4)
+        diagonal = np.tile(self._idle**2, (len(q), 1))
+        diagonal[:, self._hinge_columns] += (objective.LIMIT * (rising + falling)) ** 2
+        H.reshape(len(q), -1)[:, :: H.shape[1] + 1] += diagonal
+        push = objective.LIMIT**2 * (rising + falling) * (above - below)
+        g[:, self._hinge_columns] += push + objective.IDLE**2 * (angles - self._relaxed)
+
+    def _body(self, link: int) -> int:
+        robot = self.robot
+        return int(self._model.jnt_bodyid[robot.mj_joints[link]]) if link >= 0 else robot.mjcf.root
+
+    def _mask(self, links: Sequence[int]) -> Bool[np.ndarray, "K D"]:
+        """The columns that move some links, in the stage that is theirs."""
+        tree = self.robot.tree
+        out = np.zeros((len(links), tree.size), dtype=bool)
+        for k, link in enumerate(links):
+            out[k, :BASE] = self._first[link]
+            same = [j for j in tree.chain(link) if self._first[j] == self._first[link]]
+            out[k, tree.columns(tuple(same))] = True
+        return out
+
+    def _watch_turns(self) -> None:
+        """Which parts are turned some way, and how much that weighs."""
+        rig, links = self.robot.rig, self.robot.links.tolist()
+        followed, weights = [], []
+        for j, role in enumerate(rig.roles.roles):
+            own = j == 0 or links[j] != links[int(rig.skeleton.parents[j])]
+            if role is not None and own:
+                kind = role.value.removeprefix("left_").removeprefix("right_")
+                followed.append(j)
+                weights.append(TURNS.get(kind, TURN))
+        self._followed = np.array(followed)
+        turned = [*(links[j] for j in followed), links[chest_of(rig)]]
+        bodies = [self._body(link) for link in turned]
+        self._turned = np.array(bodies)
+        self._turned_rest = self._rest[0][bodies]
+        mask = self._mask(turned)
+        self._turn_mask = (mask * np.array([[*weights, TURNS["chest"]]]).T ** 2).T
+        self._turn_gram = self._turn_mask @ mask
+
+    def _watch_bones(self, bones: Sequence[Role]) -> None:
+        robot = self.robot
+        self._bone_links = [int(robot.links[robot.rig.roles.require(role)]) for role in bones]
+        self._bone_bodies = np.array([self._body(link) for link in self._bone_links], dtype=int)
+        along = np.array([robot.bones[role] for role in bones]).reshape(-1, 3)
+        self._bones = np.einsum("bji,bj->bi", self._rest[0][self._bone_bodies], along)
+
+    def _watch_points(self, hands: bool) -> None:
+        """The soles' corners, the middle of the hips and, where asked, both wrists; the columns
+        that move these and the bones."""
+        robot = self.robot
+        links = [link for sole in robot.soles for link in sole.links.tolist()]
+        rest = [point for sole in robot.soles for point in sole.points]
+        links.append(int(robot.links[robot.rig.pelvis]))
+        rest.append(robot.centers[robot.rig.hips].mean(0))
+        self._hands = hands
+        if hands:
+            for role in (Role.LEFT_HAND, Role.RIGHT_HAND):
+                j = robot.rig.roles.require(role)
+                links.append(int(robot.links[j]))
+                rest.append(robot.centers[j])
+        self._point_bodies = np.array([self._body(link) for link in links])
+        turns, places = (part[self._point_bodies] for part in self._rest)
+        self._arms = np.einsum("pji,pj->pi", turns, np.array(rest) - places)
+        mask = self._mask([*self._bone_links, *links])
+        self._row_mask = mask[:, None].astype(np.float64)
