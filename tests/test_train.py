@@ -1,5 +1,7 @@
 """Training: checkpoints, resuming, processes, and that a network learns what it is shown."""
 
+import importlib
+import importlib.util
 import json
 import os
 import subprocess
@@ -312,14 +314,26 @@ def test_the_command_line_trains_resumes_and_retargets(tmp_path: Path) -> None:
     path = tmp_path / "run" / "checkpoint.safetensors"
     assert load_checkpoint(path).step == 2
     assert read_settings(tmp_path / "run" / "config.toml")["steps"] == 2
-    for refused, why in (
+    for given, why in (
         (("run", "--resume", "--preset", "paper"), "trained with preset = 'tiny', not 'paper'"),
         (("run", "--resume", "--config", "tiny.toml"), "not from --config"),
         (("none", "--resume"), "no run to resume"),
     ):
-        done = command("train", "-o", *refused)
+        done = command("train", "-o", *given)
         assert done.returncode == 2
         assert why in done.stderr
+    board = command("train", "-o", "run", "--resume", "--steps", "3", "--tensorboard")
+    if importlib.util.find_spec("tensorboard"):
+        reader = importlib.import_module(
+            "tensorboard.backend.event_processing.event_accumulator"
+        ).EventAccumulator
+        events = reader(str(tmp_path / "run")).Reload()
+        last = json.loads((tmp_path / "run" / "log.jsonl").read_text().splitlines()[-1])
+        (written,) = events.Scalars("loss")
+        assert (written.step, written.value) == (3, pytest.approx(last["loss"]))
+    else:
+        assert board.returncode == 2
+        assert "spark-sim[tensorboard]" in board.stderr
     walk, target = "samples/walker_walk.bvh", "samples/dancer_wave.bvh"
     made = command(
         *("retarget", walk, "--to", target, "--method", "spark", "--checkpoint", str(path))

@@ -1,12 +1,15 @@
 """`spark-sim train`: a network of your own."""
 
+import os
 from argparse import ArgumentParser, Namespace
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from spark.settings import TrainConfig
+    from spark.train import Watch
 
 SUMMARY = "train the network that retargets"
 USAGE = "DATA... -o DIR [--config TOML] [--resume] [options]"
@@ -42,6 +45,7 @@ def configure(parser: ArgumentParser) -> None:
         parser.add_argument(f"--{name}", metavar="N", type=float if name == "rate" else int)
     parser.add_argument("--names", metavar="FILE", help="a learned encoder of joint names")
     parser.add_argument("--t5", metavar="MODEL", help="a T5 for names: a folder or a hub name")
+    parser.add_argument("--tensorboard", action="store_true", help="write DIR for TensorBoard, too")
     parser.add_argument("--force", action="store_true", help="overwrite the run in DIR")
 
 
@@ -88,8 +92,16 @@ def run(args: Namespace) -> int:
     start = start or fresh_checkpoint(config)
     out.mkdir(parents=True, exist_ok=True)
     write_atomically(out / "config.toml", toml(config).encode())
-    with console.meter(config.steps, start.step, "training") as tell:
-        done = train(clips, config, out, start=start, watch=tell)
+    with (
+        _board(out, start.step, args.tensorboard) as board,
+        console.meter(config.steps, start.step, "training") as tell,
+    ):
+
+        def watch(step: int, terms: dict[str, float]) -> None:
+            board(step, terms)
+            tell(step, terms)
+
+        done = train(clips, config, out, start=start, watch=watch)
     console.say(f"{path}: {done.step} steps on {len(clips)} clips")
     return 0
 
@@ -106,3 +118,27 @@ def _check_same_network(path: Path, trained: Mapping[str, object], config: "Trai
                 f"{path}: was trained with {name} = {before!r}, not {now!r}; --resume goes on with "
                 "the network that is there"
             )
+
+
+@contextmanager
+def _board(out: Path, step: int, wanted: bool) -> "Iterator[Watch]":
+    """What writes loss terms for TensorBoard, from `step` on; under `torchrun` one process does."""
+    from spark.errors import DependencyError
+
+    if not wanted or os.environ.get("RANK", "0") != "0":
+        yield lambda step, terms: None
+        return
+    try:
+        from torch.utils.tensorboard import SummaryWriter
+    except ImportError as error:
+        raise DependencyError(
+            f"--tensorboard needs {error.name}: pip install 'spark-sim[tensorboard]'"
+        ) from error
+
+    with SummaryWriter(str(out), purge_step=step + 1) as writer:
+
+        def tell(step: int, terms: dict[str, float]) -> None:
+            for name, value in terms.items():
+                writer.add_scalar(name, value, step)
+
+        yield tell
