@@ -70,7 +70,7 @@ class _Reader:
         self.binary = b""
         if content[:4] == struct.pack("<I", _GLB):
             content, self.binary = self._chunks(content)
-        self.json: dict[str, Any] = json.loads(content)
+        self.json: dict[str, Any] = self._parsed(content)
         compressed = [x for x in _COMPRESSED if x in self.json.get("extensionsRequired", ())]
         if compressed:
             raise self._error(f"is compressed ({compressed[0]}); expected one exported without")
@@ -196,6 +196,13 @@ class _Reader:
                 tree += children.get(joint, [])
             trees.append(tree)
         return max(trees, key=len)
+
+    def _parsed(self, content: bytes) -> dict[str, Any]:
+        try:
+            found: dict[str, Any] = json.loads(content)
+        except ValueError as error:
+            raise self._error("is no valid glTF 2.0 file: neither a GLB nor JSON") from error
+        return found
 
     @staticmethod
     def _chunks(content: bytes) -> tuple[bytes, bytes]:

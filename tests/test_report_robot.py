@@ -323,7 +323,7 @@ def test_qpos_of_any_script_is_read(robot: Morphology, tmp_path: Path) -> None:
     [
         ({"fps": 0}, "fps is 0"),
         ({"dt": 0}, "expected a positive number"),
-        ({}, "has no 'fps'"),
+        ({}, "doesn't say its rate; expected 'fps'"),
         ({"fps": 50, "qpos": np.zeros((3, 40))}, "40 columns; the robot 'ember' has 36"),
         ({"fps": 50, "qpos": np.zeros((3, 36))}, "length 0; expected 1"),
         ({"fps": 50, "qpos": np.full((3, 36), np.nan)}, "is nan in frame 0"),

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 import pytest
 
+import spark_sim
 from sim.given import GivenBody
 from sim.interpolate import at_times
 from sim.page import page, write_page
@@ -314,3 +315,16 @@ def test_coordinates_between_frames(tmp_path: Path) -> None:
     np.testing.assert_allclose(halfway[1, 7:10], frames[:, 7:10].mean(0))
     np.testing.assert_allclose(halfway[1, 15:17], frames[:, 15:17].mean(0))
     np.testing.assert_allclose(halfway[1, 17:], [np.cos(0.75), 0, np.sin(0.75), 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("option", ["html", "video", "strip"])
+def test_a_motion_is_not_overwritten_by_what_shows_it(option: str, tmp_path: Path) -> None:
+    (walk, *_) = spark_sim.sample(tmp_path)
+    before = walk.read_bytes()
+    with pytest.raises(OutputError, match=r"expected a name that ends in \.(html|mp4|png)"):
+        spark_sim.play(walk, force=True, **{option: walk})  # type: ignore[arg-type]
+    with pytest.raises(OutputError, match=r"expected a name that ends in \.html"):
+        spark_sim.report(walk, html=walk, force=True)
+    with pytest.raises(OutputError, match=r"expected a name that ends in \.xml"):
+        spark_sim.load(walk).save_mjcf(walk, force=True)  # type: ignore[union-attr]
+    assert walk.read_bytes() == before

@@ -10,11 +10,16 @@ import numpy as np
 
 from spark.errors import FileFormatError
 
+_MAGIC = (b"PK", b"\x93NUMPY")  # others numpy takes for pickles
+
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
     """All arrays of an npz. Raises `FileFormatError` where it is none, or needs pickle."""
     try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
+        content = path.read_bytes()
+        if content and not content.startswith(_MAGIC):
+            raise FileFormatError(path, None, "is no npz; expected the motion of a robot")
+        with np.load(io.BytesIO(content), allow_pickle=False) as stored:
             if not hasattr(stored, "files"):
                 raise FileFormatError(path, None, "is a single array; expected an npz of several")
             return {name: stored[name] for name in stored.files}

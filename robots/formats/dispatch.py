@@ -60,6 +60,11 @@ def read(
         raise ConventionError(f"{path}: doesn't say which robot moves; name it with --robot")
     if arrays is None:
         return read_pkl(path, robot)
+    if not is_plain(arrays) and "joint_pos" not in arrays:
+        held = ", ".join(map(repr, arrays)) or "nothing"
+        raise FileFormatError(
+            path, None, f"has neither MuJoCo's 'qpos' nor mjlab's 'joint_pos'; it holds {held}"
+        )
     return read_plain(arrays, path, robot) if is_plain(arrays) else read_mjlab(arrays, path, robot)
 
 

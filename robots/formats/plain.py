@@ -43,8 +43,12 @@ def read_plain(arrays: dict[str, np.ndarray], path: Path, robot: Morphology) -> 
 
 
 def _frame_time(arrays: dict[str, np.ndarray], path: Path) -> float:
-    step = next((name for name in _STEPS if name in arrays), None)
-    if "fps" in arrays or step is None:
+    if "fps" in arrays:
         return frame_time_of(scalar(arrays, "fps", path), path)
+    step = next((name for name in _STEPS if name in arrays), None)
+    if step is None:
+        raise FileFormatError(
+            path, None, "doesn't say its rate; expected 'fps', 'frame_time' or 'dt' beside 'qpos'"
+        )
     seconds = scalar(arrays, step, path)
     return frame_time_of(1 / seconds if seconds else np.inf, path)
