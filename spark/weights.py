@@ -41,12 +41,18 @@ class Weights:
 
     def damaged(self, error: Exception) -> FileFormatError:
         """What to raise where tensors and settings don't fit together."""
-        reason = next(iter(str(error).splitlines()), type(error).__name__)
+        # The first line of a list of tensors says only that one follows.
+        reason = " ".join(" ".join(str(error).splitlines()[:2]).split()) or type(error).__name__
         return FileFormatError(self.path, None, f"is a damaged checkpoint ({reason})")
 
 
 def read_weights(path: Path) -> Weights:
-    """Raises `FileFormatError` for anything that is not a checkpoint."""
+    """The weights in a checkpoint, or in the one of a run's folder.
+
+    Raises `FileFormatError` for anything that is not one.
+    """
+    if path.is_dir():
+        path = path / "checkpoint.safetensors"
     if not path.is_file():
         raise FileFormatError(path, None, "no such file; expected a spark-sim checkpoint")
     try:

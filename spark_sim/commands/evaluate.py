@@ -141,8 +141,6 @@ def _checkpoint(given: str) -> tuple[str, Any]:
     from spark.weights import read_weights
 
     name, equals, rest = given.partition("=")
-    path = Path(rest if equals and not Path(given).exists() else given)
-    if path.is_dir():
-        path = path / "checkpoint.safetensors"
     named = equals and not Path(given).exists()
-    return name if named else path.resolve().parent.name, read_weights(path)
+    weights = read_weights(Path(rest if named else given))
+    return name if named else weights.path.resolve().parent.name, weights
