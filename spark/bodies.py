@@ -75,11 +75,17 @@ def _chained(
     """Each joint's `local`, joined to those of all its ancestors."""
     out, pointer, pending = local, parents, parents != _own(parents)
     shape = (len(parents), 1, -1, *([1] * (local.ndim - 3)))
-    for _ in range(max(1, (max(parents.shape[1] - 1, 1)).bit_length())):
+    for _ in range(_doublings(parents.shape[1])):
         out = torch.where(pending.view(shape), join(take(out, pointer), out), out)
         pending = pending & torch.gather(pending, 1, pointer)
         pointer = torch.gather(pointer, 1, pointer)
     return out
+
+
+def _doublings(joints: int) -> int:
+    """After how many steps, each twice as far as the last, every joint has met all its ancestors;
+    in an exported graph, which is for any number of joints, enough for 256."""
+    return 8 if torch.compiler.is_exporting() else max(1, (joints - 1).bit_length())
 
 
 def _own(parents: Int[Tensor, "B J"]) -> Int[Tensor, "B J"]:

@@ -47,8 +47,8 @@ class Config:
     def default(cls) -> "Config":
         """Corrects the analytic transfer's guesses: starts equal to it."""
         return cls(
-            mask_joints=0.0,
-            drop_names=0.1,
+            mask_joints=0.3,
+            drop_names=0.2,
             positions_in=True,
             residual=True,
             noise=False,

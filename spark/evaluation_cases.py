@@ -2,7 +2,8 @@
 
 Everything is as the network sees bodies (`spark.features`), in hip heights of the body in question.
 A case is *intra-structural* where both bodies have the same roles, each in as many joints, and
-*cross-structural* else.
+*cross-structural* else. *Missing* are made cases whose source lacks joints of the target's spine,
+neck or shoulders, which any method has to guess.
 """
 
 import zlib
@@ -22,15 +23,17 @@ from spark.features import BodyFeatures
 from spark.metrics import san_height
 from spark.pairs import Clip, Stage
 from spark.roles import Role
+from spark.transfer import correspond
 from spark.variants import Variant, random_variant, same_body, scaled_body, split_body
 
-Structure = Literal["intra", "cross"]
-STRUCTURES: tuple[Structure, ...] = ("intra", "cross")
+Structure = Literal["intra", "cross", "missing"]
+STRUCTURES: tuple[Structure, ...] = ("intra", "cross", "missing")
 
 # Of one motion on two characters a frame or two may be lost in resampling; more is another motion.
 SPARE_FRAMES = 3
 # Made targets of each body and structure: its clips share them, so that results can be compared.
 _TARGETS = 3
+_TRIES = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +104,8 @@ def recorded_cases(found: Sequence[Performance]) -> tuple[list[Case], list[str]]
 
 def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = None) -> list[Case]:
     """Each clip with two targets that are changed copies of its own body, on which the answer is
-    known (`spark.pairs`): one with other bone lengths, and one with other joints and names too.
+    known (`spark.pairs`): one with other bone lengths, and one with other joints and names too. And
+    a changed copy that lacks joints, with the clip's own body as its target.
 
     Of each cell at most `limit` clips, drawn by `seed`. Training does not meet these targets,
     whatever its seed: it draws other ones.
@@ -116,23 +120,33 @@ def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = 
             if key not in stages:
                 name = zlib.crc32(one.character.encode())
                 rng = np.random.default_rng((seed, name, number, STRUCTURES.index(structure)))
-                make = {"intra": scaled_body, "cross": random_variant}[structure]
-                stages[key] = Stage(make(body, rng))
+                make = {"intra": scaled_body, "cross": random_variant, "missing": lacking_body}
+                stages[key] = Stage(make[structure](body, rng))
             stage = stages[key]
-            source = _canonical(one.clip, same_body(body), len(one.clip.hips))
+            own = _canonical(one.clip, same_body(body), len(one.clip.hips))
             turned = stage.place(
-                source.rotations[None], source.hips[None], np.asarray(one.clip.planted)[None]
+                own.rotations[None], own.hips[None], np.asarray(one.clip.planted)[None]
             )[0]
-            rig = stage.variant.body.rig
-            truth = CanonicalMotion(rig, source.frame_time, turned, source.hips)
+            changed = CanonicalMotion(stage.variant.body.rig, own.frame_time, turned, own.hips)
+            source, truth = (changed, own) if structure == "missing" else (own, changed)
             target = f"{one.character} {structure} {number}"
             cases.append(
                 Case(
                     *(one.clip.name, one.character, target, one.cell, structure, source, truth),
-                    san_height(rig),
+                    san_height(truth.rig),
                 )
             )
     return cases
+
+
+def lacking_body(body: BodyFeatures, rng: np.random.Generator) -> Variant:
+    """A random variant that lacks joints of `body` which any method has to guess, if it can."""
+    own = same_body(body).body.rig
+    for _ in range(_TRIES):
+        variant = random_variant(body, rng)
+        if (correspond(variant.body.rig, own).guess >= 0).any():
+            break
+    return variant
 
 
 def _recorded(motion: str, source: Performance, target: Performance, frames: int) -> list[Case]:

@@ -14,7 +14,11 @@ from spark.metrics import Score
 
 FORMAT, VERSION = "spark-sim evaluation", 1
 
-_TITLES = {"intra": "intra-structural", "cross": "cross-structural"}
+_TITLES = {
+    "intra": "intra-structural",
+    "cross": "cross-structural",
+    "missing": "joints that the source lacks",
+}
 # The order of the paper's table 2, by the switch that a training threw.
 _ABLATIONS = {"share": "w/o share", "mask": "w/o mask", "pos": "w/ pos", "fk": "w/o FK", "": "full"}
 

@@ -201,10 +201,12 @@ class Decoder(nn.Module):
         body: Body,
     ) -> Pose:
         """`start` with its guesses corrected: they alone are decoded."""
-        guessed = start.guess == torch.arange(start.guess.shape[1], device=known.device)
-        count = max(1, int(guessed.sum(1).max()))
-        joints = guessed.int().argsort(dim=1, descending=True, stable=True)[:, :count]
-        valid = torch.gather(guessed, 1, joints)
+        joints = torch.arange(start.guess.shape[1], device=known.device).expand_as(start.guess)
+        valid = start.guess == joints
+        if not torch.compiler.is_exporting():  # a graph can't cut its tensors by their values
+            most = max(1, int(valid.sum(1).max()))
+            joints = valid.int().argsort(dim=1, descending=True, stable=True)[:, :most]
+            valid = torch.gather(valid, 1, joints)
         assert self.start is not None
         y = (
             take(known[:, None], joints)

@@ -20,11 +20,19 @@ from spark.mirror import mirrored_body, mirrored_motion
 from spark.plant import Leg, bend_leg, stance_correction
 from spark.resample import positions_at, rotations_at
 from spark.roles import LIMBS, Group, Role
-from spark.rotation import quat_from_yaw, quat_mul, quat_rotate, sixd_from_quat, yaw_from_quat
+from spark.rotation import (
+    quat_angle,
+    quat_from_yaw,
+    quat_mul,
+    quat_rotate,
+    sixd_from_quat,
+    yaw_from_quat,
+)
 from spark.transfer import Correspondence, correspond
 from spark.variants import Variant, random_variant, same_body, split_body
 
 _PACE = 0.3  # of the logarithm of a motion's speed
+_TRIES = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,9 +78,11 @@ class PairMaker:
     `variants`, made when they are first met: itself, itself with joints split as in SAN, and random
     ones. With `distinct`, no two of them have a motion in common as a source (the paper's training
     set); without, any of them may perform any of the body's clips. With `varied`, half of the draws
-    are seen in a mirror, and half are slowed down or sped up by up to a third.
+    are seen in a mirror, half are slowed down or sped up by up to a third, and bodies are drawn
+    again where the analytic transfer has nothing to guess: there is nothing to learn there.
 
-    Bodies are drawn by the square root of their frames: long recordings of one count for less.
+    Bodies are drawn by the square root of how much they turn: much of one counts for less, and
+    hours of standing about for little.
     """
 
     def __init__(
@@ -94,7 +104,7 @@ class PairMaker:
         self._bodies = list(by_body.values())
         if not self._bodies:
             raise SkeletonError(f"no clip has {window} frames: expected at least one to train on")
-        weights = np.sqrt([sum(len(c.hips) for c in group) for group in self._bodies])
+        weights = np.sqrt([sum(map(_turning, group)) for group in self._bodies])
         self._weights = weights / weights.sum()
         self._seen: dict[tuple[int, bool], BodyFeatures] = {}
         self._stages: dict[tuple[int, bool, int], Stage] = {}
@@ -104,19 +114,23 @@ class PairMaker:
         """Draw number `n`: `windows` windows of one body's clips on one pair of its variants."""
         rng = np.random.default_rng((self.seed, n))
         k = int(rng.choice(len(self._bodies), p=self._weights))
-        performer, receiver = rng.integers(self.variants, size=2).tolist()
         clips = self._bodies[k]
+        mirrored = self.varied and bool(rng.random() < 0.5)
+        for _ in range(_TRIES if self.varied else 1):
+            performer, receiver = rng.integers(self.variants, size=2).tolist()
+            if self.distinct:
+                performer %= min(self.variants, len(clips))
+            source, target = (self._stage(k, mirrored, number) for number in (performer, receiver))
+            link = self._link(source, target)
+            if (link.guess >= 0).any():
+                break
         if self.distinct:
-            performer %= min(self.variants, len(clips))
             clips = clips[performer :: self.variants]
         rotations, hips, planted = self._cut(clips, windows, rng)
-        mirrored = self.varied and bool(rng.random() < 0.5)
         if mirrored:
             rotations, hips, planted = mirrored_motion(rotations, hips, planted)
-        source, target = (self._stage(k, mirrored, number) for number in (performer, receiver))
         on_source = source.place(rotations, hips, planted)
         on_target = target.place(rotations, hips, planted)
-        link = self._link(source, target)
         copied = link.rotations(on_source, target.variant.body.rig)
         return Pairs(
             _windows(source.variant.body, on_source, hips),
@@ -233,3 +247,10 @@ def _windows(
     local[..., 0, :] = quat_mul(back, world[..., 0, :])
     origin = hips[:, :1] * np.array([1.0, 1, 0])
     return Windows(body, sixd_from_quat(local), quat_rotate(back, hips - origin))
+
+
+def _turning(clip: Clip) -> float:
+    """How much the joints turn in all [rad], with a little for a clip that stands still."""
+    rotations = np.asarray(clip.rotations)
+    step = quat_angle(rotations[:-1], rotations[1:]).mean() if len(rotations) > 1 else 0.0
+    return float(len(rotations) * (step + 1e-3))

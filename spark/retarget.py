@@ -81,7 +81,7 @@ class Learned:
     ) -> CanonicalMotion:
         """The windows' answers laid over one another; quaternions are averaged as vectors."""
         count, size = len(start), min(window, len(start))
-        hop = max(size // 2, 1)
+        hop = max(3 * size // 4, 1)
         firsts = sorted({*range(0, count - size + 1, hop), count - size})
         rise = np.minimum(np.arange(size) + 1, np.arange(size)[::-1] + 1).astype(np.float64)
         rotations, hips = np.zeros_like(start.rotations), np.zeros_like(start.hips)

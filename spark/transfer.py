@@ -1,9 +1,10 @@
 """Analytic transfer: a motion in canonical form onto another rig, without learning.
 
-Joints of the same role turn alike. Where spine or neck have another number of joints, rotations are
-interpolated by normalised arc length, with the pelvis at 0 and the topmost spine joint at 1 (for
-the neck: topmost spine joint and head). Joints without a role copy those of the same name in the
-same place, or follow their parent. This is the row "copy" of every table.
+Joints of the same role turn alike. Where spine or neck have other joints, or the same number in
+other places, rotations are interpolated by normalised arc length, with the pelvis at 0 and the
+topmost spine joint at 1 (for the neck: topmost spine joint and head). Joints without a role copy
+those of the same name in the same place, or follow their parent. This is the row "copy" of every
+table.
 """
 
 from dataclasses import dataclass
@@ -18,7 +19,8 @@ from spark.roles import Role
 from spark.rotation import quat_conj, quat_slerp
 
 _EXACT = 1e-3  # nearer to a source's joint than this, by arc length, is that joint's place
-_SAME_PLACE = 0.1  # joints of equally long chains, taken one by one, may lie this far apart
+_SAME_PLACE = 0.3  # joints of equally long chains, taken one by one, lie nearer to one another
+_FAR = 0.6  # between joints this far apart, what a joint does is a guess
 
 # A floor further than this from z = 0, in hip heights, is moved to 0.
 _FLOOR_TOLERANCE = 0.1
@@ -75,26 +77,30 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
         known[j] = True
 
     for role in Role:
-        theirs, own = source.roles.joints(role), target.roles.joints(role)
-        if len(theirs) == len(own) or role not in _CHAINS:
+        if role not in _CHAINS:
+            theirs, own = source.roles.joints(role), target.roles.joints(role)
             for from_joint, j in zip(theirs, own, strict=False):
                 copy(j, from_joint)
     for role, (start, end) in _CHAINS.items():
         joints, at = _chain(source, role, start, end)
-        for j, u in zip(*_chain(target, role, start, end), strict=True):
-            if known[j] and target.roles.roles[j] is role:
-                elsewhere = abs(at[joints.index(int(first[j]))] - u) > _SAME_PLACE
-                guess[j] = j if elsewhere else -1
-            if not known[j]:
-                k = int(np.searchsorted(at, u, side="right")) - 1
-                after = min(k + 1, len(at) - 1)
-                span = at[after] - at[k]
-                first[j], second[j] = joints[k], joints[after]
-                mix[j] = (u - at[k]) / span if span > 0 else 0.0
-                known[j] = True
-                nearest = joints[after if mix[j] > 0.5 else k]
-                beside = min(mix[j], 1 - mix[j]) > _EXACT
-                guess[j] = j if beside or source.roles.roles[nearest] is not role else -1
+        theirs, own = source.roles.joints(role), target.roles.joints(role)
+        places = dict(zip(*_chain(target, role, start, end), strict=True))
+        moved = (abs(at[joints.index(a)] - places[j]) for a, j in zip(theirs, own, strict=False))
+        if len(theirs) == len(own) and max(moved, default=0.0) < _SAME_PLACE:
+            for from_joint, j in zip(theirs, own, strict=True):
+                copy(j, from_joint)
+        for j in own:
+            if known[j]:
+                continue
+            k = int(np.searchsorted(at, places[j], side="right")) - 1
+            after = min(k + 1, len(at) - 1)
+            span = at[after] - at[k]
+            first[j], second[j] = joints[k], joints[after]
+            mix[j] = (places[j] - at[k]) / span if span > 0 else 0.0
+            known[j] = True
+            near = joints[after if mix[j] > 0.5 else k]
+            there = min(mix[j], 1 - mix[j]) < _EXACT and source.roles.roles[near] is role
+            guess[j] = j if span > _FAR and not there else -1
 
     names = {name: j for j, name in enumerate(source.skeleton.names)}
     above = target.skeleton.ancestors(target.pelvis)[1:]

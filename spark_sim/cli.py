@@ -10,6 +10,7 @@ from spark.errors import SparkSimError
 from spark_sim import console
 from spark_sim.commands import (
     evaluate,
+    export,
     inspect,
     mjcf,
     play,
@@ -21,7 +22,10 @@ from spark_sim.commands import (
     train,
 )
 
-COMMANDS = (retarget, robots, inspect, report, play, mjcf, sample, prepare, train, evaluate)
+COMMANDS = (
+    *(retarget, robots, inspect, report, play, mjcf, sample),
+    *(prepare, train, evaluate, export),
+)
 
 DESCRIPTION = "Put a human motion on another body and measure how believable the result is."
 

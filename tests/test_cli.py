@@ -20,7 +20,7 @@ GOLDENS = Path(__file__).parent / "goldens"
 CHECKOUT = Path(__file__).parents[1]
 COMMANDS = (
     *("retarget", "robots", "inspect", "report", "play", "mjcf", "sample"),
-    *("prepare", "train", "evaluate"),
+    *("prepare", "train", "evaluate", "export"),
 )
 WALK, TARGET = "walker_walk.bvh", "dancer_wave.bvh"
 RESULT = "walker_walk_on_dancer_wave.bvh"

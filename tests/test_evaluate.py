@@ -42,7 +42,7 @@ from spark.pairs import Clip
 from spark.sample import sample_rig
 from spark.settings import TrainConfig
 from spark.train import network
-from spark.transfer import transfer
+from spark.transfer import correspond, transfer
 from spark.variants import same_body, split_body, split_joints
 from spark_sim import cli, console
 
@@ -165,18 +165,20 @@ def test_results_of_another_tool(tree: Path, found: list[Performance], tmp_path:
 
 def test_made_answers_stand_where_copies_slide(found: list[Performance]) -> None:
     cases = made_cases(found, seed=3)
-    assert [c.structure for c in cases] == ["intra", "cross"] * 6
+    assert [c.structure for c in cases] == ["intra", "cross", "missing"] * 6
     again = made_cases(found, seed=3)
     for one, other in zip(cases, again, strict=True):
         assert np.array_equal(one.truth.rotations, other.truth.rotations)
     assert {c.motion for c in made_cases(found, seed=3, limit=1)} <= {c.motion for c in cases}
-    assert len(made_cases(found, seed=3, limit=1)) == 2
+    assert len(made_cases(found, seed=3, limit=1)) == 3
     walks = [c for c in cases if c.motion == "walk"]
     row = evaluate("copy", copied, walks)
-    for structure in ("intra", "cross"):
+    for structure in ("intra", "cross", "missing"):
         mean = row.mean(structure)
         assert mean.mse > 0
         assert mean.truth_foot_speed < 0.7 * mean.foot_speed
+    lacking = [c for c in cases if c.structure == "missing"]
+    assert all((correspond(c.source.rig, c.truth.rig).guess >= 0).any() for c in lacking)
     # An intra-structural target has the same joints under the same names.
     for case in cases:
         same = case.truth.rig.skeleton.names == case.source.rig.skeleton.names
@@ -248,7 +250,8 @@ def row(name: str, **settings: object) -> Row:
     worse = replace(SCORE, mse=3e-4)
     cells = {("intra", "sc+sm"): Cell(SCORE, 3), ("intra", "uc+um"): Cell(worse, 1)}
     cells |= {("cross", "sc+sm"): Cell(worse, 4)}
-    return Row(name, cells, {"intra": 0.9, "cross": float("nan")}, settings)
+    nothing = float("nan")
+    return Row(name, cells, {"intra": 0.9, "cross": nothing, "missing": nothing}, settings)
 
 
 def test_tables_by_hand() -> None:
@@ -276,7 +279,7 @@ def test_tables_by_hand() -> None:
     told = json.loads(as_json(rows, {"data": "x"}))
     assert told["rows"][1]["training"] == {"preset": "paper", "ablate": ["mask"]}
     assert told["rows"][0]["cells"][0]["truth_jerk"] is None
-    assert told["rows"][0]["sensitivity"] == {"intra": 0.9, "cross": None}
+    assert told["rows"][0]["sensitivity"] == {"intra": 0.9, "cross": None, "missing": None}
 
 
 def test_command(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,8 @@ from spark.canonical import to_canonical
 from spark.config import Config
 from spark.contacts import planted_feet
 from spark.features import body_features, canonical_from_features, pose_features
-from spark.kinematics import forward
+from spark.kinematics import forward, world_positions
+from spark.mirror import mirrored_body, mirrored_motion
 from spark.model import Spark, _corrected
 from spark.names import NameEncoder
 from spark.pairs import Clip, PairMaker
@@ -20,6 +21,7 @@ from spark.rig_names import CONVENTIONS, name_joints
 from spark.roles import Role
 from spark.rotation import matrix_from_sixd, quat_angle
 from spark.sample import sample_motion, sample_rig
+from spark.variants import same_body
 
 SMALL = {"width": 32, "heads": 2, "encoder_blocks": 1, "decoder_blocks": 2}
 PRESETS = [
@@ -256,6 +258,33 @@ def test_the_answer_stands_where_the_copy_slides(maker: PairMaker) -> None:
                 losses.contact(positions, made.planted, made.frame_time, made.target).item()
             )
     assert np.mean(speeds["truth"]) < 0.5 * np.mean(speeds["start"])
+
+
+def test_a_mirrored_body_moves_as_in_a_mirror(maker: PairMaker) -> None:
+    clip = maker._bodies[0][0]
+    body = same_body(clip.body).body
+    mirrored = mirrored_body(body)
+    rotations, hips, _ = mirrored_motion(clip.rotations, clip.hips, clip.planted)
+    straight, flipped = (
+        world_positions(body.skeleton, clip.rotations, clip.hips),
+        world_positions(mirrored.skeleton, rotations, hips),
+    )
+    np.testing.assert_allclose(flipped, straight * [1, -1, 1], atol=1e-12)
+    left, right = (body.rig.roles.require(r) for r in (Role.LEFT_HAND, Role.RIGHT_HAND))
+    assert mirrored.rig.roles.roles[left] is Role.RIGHT_HAND
+    assert mirrored.skeleton.names[left] == body.skeleton.names[right]
+    again = mirrored_body(mirrored)
+    assert again.skeleton.names == body.skeleton.names
+    assert again.rig.roles.roles == body.rig.roles.roles
+
+
+def test_varied_draws_have_something_to_guess(maker: PairMaker) -> None:
+    clips = [clip for group in maker._bodies for clip in group]
+    varied = PairMaker(clips, window=16, variants=32, varied=True)
+    draws = [varied.draw(n, 1) for n in range(20)]
+    assert np.mean([(draw.guess >= 0).any() for draw in draws]) > 0.8
+    paces = [np.diff(draw.target.root[0, :, 0]).mean() for draw in draws]
+    assert len(np.unique(np.round(paces, 6))) > 10
 
 
 def test_rotations_of_pairs_are_rotations(batch: Batch) -> None:

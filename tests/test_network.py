@@ -1,20 +1,27 @@
 """The network that is run, on arrays, against the one that is trained."""
 
+import os
+import subprocess
+import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from onnxruntime import InferenceSession
 from test_model import PRESETS, maker  # noqa: F401
 
 from spark.batch import Collator
-from spark.bodies import Start
+from spark.bodies import Pose, Start
 from spark.checkpoint import Checkpoint, save_checkpoint
 from spark.config import Config
+from spark.errors import ConventionError
 from spark.model import Spark
 from spark.name_network import NameNetwork
 from spark.names import NameConfig, NameEncoder
 from spark.network import Network
+from spark.onnx_export import INPUTS, export_onnx
 from spark.pairs import PairMaker
 from spark.weights import read_weights
 
@@ -73,3 +80,42 @@ def test_the_network_without_torch_is_the_network(
         np.testing.assert_allclose(out.root, wanted.root.numpy(), atol=2e-4)
     assert guesses or not preset.residual
     assert isinstance(batch.start, Start)
+
+
+def test_onnx_is_the_network(maker: PairMaker, tmp_path: Path) -> None:  # noqa: F811
+    """One graph, on bodies and lengths that it was not traced with."""
+    torch.manual_seed(0)
+    names = NameEncoder(NameConfig(width=16, heads=2, blocks=1, rig_blocks=1)).eval()
+    config = replace(small(Config.default(), name_width=18), encoder_blocks=1, decoder_blocks=1)
+    model = Spark(config).eval()
+    awake(model)
+    save_checkpoint(Checkpoint(model, names), tmp_path / "run.safetensors")
+    # In a process of its own: checks of shapes at run time and tracing do not go together.
+    command = [sys.executable, "-m", "spark_sim", "export", "a.onnx"]
+    done = subprocess.run(
+        [*command, "--checkpoint", "run.safetensors"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    session = InferenceSession(tmp_path / "a.onnx")
+    assert [given.name for given in session.get_inputs()] == list(INPUTS)
+    lengths = set()
+    for n in (5, 13):
+        batch = Collator(names.encode).batch([maker.draw(n, 1)])
+        T = 16 - n
+        pose = Pose(*(t[:, :T] for t in batch.pose))
+        start = batch.start._replace(
+            rotations=batch.start.rotations[:, :T], root=batch.start.root[:, :T]
+        )
+        with torch.no_grad():
+            wanted = model(pose, batch.source, batch.target, start)
+        given = dict(zip(INPUTS, (*pose, *batch.source, *batch.target, *start), strict=True))
+        out = session.run(None, {name: tensor.numpy() for name, tensor in given.items()})[0]
+        np.testing.assert_allclose(out, wanted.rotations.numpy(), atol=2e-5)
+        lengths.add(out.shape)
+    assert len(lengths) == 2
+    with pytest.raises(ConventionError, match="noise"):
+        export_onnx(Checkpoint(Spark(small(Config.paper(), name_width=18)), names), tmp_path / "b")
