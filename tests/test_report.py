@@ -140,6 +140,19 @@ def test_a_knee_bent_backwards_is_named() -> None:
     )
 
 
+@pytest.mark.parametrize(("degrees", "at", "beyond"), [(24.2, 0, 0), (24.8, 1, 0), (25.3, 1, 1)])
+def test_a_joint_is_at_its_limit_within_half_a_degree(
+    degrees: float, at: float, beyond: float
+) -> None:
+    """A knee may bend backwards by 25 degrees."""
+    rig = stick_rig()
+    bent = standing(rig, 60)
+    bent.rotations[:, joint(Role.LEFT_LOWER_LEG)] = quat_about("y", np.radians(-degrees))
+    clip = judge(bent, rig).clip
+    assert clip.at_limit_shares["left knee"] == at
+    assert (clip.at_limit_share, clip.limit_share) == (at, beyond)
+
+
 def test_a_hand_under_the_floor_is_named_and_a_man_lying_down_does_not_float() -> None:
     rig = stick_rig()
     lying = standing(rig, 60)

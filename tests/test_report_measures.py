@@ -23,7 +23,7 @@ from sim.report.measures import (
     root_drift,
     spans,
 )
-from sim.report.selfcollision import segment_distance
+from sim.report.selfcollision import Capsules, segment_distance, self_penetration
 from sim.report.smoothness import joint_rates
 from sim.report.thresholds import PLAUSIBILITY_V1
 from spark.kinematics import forward
@@ -232,6 +232,22 @@ def test_limits_name_the_joint_the_movement_and_the_excess(
         assert found == {}
     else:
         assert found == {movement: pytest.approx(excess)}
+
+
+def test_parts_are_as_deep_in_each_other_as_their_flesh_overlaps() -> None:
+    """Shanks of 5 and 4 cm radius, 6 cm apart: 3 cm. A thigh of 6 cm, above one of them, is 4 cm in
+    the other; its own shank it touches by nature."""
+    shank = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.1]])
+    thigh = np.array([[0.0, 0.0, 0.9], [0.0, 0.0, 0.5]])
+    aside = np.array([0.0, 0.06, 0.0])
+    body = Capsules(
+        ("left lower leg", "right lower leg", "left upper leg"),
+        np.array([[shank, shank + aside, thigh]]),
+        np.array([0.05, 0.04, 0.06]),
+    )
+    pairs, depth = self_penetration(body)
+    assert pairs == (("left lower leg", "right lower leg"), ("right lower leg", "left upper leg"))
+    np.testing.assert_allclose(depth, [[0.03, 0.04]], atol=1e-12)
 
 
 def test_the_documents_tell_the_thresholds() -> None:
