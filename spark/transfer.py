@@ -18,9 +18,8 @@ from spark.rig import Rig
 from spark.roles import Role
 from spark.rotation import quat_conj, quat_slerp
 
-_EXACT = 1e-3  # nearer to a source's joint than this, by arc length, is that joint's place
 _SAME_PLACE = 0.3  # joints of equally long chains, taken one by one, lie nearer to one another
-_FAR = 0.6  # between joints this far apart, what a joint does is a guess
+_NEAR = 0.26  # further than this from any of the source's joints, what a joint does is a guess
 
 # A floor further than this from z = 0, in hip heights, is moved to 0.
 _FLOOR_TOLERANCE = 0.1
@@ -98,9 +97,8 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
             first[j], second[j] = joints[k], joints[after]
             mix[j] = (places[j] - at[k]) / span if span > 0 else 0.0
             known[j] = True
-            near = joints[after if mix[j] > 0.5 else k]
-            there = min(mix[j], 1 - mix[j]) < _EXACT and source.roles.roles[near] is role
-            guess[j] = j if span > _FAR and not there else -1
+            lonely = all(abs(at[joints.index(a)] - places[j]) > _NEAR for a in theirs)
+            guess[j] = j if lonely and len(joints) > 1 else -1
 
     names = {name: j for j, name in enumerate(source.skeleton.names)}
     above = target.skeleton.ancestors(target.pelvis)[1:]
