@@ -22,6 +22,7 @@ from spark.rotation import (
 )
 
 _BEYOND = 1.0  # what leaving the limits costs against jumping, both in squared radians
+_FAR = 1e-6  # and what being far from the rest pose does, where all else is equal
 
 
 def project(
@@ -163,7 +164,7 @@ def _steadiest(
     branches: Float[np.ndarray, "2 T K"], beyond: Float[np.ndarray, "2 T K"]
 ) -> Float[np.ndarray, "T K"]:
     """In each frame one of two branches, so that limits and jumps cost least in all (Viterbi)."""
-    stays = _BEYOND * (beyond**2).sum(-1)  # 2 T
+    stays = (_BEYOND * beyond**2 + _FAR * branches**2).sum(-1)  # 2 T
     jumps = ((branches[:, None, 1:] - branches[None, :, :-1]) ** 2).sum(-1)  # to, from, T - 1
     (s0, s1), ((j00, j01), (j10, j11)) = stays.tolist(), jumps.tolist()
     best0, best1 = s0[0], s1[0]

@@ -11,15 +11,15 @@ from jaxtyping import Float
 
 from robots.morphology import Morphology
 from robots.project import project
+from robots.stream_detour import Detours
 from robots.stream_footing import Feet
-from robots.stream_targets import Frame, FrameTargets, Ground, Watcher, together
+from robots.stream_targets import LATENCY, Frame, FrameTargets, Ground, Watcher, together
 from robots.window import Window
 from robots.window_terms import Stance, Terms
 from spark.errors import FrameError
 from spark.rig import Rig
 from spark.rotation import quat_from_matrix
 
-LATENCY = 2  # [frames]
 _GONE = 2  # frames before the free ones
 _FRAMES = _GONE + LATENCY + 1
 _ONWARD = np.array([*range(1, _FRAMES), _FRAMES - 1])
@@ -45,6 +45,7 @@ class Stream:
         self._targets: list[FrameTargets] = []
         self._q = np.zeros((_FRAMES, self.robot.mjcf.model.nq))
         self._feet = Feet(self._watcher, self.frame_time, LATENCY)
+        self._detours = Detours(self._watcher, self._terms, self.frame_time)
 
     def step(self, frame: Frame) -> Float[np.ndarray, "nq"]:
         """The next frame of the source; MuJoCo's coordinates of the robot `LATENCY` frames before
@@ -59,8 +60,11 @@ class Stream:
         if self._count:
             q = self._q[_ONWARD]
             self._targets = [*self._targets[1:], targets]
-            stance = self._feet.look(targets, self._corners(q))
-            self._q = self._window.solve(q, together(self._targets), stance)
+            poses = self._terms.poses(q[_GONE : _GONE + 1])  # what is next to be said
+            stance = self._feet.look(targets, self._terms.corners(poses)[0])
+            bones, angles = self._terms.bones(poses)[0], self._terms.angles(q)[_GONE]
+            posture = self._detours.look(self._targets[0], bones, angles)
+            self._q = self._window.solve(q, together(self._targets), stance, posture)
         else:
             self._targets = [targets] * (LATENCY + 1)
             self._q = self._first(targets)
@@ -76,11 +80,7 @@ class Stream:
         stance = Stance(np.zeros((soles, 4, 3)), np.zeros((soles, 4)))
         for held in (False, True):
             if held:
-                stance = self._feet.look(targets, self._corners(q))
+                stance = self._feet.look(targets, self._terms.corners(self._terms.poses(q))[0])
             q = self._window.settle(q, wanted, stance, _FIRST_STEPS)
             q[:] = q[-1]
         return q
-
-    def _corners(self, q: Float[np.ndarray, "W nq"]) -> Float[np.ndarray, "S 4 3"]:
-        """Of the soles, in the frame that is next to be said."""
-        return self._terms.corners(self._terms.poses(q[_GONE : _GONE + 1]))[0]

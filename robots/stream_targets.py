@@ -27,6 +27,7 @@ from spark.roles import Role
 from spark.rotation import matrix_from_quat, quat_conj
 from spark.transfer import correspond
 
+LATENCY = 2  # [frames] between what a stream has seen and what it says
 _UNIT = 0.05  # by how much a quaternion's length may differ from 1
 
 

@@ -10,7 +10,7 @@ from robots.morphology import Morphology
 from robots.objective import FAST, RUSH
 from robots.solve import SHORT_OF_LIMIT, smoothness
 from robots.stream_targets import FrameTargets
-from robots.window_terms import Stance, Terms
+from robots.window_terms import Posture, Stance, Terms
 
 SMOOTH = 7.0  # [Hz] above which a motion fades: more than in hindsight, or it would lag behind
 _DAMPING = 1e-3
@@ -53,12 +53,16 @@ class Window:
         self._most[self._columns] = FAST * frame_time
 
     def solve(
-        self, q: Float[np.ndarray, "T nq"], targets: FrameTargets, stance: Stance
+        self,
+        q: Float[np.ndarray, "T nq"],
+        targets: FrameTargets,
+        stance: Stance,
+        posture: Posture,
     ) -> Float[np.ndarray, "T nq"]:
         """`q` with its free frames, those that have targets, as these and the others want them."""
         near = self._terms.near(q[-1:])
         for _ in range(_STEPS):
-            q, length = self._step(q, targets, stance, near)
+            q, length = self._step(q, targets, stance, posture, near)
             if length < _SHORT:
                 break
         return q
@@ -69,7 +73,7 @@ class Window:
         """`q` with its free frames as their targets want them, each for itself."""
         for _ in range(steps):
             near = self._terms.near(q[-1:])
-            q, _ = self._step(q, targets, stance, near, alone=_CAREFUL)
+            q, _ = self._step(q, targets, stance, self._terms.relaxed, near, alone=_CAREFUL)
         return q
 
     def _step(
@@ -77,13 +81,14 @@ class Window:
         q: Float[np.ndarray, "T nq"],
         targets: FrameTargets,
         stance: Stance,
+        posture: Posture,
         near: Int[np.ndarray, "K"],
         *,
         alone: float | None = None,
     ) -> tuple[Float[np.ndarray, "T nq"], float]:
         """One step, and how long it was; `alone`, damped by so much, without the ties."""
         model, free = self._model, self._free
-        H, g = self._terms.linearize(q[-free:], targets, stance, near)
+        H, g = self._terms.linearize(q[-free:], targets, stance, posture, near)
         D = g.shape[1]
         whole = self._ties * (alone is None)
         blocks = whole.reshape(free, D, free, D)

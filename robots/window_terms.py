@@ -36,6 +36,14 @@ class Stance:
     holds: Float[np.ndarray, "S 4"]
 
 
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """What hinges tend to [rad, as in qpos], and how much."""
+
+    angles: Float[np.ndarray, "H"]
+    weights: Float[np.ndarray, "H"]
+
+
 class Terms:
     """What the poses of a robot cost. `bones` are those whose directions are known, `hands` says
     whether the way between both is."""
@@ -57,9 +65,8 @@ class Terms:
         lower, upper = (limit[~tree.balls] + rest for limit in (tree.lower, tree.upper))
         margin = np.minimum(objective.MARGIN, 0.1 * (upper - lower))
         self._soft = lower + margin, upper - margin
-        self._relaxed = robot.tpose.angles[0, ~tree.balls] + rest
-        self._idle = np.full(tree.size, 1e-3)
-        self._idle[self._hinge_columns] = objective.IDLE
+        angles = robot.tpose.angles[0, ~tree.balls] + rest
+        self.relaxed = Posture(angles, np.full(len(angles), objective.IDLE))
         bodies = np.array([self._body(link) for link in (*range(len(tree)), -1)])
         self._touch = Touch(robot, bodies, self._rest, np.flatnonzero(self._first[:-1]))
         self._watch_turns()
@@ -83,6 +90,14 @@ class Terms:
         soles = len(self.robot.soles)
         return self._points(poses)[:, : 4 * soles].reshape(-1, soles, 4, 3)
 
+    def bones(self, poses: Poses) -> Float[np.ndarray, "T B 3"]:
+        """Where the bones point."""
+        return (poses.turns[:, self._bone_bodies] @ self._bones[:, :, None])[..., 0]
+
+    def angles(self, q: Float[np.ndarray, "T nq"]) -> Float[np.ndarray, "T H"]:
+        """The hinges' part of a `qpos`."""
+        return q[:, self._hinge_qpos]
+
     def near(self, q: Float[np.ndarray, "T nq"]) -> Int[np.ndarray, "K"]:
         """Which parts may run into each other, in these poses and others that are not far away."""
         return self._touch.near(self.poses(q))
@@ -92,6 +107,7 @@ class Terms:
         q: Float[np.ndarray, "T nq"],
         targets: FrameTargets,
         stance: Stance,
+        posture: Posture,
         near: Int[np.ndarray, "K"],
     ) -> tuple[Float[np.ndarray, "T D D"], Float[np.ndarray, "T D"]]:
         """The normal equations of each frame for itself: `H step = -g`. `near` is what `near` says
@@ -113,7 +129,7 @@ class Terms:
         H += across @ (rows * weights.reshape(len(q), -1, 1))
         g += (across @ forces.reshape(len(q), -1, 1))[..., 0]
         self._touch.add_to(poses, axes, anchors, near, H, g)
-        self._limit(q, H, g)
+        self._limit(q, posture, H, g)
         return H, g
 
     def _columns(
@@ -146,7 +162,7 @@ class Terms:
         """How directions and points grow with all columns, the squares of their weights, and
         residuals times these."""
         points = self._points(poses)
-        bones = (poses.turns[:, self._bone_bodies] @ self._bones[:, :, None])[..., 0]
+        bones = self.bones(poses)
         (count, B, _), P, D = bones.shape, points.shape[1], axes.shape[1]
         arms = np.empty((3, count, B + P, D))
         arms[:, :, :B] = bones.transpose(2, 0, 1)[..., None]
@@ -195,19 +211,21 @@ class Terms:
     def _limit(
         self,
         q: Float[np.ndarray, "T nq"],
+        posture: Posture,
         H: Float[np.ndarray, "T D D"],
         g: Float[np.ndarray, "T D"],
     ) -> None:
-        """Keep hinges from their limits, and what nothing else asks for as in the T-pose."""
-        angles = q[:, self._hinge_qpos]
+        """Keep hinges from their limits, and what nothing else asks for as it tends to be."""
+        angles = self.angles(q)
         lower, upper = self._soft
         above, rising = one_sided(angles - upper, objective.MARGIN / 4)
         below, falling = one_sided(lower - angles, objective.MARGIN / 4)
-        diagonal = np.tile(self._idle**2, (len(q), 1))
-        diagonal[:, self._hinge_columns] += (objective.LIMIT * (rising + falling)) ** 2
+        idle = posture.weights**2
+        diagonal = np.full(g.shape, 1e-6)
+        diagonal[:, self._hinge_columns] = idle + (objective.LIMIT * (rising + falling)) ** 2
         H.reshape(len(q), -1)[:, :: H.shape[1] + 1] += diagonal
         push = objective.LIMIT**2 * (rising + falling) * (above - below)
-        g[:, self._hinge_columns] += push + objective.IDLE**2 * (angles - self._relaxed)
+        g[:, self._hinge_columns] += push + idle * (angles - posture.angles)
 
     def _body(self, link: int) -> int:
         robot = self.robot

@@ -17,8 +17,8 @@ from robots.known import known
 from robots.morphology import Morphology
 from robots.motion import RobotMotion
 from robots.solve import copy, retarget
-from robots.stream import LATENCY, Stream
-from robots.stream_targets import Frame, ground_of
+from robots.stream import Stream
+from robots.stream_targets import LATENCY, Frame, ground_of
 from robots.targets import bone_directions
 from spark.canonical import CanonicalMotion, canonical_positions, from_canonical, to_canonical
 from spark.recording import read_recording

@@ -14,8 +14,8 @@ from robots.mjcf import read_mjcf
 from robots.morphology import parts_of, understand_robot
 from robots.motion import RobotMotion
 from robots.solve import copy, retarget
-from robots.stream import LATENCY, Stream
-from robots.stream_targets import Frame, ground_of
+from robots.stream import Stream
+from robots.stream_targets import LATENCY, Frame, ground_of
 from sim.given import GivenBody
 from spark.canonical import to_canonical
 from spark.errors import ConventionError

@@ -11,8 +11,10 @@ import pytest
 from robots.morphology import Morphology
 from robots.registry import find
 from robots.solve import retarget
+from robots.stream import Stream
+from robots.stream_targets import Frame, ground_of
 from robots.targets import targets_of
-from spark.canonical import CanonicalMotion, to_canonical
+from spark.canonical import CanonicalMotion, from_canonical, to_canonical
 from spark.kinematics import world_positions
 from spark.motion import Motion
 from spark.roles import Role
@@ -47,6 +49,16 @@ def pacing(frames: int) -> CanonicalMotion:
 def test_robot_trajectory(benchmark: Any, frames: int) -> None:
     source, robot = pacing(frames), g1()
     benchmark.pedantic(lambda: retarget(source, robot).qpos, rounds=3)
+
+
+@pytest.mark.parametrize("frames", [400])
+def test_robot_stream(benchmark: Any, frames: int) -> None:
+    """Frame by frame, as for teleoperation."""
+    source, robot = pacing(frames), g1()
+    stream = Stream(source.rig, robot, source.frame_time, ground_of(source, robot))
+    motion = from_canonical(source)
+    pairs = [Frame(*pair) for pair in zip(motion.root_pos, motion.rotations, strict=True)]
+    benchmark.pedantic(lambda: [stream.step(pair) for pair in pairs], rounds=3)
 
 
 @pytest.mark.parametrize("frames", [400])

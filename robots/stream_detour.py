@@ -1,0 +1,79 @@
+"""Ways out for limbs that are stuck behind their limits.
+
+Steps downhill follow a limb wherever it goes, also into a corner that it can't leave downhill: an
+arm that came up on the wrong side. Hinge by hinge (`robots.project`) it may be reached from another
+one; then the limb is led there, as fast as it may turn.
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+from robots.project import project
+from robots.stream_targets import LATENCY, FrameTargets, Watcher
+from robots.targets import chest_of
+from robots.window_terms import Posture, Terms
+from spark.rotation import quat_from_matrix
+
+_LOST, _FOUND = np.cos(np.radians(55)), np.cos(np.radians(25))  # of a bone's error
+_PATIENCE = 0.15  # [s] before a limb that is lost is led
+_LONGEST = 0.6  # [s] that it is led, and that it is then left alone
+_FIRM = 2.0
+_FAST = 8.0  # [rad/s] that it is led
+
+
+class Detours:
+    """Looks after the limbs of a robot, and tells where hinges should tend to."""
+
+    def __init__(self, watcher: Watcher, terms: Terms, frame_time: float) -> None:
+        self._robot, self._terms, self._frame_time = watcher.robot, terms, frame_time
+        robot = self._robot
+        trunk = robot.rig.pelvis, chest_of(robot.rig)
+        inner = {k for j in trunk for k in robot.tree.chain(int(robot.links[j]))}
+        numbers = np.cumsum(~robot.tree.balls) - 1  # of the tree's hinges
+        self._limbs = []
+        for k in range(len(watcher.bones) - 1):
+            upper, lower = (robot.rig.roles.require(role) for role in watcher.bones[k : k + 2])
+            if int(robot.rig.skeleton.parents[lower]) != upper:
+                continue
+            chain = [j for j in robot.tree.chain(int(robot.links[lower])) if j not in inner]
+            hinges = [int(numbers[j]) for j in chain if not robot.tree.balls[j]]
+            self._limbs.append(([k, k + 1], hinges))
+        self._lost = np.zeros(len(self._limbs))  # [s]
+        self._led = np.zeros(len(self._limbs))  # [s] left; below 0 it is left alone
+        self._goals = np.full(len(terms.relaxed.angles), np.nan)
+
+    def look(
+        self,
+        targets: FrameTargets,
+        bones: Float[np.ndarray, "B 3"],
+        angles: Float[np.ndarray, "H"],
+    ) -> Posture:
+        """What hinges should tend to, when bones point like this and hinges stand at `angles`."""
+        right = (bones * targets.bones).sum(1)
+        worst = np.array([right[rows].min() for rows, _ in self._limbs])
+        self._lost = np.where(worst < _LOST, self._lost + self._frame_time, 0.0)
+        led = self._led > 0
+        self._led -= np.clip(self._led, -self._frame_time, self._frame_time)
+        for limb in np.flatnonzero(led & ((worst > _FOUND) | (self._led == 0))):
+            self._led[limb] = -_LONGEST
+            self._goals[self._limbs[limb][1]] = np.nan
+        lost = np.flatnonzero((self._lost > _PATIENCE) & (self._led == 0))
+        if len(lost):
+            world = quat_from_matrix(targets.world)[None]
+            q = self._robot.to_qpos(project(self._robot, world, targets.hips[None]))
+            there = (self._terms.bones(self._terms.poses(q))[0] * targets.bones).sum(1)
+            for limb in lost:
+                rows, hinges = self._limbs[limb]
+                better = there[rows].min() > _FOUND
+                self._led[limb] = _LONGEST if better else -_LONGEST
+                self._goals[hinges] = self._terms.angles(q)[0, hinges] if better else np.nan
+        relaxed, on_the_way = self._terms.relaxed, np.isfinite(self._goals)
+        if not on_the_way.any():
+            return relaxed
+        # The frames that are solved for lie ahead.
+        most = _FAST * self._frame_time * (LATENCY + 1)
+        next_angles = angles + np.clip(self._goals - angles, -most, most)
+        return Posture(
+            np.where(on_the_way, next_angles, relaxed.angles),
+            np.where(on_the_way, _FIRM, relaxed.weights),
+        )
