@@ -18,9 +18,9 @@ def claim(path: Path, *, force: bool, endings: tuple[str, ...] = ()) -> None:
     """Make the folders on the way to `path`. Raises `OutputError` where it is not free, can't be
     written, or has none of the `endings` of what goes there: a motion is never overwritten by a
     model or a page of it, not even by force."""
+    check_free(path, force=force)
     if endings and path.suffix.lower() not in endings:
         raise OutputError(f"{path}: expected a name that ends in {' or '.join(endings)}")
-    check_free(path, force=force)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

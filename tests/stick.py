@@ -1,5 +1,7 @@
 """A stick man made by hand: round numbers, rest pose = T-pose: answers work out on paper."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from spark.motion import Motion
@@ -67,3 +69,11 @@ def standing(rig: Rig, frames: int, fps: float = 60.0) -> Motion:
         root_pos=np.tile(rig.skeleton.offsets[0], (frames, 1)),
         rotations=np.tile([1.0, 0.0, 0.0, 0.0], (frames, len(rig.skeleton), 1)),
     )
+
+
+def without(rig: Rig, *gone: Role) -> Rig:
+    """The rig, under names of its own, where the joints of some roles have none."""
+    roles = tuple(None if role in gone else role for role in rig.roles.roles)
+    names = tuple(f"j{j}" for j in range(len(roles)))
+    skeleton = replace(rig.skeleton, names=names)
+    return replace(rig, skeleton=skeleton, roles=replace(rig.roles, roles=roles))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from conftest import DATA, recordings
 from humanoids import ONE_A_RIG
-from stick import joint, standing, stick_rig
+from stick import joint, standing, stick_rig, without
 
 from spark.canonical import from_canonical, to_canonical
 from spark.contacts import floor_height, planted_feet
@@ -183,14 +183,6 @@ def test_joints_without_a_role_copy_their_namesakes_or_follow() -> None:
     assert np.allclose(same.rotations[:, 18], rotations[:, 18])
     assert np.allclose(same.rotations[:, 19], [1, 0, 0, 0])
     assert np.allclose(other.rotations[:, 18], [1, 0, 0, 0])
-
-
-def without(rig: Rig, *gone: Role) -> Rig:
-    """The rig, under names of its own, where the joints of some roles have none."""
-    roles = tuple(None if role in gone else role for role in rig.roles.roles)
-    names = tuple(f"j{j}" for j in range(len(roles)))
-    skeleton = replace(rig.skeleton, names=names)
-    return replace(rig, skeleton=skeleton, roles=replace(rig.roles, roles=roles))
 
 
 def test_what_the_source_lacks_follows_or_lies_between() -> None:

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,10 +19,13 @@ from spark.canonical import from_canonical, to_canonical
 from spark.encoding import encode_new
 from spark.kinematics import forward
 from spark.motion import Motion
+from spark.retarget import Learned
 from spark.rig import Rig
+from spark.roles import Role
 from spark.sample import BUILDS, Build, make_skeleton, sample_motion, sample_rig
 from spark.skeleton import Skeleton
 from spark.transfer import transfer
+from spark.weights import SHIPPED, read_weights
 
 pytestmark = pytest.mark.bench
 
@@ -77,6 +81,18 @@ def test_canonical_transfer_and_back(benchmark: Any, frames: int) -> None:
     motion, rig = clip(frames)
     target = sample_rig("dancer")
     benchmark(lambda: from_canonical(transfer(to_canonical(motion, rig), target)))
+
+
+@pytest.mark.parametrize("frames", FRAMES)
+def test_transfer_by_the_network(benchmark: Any, frames: int) -> None:
+    """At 30 fps, onto a rig of which the source lacks joints."""
+    motion, rig = clip(frames)
+    roles = tuple(None if role is Role.NECK else role for role in rig.roles.roles)
+    neckless = replace(rig, roles=replace(rig.roles, roles=roles))
+    source = to_canonical(replace(motion, frame_time=1 / 30), neckless)
+    network, target = Learned(read_weights(SHIPPED)), sample_rig("dancer")
+    assert "network" in network(source, target).notes[-1]
+    benchmark.pedantic(lambda: network(source, target), rounds=3)
 
 
 @pytest.mark.parametrize("frames", FRAMES)
