@@ -66,10 +66,10 @@ def configure(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--method",
-        choices=("spark", "copy"),
-        default="spark",
+        choices=("copy", "spark"),
+        default="copy",
         help="how joints turn that SRC has no counterpart of; the others turn as theirs do, in "
-        "world axes. spark: as a trained network says (default); copy: in between their neighbours",
+        "world axes. copy: in between their neighbours (default); spark: as a trained network says",
     )
     parser.add_argument(
         "--checkpoint",
