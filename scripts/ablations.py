@@ -61,7 +61,7 @@ def main(dataset: str, runs: str, names: str) -> None:
     outputs = [
         f for kind in ("md", "json", "csv") for f in ("-o", str(Path(runs) / f"table.{kind}"))
     ]
-    spark_sim("evaluate", dataset, "--made", "--limit", "10", *checkpoints, *outputs, "--force")
+    spark_sim("evaluate", dataset, "--made", "--limit", "4", *checkpoints, *outputs, "--force")
 
 
 def spark_sim(*arguments: str) -> None:
