@@ -5,18 +5,23 @@ import math
 import numpy as np
 from jaxtyping import Float
 
-from spark.weights import Tensors
+from spark.weights import Weights
 
 Array = Float[np.ndarray, "..."]
 
 
 class Layers:
-    """The layers that some tensors make; `name` is a layer's, as torch's modules are called."""
+    """The layers that the tensors below `prefix` make; `name` is a layer's, as torch's modules are
+    called. Raises `FileFormatError` where one is missing."""
 
-    def __init__(self, tensors: Tensors) -> None:
+    def __init__(self, weights: Weights, prefix: str) -> None:
+        tensors = weights.below(prefix)
         self.tensors = {k: np.asarray(v, np.float32) for k, v in tensors.items()}
+        self._weights = weights
 
     def __getitem__(self, name: str) -> Array:
+        if name not in self.tensors:
+            raise self._weights.damaged(KeyError(f"no {name}"))
         return self.tensors[name]
 
     def linear(self, name: str, x: Array) -> Array:

@@ -17,7 +17,7 @@ class NameNetwork:
         self.heads = int(weights.names["heads"])
         self.blocks = int(weights.names["blocks"]), int(weights.names["rig_blocks"])
         self.distances = int(weights.names["buckets"]), int(weights.names["max_distance"])
-        self.layers = Layers(weights.below("names."))
+        self.layers = Layers(weights, "names.")
 
     def encode(self, names: Sequence[str]) -> Float[np.ndarray, "S D"]:
         """The vectors of `names`: the joints of one rig."""

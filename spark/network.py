@@ -30,7 +30,7 @@ class Network:
             self.config = Config(**weights.network)
         except TypeError as error:
             raise weights.damaged(error) from error
-        self.layers = Layers(weights.below("model."))
+        self.layers = Layers(weights, "model.")
 
     def encode(self, given: Windows, names: Names) -> Float[np.ndarray, "W T 24 D"]:
         """The latent H."""

@@ -33,8 +33,6 @@ def stance_correction(
 ) -> Float[np.ndarray, "*n T 3"]:
     """What must be added to contact points' paths so that they rest while planted [same unit];
     in between as `blend_between` does it."""
-    count = planted.shape[-1]
-    time = np.arange(count)
     begins = planted & ~np.concatenate([np.zeros_like(planted[..., :1]), planted[..., :-1]], -1)
     stance = begins.cumsum().reshape(planted.shape)  # a number for each stance of each path
     frames = planted.nonzero()
@@ -44,27 +42,32 @@ def stance_correction(
         path = contact_pos[..., axis][frames]
         means = np.bincount(stance[frames], path) / counts if len(path) else counts
         held[..., axis][frames] = means[stance[frames]] - path
-    before = np.maximum.accumulate(np.where(planted, time, -1), -1)
-    after = np.minimum.accumulate(np.where(planted, time, count)[..., ::-1], -1)[..., ::-1]
-    before = np.where(before < 0, after, before) % count  # without any stance `held` is 0
-    after = np.where(after == count, before, after)
-    u = np.clip((time - before) / np.maximum(after - before, 1), 0, 1)[..., None]
-    ease = u * u * (3 - 2 * u)
-    last, following = (np.take_along_axis(held, k[..., None], -2) for k in (before, after))
-    return last + ease * (following - last)
+    return _eased(held, planted)
 
 
 def blend_between(
     values: Float[np.ndarray, "P 3"], frames: Int[np.ndarray, "P"], count: int
 ) -> Float[np.ndarray, "T 3"]:
     """Values at some frames carried over to all: eased from one to the next, held at both ends."""
+    spread, known = np.zeros((count, 3)), np.zeros(count, dtype=bool)
+    spread[frames], known[frames] = values, True
+    return _eased(spread, known)
+
+
+def _eased(
+    values: Float[np.ndarray, "*n T 3"], known: Bool[np.ndarray, "*n T"]
+) -> Float[np.ndarray, "*n T 3"]:
+    """Values where they are known, carried over to all frames; zeros where none is known."""
+    count = known.shape[-1]
     time = np.arange(count)
-    after = np.clip(np.searchsorted(frames, time), 0, len(frames) - 1)
-    before = np.maximum(after - (frames[after] > time), 0)
-    span = np.maximum(frames[after] - frames[before], 1)
-    u = np.clip((time - frames[before]) / span, 0, 1)[:, None]
+    before = np.maximum.accumulate(np.where(known, time, -1), -1)
+    after = np.minimum.accumulate(np.where(known, time, count)[..., ::-1], -1)[..., ::-1]
+    before = np.where(before < 0, after, before) % count  # without any, `values` are 0
+    after = np.where(after == count, before, after)
+    u = np.clip((time - before) / np.maximum(after - before, 1), 0, 1)[..., None]
     ease = u * u * (3 - 2 * u)
-    return values[before] + ease * (values[after] - values[before])
+    last, following = (np.take_along_axis(values, k[..., None], -2) for k in (before, after))
+    return last + ease * (following - last)
 
 
 def bend_leg(

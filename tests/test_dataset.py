@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from conftest import recording
 
-import spark_sim
 from spark import dataset_parts
 from spark.bvh import write_bvh
 from spark.canonical import to_canonical
@@ -27,17 +26,6 @@ from spark.rig import understand
 from spark.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_about, quat_angle, quat_conj, quat_mul
 from spark.splits import TRAINING, UNSEEN, cell, seen_characters, seen_motions
-
-
-@pytest.fixture(scope="module")
-def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Sample motions as downloads lie: a folder a character."""
-    folder = tmp_path_factory.mktemp("downloads")
-    for path in spark_sim.sample(folder):
-        body, motion = path.stem.split("_", 1)
-        (folder / body).mkdir(exist_ok=True)
-        path.rename(folder / body / f"{motion}.bvh")
-    return folder
 
 
 @pytest.fixture(scope="module")

@@ -48,17 +48,6 @@ from spark_sim import cli, console
 
 
 @pytest.fixture(scope="module")
-def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two characters with the same motions, as downloads lie."""
-    folder = tmp_path_factory.mktemp("downloads")
-    for path in spark_sim.sample(folder):
-        body, motion = path.stem.split("_", 1)
-        (folder / body).mkdir(exist_ok=True)
-        path.rename(folder / body / f"{motion}.bvh")
-    return folder
-
-
-@pytest.fixture(scope="module")
 def found(tree: Path) -> list[Performance]:
     return performances(tree)
 

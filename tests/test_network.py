@@ -16,7 +16,7 @@ from spark.batch import Collator
 from spark.bodies import Pose, Start
 from spark.checkpoint import Checkpoint, save_checkpoint
 from spark.config import Config
-from spark.errors import ConventionError
+from spark.errors import ConventionError, FileFormatError
 from spark.model import Spark
 from spark.name_network import NameNetwork
 from spark.names import NameConfig, NameEncoder
@@ -119,3 +119,17 @@ def test_onnx_is_the_network(maker: PairMaker, tmp_path: Path) -> None:  # noqa:
     assert len(lengths) == 2
     with pytest.raises(ConventionError, match="noise"):
         export_onnx(Checkpoint(Spark(small(Config.paper(), name_width=18)), names), tmp_path / "b")
+
+
+def test_weights_that_lack_a_tensor_are_damaged(maker: PairMaker, tmp_path: Path) -> None:  # noqa: F811
+    names = NameEncoder(NameConfig(width=16, heads=2, blocks=1, rig_blocks=1))
+    checkpoint = Checkpoint(Spark(small(Config.default(), name_width=18)), names)
+    save_checkpoint(checkpoint, tmp_path / "a.safetensors")
+    weights = read_weights(tmp_path / "a.safetensors")
+    del weights.tensors["model.encoder.motion.weight"], weights.tensors["names.norm.weight"]
+    draw = maker.draw(0, 1)
+    with pytest.raises(FileFormatError, match=r"damaged.*norm\.weight"):
+        NameNetwork(weights).encode(draw.source.body.skeleton.names)
+    vectors = np.zeros((len(draw.source.body.joints), 18))
+    with pytest.raises(FileFormatError, match=r"damaged.*encoder\.motion"):
+        Network(weights).encode(draw.source, vectors)

@@ -16,9 +16,9 @@ from scipy.spatial.transform import Rotation
 import spark_sim
 from robots import registry
 from robots.formats import FORMATS
-from robots.formats.native import velocities
 from robots.morphology import Morphology, understand_robot
 from robots.motion import RobotMotion
+from sim.interpolate import velocities
 from spark.errors import ConventionError, FileFormatError, OutputError, SparkSimError
 from spark.files import write_atomically
 from spark_sim.robot import RobotClip, load_motion

@@ -6,9 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
-from jaxtyping import Float
 
 from robots import registry
 from robots.formats.arrays import number_array, scalar
@@ -16,6 +14,7 @@ from robots.formats.qpos import check_finite, of_qpos, unit
 from robots.known import known, model_sha256
 from robots.morphology import Morphology
 from robots.motion import RobotMotion
+from sim.interpolate import velocities
 from spark.errors import FileFormatError
 from spark.files import write_atomically
 
@@ -97,20 +96,6 @@ def read_npz(
 def is_native(arrays: dict[str, np.ndarray]) -> bool:
     """Whether an npz is one of ours."""
     return "about" in arrays
-
-
-def velocities(
-    model: mujoco.MjModel, qpos: Float[np.ndarray, "T nq"], frame_time: float
-) -> Float[np.ndarray, "T nv"]:
-    """MuJoCo's qvel by central differences; at the ends, by the difference to the neighbour."""
-    qvel = np.zeros((len(qpos), model.nv))
-    for t in range(len(qpos)):
-        before, after = max(t - 1, 0), min(t + 1, len(qpos) - 1)
-        if after > before:
-            mujoco.mj_differentiatePos(
-                model, qvel[t], (after - before) * frame_time, qpos[before], qpos[after]
-            )
-    return qvel
 
 
 def _sha256(path: Path) -> str | None:
