@@ -14,13 +14,14 @@ from pathlib import Path
 from spark.errors import SparkSimError
 from spark.settings import TrainConfig, toml
 
+_SWITCHES = {"": (), "w/o share": ("share",), "w/o mask": ("mask",), "w/ pos": ("pos",)}
+_SWITCHES |= {"w/o FK": ("fk",)}
 ROWS = {
-    "paper": TrainConfig("paper"),
-    "w/o share": TrainConfig("paper", ("share",)),
-    "w/o mask": TrainConfig("paper", ("mask",)),
-    "w/ pos": TrainConfig("paper", ("pos",)),
-    "w/o FK": TrainConfig("paper", ("fk",)),
-    "mixed": TrainConfig("paper", ("mix",)),
+    **{row or "paper": TrainConfig("paper", thrown) for row, thrown in _SWITCHES.items()},
+    **{
+        f"mixed {row}".strip(): TrainConfig("paper", (*thrown, "mix"))
+        for row, thrown in _SWITCHES.items()
+    },
     "default": TrainConfig("default"),
 }
 SCHEDULE = {

@@ -11,8 +11,9 @@ from torch import Tensor
 
 from spark.bodies import Body, Pose, Start
 from spark.features import BodyFeatures
-from spark.pairs import Pairs, Windows, leg_of
+from spark.pairs import Pairs, Windows
 from spark.roles import Group
+from spark.staging import leg_of
 
 Names = Callable[[Sequence[str]], Float[Tensor, "S E"]]
 

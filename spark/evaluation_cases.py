@@ -21,8 +21,9 @@ from spark.dataset import Performance, is_dataset, prepare, read_performances
 from spark.errors import SkeletonError
 from spark.features import BodyFeatures
 from spark.metrics import san_height
-from spark.pairs import Clip, Stage
+from spark.pairs import Clip
 from spark.roles import Role
+from spark.staging import Stage
 from spark.transfer import correspond
 from spark.variants import Variant, random_variant, same_body, scaled_body, split_body
 

@@ -7,7 +7,6 @@ were. The network gets the first, its analytic transfer to the second, and must 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -15,21 +14,18 @@ from jaxtyping import Bool, Float, Int
 
 from spark.errors import SkeletonError
 from spark.features import BodyFeatures
-from spark.kinematics import local_rotations
 from spark.mirror import mirrored_body, mirrored_motion
-from spark.plant import Leg, bend_leg, stance_correction
-from spark.resample import positions_at, rotations_at
-from spark.roles import LIMBS, Group, Role
 from spark.rotation import (
     quat_angle,
     quat_from_yaw,
-    quat_mul,
     quat_rotate,
+    quat_slerp,
     sixd_from_quat,
     yaw_from_quat,
 )
+from spark.staging import Stage, begins_of, joined, local_rows, mixed, place
 from spark.transfer import Correspondence, correspond
-from spark.variants import Variant, random_variant, same_body, split_body
+from spark.variants import random_variant, same_body, split_body
 
 _PACE = 0.3  # of the logarithm of a motion's speed
 _TRIES = 10
@@ -112,6 +108,49 @@ class PairMaker:
 
     def draw(self, n: int, windows: int) -> Pairs:
         """Draw number `n`: `windows` windows of one body's clips on one pair of its variants."""
+        return self.draws([n], windows)[0]
+
+    def draws(self, numbers: Sequence[int], windows: int) -> list[Pairs]:
+        """The draws of these numbers, made together, which is faster."""
+        drawn = [self._drawn(n, windows) for n in numbers]
+        D = len(drawn)
+        stages = [one.source for one in drawn] + [one.target for one in drawn]
+        bodies = [stage.variant.body for stage in stages]
+        links = [one.link for one in drawn]
+        hips = np.stack([one.hips for one in drawn])
+        planted = np.stack([one.planted for one in drawn])
+        rows = place(
+            stages,
+            2 * begins_of([one.rotations for one in drawn]),
+            np.concatenate([one.rotations for one in drawn]),
+            np.concatenate([hips, hips]),
+            np.concatenate([planted, planted]),
+        )
+        begins = begins_of([body.joints for body in bodies])
+        copied = mixed(
+            rows,
+            joined([link.first for link in links], begins[:D]),
+            joined([link.second for link in links], begins[:D]),
+            np.concatenate([link.mix for link in links]),
+        )
+        # Windows are seen from their first frames, as `spark.features.pose_features` sees one. The
+        # pelvis turns alike on all bodies.
+        back = quat_from_yaw(-yaw_from_quat(rows[begins[:D], :, :1]))
+        roots = quat_rotate(back, hips - hips[:, :, :1] * np.array([1, 1, 0], hips.dtype))
+        bodies += bodies[D:]
+        local = local_rows(np.concatenate([rows, copied]), bodies, np.tile(back, (3, 1, 1, 1)))
+        poses = np.moveaxis(sixd_from_quat(local), 0, 2)
+        ends = begins_of([body.joints for body in bodies])[1:]
+        seen = [
+            Windows(body, own, roots[k % D])
+            for k, (body, own) in enumerate(zip(bodies, np.split(poses, ends, 2), strict=True))
+        ]
+        return [
+            Pairs(seen[k], seen[D + k], seen[2 * D + k], links[k].guess, planted[k], one.frame_time)
+            for k, one in enumerate(drawn)
+        ]
+
+    def _drawn(self, n: int, windows: int) -> "_Drawn":
         rng = np.random.default_rng((self.seed, n))
         k = int(rng.choice(len(self._bodies), p=self._weights))
         clips = self._bodies[k]
@@ -129,39 +168,37 @@ class PairMaker:
         rotations, hips, planted = self._cut(clips, windows, rng)
         if mirrored:
             rotations, hips, planted = mirrored_motion(rotations, hips, planted)
-        on_source = source.place(rotations, hips, planted)
-        on_target = target.place(rotations, hips, planted)
-        copied = link.rotations(on_source, target.variant.body.rig)
-        return Pairs(
-            _windows(source.variant.body, on_source, hips),
-            _windows(target.variant.body, on_target, hips),
-            _windows(target.variant.body, copied, hips),
-            link.guess,
-            planted,
-            self._bodies[k][0].frame_time,
-        )
+        rows = np.ascontiguousarray(np.moveaxis(rotations, 2, 0))
+        return _Drawn(source, target, link, rows, hips, planted, clips[0].frame_time)
 
     def _cut(
         self, clips: list[Clip], windows: int, rng: np.random.Generator
     ) -> tuple[Float[np.ndarray, "W T K 4"], Float[np.ndarray, "W T 3"], Bool[np.ndarray, "W T 2"]]:
         lengths = np.array([len(c.hips) for c in clips], float)
-        chosen = rng.choice(len(clips), windows, p=lengths / lengths.sum())
-        cuts = []
-        for i in chosen.tolist():
-            clip = clips[i]
+        chosen = [clips[i] for i in rng.choice(len(clips), windows, p=lengths / lengths.sum())]
+        spans, speeds = [], np.ones((windows, 1))
+        for w, clip in enumerate(chosen):
             speed = float(np.exp(rng.uniform(-_PACE, _PACE)))
             frames = int(np.ceil((self.window - 1) * speed)) + 1
             if not self.varied or rng.random() < 0.5 or frames > len(clip.hips):
                 frames, speed = self.window, 1.0
-            at = int(rng.integers(0, len(clip.hips) - frames + 1))
-            span = slice(at, at + frames)
-            cut = clip.rotations[span], clip.hips[span], clip.planted[span]
-            if speed != 1:
-                times = np.arange(self.window) * speed
-                nearest = np.minimum(times.round().astype(int), frames - 1)
-                cut = rotations_at(cut[0], times), positions_at(cut[1], times), cut[2][nearest]
-            cuts.append(cut)
-        rotations, hips, planted = (np.stack(part) for part in zip(*cuts, strict=True))
+            at, speeds[w] = int(rng.integers(0, len(clip.hips) - frames + 1)), speed
+            spans.append(slice(at, at + frames))
+        times = np.arange(self.window) * speeds
+        last = np.array([[span.stop - span.start - 1] for span in spans])
+        before, nearest = times.astype(int), np.minimum(times.round().astype(int), last)
+        rotations = _frames([clip.rotations for clip in chosen], spans, before)
+        hips = _frames([clip.hips for clip in chosen], spans, before)
+        planted = _frames([clip.planted for clip in chosen], spans, nearest)
+        paced = np.flatnonzero(speeds != 1)
+        if len(paced):
+            share = (times - before)[paced, :, None].astype(np.float32)
+            after = np.minimum(before + 1, last)[paced]
+            chosen, spans = [chosen[w] for w in paced], [spans[w] for w in paced]
+            later = _frames([clip.rotations for clip in chosen], spans, after)
+            rotations[paced] = quat_slerp(rotations[paced], later, share)
+            later = _frames([clip.hips for clip in chosen], spans, after)
+            hips[paced] += share * (later - hips[paced])
         return rotations, hips, planted
 
     def _body(self, k: int, mirrored: bool) -> BodyFeatures:
@@ -170,7 +207,7 @@ class PairMaker:
             self._seen[k, mirrored] = mirrored_body(same_body(body).body) if mirrored else body
         return self._seen[k, mirrored]
 
-    def _stage(self, k: int, mirrored: bool, number: int) -> "Stage":
+    def _stage(self, k: int, mirrored: bool, number: int) -> Stage:
         key = (k, mirrored, number)
         if key not in self._stages:
             body = self._body(k, mirrored)
@@ -181,7 +218,7 @@ class PairMaker:
             self._stages[key] = Stage(variant)
         return self._stages[key]
 
-    def _link(self, source: "Stage", target: "Stage") -> Correspondence:
+    def _link(self, source: Stage, target: Stage) -> Correspondence:
         key = (source, target)
         if key not in self._links:
             if len(self._links) > 4096:
@@ -190,63 +227,27 @@ class PairMaker:
         return self._links[key]
 
 
-@dataclass(frozen=True, eq=False)
-class Stage:
-    """A variant and what putting motion onto it needs."""
+class _Drawn(NamedTuple):
+    """What a draw consists of before it is put on its two bodies."""
 
-    variant: Variant
-
-    @cached_property
-    def legs(self) -> tuple[Leg, ...]:
-        return tuple(leg_of(self.variant.body, g) for g in (Group.LEFT_LEG, Group.RIGHT_LEG))
-
-    def place(
-        self,
-        base: Float[np.ndarray, "W T K 4"],
-        hips: Float[np.ndarray, "W T 3"],
-        planted: Bool[np.ndarray, "W T 2"],
-    ) -> Float[np.ndarray, "W T J 4"]:
-        """The base's rotations on this body, with the planted feet planted."""
-        rotations = self.variant.rotations(base)
-        skeleton = self.variant.body.skeleton
-        positions = np.empty((*rotations.shape[:-1], 3))
-        for side, leg in enumerate(self.legs):
-            chain = list(skeleton.ancestors(leg.contact)[::-1])
-            bones = quat_rotate(rotations[..., chain[:-1], :], skeleton.offsets[chain[1:]])
-            positions[..., chain[1:], :] = hips[..., None, :] + bones.cumsum(-2)
-            move = stance_correction(positions[..., leg.contact, :], planted[..., side])
-            rotations = bend_leg(rotations, positions, leg, move)
-        return rotations
+    source: Stage
+    target: Stage
+    link: Correspondence
+    rotations: Float[np.ndarray, "K W T 4"]
+    hips: Float[np.ndarray, "W T 3"]
+    planted: Bool[np.ndarray, "W T 2"]
+    frame_time: float
 
 
-def leg_of(body: BodyFeatures, group: Group) -> Leg:
-    """The joints of one leg in the network's numbering."""
-    roles = [body.rig.roles.roles[j] for j in body.joints.tolist()]
-    upper, lower, foot, toe = LIMBS[group]
-    place: dict[Role, int] = {role: roles.index(role) for role in LIMBS[group] if role in roles}
-    thigh, shank, ankle = place[upper], place[lower], place[foot]
-    below_knee = set(body.skeleton.subtree(shank))
-    below_ankle = set(body.skeleton.subtree(ankle))
-    leg = set(body.skeleton.subtree(thigh))
-    return Leg(
-        thigh,
-        shank,
-        ankle,
-        place.get(toe, ankle),
-        tuple(sorted(leg - below_knee)),
-        tuple(sorted(below_knee - below_ankle)),
+def _frames(
+    parts: Sequence[np.ndarray], spans: Sequence[slice], frames: Int[np.ndarray, "W T"]
+) -> np.ndarray:
+    """From a span of each part, these of its frames; in single precision what is not a flag."""
+    # A view of a memory-mapped array costs more than what is read through it.
+    cut = np.stack(
+        [np.asarray(p)[span][at] for p, span, at in zip(parts, spans, frames, strict=True)]
     )
-
-
-def _windows(
-    body: BodyFeatures, world: Float[np.ndarray, "W T K 4"], hips: Float[np.ndarray, "W T 3"]
-) -> Windows:
-    """Seen from each window's first frame, as `spark.features.pose_features` sees one."""
-    local = local_rotations(body.skeleton, world)
-    back = quat_from_yaw(-yaw_from_quat(world[:, :1, 0]))
-    local[..., 0, :] = quat_mul(back, world[..., 0, :])
-    origin = hips[:, :1] * np.array([1.0, 1, 0])
-    return Windows(body, sixd_from_quat(local), quat_rotate(back, hips - origin))
+    return cut if cut.dtype == bool else cut.astype(np.float32, copy=False)
 
 
 def _turning(clip: Clip) -> float:

@@ -37,7 +37,7 @@ def stance_correction(
     stance = begins.cumsum().reshape(planted.shape)  # a number for each stance of each path
     frames = planted.nonzero()
     counts = np.maximum(np.bincount(stance[frames]), 1)
-    held = np.zeros(contact_pos.shape)
+    held = np.zeros_like(contact_pos)
     for axis in range(3):
         path = contact_pos[..., axis][frames]
         means = np.bincount(stance[frames], path) / counts if len(path) else counts
@@ -78,27 +78,36 @@ def bend_leg(
 ) -> Float[np.ndarray, "*n J 4"]:
     """Rotations with the ankle moved by `move`, or as near to it as the leg reaches."""
     hip, knee, ankle = (positions[..., j, :] for j in leg[:3])
-    thigh, shank = knee - hip, ankle - knee
+    turns = leg_turns(knee - hip, ankle - knee, rotations[..., leg.upper_leg, :], move)
+    out = rotations.copy()
+    for joints, turned in zip((leg.with_thigh, leg.with_shank), turns, strict=True):
+        out[..., list(joints), :] = quat_mul(turned[..., None, :], rotations[..., list(joints), :])
+    return out
+
+
+def leg_turns(
+    thigh: Float[np.ndarray, "*n 3"],
+    shank: Float[np.ndarray, "*n 3"],
+    upper_leg: Float[np.ndarray, "*n 4"],
+    move: Float[np.ndarray, "*n 3"],
+) -> tuple[Float[np.ndarray, "*n 4"], Float[np.ndarray, "*n 4"]]:
+    """How thigh and shank turn in the world, so that the ankle moves by `move` or as near to it as
+    the leg reaches. `upper_leg` is the thigh's rotation since the T-pose."""
     a, b = np.linalg.norm(thigh, axis=-1), np.linalg.norm(shank, axis=-1)
-    goal = ankle + move - hip
+    goal = thigh + shank + move
     reach = np.clip(np.linalg.norm(goal, axis=-1), abs(a - b) * 1.01 + 1e-9, (a + b) * _REACH)
 
-    lateral = quat_rotate(rotations[..., leg.upper_leg, :], np.array([0.0, 1, 0]))
+    lateral = quat_rotate(upper_leg, np.array([0, 1, 0], upper_leg.dtype))
     axis = np.cross(thigh, shank)
+    sine = np.linalg.norm(axis, axis=-1)
     # A straight leg bends about the body's lateral axis, backwards.
-    straight = np.linalg.norm(axis, axis=-1, keepdims=True) < 0.02 * (a * b)[..., None]
+    straight = (sine < 0.02 * a * b)[..., None]
     axis = np.where(straight, lateral, axis)
     axis = axis / np.linalg.norm(axis, axis=-1, keepdims=True)
-    now = _flexion(np.linalg.norm(ankle - hip, axis=-1), a, b)
+    now = np.arctan2(sine, np.sum(thigh * shank, axis=-1))
     turn = quat_from_rotvec(axis * (_flexion(reach, a, b) - now)[..., None])
-    bent = thigh + quat_rotate(turn, shank)
-    swing = quat_between(bent, goal)
-
-    out = rotations.copy()
-    parts = ((list(leg.with_thigh), swing), (list(leg.with_shank), quat_mul(swing, turn)))
-    for joints, turned in parts:
-        out[..., joints, :] = quat_mul(turned[..., None, :], rotations[..., joints, :])
-    return out
+    swing = quat_between(thigh + quat_rotate(turn, shank), goal)
+    return swing, quat_mul(swing, turn)
 
 
 def _flexion(

@@ -144,7 +144,7 @@ class Steps(Dataset[Batch]):
     def __getitem__(self, n: int) -> Batch:
         first = n * self.config.draws
         mine = range(first + self.rank, first + self.config.draws, self.world)
-        return self.collator.batch([self.maker.draw(k, self.config.per_body) for k in mine])
+        return self.collator.batch(self.maker.draws(mine, self.config.per_body))
 
 
 def optimiser_of(model: nn.Module, config: TrainConfig) -> torch.optim.AdamW:

@@ -1,0 +1,172 @@
+"""Motions put onto many bodies at once: rotations carried over, planted feet planted.
+
+Bodies differ in their joints, so the joints of all of them are laid end to end: a *row* is one
+joint of one body over W windows of T frames. A few operations on large arrays then do for all.
+"""
+
+from collections.abc import Sequence, Sized
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from spark.features import BodyFeatures
+from spark.plant import Leg, leg_turns, stance_correction
+from spark.roles import LIMBS, Group, Role
+from spark.rotation import quat_conj, quat_mul, quat_rotate, quat_slerp
+from spark.variants import Variant
+
+
+class LegBones(NamedTuple):
+    """The bones of both legs: to the hip, the thigh, the shank and the foot, one part after the
+    other. Part p begins with bone `begins[p]`; bone b turns with joint `joints[b]`."""
+
+    joints: Int[np.ndarray, "B"]
+    offsets: Float[np.ndarray, "B 3"]
+    begins: Int[np.ndarray, "8"]
+
+
+class LegJoints(NamedTuple):
+    """The joints that turn with the legs, and with which part: left thigh, left shank, right."""
+
+    joints: Int[np.ndarray, "N"]
+    parts: Int[np.ndarray, "N"]
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """A variant and what putting motion onto it needs."""
+
+    variant: Variant
+
+    @cached_property
+    def legs(self) -> tuple[Leg, Leg]:
+        body = self.variant.body
+        return leg_of(body, Group.LEFT_LEG), leg_of(body, Group.RIGHT_LEG)
+
+    @cached_property
+    def leg_bones(self) -> LegBones:
+        skeleton = self.variant.body.skeleton
+        joints: list[int] = []
+        offsets: list[np.ndarray] = []
+        begins: list[int] = []
+        for leg in self.legs:
+            for above, below in zip((0, *leg[:3]), leg[:4], strict=True):
+                begins.append(len(joints))
+                bones = [j for j in skeleton.ancestors(below) if above < j]
+                # Without a toe the foot is no bone: one of no length.
+                joints += [int(skeleton.parents[j]) for j in bones] or [above]
+                offsets += [skeleton.offsets[j] for j in bones] or [np.zeros(3)]
+        return LegBones(np.array(joints), np.array(offsets), np.array(begins))
+
+    @cached_property
+    def leg_joints(self) -> LegJoints:
+        parts = [list(part) for leg in self.legs for part in (leg.with_thigh, leg.with_shank)]
+        return LegJoints(np.concatenate(parts), np.repeat(np.arange(4), [*map(len, parts)]))
+
+    def place(
+        self,
+        base: Float[np.ndarray, "W T K 4"],
+        hips: Float[np.ndarray, "W T 3"],
+        planted: Bool[np.ndarray, "W T 2"],
+    ) -> Float[np.ndarray, "W T J 4"]:
+        """The base's rotations on this body, with the planted feet planted."""
+        rows = np.ascontiguousarray(np.moveaxis(base, 2, 0))
+        return np.moveaxis(place([self], [0], rows, hips[None], planted[None]), 0, 2)
+
+
+def place(
+    stages: Sequence[Stage],
+    bases: Sequence[int],
+    base: Float[np.ndarray, "R W T 4"],
+    hips: Float[np.ndarray, "S W T 3"],
+    planted: Bool[np.ndarray, "S W T 2"],
+) -> Float[np.ndarray, "N W T 4"]:
+    """The bases' rotations on all bodies, one after the other, with the planted feet planted.
+    The base of each stage begins at row `bases[s]`; hips' paths are in hip heights."""
+    variants = [stage.variant for stage in stages]
+    rows = mixed(
+        base,
+        joined([v.first for v in variants], bases),
+        joined([v.second for v in variants], bases),
+        np.concatenate([v.mix for v in variants]),
+    )
+    begins = begins_of([v.first for v in variants])
+    bones = [stage.leg_bones for stage in stages]
+    along = quat_rotate(
+        rows[joined([b.joints for b in bones], begins)],
+        np.concatenate([b.offsets for b in bones]).astype(rows.dtype)[:, None, None],
+    )
+    parts = joined([b.begins for b in bones], begins_of([b.joints for b in bones]))
+    limbs = np.add.reduceat(along, parts, axis=0).reshape(len(stages), 2, 4, *along.shape[1:])
+    contact = hips[:, None] + limbs.sum(2)
+    move = stance_correction(contact, np.moveaxis(planted, -1, 1))
+    uppers = joined([np.array([leg.upper_leg for leg in s.legs]) for s in stages], begins)
+    turns = leg_turns(
+        limbs[:, :, 1], limbs[:, :, 2], rows[uppers].reshape(*move.shape[:-1], 4), move
+    )
+    turned = np.stack(turns, 2).reshape(-1, *rows.shape[1:])
+    joints = [stage.leg_joints for stage in stages]
+    at = joined([j.joints for j in joints], begins)
+    by = joined([j.parts for j in joints], range(0, 4 * len(stages), 4))
+    rows[at] = quat_mul(turned[by], rows[at])
+    return rows
+
+
+def mixed(
+    rows: Float[np.ndarray, "R W T 4"],
+    first: Int[np.ndarray, "N"],
+    second: Int[np.ndarray, "N"],
+    mix: Float[np.ndarray, "N"],
+) -> Float[np.ndarray, "N W T 4"]:
+    """New rows: each turns from row `first` towards row `second` by `mix`."""
+    out = rows[first]
+    between = np.flatnonzero(mix)
+    if len(between):
+        share = mix[between].astype(rows.dtype)[:, None, None]
+        out[between] = quat_slerp(out[between], rows[second[between]], share)
+    return out
+
+
+def local_rows(
+    rows: Float[np.ndarray, "N W T 4"],
+    bodies: Sequence[BodyFeatures],
+    back: Float[np.ndarray, "S W 1 4"],
+) -> Float[np.ndarray, "N W T 4"]:
+    """Local rotations of the bodies' rows, each pelvis turned by `back`."""
+    begins = begins_of([body.joints for body in bodies])
+    parents = joined([np.maximum(body.skeleton.parents, 0) for body in bodies], begins)
+    local = quat_mul(quat_conj(rows)[parents], rows)
+    local[begins] = quat_mul(back, rows[begins])
+    return local
+
+
+def begins_of(parts: Sequence[Sized]) -> list[int]:
+    """Where each of several parts begins in their concatenation."""
+    return [0, *np.cumsum([len(part) for part in parts])[:-1].tolist()]
+
+
+def joined(indices: Sequence[Int[np.ndarray, "_"]], begins: Sequence[int]) -> Int[np.ndarray, "N"]:
+    """Indices into parts as indices into their concatenation."""
+    return np.concatenate([part + begin for part, begin in zip(indices, begins, strict=True)])
+
+
+def leg_of(body: BodyFeatures, group: Group) -> Leg:
+    """The joints of one leg in the network's numbering."""
+    roles = [body.rig.roles.roles[j] for j in body.joints.tolist()]
+    upper, lower, foot, toe = LIMBS[group]
+    place: dict[Role, int] = {role: roles.index(role) for role in LIMBS[group] if role in roles}
+    thigh, shank, ankle = place[upper], place[lower], place[foot]
+    below_knee = set(body.skeleton.subtree(shank))
+    below_ankle = set(body.skeleton.subtree(ankle))
+    leg = set(body.skeleton.subtree(thigh))
+    return Leg(
+        thigh,
+        shank,
+        ankle,
+        place.get(toe, ankle),
+        tuple(sorted(leg - below_knee)),
+        tuple(sorted(below_knee - below_ankle)),
+    )
