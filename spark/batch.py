@@ -10,10 +10,9 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from spark.bodies import Body, Pose, Start
+from spark.config import NO_ROTATION
 from spark.features import BodyFeatures
 from spark.pairs import Pairs, Windows
-from spark.roles import Group
-from spark.staging import leg_of
 
 Names = Callable[[Sequence[str]], Float[Tensor, "S E"]]
 
@@ -46,9 +45,8 @@ class Collator:
         planted = torch.zeros(sum(counts), draws[0].source.root.shape[1], J, dtype=torch.bool)
         row = 0
         for draw, count in zip(draws, counts, strict=True):
-            for side, group in enumerate((Group.LEFT_LEG, Group.RIGHT_LEG)):
-                contact = leg_of(draw.target.body, group).contact
-                planted[row : row + count, :, contact] = torch.as_tensor(draw.planted[..., side])
+            contacts = list(draw.target.body.contacts)
+            planted[row : row + count, :, contacts] = torch.as_tensor(draw.planted)
             row += count
         effectors = [torch.as_tensor(body.effectors > 0) for body in targets]
         return Batch(
@@ -105,13 +103,15 @@ class Collator:
 
 def _poses(windows: Sequence[Windows]) -> Pose:
     J = max(w.rotations.shape[2] for w in windows)
-    rotations = []
+    root = np.concatenate([w.root for w in windows]).astype(np.float32, copy=False)
+    rotations = np.empty((*root.shape[:2], J, 6), np.float32)
+    row = 0
     for w in windows:
-        identity = np.broadcast_to(
-            np.array([1.0, 0, 0, 0, 1, 0]), (*w.rotations.shape[:2], J - w.rotations.shape[2], 6)
-        )
-        rotations.append(_float(np.concatenate([w.rotations, identity], axis=2)))
-    return Pose(torch.cat(rotations), torch.cat([_float(w.root) for w in windows]))
+        W, _, K, _ = w.rotations.shape
+        rotations[row : row + W, :, :K] = w.rotations
+        rotations[row : row + W, :, K:] = NO_ROTATION
+        row += W
+    return Pose(torch.from_numpy(rotations), torch.from_numpy(root))
 
 
 def _stack(tensors: Sequence[Tensor], counts: Sequence[int], fill: int = 0) -> Tensor:

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.canonical import CanonicalMotion
-from spark.kinematics import local_rotations, world_positions, world_rotations
+from spark.kinematics import local_rotations, world_rotations
 from spark.rig import Rig
 from spark.rig_names import split_side
 from spark.roles import Group, Role
@@ -106,6 +106,15 @@ class BodyFeatures:
         """1 at hands, feet and head."""
         return self.having(*_EFFECTORS)
 
+    @cached_property
+    def contacts(self) -> tuple[int, int]:
+        """The joints of the left and of the right foot that touch the floor: toe, else ankle."""
+        roles = [self.rig.roles.roles[j] for j in self.joints.tolist()]
+        left, right = (
+            roles.index(toe if toe in roles else foot) for foot, toe in (_FEET[:2], _FEET[2:])
+        )
+        return left, right
+
     def having(self, *roles: Role) -> Float[np.ndarray, "K"]:
         """1 at the joints that hold one of `roles`."""
         return np.array([float(self.rig.roles.roles[j] in roles) for j in self.joints.tolist()])
@@ -136,7 +145,7 @@ def body_features(rig: Rig) -> BodyFeatures:
     parents = [-1] + [
         next((place[a] for a in rig.skeleton.ancestors(j)[1:] if a in place), 0) for j in kept[1:]
     ]
-    positions = world_positions(rig.skeleton, rig.tpose, np.zeros(3))[kept]
+    positions = rig.tpose_positions[kept]
     hips = [place[j] for r in _UPPER_LEGS for j in rig.roles.joints(r)[:1]]
     positions[0] = positions[hips].mean(0)
     positions = (positions - positions[0]) / rig.hip_height

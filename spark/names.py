@@ -11,14 +11,14 @@ name's bytes, blocks of the same kind, without positions, let every name attend 
 Text embeddings confuse left and right, so the side stands beside them as two features of its own.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 
 import torch
 import torch.nn.functional as nnf
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 from torch.nn.utils.rnn import pad_sequence
 
@@ -74,16 +74,36 @@ class NameEncoder(nn.Module):
         named = (tokens != PAD).any(-1)
         own = self._names(tokens[named])
         x = own.new_zeros((*named.shape, own.shape[-1]))
-        x = x.index_put(named.nonzero(as_tuple=True), own)
-        bias = torch.where(named, 0.0, float("-inf"))[:, None, None]
-        for block in self.rig_blocks:
-            x = block(x, bias)
-        return nnf.normalize(self.rig_norm(x), dim=-1)
+        return self._together(x.index_put(named.nonzero(as_tuple=True), own), named)
 
     @torch.no_grad()
     def encode(self, names: Sequence[str]) -> Float[Tensor, "S D"]:
         """The vectors of `names`: the joints of one rig."""
         return self(tokenize_rigs([names]).to(self.embed.weight.device))[0]
+
+    def remembering(self) -> Callable[[Sequence[str]], Float[Tensor, "S D"]]:
+        """`encode` for many rigs that have names in common, as long as the weights stay: each name
+        is read once, and by itself, so that its vector does not depend on what was read before."""
+        read: dict[str, Float[Tensor, " D"]] = {}
+
+        @torch.no_grad()
+        def encode(names: Sequence[str]) -> Float[Tensor, "S D"]:
+            words = rig_words(names)
+            for word in words:
+                if word not in read:
+                    read[word] = self._alike(tokenize([word]))[0]
+            own = torch.stack([read[word] for word in words])[None]
+            return self._together(own, torch.ones(own.shape[:2], dtype=torch.bool))[0]
+
+        return encode
+
+    def _together(
+        self, x: Float[Tensor, "R N D"], named: Bool[Tensor, "R N"]
+    ) -> Float[Tensor, "R N D"]:
+        bias = torch.where(named, 0.0, float("-inf"))[:, None, None]
+        for block in self.rig_blocks:
+            x = block(x, bias)
+        return nnf.normalize(self.rig_norm(x), dim=-1)
 
     def _names(self, tokens: Int[Tensor, "S L"]) -> Float[Tensor, "S D"]:
         """Each name by itself: the mean over its tokens. In chunks of names of similar length."""

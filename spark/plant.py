@@ -93,21 +93,25 @@ def leg_turns(
 ) -> tuple[Float[np.ndarray, "*n 4"], Float[np.ndarray, "*n 4"]]:
     """How thigh and shank turn in the world, so that the ankle moves by `move` or as near to it as
     the leg reaches. `upper_leg` is the thigh's rotation since the T-pose."""
-    a, b = np.linalg.norm(thigh, axis=-1), np.linalg.norm(shank, axis=-1)
+    a, b = _length(thigh), _length(shank)
     goal = thigh + shank + move
-    reach = np.clip(np.linalg.norm(goal, axis=-1), abs(a - b) * 1.01 + 1e-9, (a + b) * _REACH)
+    reach = np.clip(_length(goal), abs(a - b) * 1.01 + 1e-9, (a + b) * _REACH)
 
     lateral = quat_rotate(upper_leg, np.array([0, 1, 0], upper_leg.dtype))
     axis = np.cross(thigh, shank)
-    sine = np.linalg.norm(axis, axis=-1)
+    sine = _length(axis)
     # A straight leg bends about the body's lateral axis, backwards.
     straight = (sine < 0.02 * a * b)[..., None]
     axis = np.where(straight, lateral, axis)
-    axis = axis / np.linalg.norm(axis, axis=-1, keepdims=True)
-    now = np.arctan2(sine, np.sum(thigh * shank, axis=-1))
+    axis = axis / _length(axis)[..., None]
+    now = np.arctan2(sine, np.einsum("...i,...i", thigh, shank))
     turn = quat_from_rotvec(axis * (_flexion(reach, a, b) - now)[..., None])
     swing = quat_between(thigh + quat_rotate(turn, shank), goal)
     return swing, quat_mul(swing, turn)
+
+
+def _length(v: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n"]:
+    return np.sqrt(np.einsum("...i,...i", v, v))
 
 
 def _flexion(

@@ -15,7 +15,6 @@ from jaxtyping import Bool, Float, Int
 from spark.canonical import CanonicalMotion, canonical_positions
 from spark.contacts import planted_points
 from spark.feet import standing_height
-from spark.kinematics import world_positions
 from spark.plant import Leg, bend_leg, blend_between
 from spark.rig import Rig
 from spark.roles import LIMBS, Group, Role
@@ -105,5 +104,5 @@ def _contact(source: Rig, target: Rig, group: Group) -> tuple[int, int] | None:
 
 def _rest_height(rig: Rig, joint: int) -> float:
     """A joint's height [m] above the sole in the T-pose."""
-    rest: Float[np.ndarray, "J 3"] = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
+    rest = rig.tpose_positions
     return float(rest[joint, 2] - rest[rig.hips, 2].mean() + rig.hip_height)

@@ -48,6 +48,11 @@ class Rig:
         return [j for role in _UPPER_LEGS for j in self.roles.joints(role)[:1]]
 
     @cached_property
+    def tpose_positions(self) -> Float[np.ndarray, "J 3"]:
+        """The joints [m] in the T-pose, the root at the origin."""
+        return world_positions(self.skeleton, self.tpose, np.zeros(3))
+
+    @cached_property
     def contact_joints(self) -> list[int]:
         """The joint of each foot that touches the floor: its toe, or the ankle without one."""
         pairs = ((self.roles.joint(toe), self.roles.joint(foot)) for foot, toe in _FEET)

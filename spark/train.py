@@ -255,7 +255,7 @@ def _place() -> tuple[int, int, torch.device]:
 def name_vectors(names: NameEncoder | str) -> Names:
     """What turns joint names into vectors: our own encoder, or the T5 of that name."""
     if isinstance(names, NameEncoder):
-        return names.cpu().encode
+        return names.cpu().remembering()
     return T5Names(names, NAME_CACHE).encode
 
 

@@ -13,7 +13,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.canonical import CanonicalMotion
-from spark.kinematics import world_positions
 from spark.rig import Rig
 from spark.roles import Role
 from spark.rotation import quat_conj, quat_slerp
@@ -161,7 +160,7 @@ def _chain(
     begin = rig.roles.joints(start)[-1:] or (rig.pelvis,)
     tail = rig.roles.joints(end)[:1] if end is not None else ()
     joints = [*begin, *rig.roles.joints(role), *tail]
-    positions = world_positions(rig.skeleton, rig.tpose, np.zeros(3))[joints]
+    positions = rig.tpose_positions[joints]
     arc = np.cumsum(np.linalg.norm(np.diff(positions, axis=0, prepend=positions[:1]), axis=1))
     if len(joints) > 1:
         arc = arc / arc[-1] if arc[-1] > 0 else arc

@@ -1,0 +1,74 @@
+"""Training windows a second: pairs made, put into batches and handed over, as Markdown.
+
+Usage: python scripts/pairs_bench.py DATA... (datasets of `spark-sim prepare`, or folders of files)
+
+Batches are those of the default preset (4 draws of 4 windows of 64 frames), with 64 variants of a
+body. The first steps, in which variants are made and names read, are counted apart. Beside the rate
+on the clock, which other work on the machine lowers, stands that for a CPU second of a worker.
+"""
+
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+from torch.utils.data import DataLoader
+
+from spark.batch import Batch
+from spark.dataset import training_clips
+from spark.names import NameEncoder
+from spark.settings import TrainConfig
+from spark.train import Steps
+
+FIRST, STEPS = 500, 300
+
+
+class Timed(Steps):
+    """Steps with the CPU time of their process when they were done."""
+
+    def __getitem__(self, n: int) -> tuple[Batch, float]:  # type: ignore[override]
+        return super().__getitem__(n), time.process_time()
+
+
+def as_it_is(item: object) -> object:
+    """What a loader is to do with a step."""
+    return item
+
+
+def main(*data: str) -> None:
+    torch.set_num_threads(1)
+    clips, _ = training_clips([Path(folder) for folder in data])
+    config = replace(TrainConfig("default"), variants=64)
+    steps = Timed(clips, NameEncoder().eval().remembering(), config, 0, 1)
+    began, clock = time.perf_counter(), time.process_time()
+    for n in range(FIRST):
+        done = steps[n][1]
+    print("| | windows/s | windows for a CPU second of a worker |\n|---|---|---|")
+    rate, of_cpu = FIRST / (time.perf_counter() - began), FIRST / (done - clock)
+    print(f"| the first {FIRST} steps | {_windows(rate, config)} | {_windows(of_cpu, config)} |")
+    for workers in (1, 2):
+        numbers = range(FIRST, FIRST + STEPS)
+        loader = DataLoader(
+            steps, batch_size=None, sampler=numbers, num_workers=workers, collate_fn=as_it_is
+        )
+        clocks = []
+        for n, (_, clock) in enumerate(loader):
+            clocks.append(clock)
+            if n == 2 * workers:  # by now all have begun
+                began = time.perf_counter()
+        rate = (len(clocks) - 2 * workers - 1) / (time.perf_counter() - began)
+        used = sum(
+            of_one[-1] - of_one[0] for k in range(workers) for of_one in [clocks[k::workers]]
+        )
+        of_cpu = (len(clocks) - workers) / used
+        told = f"{workers} worker{'s' * (workers > 1)}"
+        print(f"| {told} | {_windows(rate, config)} | {_windows(of_cpu, config)} |")
+
+
+def _windows(steps: float, config: TrainConfig) -> int:
+    return round(steps * config.batch)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,79 @@
+"""Many bodies moved at once move as each would alone, but for the rounding of single precision."""
+
+import numpy as np
+import pytest
+
+from spark.canonical import to_canonical
+from spark.contacts import planted_feet
+from spark.features import body_features
+from spark.kinematics import forward, world_positions
+from spark.names import NameEncoder
+from spark.pairs import Clip, PairMaker
+from spark.roles import Group
+from spark.sample import sample_motion, sample_rig
+from spark.staging import Stage, leg_of
+from spark.variants import random_variant, same_body
+
+
+@pytest.fixture(scope="module")
+def clips() -> list[Clip]:
+    made = []
+    for build in ("walker", "dancer"):
+        rig = sample_rig(build)
+        motion = sample_motion("walk", rig, 30.0)
+        body, canonical = body_features(rig), to_canonical(motion, rig)
+        planted = planted_feet(rig, forward(motion)[0], motion.frame_time)
+        rotations, hips = canonical.rotations[:, body.joints], canonical.hips / rig.hip_height
+        made.append(Clip(build, body, rotations, hips, planted, motion.frame_time))
+    return made
+
+
+def test_draws_made_together_are_those_made_alone(clips: list[Clip]) -> None:
+    maker = PairMaker(clips, window=16, variants=8, varied=True)
+    together = maker.draws(range(6), 3)
+    assert len({len(draw.target.body.joints) for draw in together}) > 1
+    for n, draw in enumerate(together):
+        alone = maker.draw(n, 3)
+        for a, b in zip(draw[:3], alone[:3], strict=True):
+            assert a.body is b.body
+            np.testing.assert_allclose(a.rotations, b.rotations, atol=1e-5)
+            np.testing.assert_allclose(a.root, b.root, atol=1e-5)
+        np.testing.assert_array_equal(draw.planted, alone.planted)
+
+
+def test_a_planted_foot_rests_where_it_stood_on_average(clips: list[Clip]) -> None:
+    """By forward kinematics of the whole body, on other bones, in stances that the leg reaches."""
+    clip = clips[0]
+    stage = Stage(random_variant(clip.body, np.random.default_rng(3)))
+    skeleton = stage.variant.body.skeleton
+    planted = np.zeros((1, len(clip.hips), 2), bool)
+    planted[0, 10:14, 0] = planted[0, 24:28, 1] = True
+    base = np.asarray(clip.rotations)[None], np.asarray(clip.hips)[None]
+    loose = stage.place(*base, np.zeros_like(planted))[0]
+    placed = stage.place(*base, planted)[0]
+    before, after = (world_positions(skeleton, r, clip.hips) for r in (loose, placed))
+    for side, stance in ((0, slice(10, 14)), (1, slice(24, 28))):
+        foot = stage.variant.body.contacts[side]
+        assert np.ptp(before[stance, foot], axis=0).max() > 1e-3
+        assert np.ptp(after[stance, foot], axis=0).max() < 1e-9
+        np.testing.assert_allclose(
+            after[stance, foot].mean(0), before[stance, foot].mean(0), atol=1e-9
+        )
+    above = [j for j in range(len(skeleton)) if j not in skeleton.subtree(stage.legs[0].upper_leg)]
+    above = [j for j in above if j not in skeleton.subtree(stage.legs[1].upper_leg)]
+    np.testing.assert_array_equal(placed[:, above], loose[:, above])
+
+
+def test_feet_touch_the_floor_with_their_last_joint(clips: list[Clip]) -> None:
+    for seed in range(8):
+        body = random_variant(clips[0].body, np.random.default_rng(seed)).body
+        legs = [leg_of(body, group) for group in (Group.LEFT_LEG, Group.RIGHT_LEG)]
+        assert body.contacts == tuple(leg.contact for leg in legs)
+
+
+def test_names_read_once_are_the_names_read_together(clips: list[Clip]) -> None:
+    encoder = NameEncoder().requires_grad_(False)
+    remembered = encoder.remembering()
+    for clip in (*clips, *clips):
+        names = same_body(clip.body).body.skeleton.names
+        np.testing.assert_allclose(remembered(names), encoder.encode(names), atol=1e-5)
