@@ -29,9 +29,11 @@ class Config:
     max_group: int = 16
     mask_joints: float = 0.1  # share of joints zeroed before pooling, in training
     drop_names: float = 0.0  # share of skeletons whose names are withheld, in training
+    blur_bodies: float = 0.0  # noise on joints' positions in the T-pose, in training [hip heights]
     share_joints: bool = True  # False: the ablation "w/o share"
     positions_in: bool = False  # True: the ablation "w/ pos"
     residual: bool = False  # correct the analytic transfer's guesses
+    shrink: float = 1.0  # share of a correction that is made: others are not quite like those seen
     noise: bool = True  # decoder starts from noise, as in the paper, or from a learned query
     shape_features: bool = False
     relative_time: bool = False  # rotary positions along time instead of absolute ones
@@ -48,9 +50,10 @@ class Config:
         """Corrects the analytic transfer's guesses: starts equal to it."""
         return cls(
             mask_joints=0.3,
-            drop_names=0.2,
-            positions_in=True,
+            drop_names=0.5,
+            blur_bodies=0.1,
             residual=True,
+            shrink=0.5,
             noise=False,
             shape_features=True,
             relative_time=True,

@@ -144,8 +144,9 @@ class Encoder(nn.Module):
 
     def _joint_features(self, pose: Pose, body: Body) -> Float[Tensor, "B T J D"]:
         joints, root = pose.rotations, pose.root
-        if self.config.positions_in:
+        if self.config.residual:
             joints = _seen(joints)
+        if self.config.positions_in:
             relative = forward_kinematics(pose, body) - pose.root[:, :, None]
             joints = torch.cat([joints, relative], -1)
             velocity = torch.diff(root, dim=1, prepend=root[:, :1])
@@ -215,7 +216,8 @@ class Decoder(nn.Module):
         )
         y = self._read(y, latent, valid | ~valid.any(1, keepdim=True))
         with exactly(y):
-            sixd = self.rotation(y.float()) * valid[:, None, :, None]
+            scale = RESIDUAL_SCALE * (1.0 if self.training else self.config.shrink)
+            sixd = scale * self.rotation(y.float()) * valid[:, None, :, None]
             index = joints[:, None, :, None].expand_as(sixd)
             return _corrected(
                 start, torch.zeros_like(start.rotations).scatter(2, index, sixd), body
@@ -261,10 +263,15 @@ class Spark(nn.Module):
         return self.decode(self.encode(pose, source), target, start)
 
     def _withhold(self, body: Body) -> Body:
-        if not (self.training and self.config.drop_names):
+        drop, noise = self.config.drop_names, self.config.blur_bodies
+        if not (self.training and (drop or noise)):
             return body
-        kept = torch.rand(len(body.names), 1, 1, device=body.names.device) >= self.config.drop_names
-        return body._replace(names=body.names * kept)
+        kept = torch.rand(len(body.names), 1, 1, device=body.names.device) >= drop
+        return body._replace(
+            names=body.names * kept,
+            tpose=_blurred(body.tpose, noise),
+            shape=_blurred(body.shape, noise),
+        )
 
 
 def _temporal_block(config: Config) -> TemporalBlock:
@@ -278,11 +285,17 @@ def _seen(rotations: Float[Tensor, "B T J 6"]) -> Float[Tensor, "B T J 6"]:
     return ROTATION_GAIN * (rotations - rotations.new_tensor(NO_ROTATION))
 
 
+def _blurred(features: Float[Tensor, "B J F"], noise: float) -> Float[Tensor, "B J F"]:
+    """Features whose first three are a place or an offset, which is moved at random."""
+    moved = features[..., :3] + noise * torch.randn_like(features[..., :3])
+    return torch.cat([moved, features[..., 3:]], -1)
+
+
 def _corrected(start: Start, sixd: Float[Tensor, "B T J 6"], body: Body) -> Pose:
-    """`start` with its guesses turned a little, each in its own axes. What follows a guess goes
-    with it; every other joint keeps its rotation in the world."""
+    """`start` with its guesses turned a little, each in its own axes, by no rotation plus `sixd`.
+    What follows a guess goes with it; every other joint keeps its rotation in the world."""
     world = world_matrices(start.rotations, body.parents)
-    little = matrix_from_sixd(RESIDUAL_SCALE * sixd + sixd.new_tensor(NO_ROTATION))
+    little = matrix_from_sixd(sixd + sixd.new_tensor(NO_ROTATION))
     turn = take(world @ little @ world.mT, start.guess.clamp(min=0))
     world = torch.where((start.guess >= 0)[:, None, :, None, None], turn @ world, world)
     upper = take(world, body.parents)

@@ -36,10 +36,12 @@ class Network:
         """The latent H."""
         layers, body = self.layers, given.body
         joints, root = given.rotations, given.root
+        if self.config.residual:
+            joints = _seen(joints)
         if self.config.positions_in:
-            world = world_rotations(body.skeleton, quat_from_sixd(joints))
+            world = world_rotations(body.skeleton, quat_from_sixd(given.rotations))
             relative = world_positions(body.skeleton, world, np.zeros_like(root))
-            joints = np.concatenate([_seen(joints), relative], -1)
+            joints = np.concatenate([joints, relative], -1)
             root = np.concatenate([root, np.diff(root, axis=1, prepend=root[:, :1])], -1)
         x = layers.linear("encoder.motion", joints.astype(np.float32))
         x[:, :, 0] += layers.linear("encoder.root", root.astype(np.float32))
@@ -72,7 +74,8 @@ class Network:
         known = self._known(start.body, names) + self._places(start.body)
         y = known[joints] + self.layers["decoder.query"] + self.layers.linear("decoder.start", seen)
         sixd = self.layers.linear("decoder.rotation", self._read(y, latent))
-        return _corrected(start, sixd.astype(np.float64), joints, guess)
+        turns = self.config.shrink * RESIDUAL_SCALE * sixd.astype(np.float64)
+        return _corrected(start, turns, joints, guess)
 
     def decode(
         self, latent: Float[np.ndarray, "W T 24 D"], names: Names, body: BodyFeatures
@@ -195,7 +198,7 @@ def _corrected(
     """`spark.model._corrected`, for guesses alone."""
     skeleton = start.body.skeleton
     before = world_rotations(skeleton, quat_from_sixd(start.rotations))
-    little = quat_from_sixd(RESIDUAL_SCALE * sixd + np.array(NO_ROTATION))
+    little = quat_from_sixd(sixd + np.array(NO_ROTATION))
     own = before[:, :, joints]
     turns = quat_mul(quat_mul(own, little), quat_conj(own))
     moved = np.flatnonzero(guess >= 0)

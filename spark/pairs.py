@@ -28,6 +28,7 @@ from spark.transfer import Correspondence, correspond
 from spark.variants import random_variant, same_body, split_body
 
 _PACE = 0.3  # of the logarithm of a motion's speed
+_POWER = 0.2  # of how much a body turns: how often it is drawn
 _TRIES = 10
 
 
@@ -77,8 +78,8 @@ class PairMaker:
     are seen in a mirror, half are slowed down or sped up by up to a third, and bodies are drawn
     again where the analytic transfer has nothing to guess: there is nothing to learn there.
 
-    Bodies are drawn by the square root of how much they turn: much of one counts for less, and
-    hours of standing about for little.
+    Bodies are drawn by how much they turn, but the more of one there is the less each counts: what
+    is to be learned differs between people more than within one.
     """
 
     def __init__(
@@ -100,7 +101,7 @@ class PairMaker:
         self._bodies = list(by_body.values())
         if not self._bodies:
             raise SkeletonError(f"no clip has {window} frames: expected at least one to train on")
-        weights = np.sqrt([sum(map(_turning, group)) for group in self._bodies])
+        weights = np.array([sum(map(_turning, group)) for group in self._bodies]) ** _POWER
         self._weights = weights / weights.sum()
         self._seen: dict[tuple[int, bool], BodyFeatures] = {}
         self._stages: dict[tuple[int, bool, int], Stage] = {}

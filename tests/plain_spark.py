@@ -74,8 +74,9 @@ def encode(model: Spark, pose: Pose, body: Body) -> Tensor:
     """H (T 24 D)."""
     config, encoder = model.config, model.encoder
     joints, root = pose.rotations[0], pose.root[0]
-    if config.positions_in:
+    if config.residual:
         joints = ROTATION_GAIN * (joints - torch.tensor(NO_ROTATION))
+    if config.positions_in:
         joints = torch.cat([joints, positions(pose, body) - root[:, None]], -1)
         root = torch.cat([root, torch.cat([root[:1] * 0, root[1:] - root[:-1]])], -1)
     x = encoder.motion(joints)
@@ -133,7 +134,9 @@ def decode(model: Spark, latent: Tensor, body: Body, start: Start | None) -> Pos
     sixd = decoder.rotation(y)
     if start is None:
         return Pose(sixd[None], decoder.root(y[:, 0])[None])
-    little = matrix_from_sixd(RESIDUAL_SCALE * sixd + torch.tensor(NO_ROTATION))
+    little = matrix_from_sixd(
+        model.config.shrink * RESIDUAL_SCALE * sixd + torch.tensor(NO_ROTATION)
+    )
     parents = body.parents[0].tolist()
     local = matrix_from_sixd(start.rotations[0])
     before = [local[:, 0]]

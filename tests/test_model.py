@@ -127,7 +127,7 @@ def test_only_guesses_are_corrected_and_what_follows_them(maker: PairMaker) -> N
     torch.manual_seed(0)
     batch = Collator(NameEncoder().encode).batch([maker.draw(n, 2) for n in range(8)])
     start, J = batch.start, batch.start.guess.shape[1]
-    moved = _corrected(start, torch.randn_like(start.rotations), batch.target)
+    moved = _corrected(start, 0.1 * torch.randn_like(start.rotations), batch.target)
     before, after = (world_matrices(p.rotations, batch.target.parents) for p in (start, moved))
     kept = (start.guess < 0)[:, None, :, None, None]
     torch.testing.assert_close(before * kept, after * kept, atol=1e-5, rtol=0)
@@ -151,7 +151,7 @@ def test_one_step_learns_and_every_weight_takes_part(config: Config, batch: Batc
     # Far from the analytic transfer, so that a residual network has something to learn at once.
     truth = Pose(batch.truth.rotations, batch.truth.root + 0.2)
     if config.residual:
-        truth = _corrected(batch.start, torch.full_like(batch.start.rotations, 3.0), batch.target)
+        truth = _corrected(batch.start, torch.full_like(batch.start.rotations, 0.3), batch.target)
     seen: dict[str, bool] = {}
     errors = []
     for _ in range(30):

@@ -66,10 +66,10 @@ def configure(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--method",
-        choices=("copy", "spark"),
-        default="copy",
+        choices=("spark", "copy"),
+        default="spark",
         help="how joints turn that SRC has no counterpart of; the others turn as theirs do, in "
-        "world axes. copy: in between their neighbours (default); spark: as a trained network says",
+        "world axes. spark: as a trained network says (default); copy: in between their neighbours",
     )
     parser.add_argument(
         "--checkpoint",
