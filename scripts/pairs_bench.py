@@ -18,6 +18,7 @@ from torch.utils.data import DataLoader
 from spark.batch import Batch
 from spark.dataset import training_clips
 from spark.names import NameEncoder
+from spark.packed import Packed
 from spark.settings import TrainConfig
 from spark.train import Steps
 
@@ -31,9 +32,9 @@ class Timed(Steps):
         return super().__getitem__(n), time.process_time()
 
 
-def as_it_is(item: object) -> object:
-    """What a loader is to do with a step."""
-    return item
+def packed(item: tuple[Batch, float]) -> tuple[Packed, float]:
+    """A step as the training hands it over."""
+    return Packed(item[0]), item[1]
 
 
 def main(*data: str) -> None:
@@ -50,7 +51,7 @@ def main(*data: str) -> None:
     for workers in (1, 2):
         numbers = range(FIRST, FIRST + STEPS)
         loader = DataLoader(
-            steps, batch_size=None, sampler=numbers, num_workers=workers, collate_fn=as_it_is
+            steps, batch_size=None, sampler=numbers, num_workers=workers, collate_fn=packed
         )
         clocks = []
         for n, (_, clock) in enumerate(loader):

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any, TextIO
+from typing import TextIO
 
 import torch
 import torch.distributed as dist
@@ -35,6 +35,7 @@ from spark.config import Config
 from spark.model import Spark
 from spark.name_file import load_names
 from spark.names import NAME_CACHE, NameEncoder, T5Names
+from spark.packed import Packed
 from spark.pairs import Clip, PairMaker
 from spark.precision import fast_products
 from spark.settings import TrainConfig
@@ -203,7 +204,7 @@ def train(
         for n, batch in zip(
             range(start.step, config.steps), _batches(steps, start.step), strict=True
         ):
-            terms = take_step(runner, optimiser, _to(batch, device), n, config, rank)
+            terms = take_step(runner, optimiser, batch.on(device), n, config, rank)
             if rank:
                 continue
             done = n + 1
@@ -259,7 +260,7 @@ def name_vectors(names: NameEncoder | str) -> Names:
     return T5Names(names, NAME_CACHE).encode
 
 
-def _batches(steps: Steps, start: int) -> Iterator[Batch]:
+def _batches(steps: Steps, start: int) -> Iterator[Packed]:
     config = steps.config
     return iter(
         DataLoader(
@@ -267,26 +268,10 @@ def _batches(steps: Steps, start: int) -> Iterator[Batch]:
             batch_size=None,
             sampler=range(start, config.steps),
             num_workers=config.workers,
-            collate_fn=_as_it_is,
+            collate_fn=Packed,  # type: ignore[arg-type]  # of an item: there is no batch_size
             pin_memory=torch.cuda.is_available(),
         )
     )
-
-
-def _as_it_is(batch: Any) -> Any:
-    return batch
-
-
-def _to(batch: Batch, device: torch.device) -> Batch:
-    if device.type == "cpu":
-        return batch
-
-    def move(part: Any) -> Any:
-        if isinstance(part, Tensor):
-            return part.to(device, non_blocking=True)
-        return type(part)(*map(move, part)) if isinstance(part, tuple) else part
-
-    return Batch(*map(move, batch))
 
 
 def _log(out: Path, step: int, rank: int) -> TextIO:

@@ -22,6 +22,7 @@ from spark.clips import at_frame_time, read_clips
 from spark.errors import ConventionError, FileFormatError, SkeletonError
 from spark.model import Spark, _corrected
 from spark.names import NameConfig, NameEncoder
+from spark.packed import Packed
 from spark.pairs import Clip
 from spark.roles import Role
 from spark.rotation import quat_angle
@@ -94,6 +95,19 @@ def test_workers_change_nothing(clips: list[Clip], tmp_path: Path) -> None:
     helped = train(clips, replace(config, workers=1), tmp_path / "b", start=fresh(config))
     for name, value in weights(alone).items():
         assert torch.equal(value, weights(helped)[name]), name
+
+
+def test_a_packed_batch_is_the_batch(clips: list[Clip]) -> None:
+    batch = Steps(clips, NameEncoder(SMALL_NAMES).encode, TINY, 0, 1)[0]
+    again = Packed(batch).on(torch.device("cpu"))
+    for part, other in zip(batch[:5], again[:5], strict=True):
+        assert type(part) is type(other)
+        for a, b in zip(part, other, strict=True):
+            assert a.dtype == b.dtype
+            assert torch.equal(a, b)
+    assert torch.equal(batch.planted, again.planted)
+    assert torch.equal(batch.effectors, again.effectors)
+    assert batch.frame_time == again.frame_time
 
 
 def test_a_checkpoint_keeps_everything(clips: list[Clip], tmp_path: Path) -> None:
