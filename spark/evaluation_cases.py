@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import Literal
 
 import numpy as np
+from jaxtyping import Bool
 
 from spark.canonical import CanonicalMotion
 from spark.dataset import Performance, is_dataset, prepare, read_performances
@@ -106,7 +107,8 @@ def recorded_cases(found: Sequence[Performance]) -> tuple[list[Case], list[str]]
 def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = None) -> list[Case]:
     """Each clip with two targets that are changed copies of its own body, on which the answer is
     known (`spark.pairs`): one with other bone lengths, and one with other joints and names too. And
-    a changed copy that lacks joints, with the clip's own body as its target.
+    a changed copy that lacks joints, with the clip's own body as its target. In all answers the
+    feet are planted where the recording's stand.
 
     Of each cell at most `limit` clips, drawn by `seed`. Training does not meet these targets,
     whatever its seed: it draws other ones.
@@ -114,7 +116,9 @@ def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = 
     stages: dict[tuple[int, Structure, int], Stage] = {}
     cases = []
     for i, one in _drawn(found, seed, limit):
-        body = one.clip.body
+        body, frames = one.clip.body, len(one.clip.hips)
+        own = Stage(same_body(body))
+        recorded = _canonical(one.clip, own.variant, frames)
         for structure in STRUCTURES:
             number = i % _TARGETS
             key = (id(body), structure, number)
@@ -123,13 +127,9 @@ def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = 
                 rng = np.random.default_rng((seed, name, number, STRUCTURES.index(structure)))
                 make = {"intra": scaled_body, "cross": random_variant, "missing": lacking_body}
                 stages[key] = Stage(make[structure](body, rng))
-            stage = stages[key]
-            own = _canonical(one.clip, same_body(body), len(one.clip.hips))
-            turned = stage.place(
-                own.rotations[None], own.hips[None], np.asarray(one.clip.planted)[None]
-            )[0]
-            changed = CanonicalMotion(stage.variant.body.rig, own.frame_time, turned, own.hips)
-            source, truth = (changed, own) if structure == "missing" else (own, changed)
+            source, truth = recorded, _placed(recorded, one.clip.planted, stages[key])
+            if structure == "missing":
+                source, truth = truth, _placed(recorded, one.clip.planted, own)
             target = f"{one.character} {structure} {number}"
             cases.append(
                 Case(
@@ -138,6 +138,16 @@ def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = 
                 )
             )
     return cases
+
+
+def _placed(
+    recorded: CanonicalMotion, planted: Bool[np.ndarray, "T 2"], stage: Stage
+) -> CanonicalMotion:
+    """A recording on a changed copy of its body, the feet planted where they stand."""
+    given = recorded.rotations[None], recorded.hips[None], np.asarray(planted)[None]
+    rotations = stage.place(*given)[0]
+    rig = stage.variant.body.rig
+    return CanonicalMotion(rig, recorded.frame_time, rotations, recorded.hips)
 
 
 def lacking_body(body: BodyFeatures, rng: np.random.Generator) -> Variant:
