@@ -81,6 +81,13 @@ def run(args: Namespace) -> int:
         raise DependencyError(
             f"training needs {error.name}: pip install 'spark-sim[train]'"
         ) from error
+    if args.tensorboard:
+        try:
+            import torch.utils.tensorboard  # noqa: F401  # before minutes of work, not after
+        except ImportError as error:
+            raise DependencyError(
+                f"--tensorboard needs {error.name}: pip install 'spark-sim[tensorboard]'"
+            ) from error
     start = load_checkpoint(path) if args.resume else None
     if start:
         _check_same_network(path, start.settings, config)
@@ -123,17 +130,10 @@ def _check_same_network(path: Path, trained: Mapping[str, object], config: "Trai
 @contextmanager
 def _board(out: Path, step: int, wanted: bool) -> "Iterator[Watch]":
     """What writes loss terms for TensorBoard, from `step` on; under `torchrun` one process does."""
-    from spark.errors import DependencyError
-
     if not wanted or os.environ.get("RANK", "0") != "0":
         yield lambda step, terms: None
         return
-    try:
-        from torch.utils.tensorboard import SummaryWriter
-    except ImportError as error:
-        raise DependencyError(
-            f"--tensorboard needs {error.name}: pip install 'spark-sim[tensorboard]'"
-        ) from error
+    from torch.utils.tensorboard import SummaryWriter
 
     with SummaryWriter(str(out), purge_step=step + 1) as writer:
 
