@@ -246,10 +246,12 @@ def _place() -> tuple[int, int, torch.device]:
     """This process's rank, how many there are, and its device; joins what torchrun started."""
     world = int(os.environ.get("WORLD_SIZE", "1"))
     cuda = torch.cuda.is_available()
+    local = int(os.environ.get("LOCAL_RANK", "0"))
+    if cuda:
+        torch.cuda.set_device(local)  # else every process also holds memory on the first GPU
     if world > 1 and not dist.is_initialized():
         dist.init_process_group("nccl" if cuda else "gloo")
     rank = dist.get_rank() if world > 1 else 0
-    local = int(os.environ.get("LOCAL_RANK", "0"))
     return rank, world, torch.device("cuda", local) if cuda else torch.device("cpu")
 
 
