@@ -23,6 +23,7 @@ EASE = 0.003  # [m]
 _NEAR = 0.03  # [m] within which shapes are watched
 _MOST_SPHERES = 6  # along a shape
 _ALL_SPHERES = 24
+_PAIRS = len(DIRECTIONS) // 2  # a direction and the one against it, as many from the end
 _CORNER, _OUTSTANDING = 0.008, 0.006  # [m]
 
 
@@ -89,16 +90,26 @@ class Collisions:
             if not len(looked):
                 continue
             middle = pair.small.center[None]
-            looked = looked[_distance(self.tree, some, pair, middle, looked)[0][0] < reach]
+            looked = looked[_distance(self.tree, some, pair, middle, looked)[0] < reach]
             if not len(looked):
                 continue
-            over = _distance(self.tree, some, pair, pair.small.spheres, looked)[0]
+            over = _distance(self.tree, some, pair, pair.small.spheres, looked)
             near = over - pair.small.radii[:, None] < pair.apart + _NEAR
             if near.any():
                 around = looked[near.any(0), None] * stride + np.arange(-stride, stride + 1)
                 frames_near = np.unique(np.clip(around, 0, count - 1))
                 found.append(Near(pair, np.flatnonzero(near.any(1)), moves, frames_near))
         return found
+
+    def depth(self, frames: Frames, nears: Sequence[Near]) -> Float[np.ndarray, "T"]:
+        """By how much [m] parts are nearer to each other than they may come, at the worst pair."""
+        out = np.full(frames.places.shape[2], -np.inf)
+        for near in nears:
+            pair, at = near.pair, near.frames
+            radii = pair.small.radii[near.spheres, None]
+            distance = _distance(self.tree, frames, pair, pair.small.spheres[near.spheres], at)
+            out[at] = np.maximum(out[at], (pair.apart + radii - distance).max(0))
+        return out
 
     def add_to(
         self,
@@ -107,12 +118,14 @@ class Collisions:
         stage: Stage,
         nears: Sequence[Near],
         weight: float,
+        firm: Float[np.ndarray, "T"],
     ) -> None:
-        """Add how deep shapes are in each other."""
+        """Add how deep shapes are in each other; what is `firm` weighs more, and sets in later."""
         for near in nears:
             pair, at = near.pair, near.frames
             spheres = pair.small.spheres[near.spheres]
-            distance, side = _distance(self.tree, frames, pair, spheres, at)
+            seen = _seen_from_large(self.tree, frames, pair, spheres, at)
+            distance = _outside(pair.large, seen)
             over = pair.apart + pair.small.radii[near.spheres, None] - distance
             joints = (*near.moves[0], *near.moves[1])
             links = {pair.small.link, pair.large.link, *joints}
@@ -123,12 +136,14 @@ class Collisions:
                 if not len(deep):
                     continue
                 here = at[deep]
-                residual, slope = one_sided(over[s, deep], EASE)
+                residual, slope = one_sided(over[s, deep], EASE / firm[here])
+                heavy = weight * firm[here]
                 if not normal.rows:
-                    normal.cost[here] += 0.5 * (weight * residual) ** 2
+                    normal.cost[here] += 0.5 * (heavy * residual) ** 2
                     continue
                 touched = frames.at(here, links)
-                side_here = DIRECTIONS[side[s, deep]].T
+                beyond = DIRECTIONS @ seen[:, s, deep] - pair.large.reach[:, None]
+                side_here = DIRECTIONS[beyond.argmax(0)].T
                 push = np.einsum("ijt,jt->it", touched.turns[pair.large.link], side_here)
                 point = touched.point(pair.small.link, sphere)
                 J = [
@@ -136,9 +151,26 @@ class Collisions:
                     for moves, sign in zip(near.moves, (-1.0, 1.0), strict=True)
                     if moves
                 ]
-                normal.add_some(
-                    here, columns, np.concatenate(J) * slope * weight, residual * weight
-                )
+                normal.add_some(here, columns, np.concatenate(J) * slope * heavy, residual * heavy)
+
+
+def _seen_from_large(
+    tree: Tree,
+    frames: Frames,
+    pair: Pair,
+    points: Float[np.ndarray, "S 3"],
+    at: Int[np.ndarray, "N"],
+) -> Float[np.ndarray, "3 S N"]:
+    """Where points of the small shape are in some frames, in the rest pose of the large one [m]."""
+    a, b = pair.small.link, pair.large.link
+    anchor_a = tree.base if a < 0 else tree.anchors[a]
+    anchor_b = tree.base if b < 0 else tree.anchors[b]
+    turn_b = frames.turns[b][..., at]
+    relative = np.einsum("jit,jkt->ikt", turn_b, frames.turns[a][..., at])
+    apart = np.einsum("jit,jt->it", turn_b, frames.places[a][:, at] - frames.places[b][:, at])
+    turned = (points - anchor_a) @ relative
+    turned += (apart + anchor_b[:, None])[:, None]
+    return turned
 
 
 def _distance(
@@ -147,22 +179,20 @@ def _distance(
     pair: Pair,
     points: Float[np.ndarray, "S 3"],
     at: Int[np.ndarray, "N"],
-) -> tuple[Float[np.ndarray, "S N"], Int[np.ndarray, "S N"]]:
-    """The signed distance [m] of points of the small shape from the large one in some frames, and
-    the side that it is measured to."""
-    a, b = pair.small.link, pair.large.link
-    anchor_a = tree.base if a < 0 else tree.anchors[a]
-    anchor_b = tree.base if b < 0 else tree.anchors[b]
-    turn_b = frames.turns[b][..., at]
-    relative = np.einsum("jit,jkt->ikt", turn_b, frames.turns[a][..., at])
-    apart = np.einsum("jit,jt->it", turn_b, frames.places[a][:, at] - frames.places[b][:, at])
-    count = len(at)
-    turned = np.einsum("ikt,sk->ist", relative, points - anchor_a)
-    local = (turned + (apart + anchor_b[:, None])[:, None]).reshape(3, -1)
-    over = DIRECTIONS @ local - pair.large.reach[:, None]
-    side = over.argmax(0)
-    distance = over[side, np.arange(len(side))]
-    return distance.reshape(len(points), count), side.reshape(len(points), count)
+) -> Float[np.ndarray, "S N"]:
+    """The signed distance [m] of points of the small shape from the large one in some frames."""
+    return _outside(pair.large, _seen_from_large(tree, frames, pair, points, at))
+
+
+def _outside(shape: Shape, points: Float[np.ndarray, "3 S N"]) -> Float[np.ndarray, "S N"]:
+    """The signed distance [m] of points from a shape, both in its rest pose. Its sides come in
+    pairs that face away from each other: how far a point is from the middle of a pair says both."""
+    towards, away = shape.reach[_PAIRS:], shape.reach[_PAIRS - 1 :: -1]
+    over = DIRECTIONS[_PAIRS:] @ points.reshape(3, -1)
+    over -= (towards - away)[:, None] / 2
+    np.abs(over, out=over)
+    over -= (towards + away)[:, None] / 2
+    return over.max(0).reshape(points.shape[1:])
 
 
 def _approach(
@@ -191,7 +221,7 @@ def find_collisions(
             # The longer chain is the limb's end: the slender part.
             small, large = (a, b) if len(tree.chain(a.link)) >= len(tree.chain(b.link)) else (b, a)
             pair = Pair(small, large, _APART)
-            now = _distance(tree, frames, pair, small.spheres, np.zeros(1, dtype=np.int64))[0]
+            now = _distance(tree, frames, pair, small.spheres, np.zeros(1, dtype=np.int64))
             pairs.append(replace(pair, apart=min(_APART, float((now[:, 0] - small.radii).min()))))
     return Collisions(tree, tuple(pairs))
 

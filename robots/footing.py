@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from robots.morphology import Morphology, Sole
@@ -31,7 +31,11 @@ class Footing:
 
     def every(self, stride: int) -> "Footing":
         """That of every `stride`-th frame."""
-        return Footing(self.places[..., ::stride], self.holds[:, ::stride])
+        return self.at(slice(None, None, stride))
+
+    def at(self, frames: slice | Int[np.ndarray, "S"]) -> "Footing":
+        """That of some frames."""
+        return Footing(self.places[..., frames], self.holds[:, frames])
 
 
 def plan_footing(robot: Morphology, targets: Targets) -> list[Footing]:

@@ -7,7 +7,7 @@ and a banded Cholesky solves them in time linear in T (Golub and Van Loan, secti
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations_with_replacement, pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -15,6 +15,7 @@ from scipy.linalg import solveh_banded
 
 _IMMOVABLE = 1e8
 REACH = 2  # an acceleration ties a frame to the two next
+_BEND = (1.0, -2.0, 1.0)
 
 
 class Normal:
@@ -89,15 +90,15 @@ class Normal:
         """The step that also lessens what ties neighbours together. Columns with `limits` of 1 (-1)
         are at their upper (lower) one, and don't move where that would take them beyond."""
         T, D = self.g.shape
-        stencil = _stencil(T)
         band = np.zeros((REACH * D + 1, T, D))
         for i in range(D):
             for k in range(D - i):
                 band[k, :, i] = self.H[:, i + k, i]
         weights = ties.smoothness**2
-        for lag in range(REACH + 1):
-            band[lag * D] += stencil[lag, :, None] * weights
-        g = self.g + weights * spread(ties.accelerations, T)
+        for first, second in combinations_with_replacement(range(REACH + 1), 2):
+            at = slice(first, first + len(weights))
+            band[(second - first) * D, at] += _BEND[first] * _BEND[second] * weights
+        g = self.g + spread(weights * ties.accelerations, T)
         if len(ties.rush):
             fast = np.where(ties.rush != 0, ties.rush_weight**2, 0.0)
             band[0, :-1] += fast
@@ -123,9 +124,9 @@ class Ties:
     second differences (A = T - 2), and of `rush`, by how much their first differences (V = T - 1)
     are too large; 0 where they are not."""
 
-    smoothness: Float[np.ndarray, "D"]
+    smoothness: Float[np.ndarray, "A D"]
     accelerations: Float[np.ndarray, "A D"]
-    rush_weight: float
+    rush_weight: Float[np.ndarray, "V 1"]
     rush: Float[np.ndarray, "V D"]
 
     def cost(self, frames: int) -> Float[np.ndarray, "T"]:
@@ -134,7 +135,7 @@ class Ties:
         if len(self.accelerations):
             out[1:-1] += 0.5 * ((self.smoothness * self.accelerations) ** 2).sum(1)
         if len(self.rush):
-            out[1:] += 0.5 * self.rush_weight**2 * (self.rush**2).sum(1)
+            out[1:] += 0.5 * ((self.rush_weight * self.rush) ** 2).sum(1)
         return out
 
 
@@ -159,17 +160,4 @@ def spread(accelerations: Float[np.ndarray, "A D"], frames: int) -> Float[np.nda
         out[:-2] += accelerations
         out[1:-1] -= 2 * accelerations
         out[2:] += accelerations
-    return out
-
-
-def _stencil(frames: int) -> Float[np.ndarray, "3 T"]:
-    """Diagonals of `spread(second_differences)` as a matrix: [lag, t] ties t to t + lag."""
-    out = np.zeros((REACH + 1, frames))
-    if frames < 3:
-        return out
-    coefficients = (1.0, -2.0, 1.0)
-    for first in range(3):
-        for second in range(first, 3):
-            at = slice(first, frames - 2 + first)
-            out[second - first, at] += coefficients[first] * coefficients[second]
     return out

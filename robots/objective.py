@@ -40,6 +40,7 @@ TOUCH, TOUCH_LEGS = 45.0, 90.0  # of parts that run into each other [1 / m]
 IDLE = 0.02  # of hinges that nothing else asks for: stay as in the T-pose
 SMOOTH = 4.2  # [Hz] above which a limb's motion fades
 CALM = 2.2  # [Hz] above which a limb that gives way to another does not
+JOLT = 500.0  # [rad/s³], RMS, above which a hinge is smoothed the more
 FAST, RUSH = 12.0, 0.5  # [rad/s] above which a hinge is held back, and how much [s]
 
 
@@ -105,13 +106,16 @@ def linearize(
     q: Coordinates,
     stage: Stage,
     nears: Sequence[Near],
+    firm: Float[np.ndarray, "T"] | None = None,
     *,
     rows: bool = True,
 ) -> Normal:
-    """The normal equations of a stage at `q`; without `rows` nothing but what it costs."""
+    """The normal equations of a stage at `q`; without `rows` nothing but what it costs. `firm` is
+    by how much touching and sinking weigh more, a frame."""
     tree, rig = robot.tree, robot.rig
     frames = forward(tree, q)
     normal = Normal(len(q), len(stage.columns), rows)
+    firm = np.ones(len(q)) if firm is None else firm
     blocks = {link: Block(stage, frames, link, rows) for link in _ends(robot, stage)}
     chest = chest_of(rig)
     for j, role in enumerate(rig.roles.roles):
@@ -126,13 +130,13 @@ def linearize(
             wanted = np.moveaxis(matrix_from_quat(targets.chest), 0, -1)
             block.turn(turn_rows(frames.turns[link], wanted, block.turning(link), TURNS["chest"]))
     if stage.base:
-        _stand(robot, targets, footing, frames, blocks)
+        _stand(robot, targets, footing, frames, blocks, firm)
     elif targets.hands is not None:
         _clap(robot, targets, frames, stage, normal, rows)
     for block in blocks.values():
         block.add_to(normal)
     touch = TOUCH_LEGS if stage.base else TOUCH
-    robot.collisions.add_to(normal, frames, stage, nears, touch)
+    robot.collisions.add_to(normal, frames, stage, nears, touch, firm)
     over, slope = limit_rows(tree, q, margin=MARGIN, weight=LIMIT)
     normal.add_diagonal(slope[:, stage.columns], over[:, stage.columns])
     idle, away = np.full((2, len(q), tree.size), 1e-3)
@@ -183,6 +187,7 @@ def _stand(
     footing: Sequence[Footing],
     frames: Frames,
     blocks: dict[int, Block],
+    firm: Float[np.ndarray, "T"],
 ) -> None:
     """The hips' path, the standing feet, and the floor."""
     count = len(targets)
@@ -200,8 +205,8 @@ def _stand(
             weight = STAND[:, None] * foot.holds[c]
             foot_block.point(int(link), point, foot.places[c], weight)
             # Not below the floor, whether it stands or not.
-            depth, slope = one_sided(-point[2], SINK_EASE)
-            up = np.stack([np.zeros(count), np.zeros(count), -SINK * slope])
+            depth, slope = one_sided(-point[2], SINK_EASE / firm)
+            up = np.stack([np.zeros(count), np.zeros(count), -SINK * firm * slope])
             foot_block.point(int(link), point, point + depth / np.maximum(slope, 1e-9), up)
 
 

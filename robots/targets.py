@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy.ndimage import uniform_filter1d
 
 from robots.morphology import Morphology, Sole
@@ -61,16 +61,20 @@ class Targets:
 
     def every(self, stride: int) -> "Targets":
         """Those of every `stride`-th frame."""
+        few = self.at(slice(None, None, stride))
+        return replace(few, frame_time=stride * self.frame_time)
+
+    def at(self, frames: slice | Int[np.ndarray, "S"]) -> "Targets":
+        """Those of some frames."""
         return replace(
             self,
-            frame_time=stride * self.frame_time,
-            world=self.world[::stride],
-            chest=self.chest[::stride],
-            hips=self.hips[::stride],
-            bones={role: bone[::stride] for role, bone in self.bones.items()},
-            contacts=self.contacts[::stride],
-            feet=self.feet[::stride],
-            hands=None if self.hands is None else self.hands[::stride],
+            world=self.world[frames],
+            chest=self.chest[frames],
+            hips=self.hips[frames],
+            bones={role: bone[frames] for role, bone in self.bones.items()},
+            contacts=self.contacts[frames],
+            feet=self.feet[frames],
+            hands=None if self.hands is None else self.hands[frames],
         )
 
 

@@ -30,16 +30,21 @@ def turn_rows(
     axes: Float[np.ndarray, "C 3 T"],
     weight: float | Float[np.ndarray, "T"],
 ) -> Rows:
-    """A link that should be turned some way: the sine of the angle between, about its axis [rad].
+    """A link that should be turned some way: it costs 1 - cos of the angle between, whose gradient
+    is the sine of that angle about its axis.
 
-    Bounded, and zero at a half turn: for errors up to a right angle.
+    Three residuals are that sine; the fourth, which has no rows, is what of the cost their squares
+    lack.
     """
-    axial = np.zeros_like(now[0])
-    crossed = np.empty_like(axial)
+    axial = np.zeros((4, now.shape[2]))
+    crossed = np.empty_like(axial[:3])
     for k in range(3):  # the axial vector of now wanted^T
         cross(wanted[:, k], now[:, k], crossed)
-        axial += 0.5 * crossed
-    return axes * weight, axial * weight
+        axial[:3] += 0.5 * crossed
+    axial[3] = (3.0 - (now * wanted).sum((0, 1))) / 2
+    rows = np.zeros((len(axes), 4, now.shape[2]))
+    rows[:, :3] = axes * weight
+    return rows, axial * weight
 
 
 def point_columns(
@@ -66,7 +71,7 @@ def point_columns(
 
 
 def one_sided(
-    over: Float[np.ndarray, "*n"], ease: float
+    over: Float[np.ndarray, "*n"], ease: float | Float[np.ndarray, "*n"]
 ) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
     """A residual that grows with what is over zero, and its slope; bent over a width of `ease`.
 

@@ -112,6 +112,16 @@ class Coordinates:
         turns = None if self.turns is None else self.turns[frames]
         return Coordinates(self.pos[frames], self.quat[frames], self.angles[frames], turns)
 
+    def replaced(self, frames: Int[np.ndarray, "S"], others: "Coordinates") -> "Coordinates":
+        """The same but for some frames."""
+        pos, quat, angles = self.pos.copy(), self.quat.copy(), self.angles.copy()
+        pos[frames], quat[frames], angles[frames] = others.pos, others.quat, others.angles
+        turns = None
+        if self.turns is not None:
+            turns = self.turns.copy()
+            turns[frames] = others.turns
+        return Coordinates(pos, quat, angles, turns)
+
     def every(self, stride: int) -> "Coordinates":
         """Those of every `stride`-th frame."""
         return self.at(slice(None, None, stride))

@@ -6,10 +6,11 @@ from jaxtyping import Bool, Float, Int
 from scipy.linalg.lapack import dposv
 
 from robots import objective
+from robots.descent import SHORT_OF_LIMIT
 from robots.morphology import Morphology
 from robots.objective import FAST, RUSH
-from robots.solve import SHORT_OF_LIMIT, smoothness
 from robots.stream_targets import FrameTargets
+from robots.ties import smoothness
 from robots.window_terms import Posture, Stance, Terms
 
 SMOOTH = 7.0  # [Hz] above which a motion fades: more than in hindsight, or it would lag behind

@@ -5,17 +5,20 @@ import numpy as np
 import pytest
 from conftest import recording
 
+from robots.descent import eased
 from robots.footing import plan_footing
+from robots.mend import mend, wrong_in
 from robots.morphology import Morphology
 from robots.motion import RobotMotion
 from robots.normal import Normal, Ties, second_differences
 from robots.objective import linearize
 from robots.project import project
 from robots.registry import find
-from robots.solve import copy, retarget, stages_of, unhurried
+from robots.solve import copy, retarget, stages_of
 from robots.targets import targets_of
+from robots.ties import jolted, unhurried
 from robots.tree import Coordinates, forward
-from scripts.robot_bars import COLUMNS, measure
+from scripts.robot_bars import COLUMNS, limb_error, measure
 from spark.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.kinematics import world_positions
 from spark.recording import read_recording
@@ -103,8 +106,7 @@ def test_the_gradient_is_that_of_the_cost(
             for s in (1, -1)
         )
         slope = (after.cost - before.cost) / 2e-6
-        # What turns links is told for small errors: these are 0.05 rad.
-        np.testing.assert_allclose(normal.g[:, k], slope, rtol=1e-2, atol=5e-3)
+        np.testing.assert_allclose(normal.g[:, k], slope, rtol=1e-4, atol=1e-5)
 
 
 def test_frames_are_tied_as_by_one_large_matrix() -> None:
@@ -113,13 +115,14 @@ def test_frames_are_tied_as_by_one_large_matrix() -> None:
     normal = Normal(T, D)
     J = rng.normal(size=(T, D, 5))
     normal.add([0, 1, 2], J, rng.normal(size=(5, T)))
-    smooth, values = rng.uniform(1, 2, D), rng.normal(size=(T, D))
-    ties = Ties(smooth, second_differences(values), 1.0, np.zeros((T - 1, D)))
+    smooth, values = rng.uniform(1, 2, (T - 2, D)), rng.normal(size=(T, D))
+    ties = Ties(smooth, second_differences(values), np.ones((T - 1, 1)), np.zeros((T - 1, D)))
     step = normal.solve_together(ties, np.full(T, 0.1), np.zeros((T, D)))
     A = np.zeros((T - 2, T))
     for row in range(T - 2):
         A[row, row : row + 3] = 1, -2, 1
-    W = np.kron(A.T @ A, np.diag(smooth**2))
+    bends = np.kron(A, np.eye(D))
+    W = bends.T @ np.diag(smooth.ravel() ** 2) @ bends
     H = W + 0.1 * np.eye(T * D)
     for t in range(T):
         H[t * D : (t + 1) * D, t * D : (t + 1) * D] += J[t] @ J[t].T
@@ -130,7 +133,7 @@ def test_frames_are_tied_as_by_one_large_matrix() -> None:
 def test_a_column_at_its_limit_does_not_go_beyond() -> None:
     normal = Normal(3, 2)
     normal.add_diagonal(np.ones((3, 2)), -np.ones((3, 2)))
-    ties = Ties(np.zeros(2), np.zeros((1, 2)), 0.0, np.zeros((2, 2)))
+    ties = Ties(np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((2, 1)), np.zeros((2, 2)))
     limits = np.array([[1.0, 0], [-1, 0], [0, 0]])
     step = normal.solve_together(ties, np.zeros(3), limits)
     np.testing.assert_allclose(step, [[0, 1], [1, 1], [1, 1]], atol=1e-6)
@@ -149,6 +152,54 @@ def test_unhurried_angles_turn_no_faster_and_slow_ones_stay(ember: Morphology) -
     assert q.angles[-1, 0] == 3
 
 
+def test_what_is_eased_stays_below_and_has_no_kinks() -> None:
+    scale = np.ones(120)
+    scale[60] = 0.0
+    curve = eased(scale, 19)
+    assert (curve <= scale + 1e-12).all()
+    assert curve[60] == pytest.approx(0, abs=1e-12)
+    assert np.abs(np.diff(curve, 2)).max() < 0.3 * np.abs(np.diff(curve)).max()
+
+
+def test_only_hinges_that_jolt_are_made_stiffer(ember: Morphology) -> None:
+    angles = np.zeros((90, len(ember.tree)))
+    angles[:, 0] = np.sin(2 * np.pi * np.arange(90) / 60)  # 248 rad/s³ at most
+    angles[45:, 1] = 0.2
+    still = np.tile([1.0, 0, 0, 0], (90, 1))
+    stiffer = jolted(ember, Coordinates(np.zeros((90, 3)), still, angles), 1 / 60)
+    first, second = ember.tree.starts[:2]
+    assert (stiffer[:, first] == 1).all()
+    assert stiffer[43, second] > 5
+    assert (stiffer[:30, second] == 1).all()
+
+
+def test_arms_in_the_body_are_led_out_and_the_rest_stays(
+    walk: CanonicalMotion, walked: RobotMotion, ember: Morphology
+) -> None:
+    arms = stages_of(ember)[1]
+    targets = targets_of(walk, ember)
+    q, footing = walked.coordinates, plan_footing(ember, targets)
+    assert not wrong_in(ember, targets, q, arms).any()
+    middle = len(q) // 2
+    shoulder = ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)]
+    angles = q.angles.copy()
+    bump = np.exp(-(((np.arange(len(q)) - middle) / 6) ** 2))
+    chain = [j for j in ember.tree.chain(int(shoulder)) if j in arms.joints]
+    sides = []
+    for sign in (1.0, -1.0):
+        for j in chain:
+            tried = angles.copy()
+            tried[:, j] += sign * 0.7 * bump
+            pushed = Coordinates(q.pos, q.quat, tried).clipped(ember.tree, 0.02)
+            sides.append((wrong_in(ember, targets, pushed, arms)[middle], pushed))
+    into = [pushed for wrong, pushed in sides if wrong]
+    assert into
+    for pushed in into:
+        mended = mend(ember, targets, footing, pushed, arms)
+        assert not wrong_in(ember, targets, mended, arms).any()
+        np.testing.assert_array_equal(mended.angles[: middle - 50], pushed.angles[: middle - 50])
+
+
 def test_the_bars_hold_on_the_walk(walk: CanonicalMotion, walked: RobotMotion) -> None:
     row = dict(zip(COLUMNS, measure(walk, walked, collisions=True), strict=False))
     assert row["sunk %"] == 0
@@ -157,7 +208,7 @@ def test_the_bars_hold_on_the_walk(walk: CanonicalMotion, walked: RobotMotion) -
     assert row["limbs"] <= 6
     assert row["limit %"] == 0
     assert row["rad/s"] <= 15
-    assert row["jerk"] <= 800
+    assert row["jerk"] <= 400
     assert row["self %"] == 0
 
 
@@ -180,10 +231,21 @@ def test_the_world_has_no_preferred_heading(
 def test_the_first_frame_is_as_good_as_any(
     walk: CanonicalMotion, walked: RobotMotion, ember: Morphology
 ) -> None:
-    """Started in the middle of a stride, the same poses come out, from the first frame on."""
-    later = retarget(part(walk, slice(35, None)), ember).coordinates.angles
-    whole = walked.coordinates.angles[35:]
-    assert np.abs(later - whole)[0].max() < np.radians(8)
+    """Started in the middle of a stride, nearly the same poses come out, from the first frame on,
+    and the first one's limbs point where they should as those of any other."""
+    rest = part(walk, slice(35, None))
+    result = retarget(rest, ember)
+    later, whole = result.coordinates.angles, walked.coordinates.angles[35:]
+    first, every = (
+        limb_error(
+            part(rest, frames),
+            canonical_positions(part(rest, frames)),
+            RobotMotion(ember, result.coordinates.at(frames), rest.frame_time),
+        )
+        for frames in (slice(0, 1), slice(None))
+    )
+    assert first < 1.5 * every
+    assert np.abs(later - whole)[0].max() < np.radians(12)
     assert np.sqrt(((later - whole) ** 2).mean()) < np.radians(1.5)
     speed = np.abs(np.diff(later, axis=0))
     assert speed[0].max() < 1.5 * speed.max(axis=1).mean() + 0.02
@@ -247,5 +309,5 @@ def test_the_bars_hold_on_real_clips(robot: str, clip: str) -> None:
     assert row["limbs"] <= 6
     assert row["limit %"] <= 4
     assert row["rad/s"] <= 15
-    assert row["jerk"] <= 800
+    assert row["jerk"] <= 400
     assert row["self %"] <= 0.2
