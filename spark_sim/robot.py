@@ -11,11 +11,11 @@ from robots import registry
 from robots.formats import dispatch, format_of
 from robots.known import known
 from robots.mjcf import read_mjcf
-from robots.morphology import parts_of, understand_robot
 from robots.motion import RobotMotion
 from robots.solve import copy, retarget
 from robots.stream import Stream
 from robots.stream_targets import LATENCY, Frame, ground_of
+from robots.understand import parts_of, understand_robot
 from sim.given import GivenBody
 from spark.canonical import to_canonical
 from spark.errors import ConventionError

@@ -9,8 +9,8 @@ import pytest
 from stick import standing, stick_rig
 
 from robots.mjcf import read_mjcf
-from robots.morphology import understand_robot
 from robots.registry import find
+from robots.understand import understand_robot
 from sim.given import GivenBody, given
 from sim.physics import Assist, Tracked, track
 from sim.physics_report import summary, text

@@ -14,8 +14,8 @@ import pytest
 from stick import standing, stick_rig
 
 from robots import registry
-from robots.morphology import understand_robot
 from robots.motion import RobotMotion
+from robots.understand import understand_robot
 from sim.page import Marks, page
 from sim.report import Report, judge
 from sim.report.page import report_page, write_report_page

@@ -16,9 +16,10 @@ from jaxtyping import Float
 import spark_sim
 from robots import registry
 from robots.formats.unitree import write_csv
-from robots.morphology import Morphology, understand_robot
+from robots.morphology import Morphology
 from robots.motion import RobotMotion
 from robots.solve import retarget
+from robots.understand import understand_robot
 from sim.given import GivenBody
 from sim.report import Report, judge
 from sim.report.lowest import lowest_points

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from robots.mjcf import read_mjcf
-from robots.morphology import Morphology, understand_robot
+from robots.morphology import Morphology
 from robots.tree import forward
+from robots.understand import understand_robot
 from spark.errors import FileFormatError, SkeletonError
 from spark.kinematics import forward as skeleton_forward
 from spark.roles import Role

@@ -1,0 +1,83 @@
+"""A robot's rigid parts as the joints of a skeleton, and what they are called."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from robots.mjcf import Mjcf
+from robots.segments import Segment
+from robots.shapes import surface
+from spark.name_hints import read_names
+from spark.skeleton import Skeleton
+
+
+def labels_of(segments: Sequence[Segment]) -> tuple[str, ...]:
+    """What each part is called for reading its role: the name of the body or of its first joint,
+    whichever says more. A joint's comes first: `Left_Elbow_Yaw` may move a `left_hand_link`."""
+    tried = [
+        [_plain(segment.names[min(k, len(segment.names) - 1)]) for segment in segments]
+        for k in (1, 2, 0)
+    ]
+    hints = [read_names(names) for names in tried]
+    labels = []
+    for i in range(len(segments)):
+        said = [max(h[i].parts.values(), default=0.0) + 0.1 * bool(h[i].side) for h in hints]
+        labels.append(tried[int(np.argmax(said))][i])
+    return tuple(labels)
+
+
+def _plain(name: str) -> str:
+    """The name without the word that says what kind of element it is."""
+    for word in ("_joint", "_link", "_body"):
+        if name.lower().endswith(word):
+            return name[: -len(word)]
+    return name
+
+
+def points_of(mjcf: Mjcf, segments: Sequence[Segment]) -> list[Float[np.ndarray, "_ 3"]]:
+    """Points on the surface of each part, in the rest pose's world [m]."""
+    return [surface(mjcf, _rigid_with(mjcf, segment.body, segments)) for segment in segments]
+
+
+def _rigid_with(mjcf: Mjcf, body: int, segments: Sequence[Segment]) -> list[int]:
+    """The body and those that are welded to it, but for those that are parts of their own."""
+    own = {segment.body for segment in segments} - {body}
+    model = mjcf.model
+    inside = {body}
+    for other in mjcf.bodies():
+        above = int(model.body_parentid[other])
+        if above in inside and other not in own and not model.body_jntnum[other]:
+            inside.add(other)
+    return sorted(inside)
+
+
+def skeleton_of(
+    segments: Sequence[Segment],
+    points: Sequence[Float[np.ndarray, "_ 3"]],
+    names: tuple[str, ...],
+) -> Skeleton:
+    """The parts as joints; an End Site at the far end of each part that carries no other."""
+    parents = np.array([segment.parent for segment in segments])
+    centers = np.array([segment.center for segment in segments])
+    offsets = centers - np.where(parents[:, None] < 0, 0.0, centers[parents])
+    leaves = [i for i in range(len(segments)) if i not in parents and len(points[i])]
+    ends = [_far_end(points[i] - centers[i]) for i in leaves]
+    return Skeleton(
+        names=names,
+        parents=parents,
+        offsets=offsets,
+        translating=np.arange(len(segments)) == 0,
+        end_parents=np.array(leaves, dtype=np.int64),
+        end_offsets=np.array(ends).reshape(-1, 3),
+    )
+
+
+def _far_end(points: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "3"]:
+    """The end of a part along the way from its joint to its middle."""
+    middle = (points.max(0) + points.min(0)) / 2
+    length = float(np.linalg.norm(middle))
+    if length < 1e-6:
+        return points[int(np.argmax(np.linalg.norm(points, axis=1)))]
+    along = middle / length
+    return along * float((points @ along).max())

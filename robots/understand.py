@@ -1,0 +1,155 @@
+"""What any humanoid MJCF is, without configuration.
+
+Hinge chains become one joint a limb segment (`robots.segments`); a trunk that carries the legs
+below a waist is re-rooted at the pelvis; names and build say what is what.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from robots.mjcf import Mjcf, read_mjcf
+from robots.morphology import Morphology
+from robots.parts import labels_of, points_of, skeleton_of
+from robots.segments import Segment, segments_of, tree_of
+from robots.soles import place_feet, soles_of, with_soles
+from robots.tpose import TPose, search_tpose
+from robots.tree import Tree
+from spark.errors import SkeletonError
+from spark.groups import groups_of
+from spark.motion import Motion
+from spark.naming import Override, assign_roles
+from spark.rig import Rig, hip_height
+from spark.roles import Role, RoleMap
+from spark.skeleton import Skeleton
+from spark.tpose import find_tpose
+
+_FAR_FROM_T, _NOT_A_T = np.radians(5), np.radians(40)
+
+
+def understand_robot(source: Mjcf | str | Path, override: Override | None = None) -> Morphology:
+    """What any humanoid MJCF is; no configuration. `override` gives roles to `parts_of` it.
+
+    Raises SkeletonError where it has no legs, or limits that forbid a T-pose.
+    """
+    mjcf = source if isinstance(source, Mjcf) else read_mjcf(source, visuals=False)
+    tree, joints = tree_of(mjcf)
+    if not len(tree):
+        raise SkeletonError(f"{mjcf.path}: the model has no hinges; expected a humanoid")
+    try:
+        return _understand(mjcf, tree, joints, override)
+    except SkeletonError as error:
+        raise SkeletonError(f"{mjcf.path}: {error}") from error
+
+
+def parts_of(mjcf: Mjcf) -> Skeleton:
+    """The robot's parts, called as their bodies are: what an `override` of roles counts."""
+    tree, joints = tree_of(mjcf)
+    segments = segments_of(mjcf, tree, joints)
+    points = points_of(mjcf, segments)
+    return skeleton_of(segments, points, tuple(segment.names[0] for segment in segments))
+
+
+def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | None) -> Morphology:
+    segments = segments_of(mjcf, tree, joints)
+    points = points_of(mjcf, segments)
+    labels = labels_of(segments)
+    found = assign_roles(skeleton_of(segments, points, labels), None, override)
+    segments, order = _rerooted(segments, found)
+    points = [points[k] for k in order]
+    roles = RoleMap(
+        tuple(found.roles[k] for k in order),
+        tuple(found.confidence[k] for k in order),
+        tuple(found.reasons[k] for k in order),
+    )
+    skeleton = skeleton_of(segments, points, tuple(segment.names[0] for segment in segments))
+    still = Motion(skeleton, 1.0, skeleton.offsets[:1], _still(len(skeleton)))
+    ideal, _ = find_tpose(still, roles)
+
+    links = np.array([segment.link for segment in segments])
+    place_feet(skeleton, roles, points, ideal)
+    soles = soles_of(skeleton, roles, points, ideal, links)
+    skeleton = with_soles(skeleton, soles, links)
+    tree, assumed = _assume_limits(tree, segments, roles)
+    t = search_tpose(tree, skeleton, roles, links, ideal)
+    notes = (*mjcf.notes, *assumed, *_say_how_near(t, skeleton))
+    rig = Rig(
+        skeleton=skeleton,
+        roles=roles,
+        groups=groups_of(skeleton, roles),
+        tpose=t.world,
+        carrier=0,
+        hip_height=hip_height(skeleton, roles, t.world),
+        notes=notes,
+    )
+    return Morphology(
+        mjcf=mjcf,
+        tree=tree,
+        mj_joints=tuple(joints),
+        rig=rig,
+        links=links,
+        centers=np.array([segment.center for segment in segments]),
+        soles=soles,
+        tpose=t.coordinates,
+        notes=notes,
+    )
+
+
+def _rerooted(segments: list[Segment], roles: RoleMap) -> tuple[list[Segment], list[int]]:
+    """The parts with the pelvis as their root, and the old number of each."""
+    root = roles.require(Role.PELVIS)
+    hips = [
+        segments[roles.require(role)].center for role in (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
+    ]
+    parents = {k: segment.parent for k, segment in enumerate(segments)}
+    centers = {k: segment.center for k, segment in enumerate(segments)}
+    below, k = -1, root
+    while k >= 0:
+        above = segments[k].parent
+        parents[k] = below
+        if above >= 0:
+            centers[above] = segments[k].center
+        below, k = k, above
+    centers[root] = np.mean(hips, axis=0)
+    order, waiting = [], [root]
+    while waiting:
+        k = waiting.pop(0)
+        order.append(k)
+        waiting = [c for c in range(len(segments)) if parents[c] == k] + waiting
+    new = {k: i for i, k in enumerate(order)}
+    return [
+        replace(segments[k], parent=new.get(parents[k], -1), center=centers[k]) for k in order
+    ], order
+
+
+def _assume_limits(
+    tree: Tree, segments: Sequence[Segment], roles: RoleMap
+) -> tuple[Tree, tuple[str, ...]]:
+    """Limits where the file gives none: one turn to either side."""
+    unlimited = ~np.isfinite(tree.lower) & ~tree.balls
+    if not unlimited.any():
+        return tree, ()
+    lower = np.where(unlimited, -np.pi, tree.lower)
+    upper = np.where(unlimited, np.pi, tree.upper)
+    note = f"{int(unlimited.sum())} hinges have no limits: taken as 180 degrees to either side"
+    return replace(tree, lower=lower, upper=upper), (note,)
+
+
+def _say_how_near(t: TPose, skeleton: Skeleton) -> tuple[str, ...]:
+    worst = max(t.misses, key=lambda j: t.misses[j], default=None)
+    if worst is None or t.misses[worst] < _FAR_FROM_T:
+        return ()
+    what = f"{skeleton.names[worst]!r} stays {np.degrees(t.misses[worst]):.0f} degrees from it"
+    if t.misses[worst] > _NOT_A_T:
+        raise SkeletonError(
+            f"the joint limits forbid a T-pose (legs down, arms out): {what}; check the ranges of "
+            "the joints above it"
+        )
+    return (f"the limits allow no exact T-pose: {what}",)
+
+
+def _still(joints: int) -> Float[np.ndarray, "1 J 4"]:
+    return np.tile([1.0, 0.0, 0.0, 0.0], (1, joints, 1))
