@@ -27,8 +27,10 @@ def main(folder: str, *targets: str) -> None:
     print(row("the source itself", [spark_sim.report(s).clip for s in sources]))
     for target in map(spark_sim.load, targets):
         for name, refine in (("`copy` alone", False), ("`copy`, feet held", True)):
-            moved = ((s, spark_sim.retarget(s, target, refine=refine)) for s in sources)
-            results = [spark_sim.report(clip, source=source).clip for source, clip in moved]
+            results = []
+            for source in sources:
+                moved = spark_sim.retarget(source, target, method="copy", refine=refine)
+                results.append(spark_sim.report(moved, source=source).clip)
             print(row(f"{name}, onto {target.name}", results))
 
 

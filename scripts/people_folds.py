@@ -27,7 +27,6 @@ from spark.train import fresh_checkpoint, train
 from spark.weights import read_weights
 
 _FOLDS = 3
-_LIMIT = 40  # clips of a cell
 _RECIPE = Path(__file__).parent / "shipped.toml"
 
 
@@ -53,7 +52,7 @@ def main(dataset: str, runs: str, names: str) -> None:
     config = TrainConfig().changed(_RECIPE, **read_settings(_RECIPE), names=names)
     networks = [trained(k, found, config, Path(runs) / f"without_{k}") for k in range(_FOLDS)]
     unseen = [replace(p, cell=f"uc+{p.cell[3:]}") for p in found]
-    cases = [c for c in made_cases(unseen, limit=_LIMIT) if c.structure == "missing"]
+    cases = [c for c in made_cases(unseen) if c.structure == "missing"]
 
     def learned(case: Case) -> np.ndarray:
         moved = networks[left_out[case.performer]](case.source, case.truth.rig)
