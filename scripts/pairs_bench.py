@@ -2,7 +2,7 @@
 
 Usage: python scripts/pairs_bench.py DATA... (datasets of `spark-sim prepare`, or folders of files)
 
-Batches are those of the default preset (4 draws of 4 windows of 64 frames), with 64 variants of a
+Batches are those of the default preset (4 draws of 4 windows of 64 frames), with 16 variants of a
 body. The first steps, in which variants are made and names read, are counted apart. Beside the rate
 on the clock, which other work on the machine lowers, stands that for a CPU second of a worker.
 """
@@ -22,7 +22,7 @@ from spark.packed import Packed
 from spark.settings import TrainConfig
 from spark.train import Steps
 
-FIRST, STEPS = 500, 300
+FIRST, STEPS = 150, 150
 
 
 class Timed(Steps):
@@ -40,7 +40,7 @@ def packed(item: tuple[Batch, float]) -> tuple[Packed, float]:
 def main(*data: str) -> None:
     torch.set_num_threads(1)
     clips, _ = training_clips([Path(folder) for folder in data])
-    config = replace(TrainConfig("default"), variants=64)
+    config = replace(TrainConfig("default"), variants=16)
     steps = Timed(clips, NameEncoder().eval().remembering(), config, 0, 1)
     began, clock = time.perf_counter(), time.process_time()
     for n in range(FIRST):

@@ -193,7 +193,7 @@ def train(
     objective = Objective(model, config).to(device)
     optimiser = optimiser_of(model, config)
     restore_optimizer(optimiser, model, start.optimizer)
-    runner: nn.Module = DistributedDataParallel(objective) if world > 1 else objective
+    runner = shared(objective) if world > 1 else objective
     if device.type == "cuda":
         runner = torch.compile(runner, dynamic=True)  # type: ignore[assignment]
     steps = Steps(clips, name_vectors(start.names), config, rank, world)
@@ -220,6 +220,13 @@ def train(
                 )
                 save_checkpoint(checkpoint, out / "checkpoint.safetensors")
     return checkpoint
+
+
+def shared(objective: Objective) -> nn.Module:
+    """`objective` in each of several processes, their gradients averaged."""
+    # The published network leaves some of the parameters that there are unused.
+    unused = not objective.model.config.residual
+    return DistributedDataParallel(objective, find_unused_parameters=unused)
 
 
 def take_step(

@@ -205,21 +205,24 @@ import sys
 sys.path.insert(0, {str(CHECKOUT / "tests")!r})
 from pathlib import Path
 import torch
-from torch.nn.parallel import DistributedDataParallel
-from test_train import TINY, fresh, read_clips, sample
-from spark.train import Objective, Steps, _place
+from test_train import TINY, fresh, read_clips, replace, sample
+from spark.train import Objective, Steps, _place, shared
 folder, out = Path(sys.argv[1]), Path(sys.argv[2])
 rank, world, _ = _place()
 checkpoint = fresh(TINY).__class__(fresh(TINY).model.eval(), fresh(TINY).names)
 torch.manual_seed(1)
 torch.nn.init.normal_(checkpoint.model.decoder.rotation.weight, std=0.1)
 objective = Objective(checkpoint.model, TINY)
-runner = DistributedDataParallel(objective) if world > 1 else objective
+runner = shared(objective) if world > 1 else objective
 batch = Steps(read_clips([folder])[0], checkpoint.names.encode, TINY, rank, world)[0]
 runner(batch)[0].backward()
 if rank == 0:
     torch.save({{k: p.grad for k, p in checkpoint.model.named_parameters()}}, out)
 if world > 1:
+    paper = replace(TINY, preset="paper")
+    runner = shared(Objective(fresh(paper).model, paper))
+    for _ in range(2):  # parameters without a gradient would stop the second step
+        runner(batch)[0].backward()
     torch.distributed.destroy_process_group()
 """
     )
