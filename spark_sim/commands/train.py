@@ -109,8 +109,14 @@ def run(args: Namespace) -> int:
             tell(step, terms)
 
         done = train(clips, config, out, start=start, watch=watch)
-    console.say(f"{path}: {done.step} steps on {len(clips)} clips")
+    if _is_first():
+        console.say(f"{path}: {done.step} steps on {len(clips)} clips")
     return 0
+
+
+def _is_first() -> bool:
+    """Whether this process is the only one, or the one of `torchrun`'s that writes."""
+    return os.environ.get("RANK", "0") == "0"
 
 
 def _check_same_network(path: Path, trained: Mapping[str, object], config: "TrainConfig") -> None:
@@ -130,7 +136,7 @@ def _check_same_network(path: Path, trained: Mapping[str, object], config: "Trai
 @contextmanager
 def _board(out: Path, step: int, wanted: bool) -> "Iterator[Watch]":
     """What writes loss terms for TensorBoard, from `step` on; under `torchrun` one process does."""
-    if not wanted or os.environ.get("RANK", "0") != "0":
+    if not (wanted and _is_first()):
         yield lambda step, terms: None
         return
     from torch.utils.tensorboard import SummaryWriter
