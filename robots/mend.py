@@ -16,12 +16,13 @@ from robots.footing import Footing, corners_of
 from robots.morphology import Morphology
 from robots.stage import Stage
 from robots.targets import Targets
-from robots.ties import rush
+from robots.ties import jolted, rush
 from robots.tree import Coordinates, forward
 
-_ROUNDS, _FIRMER = 4, 3.0
+_ROUNDS, _FIRMER = 5, 3.0
 _STEPS, _LITTLE = 12, 0.01  # of each round
 _AROUND = 0.4  # [s] before and after a frame in which it may be made good
+_JOLTED = 5.0  # times as much as makes hinges stiffer
 _DEEP, _SUNK, _HASTE = 0.010, 0.006, 0.5  # [m] of what parts keep between them; [m]; [rad/s]
 
 
@@ -32,15 +33,20 @@ def mend(
     q: Coordinates,
     stage: Stage,
 ) -> Coordinates:
-    """`q` with a stage's columns changed around the frames that something is wrong in."""
+    """`q` with a stage's columns changed around the frames that something is wrong in; the best of
+    the rounds."""
     firm = np.ones(len(q))
     around = max(2, round(_AROUND / targets.frame_time))
     wide = np.ones(2 * around + 1, dtype=bool)
-    wrong = wrong_in(robot, targets, q, stage)
-    for _ in range(_ROUNDS):
-        if not wrong.any():
+    best, least = q, np.inf
+    for k in range(_ROUNDS + 1):
+        wrong = wrong_in(robot, targets, q, stage)
+        rough = wrong | jolting(robot, targets, q, stage)
+        if rough.sum() < least:
+            best, least = q, rough.sum()
+        if k == _ROUNDS or not least:
             break
-        for frames in stretches(binary_dilation(wrong, wide)):
+        for frames in stretches(binary_dilation(rough, wide)):
             # Ties reach two frames: so many at its ends stay, but for the trajectory's.
             fixed = np.zeros(len(frames), dtype=bool)
             fixed[:2] = frames[0] > 0
@@ -58,15 +64,25 @@ def mend(
                 mending=Mending(firm[frames], fixed),
             )
             q = q.replaced(frames, part)
-            firm[frames] *= _FIRMER
-        wrong = wrong_in(robot, targets, q, stage)
-    return q
+            if wrong[frames].any():
+                firm[frames] *= _FIRMER
+    return best
 
 
 def stretches(mask: Bool[np.ndarray, "T"]) -> list[Int[np.ndarray, "S"]]:
     """The frames of each stretch that is true."""
     frames = np.flatnonzero(mask)
     return [part for part in np.split(frames, np.flatnonzero(np.diff(frames) > 1) + 1) if len(part)]
+
+
+def jolting(
+    robot: Morphology, targets: Targets, q: Coordinates, stage: Stage
+) -> Bool[np.ndarray, "T"]:
+    """The frames in which hinges of a stage jolt, in spite of what smooths them."""
+    out = np.zeros(len(q), dtype=bool)
+    jolts = jolted(robot, q, targets.frame_time)[:, stage.columns]
+    out[1:-1] = jolts.max(1, initial=1.0) > _JOLTED
+    return out
 
 
 def wrong_in(
