@@ -1,0 +1,35 @@
+"""Measure the memory that retargeting onto a robot takes at its peak, in a process of its own.
+
+python scripts/robot_memory.py --frames 20000 [--robot unitree_g1]
+"""
+
+import argparse
+import resource
+
+import numpy as np
+
+from robots.known import known
+from robots.solve import retarget
+from spark.canonical import to_canonical
+from spark.motion import Motion
+from spark.sample import sample_motion, sample_rig
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--frames", type=int, required=True, help="0: the process without any")
+    parser.add_argument("--robot", default="unitree_g1")
+    args = parser.parse_args()
+    rig, robot = sample_rig("walker"), known(args.robot)
+    if args.frames:
+        walk = sample_motion("walk", rig, 60.0)
+        last = len(walk) - 1
+        again = last - np.abs(np.arange(args.frames) % (2 * last) - last)
+        long = Motion(walk.skeleton, walk.frame_time, walk.root_pos[again], walk.rotations[again])
+        retarget(to_canonical(long, rig), robot)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    print(f"{args.frames} frames: {peak:.2f} GB at the peak")
+
+
+if __name__ == "__main__":
+    main()
