@@ -3,8 +3,9 @@
 Usage: python scripts/pairs_bench.py DATA... (datasets of `spark-sim prepare`, or folders of files)
 
 Batches are those of the default preset (4 draws of 4 windows of 64 frames), with 16 variants of a
-body. The first steps, in which variants are made and names read, are counted apart. Beside the rate
-on the clock, which other work on the machine lowers, stands that for a CPU second of a worker.
+body. The first steps, in which variants are made and names read, are counted apart, and those in
+which workers begin are not counted. Beside the rate on the clock, which other work on the machine
+lowers, stands that for a CPU second of a worker.
 """
 
 import sys
@@ -17,12 +18,13 @@ from torch.utils.data import DataLoader
 
 from spark.batch import Batch
 from spark.dataset import training_clips
+from spark.memory import keep_freed_memory
 from spark.names import NameEncoder
-from spark.packed import Packed
+from spark.packed import Packed, Packer
 from spark.settings import TrainConfig
 from spark.train import Steps
 
-FIRST, STEPS = 150, 150
+FIRST, BEGUN, STEPS = 800, 400, 700
 
 
 class Timed(Steps):
@@ -32,13 +34,16 @@ class Timed(Steps):
         return super().__getitem__(n), time.process_time()
 
 
-def packed(item: tuple[Batch, float]) -> tuple[Packed, float]:
-    """A step as the training hands it over."""
-    return Packed(item[0]), item[1]
+class TimedPacker(Packer):
+    """Steps as the training hands them over."""
+
+    def __call__(self, item: tuple[Batch, float]) -> tuple[Packed, float]:  # type: ignore[override]
+        return super().__call__(item[0]), item[1]
 
 
 def main(*data: str) -> None:
     torch.set_num_threads(1)
+    keep_freed_memory()
     clips, _ = training_clips([Path(folder) for folder in data])
     config = replace(TrainConfig("default"), variants=16)
     steps = Timed(clips, NameEncoder().eval().remembering(), config, 0, 1)
@@ -51,18 +56,17 @@ def main(*data: str) -> None:
     for workers in (1, 2):
         numbers = range(FIRST, FIRST + STEPS)
         loader = DataLoader(
-            steps, batch_size=None, sampler=numbers, num_workers=workers, collate_fn=packed
+            steps, batch_size=None, sampler=numbers, num_workers=workers, collate_fn=TimedPacker()
         )
         clocks = []
         for n, (_, clock) in enumerate(loader):
             clocks.append(clock)
-            if n == 2 * workers:  # by now all have begun
+            if n + 1 == BEGUN:
                 began = time.perf_counter()
-        rate = (len(clocks) - 2 * workers - 1) / (time.perf_counter() - began)
-        used = sum(
-            of_one[-1] - of_one[0] for k in range(workers) for of_one in [clocks[k::workers]]
-        )
-        of_cpu = (len(clocks) - workers) / used
+        rate = (STEPS - BEGUN) / (time.perf_counter() - began)
+        each = [clocks[BEGUN + k :: workers] for k in range(workers)]
+        used = sum(of_one[-1] - of_one[0] for of_one in each)
+        of_cpu = (STEPS - BEGUN - workers) / used
         told = f"{workers} worker{'s' * (workers > 1)}"
         print(f"| {told} | {_windows(rate, config)} | {_windows(of_cpu, config)} |")
 

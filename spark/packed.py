@@ -4,18 +4,36 @@ from itertools import islice
 
 import torch
 from torch import Tensor
+from torch.utils.data import get_worker_info
 
 from spark.batch import Batch
 from spark.bodies import Body, Pose, Start
 
 _ALIGNED = 64  # bytes
+# Of a worker's batches the trainer uses one while two are ahead of it; one is to spare.
+_PIECES = 4
+
+
+class Packer:
+    """Packs batches into memory that it has used for earlier ones: new shared memory comes page by
+    page, which takes a third of a worker's time. What is packed holds until `_PIECES` later."""
+
+    def __init__(self) -> None:
+        self._pieces = [torch.empty(0, dtype=torch.uint8)] * _PIECES
+        self._turn = 0
+
+    def __call__(self, batch: Batch) -> "Packed":
+        self._turn = (self._turn + 1) % _PIECES
+        packed = Packed(batch, self._pieces[self._turn])
+        self._pieces[self._turn] = packed.piece
+        return packed
 
 
 class Packed:
     """What `on` makes a batch of again. Handing over one piece takes a fraction of the time that
-    the thirty tensors of a batch take one by one."""
+    the thirty tensors of a batch take one by one. It lies in `piece`, or in a larger one."""
 
-    def __init__(self, batch: Batch) -> None:
+    def __init__(self, batch: Batch, piece: Tensor) -> None:
         tensors = [*batch.source, *batch.target, *batch.pose, *batch.truth, *batch.start]
         tensors += [batch.planted, batch.effectors]
         self._frame_time = batch.frame_time
@@ -25,18 +43,22 @@ class Packed:
             size = tensor.numel() * tensor.element_size()
             self._layout.append((slice(end, end + size), tensor.dtype, tensor.shape))
             end += -(-size // _ALIGNED) * _ALIGNED
-        self._memory = torch.empty(end, dtype=torch.uint8)
-        for own, tensor in zip(self._tensors(self._memory), tensors, strict=True):
+        if piece.numel() < end:
+            piece = torch.empty(end + end // 4, dtype=torch.uint8)
+            if get_worker_info() is not None:
+                piece.share_memory_()  # type: ignore[no-untyped-call]
+        self.piece = piece
+        for own, tensor in zip(self._tensors(piece), tensors, strict=True):
             own.copy_(tensor)
 
     def pin_memory(self) -> "Packed":
         """Where a GPU fetches it from; torch's loader calls this."""
-        self._memory = self._memory.pin_memory()
+        self.piece = self.piece.pin_memory()
         return self
 
     def on(self, device: torch.device) -> Batch:
         """The batch, on `device`."""
-        parts = iter(self._tensors(self._memory.to(device, non_blocking=True)))
+        parts = iter(self._tensors(self.piece.to(device, non_blocking=True)))
         source, target = (Body(*islice(parts, len(Body._fields))) for _ in range(2))
         pose, truth = (Pose(*islice(parts, len(Pose._fields))) for _ in range(2))
         start = Start(*islice(parts, len(Start._fields)))

@@ -123,8 +123,19 @@ def quat_slerp(
     q0: Float[Any, "*#n 4"], q1: Float[Any, "*#n 4"], fraction: Float[Any, "*#n"]
 ) -> Float[Any, "*n 4"]:
     """Spherical interpolation along the shorter arc: `q0` at fraction 0, `q1` at 1."""
-    delta = rotvec_from_quat(quat_mul(quat_conj(q0), q1))
-    return quat_mul(q0, quat_from_rotvec(delta * fraction[..., None]))
+    xp = array_namespace(q0, q1)
+    q1 = xp.where(_dot(q0, q1) < 0, -q1, q1)
+    angle = 2 * xp.atan2(_norm(q1 - q0), _norm(q1 + q0))
+    part = fraction[..., None]
+    small = angle * angle < _SMALL_SQUARED
+    safe = xp.where(small, xp.ones_like(angle), angle)
+
+    def share(part: Any) -> Any:
+        """sin(part * angle) / sin(angle)"""
+        series = part * (1 + angle * angle * (1 - part * part) / 6)
+        return xp.where(small, series, xp.sin(part * safe) / xp.sin(safe))
+
+    return share(1 - part) * q0 + share(part) * q1
 
 
 def quat_between(u: Float[Any, "*#n 3"], v: Float[Any, "*#n 3"]) -> Float[Any, "*n 4"]:

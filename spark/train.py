@@ -32,10 +32,11 @@ from spark.checkpoint import (
     save_checkpoint,
 )
 from spark.config import Config
+from spark.memory import keep_freed_memory
 from spark.model import Spark
 from spark.name_file import load_names
 from spark.names import NAME_CACHE, NameEncoder, T5Names
-from spark.packed import Packed
+from spark.packed import Packed, Packer
 from spark.pairs import Clip, PairMaker
 from spark.precision import fast_products
 from spark.settings import TrainConfig
@@ -188,6 +189,7 @@ def train(
     `watch` is told the loss terms after each step that is logged. On a GPU the network is compiled
     and computes in bf16. Under `torchrun` the first process writes.
     """
+    keep_freed_memory()
     rank, world, device = _place()
     model = start.model.to(device)
     objective = Objective(model, config).to(device)
@@ -277,7 +279,7 @@ def _batches(steps: Steps, start: int) -> Iterator[Packed]:
             batch_size=None,
             sampler=range(start, config.steps),
             num_workers=config.workers,
-            collate_fn=Packed,  # type: ignore[arg-type]  # of an item: there is no batch_size
+            collate_fn=Packer(),  # type: ignore[arg-type]  # of an item: there is no batch_size
             pin_memory=torch.cuda.is_available(),
         )
     )

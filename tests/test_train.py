@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,13 +23,13 @@ from spark.clips import at_frame_time, read_clips
 from spark.errors import ConventionError, FileFormatError, SkeletonError
 from spark.model import Spark, _corrected
 from spark.names import NameConfig, NameEncoder
-from spark.packed import Packed
+from spark.packed import Packer
 from spark.pairs import Clip
 from spark.roles import Role
 from spark.rotation import quat_angle
 from spark.sample import sample_motion, sample_rig
 from spark.settings import TrainConfig, read_settings, toml
-from spark.train import Objective, Steps, network, optimiser_of, take_step, train
+from spark.train import Objective, Steps, _batches, network, optimiser_of, take_step, train
 from spark.transfer import transfer
 from spark.weights import VERSION
 from spark_sim import sample
@@ -99,7 +100,7 @@ def test_workers_change_nothing(clips: list[Clip], tmp_path: Path) -> None:
 
 def test_a_packed_batch_is_the_batch(clips: list[Clip]) -> None:
     batch = Steps(clips, NameEncoder(SMALL_NAMES).encode, TINY, 0, 1)[0]
-    again = Packed(batch).on(torch.device("cpu"))
+    again = Packer()(batch).on(torch.device("cpu"))
     for part, other in zip(batch[:5], again[:5], strict=True):
         assert type(part) is type(other)
         for a, b in zip(part, other, strict=True):
@@ -108,6 +109,16 @@ def test_a_packed_batch_is_the_batch(clips: list[Clip]) -> None:
     assert torch.equal(batch.planted, again.planted)
     assert torch.equal(batch.effectors, again.effectors)
     assert batch.frame_time == again.frame_time
+
+
+def test_batches_of_a_worker_hold_while_they_are_used(clips: list[Clip]) -> None:
+    """Their memory is used again, but not before the trainer is done with them."""
+    steps = Steps(clips, NameEncoder(SMALL_NAMES).encode, replace(TINY, workers=1, steps=14), 0, 1)
+    for n, packed in enumerate(_batches(steps, 0)):
+        time.sleep(0.02)  # so that the worker is as far ahead as it may be
+        batch, again = steps[n], packed.on(torch.device("cpu"))
+        assert torch.equal(batch.truth.rotations, again.truth.rotations), n
+        assert torch.equal(batch.pose.root, again.pose.root), n
 
 
 def test_a_checkpoint_keeps_everything(clips: list[Clip], tmp_path: Path) -> None:
