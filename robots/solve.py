@@ -45,7 +45,7 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     if stride > 1:
         few, places = targets.every(stride), [foot.every(stride) for foot in footing]
         q = solve(robot, few, places, q.every(stride)).between(stride, len(targets))
-    q = solve(robot, targets, footing, q, polish=stride > 1, last=True)
+    q = solve(robot, targets, footing, q, polish=stride > 1)
     return RobotMotion(robot, q, source.frame_time, (*robot.notes, *targets.notes))
 
 
@@ -56,11 +56,9 @@ def solve(
     q: Coordinates,
     *,
     polish: bool = False,
-    last: bool = False,
 ) -> Coordinates:
-    """Stage by stage, from `q`: first as if parts could run through each other, then apart; the
-    `last` time, what is still wrong is mended. To polish what is nearly solved, no need for the
-    first."""
+    """Stage by stage, from `q`: first as if parts could run through each other, then apart; what is
+    still wrong is mended. To polish what is nearly solved, no need for the first."""
     for stage, steps, little in zip(stages_of(robot), _STEPS, _LITTLE, strict=True):
         if not stage.columns:
             continue
