@@ -55,8 +55,7 @@ def solve_stage(
     """Gauss-Newton in the stage's columns, from `q`, damped where it would do harm.
 
     With `apart`, parts that run into each other give way, without haste: what changes `q` is
-    smoother than `q`. When `mending`, the steps are judged as a whole, and
-    halved until they do no harm.
+    smoother than `q`. When `mending`, steps are judged as a whole and halved until they do no harm.
 
     A step is judged where it is taken: frames whose surroundings get worse keep their place, and
     are damped more from then on (Levenberg and Marquardt's rule, a frame).

@@ -20,7 +20,7 @@ from spark.batch import Batch
 from spark.dataset import training_clips
 from spark.memory import keep_freed_memory
 from spark.names import NameEncoder
-from spark.packed import Packed, Packer
+from spark.packed import AHEAD, Packed, Packer
 from spark.settings import TrainConfig
 from spark.train import Steps
 
@@ -56,7 +56,12 @@ def main(*data: str) -> None:
     for workers in (1, 2):
         numbers = range(FIRST, FIRST + STEPS)
         loader = DataLoader(
-            steps, batch_size=None, sampler=numbers, num_workers=workers, collate_fn=TimedPacker()
+            steps,
+            batch_size=None,
+            sampler=numbers,
+            num_workers=workers,
+            prefetch_factor=AHEAD,
+            collate_fn=TimedPacker(),
         )
         clocks = []
         for n, (_, clock) in enumerate(loader):

@@ -10,17 +10,16 @@ not seen the person.
 """
 
 import sys
-from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
-
-import numpy as np
 
 from spark.canonical import canonical_positions
 from spark.dataset import Performance, read_performances
-from spark.evaluate import Row, copied, evaluate
+from spark.evaluate import Method, Positions, copied, evaluate
 from spark.evaluation_cases import Case, made_cases
 from spark.evaluation_tables import markdown
+from spark.pairs import Clip
 from spark.retarget import Learned
 from spark.settings import TrainConfig, read_settings
 from spark.train import fresh_checkpoint, train
@@ -35,13 +34,11 @@ def folds_of(found: list[Performance]) -> dict[str, int]:
     return {name: i % _FOLDS for i, name in enumerate(sorted({p.character for p in found}))}
 
 
-def trained(fold: int, found: list[Performance], config: TrainConfig, out: Path) -> Learned:
-    """The recipe's network without the people of a fold."""
+def trained(clips: list[Clip], config: TrainConfig, out: Path) -> Learned:
+    """The recipe's network of these clips."""
     path = out / "checkpoint.safetensors"
     if not path.exists():
         out.mkdir(parents=True, exist_ok=True)
-        left_out = folds_of(found)
-        clips = [p.clip for p in found if left_out[p.character] != fold and p.cell.endswith("+sm")]
         train(clips, config, out, start=fresh_checkpoint(config))
     return Learned(read_weights(path))
 
@@ -50,16 +47,20 @@ def main(dataset: str, runs: str, names: str) -> None:
     found = read_performances(Path(dataset))
     left_out = folds_of(found)
     config = TrainConfig().changed(_RECIPE, **read_settings(_RECIPE), names=names)
-    networks = [trained(k, found, config, Path(runs) / f"without_{k}") for k in range(_FOLDS)]
+    networks = []
+    for fold in range(_FOLDS):
+        clips = [p.clip for p in found if left_out[p.character] != fold and p.cell.endswith("+sm")]
+        networks.append(trained(clips, config, Path(runs) / f"without_{fold}"))
     unseen = [replace(p, cell=f"uc+{p.cell[3:]}") for p in found]
     cases = [c for c in made_cases(unseen) if c.structure == "missing"]
 
-    def learned(case: Case) -> np.ndarray:
+    def learned(case: Case) -> Positions:
         moved = networks[left_out[case.performer]](case.source, case.truth.rig)
         return canonical_positions(moved)
 
-    methods: dict[str, Callable[[Case], np.ndarray]] = {"copy": copied, "spark": learned}
-    rows: list[Row] = [evaluate(name, method, cases) for name, method in methods.items()]
+    # The rows of each body take up what those of all have made.
+    methods: dict[str, Method] = {"copy": cache(copied), "spark": cache(learned)}
+    rows = [evaluate(name, method, cases) for name, method in methods.items()]
     print(markdown(rows))
     print("| MSE, 1e-6 | copy | spark |\n|---|---|---|")
     for performer in sorted({c.performer for c in cases}):

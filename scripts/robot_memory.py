@@ -10,9 +10,19 @@ import numpy as np
 
 from robots.known import known
 from robots.solve import retarget
-from spark.canonical import to_canonical
+from spark.canonical import CanonicalMotion, to_canonical
 from spark.motion import Motion
 from spark.sample import sample_motion, sample_rig
+
+
+def pacing(frames: int) -> CanonicalMotion:
+    """The made walk at 60 fps, to and fro, as long as asked."""
+    rig = sample_rig("walker")
+    walk = sample_motion("walk", rig, 60.0)
+    last = len(walk) - 1
+    again = last - np.abs(np.arange(frames) % (2 * last) - last)
+    motion = Motion(walk.skeleton, walk.frame_time, walk.root_pos[again], walk.rotations[again])
+    return to_canonical(motion, rig)
 
 
 def main() -> None:
@@ -20,13 +30,9 @@ def main() -> None:
     parser.add_argument("--frames", type=int, required=True, help="0: the process without any")
     parser.add_argument("--robot", default="unitree_g1")
     args = parser.parse_args()
-    rig, robot = sample_rig("walker"), known(args.robot)
+    robot = known(args.robot)
     if args.frames:
-        walk = sample_motion("walk", rig, 60.0)
-        last = len(walk) - 1
-        again = last - np.abs(np.arange(args.frames) % (2 * last) - last)
-        long = Motion(walk.skeleton, walk.frame_time, walk.root_pos[again], walk.rotations[again])
-        retarget(to_canonical(long, rig), robot)
+        retarget(pacing(args.frames), robot)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     print(f"{args.frames} frames: {peak:.2f} GB at the peak")
 

@@ -10,8 +10,8 @@ from spark.batch import Batch
 from spark.bodies import Body, Pose, Start
 
 _ALIGNED = 64  # bytes
-# Of a worker's batches the trainer uses one while two are ahead of it; one is to spare.
-_PIECES = 4
+AHEAD = 2  # batches that a worker may be ahead of the trainer
+_PIECES = AHEAD + 2  # the one in use, and one to spare
 
 
 class Packer:

@@ -36,7 +36,7 @@ from spark.memory import keep_freed_memory
 from spark.model import Spark
 from spark.name_file import load_names
 from spark.names import NAME_CACHE, NameEncoder, T5Names
-from spark.packed import Packed, Packer
+from spark.packed import AHEAD, Packed, Packer
 from spark.pairs import Clip, PairMaker
 from spark.precision import fast_products
 from spark.settings import TrainConfig
@@ -279,6 +279,7 @@ def _batches(steps: Steps, start: int) -> Iterator[Packed]:
             batch_size=None,
             sampler=range(start, config.steps),
             num_workers=config.workers,
+            prefetch_factor=AHEAD if config.workers else None,
             collate_fn=Packer(),  # type: ignore[arg-type]  # of an item: there is no batch_size
             pin_memory=torch.cuda.is_available(),
         )

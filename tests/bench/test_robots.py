@@ -14,12 +14,11 @@ from robots.solve import retarget
 from robots.stream import Stream
 from robots.stream_targets import Frame, ground_of
 from robots.targets import targets_of
-from spark.canonical import CanonicalMotion, from_canonical, to_canonical
+from scripts.robot_memory import pacing
+from spark.canonical import from_canonical
 from spark.kinematics import world_positions
-from spark.motion import Motion
 from spark.roles import Role
 from spark.rotation import quat_mul, quat_rotate
-from spark.sample import sample_motion, sample_rig
 from spark_sim.robot import load_robot
 
 pytestmark = pytest.mark.bench
@@ -32,17 +31,6 @@ def g1() -> Morphology:
     robot = load_robot(find("unitree_g1")).on_robot.robot
     assert len(robot.collisions.pairs)  # found once for a robot
     return robot
-
-
-@cache
-def pacing(frames: int) -> CanonicalMotion:
-    """The made walk at 60 fps, to and fro, as long as asked."""
-    rig = sample_rig("walker")
-    walk = sample_motion("walk", rig, 60.0)
-    last = len(walk) - 1
-    again = last - np.abs(np.arange(frames) % (2 * last) - last)
-    motion = Motion(walk.skeleton, walk.frame_time, walk.root_pos[again], walk.rotations[again])
-    return to_canonical(motion, rig)
 
 
 @pytest.mark.parametrize("frames", [400, 4000])
