@@ -7,10 +7,10 @@ from jaxtyping import Float, Int
 
 from spark.rotation import (
     euler_from_quat,
-    quat_conj,
     quat_from_matrix,
     quat_from_rotvec,
     quat_mul,
+    quat_relative,
 )
 
 _JUMP = 0.3  # [rad] between frames, above which another way through is looked for
@@ -31,7 +31,7 @@ def hinge_angles(
     square, sign, skew = _skew(axes)
     basis = quat_from_matrix(np.stack([first, second, square], axis=-1))
     askew = quat_mul(q, quat_from_rotvec(second * skew))
-    angles = euler_from_quat(quat_mul(quat_mul(quat_conj(basis), askew), basis), "xyz")
+    angles = euler_from_quat(quat_mul(quat_relative(basis, askew), basis), "xyz")
     return angles * np.array([1.0, 1.0, sign]) - np.array([0.0, skew, 0.0])
 
 

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from sim.interpolate import quaternions
 from sim.physics import Tracked
 from sim.servos import GRAVITY
-from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
+from spark.rotation import quat_relative, rotvec_from_quat
 
 SCHEMA = "spark-sim physics 1"
 LIMITS = (
@@ -139,7 +139,7 @@ def _joint_errors(tracked: Tracked, frames: slice) -> Float[np.ndarray, "T N"]:
     starts = {int(model.jnt_qposadr[j]) for j in inside if int(model.jnt_type[j]) == _BALL}
     balls = np.array([q for q in quaternions(model) if int(q[0]) in starts], dtype=int)
     balls = balls.reshape(-1, 4)
-    turns = rotvec_from_quat(quat_mul(quat_conj(wanted[:, balls]), made[:, balls]))
+    turns = rotvec_from_quat(quat_relative(wanted[:, balls], made[:, balls]))
     angles = np.abs(made[:, hinges] - wanted[:, hinges])
     return np.concatenate([angles, np.linalg.norm(turns, axis=-1)], axis=1)
 

@@ -22,6 +22,7 @@ from spark.rotation import (
     quat_conj,
     quat_from_rotvec,
     quat_mul,
+    quat_relative,
     quat_rotate,
     quat_swing_twist,
     rotvec_from_quat,
@@ -89,7 +90,7 @@ class _Projector:
             if len(hinges) == 1:
                 angles = self._bend(j, parent, axes[0], ranges[0])[:, None]
             else:
-                angles = hinge_path(quat_mul(quat_conj(parent), self._goal(j)), axes, ranges)
+                angles = hinge_path(quat_relative(parent, self._goal(j)), axes, ranges)
             angles = limit_speed(angles, self.step)
             for k, (name, _) in enumerate(hinges):
                 self.qpos[:, self._address(name)] = angles[:, k]
@@ -108,7 +109,7 @@ class _Projector:
         """The angle of a single hinge: as its limb's bones ask, or its own turn about the axis."""
         if lower in self.bends:
             return self.bends[lower]
-        return np.clip(_turn_about(quat_mul(quat_conj(parent), self.asked[:, lower]), axis), *ends)
+        return np.clip(_turn_about(quat_relative(parent, self.asked[:, lower]), axis), *ends)
 
     def _goal(self, joint: int) -> _Quats:
         """How a joint should turn since the T-pose, so that its limb's bones go where they should
@@ -126,7 +127,7 @@ class _Projector:
         upper_bone = self._bone(self.positions, joint, lower)
         lower_bone = self._bone(self.positions, lower, end)
 
-        own = _turn_about(quat_mul(quat_conj(asked), self.asked[:, lower]), axis)
+        own = _turn_about(quat_relative(asked, self.asked[:, lower]), axis)
         cosine = (upper_bone * lower_bone).sum(-1)
         shown = _smoothstep(np.arccos(np.clip(cosine, -1, 1)), *_BENT)
         angle = _angle_between(upper_rest, lower_rest, axis, cosine, own)

@@ -18,10 +18,10 @@ from spark.rig import Rig
 from spark.rig_names import split_side
 from spark.roles import Group, Role
 from spark.rotation import (
-    quat_conj,
     quat_from_sixd,
     quat_from_yaw,
     quat_mul,
+    quat_relative,
     quat_rotate,
     sixd_from_quat,
     yaw_from_quat,
@@ -194,15 +194,14 @@ def canonical_from_features(
     skeleton, place = body.rig.skeleton, {j: k for k, j in enumerate(body.joints.tolist())}
     pelvis = int(body.joints[0])
     for j in skeleton.ancestors(pelvis)[1:]:
-        rotations[:, j] = quat_mul(
-            quat_mul(seen[:, 0], quat_conj(start.rotations[:, pelvis])), start.rotations[:, j]
-        )
+        from_pelvis = quat_relative(start.rotations[:, pelvis], start.rotations[:, j])
+        rotations[:, j] = quat_mul(seen[:, 0], from_pelvis)
     for j in range(len(skeleton)):
         if j in place:
             rotations[:, j] = seen[:, place[j]]
         elif j not in skeleton.ancestors(pelvis):
             parent = int(skeleton.parents[j])
-            local_j = quat_mul(quat_conj(start.rotations[:, parent]), start.rotations[:, j])
+            local_j = quat_relative(start.rotations[:, parent], start.rotations[:, j])
             rotations[:, j] = quat_mul(rotations[:, parent], local_j)
     hips = quat_rotate(to_heading, root * body.rig.hip_height) + origin.position
     return CanonicalMotion(body.rig, start.frame_time, rotations, hips, start.floor_z)

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.motion import Motion
-from spark.rotation import quat_conj, quat_mul, quat_rotate
+from spark.rotation import quat_mul, quat_relative, quat_rotate
 from spark.skeleton import Skeleton
 
 
@@ -27,9 +27,7 @@ def local_rotations(
     children = np.arange(1, len(skeleton))
     if len(children):
         parents = skeleton.parents[children]
-        local[..., children, :] = quat_mul(
-            quat_conj(world[..., parents, :]), world[..., children, :]
-        )
+        local[..., children, :] = quat_relative(world[..., parents, :], world[..., children, :])
     return local
 
 

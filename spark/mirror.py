@@ -41,8 +41,9 @@ def mirrored_motion(
     hips: Float[np.ndarray, "*n 3"],
     planted: Bool[np.ndarray, "*n 2"],
 ) -> tuple[Float[np.ndarray, "*n J 4"], Float[np.ndarray, "*n 3"], Bool[np.ndarray, "*n 2"]]:
-    """What a body's motion is in the mirror, on the mirrored body."""
-    return rotations * _TURNED, hips * _ACROSS, planted[..., ::-1]
+    """What a body's motion is in the mirror, on the mirrored body; in the precision it comes in."""
+    turned, across = _TURNED.astype(rotations.dtype), _ACROSS.astype(hips.dtype)
+    return rotations * turned, hips * across, planted[..., ::-1]
 
 
 def _other_side(role: Role | None) -> Role | None:

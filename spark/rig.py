@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -14,8 +15,21 @@ from spark.roles import Group, Role, RoleMap
 from spark.skeleton import Skeleton
 from spark.tpose import carrier_of, find_tpose
 
+# Roles that several joints hold, and those between which they lie.
+_CHAINS: dict[Role, tuple[Role, Role | None]] = {
+    Role.SPINE: (Role.PELVIS, None),
+    Role.NECK: (Role.SPINE, Role.HEAD),
+}
 _UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
 _FEET = ((Role.LEFT_FOOT, Role.LEFT_TOE), (Role.RIGHT_FOOT, Role.RIGHT_TOE))
+
+
+class Chain(NamedTuple):
+    """The joints of a role that several hold, from the last joint before them to the first one
+    after them, and where each lies: its normalised arc length in the T-pose, 0 to 1."""
+
+    joints: list[int]
+    places: list[float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +65,21 @@ class Rig:
     def tpose_positions(self) -> Float[np.ndarray, "J 3"]:
         """The joints [m] in the T-pose, the root at the origin."""
         return world_positions(self.skeleton, self.tpose, np.zeros(3))
+
+    @cached_property
+    def chains(self) -> dict[Role, Chain]:
+        """The spine, from the pelvis on, and the neck, from the topmost spine joint to the head."""
+        return {role: self._chain(role, *ends) for role, ends in _CHAINS.items()}
+
+    def _chain(self, role: Role, start: Role, end: Role | None) -> Chain:
+        begin = self.roles.joints(start)[-1:] or (self.pelvis,)
+        tail = self.roles.joints(end)[:1] if end is not None else ()
+        joints = [*begin, *self.roles.joints(role), *tail]
+        if len(joints) == 1:
+            return Chain(joints, [0.0])
+        bones = np.diff(self.tpose_positions[joints], axis=0)
+        *arc, length = np.cumsum(np.linalg.norm(bones, axis=1)).tolist()
+        return Chain(joints, [0.0, *(a / (length or 1.0) for a in arc), 1.0])
 
     @cached_property
     def contact_joints(self) -> list[int]:

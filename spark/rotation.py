@@ -45,6 +45,22 @@ def quat_conj(q_a_b: Float[Any, "*n 4"]) -> Float[Any, "*n 4"]:
     return xp.stack([w, -x, -y, -z], axis=-1)
 
 
+def quat_relative(q_a_b: Float[Any, "*#n 4"], q_a_c: Float[Any, "*#n 4"]) -> Float[Any, "*n 4"]:
+    """`q_b_c`: the conjugate of `q_a_b` times `q_a_c`, in one go."""
+    xp = array_namespace(q_a_b, q_a_c)
+    w1, x1, y1, z1 = (q_a_b[..., i] for i in range(4))
+    w2, x2, y2, z2 = (q_a_c[..., i] for i in range(4))
+    return xp.stack(
+        [
+            w1 * w2 + x1 * x2 + y1 * y2 + z1 * z2,
+            w1 * x2 - x1 * w2 - y1 * z2 + z1 * y2,
+            w1 * y2 + x1 * z2 - y1 * w2 - z1 * x2,
+            w1 * z2 - x1 * y2 + y1 * x2 - z1 * w2,
+        ],
+        axis=-1,
+    )
+
+
 def quat_rotate(q_a_b: Float[Any, "*#n 4"], v_b: Float[Any, "*#n 3"]) -> Float[Any, "*n 3"]:
     """The vector `v_b` in a-coordinates."""
     xp = array_namespace(q_a_b, v_b)
@@ -88,7 +104,7 @@ def quat_continuous(q: Float[Any, "T *n 4"]) -> Float[Any, "T *n 4"]:
 def quat_angle(q_a_b: Float[Any, "*#n 4"], q_a_c: Float[Any, "*#n 4"]) -> Float[Any, "*n"]:
     """The angle in [0, pi] between two rotations, exact near 0 and near pi."""
     xp = array_namespace(q_a_b, q_a_c)
-    relative = quat_mul(quat_conj(q_a_b), q_a_c)
+    relative = quat_relative(q_a_b, q_a_c)
     return 2 * xp.atan2(_norm(relative[..., 1:])[..., 0], xp.abs(relative[..., 0]))
 
 

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, Int
 from spark.features import BodyFeatures
 from spark.plant import Leg, leg_turns, stance_correction
 from spark.roles import LIMBS, Group, Role
-from spark.rotation import quat_conj, quat_mul, quat_rotate, quat_slerp
+from spark.rotation import quat_mul, quat_relative, quat_rotate, quat_slerp
 from spark.variants import Variant
 
 
@@ -138,7 +138,7 @@ def local_rows(
     """Local rotations of the bodies' rows, each pelvis turned by `back`."""
     begins = begins_of([body.joints for body in bodies])
     parents = joined([np.maximum(body.skeleton.parents, 0) for body in bodies], begins)
-    local = quat_mul(quat_conj(rows)[parents], rows)
+    local = quat_relative(rows[parents], rows)
     local[begins] = quat_mul(back, rows[begins])
     return local
 

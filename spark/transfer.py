@@ -7,6 +7,7 @@ those of the same name in the same place, or follow their parent. This is the ro
 table.
 """
 
+from bisect import bisect_right
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,12 +25,6 @@ _NEAR = 0.26  # further than this from any of the source's joints, what a joint 
 _FLOOR_TOLERANCE = 0.1
 
 _SHOULDERS = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE)
-
-# Roles that several joints hold, and the roles between which they lie.
-_CHAINS: dict[Role, tuple[Role, Role | None]] = {
-    Role.SPINE: (Role.PELVIS, None),
-    Role.NECK: (Role.SPINE, Role.HEAD),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +70,13 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
         known[j] = True
 
     for role in Role:
-        if role not in _CHAINS:
+        if role not in target.chains:
             theirs, own = source.roles.joints(role), target.roles.joints(role)
             for from_joint, j in zip(theirs, own, strict=False):
                 copy(j, from_joint)
-    for role, (start, end) in _CHAINS.items():
-        joints, at = _chain(source, role, start, end)
+    for role, (joints, at) in source.chains.items():
         theirs, own = source.roles.joints(role), target.roles.joints(role)
-        places = dict(zip(*_chain(target, role, start, end), strict=True))
+        places = dict(zip(*target.chains[role], strict=True))
         moved = (abs(at[joints.index(a)] - places[j]) for a, j in zip(theirs, own, strict=False))
         if len(theirs) == len(own) and max(moved, default=0.0) < _SAME_PLACE:
             for from_joint, j in zip(theirs, own, strict=True):
@@ -90,7 +84,7 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
         for j in own:
             if known[j]:
                 continue
-            k = int(np.searchsorted(at, places[j], side="right")) - 1
+            k = bisect_right(at, places[j]) - 1
             after = min(k + 1, len(at) - 1)
             span = at[after] - at[k]
             first[j], second[j] = joints[k], joints[after]
@@ -150,22 +144,6 @@ def _without_arms(source: Rig, target: Rig) -> tuple[str, ...]:
     if own and not theirs:
         return ("the source has no arms: the target's stay out to the sides, as in the T-pose",)
     return ()
-
-
-def _chain(
-    rig: Rig, role: Role, start: Role, end: Role | None
-) -> tuple[list[int], Float[np.ndarray, "_"]]:
-    """The joints from the last one of `start` over those of `role` to `end`, and their normalised
-    arc lengths in the T-pose. A chain of one joint lies at 0."""
-    begin = rig.roles.joints(start)[-1:] or (rig.pelvis,)
-    tail = rig.roles.joints(end)[:1] if end is not None else ()
-    joints = [*begin, *rig.roles.joints(role), *tail]
-    positions = rig.tpose_positions[joints]
-    arc = np.cumsum(np.linalg.norm(np.diff(positions, axis=0, prepend=positions[:1]), axis=1))
-    if len(joints) > 1:
-        arc = arc / arc[-1] if arc[-1] > 0 else arc
-        arc[-1] = 1.0
-    return joints, arc
 
 
 def _hangs(rig: Rig, joint: int, ancestor: int) -> bool:

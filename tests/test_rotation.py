@@ -47,6 +47,7 @@ def test_conversions_agree_with_scipy(make: Any, dtype: Any, eps: float) -> None
         (r.quat_from_sixd(r.sixd_from_quat(q)), CASES),
         (r.quat_mul(q, other), CASES * CASES[::-1]),
         (r.quat_conj(q), CASES.inv()),
+        (r.quat_relative(q, other), CASES.inv() * CASES[::-1]),
     ):
         assert result.dtype == q.dtype
         np.testing.assert_allclose(as_matrix(result), expected.as_matrix(), **close)
@@ -91,6 +92,7 @@ HALF_TURNS = np.concatenate([np.eye(4), -np.eye(4)])
 ALL = {
     "quat_mul": lambda q, p, v: r.quat_mul(q, p),
     "quat_conj": lambda q, p, v: r.quat_conj(q),
+    "quat_relative": lambda q, p, v: r.quat_relative(q, p),
     "quat_rotate": lambda q, p, v: r.quat_rotate(q, v),
     "quat_normalize": lambda q, p, v: r.quat_normalize(q),
     "quat_identity": lambda q, p, v: r.quat_identity(v),

@@ -36,6 +36,7 @@ def test_draws_made_together_are_those_made_alone(clips: list[Clip]) -> None:
         alone = maker.draw(n, 3)
         for a, b in zip(draw[:3], alone[:3], strict=True):
             assert a.body is b.body
+            assert a.rotations.dtype == a.root.dtype == np.float32  # seen in a mirror, too
             np.testing.assert_allclose(a.rotations, b.rotations, atol=1e-5)
             np.testing.assert_allclose(a.root, b.root, atol=1e-5)
         np.testing.assert_array_equal(draw.planted, alone.planted)

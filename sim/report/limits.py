@@ -17,7 +17,7 @@ from jaxtyping import Float
 
 from spark.rig import Rig
 from spark.roles import Role
-from spark.rotation import quat_conj, quat_mul, quat_swing_twist, rotvec_from_quat
+from spark.rotation import quat_relative, quat_swing_twist, rotvec_from_quat
 
 _X, _Y, _Z = 0, 1, 2
 
@@ -153,7 +153,7 @@ def limit_excess(since_tpose: Float[np.ndarray, "T J 4"], rig: Rig) -> tuple[Lim
             )
             if joint is None or parent is None:
                 continue
-            turn = quat_mul(quat_conj(since_tpose[:, parent]), since_tpose[:, joint])
+            turn = quat_relative(since_tpose[:, parent], since_tpose[:, joint])
             if side == "right":
                 turn = turn * np.array([1.0, -1.0, 1.0, -1.0])  # mirrored in the XZ plane
             found.append(

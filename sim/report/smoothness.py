@@ -5,7 +5,7 @@ from jaxtyping import Float
 
 from sim.report.derivatives import derivative
 from spark.rig import Rig
-from spark.rotation import quat_conj, quat_continuous, quat_mul
+from spark.rotation import quat_conj, quat_continuous, quat_mul, quat_relative
 
 
 def joint_rates(
@@ -25,7 +25,7 @@ def joint_rates(
     ]
     names = tuple(str(roles[j]).replace("_", " ") for j, _ in pairs)
     joints, parents = [j for j, _ in pairs], [above for _, above in pairs]
-    turn = quat_mul(quat_conj(world[:, parents]), world[:, joints])
+    turn = quat_relative(world[:, parents], world[:, joints])
     return names, *turning(turn, frame_time, window)
 
 
