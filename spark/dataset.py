@@ -41,7 +41,7 @@ from spark.reading import motion_files
 from spark.rig import Rig
 from spark.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_conj, quat_mul
-from spark.splits import cell, seen_characters, seen_motions
+from spark.splits import cells, seen_characters, seen_motions
 from spark.variants import split_joints
 
 FORMAT, VERSION = "spark-sim dataset", 2
@@ -259,9 +259,9 @@ def _index(digests: dict[Path, str], parts: Path, seed: int) -> Index:
         first_frame += frames
     characters = seen_characters((body["character"] for body in bodies), seed)
     motions = seen_motions((clip["motion"] for clip in clips), seed)
-    for clip in clips:
-        seen_body = characters[bodies[clip["body"]]["character"]]
-        clip["cell"] = cell(seen_body, motions[clip["motion"]])
+    pairs = [(bodies[clip["body"]]["character"], clip["motion"]) for clip in clips]
+    for clip, name in zip(clips, cells(pairs, characters, motions), strict=True):
+        clip["cell"] = name
     return {
         "format": FORMAT,
         "version": VERSION,

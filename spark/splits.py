@@ -3,7 +3,7 @@
 import hashlib
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
 # Section 5: twelve characters to train on, seven to test on; three are in both.
 TRAINING = (
@@ -39,9 +39,16 @@ def seen_motions(names: Iterable[str], seed: int) -> dict[str, bool]:
     return _draw(sorted(set(names)), "motions", seed)
 
 
-def cell(character_seen: bool, motion_seen: bool) -> str:
-    """The cell's name in the paper; training uses `sc+sm`."""
-    return f"{'sc' if character_seen else 'uc'}+{'sm' if motion_seen else 'um'}"
+def cells(
+    clips: Sequence[tuple[str, str]], characters: Mapping[str, bool], motions: Mapping[str, bool]
+) -> list[str]:
+    """The cell of each clip, a character and a motion, as the paper names it; training uses
+    `sc+sm`. A character whose every motion is unseen is not seen itself."""
+    met = {who for who, motion in clips if characters[who] and motions[motion]}
+    return [
+        f"{'sc' if who in met else 'uc'}+{'sm' if motions[motion] else 'um'}"
+        for who, motion in clips
+    ]
 
 
 def _draw(names: list[str], what: str, seed: int) -> dict[str, bool]:

@@ -25,7 +25,7 @@ from spark.reading import motion_files, read_motion
 from spark.rig import understand
 from spark.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_about, quat_angle, quat_conj, quat_mul
-from spark.splits import TRAINING, UNSEEN, cell, seen_characters, seen_motions
+from spark.splits import TRAINING, UNSEEN, cells, seen_characters, seen_motions
 
 
 @pytest.fixture(scope="module")
@@ -205,12 +205,12 @@ def test_drawn_splits() -> None:
     assert sum(more[name] != seen[name] for name in names) <= 1
     assert seen_motions(["only"], 0) == {"only": True}
     assert sorted(seen_characters(["a", "b"], 0).values()) == [False, True]
-    assert [cell(c, m) for c in (True, False) for m in (True, False)] == [
-        "sc+sm",
-        "sc+um",
-        "uc+sm",
-        "uc+um",
-    ]
+
+
+def test_whom_training_does_not_meet_is_not_seen() -> None:
+    clips = [(who, motion) for who in "ab" for motion in "xy"] + [("c", "y")]
+    found = cells(clips, {"a": True, "b": False, "c": True}, {"x": True, "y": False})
+    assert found == ["sc+sm", "sc+um", "uc+sm", "uc+um", "uc+um"]
 
 
 def test_command(tree: Path, tmp_path: Path) -> None:
@@ -245,7 +245,8 @@ def test_mixamo_downloads(tmp_path: Path) -> None:
     ]
     cells = {index["bodies"][clip["body"]]["character"]: clip["cell"] for clip in index["clips"]}
     assert cells["Kaya"].startswith("uc")
-    assert {cells[name][:2] for name in ("Amy", "Michelle", "Big_Vegas")} == {"sc"}
+    assert {cells[name] for name in ("Amy", "Michelle")} == {"sc+sm"}
+    assert cells["Big_Vegas"] == "uc+um"  # his only motion is held out
     # Files of 60 and of 30 fps are 30 fps here.
     frames = {clip["file"]: clip["frames"] for clip in index["clips"]}
     assert frames["Kaya/silly_dancing_115f.fbx"] == 115
