@@ -1,54 +1,30 @@
-"""Parts of a robot that must not run into each other.
+"""Parts of a robot that must not run into each other: quickly, for whole trajectories.
 
-Of two shapes, the one is spheres along its length, the other a polytope of 26 sides around it (a
-k-DOP: Klosowski et al. 1998): the signed distance to one is a matrix product and a maximum.
+`robots.contact` measures the same exactly.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
-import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from robots.hulls import Pair, Shape, meet, shapes_of
 from robots.mjcf import Mjcf
 from robots.normal import Normal
-from robots.shapes import DIRECTIONS, surface_of
+from robots.shapes import DIRECTIONS
 from robots.stage import Stage
 from robots.terms import one_sided
 from robots.tree import Coordinates, Frames, Tree, forward
 
-_APART = 0.006  # [m] that shapes keep between them; less where the T-pose has less
+APART = 0.002  # [m] that shapes keep between them; less where the T-pose has less
 EASE = 0.003  # [m]
 _NEAR = 0.03  # [m] within which shapes are watched
-_MOST_SPHERES = 6  # along a shape
-_ALL_SPHERES = 24
 _PAIRS = len(DIRECTIONS) // 2  # a direction and the one against it, as many from the end
-_CORNER, _OUTSTANDING = 0.008, 0.006  # [m]
 
 
-@dataclass(frozen=True, eq=False)
-class Shape:
-    """A shape that link `link` moves, in the rest pose's world [m]: inside all half-spaces
-    `sides . x <= reach`, roughly covered by spheres, all of it within `bound` of `center`."""
-
-    link: int
-    body: int
-    geom: int
-    reach: Float[np.ndarray, "26"]
-    spheres: Float[np.ndarray, "S 3"]
-    radii: Float[np.ndarray, "S"]
-    center: Float[np.ndarray, "3"]
-    bound: float
-
-
-@dataclass(frozen=True, eq=False)
-class Pair:
-    """Two shapes, and how near [m] they may come."""
-
-    small: Shape
-    large: Shape
-    apart: float
+Moves = tuple[tuple[int, ...], tuple[int, ...]]  # the joints that move each of a pair
+Watched = tuple[Pair, Moves]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +34,7 @@ class Near:
 
     pair: Pair
     spheres: Int[np.ndarray, "N"]
-    moves: tuple[tuple[int, ...], tuple[int, ...]]
+    moves: Moves
     frames: Int[np.ndarray, "S"]
 
 
@@ -68,48 +44,57 @@ class Collisions:
 
     tree: Tree
     pairs: tuple[Pair, ...]
+    _known: dict[Stage, dict[Shape, list[Watched]]] = field(default_factory=dict)
 
     def near(self, frames: Frames, stage: Stage, stride: int) -> list[Near]:
         """The pairs that the stage moves against each other, where they are near; looked for in
-        every `stride`-th frame. Parts that a later stage moves have to give way in that one."""
+        every `stride`-th frame and the last. Parts that a later stage moves have to give way in
+        that one."""
         count = frames.places.shape[2]
-        some = frames.at(np.arange(0, count, stride))
-        found = []
+        looks = np.unique(np.append(np.arange(0, count, stride), count - 1))
+        some = frames.at(looks)
         shapes = {x.geom: x for pair in self.pairs for x in (pair.small, pair.large)}
         centers = {g: some.point(x.link, x.center) for g, x in shapes.items()}
-        free = {link: stage.free(link) for link in {x.link for x in shapes.values()}}
-        for pair in self.pairs:
-            a, b = free[pair.small.link], free[pair.large.link]
-            moves = tuple(j for j in a if j not in b), tuple(j for j in b if j not in a)
-            later = any(not stage.moves(link) for link in (pair.small.link, pair.large.link))
-            if not (moves[0] or moves[1]) or (stage.base and later):
-                continue
-            reach = pair.small.bound + pair.apart + _NEAR
-            between = centers[pair.small.geom] - centers[pair.large.geom]
-            looked = np.flatnonzero((between**2).sum(0) < (reach + pair.large.bound) ** 2)
-            if not len(looked):
-                continue
-            middle = pair.small.center[None]
-            looked = looked[_distance(self.tree, some, pair, middle, looked)[0] < reach]
-            if not len(looked):
-                continue
-            over = _distance(self.tree, some, pair, pair.small.spheres, looked)
-            near = over - pair.small.radii[:, None] < pair.apart + _NEAR
-            if near.any():
-                around = looked[near.any(0), None] * stride + np.arange(-stride, stride + 1)
-                frames_near = np.unique(np.clip(around, 0, count - 1))
-                found.append(Near(pair, np.flatnonzero(near.any(1)), moves, frames_near))
+        found = []
+        for small, watched in self._watched(stage).items():
+            between = np.stack([centers[pair.large.geom] for pair, _ in watched])
+            between -= centers[small.geom]
+            far = np.sqrt(np.einsum("kit,kit->kt", between, between))
+            # What may have come nearer between two looks, by half of how far it moved.
+            step = np.linalg.norm(np.diff(between, axis=2), axis=1) / 2
+            moved = np.zeros_like(far)
+            moved[:, :-1] = step
+            moved[:, 1:] = np.maximum(moved[:, 1:], step)
+            reach = small.bound + _NEAR + moved + [[pair.apart] for pair, _ in watched]
+            close = far < reach + [[pair.large.bound] for pair, _ in watched]
+            for k in np.flatnonzero(close.any(1)).tolist():
+                pair, moves = watched[k]
+                at = np.flatnonzero(close[k])
+                middle = _distance(self.tree, some, pair, small.center[None], at)[0]
+                at = at[middle < reach[k, at]]
+                if not len(at):
+                    continue
+                over = _distance(self.tree, some, pair, small.spheres, at)
+                near = over - small.radii[:, None] < pair.apart + _NEAR + moved[k, at]
+                if near.any():
+                    around = looks[at[near.any(0)], None] + np.arange(-stride, stride + 1)
+                    frames_near = np.unique(np.clip(around, 0, count - 1))
+                    found.append(Near(pair, np.flatnonzero(near.any(1)), moves, frames_near))
         return found
 
-    def depth(self, frames: Frames, nears: Sequence[Near]) -> Float[np.ndarray, "T"]:
-        """By how much [m] parts are nearer to each other than they may come, at the worst pair."""
-        out = np.full(frames.places.shape[2], -np.inf)
-        for near in nears:
-            pair, at = near.pair, near.frames
-            radii = pair.small.radii[near.spheres, None]
-            distance = _distance(self.tree, frames, pair, pair.small.spheres[near.spheres], at)
-            out[at] = np.maximum(out[at], (pair.apart + radii - distance).max(0))
-        return out
+    def _watched(self, stage: Stage) -> dict[Shape, list[Watched]]:
+        """The pairs that a stage moves against each other, by their small shapes."""
+        if stage not in self._known:
+            out: dict[Shape, list[Watched]] = {}
+            for pair in self.pairs:
+                small, large = pair.small.link, pair.large.link
+                a, b = stage.free(small), stage.free(large)
+                moves = tuple(j for j in a if j not in b), tuple(j for j in b if j not in a)
+                later = not (stage.moves(small) and stage.moves(large))
+                if (moves[0] or moves[1]) and not (stage.base and later):
+                    out.setdefault(pair.small, []).append((pair, moves))
+            self._known[stage] = out
+        return self._known[stage]
 
     def add_to(
         self,
@@ -147,7 +132,7 @@ class Collisions:
                 push = np.einsum("ijt,jt->it", touched.turns[pair.large.link], side_here)
                 point = touched.point(pair.small.link, sphere)
                 J = [
-                    _approach(touched, moves, point, sign * push)
+                    approach(touched, moves, point, sign * push)
                     for moves, sign in zip(near.moves, (-1.0, 1.0), strict=True)
                     if moves
                 ]
@@ -195,7 +180,7 @@ def _outside(shape: Shape, points: Float[np.ndarray, "3 S N"]) -> Float[np.ndarr
     return over.max(0).reshape(points.shape[1:])
 
 
-def _approach(
+def approach(
     frames: Frames,
     joints: tuple[int, ...],
     point: Float[np.ndarray, "3 N"],
@@ -211,106 +196,16 @@ def find_collisions(
 ) -> Collisions:
     """The pairs of the model's colliding shapes, but for those of neighbouring bodies and those
     that the file excludes. What touches in the T-pose may stay as near as it is there."""
-    shapes = _shapes(mjcf, joints)
+    shapes = shapes_of(mjcf, joints)
     frames = forward(tree, tpose)
     pairs = []
     for i, a in enumerate(shapes):
         for b in shapes[i + 1 :]:
-            if not _meet(mjcf, a, b):
+            if not meet(mjcf, a, b):
                 continue
             # The longer chain is the limb's end: the slender part.
             small, large = (a, b) if len(tree.chain(a.link)) >= len(tree.chain(b.link)) else (b, a)
-            pair = Pair(small, large, _APART)
+            pair = Pair(small, large, APART)
             now = _distance(tree, frames, pair, small.spheres, np.zeros(1, dtype=np.int64))
-            pairs.append(replace(pair, apart=min(_APART, float((now[:, 0] - small.radii).min()))))
+            pairs.append(replace(pair, apart=min(APART, float((now[:, 0] - small.radii).min()))))
     return Collisions(tree, tuple(pairs))
-
-
-def _shapes(mjcf: Mjcf, joints: Sequence[int]) -> list[Shape]:
-    model = mjcf.model
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    links = {mjcf.root: -1}
-    for i, joint in enumerate(joints):
-        links[int(model.jnt_bodyid[joint])] = i
-    shapes = []
-    for body in mjcf.bodies():
-        if body not in links:
-            links[body] = links[int(model.body_parentid[body])]
-        start = int(model.body_geomadr[body])
-        for geom in range(start, start + int(model.body_geomnum[body])):
-            if not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
-                continue
-            points = surface_of(model, data, geom)
-            if len(points):
-                shapes.append(_shape(links[body], body, geom, points))
-    return shapes
-
-
-def _shape(link: int, body: int, geom: int, points: Float[np.ndarray, "P 3"]) -> Shape:
-    middle = (points.max(0) + points.min(0)) / 2
-    axes = np.linalg.eigh(np.cov((points - middle).T) + 1e-12 * np.eye(3))[1]
-    inside = (points - middle) @ axes
-    low, high = inside.min(0), inside.max(0)
-    center = middle + axes @ ((low + high) / 2)
-    half = (high - low) / 2
-    order = np.argsort(half)
-    thin, middle_half, long_half = half[order]
-    # A rod is a row of spheres, a plate a grid of them.
-    radius = float((thin + middle_half) / 2 if middle_half < 1.3 * thin else thin)
-    grids = []
-    for reach, most in ((middle_half, 3), (long_half, _MOST_SPHERES)):
-        spare = max(float(reach) - radius, 0.0)
-        count = int(np.clip(np.ceil(spare / max(radius, 1e-3)) + 1, 1, most))
-        grids.append(np.linspace(-spare, spare, count) if count > 1 else np.zeros(1))
-    across, along = (grid.ravel() for grid in np.meshgrid(*grids))
-    spheres = center + np.outer(across, axes[:, order[1]]) + np.outer(along, axes[:, order[2]])
-    reach = (DIRECTIONS @ points.T).max(1)
-    spheres, radii = _with_corners(spheres, np.full(len(spheres), radius), points, reach)
-    return Shape(
-        link=link,
-        body=body,
-        geom=geom,
-        reach=reach,
-        spheres=spheres,
-        radii=radii,
-        center=center,
-        bound=float(np.linalg.norm(half)),
-    )
-
-
-def _with_corners(
-    spheres: Float[np.ndarray, "S 3"],
-    radii: Float[np.ndarray, "S"],
-    points: Float[np.ndarray, "P 3"],
-    reach: Float[np.ndarray, "26"],
-) -> tuple[Float[np.ndarray, "R 3"], Float[np.ndarray, "R"]]:
-    """With small spheres where the shape stands out from the ones that it has."""
-    while len(spheres) < _ALL_SPHERES:
-        short = reach - ((DIRECTIONS @ spheres.T) + radii).max(1)
-        side = int(short.argmax())
-        if short[side] < _OUTSTANDING:
-            break
-        corner = points[int((points @ DIRECTIONS[side]).argmax())]
-        spheres = np.concatenate([spheres, [corner - _CORNER * DIRECTIONS[side]]])
-        radii = np.append(radii, _CORNER)
-    return spheres, radii
-
-
-def _meet(mjcf: Mjcf, a: Shape, b: Shape) -> bool:
-    """Whether MuJoCo would let the two shapes collide."""
-    model = mjcf.model
-    if a.link == b.link:
-        return False
-    weld = model.body_weldid
-    wa, wb = int(weld[a.body]), int(weld[b.body])
-    parents = {int(weld[model.body_parentid[wa]]), int(weld[model.body_parentid[wb]])}
-    if wa in parents or wb in parents:
-        return False
-    ids = sorted((a.body, b.body))
-    if (ids[0] << 16) + ids[1] in set(model.exclude_signature.tolist()):
-        return False
-    return bool(
-        model.geom_contype[a.geom] & model.geom_conaffinity[b.geom]
-        or model.geom_contype[b.geom] & model.geom_conaffinity[a.geom]
-    )

@@ -71,14 +71,16 @@ def solve_stage(
     stiffer = np.ones((max(len(q) - 2, 0), len(stage.columns)))
 
     def look(q: Coordinates, rows: bool) -> tuple[Normal, Ties, Float[np.ndarray, "T"]]:
-        normal = linearize(robot, targets, footing, q, stage, nears, firm, rows=rows)
+        exact = mending is not None
+        normal = linearize(robot, targets, footing, q, stage, nears, firm, rows=rows, exact=exact)
         ties = ties_of(robot, q, start, targets.frame_time, stage.columns, stiffer, firm)
         return normal, ties, uniform_filter1d(normal.cost + ties.cost(len(q)), window)
 
     last, idle = np.inf, 0
     for k in range(most):
         if apart and k % 3 == 0:
-            nears = robot.collisions.near(forward(tree, q), stage, stride_of(targets))
+            stride = 1 if mending else stride_of(targets)
+            nears = robot.collisions.near(forward(tree, q), stage, stride)
         stiffer = np.maximum(stiffer, jolted(robot, q, targets.frame_time)[:, stage.columns])
         normal, ties, cost = look(q, rows=True)
         limits = q.at_limits(tree, SHORT_OF_LIMIT)[:, stage.columns]

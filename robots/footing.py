@@ -20,6 +20,7 @@ from spark.rotation import quat_rotate
 WOBBLE = 0.05  # hip heights that a standing foot may stray from its mean place without having moved
 TURN = np.radians(12)  # and how far it may turn
 EASE = 0.05  # [s] over which a foot is taken hold of and let go
+_SLIDE = 0.03  # of how firmly feet stand, so that they can slide to where they like to stand
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +28,7 @@ class Footing:
     """For each corner of a sole: where it should stand [m, world], and how firmly (0 to 1)."""
 
     places: Float[np.ndarray, "4 3 T"]
-    holds: Float[np.ndarray, "4 T"]
+    holds: Float[np.ndarray, "4 3 T"]
 
     def every(self, stride: int) -> "Footing":
         """That of every `stride`-th frame."""
@@ -35,7 +36,11 @@ class Footing:
 
     def at(self, frames: slice | Int[np.ndarray, "S"]) -> "Footing":
         """That of some frames."""
-        return Footing(self.places[..., frames], self.holds[:, frames])
+        return Footing(self.places[..., frames], self.holds[..., frames])
+
+    def sliding(self) -> "Footing":
+        """The same over the floor, but hardly held there."""
+        return Footing(self.places, self.holds * np.array([[_SLIDE], [_SLIDE], [1.0]]))
 
 
 def plan_footing(robot: Morphology, targets: Targets) -> list[Footing]:
@@ -59,7 +64,7 @@ def within_reach(robot: Morphology, footing: Sequence[Footing], q: Coordinates) 
 def _moved(foot: Footing, corners: Float[np.ndarray, "4 3 T"]) -> Footing:
     """Each footprint shifted and turned, over the floor, as the sole's corners are on average."""
     places = foot.places.copy()
-    held = foot.holds.max(0)
+    held = foot.holds[:, 0].max(0)
     edges = np.flatnonzero(np.diff(held > 0, prepend=False, append=False)).tolist()
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
         weight = held[start:stop] / held[start:stop].sum()
@@ -113,7 +118,9 @@ def _footing(
     for corner, (x, y) in enumerate(flat - flat[2:].mean(0)):
         places[corner, 0] = pivot[:, 0] + cos * x - sin * y
         places[corner, 1] = pivot[:, 1] + sin * x + cos * y
-    return Footing(places, _eased(contacts, max(1, round(EASE / frame_time)))[[0, 0, 1, 1]])
+    ease = max(1, round(EASE / frame_time))
+    still, low = _eased(contacts, ease), _eased(contacts | targets.touches[:, s], ease)
+    return Footing(places, np.stack([still, still, low], axis=1)[[0, 0, 1, 1]])
 
 
 def _stances(

@@ -3,15 +3,16 @@
 Parts that are in each other, soles below the floor and hinges that rush are soft walls to the
 solver: other wishes may outweigh them. The frames around these are solved again, with walls that
 grow firmer round by round (a penalty method: Nocedal and Wright, "Numerical Optimization", 17.1).
+Arms that would have to pass through something are led around it.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Bool, Int
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, maximum_filter1d
 
-from robots.descent import Mending, solve_stage, stride_of
+from robots.descent import SHORT_OF_LIMIT, Mending, eased, solve_stage, stride_of
 from robots.footing import Footing, corners_of
 from robots.morphology import Morphology
 from robots.stage import Stage
@@ -19,11 +20,12 @@ from robots.targets import Targets
 from robots.ties import jolted, rush
 from robots.tree import Coordinates, forward
 
-_ROUNDS, _FIRMER = 5, 3.0
+_ROUNDS, _FIRMER = 6, 3.0
+_LED = 3  # rounds after which arms are led out of what they are stuck in
 _STEPS, _LITTLE = 12, 0.01  # of each round
 _AROUND = 0.4  # [s] before and after a frame in which it may be made good
 _JOLTED = 5.0  # times as much as makes hinges stiffer
-_DEEP, _SUNK, _HASTE = 0.010, 0.006, 0.5  # [m] of what parts keep between them; [m]; [rad/s]
+_DEEP, _SUNK, _HASTE = 0.008, 0.006, 0.5  # [m] of what parts keep between them; [m]; [rad/s]
 
 
 def mend(
@@ -33,40 +35,67 @@ def mend(
     q: Coordinates,
     stage: Stage,
 ) -> Coordinates:
-    """`q` with a stage's columns changed around the frames that something is wrong in; the best of
-    the rounds."""
-    firm = np.ones(len(q))
+    """`q` with a stage's columns changed around the frames that something is wrong in."""
     around = max(2, round(_AROUND / targets.frame_time))
     wide = np.ones(2 * around + 1, dtype=bool)
+    wrong = wrong_in(robot, targets, q, stage, stride_of(targets))
+    for frames in stretches(binary_dilation(wrong | jolting(robot, targets, q, stage), wide)):
+        # Ties reach two frames: so many at its ends stay, but for the trajectory's.
+        fixed = np.zeros(len(frames), dtype=bool)
+        fixed[:2] = frames[0] > 0
+        fixed[-2:] |= frames[-1] < len(q) - 1
+        there = [foot.at(frames) for foot in footing]
+        part = _mended(robot, targets.at(frames), there, q.at(frames), stage, fixed)
+        q = q.replaced(frames, part)
+    return q
+
+
+def _mended(
+    robot: Morphology,
+    targets: Targets,
+    footing: list[Footing],
+    q: Coordinates,
+    stage: Stage,
+    fixed: Bool[np.ndarray, "T"],
+) -> Coordinates:
+    """The best of the rounds."""
+    firm = np.ones(len(q))
     best, least = q, np.inf
     for k in range(_ROUNDS + 1):
-        wrong = wrong_in(robot, targets, q, stage)
+        wrong = wrong_in(robot, targets, q, stage, 1)
         rough = wrong | jolting(robot, targets, q, stage)
         if rough.sum() < least:
             best, least = q, rough.sum()
         if k == _ROUNDS or not least:
             break
-        for frames in stretches(binary_dilation(rough, wide)):
-            # Ties reach two frames: so many at its ends stay, but for the trajectory's.
-            fixed = np.zeros(len(frames), dtype=bool)
-            fixed[:2] = frames[0] > 0
-            fixed[-2:] |= frames[-1] < len(q) - 1
-            part = solve_stage(
-                robot,
-                targets.at(frames),
-                [foot.at(frames) for foot in footing],
-                q.at(frames),
-                stage,
-                _STEPS,
-                _LITTLE,
-                0.0,
-                apart=True,
-                mending=Mending(firm[frames], fixed),
-            )
-            q = q.replaced(frames, part)
-            if wrong[frames].any():
-                firm[frames] *= _FIRMER
+        if k == _LED and not stage.base and wrong.any():
+            q = _led_out(robot, q, stage, wrong, fixed)
+        mending = Mending(firm, fixed)
+        ends = (_STEPS, _LITTLE, 0.0)
+        q = solve_stage(robot, targets, footing, q, stage, *ends, apart=True, mending=mending)
+        if wrong.any():
+            firm = firm * _FIRMER
     return best
+
+
+def _led_out(
+    robot: Morphology,
+    q: Coordinates,
+    stage: Stage,
+    wrong: Bool[np.ndarray, "T"],
+    fixed: Bool[np.ndarray, "T"],
+) -> Coordinates:
+    """`q` with a stage's hinges as in the T-pose where something is wrong, and on the way there and
+    back between: out in the open, from where another way is found."""
+    count = max(1, int(max(np.flatnonzero(wrong)[0], len(q) - 1 - np.flatnonzero(wrong)[-1])))
+    window = 2 * max(1, count // 2) + 1
+    share = 1.0 - eased(1.0 - maximum_filter1d(wrong.astype(np.float64), 3), window)
+    share[fixed] = 0.0
+    joints = [j for j in stage.joints if not robot.tree.balls[j]]
+    angles = q.angles.copy()
+    rest = robot.tpose.angles[0, joints]
+    angles[:, joints] += share[:, None] * (rest - angles[:, joints])
+    return Coordinates(q.pos, q.quat, angles, q.turns).clipped(robot.tree, SHORT_OF_LIMIT)
 
 
 def stretches(mask: Bool[np.ndarray, "T"]) -> list[Int[np.ndarray, "S"]]:
@@ -86,12 +115,13 @@ def jolting(
 
 
 def wrong_in(
-    robot: Morphology, targets: Targets, q: Coordinates, stage: Stage
+    robot: Morphology, targets: Targets, q: Coordinates, stage: Stage, stride: int
 ) -> Bool[np.ndarray, "T"]:
-    """The frames in which parts that a stage moves are where, or as fast as, they must not be."""
+    """The frames in which parts that a stage moves are where, or as fast as, they must not be;
+    collisions are looked for in every `stride`-th and, near these, in all."""
     frames = forward(robot.tree, q)
-    nears = robot.collisions.near(frames, stage, stride_of(targets))
-    wrong = robot.collisions.depth(frames, nears) > _DEEP
+    nears = robot.collisions.near(frames, stage, stride)
+    wrong = robot.contacts.depth(robot.to_qpos(q), nears) > _DEEP
     fast = np.abs(rush(robot, q, targets.frame_time)[:, stage.columns]).max(1, initial=0.0)
     wrong[1:] |= fast > _HASTE * targets.frame_time
     if stage.base:

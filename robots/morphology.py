@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from robots.collision import Collisions, find_collisions
+from robots.contact import Contacts
 from robots.mjcf import Mjcf
 from robots.tpose import rest_pose
 from robots.tree import Coordinates, Tree, forward
@@ -74,6 +75,11 @@ class Morphology:
     def collisions(self) -> Collisions:
         """The pairs of the robot's shapes that must not run into each other."""
         return find_collisions(self.mjcf, self.tree, self.mj_joints, self.tpose)
+
+    @cached_property
+    def contacts(self) -> Contacts:
+        """What measures these pairs exactly."""
+        return Contacts(self.mjcf.model, self.collisions, self.to_qpos(self.tpose)[0])
 
     @cached_property
     def _addresses(self) -> Int[np.ndarray, "N"]:

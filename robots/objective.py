@@ -19,14 +19,14 @@ from robots.tree import Coordinates, Frames, forward
 from spark.roles import Role
 from spark.rotation import matrix_from_quat
 
-DIRECTION = 1.0  # of arms and legs
+DIRECTION = 2.0  # of arms and legs
 TURNS = {  # how a part is turned: beside the directions, little matters but what sees or stands
     "pelvis": 0.8,
     "chest": 0.8,
     "head": 0.5,
     "neck": 0.1,
     "hand": 0.25,
-    "foot": 0.4,
+    "foot": 0.6,
     "spine": 0.1,
     "clavicle": 0.2,
 }
@@ -35,10 +35,10 @@ PATH = np.array([1.5, 1.5, 1.5])  # of the hips [1 / m]
 STAND = np.array([25.0, 25.0, 20.0])  # of a sole's corner [1 / m]
 SINK, SINK_EASE = 80.0, 0.004  # of a sole's corner below the floor [1 / m]; [m]
 LIMIT, MARGIN = 8.0, np.radians(2.0)  # of a hinge near its limit
-CLAP, NEAR = 12.0, 0.12  # of hands [1 / m] that are as near as this [m]
-TOUCH, TOUCH_LEGS = 45.0, 90.0  # of parts that run into each other [1 / m]
+CLAP, NEAR = 24.0, 0.12  # of hands [1 / m] that are as near as this [m]
+TOUCH, TOUCH_LEGS = 75.0, 90.0  # of parts that run into each other [1 / m]
 IDLE = 0.02  # of hinges that nothing else asks for: stay as in the T-pose
-SMOOTH = 4.2  # [Hz] above which a limb's motion fades
+SMOOTH = 3.4  # [Hz] above which a limb's motion fades
 CALM = 2.2  # [Hz] above which a limb that gives way to another does not
 JOLT = 500.0  # [rad/s³], RMS, above which a hinge is smoothed the more
 FAST, RUSH = 12.0, 0.5  # [rad/s] above which a hinge is held back, and how much [s]
@@ -109,9 +109,10 @@ def linearize(
     firm: Float[np.ndarray, "T"] | None = None,
     *,
     rows: bool = True,
+    exact: bool = False,
 ) -> Normal:
     """The normal equations of a stage at `q`; without `rows` nothing but what it costs. `firm` is
-    by how much touching and sinking weigh more, a frame."""
+    by how much touching and sinking weigh more, a frame; `exact` measures where parts touch."""
     tree, rig = robot.tree, robot.rig
     frames = forward(tree, q)
     normal = Normal(len(q), len(stage.columns), rows)
@@ -136,7 +137,10 @@ def linearize(
     for block in blocks.values():
         block.add_to(normal)
     touch = TOUCH_LEGS if stage.base else TOUCH
-    robot.collisions.add_to(normal, frames, stage, nears, touch, firm)
+    if exact:
+        robot.contacts.add_to(normal, robot.to_qpos(q), frames, stage, nears, touch, firm)
+    else:
+        robot.collisions.add_to(normal, frames, stage, nears, touch, firm)
     over, slope = limit_rows(tree, q, margin=MARGIN, weight=LIMIT)
     normal.add_diagonal(slope[:, stage.columns], over[:, stage.columns])
     idle, away = np.full((2, len(q), tree.size), 1e-3)

@@ -57,14 +57,16 @@ def solve(
     *,
     polish: bool = False,
 ) -> Coordinates:
-    """Stage by stage, from `q`: first as if parts could run through each other, then apart; what is
-    still wrong is mended. To polish what is nearly solved, no need for the first."""
+    """Stage by stage, from `q`: first as if parts could run through each other and feet could
+    slide, then apart and with feet where they came to rest; what is still wrong is mended. To
+    polish what is nearly solved, no need for the first."""
     for stage, steps, little in zip(stages_of(robot), _STEPS, _LITTLE, strict=True):
         if not stage.columns:
             continue
         ends = (steps, _POLISHED, 1.0) if polish else (steps, little, _REFUSED)
         if not polish:
-            q = solve_stage(robot, targets, footing, q, stage, *ends, apart=False)
+            sliding = [foot.sliding() for foot in footing]
+            q = solve_stage(robot, targets, sliding, q, stage, *ends, apart=False)
         if stage.base:
             footing = within_reach(robot, footing, q)
         if polish or robot.collisions.near(forward(robot.tree, q), stage, stride_of(targets)):

@@ -6,7 +6,7 @@ from functools import cached_property
 from robots.tree import BASE, Tree
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Stage:
     """Part of the columns: those that are solved for while the others are given.
 

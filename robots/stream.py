@@ -77,7 +77,7 @@ class Stream:
         projected = project(robot, quat_from_matrix(targets.world)[None], targets.hips[None])
         q = robot.to_qpos(projected)[np.zeros(_FRAMES, dtype=int)]
         soles = len(robot.soles)
-        stance = Stance(np.zeros((soles, 4, 3)), np.zeros((soles, 4)))
+        stance = Stance(np.zeros((soles, 4, 3)), np.zeros((soles, 4, 3)))
         for held in (False, True):
             if held:
                 stance = self._feet.look(targets, self._terms.corners(self._terms.poses(q))[0])

@@ -65,7 +65,8 @@ class Feet:
                 mark.follow(moved, turn, float(self._holds[s].max()), wobble)
             places[s, :, :2] = mark.places(self._flat[s])
         self._holds = self._holds + step
-        return Stance(places, np.repeat(self._holds, 2, axis=1))
+        corners = np.repeat(self._holds, 2, axis=1)
+        return Stance(places, np.repeat(corners[..., None], 3, axis=2))
 
 
 class Footprint:

@@ -42,8 +42,8 @@ class Targets:
     """Over frames, floor at z = 0: `world`, the rig's joints' rotations (`q_world_joint`); `chest`,
     that of the topmost part of the trunk; `hips`, the path of the hips' middle [m]; `bones`, unit
     directions by the role at a segment's upper end; `contacts`, whether heel and toe of each of the
-    robot's soles stand; `feet`, the paths of the source's heels and toes over the floor [m];
-    `hands`, from the right hand to the left [m].
+    robot's soles stand, and `touches`, whether they do for a moment; `feet`, the paths of the
+    source's heels and toes over the floor [m]; `hands`, from the right hand to the left [m].
     """
 
     frame_time: float
@@ -52,6 +52,7 @@ class Targets:
     hips: Float[np.ndarray, "T 3"]
     bones: dict[Role, Float[np.ndarray, "T 3"]]
     contacts: Bool[np.ndarray, "T S 2"]
+    touches: Bool[np.ndarray, "T S 2"]
     feet: Float[np.ndarray, "T S 2 2"]
     hands: Float[np.ndarray, "T 3"] | None
     notes: tuple[str, ...]
@@ -73,6 +74,7 @@ class Targets:
             hips=self.hips[frames],
             bones={role: bone[frames] for role, bone in self.bones.items()},
             contacts=self.contacts[frames],
+            touches=self.touches[frames],
             feet=self.feet[frames],
             hands=None if self.hands is None else self.hands[frames],
         )
@@ -86,13 +88,15 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
     own_chest = chest_of(robot.rig)
     paths = feet_of(source, positions, robot)
     scale = robot.rig.hip_height / rig.hip_height
+    touches = _touches(source, paths)
     return Targets(
         frame_time=source.frame_time,
         world=quat_mul(moved.rotations, robot.rig.tpose),
         chest=quat_mul(source.rotations[:, chest_of(rig)], robot.rig.tpose[own_chest]),
         hips=moved.hips - np.array([0.0, 0.0, moved.floor_z]),
         bones=bone_directions(rig, positions, source.rotations),
-        contacts=_contacts(source, paths),
+        contacts=_without_flicker(touches, max(1, round(_GAP / source.frame_time))),
+        touches=touches,
         feet=scale * paths[..., :2],
         hands=_between_hands(rig, positions, robot),
         notes=moved.notes,
@@ -148,14 +152,14 @@ def side_of(robot: Morphology, sole: Sole) -> Side:
     return "left" if robot.rig.roles.roles[sole.foot] is Role.LEFT_FOOT else "right"
 
 
-def _contacts(
+def _touches(
     source: CanonicalMotion, paths: Float[np.ndarray, "T S 2 3"]
 ) -> Bool[np.ndarray, "T S 2"]:
-    """Whether heels and toes stand."""
+    """Whether heels and toes stand, be it for a frame."""
     stands = np.zeros(paths.shape[:-1], dtype=bool)
     for s in np.flatnonzero(paths.any(axis=(0, 2, 3))).tolist():
         stands[:, s] = planted_points(paths[:, s], source.frame_time, standing_height(source.rig))
-    return _without_flicker(stands, max(1, round(_GAP / source.frame_time)))
+    return stands
 
 
 def _without_flicker(mask: Bool[np.ndarray, "T S 2"], frames: int) -> Bool[np.ndarray, "T S 2"]:

@@ -13,7 +13,7 @@ from robots.stream_targets import FrameTargets
 from robots.ties import smoothness
 from robots.window_terms import Posture, Stance, Terms
 
-SMOOTH = 7.0  # [Hz] above which a motion fades: more than in hindsight, or it would lag behind
+SMOOTH = 5.5  # [Hz] above which a motion fades: more than in hindsight, or it would lag behind
 _DAMPING = 1e-3
 _CAREFUL = 0.02  # where nothing else keeps steps small
 _IMMOVABLE = 1e8

@@ -33,7 +33,7 @@ class Stance:
     """For each corner of each sole: where it should stand [m], and how firmly (0 to 1)."""
 
     places: Float[np.ndarray, "S 4 3"]
-    holds: Float[np.ndarray, "S 4"]
+    holds: Float[np.ndarray, "S 4 3"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,7 +201,7 @@ class Terms:
     ) -> None:
         """Corners stand where they should, and none is below the floor."""
         count = 4 * len(self.robot.soles)
-        firm = (objective.STAND * stance.holds.reshape(-1, 1)) ** 2
+        firm = (objective.STAND * stance.holds.reshape(-1, 3)) ** 2
         weights[:, :count] = firm
         forces[:, :count] = firm * (points[:, :count] - stance.places.reshape(-1, 3))
         depth, slope = one_sided(-points[:, :count, 2], objective.SINK_EASE)

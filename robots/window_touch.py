@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from robots.collision import EASE, Pair
+from robots.collision import EASE
+from robots.hulls import Pair
 from robots.morphology import Morphology
 from robots.objective import TOUCH, TOUCH_LEGS
 from robots.shapes import DIRECTIONS

@@ -179,7 +179,7 @@ def test_arms_in_the_body_are_led_out_and_the_rest_stays(
     arms = stages_of(ember)[1]
     targets = targets_of(walk, ember)
     q, footing = walked.coordinates, plan_footing(ember, targets)
-    assert not wrong_in(ember, targets, q, arms).any()
+    assert not wrong_in(ember, targets, q, arms, 1).any()
     middle = len(q) // 2
     shoulder = ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)]
     angles = q.angles.copy()
@@ -191,12 +191,12 @@ def test_arms_in_the_body_are_led_out_and_the_rest_stays(
             tried = angles.copy()
             tried[:, j] += sign * 0.7 * bump
             pushed = Coordinates(q.pos, q.quat, tried).clipped(ember.tree, 0.02)
-            sides.append((wrong_in(ember, targets, pushed, arms)[middle], pushed))
+            sides.append((wrong_in(ember, targets, pushed, arms, 1)[middle], pushed))
     into = [pushed for wrong, pushed in sides if wrong]
     assert into
     for pushed in into:
         mended = mend(ember, targets, footing, pushed, arms)
-        assert not wrong_in(ember, targets, mended, arms).any()
+        assert not wrong_in(ember, targets, mended, arms, 1).any()
         np.testing.assert_array_equal(mended.angles[: middle - 50], pushed.angles[: middle - 50])
 
 

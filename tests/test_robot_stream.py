@@ -110,7 +110,7 @@ def test_the_objective_is_that_of_whole_clips() -> None:
         one = slice(t, t + 1)
         stance = Stance(
             np.stack([foot.places[..., t] for foot in footing]),
-            np.stack([foot.holds[:, t] for foot in footing]),
+            np.stack([foot.holds[..., t] for foot in footing]),
         )
         here = FrameTargets(*(getattr(seen, name)[one] for name in FrameTargets.__annotations__))
         qpos = EMBER.to_qpos(q.at(one))

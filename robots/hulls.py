@@ -1,0 +1,134 @@
+"""The shapes of a robot that can meet, each told in two ways.
+
+Of two shapes, the one is spheres along its length, the other a polytope of 26 sides around it (a
+k-DOP: Klosowski et al. 1998): the signed distance to one is a matrix product and a maximum.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from robots.mjcf import Mjcf
+from robots.shapes import DIRECTIONS, surface_of
+
+_MOST_SPHERES = 6  # along a shape
+_ALL_SPHERES = 24
+_CORNER, _OUTSTANDING = 0.008, 0.006  # [m]
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A shape that link `link` moves, in the rest pose's world [m]: inside all half-spaces
+    `sides . x <= reach`, roughly covered by spheres, all of it within `bound` of `center`."""
+
+    link: int
+    body: int
+    geom: int
+    reach: Float[np.ndarray, "26"]
+    spheres: Float[np.ndarray, "S 3"]
+    radii: Float[np.ndarray, "S"]
+    center: Float[np.ndarray, "3"]
+    bound: float
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two shapes, and how near [m] they may come."""
+
+    small: Shape
+    large: Shape
+    apart: float
+
+
+def shapes_of(mjcf: Mjcf, joints: Sequence[int]) -> list[Shape]:
+    """The shapes of a model that collide with anything."""
+    model = mjcf.model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    links = {mjcf.root: -1}
+    for i, joint in enumerate(joints):
+        links[int(model.jnt_bodyid[joint])] = i
+    shapes = []
+    for body in mjcf.bodies():
+        if body not in links:
+            links[body] = links[int(model.body_parentid[body])]
+        start = int(model.body_geomadr[body])
+        for geom in range(start, start + int(model.body_geomnum[body])):
+            if not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
+                continue
+            points = surface_of(model, data, geom)
+            if len(points):
+                shapes.append(_shape(links[body], body, geom, points))
+    return shapes
+
+
+def _shape(link: int, body: int, geom: int, points: Float[np.ndarray, "P 3"]) -> Shape:
+    middle = (points.max(0) + points.min(0)) / 2
+    axes = np.linalg.eigh(np.cov((points - middle).T) + 1e-12 * np.eye(3))[1]
+    inside = (points - middle) @ axes
+    low, high = inside.min(0), inside.max(0)
+    center = middle + axes @ ((low + high) / 2)
+    half = (high - low) / 2
+    order = np.argsort(half)
+    thin, middle_half, long_half = half[order]
+    # A rod is a row of spheres, a plate a grid of them.
+    radius = float((thin + middle_half) / 2 if middle_half < 1.3 * thin else thin)
+    grids = []
+    for reach, most in ((middle_half, 3), (long_half, _MOST_SPHERES)):
+        spare = max(float(reach) - radius, 0.0)
+        count = int(np.clip(np.ceil(spare / max(radius, 1e-3)) + 1, 1, most))
+        grids.append(np.linspace(-spare, spare, count) if count > 1 else np.zeros(1))
+    across, along = (grid.ravel() for grid in np.meshgrid(*grids))
+    spheres = center + np.outer(across, axes[:, order[1]]) + np.outer(along, axes[:, order[2]])
+    reach = (DIRECTIONS @ points.T).max(1)
+    spheres, radii = _with_corners(spheres, np.full(len(spheres), radius), points, reach)
+    return Shape(
+        link=link,
+        body=body,
+        geom=geom,
+        reach=reach,
+        spheres=spheres,
+        radii=radii,
+        center=center,
+        bound=float(np.linalg.norm(half)),
+    )
+
+
+def _with_corners(
+    spheres: Float[np.ndarray, "S 3"],
+    radii: Float[np.ndarray, "S"],
+    points: Float[np.ndarray, "P 3"],
+    reach: Float[np.ndarray, "26"],
+) -> tuple[Float[np.ndarray, "R 3"], Float[np.ndarray, "R"]]:
+    """With small spheres where the shape stands out from the ones that it has."""
+    while len(spheres) < _ALL_SPHERES:
+        short = reach - ((DIRECTIONS @ spheres.T) + radii).max(1)
+        side = int(short.argmax())
+        if short[side] < _OUTSTANDING:
+            break
+        corner = points[int((points @ DIRECTIONS[side]).argmax())]
+        spheres = np.concatenate([spheres, [corner - _CORNER * DIRECTIONS[side]]])
+        radii = np.append(radii, _CORNER)
+    return spheres, radii
+
+
+def meet(mjcf: Mjcf, a: Shape, b: Shape) -> bool:
+    """Whether MuJoCo would let the two shapes collide."""
+    model = mjcf.model
+    if a.link == b.link:
+        return False
+    weld = model.body_weldid
+    wa, wb = int(weld[a.body]), int(weld[b.body])
+    parents = {int(weld[model.body_parentid[wa]]), int(weld[model.body_parentid[wb]])}
+    if wa in parents or wb in parents:
+        return False
+    ids = sorted((a.body, b.body))
+    if (ids[0] << 16) + ids[1] in set(model.exclude_signature.tolist()):
+        return False
+    return bool(
+        model.geom_contype[a.geom] & model.geom_conaffinity[b.geom]
+        or model.geom_contype[b.geom] & model.geom_conaffinity[a.geom]
+    )
