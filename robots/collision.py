@@ -17,9 +17,9 @@ from robots.stage import Stage
 from robots.terms import one_sided
 from robots.tree import Coordinates, Frames, Tree, forward
 
-APART = 0.002  # [m] that shapes keep between them; less where the T-pose has less
+APART = 0.0  # [m] that shapes keep between them; less where the T-pose has less
 EASE = 0.003  # [m]
-_NEAR = 0.03  # [m] within which shapes are watched
+NEAR = 0.02  # [m] within which shapes are watched
 _PAIRS = len(DIRECTIONS) // 2  # a direction and the one against it, as many from the end
 
 
@@ -46,10 +46,10 @@ class Collisions:
     pairs: tuple[Pair, ...]
     _known: dict[Stage, dict[Shape, list[Watched]]] = field(default_factory=dict)
 
-    def near(self, frames: Frames, stage: Stage, stride: int) -> list[Near]:
-        """The pairs that the stage moves against each other, where they are near; looked for in
-        every `stride`-th frame and the last. Parts that a later stage moves have to give way in
-        that one."""
+    def near(self, frames: Frames, stage: Stage, stride: int, within: float = NEAR) -> list[Near]:
+        """The pairs that the stage moves against each other, where they are `within` so much [m];
+        looked for in every `stride`-th frame and the last. Parts that a later stage moves have to
+        give way in that one."""
         count = frames.places.shape[2]
         looks = np.unique(np.append(np.arange(0, count, stride), count - 1))
         some = frames.at(looks)
@@ -65,7 +65,7 @@ class Collisions:
             moved = np.zeros_like(far)
             moved[:, :-1] = step
             moved[:, 1:] = np.maximum(moved[:, 1:], step)
-            reach = small.bound + _NEAR + moved + [[pair.apart] for pair, _ in watched]
+            reach = small.bound + within + moved + [[pair.apart] for pair, _ in watched]
             close = far < reach + [[pair.large.bound] for pair, _ in watched]
             for k in np.flatnonzero(close.any(1)).tolist():
                 pair, moves = watched[k]
@@ -75,7 +75,7 @@ class Collisions:
                 if not len(at):
                     continue
                 over = _distance(self.tree, some, pair, small.spheres, at)
-                near = over - small.radii[:, None] < pair.apart + _NEAR + moved[k, at]
+                near = over - small.radii[:, None] < pair.apart + within + moved[k, at]
                 if near.any():
                     around = looks[at[near.any(0)], None] + np.arange(-stride, stride + 1)
                     frames_near = np.unique(np.clip(around, 0, count - 1))

@@ -6,7 +6,6 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
-from robots.collision import Near
 from robots.footing import Footing
 from robots.morphology import Morphology
 from robots.normal import Normal, Ties
@@ -17,11 +16,13 @@ from robots.ties import jolted, ties_of
 from robots.tree import Coordinates, forward
 
 _AROUND = 0.15  # [s] before and after a frame in which a step must not do harm
-_HALVINGS = 5  # of a step, when mending
-_PATIENCE = 3  # steps without progress, while many frames refuse them
+_WIDE, _GIVEN = 0.5, 0.5  # [s] around it, and of what is gained there a frame may lose so much
+_HALVINGS = 6  # of a step, when mending
+_PATIENCE = 2  # steps without progress, while many frames refuse them
+_WATCH = 5  # steps from one look for collisions to the next
 _LONGEST = 1.0  # [rad, m] a column moves in a step
-_LOOK = 0.06  # [s] from one look for collisions to the next
-_DAMPING, _IMMOVABLE = 1e-3, 1e8
+_LOOK = 0.06  # [s] between the frames that are looked at for collisions
+_DAMPING, _CAREFUL, _IMMOVABLE = 1e-3, 0.1, 1e8
 SHORT_OF_LIMIT = np.radians(0.75)
 
 
@@ -58,57 +59,64 @@ def solve_stage(
     smoother than `q`. When `mending`, steps are judged as a whole and halved until they do no harm.
 
     A step is judged where it is taken: frames whose surroundings get worse keep their place, and
-    are damped more from then on (Levenberg and Marquardt's rule, a frame).
+    are damped more from then on (Levenberg and Marquardt's rule, a frame). Where some stay and
+    others go, the normal equations are mixed alike: between two points of a parabola that is exact.
     """
     tree = robot.tree
     window = max(1, 2 * round(_AROUND / targets.frame_time) + 1)
+    wide = max(1, 2 * round(_WIDE / targets.frame_time) + 1)
     firm, least = np.ones(len(q)), np.full(len(q), _DAMPING)
     if mending:
         firm, least = mending.firm, np.where(mending.fixed, _IMMOVABLE, _DAMPING)
     damping = least
     start = q if apart else None
-    nears: list[Near] = []
+    stride = 1 if mending else stride_of(targets)
+    nears = robot.collisions.near(forward(tree, q), stage, stride) if apart else []
     stiffer = np.ones((max(len(q) - 2, 0), len(stage.columns)))
 
-    def look(q: Coordinates, rows: bool) -> tuple[Normal, Ties, Float[np.ndarray, "T"]]:
+    def look(q: Coordinates, rows: bool = True) -> Normal:
         exact = mending is not None
-        normal = linearize(robot, targets, footing, q, stage, nears, firm, rows=rows, exact=exact)
-        ties = ties_of(robot, q, start, targets.frame_time, stage.columns, stiffer, firm)
-        return normal, ties, uniform_filter1d(normal.cost + ties.cost(len(q)), window)
+        return linearize(robot, targets, footing, q, stage, nears, firm, rows=rows, exact=exact)
 
-    last, idle = np.inf, 0
+    def tie(q: Coordinates) -> Ties:
+        return ties_of(robot, q, start, targets.frame_time, stage.columns, stiffer, firm)
+
+    normal, idle = look(q), 0
     for k in range(most):
-        if apart and k % 3 == 0:
-            stride = 1 if mending else stride_of(targets)
-            nears = robot.collisions.near(forward(tree, q), stage, stride)
         stiffer = np.maximum(stiffer, jolted(robot, q, targets.frame_time)[:, stage.columns])
-        normal, ties, cost = look(q, rows=True)
+        ties = tie(q)
+        cost = uniform_filter1d(normal.cost + ties.cost(len(q)), window)
         limits = q.at_limits(tree, SHORT_OF_LIMIT)[:, stage.columns]
         step = np.zeros((len(q), tree.size))
         step[:, stage.columns] = normal.solve_together(ties, damping, limits)
         long = np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(1), 1e-9))
         step *= eased(long, window)[:, None]
-        trial = q.moved(tree, step).clipped(tree, SHORT_OF_LIMIT)
-        after = look(trial, rows=False)[2]
+        share = np.ones(len(q))
+        for _ in range(_HALVINGS if mending else 1):
+            trial = q.moved(tree, step).clipped(tree, SHORT_OF_LIMIT)
+            if apart and k % _WATCH == _WATCH - 1:
+                nears = robot.collisions.near(forward(tree, trial), stage, stride)
+            there = look(trial, rows=k < most - 1)
+            after = uniform_filter1d(there.cost + tie(trial).cost(len(q)), window)
+            if not mending or after.sum() <= cost.sum():
+                break
+            step *= 0.5
         if mending:
-            for _ in range(_HALVINGS):
-                if after.sum() <= cost.sum():
-                    break
-                step *= 0.5
-                trial = q.moved(tree, step).clipped(tree, SHORT_OF_LIMIT)
-                after = look(trial, rows=False)[2]
             worse = np.full(len(q), after.sum() > cost.sum())
         else:
-            worse = after > cost * (1 + 1e-3) + 1e-9
-        damping = np.where(worse, damping * 10, np.maximum(damping / 5, least))
+            gained = np.maximum(uniform_filter1d(cost - after, wide), 0.0)
+            worse = after > cost * (1 + 1e-3) + _GIVEN * gained + 1e-9
+        damping = np.where(worse, np.maximum(damping * 10, _CAREFUL), damping / 10)
+        damping = np.maximum(damping, least)
         if worse.any():
-            step *= eased(1.0 - worse, window)[:, None]
-            trial = q.moved(tree, step).clipped(tree, SHORT_OF_LIMIT)
-        q = trial
-        idle = idle + 1 if cost.sum() > (1 - little) * last else 0
+            share = eased(1.0 - worse, window)
+            trial = q.moved(tree, step * share[:, None]).clipped(tree, SHORT_OF_LIMIT)
+            there = normal.mixed(there, share) if there.rows else there
+        q, normal = trial, there
+        left = (cost + share * (after - cost)).sum()
+        idle = idle + 1 if left > (1 - little) * cost.sum() else 0
         if idle > (_PATIENCE if worse.mean() > refused else 0):
             break
-        last = float(cost.sum())
     return q
 
 

@@ -25,7 +25,8 @@ _LED = 3  # rounds after which arms are led out of what they are stuck in
 _STEPS, _LITTLE = 12, 0.01  # of each round
 _AROUND = 0.4  # [s] before and after a frame in which it may be made good
 _JOLTED = 5.0  # times as much as makes hinges stiffer
-_DEEP, _SUNK, _HASTE = 0.008, 0.006, 0.5  # [m] of what parts keep between them; [m]; [rad/s]
+_CLOSE = 0.01  # [m] by the quick measure, where the exact one is asked
+_DEEP, _SUNK, _HASTE = 0.006, 0.006, 0.5  # [m] of what parts keep between them; [m]; [rad/s]
 
 
 def mend(
@@ -120,7 +121,7 @@ def wrong_in(
     """The frames in which parts that a stage moves are where, or as fast as, they must not be;
     collisions are looked for in every `stride`-th and, near these, in all."""
     frames = forward(robot.tree, q)
-    nears = robot.collisions.near(frames, stage, stride)
+    nears = robot.collisions.near(frames, stage, stride, _CLOSE)
     wrong = robot.contacts.depth(robot.to_qpos(q), nears) > _DEEP
     fast = np.abs(rush(robot, q, targets.frame_time)[:, stage.columns]).max(1, initial=0.0)
     wrong[1:] |= fast > _HASTE * targets.frame_time

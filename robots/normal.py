@@ -68,6 +68,14 @@ class Normal:
             self.H[:, at, at] += rows**2
             self.g += rows * residuals
 
+    def mixed(self, other: "Normal", share: Float[np.ndarray, "T"]) -> "Normal":
+        """So much of other ones, a frame, and the rest of these."""
+        out = Normal(0, 0)
+        out.H = self.H + share[:, None, None] * (other.H - self.H)
+        out.g = self.g + share[:, None] * (other.g - self.g)
+        out.cost = self.cost + share * (other.cost - self.cost)
+        return out
+
     def pin(self, pinned: Bool[np.ndarray, "T D"]) -> None:
         """Keep some columns from moving."""
         free = np.where(pinned, 0.0, 1.0)

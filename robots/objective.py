@@ -35,12 +35,13 @@ PATH = np.array([1.5, 1.5, 1.5])  # of the hips [1 / m]
 STAND = np.array([25.0, 25.0, 20.0])  # of a sole's corner [1 / m]
 SINK, SINK_EASE = 80.0, 0.004  # of a sole's corner below the floor [1 / m]; [m]
 LIMIT, MARGIN = 8.0, np.radians(2.0)  # of a hinge near its limit
-CLAP, NEAR = 24.0, 0.12  # of hands [1 / m] that are as near as this [m]
+CLAP, NEAR = 20.0, 0.12  # of hands [1 / m] that are as near as this [m]
 TOUCH, TOUCH_LEGS = 75.0, 90.0  # of parts that run into each other [1 / m]
 IDLE = 0.02  # of hinges that nothing else asks for: stay as in the T-pose
-SMOOTH = 3.4  # [Hz] above which a limb's motion fades
+SMOOTH = 3.3  # [Hz] above which a limb's motion fades
+ANKLE = 0.5  # of how the accelerations of other hinges weigh, those of ankles do
 CALM = 2.2  # [Hz] above which a limb that gives way to another does not
-JOLT = 500.0  # [rad/s³], RMS, above which a hinge is smoothed the more
+JOLT = 450.0  # [rad/s³], RMS, above which a hinge is smoothed the more
 FAST, RUSH = 12.0, 0.5  # [rad/s] above which a hinge is held back, and how much [s]
 
 

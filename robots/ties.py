@@ -6,8 +6,9 @@ from scipy.ndimage import uniform_filter1d
 
 from robots.morphology import Morphology
 from robots.normal import Ties, second_differences
-from robots.objective import CALM, FAST, JOLT, PATH, RUSH, SMOOTH
+from robots.objective import ANKLE, CALM, FAST, JOLT, PATH, RUSH, SMOOTH
 from robots.tree import Coordinates
+from spark.roles import Role
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 
 _AROUND = 0.15  # [s] before and after a jolt that are smoothed with it
@@ -69,9 +70,16 @@ def unhurried(robot: Morphology, q: Coordinates, frame_time: float) -> Coordinat
 
 
 def smoothness(robot: Morphology) -> Float[np.ndarray, "D"]:
-    """How accelerations weigh [s²], so that what is faster than `SMOOTH` fades."""
+    """How accelerations weigh [s²], so that what is faster than `SMOOTH` fades; those of what turns
+    a foot alone less, since that is wished for less firmly than the direction of a limb."""
     weights = np.full(robot.tree.size, 1.0 / (2 * np.pi * SMOOTH) ** 2)
     weights[:3] *= PATH
+    roles, tree = robot.rig.roles, robot.tree
+    for side in ("left", "right"):
+        shank, foot = (roles.require(Role(f"{side}_{part}")) for part in ("lower_leg", "foot"))
+        above = tree.chain(int(robot.links[shank]))
+        alone = tuple(j for j in tree.chain(int(robot.links[foot])) if j not in above)
+        weights[tree.columns(alone)] *= ANKLE
     return weights
 
 
