@@ -17,9 +17,9 @@ SMOOTH = 5.5  # [Hz] above which a motion fades: more than in hindsight, or it w
 _DAMPING = 1e-3
 _CAREFUL = 0.02  # where nothing else keeps steps small
 _IMMOVABLE = 1e8
-_LONGEST = 0.5  # [rad, m] a column moves in one step
+_LONGEST = 0.2  # [rad, m] a column moves in one step
 _STEPS = 2  # at most,
-_SHORT = 0.15  # [rad, m] and none after one that is shorter
+_SHORT = 0.1  # [rad, m] and none after one that is shorter
 
 
 class Window:
