@@ -15,6 +15,7 @@ from torch import Tensor
 
 from spark.config import Config
 from spark.files import write_atomically
+from spark.known_bodies import Trunk
 from spark.model import Spark
 from spark.names import NameConfig, NameEncoder
 from spark.weights import FORMAT, VERSION, Tensors, read_weights
@@ -24,14 +25,16 @@ from spark.weights import FORMAT, VERSION, Tensors, read_weights
 class Checkpoint:
     """A network, the encoder of its joint names and where its training stands.
 
-    `names` is our own encoder, or the directory or hub name of a T5. `optimizer` holds the
-    optimiser's state by `<parameter>/<key>`; empty where training cannot be resumed.
+    `names` is our own encoder, or the directory or hub name of a T5. `bodies` are those that it was
+    trained on. `optimizer` holds the optimiser's state by `<parameter>/<key>`; empty where training
+    cannot be resumed.
     """
 
     model: Spark
     names: NameEncoder | str
     step: int = 0
     settings: dict[str, Any] = field(default_factory=dict)
+    bodies: list[Trunk] = field(default_factory=list)
     optimizer: dict[str, Tensor] = field(default_factory=dict)
 
 
@@ -42,6 +45,7 @@ def save_checkpoint(checkpoint: Checkpoint, path: Path) -> None:
         "network": asdict(checkpoint.model.config),
         "step": checkpoint.step,
         "settings": checkpoint.settings,
+        "bodies": checkpoint.bodies,
     }
     if isinstance(checkpoint.names, NameEncoder):
         tensors |= {f"names.{k}": v for k, v in checkpoint.names.state_dict().items()}
@@ -70,7 +74,7 @@ def load_checkpoint(path: Path) -> Checkpoint:
     except (TypeError, ValueError, RuntimeError) as error:
         raise weights.damaged(error) from error
     optimizer = _tensors(weights.below("optimizer."))
-    return Checkpoint(model, names, weights.step, weights.settings, optimizer)
+    return Checkpoint(model, names, weights.step, weights.settings, weights.bodies, optimizer)
 
 
 def optimizer_tensors(

@@ -50,10 +50,10 @@ class Config:
         """Corrects the analytic transfer's guesses: starts equal to it."""
         return cls(
             mask_joints=0.3,
-            drop_names=0.5,
+            drop_names=0.1,
             blur_bodies=0.1,
             residual=True,
-            shrink=0.5,
+            shrink=0.8,
             noise=False,
             shape_features=True,
             relative_time=True,

@@ -63,8 +63,10 @@ class Network:
         names: Names,
         start: Windows,
         guess: Int[np.ndarray, "J"],
+        share: float = 1.0,
     ) -> Windows:
-        """The motion that H describes, from the analytic transfer `start`: a residual network's.
+        """The motion that H describes, from the analytic transfer `start`: a residual network's,
+        of whose corrections a share is made.
 
         `guess` is `Correspondence.guess` in the network's numbering."""
         joints = np.flatnonzero(guess == np.arange(len(guess)))
@@ -74,7 +76,7 @@ class Network:
         known = self._known(start.body, names) + self._places(start.body)
         y = known[joints] + self.layers["decoder.query"] + self.layers.linear("decoder.start", seen)
         sixd = self.layers.linear("decoder.rotation", self._read(y, latent))
-        turns = self.config.shrink * RESIDUAL_SCALE * sixd.astype(np.float64)
+        turns = share * self.config.shrink * RESIDUAL_SCALE * sixd.astype(np.float64)
         return _corrected(start, turns, joints, guess)
 
     def decode(

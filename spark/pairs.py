@@ -1,4 +1,4 @@
-"""Training pairs with exact answers: one motion on two random skeletons, made while training runs.
+"""Training pairs with exact answers: one motion on two skeletons, made while training runs.
 
 A clip is kept on its own skeleton in canonical form. For a batch, windows of it are put onto two
 random variants of that skeleton; on both, the feet are planted again where the recording's feet
@@ -74,9 +74,10 @@ class PairMaker:
     Making a skeleton costs as much as using it many times, so each body has a fixed set of
     `variants`, made when they are first met: itself, itself with joints split as in SAN, and random
     ones. With `distinct`, no two of them have a motion in common as a source (the paper's training
-    set); without, any of them may perform any of the body's clips. With `varied`, half of the draws
-    are seen in a mirror, half are slowed down or sped up by up to a third, and bodies are drawn
-    again where the analytic transfer has nothing to guess: there is nothing to learn there.
+    set); without, any of them may perform any of the body's clips. With `varied`, the target is the
+    body itself under its own names, as real targets are; half of the draws are seen in a mirror,
+    half are slowed down or sped up by up to a third, and sources are drawn again where the analytic
+    transfer has nothing to guess: there is nothing to learn there.
 
     Bodies are drawn by how much they turn, but the more of one there is the less each counts: what
     is to be learned differs between people more than within one.
@@ -158,6 +159,8 @@ class PairMaker:
         mirrored = self.varied and bool(rng.random() < 0.5)
         for _ in range(_TRIES if self.varied else 1):
             performer, receiver = rng.integers(self.variants, size=2).tolist()
+            if self.varied:
+                receiver = 0
             if self.distinct:
                 performer %= min(self.variants, len(clips))
             source, target = (self._stage(k, mirrored, number) for number in (performer, receiver))

@@ -17,6 +17,7 @@ from spark.canonical import CanonicalMotion
 from spark.clips import FRAME_TIME, at_frame_time
 from spark.errors import DependencyError, name_list
 from spark.features import BodyFeatures, body_features, canonical_from_features, pose_features
+from spark.known_bodies import nearness
 from spark.name_network import NameNetwork
 from spark.network import Network
 from spark.pairs import Windows
@@ -37,6 +38,7 @@ class Learned:
             self.network = Network(weights)
             self._encode = _names_of(weights)
             self.window = int(weights.settings.get("window", 64))
+            self.bodies = weights.bodies
         except (KeyError, TypeError, ValueError) as error:
             raise weights.damaged(error) from error
 
@@ -46,21 +48,27 @@ class Learned:
         """`source`'s motion on `target`; any length, 1 frame too.
 
         `window` [frames at 30 fps] is the training's where it is not given. Where the transfer has
-        nothing to guess, what corrects its guesses leaves it as it is.
+        nothing to guess, or the network has met no body like the target, what corrects guesses
+        leaves them as they are; less is corrected the less they are alike.
         """
         start = transfer(source, target)
         bodies = body_features(source.rig), body_features(target)
         guess = guesses(source.rig, bodies[1])
-        if self.network.config.residual and not (guess >= 0).any():
-            return start
+        share = 1.0
         if self.network.config.residual:
+            if not (guess >= 0).any():
+                return start
             names = [
                 target.skeleton.names[bodies[1].joints[j]] for j in np.unique(guess[guess >= 0])
             ]
-            note = f"no counterpart in the source: {name_list(names)}; the network fills them in"
+            share = nearness(bodies[1], self.bodies)
+            who = "the network fills them in" if share else "interpolated, or following"
+            note = f"no counterpart in the source: {name_list(names)}; {who}"
             start = replace(start, notes=(*start.notes, note))
+            if not share:
+                return start
         slow_source, slow_start = (at_frame_time(c, FRAME_TIME) for c in (source, start))
-        slow = self._blended(slow_source, slow_start, bodies, guess, window or self.window)
+        slow = self._blended(slow_source, slow_start, bodies, guess, share, window or self.window)
         if slow_start is start:
             return slow
         turned = quat_mul(slow.rotations, quat_conj(slow_start.rotations))
@@ -77,6 +85,7 @@ class Learned:
         start: CanonicalMotion,
         bodies: tuple[BodyFeatures, BodyFeatures],
         guess: Int[np.ndarray, "J"],
+        share: float,
         window: int,
     ) -> CanonicalMotion:
         """The windows' answers laid over one another; quaternions are averaged as vectors."""
@@ -90,7 +99,7 @@ class Learned:
             spans = [slice(at, at + size) for at in firsts[k : k + _AT_A_TIME]]
             given = [_cut(source, span) for span in spans]
             copied = [_cut(start, span) for span in spans]
-            answers = self._answers(given, copied, bodies, guess)
+            answers = self._answers(given, copied, bodies, guess, share)
             for span, answer in zip(spans, answers, strict=True):
                 same = np.sign((answer.rotations * start.rotations[span]).sum(-1, keepdims=True))
                 rotations[span] += (
@@ -106,6 +115,7 @@ class Learned:
         starts: list[CanonicalMotion],
         bodies: tuple[BodyFeatures, BodyFeatures],
         guess: Int[np.ndarray, "J"],
+        share: float,
     ) -> list[CanonicalMotion]:
         """What the network makes of windows of one length."""
         given, asked = bodies
@@ -116,7 +126,7 @@ class Learned:
         )
         latent = self.network.encode(_windows(given, read), known)
         if self.network.config.residual:
-            out = self.network.correct(latent, wanted, _windows(asked, copied), guess)
+            out = self.network.correct(latent, wanted, _windows(asked, copied), guess, share)
         else:
             out = self.network.decode(latent, wanted, asked)
         return [

@@ -32,6 +32,7 @@ from spark.checkpoint import (
     save_checkpoint,
 )
 from spark.config import Config
+from spark.known_bodies import distinct
 from spark.memory import keep_freed_memory
 from spark.model import Spark
 from spark.name_file import load_names
@@ -199,6 +200,7 @@ def train(
     if device.type == "cuda":
         runner = torch.compile(runner, dynamic=True)  # type: ignore[assignment]
     steps = Steps(clips, name_vectors(start.names), config, rank, world)
+    bodies = distinct(clip.body for clip in clips)
     checkpoint = start
     model.train()
     began = perf_counter()
@@ -217,9 +219,8 @@ def train(
                 log.flush()
                 watch(done, values)
             if done % config.save_every == 0 or done == config.steps:
-                checkpoint = Checkpoint(
-                    model, start.names, done, asdict(config), optimizer_tensors(optimiser, model)
-                )
+                state = optimizer_tensors(optimiser, model)
+                checkpoint = Checkpoint(model, start.names, done, asdict(config), bodies, state)
                 save_checkpoint(checkpoint, out / "checkpoint.safetensors")
     return checkpoint
 

@@ -91,7 +91,7 @@ def random_variant(
         convention = str(rng.choice([name for name in CONVENTIONS if name not in HELD_OUT]))
     nodes = _nodes(base)
     nodes = _drop(nodes, rng)
-    nodes = _split(nodes, rng)
+    nodes = _split(nodes, base.skeleton, rng)
     _scale(nodes, rng)
     return _finish(nodes, base, convention)
 
@@ -168,21 +168,33 @@ def _drop(nodes: list[_Node], rng: np.random.Generator) -> list[_Node]:
     return [node for node in nodes if not any(node is gone for gone in dropped)]
 
 
-def _split(nodes: list[_Node], rng: np.random.Generator) -> list[_Node]:
-    """Put a joint into the middle of bones. In the trunk it bends halfway, in a limb it follows."""
+def _split(nodes: list[_Node], base: Skeleton, rng: np.random.Generator) -> list[_Node]:
+    """Put a joint into the middle of bones. In the trunk it bends as the base does there, in a limb
+    it follows."""
     whole_kind = {kind: bool(rng.random() < p) for kind, p in _SPLIT.items()}
     out: list[_Node] = []
     for node in nodes:
         if node.parent is not None and whole_kind.get(node.kind, False):
             trunk = node.kind in ("spine", "neck")
             role = node.role if trunk else None
-            middle = _Node(node.parent, node.offset / 2, role, node.parent.first, node.first)
-            if trunk and not (node.parent.mix or node.mix):
-                middle.mix = 0.5
+            above = node.parent.first
+            turns = midway(base, above, node.first) if trunk else (above, above, 0.0)
+            middle = _Node(node.parent, node.offset / 2, role, *turns)
             node.parent, node.offset = middle, node.offset / 2
             out.append(middle)
         out.append(node)
     return out
+
+
+def midway(base: Skeleton, above: int, below: int) -> tuple[int, int, float]:
+    """Halfway from joint `above` to `below`: the two joints next to it, and how far it is from the
+    first to the second."""
+    path = base.ancestors(below)
+    chain = list(path[path.index(above) :: -1])
+    arc = np.cumsum([0.0, *np.linalg.norm(base.offsets[chain[1:]], axis=1)])
+    k = min(int(np.searchsorted(arc, arc[-1] / 2, side="right")), len(chain) - 1)
+    span = arc[k] - arc[k - 1]
+    return chain[k - 1], chain[k], float((arc[-1] / 2 - arc[k - 1]) / span) if span else 0.5
 
 
 def _scale(nodes: list[_Node], rng: np.random.Generator) -> None:

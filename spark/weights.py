@@ -15,9 +15,10 @@ from jaxtyping import Shaped
 from safetensors import SafetensorError, safe_open
 
 from spark.errors import FileFormatError
+from spark.known_bodies import Trunk
 
 FORMAT = "spark-sim checkpoint"
-VERSION = 2
+VERSION = 3
 SHIPPED = Path(__file__).parent / "shipped" / "spark.safetensors"
 
 Tensors = dict[str, Shaped[np.ndarray, "..."]]
@@ -26,13 +27,14 @@ Tensors = dict[str, Shaped[np.ndarray, "..."]]
 @dataclass(frozen=True, eq=False)
 class Weights:
     """A file's tensors and settings. `names` are the settings of our own encoder of names, or
-    `{"t5": ...}` with the directory or hub name of a T5."""
+    `{"t5": ...}` with the directory or hub name of a T5; `bodies` those that it was trained on."""
 
     path: Path
     network: dict[str, Any]
     names: dict[str, Any]
     step: int
     settings: dict[str, Any]
+    bodies: list[Trunk]
     tensors: Tensors
 
     def below(self, prefix: str) -> Tensors:
@@ -73,6 +75,8 @@ def read_weights(path: Path) -> Weights:
     try:
         header = json.loads(metadata["config"])
         network, names = dict(header["network"]), dict(header["names"])
-        return Weights(path, network, names, int(header["step"]), dict(header["settings"]), tensors)
-    except (KeyError, TypeError, ValueError) as error:
+        bodies = [{str(k): tuple(map(float, v)) for k, v in b.items()} for b in header["bodies"]]
+        settings = dict(header["settings"])
+        return Weights(path, network, names, int(header["step"]), settings, bodies, tensors)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise FileFormatError(path, None, f"is a damaged checkpoint ({error!r})") from error

@@ -11,8 +11,9 @@ from spark.names import NameEncoder
 from spark.pairs import Clip, PairMaker
 from spark.roles import Group
 from spark.sample import sample_motion, sample_rig
+from spark.skeleton import Skeleton
 from spark.staging import Stage, leg_of
-from spark.variants import random_variant, same_body
+from spark.variants import midway, random_variant, same_body
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +32,7 @@ def clips() -> list[Clip]:
 def test_draws_made_together_are_those_made_alone(clips: list[Clip]) -> None:
     maker = PairMaker(clips, window=16, variants=8, varied=True)
     together = maker.draws(range(6), 3)
-    assert len({len(draw.target.body.joints) for draw in together}) > 1
+    assert len({len(draw.source.body.joints) for draw in together}) > 1
     for n, draw in enumerate(together):
         alone = maker.draw(n, 3)
         for a, b in zip(draw[:3], alone[:3], strict=True):
@@ -78,3 +79,16 @@ def test_names_read_once_are_the_names_read_together(clips: list[Clip]) -> None:
     for clip in (*clips, *clips):
         names = same_body(clip.body).body.skeleton.names
         np.testing.assert_allclose(remembered(names), encoder.encode(names), atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "expected"),
+    [((1.0, 1.0, 2.0), (2, 3, 0.0)), ((1.0, 3.0), (1, 2, 1 / 3)), ((2.0,), (0, 1, 0.5))],
+)
+def test_a_joint_put_into_the_trunk_turns_as_the_base_does_there(
+    lengths: tuple[float, ...], expected: tuple[int, int, float]
+) -> None:
+    offsets = np.array([(0, 0, length) for length in (0.0, *lengths)])
+    joints = np.arange(len(offsets))
+    chain = Skeleton(tuple("abcd"[: len(joints)]), joints - 1, offsets, joints == 0)
+    assert midway(chain, 0, len(joints) - 1) == pytest.approx(expected)
