@@ -15,10 +15,11 @@ from robots.objective import linearize
 from robots.project import project
 from robots.registry import find
 from robots.solve import copy, retarget, stages_of
+from robots.stage import Stage
 from robots.targets import targets_of
 from robots.ties import jolted, unhurried
 from robots.tree import Coordinates, forward
-from scripts.robot_bars import COLUMNS, limb_error, measure
+from scripts.robot_bars import COLUMNS, limb_error, measure, misses
 from spark.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.kinematics import world_positions
 from spark.recording import read_recording
@@ -84,9 +85,10 @@ def clap(rig: Rig, apart: np.ndarray) -> CanonicalMotion:
     return CanonicalMotion(rig, 1 / 60, rotations, hips, 0.0)
 
 
+@pytest.mark.parametrize("exact", [False, True])
 @pytest.mark.parametrize("stage", [0, 1])
 def test_the_gradient_is_that_of_the_cost(
-    walk: CanonicalMotion, ember: Morphology, stage: int
+    walk: CanonicalMotion, ember: Morphology, stage: int, exact: bool
 ) -> None:
     source = part(walk, slice(0, 4))
     targets = targets_of(source, ember)
@@ -97,12 +99,21 @@ def test_the_gradient_is_that_of_the_cost(
     q = q.moved(tree, rng.normal(size=(4, tree.size)) * 0.05).clipped(tree, 0.05)
     which = stages_of(ember)[stage]
     nears = ember.collisions.near(forward(tree, q), which, 1)
-    normal = linearize(ember, targets, footing, q, which, nears)
+    normal = linearize(ember, targets, footing, q, which, nears, exact=exact)
     for k, column in enumerate(which.columns):
         step = np.zeros((4, tree.size))
         step[:, column] = 1e-6
         after, before = (
-            linearize(ember, targets, footing, q.moved(tree, s * step), which, nears, rows=False)
+            linearize(
+                ember,
+                targets,
+                footing,
+                q.moved(tree, s * step),
+                which,
+                nears,
+                rows=False,
+                exact=exact,
+            )
             for s in (1, -1)
         )
         slope = (after.cost - before.cost) / 2e-6
@@ -198,6 +209,63 @@ def test_arms_in_the_body_are_led_out_and_the_rest_stays(
         mended = mend(ember, targets, footing, pushed, arms)
         assert not wrong_in(ember, targets, mended, arms, 1).any()
         np.testing.assert_array_equal(mended.angles[: middle - 50], pushed.angles[: middle - 50])
+
+
+def test_what_is_measured_is_what_mujoco_finds(ember: Morphology) -> None:
+    """Arms swung at random: parts that are in each other, by MuJoCo's contacts."""
+    rng = np.random.default_rng(3)
+    count, tree, model = 60, ember.tree, ember.mjcf.model
+    lower, upper = np.maximum(tree.lower, -2.0), np.minimum(tree.upper, 2.0)
+    still = np.tile([1.0, 0, 0, 0], (count, 1))
+    angles = rng.uniform(lower, upper, (count, len(tree)))
+    q = Coordinates(np.zeros((count, 3)), still, angles)
+    whole = Stage(tree, tuple(range(len(tree))), True)
+    nears = ember.collisions.near(forward(tree, q), whole, 1)
+    qpos = ember.to_qpos(q)
+    depth = ember.contacts.depth(qpos, nears)
+    watched = {frozenset((p.small.geom, p.large.geom)) for p in ember.collisions.pairs}
+    data = mujoco.MjData(model)
+    found = np.full(count, -np.inf)
+    for t in range(count):
+        data.qpos[:] = qpos[t]
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_collision(model, data)
+        for contact in data.contact[: data.ncon]:
+            if frozenset(int(g) for g in contact.geom) in watched:
+                found[t] = max(found[t], -contact.dist)
+    deep = found > 0.005
+    assert deep.sum() > 10
+    np.testing.assert_allclose(depth[deep], found[deep], atol=2e-3)
+
+
+def test_feet_slide_but_stay_on_the_floor(walk: CanonicalMotion, ember: Morphology) -> None:
+    foot = plan_footing(ember, targets_of(walk, ember))[0]
+    sliding = foot.sliding()
+    np.testing.assert_array_equal(sliding.holds[:, 2], foot.holds[:, 2])
+    assert sliding.holds[:, :2].max() < 0.1 < foot.holds[:, :2].max()
+
+
+def test_what_passes_between_two_looks_is_seen(walked: RobotMotion, ember: Morphology) -> None:
+    """A hanging arm that swings through the body in six frames, looked at in the first and last."""
+    arms = stages_of(ember)[1]
+    tree, count = ember.tree, 7
+    angles = np.repeat(walked.coordinates.angles[:1], count, axis=0)
+    shoulder = int(ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)])
+    still = np.tile([1.0, 0, 0, 0], (count, 1))
+    base = np.zeros((count, 3))
+    passed = 0
+    for j in (j for j in tree.chain(shoulder) if j in arms.joints):
+        swung = angles.copy()
+        swung[:, j] += np.linspace(-0.8, 0.8, count)
+        q = Coordinates(base, still, swung).clipped(tree, 0.02)
+        frames, qpos = forward(tree, q), ember.to_qpos(q)
+        every, ends = (
+            ember.contacts.depth(qpos, ember.collisions.near(frames, arms, stride))
+            for stride in (1, count - 1)
+        )
+        passed += (every > 0.01).any()
+        np.testing.assert_allclose(ends[every > 0.01], every[every > 0.01])
+    assert passed
 
 
 def test_the_bars_hold_on_the_walk(walk: CanonicalMotion, walked: RobotMotion) -> None:
@@ -297,17 +365,17 @@ def between_hands(result: RobotMotion) -> np.ndarray:
 
 
 @pytest.mark.parametrize("robot", ["unitree_g1", "unitree_h1", "booster_t1"])
-@pytest.mark.parametrize("clip", ["cmu_asf/cmu_02_01.bvh", "animateddrawings/jumping.bvh"])
+@pytest.mark.parametrize(
+    "clip",
+    [
+        "cmu_asf/cmu_02_01.bvh",
+        "animateddrawings/jumping.bvh",
+        "animateddrawings/dab.bvh",
+    ],
+)
 def test_the_bars_hold_on_real_clips(robot: str, clip: str) -> None:
     motion = read_recording(recording(clip)).motion
     source = to_canonical(motion, understand(motion))
     result = retarget(source, load_robot(find(robot)).on_robot.robot)
-    row = dict(zip(COLUMNS, measure(source, result, collisions=True), strict=False))
-    assert row["sunk %"] <= 1
-    assert row["float %"] <= 1.5
-    assert row["skate"] <= 4
-    assert row["limbs"] <= 6
-    assert row["limit %"] <= 4
-    assert row["rad/s"] <= 15
-    assert row["jerk"] <= 400
-    assert row["self %"] <= 0.2
+    row = [*measure(source, result, collisions=True), 0.0]  # speed has its own bench
+    assert not misses(row, dance="dab" in clip)
