@@ -58,9 +58,10 @@ def solve_stage(
     With `apart`, parts that run into each other give way, without haste: what changes `q` is
     smoother than `q`. When `mending`, steps are judged as a whole and halved until they do no harm.
 
-    A step is judged where it is taken: frames whose surroundings get worse keep their place, and
-    are damped more from then on (Levenberg and Marquardt's rule, a frame). Where some stay and
-    others go, the normal equations are mixed alike: between two points of a parabola that is exact.
+    A step is judged where it is taken: frames that get worse, with what is around them, by more
+    than a share of what is gained nearby, keep their place and are damped more from then on
+    (Levenberg and Marquardt's rule, a frame). Where some stay and others go, the normal equations
+    are mixed alike: that is exact on a parabola.
     """
     tree = robot.tree
     window = max(1, 2 * round(_AROUND / targets.frame_time) + 1)

@@ -21,6 +21,7 @@ from spark.canonical import CanonicalMotion
 _STEPS = (12, 10)  # Gauss-Newton steps of the stages, at most
 _LITTLE = (0.02, 0.05)  # a stage ends where a step lessens the cost by less than this share,
 _REFUSED = 0.1  # and no more of the frames refuse it
+_POLISH = (1, 0.0, 1.0)  # one step, where splines are nearly right
 _COARSE = 1 / 20  # [s] between the frames that are solved first
 
 
@@ -62,7 +63,7 @@ def solve(
     for stage, steps, little in zip(stages_of(robot), _STEPS, _LITTLE, strict=True):
         if not stage.columns:
             continue
-        ends = (1, 0.0, 1.0) if polish else (steps, little, _REFUSED)
+        ends = _POLISH if polish else (steps, little, _REFUSED)
         if not polish:
             sliding = [foot.sliding() for foot in footing]
             q = solve_stage(robot, targets, sliding, q, stage, *ends, apart=False)

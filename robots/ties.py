@@ -76,7 +76,9 @@ def smoothness(robot: Morphology) -> Float[np.ndarray, "D"]:
     weights[:3] *= PATH
     roles, tree = robot.rig.roles, robot.tree
     for side in ("left", "right"):
-        shank, foot = (roles.require(Role(f"{side}_{part}")) for part in ("lower_leg", "foot"))
+        shank, foot = (roles.joint(Role(f"{side}_{part}")) for part in ("lower_leg", "foot"))
+        if shank is None or foot is None:
+            continue
         above = tree.chain(int(robot.links[shank]))
         alone = tuple(j for j in tree.chain(int(robot.links[foot])) if j not in above)
         weights[tree.columns(alone)] *= ANKLE
