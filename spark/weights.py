@@ -75,8 +75,11 @@ def read_weights(path: Path) -> Weights:
     try:
         header = json.loads(metadata["config"])
         network, names = dict(header["network"]), dict(header["names"])
-        bodies = [{str(k): tuple(map(float, v)) for k, v in b.items()} for b in header["bodies"]]
         settings = dict(header["settings"])
+        bodies: list[Trunk] = [
+            {str(name): (float(x), float(y), float(z)) for name, (x, y, z) in body.items()}
+            for body in header["bodies"]
+        ]
         return Weights(path, network, names, int(header["step"]), settings, bodies, tensors)
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise FileFormatError(path, None, f"is a damaged checkpoint ({error!r})") from error

@@ -33,7 +33,7 @@ from spark.sample import sample_motion, sample_rig
 from spark.settings import TrainConfig, read_settings, toml
 from spark.train import Objective, Steps, _batches, network, optimiser_of, take_step, train
 from spark.transfer import transfer
-from spark.weights import VERSION
+from spark.weights import VERSION, read_weights
 from spark_sim import sample
 
 CHECKOUT = Path(__file__).parents[1]
@@ -160,8 +160,15 @@ def test_what_is_no_checkpoint_is_refused(tmp_path: Path) -> None:
         save_file({"a": torch.zeros(1)}, path, metadata)
         with pytest.raises(FileFormatError, match=message):
             load_checkpoint(path)
-    good = fresh(TINY)
+    header: dict[str, object] = {"network": {}, "names": {}, "step": 0, "settings": {}}
+    for body in ({"Spine": (0.0, 0.0)}, {"Spine": "up!"}, ["Spine"], {"Spine": 1.0}):
+        metadata["config"] = json.dumps({**header, "bodies": [body]})
+        save_file({"a": torch.zeros(1)}, path, metadata)
+        with pytest.raises(FileFormatError, match="damaged"):
+            read_weights(path)
+    good = replace(fresh(TINY), bodies=[{"Spine": (0.0, 0.0, 0.25)}])
     save_checkpoint(good, path)
+    assert load_checkpoint(path).bodies == good.bodies
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(FileFormatError, match="no safetensors"):
