@@ -190,9 +190,9 @@ def retarget(
     """The motion of `source` on the body of `target`, in the hierarchy and units of its file.
 
     Both are clips, or what `load` takes: `target` may be a robot's name or MJCF. Each joint turns
-    as its counterpart does, in world axes; what the source has no counterpart of is filled in by a
-    trained network (method "spark": that of `checkpoint`, or the one that ships) or by
-    interpolation ("copy"). Robots are solved for. With `refine`, feet are held where the source's
+    as its counterpart does, in world axes; what the source has no counterpart of is filled in by
+    interpolation (method "copy") or, on rigs like those that it has met, by a trained network
+    ("spark": that of `checkpoint`, or the one that ships). Robots are solved for. With `refine`, feet are held where the source's
     stand. Raises `SkeletonError` where one is no humanoid.
     """
     if method not in METHODS:

@@ -69,7 +69,8 @@ def configure(parser: ArgumentParser) -> None:
         choices=("spark", "copy"),
         default="spark",
         help="how joints turn that SRC has no counterpart of; the others turn as theirs do, in "
-        "world axes. spark: as a trained network says (default); copy: in between their neighbours",
+        "world axes. spark: as a trained network says, on rigs like those it has met (default); "
+        "copy: in between their neighbours, as on all other rigs",
     )
     parser.add_argument(
         "--checkpoint",
