@@ -192,8 +192,8 @@ def retarget(
     Both are clips, or what `load` takes: `target` may be a robot's name or MJCF. Each joint turns
     as its counterpart does, in world axes; what the source has no counterpart of is filled in by
     interpolation (method "copy") or, on rigs like those that it has met, by a trained network
-    ("spark": that of `checkpoint`, or the one that ships). Robots are solved for. With `refine`, feet are held where the source's
-    stand. Raises `SkeletonError` where one is no humanoid.
+    ("spark": that of `checkpoint`, or the one that ships). Robots are solved for. With `refine`,
+    feet are held where the source's stand. Raises `SkeletonError` where one is no humanoid.
     """
     if method not in METHODS:
         raise ConventionError(f"method {method!r} is not known; expected 'copy' or 'spark'")
