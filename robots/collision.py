@@ -22,7 +22,6 @@ EASE = 0.003  # [m]
 NEAR = 0.02  # [m] within which shapes are watched
 _PAIRS = len(DIRECTIONS) // 2  # a direction and the one against it, as many from the end
 
-
 Moves = tuple[tuple[int, ...], tuple[int, ...]]  # the joints that move each of a pair
 Watched = tuple[Pair, Moves]
 

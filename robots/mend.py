@@ -88,7 +88,8 @@ def _led_out(
 ) -> Coordinates:
     """`q` with a stage's hinges as in the T-pose where something is wrong, and on the way there and
     back between: out in the open, from where another way is found."""
-    count = max(1, int(max(np.flatnonzero(wrong)[0], len(q) - 1 - np.flatnonzero(wrong)[-1])))
+    at = np.flatnonzero(wrong).tolist()
+    count = max(1, at[0], len(q) - 1 - at[-1])
     window = 2 * max(1, count // 2) + 1
     share = 1.0 - eased(1.0 - maximum_filter1d(wrong.astype(np.float64), 3), window)
     share[fixed] = 0.0

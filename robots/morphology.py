@@ -23,6 +23,7 @@ from spark.rotation import (
     quat_from_matrix,
     quat_mul,
     quat_normalize,
+    quat_relative,
     quat_rotate,
 )
 
@@ -107,7 +108,7 @@ class Morphology:
         for j in np.flatnonzero(tree.balls):
             assert q.turns is not None
             at = int(self._addresses[j])
-            turn = quat_mul(quat_conj(body_quats[j]), quat_mul(q.turns[:, j], body_quats[j]))
+            turn = quat_relative(body_quats[j], quat_mul(q.turns[:, j], body_quats[j]))
             qpos[:, at : at + 4] = quat_continuous(turn)
         return qpos
 
@@ -156,7 +157,7 @@ class Morphology:
         )
         parents = self.rig.skeleton.parents[1:]
         local, offsets = world.copy(), places.copy()
-        local[:, 1:] = quat_mul(quat_conj(world[:, parents]), world[:, 1:])
+        local[:, 1:] = quat_relative(world[:, parents], world[:, 1:])
         turned = matrix_from_quat(quat_conj(world[:, parents]))
         steps = places[:, 1:] - places[:, parents]
         offsets[:, 1:] = (turned @ steps[..., None])[..., 0]

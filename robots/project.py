@@ -15,9 +15,9 @@ from jaxtyping import Float
 from robots.morphology import Morphology
 from robots.tree import Coordinates, Frames, Tree, forward
 from spark.rotation import (
-    quat_conj,
     quat_from_rotvec,
     quat_mul,
+    quat_relative,
     quat_rotate,
 )
 
@@ -39,7 +39,7 @@ def project(
     for group in _groups(robot):
         above = links[int(tree.parents[group[0]])]
         target = wanted[group[-1]]
-        local = quat_mul(quat_conj(above), target)
+        local = quat_relative(above, target)
         if tree.balls[group[0]]:
             assert turns is not None
             turns[:, group[0]] = local
@@ -155,7 +155,7 @@ def _three(
             np.cross(flat_before, flat_after) @ a1, (flat_before * flat_after).sum(1)
         )
         q12 = quat_mul(quat_from_rotvec(a1 * first[:, None]), q2)
-        third = _twist(quat_mul(quat_conj(q12), q), a3)
+        third = _twist(quat_relative(q12, q), a3)
         solutions.append(np.stack([first, second, third], axis=-1))
     return solutions
 

@@ -1,8 +1,9 @@
 """Training pairs with exact answers: one motion on two skeletons, made while training runs.
 
 A clip is kept on its own skeleton in canonical form. For a batch, windows of it are put onto two
-random variants of that skeleton; on both, the feet are planted again where the recording's feet
-were. The network gets the first, its analytic transfer to the second, and must find the second.
+variants of that skeleton, random ones or itself; on both, the feet are planted again where the
+recording's feet were. The network gets the first, its analytic transfer to the second, and must
+find the second.
 """
 
 from collections.abc import Sequence
