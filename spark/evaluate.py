@@ -18,11 +18,10 @@ from spark.clips import FRAME_TIME, at_frame_time
 from spark.errors import FileFormatError, SkeletonError, name_list
 from spark.evaluation_cases import SPARE_FRAMES, STRUCTURES, Case, Structure
 from spark.metrics import Score, mean_score, score_positions, source_sensitivity
+from spark.own_motion import Retargeting, with_own_motion
 from spark.reading import SUFFIXES, read_motion
 from spark.refine import refine
-from spark.retarget import Learned
 from spark.rig import understand
-from spark.transfer import transfer
 
 Positions = Float[np.ndarray, "_ _ 3"]  # frames, joints
 Method = Callable[[Case], Positions]
@@ -93,28 +92,17 @@ def evaluate(
     )
 
 
-def copied(case: Case) -> Positions:
-    """The analytic transfer: the bar."""
-    return canonical_positions(transfer(case.source, case.truth.rig))
-
-
-def copied_feet_held(case: Case) -> Positions:
-    """The analytic transfer with its feet held where the source's stand, as `retarget` does."""
-    moved = transfer(case.source, case.truth.rig)
-    return canonical_positions(refine(case.source, moved))
-
-
-def learned(network: Learned) -> Method:
-    """A trained network."""
-    return lambda case: canonical_positions(network(case.source, case.truth.rig))
-
-
-def learned_feet_held(network: Learned) -> Method:
-    """A trained network, then feet held where the source's stand, as `retarget` does."""
+def by(method: Retargeting, *, own_motion: bool = False, feet_held: bool = False) -> Method:
+    """The analytic transfer, or a trained network; with `own_motion`, corrected by a recording of
+    the target's own (`spark.own_motion`), with `feet_held`, then its feet held where the source's
+    stand: all of it is what `retarget` does."""
 
     def run(case: Case) -> Positions:
-        moved = network(case.source, case.truth.rig)
-        return canonical_positions(refine(case.source, moved))
+        if own_motion and case.own is not None:
+            moved = with_own_motion(method, case.source, case.own)
+        else:
+            moved = method(case.source, case.truth.rig)
+        return canonical_positions(refine(case.source, moved) if feet_held else moved)
 
     return run
 

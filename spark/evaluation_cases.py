@@ -15,7 +15,6 @@ from tempfile import TemporaryDirectory
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool
 
 from spark.canonical import CanonicalMotion
 from spark.dataset import Performance, is_dataset, prepare, read_performances
@@ -36,6 +35,8 @@ SPARE_FRAMES = 3
 # Made targets of each body and structure: its clips share them, so that results can be compared.
 _TARGETS = 3
 _TRIES = 50
+# A clip is halved if both halves last so long [s].
+_HALF = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +44,8 @@ class Case:
     """`source` is to be put on `truth.rig`; `truth` is the answer.
 
     `height` is the target's in SAN's metric [hip heights], `answer` the clip that the truth is
-    where it was recorded and not made, `performer` the source's character.
+    where it was recorded and not made, `performer` the source's character, `own` another recording
+    of the target, if there is one.
     """
 
     motion: str
@@ -55,6 +57,7 @@ class Case:
     truth: CanonicalMotion
     height: float
     answer: Performance | None = None
+    own: CanonicalMotion | None = None
 
 
 def performances(path: Path, workers: int = 1) -> list[Performance]:
@@ -94,7 +97,9 @@ def recorded_cases(found: Sequence[Performance]) -> tuple[list[Case], list[str]]
                         f"{abs(lengths[0] - lengths[1])} frames: not taken as one motion"
                     )
                     continue
-                cases += _recorded(motion, source, target, min(lengths))
+                others = [p.clip for p in found if p.clip.body is target.clip.body]
+                own = _longest([clip for clip in others if clip.name != motion])
+                cases += _recorded(motion, source, target, min(lengths), own)
     if not cases:
         raise SkeletonError(
             f"no motion is on two characters among {len(found)} clips ("
@@ -110,15 +115,18 @@ def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = 
     a changed copy that lacks joints, with the clip's own body as its target. In all answers the
     feet are planted where the recording's stand.
 
+    The target's own recording is the longest other clip of the body; of a body with one clip, its
+    first half, and the second is asked for, if that much is left.
+
     Of each cell at most `limit` clips, drawn by `seed`. Training does not meet these targets,
     whatever its seed: it draws other ones.
     """
     stages: dict[tuple[int, Structure, int], Stage] = {}
     cases = []
     for i, one in _drawn(found, seed, limit):
-        body, frames = one.clip.body, len(one.clip.hips)
-        own = Stage(same_body(body))
-        recorded = _canonical(one.clip, own.variant, frames)
+        body, (clip, other) = one.clip.body, _asked_and_own(one.clip, found)
+        unchanged = Stage(same_body(body))
+        recorded = _canonical(clip, unchanged.variant, len(clip.hips))
         for structure in STRUCTURES:
             number = i % _TARGETS
             key = (id(body), structure, number)
@@ -127,27 +135,47 @@ def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = 
                 rng = np.random.default_rng((seed, name, number, STRUCTURES.index(structure)))
                 make = {"intra": scaled_body, "cross": random_variant, "missing": lacking_body}
                 stages[key] = Stage(make[structure](body, rng))
-            source, truth = recorded, _placed(recorded, one.clip.planted, stages[key])
-            if structure == "missing":
-                source, truth = truth, _placed(recorded, one.clip.planted, own)
-            target = f"{one.character} {structure} {number}"
+            ends = unchanged, stages[key]
+            source, target = ends[::-1] if structure == "missing" else ends
             cases.append(
                 Case(
-                    *(one.clip.name, one.character, target, one.cell, structure, source, truth),
+                    *(one.clip.name, one.character, f"{one.character} {structure} {number}"),
+                    *(one.cell, structure),
+                    recorded if source is unchanged else _placed(clip, source),
+                    truth := _placed(clip, target),
                     san_height(truth.rig),
+                    own=None if other is None else _placed(other, target),
                 )
             )
     return cases
 
 
-def _placed(
-    recorded: CanonicalMotion, planted: Bool[np.ndarray, "T 2"], stage: Stage
-) -> CanonicalMotion:
+def _asked_and_own(clip: Clip, found: Sequence[Performance]) -> tuple[Clip, Clip | None]:
+    """What of a clip is asked for, and another recording of its body."""
+    others = [p.clip for p in found if p.clip.body is clip.body and p.clip is not clip]
+    if others:
+        return clip, _longest(others)
+    half = len(clip.hips) // 2
+    if half * clip.frame_time < _HALF:
+        return clip, None
+    return _part(clip, slice(half, None)), _part(clip, slice(half))
+
+
+def _longest(clips: Sequence[Clip]) -> Clip | None:
+    return max(clips, key=lambda clip: len(clip.hips), default=None)
+
+
+def _part(clip: Clip, frames: slice) -> Clip:
+    rotations, hips, planted = (x[frames] for x in (clip.rotations, clip.hips, clip.planted))
+    return replace(clip, rotations=rotations, hips=hips, planted=planted)
+
+
+def _placed(clip: Clip, stage: Stage) -> CanonicalMotion:
     """A recording on a changed copy of its body, the feet planted where they stand."""
-    given = recorded.rotations[None], recorded.hips[None], np.asarray(planted)[None]
-    rotations = stage.place(*given)[0]
-    rig = stage.variant.body.rig
-    return CanonicalMotion(rig, recorded.frame_time, rotations, recorded.hips)
+    given = (clip.rotations, np.float64), (clip.hips, np.float64), (clip.planted, bool)
+    rotations, hips, planted = (np.asarray(array, kind)[None] for array, kind in given)
+    placed = stage.place(rotations, hips, planted)[0]
+    return CanonicalMotion(stage.variant.body.rig, clip.frame_time, placed, hips[0])
 
 
 def lacking_body(body: BodyFeatures, rng: np.random.Generator) -> Variant:
@@ -160,12 +188,14 @@ def lacking_body(body: BodyFeatures, rng: np.random.Generator) -> Variant:
     return variant
 
 
-def _recorded(motion: str, source: Performance, target: Performance, frames: int) -> list[Case]:
-    own, theirs = source.clip.body, target.clip.body
+def _recorded(
+    motion: str, source: Performance, target: Performance, frames: int, own: Clip | None
+) -> list[Case]:
+    given_body, theirs = source.clip.body, target.clip.body
     height = san_height(theirs.rig) / theirs.rig.hip_height
-    given = _canonical(source.clip, same_body(own), frames)
+    given = _canonical(source.clip, same_body(given_body), frames)
     targets: dict[Structure, Variant] = {"cross": same_body(theirs)}
-    if _structure(own) == _structure(theirs):
+    if _structure(given_body) == _structure(theirs):
         targets = {"intra": same_body(theirs), "cross": split_body(theirs)}
     return [
         Case(
@@ -173,6 +203,7 @@ def _recorded(motion: str, source: Performance, target: Performance, frames: int
             _canonical(target.clip, variant, frames),
             height,
             target if variant.body.skeleton.names == theirs.skeleton.names else None,
+            None if own is None else _canonical(own, variant, len(own.hips)),
         )
         for structure, variant in targets.items()
     ]

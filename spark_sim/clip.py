@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias, overload
 
 from robots import formats, registry
 from spark.bvh import write_bvh
-from spark.canonical import from_canonical, to_canonical
+from spark.canonical import CanonicalMotion, from_canonical, to_canonical
 from spark.encoding import encode, encode_new
 from spark.errors import ConventionError, FileFormatError, SkeletonError
 from spark.motion import Motion
@@ -191,9 +191,10 @@ def retarget(
 
     Both are clips, or what `load` takes: `target` may be a robot's name or MJCF. Each joint turns
     as its counterpart does, in world axes; what the source has no counterpart of is filled in by
-    interpolation (method "copy") or, on rigs like those that it has met, by a trained network
-    ("spark": that of `checkpoint`, or the one that ships). Robots are solved for. With `refine`,
-    feet are held where the source's stand. Raises `SkeletonError` where one is no humanoid.
+    interpolation (method "copy") or ("spark") on rigs like those that it has met by a trained
+    network, that of `checkpoint` or the one that ships, and as far as the target's own motion shows
+    what they do. Robots are solved for. With `refine`, feet are held where the source's stand.
+    Raises `SkeletonError` where one is no humanoid.
     """
     if method not in METHODS:
         raise ConventionError(f"method {method!r} is not known; expected 'copy' or 'spark'")
@@ -210,7 +211,7 @@ def retarget(
     if method == "copy":
         moved = transfer(canonical, target.rig)
     else:
-        moved = _learned(checkpoint)(canonical, target.rig)
+        moved = _filled_in(canonical, target, _learned(checkpoint))
     if refine:
         moved = hold_feet(canonical, moved)
     motion = from_canonical(moved)
@@ -221,6 +222,15 @@ def retarget(
     recording = replace(target.recording, bvh=bvh, motion=motion, notes=(*moved.notes, *notes))
     # The rig is given: what is known of a body does not depend on the motion that it makes.
     return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig)
+
+
+def _filled_in(source: CanonicalMotion, target: Clip, network: "Learned") -> CanonicalMotion:
+    """As a network says and, where it corrects the transfer, the target's own motion."""
+    from spark.own_motion import with_own_motion
+
+    if not network.network.config.residual:
+        return network(source, target.rig)
+    return with_own_motion(network, source, to_canonical(target.motion, target.rig))
 
 
 def _learned(checkpoint: File | None) -> "Learned":

@@ -10,6 +10,7 @@ from spark_sim.commands.options import add_force
 if TYPE_CHECKING:
     from spark.evaluate import Row
     from spark.evaluation_cases import Case
+    from spark.own_motion import Retargeting
 
 SUMMARY = "measure methods against a ground truth"
 USAGE = "DATA [--checkpoint RUN]... [--result NAME=DIR]..."
@@ -17,9 +18,10 @@ DESCRIPTION = """\
 Put motions on other bodies and measure how far that is from what is known to
 be right. DATA is a dataset that `spark-sim prepare` made, or a folder with one
 folder a character, as Mixamo downloads lie: a motion that is there on two
-characters is one with a known answer. Rows: copy (the analytic transfer), copy
-with feet held, each --checkpoint, each --result. Columns: the paper's tables 1
-and 2; the metrics of docs/evaluation.md."""
+characters is one with a known answer. Rows: copy (the analytic transfer), each
+--checkpoint, each --result; the first two also with feet held, and corrected
+by another recording of the target's own, as `retarget` does it. Columns: the
+paper's tables 1 and 2; the metrics of docs/evaluation.md."""
 EXAMPLES = """\
 examples:
   spark-sim evaluate mixamo/
@@ -28,6 +30,12 @@ examples:
                                                       # MOTION.bvh
   spark-sim evaluate dataset --made --checkpoint run
 """
+_WAYS: dict[str, dict[str, bool]] = {  # rows of one method, as they are named
+    "": {},
+    ", feet held": {"feet_held": True},
+    ", own motion": {"own_motion": True},
+    ", own motion, feet held": {"own_motion": True, "feet_held": True},
+}
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -70,10 +78,11 @@ def configure(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     from spark.errors import ConventionError
-    from spark.evaluate import copied, copied_feet_held, evaluate, results_in
+    from spark.evaluate import by, evaluate, results_in
     from spark.evaluation_cases import made_cases, performances, recorded_cases
     from spark.evaluation_tables import markdown
     from spark.files import write_atomically
+    from spark.transfer import transfer
     from spark_sim import console, files
 
     outputs = [Path(output) for output in args.output]
@@ -100,16 +109,20 @@ def run(args: Namespace) -> int:
             name, method, of, progress=lambda it: console.progress(it, name, len(of)), **more
         )
 
-    rows = [row("copy", copied, cases), row("copy, feet held", copied_feet_held, cases)]
+    rows = []
+
+    def add(name: str, method: "Retargeting", ways: "Sequence[str]", **about: Any) -> None:
+        for way in ways:
+            rows.append(row(name + way, by(method, **_WAYS[way]), cases, **about))
+
+    plain, held, own, both = _WAYS
+    add("copy", transfer, (plain, held, own))
     for name, weights in checkpoints.items():
-        from spark.evaluate import learned, learned_feet_held
         from spark.retarget import Learned
 
         network = Learned(weights)
-        rows.append(row(name, learned(network), cases, settings=weights.settings))
-        if network.network.config.residual:
-            held = learned_feet_held(network)
-            rows.append(row(f"{name}, feet held", held, cases, settings=weights.settings))
+        ways = (plain, own, both) if network.network.config.residual else (plain,)
+        add(name, network, ways, settings=weights.settings)
     for name, folder in results.items():
         answered = [case for case in cases if case.answer is not None]
         rows.append(row(name, results_in(Path(folder)), answered))
