@@ -11,18 +11,18 @@ not seen the person.
 
 import sys
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
-from spark.canonical import canonical_positions
 from spark.dataset import Performance, read_performances
-from spark.evaluate import Method, Positions, copied, evaluate
+from spark.evaluate import Method, Positions, by, evaluate
 from spark.evaluation_cases import Case, made_cases
 from spark.evaluation_tables import markdown
 from spark.pairs import Clip
 from spark.retarget import Learned
 from spark.settings import TrainConfig, read_settings
 from spark.train import fresh_checkpoint, train
+from spark.transfer import transfer
 from spark.weights import read_weights
 
 _FOLDS = 3
@@ -54,19 +54,22 @@ def main(dataset: str, runs: str, names: str) -> None:
     unseen = [replace(p, cell=f"uc+{p.cell[3:]}") for p in found]
     cases = [c for c in made_cases(unseen) if c.structure == "missing"]
 
-    def learned(case: Case) -> Positions:
-        moved = networks[left_out[case.performer]](case.source, case.truth.rig)
-        return canonical_positions(moved)
+    def learned(case: Case, *, own_motion: bool) -> Positions:
+        return by(networks[left_out[case.performer]], own_motion=own_motion)(case)
 
     # The rows of each body take up what those of all have made.
-    methods: dict[str, Method] = {"copy": cache(copied), "spark": cache(learned)}
+    methods: dict[str, Method] = {
+        "copy": cache(by(transfer)),
+        "spark": cache(partial(learned, own_motion=False)),
+        "spark, own motion": cache(partial(learned, own_motion=True)),
+    }
     rows = [evaluate(name, method, cases) for name, method in methods.items()]
     print(markdown(rows))
-    print("| MSE, 1e-6 | copy | spark |\n|---|---|---|")
+    print(f"| MSE, 1e-6 | {' | '.join(methods)} |\n|---|---|---|---|")
     for performer in sorted({c.performer for c in cases}):
         own = [c for c in cases if c.performer == performer]
-        both = [evaluate(n, m, own).mean("missing").mse * 1e6 for n, m in methods.items()]
-        print(f"| {performer} | {both[0]:.1f} | {both[1]:.1f} |")
+        scores = [evaluate(n, m, own).mean("missing").mse * 1e6 for n, m in methods.items()]
+        print(f"| {performer} | {' | '.join(f'{score:.1f}' for score in scores)} |")
 
 
 if __name__ == "__main__":

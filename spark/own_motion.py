@@ -30,6 +30,7 @@ from spark.transfer import Correspondence, correspond, transfer
 _SPANS, _SPAN = 10, 100  # so many parts of a recording, of so many frames at 30 fps, are looked at
 _SHORTEST = 2.0  # [s] of a recording that tells anything
 _STILL = np.radians(10.0)  # a body whose joints all turn less stands, as in a T-pose
+_LITTLE = 0.05  # of the way from one joint to another
 _FOLDS = 4
 _RIDGE = 0.2  # of the variance of a feature
 _LEAST = 0.1  # a feature that varies less, in units of a rotation matrix, isn't blown up
@@ -82,7 +83,7 @@ def _foretold(source: Rig, target: Rig, link: Correspondence) -> Int[np.ndarray,
     told = correspond(target, source).guess < 0
     first, second = (told[joints[guesses]] for joints in (link.first, link.second))
     mix = link.mix[guesses]
-    return guesses[(first | (mix == 1)) & (second | (mix == 0))]
+    return guesses[(first | (mix > 1 - _LITTLE)) & (second | (mix < _LITTLE))]
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,11 +25,8 @@ from spark.errors import FileFormatError, SkeletonError, SparkSimError
 from spark.evaluate import (
     Cell,
     Row,
-    copied,
-    copied_feet_held,
+    by,
     evaluate,
-    learned,
-    learned_feet_held,
     results_in,
 )
 from spark.evaluation_cases import Case, made_cases, performances, recorded_cases
@@ -104,11 +101,11 @@ def test_the_same_body_twice_is_both_structures_and_copy_is_right(
         write_bvh(replace(bvh, joints=joints), tmp_path / name / "walk.bvh")
     cases, _ = recorded_cases(performances(tmp_path))
     assert sorted(c.structure for c in cases) == ["cross", "cross", "intra", "intra"]
-    row = evaluate("copy", copied, [c for c in cases if c.structure == "intra"])
+    row = evaluate("copy", by(transfer), [c for c in cases if c.structure == "intra"])
     assert row.mean("intra").mse < 1e-12
     # A tool's results know no split targets.
     assert math.isnan(row.mean("cross").mse)
-    table = markdown([evaluate("copy", copied, cases), replace(row, name="results")])
+    table = markdown([evaluate("copy", by(transfer), cases), replace(row, name="results")])
     assert re.search(r"^\| results \| \S+ \| - \|$", table, re.M)
     split = next(c for c in cases if c.structure == "cross")
     assert split.answer is None
@@ -162,7 +159,7 @@ def test_made_answers_stand_where_copies_slide(found: list[Performance]) -> None
     assert {c.motion for c in made_cases(found, seed=3, limit=1)} <= {c.motion for c in cases}
     assert len(made_cases(found, seed=3, limit=1)) == 3
     walks = [c for c in cases if c.motion == "walk"]
-    row = evaluate("copy", copied, walks)
+    row = evaluate("copy", by(transfer), walks)
     for structure in ("intra", "cross", "missing"):
         mean = row.mean(structure)
         assert mean.mse > 0
@@ -190,10 +187,10 @@ def test_a_new_network_is_copy(found: list[Performance], tmp_path: Path) -> None
         Spark(network(config, 16)), names, settings={"window": 32}, bodies=bodies
     )
     run = nets.learned(checkpoint, tmp_path)
-    pairs = (copied, learned(run)), (copied_feet_held, learned_feet_held(run))
-    for plain, new in pairs:
-        copy, own = (evaluate("", m, cases).mean("missing") for m in (plain, new))
-        assert own.mse == pytest.approx(copy.mse, rel=1e-3)
+    for held in (False, True):
+        both = (by(method, feet_held=held) for method in (transfer, run))
+        copy, new = (evaluate("", method, cases).mean("missing") for method in both)
+        assert new.mse == pytest.approx(copy.mse, rel=1e-3)
 
 
 def test_ignoring_the_source_is_seen(found: list[Performance]) -> None:
@@ -286,8 +283,9 @@ def test_command(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     command = [sys.executable, "-m", "spark_sim", "evaluate", tree, "--checkpoint", "run", *outputs]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    rows = [line.split("|")[1].strip() for line in done.stdout.splitlines()[2:6]]
-    assert rows == ["copy", "copy, feet held", "run", "run, feet held"]
+    rows = [line.split("|")[1].strip() for line in done.stdout.splitlines()[2:8]]
+    both = "run", "run, own motion", "run, own motion, feet held"
+    assert rows == ["copy", "copy, feet held", "copy, own motion", *both]
     assert (tmp_path / "t.md").read_text() == done.stdout
     assert json.loads((tmp_path / "t.json").read_text())["data"] == str(tree)
     assert (tmp_path / "t.csv").read_text().startswith("method,")

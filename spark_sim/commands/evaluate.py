@@ -112,8 +112,7 @@ def run(args: Namespace) -> int:
     rows = []
 
     def add(name: str, method: "Retargeting", ways: "Sequence[str]", **about: Any) -> None:
-        for way in ways:
-            rows.append(row(name + way, by(method, **_WAYS[way]), cases, **about))
+        rows.extend(row(name + way, by(method, **_WAYS[way]), cases, **about) for way in ways)
 
     plain, held, own, both = _WAYS
     add("copy", transfer, (plain, held, own))
