@@ -113,7 +113,7 @@ def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = 
     """Each clip with two targets that are changed copies of its own body, on which the answer is
     known (`spark.pairs`): one with other bone lengths, and one with other joints and names too. And
     a changed copy that lacks joints, with the clip's own body as its target. In all answers the
-    feet are planted where the recording's stand.
+    feet are planted while the recording's stand, and as high.
 
     The target's own recording is the longest other clip of the body; of a body with one clip, its
     first half, and the second is asked for, if that much is left.
@@ -172,9 +172,9 @@ def _part(clip: Clip, frames: slice) -> Clip:
 
 def _placed(clip: Clip, stage: Stage) -> CanonicalMotion:
     """A recording on a changed copy of its body, the feet planted where they stand."""
-    given = (clip.rotations, np.float64), (clip.hips, np.float64), (clip.planted, bool)
-    rotations, hips, planted = (np.asarray(array, kind)[None] for array, kind in given)
-    placed = stage.place(rotations, hips, planted)[0]
+    rotations, hips = (np.asarray(x, np.float64)[None] for x in (clip.rotations, clip.hips))
+    planted = np.asarray(clip.planted)[None]
+    placed = stage.place(rotations, hips, planted, clip.lift[None])[0]
     return CanonicalMotion(stage.variant.body.rig, clip.frame_time, placed, hips[0])
 
 

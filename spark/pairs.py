@@ -1,13 +1,14 @@
 """Training pairs with exact answers: one motion on two skeletons, made while training runs.
 
 A clip is kept on its own skeleton in canonical form. For a batch, windows of it are put onto two
-variants of that skeleton, random ones or itself; on both, the feet are planted again where the
-recording's feet were. The network gets the first, its analytic transfer to the second, and must
-find the second.
+variants of that skeleton, random ones or itself; on both, the feet are planted again while the
+recording's stand, and as high. The network gets the first, its analytic transfer to the second, and
+must find the second.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ from spark.rotation import (
     sixd_from_quat,
     yaw_from_quat,
 )
-from spark.staging import Stage, begins_of, joined, local_rows, mixed, place
+from spark.staging import Stage, begins_of, foot_lift, joined, local_rows, mixed, place
 from spark.transfer import Correspondence, correspond
 from spark.variants import random_variant, same_body, split_body
 
@@ -47,6 +48,12 @@ class Clip:
     hips: Float[np.ndarray, "T 3"]
     planted: Bool[np.ndarray, "T 2"]
     frame_time: float
+
+    @cached_property
+    def lift(self) -> Float[np.ndarray, "T 2 2"]:
+        """How much higher ankle and toe of each foot are than in the T-pose [hip heights]."""
+        rotations, hips = (np.asarray(x, np.float64) for x in (self.rotations, self.hips))
+        return foot_lift(self.body, rotations, hips).astype(np.float32)
 
 
 class Windows(NamedTuple):
@@ -122,12 +129,14 @@ class PairMaker:
         links = [one.link for one in drawn]
         hips = np.stack([one.hips for one in drawn])
         planted = np.stack([one.planted for one in drawn])
+        lift = np.stack([one.lift for one in drawn])
         rows = place(
             stages,
             2 * begins_of([one.rotations for one in drawn]),
             np.concatenate([one.rotations for one in drawn]),
             np.concatenate([hips, hips]),
             np.concatenate([planted, planted]),
+            np.concatenate([lift, lift]),
         )
         begins = begins_of([body.joints for body in bodies])
         copied = mixed(
@@ -170,15 +179,21 @@ class PairMaker:
                 break
         if self.distinct:
             clips = clips[performer :: self.variants]
-        rotations, hips, planted = self._cut(clips, windows, rng)
+        rotations, hips, planted, lift = self._cut(clips, windows, rng)
         if mirrored:
             rotations, hips, planted = mirrored_motion(rotations, hips, planted)
+            lift = lift[:, :, ::-1]
         rows = np.ascontiguousarray(np.moveaxis(rotations, 2, 0))
-        return _Drawn(source, target, link, rows, hips, planted, clips[0].frame_time)
+        return _Drawn(source, target, link, rows, hips, planted, lift, clips[0].frame_time)
 
     def _cut(
         self, clips: list[Clip], windows: int, rng: np.random.Generator
-    ) -> tuple[Float[np.ndarray, "W T K 4"], Float[np.ndarray, "W T 3"], Bool[np.ndarray, "W T 2"]]:
+    ) -> tuple[
+        Float[np.ndarray, "W T K 4"],
+        Float[np.ndarray, "W T 3"],
+        Bool[np.ndarray, "W T 2"],
+        Float[np.ndarray, "W T 2 2"],
+    ]:
         lengths = np.array([len(c.hips) for c in clips], float)
         chosen = [clips[i] for i in rng.choice(len(clips), windows, p=lengths / lengths.sum())]
         spans, speeds = [], np.ones((windows, 1))
@@ -195,6 +210,7 @@ class PairMaker:
         rotations = _frames([clip.rotations for clip in chosen], spans, before)
         hips = _frames([clip.hips for clip in chosen], spans, before)
         planted = _frames([clip.planted for clip in chosen], spans, nearest)
+        lift = _frames([clip.lift for clip in chosen], spans, nearest)
         paced = np.flatnonzero(speeds != 1)
         if len(paced):
             share = (times - before)[paced, :, None].astype(np.float32)
@@ -204,7 +220,7 @@ class PairMaker:
             rotations[paced] = quat_slerp(rotations[paced], later, share)
             later = _frames([clip.hips for clip in chosen], spans, after)
             hips[paced] += share * (later - hips[paced])
-        return rotations, hips, planted
+        return rotations, hips, planted, lift
 
     def _body(self, k: int, mirrored: bool) -> BodyFeatures:
         if (k, mirrored) not in self._seen:
@@ -241,6 +257,7 @@ class _Drawn(NamedTuple):
     rotations: Float[np.ndarray, "K W T 4"]
     hips: Float[np.ndarray, "W T 3"]
     planted: Bool[np.ndarray, "W T 2"]
+    lift: Float[np.ndarray, "W T 2 2"]
     frame_time: float
 
 

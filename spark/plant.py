@@ -1,8 +1,8 @@
 """Planted feet: move each stance foot to one place and bend the leg after it.
 
 Works on rotations since the T-pose in world axes, for any leading batch axes. A foot's point of
-contact (its toe, or its ankle where there is no toe) is held at its mean place over each stance;
-between stances the correction blends from one to the next, so nothing jumps. The leg follows by
+contact (its toe, or its ankle where there is no toe) is held in one place over each stance; between
+stances the correction blends from one to the next, so nothing jumps. The leg follows by
 two-bone inverse kinematics in its own bending plane; the foot keeps its rotation in the world.
 """
 
@@ -29,19 +29,21 @@ class Leg(NamedTuple):
 
 
 def stance_correction(
-    contact_pos: Float[np.ndarray, "*n T 3"], planted: Bool[np.ndarray, "*n T"]
+    contact_pos: Float[np.ndarray, "*n T 3"],
+    wanted_pos: Float[np.ndarray, "*n T 3"],
+    planted: Bool[np.ndarray, "*n T"],
 ) -> Float[np.ndarray, "*n T 3"]:
-    """What must be added to contact points' paths so that they rest while planted [same unit];
-    in between as `blend_between` does it."""
+    """What must be added to contact points' paths so that they rest while planted, where those
+    wanted are on average [same unit]; in between as `blend_between` does it."""
     begins = planted & ~np.concatenate([np.zeros_like(planted[..., :1]), planted[..., :-1]], -1)
     stance = begins.cumsum().reshape(planted.shape)  # a number for each stance of each path
     frames = planted.nonzero()
     counts = np.maximum(np.bincount(stance[frames]), 1)
     held = np.zeros_like(contact_pos)
     for axis in range(3):
-        path = contact_pos[..., axis][frames]
-        means = np.bincount(stance[frames], path) / counts if len(path) else counts
-        held[..., axis][frames] = means[stance[frames]] - path
+        wanted = wanted_pos[..., axis][frames]
+        means = np.bincount(stance[frames], wanted) / counts if len(wanted) else counts
+        held[..., axis][frames] = means[stance[frames]] - contact_pos[..., axis][frames]
     return _eased(held, planted)
 
 

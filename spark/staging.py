@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from spark.features import BodyFeatures
+from spark.kinematics import world_positions
 from spark.plant import Leg, leg_turns, stance_correction
 from spark.roles import LIMBS, Group, Role
 from spark.rotation import quat_mul, quat_relative, quat_rotate, quat_slerp
@@ -66,15 +67,24 @@ class Stage:
         parts = [list(part) for leg in self.legs for part in (leg.with_thigh, leg.with_shank)]
         return LegJoints(np.concatenate(parts), np.repeat(np.arange(4), [*map(len, parts)]))
 
+    @cached_property
+    def contacts(self) -> tuple[Int[np.ndarray, "2"], Float[np.ndarray, "2"]]:
+        """Which of ankle (0) and toe (1) of each foot touches the floor, and how high it is in the
+        T-pose."""
+        own = [leg.contact for leg in self.legs]
+        heights = 1 + self.variant.body.skeleton.rest_positions[own, 2]
+        return np.array([leg.contact != leg.foot for leg in self.legs]).astype(int), heights
+
     def place(
         self,
         base: Float[np.ndarray, "W T K 4"],
         hips: Float[np.ndarray, "W T 3"],
         planted: Bool[np.ndarray, "W T 2"],
+        lift: Float[np.ndarray, "W T 2 2"],
     ) -> Float[np.ndarray, "W T J 4"]:
         """The base's rotations on this body, with the planted feet planted."""
         rows = np.ascontiguousarray(np.moveaxis(base, 2, 0))
-        return np.moveaxis(place([self], [0], rows, hips[None], planted[None]), 0, 2)
+        return np.moveaxis(place([self], [0], rows, hips[None], planted[None], lift[None]), 0, 2)
 
 
 def place(
@@ -83,9 +93,11 @@ def place(
     base: Float[np.ndarray, "R W T 4"],
     hips: Float[np.ndarray, "S W T 3"],
     planted: Bool[np.ndarray, "S W T 2"],
+    lift: Float[np.ndarray, "S W T 2 2"],
 ) -> Float[np.ndarray, "N W T 4"]:
-    """The bases' rotations on all bodies, one after the other, with the planted feet planted.
-    The base of each stage begins at row `bases[s]`; hips' paths are in hip heights."""
+    """The bases' rotations on all bodies, one after the other, with the planted feet planted: over
+    the ground where they are on average, as high as the bases' are (`foot_lift`). The base of each
+    stage begins at row `bases[s]`; hips' paths and heights are in hip heights."""
     variants = [stage.variant for stage in stages]
     rows = mixed(
         base,
@@ -102,7 +114,11 @@ def place(
     parts = joined([b.begins for b in bones], begins_of([b.joints for b in bones]))
     limbs = np.add.reduceat(along, parts, axis=0).reshape(len(stages), 2, 4, *along.shape[1:])
     contact = hips[:, None] + limbs.sum(2)
-    move = stance_correction(contact, np.moveaxis(planted, -1, 1))
+    touching, rest = (np.stack(each) for each in zip(*(s.contacts for s in stages), strict=True))
+    wanted = contact.copy()
+    for s, side in np.ndindex(touching.shape):
+        wanted[s, side, ..., 2] = rest[s, side] + lift[s, ..., side, touching[s, side]]
+    move = stance_correction(contact, wanted, np.moveaxis(planted, -1, 1))
     uppers = joined([np.array([leg.upper_leg for leg in s.legs]) for s in stages], begins)
     turns = leg_turns(
         limbs[:, :, 1], limbs[:, :, 2], rows[uppers].reshape(*move.shape[:-1], 4), move
@@ -113,6 +129,17 @@ def place(
     by = joined([j.parts for j in joints], range(0, 4 * len(stages), 4))
     rows[at] = quat_mul(turned[by], rows[at])
     return rows
+
+
+def foot_lift(
+    body: BodyFeatures, rotations: Float[np.ndarray, "T K 4"], hips: Float[np.ndarray, "T 3"]
+) -> Float[np.ndarray, "T 2 2"]:
+    """How much higher ankle and toe of each foot are than in the T-pose [hip heights]."""
+    legs = (leg_of(body, group) for group in (Group.LEFT_LEG, Group.RIGHT_LEG))
+    joints = np.array([[leg.foot, leg.contact] for leg in legs])
+    skeleton = body.skeleton
+    heights = world_positions(skeleton, rotations, hips)[..., 2]
+    return heights[:, joints] - (1 + skeleton.rest_positions[joints, 2])
 
 
 def mixed(

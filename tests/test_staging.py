@@ -43,24 +43,30 @@ def test_draws_made_together_are_those_made_alone(clips: list[Clip]) -> None:
         np.testing.assert_array_equal(draw.planted, alone.planted)
 
 
-def test_a_planted_foot_rests_where_it_stood_on_average(clips: list[Clip]) -> None:
+def test_a_planted_foot_rests_as_high_as_the_recorded_one(
+    clips: list[Clip],
+) -> None:
     """By forward kinematics of the whole body, on other bones, in stances that the leg reaches."""
     clip = clips[0]
     stage = Stage(random_variant(clip.body, np.random.default_rng(3)))
     skeleton = stage.variant.body.skeleton
     planted = np.zeros((1, len(clip.hips), 2), bool)
     planted[0, 10:14, 0] = planted[0, 24:28, 1] = True
-    base = np.asarray(clip.rotations)[None], np.asarray(clip.hips)[None]
-    loose = stage.place(*base, np.zeros_like(planted))[0]
-    placed = stage.place(*base, planted)[0]
+    base, lift = (np.asarray(clip.rotations)[None], np.asarray(clip.hips)[None]), clip.lift[None]
+    loose = stage.place(*base, np.zeros_like(planted), lift)[0]
+    placed = stage.place(*base, planted, lift)[0]
+    recorded = world_positions(clip.body.skeleton, clip.rotations, clip.hips)
     before, after = (world_positions(skeleton, r, clip.hips) for r in (loose, placed))
     for side, stance in ((0, slice(10, 14)), (1, slice(24, 28))):
         foot = stage.variant.body.contacts[side]
         assert np.ptp(before[stance, foot], axis=0).max() > 1e-3
         assert np.ptp(after[stance, foot], axis=0).max() < 1e-9
-        np.testing.assert_allclose(
-            after[stance, foot].mean(0), before[stance, foot].mean(0), atol=1e-9
-        )
+        where = after[stance, foot].mean(0)
+        np.testing.assert_allclose(where[:2], before[stance, foot].mean(0)[:2], atol=1e-9)
+        # As far above where it is in the T-pose as the recorded foot is.
+        own = clip.body.contacts[side]
+        higher = recorded[stance, own, 2].mean() - clip.body.skeleton.rest_positions[own, 2]
+        assert where[2] == pytest.approx(skeleton.rest_positions[foot, 2] + higher, abs=1e-6)
     above = [j for j in range(len(skeleton)) if j not in skeleton.subtree(stage.legs[0].upper_leg)]
     above = [j for j in above if j not in skeleton.subtree(stage.legs[1].upper_leg)]
     np.testing.assert_array_equal(placed[:, above], loose[:, above])
