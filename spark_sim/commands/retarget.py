@@ -69,8 +69,9 @@ def configure(parser: ArgumentParser) -> None:
         choices=("spark", "copy"),
         default="spark",
         help="how joints turn that SRC has no counterpart of; the others turn as theirs do, in "
-        "world axes. spark: as a trained network says, on rigs like those it has met (default); "
-        "copy: in between their neighbours, as on all other rigs",
+        "world axes. spark: as a trained network says, on rigs like those it has met, and as they "
+        "turn in TARGET's own motion, if its file has one (default); copy: in between their "
+        "neighbours",
     )
     parser.add_argument(
         "--checkpoint",
