@@ -15,12 +15,13 @@ from sim.body import build_body
 from sim.pose import qpos_from_motion
 from sim.report import judge
 from spark.bvh import read_bvh, write_bvh
-from spark.canonical import from_canonical, to_canonical
+from spark.canonical import CanonicalMotion, from_canonical, to_canonical
 from spark.encoding import encode_new
 from spark.features import body_features
 from spark.kinematics import forward
 from spark.known_bodies import trunk_of
 from spark.motion import Motion
+from spark.own_motion import with_own_motion
 from spark.retarget import Learned
 from spark.rig import Rig
 from spark.roles import Role
@@ -85,17 +86,33 @@ def test_canonical_transfer_and_back(benchmark: Any, frames: int) -> None:
     benchmark(lambda: from_canonical(transfer(to_canonical(motion, rig), target)))
 
 
-@pytest.mark.parametrize("frames", FRAMES)
-def test_transfer_by_the_network(benchmark: Any, frames: int) -> None:
-    """At 30 fps, onto a rig of which the source lacks joints."""
+def without_a_neck(frames: int) -> CanonicalMotion:
+    """At 30 fps."""
     motion, rig = clip(frames)
     roles = tuple(None if role is Role.NECK else role for role in rig.roles.roles)
     neckless = replace(rig, roles=replace(rig.roles, roles=roles))
-    source = to_canonical(replace(motion, frame_time=1 / 30), neckless)
-    network, target = Learned(read_weights(SHIPPED)), sample_rig("dancer")
+    return to_canonical(replace(motion, frame_time=1 / 30), neckless)
+
+
+@pytest.mark.parametrize("frames", FRAMES)
+def test_transfer_by_the_network(benchmark: Any, frames: int) -> None:
+    """Onto a rig of which the source lacks joints."""
+    source, target = without_a_neck(frames), sample_rig("dancer")
+    network = Learned(read_weights(SHIPPED))
     network.bodies.append(trunk_of(body_features(target)))
     assert "network" in network(source, target).notes[-1]
     benchmark.pedantic(lambda: network(source, target), rounds=3)
+
+
+@pytest.mark.parametrize("frames", FRAMES)
+def test_transfer_with_own_motion(benchmark: Any, frames: int) -> None:
+    """Onto a rig that the network hasn't met, and that squats for 33 s in a file of its own."""
+    source, target = without_a_neck(frames), sample_rig("dancer")
+    squat = to_canonical(sample_motion("squat", target, 30.0), target)
+    again = np.arange(1000) % len(squat)
+    own = replace(squat, rotations=squat.rotations[again], hips=squat.hips[again])
+    network = Learned(read_weights(SHIPPED))
+    benchmark.pedantic(lambda: with_own_motion(network, source, own), rounds=3)
 
 
 @pytest.mark.parametrize("frames", FRAMES)
