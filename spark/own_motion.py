@@ -18,7 +18,6 @@ from spark.errors import name_list
 from spark.rig import Rig
 from spark.roles import Role
 from spark.rotation import (
-    quat_angle,
     quat_from_rotvec,
     quat_mul,
     quat_relative,
@@ -29,7 +28,7 @@ from spark.transfer import Correspondence, correspond, transfer
 
 _SPANS, _SPAN = 10, 100  # so many parts of a recording, of so many frames at 30 fps, are looked at
 _SHORTEST = 2.0  # [s] of a recording that tells anything
-_STILL = np.radians(10.0)  # a body whose joints all turn less stands, as in a T-pose
+_STILL = 0.2  # a body whose features all stay closer than this stands, as in a T-pose
 _LITTLE = 0.05  # of the way from one joint to another
 _FOLDS = 4
 _RIDGE = 0.2  # of the variance of a feature
@@ -64,7 +63,10 @@ def with_own_motion(
         rotvec_from_quat(quat_relative(back.rotations[:, joints], span.rotations[:, joints]))
         for back, span in zip(backs, spans, strict=True)
     ]
-    habits = _learn(np.concatenate([*map(_features, backs)]), np.concatenate(lost))
+    features = np.concatenate([_features(back) for back in backs])
+    if np.ptp(features, axis=0).max() < _STILL:
+        return moved
+    habits = _learn(features, np.concatenate(lost))
     if not habits.share.any():
         return moved
     turns = quat_from_rotvec(habits.of(_features(moved)))
@@ -161,11 +163,10 @@ def _turned(
 
 
 def _spans(own: CanonicalMotion) -> list[CanonicalMotion]:
-    """Parts of a recording, spread over it; none where it tells nothing."""
-    turned = quat_angle(own.rotations[:1], own.rotations).max()
-    if len(own) * own.frame_time < _SHORTEST or turned < _STILL:
+    """Parts of a recording, spread over it; none of a short one."""
+    if len(own) * own.frame_time < _SHORTEST:
         return []
-    size = min(round(_SPAN * FRAME_TIME / own.frame_time), len(own))
+    size = min(max(1, round(_SPAN * FRAME_TIME / own.frame_time)), len(own))
     count = min(_SPANS, len(own) // size)
     firsts = np.linspace(0, len(own) - size, count).astype(int).tolist()
     parts = [slice(first, first + size) for first in firsts]
