@@ -54,14 +54,14 @@ def main(dataset: str, runs: str, names: str) -> None:
     unseen = [replace(p, cell=f"uc+{p.cell[3:]}") for p in found]
     cases = [c for c in made_cases(unseen) if c.structure == "missing"]
 
-    def learned(case: Case, *, own_motion: bool) -> Positions:
-        return by(networks[left_out[case.performer]], own_motion=own_motion)(case)
+    def learned(case: Case, **as_retarget: bool) -> Positions:
+        return by(networks[left_out[case.performer]], **as_retarget)(case)
 
-    # The rows of each body take up what those of all have made.
+    # The rows of each body take up what those of all have made; the last does as `retarget` does.
     methods: dict[str, Method] = {
         "copy": cache(by(transfer)),
-        "spark": cache(partial(learned, own_motion=False)),
-        "spark, own motion": cache(partial(learned, own_motion=True)),
+        "spark": cache(learned),
+        "spark, own motion, feet held": cache(partial(learned, own_motion=True, feet_held=True)),
     }
     rows = [evaluate(name, method, cases) for name, method in methods.items()]
     print(markdown(rows))
