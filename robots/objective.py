@@ -41,7 +41,7 @@ IDLE = 0.02  # of hinges that nothing else asks for: stay as in the T-pose
 SMOOTH = 3.3  # [Hz] above which a limb's motion fades
 ANKLE = 0.5  # of how the accelerations of other hinges weigh, those of ankles do
 CALM = 2.2  # [Hz] above which a limb that gives way to another does not
-JOLT = 450.0  # [rad/s³], RMS, above which a hinge is smoothed the more
+JOLT = 430.0  # [rad/s³], RMS, above which a hinge is smoothed the more
 FAST, RUSH = 12.0, 0.5  # [rad/s] above which a hinge is held back, and how much [s]
 
 

@@ -13,6 +13,7 @@ from robots.morphology import Morphology
 from robots.motion import RobotMotion
 from robots.project import project
 from robots.stage import Stage
+from robots.start import learned_start
 from robots.targets import Targets, chest_of, targets_of
 from robots.ties import unhurried
 from robots.tree import Coordinates, forward
@@ -40,13 +41,25 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     """
     targets = targets_of(source, robot)
     footing = plan_footing(robot, targets)
-    q = unhurried(robot, project(robot, targets.world, targets.hips), targets.frame_time)
-    stride = min(max(1, round(_COARSE / targets.frame_time)), max(len(q) // 4, 1))
+    stride = stride_between(targets)
+    few, places, q = copied(robot, targets, footing, stride)
+    q = solve(robot, few, places, learned_start(robot, few, places, q))
     if stride > 1:
-        few, places = targets.every(stride), [foot.every(stride) for foot in footing]
-        q = solve(robot, few, places, q.every(stride)).between(stride, len(targets))
-    q = solve(robot, targets, footing, q, polish=stride > 1)
+        q = solve(robot, targets, footing, q.between(stride, len(targets)), polish=True)
     return RobotMotion(robot, q, source.frame_time, (*robot.notes, *targets.notes))
+
+
+def stride_between(targets: Targets) -> int:
+    """From each frame that is solved first to the next."""
+    return min(max(1, round(_COARSE / targets.frame_time)), max(len(targets) // 4, 1))
+
+
+def copied(
+    robot: Morphology, targets: Targets, footing: list[Footing], stride: int
+) -> tuple[Targets, list[Footing], Coordinates]:
+    """Every `stride`-th frame: what is asked for, and the copy, without jumps."""
+    q = unhurried(robot, project(robot, targets.world, targets.hips), targets.frame_time)
+    return targets.every(stride), [foot.every(stride) for foot in footing], q.every(stride)
 
 
 def solve(
