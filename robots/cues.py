@@ -16,7 +16,7 @@ from robots.footing import Footing, corners_of
 from robots.morphology import Morphology
 from robots.project import hips_of
 from robots.targets import BONES, Targets, chest_of, side_of
-from robots.tree import Coordinates, Frames, forward
+from robots.tree import Frames
 from spark.rig import Rig
 from spark.roles import Role
 from spark.rotation import (
@@ -57,11 +57,13 @@ _ANSWER = ((_OTHER, _AXIAL), (np.zeros(1, dtype=np.int64), _POLAR))
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """A robot's parts over frames: rotations since the T-pose, and the middle of the hips [m]. What
-    a robot lacks turns like what it would hang on."""
+    """How a robot stands over frames: the rotations of `PARTS` since the T-pose, the middle of the
+    hips [m], and the rotations of all joints in the world. What a robot lacks turns like what it
+    would hang on."""
 
     parts: Float[np.ndarray, "T 14 4"]
     hips: Float[np.ndarray, "T 3"]
+    world: Float[np.ndarray, "T J 4"]
 
 
 def joints_of(rig: Rig) -> tuple[int | None, ...]:
@@ -70,25 +72,25 @@ def joints_of(rig: Rig) -> tuple[int | None, ...]:
 
 
 def pose_of(robot: Morphology, frames: Frames) -> Pose:
-    """How the parts are turned, and where the hips are."""
+    """How the robot stands where its links are."""
     rig = robot.rig
-    parts: list[Float[np.ndarray, "T 4"]] = []
+    world = quat_from_matrix(np.moveaxis(frames.turns[robot.links], -1, 0))
+    joints: list[int] = []
     for j, above in zip(joints_of(rig), _ABOVE, strict=True):
-        if j is None:
-            parts.append(parts[above])
-        else:
-            turns = np.moveaxis(frames.turns[int(robot.links[j])], -1, 0)
-            parts.append(quat_mul(quat_from_matrix(turns), quat_conj(rig.tpose[j])))
-    return Pose(np.stack(parts, axis=1), hips_of(robot, frames))
+        joints.append(joints[above] if j is None else j)
+    parts = quat_mul(world[:, joints], quat_conj(rig.tpose[joints]))
+    return Pose(parts, hips_of(robot, frames), world)
 
 
 def cues_of(
-    robot: Morphology, targets: Targets, footing: Sequence[Footing], q: Coordinates
+    robot: Morphology,
+    targets: Targets,
+    footing: Sequence[Footing],
+    frames: Frames,
+    pose: Pose,
 ) -> Float[np.ndarray, "T C"]:
-    """What is seen of `q`: how it stands, and how far it is from what is wanted."""
-    rig, height, count = robot.rig, robot.rig.hip_height, len(q)
-    frames = forward(robot.tree, q)
-    pose = pose_of(robot, frames)
+    """What is seen of a pose: how it stands, and how far it is from what is wanted."""
+    rig, height, count = robot.rig, robot.rig.hip_height, len(pose.hips)
     joints, back = joints_of(rig), quat_conj(pose.parts)
     miss = np.zeros((count, len(PARTS), 3))
     for k, j in enumerate(joints):

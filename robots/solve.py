@@ -58,8 +58,9 @@ def copied(
     robot: Morphology, targets: Targets, footing: list[Footing], stride: int
 ) -> tuple[Targets, list[Footing], Coordinates]:
     """Every `stride`-th frame: what is asked for, and the copy, without jumps."""
-    q = unhurried(robot, project(robot, targets.world, targets.hips), targets.frame_time)
-    return targets.every(stride), [foot.every(stride) for foot in footing], q.every(stride)
+    few = targets.every(stride)
+    q = unhurried(robot, project(robot, few.world, few.hips), few.frame_time)
+    return few, [foot.every(stride) for foot in footing], q
 
 
 def solve(

@@ -16,7 +16,7 @@ from jaxtyping import Float
 from safetensors.numpy import load_file
 from scipy.ndimage import gaussian_filter1d
 
-from robots.cues import answer_mirror, cue_mirror, cues_of, joints_of, pose_of, read_answer
+from robots.cues import Pose, answer_mirror, cue_mirror, cues_of, joints_of, pose_of, read_answer
 from robots.footing import Footing
 from robots.morphology import Morphology
 from robots.project import project
@@ -27,7 +27,6 @@ from spark.roles import Role
 from spark.rotation import (
     quat_conj,
     quat_continuous,
-    quat_from_matrix,
     quat_from_rotvec,
     quat_mul,
     quat_normalize,
@@ -55,8 +54,10 @@ def learned_start(
     Frames should be about `1 / 20` s apart, as those are that the network was trained on. `layers`
     are those in the package, where no other ones are given.
     """
-    answer = predict(cues_of(robot, targets, footing, q), layers or shipped())
-    return smoothed(unhurried(robot, moved(robot, targets, q, answer), targets.frame_time))
+    frames = forward(robot.tree, q)
+    pose = pose_of(robot, frames)
+    answer = predict(cues_of(robot, targets, footing, frames, pose), layers or shipped())
+    return smoothed(unhurried(robot, moved(robot, targets, pose, answer), targets.frame_time))
 
 
 @cache
@@ -76,18 +77,17 @@ def predict(cues: Float[np.ndarray, "T C"], layers: Layers) -> Float[np.ndarray,
 
 
 def moved(
-    robot: Morphology, targets: Targets, q: Coordinates, answer: Float[np.ndarray, "T A"]
+    robot: Morphology, targets: Targets, pose: Pose, answer: Float[np.ndarray, "T A"]
 ) -> Coordinates:
-    """`q` with its parts and hips moved as an answer says, as far as hinges can. The head and
+    """A pose with its parts and hips moved as an answer says, as far as hinges can. The head and
     collarbones turn as they are wanted; what has no role goes with the part that it hangs on."""
-    rig, frames = robot.rig, forward(robot.tree, q)
-    turns, hips = read_answer(pose_of(robot, frames), answer, rig.hip_height)
+    rig, was = robot.rig, pose.world
+    turns, hips = read_answer(pose, answer, rig.hip_height)
     parts = {j: turns[:, k] for k, j in reversed(list(enumerate(joints_of(rig)))) if j is not None}
     spine = rig.roles.joints(Role.SPINE)
     for i, j in enumerate(spine[:-1]):
         share = (i + 1) / len(spine)
         parts[j] = (1 - share) * parts[rig.pelvis] + share * parts[spine[-1]]
-    was = quat_from_matrix(np.moveaxis(frames.turns[robot.links], -1, 0))
     world = targets.world.copy()
     for j, parent in enumerate(rig.skeleton.parents.tolist()):
         if j in parts:

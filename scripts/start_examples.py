@@ -85,11 +85,12 @@ def example(robot: Morphology, name: str, motion: CanonicalMotion, path: str) ->
     targets = targets_of(motion, robot)
     few, places, q = copied(robot, targets, plan_footing(robot, targets), stride_between(targets))
     better = solve(robot, few, places, q)
-    was, now = (pose_of(robot, forward(robot.tree, x)) for x in (q, better))
+    frames = forward(robot.tree, q)
+    was, now = pose_of(robot, frames), pose_of(robot, forward(robot.tree, better))
     return Example(
         name,
         path,
-        cues_of(robot, few, places, q).astype(np.float32),
+        cues_of(robot, few, places, frames, was).astype(np.float32),
         answer_of(was, now, robot.rig.hip_height).astype(np.float32),
         np.array([j is not None for j in joints_of(robot.rig)]),
     )

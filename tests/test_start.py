@@ -37,7 +37,8 @@ class Copied:
 
     @property
     def cues(self) -> np.ndarray:
-        return cues_of(self.robot, self.targets, self.footing, self.q)
+        frames = forward(self.robot.tree, self.q)
+        return cues_of(self.robot, self.targets, self.footing, frames, pose_of(self.robot, frames))
 
     @property
     def start(self) -> Coordinates:
@@ -125,11 +126,11 @@ def test_an_answer_takes_a_copy_to_the_pose_that_it_tells_of(
     solved = solve(robot, here.targets, here.footing, here.q)
     was, now = (pose_of(robot, forward(tree, q)) for q in (here.q, solved))
     answer = answer_of(was, now, robot.rig.hip_height)
-    there = pose_of(robot, forward(tree, moved(robot, here.targets, here.q, answer)))
+    there = pose_of(robot, forward(tree, moved(robot, here.targets, was, answer)))
     np.testing.assert_allclose(there.hips, now.hips, atol=1e-9)
     alike = np.abs((there.parts * now.parts).sum(-1))
     assert np.degrees(2 * np.arccos(np.minimum(alike, 1.0))).mean() < 0.5
-    stays = moved(robot, here.targets, here.q, 0 * answer)
+    stays = moved(robot, here.targets, was, 0 * answer)
     np.testing.assert_allclose(stays.pos, here.q.pos, atol=1e-6)
 
 
