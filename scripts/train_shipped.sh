@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Trains the network that ships, from recordings to the file in the package: about two hours on one
+# Trains the networks that ship, from recordings to the files in the package: about two hours on one
 # core. DATA holds the folders named below (docs/model.md says where they come from); OUT gets the
 # dataset, the name encoder and the run, and what is in it already is not made again.
 #
@@ -24,3 +24,4 @@ else
     --names "$out/names.safetensors"
 fi
 python scripts/ship_weights.py "$out/run/checkpoint.safetensors"
+python -m scripts.train_start "$data" "$out/start"

@@ -109,7 +109,7 @@ def run(args: Namespace) -> int:
             name, method, of, progress=lambda it: console.progress(it, name, len(of)), **more
         )
 
-    rows = []
+    rows: list[Row] = []
 
     def add(name: str, method: "Retargeting", ways: "Sequence[str]", **about: Any) -> None:
         rows.extend(row(name + way, by(method, **_WAYS[way]), cases, **about) for way in ways)
