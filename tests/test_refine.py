@@ -71,13 +71,15 @@ def test_made_motions_stand_on_the_other_rig(name: str) -> None:
 
 
 def test_a_slid_foot_is_held_at_the_middle_of_its_stance() -> None:
-    """By hand: 4 frames of stance sliding 1 cm a frame are held at their mean, 1.5 cm in."""
-    path = np.zeros((8, 3))
-    path[:, 0] = 0.01 * np.arange(8)
+    """By hand: 4 frames of stance sliding 1 cm a frame are held at their mean, 1.5 cm in, and as
+    high as is wanted: at 2 cm on average."""
+    path, wanted = np.zeros((8, 3)), np.zeros((8, 3))
+    path[:, 0] = wanted[:, 0] = 0.01 * np.arange(8)
+    path[:, 2], wanted[2:6, 2] = 0.1, (0.01, 0.01, 0.03, 0.03)
     planted = np.array([0, 0, 1, 1, 1, 1, 0, 0], dtype=bool)
-    held = path + stance_correction(path, planted)
-    np.testing.assert_allclose(held[2:6, 0], 0.035, atol=1e-12)
-    np.testing.assert_allclose(stance_correction(path, np.zeros(8, dtype=bool)), 0)
+    held = path + stance_correction(path, wanted, planted)
+    np.testing.assert_allclose(held[2:6], [(0.035, 0, 0.02)] * 4, atol=1e-12)
+    np.testing.assert_allclose(stance_correction(path, wanted, np.zeros(8, dtype=bool)), 0)
 
 
 def test_corrections_blend_without_a_jump() -> None:
@@ -89,12 +91,12 @@ def test_corrections_blend_without_a_jump() -> None:
 def test_many_paths_at_once_are_each_by_itself() -> None:
     """Stances that touch a window's ends, none at all, and all: held at means, eased in between."""
     rng = np.random.default_rng(0)
-    paths = rng.normal(size=(5, 30, 3))
+    paths, goals = rng.normal(size=(2, 5, 30, 3))
     planted = rng.random((5, 30)) < np.array([0.2, 0.5, 0.9, 0.0, 1.0])[:, None]
-    together = stance_correction(paths, planted)
-    for path, flags, made in zip(paths, planted, together, strict=True):
+    together = stance_correction(paths, goals, planted)
+    for path, goal, flags, made in zip(paths, goals, planted, together, strict=True):
         frames = np.flatnonzero(flags)
         stances = np.split(frames, np.flatnonzero(np.diff(frames) > 1) + 1)
-        held = [path[stance].mean(0) - path[stance] for stance in stances if len(stance)]
+        held = [goal[stance].mean(0) - path[stance] for stance in stances if len(stance)]
         wanted = blend_between(np.concatenate(held), frames, 30) if held else np.zeros((30, 3))
         np.testing.assert_allclose(made, wanted, atol=1e-12)
