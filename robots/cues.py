@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 from robots.footing import Footing, corners_of
 from robots.morphology import Morphology
 from robots.project import hips_of
-from robots.targets import BONES, Targets, chest_of, side_of
+from robots.targets import BONES, Targets, side_of
 from robots.tree import Frames
 from spark.rig import Rig
 from spark.roles import Role
@@ -68,7 +68,7 @@ class Pose:
 
 def joints_of(rig: Rig) -> tuple[int | None, ...]:
     """The joint of the rig for each of `PARTS`; of the spine, the topmost."""
-    return tuple(chest_of(rig) if p is Role.SPINE else rig.roles.joint(p) for p in PARTS)
+    return tuple(rig.chest if p is Role.SPINE else rig.roles.joint(p) for p in PARTS)
 
 
 def pose_of(robot: Morphology, frames: Frames) -> Pose:

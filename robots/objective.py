@@ -13,7 +13,7 @@ from robots.footing import Footing
 from robots.morphology import Morphology
 from robots.normal import Normal
 from robots.stage import Stage
-from robots.targets import Targets, chest_of
+from robots.targets import Targets
 from robots.terms import Rows, direction_rows, limit_rows, one_sided, point_columns, turn_rows
 from robots.tree import Coordinates, Frames, forward
 from spark.roles import Role
@@ -119,7 +119,7 @@ def linearize(
     normal = Normal(len(q), len(stage.columns), rows)
     firm = np.ones(len(q)) if firm is None else firm
     blocks = {link: Block(stage, frames, link, rows) for link in _ends(robot, stage)}
-    chest = chest_of(rig)
+    chest = rig.chest
     for j, role in enumerate(rig.roles.roles):
         link = int(robot.links[j])
         block = _block_of(blocks, robot, link)

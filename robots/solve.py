@@ -14,7 +14,7 @@ from robots.motion import RobotMotion
 from robots.project import project
 from robots.stage import Stage
 from robots.start import learned_start
-from robots.targets import Targets, chest_of, targets_of
+from robots.targets import Targets, targets_of
 from robots.ties import unhurried
 from robots.tree import Coordinates, forward
 from spark.canonical import CanonicalMotion
@@ -92,7 +92,7 @@ def solve(
 def stages_of(robot: Morphology) -> tuple[Stage, Stage]:
     """Base, trunk and legs; then the rest."""
     tree = robot.tree
-    links = {int(robot.links[chest_of(robot.rig)])}
+    links = {int(robot.links[robot.rig.chest])}
     links |= {int(link) for sole in robot.soles for link in sole.links}
     links |= {int(robot.links[j]) for j in robot.rig.contact_joints}
     first = sorted({j for link in links for j in tree.chain(link)})

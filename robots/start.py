@@ -35,7 +35,7 @@ from spark.rotation import (
 )
 
 SHIPPED = Path(__file__).parent / "shipped" / "start.safetensors"
-WIDTH, STRIDES = 5, (1, 2)  # of the convolutions: frames that they see, and how far apart
+STRIDES = 1, 2  # frames from one that a convolution sees to the next
 MOST = 4.0  # standard deviations that a cue may be from its mean
 _SMOOTH = 1.0  # frames over which the start is smoothed (a Gaussian's standard deviation)
 

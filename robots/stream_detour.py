@@ -10,7 +10,6 @@ from jaxtyping import Float
 
 from robots.project import project
 from robots.stream_targets import LATENCY, FrameTargets, Watcher
-from robots.targets import chest_of
 from robots.window_terms import Posture, Terms
 from spark.rotation import quat_from_matrix
 
@@ -27,7 +26,7 @@ class Detours:
     def __init__(self, watcher: Watcher, terms: Terms, frame_time: float) -> None:
         self._robot, self._terms, self._frame_time = watcher.robot, terms, frame_time
         robot = self._robot
-        trunk = robot.rig.pelvis, chest_of(robot.rig)
+        trunk = robot.rig.pelvis, robot.rig.chest
         inner = {k for j in trunk for k in robot.tree.chain(int(robot.links[j]))}
         numbers = np.cumsum(~robot.tree.balls) - 1  # of the tree's hinges
         self._limbs = []

@@ -14,7 +14,6 @@ from robots.targets import (
     BONES,
     OUT,
     arm_length,
-    chest_of,
     feet_of,
     palm_thickness,
     side_of,
@@ -88,7 +87,7 @@ class Watcher:
         self._parents = source.skeleton.parents.tolist()
         self._untpose = matrix_from_quat(quat_conj(source.tpose))
         self._tpose = matrix_from_quat(robot.rig.tpose)
-        self._chest = chest_of(source)
+        self._chest = source.chest
         self._turns = correspond(source, robot.rig)
         self._held = np.flatnonzero(self._turns.first < 0)
         self._between = np.flatnonzero((self._turns.mix != 0) & (self._turns.first >= 0))
@@ -112,7 +111,7 @@ class Watcher:
         own = self._own(turns)
         return FrameTargets(
             world=own @ self._tpose,
-            chest=turns[self._chest] @ self._tpose[chest_of(self.robot.rig)],
+            chest=turns[self._chest] @ self._tpose[self.robot.rig.chest],
             hips=self.scale * hips,
             bones=bones,
             hands=self._between_hands(joints),

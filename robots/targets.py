@@ -85,14 +85,14 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
     moved = transfer(source, robot.rig)
     positions = canonical_positions(source)
     rig = source.rig
-    own_chest = chest_of(robot.rig)
+    own_chest = robot.rig.chest
     paths = feet_of(source, positions, robot)
     scale = robot.rig.hip_height / rig.hip_height
     touches = _touches(source, paths)
     return Targets(
         frame_time=source.frame_time,
         world=quat_mul(moved.rotations, robot.rig.tpose),
-        chest=quat_mul(source.rotations[:, chest_of(rig)], robot.rig.tpose[own_chest]),
+        chest=quat_mul(source.rotations[:, rig.chest], robot.rig.tpose[own_chest]),
         hips=moved.hips - np.array([0.0, 0.0, moved.floor_z]),
         bones=bone_directions(rig, positions, source.rotations),
         contacts=_without_flicker(touches, max(1, round(_GAP / source.frame_time))),
@@ -101,11 +101,6 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
         hands=_between_hands(rig, positions, robot),
         notes=moved.notes,
     )
-
-
-def chest_of(rig: Rig) -> int:
-    """The topmost joint of the trunk."""
-    return (rig.pelvis, *rig.roles.joints(Role.SPINE))[-1]
 
 
 def bone_directions(

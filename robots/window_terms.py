@@ -19,7 +19,6 @@ from robots.morphology import Morphology
 from robots.objective import TURN, TURNS
 from robots.solve import stages_of
 from robots.stream_targets import FrameTargets
-from robots.targets import chest_of
 from robots.terms import one_sided
 from robots.tree import BASE
 from robots.window_touch import Poses, Touch
@@ -252,7 +251,7 @@ class Terms:
                 followed.append(j)
                 weights.append(TURNS.get(kind, TURN))
         self._followed = np.array(followed)
-        turned = [*(links[j] for j in followed), links[chest_of(rig)]]
+        turned = [*(links[j] for j in followed), links[rig.chest]]
         bodies = [self._body(link) for link in turned]
         self._turned = np.array(bodies)
         self._turned_rest = self._rest[0][bodies]

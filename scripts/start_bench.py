@@ -16,7 +16,6 @@ from robots.start import Layers, learned_start
 from robots.targets import Targets, targets_of
 from robots.ties import ties_of
 from robots.tree import Coordinates, forward
-from scripts.start_examples import part
 from spark.canonical import CanonicalMotion
 
 LONGEST = 20.0  # [s] of each motion
@@ -29,7 +28,7 @@ def compare(robot: Morphology, motions: Sequence[CanonicalMotion], layers: Layer
     frame in the end."""
     rows = []
     for motion in motions:
-        piece = part(motion, slice(0, round(LONGEST / motion.frame_time)))
+        piece = motion.frames(0, round(LONGEST / motion.frame_time))
         targets = targets_of(piece, robot)
         footing = plan_footing(robot, targets)
         few, places, q = copied(robot, targets, footing, stride_between(targets))

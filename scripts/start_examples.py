@@ -76,7 +76,7 @@ def solved(motions: dict[str, tuple[CanonicalMotion, float]]) -> Iterator[Exampl
                     continue
                 frames = round((min(seconds, BRIEF) if seed else seconds) / motion.frame_time)
                 start = int(rng.integers(max(1, len(motion) - frames)))
-                piece = part(motion, slice(start, start + frames))
+                piece = motion.frames(start, start + frames)
                 if len(piece) >= SHORTEST:
                     yield example(robot, name, piece, path)
 
@@ -93,16 +93,6 @@ def example(robot: Morphology, name: str, motion: CanonicalMotion, path: str) ->
         cues_of(robot, few, places, frames, was).astype(np.float32),
         answer_of(was, now, robot.rig.hip_height).astype(np.float32),
         np.array([j is not None for j in joints_of(robot.rig)]),
-    )
-
-
-def part(motion: CanonicalMotion, frames: slice) -> CanonicalMotion:
-    return CanonicalMotion(
-        motion.rig,
-        motion.frame_time,
-        motion.rotations[frames],
-        motion.hips[frames],
-        motion.floor_z,
     )
 
 

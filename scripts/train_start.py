@@ -20,11 +20,12 @@ from torch import nn
 
 from robots.cues import answer_mirror, cue_mirror
 from robots.known import known
-from robots.start import MOST, SHIPPED, STRIDES, WIDTH, Layers
+from robots.start import MOST, SHIPPED, STRIDES, Layers
 from scripts.start_bench import compare, show
 from scripts.start_examples import SETS, Example, load, recordings, save, solved
 
-HIDDEN, EPOCHS, BATCH, FRAMES, RATE, DECAY = 128, 6, 64, 32, 2e-3, 0.02
+WIDTH, HIDDEN = 5, 128  # frames that a convolution sees, and what it gives of each
+EPOCHS, BATCH, FRAMES, RATE, DECAY = 6, 64, 32, 2e-3, 0.02
 NOISE, KINK = 0.1, 0.15  # of cues; of errors, where squares become absolute values
 LARGEST = 1.5  # [rad, hip heights] of an answer
 LIMB = (1.0, 1.0, 0.7, 1.0, 1.0, 0.3)

@@ -1,6 +1,6 @@
 """Canonical form: a motion as rotations since the T-pose, one language for every rig."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -30,6 +30,10 @@ class CanonicalMotion:
 
     def __len__(self) -> int:
         return len(self.hips)
+
+    def frames(self, start: int, stop: int) -> "CanonicalMotion":
+        """The motion of frames `start` to `stop`, exclusive."""
+        return replace(self, rotations=self.rotations[start:stop], hips=self.hips[start:stop])
 
 
 def to_canonical(motion: Motion, rig: Rig) -> CanonicalMotion:

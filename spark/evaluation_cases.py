@@ -21,6 +21,7 @@ from spark.dataset import Performance, is_dataset, prepare, read_performances
 from spark.errors import SkeletonError
 from spark.features import BodyFeatures
 from spark.metrics import san_height
+from spark.own_motion import SHORTEST
 from spark.pairs import Clip
 from spark.roles import Role
 from spark.staging import Stage
@@ -35,8 +36,6 @@ SPARE_FRAMES = 3
 # Made targets of each body and structure: its clips share them, so that results can be compared.
 _TARGETS = 3
 _TRIES = 50
-# A clip is halved if both halves last so long [s].
-_HALF = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +155,7 @@ def _asked_and_own(clip: Clip, found: Sequence[Performance]) -> tuple[Clip, Clip
     if others:
         return clip, _longest(others)
     half = len(clip.hips) // 2
-    if half * clip.frame_time < _HALF:
+    if half * clip.frame_time < SHORTEST:
         return clip, None
     return _part(clip, slice(half, None)), _part(clip, slice(half))
 

@@ -27,7 +27,7 @@ from spark.rotation import (
 from spark.transfer import Correspondence, correspond, transfer
 
 _SPANS, _SPAN = 10, 100  # so many parts of a recording, of so many frames at 30 fps, are looked at
-_SHORTEST = 2.0  # [s] of a recording that tells anything
+SHORTEST = 2.0  # [s] of a recording that tells anything
 _STILL = 0.2  # a body whose features all stay closer than this stands, as in a T-pose
 _LITTLE = 0.05  # of the way from one joint to another
 _FOLDS = 4
@@ -138,9 +138,8 @@ def _features(motion: CanonicalMotion) -> Float[np.ndarray, "T F"]:
     """How chest, head, arms and legs are turned against each other, as columns of matrices: those
     don't jump."""
     rig, rotations = motion.rig, motion.rotations
-    chest = (rig.pelvis, *rig.roles.joints(Role.SPINE))[-1]
-    seen = [quat_relative(rotations[:, rig.pelvis], rotations[:, chest])]
-    for base, roles in zip((chest, rig.pelvis), _PARTS, strict=True):
+    seen = [quat_relative(rotations[:, rig.pelvis], rotations[:, rig.chest])]
+    for base, roles in zip((rig.chest, rig.pelvis), _PARTS, strict=True):
         parts = [rig.roles.joint(role) for role in roles]
         seen += [quat_relative(rotations[:, base], rotations[:, j]) for j in parts if j is not None]
     return np.concatenate([sixd_from_quat(q) for q in seen], -1)
@@ -164,11 +163,9 @@ def _turned(
 
 def _spans(own: CanonicalMotion) -> list[CanonicalMotion]:
     """Parts of a recording, spread over it; none of a short one."""
-    if len(own) * own.frame_time < _SHORTEST:
+    if len(own) * own.frame_time < SHORTEST:
         return []
     size = min(max(1, round(_SPAN * FRAME_TIME / own.frame_time)), len(own))
     count = min(_SPANS, len(own) // size)
     firsts = np.linspace(0, len(own) - size, count).astype(int).tolist()
-    parts = [slice(first, first + size) for first in firsts]
-    cut = (replace(own, rotations=own.rotations[p], hips=own.hips[p]) for p in parts)
-    return [at_frame_time(span, FRAME_TIME) for span in cut]
+    return [at_frame_time(own.frames(at, at + size), FRAME_TIME) for at in firsts]

@@ -97,8 +97,8 @@ class Learned:
         total = np.zeros(count)
         for k in range(0, len(firsts), _AT_A_TIME):
             spans = [slice(at, at + size) for at in firsts[k : k + _AT_A_TIME]]
-            given = [_cut(source, span) for span in spans]
-            copied = [_cut(start, span) for span in spans]
+            given = [source.frames(span.start, span.stop) for span in spans]
+            copied = [start.frames(span.start, span.stop) for span in spans]
             answers = self._answers(given, copied, bodies, guess, share)
             for span, answer in zip(spans, answers, strict=True):
                 same = np.sign((answer.rotations * start.rotations[span]).sum(-1, keepdims=True))
@@ -161,7 +161,3 @@ def _names_of(weights: Weights) -> Callable[[Sequence[str]], Float[np.ndarray, "
 
 def _windows(body: BodyFeatures, read: Sequence[tuple[np.ndarray, np.ndarray, object]]) -> Windows:
     return Windows(body, np.stack([r[0] for r in read]), np.stack([r[1] for r in read]))
-
-
-def _cut(canonical: CanonicalMotion, span: slice) -> CanonicalMotion:
-    return replace(canonical, rotations=canonical.rotations[span], hips=canonical.hips[span])

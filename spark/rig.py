@@ -57,6 +57,11 @@ class Rig:
         return self.roles.require(Role.PELVIS)
 
     @cached_property
+    def chest(self) -> int:
+        """The topmost joint of the trunk."""
+        return (self.pelvis, *self.roles.joints(Role.SPINE))[-1]
+
+    @cached_property
     def hips(self) -> list[int]:
         """The upper-leg joints; their middle is the point that carries the body's path."""
         return [j for role in _UPPER_LEGS for j in self.roles.joints(role)[:1]]

@@ -76,6 +76,11 @@ class Clip:
         except SkeletonError as error:
             raise SkeletonError(f"{self.recording.bvh.path or self.name}: {error}") from error
 
+    @cached_property
+    def canonical(self) -> CanonicalMotion:
+        """The motion in canonical form. Raises what `rig` raises."""
+        return to_canonical(self.motion, self.rig)
+
     @property
     def notes(self) -> tuple[str, ...]:
         """What was assumed about the file and, for a humanoid, its body."""
@@ -230,7 +235,7 @@ def _filled_in(source: CanonicalMotion, target: Clip, network: "Learned") -> Can
 
     if not network.network.config.residual:
         return network(source, target.rig)
-    return with_own_motion(network, source, to_canonical(target.motion, target.rig))
+    return with_own_motion(network, source, target.canonical)
 
 
 def _learned(checkpoint: File | None) -> "Learned":

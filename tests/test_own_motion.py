@@ -71,14 +71,14 @@ def test_it_does_not_matter_where_and_whereto_it_was_recorded() -> None:
 def test_where_it_tells_nothing_the_method_is_left_alone(why: str) -> None:
     own, source = bowing(20), lacking(bowing(5, phase=1.0))
     if why == "short":
-        own = replace(own, rotations=own.rotations[:55], hips=own.hips[:55])
+        own = own.frames(0, 55)
     if why == "still":
         own = replace(own, rotations=np.tile(own.rotations[:1], (len(own), 1, 1)))
     if why == "turned around":
         around = quat_from_yaw(np.linspace(0, 6, len(own)))
         own = replace(own, rotations=quat_mul(around[:, None], own.rotations[:1]))
     if why == "a frame":
-        own = replace(own, rotations=own.rotations[:1], hips=own.hips[:1], frame_time=10.0)
+        own = replace(own.frames(0, 1), frame_time=10.0)
     if why == "nothing missing":
         source = bowing(5)
     moved, copied = with_own_motion(transfer, source, own), transfer(source, own.rig)

@@ -46,16 +46,6 @@ def walked(walk: CanonicalMotion, ember: Morphology) -> RobotMotion:
     return retarget(walk, ember)
 
 
-def part(source: CanonicalMotion, frames: slice) -> CanonicalMotion:
-    return CanonicalMotion(
-        source.rig,
-        source.frame_time,
-        source.rotations[frames],
-        source.hips[frames],
-        source.floor_z,
-    )
-
-
 def turned(source: CanonicalMotion, yaw: float) -> CanonicalMotion:
     q = quat_from_yaw(np.array(yaw))
     return CanonicalMotion(
@@ -90,7 +80,7 @@ def clap(rig: Rig, apart: np.ndarray) -> CanonicalMotion:
 def test_the_gradient_is_that_of_the_cost(
     walk: CanonicalMotion, ember: Morphology, stage: int, exact: bool
 ) -> None:
-    source = part(walk, slice(0, 4))
+    source = walk.frames(0, 4)
     targets = targets_of(source, ember)
     footing = plan_footing(ember, targets)
     rng = np.random.default_rng(0)
@@ -301,16 +291,16 @@ def test_the_first_frame_is_as_good_as_any(
 ) -> None:
     """Started in the middle of a stride, nearly the same poses come out, from the first frame on,
     and the first one's limbs point where they should as those of any other."""
-    rest = part(walk, slice(35, None))
+    rest = walk.frames(35, len(walk))
     result = retarget(rest, ember)
     later, whole = result.coordinates.angles, walked.coordinates.angles[35:]
     first, every = (
         limb_error(
-            part(rest, frames),
-            canonical_positions(part(rest, frames)),
-            RobotMotion(ember, result.coordinates.at(frames), rest.frame_time),
+            rest.frames(0, count),
+            canonical_positions(rest.frames(0, count)),
+            RobotMotion(ember, result.coordinates.at(slice(0, count)), rest.frame_time),
         )
-        for frames in (slice(0, 1), slice(None))
+        for count in (1, len(rest))
     )
     assert first < 1.5 * every
     assert np.abs(later - whole)[0].max() < np.radians(8)
@@ -321,7 +311,7 @@ def test_the_first_frame_is_as_good_as_any(
 
 @pytest.mark.parametrize("frames", [1, 2, 3, 5])
 def test_short_clips_are_clips(walk: CanonicalMotion, ember: Morphology, frames: int) -> None:
-    result = retarget(part(walk, slice(0, frames)), ember)
+    result = retarget(walk.frames(0, frames), ember)
     assert result.qpos.shape == (frames, ember.mjcf.model.nq)
     assert np.isfinite(result.qpos).all()
 

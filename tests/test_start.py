@@ -163,10 +163,7 @@ def test_a_start_keeps_the_limits(walk: CanonicalMotion, name: str) -> None:
 
 @pytest.mark.parametrize("frames", [1, 2, 4])
 def test_few_frames_have_a_start(walk: CanonicalMotion, ember: Morphology, frames: int) -> None:
-    few = CanonicalMotion(
-        walk.rig, walk.frame_time, walk.rotations[:frames], walk.hips[:frames], walk.floor_z
-    )
-    assert np.isfinite(on_robot(few, ember).start.angles).all()
+    assert np.isfinite(on_robot(walk.frames(0, frames), ember).start.angles).all()
 
 
 def test_variants_are_other_robots(ember: Morphology) -> None:
