@@ -13,7 +13,6 @@ from robots.morphology import Morphology
 from robots.motion import RobotMotion
 from robots.project import project
 from robots.stage import Stage
-from robots.start import learned_start
 from robots.targets import Targets, targets_of
 from robots.ties import unhurried
 from robots.tree import Coordinates, forward
@@ -42,8 +41,9 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     targets = targets_of(source, robot)
     footing = plan_footing(robot, targets)
     stride = stride_between(targets)
-    few, places, q = copied(robot, targets, footing, stride)
-    q = solve(robot, few, places, learned_start(robot, few, places, q))
+    few = targets.every(stride)
+    q = unhurried(robot, project(robot, few.world, few.hips), few.frame_time)
+    q = solve(robot, few, [foot.every(stride) for foot in footing], q)
     if stride > 1:
         q = solve(robot, targets, footing, q.between(stride, len(targets)), polish=True)
     return RobotMotion(robot, q, source.frame_time, (*robot.notes, *targets.notes))
@@ -52,15 +52,6 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
 def stride_between(targets: Targets) -> int:
     """From each frame that is solved first to the next."""
     return min(max(1, round(_COARSE / targets.frame_time)), max(len(targets) // 4, 1))
-
-
-def copied(
-    robot: Morphology, targets: Targets, footing: list[Footing], stride: int
-) -> tuple[Targets, list[Footing], Coordinates]:
-    """Every `stride`-th frame: what is asked for, and the copy, without jumps."""
-    few = targets.every(stride)
-    q = unhurried(robot, project(robot, few.world, few.hips), few.frame_time)
-    return few, [foot.every(stride) for foot in footing], q
 
 
 def solve(

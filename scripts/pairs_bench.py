@@ -18,7 +18,6 @@ from torch.utils.data import DataLoader
 
 from spark.batch import Batch
 from spark.dataset import training_clips
-from spark.memory import keep_freed_memory
 from spark.names import NameEncoder
 from spark.packed import AHEAD, Packed, Packer
 from spark.settings import TrainConfig
@@ -43,7 +42,6 @@ class TimedPacker(Packer):
 
 def main(*data: str) -> None:
     torch.set_num_threads(1)
-    keep_freed_memory()
     clips, _ = training_clips([Path(folder) for folder in data])
     config = replace(TrainConfig("default"), variants=16)
     steps = Timed(clips, NameEncoder().eval().remembering(), config, 0, 1)

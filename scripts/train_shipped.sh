@@ -24,4 +24,3 @@ else
     --names "$out/names.safetensors"
 fi
 python scripts/ship_weights.py "$out/run/checkpoint.safetensors"
-python -m scripts.train_start "$data" "$out/start"

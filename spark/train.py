@@ -33,7 +33,6 @@ from spark.checkpoint import (
 )
 from spark.config import Config
 from spark.known_bodies import distinct
-from spark.memory import keep_freed_memory
 from spark.model import Spark
 from spark.name_file import load_names
 from spark.names import NAME_CACHE, NameEncoder, T5Names
@@ -190,7 +189,6 @@ def train(
     `watch` is told the loss terms after each step that is logged. On a GPU the network is compiled
     and computes in bf16. Under `torchrun` the first process writes.
     """
-    keep_freed_memory()
     rank, world, device = _place()
     model = start.model.to(device)
     objective = Objective(model, config).to(device)
