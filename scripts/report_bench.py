@@ -19,8 +19,8 @@ from sim.report import Report, judge
 from sim.report.thresholds import PLAUSIBILITY_V1
 from sim.report.track import track
 from spark.errors import SkeletonError, SparkSimError
+from spark.io.recording import read_recording
 from spark.motion import Motion
-from spark.recording import read_recording
 from spark.rig import Rig, understand
 
 FOLDERS = ("cmu_asf", "cmu_expmap", "reactidle", "animateddrawings")

@@ -23,7 +23,7 @@ from robots.stream import Stream
 from robots.stream_targets import LATENCY, Frame, ground_of
 from robots.targets import bone_directions
 from spark.canonical import CanonicalMotion, canonical_positions, from_canonical, to_canonical
-from spark.recording import read_recording
+from spark.io.recording import read_recording
 from spark.rig import understand
 from spark.roles import Role
 

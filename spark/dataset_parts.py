@@ -20,7 +20,7 @@ from spark.clips import clip_of
 from spark.errors import SparkSimError
 from spark.features import body_features
 from spark.files import write_atomically
-from spark.reading import read_motion
+from spark.io.reading import read_motion
 from spark.rig import Rig, understand
 from spark.rig_json import rig_from_json, rig_to_json
 

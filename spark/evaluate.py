@@ -17,9 +17,9 @@ from spark.canonical import canonical_positions, to_canonical
 from spark.clips import FRAME_TIME, at_frame_time
 from spark.errors import FileFormatError, SkeletonError, name_list
 from spark.evaluation_cases import SPARE_FRAMES, STRUCTURES, Case, Structure
+from spark.io.reading import SUFFIXES, read_motion
 from spark.metrics import Score, mean_score, score_positions, source_sensitivity
 from spark.own_motion import Retargeting, with_own_motion
-from spark.reading import SUFFIXES, read_motion
 from spark.refine import refine
 from spark.rig import understand
 

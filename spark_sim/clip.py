@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, overload
 
 from robots import formats, registry
-from spark.bvh import write_bvh
 from spark.canonical import CanonicalMotion, from_canonical, to_canonical
-from spark.encoding import encode, encode_new
 from spark.errors import ConventionError, FileFormatError, SkeletonError
+from spark.io.bvh import write_bvh
+from spark.io.encoding import encode, encode_new
+from spark.io.reading import read_motion
+from spark.io.recording import Recording
 from spark.motion import Motion
 from spark.override import Override
-from spark.reading import read_motion
-from spark.recording import Recording
 from spark.refine import refine as hold_feet
 from spark.rig import Rig, understand
 from spark.transfer import transfer

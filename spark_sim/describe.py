@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from spark.convention import Convention
 from spark.errors import SkeletonError
+from spark.io.convention import Convention
 from spark.rotation import quat_angle, quat_identity
 from spark_sim.clip import AnyClip, Clip
 from spark_sim.console import columns

@@ -12,7 +12,7 @@ from humanoids import ONE_A_RIG
 from sim.body import build_body
 from sim.joints import JointType
 from sim.mjcf import write_mjcf
-from spark.reading import read_motion
+from spark.io.reading import read_motion
 from spark.rig import Rig, understand
 
 STANDING = (

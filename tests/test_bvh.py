@@ -12,10 +12,10 @@ from conftest import recordings
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from spark.bvh import CHANNELS, Bvh, BvhJoint, read_bvh, write_bvh
-from spark.encoding import encode
 from spark.errors import FileFormatError, OutputError, SkeletonError, SparkSimError
-from spark.recording import read_recording
+from spark.io.bvh import CHANNELS, Bvh, BvhJoint, read_bvh, write_bvh
+from spark.io.encoding import encode
+from spark.io.recording import read_recording
 
 SMALL = """\
 HIERARCHY

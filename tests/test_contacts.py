@@ -7,8 +7,8 @@ import pytest
 from conftest import recordings
 
 from spark.contacts import planted_feet, planted_points, speeds
+from spark.io.recording import read_recording
 from spark.kinematics import forward
-from spark.recording import read_recording
 from spark.rig import understand
 from spark.sample import sample_motion, sample_rig
 

@@ -12,16 +12,16 @@ import pytest
 from conftest import recording
 
 from spark import dataset_parts
-from spark.bvh import write_bvh
 from spark.canonical import to_canonical
 from spark.clips import clip_of
 from spark.dataset import _on_body, is_dataset, prepare, read_dataset, training_clips
 from spark.dataset_parts import Part
-from spark.encoding import encode_new
 from spark.errors import FileFormatError, OutputError, SkeletonError
 from spark.features import body_features
+from spark.io.bvh import write_bvh
+from spark.io.encoding import encode_new
+from spark.io.reading import motion_files, read_motion
 from spark.pairs import PairMaker
-from spark.reading import motion_files, read_motion
 from spark.rig import understand
 from spark.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_about, quat_angle, quat_conj, quat_mul

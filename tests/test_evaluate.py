@@ -16,7 +16,6 @@ import pytest
 import torch
 
 import spark_sim
-from spark.bvh import read_bvh, write_bvh
 from spark.canonical import CanonicalMotion, canonical_positions
 from spark.checkpoint import Checkpoint, save_checkpoint
 from spark.contacts import planted_feet, speeds
@@ -32,6 +31,7 @@ from spark.evaluate import (
 from spark.evaluation_cases import Case, made_cases, performances, recorded_cases
 from spark.evaluation_tables import as_csv, as_json, markdown
 from spark.features import body_features
+from spark.io.bvh import read_bvh, write_bvh
 from spark.known_bodies import distinct
 from spark.metrics import Score
 from spark.model import Spark

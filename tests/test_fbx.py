@@ -12,8 +12,8 @@ from fbx_text import Fbx, Node, Take
 
 import spark_sim
 from spark.errors import ConventionError, DependencyError, FileFormatError
-from spark.fbx import read_fbx
-from spark.fbx_scene import FbxScene
+from spark.io.fbx import read_fbx
+from spark.io.fbx_scene import FbxScene
 from spark.kinematics import forward
 from spark.rig import understand
 from spark.rotation import quat_angle, quat_identity

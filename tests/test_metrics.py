@@ -12,7 +12,7 @@ from stick import stick_rig
 from spark.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.clips import at_frame_time
 from spark.errors import SkeletonError
-from spark.fbx import read_fbx
+from spark.io.fbx import read_fbx
 from spark.metrics import (
     Score,
     foot_speed,

@@ -9,8 +9,8 @@ from conftest import recording
 from stick import joint, stick_rig, without
 
 from spark.canonical import CanonicalMotion, to_canonical
+from spark.io.reading import read_motion
 from spark.own_motion import with_own_motion
-from spark.reading import read_motion
 from spark.rig import understand
 from spark.roles import Role
 from spark.rotation import quat_about, quat_angle, quat_from_yaw, quat_mul

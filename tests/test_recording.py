@@ -11,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from spark.bvh import CHANNELS, Bvh, BvhJoint, write_bvh
-from spark.convention import UNITS
-from spark.encoding import encode, encode_new
 from spark.errors import ConventionError, SkeletonError
-from spark.euler import euler_over_time, quat_from_angles
+from spark.io.bvh import CHANNELS, Bvh, BvhJoint, write_bvh
+from spark.io.convention import UNITS
+from spark.io.encoding import encode, encode_new
+from spark.io.euler import euler_over_time, quat_from_angles
+from spark.io.recording import Recording, read_recording
 from spark.kinematics import end_positions, forward
 from spark.motion import Motion
-from spark.recording import Recording, read_recording
 from spark.skeleton import Skeleton
 
 XYZ = CHANNELS[:3]

@@ -9,9 +9,9 @@ from scripts.corruptions import CORRUPTIONS, HARMLESS
 from scripts.report_bench import auc, scores, table
 from sim.report import judge
 from sim.report.track import track
+from spark.io.recording import read_recording
 from spark.kinematics import forward
 from spark.motion import Motion
-from spark.recording import read_recording
 from spark.rig import Rig, understand
 from spark.roles import Role
 from spark.rotation import quat_about, quat_angle, quat_slerp

@@ -29,7 +29,7 @@ from sim.report.track import track
 from sim.report.wrench import required_wrench
 from spark.canonical import to_canonical
 from spark.errors import FileFormatError, SkeletonError, SparkSimError
-from spark.recording import read_recording
+from spark.io.recording import read_recording
 from spark.rig import understand
 from spark_sim.cli import run
 from spark_sim.robot import RobotClip

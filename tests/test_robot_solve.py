@@ -21,8 +21,8 @@ from robots.ties import jolted, unhurried
 from robots.tree import Coordinates, forward
 from scripts.robot_bars import COLUMNS, limb_error, measure, misses
 from spark.canonical import CanonicalMotion, canonical_positions, to_canonical
+from spark.io.recording import read_recording
 from spark.kinematics import world_positions
-from spark.recording import read_recording
 from spark.rig import Rig, understand
 from spark.roles import Role
 from spark.rotation import quat_from_rotvec, quat_from_yaw, quat_mul, quat_rotate

@@ -23,8 +23,8 @@ from robots.window_terms import Stance, Terms
 from scripts.robot_bars import COLUMNS, follow, limb_error, measure
 from spark.canonical import canonical_positions, to_canonical
 from spark.errors import ConventionError, FrameError
+from spark.io.recording import read_recording
 from spark.motion import Motion
-from spark.recording import read_recording
 from spark.rig import understand
 from spark.rotation import (
     matrix_from_quat,

@@ -14,10 +14,10 @@ from rigs import RIGS, build, walk
 
 from spark.errors import SkeletonError
 from spark.groups import groups_of
+from spark.io.recording import read_recording
 from spark.motion import Motion
 from spark.naming import assign_roles
 from spark.override import check_chains
-from spark.recording import read_recording
 from spark.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import quat_from_rotvec, quat_mul
 from spark.skeleton import Skeleton

@@ -8,7 +8,7 @@ from conftest import recording
 from stick import without
 
 from spark.canonical import CanonicalMotion, canonical_positions, to_canonical
-from spark.reading import read_motion
+from spark.io.reading import read_motion
 from spark.retarget import Learned
 from spark.rig import understand
 from spark.roles import Role

@@ -12,9 +12,9 @@ from stick import joint, standing, stick_rig
 
 from spark.canonical import to_canonical
 from spark.errors import SkeletonError
+from spark.io.recording import read_recording
 from spark.kinematics import local_rotations, world_positions
 from spark.motion import Motion
-from spark.recording import read_recording
 from spark.rig import Rig, understand
 from spark.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import (

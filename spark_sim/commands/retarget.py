@@ -95,7 +95,7 @@ def run(args: Namespace) -> int:
     from robots.formats import SUFFIXES, format_of
     from robots.registry import is_robot
     from spark.errors import OutputError, SparkSimError
-    from spark.reading import SUFFIXES as CHARACTERS
+    from spark.io.reading import SUFFIXES as CHARACTERS
     from spark_sim import console, files
 
     robot = is_robot(args.to) or Path(args.to).suffix.lower() in SUFFIXES
@@ -182,7 +182,7 @@ def _jobs(
     Below a folder given as a source the tree of folders is kept, of files with these endings.
     """
     from spark.errors import OutputError
-    from spark.reading import motion_files
+    from spark.io.reading import motion_files
 
     found: list[tuple[Path, Path]] = []
     for source in map(Path, sources):

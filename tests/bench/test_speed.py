@@ -14,10 +14,10 @@ import pytest
 from sim.body import build_body
 from sim.pose import qpos_from_motion
 from sim.report import judge
-from spark.bvh import read_bvh, write_bvh
 from spark.canonical import CanonicalMotion, from_canonical, to_canonical
-from spark.encoding import encode_new
 from spark.features import body_features
+from spark.io.bvh import read_bvh, write_bvh
+from spark.io.encoding import encode_new
 from spark.kinematics import forward
 from spark.known_bodies import trunk_of
 from spark.motion import Motion

@@ -1,6 +1,6 @@
 """Recordings: a file, and the motion that it holds in SI units and Z-up axes.
 
-This is the border where file units, file axes, Euler angles and degrees end; `spark.encoding` is
+This is the border where file units, file axes, Euler angles and degrees end; `spark.io.encoding` is
 the way back.
 """
 
@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from spark.bvh import Bvh, read_bvh
-from spark.convention import Convention, given_unit, given_up, infer_unit, infer_up
 from spark.errors import ConventionError, name_list
-from spark.euler import quat_from_angles
+from spark.io.bvh import Bvh, read_bvh
+from spark.io.convention import Convention, given_unit, given_up, infer_unit, infer_up
+from spark.io.euler import quat_from_angles
 from spark.motion import Motion
 from spark.rotation import quat_identity
 from spark.skeleton import Skeleton
@@ -49,7 +49,7 @@ def read_recording(
 ) -> Recording:
     """The recording in the BVH file at `path`.
 
-    `unit` (a name of `spark.convention.UNITS` or metres) and `up` (x, y or z) are inferred where
+    `unit` (a name of `spark.io.convention.UNITS` or metres) and `up` (x, y or z) are inferred where
     not given. A file without frames gives one frame of its rest pose. Raises `FileFormatError` as
     `read_bvh` does, and `ConventionError` where a convention isn't known or can't be inferred.
     """

@@ -11,20 +11,20 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from spark.convention import Convention, given_unit, given_up, infer_unit, infer_up
-from spark.encoding import encode_new
 from spark.errors import ConventionError, FileFormatError
-from spark.fbx_scene import FbxScene
-from spark.fbx_settings import FbxSettings, read_settings
+from spark.io.convention import Convention, given_unit, given_up, infer_unit, infer_up
+from spark.io.encoding import encode_new
+from spark.io.fbx_scene import FbxScene
+from spark.io.fbx_settings import FbxSettings, read_settings
+from spark.io.recording import Recording, in_si, unique_names
 from spark.kinematics import local_rotations
 from spark.motion import Motion
-from spark.recording import Recording, in_si, unique_names
 from spark.rotation import quat_conj, quat_continuous, quat_from_matrix, quat_rotate
 from spark.skeleton import Skeleton
 
 # A joint moves in its parent where its place changes by more than this share of the body's size.
 _STILL = 1e-4
-# Humans [m], as `spark.convention` has them.
+# Humans [m], as `spark.io.convention` has them.
 _PLAUSIBLE = (0.5, 3.0)
 
 

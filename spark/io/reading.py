@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from spark.errors import FileFormatError
-from spark.fbx import read_fbx
-from spark.recording import Recording, read_recording
+from spark.io.fbx import read_fbx
+from spark.io.recording import Recording, read_recording
 
 SUFFIXES = (".bvh", ".fbx")
 
@@ -15,7 +15,7 @@ def read_motion(
 ) -> Recording:
     """The recording in a BVH or FBX file, told apart by the ending of its name (BVH by any other).
 
-    Raises what `spark.recording.read_recording` and `spark.fbx.read_fbx` raise.
+    Raises what `spark.io.recording.read_recording` and `spark.io.fbx.read_fbx` raise.
     """
     path = Path(path)
     read = read_fbx if path.suffix.lower() == ".fbx" else read_recording

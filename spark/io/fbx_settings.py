@@ -8,8 +8,8 @@ import re
 import struct
 from dataclasses import dataclass
 
-from spark.convention import UPS, Up
 from spark.errors import ConventionError
+from spark.io.convention import UPS, Up
 
 _MAGIC = b"Kaydara FBX Binary"
 

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from spark.bvh import Bvh, BvhJoint, Vector
-from spark.convention import Convention, given_unit, given_up
 from spark.errors import SkeletonError, name_list
-from spark.euler import euler_over_time, quat_from_angles
+from spark.io.bvh import Bvh, BvhJoint, Vector
+from spark.io.convention import Convention, given_unit, given_up
+from spark.io.euler import euler_over_time, quat_from_angles
+from spark.io.recording import Recording
 from spark.motion import Motion
-from spark.recording import Recording
 from spark.rotation import quat_angle, quat_identity
 from spark.skeleton import Skeleton
 

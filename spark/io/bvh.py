@@ -1,7 +1,7 @@
 """BVH as it is written: names, offsets, channels, order and values, unchanged.
 
 The format is Biovision's: a HIERARCHY of joints with OFFSET and CHANNELS, then MOTION with one row
-of channel values a frame. Units, axes and Euler angles stay the file's own here; `spark.recording`
+of channel values a frame. Units, axes and Euler angles stay the file's own here; `spark.io.recording`
 turns them into SI.
 """
 
@@ -19,7 +19,7 @@ from jaxtyping import Float, Int
 
 from spark.errors import FileFormatError, SkeletonError
 from spark.files import write_atomically
-from spark.scanner import LARGEST, Scanner, number, shown
+from spark.io.scanner import LARGEST, Scanner, number, shown
 
 Vector = tuple[float, float, float]
 
