@@ -14,8 +14,8 @@ from robots.tpose import rest_pose
 from robots.tree import Coordinates, Tree, forward
 from spark.kinematics import world_positions
 from spark.motion import Motion
-from spark.rig import Rig
-from spark.roles import Role
+from spark.rig.rig import Rig
+from spark.rig.roles import Role
 from spark.rotation import (
     matrix_from_quat,
     quat_conj,

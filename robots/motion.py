@@ -12,7 +12,7 @@ from robots.morphology import Morphology, Sole
 from robots.tree import Coordinates
 from sim.given import GivenBody, GivenSole
 from spark.motion import Motion
-from spark.roles import Role
+from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_rotate
 
 

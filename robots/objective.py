@@ -16,7 +16,7 @@ from robots.stage import Stage
 from robots.targets import Targets
 from robots.terms import Rows, direction_rows, limit_rows, one_sided, point_columns, turn_rows
 from robots.tree import Coordinates, Frames, forward
-from spark.roles import Role
+from spark.rig.roles import Role
 from spark.rotation import matrix_from_quat
 
 DIRECTION = 2.0  # of arms and legs

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from robots.mjcf import Mjcf
 from robots.segments import Segment
 from robots.shapes import surface
-from spark.name_hints import read_names
+from spark.rig.name_hints import read_names
 from spark.skeleton import Skeleton
 
 

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from robots.morphology import Sole
 from robots.shapes import corners, flattening, sole_heading
 from spark.kinematics import world_positions
-from spark.roles import Role, RoleMap
+from spark.rig.roles import Role, RoleMap
 from spark.rotation import (
     quat_conj,
     quat_from_yaw,

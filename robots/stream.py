@@ -17,7 +17,7 @@ from robots.stream_targets import LATENCY, Frame, FrameTargets, Ground, Watcher,
 from robots.window import Window
 from robots.window_terms import Stance, Terms
 from spark.errors import FrameError
-from spark.rig import Rig
+from spark.rig.rig import Rig
 from spark.rotation import quat_from_matrix
 
 _GONE = 2  # frames before the free ones

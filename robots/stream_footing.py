@@ -12,8 +12,8 @@ from jaxtyping import Float
 from robots.footing import EASE, TURN, WOBBLE, flat_sole
 from robots.stream_targets import FrameTargets, Watcher
 from robots.window_terms import Stance
-from spark.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
-from spark.feet import standing_height
+from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
+from spark.rig.feet import standing_height
 
 _LET_GO = 1.5  # times the speed and height at which a foot comes to stand: there it is let go
 

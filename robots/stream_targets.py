@@ -20,9 +20,9 @@ from robots.targets import (
 )
 from spark.canonical import CanonicalMotion, canonical_positions
 from spark.errors import FrameError
-from spark.feet import sole_corners
-from spark.rig import Rig
-from spark.roles import Role
+from spark.rig.feet import sole_corners
+from spark.rig.rig import Rig
+from spark.rig.roles import Role
 from spark.rotation import matrix_from_quat, quat_conj
 from spark.transfer import correspond
 

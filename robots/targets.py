@@ -10,10 +10,10 @@ from robots.morphology import Morphology, Sole
 from robots.shapes import surface
 from robots.tree import forward
 from spark.canonical import CanonicalMotion, canonical_positions
-from spark.contacts import planted_points
-from spark.feet import Side, sole_corners, sole_positions, standing_height
-from spark.rig import Rig
-from spark.roles import LIMBS, Group, Role
+from spark.rig.contacts import planted_points
+from spark.rig.feet import Side, sole_corners, sole_positions, standing_height
+from spark.rig.rig import Rig
+from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_mul, quat_rotate
 from spark.transfer import transfer
 

@@ -8,7 +8,7 @@ from robots.morphology import Morphology
 from robots.normal import Ties, second_differences
 from robots.objective import ANKLE, CALM, FAST, JOLT, PATH, RUSH, SMOOTH
 from robots.tree import Coordinates
-from spark.roles import Role
+from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 
 _AROUND = 0.15  # [s] before and after a jolt that are smoothed with it

@@ -8,8 +8,8 @@ from jaxtyping import Float, Int
 from robots.normal import Normal
 from robots.terms import Rows, direction_rows, limit_rows, turn_rows
 from robots.tree import BASE, Coordinates, Tree, forward
-from spark.bones import Pose
-from spark.roles import LIMBS, Group, Role, RoleMap
+from spark.rig.bones import Pose
+from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import matrix_from_quat, quat_between, quat_from_matrix, quat_mul, quat_rotate
 from spark.skeleton import Skeleton
 

@@ -19,13 +19,13 @@ from robots.soles import place_feet, soles_of, with_soles
 from robots.tpose import TPose, search_tpose
 from robots.tree import Tree
 from spark.errors import SkeletonError
-from spark.groups import groups_of
 from spark.motion import Motion
-from spark.naming import Override, assign_roles
-from spark.rig import Rig, hip_height
-from spark.roles import Role, RoleMap
+from spark.rig.groups import groups_of
+from spark.rig.rig import Rig, hip_height
+from spark.rig.role_assignment import Override, assign_roles
+from spark.rig.roles import Role, RoleMap
+from spark.rig.tpose import find_tpose
 from spark.skeleton import Skeleton
-from spark.tpose import find_tpose
 
 _FAR_FROM_T, _NOT_A_T = np.radians(5), np.radians(40)
 

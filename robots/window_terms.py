@@ -22,7 +22,7 @@ from robots.stream_targets import FrameTargets
 from robots.terms import one_sided
 from robots.tree import BASE
 from robots.window_touch import Poses, Touch
-from spark.roles import Role
+from spark.rig.roles import Role
 
 Linear = tuple[Float[np.ndarray, "T R 3 D"], Float[np.ndarray, "T R 3"], Float[np.ndarray, "T R 3"]]
 

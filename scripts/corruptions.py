@@ -11,8 +11,8 @@ from sim.report.measures import at_times
 from spark.canonical import CanonicalMotion, from_canonical, to_canonical
 from spark.kinematics import forward, local_rotations
 from spark.motion import Motion
-from spark.rig import Rig
-from spark.roles import Role
+from spark.rig.rig import Rig
+from spark.rig.roles import Role
 from spark.rotation import (
     quat_about,
     quat_between,

@@ -17,9 +17,9 @@ from spark.features import body_features
 from spark.motion import Motion
 from spark.name_rigs import OTHER, Named, rig_of
 from spark.name_words import rig_words
-from spark.rig import understand
-from spark.rig_names import CONVENTIONS, split_side
-from spark.roles import Role
+from spark.rig.name_conventions import CONVENTIONS, split_side
+from spark.rig.rig import understand
+from spark.rig.roles import Role
 from spark.train_names import score_rigs, train_names
 
 

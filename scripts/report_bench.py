@@ -21,7 +21,7 @@ from sim.report.track import track
 from spark.errors import SkeletonError, SparkSimError
 from spark.io.recording import read_recording
 from spark.motion import Motion
-from spark.rig import Rig, understand
+from spark.rig.rig import Rig, understand
 
 FOLDERS = ("cmu_asf", "cmu_expmap", "reactidle", "animateddrawings")
 PER_FOLDER = 12

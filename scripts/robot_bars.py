@@ -24,8 +24,8 @@ from robots.stream_targets import LATENCY, Frame, ground_of
 from robots.targets import bone_directions
 from spark.canonical import CanonicalMotion, canonical_positions, from_canonical, to_canonical
 from spark.io.recording import read_recording
-from spark.rig import understand
-from spark.roles import Role
+from spark.rig.rig import understand
+from spark.rig.roles import Role
 
 COLUMNS = {  # name: format
     "sunk %": "6.2f",

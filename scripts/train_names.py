@@ -11,7 +11,7 @@ import torch
 
 from spark.name_file import save_names
 from spark.names import NameEncoder
-from spark.rig_names import HELD_OUT
+from spark.rig.name_conventions import HELD_OUT
 from spark.train_names import NameScore, score_names, train_names
 
 

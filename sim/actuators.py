@@ -13,9 +13,9 @@ from jaxtyping import Float
 from sim.inertia import Inertias, held_torques
 from sim.joints import Axis, mirrored
 from sim.parts import DETAIL, joint_kind_of, kept_joints, side_of
-from spark.feet import FOOT_LENGTH, sole_corners, sole_positions, standing_height
 from spark.kinematics import world_positions
-from spark.rig import Rig
+from spark.rig.feet import FOOT_LENGTH, sole_corners, sole_positions, standing_height
+from spark.rig.rig import Rig
 
 SAG = np.radians(0.8)
 PEAK = 4.0

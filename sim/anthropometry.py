@@ -11,10 +11,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.errors import SkeletonError
-from spark.feet import sole_corners, sole_positions, standing_height
 from spark.kinematics import world_positions
-from spark.rig import Rig
-from spark.roles import LIMBS, Group, Role
+from spark.rig.feet import sole_corners, sole_positions, standing_height
+from spark.rig.rig import Rig
+from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import matrix_from_quat, quat_conj, quat_rotate
 
 _Vector = Float[np.ndarray, "3"]

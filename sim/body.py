@@ -23,9 +23,9 @@ from sim.sensors import add_sensors, add_sites
 from sim.shapes import add_materials, add_shapes
 from sim.stance import arms_down, balanced, lean, standing_position
 from spark.errors import SkeletonError
-from spark.feet import standing_height
 from spark.kinematics import world_positions
-from spark.rig import Rig
+from spark.rig.feet import standing_height
+from spark.rig.rig import Rig
 
 BODY_MASS_INDEX = 22.0  # kg / m²: the middle of the healthy range
 _NEAR = 3  # joints

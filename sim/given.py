@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from sim.body import build_body
 from sim.pose import qpos_from_motion
 from spark.motion import Motion
-from spark.rig import Rig
+from spark.rig.rig import Rig
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from sim.anthropometry import segments
 from spark.kinematics import world_positions
-from spark.rig import Rig
+from spark.rig.rig import Rig
 from spark.rotation import matrix_from_quat
 
 LEAST_MASS = 1e-3  # [kg] of fingers and helpers: MuJoCo needs some

@@ -19,11 +19,11 @@ from sim.parts import kept_joints
 from spark.errors import DependencyError, SkeletonError, name_list
 from spark.kinematics import world_positions
 from spark.motion import Motion
-from spark.rig import Rig
-from spark.roles import Role, RoleMap
+from spark.rig.rig import Rig
+from spark.rig.roles import Role, RoleMap
+from spark.rig.tpose import find_tpose
 from spark.rotation import quat_rotate
 from spark.skeleton import Skeleton
-from spark.tpose import find_tpose
 
 _SHORT = 0.01  # [m]: bones below this say nothing about the scale
 _ALIKE = 0.1  # share by which bones of one body differ in length

@@ -1,7 +1,7 @@
 """Which joints of a rig move its body, and what each of them is called on it."""
 
 from sim.joints import HINGES, JOINTS, Hinge
-from spark.rig import Rig
+from spark.rig.rig import Rig
 
 LINK = "link"
 DETAIL = "detail"

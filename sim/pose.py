@@ -9,7 +9,7 @@ from sim.project import project
 from sim.stance import standing_position
 from spark.kinematics import forward, local_rotations, world_positions
 from spark.motion import Motion
-from spark.rig import Rig
+from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul
 
 

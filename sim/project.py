@@ -15,7 +15,7 @@ from sim.hinges import hinge_path, limit_speed
 from sim.joints import mirrored
 from sim.parts import hinges_of, joint_kind_of, kept_joints, side_of
 from spark.kinematics import world_positions
-from spark.rig import Rig
+from spark.rig.rig import Rig
 from spark.rotation import (
     quat_angle,
     quat_between,

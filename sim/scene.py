@@ -12,10 +12,10 @@ from sim.display import add_display
 from sim.given import GivenBody, given
 from sim.interpolate import at_times
 from spark.errors import SkeletonError
-from spark.feet import standing_height
 from spark.kinematics import forward
 from spark.motion import Motion
-from spark.rig import Rig
+from spark.rig.feet import standing_height
+from spark.rig.rig import Rig
 from spark.rotation import quat_about, quat_conj, quat_mul, quat_rotate
 
 _SPACING = 0.8  # of the mean of two neighbours' standing heights, between them

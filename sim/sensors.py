@@ -5,10 +5,10 @@ import numpy as np
 
 from sim.inertia import Inertias
 from sim.parts import DETAIL
-from spark.feet import sole_corners, sole_positions
 from spark.kinematics import world_positions
-from spark.rig import Rig
-from spark.roles import Role
+from spark.rig.feet import sole_corners, sole_positions
+from spark.rig.rig import Rig
+from spark.rig.roles import Role
 
 _MARGIN = 0.01  # [m] by which the volume of a touch sensor is larger than the foot's box
 

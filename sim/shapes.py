@@ -12,9 +12,9 @@ from jaxtyping import Float
 from sim.anthropometry import RADII
 from sim.mesh import Hull
 from sim.parts import DETAIL, kind_of, side_of
-from spark.feet import sole_corners, sole_positions, standing_height
 from spark.kinematics import end_positions, world_positions
-from spark.rig import Rig
+from spark.rig.feet import sole_corners, sole_positions, standing_height
+from spark.rig.rig import Rig
 
 _DETAIL = 0.006  # radius of fingers, face and helpers, as a fraction of the standing height
 _HEAD = np.array([0.055, 0.045, 0.068])  # half axes of the head

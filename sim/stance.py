@@ -4,10 +4,10 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.inertia import Inertias
-from spark.feet import sole_corners, sole_positions
 from spark.kinematics import world_positions
-from spark.rig import Rig
-from spark.roles import Role
+from spark.rig.feet import sole_corners, sole_positions
+from spark.rig.rig import Rig
+from spark.rig.roles import Role
 from spark.rotation import quat_about, quat_conj, quat_mul, quat_rotate
 
 _ARMS_DOWN = np.radians(75)

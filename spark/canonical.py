@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from spark.contacts import floor_height
 from spark.kinematics import forward, local_rotations, world_positions
 from spark.motion import Motion
-from spark.rig import Rig
+from spark.rig.contacts import floor_height
+from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_rotate
 
 

@@ -38,8 +38,8 @@ from spark.features import BodyFeatures, body_features
 from spark.files import write_atomically
 from spark.io.reading import motion_files
 from spark.pairs import Clip
-from spark.rig import Rig
-from spark.rig_json import rig_from_json, rig_to_json
+from spark.rig.rig import Rig
+from spark.rig.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_conj, quat_mul
 from spark.splits import cells, seen_characters, seen_motions
 from spark.variants import split_joints

@@ -21,8 +21,8 @@ from spark.errors import SparkSimError
 from spark.features import body_features
 from spark.files import write_atomically
 from spark.io.reading import read_motion
-from spark.rig import Rig, understand
-from spark.rig_json import rig_from_json, rig_to_json
+from spark.rig.rig import Rig, understand
+from spark.rig.rig_json import rig_from_json, rig_to_json
 
 # Goes up whenever the same file gives another part.
 VERSION = 2

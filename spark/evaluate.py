@@ -21,7 +21,7 @@ from spark.io.reading import SUFFIXES, read_motion
 from spark.metrics import Score, mean_score, score_positions, source_sensitivity
 from spark.own_motion import Retargeting, with_own_motion
 from spark.refine import refine
-from spark.rig import understand
+from spark.rig.rig import understand
 
 Positions = Float[np.ndarray, "_ _ 3"]  # frames, joints
 Method = Callable[[Case], Positions]

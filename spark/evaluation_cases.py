@@ -23,7 +23,7 @@ from spark.features import BodyFeatures
 from spark.metrics import san_height
 from spark.own_motion import SHORTEST
 from spark.pairs import Clip
-from spark.roles import Role
+from spark.rig.roles import Role
 from spark.staging import Stage
 from spark.transfer import correspond
 from spark.variants import Variant, random_variant, same_body, scaled_body, split_body

@@ -14,9 +14,9 @@ from jaxtyping import Float, Int
 
 from spark.canonical import CanonicalMotion
 from spark.kinematics import local_rotations, world_rotations
-from spark.rig import Rig
-from spark.rig_names import split_side
-from spark.roles import Group, Role
+from spark.rig.name_conventions import split_side
+from spark.rig.rig import Rig
+from spark.rig.roles import Group, Role
 from spark.rotation import (
     quat_from_sixd,
     quat_from_yaw,

@@ -14,9 +14,9 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from spark.actor import Actor
 from spark.canonical import CanonicalMotion
-from spark.feet import sole_corners
-from spark.rig import Rig
-from spark.roles import LIMBS, Group, Role
+from spark.rig.feet import sole_corners
+from spark.rig.rig import Rig
+from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_about, quat_from_yaw, quat_mul, quat_rotate
 
 FOOT_FLAT, MID_STANCE, HEEL_OFF, TOE_OFF = 0.12, 0.25, 0.31, 0.62

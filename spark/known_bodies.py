@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from spark.features import BodyFeatures
-from spark.roles import Role
+from spark.rig.roles import Role
 
 # Hip heights by which a joint lies elsewhere on a body that a network knows nothing of. Among the
 # recordings at hand, two people of one rig are 0.01 to 0.1 apart, mostly; rigs of other makers

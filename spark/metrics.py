@@ -12,11 +12,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from spark.canonical import CanonicalMotion, canonical_positions
-from spark.contacts import planted_feet, speeds
 from spark.errors import SkeletonError
 from spark.features import body_features
-from spark.rig import Rig
-from spark.roles import Role
+from spark.rig.contacts import planted_feet, speeds
+from spark.rig.rig import Rig
+from spark.rig.roles import Role
 from spark.rotation import quat_rotate
 
 

@@ -4,10 +4,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from spark.features import BodyFeatures
-from spark.groups import groups_of
-from spark.rig import Rig
-from spark.rig_names import split_side
-from spark.roles import Role, RoleMap
+from spark.rig.groups import groups_of
+from spark.rig.name_conventions import split_side
+from spark.rig.rig import Rig
+from spark.rig.roles import Role, RoleMap
 from spark.skeleton import Skeleton
 
 _ACROSS = np.array([1.0, -1.0, 1.0])  # y points left

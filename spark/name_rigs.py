@@ -12,8 +12,8 @@ from typing import TypeVar
 import numpy as np
 
 from spark.name_words import rig_words
-from spark.rig_names import CONVENTIONS, name_joints, split_side
-from spark.roles import Role
+from spark.rig.name_conventions import CONVENTIONS, name_joints, split_side
+from spark.rig.roles import Role
 
 KINDS = tuple(dict.fromkeys(split_side(role)[1] for role in Role))
 OTHER = "other"

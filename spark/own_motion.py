@@ -15,8 +15,8 @@ from jaxtyping import Float, Int
 from spark.canonical import CanonicalMotion
 from spark.clips import FRAME_TIME, at_frame_time
 from spark.errors import name_list
-from spark.rig import Rig
-from spark.roles import Role
+from spark.rig.rig import Rig
+from spark.rig.roles import Role
 from spark.rotation import (
     quat_from_rotvec,
     quat_mul,

@@ -22,7 +22,7 @@ from spark.name_network import NameNetwork
 from spark.network import Network
 from spark.pairs import Windows
 from spark.resample import positions_at, rotations_at
-from spark.rig import Rig
+from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_normalize
 from spark.transfer import correspond, transfer
 from spark.weights import Weights

@@ -10,9 +10,9 @@ from spark.actor import Actor
 from spark.canonical import CanonicalMotion, from_canonical
 from spark.gait import walk
 from spark.motion import Motion
-from spark.rig import Rig, understand
-from spark.rig_names import name_joints
-from spark.roles import LIMBS, Group, Role
+from spark.rig.name_conventions import name_joints
+from spark.rig.rig import Rig, understand
+from spark.rig.roles import LIMBS, Group, Role
 from spark.skeleton import Skeleton
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.canonical import CanonicalMotion
-from spark.rig import Rig
-from spark.roles import Role
+from spark.rig.rig import Rig
+from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_slerp
 
 _SAME_PLACE = 0.3  # joints of equally long chains, taken one by one, lie nearer to one another

@@ -13,10 +13,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.features import BodyFeatures
-from spark.groups import groups_of
-from spark.rig import Rig
-from spark.rig_names import CONVENTIONS, HELD_OUT, name_joints, split_side
-from spark.roles import Role, RoleMap
+from spark.rig.groups import groups_of
+from spark.rig.name_conventions import CONVENTIONS, HELD_OUT, name_joints, split_side
+from spark.rig.rig import Rig
+from spark.rig.roles import Role, RoleMap
 from spark.rotation import quat_slerp
 from spark.skeleton import Skeleton
 

@@ -14,9 +14,9 @@ from spark.io.encoding import encode, encode_new
 from spark.io.reading import read_motion
 from spark.io.recording import Recording
 from spark.motion import Motion
-from spark.override import Override
 from spark.refine import refine as hold_feet
-from spark.rig import Rig, understand
+from spark.rig.override import Override
+from spark.rig.rig import Rig, understand
 from spark.transfer import transfer
 from spark_sim import files, rolemap
 

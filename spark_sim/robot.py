@@ -20,7 +20,7 @@ from sim.given import GivenBody
 from spark.canonical import to_canonical
 from spark.errors import ConventionError
 from spark.motion import Motion
-from spark.rig import Rig
+from spark.rig.rig import Rig
 from spark_sim import files, rolemap
 from spark_sim.clip import AnyClip, File, load
 

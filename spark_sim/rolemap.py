@@ -16,8 +16,8 @@ from pathlib import Path
 
 from spark.errors import FileFormatError, SkeletonError
 from spark.files import write_atomically
-from spark.override import Override, check_override
-from spark.roles import Role, RoleMap
+from spark.rig.override import Override, check_override
+from spark.rig.roles import Role, RoleMap
 from spark.skeleton import Skeleton
 
 _SEVERAL = (Role.SPINE, Role.NECK)

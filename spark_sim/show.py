@@ -8,9 +8,9 @@ from sim.given import given
 from sim.physics import Assist, Tracked, track
 from sim.physics_report import LIMITS, summary, text
 from sim.scene import Figure
-from spark.contacts import floor_height
-from spark.feet import standing_height
 from spark.kinematics import forward
+from spark.rig.contacts import floor_height
+from spark.rig.feet import standing_height
 from spark_sim.clip import AnyClip, File, load
 
 __all__ = ["LIMITS", "Simulated", "figures_of", "simulate"]

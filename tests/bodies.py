@@ -13,7 +13,7 @@ from sim.body import build_body
 from sim.joints import JointType
 from sim.mjcf import write_mjcf
 from spark.io.reading import read_motion
-from spark.rig import Rig, understand
+from spark.rig.rig import Rig, understand
 
 STANDING = (
     *ONE_A_RIG,

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from spark.kinematics import world_positions, world_rotations
-from spark.rig import Rig
-from spark.roles import Role
+from spark.rig.rig import Rig
+from spark.rig.roles import Role
 from spark.rotation import matrix_from_quat, quat_about
 from spark.skeleton import Skeleton
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from spark.kinematics import local_rotations, world_positions, world_rotations
 from spark.motion import Motion
-from spark.rig import Rig
-from spark.roles import LIMBS, Group, Role
+from spark.rig.rig import Rig
+from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import (
     quat_conj,
     quat_from_matrix,

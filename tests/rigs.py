@@ -8,7 +8,7 @@ A line with `{Left}`, `{left}`, `{L}`, `{l}` or `{左}` stands for one on each s
 import numpy as np
 
 from spark.motion import Motion
-from spark.roles import Role
+from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec
 from spark.skeleton import Skeleton
 

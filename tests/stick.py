@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from spark.motion import Motion
-from spark.rig import Rig
-from spark.roles import Role, RoleMap
+from spark.rig.rig import Rig
+from spark.rig.roles import Role, RoleMap
 from spark.skeleton import Skeleton
 
 # name, parent, offset [m]: hips 0.9 m above the sole, ankles 0.1 m, thighs and shanks 0.4 m.

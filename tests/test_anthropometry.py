@@ -8,10 +8,10 @@ from stick import joint, standing, stick_rig
 
 from sim.anthropometry import Segments, segments
 from spark.errors import SkeletonError
-from spark.feet import standing_height
 from spark.kinematics import forward
-from spark.rig import Rig
-from spark.roles import Role, RoleMap
+from spark.rig.feet import standing_height
+from spark.rig.rig import Rig
+from spark.rig.roles import Role, RoleMap
 from spark.rotation import quat_rotate
 
 

@@ -19,7 +19,7 @@ from spark.errors import OutputError, SkeletonError
 from spark.io.reading import read_motion
 from spark.kinematics import forward
 from spark.motion import Motion
-from spark.rig import Rig, understand
+from spark.rig.rig import Rig, understand
 from spark.rotation import quat_angle, quat_conj, quat_mul
 from spark.sample import BUILDS, sample_motion, sample_rig
 

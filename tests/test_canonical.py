@@ -8,15 +8,15 @@ from rerig import along_x, rerig
 from stick import joint, standing, stick_rig
 
 from spark.canonical import canonical_positions, from_canonical, to_canonical
-from spark.contacts import floor_height
 from spark.kinematics import forward
 from spark.motion import Motion
-from spark.rig import Rig
-from spark.roles import Role, RoleMap
+from spark.rig.contacts import floor_height
+from spark.rig.rig import Rig
+from spark.rig.roles import Role, RoleMap
+from spark.rig.tpose import find_tpose
 from spark.rotation import quat_angle, quat_mul, quat_normalize, quat_rotate
 from spark.sample import sample_motion, sample_rig
 from spark.skeleton import Skeleton
-from spark.tpose import find_tpose
 
 
 def under_a_root(rig: Rig, moves: bool) -> Rig:

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from conftest import recordings
 
-from spark.contacts import planted_feet, planted_points, speeds
 from spark.io.recording import read_recording
 from spark.kinematics import forward
-from spark.rig import understand
+from spark.rig.contacts import planted_feet, planted_points, speeds
+from spark.rig.rig import understand
 from spark.sample import sample_motion, sample_rig
 
 

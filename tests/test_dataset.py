@@ -22,8 +22,8 @@ from spark.io.bvh import write_bvh
 from spark.io.encoding import encode_new
 from spark.io.reading import motion_files, read_motion
 from spark.pairs import PairMaker
-from spark.rig import understand
-from spark.rig_json import rig_from_json, rig_to_json
+from spark.rig.rig import understand
+from spark.rig.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_about, quat_angle, quat_conj, quat_mul
 from spark.splits import TRAINING, UNSEEN, cells, seen_characters, seen_motions
 

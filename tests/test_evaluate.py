@@ -18,7 +18,6 @@ import torch
 import spark_sim
 from spark.canonical import CanonicalMotion, canonical_positions
 from spark.checkpoint import Checkpoint, save_checkpoint
-from spark.contacts import planted_feet, speeds
 from spark.dataset import Performance
 from spark.errors import FileFormatError, SkeletonError, SparkSimError
 from spark.evaluate import (
@@ -37,6 +36,7 @@ from spark.metrics import Score
 from spark.model import Spark
 from spark.names import NameConfig, NameEncoder
 from spark.pairs import Clip
+from spark.rig.contacts import planted_feet, speeds
 from spark.sample import sample_rig
 from spark.settings import TrainConfig
 from spark.train import network

@@ -15,7 +15,7 @@ from spark.errors import ConventionError, DependencyError, FileFormatError
 from spark.io.fbx import read_fbx
 from spark.io.fbx_scene import FbxScene
 from spark.kinematics import forward
-from spark.rig import understand
+from spark.rig.rig import understand
 from spark.rotation import quat_angle, quat_identity
 
 pytest.importorskip("pufbx")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from stick import joint, standing, stick_rig
 
-from spark.feet import FOOT_LENGTH, FOOT_WIDTH, sole_corners, sole_positions, standing_height
 from spark.kinematics import forward
 from spark.motion import Motion
-from spark.rig import Rig
-from spark.roles import Role, RoleMap
+from spark.rig.feet import FOOT_LENGTH, FOOT_WIDTH, sole_corners, sole_positions, standing_height
+from spark.rig.rig import Rig
+from spark.rig.roles import Role, RoleMap
 from spark.rotation import quat_about, quat_rotate
 
 

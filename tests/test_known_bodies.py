@@ -6,7 +6,7 @@ import pytest
 
 from spark.features import BodyFeatures, body_features
 from spark.known_bodies import distinct, nearness, trunk_of
-from spark.roles import Role
+from spark.rig.roles import Role
 from spark.sample import sample_rig
 
 

@@ -17,8 +17,8 @@ from sim.gltf import read_skinned_mesh
 from sim.mesh import hulls_of
 from sim.mjcf import notes_of, paths_of, write_mjcf
 from spark.errors import DependencyError, FileFormatError, SkeletonError
-from spark.rig import Rig
-from spark.roles import Role, RoleMap
+from spark.rig.rig import Rig
+from spark.rig.roles import Role, RoleMap
 
 BONES = (Role.LEFT_UPPER_ARM, Role.LEFT_FOREARM, Role.RIGHT_HAND, Role.LEFT_LOWER_LEG, Role.SPINE)
 

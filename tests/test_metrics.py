@@ -25,7 +25,7 @@ from spark.metrics import (
     source_sensitivity,
 )
 from spark.refine import refine
-from spark.rig import understand
+from spark.rig.rig import understand
 from spark.transfer import transfer
 
 HEIGHT = 2.0

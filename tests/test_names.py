@@ -25,8 +25,8 @@ from spark.names import (
     tokenize,
     tokenize_rigs,
 )
-from spark.rig_names import CONVENTIONS, HELD_OUT, name_joints
-from spark.roles import Role
+from spark.rig.name_conventions import CONVENTIONS, HELD_OUT, name_joints
+from spark.rig.roles import Role
 from spark.settings import TrainConfig
 from spark.train import fresh_checkpoint
 from spark.train_names import LEARNED, score_names, train_names

@@ -5,12 +5,12 @@ import pytest
 from conftest import recording
 
 from spark.canonical import canonical_positions, from_canonical, to_canonical
-from spark.contacts import planted_feet, speeds
 from spark.io.recording import read_recording
 from spark.kinematics import forward
 from spark.plant import blend_between, stance_correction
 from spark.refine import refine
-from spark.rig import Rig, understand
+from spark.rig.contacts import planted_feet, speeds
+from spark.rig.rig import Rig, understand
 from spark.sample import MOTIONS, sample_motion, sample_rig
 from spark.transfer import transfer
 

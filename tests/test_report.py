@@ -11,11 +11,11 @@ from stick import joint, standing, stick_rig
 
 from sim.report import Finding, Report, compare, judge
 from spark.errors import SkeletonError, SparkSimError
-from spark.feet import FOOT_LENGTH, standing_height
 from spark.io.recording import read_recording
 from spark.motion import Motion
-from spark.rig import Rig, understand
-from spark.roles import Role, RoleMap
+from spark.rig.feet import FOOT_LENGTH, standing_height
+from spark.rig.rig import Rig, understand
+from spark.rig.roles import Role, RoleMap
 from spark.rotation import quat_about, quat_from_yaw, quat_mul, quat_rotate
 
 FPS = 60.0

@@ -12,8 +12,8 @@ from sim.report.track import track
 from spark.io.recording import read_recording
 from spark.kinematics import forward
 from spark.motion import Motion
-from spark.rig import Rig, understand
-from spark.roles import Role
+from spark.rig.rig import Rig, understand
+from spark.rig.roles import Role
 from spark.rotation import quat_about, quat_angle, quat_slerp
 
 

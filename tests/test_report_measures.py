@@ -27,7 +27,7 @@ from sim.report.selfcollision import Capsules, segment_distance, self_penetratio
 from sim.report.smoothness import joint_rates
 from sim.report.thresholds import PLAUSIBILITY_V1
 from spark.kinematics import forward
-from spark.roles import Role
+from spark.rig.roles import Role
 from spark.rotation import quat_about, quat_mul
 
 

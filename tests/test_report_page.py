@@ -23,7 +23,7 @@ from sim.report.plots import Plot, svg
 from sim.scene import Figure
 from spark.errors import OutputError
 from spark.motion import Motion
-from spark.rig import Rig
+from spark.rig.rig import Rig
 
 # Stands for a second, sinks for one, slides for one.
 PATH = np.zeros((180, 3))

@@ -30,7 +30,7 @@ from sim.report.wrench import required_wrench
 from spark.canonical import to_canonical
 from spark.errors import FileFormatError, SkeletonError, SparkSimError
 from spark.io.recording import read_recording
-from spark.rig import understand
+from spark.rig.rig import understand
 from spark_sim.cli import run
 from spark_sim.robot import RobotClip
 

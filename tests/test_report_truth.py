@@ -9,7 +9,7 @@ from stick import joint, standing, stick_rig
 from sim.report import compare, judge
 from sim.report.page import report_page
 from spark.errors import SkeletonError
-from spark.roles import Role
+from spark.rig.roles import Role
 from spark.rotation import quat_about
 
 # The stick man from the hips to the end of a toe and to the crown:

@@ -25,7 +25,7 @@ from spark.canonical import canonical_positions, to_canonical
 from spark.errors import ConventionError, FrameError
 from spark.io.recording import read_recording
 from spark.motion import Motion
-from spark.rig import understand
+from spark.rig.rig import understand
 from spark.rotation import (
     matrix_from_quat,
     quat_from_rotvec,

@@ -16,7 +16,7 @@ import spark_sim
 from spark.canonical import to_canonical
 from spark.errors import ConventionError, SparkSimError
 from spark.kinematics import forward
-from spark.roles import Role
+from spark.rig.roles import Role
 from spark_sim.cli import run
 from spark_sim.robot import RobotClip
 

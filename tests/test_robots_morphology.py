@@ -14,7 +14,7 @@ from robots.tree import forward
 from robots.understand import understand_robot
 from spark.errors import FileFormatError, SkeletonError
 from spark.kinematics import forward as skeleton_forward
-from spark.roles import Role
+from spark.rig.roles import Role
 from spark.rotation import quat_rotate
 
 PLACES = {

@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from rigs import RIGS, build, walk
 
 from spark.errors import SkeletonError
-from spark.groups import groups_of
 from spark.io.recording import read_recording
 from spark.motion import Motion
-from spark.naming import assign_roles
-from spark.override import check_chains
-from spark.roles import LIMBS, Group, Role, RoleMap
+from spark.rig.groups import groups_of
+from spark.rig.override import check_chains
+from spark.rig.role_assignment import assign_roles
+from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import quat_from_rotvec, quat_mul
 from spark.skeleton import Skeleton
 

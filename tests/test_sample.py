@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from spark.canonical import to_canonical
-from spark.feet import sole_corners, sole_positions
 from spark.gait import FOOT_FLAT, HEEL_OFF, MID_STANCE, TOE_OFF, stride_time
 from spark.io.bvh import write_bvh
 from spark.io.encoding import encode_new
 from spark.io.recording import read_recording
 from spark.kinematics import forward, local_rotations
-from spark.roles import Role
+from spark.rig.feet import sole_corners, sole_positions
+from spark.rig.roles import Role
 from spark.rotation import quat_angle, rotvec_from_quat
 from spark.sample import BUILDS, MOTIONS, sample_motion, sample_rig
 

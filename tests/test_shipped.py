@@ -10,8 +10,8 @@ from stick import without
 from spark.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.io.reading import read_motion
 from spark.retarget import Learned
-from spark.rig import understand
-from spark.roles import Role
+from spark.rig.rig import understand
+from spark.rig.roles import Role
 from spark.transfer import transfer
 from spark.weights import SHIPPED, read_weights
 

@@ -24,7 +24,7 @@ from sim.simplify import area, simplify_together
 from sim.video import write_strip, write_video
 from spark.errors import DependencyError, OutputError
 from spark.motion import Motion
-from spark.rig import Rig
+from spark.rig.rig import Rig
 from spark.rotation import quat_mul, quat_rotate
 from spark.sample import sample_motion, sample_rig
 

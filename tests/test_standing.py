@@ -16,8 +16,8 @@ from sim.actuators import ctrl_of_qpos
 from sim.inertia import inertias
 from sim.pose import qpos_of_pose
 from sim.stance import lean
-from spark.rig import Rig
-from spark.roles import Role
+from spark.rig.rig import Rig
+from spark.rig.roles import Role
 from spark.rotation import quat_about, quat_angle, quat_mul
 
 JOINT_TYPES = ("ball", "hinge")

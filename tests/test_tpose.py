@@ -15,8 +15,9 @@ from spark.errors import SkeletonError
 from spark.io.recording import read_recording
 from spark.kinematics import local_rotations, world_positions
 from spark.motion import Motion
-from spark.rig import Rig, understand
-from spark.roles import LIMBS, Group, Role, RoleMap
+from spark.rig.rig import Rig, understand
+from spark.rig.roles import LIMBS, Group, Role, RoleMap
+from spark.rig.tpose import find_tpose
 from spark.rotation import (
     quat_about,
     quat_angle,
@@ -27,7 +28,6 @@ from spark.rotation import (
 )
 from spark.sample import BUILDS, sample_motion, sample_rig
 from spark.skeleton import Skeleton
-from spark.tpose import find_tpose
 
 DOWN, LEFT, RIGHT = np.array([0.0, 0, -1]), np.array([0.0, 1, 0]), np.array([0.0, -1, 0])
 # How far [deg] a T-pose found from a motion may be from the true one: a foot's slope is that of

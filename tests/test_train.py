@@ -27,7 +27,7 @@ from spark.model import Spark, _corrected
 from spark.names import NameConfig, NameEncoder
 from spark.packed import Packer
 from spark.pairs import Clip
-from spark.roles import Role
+from spark.rig.roles import Role
 from spark.rotation import quat_about, quat_angle, quat_mul
 from spark.sample import sample_motion, sample_rig
 from spark.settings import TrainConfig, read_settings, toml

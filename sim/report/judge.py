@@ -22,10 +22,10 @@ from sim.report.result import Report
 from sim.report.thresholds import PLAUSIBILITY_V1
 from sim.report.track import Track, track
 from sim.report.truth import accuracy
-from spark.contacts import planted_feet
 from spark.errors import SkeletonError
 from spark.motion import Motion
-from spark.rig import Rig
+from spark.rig.contacts import planted_feet
+from spark.rig.rig import Rig
 
 # A source whose floor is further from z = 0 than this, in hip heights, may have been put on it.
 _FLOOR_AT_ZERO = 0.1

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from spark.rig import Rig
-from spark.roles import Role
+from spark.rig.rig import Rig
+from spark.rig.roles import Role
 from spark.rotation import quat_relative, quat_swing_twist, rotvec_from_quat
 
 _X, _Y, _Z = 0, 1, 2

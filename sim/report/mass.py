@@ -9,7 +9,7 @@ from jaxtyping import Float
 from sim.anthropometry import segments
 from sim.given import GivenBody
 from sim.report.poses import Poses
-from spark.rig import Rig
+from spark.rig.rig import Rig
 from spark.rotation import quat_mul, quat_rotate
 
 

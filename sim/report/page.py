@@ -21,7 +21,7 @@ from sim.report.track import track
 from sim.scene import Figure, build_scene
 from spark.errors import DependencyError, OutputError
 from spark.motion import Motion
-from spark.rig import Rig
+from spark.rig.rig import Rig
 
 _MOMENTS = 6
 _LISTED = 200

@@ -8,8 +8,8 @@ from jaxtyping import Float
 
 from sim.anthropometry import RADII
 from sim.report.track import Track
-from spark.feet import standing_height
-from spark.roles import Role
+from spark.rig.feet import standing_height
+from spark.rig.roles import Role
 from spark.rotation import quat_rotate
 
 # Fractions of the standing height: from the head's joint to its middle, from the wrist to the

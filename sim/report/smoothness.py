@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.report.derivatives import derivative
-from spark.rig import Rig
+from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_continuous, quat_mul, quat_relative
 
 

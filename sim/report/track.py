@@ -11,11 +11,11 @@ from sim.report.lowest import lowest_points
 from sim.report.mass import Mass, human_mass, model_mass
 from sim.report.poses import Poses, follow
 from spark.errors import SkeletonError
-from spark.feet import SOLE_POINTS, Sole, sole_corners, sole_positions, standing_height
 from spark.kinematics import forward
 from spark.motion import Motion
-from spark.rig import Rig
-from spark.roles import Role
+from spark.rig.feet import SOLE_POINTS, Sole, sole_corners, sole_positions, standing_height
+from spark.rig.rig import Rig
+from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_mul, quat_rotate, yaw_from_quat
 
 # They have soles, or lie inside other flesh.

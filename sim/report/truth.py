@@ -11,7 +11,7 @@ from spark.errors import SkeletonError
 from spark.features import body_features
 from spark.metrics import san_height, score
 from spark.motion import Motion
-from spark.rig import Rig
+from spark.rig.rig import Rig
 
 # Bones that differ by more than this share of the hip height are not the same.
 _BONES = 0.01

@@ -17,7 +17,7 @@ from robots.targets import targets_of
 from scripts.robot_memory import pacing
 from spark.canonical import from_canonical
 from spark.kinematics import world_positions
-from spark.roles import Role
+from spark.rig.roles import Role
 from spark.rotation import quat_mul, quat_rotate
 from spark_sim.robot import load_robot
 

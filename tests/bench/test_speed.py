@@ -23,8 +23,8 @@ from spark.known_bodies import trunk_of
 from spark.motion import Motion
 from spark.own_motion import with_own_motion
 from spark.retarget import Learned
-from spark.rig import Rig
-from spark.roles import Role
+from spark.rig.rig import Rig
+from spark.rig.roles import Role
 from spark.sample import BUILDS, Build, make_skeleton, sample_motion, sample_rig
 from spark.skeleton import Skeleton
 from spark.transfer import transfer

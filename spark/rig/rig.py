@@ -7,13 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from spark.groups import groups_of
 from spark.kinematics import end_positions, world_positions
 from spark.motion import Motion
-from spark.naming import Override, assign_roles
-from spark.roles import Group, Role, RoleMap
+from spark.rig.groups import groups_of
+from spark.rig.role_assignment import Override, assign_roles
+from spark.rig.roles import Group, Role, RoleMap
+from spark.rig.tpose import carrier_of, find_tpose
 from spark.skeleton import Skeleton
-from spark.tpose import carrier_of, find_tpose
 
 # Roles that several joints hold, and those between which they lie.
 _CHAINS: dict[Role, tuple[Role, Role | None]] = {
@@ -97,7 +97,7 @@ def understand(motion: Motion, override: Override | None = None) -> Rig:
     """What the skeleton of `motion` is: no configuration, names and geometry say it.
 
     Raises SkeletonError with the reason where the body is not a humanoid. `override` is a role map
-    as `spark.naming.assign_roles` takes it.
+    as `spark.rig.role_assignment.assign_roles` takes it.
     """
     skeleton = motion.skeleton
     roles = assign_roles(skeleton, motion, override)

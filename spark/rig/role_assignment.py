@@ -2,15 +2,15 @@
 
 from collections.abc import Sequence
 
-from spark.body_plan import BodyPlan, plan_body
 from spark.errors import SkeletonError
-from spark.facing import LabelledPair
 from spark.motion import Motion
-from spark.name_hints import NameHint, read_names
-from spark.override import Override, check_chains, check_override
-from spark.roles import Role, RoleMap
+from spark.rig.body_plan import BodyPlan, plan_body
+from spark.rig.facing import LabelledPair
+from spark.rig.measurements import measure
+from spark.rig.name_hints import NameHint, read_names
+from spark.rig.override import Override, check_chains, check_override
+from spark.rig.roles import Role, RoleMap
 from spark.skeleton import Skeleton
-from spark.stance import measure
 
 __all__ = ["Override", "assign_roles"]
 

@@ -2,7 +2,7 @@
 
 A meaning is a role's name without its side. Many words are ambiguous between rigs: "shoulder" is a
 clavicle above an "arm" and an upper arm below a "collar". They say so here, with how sure the word
-is, and the chain a joint stands in decides (`spark.limb_roles`).
+is, and the chain a joint stands in decides (`spark.rig.limb_roles`).
 """
 
 

@@ -16,11 +16,11 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
-from spark.bones import Pose
 from spark.motion import Motion
-from spark.observed import bend_axis, resting_slope, standing_slope
-from spark.reference import GROUP_OF, Reference, pelvis_frame, reference_of, snap
-from spark.roles import Group, Role, RoleMap
+from spark.rig.bones import Pose
+from spark.rig.observed import bend_axis, resting_slope, standing_slope
+from spark.rig.reference_pose import GROUP_OF, Reference, pelvis_frame, reference_of, snap
+from spark.rig.roles import Group, Role, RoleMap
 from spark.rotation import (
     quat_angle,
     quat_between,

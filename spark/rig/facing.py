@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from spark.limb_roles import Labels
-from spark.stance import Stance
-from spark.topology import Pair
+from spark.rig.limb_roles import Labels
+from spark.rig.measurements import Stance
+from spark.rig.topology import Pair
 
 _FOOT, _KNEE, _ELBOW = 1.0, 3.0, 2.0  # how surely each shows the front
 _GROUND = 0.3  # hands lower than this share of the hip height stand on the ground

@@ -7,7 +7,7 @@ number (Spine, Spine1, ...).
 
 from collections.abc import Iterable
 
-from spark.roles import Role
+from spark.rig.roles import Role
 
 _ORDER = [
     "pelvis",

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spark.name_hints import NameHint
+from spark.rig.measurements import Stance
+from spark.rig.name_hints import NameHint
 from spark.skeleton import Skeleton
-from spark.stance import Stance
 
 SIMILAR = 0.2  # bones of a mirrored pair differ by less than this share of the chain
 

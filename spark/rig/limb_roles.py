@@ -8,8 +8,8 @@ from math import log
 import numpy as np
 from jaxtyping import Float
 
-from spark.name_hints import NameHint
-from spark.stance import Stance
+from spark.rig.measurements import Stance
+from spark.rig.name_hints import NameHint
 
 LEG = ("upper_leg", "lower_leg", "foot", "toe")
 ARM = ("clavicle", "upper_arm", "forearm", "hand")

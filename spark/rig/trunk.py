@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from spark.name_hints import NameHint
+from spark.rig.measurements import Stance
+from spark.rig.name_hints import NameHint
+from spark.rig.topology import Pair, chain_below, common_ancestor, path_between
 from spark.skeleton import Skeleton
-from spark.stance import Stance
-from spark.topology import Pair, chain_below, common_ancestor, path_between
 
 
 def find_pelvis(skeleton: Skeleton, hints: Sequence[NameHint], legs: Pair) -> int:

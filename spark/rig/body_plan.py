@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from spark.errors import SkeletonError
-from spark.facing import LabelledPair, first_is_left, stands_on_four
-from spark.limb_roles import ARM, LEG, label_limb
-from spark.name_hints import NameHint
+from spark.rig.facing import LabelledPair, first_is_left, stands_on_four
+from spark.rig.limb_roles import ARM, LEG, label_limb
+from spark.rig.measurements import Stance, rest_stance
+from spark.rig.name_hints import NameHint
+from spark.rig.topology import Pair, mirrored_pairs, named_pair
+from spark.rig.trunk import find_pelvis, find_trunk
 from spark.skeleton import Skeleton
-from spark.stance import Stance, rest_stance
-from spark.topology import Pair, mirrored_pairs, named_pair
-from spark.trunk import find_pelvis, find_trunk
 
 _SURE = 1.5  # names that mean a limb's parts this much in all settle which limb it is
 _REMEDY = "a map file can say which joint is what (spark-sim inspect --help)"

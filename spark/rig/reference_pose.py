@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from spark.bones import SHORT, Pose
 from spark.errors import SkeletonError
 from spark.motion import Motion
-from spark.observed import mean_rotations, nearest_right_angle
-from spark.roles import LIMBS, Group, Role, RoleMap
+from spark.rig.bones import SHORT, Pose
+from spark.rig.observed import mean_rotations, nearest_right_angle
+from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import quat_identity
 
 _LEAN = np.radians(35)  # a body this near to an axis stands along it

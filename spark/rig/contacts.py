@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from spark.feet import sole_corners, sole_positions, standing_height
-from spark.rig import Rig
+from spark.rig.feet import sole_corners, sole_positions, standing_height
+from spark.rig.rig import Rig
 
 # A foot is planted while it is slower and lower than this; for a body 1.75 m tall, scaled with it.
 PLANTED_SPEED = 0.15

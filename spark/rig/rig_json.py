@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from spark.rig import Rig
-from spark.roles import Group, Role, RoleMap
+from spark.rig.rig import Rig
+from spark.rig.roles import Group, Role, RoleMap
 from spark.skeleton import Skeleton
 
 

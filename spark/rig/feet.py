@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.kinematics import end_positions, world_positions
-from spark.rig import Rig
-from spark.roles import Role
+from spark.rig.rig import Rig
+from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_rotate
 
 Side = Literal["left", "right"]

@@ -1,6 +1,6 @@
 """The paper's six body parts (section 4.1): which of them each joint belongs to."""
 
-from spark.roles import LIMBS, Group, Role, RoleMap
+from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.skeleton import Skeleton
 
 _OF_ROLE: dict[Role, Group] = {

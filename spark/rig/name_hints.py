@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
-from spark.aliases import (
+from spark.rig.aliases import (
     ASIDE,
     AXES,
     FORELEG,

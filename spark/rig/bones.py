@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.kinematics import end_positions, world_positions, world_rotations
-from spark.roles import LIMBS, RoleMap
+from spark.rig.roles import LIMBS, RoleMap
 from spark.rotation import quat_conj, quat_rotate
 from spark.skeleton import Skeleton
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from spark.errors import SkeletonError
-from spark.roles import LIMBS, Role, RoleMap
+from spark.rig.roles import LIMBS, Role, RoleMap
 from spark.skeleton import Skeleton
 
 Override = Mapping[Role, Sequence[int]]
