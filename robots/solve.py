@@ -16,7 +16,7 @@ from robots.stage import Stage
 from robots.targets import Targets, targets_of
 from robots.ties import unhurried
 from robots.tree import Coordinates, forward
-from spark.canonical import CanonicalMotion
+from spark.transfer.canonical import CanonicalMotion
 
 _STEPS = (12, 10)  # Gauss-Newton steps of the stages, at most
 _LITTLE = (0.02, 0.05)  # a stage ends where a step lessens the cost by less than this share,

@@ -18,13 +18,13 @@ from robots.targets import (
     palm_thickness,
     side_of,
 )
-from spark.canonical import CanonicalMotion, canonical_positions
 from spark.errors import FrameError
 from spark.rig.feet import sole_corners
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import matrix_from_quat, quat_conj
-from spark.transfer import correspond
+from spark.transfer.analytic import correspond
+from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
 LATENCY = 2  # [frames] between what a stream has seen and what it says
 _UNIT = 0.05  # by how much a quaternion's length may differ from 1

@@ -9,13 +9,13 @@ from scipy.ndimage import uniform_filter1d
 from robots.morphology import Morphology, Sole
 from robots.shapes import surface
 from robots.tree import forward
-from spark.canonical import CanonicalMotion, canonical_positions
 from spark.rig.contacts import planted_points
 from spark.rig.feet import Side, sole_corners, sole_positions, standing_height
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_mul, quat_rotate
-from spark.transfer import transfer
+from spark.transfer.analytic import transfer
+from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
 _GAP = 0.08  # contacts and breaks shorter than this [s] are noise
 BONES = (  # the limbs' segments, by the roles at their ends

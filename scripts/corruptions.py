@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from sim.report.measures import at_times
-from spark.canonical import CanonicalMotion, from_canonical, to_canonical
 from spark.kinematics import forward, local_rotations
 from spark.motion import Motion
 from spark.rig.rig import Rig
@@ -24,6 +23,7 @@ from spark.rotation import (
     quat_slerp,
     yaw_from_quat,
 )
+from spark.transfer.canonical import CanonicalMotion, from_canonical, to_canonical
 
 Corruption = Callable[[Motion, Rig, np.random.Generator], Motion]
 

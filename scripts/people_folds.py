@@ -22,7 +22,7 @@ from spark.pairs import Clip
 from spark.retarget import Learned
 from spark.settings import TrainConfig, read_settings
 from spark.train import fresh_checkpoint, train
-from spark.transfer import transfer
+from spark.transfer.analytic import transfer
 from spark.weights import read_weights
 
 _FOLDS = 3

@@ -22,10 +22,15 @@ from robots.solve import copy, retarget
 from robots.stream import Stream
 from robots.stream_targets import LATENCY, Frame, ground_of
 from robots.targets import bone_directions
-from spark.canonical import CanonicalMotion, canonical_positions, from_canonical, to_canonical
 from spark.io.recording import read_recording
 from spark.rig.rig import understand
 from spark.rig.roles import Role
+from spark.transfer.canonical import (
+    CanonicalMotion,
+    canonical_positions,
+    from_canonical,
+    to_canonical,
+)
 
 COLUMNS = {  # name: format
     "sunk %": "6.2f",

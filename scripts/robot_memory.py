@@ -10,9 +10,9 @@ import numpy as np
 
 from robots.known import known
 from robots.solve import retarget
-from spark.canonical import CanonicalMotion, to_canonical
 from spark.motion import Motion
 from spark.sample import sample_motion, sample_rig
+from spark.transfer.canonical import CanonicalMotion, to_canonical
 
 
 def pacing(frames: int) -> CanonicalMotion:

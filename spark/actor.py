@@ -3,12 +3,12 @@
 import numpy as np
 from jaxtyping import Float
 
-from spark.canonical import CanonicalMotion, canonical_positions
 from spark.kinematics import world_positions
-from spark.plant import Leg, bend_leg
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import Axis, quat_about, quat_conj, quat_mul
+from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.leg_ik import Leg, bend_leg
 
 
 class Actor:

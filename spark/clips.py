@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 
-from spark.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.errors import SkeletonError, SparkSimError
 from spark.features import BodyFeatures, body_features
 from spark.io.reading import motion_files, read_motion
@@ -14,6 +13,7 @@ from spark.resample import positions_at, rotations_at
 from spark.rig.contacts import planted_feet
 from spark.rig.rig import understand
 from spark.skeleton import Skeleton
+from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
 
 FRAME_TIME = 1 / 30
 

@@ -15,7 +15,6 @@ from zipfile import BadZipFile
 import numpy as np
 from jaxtyping import Bool, Float
 
-from spark.canonical import to_canonical
 from spark.clips import clip_of
 from spark.errors import SparkSimError
 from spark.features import body_features
@@ -23,6 +22,7 @@ from spark.files import write_atomically
 from spark.io.reading import read_motion
 from spark.rig.rig import Rig, understand
 from spark.rig.rig_json import rig_from_json, rig_to_json
+from spark.transfer.canonical import to_canonical
 
 # Goes up whenever the same file gives another part.
 VERSION = 2

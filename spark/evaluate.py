@@ -13,15 +13,15 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from spark.canonical import canonical_positions, to_canonical
 from spark.clips import FRAME_TIME, at_frame_time
 from spark.errors import FileFormatError, SkeletonError, name_list
 from spark.evaluation_cases import SPARE_FRAMES, STRUCTURES, Case, Structure
 from spark.io.reading import SUFFIXES, read_motion
 from spark.metrics import Score, mean_score, score_positions, source_sensitivity
-from spark.own_motion import Retargeting, with_own_motion
-from spark.refine import refine
 from spark.rig.rig import understand
+from spark.transfer.canonical import canonical_positions, to_canonical
+from spark.transfer.foot_lock import refine
+from spark.transfer.target_prior import Retargeting, with_own_motion
 
 Positions = Float[np.ndarray, "_ _ 3"]  # frames, joints
 Method = Callable[[Case], Positions]
@@ -94,7 +94,7 @@ def evaluate(
 
 def by(method: Retargeting, *, own_motion: bool = False, feet_held: bool = False) -> Method:
     """The analytic transfer, or a trained network; with `own_motion`, corrected by a recording of
-    the target's own (`spark.own_motion`), with `feet_held`, then its feet held where the source's
+    the target's own (`spark.transfer.target_prior`), with `feet_held`, then its feet held where the source's
     stand: all of it is what `retarget` does."""
 
     def run(case: Case) -> Positions:

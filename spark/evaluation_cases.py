@@ -16,16 +16,16 @@ from typing import Literal
 
 import numpy as np
 
-from spark.canonical import CanonicalMotion
 from spark.dataset import Performance, is_dataset, prepare, read_performances
 from spark.errors import SkeletonError
 from spark.features import BodyFeatures
 from spark.metrics import san_height
-from spark.own_motion import SHORTEST
 from spark.pairs import Clip
 from spark.rig.roles import Role
 from spark.staging import Stage
-from spark.transfer import correspond
+from spark.transfer.analytic import correspond
+from spark.transfer.canonical import CanonicalMotion
+from spark.transfer.target_prior import SHORTEST
 from spark.variants import Variant, random_variant, same_body, scaled_body, split_body
 
 Structure = Literal["intra", "cross", "missing"]

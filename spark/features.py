@@ -12,7 +12,6 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from spark.canonical import CanonicalMotion
 from spark.kinematics import local_rotations, world_rotations
 from spark.rig.name_conventions import split_side
 from spark.rig.rig import Rig
@@ -27,6 +26,7 @@ from spark.rotation import (
     yaw_from_quat,
 )
 from spark.skeleton import Skeleton
+from spark.transfer.canonical import CanonicalMotion
 
 # The paper leaves out joints by such words (section 5, "Datasets").
 _LEFT_OUT = re.compile(

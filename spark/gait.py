@@ -13,11 +13,11 @@ from jaxtyping import Float
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from spark.actor import Actor
-from spark.canonical import CanonicalMotion
 from spark.rig.feet import sole_corners
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_about, quat_from_yaw, quat_mul, quat_rotate
+from spark.transfer.canonical import CanonicalMotion
 
 FOOT_FLAT, MID_STANCE, HEEL_OFF, TOE_OFF = 0.12, 0.25, 0.31, 0.62
 """Instants of a stride, from one heel strike to the next; the foot stands until `TOE_OFF`."""

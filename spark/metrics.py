@@ -11,13 +11,13 @@ from dataclasses import astuple, dataclass, fields
 import numpy as np
 from jaxtyping import Bool, Float
 
-from spark.canonical import CanonicalMotion, canonical_positions
 from spark.errors import SkeletonError
 from spark.features import body_features
 from spark.rig.contacts import planted_feet, speeds
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_rotate
+from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from spark.rotation import (
     yaw_from_quat,
 )
 from spark.staging import Stage, begins_of, foot_lift, joined, local_rows, mixed, place
-from spark.transfer import Correspondence, correspond
+from spark.transfer.analytic import Correspondence, correspond
 from spark.variants import random_variant, same_body, split_body
 
 _PACE = 0.3  # of the logarithm of a motion's speed

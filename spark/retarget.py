@@ -13,7 +13,6 @@ from functools import cache
 import numpy as np
 from jaxtyping import Float, Int
 
-from spark.canonical import CanonicalMotion
 from spark.clips import FRAME_TIME, at_frame_time
 from spark.errors import DependencyError, name_list
 from spark.features import BodyFeatures, body_features, canonical_from_features, pose_features
@@ -24,7 +23,8 @@ from spark.pairs import Windows
 from spark.resample import positions_at, rotations_at
 from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_normalize
-from spark.transfer import correspond, transfer
+from spark.transfer.analytic import correspond, transfer
+from spark.transfer.canonical import CanonicalMotion
 from spark.weights import Weights
 
 _AT_A_TIME = 32

@@ -7,13 +7,13 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.actor import Actor
-from spark.canonical import CanonicalMotion, from_canonical
 from spark.gait import walk
 from spark.motion import Motion
 from spark.rig.name_conventions import name_joints
 from spark.rig.rig import Rig, understand
 from spark.rig.roles import LIMBS, Group, Role
 from spark.skeleton import Skeleton
+from spark.transfer.canonical import CanonicalMotion, from_canonical
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ Nobody has one motion on many skeletons by measurement. But a motion on a *chang
 skeleton is known exactly: bones scaled, joints split (as SAN does) or merged, toes, collarbones and
 hands dropped, everything renamed after another rig's convention. Rotations since the T-pose stay
 what they were, a new joint's lie between its neighbours', and only the feet need to be planted
-again (`spark.plant`).
+again (`spark.transfer.leg_ik`).
 """
 
 from dataclasses import dataclass

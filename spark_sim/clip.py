@@ -7,17 +7,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, overload
 
 from robots import formats, registry
-from spark.canonical import CanonicalMotion, from_canonical, to_canonical
 from spark.errors import ConventionError, FileFormatError, SkeletonError
 from spark.io.bvh import write_bvh
 from spark.io.encoding import encode, encode_new
 from spark.io.reading import read_motion
 from spark.io.recording import Recording
 from spark.motion import Motion
-from spark.refine import refine as hold_feet
 from spark.rig.override import Override
 from spark.rig.rig import Rig, understand
-from spark.transfer import transfer
+from spark.transfer.analytic import transfer
+from spark.transfer.canonical import CanonicalMotion, from_canonical, to_canonical
+from spark.transfer.foot_lock import refine as hold_feet
 from spark_sim import files, rolemap
 
 if TYPE_CHECKING:
@@ -231,7 +231,7 @@ def retarget(
 
 def _filled_in(source: CanonicalMotion, target: Clip, network: "Learned") -> CanonicalMotion:
     """As a network says and, where it corrects the transfer, the target's own motion."""
-    from spark.own_motion import with_own_motion
+    from spark.transfer.target_prior import with_own_motion
 
     if not network.network.config.residual:
         return network(source, target.rig)

@@ -17,10 +17,10 @@ from robots.stream import Stream
 from robots.stream_targets import LATENCY, Frame, ground_of
 from robots.understand import parts_of, understand_robot
 from sim.given import GivenBody
-from spark.canonical import to_canonical
 from spark.errors import ConventionError
 from spark.motion import Motion
 from spark.rig.rig import Rig
+from spark.transfer.canonical import to_canonical
 from spark_sim import files, rolemap
 from spark_sim.clip import AnyClip, File, load
 

@@ -12,7 +12,6 @@ import pytest
 from conftest import recording
 
 from spark import dataset_parts
-from spark.canonical import to_canonical
 from spark.clips import clip_of
 from spark.dataset import _on_body, is_dataset, prepare, read_dataset, training_clips
 from spark.dataset_parts import Part
@@ -26,6 +25,7 @@ from spark.rig.rig import understand
 from spark.rig.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_about, quat_angle, quat_conj, quat_mul
 from spark.splits import TRAINING, UNSEEN, cells, seen_characters, seen_motions
+from spark.transfer.canonical import to_canonical
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,6 @@ import pytest
 import torch
 
 import spark_sim
-from spark.canonical import CanonicalMotion, canonical_positions
 from spark.checkpoint import Checkpoint, save_checkpoint
 from spark.dataset import Performance
 from spark.errors import FileFormatError, SkeletonError, SparkSimError
@@ -40,7 +39,8 @@ from spark.rig.contacts import planted_feet, speeds
 from spark.sample import sample_rig
 from spark.settings import TrainConfig
 from spark.train import network
-from spark.transfer import correspond, transfer
+from spark.transfer.analytic import correspond, transfer
+from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.variants import same_body, split_body, split_joints
 from spark_sim import cli, console
 

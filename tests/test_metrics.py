@@ -9,7 +9,6 @@ from conftest import recording
 from rigs import RIGS, build, walk
 from stick import stick_rig
 
-from spark.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.clips import at_frame_time
 from spark.errors import SkeletonError
 from spark.io.fbx import read_fbx
@@ -24,9 +23,10 @@ from spark.metrics import (
     score,
     source_sensitivity,
 )
-from spark.refine import refine
 from spark.rig.rig import understand
-from spark.transfer import transfer
+from spark.transfer.analytic import transfer
+from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
+from spark.transfer.foot_lock import refine
 
 HEIGHT = 2.0
 

@@ -8,7 +8,6 @@ import torch
 from spark import losses
 from spark.batch import Batch, Collator
 from spark.bodies import Body, Pose, Start, forward_kinematics, take, world_matrices
-from spark.canonical import to_canonical
 from spark.config import Config
 from spark.features import body_features, canonical_from_features, pose_features
 from spark.kinematics import forward, world_positions
@@ -21,6 +20,7 @@ from spark.rig.name_conventions import CONVENTIONS, name_joints
 from spark.rig.roles import Role
 from spark.rotation import matrix_from_sixd, quat_angle
 from spark.sample import sample_motion, sample_rig
+from spark.transfer.canonical import to_canonical
 from spark.variants import same_body
 
 SMALL = {"width": 32, "heads": 2, "encoder_blocks": 1, "decoder_blocks": 2}

@@ -8,13 +8,13 @@ import pytest
 from conftest import recording
 from stick import joint, stick_rig, without
 
-from spark.canonical import CanonicalMotion, to_canonical
 from spark.io.reading import read_motion
-from spark.own_motion import with_own_motion
 from spark.rig.rig import understand
 from spark.rig.roles import Role
 from spark.rotation import quat_about, quat_angle, quat_from_yaw, quat_mul
-from spark.transfer import correspond, transfer
+from spark.transfer.analytic import correspond, transfer
+from spark.transfer.canonical import CanonicalMotion, to_canonical
+from spark.transfer.target_prior import with_own_motion
 
 NECK, HEAD = joint(Role.NECK), joint(Role.HEAD)
 

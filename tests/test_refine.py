@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from conftest import recording
 
-from spark.canonical import canonical_positions, from_canonical, to_canonical
 from spark.io.recording import read_recording
 from spark.kinematics import forward
-from spark.plant import blend_between, stance_correction
-from spark.refine import refine
 from spark.rig.contacts import planted_feet, speeds
 from spark.rig.rig import Rig, understand
 from spark.sample import MOTIONS, sample_motion, sample_rig
-from spark.transfer import transfer
+from spark.transfer.analytic import transfer
+from spark.transfer.canonical import canonical_positions, from_canonical, to_canonical
+from spark.transfer.foot_lock import refine
+from spark.transfer.leg_ik import blend_between, stance_correction
 
 PAIRS = [
     ("cmu_asf/cmu_02_01.bvh", "zoo/m2m_human.bvh"),

@@ -27,10 +27,10 @@ from sim.report.mass import model_mass
 from sim.report.poses import follow
 from sim.report.track import track
 from sim.report.wrench import required_wrench
-from spark.canonical import to_canonical
 from spark.errors import FileFormatError, SkeletonError, SparkSimError
 from spark.io.recording import read_recording
 from spark.rig.rig import understand
+from spark.transfer.canonical import to_canonical
 from spark_sim.cli import run
 from spark_sim.robot import RobotClip
 

@@ -21,7 +21,6 @@ from robots.targets import targets_of
 from robots.tree import forward
 from robots.window_terms import Stance, Terms
 from scripts.robot_bars import COLUMNS, follow, limb_error, measure
-from spark.canonical import canonical_positions, to_canonical
 from spark.errors import ConventionError, FrameError
 from spark.io.recording import read_recording
 from spark.motion import Motion
@@ -34,6 +33,7 @@ from spark.rotation import (
     quat_rotate,
 )
 from spark.sample import sample_motion, sample_rig
+from spark.transfer.canonical import canonical_positions, to_canonical
 from spark_sim.robot import load_robot
 
 RIG = sample_rig("walker")

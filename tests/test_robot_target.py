@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 import spark_sim
-from spark.canonical import to_canonical
 from spark.errors import ConventionError, SparkSimError
 from spark.kinematics import forward
 from spark.rig.roles import Role
+from spark.transfer.canonical import to_canonical
 from spark_sim.cli import run
 from spark_sim.robot import RobotClip
 

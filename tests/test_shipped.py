@@ -7,12 +7,12 @@ import pytest
 from conftest import recording
 from stick import without
 
-from spark.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.io.reading import read_motion
 from spark.retarget import Learned
 from spark.rig.rig import understand
 from spark.rig.roles import Role
-from spark.transfer import transfer
+from spark.transfer.analytic import transfer
+from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.weights import SHIPPED, read_weights
 
 

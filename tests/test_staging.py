@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from spark.canonical import to_canonical
 from spark.features import body_features
 from spark.kinematics import forward, world_positions
 from spark.names import NameEncoder
@@ -13,6 +12,7 @@ from spark.rig.roles import Group
 from spark.sample import sample_motion, sample_rig
 from spark.skeleton import Skeleton
 from spark.staging import Stage, leg_of
+from spark.transfer.canonical import to_canonical
 from spark.variants import midway, random_variant, same_body
 
 

@@ -10,7 +10,6 @@ from humanoids import EVERY_BODY, ONE_A_RIG
 from rerig import along_x, rerig, rest_in
 from stick import joint, standing, stick_rig
 
-from spark.canonical import to_canonical
 from spark.errors import SkeletonError
 from spark.io.recording import read_recording
 from spark.kinematics import local_rotations, world_positions
@@ -28,6 +27,7 @@ from spark.rotation import (
 )
 from spark.sample import BUILDS, sample_motion, sample_rig
 from spark.skeleton import Skeleton
+from spark.transfer.canonical import to_canonical
 
 DOWN, LEFT, RIGHT = np.array([0.0, 0, -1]), np.array([0.0, 1, 0]), np.array([0.0, -1, 0])
 # How far [deg] a T-pose found from a motion may be from the true one: a foot's slope is that of

@@ -17,7 +17,6 @@ from nets import learned
 from safetensors.torch import save_file
 from stick import without
 
-from spark.canonical import canonical_positions, to_canonical
 from spark.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from spark.clips import at_frame_time, read_clips
 from spark.errors import ConventionError, FileFormatError, SkeletonError
@@ -32,7 +31,8 @@ from spark.rotation import quat_about, quat_angle, quat_mul
 from spark.sample import sample_motion, sample_rig
 from spark.settings import TrainConfig, read_settings, toml
 from spark.train import Objective, Steps, _batches, network, optimiser_of, take_step, train
-from spark.transfer import transfer
+from spark.transfer.analytic import transfer
+from spark.transfer.canonical import canonical_positions, to_canonical
 from spark.weights import VERSION, read_weights
 from spark_sim import sample
 

@@ -9,7 +9,6 @@ from conftest import DATA, recordings
 from humanoids import ONE_A_RIG
 from stick import joint, standing, stick_rig, without
 
-from spark.canonical import from_canonical, to_canonical
 from spark.io.recording import read_recording
 from spark.kinematics import forward
 from spark.motion import Motion
@@ -19,7 +18,8 @@ from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import quat_about, quat_angle, quat_mul, quat_normalize, quat_rotate
 from spark.sample import BUILDS, MOTIONS, sample_motion, sample_rig
 from spark.skeleton import Skeleton
-from spark.transfer import correspond, transfer
+from spark.transfer.analytic import correspond, transfer
+from spark.transfer.canonical import from_canonical, to_canonical
 
 
 def read(path: object, frames: int = 60) -> tuple[Motion, Rig]:

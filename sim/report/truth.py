@@ -6,12 +6,12 @@ from itertools import zip_longest
 import numpy as np
 from jaxtyping import Float
 
-from spark.canonical import canonical_positions, to_canonical
 from spark.errors import SkeletonError
 from spark.features import body_features
 from spark.metrics import san_height, score
 from spark.motion import Motion
 from spark.rig.rig import Rig
+from spark.transfer.canonical import canonical_positions, to_canonical
 
 # Bones that differ by more than this share of the hip height are not the same.
 _BONES = 0.01

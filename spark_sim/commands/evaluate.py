@@ -10,7 +10,7 @@ from spark_sim.commands.options import add_force
 if TYPE_CHECKING:
     from spark.evaluate import Row
     from spark.evaluation_cases import Case
-    from spark.own_motion import Retargeting
+    from spark.transfer.target_prior import Retargeting
 
 SUMMARY = "measure methods against a ground truth"
 USAGE = "DATA [--checkpoint RUN]... [--result NAME=DIR]..."
@@ -82,7 +82,7 @@ def run(args: Namespace) -> int:
     from spark.evaluation_cases import made_cases, performances, recorded_cases
     from spark.evaluation_tables import markdown
     from spark.files import write_atomically
-    from spark.transfer import transfer
+    from spark.transfer.analytic import transfer
     from spark_sim import console, files
 
     outputs = [Path(output) for output in args.output]

@@ -15,10 +15,10 @@ from robots.stream import Stream
 from robots.stream_targets import Frame, ground_of
 from robots.targets import targets_of
 from scripts.robot_memory import pacing
-from spark.canonical import from_canonical
 from spark.kinematics import world_positions
 from spark.rig.roles import Role
 from spark.rotation import quat_mul, quat_rotate
+from spark.transfer.canonical import from_canonical
 from spark_sim.robot import load_robot
 
 pytestmark = pytest.mark.bench

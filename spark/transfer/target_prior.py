@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from spark.canonical import CanonicalMotion
 from spark.clips import FRAME_TIME, at_frame_time
 from spark.errors import name_list
 from spark.rig.rig import Rig
@@ -24,7 +23,8 @@ from spark.rotation import (
     rotvec_from_quat,
     sixd_from_quat,
 )
-from spark.transfer import Correspondence, correspond, transfer
+from spark.transfer.analytic import Correspondence, correspond, transfer
+from spark.transfer.canonical import CanonicalMotion
 
 _SPANS, _SPAN = 10, 100  # so many parts of a recording, of so many frames at 30 fps, are looked at
 SHORTEST = 2.0  # [s] of a recording that tells anything

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from spark.canonical import CanonicalMotion
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_slerp
+from spark.transfer.canonical import CanonicalMotion
 
 _SAME_PLACE = 0.3  # joints of equally long chains, taken one by one, lie nearer to one another
 _NEAR = 0.26  # further than this from any of the source's joints, what a joint does is a guess

@@ -12,12 +12,12 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from spark.canonical import CanonicalMotion, canonical_positions
-from spark.plant import Leg, bend_leg, blend_between
 from spark.rig.contacts import planted_points
 from spark.rig.feet import standing_height
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
+from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.leg_ik import Leg, bend_leg, blend_between
 
 # A foot that stands for less [s] is passing by.
 _SHORTEST_STANCE = 0.1
