@@ -10,8 +10,8 @@ import numpy as np
 
 from robots.known import known
 from robots.solve import retarget
+from spark.demo.sample import sample_motion, sample_rig
 from spark.motion import Motion
-from spark.sample import sample_motion, sample_rig
 from spark.transfer.canonical import CanonicalMotion, to_canonical
 
 

@@ -333,7 +333,7 @@ def sample(folder: File = "samples", *, force: bool = False) -> tuple[Path, ...]
 
     Raises `OutputError` where one of the files exists, unless forced.
     """
-    from spark.sample import BUILDS, MOTIONS, sample_motion, sample_rig
+    from spark.demo.sample import BUILDS, MOTIONS, sample_motion, sample_rig
 
     written = {
         (rig, motion): Path(folder) / f"{rig}_{motion}.bvh" for rig in BUILDS for motion in MOTIONS

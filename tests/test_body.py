@@ -14,13 +14,13 @@ from stick import stick_rig
 from sim.body import build_body
 from sim.mjcf import notes_of, to_xml, write_mjcf
 from sim.pose import qpos_from_motion
+from spark.demo.sample import BUILDS, sample_motion, sample_rig
 from spark.errors import OutputError, SkeletonError
 from spark.io.reading import read_motion
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig.rig import Rig, understand
 from spark.rotation import quat_angle, quat_conj, quat_mul
-from spark.sample import BUILDS, sample_motion, sample_rig
 from spark.transfer.canonical import from_canonical, to_canonical
 
 JOINT_TYPES = ("ball", "hinge")

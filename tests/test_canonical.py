@@ -7,6 +7,7 @@ import pytest
 from rerig import along_x, rerig
 from stick import joint, standing, stick_rig
 
+from spark.demo.sample import sample_motion, sample_rig
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig.contacts import floor_height
@@ -14,7 +15,6 @@ from spark.rig.rig import Rig
 from spark.rig.roles import Role, RoleMap
 from spark.rig.tpose import find_tpose
 from spark.rotation import quat_angle, quat_mul, quat_normalize, quat_rotate
-from spark.sample import sample_motion, sample_rig
 from spark.skeleton import Skeleton
 from spark.transfer.canonical import canonical_positions, from_canonical, to_canonical
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from conftest import recordings
 
+from spark.demo.sample import sample_motion, sample_rig
 from spark.io.recording import read_recording
 from spark.kinematics import forward
 from spark.rig.contacts import planted_feet, planted_points, speeds
 from spark.rig.rig import understand
-from spark.sample import sample_motion, sample_rig
 
 
 def test_speed_of_a_point_that_moves_evenly() -> None:

@@ -18,6 +18,7 @@ import torch
 import spark_sim
 from spark.checkpoint import Checkpoint, save_checkpoint
 from spark.dataset import Performance
+from spark.demo.sample import sample_rig
 from spark.errors import FileFormatError, SkeletonError, SparkSimError
 from spark.evaluate import (
     Cell,
@@ -36,7 +37,6 @@ from spark.model import Spark
 from spark.names import NameConfig, NameEncoder
 from spark.pairs import Clip
 from spark.rig.contacts import planted_feet, speeds
-from spark.sample import sample_rig
 from spark.settings import TrainConfig
 from spark.train import network
 from spark.transfer.analytic import correspond, transfer

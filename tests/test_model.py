@@ -9,6 +9,7 @@ from spark import losses
 from spark.batch import Batch, Collator
 from spark.bodies import Body, Pose, Start, forward_kinematics, take, world_matrices
 from spark.config import Config
+from spark.demo.sample import sample_motion, sample_rig
 from spark.features import body_features, canonical_from_features, pose_features
 from spark.kinematics import forward, world_positions
 from spark.mirror import mirrored_body, mirrored_motion
@@ -19,7 +20,6 @@ from spark.rig.contacts import planted_feet
 from spark.rig.name_conventions import CONVENTIONS, name_joints
 from spark.rig.roles import Role
 from spark.rotation import matrix_from_sixd, quat_angle
-from spark.sample import sample_motion, sample_rig
 from spark.transfer.canonical import to_canonical
 from spark.variants import same_body
 

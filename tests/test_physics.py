@@ -14,8 +14,8 @@ from robots.understand import understand_robot
 from sim.given import GivenBody, given
 from sim.physics import Assist, Tracked, track
 from sim.physics_report import summary, text
+from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import SkeletonError
-from spark.sample import sample_motion, sample_rig
 
 FPS, HEIGHT, G = 60.0, 1.7, 9.81
 MACHINE = """

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from conftest import recording
 
+from spark.demo.sample import MOTIONS, sample_motion, sample_rig
 from spark.io.recording import read_recording
 from spark.kinematics import forward
 from spark.rig.contacts import planted_feet, speeds
 from spark.rig.rig import Rig, understand
-from spark.sample import MOTIONS, sample_motion, sample_rig
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import canonical_positions, from_canonical, to_canonical
 from spark.transfer.foot_lock import refine

@@ -20,12 +20,12 @@ from robots.targets import targets_of
 from robots.ties import jolted, unhurried
 from robots.tree import Coordinates, forward
 from scripts.robot_bars import COLUMNS, limb_error, measure, misses
+from spark.demo.sample import sample_motion, sample_rig
 from spark.io.recording import read_recording
 from spark.kinematics import world_positions
 from spark.rig.rig import Rig, understand
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_from_yaw, quat_mul, quat_rotate
-from spark.sample import sample_motion, sample_rig
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark_sim.robot import load_robot
 

@@ -21,6 +21,7 @@ from robots.targets import targets_of
 from robots.tree import forward
 from robots.window_terms import Stance, Terms
 from scripts.robot_bars import COLUMNS, follow, limb_error, measure
+from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import ConventionError, FrameError
 from spark.io.recording import read_recording
 from spark.motion import Motion
@@ -32,7 +33,6 @@ from spark.rotation import (
     quat_mul,
     quat_rotate,
 )
-from spark.sample import sample_motion, sample_rig
 from spark.transfer.canonical import canonical_positions, to_canonical
 from spark_sim.robot import load_robot
 

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spark.gait import FOOT_FLAT, HEEL_OFF, MID_STANCE, TOE_OFF, stride_time
+from spark.demo.gait import FOOT_FLAT, HEEL_OFF, MID_STANCE, TOE_OFF, stride_time
+from spark.demo.sample import BUILDS, MOTIONS, sample_motion, sample_rig
 from spark.io.bvh import write_bvh
 from spark.io.encoding import encode_new
 from spark.io.recording import read_recording
@@ -14,7 +15,6 @@ from spark.kinematics import forward, local_rotations
 from spark.rig.feet import sole_corners, sole_positions
 from spark.rig.roles import Role
 from spark.rotation import quat_angle, rotvec_from_quat
-from spark.sample import BUILDS, MOTIONS, sample_motion, sample_rig
 from spark.transfer.canonical import to_canonical
 
 EVERY = [(name, build) for name in MOTIONS for build in BUILDS]

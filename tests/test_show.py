@@ -22,11 +22,11 @@ from sim.render import frames
 from sim.scene import Figure, Scene, build_scene
 from sim.simplify import area, simplify_together
 from sim.video import write_strip, write_video
+from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import DependencyError, OutputError
 from spark.motion import Motion
 from spark.rig.rig import Rig
 from spark.rotation import quat_mul, quat_rotate
-from spark.sample import sample_motion, sample_rig
 
 
 def figures() -> list[Figure]:

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from spark.demo.sample import sample_motion, sample_rig
 from spark.features import body_features
 from spark.kinematics import forward, world_positions
 from spark.names import NameEncoder
 from spark.pairs import Clip, PairMaker
 from spark.rig.contacts import planted_feet
 from spark.rig.roles import Group
-from spark.sample import sample_motion, sample_rig
 from spark.skeleton import Skeleton
 from spark.staging import Stage, leg_of
 from spark.transfer.canonical import to_canonical

@@ -10,6 +10,7 @@ from humanoids import EVERY_BODY, ONE_A_RIG
 from rerig import along_x, rerig, rest_in
 from stick import joint, standing, stick_rig
 
+from spark.demo.sample import BUILDS, sample_motion, sample_rig
 from spark.errors import SkeletonError
 from spark.io.recording import read_recording
 from spark.kinematics import local_rotations, world_positions
@@ -25,7 +26,6 @@ from spark.rotation import (
     quat_rotate,
     rotvec_from_quat,
 )
-from spark.sample import BUILDS, sample_motion, sample_rig
 from spark.skeleton import Skeleton
 from spark.transfer.canonical import to_canonical
 

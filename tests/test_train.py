@@ -19,6 +19,7 @@ from stick import without
 
 from spark.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from spark.clips import at_frame_time, read_clips
+from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import ConventionError, FileFormatError, SkeletonError
 from spark.features import body_features
 from spark.known_bodies import trunk_of
@@ -28,7 +29,6 @@ from spark.packed import Packer
 from spark.pairs import Clip
 from spark.rig.roles import Role
 from spark.rotation import quat_about, quat_angle, quat_mul
-from spark.sample import sample_motion, sample_rig
 from spark.settings import TrainConfig, read_settings, toml
 from spark.train import Objective, Steps, _batches, network, optimiser_of, take_step, train
 from spark.transfer.analytic import transfer

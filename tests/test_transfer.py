@@ -9,6 +9,7 @@ from conftest import DATA, recordings
 from humanoids import ONE_A_RIG
 from stick import joint, standing, stick_rig, without
 
+from spark.demo.sample import BUILDS, MOTIONS, sample_motion, sample_rig
 from spark.io.recording import read_recording
 from spark.kinematics import forward
 from spark.motion import Motion
@@ -16,7 +17,6 @@ from spark.rig.contacts import floor_height, planted_feet
 from spark.rig.rig import Rig, understand
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import quat_about, quat_angle, quat_mul, quat_normalize, quat_rotate
-from spark.sample import BUILDS, MOTIONS, sample_motion, sample_rig
 from spark.skeleton import Skeleton
 from spark.transfer.analytic import correspond, transfer
 from spark.transfer.canonical import from_canonical, to_canonical

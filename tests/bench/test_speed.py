@@ -14,6 +14,7 @@ import pytest
 from sim.body import build_body
 from sim.pose import qpos_from_motion
 from sim.report import judge
+from spark.demo.sample import BUILDS, Build, make_skeleton, sample_motion, sample_rig
 from spark.features import body_features
 from spark.io.bvh import read_bvh, write_bvh
 from spark.io.encoding import encode_new
@@ -23,7 +24,6 @@ from spark.motion import Motion
 from spark.retarget import Learned
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
-from spark.sample import BUILDS, Build, make_skeleton, sample_motion, sample_rig
 from spark.skeleton import Skeleton
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, from_canonical, to_canonical

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-from spark.actor import Actor
+from spark.demo.actor import Actor
 from spark.rig.feet import sole_corners
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role

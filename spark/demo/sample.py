@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from spark.actor import Actor
-from spark.gait import walk
+from spark.demo.actor import Actor
+from spark.demo.gait import walk
 from spark.motion import Motion
 from spark.rig.name_conventions import name_joints
 from spark.rig.rig import Rig, understand
