@@ -13,10 +13,10 @@ import numpy as np
 import torch
 from rigs import RIGS, build
 
-from spark.features import body_features
 from spark.motion import Motion
 from spark.name_rigs import OTHER, Named, rig_of
-from spark.name_words import rig_words
+from spark.network.features import body_features
+from spark.network.name_words import rig_words
 from spark.rig.name_conventions import CONVENTIONS, split_side
 from spark.rig.rig import understand
 from spark.rig.roles import Role

@@ -18,12 +18,12 @@ from spark.dataset import Performance, read_performances
 from spark.evaluate import Method, Positions, by, evaluate
 from spark.evaluation_cases import Case, made_cases
 from spark.evaluation_tables import markdown
+from spark.network.retarget import Learned
+from spark.network.weights import read_weights
 from spark.pairs import Clip
-from spark.retarget import Learned
 from spark.settings import TrainConfig, read_settings
 from spark.train import fresh_checkpoint, train
 from spark.transfer.analytic import transfer
-from spark.weights import read_weights
 
 _FOLDS = 3
 _RECIPE = Path(__file__).parent / "shipped.toml"

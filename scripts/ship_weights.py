@@ -10,7 +10,7 @@ from pathlib import Path
 
 from spark.checkpoint import load_checkpoint, save_checkpoint
 from spark.names import NameEncoder
-from spark.weights import SHIPPED
+from spark.network.weights import SHIPPED
 
 
 def main(path: str) -> None:

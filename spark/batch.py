@@ -10,8 +10,8 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 from spark.bodies import Body, Pose, Start
-from spark.config import NO_ROTATION
-from spark.features import BodyFeatures
+from spark.network.config import NO_ROTATION
+from spark.network.features import BodyFeatures
 from spark.pairs import Pairs, Windows
 
 Names = Callable[[Sequence[str]], Float[Tensor, "S E"]]

@@ -1,4 +1,4 @@
-"""Checkpoints: one file (`spark.weights`) with weights, settings and what resuming needs.
+"""Checkpoints: one file (`spark.network.weights`) with weights, settings and what resuming needs.
 
 Draws and noise are functions of the step's number, so the step is all that there is of the state
 of random numbers.
@@ -13,12 +13,12 @@ import torch
 from safetensors.torch import save
 from torch import Tensor
 
-from spark.config import Config
 from spark.files import write_atomically
-from spark.known_bodies import Trunk
 from spark.model import Spark
 from spark.names import NameConfig, NameEncoder
-from spark.weights import FORMAT, VERSION, Tensors, read_weights
+from spark.network.config import Config
+from spark.network.known_bodies import Trunk
+from spark.network.weights import FORMAT, VERSION, Tensors, read_weights
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from spark.errors import SkeletonError, SparkSimError
-from spark.features import BodyFeatures, body_features
 from spark.io.reading import motion_files, read_motion
+from spark.network.features import BodyFeatures, body_features
 from spark.pairs import Clip
 from spark.resample import positions_at, rotations_at
 from spark.rig.contacts import planted_feet

@@ -34,9 +34,9 @@ from spark.errors import (
     SparkSimError,
     name_list,
 )
-from spark.features import BodyFeatures, body_features
 from spark.files import write_atomically
 from spark.io.reading import motion_files
+from spark.network.features import BodyFeatures, body_features
 from spark.pairs import Clip
 from spark.rig.rig import Rig
 from spark.rig.rig_json import rig_from_json, rig_to_json

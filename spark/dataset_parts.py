@@ -17,9 +17,9 @@ from jaxtyping import Bool, Float
 
 from spark.clips import clip_of
 from spark.errors import SparkSimError
-from spark.features import body_features
 from spark.files import write_atomically
 from spark.io.reading import read_motion
+from spark.network.features import body_features
 from spark.rig.rig import Rig, understand
 from spark.rig.rig_json import rig_from_json, rig_to_json
 from spark.transfer.canonical import to_canonical

@@ -1,6 +1,6 @@
 """What a method is asked for and what the answer is: pairs of one motion on two bodies.
 
-Everything is as the network sees bodies (`spark.features`), in hip heights of the body in question.
+Everything is as the network sees bodies (`spark.network.features`), in hip heights of the body in question.
 A case is *intra-structural* where both bodies have the same roles, each in as many joints, and
 *cross-structural* else. *Missing* are made cases whose source lacks joints of the target's spine,
 neck or shoulders, which any method has to guess.
@@ -18,8 +18,8 @@ import numpy as np
 
 from spark.dataset import Performance, is_dataset, prepare, read_performances
 from spark.errors import SkeletonError
-from spark.features import BodyFeatures
 from spark.metrics import san_height
+from spark.network.features import BodyFeatures
 from spark.pairs import Clip
 from spark.rig.roles import Role
 from spark.staging import Stage

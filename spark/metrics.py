@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from spark.errors import SkeletonError
-from spark.features import body_features
+from spark.network.features import body_features
 from spark.rig.contacts import planted_feet, speeds
 from spark.rig.rig import Rig
 from spark.rig.roles import Role

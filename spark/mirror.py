@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from spark.features import BodyFeatures
+from spark.network.features import BodyFeatures
 from spark.rig.groups import groups_of
 from spark.rig.name_conventions import split_side
 from spark.rig.rig import Rig

@@ -20,7 +20,7 @@ from torch import Tensor, nn
 
 from spark.attention import Attention, Feedforward, TemporalBlock, sinusoids
 from spark.bodies import Body, Pose, Start, forward_kinematics, take, world_matrices
-from spark.config import (
+from spark.network.config import (
     N_GROUPS,
     N_TOKENS,
     NO_ROTATION,

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from spark.name_words import rig_words
+from spark.network.name_words import rig_words
 from spark.rig.name_conventions import CONVENTIONS, name_joints, split_side
 from spark.rig.roles import Role
 

@@ -24,7 +24,7 @@ from torch.nn.utils.rnn import pad_sequence
 
 from spark.errors import DependencyError, FileFormatError
 from spark.files import write_atomically
-from spark.name_words import BYTE_OFFSET, PAD, name_tokens, relative_buckets, rig_words
+from spark.network.name_words import BYTE_OFFSET, PAD, name_tokens, relative_buckets, rig_words
 
 NAME_CACHE = Path.home() / ".cache" / "spark-sim" / "names.pt"
 _CHUNKS = 4

@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from spark.errors import SkeletonError
-from spark.features import BodyFeatures
 from spark.mirror import mirrored_body, mirrored_motion
+from spark.network.features import BodyFeatures
 from spark.rotation import (
     quat_angle,
     quat_from_yaw,
@@ -145,7 +145,7 @@ class PairMaker:
             joined([link.second for link in links], begins[:D]),
             np.concatenate([link.mix for link in links]),
         )
-        # Windows are seen from their first frames, as `spark.features.pose_features` sees one. The
+        # Windows are seen from their first frames, as `spark.network.features.pose_features` sees one. The
         # pelvis turns alike on all bodies.
         back = quat_from_yaw(-yaw_from_quat(rows[begins[:D], :, :1]))
         roots = quat_rotate(back, hips - hips[:, :, :1] * np.array([1, 1, 0], hips.dtype))

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from spark.features import BodyFeatures
 from spark.kinematics import world_positions
+from spark.network.features import BodyFeatures
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_mul, quat_relative, quat_rotate, quat_slerp
 from spark.transfer.leg_ik import Leg, leg_turns, stance_correction

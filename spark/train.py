@@ -31,11 +31,11 @@ from spark.checkpoint import (
     restore_optimizer,
     save_checkpoint,
 )
-from spark.config import Config
-from spark.known_bodies import distinct
 from spark.model import Spark
 from spark.name_file import load_names
 from spark.names import NAME_CACHE, NameEncoder, T5Names
+from spark.network.config import Config
+from spark.network.known_bodies import distinct
 from spark.packed import AHEAD, Packed, Packer
 from spark.pairs import Clip, PairMaker
 from spark.precision import fast_products

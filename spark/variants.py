@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from spark.features import BodyFeatures
+from spark.network.features import BodyFeatures
 from spark.rig.groups import groups_of
 from spark.rig.name_conventions import CONVENTIONS, HELD_OUT, name_joints, split_side
 from spark.rig.rig import Rig

@@ -23,7 +23,7 @@ from spark_sim import files, rolemap
 if TYPE_CHECKING:
     from sim.joints import JointType
     from sim.report import Report
-    from spark.retarget import Learned
+    from spark.network.retarget import Learned
     from spark_sim.robot import RobotClip
     from spark_sim.show import Simulated
 
@@ -240,16 +240,16 @@ def _filled_in(source: CanonicalMotion, target: Clip, network: "Learned") -> Can
 
 def _learned(checkpoint: File | None) -> "Learned":
     """The network of a checkpoint, or the one that ships."""
-    from spark.retarget import Learned
-    from spark.weights import read_weights
+    from spark.network.retarget import Learned
+    from spark.network.weights import read_weights
 
     return _shipped() if checkpoint is None else Learned(read_weights(Path(checkpoint)))
 
 
 @cache
 def _shipped() -> "Learned":
-    from spark.retarget import Learned
-    from spark.weights import SHIPPED, read_weights
+    from spark.network.retarget import Learned
+    from spark.network.weights import SHIPPED, read_weights
 
     return Learned(read_weights(SHIPPED))
 

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from spark.checkpoint import Checkpoint, save_checkpoint
-from spark.retarget import Learned
-from spark.weights import read_weights
+from spark.network.retarget import Learned
+from spark.network.weights import read_weights
 
 
 def learned(checkpoint: Checkpoint, folder: Path) -> Learned:

@@ -8,8 +8,8 @@ from torch import Tensor
 
 from spark.attention import Attention, TemporalBlock
 from spark.bodies import Body, Pose, Start
-from spark.config import NO_ROTATION, RESIDUAL_SCALE, ROTATION_GAIN
 from spark.model import Spark
+from spark.network.config import NO_ROTATION, RESIDUAL_SCALE, ROTATION_GAIN
 from spark.rotation import matrix_from_sixd
 
 

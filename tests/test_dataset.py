@@ -16,10 +16,10 @@ from spark.clips import clip_of
 from spark.dataset import _on_body, is_dataset, prepare, read_dataset, training_clips
 from spark.dataset_parts import Part
 from spark.errors import FileFormatError, OutputError, SkeletonError
-from spark.features import body_features
 from spark.io.bvh import write_bvh
 from spark.io.encoding import encode_new
 from spark.io.reading import motion_files, read_motion
+from spark.network.features import body_features
 from spark.pairs import PairMaker
 from spark.rig.rig import understand
 from spark.rig.rig_json import rig_from_json, rig_to_json

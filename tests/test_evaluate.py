@@ -29,12 +29,12 @@ from spark.evaluate import (
 )
 from spark.evaluation_cases import Case, made_cases, performances, recorded_cases
 from spark.evaluation_tables import as_csv, as_json, markdown
-from spark.features import body_features
 from spark.io.bvh import read_bvh, write_bvh
-from spark.known_bodies import distinct
 from spark.metrics import Score
 from spark.model import Spark
 from spark.names import NameConfig, NameEncoder
+from spark.network.features import body_features
+from spark.network.known_bodies import distinct
 from spark.pairs import Clip
 from spark.rig.contacts import planted_feet, speeds
 from spark.settings import TrainConfig

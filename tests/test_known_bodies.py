@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from spark.demo.sample import sample_rig
-from spark.features import BodyFeatures, body_features
-from spark.known_bodies import distinct, nearness, trunk_of
+from spark.network.features import BodyFeatures, body_features
+from spark.network.known_bodies import distinct, nearness, trunk_of
 from spark.rig.roles import Role
 
 

@@ -8,13 +8,13 @@ import torch
 from spark import losses
 from spark.batch import Batch, Collator
 from spark.bodies import Body, Pose, Start, forward_kinematics, take, world_matrices
-from spark.config import Config
 from spark.demo.sample import sample_motion, sample_rig
-from spark.features import body_features, canonical_from_features, pose_features
 from spark.kinematics import forward, world_positions
 from spark.mirror import mirrored_body, mirrored_motion
 from spark.model import Spark, _corrected
 from spark.names import NameEncoder
+from spark.network.config import Config
+from spark.network.features import body_features, canonical_from_features, pose_features
 from spark.pairs import Clip, PairMaker
 from spark.rig.contacts import planted_feet
 from spark.rig.name_conventions import CONVENTIONS, name_joints

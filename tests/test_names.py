@@ -17,7 +17,6 @@ from spark.checkpoint import load_checkpoint, save_checkpoint
 from spark.errors import ConventionError, DependencyError, FileFormatError
 from spark.name_file import load_names, save_names
 from spark.name_rigs import KINDS, OTHER, made_up_rig, rig_of
-from spark.name_words import PAD, rig_words
 from spark.names import (
     NameConfig,
     NameEncoder,
@@ -25,6 +24,7 @@ from spark.names import (
     tokenize,
     tokenize_rigs,
 )
+from spark.network.name_words import PAD, rig_words
 from spark.rig.name_conventions import CONVENTIONS, HELD_OUT, name_joints
 from spark.rig.roles import Role
 from spark.settings import TrainConfig

@@ -15,15 +15,15 @@ from test_model import PRESETS, maker  # noqa: F401
 from spark.batch import Collator
 from spark.bodies import Pose, Start
 from spark.checkpoint import Checkpoint, save_checkpoint
-from spark.config import Config
 from spark.errors import ConventionError, FileFormatError
 from spark.model import Spark
-from spark.name_network import NameNetwork
 from spark.names import NameConfig, NameEncoder
-from spark.network import Network
+from spark.network.config import Config
+from spark.network.forward import Network
+from spark.network.names import NameNetwork
+from spark.network.weights import read_weights
 from spark.onnx_export import INPUTS, export_onnx
 from spark.pairs import PairMaker
-from spark.weights import read_weights
 
 
 def small(config: Config, **changes: object) -> Config:

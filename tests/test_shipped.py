@@ -8,12 +8,12 @@ from conftest import recording
 from stick import without
 
 from spark.io.reading import read_motion
-from spark.retarget import Learned
+from spark.network.retarget import Learned
+from spark.network.weights import SHIPPED, read_weights
 from spark.rig.rig import understand
 from spark.rig.roles import Role
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
-from spark.weights import SHIPPED, read_weights
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from spark.demo.sample import sample_motion, sample_rig
-from spark.features import body_features
 from spark.kinematics import forward, world_positions
 from spark.names import NameEncoder
+from spark.network.features import body_features
 from spark.pairs import Clip, PairMaker
 from spark.rig.contacts import planted_feet
 from spark.rig.roles import Group

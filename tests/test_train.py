@@ -21,10 +21,11 @@ from spark.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from spark.clips import at_frame_time, read_clips
 from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import ConventionError, FileFormatError, SkeletonError
-from spark.features import body_features
-from spark.known_bodies import trunk_of
 from spark.model import Spark, _corrected
 from spark.names import NameConfig, NameEncoder
+from spark.network.features import body_features
+from spark.network.known_bodies import trunk_of
+from spark.network.weights import VERSION, read_weights
 from spark.packed import Packer
 from spark.pairs import Clip
 from spark.rig.roles import Role
@@ -33,7 +34,6 @@ from spark.settings import TrainConfig, read_settings, toml
 from spark.train import Objective, Steps, _batches, network, optimiser_of, take_step, train
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import canonical_positions, to_canonical
-from spark.weights import VERSION, read_weights
 from spark_sim import sample
 
 CHECKOUT = Path(__file__).parents[1]

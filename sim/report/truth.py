@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import SkeletonError
-from spark.features import body_features
 from spark.metrics import san_height, score
 from spark.motion import Motion
+from spark.network.features import body_features
 from spark.rig.rig import Rig
 from spark.transfer.canonical import canonical_positions, to_canonical
 

@@ -117,7 +117,7 @@ def run(args: Namespace) -> int:
     plain, held, own, both = _WAYS
     add("copy", transfer, (plain, held, own))
     for name, weights in checkpoints.items():
-        from spark.retarget import Learned
+        from spark.network.retarget import Learned
 
         network = Learned(weights)
         ways = (plain, own, both) if network.network.config.residual else (plain,)
@@ -150,7 +150,7 @@ def _named(given: str) -> tuple[str, str]:
 
 
 def _checkpoint(given: str) -> tuple[str, Any]:
-    from spark.weights import read_weights
+    from spark.network.weights import read_weights
 
     name, equals, rest = given.partition("=")
     named = equals and not Path(given).exists()

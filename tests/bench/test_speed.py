@@ -15,20 +15,20 @@ from sim.body import build_body
 from sim.pose import qpos_from_motion
 from sim.report import judge
 from spark.demo.sample import BUILDS, Build, make_skeleton, sample_motion, sample_rig
-from spark.features import body_features
 from spark.io.bvh import read_bvh, write_bvh
 from spark.io.encoding import encode_new
 from spark.kinematics import forward
-from spark.known_bodies import trunk_of
 from spark.motion import Motion
-from spark.retarget import Learned
+from spark.network.features import body_features
+from spark.network.known_bodies import trunk_of
+from spark.network.retarget import Learned
+from spark.network.weights import SHIPPED, read_weights
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.skeleton import Skeleton
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, from_canonical, to_canonical
 from spark.transfer.target_prior import with_own_motion
-from spark.weights import SHIPPED, read_weights
 
 pytestmark = pytest.mark.bench
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from spark.features import BodyFeatures
+from spark.network.features import BodyFeatures
 from spark.rig.roles import Role
 
 # Hip heights by which a joint lies elsewhere on a body that a network knows nothing of. Among the

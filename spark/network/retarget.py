@@ -15,17 +15,22 @@ from jaxtyping import Float, Int
 
 from spark.clips import FRAME_TIME, at_frame_time
 from spark.errors import DependencyError, name_list
-from spark.features import BodyFeatures, body_features, canonical_from_features, pose_features
-from spark.known_bodies import nearness
-from spark.name_network import NameNetwork
-from spark.network import Network
+from spark.network.features import (
+    BodyFeatures,
+    body_features,
+    canonical_from_features,
+    pose_features,
+)
+from spark.network.forward import Network
+from spark.network.known_bodies import nearness
+from spark.network.names import NameNetwork
+from spark.network.weights import Weights
 from spark.pairs import Windows
 from spark.resample import positions_at, rotations_at
 from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_normalize
 from spark.transfer.analytic import correspond, transfer
 from spark.transfer.canonical import CanonicalMotion
-from spark.weights import Weights
 
 _AT_A_TIME = 32
 

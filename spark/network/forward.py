@@ -9,13 +9,20 @@ import math
 import numpy as np
 from jaxtyping import Float, Int
 
-from spark.array_layers import Layers, attend, join_heads, split_heads
-from spark.config import N_GROUPS, N_TOKENS, NO_ROTATION, RESIDUAL_SCALE, ROTATION_GAIN, Config
-from spark.features import BodyFeatures
 from spark.kinematics import local_rotations, world_positions, world_rotations
+from spark.network.config import (
+    N_GROUPS,
+    N_TOKENS,
+    NO_ROTATION,
+    RESIDUAL_SCALE,
+    ROTATION_GAIN,
+    Config,
+)
+from spark.network.features import BodyFeatures
+from spark.network.layers import Layers, attend, join_heads, split_heads
+from spark.network.weights import Weights
 from spark.pairs import Windows
 from spark.rotation import quat_conj, quat_from_sixd, quat_mul, sixd_from_quat
-from spark.weights import Weights
 
 Array = Float[np.ndarray, "..."]
 Tokens = Float[np.ndarray, "W T _ D"]

@@ -15,7 +15,7 @@ from jaxtyping import Shaped
 from safetensors import SafetensorError, safe_open
 
 from spark.errors import FileFormatError
-from spark.known_bodies import Trunk
+from spark.network.known_bodies import Trunk
 
 FORMAT = "spark-sim checkpoint"
 VERSION = 3

@@ -1,0 +1,1 @@
+"""The SPARK network's inference, on numpy alone."""
