@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 from spark.errors import SparkSimError
-from spark.settings import TrainConfig, toml
+from spark.training.settings import TrainConfig, toml
 
 _SWITCHES = {"": (), "w/o share": ("share",), "w/o mask": ("mask",), "w/ pos": ("pos",)}
 _SWITCHES |= {"w/o FK": ("fk",)}

@@ -14,13 +14,13 @@ import torch
 from rigs import RIGS, build
 
 from spark.motion import Motion
-from spark.name_rigs import OTHER, Named, rig_of
 from spark.network.features import body_features
 from spark.network.name_words import rig_words
 from spark.rig.name_conventions import CONVENTIONS, split_side
 from spark.rig.rig import understand
 from spark.rig.roles import Role
-from spark.train_names import score_rigs, train_names
+from spark.training.name_rigs import OTHER, Named, rig_of
+from spark.training.train_names import score_rigs, train_names
 
 
 def named_rig(chains: str) -> list[Named]:

@@ -16,12 +16,12 @@ from pathlib import Path
 import torch
 from torch.utils.data import DataLoader
 
-from spark.batch import Batch
-from spark.dataset import training_clips
-from spark.names import NameEncoder
-from spark.packed import AHEAD, Packed, Packer
-from spark.settings import TrainConfig
-from spark.train import Steps
+from spark.training.batch import Batch
+from spark.training.dataset import training_clips
+from spark.training.name_encoder import NameEncoder
+from spark.training.packed import AHEAD, Packed, Packer
+from spark.training.settings import TrainConfig
+from spark.training.train import Steps
 
 FIRST, BEGUN, STEPS = 800, 400, 700
 

@@ -14,15 +14,15 @@ from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 
-from spark.dataset import Performance, read_performances
 from spark.evaluate import Method, Positions, by, evaluate
 from spark.evaluation_cases import Case, made_cases
 from spark.evaluation_tables import markdown
 from spark.network.retarget import Learned
 from spark.network.weights import read_weights
-from spark.pairs import Clip
-from spark.settings import TrainConfig, read_settings
-from spark.train import fresh_checkpoint, train
+from spark.training.dataset import Performance, read_performances
+from spark.training.pairs import Clip
+from spark.training.settings import TrainConfig, read_settings
+from spark.training.train import fresh_checkpoint, train
 from spark.transfer.analytic import transfer
 
 _FOLDS = 3

@@ -8,9 +8,9 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-from spark.checkpoint import load_checkpoint, save_checkpoint
-from spark.names import NameEncoder
 from spark.network.weights import SHIPPED
+from spark.training.checkpoint import load_checkpoint, save_checkpoint
+from spark.training.name_encoder import NameEncoder
 
 
 def main(path: str) -> None:

@@ -9,10 +9,10 @@ from time import perf_counter
 
 import torch
 
-from spark.name_file import save_names
-from spark.names import NameEncoder
 from spark.rig.name_conventions import HELD_OUT
-from spark.train_names import NameScore, score_names, train_names
+from spark.training.name_encoder import NameEncoder
+from spark.training.name_file import save_names
+from spark.training.train_names import NameScore, score_names, train_names
 
 
 def say(what: str, score: NameScore) -> None:

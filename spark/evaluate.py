@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from spark.clips import FRAME_TIME, at_frame_time
 from spark.errors import FileFormatError, SkeletonError, name_list
 from spark.evaluation_cases import SPARE_FRAMES, STRUCTURES, Case, Structure
 from spark.io.reading import SUFFIXES, read_motion
 from spark.metrics import Score, mean_score, score_positions, source_sensitivity
 from spark.rig.rig import understand
+from spark.training.clips import FRAME_TIME, at_frame_time
 from spark.transfer.canonical import canonical_positions, to_canonical
 from spark.transfer.foot_lock import refine
 from spark.transfer.target_prior import Retargeting, with_own_motion

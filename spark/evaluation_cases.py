@@ -16,17 +16,17 @@ from typing import Literal
 
 import numpy as np
 
-from spark.dataset import Performance, is_dataset, prepare, read_performances
 from spark.errors import SkeletonError
 from spark.metrics import san_height
 from spark.network.features import BodyFeatures
-from spark.pairs import Clip
 from spark.rig.roles import Role
-from spark.staging import Stage
+from spark.training.dataset import Performance, is_dataset, prepare, read_performances
+from spark.training.pairs import Clip
+from spark.training.staging import Stage
+from spark.training.variants import Variant, random_variant, same_body, scaled_body, split_body
 from spark.transfer.analytic import correspond
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.target_prior import SHORTEST
-from spark.variants import Variant, random_variant, same_body, scaled_body, split_body
 
 Structure = Literal["intra", "cross", "missing"]
 STRUCTURES: tuple[Structure, ...] = ("intra", "cross", "missing")
@@ -62,7 +62,7 @@ class Case:
 def performances(path: Path, workers: int = 1) -> list[Performance]:
     """The clips of a dataset, or of a folder with one folder a character, which has no cells.
 
-    Raises what `spark.dataset.prepare` and `read_performances` raise.
+    Raises what `spark.training.dataset.prepare` and `read_performances` raise.
     """
     if is_dataset(path):
         return read_performances(path)
@@ -110,7 +110,7 @@ def recorded_cases(found: Sequence[Performance]) -> tuple[list[Case], list[str]]
 
 def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = None) -> list[Case]:
     """Each clip with two targets that are changed copies of its own body, on which the answer is
-    known (`spark.pairs`): one with other bone lengths, and one with other joints and names too. And
+    known (`spark.training.pairs`): one with other bone lengths, and one with other joints and names too. And
     a changed copy that lacks joints, with the clip's own body as its target. In all answers the
     feet are planted while the recording's stand, and as high.
 

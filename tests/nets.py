@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from spark.checkpoint import Checkpoint, save_checkpoint
 from spark.network.retarget import Learned
 from spark.network.weights import read_weights
+from spark.training.checkpoint import Checkpoint, save_checkpoint
 
 
 def learned(checkpoint: Checkpoint, folder: Path) -> Learned:

@@ -1,16 +1,16 @@
 """The network once more, as plainly as its equations: one skeleton, joint, head and frame at a
-time, no padding, no fused attention. It reads the weights of a `spark.model.Spark`."""
+time, no padding, no fused attention. It reads the weights of a `spark.training.model.Spark`."""
 
 import math
 
 import torch
 from torch import Tensor
 
-from spark.attention import Attention, TemporalBlock
-from spark.bodies import Body, Pose, Start
-from spark.model import Spark
 from spark.network.config import NO_ROTATION, RESIDUAL_SCALE, ROTATION_GAIN
 from spark.rotation import matrix_from_sixd
+from spark.training.attention import Attention, TemporalBlock
+from spark.training.model import Spark
+from spark.training.tensors import Body, Pose, Start
 
 
 def retargeted(model: Spark, pose: Pose, source: Body, target: Body, start: Start | None) -> Pose:

@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 from conftest import recording
 
-from spark import dataset_parts
-from spark.clips import clip_of
-from spark.dataset import _on_body, is_dataset, prepare, read_dataset, training_clips
-from spark.dataset_parts import Part
 from spark.errors import FileFormatError, OutputError, SkeletonError
 from spark.io.bvh import write_bvh
 from spark.io.encoding import encode_new
 from spark.io.reading import motion_files, read_motion
 from spark.network.features import body_features
-from spark.pairs import PairMaker
 from spark.rig.rig import understand
 from spark.rig.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_about, quat_angle, quat_conj, quat_mul
-from spark.splits import TRAINING, UNSEEN, cells, seen_characters, seen_motions
+from spark.training import dataset_parts
+from spark.training.clips import clip_of
+from spark.training.dataset import _on_body, is_dataset, prepare, read_dataset, training_clips
+from spark.training.dataset_parts import Part
+from spark.training.pairs import PairMaker
+from spark.training.splits import TRAINING, UNSEEN, cells, seen_characters, seen_motions
 from spark.transfer.canonical import to_canonical
 
 

@@ -16,8 +16,6 @@ import pytest
 import torch
 
 import spark_sim
-from spark.checkpoint import Checkpoint, save_checkpoint
-from spark.dataset import Performance
 from spark.demo.sample import sample_rig
 from spark.errors import FileFormatError, SkeletonError, SparkSimError
 from spark.evaluate import (
@@ -31,17 +29,19 @@ from spark.evaluation_cases import Case, made_cases, performances, recorded_case
 from spark.evaluation_tables import as_csv, as_json, markdown
 from spark.io.bvh import read_bvh, write_bvh
 from spark.metrics import Score
-from spark.model import Spark
-from spark.names import NameConfig, NameEncoder
 from spark.network.features import body_features
 from spark.network.known_bodies import distinct
-from spark.pairs import Clip
 from spark.rig.contacts import planted_feet, speeds
-from spark.settings import TrainConfig
-from spark.train import network
+from spark.training.checkpoint import Checkpoint, save_checkpoint
+from spark.training.dataset import Performance
+from spark.training.model import Spark
+from spark.training.name_encoder import NameConfig, NameEncoder
+from spark.training.pairs import Clip
+from spark.training.settings import TrainConfig
+from spark.training.train import network
+from spark.training.variants import same_body, split_body, split_joints
 from spark.transfer.analytic import correspond, transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
-from spark.variants import same_body, split_body, split_joints
 from spark_sim import cli, console
 
 

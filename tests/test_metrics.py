@@ -9,7 +9,6 @@ from conftest import recording
 from rigs import RIGS, build, walk
 from stick import stick_rig
 
-from spark.clips import at_frame_time
 from spark.errors import SkeletonError
 from spark.io.fbx import read_fbx
 from spark.metrics import (
@@ -24,6 +23,7 @@ from spark.metrics import (
     source_sensitivity,
 )
 from spark.rig.rig import understand
+from spark.training.clips import at_frame_time
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.transfer.foot_lock import refine

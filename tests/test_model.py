@@ -5,23 +5,23 @@ import plain_spark
 import pytest
 import torch
 
-from spark import losses
-from spark.batch import Batch, Collator
-from spark.bodies import Body, Pose, Start, forward_kinematics, take, world_matrices
 from spark.demo.sample import sample_motion, sample_rig
 from spark.kinematics import forward, world_positions
-from spark.mirror import mirrored_body, mirrored_motion
-from spark.model import Spark, _corrected
-from spark.names import NameEncoder
 from spark.network.config import Config
 from spark.network.features import body_features, canonical_from_features, pose_features
-from spark.pairs import Clip, PairMaker
 from spark.rig.contacts import planted_feet
 from spark.rig.name_conventions import CONVENTIONS, name_joints
 from spark.rig.roles import Role
 from spark.rotation import matrix_from_sixd, quat_angle
+from spark.training import losses
+from spark.training.batch import Batch, Collator
+from spark.training.mirror import mirrored_body, mirrored_motion
+from spark.training.model import Spark, _corrected
+from spark.training.name_encoder import NameEncoder
+from spark.training.pairs import Clip, PairMaker
+from spark.training.tensors import Body, Pose, Start, forward_kinematics, take, world_matrices
+from spark.training.variants import same_body
 from spark.transfer.canonical import to_canonical
-from spark.variants import same_body
 
 SMALL = {"width": 32, "heads": 2, "encoder_blocks": 1, "decoder_blocks": 2}
 PRESETS = [

@@ -13,23 +13,23 @@ from hypothesis import strategies as st
 from rigs import RIGS, build
 from safetensors.torch import save_file
 
-from spark.checkpoint import load_checkpoint, save_checkpoint
 from spark.errors import ConventionError, DependencyError, FileFormatError
-from spark.name_file import load_names, save_names
-from spark.name_rigs import KINDS, OTHER, made_up_rig, rig_of
-from spark.names import (
+from spark.network.name_words import PAD, rig_words
+from spark.rig.name_conventions import CONVENTIONS, HELD_OUT, name_joints
+from spark.rig.roles import Role
+from spark.training.checkpoint import load_checkpoint, save_checkpoint
+from spark.training.name_encoder import (
     NameConfig,
     NameEncoder,
     T5Names,
     tokenize,
     tokenize_rigs,
 )
-from spark.network.name_words import PAD, rig_words
-from spark.rig.name_conventions import CONVENTIONS, HELD_OUT, name_joints
-from spark.rig.roles import Role
-from spark.settings import TrainConfig
-from spark.train import fresh_checkpoint
-from spark.train_names import LEARNED, score_names, train_names
+from spark.training.name_file import load_names, save_names
+from spark.training.name_rigs import KINDS, OTHER, made_up_rig, rig_of
+from spark.training.settings import TrainConfig
+from spark.training.train import fresh_checkpoint
+from spark.training.train_names import LEARNED, score_names, train_names
 
 SMALL = NameConfig(width=48, heads=4, blocks=1, rig_blocks=1)
 ROLES = list(Role)
@@ -154,7 +154,7 @@ def test_training_is_the_same_again() -> None:
 
 
 def test_a_side_read_wrongly_is_counted(encoder: NameEncoder) -> None:
-    from spark.train_names import score_rigs
+    from spark.training.train_names import score_rigs
 
     rig = [
         (name, {"left": "right", "right": "left"}.get(side, side), kind)
@@ -202,7 +202,7 @@ def test_cached_names_need_no_transformers(t5: Path, tmp_path: Path) -> None:
 import sys
 sys.modules["transformers"] = None  # importing it fails
 from pathlib import Path
-from spark.names import T5Names
+from spark.training.name_encoder import T5Names
 names = T5Names({str(t5)!r}, Path({str(cache)!r}))
 print(*names.encode(["Hips"])[0].tolist())
 try:

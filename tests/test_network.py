@@ -12,18 +12,18 @@ import torch
 from onnxruntime import InferenceSession
 from test_model import PRESETS, maker  # noqa: F401
 
-from spark.batch import Collator
-from spark.bodies import Pose, Start
-from spark.checkpoint import Checkpoint, save_checkpoint
 from spark.errors import ConventionError, FileFormatError
-from spark.model import Spark
-from spark.names import NameConfig, NameEncoder
 from spark.network.config import Config
 from spark.network.forward import Network
 from spark.network.names import NameNetwork
 from spark.network.weights import read_weights
-from spark.onnx_export import INPUTS, export_onnx
-from spark.pairs import PairMaker
+from spark.training.batch import Collator
+from spark.training.checkpoint import Checkpoint, save_checkpoint
+from spark.training.model import Spark
+from spark.training.name_encoder import NameConfig, NameEncoder
+from spark.training.onnx import INPUTS, export_onnx
+from spark.training.pairs import PairMaker
+from spark.training.tensors import Pose, Start
 
 
 def small(config: Config, **changes: object) -> Config:

@@ -5,15 +5,15 @@ import pytest
 
 from spark.demo.sample import sample_motion, sample_rig
 from spark.kinematics import forward, world_positions
-from spark.names import NameEncoder
 from spark.network.features import body_features
-from spark.pairs import Clip, PairMaker
 from spark.rig.contacts import planted_feet
 from spark.rig.roles import Group
 from spark.skeleton import Skeleton
-from spark.staging import Stage, leg_of
+from spark.training.name_encoder import NameEncoder
+from spark.training.pairs import Clip, PairMaker
+from spark.training.staging import Stage, leg_of
+from spark.training.variants import midway, random_variant, same_body
 from spark.transfer.canonical import to_canonical
-from spark.variants import midway, random_variant, same_body
 
 
 @pytest.fixture(scope="module")

@@ -17,21 +17,21 @@ from nets import learned
 from safetensors.torch import save_file
 from stick import without
 
-from spark.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
-from spark.clips import at_frame_time, read_clips
 from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import ConventionError, FileFormatError, SkeletonError
-from spark.model import Spark, _corrected
-from spark.names import NameConfig, NameEncoder
 from spark.network.features import body_features
 from spark.network.known_bodies import trunk_of
 from spark.network.weights import VERSION, read_weights
-from spark.packed import Packer
-from spark.pairs import Clip
 from spark.rig.roles import Role
 from spark.rotation import quat_about, quat_angle, quat_mul
-from spark.settings import TrainConfig, read_settings, toml
-from spark.train import Objective, Steps, _batches, network, optimiser_of, take_step, train
+from spark.training.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
+from spark.training.clips import at_frame_time, read_clips
+from spark.training.model import Spark, _corrected
+from spark.training.name_encoder import NameConfig, NameEncoder
+from spark.training.packed import Packer
+from spark.training.pairs import Clip
+from spark.training.settings import TrainConfig, read_settings, toml
+from spark.training.train import Objective, Steps, _batches, network, optimiser_of, take_step, train
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import canonical_positions, to_canonical
 from spark_sim import sample
@@ -235,7 +235,7 @@ sys.path.insert(0, {str(CHECKOUT / "tests")!r})
 from pathlib import Path
 import torch
 from test_train import TINY, fresh, read_clips, replace, sample
-from spark.train import Objective, Steps, _place, shared
+from spark.training.train import Objective, Steps, _place, shared
 folder, out = Path(sys.argv[1]), Path(sys.argv[2])
 rank, world, _ = _place()
 checkpoint = fresh(TINY).__class__(fresh(TINY).model.eval(), fresh(TINY).names)

@@ -1,4 +1,4 @@
-"""The network of `spark.model` without torch: what `retarget` runs, on any machine, at once.
+"""The network of `spark.training.model` without torch: what `retarget` runs, on any machine, at once.
 
 The same equations on the same weights, for W windows of one pair of bodies, so that nothing is
 padded and nothing masked. tests/test_network.py holds it against the network that is trained.
@@ -21,8 +21,8 @@ from spark.network.config import (
 from spark.network.features import BodyFeatures
 from spark.network.layers import Layers, attend, join_heads, split_heads
 from spark.network.weights import Weights
-from spark.pairs import Windows
 from spark.rotation import quat_conj, quat_from_sixd, quat_mul, sixd_from_quat
+from spark.training.pairs import Windows
 
 Array = Float[np.ndarray, "..."]
 Tokens = Float[np.ndarray, "W T _ D"]
@@ -204,7 +204,7 @@ def _corrected(
     joints: Int[np.ndarray, "N"],
     guess: Int[np.ndarray, "J"],
 ) -> Windows:
-    """`spark.model._corrected`, for guesses alone."""
+    """`spark.training.model._corrected`, for guesses alone."""
     skeleton = start.body.skeleton
     before = world_rotations(skeleton, quat_from_sixd(start.rotations))
     little = quat_from_sixd(sixd + np.array(NO_ROTATION))

@@ -1,4 +1,4 @@
-"""Our own name encoder without torch: the forward pass of `spark.names.NameEncoder` on arrays."""
+"""Our own name encoder without torch: the forward pass of `spark.training.name_encoder.NameEncoder` on arrays."""
 
 from collections.abc import Sequence
 

@@ -13,7 +13,6 @@ from functools import cache
 import numpy as np
 from jaxtyping import Float, Int
 
-from spark.clips import FRAME_TIME, at_frame_time
 from spark.errors import DependencyError, name_list
 from spark.network.features import (
     BodyFeatures,
@@ -25,10 +24,11 @@ from spark.network.forward import Network
 from spark.network.known_bodies import nearness
 from spark.network.names import NameNetwork
 from spark.network.weights import Weights
-from spark.pairs import Windows
 from spark.resample import positions_at, rotations_at
 from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_normalize
+from spark.training.clips import FRAME_TIME, at_frame_time
+from spark.training.pairs import Windows
 from spark.transfer.analytic import correspond, transfer
 from spark.transfer.canonical import CanonicalMotion
 
@@ -152,7 +152,7 @@ def _names_of(weights: Weights) -> Callable[[Sequence[str]], Float[np.ndarray, "
     encode: Callable[[tuple[str, ...]], Float[np.ndarray, "_ E"]]
     if "t5" in weights.names:
         try:
-            from spark.names import NAME_CACHE, T5Names
+            from spark.training.name_encoder import NAME_CACHE, T5Names
         except ImportError as error:
             raise DependencyError(
                 f"a network with T5's names needs {error.name}: pip install 'spark-sim[t5]'"

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from spark.clips import FRAME_TIME, at_frame_time
 from spark.errors import name_list
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
@@ -23,6 +22,7 @@ from spark.rotation import (
     rotvec_from_quat,
     sixd_from_quat,
 )
+from spark.training.clips import FRAME_TIME, at_frame_time
 from spark.transfer.analytic import Correspondence, correspond, transfer
 from spark.transfer.canonical import CanonicalMotion
 

@@ -35,8 +35,8 @@ def run(args: Namespace) -> int:
     out = Path(args.output)
     files.claim(out, force=args.force, endings=(".onnx",))
     try:
-        from spark.checkpoint import load_checkpoint
-        from spark.onnx_export import export_onnx
+        from spark.training.checkpoint import load_checkpoint
+        from spark.training.onnx import export_onnx
     except ImportError as error:
         raise DependencyError(
             f"export needs {error.name}: pip install 'spark-sim[onnx]'"

@@ -34,8 +34,8 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    from spark.dataset import prepare
     from spark.errors import ConventionError
+    from spark.training.dataset import prepare
     from spark_sim import console
 
     out = Path(args.output)

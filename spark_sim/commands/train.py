@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from spark.settings import TrainConfig
-    from spark.train import Watch
+    from spark.training.settings import TrainConfig
+    from spark.training.train import Watch
 
 SUMMARY = "train the network that retargets"
 USAGE = "DATA... -o DIR [--config TOML] [--resume] [options]"
@@ -52,7 +52,7 @@ def configure(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     from spark.errors import ConventionError, DependencyError, OutputError
     from spark.files import write_atomically
-    from spark.settings import TrainConfig, read_settings, toml
+    from spark.training.settings import TrainConfig, read_settings, toml
     from spark_sim import console
 
     out = Path(args.output)
@@ -74,9 +74,9 @@ def run(args: Namespace) -> int:
     if path.exists() and not (args.resume or args.force):
         raise OutputError(f"{path}: exists; go on with --resume, or overwrite it with --force")
     try:
-        from spark.checkpoint import load_checkpoint
-        from spark.dataset import training_clips
-        from spark.train import fresh_checkpoint, train
+        from spark.training.checkpoint import load_checkpoint
+        from spark.training.dataset import training_clips
+        from spark.training.train import fresh_checkpoint, train
     except ImportError as error:
         raise DependencyError(
             f"training needs {error.name}: pip install 'spark-sim[train]'"

@@ -8,11 +8,11 @@ import numpy as np
 from spark.errors import SkeletonError, SparkSimError
 from spark.io.reading import motion_files, read_motion
 from spark.network.features import BodyFeatures, body_features
-from spark.pairs import Clip
 from spark.resample import positions_at, rotations_at
 from spark.rig.contacts import planted_feet
 from spark.rig.rig import understand
 from spark.skeleton import Skeleton
+from spark.training.pairs import Clip
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
 
 FRAME_TIME = 1 / 30

@@ -9,7 +9,7 @@ from safetensors.torch import save
 
 from spark.errors import FileFormatError
 from spark.files import write_atomically
-from spark.names import NameConfig, NameEncoder
+from spark.training.name_encoder import NameConfig, NameEncoder
 
 FORMAT = "spark-sim names"
 

@@ -9,10 +9,10 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from spark.bodies import Body, Pose, Start
 from spark.network.config import NO_ROTATION
 from spark.network.features import BodyFeatures
-from spark.pairs import Pairs, Windows
+from spark.training.pairs import Pairs, Windows
+from spark.training.tensors import Body, Pose, Start
 
 Names = Callable[[Sequence[str]], Float[Tensor, "S E"]]
 

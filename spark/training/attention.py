@@ -11,7 +11,7 @@ import torch.nn.functional as nnf
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
-from spark.precision import exactly
+from spark.training.precision import exactly
 
 Heads = Float[Tensor, "M H _ C"]  # of any number of tokens
 

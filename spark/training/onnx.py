@@ -1,7 +1,7 @@
 """A trained network as ONNX, for engines: one graph for motions of any length, on any two bodies.
 
 What it computes is `Spark.forward` of a network that corrects the analytic transfer; its inputs are
-the fields of `spark.bodies.Pose`, `Body` and `Start`, with a batch axis of 1.
+the fields of `spark.training.tensors.Pose`, `Body` and `Start`, with a batch axis of 1.
 """
 
 import logging
@@ -12,10 +12,10 @@ import torch
 from torch import Tensor, nn
 from torch.export import Dim
 
-from spark.bodies import Body, Pose, Start
-from spark.checkpoint import Checkpoint
 from spark.errors import ConventionError, DependencyError
 from spark.files import write_atomically
+from spark.training.checkpoint import Checkpoint
+from spark.training.tensors import Body, Pose, Start
 
 INPUTS = (
     *("rotations", "root"),

@@ -22,25 +22,25 @@ from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 from torch.utils.data import DataLoader, Dataset
 
-from spark import losses
-from spark.batch import Batch, Collator, Names
-from spark.bodies import forward_kinematics
-from spark.checkpoint import (
+from spark.network.config import Config
+from spark.network.known_bodies import distinct
+from spark.training import losses
+from spark.training.batch import Batch, Collator, Names
+from spark.training.checkpoint import (
     Checkpoint,
     optimizer_tensors,
     restore_optimizer,
     save_checkpoint,
 )
-from spark.model import Spark
-from spark.name_file import load_names
-from spark.names import NAME_CACHE, NameEncoder, T5Names
-from spark.network.config import Config
-from spark.network.known_bodies import distinct
-from spark.packed import AHEAD, Packed, Packer
-from spark.pairs import Clip, PairMaker
-from spark.precision import fast_products
-from spark.settings import TrainConfig
-from spark.train_names import train_names
+from spark.training.model import Spark
+from spark.training.name_encoder import NAME_CACHE, NameEncoder, T5Names
+from spark.training.name_file import load_names
+from spark.training.packed import AHEAD, Packed, Packer
+from spark.training.pairs import Clip, PairMaker
+from spark.training.precision import fast_products
+from spark.training.settings import TrainConfig
+from spark.training.tensors import forward_kinematics
+from spark.training.train_names import train_names
 
 BETAS = (0.9, 0.99)
 PAPER_WEIGHTS = {"rec": 1.0, "cyc": 20.0, "root": 7.0, "fk": 100.0}

@@ -16,7 +16,7 @@ _TURNED = np.array([1.0, -1.0, 1.0, -1.0])  # a rotation seen in a mirror
 
 def mirrored_body(body: BodyFeatures) -> BodyFeatures:
     """`body` seen in a mirror: every joint keeps its number, and takes role and name of the one on
-    the other side. `body` must be a variant (`spark.variants.same_body`)."""
+    the other side. `body` must be a variant (`spark.training.variants.same_body`)."""
     rig, skeleton = body.rig, body.skeleton
     roles = tuple(_other_side(role) for role in rig.roles.roles)
     names = list(skeleton.names)

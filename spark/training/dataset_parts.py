@@ -15,13 +15,13 @@ from zipfile import BadZipFile
 import numpy as np
 from jaxtyping import Bool, Float
 
-from spark.clips import clip_of
 from spark.errors import SparkSimError
 from spark.files import write_atomically
 from spark.io.reading import read_motion
 from spark.network.features import body_features
 from spark.rig.rig import Rig, understand
 from spark.rig.rig_json import rig_from_json, rig_to_json
+from spark.training.clips import clip_of
 from spark.transfer.canonical import to_canonical
 
 # Goes up whenever the same file gives another part.
@@ -30,7 +30,7 @@ VERSION = 2
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A file as a `spark.pairs.Clip` on its own rig, at 30 fps; its own frame rate, and the height
+    """A file as a `spark.training.pairs.Clip` on its own rig, at 30 fps; its own frame rate, and the height
     [m] of the floor that its feet stand on, which the path counts from."""
 
     rig: Rig

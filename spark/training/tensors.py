@@ -10,8 +10,8 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from spark.precision import exactly
 from spark.rotation import matrix_from_sixd
+from spark.training.precision import exactly
 
 
 class Body(NamedTuple):

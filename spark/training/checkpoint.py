@@ -14,11 +14,11 @@ from safetensors.torch import save
 from torch import Tensor
 
 from spark.files import write_atomically
-from spark.model import Spark
-from spark.names import NameConfig, NameEncoder
 from spark.network.config import Config
 from spark.network.known_bodies import Trunk
 from spark.network.weights import FORMAT, VERSION, Tensors, read_weights
+from spark.training.model import Spark
+from spark.training.name_encoder import NameConfig, NameEncoder
 
 
 @dataclass(frozen=True, eq=False)

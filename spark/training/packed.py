@@ -6,8 +6,8 @@ import torch
 from torch import Tensor
 from torch.utils.data import get_worker_info
 
-from spark.batch import Batch
-from spark.bodies import Body, Pose, Start
+from spark.training.batch import Batch
+from spark.training.tensors import Body, Pose, Start
 
 _ALIGNED = 64  # bytes
 AHEAD = 2  # batches that a worker may be ahead of the trainer

@@ -16,8 +16,8 @@ from spark.kinematics import world_positions
 from spark.network.features import BodyFeatures
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_mul, quat_relative, quat_rotate, quat_slerp
+from spark.training.variants import Variant
 from spark.transfer.leg_ik import Leg, leg_turns, stance_correction
-from spark.variants import Variant
 
 
 class LegBones(NamedTuple):

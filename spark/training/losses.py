@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from spark.bodies import Body, Pose
+from spark.training.tensors import Body, Pose
 
 Scalar = Float[Tensor, ""]
 

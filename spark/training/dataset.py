@@ -5,10 +5,10 @@
                    left out of the dataset and why
     numbers.npy    float32: of each clip its rotations (T, K, 4), then its hips' path (T, 3)
     planted.npy    bool (frames, 2): whether the left and the right foot stand
-    parts/         what each file gave (`spark.dataset_parts`): a run that stopped goes on, and one
+    parts/         what each file gave (`spark.training.dataset_parts`): a run that stopped goes on, and one
                    with more files reads only those
 
-A clip is what `spark.pairs.Clip` says: canonical, at 30 fps, on the network's view of its body.
+A clip is what `spark.training.pairs.Clip` says: canonical, at 30 fps, on the network's view of its body.
 """
 
 import json
@@ -25,8 +25,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
-from spark.clips import FRAME_TIME, read_clips
-from spark.dataset_parts import Part, make_part, read_part
 from spark.errors import (
     FileFormatError,
     OutputError,
@@ -37,12 +35,14 @@ from spark.errors import (
 from spark.files import write_atomically
 from spark.io.reading import motion_files
 from spark.network.features import BodyFeatures, body_features
-from spark.pairs import Clip
 from spark.rig.rig import Rig
 from spark.rig.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_conj, quat_mul
-from spark.splits import cells, seen_characters, seen_motions
-from spark.variants import split_joints
+from spark.training.clips import FRAME_TIME, read_clips
+from spark.training.dataset_parts import Part, make_part, read_part
+from spark.training.pairs import Clip
+from spark.training.splits import cells, seen_characters, seen_motions
+from spark.training.variants import split_joints
 
 FORMAT, VERSION = "spark-sim dataset", 2
 
@@ -97,7 +97,7 @@ def training_clips(
     paths: Sequence[Path], progress: Callable[[Iterable[Path]], Iterable[Path]] = iter
 ) -> tuple[list[Clip], tuple[str, ...]]:
     """The clips to train on in datasets and in trees of motion files, and notes on what was left
-    out. Raises what `read_dataset` and `spark.clips.read_clips` raise."""
+    out. Raises what `read_dataset` and `spark.training.clips.read_clips` raise."""
     clips = [clip for path in paths if is_dataset(path) for clip in read_dataset(path)]
     trees = [path for path in paths if not is_dataset(path)]
     if not trees:

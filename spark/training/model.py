@@ -18,8 +18,6 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
-from spark.attention import Attention, Feedforward, TemporalBlock, sinusoids
-from spark.bodies import Body, Pose, Start, forward_kinematics, take, world_matrices
 from spark.network.config import (
     N_GROUPS,
     N_TOKENS,
@@ -31,8 +29,10 @@ from spark.network.config import (
     TPOSE_FEATURES,
     Config,
 )
-from spark.precision import exactly
 from spark.rotation import matrix_from_sixd
+from spark.training.attention import Attention, Feedforward, TemporalBlock, sinusoids
+from spark.training.precision import exactly
+from spark.training.tensors import Body, Pose, Start, forward_kinematics, take, world_matrices
 
 
 class DecoderBlock(nn.Module):

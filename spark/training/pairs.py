@@ -15,7 +15,6 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from spark.errors import SkeletonError
-from spark.mirror import mirrored_body, mirrored_motion
 from spark.network.features import BodyFeatures
 from spark.rotation import (
     quat_angle,
@@ -25,9 +24,10 @@ from spark.rotation import (
     sixd_from_quat,
     yaw_from_quat,
 )
-from spark.staging import Stage, begins_of, foot_lift, joined, local_rows, mixed, place
+from spark.training.mirror import mirrored_body, mirrored_motion
+from spark.training.staging import Stage, begins_of, foot_lift, joined, local_rows, mixed, place
+from spark.training.variants import random_variant, same_body, split_body
 from spark.transfer.analytic import Correspondence, correspond
-from spark.variants import random_variant, same_body, split_body
 
 _PACE = 0.3  # of the logarithm of a motion's speed
 _POWER = 0.2  # of how much a body turns: how often it is drawn

@@ -1,0 +1,1 @@
+"""The SPARK network's training, with torch: data, model, losses, checkpoints."""
