@@ -14,9 +14,9 @@ from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 
-from spark.evaluate import Method, Positions, by, evaluate
-from spark.evaluation_cases import Case, made_cases
-from spark.evaluation_tables import markdown
+from spark.evaluation.cases import Case, made_cases
+from spark.evaluation.evaluate import Method, Positions, by, evaluate
+from spark.evaluation.tables import markdown
 from spark.network.retarget import Learned
 from spark.network.weights import read_weights
 from spark.training.dataset import Performance, read_performances

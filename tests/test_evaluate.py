@@ -18,17 +18,17 @@ import torch
 import spark_sim
 from spark.demo.sample import sample_rig
 from spark.errors import FileFormatError, SkeletonError, SparkSimError
-from spark.evaluate import (
+from spark.evaluation.cases import Case, made_cases, performances, recorded_cases
+from spark.evaluation.evaluate import (
     Cell,
     Row,
     by,
     evaluate,
     results_in,
 )
-from spark.evaluation_cases import Case, made_cases, performances, recorded_cases
-from spark.evaluation_tables import as_csv, as_json, markdown
+from spark.evaluation.metrics import Score
+from spark.evaluation.tables import as_csv, as_json, markdown
 from spark.io.bvh import read_bvh, write_bvh
-from spark.metrics import Score
 from spark.network.features import body_features
 from spark.network.known_bodies import distinct
 from spark.rig.contacts import planted_feet, speeds

@@ -10,8 +10,7 @@ from rigs import RIGS, build, walk
 from stick import stick_rig
 
 from spark.errors import SkeletonError
-from spark.io.fbx import read_fbx
-from spark.metrics import (
+from spark.evaluation.metrics import (
     Score,
     foot_speed,
     jerk,
@@ -22,6 +21,7 @@ from spark.metrics import (
     score,
     source_sensitivity,
 )
+from spark.io.fbx import read_fbx
 from spark.rig.rig import understand
 from spark.training.clips import at_frame_time
 from spark.transfer.analytic import transfer

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import SkeletonError
-from spark.metrics import san_height, score
+from spark.evaluation.metrics import san_height, score
 from spark.motion import Motion
 from spark.network.features import body_features
 from spark.rig.rig import Rig
@@ -20,7 +20,7 @@ _BONES = 0.01
 @dataclass(frozen=True, eq=False)
 class Accuracy:
     """`mse` and `relative_mse` (root-relative) in the metric of Skeleton-Aware Networks, `mpjpe`
-    [% of the height], all of `spark.metrics`; `errors` [% of the height] is the joints' mean
+    [% of the height], all of `spark.evaluation.metrics`; `errors` [% of the height] is the joints' mean
     distance from where they should be, frame by frame."""
 
     mse: float

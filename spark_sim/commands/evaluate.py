@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from spark_sim.commands.options import add_force
 
 if TYPE_CHECKING:
-    from spark.evaluate import Row
-    from spark.evaluation_cases import Case
+    from spark.evaluation.cases import Case
+    from spark.evaluation.evaluate import Row
     from spark.transfer.target_prior import Retargeting
 
 SUMMARY = "measure methods against a ground truth"
@@ -78,9 +78,9 @@ def configure(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     from spark.errors import ConventionError
-    from spark.evaluate import by, evaluate, results_in
-    from spark.evaluation_cases import made_cases, performances, recorded_cases
-    from spark.evaluation_tables import markdown
+    from spark.evaluation.cases import made_cases, performances, recorded_cases
+    from spark.evaluation.evaluate import by, evaluate, results_in
+    from spark.evaluation.tables import markdown
     from spark.files import write_atomically
     from spark.transfer.analytic import transfer
     from spark_sim import console, files
@@ -133,7 +133,7 @@ def run(args: Namespace) -> int:
 
 
 def _text(path: Path, rows: "Sequence[Row]", about: dict[str, Any]) -> str:
-    from spark.evaluation_tables import as_csv, as_json, markdown
+    from spark.evaluation.tables import as_csv, as_json, markdown
 
     if path.suffix.lower() == ".json":
         return as_json(rows, about)

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, fields
 from typing import Any
 
-from spark.evaluate import Row
-from spark.evaluation_cases import STRUCTURES, Structure
-from spark.metrics import Score
+from spark.evaluation.cases import STRUCTURES, Structure
+from spark.evaluation.evaluate import Row
+from spark.evaluation.metrics import Score
 
 FORMAT, VERSION = "spark-sim evaluation", 1
 

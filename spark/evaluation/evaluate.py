@@ -14,9 +14,9 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import FileFormatError, SkeletonError, name_list
-from spark.evaluation_cases import SPARE_FRAMES, STRUCTURES, Case, Structure
+from spark.evaluation.cases import SPARE_FRAMES, STRUCTURES, Case, Structure
+from spark.evaluation.metrics import Score, mean_score, score_positions, source_sensitivity
 from spark.io.reading import SUFFIXES, read_motion
-from spark.metrics import Score, mean_score, score_positions, source_sensitivity
 from spark.rig.rig import understand
 from spark.training.clips import FRAME_TIME, at_frame_time
 from spark.transfer.canonical import canonical_positions, to_canonical

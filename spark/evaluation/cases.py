@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 
 from spark.errors import SkeletonError
-from spark.metrics import san_height
+from spark.evaluation.metrics import san_height
 from spark.network.features import BodyFeatures
 from spark.rig.roles import Role
 from spark.training.dataset import Performance, is_dataset, prepare, read_performances

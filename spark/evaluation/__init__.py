@@ -1,0 +1,1 @@
+"""Methods against ground truths: metrics, cases, tables."""
