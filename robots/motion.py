@@ -10,7 +10,7 @@ from jaxtyping import Float
 from robots.mjcf import read_mjcf
 from robots.morphology import Morphology, Sole
 from robots.tree import Coordinates
-from sim.given import GivenBody, GivenSole
+from sim.trajectory import GivenBody, GivenSole
 from spark.motion import Motion
 from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_rotate

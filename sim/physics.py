@@ -12,9 +12,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sim.given import GivenBody
 from sim.interpolate import at_times, velocities
 from sim.servos import with_servos
+from sim.trajectory import GivenBody
 from spark.errors import SkeletonError
 
 FALL_DROP = 0.2  # of the standing height: how much lower than its target the root is

@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.display import add_display
-from sim.given import GivenBody, given
 from sim.interpolate import at_times
+from sim.trajectory import GivenBody, given
 from spark.errors import SkeletonError
 from spark.kinematics import forward
 from spark.motion import Motion

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from sim.given import GivenBody
+from sim.trajectory import GivenBody
 from spark.errors import SkeletonError
 
 SOFTNESS = 0.1  # [rad] from the target at which a servo of ours gives all that its motor can

@@ -16,7 +16,7 @@ from robots.solve import copy, retarget
 from robots.stream import Stream
 from robots.stream_targets import LATENCY, Frame, ground_of
 from robots.understand import parts_of, understand_robot
-from sim.given import GivenBody
+from sim.trajectory import GivenBody
 from spark.errors import ConventionError
 from spark.motion import Motion
 from spark.rig.rig import Rig

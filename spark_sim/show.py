@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sim.given import given
 from sim.physics import Assist, Tracked, track
 from sim.physics_report import LIMITS, summary, text
 from sim.scene import Figure
+from sim.trajectory import given
 from spark.kinematics import forward
 from spark.rig.contacts import floor_height
 from spark.rig.feet import standing_height

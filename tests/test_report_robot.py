@@ -20,13 +20,13 @@ from robots.morphology import Morphology
 from robots.motion import RobotMotion
 from robots.solve import retarget
 from robots.understand import understand_robot
-from sim.given import GivenBody
 from sim.report import Report, judge
 from sim.report.lowest import lowest_points
 from sim.report.mass import model_mass
 from sim.report.poses import follow
 from sim.report.track import track
 from sim.report.wrench import required_wrench
+from sim.trajectory import GivenBody
 from spark.errors import FileFormatError, SkeletonError, SparkSimError
 from spark.io.recording import read_recording
 from spark.rig.rig import understand

@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from sim.given import GivenBody
 from sim.report.derivatives import derivative
 from sim.report.limits import LimitExcess
 from sim.report.smoothness import turning
+from sim.trajectory import GivenBody
 from spark.rotation import quat_normalize, rotvec_from_quat
 
 _HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)

@@ -6,7 +6,6 @@ from typing import TypeAlias
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sim.given import GivenBody
 from sim.report.findings import find
 from sim.report.measured import Measured, measure
 from sim.report.measures import (
@@ -22,6 +21,7 @@ from sim.report.result import Report
 from sim.report.thresholds import PLAUSIBILITY_V1
 from sim.report.track import Track, track
 from sim.report.truth import accuracy
+from sim.trajectory import GivenBody
 from spark.errors import SkeletonError
 from spark.motion import Motion
 from spark.rig.contacts import planted_feet

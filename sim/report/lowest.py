@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from sim.given import GivenBody
 from sim.report.poses import Poses, part_name
+from sim.trajectory import GivenBody
 from spark.rotation import quat_conj, quat_rotate
 
 _PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.anthropometry import segments
-from sim.given import GivenBody
 from sim.report.poses import Poses
+from sim.trajectory import GivenBody
 from spark.rig.rig import Rig
 from spark.rotation import quat_mul, quat_rotate
 

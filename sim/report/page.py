@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
-from sim.given import GivenBody
 from sim.page import Marks, page
 from sim.render import frames
 from sim.report.judge import Source
@@ -19,6 +18,7 @@ from sim.report.result import Finding, Report
 from sim.report.text import figures, of_which, shares
 from sim.report.track import track
 from sim.scene import Figure, build_scene
+from sim.trajectory import GivenBody
 from spark.errors import DependencyError, OutputError
 from spark.motion import Motion
 from spark.rig.rig import Rig

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
-from sim.given import GivenBody
+from sim.trajectory import GivenBody
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.anthropometry import RADII
-from sim.given import GivenBody, GivenSole
 from sim.report.lowest import lowest_points
 from sim.report.mass import Mass, human_mass, model_mass
 from sim.report.poses import Poses, follow
+from sim.trajectory import GivenBody, GivenSole
 from spark.errors import SkeletonError
 from spark.kinematics import forward
 from spark.motion import Motion
