@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
-from sim.body import build_body
-from sim.pose import qpos_from_motion
+from sim.body.build import build_body
+from sim.body.qpos import qpos_from_motion
 from spark.motion import Motion
 from spark.rig.rig import Rig
 
@@ -40,7 +40,7 @@ class GivenBody:
 
 
 def given(rig: Rig, motion: Motion) -> GivenBody:
-    """The motion on the body that `sim.body.build_body` makes of its rig."""
+    """The motion on the body that `sim.body.build.build_body` makes of its rig."""
     spec = build_body(rig)
     model = spec.compile()
     root = int(model.body(rig.skeleton.names[rig.carrier]).id)

@@ -21,7 +21,7 @@ from spark.transfer.foot_lock import refine as hold_feet
 from spark_sim import files, rolemap
 
 if TYPE_CHECKING:
-    from sim.joints import JointType
+    from sim.body.joints import JointType
     from sim.report import Report
     from spark.network.retarget import Learned
     from spark_sim.robot import RobotClip
@@ -103,12 +103,12 @@ class Clip:
     ) -> tuple[tuple[Path, Path], tuple[str, ...]]:
         """Write a MuJoCo model of the body, and `NAME_scene.xml` beside it, with a floor and light.
 
-        `joints` and `mesh` are those of `sim.body.build_body`; hulls of a mesh go into a folder
+        `joints` and `mesh` are those of `sim.body.build.build_body`; hulls of a mesh go into a folder
         `NAME_meshes`. Gives both paths, and notes on what was assumed. Raises `OutputError` where
         one of the files exists, unless forced.
         """
-        from sim.body import build_body
-        from sim.mjcf import notes_of, paths_of, write_mjcf
+        from sim.body.build import build_body
+        from sim.body.mjcf import notes_of, paths_of, write_mjcf
 
         spec = build_body(self.rig, joints=joints, mesh=mesh)
         body, *beside = paths_of(spec, path)

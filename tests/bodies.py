@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 from humanoids import ONE_A_RIG
 
-from sim.body import build_body
-from sim.joints import JointType
-from sim.mjcf import write_mjcf
+from sim.body.build import build_body
+from sim.body.joints import JointType
+from sim.body.mjcf import write_mjcf
 from spark.io.reading import read_motion
 from spark.rig.rig import Rig, understand
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from stick import joint, standing, stick_rig
 
-from sim.anthropometry import Segments, segments
+from sim.body.anthropometry import Segments, segments
 from spark.errors import SkeletonError
 from spark.kinematics import forward
 from spark.rig.feet import standing_height

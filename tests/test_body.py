@@ -11,9 +11,9 @@ from conftest import recording, recordings
 from humanoids import ONE_A_RIG
 from stick import stick_rig
 
-from sim.body import build_body
-from sim.mjcf import notes_of, to_xml, write_mjcf
-from sim.pose import qpos_from_motion
+from sim.body.build import build_body
+from sim.body.mjcf import notes_of, to_xml, write_mjcf
+from sim.body.qpos import qpos_from_motion
 from spark.demo.sample import BUILDS, sample_motion, sample_rig
 from spark.errors import OutputError, SkeletonError
 from spark.io.reading import read_motion

@@ -12,10 +12,10 @@ from bodies import at_key, joint_errors_deg, run
 from glb import HALF_WIDTH, box_of, write_glb
 from stick import joint, stick_rig
 
-from sim.body import build_body
-from sim.gltf import read_skinned_mesh
-from sim.mesh import hulls_of
-from sim.mjcf import notes_of, paths_of, write_mjcf
+from sim.body.build import build_body
+from sim.body.gltf import read_skinned_mesh
+from sim.body.mesh import hulls_of
+from sim.body.mjcf import notes_of, paths_of, write_mjcf
 from spark.errors import DependencyError, FileFormatError, SkeletonError
 from spark.rig.rig import Rig
 from spark.rig.roles import Role, RoleMap

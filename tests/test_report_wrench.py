@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from stick import standing, stick_rig
 
-from sim.body import build_body
-from sim.pose import qpos_from_motion
+from sim.body.build import build_body
+from sim.body.qpos import qpos_from_motion
 from sim.report.mass import Mass
 from sim.report.support import Support
 from sim.report.thresholds import PLAUSIBILITY_V1

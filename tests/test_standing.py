@@ -12,10 +12,10 @@ from bodies import STANDING, at_key, joint_errors_deg, rig_of, run, scene_of
 from conftest import recordings
 from stick import joint, stick_rig
 
-from sim.actuators import ctrl_of_qpos
-from sim.inertia import inertias
-from sim.pose import qpos_of_pose
-from sim.stance import lean
+from sim.body.actuators import ctrl_of_qpos
+from sim.body.inertia import inertias
+from sim.body.keyframes import lean
+from sim.body.qpos import qpos_of_pose
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_about, quat_angle, quat_mul

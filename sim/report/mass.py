@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from sim.anthropometry import segments
+from sim.body.anthropometry import segments
 from sim.report.poses import Poses
 from sim.trajectory import GivenBody
 from spark.rig.rig import Rig
@@ -36,7 +36,7 @@ class Mass:
 def human_mass(
     rig: Rig, positions: Float[np.ndarray, "T J 3"], world: Float[np.ndarray, "T J 4"]
 ) -> Mass:
-    """A human's mass on the rig's bones (`sim.anthropometry`)."""
+    """A human's mass on the rig's bones (`sim.body.anthropometry`)."""
     body = segments(rig)
     turns = world[:, body.joints]
     coms = positions[:, body.joints] + quat_rotate(turns, body.coms)

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
-from sim.anthropometry import RADII
+from sim.body.anthropometry import RADII
 from sim.report.track import Track
 from spark.rig.feet import standing_height
 from spark.rig.roles import Role

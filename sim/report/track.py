@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from sim.anthropometry import RADII
+from sim.body.anthropometry import RADII
 from sim.report.lowest import lowest_points
 from sim.report.mass import Mass, human_mass, model_mass
 from sim.report.poses import Poses, follow

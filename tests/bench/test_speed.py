@@ -11,8 +11,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim.body import build_body
-from sim.pose import qpos_from_motion
+from sim.body.build import build_body
+from sim.body.qpos import qpos_from_motion
 from sim.report import judge
 from spark.demo.sample import BUILDS, Build, make_skeleton, sample_motion, sample_rig
 from spark.io.bvh import read_bvh, write_bvh

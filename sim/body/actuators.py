@@ -10,9 +10,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from sim.inertia import Inertias, held_torques
-from sim.joints import Axis, mirrored
-from sim.parts import DETAIL, joint_kind_of, kept_joints, side_of
+from sim.body.inertia import Inertias, held_torques
+from sim.body.joints import Axis, mirrored
+from sim.body.parts import DETAIL, joint_kind_of, kept_joints, side_of
 from spark.kinematics import world_positions
 from spark.rig.feet import FOOT_LENGTH, sole_corners, sole_positions, standing_height
 from spark.rig.rig import Rig

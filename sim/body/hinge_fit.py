@@ -11,9 +11,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from sim.hinges import hinge_path, limit_speed
-from sim.joints import mirrored
-from sim.parts import hinges_of, joint_kind_of, kept_joints, side_of
+from sim.body.hinges import hinge_path, limit_speed
+from sim.body.joints import mirrored
+from sim.body.parts import hinges_of, joint_kind_of, kept_joints, side_of
 from spark.kinematics import world_positions
 from spark.rig.rig import Rig
 from spark.rotation import (

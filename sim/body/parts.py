@@ -1,6 +1,6 @@
 """Which joints of a rig move its body, and what each of them is called on it."""
 
-from sim.joints import HINGES, JOINTS, Hinge
+from sim.body.joints import HINGES, JOINTS, Hinge
 from spark.rig.rig import Rig
 
 LINK = "link"

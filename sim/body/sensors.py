@@ -3,8 +3,8 @@
 import mujoco
 import numpy as np
 
-from sim.inertia import Inertias
-from sim.parts import DETAIL
+from sim.body.inertia import Inertias
+from sim.body.parts import DETAIL
 from spark.kinematics import world_positions
 from spark.rig.feet import sole_corners, sole_positions
 from spark.rig.rig import Rig

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from sim.gltf import SkinnedMesh, read_skinned_mesh
-from sim.parts import kept_joints
+from sim.body.gltf import SkinnedMesh, read_skinned_mesh
+from sim.body.parts import kept_joints
 from spark.errors import DependencyError, SkeletonError, name_list
 from spark.kinematics import world_positions
 from spark.motion import Motion

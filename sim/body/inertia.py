@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from sim.anthropometry import segments
+from sim.body.anthropometry import segments
 from spark.kinematics import world_positions
 from spark.rig.rig import Rig
 from spark.rotation import matrix_from_quat

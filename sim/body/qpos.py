@@ -4,9 +4,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from sim.parts import kept_joints
-from sim.project import project
-from sim.stance import standing_position
+from sim.body.hinge_fit import project
+from sim.body.keyframes import standing_position
+from sim.body.parts import kept_joints
 from spark.kinematics import forward, local_rotations, world_positions
 from spark.motion import Motion
 from spark.rig.rig import Rig
@@ -14,10 +14,10 @@ from spark.rotation import quat_conj, quat_mul
 
 
 def qpos_from_motion(model: mujoco.MjModel, motion: Motion, rig: Rig) -> Float[np.ndarray, "T nq"]:
-    """Coordinates of every frame on the body that `sim.body.build_body` made of `rig`.
+    """Coordinates of every frame on the body that `sim.body.build.build_body` made of `rig`.
 
     Bones that the file stretches keep the skeleton's length. Angles of hinges are continuous and
-    within their ranges; `sim.project.project` also says what they lost.
+    within their ranges; `sim.body.hinge_fit.project` also says what they lost.
     """
     return _assemble(model, rig, *forward(motion), motion.frame_time)
 

@@ -9,9 +9,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from sim.anthropometry import RADII
-from sim.mesh import Hull
-from sim.parts import DETAIL, kind_of, side_of
+from sim.body.anthropometry import RADII
+from sim.body.mesh import Hull
+from sim.body.parts import DETAIL, kind_of, side_of
 from spark.kinematics import end_positions, world_positions
 from spark.rig.feet import sole_corners, sole_positions, standing_height
 from spark.rig.rig import Rig

@@ -13,15 +13,15 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from sim.actuators import add_servos, ctrl_of_qpos, set_strength, strengths
-from sim.inertia import Inertias, inertias
-from sim.joints import CONES, HINGES, JointType, Range, mirrored
-from sim.mesh import hulls_of
-from sim.parts import DETAIL, LINK, hinges_of, joint_kind_of, kept_joints, kind_of, side_of
-from sim.pose import qpos_of_pose
-from sim.sensors import add_sensors, add_sites
-from sim.shapes import add_materials, add_shapes
-from sim.stance import arms_down, balanced, lean, standing_position
+from sim.body.actuators import add_servos, ctrl_of_qpos, set_strength, strengths
+from sim.body.inertia import Inertias, inertias
+from sim.body.joints import CONES, HINGES, JointType, Range, mirrored
+from sim.body.keyframes import arms_down, balanced, lean, standing_position
+from sim.body.mesh import hulls_of
+from sim.body.parts import DETAIL, LINK, hinges_of, joint_kind_of, kept_joints, kind_of, side_of
+from sim.body.qpos import qpos_of_pose
+from sim.body.sensors import add_sensors, add_sites
+from sim.body.shapes import add_materials, add_shapes
 from spark.errors import SkeletonError
 from spark.kinematics import world_positions
 from spark.rig.feet import standing_height
@@ -42,7 +42,7 @@ def build_body(
     """The model of a rig, T-posed at the origin with its soles at z = 0.
 
     `mass` [kg] is that of the whole body; where it is not given it follows from the height.
-    `joints` are balls, or "hinge": one at elbow and knee, three elsewhere (`sim.joints.HINGES`).
+    `joints` are balls, or "hinge": one at elbow and knee, three elsewhere (`sim.body.joints.HINGES`).
     `mesh` is a glTF file of a skin on the same skeleton: its hulls replace the capsules.
     Its keyframes, `tpose` and `home` (arms lowered), have the controls that hold them.
     """

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from sim.inertia import Inertias
+from sim.body.inertia import Inertias
 from spark.kinematics import world_positions
 from spark.rig.feet import sole_corners, sole_positions
 from spark.rig.rig import Rig

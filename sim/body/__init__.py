@@ -1,0 +1,1 @@
+"""MuJoCo bodies for rigs: masses, joints, shapes, servos, keyframes, MJCF."""
