@@ -301,7 +301,7 @@ def play(
     `progress` wraps the frames of the video. Raises `DependencyError` where there is no display, or
     nothing to draw or encode with, and `OutputError` where a file exists, unless forced.
     """
-    from sim.scene import build_scene
+    from sim.view.scene import build_scene
     from spark_sim.show import figures_of
 
     for path, endings in ((video, (".mp4",)), (html, _PAGE), (strip, (".png",))):
@@ -311,19 +311,19 @@ def play(
     figures = [figure for clip in shown for figure in figures_of(clip)]
     scene = build_scene(figures)
     if video is not None:
-        from sim.video import write_video
+        from sim.view.video import write_video
 
         write_video(scene, video, progress=progress)
     if html is not None:
-        from sim.page import write_page
+        from sim.view.page import write_page
 
         write_page(figures, html, title=" · ".join(c.name for c in shown))
     if strip is not None:
-        from sim.video import write_strip
+        from sim.view.video import write_strip
 
         write_strip(scene, strip)
     if video is html is strip is None:
-        from sim.window import open_window
+        from sim.view.window import open_window
 
         open_window(scene)
 

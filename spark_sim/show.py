@@ -6,8 +6,8 @@ from typing import Any
 
 from sim.physics import Assist, Tracked, track
 from sim.physics_report import LIMITS, summary, text
-from sim.scene import Figure
 from sim.trajectory import given
+from sim.view.scene import Figure
 from spark.kinematics import forward
 from spark.rig.contacts import floor_height
 from spark.rig.feet import standing_height

@@ -35,7 +35,7 @@ def tracked(*paths: str) -> set[str]:
 def test_wheel_holds_every_file_of_the_packages(wheel: Path) -> None:
     held = set(zipfile.ZipFile(wheel).namelist())
     needed = tracked(*PACKAGES)
-    assert {"sim/page.html", "robots/ember/ember.xml", "spark/py.typed"} <= needed
+    assert {"sim/view/page.html", "robots/ember/ember.xml", "spark/py.typed"} <= needed
     assert needed <= held
 
 

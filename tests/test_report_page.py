@@ -16,11 +16,11 @@ from stick import standing, stick_rig
 from robots import registry
 from robots.motion import RobotMotion
 from robots.understand import understand_robot
-from sim.page import Marks, page
 from sim.report import Report, judge
 from sim.report.page import report_page, write_report_page
 from sim.report.plots import Plot, svg
-from sim.scene import Figure
+from sim.view.page import Marks, page
+from sim.view.scene import Figure
 from spark.errors import OutputError
 from spark.motion import Motion
 from spark.rig.rig import Rig

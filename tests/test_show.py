@@ -16,12 +16,12 @@ import pytest
 
 import spark_sim
 from sim.interpolate import at_times
-from sim.page import page, write_page
-from sim.render import frames
-from sim.scene import Figure, Scene, build_scene
-from sim.simplify import area, simplify_together
 from sim.trajectory import GivenBody
-from sim.video import write_strip, write_video
+from sim.view.page import page, write_page
+from sim.view.render import frames
+from sim.view.scene import Figure, Scene, build_scene
+from sim.view.simplify import area, simplify_together
+from sim.view.video import write_strip, write_video
 from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import DependencyError, OutputError
 from spark.motion import Motion

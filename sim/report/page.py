@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
-from sim.page import Marks, page
-from sim.render import frames
 from sim.report.judge import Source
 from sim.report.measured import FLAGS, Measured
 from sim.report.plots import flag_strips, plots, svg
 from sim.report.result import Finding, Report
 from sim.report.text import figures, of_which, shares
 from sim.report.track import track
-from sim.scene import Figure, build_scene
 from sim.trajectory import GivenBody
+from sim.view.page import Marks, page
+from sim.view.render import frames
+from sim.view.scene import Figure, build_scene
 from spark.errors import DependencyError, OutputError
 from spark.motion import Motion
 from spark.rig.rig import Rig

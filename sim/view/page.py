@@ -16,8 +16,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from sim.camera import distance
-from sim.scene import Figure, Placed, Scene, build_scene
+from sim.view.camera import distance
+from sim.view.scene import Figure, Placed, Scene, build_scene
 from spark.errors import OutputError
 
 _HALF_VIEW = 0.26  # tan of half the page's angle, less what its bar and labels take
@@ -78,7 +78,7 @@ def page(
         ],
         "meshes": list(meshes.values()),
     }
-    template = (files("sim") / "page.html").read_text(encoding="utf-8")
+    template = (files("sim.view") / "page.html").read_text(encoding="utf-8")
     packed = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
     return template.replace("__TITLE__", html.escape(title)).replace("__DATA__", packed)
 

@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
-from sim.simplify import Mesh, simplify_together
 from sim.trajectory import GivenBody
+from sim.view.simplify import Mesh, simplify_together
 
 FACES = 40_000  # of one figure's meshes
 GHOST_RGBA = (0.35, 0.42, 0.55, 0.3)

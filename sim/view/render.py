@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 from jaxtyping import UInt8
 
-from sim.camera import AZIMUTH, ELEVATION, FIELD_OF_VIEW, distance
-from sim.scene import Scene
+from sim.view.camera import AZIMUTH, ELEVATION, FIELD_OF_VIEW, distance
+from sim.view.scene import Scene
 from spark.errors import DependencyError
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from sim.display import add_display
 from sim.interpolate import at_times
 from sim.trajectory import GivenBody, given
+from sim.view.display import add_display
 from spark.errors import SkeletonError
 from spark.kinematics import forward
 from spark.motion import Motion

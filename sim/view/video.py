@@ -7,9 +7,9 @@ from shutil import which
 
 import numpy as np
 
-from sim.camera import fitting_aspect
-from sim.render import frames
-from sim.scene import Scene
+from sim.view.camera import fitting_aspect
+from sim.view.render import frames
+from sim.view.scene import Scene
 from spark.errors import DependencyError, OutputError
 
 Progress = Callable[[Iterable[int]], Iterable[int]]

@@ -3,8 +3,8 @@
 import time
 
 from sim import has_display
-from sim.camera import AZIMUTH, ELEVATION, distance
-from sim.scene import Scene
+from sim.view.camera import AZIMUTH, ELEVATION, distance
+from sim.view.scene import Scene
 from spark.errors import DependencyError
 
 _HALF_VIEW = 0.4  # tan of half of the viewer's 45 degrees, and a margin

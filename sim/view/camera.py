@@ -6,7 +6,7 @@ From there who lags behind the others, as small bodies do, moves away from them 
 import numpy as np
 from jaxtyping import Float
 
-from sim.scene import Scene
+from sim.view.scene import Scene
 
 AZIMUTH, ELEVATION = 210.0, -10.0  # [deg], MuJoCo's: of the direction in which the camera looks
 FIELD_OF_VIEW = 35.0  # [deg] up and down

@@ -1,0 +1,1 @@
+"""What motions look like: scenes, pictures, videos, pages, the window."""
