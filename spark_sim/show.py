@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sim.physics import Assist, Tracked, track
-from sim.physics_report import LIMITS, summary, text
+from sim.physics.summary import LIMITS, summary, text
+from sim.physics.tracking import Assist, Tracked, track
 from sim.trajectory import given
 from sim.view.scene import Figure
 from spark.kinematics import forward

@@ -11,8 +11,8 @@ from stick import standing, stick_rig
 from robots.mjcf import read_mjcf
 from robots.registry import find
 from robots.understand import understand_robot
-from sim.physics import Assist, Tracked, track
-from sim.physics_report import summary, text
+from sim.physics.summary import summary, text
+from sim.physics.tracking import Assist, Tracked, track
 from sim.trajectory import GivenBody, given
 from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import SkeletonError

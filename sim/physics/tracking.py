@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from sim.interpolate import at_times, velocities
-from sim.servos import with_servos
+from sim.physics.servos import with_servos
 from sim.trajectory import GivenBody
 from spark.errors import SkeletonError
 

@@ -1,0 +1,1 @@
+"""Motions tracked in simulation."""
