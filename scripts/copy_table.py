@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import spark_sim
-from sim.report.measured import FLAGS, Measured
+from sim.report.clip_metrics import FLAGS, Measured
 
 
 def row(name: str, clips: list[Measured]) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from sim.report.measured import FLAGS
+from sim.report.clip_metrics import FLAGS
 from sim.report.result import Report
 
 _BEST, _LABEL = 32, 34  # green; the first column's width

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sim.report.measured import Measured
+from sim.report.clip_metrics import Measured
 from sim.report.measures import Drift, spans
 from sim.report.result import Finding
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
-from sim.report.judge import Source
-from sim.report.measured import FLAGS, Measured
+from sim.report.assess import Source
+from sim.report.clip_metrics import FLAGS, Measured
 from sim.report.plots import flag_strips, plots, svg
 from sim.report.result import Finding, Report
 from sim.report.text import figures, of_which, shares

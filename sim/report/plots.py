@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sim.report.measured import FLAGS, Measured
+from sim.report.clip_metrics import FLAGS, Measured
 from sim.report.measures import spans
 from sim.report.result import Report
 

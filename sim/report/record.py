@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.report.measured import FLAGS, Measured
+from sim.report.clip_metrics import FLAGS, Measured
 from sim.report.measures import Drift, spans
 from sim.report.result import Finding, Report
 from sim.report.truth import Accuracy

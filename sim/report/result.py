@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from sim.report.measured import Measured
+from sim.report.clip_metrics import Measured
 from sim.report.measures import ContactMatch, Drift
 from sim.report.truth import Accuracy
 

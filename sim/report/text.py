@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sim.report.measured import FLAGS, Measured
+from sim.report.clip_metrics import FLAGS, Measured
 from sim.report.result import Finding, Report
 
 _RED, _YELLOW, _GREEN, _DIM, _BOLD = 31, 33, 32, 2, 1

@@ -6,8 +6,8 @@ from typing import TypeAlias
 import numpy as np
 from jaxtyping import Bool, Float
 
+from sim.report.clip_metrics import Measured, measure
 from sim.report.findings import find
-from sim.report.measured import Measured, measure
 from sim.report.measures import (
     ContactMatch,
     Drift,
