@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from robots.hulls import Pair, Shape, meet, shapes_of
-from robots.mjcf import Mjcf
+from robots.model.mjcf import Mjcf
+from robots.model.shapes import DIRECTIONS
 from robots.normal import Normal
-from robots.shapes import DIRECTIONS
 from robots.stage import Stage
 from robots.terms import one_sided
 from robots.tree import Coordinates, Frames, Tree, forward

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from robots.footing import Footing
-from robots.morphology import Morphology
+from robots.model.morphology import Morphology
 from robots.normal import Normal, Ties
 from robots.objective import linearize
 from robots.stage import Stage

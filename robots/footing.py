@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from robots.morphology import Morphology, Sole
+from robots.model.morphology import Morphology, Sole
 from robots.targets import Targets
 from robots.tree import Coordinates, Frames, forward
 from spark.kinematics import world_positions

@@ -11,8 +11,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from robots.mjcf import Mjcf
-from robots.shapes import DIRECTIONS, surface_of
+from robots.model.mjcf import Mjcf
+from robots.model.shapes import DIRECTIONS, surface_of
 
 _MOST_SPHERES = 6  # along a shape
 _ALL_SPHERES = 24

@@ -14,7 +14,7 @@ from scipy.ndimage import binary_dilation, maximum_filter1d
 
 from robots.descent import SHORT_OF_LIMIT, Mending, eased, solve_stage, stride_of
 from robots.footing import Footing, corners_of
-from robots.morphology import Morphology
+from robots.model.morphology import Morphology
 from robots.stage import Stage
 from robots.targets import Targets
 from robots.ties import jolted, rush

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from robots.collision import Near
 from robots.footing import Footing
-from robots.morphology import Morphology
+from robots.model.morphology import Morphology
 from robots.normal import Normal
 from robots.stage import Stage
 from robots.targets import Targets

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from robots.morphology import Morphology
+from robots.model.morphology import Morphology
 from robots.tree import Coordinates, Frames, Tree, forward
 from spark.rotation import (
     quat_from_rotvec,

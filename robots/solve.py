@@ -9,8 +9,8 @@ which the feet tie together, then arms and head, which hang on the trunk and don
 from robots.descent import solve_stage, stride_of
 from robots.footing import Footing, plan_footing, within_reach
 from robots.mend import mend
-from robots.morphology import Morphology
-from robots.motion import RobotMotion
+from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
 from robots.project import project
 from robots.stage import Stage
 from robots.targets import Targets, targets_of

@@ -9,7 +9,7 @@ has been seen since a better one.
 import numpy as np
 from jaxtyping import Float
 
-from robots.morphology import Morphology
+from robots.model.morphology import Morphology
 from robots.project import project
 from robots.stream_detour import Detours
 from robots.stream_footing import Feet

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from robots.morphology import Morphology
+from robots.model.morphology import Morphology
 from robots.targets import (
     BONES,
     OUT,

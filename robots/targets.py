@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.ndimage import uniform_filter1d
 
-from robots.morphology import Morphology, Sole
-from robots.shapes import surface
+from robots.model.morphology import Morphology, Sole
+from robots.model.shapes import surface
 from robots.tree import forward
 from spark.rig.contacts import planted_points
 from spark.rig.feet import Side, sole_corners, sole_positions, standing_height

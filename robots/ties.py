@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import uniform_filter1d
 
-from robots.morphology import Morphology
+from robots.model.morphology import Morphology
 from robots.normal import Ties, second_differences
 from robots.objective import ANKLE, CALM, FAST, JOLT, PATH, RUSH, SMOOTH
 from robots.tree import Coordinates

@@ -7,7 +7,7 @@ from scipy.linalg.lapack import dposv
 
 from robots import objective
 from robots.descent import SHORT_OF_LIMIT
-from robots.morphology import Morphology
+from robots.model.morphology import Morphology
 from robots.objective import FAST, RUSH
 from robots.stream_targets import FrameTargets
 from robots.ties import smoothness

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from robots import objective
-from robots.morphology import Morphology
+from robots.model.morphology import Morphology
 from robots.objective import TURN, TURNS
 from robots.solve import stages_of
 from robots.stream_targets import FrameTargets

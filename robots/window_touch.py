@@ -7,9 +7,9 @@ from jaxtyping import Float, Int
 
 from robots.collision import EASE
 from robots.hulls import Pair
-from robots.morphology import Morphology
+from robots.model.morphology import Morphology
+from robots.model.shapes import DIRECTIONS
 from robots.objective import TOUCH, TOUCH_LEGS
-from robots.shapes import DIRECTIONS
 from robots.terms import one_sided
 
 _ACTIVE = 3 * EASE  # [m] beyond which a shape is not felt

@@ -15,9 +15,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from robots.known import known
-from robots.morphology import Morphology
-from robots.motion import RobotMotion
+from robots.model.known import known
+from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
 from robots.solve import copy, retarget
 from robots.stream import Stream
 from robots.stream_targets import LATENCY, Frame, ground_of

@@ -8,7 +8,7 @@ import resource
 
 import numpy as np
 
-from robots.known import known
+from robots.model.known import known
 from robots.solve import retarget
 from spark.demo.sample import sample_motion, sample_rig
 from spark.motion import Motion

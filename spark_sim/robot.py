@@ -9,13 +9,13 @@ from jaxtyping import Float
 
 from robots import registry
 from robots.formats import dispatch, format_of
-from robots.known import known
-from robots.mjcf import read_mjcf
-from robots.motion import RobotMotion
+from robots.model.known import known
+from robots.model.mjcf import read_mjcf
+from robots.model.motion import RobotMotion
+from robots.model.understand import parts_of, understand_robot
 from robots.solve import copy, retarget
 from robots.stream import Stream
 from robots.stream_targets import LATENCY, Frame, ground_of
-from robots.understand import parts_of, understand_robot
 from sim.trajectory import GivenBody
 from spark.errors import ConventionError
 from spark.motion import Motion

@@ -38,7 +38,7 @@ def test_imports_run_one_way() -> None:
     ("layer", "source", "found"),
     [
         ("spark", "def f():\n    from sim.body.build import build_body", {"sim"}),
-        ("sim", "import numpy, robots.mjcf as m", {"robots"}),
+        ("sim", "import numpy, robots.model.mjcf as m", {"robots"}),
         ("robots", "if 1:\n    import spark_sim", {"spark_sim"}),
         ("spark_sim", "import spark, sim, robots, scripts.train", {"scripts"}),
         ("sim", "from spark.errors import SparkSimError\nimport simulation", set()),

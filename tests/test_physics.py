@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from stick import standing, stick_rig
 
-from robots.mjcf import read_mjcf
+from robots.model.mjcf import read_mjcf
+from robots.model.understand import understand_robot
 from robots.registry import find
-from robots.understand import understand_robot
 from sim.physics.summary import summary, text
 from sim.physics.tracking import Assist, Tracked, track
 from sim.trajectory import GivenBody, given

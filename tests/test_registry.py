@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from robots import registry
-from robots.known import known
-from robots.mjcf import read_mjcf
-from robots.morphology import Morphology
+from robots.model.known import known
+from robots.model.mjcf import read_mjcf
+from robots.model.morphology import Morphology
 from robots.registry import ENTRIES, Entry
 from spark.errors import ConventionError, DependencyError, FileFormatError
 

@@ -14,8 +14,8 @@ import pytest
 from stick import standing, stick_rig
 
 from robots import registry
-from robots.motion import RobotMotion
-from robots.understand import understand_robot
+from robots.model.motion import RobotMotion
+from robots.model.understand import understand_robot
 from sim.report import Report, judge
 from sim.report.page import report_page, write_report_page
 from sim.report.plots import Plot, svg

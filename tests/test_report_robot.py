@@ -16,10 +16,10 @@ from jaxtyping import Float
 import spark_sim
 from robots import registry
 from robots.formats.unitree import write_csv
-from robots.morphology import Morphology
-from robots.motion import RobotMotion
+from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
+from robots.model.understand import understand_robot
 from robots.solve import retarget
-from robots.understand import understand_robot
 from sim.report import Report, judge
 from sim.report.lowest import lowest_points
 from sim.report.mass import model_mass

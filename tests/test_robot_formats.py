@@ -16,9 +16,9 @@ from scipy.spatial.transform import Rotation
 import spark_sim
 from robots import registry
 from robots.formats import FORMATS
-from robots.morphology import Morphology
-from robots.motion import RobotMotion
-from robots.understand import understand_robot
+from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
+from robots.model.understand import understand_robot
 from sim.interpolate import velocities
 from spark.errors import ConventionError, FileFormatError, OutputError, SparkSimError
 from spark.files import write_atomically

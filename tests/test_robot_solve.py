@@ -8,8 +8,8 @@ from conftest import recording
 from robots.descent import eased
 from robots.footing import plan_footing
 from robots.mend import mend, wrong_in
-from robots.morphology import Morphology
-from robots.motion import RobotMotion
+from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
 from robots.normal import Normal, Ties, second_differences
 from robots.objective import linearize
 from robots.project import project

@@ -9,8 +9,8 @@ from conftest import recording
 import spark_sim
 from robots.collision import Near
 from robots.footing import corners_of, plan_footing
-from robots.known import known
-from robots.motion import RobotMotion
+from robots.model.known import known
+from robots.model.motion import RobotMotion
 from robots.objective import linearize
 from robots.project import project
 from robots.solve import stages_of

@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from robots.mjcf import read_mjcf
-from robots.morphology import Morphology
+from robots.model.mjcf import read_mjcf
+from robots.model.morphology import Morphology
+from robots.model.understand import understand_robot
 from robots.tree import forward
-from robots.understand import understand_robot
 from spark.errors import FileFormatError, SkeletonError
 from spark.kinematics import forward as skeleton_forward
 from spark.rig.roles import Role

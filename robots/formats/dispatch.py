@@ -9,8 +9,8 @@ from robots.formats.mjlab import read_mjlab, write_mjlab
 from robots.formats.native import is_native, read_npz, write_npz
 from robots.formats.plain import is_plain, read_plain
 from robots.formats.unitree import ORDERS, likely_order, read_csv, write_csv
-from robots.morphology import Morphology
-from robots.motion import RobotMotion
+from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
 from spark.errors import ConventionError, FileFormatError
 
 

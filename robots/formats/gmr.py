@@ -14,8 +14,8 @@ import numpy as np
 from robots.formats.arrays import number_array, scalar
 from robots.formats.mjlab import body_poses
 from robots.formats.qpos import Columns, columns_of, frame_time_of, motion_of
-from robots.morphology import Morphology
-from robots.motion import RobotMotion
+from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
 from spark.errors import FileFormatError
 from spark.files import write_atomically
 

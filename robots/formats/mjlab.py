@@ -16,8 +16,8 @@ from jaxtyping import Float, Int
 
 from robots.formats.arrays import number_array, scalar
 from robots.formats.qpos import Columns, check_finite, columns_of, frame_time_of, motion_of
-from robots.morphology import Morphology
-from robots.motion import RobotMotion
+from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
 from robots.tree import Tree
 from spark.errors import FileFormatError
 from spark.files import write_atomically

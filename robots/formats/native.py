@@ -11,9 +11,9 @@ import numpy as np
 from robots import registry
 from robots.formats.arrays import number_array, scalar
 from robots.formats.qpos import check_finite, of_qpos, unit
-from robots.known import known, model_sha256
-from robots.morphology import Morphology
-from robots.motion import RobotMotion
+from robots.model.known import known, model_sha256
+from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
 from sim.interpolate import velocities
 from spark.errors import FileFormatError
 from spark.files import write_atomically

@@ -10,8 +10,8 @@ import numpy as np
 
 from robots.formats.arrays import number_array, scalar
 from robots.formats.qpos import check_finite, frame_time_of, of_qpos, unit
-from robots.morphology import Morphology
-from robots.motion import RobotMotion
+from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
 from spark.errors import FileFormatError
 
 _STEPS = ("frame_time", "dt")

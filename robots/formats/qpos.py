@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from robots.morphology import Morphology
-from robots.motion import RobotMotion
+from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
 from robots.registry import ENTRIES
 from spark.errors import FileFormatError, OutputError
 

@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Float
 
 from robots.formats.qpos import Columns, columns_of, frame_time_of, motion_of
-from robots.morphology import Morphology
-from robots.motion import RobotMotion
+from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
 from spark.errors import ConventionError, FileFormatError
 from spark.files import write_atomically
 

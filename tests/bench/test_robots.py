@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from robots.morphology import Morphology
+from robots.model.morphology import Morphology
 from robots.registry import find
 from robots.solve import retarget
 from robots.stream import Stream

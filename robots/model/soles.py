@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from robots.morphology import Sole
-from robots.shapes import corners, flattening, sole_heading
+from robots.model.morphology import Sole
+from robots.model.shapes import corners, flattening, sole_heading
 from spark.kinematics import world_positions
 from spark.rig.roles import Role, RoleMap
 from spark.rotation import (

@@ -6,8 +6,8 @@ from functools import lru_cache
 from pathlib import Path
 
 from robots import registry
-from robots.morphology import Morphology
-from robots.understand import understand_robot
+from robots.model.morphology import Morphology
+from robots.model.understand import understand_robot
 
 _INCLUDE = re.compile(rb"<include\s+file\s*=\s*[\"']([^\"']+)")
 

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from robots.mjcf import BALL, Mjcf
+from robots.model.mjcf import BALL, Mjcf
 from robots.tree import ROOT, Tree
 
 _PARALLEL = np.cos(np.radians(30))  # hinges nearer to parallel than this are two joints: a knee

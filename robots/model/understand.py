@@ -1,6 +1,6 @@
 """What any humanoid MJCF is, without configuration.
 
-Hinge chains become one joint a limb segment (`robots.segments`); a trunk that carries the legs
+Hinge chains become one joint a limb segment (`robots.model.segments`); a trunk that carries the legs
 below a waist is re-rooted at the pelvis; names and build say what is what.
 """
 
@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from robots.mjcf import Mjcf, read_mjcf
-from robots.morphology import Morphology
-from robots.parts import labels_of, points_of, skeleton_of
-from robots.segments import Segment, segments_of, tree_of
-from robots.soles import place_feet, soles_of, with_soles
-from robots.tpose import TPose, search_tpose
+from robots.model.mjcf import Mjcf, read_mjcf
+from robots.model.morphology import Morphology
+from robots.model.parts import labels_of, points_of, skeleton_of
+from robots.model.segments import Segment, segments_of, tree_of
+from robots.model.soles import place_feet, soles_of, with_soles
+from robots.model.tpose import TPose, search_tpose
 from robots.tree import Tree
 from spark.errors import SkeletonError
 from spark.motion import Motion

@@ -9,8 +9,8 @@ from jaxtyping import Float, Int
 
 from robots.collision import Collisions, find_collisions
 from robots.contact import Contacts
-from robots.mjcf import Mjcf
-from robots.tpose import rest_pose
+from robots.model.mjcf import Mjcf
+from robots.model.tpose import rest_pose
 from robots.tree import Coordinates, Tree, forward
 from spark.kinematics import world_positions
 from spark.motion import Motion

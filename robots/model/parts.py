@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from robots.mjcf import Mjcf
-from robots.segments import Segment
-from robots.shapes import surface
+from robots.model.mjcf import Mjcf
+from robots.model.segments import Segment
+from robots.model.shapes import surface
 from spark.rig.name_hints import read_names
 from spark.skeleton import Skeleton
 

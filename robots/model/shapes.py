@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import ConvexHull, QhullError
 
-from robots.mjcf import Mjcf
+from robots.model.mjcf import Mjcf
 from spark.rotation import quat_between
 
 _NEAR_LOWEST = 0.08  # of the foot's length: points this low belong to the sole

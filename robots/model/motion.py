@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from robots.mjcf import read_mjcf
-from robots.morphology import Morphology, Sole
+from robots.model.mjcf import read_mjcf
+from robots.model.morphology import Morphology, Sole
 from robots.tree import Coordinates
 from sim.trajectory import GivenBody, GivenSole
 from spark.motion import Motion

@@ -1,0 +1,1 @@
+"""What a robot is: from any humanoid's MJCF to its morphology."""
