@@ -1,6 +1,6 @@
 """Retargeting onto a robot while the source moves: for teleoperation.
 
-What `robots.solve` does for a whole clip, over the last frames alone: two frames that are gone,
+What `robots.solver.solve` does for a whole clip, over the last frames alone: two frames that are gone,
 which the next ones are tied to by their accelerations, and three that are still free. Every new
 frame moves the window on by one, and what leaves it is the answer: `LATENCY` frames old, by what
 has been seen since a better one.
@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from robots.model.morphology import Morphology
-from robots.project import project
+from robots.solver.projection import project
 from robots.stream_detour import Detours
 from robots.stream_footing import Feet
 from robots.stream_targets import LATENCY, Frame, FrameTargets, Ground, Watcher, together

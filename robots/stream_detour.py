@@ -1,14 +1,14 @@
 """Ways out for limbs that are stuck behind their limits.
 
 Steps downhill follow a limb wherever it goes, also into a corner that it can't leave downhill: an
-arm that came up on the wrong side. Hinge by hinge (`robots.project`) it may be reached from another
+arm that came up on the wrong side. Hinge by hinge (`robots.solver.projection`) it may be reached from another
 one; then the limb is led there, as fast as it may turn.
 """
 
 import numpy as np
 from jaxtyping import Float
 
-from robots.project import project
+from robots.solver.projection import project
 from robots.stream_targets import LATENCY, FrameTargets, Watcher
 from robots.window_terms import Posture, Terms
 from spark.rotation import quat_from_matrix

@@ -1,7 +1,7 @@
 """Which feet stand, told as frames come in, and where they are held.
 
 A foot is held where it comes down. What the source's foot wobbles while it stands is lost, what it
-drifts beyond that is motion and stays; as in `robots.footing`, which sees the whole clip.
+drifts beyond that is motion and stays; as in `robots.solver.footprints`, which sees the whole clip.
 """
 
 from collections import deque
@@ -9,7 +9,7 @@ from collections import deque
 import numpy as np
 from jaxtyping import Float
 
-from robots.footing import EASE, TURN, WOBBLE, flat_sole
+from robots.solver.footprints import EASE, TURN, WOBBLE, flat_sole
 from robots.stream_targets import FrameTargets, Watcher
 from robots.window_terms import Stance
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW

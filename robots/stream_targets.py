@@ -1,4 +1,4 @@
-"""One frame of a source as a robot's targets: what `robots.targets` makes of a clip, without what
+"""One frame of a source as a robot's targets: what `robots.solver.targets` makes of a clip, without what
 only a clip can tell, in a tenth of its time."""
 
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from robots.model.morphology import Morphology
-from robots.targets import (
+from robots.solver.targets import (
     BONES,
     OUT,
     arm_length,
@@ -51,7 +51,7 @@ class Ground:
 
 @dataclass(frozen=True, eq=False)
 class FrameTargets:
-    """`robots.targets.Targets` of one frame, or of some (T), floor at z = 0, turns as matrices
+    """`robots.solver.targets.Targets` of one frame, or of some (T), floor at z = 0, turns as matrices
     (`R_world_joint`).
 
     `bones` are in the order of `Watcher.bones`. `feet` are the source's heel and toe of each of the

@@ -5,12 +5,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.linalg.lapack import dposv
 
-from robots import objective
-from robots.descent import SHORT_OF_LIMIT
 from robots.model.morphology import Morphology
-from robots.objective import FAST, RUSH
+from robots.solver import objective
+from robots.solver.descent import SHORT_OF_LIMIT
+from robots.solver.objective import FAST, RUSH
+from robots.solver.smoothness import smoothness
 from robots.stream_targets import FrameTargets
-from robots.ties import smoothness
 from robots.window_terms import Posture, Stance, Terms
 
 SMOOTH = 5.5  # [Hz] above which a motion fades: more than in hindsight, or it would lag behind
@@ -43,7 +43,7 @@ class Window:
         lower, upper = tree.within(SHORT_OF_LIMIT)
         rest = self._model.qpos0[self._angles]
         self._lower, self._upper = lower[hinges] + rest, upper[hinges] + rest
-        # What ties frames together: as `robots.normal.Ties`, those that are gone immovable.
+        # What ties frames together: as `robots.least_squares.Ties`, those that are gone immovable.
         weights = smoothness(robot) * (objective.SMOOTH / SMOOTH / frame_time) ** 2
         self._stiff = weights**2
         second, self._first = (np.diff(np.eye(gone + free), k, axis=0)[:, gone:] for k in (2, 1))

@@ -1,6 +1,6 @@
 """The objective of a few frames, in a few tenths of a millisecond.
 
-The terms and weights are those of `robots.objective`, and so is the order: arms and head hang on
+The terms and weights are those of `robots.solver.objective`, and so is the order: arms and head hang on
 base, trunk and legs, and don't move them. There every term walks its own chain, over thousands of
 frames; here MuJoCo says where bodies are, and all columns of all terms are made at once. The
 columns are MuJoCo's degrees of freedom, in the order of `robots.tree`: the base turns about its own
@@ -14,12 +14,12 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from robots import objective
 from robots.model.morphology import Morphology
-from robots.objective import TURN, TURNS
-from robots.solve import stages_of
+from robots.residuals import one_sided
+from robots.solver import objective
+from robots.solver.objective import TURN, TURNS
+from robots.solver.solve import stages_of
 from robots.stream_targets import FrameTargets
-from robots.terms import one_sided
 from robots.tree import BASE
 from robots.window_touch import Poses, Touch
 from spark.rig.roles import Role
@@ -113,7 +113,7 @@ class Terms:
         of such poses."""
         poses = self.poses(q)
         axes, anchors = self._columns(poses)
-        # Parts that should be turned some way: an axial vector each (`robots.terms.turn_rows`).
+        # Parts that should be turned some way: an axial vector each (`robots.residuals.turn_rows`).
         wanted = np.concatenate([targets.world[:, self._followed], targets.chest[:, None]], axis=1)
         M = poses.turns[:, self._turned] @ (wanted @ self._turned_rest).transpose(0, 1, 3, 2)
         axial = np.empty((*M.shape[:2], 3))

@@ -1,16 +1,16 @@
-"""Parts that run into each other, in a few frames: `robots.collision` for all shapes at once."""
+"""Parts that run into each other, in a few frames: `robots.solver.collision` for all shapes at once."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from robots.collision import EASE
-from robots.hulls import Pair
 from robots.model.morphology import Morphology
 from robots.model.shapes import DIRECTIONS
-from robots.objective import TOUCH, TOUCH_LEGS
-from robots.terms import one_sided
+from robots.residuals import one_sided
+from robots.solver.collision import EASE
+from robots.solver.hulls import Pair
+from robots.solver.objective import TOUCH, TOUCH_LEGS
 
 _ACTIVE = 3 * EASE  # [m] beyond which a shape is not felt
 _REACH = 0.03  # [m] that shapes may move between the frame that is looked at and the others

@@ -18,10 +18,10 @@ import numpy as np
 from robots.model.known import known
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
-from robots.solve import copy, retarget
+from robots.solver.solve import copy, retarget
+from robots.solver.targets import bone_directions
 from robots.stream import Stream
 from robots.stream_targets import LATENCY, Frame, ground_of
-from robots.targets import bone_directions
 from spark.io.recording import read_recording
 from spark.rig.rig import understand
 from spark.rig.roles import Role

@@ -9,7 +9,7 @@ import resource
 import numpy as np
 
 from robots.model.known import known
-from robots.solve import retarget
+from robots.solver.solve import retarget
 from spark.demo.sample import sample_motion, sample_rig
 from spark.motion import Motion
 from spark.transfer.canonical import CanonicalMotion, to_canonical

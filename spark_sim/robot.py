@@ -13,7 +13,7 @@ from robots.model.known import known
 from robots.model.mjcf import read_mjcf
 from robots.model.motion import RobotMotion
 from robots.model.understand import parts_of, understand_robot
-from robots.solve import copy, retarget
+from robots.solver.solve import copy, retarget
 from robots.stream import Stream
 from robots.stream_targets import LATENCY, Frame, ground_of
 from sim.trajectory import GivenBody

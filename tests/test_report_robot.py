@@ -19,7 +19,7 @@ from robots.formats.unitree import write_csv
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.model.understand import understand_robot
-from robots.solve import retarget
+from robots.solver.solve import retarget
 from sim.report import Report, judge
 from sim.report.lowest import lowest_points
 from sim.report.mass import model_mass

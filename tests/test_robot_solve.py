@@ -5,19 +5,19 @@ import numpy as np
 import pytest
 from conftest import recording
 
-from robots.descent import eased
-from robots.footing import plan_footing
-from robots.mend import mend, wrong_in
+from robots.least_squares import Normal, Ties, second_differences
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
-from robots.normal import Normal, Ties, second_differences
-from robots.objective import linearize
-from robots.project import project
 from robots.registry import find
-from robots.solve import copy, retarget, stages_of
-from robots.stage import Stage
-from robots.targets import targets_of
-from robots.ties import jolted, unhurried
+from robots.solver.block import Stage
+from robots.solver.descent import eased
+from robots.solver.footprints import plan_footing
+from robots.solver.objective import linearize
+from robots.solver.projection import project
+from robots.solver.repair import mend, wrong_in
+from robots.solver.smoothness import jolted, unhurried
+from robots.solver.solve import copy, retarget, stages_of
+from robots.solver.targets import targets_of
 from robots.tree import Coordinates, forward
 from scripts.robot_bars import COLUMNS, limb_error, measure, misses
 from spark.demo.sample import sample_motion, sample_rig

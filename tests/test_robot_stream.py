@@ -7,17 +7,17 @@ import pytest
 from conftest import recording
 
 import spark_sim
-from robots.collision import Near
-from robots.footing import corners_of, plan_footing
 from robots.model.known import known
 from robots.model.motion import RobotMotion
-from robots.objective import linearize
-from robots.project import project
-from robots.solve import stages_of
-from robots.stage import Stage
+from robots.solver.block import Stage
+from robots.solver.collision import Near
+from robots.solver.footprints import corners_of, plan_footing
+from robots.solver.objective import linearize
+from robots.solver.projection import project
+from robots.solver.solve import stages_of
+from robots.solver.targets import targets_of
 from robots.stream import Stream
 from robots.stream_targets import LATENCY, Frame, FrameTargets, Watcher, ground_of
-from robots.targets import targets_of
 from robots.tree import forward
 from robots.window_terms import Stance, Terms
 from scripts.robot_bars import COLUMNS, follow, limb_error, measure

@@ -7,10 +7,10 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
-from robots.collision import Collisions, find_collisions
-from robots.contact import Contacts
 from robots.model.mjcf import Mjcf
 from robots.model.tpose import rest_pose
+from robots.solver.collision import Collisions, find_collisions
+from robots.solver.exact_contact import Contacts
 from robots.tree import Coordinates, Tree, forward
 from spark.kinematics import world_positions
 from spark.motion import Motion

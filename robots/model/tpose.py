@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from robots.normal import Normal
-from robots.terms import Rows, direction_rows, limit_rows, turn_rows
+from robots.least_squares import Normal
+from robots.residuals import Rows, direction_rows, limit_rows, turn_rows
 from robots.tree import BASE, Coordinates, Tree, forward
 from spark.rig.bones import Pose
 from spark.rig.roles import LIMBS, Group, Role, RoleMap

@@ -10,10 +10,10 @@ import pytest
 
 from robots.model.morphology import Morphology
 from robots.registry import find
-from robots.solve import retarget
+from robots.solver.solve import retarget
+from robots.solver.targets import targets_of
 from robots.stream import Stream
 from robots.stream_targets import Frame, ground_of
-from robots.targets import targets_of
 from scripts.robot_memory import pacing
 from spark.kinematics import world_positions
 from spark.rig.roles import Role

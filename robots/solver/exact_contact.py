@@ -8,11 +8,11 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from robots.collision import APART, EASE, Collisions, Near, approach
-from robots.hulls import Pair
-from robots.normal import Normal
-from robots.stage import Stage
-from robots.terms import one_sided
+from robots.least_squares import Normal
+from robots.residuals import one_sided
+from robots.solver.block import Stage
+from robots.solver.collision import APART, EASE, Collisions, Near, approach
+from robots.solver.hulls import Pair
 from robots.tree import Frames
 
 _FELT = 0.02  # [m] beyond which distances are not told apart

@@ -1,6 +1,6 @@
 """Parts of a robot that must not run into each other: quickly, for whole trajectories.
 
-`robots.contact` measures the same exactly.
+`robots.solver.exact_contact` measures the same exactly.
 """
 
 from collections.abc import Sequence
@@ -9,12 +9,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from robots.hulls import Pair, Shape, meet, shapes_of
+from robots.least_squares import Normal
 from robots.model.mjcf import Mjcf
 from robots.model.shapes import DIRECTIONS
-from robots.normal import Normal
-from robots.stage import Stage
-from robots.terms import one_sided
+from robots.residuals import one_sided
+from robots.solver.block import Stage
+from robots.solver.hulls import Pair, Shape, meet, shapes_of
 from robots.tree import Coordinates, Frames, Tree, forward
 
 APART = 0.0  # [m] that shapes keep between them; less where the T-pose has less

@@ -4,9 +4,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import uniform_filter1d
 
+from robots.least_squares import Ties, second_differences
 from robots.model.morphology import Morphology
-from robots.normal import Ties, second_differences
-from robots.objective import ANKLE, CALM, FAST, JOLT, PATH, RUSH, SMOOTH
+from robots.solver.objective import ANKLE, CALM, FAST, JOLT, PATH, RUSH, SMOOTH
 from robots.tree import Coordinates
 from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat

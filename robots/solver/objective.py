@@ -8,13 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from robots.collision import Near
-from robots.footing import Footing
+from robots.least_squares import Normal
 from robots.model.morphology import Morphology
-from robots.normal import Normal
-from robots.stage import Stage
-from robots.targets import Targets
-from robots.terms import Rows, direction_rows, limit_rows, one_sided, point_columns, turn_rows
+from robots.residuals import Rows, direction_rows, limit_rows, one_sided, point_columns, turn_rows
+from robots.solver.block import Stage
+from robots.solver.collision import Near
+from robots.solver.footprints import Footing
+from robots.solver.targets import Targets
 from robots.tree import Coordinates, Frames, forward
 from spark.rig.roles import Role
 from spark.rotation import matrix_from_quat

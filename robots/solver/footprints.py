@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from robots.model.morphology import Morphology, Sole
-from robots.targets import Targets
+from robots.solver.targets import Targets
 from robots.tree import Coordinates, Frames, forward
 from spark.kinematics import world_positions
 from spark.rotation import quat_rotate

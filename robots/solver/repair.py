@@ -12,12 +12,12 @@ import numpy as np
 from jaxtyping import Bool, Int
 from scipy.ndimage import binary_dilation, maximum_filter1d
 
-from robots.descent import SHORT_OF_LIMIT, Mending, eased, solve_stage, stride_of
-from robots.footing import Footing, corners_of
 from robots.model.morphology import Morphology
-from robots.stage import Stage
-from robots.targets import Targets
-from robots.ties import jolted, rush
+from robots.solver.block import Stage
+from robots.solver.descent import SHORT_OF_LIMIT, Mending, eased, solve_stage, stride_of
+from robots.solver.footprints import Footing, corners_of
+from robots.solver.smoothness import jolted, rush
+from robots.solver.targets import Targets
 from robots.tree import Coordinates, forward
 
 _ROUNDS, _FIRMER = 6, 3.0

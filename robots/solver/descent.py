@@ -6,13 +6,13 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
-from robots.footing import Footing
+from robots.least_squares import Normal, Ties
 from robots.model.morphology import Morphology
-from robots.normal import Normal, Ties
-from robots.objective import linearize
-from robots.stage import Stage
-from robots.targets import Targets
-from robots.ties import jolted, ties_of
+from robots.solver.block import Stage
+from robots.solver.footprints import Footing
+from robots.solver.objective import linearize
+from robots.solver.smoothness import jolted, ties_of
+from robots.solver.targets import Targets
 from robots.tree import Coordinates, forward
 
 _AROUND = 0.15  # [s] before and after a frame in which a step must not do harm

@@ -1,20 +1,20 @@
 """Retargeting onto a robot: the whole trajectory at once.
 
 Gauss-Newton over the coordinates of all frames: every frame's pose against its targets, planted
-feet, the floor, limits; neighbours tied by their accelerations (`robots.objective`,
-`robots.normal`). It runs in two stages, each with everything below it free: base, trunk and legs,
+feet, the floor, limits; neighbours tied by their accelerations (`robots.solver.objective`,
+`robots.least_squares`). It runs in two stages, each with everything below it free: base, trunk and legs,
 which the feet tie together, then arms and head, which hang on the trunk and don't move it.
 """
 
-from robots.descent import solve_stage, stride_of
-from robots.footing import Footing, plan_footing, within_reach
-from robots.mend import mend
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
-from robots.project import project
-from robots.stage import Stage
-from robots.targets import Targets, targets_of
-from robots.ties import unhurried
+from robots.solver.block import Stage
+from robots.solver.descent import solve_stage, stride_of
+from robots.solver.footprints import Footing, plan_footing, within_reach
+from robots.solver.projection import project
+from robots.solver.repair import mend
+from robots.solver.smoothness import unhurried
+from robots.solver.targets import Targets, targets_of
 from robots.tree import Coordinates, forward
 from spark.transfer.canonical import CanonicalMotion
 

@@ -1,0 +1,1 @@
+"""Whole trajectories on robots: one least-squares problem over all frames."""
