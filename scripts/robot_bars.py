@@ -20,8 +20,8 @@ from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.solver.solve import copy, retarget
 from robots.solver.targets import bone_directions
-from robots.stream import Stream
-from robots.stream_targets import LATENCY, Frame, ground_of
+from robots.stream.frame_targets import LATENCY, Frame, ground_of
+from robots.stream.stream import Stream
 from spark.io.recording import read_recording
 from spark.rig.rig import understand
 from spark.rig.roles import Role

@@ -14,8 +14,8 @@ from robots.model.mjcf import read_mjcf
 from robots.model.motion import RobotMotion
 from robots.model.understand import parts_of, understand_robot
 from robots.solver.solve import copy, retarget
-from robots.stream import Stream
-from robots.stream_targets import LATENCY, Frame, ground_of
+from robots.stream.frame_targets import LATENCY, Frame, ground_of
+from robots.stream.stream import Stream
 from sim.trajectory import GivenBody
 from spark.errors import ConventionError
 from spark.motion import Motion

@@ -16,10 +16,10 @@ from robots.solver.objective import linearize
 from robots.solver.projection import project
 from robots.solver.solve import stages_of
 from robots.solver.targets import targets_of
-from robots.stream import Stream
-from robots.stream_targets import LATENCY, Frame, FrameTargets, Watcher, ground_of
+from robots.stream.frame_targets import LATENCY, Frame, FrameTargets, Watcher, ground_of
+from robots.stream.stream import Stream
+from robots.stream.terms import Stance, Terms
 from robots.tree import forward
-from robots.window_terms import Stance, Terms
 from scripts.robot_bars import COLUMNS, follow, limb_error, measure
 from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import ConventionError, FrameError

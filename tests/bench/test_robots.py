@@ -12,8 +12,8 @@ from robots.model.morphology import Morphology
 from robots.registry import find
 from robots.solver.solve import retarget
 from robots.solver.targets import targets_of
-from robots.stream import Stream
-from robots.stream_targets import Frame, ground_of
+from robots.stream.frame_targets import Frame, ground_of
+from robots.stream.stream import Stream
 from scripts.robot_memory import pacing
 from spark.kinematics import world_positions
 from spark.rig.roles import Role

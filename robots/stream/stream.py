@@ -11,11 +11,11 @@ from jaxtyping import Float
 
 from robots.model.morphology import Morphology
 from robots.solver.projection import project
-from robots.stream_detour import Detours
-from robots.stream_footing import Feet
-from robots.stream_targets import LATENCY, Frame, FrameTargets, Ground, Watcher, together
-from robots.window import Window
-from robots.window_terms import Stance, Terms
+from robots.stream.detour import Detours
+from robots.stream.footing import Feet
+from robots.stream.frame_targets import LATENCY, Frame, FrameTargets, Ground, Watcher, together
+from robots.stream.terms import Stance, Terms
+from robots.stream.window import Window
 from spark.errors import FrameError
 from spark.rig.rig import Rig
 from spark.rotation import quat_from_matrix

@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from robots.solver.projection import project
-from robots.stream_targets import LATENCY, FrameTargets, Watcher
-from robots.window_terms import Posture, Terms
+from robots.stream.frame_targets import LATENCY, FrameTargets, Watcher
+from robots.stream.terms import Posture, Terms
 from spark.rotation import quat_from_matrix
 
 _LOST, _FOUND = np.cos(np.radians(55)), np.cos(np.radians(25))  # of a bone's error

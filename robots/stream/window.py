@@ -10,8 +10,8 @@ from robots.solver import objective
 from robots.solver.descent import SHORT_OF_LIMIT
 from robots.solver.objective import FAST, RUSH
 from robots.solver.smoothness import smoothness
-from robots.stream_targets import FrameTargets
-from robots.window_terms import Posture, Stance, Terms
+from robots.stream.frame_targets import FrameTargets
+from robots.stream.terms import Posture, Stance, Terms
 
 SMOOTH = 5.5  # [Hz] above which a motion fades: more than in hindsight, or it would lag behind
 _DAMPING = 1e-3

@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Float
 
 from robots.solver.footprints import EASE, TURN, WOBBLE, flat_sole
-from robots.stream_targets import FrameTargets, Watcher
-from robots.window_terms import Stance
+from robots.stream.frame_targets import FrameTargets, Watcher
+from robots.stream.terms import Stance
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
 from spark.rig.feet import standing_height
 

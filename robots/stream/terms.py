@@ -19,9 +19,9 @@ from robots.residuals import one_sided
 from robots.solver import objective
 from robots.solver.objective import TURN, TURNS
 from robots.solver.solve import stages_of
-from robots.stream_targets import FrameTargets
+from robots.stream.collision import Poses, Touch
+from robots.stream.frame_targets import FrameTargets
 from robots.tree import BASE
-from robots.window_touch import Poses, Touch
 from spark.rig.roles import Role
 
 Linear = tuple[Float[np.ndarray, "T R 3 D"], Float[np.ndarray, "T R 3"], Float[np.ndarray, "T R 3"]]

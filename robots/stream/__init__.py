@@ -1,0 +1,1 @@
+"""Robots that follow a source frame by frame."""
