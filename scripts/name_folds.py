@@ -1,9 +1,9 @@
 """How well the name encoder finds roles on rigs whose conventions it has not learned, fold by fold.
 
-Usage: PYTHONPATH=tests python scripts/name_folds.py [STEPS] [FOLDS] [SHARE]
+Usage: python -m scripts.name_folds [STEPS] [FOLDS] [SHARE]
 
-The rigs are those of tests/rigs.py. Each fold holds out some of them, and with them every learned
-convention that names SHARE or more of the joints of one of them by the same word.
+The rigs are those of tests/helpers/rigs.py. Each fold holds out some of them, and with them every
+learned convention that names SHARE or more of the joints of one of them by the same word.
 """
 
 import sys
@@ -11,7 +11,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import torch
-from rigs import RIGS, build
 
 from spark.motion import Motion
 from spark.network.features import body_features
@@ -21,6 +20,7 @@ from spark.rig.rig import understand
 from spark.rig.roles import Role
 from spark.training.name_rigs import OTHER, Named, rig_of
 from spark.training.train_names import score_rigs, train_names
+from tests.helpers.rigs import RIGS, build
 
 
 def named_rig(chains: str) -> list[Named]:

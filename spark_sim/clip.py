@@ -103,9 +103,9 @@ class Clip:
     ) -> tuple[tuple[Path, Path], tuple[str, ...]]:
         """Write a MuJoCo model of the body, and `NAME_scene.xml` beside it, with a floor and light.
 
-        `joints` and `mesh` are those of `sim.body.build.build_body`; hulls of a mesh go into a folder
-        `NAME_meshes`. Gives both paths, and notes on what was assumed. Raises `OutputError` where
-        one of the files exists, unless forced.
+        `joints` and `mesh` are those of `sim.body.build.build_body`; hulls of a mesh go into a
+        folder `NAME_meshes`. Gives both paths, and notes on what was assumed. Raises `OutputError`
+        where one of the files exists, unless forced.
         """
         from sim.body.build import build_body
         from sim.body.mjcf import notes_of, paths_of, write_mjcf

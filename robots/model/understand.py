@@ -1,7 +1,7 @@
 """What any humanoid MJCF is, without configuration.
 
-Hinge chains become one joint a limb segment (`robots.model.segments`); a trunk that carries the legs
-below a waist is re-rooted at the pelvis; names and build say what is what.
+Hinge chains become one joint a limb segment (`robots.model.segments`); a trunk that carries the
+legs below a waist is re-rooted at the pelvis; names and build say what is what.
 """
 
 from collections.abc import Sequence

@@ -2,8 +2,8 @@
 
 Gauss-Newton over the coordinates of all frames: every frame's pose against its targets, planted
 feet, the floor, limits; neighbours tied by their accelerations (`robots.solver.objective`,
-`robots.least_squares`). It runs in two stages, each with everything below it free: base, trunk and legs,
-which the feet tie together, then arms and head, which hang on the trunk and don't move it.
+`robots.least_squares`). It runs in two stages, each with everything below it free: base, trunk and
+legs, which the feet tie together, then arms and head, which hang on the trunk and don't move it.
 """
 
 from robots.model.morphology import Morphology

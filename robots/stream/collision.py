@@ -1,4 +1,6 @@
-"""Parts that run into each other, in a few frames: `robots.solver.collision` for all shapes at once."""
+"""Parts that run into each other, in a few frames: `robots.solver.collision` for all shapes at
+once.
+"""
 
 from dataclasses import dataclass
 

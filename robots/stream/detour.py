@@ -1,8 +1,8 @@
 """Ways out for limbs that are stuck behind their limits.
 
 Steps downhill follow a limb wherever it goes, also into a corner that it can't leave downhill: an
-arm that came up on the wrong side. Hinge by hinge (`robots.solver.projection`) it may be reached from another
-one; then the limb is led there, as fast as it may turn.
+arm that came up on the wrong side. Hinge by hinge (`robots.solver.projection`) it may be reached
+from another one; then the limb is led there, as fast as it may turn.
 """
 
 import numpy as np

@@ -1,5 +1,5 @@
-"""One frame of a source as a robot's targets: what `robots.solver.targets` makes of a clip, without what
-only a clip can tell, in a tenth of its time."""
+"""One frame of a source as a robot's targets: what `robots.solver.targets` makes of a clip, without
+what only a clip can tell, in a tenth of its time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -51,8 +51,8 @@ class Ground:
 
 @dataclass(frozen=True, eq=False)
 class FrameTargets:
-    """`robots.solver.targets.Targets` of one frame, or of some (T), floor at z = 0, turns as matrices
-    (`R_world_joint`).
+    """`robots.solver.targets.Targets` of one frame, or of some (T), floor at z = 0, turns as
+    matrices (`R_world_joint`).
 
     `bones` are in the order of `Watcher.bones`. `feet` are the source's heel and toe of each of the
     robot's soles [m, the source's own world].

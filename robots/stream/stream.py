@@ -1,9 +1,9 @@
 """Retargeting onto a robot while the source moves: for teleoperation.
 
-What `robots.solver.solve` does for a whole clip, over the last frames alone: two frames that are gone,
-which the next ones are tied to by their accelerations, and three that are still free. Every new
-frame moves the window on by one, and what leaves it is the answer: `LATENCY` frames old, by what
-has been seen since a better one.
+What `robots.solver.solve` does for a whole clip, over the last frames alone: two frames that are
+gone, which the next ones are tied to by their accelerations, and three that are still free. Every
+new frame moves the window on by one, and what leaves it is the answer: `LATENCY` frames old, by
+what has been seen since a better one.
 """
 
 import numpy as np

@@ -1,10 +1,10 @@
 """The objective of a few frames, in a few tenths of a millisecond.
 
-The terms and weights are those of `robots.solver.objective`, and so is the order: arms and head hang on
-base, trunk and legs, and don't move them. There every term walks its own chain, over thousands of
-frames; here MuJoCo says where bodies are, and all columns of all terms are made at once. The
-columns are MuJoCo's degrees of freedom, in the order of `robots.tree`: the base turns about its own
-axes, and so do balls.
+The terms and weights are those of `robots.solver.objective`, and so is the order: arms and head
+hang on base, trunk and legs, and don't move them. There every term walks its own chain, over
+thousands of frames; here MuJoCo says where bodies are, and all columns of all terms are made at
+once. The columns are MuJoCo's degrees of freedom, in the order of `robots.tree`: the base turns
+about its own axes, and so do balls.
 """
 
 from collections.abc import Sequence

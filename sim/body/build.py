@@ -42,9 +42,10 @@ def build_body(
     """The model of a rig, T-posed at the origin with its soles at z = 0.
 
     `mass` [kg] is that of the whole body; where it is not given it follows from the height.
-    `joints` are balls, or "hinge": one at elbow and knee, three elsewhere (`sim.body.joints.HINGES`).
-    `mesh` is a glTF file of a skin on the same skeleton: its hulls replace the capsules.
-    Its keyframes, `tpose` and `home` (arms lowered), have the controls that hold them.
+    `joints` are balls, or "hinge": one at elbow and knee, three elsewhere
+    (`sim.body.joints.HINGES`). `mesh` is a glTF file of a skin on the same skeleton: its hulls
+    replace the capsules. Its keyframes, `tpose` and `home` (arms lowered), have the controls that
+    hold them.
     """
     if mass is not None and not (np.isfinite(mass) and mass > 0):
         raise SkeletonError(f"mass is {mass} kg; expected a positive number")

@@ -19,9 +19,9 @@ _BONES = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """`mse` and `relative_mse` (root-relative) in the metric of Skeleton-Aware Networks, `mpjpe`
-    [% of the height], all of `spark.evaluation.metrics`; `errors` [% of the height] is the joints' mean
-    distance from where they should be, frame by frame."""
+    """`mse` and `relative_mse` (root-relative) in the metric of Skeleton-Aware Networks, `mpjpe` [%
+    of the height], all of `spark.evaluation.metrics`; `errors` [% of the height] is the joints'
+    mean distance from where they should be, frame by frame."""
 
     mse: float
     relative_mse: float

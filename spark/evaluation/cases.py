@@ -1,9 +1,9 @@
 """What a method is asked for and what the answer is: pairs of one motion on two bodies.
 
-Everything is as the network sees bodies (`spark.network.features`), in hip heights of the body in question.
-A case is *intra-structural* where both bodies have the same roles, each in as many joints, and
-*cross-structural* else. *Missing* are made cases whose source lacks joints of the target's spine,
-neck or shoulders, which any method has to guess.
+Everything is as the network sees bodies (`spark.network.features`), in hip heights of the body in
+question. A case is *intra-structural* where both bodies have the same roles, each in as many
+joints, and *cross-structural* else. *Missing* are made cases whose source lacks joints of the
+target's spine, neck or shoulders, which any method has to guess.
 """
 
 import zlib
@@ -110,9 +110,9 @@ def recorded_cases(found: Sequence[Performance]) -> tuple[list[Case], list[str]]
 
 def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = None) -> list[Case]:
     """Each clip with two targets that are changed copies of its own body, on which the answer is
-    known (`spark.training.pairs`): one with other bone lengths, and one with other joints and names too. And
-    a changed copy that lacks joints, with the clip's own body as its target. In all answers the
-    feet are planted while the recording's stand, and as high.
+    known (`spark.training.pairs`): one with other bone lengths, and one with other joints and names
+    too. And a changed copy that lacks joints, with the clip's own body as its target. In all
+    answers the feet are planted while the recording's stand, and as high.
 
     The target's own recording is the longest other clip of the body; of a body with one clip, its
     first half, and the second is asked for, if that much is left.

@@ -94,8 +94,8 @@ def evaluate(
 
 def by(method: Retargeting, *, own_motion: bool = False, feet_held: bool = False) -> Method:
     """The analytic transfer, or a trained network; with `own_motion`, corrected by a recording of
-    the target's own (`spark.transfer.target_prior`), with `feet_held`, then its feet held where the source's
-    stand: all of it is what `retarget` does."""
+    the target's own (`spark.transfer.target_prior`), with `feet_held`, then its feet held where the
+    source's stand: all of it is what `retarget` does."""
 
     def run(case: Case) -> Positions:
         if own_motion and case.own is not None:

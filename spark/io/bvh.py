@@ -1,8 +1,8 @@
 """BVH as it is written: names, offsets, channels, order and values, unchanged.
 
 The format is Biovision's: a HIERARCHY of joints with OFFSET and CHANNELS, then MOTION with one row
-of channel values a frame. Units, axes and Euler angles stay the file's own here; `spark.io.recording`
-turns them into SI.
+of channel values a frame. Units, axes and Euler angles stay the file's own here;
+`spark.io.recording` turns them into SI.
 """
 
 import re

@@ -1,7 +1,9 @@
-"""The network of `spark.training.model` without torch: what `retarget` runs, on any machine, at once.
+"""The network of `spark.training.model` without torch: what `retarget` runs, on any machine, at
+once.
 
 The same equations on the same weights, for W windows of one pair of bodies, so that nothing is
-padded and nothing masked. tests/test_network.py holds it against the network that is trained.
+padded and nothing masked. tests/spark/network/test_forward.py holds it against the network that is
+trained.
 """
 
 import math

@@ -1,4 +1,6 @@
-"""Our own name encoder without torch: the forward pass of `spark.training.name_encoder.NameEncoder` on arrays."""
+"""Our own name encoder without torch: the forward pass of `spark.training.name_encoder.NameEncoder`
+on arrays.
+"""
 
 from collections.abc import Sequence
 

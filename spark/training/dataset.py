@@ -4,11 +4,12 @@
                    cell, where in the arrays, on which floor), every file with its SHA-256, what was
                    left out of the dataset and why
     numbers.npy    float32: of each clip its rotations (T, K, 4), then its hips' path (T, 3)
-    planted.npy    bool (frames, 2): whether the left and the right foot stand
-    parts/         what each file gave (`spark.training.dataset_parts`): a run that stopped goes on, and one
+    planted.npy    bool (frames, 2): whether the left and the right foot stand parts/         what
+    each file gave (`spark.training.dataset_parts`): a run that stopped goes on, and one
                    with more files reads only those
 
-A clip is what `spark.training.pairs.Clip` says: canonical, at 30 fps, on the network's view of its body.
+A clip is what `spark.training.pairs.Clip` says: canonical, at 30 fps, on the network's view of its
+body.
 """
 
 import json

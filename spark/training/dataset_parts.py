@@ -30,8 +30,8 @@ VERSION = 2
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A file as a `spark.training.pairs.Clip` on its own rig, at 30 fps; its own frame rate, and the height
-    [m] of the floor that its feet stand on, which the path counts from."""
+    """A file as a `spark.training.pairs.Clip` on its own rig, at 30 fps; its own frame rate, and
+    the height [m] of the floor that its feet stand on, which the path counts from."""
 
     rig: Rig
     rotations: Float[np.ndarray, "T K 4"]

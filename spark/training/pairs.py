@@ -145,8 +145,8 @@ class PairMaker:
             joined([link.second for link in links], begins[:D]),
             np.concatenate([link.mix for link in links]),
         )
-        # Windows are seen from their first frames, as `spark.network.features.pose_features` sees one. The
-        # pelvis turns alike on all bodies.
+        # Windows are seen from their first frames, as `spark.network.features.pose_features` sees
+        # one. The pelvis turns alike on all bodies.
         back = quat_from_yaw(-yaw_from_quat(rows[begins[:D], :, :1]))
         roots = quat_rotate(back, hips - hips[:, :, :1] * np.array([1, 1, 0], hips.dtype))
         bodies += bodies[D:]

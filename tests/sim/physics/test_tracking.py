@@ -1,0 +1,243 @@
+"""Motions tracked in simulation, against mechanics worked by hand."""
+
+import json
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from robots.model.mjcf import read_mjcf
+from robots.model.understand import understand_robot
+from robots.registry import find
+from sim.physics.summary import summary, text
+from sim.physics.tracking import Assist, Tracked, track
+from sim.trajectory import GivenBody, given
+from spark.demo.sample import sample_motion, sample_rig
+from spark.errors import SkeletonError
+from tests.helpers.stick import standing, stick_rig
+
+FPS, HEIGHT, G = 60.0, 1.7, 9.81
+MACHINE = """
+<mujoco>
+  <compiler angle="radian"/>
+  <worldbody>
+    <body name="base" pos="0 0 0.1">
+      <freejoint/>
+      <geom type="box" size="0.5 0.5 0.1" mass="200"/>
+      <body name="arm" pos="0 0 1">
+        <joint name="elbow" {joint}/>
+        <inertial pos="0.5 0 0" mass="2" diaginertia="0.01 0.01 0.01"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>{actuator}</actuator>
+</mujoco>"""
+BARE = '<inertial pos="0 0 0" mass="200" diaginertia="1 1 1"/>'
+HINGE = 'type="hinge" axis="0 1 0"'
+
+
+def still(seconds: float, *, up: float = 0.0) -> GivenBody:
+    """The stick man in its T-pose, `up` metres above the floor."""
+    rig = stick_rig()
+    body = given(rig, standing(rig, int(seconds * FPS) + 1, FPS))
+    body.qpos[:, 2] += up
+    return body
+
+
+def machine(actuator: str, frames: int, *, joint: str = HINGE) -> GivenBody:
+    """A heavy box with an arm of 2 kg, whose centre lies 0.5 m ahead, held level."""
+    spec = mujoco.MjSpec.from_string(MACHINE.format(actuator=actuator, joint=joint))
+    model = spec.compile()
+    return GivenBody(spec, model, 1, np.tile(model.qpos0, (frames, 1)))
+
+
+def follow(body: GivenBody, *, assist: Assist | None = None) -> Tracked:
+    return track(body, 1 / FPS, height=HEIGHT, assist=assist)
+
+
+def center_of_mass(tracked: Tracked) -> np.ndarray:
+    model, root = tracked.model, tracked.target.root
+    data, out = mujoco.MjData(model), np.zeros((len(tracked.record.qpos), 3))
+    for t, qpos in enumerate(tracked.record.qpos):
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        out[t] = data.subtree_com[root]
+    return out
+
+
+def test_a_tpose_stands_without_help() -> None:
+    tracked = follow(still(2.0))
+    found = summary(tracked)
+    assert found["fall_frame"] is None
+    assert found["assist"] is None
+    assert found["error"]["mpjpe_cm"] < 1.0
+    assert found["error"]["joints_deg"] < 1.0
+    # The floor carries the whole weight, with nothing but the feet on it.
+    assert tracked.record.loads[-30:].sum(1).mean() == pytest.approx(tracked.mass * G, rel=0.01)
+    assert {each["body"].split("_")[1] for each in found["floor"]} <= {"foot", "toe"}
+
+
+def test_a_walk_is_tracked_with_help() -> None:
+    rig = sample_rig("walker")
+    motion = sample_motion("walk", rig, FPS)
+    found = summary(follow(given(rig, motion), assist=Assist()))
+    assert found["fall_frame"] is None
+    assert found["error"]["mpjpe_cm"] < 5.0
+    assert found["error"]["joints_deg"] < 3.0
+    assert found["assist"]["carried"] < 0.5, "the legs carry most of it"
+    assert found["assist"]["force"]["max"] <= 1.0 + 1e-9
+
+
+def test_free_fall_is_gravity_alone() -> None:
+    tracked = follow(still(0.6, up=3.0))
+    t = np.arange(len(tracked.record.qpos)) / FPS
+    np.testing.assert_allclose(
+        center_of_mass(tracked)[:, 2] - center_of_mass(tracked)[0, 2],
+        -G * t * (t + tracked.model.opt.timestep) / 2,  # the integrator's own sum
+        atol=1e-4,
+    )
+    assert not tracked.record.loads.any()
+    assert np.sqrt(tracked.record.square).max() < 1.0, "nothing to hold"
+    drop = 0.2 * HEIGHT
+    assert summary(tracked)["fall_frame"] == pytest.approx(FPS * np.sqrt(2 * drop / G), abs=1)
+
+
+def test_held_in_the_air_the_assist_is_the_whole_weight() -> None:
+    tracked = follow(still(3.0, up=2.0), assist=Assist(force=2.0))
+    weight = tracked.mass * G
+    force, torque = np.split(tracked.record.wrench[-60:].mean(0), 2)
+    np.testing.assert_allclose(force / weight, [0, 0, 1], atol=0.005)
+    # It hangs below its target where the spring of 10 rad/s carries it: g / 10².
+    sag = tracked.target.qpos[-1, 2] - tracked.record.qpos[-1, 2]
+    assert sag == pytest.approx(G / 100, rel=0.01)
+    # A force at the pelvis holds a body whose centre of mass is elsewhere only with a torque.
+    arm = center_of_mass(tracked)[-60:].mean(0) - tracked.record.points[-60:, 0].mean(0)
+    np.testing.assert_allclose(torque, np.cross(arm, [0, 0, weight]), atol=0.01 * weight)
+
+
+def test_the_assist_reported_is_what_moves_the_body() -> None:
+    """Force and gravity change the momentum: the body follows a target that accelerates."""
+    body = still(1.0, up=2.0)
+    t = np.arange(len(body.qpos)) / FPS
+    body.qpos[:, 0] += 0.8 * t**2
+    tracked = follow(body, assist=Assist(force=3.0))
+    com = center_of_mass(tracked)
+    momentum = tracked.mass * (np.diff(com[-2:], axis=0) - np.diff(com[5:7], axis=0))[0] * FPS
+    force = tracked.record.wrench[6:, :3] - [0, 0, tracked.mass * G]
+    impulse = ((force[1:] + force[:-1]) / 2).sum(0) / FPS
+    np.testing.assert_allclose(momentum, impulse, atol=0.02 * tracked.mass)
+    assert momentum[0] > 0.5 * tracked.mass
+
+
+def test_the_assist_is_cut_off() -> None:
+    tracked = follow(still(0.5, up=2.0), assist=Assist(force=0.3, torque=0.02))
+    force = np.linalg.norm(tracked.record.wrench[:, :3], axis=1)
+    assert force.max() == pytest.approx(0.3 * tracked.mass * G)
+    com = center_of_mass(tracked)[:, 2]
+    fallen = com[0] - com[-1]
+    assert fallen > 0.7 * G * 0.5**2 / 2, "three tenths of the weight don't hold it"
+
+
+def test_torque_is_what_the_arm_weighs() -> None:
+    strong = follow(machine('<motor joint="elbow" gear="20" ctrlrange="-2 2"/>', 121))
+    found = {row["name"]: row for row in summary(strong)["joints"]}["elbow"]
+    assert np.sqrt(strong.record.square[-30:, 1].mean()) == pytest.approx(2 * G * 0.5, rel=0.02)
+    assert found["peak_nm"] < 40
+    assert found["saturated"] < 0.05
+    weak = follow(machine('<motor joint="elbow" gear="2" ctrlrange="-2 2"/>', 61))
+    found = {row["name"]: row for row in summary(weak)["joints"]}["elbow"]
+    assert found["peak_nm"] == pytest.approx(4.0)
+    assert found["saturated"] > 0.9
+    assert "servos of ours" in weak.notes[0]
+
+
+def test_own_servos_stay_as_they_are() -> None:
+    tracked = follow(machine('<position joint="elbow" kp="200" kv="20"/>', 121))
+    assert tracked.notes == ()
+    sag = abs(float(tracked.record.qpos[-1, 7]))
+    assert 200 * sag == pytest.approx(2 * G * 0.5 * np.cos(sag), rel=0.01)
+
+
+def test_a_ball_is_followed_round_and_round() -> None:
+    """A rotation vector jumps at half a turn; the servos must not."""
+    axes = "".join(
+        f'<position joint="elbow" kp="300" kv="20" gear="{g}"/>'
+        for g in ("1 0 0", "0 1 0", "0 0 1")
+    )
+    body = machine(axes, 121, joint='type="ball"')
+    turn = np.linspace(0, 4 * np.pi, 121)
+    body.qpos[:, 7], body.qpos[:, 10] = np.cos(turn / 2), np.sin(turn / 2)
+    found = summary(follow(body))
+    assert found["error"]["joints_deg"] < 5.0
+
+
+def test_the_same_input_gives_the_same_output() -> None:
+    first, second = (follow(still(0.5), assist=Assist()) for _ in range(2))
+    assert first.record.qpos.tobytes() == second.record.qpos.tobytes()
+    assert json.dumps(summary(first)) == json.dumps(summary(second))
+
+
+def test_divergence_is_said_and_nothing_is_nan(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    body = machine('<position joint="elbow" kp="1e12"/>', 31)
+    body.qpos[1:, 7] = 1.0
+    tracked = follow(body)
+    assert tracked.diverged is not None
+    for values in vars(tracked.record).values():
+        assert np.isfinite(values).all()
+    found = summary(tracked)
+    json.dumps(found, allow_nan=False)
+    assert f"diverged at frame {tracked.diverged}" in text(found, "arm")
+    assert capfd.readouterr() == ("", "")
+    assert not list(tmp_path.iterdir()), "MuJoCo keeps its warnings to itself"
+
+
+def test_a_robot_stands_on_its_own_servos() -> None:
+    robot = understand_robot(find("robot"))
+    model = read_mjcf(find("robot"))
+    qpos = np.tile(robot.to_qpos(robot.tpose), (91, 1))
+    body = GivenBody(model.spec, model.model, model.root, qpos)
+    found = summary(track(body, 1 / FPS, height=1.32, assist=Assist()))
+    assert found["fall_frame"] is None
+    assert found["notes"] == []
+    assert len(found["joints"]) == 29
+    assert found["error"]["mpjpe_cm"] < 3.0
+
+
+def test_a_first_frame_of_another_pose_is_no_velocity() -> None:
+    """Many files begin with a T-pose, and with the motion in the next frame."""
+    body = still(1.0)
+    body.qpos[0, 7:11] = [np.sqrt(0.5), 0, np.sqrt(0.5), 0]
+    tracked = follow(body, assist=Assist())
+    assert "begins at rest" in tracked.notes[0]
+    assert tracked.diverged is None
+    assert not tracked.record.fallen.any()
+
+
+def test_one_frame_and_bad_input() -> None:
+    found = summary(follow(still(0.0), assist=Assist()))
+    assert (found["frames"], found["fall_frame"], found["stays_up_s"]) == (1, None, 0.0)
+    assert found["assist"]["work_j"] == 0
+    json.dumps(found, allow_nan=False)
+    body = still(0.1)
+    body.qpos[2, 3] = np.nan
+    with pytest.raises(SkeletonError, match="finite"):
+        follow(body)
+    bare = MACHINE.replace('<geom type="box" size="0.5 0.5 0.1" mass="200"/>', BARE)
+    spec = mujoco.MjSpec.from_string(bare.format(actuator="", joint=HINGE))
+    model = spec.compile()
+    with pytest.raises(SkeletonError, match="no shapes"):
+        follow(GivenBody(spec, model, 1, np.tile(model.qpos0, (3, 1))))
+
+
+def test_a_model_that_leaves_contacts_to_its_scene_stands() -> None:
+    ghost = MACHINE.replace("<geom ", '<geom contype="0" conaffinity="0" group="3" ')
+    spec = mujoco.MjSpec.from_string(ghost.format(actuator="", joint=HINGE))
+    model = spec.compile()
+    tracked = follow(GivenBody(spec, model, 1, np.tile(model.qpos0, (61, 1))))
+    assert tracked.record.loads[-1].sum() == pytest.approx(tracked.mass * G, rel=0.02)
+    assert any("set to collide" in note for note in tracked.notes)

@@ -1,0 +1,179 @@
+"""The report's page: one file, opens offline, and its replay, list and plots work together."""
+
+import base64
+import json
+import os
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robots import registry
+from robots.model.motion import RobotMotion
+from robots.model.understand import understand_robot
+from sim.report import Report, judge
+from sim.report.page import report_page, write_report_page
+from sim.report.plots import Plot, svg
+from sim.view.page import Marks, page
+from sim.view.scene import Figure
+from spark.errors import OutputError
+from spark.motion import Motion
+from spark.rig.rig import Rig
+from tests.helpers.stick import standing, stick_rig
+
+# Stands for a second, sinks for one, slides for one.
+PATH = np.zeros((180, 3))
+PATH[60:120, 2] = -0.05
+PATH[120:, 0] = 0.5 * np.arange(60) / 60
+TITLE = "a & b __X__ </script>"
+
+
+def stumbling() -> tuple[Report, tuple[Motion, Rig], tuple[Motion, Rig]]:
+    rig = stick_rig()
+    still = standing(rig, 180)
+    moved = replace(still, root_pos=still.root_pos + PATH)
+    return judge(moved, rig, source=(still, rig)), (moved, rig), (still, rig)
+
+
+@pytest.fixture(scope="module")
+def text() -> str:
+    report, motion, source = stumbling()
+    return report_page(report, motion, source, title=TITLE)
+
+
+@pytest.fixture(scope="module")
+def robot_text() -> str:
+    """The same of a robot, beside the stick man."""
+    robot = understand_robot(registry.find("robot"))
+    qpos = np.tile(robot.to_qpos(robot.tpose)[0], (180, 1))
+    lowest = min(robot.standing_sole(sole)[:, 2].min() for sole in robot.soles)
+    pelvis = robot.motion(robot.from_qpos(qpos[:1]), 1.0).root_pos[0, 2]
+    qpos[:, :3] += PATH - np.array([0.0, 0.0, lowest + pelvis])
+    moved = RobotMotion(robot, robot.from_qpos(qpos), 1 / 60)
+    source = standing(stick_rig(), 180), stick_rig()
+    motion = moved.motion, robot.rig, moved.body
+    report = judge(moved.motion, robot.rig, source=source, body=moved.body)
+    return report_page(report, motion, source, title=TITLE)
+
+
+def test_it_is_one_file_that_asks_for_nothing(text: str) -> None:
+    assert not re.search(r"(src|href)\s*=\s*[\"']?(https?:)?//", text)
+    assert "a &amp; b __X__ &lt;/script&gt;" in text
+    assert "of the frames are implausible" in text
+    assert "left foot sinks 5.0 cm under the floor" in text
+
+
+def test_it_holds_the_whole_record(text: str) -> None:
+    found = re.search(r'<script id="report" type="application/json">(.*?)</script>', text, re.S)
+    assert found
+    assert json.loads(found[1]) == json.loads(json.dumps(stumbling()[0].json()))
+
+
+def test_a_line_shows_the_worst_of_the_frames_that_share_a_pixel() -> None:
+    values = np.zeros(20000)
+    values[12345] = 1.0
+    never = np.zeros(20000, dtype=bool)
+    for lowest, spike in ((False, values), (True, -values)):
+        drawn = svg(Plot("x", "m", spike, never, None, lowest=lowest), 1.0, 1.0)
+        points = re.search(r'class="clip" points="([^"]*)"', drawn)
+        assert points
+        y = [float(point.split(",")[1]) for point in points[1].split()]
+        assert len(y) <= 501
+        assert np.ptp(y) > 30
+
+
+def test_the_scale_is_of_what_is_drawn() -> None:
+    """A spike of one frame is on the scale, and what is nothing but rounding is flat."""
+    never = np.zeros(100, dtype=bool)
+    spike, noise = np.zeros(100), np.full(100, 1e-8)
+    spike[50] = 30.0
+    assert "0 to 36<" in svg(Plot("x", "m", spike, never, None), 1.0, 1.0)
+    assert "0 to 1<" in svg(Plot("x", "m", noise, never, None), 1.0, 1.0)
+
+
+def test_marks_of_one_frame_outlast_the_thinning() -> None:
+    """60 frames a second, of which the page has every other one: one slides, one floats."""
+    rig = stick_rig()
+    still = standing(rig, 60)
+    states = np.zeros((60, 1), dtype=np.uint8)
+    states[31], flags = 2, [""] * 60
+    flags[41] = "F"
+    marks = Marks(np.zeros((60, 1, 3)), states, tuple(flags))
+    data = re.search(
+        r"const DATA = (.*);", page([Figure(rig, still, "x")], title="", marks=[marks])
+    )
+    assert data
+    shown = json.loads(data[1])["figures"][0]["marks"]
+    seen = np.frombuffer(base64.b64decode(shown["states"]), dtype=np.uint8)
+    assert len(seen) == 30
+    assert np.flatnonzero(seen).tolist() in ([15], [16])
+    assert np.flatnonzero(shown["flags"]).tolist() in ([20], [21])
+
+
+def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
+    report, motion, source = stumbling()
+    with pytest.raises(OutputError, match="nowhere"):
+        write_report_page(report, tmp_path / "nowhere" / "r.html", motion, source, title="t")
+
+
+@pytest.mark.parametrize("body", ["text", "robot_text"])
+def test_it_works_in_a_browser(body: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    """Headless Chromium: no error; a finding sets the replay's time; the replay looks different."""
+    text: str = request.getfixturevalue(body)
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    if chromium is None:
+        assert "CI" not in os.environ, "CI installs chromium"
+        pytest.skip("chromium is not installed")
+    probe = """<script>
+      const seen = []; onerror = m => seen.push(String(m)); console.error = onerror;
+      const out = { seen, times: [], pictures: [], labels: [] };
+      const inside = code => replay.contentWindow.eval(code);
+      // Frames are drawn when they are asked for, and messages arrive at once: no clock, no race.
+      const deliver = (to, from) => data =>
+        to.dispatchEvent(new to.MessageEvent("message", { data, source: from }));
+      const note = () => { inside("tell(); draw()"); out.times.push(inside("view.time"));
+        out.labels.push(inside("el('time').textContent"));
+        const c = replay.contentDocument.getElementById("view");
+        const d = c.getContext("2d").getImageData(0, 0, c.width, c.height).data;
+        let s = 0; for (let i = 0; i < d.length; i += 4) s = (s * 31 + d[i]) % 1000003;
+        out.pictures.push(s); };
+      addEventListener("load", () => { try {
+        inside("requestAnimationFrame = () => 0");
+        replay.contentWindow.postMessage = deliver(replay.contentWindow, window);
+        window.postMessage = deliver(window, replay.contentWindow);
+        seek(0); note();
+        document.querySelector("#findings button").click(); note();
+        const box = plots.getBoundingClientRect();
+        plots.onclick({ clientX: box.left + 0.75 * box.width }); note();
+        out.cursor = now.style.left; now.style.left = "";
+        inside("told = null; tick(0)"); out.told = now.style.left;
+      } catch (e) { seen.push(String(e)); }
+      document.body.dataset.result = JSON.stringify(out); });
+      </script></html>"""
+    path = tmp_path / "probe.html"
+    head, _, tail = text.rpartition("</html>")
+    path.write_text(head + probe + tail)
+    quiet = (
+        "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-sync "
+        "--disable-background-networking --disable-component-update --virtual-time-budget=1000"
+    )
+    ran = subprocess.run(
+        [chromium, *quiet.split(), f"--user-data-dir={tmp_path}", "--dump-dom", path.as_uri()],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    found = re.search(r'data-result="([^"]*)"', ran.stdout)
+    assert found, ran.stderr[-500:]
+    result = json.loads(found[1].replace("&quot;", '"'))
+    assert result["seen"] == []
+    np.testing.assert_allclose(result["times"], [0, 1, 0.75 * 179 / 60], atol=0.01)
+    assert len(set(result["pictures"])) == 3
+    assert result["labels"] == ["0.00 s · frame 0", "1.00 s · frame 60", "2.24 s · frame 134"]
+    assert float(result["cursor"].removesuffix("%")) == pytest.approx(75, abs=1)
+    assert result["told"] == pytest.approx(result["cursor"])

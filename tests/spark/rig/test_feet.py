@@ -1,0 +1,90 @@
+"""Soles: on the floor in the T-pose, symmetric, as long as the rig says, rigid with the foot."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spark.kinematics import forward
+from spark.motion import Motion
+from spark.rig.feet import FOOT_LENGTH, FOOT_WIDTH, sole_corners, sole_positions, standing_height
+from spark.rig.rig import Rig
+from spark.rig.roles import Role, RoleMap
+from spark.rotation import quat_about, quat_rotate
+from tests.helpers.stick import joint, standing, stick_rig
+
+
+def soles_of(rig: Rig, motion: Motion) -> np.ndarray:
+    pos, world = forward(motion)
+    return np.stack([sole_positions(sole, pos, world) for sole in sole_corners(rig)], axis=1)
+
+
+def test_in_the_tpose_the_soles_lie_on_the_floor_and_mirror_each_other() -> None:
+    rig = stick_rig()
+    left, right = soles_of(rig, standing(rig, 1))[0]
+    np.testing.assert_allclose(left[:, 2], 0, atol=1e-12)
+    np.testing.assert_allclose(left * [1, -1, 1], right, atol=1e-12)
+
+
+def test_lengths_come_from_the_rig_and_the_width_from_its_height() -> None:
+    rig = stick_rig()
+    height = standing_height(rig)
+    assert height == pytest.approx(0.9 / 0.53)
+    left = soles_of(rig, standing(rig, 1))[0, 0]
+    heel = -0.25 * FOOT_LENGTH * height
+    np.testing.assert_allclose(left[:, 0], [heel, heel, 0.13, 0.13, 0.20, 0.20], atol=1e-12)
+    half = 0.5 * FOOT_WIDTH * height
+    np.testing.assert_allclose(left[:, 1], 0.1 + np.array([-half, half] * 3), atol=1e-12)
+
+
+def test_without_toes_the_foot_has_human_proportions() -> None:
+    rig = stick_rig()
+    roles = tuple(None if r in (Role.LEFT_TOE, Role.RIGHT_TOE) else r for r in rig.roles.roles)
+    skeleton = replace(rig.skeleton, offsets=rig.skeleton.offsets.copy())
+    for toe in (Role.LEFT_TOE, Role.RIGHT_TOE):
+        skeleton.offsets[joint(toe)] = 0
+    skeleton = replace(
+        skeleton, end_parents=np.zeros(0, dtype=np.int64), end_offsets=np.zeros((0, 3))
+    )
+    rig = replace(
+        rig, skeleton=skeleton, roles=RoleMap(roles, rig.roles.confidence, rig.roles.reasons)
+    )
+    left = soles_of(rig, standing(rig, 1))[0, 0]
+    assert np.ptp(left[:, 0]) == pytest.approx(FOOT_LENGTH * standing_height(rig))
+    assert set(sole_corners(rig)[0].joints) == {joint(Role.LEFT_FOOT)}
+
+
+def test_toes_bend_while_heel_and_ball_stay() -> None:
+    rig = stick_rig()
+    motion = standing(rig, 1)
+    motion.rotations[0, joint(Role.LEFT_TOE)] = quat_about("y", np.array(-np.pi / 2))
+    left = soles_of(rig, motion)[0, 0]
+    np.testing.assert_allclose(left[:4, 2], 0, atol=1e-12)
+    # The tip lies 0.07 ahead of and 0.02 below the toe joint (0.13, 0.02): turned up by 90 degrees
+    # it lies 0.07 above and 0.02 ahead of it.
+    np.testing.assert_allclose(left[4:, [0, 2]], [[0.13 + 0.02, 0.02 + 0.07]] * 2, atol=1e-12)
+
+
+def test_the_offsets_do_not_depend_on_the_rigs_local_axes() -> None:
+    rig = stick_rig()
+    turn = quat_about("x", np.array(0.7))
+    turned = replace(rig, tpose=np.tile(turn, (len(rig.skeleton), 1)))
+    # A skeleton whose rest pose is the stick man turned by -0.7 about X, standing up in `tpose`.
+    inverse = quat_about("x", np.array(-0.7))
+    skeleton = replace(
+        rig.skeleton,
+        offsets=quat_rotate(inverse, rig.skeleton.offsets),
+        end_offsets=quat_rotate(inverse, rig.skeleton.end_offsets),
+    )
+    turned = replace(turned, skeleton=skeleton)
+    pose = standing(turned, 1)
+    pose.rotations[0, 0] = turn
+    pose.root_pos[0] = [0.0, 0.0, 0.9]
+    np.testing.assert_allclose(soles_of(turned, pose), soles_of(rig, standing(rig, 1)), atol=1e-12)
+
+
+def test_a_leg_without_a_foot_has_no_sole() -> None:
+    rig = stick_rig()
+    roles = tuple(None if r is Role.RIGHT_FOOT else r for r in rig.roles.roles)
+    rig = replace(rig, roles=RoleMap(roles, rig.roles.confidence, rig.roles.reasons))
+    assert [sole.side for sole in sole_corners(rig)] == ["left"]

@@ -1,0 +1,324 @@
+"""Every rig's T-pose is a T, whatever its rest pose is, and the same in all of its clips."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from spark.demo.sample import BUILDS, sample_motion, sample_rig
+from spark.errors import SkeletonError
+from spark.io.recording import read_recording
+from spark.kinematics import local_rotations, world_positions
+from spark.motion import Motion
+from spark.rig.rig import Rig, understand
+from spark.rig.roles import LIMBS, Group, Role, RoleMap
+from spark.rig.tpose import find_tpose
+from spark.rotation import (
+    quat_about,
+    quat_angle,
+    quat_from_rotvec,
+    quat_mul,
+    quat_rotate,
+    rotvec_from_quat,
+)
+from spark.skeleton import Skeleton
+from spark.transfer.canonical import to_canonical
+from tests.helpers.humanoids import EVERY_BODY, ONE_A_RIG
+from tests.helpers.recordings import DATA, recording, recordings
+from tests.helpers.rerig import along_x, rerig, rest_in
+from tests.helpers.stick import joint, standing, stick_rig
+
+DOWN, LEFT, RIGHT = np.array([0.0, 0, -1]), np.array([0.0, 1, 0]), np.array([0.0, -1, 0])
+# How far [deg] a T-pose found from a motion may be from the true one: a foot's slope is that of
+# standing feet, toes are laid level, and clavicles, which may slope, are laid along the line.
+LOOSE = {
+    Role.LEFT_FOOT: 8.0,
+    Role.RIGHT_FOOT: 8.0,
+    Role.LEFT_TOE: 15.0,
+    Role.RIGHT_TOE: 15.0,
+    Role.LEFT_CLAVICLE: 25.0,
+    Role.RIGHT_CLAVICLE: 25.0,
+}
+
+
+def rig_of(path: object) -> Rig:
+    return understand(read_recording(str(path)).motion)
+
+
+def direction(rig: Rig, start: Role, end: Role) -> np.ndarray | None:
+    a, b = rig.roles.joint(start), rig.roles.joint(end)
+    if a is None or b is None:
+        return None
+    positions = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
+    bone = positions[b] - positions[a]
+    return bone / np.linalg.norm(bone)
+
+
+def assert_is_t(rig: Rig) -> None:
+    for group, limb in LIMBS.items():
+        goal = {Group.LEFT_ARM: LEFT, Group.RIGHT_ARM: RIGHT}.get(group, DOWN)
+        arm = group in (Group.LEFT_ARM, Group.RIGHT_ARM)
+        for start, end in zip(limb[arm:], limb[1 + arm :], strict=False):
+            bone = direction(rig, start, end)
+            if bone is None:
+                continue
+            if end in (Role.LEFT_TOE, Role.RIGHT_TOE):
+                assert bone[0] > 0.3
+                assert bone[2] < 0.2, "the toes are not above the ankle"
+                assert abs(bone[1]) < 1e-6, "feet point straight ahead"
+            else:
+                assert np.degrees(np.arccos(np.clip(bone @ goal, -1, 1))) < 1e-3, (start, end)
+    trunk = direction(rig, Role.PELVIS, Role.HEAD)
+    if trunk is not None:
+        assert trunk[2] > 0.9
+    assert rig.hip_height > 0
+
+
+@pytest.mark.parametrize("path", recordings(*EVERY_BODY))
+def test_tpose_is_a_t(path: object) -> None:
+    assert_is_t(rig_of(path))
+
+
+@pytest.mark.parametrize("build", BUILDS)
+def test_tpose_of_made_rigs(build: str) -> None:
+    assert_is_t(sample_rig(build))
+
+
+def test_a_bent_tpose_is_noticed() -> None:
+    rig = sample_rig("walker")
+    forearm = list(rig.skeleton.subtree(rig.roles.require(Role.LEFT_UPPER_ARM)))
+    rig.tpose[forearm] = quat_mul(quat_about("z", np.array(0.1)), rig.tpose[forearm])
+    with pytest.raises(AssertionError):
+        assert_is_t(rig)
+
+
+# How limbs of the left side are turned from the T-pose at rest, and the whole body after them.
+RESTS: dict[str, tuple[dict[Role, list[float]], list[float]]] = {
+    "T, facing backwards": ({}, [0, 0, np.pi]),
+    "A-pose, facing left": ({Role.LEFT_UPPER_ARM: [-0.8, 0, 0]}, [0, 0, np.pi / 2]),
+    "arms hanging, palms to the thighs": ({Role.LEFT_UPPER_ARM: [-np.pi / 2, 0, 0]}, [0, 0, 0]),
+    "arms ahead, palms down": ({Role.LEFT_UPPER_ARM: [0, 0, -np.pi / 2]}, [0, 0, 0]),
+    "elbows bent, legs apart": (
+        {
+            Role.LEFT_UPPER_ARM: [-0.8, 0, 0],
+            Role.LEFT_FOREARM: [0, 0, -0.6],
+            Role.LEFT_UPPER_LEG: [0.3, 0, 0],
+        },
+        [0, 0, 0],
+    ),
+    "crouching": (
+        {Role.LEFT_UPPER_LEG: [0, -1.2, 0], Role.LEFT_LOWER_LEG: [0, 1.5, 0]},
+        [0, 0, 0],
+    ),
+    "lying on its back": ({Role.LEFT_UPPER_ARM: [-0.8, 0, 0]}, [0, -np.pi / 2, 0]),
+    "head down": ({}, [np.pi, 0, 0]),
+}
+
+
+@pytest.mark.parametrize("rest", RESTS)
+def test_any_rest_pose_leads_to_the_same_tpose(rest: str) -> None:
+    """The rig that the same body gets from another rest pose is the same rig, twists included."""
+    rig = sample_rig("walker")
+    motion = sample_motion("walk", rig, 30.0)
+    axes = rest_in(rig, *RESTS[rest])
+    tpose, notes = find_tpose(rerig(motion, axes), rig.roles)
+    assert np.degrees(quat_angle(tpose, quat_mul(rig.tpose, axes))).max() < 1e-3
+    assert notes == ()
+
+
+def assert_near(rig: Rig, tpose: np.ndarray, true: np.ndarray) -> None:
+    for j, error in enumerate(np.degrees(quat_angle(tpose, true))):
+        role = rig.roles.roles[j]
+        assert role is None or error < LOOSE.get(role, 1.0), (role, error)
+
+
+@pytest.mark.parametrize("quarters", [(0, 0), (1, 2), (2, 1), (3, 3)])
+@pytest.mark.parametrize("name", ["walk", "squat"])
+def test_rest_poses_without_a_pose_lead_to_the_tpose(name: str, quarters: tuple[int, int]) -> None:
+    """All bones along one axis, as in LAFAN1: mean pose and bending axes give the T-pose."""
+    rig = sample_rig("walker")
+    axes = along_x(rig, quarters)
+    lined_up = rerig(sample_motion(name, rig, 30.0), axes)
+    tpose, notes = find_tpose(lined_up, rig.roles)
+    assert "found from the motion" in notes[0]
+    assert_near(rig, tpose, quat_mul(rig.tpose, axes))
+    assert_is_t(replace(rig, skeleton=lined_up.skeleton, tpose=tpose))
+
+
+def test_ankles_that_were_not_captured_show_how_feet_were_built() -> None:
+    """Where the ankle keeps still while the leg moves, the foot is flat below an upright shank."""
+    rig = sample_rig("walker")
+    motion = sample_motion("walk", rig, 30.0)
+    feet = [rig.roles.require(role) for role in (Role.LEFT_FOOT, Role.RIGHT_FOOT)]
+    motion.rotations[:, feet] = [1.0, 0, 0, 0]
+    axes = along_x(rig, (0, 2))
+    tpose, _ = find_tpose(rerig(motion, axes), rig.roles)
+    error = np.degrees(quat_angle(tpose, quat_mul(rig.tpose, axes)))
+    assert error[feet].max() < 1e-3
+
+
+LINED_UP = ("cmu_asf/cmu_02_01.bvh", "cmu_asf/cmu_02_05.bvh", "animateddrawings/jumping.bvh")
+
+
+@pytest.mark.parametrize("path", recordings(*LINED_UP))
+def test_recorded_bodies_without_a_rest_pose_keep_their_twists(path: object) -> None:
+    """On captured motions too, thighs, shanks, arms, hands and trunk come out exactly."""
+    motion = read_recording(str(path)).motion
+    rig = understand(motion)
+    axes = along_x(rig, (1, 3))
+    tpose, _ = find_tpose(rerig(motion, axes), rig.roles)
+    assert_near(rig, tpose, quat_mul(rig.tpose, axes))
+
+
+CLIPS_OF_ONE_RIG = {
+    "cmu subject 01": ("cmu_asf/cmu_01_*.bvh",),
+    "cmu subject 02": ("cmu_asf/cmu_02_*.bvh",),
+    "cmu_expmap": ("cmu_expmap/test_[bjrsw]*_1.bvh",),
+    "fair1": ("animateddrawings/[dz]*.bvh", "animateddrawings/jumping.bvh"),
+    "rokoko": ("zoo/ad_rokoko_mixamo.bvh", "animateddrawings/jesse_dance.bvh"),
+    "kaiju": ("mesh2motion/kaiju_Walk*.bvh",),
+    "bird": ("mesh2motion/bird_*.bvh",),
+}
+
+
+@pytest.mark.parametrize("family", CLIPS_OF_ONE_RIG)
+def test_clips_of_a_rig_share_its_tpose(family: str) -> None:
+    if not DATA.exists():
+        pytest.skip(f"{family}: no recordings beside the checkout")
+    parameters = recordings(*CLIPS_OF_ONE_RIG[family])
+    rigs = [rig_of(p.values[0]) for p in parameters[:8]]  # type: ignore[attr-defined]
+    assert len(rigs) > 1
+    for rig in rigs[1:]:
+        assert np.allclose(rig.skeleton.offsets, rigs[0].skeleton.offsets, atol=5e-3)
+        assert np.degrees(quat_angle(rigs[0].tpose, rig.tpose)).max() < 5
+
+
+MOVING = (
+    *(f for f in ONE_A_RIG if "face" not in f and "tpose" not in f),
+    "animateddrawings/*.bvh",
+    "mesh2motion/kaiju_[HIRST]*.bvh",
+)
+
+
+@pytest.mark.parametrize("path", recordings(*MOVING))
+def test_knees_bend_backwards_and_elbows_forwards(path: object) -> None:
+    """A knee turns about +Y, a left elbow about -Z, a right one about +Z: seen in the T-pose's
+    axes, so a limb that is twisted there shows. Checked where a clip bends the joint."""
+    motion = read_recording(str(path)).motion
+    rig = understand(motion)
+    local = rotvec_from_quat(local_rotations(rig.skeleton, to_canonical(motion, rig).rotations))
+    for role, axis, bone in (
+        (Role.LEFT_LOWER_LEG, [0, 1, 0], DOWN),
+        (Role.RIGHT_LOWER_LEG, [0, 1, 0], DOWN),
+        (Role.LEFT_FOREARM, [0, 0, -1], LEFT),
+        (Role.RIGHT_FOREARM, [0, 0, 1], RIGHT),
+    ):
+        turns = local[:, rig.roles.require(role)]
+        turns = turns - (turns @ bone)[:, None] * bone  # a forearm may twist as it likes
+        bend = turns[np.linalg.norm(turns, axis=-1) > np.radians(35)]
+        if len(bend) < 0.05 * len(turns):
+            continue
+        mean = bend.mean(0) / np.linalg.norm(bend.mean(0))
+        assert mean @ axis > 0.6, (role, mean)
+
+
+@pytest.mark.parametrize("path", recordings(*ONE_A_RIG, "mesh2motion/kaiju_Idle.bvh"))
+def test_thumbs_point_forward(path: object) -> None:
+    """Of the hands that have fingers: the index finger's root lies before the little finger's, the
+    thumb before the wrist."""
+    rig = rig_of(path)
+    positions = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
+    for role in (Role.LEFT_HAND, Role.RIGHT_HAND):
+        hand = rig.roles.joint(role)
+        below = rig.skeleton.subtree(hand)[1:] if hand is not None else ()
+        first = {
+            finger: next((j for j in below if finger in rig.skeleton.names[j].lower()), None)
+            for finger in ("thumb", "index", "pinky")
+        }
+        pairs = [(first["index"], first["pinky"]), (first["thumb"], hand)]
+        ahead = next((p for p in pairs if None not in p), None)
+        if ahead is None:
+            continue
+        across = positions[ahead[0]] - positions[ahead[1]]
+        across[1] = 0
+        if np.linalg.norm(across) > 0.005:
+            assert across[0] > 0.7 * np.linalg.norm(across), (role, across)
+
+
+def with_thumbs(rig: Rig) -> Rig:
+    """The stick man with a thumb on each hand, before its palm."""
+    skeleton, roles = rig.skeleton, rig.roles
+    hands = [joint(Role.LEFT_HAND), joint(Role.RIGHT_HAND)]
+    return replace(
+        rig,
+        skeleton=Skeleton(
+            (*skeleton.names, "left_thumb", "right_thumb"),
+            np.append(skeleton.parents, hands),
+            np.concatenate([skeleton.offsets, [[0.04, 0.03, -0.01], [0.04, -0.03, -0.01]]]),
+            np.append(skeleton.translating, [False, False]),
+            skeleton.end_parents,
+            skeleton.end_offsets,
+        ),
+        roles=RoleMap((*roles.roles, None, None), (1.0,) * 20, ("",) * 20),
+        tpose=np.tile([1.0, 0, 0, 0], (20, 1)),
+    )
+
+
+@pytest.mark.parametrize(("roll", "turned"), [(0.0, False), (0.5, False), (np.pi / 2, True)])
+def test_palms_turn_down_where_thumbs_say_so(roll: float, turned: bool) -> None:
+    """Hanging arms whose palms face backwards come up with their thumbs down; that is mended."""
+    rig = with_thumbs(stick_rig())
+    hang = [rest_in(rig, {Role.LEFT_UPPER_ARM: [-np.pi / 2, 0, 0]}, [0, 0, 0])]
+    for side, sign in ((Role.LEFT_UPPER_ARM, 1.0), (Role.RIGHT_UPPER_ARM, -1.0)):
+        arm = list(rig.skeleton.subtree(rig.roles.require(side)))
+        inward = quat_from_rotvec(np.array([0, 0, -sign * roll]))
+        hang[0][arm] = quat_mul(hang[0][arm], inward)
+    motion = rerig(standing(rig, 3), hang[0])
+    tpose, notes = find_tpose(motion, rig.roles)
+    assert len(notes) == (2 if turned else 0)
+    for thumb in (18, 19):
+        hand = motion.skeleton.parents[thumb]
+        side = quat_rotate(tpose[hand], motion.skeleton.offsets[thumb])
+        assert side[0] > 0.8 * np.hypot(side[0], side[2])
+
+
+@pytest.mark.parametrize("build", BUILDS)
+def test_turning_the_file_does_not_turn_the_tpose(build: str) -> None:
+    """A rig that faces elsewhere at rest has the same T-pose: it faces +X."""
+    rig = sample_rig(build)
+    motion = sample_motion("walk", rig, 30.0)
+    yaw = quat_about("z", np.array(np.pi / 2))
+    R = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    skeleton = rig.skeleton
+    turned = type(skeleton)(
+        skeleton.names,
+        skeleton.parents,
+        skeleton.offsets @ R.T,
+        skeleton.translating,
+        skeleton.end_parents,
+        skeleton.end_offsets @ R.T,
+    )
+    back = yaw * np.array([1, -1, -1, -1])
+    rotations = quat_mul(quat_mul(yaw, motion.rotations), back)
+    other = understand(Motion(turned, motion.frame_time, motion.root_pos @ R.T, rotations))
+    expected = quat_mul(rig.tpose, back)
+    assert np.degrees(quat_angle(expected, other.tpose)).max() < 1e-3
+
+
+def test_the_kaiju_keeps_its_stoop() -> None:
+    """A body that leans at rest stands on its feet in the T-pose, and leans there as well."""
+    rig = rig_of(recording("mesh2motion/kaiju_Idle.bvh"))
+    rest = rig.skeleton.rest_positions
+    spine = [rig.pelvis, *rig.roles.joints(Role.SPINE)]
+    positions = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
+    for a, b in pairwise(spine):
+        assert np.allclose(positions[b] - positions[a], rest[b] - rest[a], atol=1e-9)
+
+
+def test_a_body_in_one_point_is_refused() -> None:
+    rig = stick_rig()
+    flat = replace(rig.skeleton, offsets=np.zeros_like(rig.skeleton.offsets))
+    motion = replace(standing(rig, 2), skeleton=flat)
+    with pytest.raises(SkeletonError, match="no direction is left"):
+        find_tpose(motion, rig.roles)

@@ -1,0 +1,102 @@
+"""Refined feet stand still where the source's stand, and the rest of the body hardly notices."""
+
+import numpy as np
+import pytest
+
+from spark.demo.sample import MOTIONS, sample_motion, sample_rig
+from spark.io.recording import read_recording
+from spark.kinematics import forward
+from spark.rig.contacts import planted_feet, speeds
+from spark.rig.rig import Rig, understand
+from spark.transfer.analytic import transfer
+from spark.transfer.canonical import canonical_positions, from_canonical, to_canonical
+from spark.transfer.foot_lock import refine
+from spark.transfer.leg_ik import blend_between, stance_correction
+from tests.helpers.recordings import recording
+
+PAIRS = [
+    ("cmu_asf/cmu_02_01.bvh", "zoo/m2m_human.bvh"),
+    ("cmu_asf/cmu_02_05.bvh", "zoo/ad_rokoko_mixamo.bvh"),
+    ("cmu_asf/cmu_01_01.bvh", "zoo/makehuman_walk.bvh"),
+    ("cmu_asf/cmu_01_01.bvh", "zoo/ad_fair1_zup.bvh"),
+]
+
+
+def read(name: str) -> tuple[object, Rig]:
+    motion = read_recording(recording(name)).motion
+    return motion, understand(motion)
+
+
+def foot_speed(positions: np.ndarray, rig: Rig, planted: np.ndarray, frame_time: float) -> float:
+    return float(speeds(positions[:, rig.contact_joints], frame_time)[planted].mean())
+
+
+@pytest.mark.parametrize(("source", "target"), PAIRS)
+def test_standing_feet_slow_down_threefold_and_little_else_moves(source: str, target: str) -> None:
+    motion, rig = read(source)
+    _, other = read(target)
+    canonical = to_canonical(motion, rig)  # type: ignore[arg-type]
+    copied = transfer(canonical, other)
+    refined = refine(canonical, copied)
+    planted = planted_feet(rig, canonical_positions(canonical), canonical.frame_time)
+    before, after = canonical_positions(copied), canonical_positions(refined)
+    fast, slow = (foot_speed(p, other, planted, canonical.frame_time) for p in (before, after))
+    assert slow < fast / 3
+    assert np.linalg.norm(after - before, axis=-1).mean() < 0.01 * other.hip_height
+    jerks = [np.diff(p, 3, axis=0).std() for p in (before, after)]
+    assert jerks[1] < 1.1 * jerks[0]
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_feet_that_already_stand_are_left_alone(name: str) -> None:
+    rig = sample_rig("walker")
+    canonical = to_canonical(sample_motion(name, rig, 60.0), rig)
+    same = refine(canonical, transfer(canonical, rig))
+    moved = canonical_positions(same) - canonical_positions(canonical)
+    assert np.abs(moved).max() < 0.01
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_made_motions_stand_on_the_other_rig(name: str) -> None:
+    """The walker's longer trunk and shorter legs: its dancer's feet rest on the floor, unmoved."""
+    source, target = sample_rig("walker"), sample_rig("dancer")
+    canonical = to_canonical(sample_motion(name, source, 60.0), source)
+    refined = refine(canonical, transfer(canonical, target))
+    motion = from_canonical(refined)
+    positions, _ = forward(motion)
+    planted = planted_feet(source, canonical_positions(canonical), canonical.frame_time)
+    inside = planted[2:-2] & planted[:-4] & planted[4:]
+    moving = speeds(positions[:, target.contact_joints], motion.frame_time)[2:-2]
+    assert moving[inside].mean() < 0.01
+
+
+def test_a_slid_foot_is_held_at_the_middle_of_its_stance() -> None:
+    """By hand: 4 frames of stance sliding 1 cm a frame are held at their mean, 1.5 cm in, and as
+    high as is wanted: at 2 cm on average."""
+    path, wanted = np.zeros((8, 3)), np.zeros((8, 3))
+    path[:, 0] = wanted[:, 0] = 0.01 * np.arange(8)
+    path[:, 2], wanted[2:6, 2] = 0.1, (0.01, 0.01, 0.03, 0.03)
+    planted = np.array([0, 0, 1, 1, 1, 1, 0, 0], dtype=bool)
+    held = path + stance_correction(path, wanted, planted)
+    np.testing.assert_allclose(held[2:6], [(0.035, 0, 0.02)] * 4, atol=1e-12)
+    np.testing.assert_allclose(stance_correction(path, wanted, np.zeros(8, dtype=bool)), 0)
+
+
+def test_corrections_blend_without_a_jump() -> None:
+    values = np.array([[0.0, 0, 0], [1.0, 0, 0]])
+    out = blend_between(values, np.array([2, 6]), 9)[:, 0]
+    np.testing.assert_allclose(out, [0, 0, 0, 5 / 32, 0.5, 27 / 32, 1, 1, 1])
+
+
+def test_many_paths_at_once_are_each_by_itself() -> None:
+    """Stances that touch a window's ends, none at all, and all: held at means, eased in between."""
+    rng = np.random.default_rng(0)
+    paths, goals = rng.normal(size=(2, 5, 30, 3))
+    planted = rng.random((5, 30)) < np.array([0.2, 0.5, 0.9, 0.0, 1.0])[:, None]
+    together = stance_correction(paths, goals, planted)
+    for path, goal, flags, made in zip(paths, goals, planted, together, strict=True):
+        frames = np.flatnonzero(flags)
+        stances = np.split(frames, np.flatnonzero(np.diff(frames) > 1) + 1)
+        held = [goal[stance].mean(0) - path[stance] for stance in stances if len(stance)]
+        wanted = blend_between(np.concatenate(held), frames, 30) if held else np.zeros((30, 3))
+        np.testing.assert_allclose(made, wanted, atol=1e-12)
