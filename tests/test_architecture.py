@@ -8,44 +8,97 @@ from pathlib import Path
 import pytest
 
 CHECKOUT = Path(__file__).parents[1]
-LAYERS = ("spark", "sim", "robots", "spark_sim", "scripts")
+ROOMS = (
+    ("spark",),  # its own files: errors, files, rotation, skeleton, motion, kinematics, resample
+    ("spark.io", "spark.rig"),
+    ("spark.transfer",),
+    ("spark.demo", "spark.network"),
+    ("spark.training",),
+    ("spark.evaluation",),
+    ("sim.body",),
+    ("sim",),  # trajectory, interpolate
+    ("sim.physics", "sim.view"),
+    ("sim.report",),
+    ("robots",),  # tree, registry, least_squares, residuals
+    ("robots.model",),
+    ("robots.formats", "robots.solver"),
+    ("robots.stream",),
+    ("spark_sim",),
+    ("spark_sim.commands",),
+    ("tests.helpers",),
+    ("scripts",),
+    ("tests",),
+)
+"""Imports run up this table: a file imports from its own room and from the rows above it."""
+
+LEVEL = {room: level for level, row in enumerate(ROOMS) for room in row}
+PACKAGES = ("spark", "sim", "robots", "spark_sim", "scripts")
+COMMAND_LINE = {"spark_sim.cli", "spark_sim.__main__"}  # they start the commands
 
 
 def imports(source: str) -> set[str]:
-    """Top-level packages that a module imports, at its top or inside a function."""
+    """The names that a module imports, dotted, at its top or inside a function."""
     found: set[str] = set()
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
-            found |= {alias.name.split(".")[0] for alias in node.names}
+            found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, "imports are absolute"
-            found.add((node.module or "").split(".")[0])
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
     return found
 
 
-def breaches(layer: str, source: str) -> set[str]:
-    """Packages above `layer` that the source imports; tests are above all."""
-    return imports(source) & {*LAYERS[LAYERS.index(layer) + 1 :], "tests"}
+def room_of(name: str) -> str | None:
+    """The innermost room that a dotted name is in; None for what is not ours."""
+    parts = name.split(".")
+    names = (".".join(parts[:k]) for k in range(len(parts), 0, -1))
+    return next((room for room in names if room in LEVEL), None)
+
+
+def breaches(module: str, source: str) -> set[str]:
+    """What a module imports from rooms beside or above its own."""
+    own = room_of(module)
+    assert own is not None
+    rooms = {name: room for name in imports(source) if (room := room_of(name)) not in (None, own)}
+    return {name for name, room in rooms.items() if room and LEVEL[room] >= LEVEL[own]}
+
+
+def modules(*packages: str) -> dict[str, Path]:
+    """The files of packages by their dotted names."""
+    files = [path for package in packages for path in (CHECKOUT / package).rglob("*.py")]
+    names = [".".join(path.relative_to(CHECKOUT).with_suffix("").parts) for path in sorted(files)]
+    return {n.removesuffix(".__init__"): p for n, p in zip(names, sorted(files), strict=True)}
+
+
+def test_every_folder_is_a_room() -> None:
+    folders = {name.rpartition(".")[0] for name in modules(*PACKAGES)} - {""}
+    assert folders == {room for room in LEVEL if not room.startswith("tests")}
 
 
 def test_imports_run_one_way() -> None:
-    files = [(layer, path) for layer in LAYERS for path in (CHECKOUT / layer).rglob("*.py")]
-    assert {layer for layer, _ in files} >= {"spark", "sim", "robots", "spark_sim"}
-    assert {str(p): found for layer, p in files if (found := breaches(layer, p.read_text()))} == {}
+    found = {
+        name: breaches(name, path.read_text())
+        for name, path in modules(*PACKAGES).items()
+        if name not in COMMAND_LINE
+    }
+    assert {name: names for name, names in found.items() if names} == {}
 
 
 @pytest.mark.parametrize(
-    ("layer", "source", "found"),
+    ("module", "source", "found"),
     [
-        ("spark", "def f():\n    from sim.body.build import build_body", {"sim"}),
-        ("sim", "import numpy, robots.model.mjcf as m", {"robots"}),
-        ("robots", "if 1:\n    import spark_sim", {"spark_sim"}),
-        ("spark_sim", "import spark, sim, robots, scripts.train", {"scripts"}),
-        ("sim", "from spark.errors import SparkSimError\nimport simulation", set()),
+        ("spark.motion", "def f():\n    from sim.body.build import x", {"sim.body.build.x"}),
+        ("spark.io.bvh", "from spark.rig.roles import Role", {"spark.rig.roles.Role"}),
+        ("spark.network.forward", "import spark.training.pairs", {"spark.training.pairs"}),
+        ("sim.body.build", "from sim import interpolate", {"sim.interpolate"}),
+        ("sim.view.scene", "import numpy, robots.model.mjcf as m", {"robots.model.mjcf"}),
+        ("robots.solver.solve", "if 1:\n    import spark_sim", {"spark_sim"}),
+        ("spark_sim.api", "import spark, sim, robots, scripts.train", {"scripts.train"}),
+        ("sim.report.text", "from spark.errors import SparkSimError\nimport simulation", set()),
     ],
 )
-def test_the_guard_sees_breaches(layer: str, source: str, found: set[str]) -> None:
-    assert breaches(layer, source) == found
+def test_the_guard_sees_breaches(module: str, source: str, found: set[str]) -> None:
+    assert breaches(module, source) == found
 
 
 def loads_torch(code: str) -> bool:
@@ -58,16 +111,13 @@ def loads_torch(code: str) -> bool:
     return done.stdout.endswith("True\n")
 
 
-def modules(package: str) -> str:
-    """An import statement for all modules of a package."""
-    found = sorted((CHECKOUT / package).rglob("*.py"))
-    names = [".".join(p.relative_to(CHECKOUT).with_suffix("").parts) for p in found]
-    return "import " + ", ".join(n.removesuffix(".__init__") for n in names if "__main__" not in n)
+WITH_TORCH = ("spark.training", "spark.network.t5")
 
 
-def test_bodies_and_robots_load_no_torch() -> None:
-    assert not loads_torch("import spark")
-    assert not loads_torch(f"{modules('sim')}\n{modules('robots')}\n{modules('spark_sim')}")
+def test_only_training_loads_torch() -> None:
+    names = [n for n in modules(*PACKAGES[:4]) if not n.startswith(WITH_TORCH)]
+    names.remove("spark_sim.__main__")
+    assert not loads_torch("import " + ", ".join(names))
 
 
 def test_the_torch_guard_can_fail() -> None:

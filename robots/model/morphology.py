@@ -9,8 +9,6 @@ from jaxtyping import Float, Int
 
 from robots.model.mjcf import Mjcf
 from robots.model.tpose import rest_pose
-from robots.solver.collision import Collisions, find_collisions
-from robots.solver.exact_contact import Contacts
 from robots.tree import Coordinates, Tree, forward
 from spark.kinematics import world_positions
 from spark.motion import Motion
@@ -71,16 +69,6 @@ class Morphology:
             if role is not None and bone is not None:
                 found[role] = bone / np.linalg.norm(bone)
         return found
-
-    @cached_property
-    def collisions(self) -> Collisions:
-        """The pairs of the robot's shapes that must not run into each other."""
-        return find_collisions(self.mjcf, self.tree, self.mj_joints, self.tpose)
-
-    @cached_property
-    def contacts(self) -> Contacts:
-        """What measures these pairs exactly."""
-        return Contacts(self.mjcf.model, self.collisions, self.to_qpos(self.tpose)[0])
 
     @cached_property
     def _addresses(self) -> Int[np.ndarray, "N"]:

@@ -5,17 +5,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from robots.least_squares import Normal
-from robots.model.mjcf import Mjcf
+from robots.model.morphology import Morphology
 from robots.model.shapes import DIRECTIONS
 from robots.residuals import one_sided
 from robots.solver.block import Stage
 from robots.solver.hulls import Pair, Shape, meet, shapes_of
-from robots.tree import Coordinates, Frames, Tree, forward
+from robots.tree import Frames, Tree, forward
 
 APART = 0.0  # [m] that shapes keep between them; less where the T-pose has less
 EASE = 0.003  # [m]
@@ -190,13 +191,13 @@ def approach(
     return (moved * along).sum(1)
 
 
-def find_collisions(
-    mjcf: Mjcf, tree: Tree, joints: Sequence[int], tpose: Coordinates
-) -> Collisions:
-    """The pairs of the model's colliding shapes, but for those of neighbouring bodies and those
+@lru_cache(maxsize=16)
+def collisions_of(robot: Morphology) -> Collisions:
+    """The pairs of the robot's colliding shapes, but for those of neighbouring bodies and those
     that the file excludes. What touches in the T-pose may stay as near as it is there."""
-    shapes = shapes_of(mjcf, joints)
-    frames = forward(tree, tpose)
+    mjcf, tree = robot.mjcf, robot.tree
+    shapes = shapes_of(mjcf, robot.mj_joints)
+    frames = forward(tree, robot.tpose)
     pairs = []
     for i, a in enumerate(shapes):
         for b in shapes[i + 1 :]:

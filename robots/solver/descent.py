@@ -9,6 +9,7 @@ from scipy.ndimage import minimum_filter1d, uniform_filter1d
 from robots.least_squares import Normal, Ties
 from robots.model.morphology import Morphology
 from robots.solver.block import Stage
+from robots.solver.collision import collisions_of
 from robots.solver.footprints import Footing
 from robots.solver.objective import linearize
 from robots.solver.smoothness import jolted, ties_of
@@ -72,7 +73,7 @@ def solve_stage(
     damping = least
     start = q if apart else None
     stride = 1 if mending else stride_of(targets)
-    nears = robot.collisions.near(forward(tree, q), stage, stride) if apart else []
+    nears = collisions_of(robot).near(forward(tree, q), stage, stride) if apart else []
     stiffer = np.ones((max(len(q) - 2, 0), len(stage.columns)))
 
     def look(q: Coordinates, rows: bool = True) -> Normal:
@@ -96,7 +97,7 @@ def solve_stage(
         for _ in range(_HALVINGS if mending else 1):
             trial = q.moved(tree, step).clipped(tree, SHORT_OF_LIMIT)
             if apart and k % _WATCH == _WATCH - 1:
-                nears = robot.collisions.near(forward(tree, trial), stage, stride)
+                nears = collisions_of(robot).near(forward(tree, trial), stage, stride)
             there = look(trial, rows=k < most - 1)
             after = uniform_filter1d(there.cost + tie(trial).cost(len(q)), window)
             if not mending or after.sum() <= cost.sum():

@@ -2,16 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from robots.least_squares import Normal
+from robots.model.morphology import Morphology
 from robots.residuals import one_sided
 from robots.solver.block import Stage
-from robots.solver.collision import APART, EASE, Collisions, Near, approach
+from robots.solver.collision import APART, EASE, Collisions, Near, approach, collisions_of
 from robots.solver.hulls import Pair
 from robots.tree import Frames
 
@@ -121,3 +122,9 @@ class Contacts:
                 out = (small - large) / far[at]
                 found.append(Measured(near, at, far[at], np.stack([small, large]), out))
         return found
+
+
+@lru_cache(maxsize=16)
+def exact_contacts_of(robot: Morphology) -> Contacts:
+    """What measures the pairs of `collisions_of` exactly."""
+    return Contacts(robot.mjcf.model, collisions_of(robot), robot.to_qpos(robot.tpose)[0])

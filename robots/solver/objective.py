@@ -12,7 +12,8 @@ from robots.least_squares import Normal
 from robots.model.morphology import Morphology
 from robots.residuals import Rows, direction_rows, limit_rows, one_sided, point_columns, turn_rows
 from robots.solver.block import Stage
-from robots.solver.collision import Near
+from robots.solver.collision import Near, collisions_of
+from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.footprints import Footing
 from robots.solver.targets import Targets
 from robots.tree import Coordinates, Frames, forward
@@ -139,9 +140,9 @@ def linearize(
         block.add_to(normal)
     touch = TOUCH_LEGS if stage.base else TOUCH
     if exact:
-        robot.contacts.add_to(normal, robot.to_qpos(q), frames, stage, nears, touch, firm)
+        exact_contacts_of(robot).add_to(normal, robot.to_qpos(q), frames, stage, nears, touch, firm)
     else:
-        robot.collisions.add_to(normal, frames, stage, nears, touch, firm)
+        collisions_of(robot).add_to(normal, frames, stage, nears, touch, firm)
     over, slope = limit_rows(tree, q, margin=MARGIN, weight=LIMIT)
     normal.add_diagonal(slope[:, stage.columns], over[:, stage.columns])
     idle, away = np.full((2, len(q), tree.size), 1e-3)

@@ -14,7 +14,9 @@ from scipy.ndimage import binary_dilation, maximum_filter1d
 
 from robots.model.morphology import Morphology
 from robots.solver.block import Stage
+from robots.solver.collision import collisions_of
 from robots.solver.descent import SHORT_OF_LIMIT, Mending, eased, solve_stage, stride_of
+from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.footprints import Footing, corners_of
 from robots.solver.smoothness import jolted, rush
 from robots.solver.targets import Targets
@@ -122,8 +124,8 @@ def wrong_in(
     """The frames in which parts that a stage moves are where, or as fast as, they must not be;
     collisions are looked for in every `stride`-th and, near these, in all."""
     frames = forward(robot.tree, q)
-    nears = robot.collisions.near(frames, stage, stride, _CLOSE)
-    wrong = robot.contacts.depth(robot.to_qpos(q), nears) > _DEEP
+    nears = collisions_of(robot).near(frames, stage, stride, _CLOSE)
+    wrong = exact_contacts_of(robot).depth(robot.to_qpos(q), nears) > _DEEP
     fast = np.abs(rush(robot, q, targets.frame_time)[:, stage.columns]).max(1, initial=0.0)
     wrong[1:] |= fast > _HASTE * targets.frame_time
     if stage.base:

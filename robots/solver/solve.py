@@ -9,6 +9,7 @@ legs, which the feet tie together, then arms and head, which hang on the trunk a
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.solver.block import Stage
+from robots.solver.collision import collisions_of
 from robots.solver.descent import solve_stage, stride_of
 from robots.solver.footprints import Footing, plan_footing, within_reach
 from robots.solver.projection import project
@@ -74,7 +75,7 @@ def solve(
             q = solve_stage(robot, targets, sliding, q, stage, *ends, apart=False)
         if stage.base:
             footing = within_reach(robot, footing, q)
-        if polish or robot.collisions.near(forward(robot.tree, q), stage, stride_of(targets)):
+        if polish or collisions_of(robot).near(forward(robot.tree, q), stage, stride_of(targets)):
             q = solve_stage(robot, targets, footing, q, stage, *ends, apart=True)
         q = mend(robot, targets, footing, q, stage)
     return q

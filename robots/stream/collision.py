@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 from robots.model.morphology import Morphology
 from robots.model.shapes import DIRECTIONS
 from robots.residuals import one_sided
-from robots.solver.collision import EASE
+from robots.solver.collision import EASE, collisions_of
 from robots.solver.hulls import Pair
 from robots.solver.objective import TOUCH, TOUCH_LEGS
 
@@ -41,7 +41,7 @@ class Touch:
         first: Int[np.ndarray, "F"],
     ) -> None:
         self._turns, self._places = rest
-        pairs = robot.collisions.pairs
+        pairs = collisions_of(robot).pairs
         shapes = {x.geom: x for pair in pairs for x in (pair.small, pair.large)}
         number = {geom: k for k, geom in enumerate(shapes)}
         self._shapes = bodies[[shape.link for shape in shapes.values()]]

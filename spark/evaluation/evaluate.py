@@ -18,8 +18,7 @@ from spark.evaluation.cases import SPARE_FRAMES, STRUCTURES, Case, Structure
 from spark.evaluation.metrics import Score, mean_score, score_positions, source_sensitivity
 from spark.io.reading import SUFFIXES, read_motion
 from spark.rig.rig import understand
-from spark.training.clips import FRAME_TIME, at_frame_time
-from spark.transfer.canonical import canonical_positions, to_canonical
+from spark.transfer.canonical import FRAME_TIME, at_frame_time, canonical_positions, to_canonical
 from spark.transfer.foot_lock import refine
 from spark.transfer.target_prior import Retargeting, with_own_motion
 

@@ -23,8 +23,8 @@ from spark.network.config import (
 from spark.network.features import BodyFeatures
 from spark.network.layers import Layers, attend, join_heads, split_heads
 from spark.network.weights import Weights
+from spark.network.windows import Windows
 from spark.rotation import quat_conj, quat_from_sixd, quat_mul, sixd_from_quat
-from spark.training.pairs import Windows
 
 Array = Float[np.ndarray, "..."]
 Tokens = Float[np.ndarray, "W T _ D"]

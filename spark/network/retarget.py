@@ -24,13 +24,12 @@ from spark.network.forward import Network
 from spark.network.known_bodies import nearness
 from spark.network.names import NameNetwork
 from spark.network.weights import Weights
+from spark.network.windows import Windows
 from spark.resample import positions_at, rotations_at
 from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_normalize
-from spark.training.clips import FRAME_TIME, at_frame_time
-from spark.training.pairs import Windows
 from spark.transfer.analytic import correspond, transfer
-from spark.transfer.canonical import CanonicalMotion
+from spark.transfer.canonical import FRAME_TIME, CanonicalMotion, at_frame_time
 
 _AT_A_TIME = 32
 
@@ -152,7 +151,7 @@ def _names_of(weights: Weights) -> Callable[[Sequence[str]], Float[np.ndarray, "
     encode: Callable[[tuple[str, ...]], Float[np.ndarray, "_ E"]]
     if "t5" in weights.names:
         try:
-            from spark.training.name_encoder import NAME_CACHE, T5Names
+            from spark.network.t5 import NAME_CACHE, T5Names
         except ImportError as error:
             raise DependencyError(
                 f"a network with T5's names needs {error.name}: pip install 'spark-sim[t5]'"

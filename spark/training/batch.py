@@ -11,7 +11,8 @@ from torch import Tensor
 
 from spark.network.config import NO_ROTATION
 from spark.network.features import BodyFeatures
-from spark.training.pairs import Pairs, Windows
+from spark.network.windows import Windows
+from spark.training.pairs import Pairs
 from spark.training.tensors import Body, Pose, Start
 
 Names = Callable[[Sequence[str]], Float[Tensor, "S E"]]

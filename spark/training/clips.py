@@ -8,14 +8,17 @@ import numpy as np
 from spark.errors import SkeletonError, SparkSimError
 from spark.io.reading import motion_files, read_motion
 from spark.network.features import BodyFeatures, body_features
-from spark.resample import positions_at, rotations_at
 from spark.rig.contacts import planted_feet
 from spark.rig.rig import understand
 from spark.skeleton import Skeleton
 from spark.training.pairs import Clip
-from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
-
-FRAME_TIME = 1 / 30
+from spark.transfer.canonical import (
+    FRAME_TIME,
+    CanonicalMotion,
+    at_frame_time,
+    canonical_positions,
+    to_canonical,
+)
 
 
 def read_clips(
@@ -43,24 +46,6 @@ def read_clips(
             f"{', '.join(map(str, paths))}: no recording of a humanoid to train on; {notes[0]}"
         )
     return clips, tuple(notes)
-
-
-def at_frame_time(canonical: CanonicalMotion, frame_time: float) -> CanonicalMotion:
-    """`canonical` at another frame rate: rotations by slerp, the path linearly; the first frame
-    stays. A motion that has this frame time already is given back as it is."""
-    if abs(canonical.frame_time - frame_time) < 1e-3 * frame_time:
-        return canonical
-    last = len(canonical) - 1
-    times = np.arange(int(last * canonical.frame_time / frame_time + 1e-6) + 1) * frame_time
-    at = times / canonical.frame_time
-    return CanonicalMotion(
-        canonical.rig,
-        frame_time,
-        rotations_at(canonical.rotations, at),
-        positions_at(canonical.hips, at),
-        canonical.floor_z,
-        canonical.notes,
-    )
 
 
 def clip_of(name: str, canonical: CanonicalMotion, body: BodyFeatures) -> Clip:

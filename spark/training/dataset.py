@@ -39,11 +39,12 @@ from spark.network.features import BodyFeatures, body_features
 from spark.rig.rig import Rig
 from spark.rig.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_conj, quat_mul
-from spark.training.clips import FRAME_TIME, read_clips
+from spark.training.clips import read_clips
 from spark.training.dataset_parts import Part, make_part, read_part
 from spark.training.pairs import Clip
 from spark.training.splits import cells, seen_characters, seen_motions
 from spark.training.variants import split_joints
+from spark.transfer.canonical import FRAME_TIME
 
 FORMAT, VERSION = "spark-sim dataset", 2
 

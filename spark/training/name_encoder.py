@@ -1,6 +1,6 @@
-"""Joint names as vectors: T5 where its weights are at hand, our own small encoder otherwise.
+"""Joint names as vectors: our own small encoder, as it is trained.
 
-Our own has T5's encoder architecture (pre-norm with RMS norms and no biases, relative position
+It has T5's encoder architecture (pre-norm with RMS norms and no biases, relative position
 buckets shared by all layers; Raffel et al. 2020) and ByT5's tokens (a byte plus 3; Xue et al.
 2022), so that it needs no vocabulary file and reads any language. It ships inside the checkpoint.
 
@@ -13,8 +13,6 @@ Text embeddings confuse left and right, so the side stands beside them as two fe
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from io import BytesIO
-from pathlib import Path
 
 import torch
 import torch.nn.functional as nnf
@@ -22,11 +20,8 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 from torch.nn.utils.rnn import pad_sequence
 
-from spark.errors import DependencyError, FileFormatError
-from spark.files import write_atomically
 from spark.network.name_words import BYTE_OFFSET, PAD, name_tokens, relative_buckets, rig_words
 
-NAME_CACHE = Path.home() / ".cache" / "spark-sim" / "names.pt"
 _CHUNKS = 4
 
 
@@ -149,66 +144,3 @@ class _Block(nn.Module):
         attended = nnf.scaled_dot_product_attention(q, k, v, attn_mask=bias, scale=1.0)
         x = x + self.out(attended.transpose(1, 2).reshape(S, L, D))
         return x + self.narrow(nnf.relu(self.wide(self.norm_ff(x))))
-
-
-class T5Names:
-    """A T5 encoder from a local directory or a hub name, frozen, its vectors kept on disk.
-
-    `transformers` is imported when a name is met that the cache does not hold, and not before. A
-    directory whose files have changed is another model.
-    """
-
-    def __init__(self, model: str, cache: Path) -> None:
-        self.model, self.cache = model, cache
-        self._key = _identity(model)
-        self._vectors = _cached(cache).get(self._key, {})
-
-    def encode(self, names: Sequence[str]) -> Float[Tensor, "S D"]:
-        """The mean of T5's last hidden states over each name's tokens, normalised."""
-        missing = sorted(set(names) - set(self._vectors))
-        if missing:
-            self._vectors |= dict(zip(missing, self._run(missing), strict=True))
-            self.cache.parent.mkdir(parents=True, exist_ok=True)
-            data = BytesIO()
-            torch.save({**_cached(self.cache), self._key: self._vectors}, data)
-            write_atomically(self.cache, data.getvalue())
-        return torch.stack([self._vectors[name] for name in names])
-
-    @torch.no_grad()
-    def _run(self, names: list[str]) -> list[Tensor]:
-        try:
-            from transformers import AutoTokenizer, T5EncoderModel
-        except ImportError as error:
-            raise DependencyError(
-                "T5 name embeddings need transformers: pip install 'spark-sim[t5]'"
-            ) from error
-        try:
-            tokenizer = AutoTokenizer.from_pretrained(self.model)
-            model = T5EncoderModel.from_pretrained(self.model).train(False)
-        except (OSError, ValueError) as error:
-            raise DependencyError(f"no T5 model at {self.model!r}: {error}") from error
-        tokens = tokenizer(names, padding=True, return_tensors="pt")
-        hidden = model(**tokens).last_hidden_state
-        weight = tokens.attention_mask[..., None].to(hidden.dtype)
-        return list(nnf.normalize((hidden * weight).sum(1) / weight.sum(1), dim=-1))
-
-
-def _identity(model: str) -> str:
-    """A hub name, or a directory and when its files were last changed."""
-    folder = Path(model)
-    if not folder.is_dir():
-        return model
-    return f"{folder.resolve()}@{max((f.stat().st_mtime_ns for f in folder.iterdir()), default=0)}"
-
-
-def _cached(cache: Path) -> dict[str, dict[str, Tensor]]:
-    """The vectors of names by model; none where there is no cache yet."""
-    if not cache.exists():
-        return {}
-    try:
-        stored = torch.load(cache, weights_only=True)
-        return {str(model): dict(vectors) for model, vectors in stored.items()}
-    except Exception as error:
-        raise FileFormatError(
-            cache, None, "is no cache of name embeddings; delete it to go on"
-        ) from error

@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, Int
 
 from spark.errors import SkeletonError
 from spark.network.features import BodyFeatures
+from spark.network.windows import Windows
 from spark.rotation import (
     quat_angle,
     quat_from_yaw,
@@ -54,14 +55,6 @@ class Clip:
         """How much higher ankle and toe of each foot are than in the T-pose [hip heights]."""
         rotations, hips = (np.asarray(x, np.float64) for x in (self.rotations, self.hips))
         return foot_lift(self.body, rotations, hips).astype(np.float32)
-
-
-class Windows(NamedTuple):
-    """W windows of T frames on one body: local 6D rotations, root, and what loss terms need."""
-
-    body: BodyFeatures
-    rotations: Float[np.ndarray, "W T K 6"]
-    root: Float[np.ndarray, "W T 3"]
 
 
 class Pairs(NamedTuple):

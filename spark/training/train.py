@@ -24,6 +24,7 @@ from torch.utils.data import DataLoader, Dataset
 
 from spark.network.config import Config
 from spark.network.known_bodies import distinct
+from spark.network.t5 import NAME_CACHE, T5Names
 from spark.training import losses
 from spark.training.batch import Batch, Collator, Names
 from spark.training.checkpoint import (
@@ -33,7 +34,7 @@ from spark.training.checkpoint import (
     save_checkpoint,
 )
 from spark.training.model import Spark
-from spark.training.name_encoder import NAME_CACHE, NameEncoder, T5Names
+from spark.training.name_encoder import NameEncoder
 from spark.training.name_file import load_names
 from spark.training.packed import AHEAD, Packed, Packer
 from spark.training.pairs import Clip, PairMaker

@@ -7,9 +7,12 @@ from jaxtyping import Float
 
 from spark.kinematics import forward, local_rotations, world_positions
 from spark.motion import Motion
+from spark.resample import positions_at, rotations_at
 from spark.rig.contacts import floor_height
 from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_rotate
+
+FRAME_TIME = 1 / 30  # [s] at which motions are learned from: what the network reads, and priors
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,3 +77,21 @@ def from_canonical(canonical: CanonicalMotion) -> Motion:
     translations = np.tile(skeleton.offsets, (len(canonical), 1, 1))
     translations[:, rig.carrier] += quat_rotate(quat_conj(world[:, above]), missing)
     return Motion(skeleton, canonical.frame_time, root, rotations, translations)
+
+
+def at_frame_time(canonical: CanonicalMotion, frame_time: float) -> CanonicalMotion:
+    """`canonical` at another frame rate: rotations by slerp, the path linearly; the first frame
+    stays. A motion that has this frame time already is given back as it is."""
+    if abs(canonical.frame_time - frame_time) < 1e-3 * frame_time:
+        return canonical
+    last = len(canonical) - 1
+    times = np.arange(int(last * canonical.frame_time / frame_time + 1e-6) + 1) * frame_time
+    at = times / canonical.frame_time
+    return CanonicalMotion(
+        canonical.rig,
+        frame_time,
+        rotations_at(canonical.rotations, at),
+        positions_at(canonical.hips, at),
+        canonical.floor_z,
+        canonical.notes,
+    )

@@ -22,9 +22,8 @@ from spark.rotation import (
     rotvec_from_quat,
     sixd_from_quat,
 )
-from spark.training.clips import FRAME_TIME, at_frame_time
 from spark.transfer.analytic import Correspondence, correspond, transfer
-from spark.transfer.canonical import CanonicalMotion
+from spark.transfer.canonical import FRAME_TIME, CanonicalMotion, at_frame_time
 
 _SPANS, _SPAN = 10, 100  # so many parts of a recording, of so many frames at 30 fps, are looked at
 SHORTEST = 2.0  # [s] of a recording that tells anything

@@ -10,6 +10,7 @@ import pytest
 
 from robots.model.morphology import Morphology
 from robots.registry import find
+from robots.solver.collision import collisions_of
 from robots.solver.solve import retarget
 from robots.solver.targets import targets_of
 from robots.stream.frame_targets import Frame, ground_of
@@ -29,7 +30,7 @@ PARTS = ("upper_leg", "lower_leg", "foot", "upper_arm", "forearm", "hand")
 @cache
 def g1() -> Morphology:
     robot = load_robot(find("unitree_g1")).on_robot.robot
-    assert len(robot.collisions.pairs)  # found once for a robot
+    assert len(collisions_of(robot).pairs)  # found once for a robot
     return robot
 
 

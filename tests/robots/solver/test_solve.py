@@ -9,7 +9,9 @@ from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.registry import find
 from robots.solver.block import Stage
+from robots.solver.collision import collisions_of
 from robots.solver.descent import eased
+from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.footprints import plan_footing
 from robots.solver.objective import linearize
 from robots.solver.projection import project
@@ -88,7 +90,7 @@ def test_the_gradient_is_that_of_the_cost(
     q = project(ember, targets.world, targets.hips)
     q = q.moved(tree, rng.normal(size=(4, tree.size)) * 0.05).clipped(tree, 0.05)
     which = stages_of(ember)[stage]
-    nears = ember.collisions.near(forward(tree, q), which, 1)
+    nears = collisions_of(ember).near(forward(tree, q), which, 1)
     normal = linearize(ember, targets, footing, q, which, nears, exact=exact)
     for k, column in enumerate(which.columns):
         step = np.zeros((4, tree.size))
@@ -210,10 +212,10 @@ def test_what_is_measured_is_what_mujoco_finds(ember: Morphology) -> None:
     angles = rng.uniform(lower, upper, (count, len(tree)))
     q = Coordinates(np.zeros((count, 3)), still, angles)
     whole = Stage(tree, tuple(range(len(tree))), True)
-    nears = ember.collisions.near(forward(tree, q), whole, 1)
+    nears = collisions_of(ember).near(forward(tree, q), whole, 1)
     qpos = ember.to_qpos(q)
-    depth = ember.contacts.depth(qpos, nears)
-    watched = {frozenset((p.small.geom, p.large.geom)) for p in ember.collisions.pairs}
+    depth = exact_contacts_of(ember).depth(qpos, nears)
+    watched = {frozenset((p.small.geom, p.large.geom)) for p in collisions_of(ember).pairs}
     data = mujoco.MjData(model)
     found = np.full(count, -np.inf)
     for t in range(count):
@@ -250,7 +252,7 @@ def test_what_passes_between_two_looks_is_seen(walked: RobotMotion, ember: Morph
         q = Coordinates(base, still, swung).clipped(tree, 0.02)
         frames, qpos = forward(tree, q), ember.to_qpos(q)
         every, ends = (
-            ember.contacts.depth(qpos, ember.collisions.near(frames, arms, stride))
+            exact_contacts_of(ember).depth(qpos, collisions_of(ember).near(frames, arms, stride))
             for stride in (1, count - 1)
         )
         passed += (every > 0.01).any()

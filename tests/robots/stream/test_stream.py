@@ -9,7 +9,7 @@ import spark_sim
 from robots.model.known import known
 from robots.model.motion import RobotMotion
 from robots.solver.block import Stage
-from robots.solver.collision import Near
+from robots.solver.collision import Near, collisions_of
 from robots.solver.footprints import corners_of, plan_footing
 from robots.solver.objective import linearize
 from robots.solver.projection import project
@@ -101,7 +101,7 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     )
 
     def near(stage: Stage) -> list[Near]:
-        return EMBER.collisions.near(forward(tree, q), stage, 1)
+        return collisions_of(EMBER).near(forward(tree, q), stage, 1)
 
     assert near(stages_of(EMBER)[1])
     # A stance is of one time: frames are asked for one by one.

@@ -20,9 +20,13 @@ from spark.evaluation.metrics import (
 )
 from spark.io.fbx import read_fbx
 from spark.rig.rig import understand
-from spark.training.clips import at_frame_time
 from spark.transfer.analytic import transfer
-from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
+from spark.transfer.canonical import (
+    CanonicalMotion,
+    at_frame_time,
+    canonical_positions,
+    to_canonical,
+)
 from spark.transfer.foot_lock import refine
 from tests.helpers.recordings import recording
 from tests.helpers.rigs import RIGS, build, walk

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import torch
 from onnxruntime import InferenceSession
-from tests.spark.training.test_model import PRESETS, maker  # noqa: F401
 
 from spark.errors import ConventionError, FileFormatError
 from spark.network.config import Config
@@ -24,6 +23,7 @@ from spark.training.name_encoder import NameConfig, NameEncoder
 from spark.training.onnx import INPUTS, export_onnx
 from spark.training.pairs import PairMaker
 from spark.training.tensors import Pose, Start
+from tests.spark.training.test_model import PRESETS, maker  # noqa: F401
 
 
 def small(config: Config, **changes: object) -> Config:

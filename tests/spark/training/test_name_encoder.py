@@ -14,16 +14,11 @@ from safetensors.torch import save_file
 
 from spark.errors import ConventionError, DependencyError, FileFormatError
 from spark.network.name_words import PAD, rig_words
+from spark.network.t5 import T5Names
 from spark.rig.name_conventions import CONVENTIONS, HELD_OUT, name_joints
 from spark.rig.roles import Role
 from spark.training.checkpoint import load_checkpoint, save_checkpoint
-from spark.training.name_encoder import (
-    NameConfig,
-    NameEncoder,
-    T5Names,
-    tokenize,
-    tokenize_rigs,
-)
+from spark.training.name_encoder import NameConfig, NameEncoder, tokenize, tokenize_rigs
 from spark.training.name_file import load_names, save_names
 from spark.training.name_rigs import KINDS, OTHER, made_up_rig, rig_of
 from spark.training.settings import TrainConfig
@@ -202,7 +197,7 @@ def test_cached_names_need_no_transformers(t5: Path, tmp_path: Path) -> None:
 import sys
 sys.modules["transformers"] = None  # importing it fails
 from pathlib import Path
-from spark.training.name_encoder import T5Names
+from spark.network.t5 import T5Names
 names = T5Names({str(t5)!r}, Path({str(cache)!r}))
 print(*names.encode(["Hips"])[0].tolist())
 try:

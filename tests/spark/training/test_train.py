@@ -23,7 +23,7 @@ from spark.network.weights import VERSION, read_weights
 from spark.rig.roles import Role
 from spark.rotation import quat_about, quat_angle, quat_mul
 from spark.training.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
-from spark.training.clips import at_frame_time, read_clips
+from spark.training.clips import read_clips
 from spark.training.model import Spark, _corrected
 from spark.training.name_encoder import NameConfig, NameEncoder
 from spark.training.packed import Packer
@@ -31,7 +31,7 @@ from spark.training.pairs import Clip
 from spark.training.settings import TrainConfig, read_settings, toml
 from spark.training.train import Objective, Steps, _batches, network, optimiser_of, take_step, train
 from spark.transfer.analytic import transfer
-from spark.transfer.canonical import canonical_positions, to_canonical
+from spark.transfer.canonical import at_frame_time, canonical_positions, to_canonical
 from spark_sim import sample
 from tests.helpers.nets import learned
 from tests.helpers.stick import without
