@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 import spark_sim
-from sim.report.clip_metrics import FLAGS, Measured
+from sim.report.clip_metrics import FLAGS, ClipMetrics
 
 
-def row(name: str, clips: list[Measured]) -> str:
+def row(name: str, clips: list[ClipMetrics]) -> str:
     """Shares over the frames of all clips together."""
     flags = [np.concatenate([clip.flags[letter] for clip in clips]) for letter in FLAGS]
     shares = [np.any(flags, axis=0), *flags]

@@ -20,7 +20,7 @@ from spark.evaluation.tables import markdown
 from spark.network.retarget import Learned
 from spark.network.weights import read_weights
 from spark.training.dataset import Performance, read_performances
-from spark.training.pairs import Clip
+from spark.training.pairs import TrainingClip
 from spark.training.settings import TrainConfig, read_settings
 from spark.training.train import fresh_checkpoint, train
 from spark.transfer.analytic import transfer
@@ -34,7 +34,7 @@ def folds_of(found: list[Performance]) -> dict[str, int]:
     return {name: i % _FOLDS for i, name in enumerate(sorted({p.character for p in found}))}
 
 
-def trained(clips: list[Clip], config: TrainConfig, out: Path) -> Learned:
+def trained(clips: list[TrainingClip], config: TrainConfig, out: Path) -> Learned:
     """The recipe's network of these clips."""
     path = out / "checkpoint.safetensors"
     if not path.exists():

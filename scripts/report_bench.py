@@ -15,7 +15,7 @@ from scipy.stats import rankdata
 from tqdm import tqdm
 
 from scripts.corruptions import CORRUPTIONS, HARMLESS
-from sim.report import Report, judge
+from sim.report import Report, assess
 from sim.report.thresholds import PLAUSIBILITY_V1
 from sim.report.track import track
 from spark.errors import SkeletonError, SparkSimError
@@ -110,7 +110,7 @@ def bench(data: Path) -> tuple[int, dict[str, dict[str, float]]]:
     for name, motion, rig in tqdm(list(clips(data)), file=sys.stderr, disable=None):
         rng = np.random.default_rng(len(clean))
         source = (motion, rig)
-        report = judge(motion, rig, source=source)
+        report = assess(motion, rig, source=source)
         clean[name] = scores(report)
         assert report.drift is not None
         for kind, corrupt in CORRUPTIONS.items():
@@ -122,7 +122,7 @@ def bench(data: Path) -> tuple[int, dict[str, dict[str, float]]]:
                 continue
             # A mirrored motion walks another path by intent: it is its own source.
             origin = (changed, rig) if kind == "mirrored" else source
-            spoilt[kind][name] = scores(judge(changed, rig, source=origin))
+            spoilt[kind][name] = scores(assess(changed, rig, source=origin))
     return len(clean), {
         kind: {
             measure: auc([clean[n][measure] for n in rows], [rows[n][measure] for n in rows])

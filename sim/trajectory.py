@@ -13,7 +13,7 @@ from spark.rig.rig import Rig
 
 
 @dataclass(frozen=True, eq=False)
-class GivenSole:
+class ModelSole:
     """The corners of one foot's sole: `bodies[c]` of the model carries corner c, which is at
     `points[c]` [m] in that body's axes."""
 
@@ -23,7 +23,7 @@ class GivenSole:
 
 
 @dataclass(frozen=True, eq=False)
-class GivenBody:
+class ModelTrajectory:
     """`spec` compiles to `model`; `root` is the humanoid's body with the free joint; `qpos` holds
     MuJoCo's coordinates of each frame (position [m], quaternion wxyz, joints [rad]).
 
@@ -35,13 +35,13 @@ class GivenBody:
     model: mujoco.MjModel
     root: int
     qpos: Float[np.ndarray, "T nq"]
-    soles: tuple[GivenSole, ...] = ()
+    soles: tuple[ModelSole, ...] = ()
     tpose: Float[np.ndarray, "nq"] | None = None
 
 
-def given(rig: Rig, motion: Motion) -> GivenBody:
+def model_trajectory(rig: Rig, motion: Motion) -> ModelTrajectory:
     """The motion on the body that `sim.body.build.build_body` makes of its rig."""
     spec = build_body(rig)
     model = spec.compile()
-    root = int(model.body(rig.skeleton.names[rig.carrier]).id)
-    return GivenBody(spec, model, root, qpos_from_motion(model, motion, rig))
+    root = int(model.body(rig.skeleton.names[rig.root_joint]).id)
+    return ModelTrajectory(spec, model, root, qpos_from_motion(model, motion, rig))

@@ -17,7 +17,7 @@ from spark.rig.override import Override
 from spark.rig.rig import Rig, understand
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, from_canonical, to_canonical
-from spark.transfer.foot_lock import refine as hold_feet
+from spark.transfer.foot_lock import lock_feet
 from spark_sim import files, rolemap
 
 if TYPE_CHECKING:
@@ -218,7 +218,7 @@ def retarget(
     else:
         moved = _filled_in(canonical, target, _learned(checkpoint))
     if refine:
-        moved = hold_feet(canonical, moved)
+        moved = lock_feet(canonical, moved)
     motion = from_canonical(moved)
     bvh, notes = encode(motion, target.recording)
     file = target.recording.bvh.path
@@ -267,7 +267,7 @@ def report(
 
     With `html`, also written as a web page. Raises `OutputError` where that exists, unless forced.
     """
-    from sim.report import judge
+    from sim.report import assess
 
     if html is not None:
         files.claim(Path(html), force=force, endings=_PAGE)
@@ -277,7 +277,7 @@ def report(
         source = _clip(source)
         origin, names = (source.motion, source.rig, source.body), (clip.name, source.name)
     known = None if truth is None else _clip(truth).motion
-    judged = judge(clip.motion, clip.rig, source=origin, body=clip.body, truth=known)
+    judged = assess(clip.motion, clip.rig, source=origin, body=clip.body, truth=known)
     if html is not None:
         from sim.report.page import write_report_page
 

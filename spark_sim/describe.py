@@ -53,7 +53,7 @@ def describe(clip: "AnyClip") -> dict[str, Any]:
     ]
     body = {
         "hip_height": rig.hip_height,
-        "carrier": rig.skeleton.names[rig.carrier],
+        "carrier": rig.skeleton.names[rig.root_joint],
         "joints": joints,
     }
     return facts | {"body": body, "notes": list(clip.notes)}

@@ -16,7 +16,7 @@ from robots.model.understand import parts_of, understand_robot
 from robots.solver.solve import copy, retarget
 from robots.stream.frame_targets import LATENCY, Frame, ground_of
 from robots.stream.stream import Stream
-from sim.trajectory import GivenBody
+from sim.trajectory import ModelTrajectory
 from spark.errors import ConventionError
 from spark.motion import Motion
 from spark.rig.rig import Rig
@@ -45,7 +45,7 @@ class RobotClip:
         return self.on_robot.robot.rig
 
     @cached_property
-    def body(self) -> GivenBody:
+    def body(self) -> ModelTrajectory:
         """The robot's own model."""
         return self.on_robot.body
 

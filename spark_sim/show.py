@@ -6,7 +6,7 @@ from typing import Any
 
 from sim.physics.summary import LIMITS, summary, text
 from sim.physics.tracking import Assist, Tracked, track
-from sim.trajectory import given
+from sim.trajectory import model_trajectory
 from sim.view.scene import Figure
 from spark.kinematics import forward
 from spark.rig.contacts import floor_height
@@ -50,7 +50,7 @@ def simulate(clip: "AnyClip | File", *, assist: bool = False) -> Simulated:
     """
     clip = load(clip) if isinstance(clip, str | Path) else clip
     tracked = track(
-        clip.body or given(clip.rig, clip.motion),
+        clip.body or model_trajectory(clip.rig, clip.motion),
         clip.motion.frame_time,
         height=standing_height(clip.rig),
         floor_z=_floor(clip),

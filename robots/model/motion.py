@@ -10,7 +10,7 @@ from jaxtyping import Float
 from robots.model.mjcf import read_mjcf
 from robots.model.morphology import Morphology, Sole
 from robots.tree import Coordinates
-from sim.trajectory import GivenBody, GivenSole
+from sim.trajectory import ModelSole, ModelTrajectory
 from spark.motion import Motion
 from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_rotate
@@ -39,10 +39,10 @@ class RobotMotion:
         return self.robot.motion(self.coordinates, self.frame_time)
 
     @cached_property
-    def body(self) -> GivenBody:
+    def body(self) -> ModelTrajectory:
         """The model with all its shapes, and the coordinates: what is shown and judged."""
         mjcf, robot = read_mjcf(self.robot.mjcf.path), self.robot
-        return GivenBody(
+        return ModelTrajectory(
             spec=mjcf.spec,
             model=mjcf.model,
             root=mjcf.root,
@@ -51,7 +51,7 @@ class RobotMotion:
             tpose=robot.to_qpos(robot.tpose)[0],
         )
 
-    def _sole(self, sole: Sole) -> GivenSole:
+    def _sole(self, sole: Sole) -> ModelSole:
         """A sole in the axes of the model's bodies."""
         robot = self.robot
         model = robot.mjcf.model
@@ -61,4 +61,4 @@ class RobotMotion:
         bodies = model.jnt_bodyid[joints].astype(np.int64)
         q_body_world = quat_conj(data.xquat[bodies])
         side = "left" if robot.rig.roles.roles[sole.foot] == Role.LEFT_FOOT else "right"
-        return GivenSole(side, bodies, quat_rotate(q_body_world, sole.points - data.xpos[bodies]))
+        return ModelSole(side, bodies, quat_rotate(q_body_world, sole.points - data.xpos[bodies]))

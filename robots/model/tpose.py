@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from robots.least_squares import Normal
 from robots.residuals import Rows, direction_rows, limit_rows, turn_rows
 from robots.tree import BASE, Coordinates, Tree, forward
-from spark.rig.bones import Pose
+from spark.rig.bones import RigPose
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import matrix_from_quat, quat_between, quat_from_matrix, quat_mul, quat_rotate
 from spark.skeleton import Skeleton
@@ -102,7 +102,7 @@ def _starts(tree: Tree) -> Coordinates:
 
 
 def _bone_goals(
-    rest: Pose, links: Int[np.ndarray, "J"]
+    rest: RigPose, links: Int[np.ndarray, "J"]
 ) -> dict[int, tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]]:
     """For each joint of arms and legs that can turn: its bone in the rest pose and where it points
     in the T-pose."""
@@ -119,9 +119,9 @@ def _bone_goals(
     return goals
 
 
-def rest_pose(skeleton: Skeleton, roles: RoleMap) -> Pose:
+def rest_pose(skeleton: Skeleton, roles: RoleMap) -> RigPose:
     """The rest pose, for asking where its bones point."""
-    return Pose(skeleton, roles, np.tile([1.0, 0.0, 0.0, 0.0], (len(skeleton), 1)))
+    return RigPose(skeleton, roles, np.tile([1.0, 0.0, 0.0, 0.0], (len(skeleton), 1)))
 
 
 def _linearize(
@@ -177,7 +177,7 @@ def _add(normal: Normal, columns: list[int], rows: Rows) -> None:
 
 
 def _flexes(
-    tree: Tree, rest: Pose, links: Int[np.ndarray, "J"]
+    tree: Tree, rest: RigPose, links: Int[np.ndarray, "J"]
 ) -> dict[int, tuple[int, Float[np.ndarray, "3"]]]:
     """For each knee and elbow with hinges: the one that bends it, and the axis about which it
     bends by growing angles, in the rest pose."""
@@ -201,7 +201,7 @@ def _own_first(tree: Tree, skeleton: Skeleton, links: Int[np.ndarray, "J"], j: i
     return own
 
 
-def _bend_sign(tree: Tree, rest: Pose, j: int, hinge: int) -> float:
+def _bend_sign(tree: Tree, rest: RigPose, j: int, hinge: int) -> float:
     """+1 where a growing angle bends the joint: to the side where its range is larger."""
     upper, lower = rest.bone(int(rest.skeleton.parents[j])), rest.bone(j)
     if upper is None or lower is None:

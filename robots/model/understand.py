@@ -81,7 +81,7 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
         roles=roles,
         groups=groups_of(skeleton, roles),
         tpose=t.world,
-        carrier=0,
+        root_joint=0,
         hip_height=hip_height(skeleton, roles, t.world),
         notes=notes,
     )

@@ -15,7 +15,7 @@ from robots.model.morphology import Morphology
 from robots.model.shapes import DIRECTIONS
 from robots.residuals import one_sided
 from robots.solver.block import Stage
-from robots.solver.hulls import Pair, Shape, meet, shapes_of
+from robots.solver.hulls import Shape, ShapePair, meet, shapes_of
 from robots.tree import Frames, Tree, forward
 
 APART = 0.0  # [m] that shapes keep between them; less where the T-pose has less
@@ -24,7 +24,7 @@ NEAR = 0.02  # [m] within which shapes are watched
 _PAIRS = len(DIRECTIONS) // 2  # a direction and the one against it, as many from the end
 
 Moves = tuple[tuple[int, ...], tuple[int, ...]]  # the joints that move each of a pair
-Watched = tuple[Pair, Moves]
+Watched = tuple[ShapePair, Moves]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class Near:
     """Frames in which a pair of shapes is near, the small one's spheres that are, and the joints
     that move each of the two."""
 
-    pair: Pair
+    pair: ShapePair
     spheres: Int[np.ndarray, "N"]
     moves: Moves
     frames: Int[np.ndarray, "S"]
@@ -43,7 +43,7 @@ class Collisions:
     """The pairs of shapes that can meet."""
 
     tree: Tree
-    pairs: tuple[Pair, ...]
+    pairs: tuple[ShapePair, ...]
     _known: dict[Stage, dict[Shape, list[Watched]]] = field(default_factory=dict)
 
     def near(self, frames: Frames, stage: Stage, stride: int, within: float = NEAR) -> list[Near]:
@@ -142,7 +142,7 @@ class Collisions:
 def _seen_from_large(
     tree: Tree,
     frames: Frames,
-    pair: Pair,
+    pair: ShapePair,
     points: Float[np.ndarray, "S 3"],
     at: Int[np.ndarray, "N"],
 ) -> Float[np.ndarray, "3 S N"]:
@@ -161,7 +161,7 @@ def _seen_from_large(
 def _distance(
     tree: Tree,
     frames: Frames,
-    pair: Pair,
+    pair: ShapePair,
     points: Float[np.ndarray, "S 3"],
     at: Int[np.ndarray, "N"],
 ) -> Float[np.ndarray, "S N"]:
@@ -205,7 +205,7 @@ def collisions_of(robot: Morphology) -> Collisions:
                 continue
             # The longer chain is the limb's end: the slender part.
             small, large = (a, b) if len(tree.chain(a.link)) >= len(tree.chain(b.link)) else (b, a)
-            pair = Pair(small, large, APART)
+            pair = ShapePair(small, large, APART)
             now = _distance(tree, frames, pair, small.spheres, np.zeros(1, dtype=np.int64))
             pairs.append(replace(pair, apart=min(APART, float((now[:, 0] - small.radii).min()))))
     return Collisions(tree, tuple(pairs))

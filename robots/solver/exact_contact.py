@@ -13,14 +13,14 @@ from robots.model.morphology import Morphology
 from robots.residuals import one_sided
 from robots.solver.block import Stage
 from robots.solver.collision import APART, EASE, Collisions, Near, approach, collisions_of
-from robots.solver.hulls import Pair
+from robots.solver.hulls import ShapePair
 from robots.tree import Frames
 
 _FELT = 0.02  # [m] beyond which distances are not told apart
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class PairDistance:
     """Of a pair in some frames: the points of the small and the large shape that are nearest to
     each other, or deepest in each other, how far [m] apart these are (negative: deep), and the unit
     vector from the large one's surface outwards."""
@@ -84,7 +84,7 @@ class Contacts:
             normal.add_some(here, columns, np.concatenate(J) * slope * heavy, residual * heavy)
 
     @cached_property
-    def _apart(self) -> dict[Pair, float]:
+    def _apart(self) -> dict[ShapePair, float]:
         """How near [m] the pairs may come."""
         data = mujoco.MjData(self.model)
         data.qpos[:] = self.tpose
@@ -99,7 +99,9 @@ class Contacts:
             for pair in self.collisions.pairs
         }
 
-    def _measure(self, qpos: Float[np.ndarray, "T nq"], nears: Sequence[Near]) -> list[Measured]:
+    def _measure(
+        self, qpos: Float[np.ndarray, "T nq"], nears: Sequence[Near]
+    ) -> list[PairDistance]:
         """Pairs in the frames in which they are near."""
         model, data = self.model, mujoco.MjData(self.model)
         watched: Bool[np.ndarray, "K T"] = np.zeros((len(nears), len(qpos)), dtype=bool)
@@ -120,7 +122,7 @@ class Contacts:
             if len(at):
                 large, small = points[at, :3].T, points[at, 3:].T
                 out = (small - large) / far[at]
-                found.append(Measured(near, at, far[at], np.stack([small, large]), out))
+                found.append(PairDistance(near, at, far[at], np.stack([small, large]), out))
         return found
 
 

@@ -35,7 +35,7 @@ class Shape:
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
+class ShapePair:
     """Two shapes, and how near [m] they may come."""
 
     small: Shape

@@ -11,7 +11,7 @@ from robots.model.morphology import Morphology
 from robots.model.shapes import DIRECTIONS
 from robots.residuals import one_sided
 from robots.solver.collision import EASE, collisions_of
-from robots.solver.hulls import Pair
+from robots.solver.hulls import ShapePair
 from robots.solver.objective import TOUCH, TOUCH_LEGS
 
 _ACTIVE = 3 * EASE  # [m] beyond which a shape is not felt
@@ -19,7 +19,7 @@ _REACH = 0.03  # [m] that shapes may move between the frame that is looked at an
 
 
 @dataclass(frozen=True, eq=False)
-class Poses:
+class WindowPoses:
     """Where a model's bodies and joints are in some frames, as MuJoCo says it."""
 
     turns: Float[np.ndarray, "T B 3 3"]
@@ -62,7 +62,7 @@ class Touch:
         self._radii = np.array(radii)
         self._watch_columns(robot, pairs, set(first.tolist()))
 
-    def near(self, poses: Poses) -> Int[np.ndarray, "K"]:
+    def near(self, poses: WindowPoses) -> Int[np.ndarray, "K"]:
         """The spheres that are near enough to be felt, now or soon."""
         centers = _placed(poses, self._shapes, self._centers)
         x, y, z = (centers[:, self._small] - centers[:, self._large]).transpose(2, 0, 1)
@@ -72,7 +72,7 @@ class Touch:
 
     def add_to(
         self,
-        poses: Poses,
+        poses: WindowPoses,
         axes: Float[np.ndarray, "T D 3"],
         anchors: Float[np.ndarray, "T D 3"],
         near: Int[np.ndarray, "K"],
@@ -104,7 +104,7 @@ class Touch:
             g[t] += residual[frames == t] @ rows
 
     def _depth(
-        self, poses: Poses, near: Int[np.ndarray, "K"]
+        self, poses: WindowPoses, near: Int[np.ndarray, "K"]
     ) -> tuple[Float[np.ndarray, "T K"], Int[np.ndarray, "T K"]]:
         """How deep [m] spheres are in the shapes of their pairs, and the nearest side of these."""
         pairs = self._pairs[near]
@@ -124,7 +124,9 @@ class Touch:
         away = np.array(points).reshape(-1, 3) - self._places[bodies]
         return np.einsum("kji,kj->ki", self._turns[bodies], away)
 
-    def _watch_columns(self, robot: Morphology, pairs: tuple[Pair, ...], first: set[int]) -> None:
+    def _watch_columns(
+        self, robot: Morphology, pairs: tuple[ShapePair, ...], first: set[int]
+    ) -> None:
         """Which columns move the pairs together (-1) and apart, of the links that give way."""
         tree = robot.tree
         self._signs = np.zeros((len(pairs), tree.size))
@@ -141,7 +143,7 @@ class Touch:
 
 
 def _placed(
-    poses: Poses, bodies: Int[np.ndarray, "K"], points: Float[np.ndarray, "K 3"]
+    poses: WindowPoses, bodies: Int[np.ndarray, "K"], points: Float[np.ndarray, "K 3"]
 ) -> Float[np.ndarray, "T K 3"]:
     return _turned(poses.turns[:, bodies], points) + poses.places[:, bodies]
 

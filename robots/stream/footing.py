@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from robots.solver.footprints import EASE, TURN, WOBBLE, flat_sole
 from robots.stream.frame_targets import FrameTargets, Watcher
-from robots.stream.terms import Stance
+from robots.stream.terms import FootTargets
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
 from spark.rig.feet import standing_height
 
@@ -38,7 +38,7 @@ class Feet:
         self._holds = np.zeros((soles, 2))
         self._prints = [Footprint() for _ in range(soles)]
 
-    def look(self, targets: FrameTargets, corners: Float[np.ndarray, "S 4 3"]) -> Stance:
+    def look(self, targets: FrameTargets, corners: Float[np.ndarray, "S 4 3"]) -> FootTargets:
         """Takes in the newest frame, and says how the feet stand `ahead` frames before it, when
         the robot's are at `corners`."""
         first = not self._seen
@@ -66,7 +66,7 @@ class Feet:
             places[s, :, :2] = mark.places(self._flat[s])
         self._holds = self._holds + step
         corners = np.repeat(self._holds, 2, axis=1)
-        return Stance(places, np.repeat(corners[..., None], 3, axis=2))
+        return FootTargets(places, np.repeat(corners[..., None], 3, axis=2))
 
 
 class Footprint:

@@ -14,7 +14,7 @@ from robots.solver.projection import project
 from robots.stream.detour import Detours
 from robots.stream.footing import Feet
 from robots.stream.frame_targets import LATENCY, Frame, FrameTargets, Ground, Watcher, together
-from robots.stream.terms import Stance, Terms
+from robots.stream.terms import FootTargets, Terms
 from robots.stream.window import Window
 from spark.errors import FrameError
 from spark.rig.rig import Rig
@@ -77,7 +77,7 @@ class Stream:
         projected = project(robot, quat_from_matrix(targets.world)[None], targets.hips[None])
         q = robot.to_qpos(projected)[np.zeros(_FRAMES, dtype=int)]
         soles = len(robot.soles)
-        stance = Stance(np.zeros((soles, 4, 3)), np.zeros((soles, 4, 3)))
+        stance = FootTargets(np.zeros((soles, 4, 3)), np.zeros((soles, 4, 3)))
         for held in (False, True):
             if held:
                 stance = self._feet.look(targets, self._terms.corners(self._terms.poses(q))[0])

@@ -19,7 +19,7 @@ from robots.residuals import one_sided
 from robots.solver import objective
 from robots.solver.objective import TURN, TURNS
 from robots.solver.solve import stages_of
-from robots.stream.collision import Poses, Touch
+from robots.stream.collision import Touch, WindowPoses
 from robots.stream.frame_targets import FrameTargets
 from robots.tree import BASE
 from spark.rig.roles import Role
@@ -28,7 +28,7 @@ Linear = tuple[Float[np.ndarray, "T R 3 D"], Float[np.ndarray, "T R 3"], Float[n
 
 
 @dataclass(frozen=True, eq=False)
-class Stance:
+class FootTargets:
     """For each corner of each sole: where it should stand [m], and how firmly (0 to 1)."""
 
     places: Float[np.ndarray, "S 4 3"]
@@ -72,7 +72,7 @@ class Terms:
         self._watch_bones(bones)
         self._watch_points(hands)
 
-    def poses(self, q: Float[np.ndarray, "T nq"]) -> Poses:
+    def poses(self, q: Float[np.ndarray, "T nq"]) -> WindowPoses:
         """Where everything is in the frames of a `qpos`."""
         model, data, count = self._model, self._data, len(q)
         turns, places = np.empty((count, model.nbody, 9)), np.empty((count, model.nbody, 3))
@@ -82,14 +82,14 @@ class Terms:
             mujoco.mj_kinematics(model, data)
             turns[t], places[t] = data.xmat, data.xpos
             axes[t], anchors[t] = data.xaxis, data.xanchor
-        return Poses(turns.reshape(count, -1, 3, 3), places, axes, anchors)
+        return WindowPoses(turns.reshape(count, -1, 3, 3), places, axes, anchors)
 
-    def corners(self, poses: Poses) -> Float[np.ndarray, "T S 4 3"]:
+    def corners(self, poses: WindowPoses) -> Float[np.ndarray, "T S 4 3"]:
         """The corners of the soles [m, world]."""
         soles = len(self.robot.soles)
         return self._points(poses)[:, : 4 * soles].reshape(-1, soles, 4, 3)
 
-    def bones(self, poses: Poses) -> Float[np.ndarray, "T B 3"]:
+    def bones(self, poses: WindowPoses) -> Float[np.ndarray, "T B 3"]:
         """Where the bones point."""
         return (poses.turns[:, self._bone_bodies] @ self._bones[:, :, None])[..., 0]
 
@@ -105,7 +105,7 @@ class Terms:
         self,
         q: Float[np.ndarray, "T nq"],
         targets: FrameTargets,
-        stance: Stance,
+        stance: FootTargets,
         posture: Posture,
         near: Int[np.ndarray, "K"],
     ) -> tuple[Float[np.ndarray, "T D D"], Float[np.ndarray, "T D"]]:
@@ -132,7 +132,7 @@ class Terms:
         return H, g
 
     def _columns(
-        self, poses: Poses
+        self, poses: WindowPoses
     ) -> tuple[Float[np.ndarray, "T D 3"], Float[np.ndarray, "T D 3"]]:
         """The columns' axes, none for a shift, and what these turn about."""
         root = self.robot.mjcf.root
@@ -146,17 +146,17 @@ class Terms:
             axes[:, at : at + 3] = poses.turns[:, self._body(link)].transpose(0, 2, 1)
         return axes, anchors
 
-    def _points(self, poses: Poses) -> Float[np.ndarray, "T P 3"]:
+    def _points(self, poses: WindowPoses) -> Float[np.ndarray, "T P 3"]:
         turns = poses.turns[:, self._point_bodies]
         return (turns @ self._arms[:, :, None])[..., 0] + poses.places[:, self._point_bodies]
 
     def _rows(
         self,
-        poses: Poses,
+        poses: WindowPoses,
         axes: Float[np.ndarray, "T D 3"],
         anchors: Float[np.ndarray, "T D 3"],
         targets: FrameTargets,
-        stance: Stance,
+        stance: FootTargets,
     ) -> Linear:
         """How directions and points grow with all columns, the squares of their weights, and
         residuals times these."""
@@ -194,7 +194,7 @@ class Terms:
     def _weigh_soles(
         self,
         points: Float[np.ndarray, "T P 3"],
-        stance: Stance,
+        stance: FootTargets,
         weights: Float[np.ndarray, "T P 3"],
         forces: Float[np.ndarray, "T P 3"],
     ) -> None:

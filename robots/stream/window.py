@@ -11,7 +11,7 @@ from robots.solver.descent import SHORT_OF_LIMIT
 from robots.solver.objective import FAST, RUSH
 from robots.solver.smoothness import smoothness
 from robots.stream.frame_targets import FrameTargets
-from robots.stream.terms import Posture, Stance, Terms
+from robots.stream.terms import FootTargets, Posture, Terms
 
 SMOOTH = 5.5  # [Hz] above which a motion fades: more than in hindsight, or it would lag behind
 _DAMPING = 1e-3
@@ -57,7 +57,7 @@ class Window:
         self,
         q: Float[np.ndarray, "T nq"],
         targets: FrameTargets,
-        stance: Stance,
+        stance: FootTargets,
         posture: Posture,
     ) -> Float[np.ndarray, "T nq"]:
         """`q` with its free frames, those that have targets, as these and the others want them."""
@@ -69,7 +69,7 @@ class Window:
         return q
 
     def settle(
-        self, q: Float[np.ndarray, "T nq"], targets: FrameTargets, stance: Stance, steps: int
+        self, q: Float[np.ndarray, "T nq"], targets: FrameTargets, stance: FootTargets, steps: int
     ) -> Float[np.ndarray, "T nq"]:
         """`q` with its free frames as their targets want them, each for itself."""
         for _ in range(steps):
@@ -81,7 +81,7 @@ class Window:
         self,
         q: Float[np.ndarray, "T nq"],
         targets: FrameTargets,
-        stance: Stance,
+        stance: FootTargets,
         posture: Posture,
         near: Int[np.ndarray, "K"],
         *,

@@ -34,7 +34,7 @@ def strengths(rig: Rig, bodies: Inertias) -> dict[str, float]:
     found: dict[str, float] = {}
     for j in kept_joints(rig):
         kind = joint_kind_of(rig, j)
-        if j == rig.carrier or kind == DETAIL:
+        if j == rig.root_joint or kind == DETAIL:
             continue
         duty = max(float(held[j]), _LEAST * weight * height)
         if kind == "toe":

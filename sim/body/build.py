@@ -140,7 +140,7 @@ def _add_bodies(
     bodies: dict[int, mujoco.MjsBody] = {}
     for j in kept_joints(rig):
         name = rig.skeleton.names[j]
-        if j == rig.carrier:
+        if j == rig.root_joint:
             start = standing_position(rig, rig.tpose)
             body = spec.worldbody.add_body(name=name, pos=start, childclass=_ROOT)
             body.add_freejoint(name=name)

@@ -36,25 +36,25 @@ _BENT = np.radians([8.0, 25.0])  # below the first a limb is straight; above the
 
 
 @dataclass(frozen=True, eq=False)
-class Projection:
+class HingeFit:
     """Coordinates on a body of hinges, and `notes` on what of the motion they lack."""
 
     qpos: Float[np.ndarray, "T nq"]
     notes: tuple[str, ...]
 
 
-def project(
+def fit_hinges(
     model: mujoco.MjModel,
     rig: Rig,
     positions: Float[np.ndarray, "T J 3"],
     world: Float[np.ndarray, "T J 4"],
     frame_time: float,
-) -> Projection:
+) -> HingeFit:
     """Coordinates of a body of hinges for joint positions and rotations as `forward` gives them."""
-    return _Projector(model, rig, positions, world, MAX_SPEED * frame_time).run()
+    return _HingeFitter(model, rig, positions, world, MAX_SPEED * frame_time).run()
 
 
-class _Projector:
+class _HingeFitter:
     """Goes down the tree: each joint makes up for what those above it could not do."""
 
     def __init__(
@@ -73,11 +73,11 @@ class _Projector:
         self.bends: dict[int, _Angles] = {}
         self.stopped: dict[str, float] = {}
 
-    def run(self) -> Projection:
+    def run(self) -> HingeFit:
         rig = self.rig
-        root = self._address(rig.skeleton.names[rig.carrier])
-        self.qpos[:, root : root + 3] = self.positions[:, rig.carrier]
-        self.qpos[:, root + 3 : root + 7] = self.asked[:, rig.carrier]
+        root = self._address(rig.skeleton.names[rig.root_joint])
+        self.qpos[:, root : root + 3] = self.positions[:, rig.root_joint]
+        self.qpos[:, root + 3 : root + 7] = self.asked[:, rig.root_joint]
         for j in kept_joints(rig)[1:]:
             hinges = hinges_of(rig, j)
             parent = self.made[:, int(rig.skeleton.parents[j])]
@@ -98,7 +98,7 @@ class _Projector:
                 self.made[:, j] = quat_mul(self.made[:, j], turn)
                 stopped = np.mean((angles[:, k] <= ranges[k, 0]) | (angles[:, k] >= ranges[k, 1]))
                 self.stopped[name] = float(stopped)
-        return Projection(self.qpos, self._notes())
+        return HingeFit(self.qpos, self._notes())
 
     def _address(self, name: str) -> int:
         return int(self.model.joint(name).qposadr[0])
@@ -171,7 +171,7 @@ class _Projector:
             quat_mul(self.made, rig.tpose),
             self.positions[:, 0],
         )
-        made += (self.positions - made)[:, [rig.carrier]]
+        made += (self.positions - made)[:, [rig.root_joint]]
         away = np.linalg.norm(made[:, below] - self.positions[:, below], axis=-1)
         frame, worst = np.unravel_index(int(away.argmax()), away.shape)
         notes = [

@@ -33,7 +33,7 @@ def standing_position(rig: Rig, world: Float[np.ndarray, "J 4"]) -> Float[np.nda
     hips = positions[rig.hips].mean(0)
     points = [sole_positions(sole, positions, world) for sole in sole_corners(rig)]
     floor = np.concatenate(points)[:, 2].min() if points else hips[2] - rig.hip_height
-    return positions[rig.carrier] - [hips[0], hips[1], floor]
+    return positions[rig.root_joint] - [hips[0], hips[1], floor]
 
 
 def balanced(
@@ -74,7 +74,7 @@ def _weight(
     positions = world_positions(rig.skeleton, world, np.zeros(3))
     points = np.concatenate([sole_positions(sole, positions, world) for sole in soles])
     since_tpose = quat_mul(world, quat_conj(rig.tpose))
-    below = list(rig.skeleton.subtree(rig.carrier))
+    below = list(rig.skeleton.subtree(rig.root_joint))
     places = positions[below] + quat_rotate(since_tpose[below], masses.coms[below])
     com = masses.masses[below] @ places / masses.masses[below].sum()
     (heel, _, floor), (tip, _, _) = points.min(0), points.max(0)

@@ -145,5 +145,5 @@ def _owners(mesh: SkinnedMesh, rig: Rig, theirs: dict[int, int]) -> Int[np.ndarr
     ours = {k: j for j, k in theirs.items()}
     nearest = np.empty(len(mesh.names), dtype=int)
     for k, parent in enumerate(mesh.parents):
-        nearest[k] = ours.get(k, nearest[parent] if parent >= 0 else rig.carrier)
+        nearest[k] = ours.get(k, nearest[parent] if parent >= 0 else rig.root_joint)
     return nearest[mesh.owners]

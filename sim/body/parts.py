@@ -9,7 +9,7 @@ DETAIL = "detail"
 
 def kept_joints(rig: Rig) -> tuple[int, ...]:
     """The joints that have a body: the carrier and all below it, parents first."""
-    return rig.skeleton.subtree(rig.carrier)
+    return rig.skeleton.subtree(rig.root_joint)
 
 
 def kind_of(rig: Rig, joint: int) -> str:
@@ -41,7 +41,7 @@ def side_of(rig: Rig, joint: int) -> str:
 def hinges_of(rig: Rig, joint: int) -> tuple[tuple[str, Hinge], ...]:
     """The hinges of a joint on a body of hinges, outermost first, and their names on it; none for
     the carrier and for joints without a role."""
-    if joint == rig.carrier:
+    if joint == rig.root_joint:
         return ()
     hinges = HINGES.get(joint_kind_of(rig, joint), ())
     name = rig.skeleton.names[joint]

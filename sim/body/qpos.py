@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from sim.body.hinge_fit import project
+from sim.body.hinge_fit import fit_hinges
 from sim.body.keyframes import standing_position
 from sim.body.parts import kept_joints
 from spark.kinematics import forward, local_rotations, world_positions
@@ -17,7 +17,7 @@ def qpos_from_motion(model: mujoco.MjModel, motion: Motion, rig: Rig) -> Float[n
     """Coordinates of every frame on the body that `sim.body.build.build_body` made of `rig`.
 
     Bones that the file stretches keep the skeleton's length. Angles of hinges are continuous and
-    within their ranges; `sim.body.hinge_fit.project` also says what they lost.
+    within their ranges; `sim.body.hinge_fit.fit_hinges` also says what they lost.
     """
     return _assemble(model, rig, *forward(motion), motion.frame_time)
 
@@ -28,7 +28,7 @@ def qpos_of_pose(
     """The coordinates in which the joints have these rotations `q_world_joint` and the soles stand
     at z = 0."""
     positions = world_positions(rig.skeleton, world, np.zeros(3))
-    positions += standing_position(rig, world) - positions[rig.carrier]
+    positions += standing_position(rig, world) - positions[rig.root_joint]
     return _assemble(model, rig, positions[None], world[None], 1.0)[0]
 
 
@@ -40,13 +40,13 @@ def _assemble(
     frame_time: float,
 ) -> Float[np.ndarray, "T nq"]:
     if np.any(model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE)):
-        return project(model, rig, positions, world, frame_time).qpos
+        return fit_hinges(model, rig, positions, world, frame_time).qpos
     since_tpose = quat_mul(world, quat_conj(rig.tpose))
     local = local_rotations(rig.skeleton, since_tpose)
     qpos = np.empty((len(positions), model.nq))
     for j in kept_joints(rig):
         address = int(model.joint(rig.skeleton.names[j]).qposadr[0])
-        if j == rig.carrier:
+        if j == rig.root_joint:
             qpos[:, address : address + 3] = positions[:, j]
             qpos[:, address + 3 : address + 7] = since_tpose[:, j]
         else:

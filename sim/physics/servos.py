@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from sim.trajectory import GivenBody
+from sim.trajectory import ModelTrajectory
 from spark.errors import SkeletonError
 
 SOFTNESS = 0.1  # [rad] from the target at which a servo of ours gives all that its motor can
@@ -16,7 +16,7 @@ _COLLISION_GROUP = 3  # by custom; viewers don't show it
 
 
 def with_servos(
-    body: GivenBody, *, height: float, floor_z: float
+    body: ModelTrajectory, *, height: float, floor_z: float
 ) -> tuple[mujoco.MjModel, tuple[str, ...]]:
     """The body's model on a floor, with a position servo where it has an actuator, and what was
     assumed on the way.

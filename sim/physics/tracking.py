@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 
 from sim.interpolate import at_times, velocities
 from sim.physics.servos import with_servos
-from sim.trajectory import GivenBody
+from sim.trajectory import ModelTrajectory
 from spark.errors import SkeletonError
 
 FALL_DROP = 0.2  # of the standing height: how much lower than its target the root is
@@ -74,7 +74,7 @@ class Tracked:
     """
 
     model: mujoco.MjModel
-    target: GivenBody
+    target: ModelTrajectory
     target_points: Float[np.ndarray, "T B 3"]
     record: Record
     frame_time: float
@@ -85,13 +85,13 @@ class Tracked:
     notes: tuple[str, ...]
 
     @property
-    def body(self) -> GivenBody:
+    def body(self) -> ModelTrajectory:
         """The body as it moved in the simulation."""
         return replace(self.target, qpos=self.record.qpos)
 
 
 def track(
-    target: GivenBody,
+    target: ModelTrajectory,
     frame_time: float,
     *,
     height: float,

@@ -1,8 +1,8 @@
 """The physical plausibility report."""
 
-from sim.report.assess import judge
-from sim.report.clip_metrics import Measured
+from sim.report.assess import assess
+from sim.report.clip_metrics import ClipMetrics
 from sim.report.compare import compare
 from sim.report.result import Finding, Report
 
-__all__ = ["Finding", "Measured", "Report", "compare", "judge"]
+__all__ = ["ClipMetrics", "Finding", "Report", "assess", "compare"]

@@ -6,7 +6,7 @@ from typing import TypeAlias
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sim.report.clip_metrics import Measured, measure
+from sim.report.clip_metrics import ClipMetrics, measure
 from sim.report.findings import find
 from sim.report.measures import (
     ContactMatch,
@@ -21,7 +21,7 @@ from sim.report.result import Report
 from sim.report.thresholds import PLAUSIBILITY_V1
 from sim.report.track import Track, track
 from sim.report.truth import accuracy
-from sim.trajectory import GivenBody
+from sim.trajectory import ModelTrajectory
 from spark.errors import SkeletonError
 from spark.motion import Motion
 from spark.rig.contacts import planted_feet
@@ -31,15 +31,15 @@ from spark.rig.rig import Rig
 _FLOOR_AT_ZERO = 0.1
 
 
-Source: TypeAlias = tuple[Motion, Rig] | tuple[Motion, Rig, GivenBody | None]
+Source: TypeAlias = tuple[Motion, Rig] | tuple[Motion, Rig, ModelTrajectory | None]
 
 
-def judge(
+def assess(
     motion: Motion,
     rig: Rig,
     *,
     source: Source | None = None,
-    body: GivenBody | None = None,
+    body: ModelTrajectory | None = None,
     truth: Motion | None = None,
 ) -> Report:
     """The plausibility report of `motion`, and its difference to `source` where that is given.
@@ -83,7 +83,7 @@ def judge(
     return Report(clip, source_clip, drift, contacts, find(clip, drift), notes, known)
 
 
-def _track(name: str, motion: Motion, rig: Rig, body: GivenBody | None = None) -> Track:
+def _track(name: str, motion: Motion, rig: Rig, body: ModelTrajectory | None = None) -> Track:
     if not len(motion):
         raise SkeletonError(f"{name} has no frames: nothing to judge")
     return track(motion, rig, body)
@@ -125,8 +125,8 @@ def _floor_from_source(
 
 
 def _beyond_source(
-    clip: Measured, source: Measured, times: Float[np.ndarray, "T"], scale: float
-) -> Measured:
+    clip: ClipMetrics, source: ClipMetrics, times: Float[np.ndarray, "T"], scale: float
+) -> ClipMetrics:
     """Self-penetration only counts as far as it goes beyond the source's own."""
     theirs = at_times(source.self_depth, source.frame_time, times) * scale
     column = {pair: k for k, pair in enumerate(source.self_pairs)}

@@ -20,7 +20,7 @@ FLAGS = {"P": "penetration", "F": "floating", "S": "skating", "R": "root wrench"
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class ClipMetrics:
     """One clip's measures over time; heights are above the floor [m].
 
     `flags` holds one row per letter of `FLAGS`.
@@ -110,7 +110,7 @@ class Measured:
         return float(np.any(over, axis=0).mean()) if over else 0.0
 
 
-def measure(track: Track, floor_z: float) -> Measured:
+def measure(track: Track, floor_z: float) -> ClipMetrics:
     """All measures of a motion over a floor at `floor_z` [m]."""
     thresholds = PLAUSIBILITY_V1.scaled(track.rig.hip_height)
     frame_time, window = track.motion.frame_time, thresholds.window
@@ -135,7 +135,7 @@ def measure(track: Track, floor_z: float) -> Measured:
         rates = hinge_rates(track.body, frame_time, window)
         self_bound = thresholds.shape_penetration
     joint_names, joint_speed, joint_jerk = rates
-    return Measured(
+    return ClipMetrics(
         frame_time=frame_time,
         floor_z=floor_z,
         thresholds=thresholds,

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sim.report.clip_metrics import Measured
+from sim.report.clip_metrics import ClipMetrics
 from sim.report.measures import Drift, spans
 from sim.report.result import Finding
 
@@ -14,7 +14,7 @@ _GAP = 0.1
 _LEAST_BEND = np.radians(1.0)
 
 
-def find(clip: Measured, drift: Drift | None) -> tuple[Finding, ...]:
+def find(clip: ClipMetrics, drift: Drift | None) -> tuple[Finding, ...]:
     """All events of a clip, the gravest of each measure first."""
     gap = int(_GAP / clip.frame_time)
     kinds = (_sinking, _floating, _sliding, _pushed, _bending, _piercing, _tipping)
@@ -22,7 +22,7 @@ def find(clip: Measured, drift: Drift | None) -> tuple[Finding, ...]:
     return (*found, *(_straying(drift) if drift else ()))
 
 
-def _sinking(clip: Measured, gap: int) -> Iterator[Finding]:
+def _sinking(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     for name in dict.fromkeys(clip.depth_names):
         depth = clip.depth[:, [n == name for n in clip.depth_names]].max(axis=1)
         for start, stop in spans(depth > clip.thresholds.penetration, gap):
@@ -32,14 +32,14 @@ def _sinking(clip: Measured, gap: int) -> Iterator[Finding]:
             yield Finding("penetration", name, start, stop, amount, "m", sentence)
 
 
-def _floating(clip: Measured, gap: int) -> Iterator[Finding]:
+def _floating(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     for start, stop in spans(clip.flags["F"], gap):
         amount = float(clip.clearance[start:stop].max())
         sentence = f"the body floats {100 * amount:.1f} cm above the floor"
         yield Finding("floating", "body", start, stop, amount, "m", sentence)
 
 
-def _sliding(clip: Measured, gap: int) -> Iterator[Finding]:
+def _sliding(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     for side in dict.fromkeys(clip.sides):
         columns = [s == side for s in clip.sides]
         speed = np.where(clip.skating, clip.speeds, 0.0)[:, columns].max(axis=1)
@@ -49,7 +49,7 @@ def _sliding(clip: Measured, gap: int) -> Iterator[Finding]:
             yield Finding("skating", side, start, stop, amount, "m", sentence)
 
 
-def _pushed(clip: Measured, gap: int) -> Iterator[Finding]:
+def _pushed(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     force, torque = clip.unexplained.T
     for start, stop in spans(clip.flags["R"] & ~clip.flags["F"], gap):
         amount, unit = float(force[start:stop].max()), "bw"
@@ -60,7 +60,7 @@ def _pushed(clip: Measured, gap: int) -> Iterator[Finding]:
         yield Finding("root wrench", "body", start, stop, amount, unit, sentence)
 
 
-def _bending(clip: Measured, gap: int) -> Iterator[Finding]:
+def _bending(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     for limit in clip.limits:
         for excess, movement in zip(limit.excess.T, limit.movements, strict=True):
             for start, stop in spans(excess > 0, gap):
@@ -71,7 +71,7 @@ def _bending(clip: Measured, gap: int) -> Iterator[Finding]:
                 yield Finding("joint limit", limit.joint, start, stop, amount, "rad", sentence)
 
 
-def _piercing(clip: Measured, gap: int) -> Iterator[Finding]:
+def _piercing(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     for (one, other), depth in zip(clip.self_pairs, clip.self_depth.T, strict=True):
         for start, stop in spans(depth > clip.self_bound, gap):
             amount = float(depth[start:stop].max())
@@ -80,7 +80,7 @@ def _piercing(clip: Measured, gap: int) -> Iterator[Finding]:
             yield Finding("self-penetration", where, start, stop, amount, "m", sentence)
 
 
-def _tipping(clip: Measured, gap: int) -> Iterator[Finding]:
+def _tipping(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     outside = np.nan_to_num(clip.imbalance)
     for start, stop in spans(outside > clip.thresholds.balance, gap):
         amount = float(outside[start:stop].max())

@@ -7,7 +7,7 @@ from jaxtyping import Float
 from sim.report.derivatives import derivative
 from sim.report.limits import LimitExcess
 from sim.report.smoothness import turning
-from sim.trajectory import GivenBody
+from sim.trajectory import ModelTrajectory
 from spark.rotation import quat_normalize, rotvec_from_quat
 
 _HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
@@ -15,7 +15,7 @@ _HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL
 _ROUNDING = 1e-4
 
 
-def hinge_excess(body: GivenBody) -> tuple[LimitExcess, ...]:
+def hinge_excess(body: ModelTrajectory) -> tuple[LimitExcess, ...]:
     """How far each hinge is beyond its range in the file, and each ball beyond its cone.
 
     Joints without limits are left out.
@@ -39,7 +39,7 @@ def hinge_excess(body: GivenBody) -> tuple[LimitExcess, ...]:
 
 
 def hinge_rates(
-    body: GivenBody, frame_time: float, window: float
+    body: ModelTrajectory, frame_time: float, window: float
 ) -> tuple[tuple[str, ...], Float[np.ndarray, "T B"], Float[np.ndarray, "T B"]]:
     """Names, angular speeds [rad/s] and jerks [rad/s³] of the model's joints."""
     model, joints = body.model, _joints(body)
@@ -56,7 +56,7 @@ def hinge_rates(
     )
 
 
-def _joints(body: GivenBody) -> list[int]:
+def _joints(body: ModelTrajectory) -> list[int]:
     """The humanoid's hinges and balls."""
     model = body.model
     return [

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from sim.report.poses import Poses, part_name
-from sim.trajectory import GivenBody
+from sim.report.poses import ModelPoses, part_name
+from sim.trajectory import ModelTrajectory
 from spark.rotation import quat_conj, quat_rotate
 
 _PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)
@@ -15,7 +15,7 @@ _RING = 16  # points on a cylinder's edge
 
 
 def lowest_points(
-    body: GivenBody, poses: Poses
+    body: ModelTrajectory, poses: ModelPoses
 ) -> tuple[tuple[str, ...], Float[np.ndarray, "T B 3"]]:
     """The names of the model's parts, and the lowest point of each [m, world].
 

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.body.anthropometry import segments
-from sim.report.poses import Poses
-from sim.trajectory import GivenBody
+from sim.report.poses import ModelPoses
+from sim.trajectory import ModelTrajectory
 from spark.rig.rig import Rig
 from spark.rotation import quat_mul, quat_rotate
 
@@ -43,7 +43,7 @@ def human_mass(
     return Mass(body.masses, body.inertias, coms, turns)
 
 
-def model_mass(body: GivenBody, poses: Poses) -> Mass:
+def model_mass(body: ModelTrajectory, poses: ModelPoses) -> Mass:
     """The mass of the model's bodies, as the file has it."""
     model = body.model
     heavy = poses.bodies[model.body_mass[poses.bodies] > 0]

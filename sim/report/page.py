@@ -10,12 +10,12 @@ import numpy as np
 from jaxtyping import UInt8
 
 from sim.report.assess import Source
-from sim.report.clip_metrics import FLAGS, Measured
+from sim.report.clip_metrics import FLAGS, ClipMetrics
 from sim.report.plots import flag_strips, plots, svg
 from sim.report.result import Finding, Report
 from sim.report.text import figures, of_which, shares
 from sim.report.track import track
-from sim.trajectory import GivenBody
+from sim.trajectory import ModelTrajectory
 from sim.view.page import Marks, page
 from sim.view.render import frames
 from sim.view.scene import Figure, build_scene
@@ -37,7 +37,7 @@ def write_report_page(
     title: str,
     names: tuple[str, str] = ("motion", "source"),
 ) -> None:
-    """Write the page of `report`, which `judge` made of `motion` and `source`, to `path`."""
+    """Write the page of `report`, which `assess` made of `motion` and `source`, to `path`."""
     text = report_page(report, motion, source, title=title, names=names)
     try:
         Path(path).write_text(text, encoding="utf-8")
@@ -95,7 +95,9 @@ def report_page(
     )
 
 
-def _marks(measured: Measured, motion: Motion, rig: Rig, body: GivenBody | None = None) -> Marks:
+def _marks(
+    measured: ClipMetrics, motion: Motion, rig: Rig, body: ModelTrajectory | None = None
+) -> Marks:
     followed = track(motion, rig, body)
     heights = followed.points[..., 2] - measured.floor_z
     states = np.zeros(heights.shape, dtype=np.uint8)

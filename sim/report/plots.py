@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sim.report.clip_metrics import FLAGS, Measured
+from sim.report.clip_metrics import FLAGS, ClipMetrics
 from sim.report.measures import spans
 from sim.report.result import Report
 
@@ -126,7 +126,7 @@ def _high(values: Float[np.ndarray, "N"]) -> float:
     return float(np.percentile(values[values > 0], 99.5)) if np.any(values > 0) else 0.0
 
 
-def flag_strips(clip: Measured) -> str:
+def flag_strips(clip: ClipMetrics) -> str:
     """When each flag is up: one strip a flag."""
     return "".join(
         f"<figure class=strip><figcaption>{letter} {html.escape(name)}</figcaption>"
@@ -155,15 +155,15 @@ def _line(y: Float[np.ndarray, "T"], across: float, lowest: bool, kind: str) -> 
     return f'<polyline class="{kind}" points="{points}"/>'
 
 
-def _lowest(clip: Measured) -> Float[np.ndarray, "T"]:
+def _lowest(clip: ClipMetrics) -> Float[np.ndarray, "T"]:
     return np.where(clip.depth.max(axis=1) > 0, -clip.depth.max(axis=1), clip.clearance)
 
 
-def _sliding(clip: Measured) -> Float[np.ndarray, "T"]:
+def _sliding(clip: ClipMetrics) -> Float[np.ndarray, "T"]:
     return np.where(clip.skating, clip.speeds, 0.0).max(axis=1)
 
 
-def _beyond(clip: Measured) -> Float[np.ndarray, "T"]:
+def _beyond(clip: ClipMetrics) -> Float[np.ndarray, "T"]:
     if not clip.limits:
         return np.zeros(len(clip))
     return np.degrees(np.max([limit.excess.max(axis=1) for limit in clip.limits], axis=0))

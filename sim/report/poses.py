@@ -7,11 +7,11 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
-from sim.trajectory import GivenBody
+from sim.trajectory import ModelTrajectory
 
 
 @dataclass(frozen=True, eq=False)
-class Poses:
+class ModelPoses:
     """Bodies over time: `pos` [m] and `quat` in the world, by the model's number; `bodies` are the
     numbers of the humanoid's own.
 
@@ -26,7 +26,7 @@ class Poses:
     depth: Float[np.ndarray, "T K"]
 
 
-def follow(body: GivenBody) -> Poses:
+def follow(body: ModelTrajectory) -> ModelPoses:
     """Run MuJoCo's kinematics and collision detection over all frames.
 
     Shapes collide as the file says: by its bits, excludes and pairs, never with their parents.
@@ -46,7 +46,7 @@ def follow(body: GivenBody) -> Poses:
         pos[t], quat[t] = data.xpos, data.xquat
     pairs = [*dict.fromkeys(p for found in touching for p in found if p not in ignored)]
     depth = np.array([[found.get(p, 0.0) for p in pairs] for found in touching])
-    return Poses(bodies, pos, quat, tuple(pairs), depth.reshape(len(touching), len(pairs)))
+    return ModelPoses(bodies, pos, quat, tuple(pairs), depth.reshape(len(touching), len(pairs)))
 
 
 def part_name(model: mujoco.MjModel, body: int) -> str:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.report.clip_metrics import FLAGS, Measured
+from sim.report.clip_metrics import FLAGS, ClipMetrics
 from sim.report.measures import Drift, spans
 from sim.report.result import Finding, Report
 from sim.report.truth import Accuracy
@@ -56,12 +56,12 @@ _UNITS = {
 }
 
 
-def _threshold_values(clip: Measured) -> dict[str, float]:
+def _threshold_values(clip: ClipMetrics) -> dict[str, float]:
     values = asdict(clip.thresholds)
     return {f"{name}_{unit}" if unit else name: values[name] for name, unit in _UNITS.items()}
 
 
-def _measured(clip: Measured) -> dict[str, Any]:
+def _measured(clip: ClipMetrics) -> dict[str, Any]:
     return {
         "implausible_share": clip.implausible_share,
         "floor_z_m": clip.floor_z,

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from sim.report.clip_metrics import Measured
+from sim.report.clip_metrics import ClipMetrics
 from sim.report.measures import ContactMatch, Drift
 from sim.report.truth import Accuracy
 
@@ -42,8 +42,8 @@ class Report:
     `clip.self_depth` is then what goes beyond the source's own self-penetration.
     """
 
-    clip: Measured
-    source: Measured | None
+    clip: ClipMetrics
+    source: ClipMetrics | None
     drift: Drift | None
     contacts: ContactMatch | None
     findings: tuple[Finding, ...]

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sim.report.clip_metrics import FLAGS, Measured
+from sim.report.clip_metrics import FLAGS, ClipMetrics
 from sim.report.result import Finding, Report
 
 _RED, _YELLOW, _GREEN, _DIM, _BOLD = 31, 33, 32, 2, 1
@@ -57,7 +57,7 @@ def _percent(share: float) -> str:
     return f"{100 * share:.1f} %"
 
 
-def shares(clip: Measured) -> Iterator[tuple[str, float]]:
+def shares(clip: ClipMetrics) -> Iterator[tuple[str, float]]:
     """The measures that are shares of frames, by name."""
     for letter, name in FLAGS.items():
         yield name, clip.shares[letter]
@@ -68,7 +68,7 @@ def shares(clip: Measured) -> Iterator[tuple[str, float]]:
         yield "out of balance", clip.unbalanced_share
 
 
-def of_which(clip: Measured, name: str) -> str:
+def of_which(clip: ClipMetrics, name: str) -> str:
     """What a share is of, where that isn't all frames."""
     if name != "out of balance":
         return ""

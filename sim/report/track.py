@@ -8,8 +8,8 @@ from jaxtyping import Float
 from sim.body.anthropometry import RADII
 from sim.report.lowest import lowest_points
 from sim.report.mass import Mass, human_mass, model_mass
-from sim.report.poses import Poses, follow
-from sim.trajectory import GivenBody, GivenSole
+from sim.report.poses import ModelPoses, follow
+from sim.trajectory import ModelSole, ModelTrajectory
 from spark.errors import SkeletonError
 from spark.kinematics import forward
 from spark.motion import Motion
@@ -47,8 +47,8 @@ class Track:
     positions: Float[np.ndarray, "T J 3"]
     world: Float[np.ndarray, "T J 4"]
     since_tpose: Float[np.ndarray, "T J 4"]
-    body: GivenBody | None
-    poses: Poses | None
+    body: ModelTrajectory | None
+    poses: ModelPoses | None
 
     def __len__(self) -> int:
         return len(self.hips)
@@ -59,7 +59,7 @@ class Track:
         return self.points[..., 2].min(axis=1)
 
 
-def track(motion: Motion, rig: Rig, body: GivenBody | None = None) -> Track:
+def track(motion: Motion, rig: Rig, body: ModelTrajectory | None = None) -> Track:
     """Follow the motion, on `body` where that is given.
 
     Raises SkeletonError where the rig has no foot or no leg to stand on, and where the body has
@@ -133,6 +133,6 @@ def _soles(rig: Rig) -> tuple[Sole, ...]:
     return soles
 
 
-def _given_corners(sole: GivenSole, poses: Poses) -> Float[np.ndarray, "T C 3"]:
+def _given_corners(sole: ModelSole, poses: ModelPoses) -> Float[np.ndarray, "T C 3"]:
     turned = quat_rotate(poses.quat[:, sole.bodies], sole.points)
     return poses.pos[:, sole.bodies] + turned

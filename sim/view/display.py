@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
-from sim.trajectory import GivenBody
+from sim.trajectory import ModelTrajectory
 from sim.view.simplify import Mesh, simplify_together
 
 FACES = 40_000  # of one figure's meshes
@@ -30,7 +30,7 @@ _WIDTHS = {int(mujoco.mjtJoint.mjJNT_FREE): 7, int(mujoco.mjtJoint.mjJNT_BALL): 
 
 
 def add_display(
-    spec: mujoco.MjSpec, body: GivenBody, prefix: str, *, ghost: bool = False
+    spec: mujoco.MjSpec, body: ModelTrajectory, prefix: str, *, ghost: bool = False
 ) -> Int[np.ndarray, "n"]:
     """Add the body's root and all below it to the spec's world; names begin with `prefix`.
 

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.interpolate import at_times
-from sim.trajectory import GivenBody, given
+from sim.trajectory import ModelTrajectory, model_trajectory
 from sim.view.display import add_display
 from spark.errors import SkeletonError
 from spark.kinematics import forward
@@ -33,7 +33,7 @@ class Figure:
     motion: Motion
     label: str
     floor_z: float = 0.0
-    body: GivenBody | None = None
+    body: ModelTrajectory | None = None
     ghost: bool = False
 
 
@@ -105,7 +105,7 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
     placed: list[Placed] = []
     column = 0
     for k, figure in enumerate(figures):
-        body = figure.body or given(figure.rig, figure.motion)
+        body = figure.body or model_trajectory(figure.rig, figure.motion)
         first_body = len(list(world.bodies))
         columns = add_display(world, body, f"{k}_", ghost=figure.ghost)
         qpos = at_times(body.model, body.qpos, figure.motion.frame_time, times)[:, columns]
@@ -137,8 +137,10 @@ def _lanes(figures: Sequence[Figure], heights: Sequence[float]) -> Float[np.ndar
 def _turn(figure: Figure) -> Float[np.ndarray, "4"]:
     """The turn about Z after which the figure faces +X in its first frame."""
     rig = figure.rig
-    pelvis = forward(figure.motion.frames(0, 1))[1][0, rig.carrier]
-    ahead = quat_rotate(quat_mul(pelvis, quat_conj(rig.tpose[rig.carrier])), np.array([1.0, 0, 0]))
+    pelvis = forward(figure.motion.frames(0, 1))[1][0, rig.root_joint]
+    ahead = quat_rotate(
+        quat_mul(pelvis, quat_conj(rig.tpose[rig.root_joint])), np.array([1.0, 0, 0])
+    )
     if np.hypot(ahead[0], ahead[1]) < 0.3:  # lies: where it looks says nothing
         return np.array([1.0, 0, 0, 0])
     return quat_about("z", np.array(-np.arctan2(ahead[1], ahead[0])))

@@ -21,8 +21,8 @@ from spark.evaluation.metrics import san_height
 from spark.network.features import BodyFeatures
 from spark.rig.roles import Role
 from spark.training.dataset import Performance, is_dataset, prepare, read_performances
-from spark.training.pairs import Clip
-from spark.training.staging import Stage
+from spark.training.pairs import TrainingClip
+from spark.training.staging import StagedBody
 from spark.training.variants import Variant, random_variant, same_body, scaled_body, split_body
 from spark.transfer.analytic import correspond
 from spark.transfer.canonical import CanonicalMotion
@@ -120,11 +120,11 @@ def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = 
     Of each cell at most `limit` clips, drawn by `seed`. Training does not meet these targets,
     whatever its seed: it draws other ones.
     """
-    stages: dict[tuple[int, Structure, int], Stage] = {}
+    stages: dict[tuple[int, Structure, int], StagedBody] = {}
     cases = []
     for i, one in _drawn(found, seed, limit):
         body, (clip, other) = one.clip.body, _asked_and_own(one.clip, found)
-        unchanged = Stage(same_body(body))
+        unchanged = StagedBody(same_body(body))
         recorded = _canonical(clip, unchanged.variant, len(clip.hips))
         for structure in STRUCTURES:
             number = i % _TARGETS
@@ -133,7 +133,7 @@ def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = 
                 name = zlib.crc32(one.character.encode())
                 rng = np.random.default_rng((seed, name, number, STRUCTURES.index(structure)))
                 make = {"intra": scaled_body, "cross": random_variant, "missing": lacking_body}
-                stages[key] = Stage(make[structure](body, rng))
+                stages[key] = StagedBody(make[structure](body, rng))
             ends = unchanged, stages[key]
             source, target = ends[::-1] if structure == "missing" else ends
             cases.append(
@@ -149,7 +149,9 @@ def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = 
     return cases
 
 
-def _asked_and_own(clip: Clip, found: Sequence[Performance]) -> tuple[Clip, Clip | None]:
+def _asked_and_own(
+    clip: TrainingClip, found: Sequence[Performance]
+) -> tuple[TrainingClip, TrainingClip | None]:
     """What of a clip is asked for, and another recording of its body."""
     others = [p.clip for p in found if p.clip.body is clip.body and p.clip is not clip]
     if others:
@@ -160,16 +162,16 @@ def _asked_and_own(clip: Clip, found: Sequence[Performance]) -> tuple[Clip, Clip
     return _part(clip, slice(half, None)), _part(clip, slice(half))
 
 
-def _longest(clips: Sequence[Clip]) -> Clip | None:
+def _longest(clips: Sequence[TrainingClip]) -> TrainingClip | None:
     return max(clips, key=lambda clip: len(clip.hips), default=None)
 
 
-def _part(clip: Clip, frames: slice) -> Clip:
+def _part(clip: TrainingClip, frames: slice) -> TrainingClip:
     rotations, hips, planted = (x[frames] for x in (clip.rotations, clip.hips, clip.planted))
     return replace(clip, rotations=rotations, hips=hips, planted=planted)
 
 
-def _placed(clip: Clip, stage: Stage) -> CanonicalMotion:
+def _placed(clip: TrainingClip, stage: StagedBody) -> CanonicalMotion:
     """A recording on a changed copy of its body, the feet planted where they stand."""
     rotations, hips = (np.asarray(x, np.float64)[None] for x in (clip.rotations, clip.hips))
     planted = np.asarray(clip.planted)[None]
@@ -182,13 +184,13 @@ def lacking_body(body: BodyFeatures, rng: np.random.Generator) -> Variant:
     own = same_body(body).body.rig
     for _ in range(_TRIES):
         variant = random_variant(body, rng)
-        if (correspond(variant.body.rig, own).guess >= 0).any():
+        if (correspond(variant.body.rig, own).unmatched >= 0).any():
             break
     return variant
 
 
 def _recorded(
-    motion: str, source: Performance, target: Performance, frames: int, own: Clip | None
+    motion: str, source: Performance, target: Performance, frames: int, own: TrainingClip | None
 ) -> list[Case]:
     given_body, theirs = source.clip.body, target.clip.body
     height = san_height(theirs.rig) / theirs.rig.hip_height
@@ -215,12 +217,12 @@ def _structure(body: BodyFeatures) -> Counter[Role | None]:
     return found
 
 
-def _in_memory(clip: Clip) -> Clip:
+def _in_memory(clip: TrainingClip) -> TrainingClip:
     rotations, hips, planted = map(np.array, (clip.rotations, clip.hips, clip.planted))
     return replace(clip, rotations=rotations, hips=hips, planted=planted)
 
 
-def _canonical(clip: Clip, variant: Variant, frames: int) -> CanonicalMotion:
+def _canonical(clip: TrainingClip, variant: Variant, frames: int) -> CanonicalMotion:
     rotations = variant.rotations(np.asarray(clip.rotations[:frames], np.float64))
     hips = np.asarray(clip.hips[:frames], np.float64)
     return CanonicalMotion(variant.body.rig, clip.frame_time, rotations, hips)

@@ -19,7 +19,7 @@ from spark.evaluation.metrics import Score, mean_score, score_positions, source_
 from spark.io.reading import SUFFIXES, read_motion
 from spark.rig.rig import understand
 from spark.transfer.canonical import FRAME_TIME, at_frame_time, canonical_positions, to_canonical
-from spark.transfer.foot_lock import refine
+from spark.transfer.foot_lock import lock_feet
 from spark.transfer.target_prior import Retargeting, with_own_motion
 
 Positions = Float[np.ndarray, "_ _ 3"]  # frames, joints
@@ -101,7 +101,7 @@ def by(method: Retargeting, *, own_motion: bool = False, feet_held: bool = False
             moved = with_own_motion(method, case.source, case.own)
         else:
             moved = method(case.source, case.truth.rig)
-        return canonical_positions(refine(case.source, moved) if feet_held else moved)
+        return canonical_positions(lock_feet(case.source, moved) if feet_held else moved)
 
     return run
 

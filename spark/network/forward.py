@@ -71,14 +71,14 @@ class Network:
         latent: Float[np.ndarray, "W T 24 D"],
         names: Names,
         start: Windows,
-        guess: Int[np.ndarray, "J"],
+        unmatched: Int[np.ndarray, "J"],
         share: float = 1.0,
     ) -> Windows:
         """The motion that H describes, from the analytic transfer `start`: a residual network's,
         of whose corrections a share is made.
 
-        `guess` is `Correspondence.guess` in the network's numbering."""
-        joints = np.flatnonzero(guess == np.arange(len(guess)))
+        `unmatched` is `Correspondence.unmatched` in the network's numbering."""
+        joints = np.flatnonzero(unmatched == np.arange(len(unmatched)))
         if not len(joints):
             return start
         seen = _seen(start.rotations[:, :, joints]).astype(np.float32)
@@ -86,7 +86,7 @@ class Network:
         y = known[joints] + self.layers["decoder.query"] + self.layers.linear("decoder.start", seen)
         sixd = self.layers.linear("decoder.rotation", self._read(y, latent))
         turns = share * self.config.shrink * RESIDUAL_SCALE * sixd.astype(np.float64)
-        return _corrected(start, turns, joints, guess)
+        return _corrected(start, turns, joints, unmatched)
 
     def decode(
         self, latent: Float[np.ndarray, "W T 24 D"], names: Names, body: BodyFeatures
@@ -204,7 +204,7 @@ def _corrected(
     start: Windows,
     sixd: Float[np.ndarray, "W T N 6"],
     joints: Int[np.ndarray, "N"],
-    guess: Int[np.ndarray, "J"],
+    unmatched: Int[np.ndarray, "J"],
 ) -> Windows:
     """`spark.training.model._corrected`, for guesses alone."""
     skeleton = start.body.skeleton
@@ -212,10 +212,10 @@ def _corrected(
     little = quat_from_sixd(sixd + np.array(NO_ROTATION))
     own = before[:, :, joints]
     turns = quat_mul(quat_mul(own, little), quat_conj(own))
-    moved = np.flatnonzero(guess >= 0)
+    moved = np.flatnonzero(unmatched >= 0)
     place = {int(j): n for n, j in enumerate(joints)}
     world = before.copy()
-    turns = turns[:, :, [place[int(guess[j])] for j in moved]]
+    turns = turns[:, :, [place[int(unmatched[j])] for j in moved]]
     world[:, :, moved] = quat_mul(turns, before[:, :, moved])
     return Windows(start.body, sixd_from_quat(local_rotations(skeleton, world)), start.root)
 

@@ -57,13 +57,14 @@ class Learned:
         """
         start = transfer(source, target)
         bodies = body_features(source.rig), body_features(target)
-        guess = guesses(source.rig, bodies[1])
+        unmatched = unmatched_joints(source.rig, bodies[1])
         share = 1.0
         if self.network.config.residual:
-            if not (guess >= 0).any():
+            if not (unmatched >= 0).any():
                 return start
             names = [
-                target.skeleton.names[bodies[1].joints[j]] for j in np.unique(guess[guess >= 0])
+                target.skeleton.names[bodies[1].joints[j]]
+                for j in np.unique(unmatched[unmatched >= 0])
             ]
             share = nearness(bodies[1], self.bodies)
             who = "the network fills them in" if share else "interpolated, or following"
@@ -72,7 +73,9 @@ class Learned:
             if not share:
                 return start
         slow_source, slow_start = (at_frame_time(c, FRAME_TIME) for c in (source, start))
-        slow = self._blended(slow_source, slow_start, bodies, guess, share, window or self.window)
+        slow = self._blended(
+            slow_source, slow_start, bodies, unmatched, share, window or self.window
+        )
         if slow_start is start:
             return slow
         turned = quat_mul(slow.rotations, quat_conj(slow_start.rotations))
@@ -88,7 +91,7 @@ class Learned:
         source: CanonicalMotion,
         start: CanonicalMotion,
         bodies: tuple[BodyFeatures, BodyFeatures],
-        guess: Int[np.ndarray, "J"],
+        unmatched: Int[np.ndarray, "J"],
         share: float,
         window: int,
     ) -> CanonicalMotion:
@@ -103,7 +106,7 @@ class Learned:
             spans = [slice(at, at + size) for at in firsts[k : k + _AT_A_TIME]]
             given = [source.frames(span.start, span.stop) for span in spans]
             copied = [start.frames(span.start, span.stop) for span in spans]
-            answers = self._answers(given, copied, bodies, guess, share)
+            answers = self._answers(given, copied, bodies, unmatched, share)
             for span, answer in zip(spans, answers, strict=True):
                 same = np.sign((answer.rotations * start.rotations[span]).sum(-1, keepdims=True))
                 rotations[span] += (
@@ -118,7 +121,7 @@ class Learned:
         sources: list[CanonicalMotion],
         starts: list[CanonicalMotion],
         bodies: tuple[BodyFeatures, BodyFeatures],
-        guess: Int[np.ndarray, "J"],
+        unmatched: Int[np.ndarray, "J"],
         share: float,
     ) -> list[CanonicalMotion]:
         """What the network makes of windows of one length."""
@@ -130,7 +133,7 @@ class Learned:
         )
         latent = self.network.encode(_windows(given, read), known)
         if self.network.config.residual:
-            out = self.network.correct(latent, wanted, _windows(asked, copied), guess, share)
+            out = self.network.correct(latent, wanted, _windows(asked, copied), unmatched, share)
         else:
             out = self.network.decode(latent, wanted, asked)
         return [
@@ -139,10 +142,10 @@ class Learned:
         ]
 
 
-def guesses(source: Rig, target: BodyFeatures) -> Int[np.ndarray, "J"]:
-    """`Correspondence.guess` in the network's numbering of the target's joints."""
+def unmatched_joints(source: Rig, target: BodyFeatures) -> Int[np.ndarray, "J"]:
+    """`Correspondence.unmatched` in the network's numbering of the target's joints."""
     place = {int(j): k for k, j in enumerate(target.joints)}
-    found = correspond(source, target.rig).guess[target.joints]
+    found = correspond(source, target.rig).unmatched[target.joints]
     return np.array([place.get(int(j), -1) for j in found])
 
 

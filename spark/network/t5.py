@@ -1,5 +1,5 @@
-"""Joint names as vectors by a T5, where its weights are at hand: the one file of the room that needs
-torch, and `transformers`.
+"""Joint names as vectors by a T5, where its weights are at hand: the one file of the room that
+needs torch, and `transformers`.
 """
 
 from collections.abc import Sequence

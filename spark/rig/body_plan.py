@@ -8,9 +8,9 @@ import numpy as np
 from spark.errors import SkeletonError
 from spark.rig.facing import LabelledPair, first_is_left, stands_on_four
 from spark.rig.limb_roles import ARM, LEG, label_limb
-from spark.rig.measurements import Stance, rest_stance
+from spark.rig.measurements import Measurements, rest_measurements
 from spark.rig.name_hints import NameHint
-from spark.rig.topology import Pair, mirrored_pairs, named_pair
+from spark.rig.topology import LimbPair, mirrored_pairs, named_pair
 from spark.rig.trunk import find_pelvis, find_trunk
 from spark.skeleton import Skeleton
 
@@ -32,7 +32,7 @@ class BodyPlan:
     mirrored: frozenset[int]
 
 
-def plan_body(stance: Stance, hints: Sequence[NameHint]) -> BodyPlan:
+def plan_body(stance: Measurements, hints: Sequence[NameHint]) -> BodyPlan:
     """The plan of a two-legged body; SkeletonError with the reason where it is none."""
     skeleton = stance.skeleton
     if stance.reach[0] <= 0:
@@ -73,12 +73,14 @@ def plan_body(stance: Stance, hints: Sequence[NameHint]) -> BodyPlan:
     return BodyPlan(pelvis, spine, neck, head, labelled_legs, labelled_arms, sides, mirrored)
 
 
-def _human(hints: Sequence[NameHint], arms: Pair) -> bool:
+def _human(hints: Sequence[NameHint], arms: LimbPair) -> bool:
     """Whether names speak of arms, not of front legs or wings."""
     return not any(hints[j].foreleg or "wing" in hints[j].parts for j in arms.first)
 
 
-def _others(stance: Stance, skeleton: Skeleton, pairs: Sequence[Pair], legs: Pair) -> list[Pair]:
+def _others(
+    stance: Measurements, skeleton: Skeleton, pairs: Sequence[LimbPair], legs: LimbPair
+) -> list[LimbPair]:
     """The pairs that are no part of the legs and long enough to be limbs beside them."""
     inside = {j for root in legs.roots for j in skeleton.subtree(root)}
     above = set(skeleton.ancestors(legs.roots[0])) | set(skeleton.ancestors(legs.roots[1]))
@@ -93,8 +95,11 @@ def _others(stance: Stance, skeleton: Skeleton, pairs: Sequence[Pair], legs: Pai
 
 
 def _legs_by_shape(
-    stance: Stance, hints: Sequence[NameHint], pairs: Sequence[Pair], arms: Pair | None
-) -> Pair | None:
+    stance: Measurements,
+    hints: Sequence[NameHint],
+    pairs: Sequence[LimbPair],
+    arms: LimbPair | None,
+) -> LimbPair | None:
     """The pair of limbs that is lowest while the body is up, in the motion and at rest.
 
     Where that leaves it open (a body that only lies), build tells: segment lengths and the place in
@@ -102,25 +107,25 @@ def _legs_by_shape(
     """
     taken = set() if arms is None else {*arms.first, *arms.second}
     able = [p for p in pairs if not taken & set(p.roots) and min(len(p.first), len(p.second)) >= 2]
-    rest = rest_stance(stance.skeleton)
+    rest = rest_measurements(stance.skeleton)
 
-    def height(pair: Pair) -> float:
+    def height(pair: LimbPair) -> float:
         lifts = [lift for seen in (stance, rest) if not np.isnan(lift := seen.lift(pair.roots))]
         return float(np.mean(lifts)) if lifts else 0.5
 
-    def unlike(pair: Pair) -> float:
+    def unlike(pair: LimbPair) -> float:
         as_leg, as_arm = (
             label_limb(stance, hints, (pair.first, pair.second), parts)[0].score
             for parts in (LEG, ARM)
         )
         fit = float(np.clip(as_leg - as_arm, -4, 4))
-        return height(pair) - 0.05 * fit + 0.02 * len(stance.skeleton.ancestors(pair.carrier))
+        return height(pair) - 0.05 * fit + 0.02 * len(stance.skeleton.ancestors(pair.root_joint))
 
     legs = min(able, key=unlike, default=None)
     return legs if legs is not None and height(legs) <= 0.5 else None
 
 
-def _no_legs(skeleton: Skeleton, hints: Sequence[NameHint], arms: Pair | None) -> str:
+def _no_legs(skeleton: Skeleton, hints: Sequence[NameHint], arms: LimbPair | None) -> str:
     if len(skeleton) < 7:
         what = f"{len(skeleton)} joints are too few for a body with two legs and a trunk"
     elif any("fin" in name.lower() and hints[j].aside for j, name in enumerate(skeleton.names)):
@@ -135,11 +140,11 @@ def _no_legs(skeleton: Skeleton, hints: Sequence[NameHint], arms: Pair | None) -
 
 
 def _refuse_other_plans(
-    stance: Stance,
+    stance: Measurements,
     hints: Sequence[NameHint],
-    legs: Pair,
-    arms: Pair | None,
-    others: Sequence[Pair],
+    legs: LimbPair,
+    arms: LimbPair | None,
+    others: Sequence[LimbPair],
 ) -> None:
     forks = [
         child
@@ -150,13 +155,13 @@ def _refuse_other_plans(
     if forks:
         raise SkeletonError(
             f"not a humanoid: it has {2 + 2 * len(forks)} legs, all of them carried by "
-            f"{stance.skeleton.names[legs.carrier]!r}; {_REMEDY}"
+            f"{stance.skeleton.names[legs.root_joint]!r}; {_REMEDY}"
         )
     if len(others) > 1:
         wings = any("wing" in hint.parts for hint in hints)
         what = f"it has {1 + len(others)} pairs of limbs" + (", one of them wings" if wings else "")
         raise SkeletonError(f"not a humanoid: {what}; {_REMEDY}")
-    if arms is not None and stands_on_four(stance, rest_stance(stance.skeleton), legs, arms):
+    if arms is not None and stands_on_four(stance, rest_measurements(stance.skeleton), legs, arms):
         raise SkeletonError(
             "not a humanoid: it walks on four legs, its front limbs reach the ground as its hind "
             f"legs do; {_REMEDY}"
@@ -164,7 +169,7 @@ def _refuse_other_plans(
 
 
 def _align(
-    stance: Stance, legs: LabelledPair, arms: LabelledPair
+    stance: Measurements, legs: LabelledPair, arms: LabelledPair
 ) -> tuple[LabelledPair, LabelledPair]:
     """Both with the limbs of one side first; where names tell one pair's sides, both know them."""
     if legs.pair.sided and arms.pair.sided:
@@ -183,5 +188,5 @@ def _ordered(limbs: LabelledPair, swap: bool, sided: bool) -> LabelledPair:
     pair, labels = limbs.pair, limbs.labels
     first, second = (pair.second, pair.first) if swap else (pair.first, pair.second)
     return LabelledPair(
-        Pair(pair.carrier, first, second, sided), (labels[1], labels[0]) if swap else labels
+        LimbPair(pair.root_joint, first, second, sided), (labels[1], labels[0]) if swap else labels
     )

@@ -22,7 +22,7 @@ Vector = Float[np.ndarray, "3"]
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class RigPose:
     """A skeleton in one pose, given by local rotations. Bones are in the axes of their joint."""
 
     skeleton: Skeleton

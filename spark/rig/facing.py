@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.rig.limb_roles import Labels
-from spark.rig.measurements import Stance
-from spark.rig.topology import Pair
+from spark.rig.measurements import Measurements
+from spark.rig.topology import LimbPair
 
 _FOOT, _KNEE, _ELBOW = 1.0, 3.0, 2.0  # how surely each shows the front
 _GROUND = 0.3  # hands lower than this share of the hip height stand on the ground
@@ -17,7 +17,7 @@ _GROUND = 0.3  # hands lower than this share of the hip height stand on the grou
 class LabelledPair:
     """Two limbs of which the joints' parts are known."""
 
-    pair: Pair
+    pair: LimbPair
     labels: tuple[Labels, Labels]
 
     def joint(self, side: int, part: str) -> int | None:
@@ -28,7 +28,7 @@ class LabelledPair:
 
 
 def first_is_left(
-    stance: Stance, legs: LabelledPair, arms: LabelledPair | None, above: int | None
+    stance: Measurements, legs: LabelledPair, arms: LabelledPair | None, above: int | None
 ) -> float:
     """Evidence that the pairs' `first` limbs are the left ones: sure at 0.3, against below 0.
 
@@ -59,7 +59,7 @@ def first_is_left(
 
 
 def _bend(
-    stance: Stance,
+    stance: Measurements,
     limb: LabelledPair,
     side: int,
     parts: tuple[str, str, str],
@@ -80,7 +80,7 @@ def _bend(
 
 
 def _foot(
-    stance: Stance, legs: LabelledPair, side: int, forward: Float[np.ndarray, "T 3"]
+    stance: Measurements, legs: LabelledPair, side: int, forward: Float[np.ndarray, "T 3"]
 ) -> float:
     """How much the foot points forward: 1 straight ahead."""
     ankle = legs.joint(side, "foot")
@@ -93,7 +93,9 @@ def _foot(
     return float(np.mean((foot * forward).sum(-1) / np.maximum(length, 1e-9)))
 
 
-def stands_on_four(stance: Stance, rest: Stance, legs: Pair, arms: Pair) -> bool:
+def stands_on_four(
+    stance: Measurements, rest: Measurements, legs: LimbPair, arms: LimbPair
+) -> bool:
     """Whether the tips of `arms` are as low as those of `legs`, seen from the legs' carrier.
 
     The rest pose tells where it is a stance, the typical frame of the motion otherwise: a fallen

@@ -8,7 +8,7 @@ from math import log
 import numpy as np
 from jaxtyping import Float
 
-from spark.rig.measurements import Stance
+from spark.rig.measurements import Measurements
 from spark.rig.name_hints import NameHint
 
 LEG = ("upper_leg", "lower_leg", "foot", "toe")
@@ -28,7 +28,7 @@ class Labels:
 
 
 def label_limb(
-    stance: Stance,
+    stance: Measurements,
     hints: Sequence[NameHint],
     chains: Sequence[tuple[int, ...]],
     parts: tuple[str, ...],
@@ -40,7 +40,7 @@ def label_limb(
 
 
 def _best(
-    stance: Stance,
+    stance: Measurements,
     hints: Sequence[NameHint],
     chains: Sequence[tuple[int, ...]],
     parts: tuple[str, ...],
@@ -80,7 +80,7 @@ def _name_score(hint: NameHint, part: str, parts: tuple[str, ...]) -> float:
     return -0.6 if any(other in hint.parts for other in parts) else 0.0
 
 
-def _arc_lengths(stance: Stance, chain: tuple[int, ...]) -> list[float]:
+def _arc_lengths(stance: Measurements, chain: tuple[int, ...]) -> list[float]:
     """Distance along the chain from its carrier to each joint, and last to the tip [m]."""
     at = [float(stance.bones[chain[0]])]
     for joint in chain[1:]:
@@ -88,7 +88,7 @@ def _arc_lengths(stance: Stance, chain: tuple[int, ...]) -> list[float]:
     return [*at, at[-1] + float(stance.end_reach[chain[-1]])]
 
 
-def _stiffness(stance: Stance, chain: tuple[int, ...]) -> Float[np.ndarray, "_"]:
+def _stiffness(stance: Measurements, chain: tuple[int, ...]) -> Float[np.ndarray, "_"]:
     """1 for joints that never bend in a motion in which others of the chain do, 0 otherwise."""
     bending = stance.bending(chain)
     most = np.nanmax(bending, initial=0.0)

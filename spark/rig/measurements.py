@@ -15,7 +15,7 @@ MAX_FRAMES = 48
 
 
 @dataclass(frozen=True, eq=False)
-class Stance:
+class Measurements:
     """Joints and End Sites of a skeleton in some frames [m, world]; lengths are pose-free.
 
     `posed` is False where the rest pose had to do: no motion was given.
@@ -107,22 +107,22 @@ class Stance:
         return self.ends[:, far]
 
 
-def rest_stance(skeleton: Skeleton) -> Stance:
+def rest_measurements(skeleton: Skeleton) -> Measurements:
     """The rest pose as one frame."""
     joints = skeleton.rest_positions
-    return Stance(
+    return Measurements(
         skeleton, joints[None], (joints[skeleton.end_parents] + skeleton.end_offsets)[None], False
     )
 
 
-def measure(skeleton: Skeleton, motion: Motion | None) -> Stance:
+def measure(skeleton: Skeleton, motion: Motion | None) -> Measurements:
     """At most `MAX_FRAMES` frames spread over `motion`, or the rest pose where there is none.
 
     Frames in which the bones shrink away (positions animated in another unit than the offsets) are
     taken with the skeleton's own offsets.
     """
     if motion is None or not len(motion):
-        return rest_stance(skeleton)
+        return rest_measurements(skeleton)
     step = -(-len(motion) // MAX_FRAMES)
     some = Motion(
         skeleton,
@@ -132,9 +132,9 @@ def measure(skeleton: Skeleton, motion: Motion | None) -> Stance:
         None if motion.translations is None else motion.translations[::step],
     )
     joints, world = forward(some)
-    stance = Stance(skeleton, joints, end_positions(skeleton, joints, world), True)
+    stance = Measurements(skeleton, joints, end_positions(skeleton, joints, world), True)
     own = np.linalg.norm(skeleton.offsets[1:], axis=-1).sum()
     if motion.translations is not None and not 0.5 * own < stance.bones.sum() < 2.0 * own:
         joints, world = forward(Motion(skeleton, 1.0, some.root_pos, some.rotations))
-        stance = Stance(skeleton, joints, end_positions(skeleton, joints, world), True)
+        stance = Measurements(skeleton, joints, end_positions(skeleton, joints, world), True)
     return stance

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from spark.errors import SkeletonError
 from spark.motion import Motion
-from spark.rig.bones import SHORT, Pose
+from spark.rig.bones import SHORT, RigPose
 from spark.rig.observed import mean_rotations, nearest_right_angle
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import quat_identity
@@ -37,7 +37,7 @@ class Reference:
     """
 
     motion: Motion
-    pose: Pose
+    pose: RigPose
     posed: bool
     square: bool
     notes: tuple[str, ...]
@@ -47,7 +47,7 @@ def reference_of(motion: Motion, roles: RoleMap) -> Reference:
     """The rest pose where it is a pose. Where it is none, the mean pose over the frames; on a
     square rig rounded to right angles, with straight fingers."""
     skeleton = motion.skeleton
-    rest = Pose(skeleton, roles, quat_identity(np.zeros((len(skeleton), 1))))
+    rest = RigPose(skeleton, roles, quat_identity(np.zeros((len(skeleton), 1))))
     if _stands(rest):
         return Reference(motion, rest, True, False, ())
     square = _at_right_angles(rest)
@@ -60,10 +60,10 @@ def reference_of(motion: Motion, roles: RoleMap) -> Reference:
         for hand in (j for role in _HANDS for j in roles.joints(role)):
             local[list(skeleton.subtree(hand)[1:])] = rest.local[0]
     note = "the rest pose is not a pose: the T-pose is found from the motion"
-    return Reference(motion, Pose(skeleton, roles, local), False, square, (note,))
+    return Reference(motion, RigPose(skeleton, roles, local), False, square, (note,))
 
 
-def _stands(rest: Pose) -> bool:
+def _stands(rest: RigPose) -> bool:
     """Whether the rest pose is a pose: legs don't point up along the trunk, arms don't cross it."""
     lateral, up = _lateral(rest), _trunk(rest)
     for group in LIMBS:
@@ -75,7 +75,7 @@ def _stands(rest: Pose) -> bool:
     return True
 
 
-def _at_right_angles(rest: Pose) -> bool:
+def _at_right_angles(rest: RigPose) -> bool:
     """Whether all limb bones lie along coordinate axes of their joints."""
     bones = (rest.bone(j) for group in LIMBS for j in _limb(rest.roles, group)[:-1])
     return all(bone is None or tilt(bone) < _BUILT for bone in bones)
@@ -103,7 +103,7 @@ def pelvis_frame(reference: Reference) -> Float[np.ndarray, "3 3"]:
     return np.stack([np.cross(lateral, up), lateral, up])
 
 
-def _lateral(pose: Pose) -> Vector:
+def _lateral(pose: RigPose) -> Vector:
     """The unit vector from the right hip to the left one, or between the shoulders."""
     for pair in (_UPPER_LEGS, _UPPER_ARMS):
         left, right = (pose.roles.joint(role) for role in pair)
@@ -114,13 +114,13 @@ def _lateral(pose: Pose) -> Vector:
     raise SkeletonError("hips and shoulders lie in one point each: no direction is left")
 
 
-def _trunk(pose: Pose) -> Vector:
+def _trunk(pose: RigPose) -> Vector:
     """The vector [m] from the hips to the head; without a trunk, from the feet to the hips."""
     *_, below, top = _landmarks(pose)
     return top - below
 
 
-def _landmarks(pose: Pose) -> list[Vector]:
+def _landmarks(pose: RigPose) -> list[Vector]:
     """The feet's middle, the hips' middle, and the head or the trunk's topmost joint if any."""
     at, roles = pose.positions, pose.roles
     hips = np.mean([at[roles.require(role)] for role in _UPPER_LEGS], axis=0)

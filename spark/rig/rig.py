@@ -12,7 +12,7 @@ from spark.motion import Motion
 from spark.rig.groups import groups_of
 from spark.rig.role_assignment import Override, assign_roles
 from spark.rig.roles import Group, Role, RoleMap
-from spark.rig.tpose import carrier_of, find_tpose
+from spark.rig.tpose import find_tpose, root_joint_of
 from spark.skeleton import Skeleton
 
 # Roles that several joints hold, and those between which they lie.
@@ -38,7 +38,7 @@ class Rig:
 
     `tpose` holds each joint's `q_world_joint` in the T-pose: pelvis upright facing +X, legs down,
     arms out along +-Y, palms down. `groups[j]` are the body parts of joint j; the hip joint and the
-    topmost spine joint belong to several. `carrier` is the joint that takes the body's motion
+    topmost spine joint belong to several. `root_joint` is the joint that takes the body's motion
     through the world: the pelvis, or the joint above it that the file can move.
     `hip_height` [m] is the height of the hips' middle above the sole in the T-pose.
     """
@@ -47,7 +47,7 @@ class Rig:
     roles: RoleMap
     groups: tuple[frozenset[Group], ...]
     tpose: Float[np.ndarray, "J 4"]
-    carrier: int
+    root_joint: int
     hip_height: float
     notes: tuple[str, ...] = ()
 
@@ -103,9 +103,9 @@ def understand(motion: Motion, override: Override | None = None) -> Rig:
     roles = assign_roles(skeleton, motion, override)
     tpose, notes = find_tpose(motion, roles)
     pelvis = roles.require(Role.PELVIS)
-    carrier = carrier_of(skeleton, pelvis)
+    root_joint = root_joint_of(skeleton, pelvis)
     height = hip_height(skeleton, roles, tpose)
-    return Rig(skeleton, roles, groups_of(skeleton, roles), tpose, carrier, height, notes)
+    return Rig(skeleton, roles, groups_of(skeleton, roles), tpose, root_joint, height, notes)
 
 
 def hip_height(skeleton: Skeleton, roles: RoleMap, tpose: Float[np.ndarray, "J 4"]) -> float:

@@ -24,7 +24,7 @@ def rig_to_json(rig: Rig) -> dict[str, Any]:
         "reasons": list(roles.reasons),
         "groups": [sorted(group.value for group in groups) for groups in rig.groups],
         "tpose": rig.tpose.tolist(),
-        "carrier": rig.carrier,
+        "carrier": rig.root_joint,
         "hip_height": rig.hip_height,
         "notes": list(rig.notes),
     }

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spark.rig.measurements import Stance
+from spark.rig.measurements import Measurements
 from spark.rig.name_hints import NameHint
 from spark.skeleton import Skeleton
 
@@ -13,13 +13,13 @@ SIMILAR = 0.2  # bones of a mirrored pair differ by less than this share of the 
 
 
 @dataclass(frozen=True)
-class Pair:
+class LimbPair:
     """Two limbs side by side and the joint that carries both, nearest the trunk first.
 
     `first` is the left one where `sided`, and the one that comes first in the file otherwise.
     """
 
-    carrier: int
+    root_joint: int
     first: tuple[int, ...]
     second: tuple[int, ...]
     sided: bool
@@ -30,7 +30,7 @@ class Pair:
         return self.first[0], self.second[0]
 
 
-def chain_below(stance: Stance, joint: int) -> tuple[int, ...]:
+def chain_below(stance: Measurements, joint: int) -> tuple[int, ...]:
     """`joint` and the joints after it along the longest way down."""
     chain = [joint]
     while below := stance.skeleton.children[chain[-1]]:
@@ -53,8 +53,8 @@ def common_ancestor(skeleton: Skeleton, a: int, b: int) -> int:
 
 
 def named_pair(
-    stance: Stance, hints: Sequence[NameHint], parts: frozenset[str], least: float
-) -> Pair | None:
+    stance: Measurements, hints: Sequence[NameHint], parts: frozenset[str], least: float
+) -> LimbPair | None:
     """The left and right limb whose joints' names mean `parts`, at least `least` in all a side.
 
     On the way from the root to a joint each part counts once, as its surest name means it.
@@ -73,35 +73,37 @@ def named_pair(
         if total[tip] < least:
             return None
         tips.append(tip)
-    carrier = common_ancestor(skeleton, *tips)
-    if carrier in tips:
+    root_joint = common_ancestor(skeleton, *tips)
+    if root_joint in tips:
         return None
-    left, right = (_through(stance, carrier, tip) for tip in tips)
-    return Pair(carrier, left, right, sided=True)
+    left, right = (_through(stance, root_joint, tip) for tip in tips)
+    return LimbPair(root_joint, left, right, sided=True)
 
 
-def _through(stance: Stance, carrier: int, tip: int) -> tuple[int, ...]:
-    """The chain that leaves `carrier` towards `tip` and goes on as far as it can."""
+def _through(stance: Measurements, root_joint: int, tip: int) -> tuple[int, ...]:
+    """The chain that leaves `root_joint` towards `tip` and goes on as far as it can."""
     up = stance.skeleton.ancestors(tip)
-    down = tuple(reversed(up[: up.index(carrier)]))
+    down = tuple(reversed(up[: up.index(root_joint)]))
     return (*down, *chain_below(stance, tip)[1:])
 
 
-def mirrored_pairs(stance: Stance, hints: Sequence[NameHint], shortest: float) -> tuple[Pair, ...]:
+def mirrored_pairs(
+    stance: Measurements, hints: Sequence[NameHint], shortest: float
+) -> tuple[LimbPair, ...]:
     """Pairs of similar chains that one joint carries, each at least `shortest` [m] long.
 
     Chains whose first joint is by name a finger, hair, cloth, ... do not count, and of a pair
     within a pair (fingers of a hand) only the outer one does.
     """
     skeleton = stance.skeleton
-    pairs: list[Pair] = []
+    pairs: list[LimbPair] = []
     inside: set[int] = set()
-    for carrier in range(len(skeleton)):
-        if carrier in inside:
+    for root_joint in range(len(skeleton)):
+        if root_joint in inside:
             continue
         starts = [
             child
-            for child in skeleton.children[carrier]
+            for child in skeleton.children[root_joint]
             if hints[child].aside not in _NEVER_LIMBS
             and stance.reach[child] + stance.bones[child] >= shortest
         ]
@@ -120,7 +122,7 @@ def mirrored_pairs(stance: Stance, hints: Sequence[NameHint], shortest: float) -
             if difference > SIMILAR:
                 break
             chains = [chain for chain in chains if chain not in (a, b)]
-            pairs.append(Pair(carrier, a, b, sided=False))
+            pairs.append(LimbPair(root_joint, a, b, sided=False))
             inside.update(skeleton.subtree(a[0]), skeleton.subtree(b[0]))
     return tuple(pairs)
 
@@ -136,7 +138,7 @@ _NEVER_LIMBS = (
 )
 
 
-def _difference(stance: Stance, a: tuple[int, ...], b: tuple[int, ...]) -> float:
+def _difference(stance: Measurements, a: tuple[int, ...], b: tuple[int, ...]) -> float:
     """How unlike two chains are: bone by bone, as a share of their length."""
     if len(a) != len(b):
         return np.inf

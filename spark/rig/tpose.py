@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.motion import Motion
-from spark.rig.bones import Pose
+from spark.rig.bones import RigPose
 from spark.rig.observed import bend_axis, resting_slope, standing_slope
 from spark.rig.reference_pose import GROUP_OF, Reference, pelvis_frame, reference_of, snap
 from spark.rig.roles import Group, Role, RoleMap
@@ -69,9 +69,9 @@ def find_tpose(motion: Motion, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"]
     pelvis = roles.require(Role.PELVIS)
     tpose[pelvis] = quat_from_matrix(pelvis_frame(reference))
     above = skeleton.ancestors(pelvis)
-    carrier = carrier_of(skeleton, pelvis)
+    root_joint = root_joint_of(skeleton, pelvis)
     for child, j in pairwise(above):
-        if j >= carrier:
+        if j >= root_joint:
             tpose[j] = quat_mul(tpose[child], quat_conj(reference.pose.local[child]))
     notes = list(reference.notes)
     for j in range(len(skeleton)):
@@ -91,7 +91,7 @@ def find_tpose(motion: Motion, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"]
     return tpose, tuple(notes)
 
 
-def carrier_of(skeleton: Skeleton, pelvis: int) -> int:
+def root_joint_of(skeleton: Skeleton, pelvis: int) -> int:
     """The joint that takes the body through the world: the pelvis, or the nearest joint above it
     that the file can move."""
     return next((j for j in skeleton.ancestors(pelvis) if skeleton.translating[j]), 0)
@@ -171,7 +171,7 @@ def _square(q: Quat, about: Vector, side: Vector) -> Quat:
     return quat_mul(_turn(nearest, side, about), q)
 
 
-def _palm_down(pose: Pose, hand: int, q: Quat) -> tuple[Quat, tuple[str, ...]]:
+def _palm_down(pose: RigPose, hand: int, q: Quat) -> tuple[Quat, tuple[str, ...]]:
     """`q`, turned by right angles where thumb or fingers say that the palm faces elsewhere."""
     found = pose.thumb_side(hand)
     if found is None:

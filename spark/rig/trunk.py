@@ -4,28 +4,32 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from spark.rig.measurements import Stance
+from spark.rig.measurements import Measurements
 from spark.rig.name_hints import NameHint
-from spark.rig.topology import Pair, chain_below, common_ancestor, path_between
+from spark.rig.topology import LimbPair, chain_below, common_ancestor, path_between
 from spark.skeleton import Skeleton
 
 
-def find_pelvis(skeleton: Skeleton, hints: Sequence[NameHint], legs: Pair) -> int:
+def find_pelvis(skeleton: Skeleton, hints: Sequence[NameHint], legs: LimbPair) -> int:
     """The joint that carries the legs; 3ds Max hangs them on the spine's first joint."""
-    carrier = legs.carrier
-    parent = int(skeleton.parents[carrier])
-    if "spine" in hints[carrier].parts and parent >= 0:
-        return parent if hints[parent].parts.get("pelvis", 0.0) > 0.5 else carrier
-    return carrier
+    root_joint = legs.root_joint
+    parent = int(skeleton.parents[root_joint])
+    if "spine" in hints[root_joint].parts and parent >= 0:
+        return parent if hints[parent].parts.get("pelvis", 0.0) > 0.5 else root_joint
+    return root_joint
 
 
 def find_trunk(
-    stance: Stance, hints: Sequence[NameHint], pelvis: int, legs: Pair, arms: Pair | None
+    stance: Measurements,
+    hints: Sequence[NameHint],
+    pelvis: int,
+    legs: LimbPair,
+    arms: LimbPair | None,
 ) -> tuple[tuple[int, ...], tuple[int, ...], int | None]:
     """Spine and neck from the pelvis upwards, and the head."""
     skeleton = stance.skeleton
     limbs = {j for p in (legs, arms) if p is not None for r in p.roots for j in skeleton.subtree(r)}
-    top = pelvis if arms is None else arms.carrier
+    top = pelvis if arms is None else arms.root_joint
     head = _head(stance, hints, pelvis, top, legs, limbs)
     spine = list(_between(stance, pelvis, top))
     if top != pelvis:
@@ -46,7 +50,7 @@ def find_trunk(
     return tuple(spine), tuple(rising), head
 
 
-def _between(stance: Stance, pelvis: int, top: int) -> tuple[int, ...]:
+def _between(stance: Measurements, pelvis: int, top: int) -> tuple[int, ...]:
     """The trunk's joints between two others.
 
     A common ancestor of both that lies at the pelvis only carries them (MakeHuman's Root).
@@ -62,7 +66,12 @@ def _between(stance: Stance, pelvis: int, top: int) -> tuple[int, ...]:
 
 
 def _head(
-    stance: Stance, hints: Sequence[NameHint], pelvis: int, top: int, legs: Pair, limbs: set[int]
+    stance: Measurements,
+    hints: Sequence[NameHint],
+    pelvis: int,
+    top: int,
+    legs: LimbPair,
+    limbs: set[int],
 ) -> int | None:
     """The joint named head, or the end of the chain that leaves the arms' carrier upwards."""
     skeleton = stance.skeleton
@@ -88,7 +97,7 @@ def _head(
     return chain[-2] if nub else chain[-1]
 
 
-def _rises(stance: Stance, joint: int, pelvis: int, top: int, legs: Pair) -> bool:
+def _rises(stance: Measurements, joint: int, pelvis: int, top: int, legs: LimbPair) -> bool:
     """Whether a chain leaves the trunk away from the legs, in most frames."""
     at = stance.joints
     below = at[:, pelvis] if top != pelvis else np.mean([stance.tip(j) for j in legs.roots], axis=0)

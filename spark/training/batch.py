@@ -13,7 +13,7 @@ from spark.network.config import NO_ROTATION
 from spark.network.features import BodyFeatures
 from spark.network.windows import Windows
 from spark.training.pairs import Pairs
-from spark.training.tensors import Body, Pose, Start
+from spark.training.tensors import Body, PoseTensors, Start
 
 Names = Callable[[Sequence[str]], Float[Tensor, "S E"]]
 
@@ -23,8 +23,8 @@ class Batch(NamedTuple):
 
     source: Body
     target: Body
-    pose: Pose
-    truth: Pose
+    pose: PoseTensors
+    truth: PoseTensors
     start: Start
     planted: Bool[Tensor, "B T J"]
     effectors: Bool[Tensor, "B J"]
@@ -57,7 +57,7 @@ class Collator:
             _poses([draw.target for draw in draws]),
             Start(
                 *_poses([draw.start for draw in draws]),
-                _stack([torch.as_tensor(draw.guess) for draw in draws], counts, -1),
+                _stack([torch.as_tensor(draw.unmatched) for draw in draws], counts, -1),
             ),
             planted,
             _stack(effectors, counts),
@@ -102,7 +102,7 @@ class Collator:
         )
 
 
-def _poses(windows: Sequence[Windows]) -> Pose:
+def _poses(windows: Sequence[Windows]) -> PoseTensors:
     J = max(w.rotations.shape[2] for w in windows)
     root = np.concatenate([w.root for w in windows]).astype(np.float32, copy=False)
     rotations = np.empty((*root.shape[:2], J, 6), np.float32)
@@ -112,7 +112,7 @@ def _poses(windows: Sequence[Windows]) -> Pose:
         rotations[row : row + W, :, :K] = w.rotations
         rotations[row : row + W, :, K:] = NO_ROTATION
         row += W
-    return Pose(torch.from_numpy(rotations), torch.from_numpy(root))
+    return PoseTensors(torch.from_numpy(rotations), torch.from_numpy(root))
 
 
 def _stack(tensors: Sequence[Tensor], counts: Sequence[int], fill: int = 0) -> Tensor:

@@ -11,7 +11,7 @@ from spark.network.features import BodyFeatures, body_features
 from spark.rig.contacts import planted_feet
 from spark.rig.rig import understand
 from spark.skeleton import Skeleton
-from spark.training.pairs import Clip
+from spark.training.pairs import TrainingClip
 from spark.transfer.canonical import (
     FRAME_TIME,
     CanonicalMotion,
@@ -23,14 +23,14 @@ from spark.transfer.canonical import (
 
 def read_clips(
     paths: Sequence[Path], progress: Callable[[Iterable[Path]], Iterable[Path]] = iter
-) -> tuple[list[Clip], tuple[str, ...]]:
+) -> tuple[list[TrainingClip], tuple[str, ...]]:
     """The humanoid recordings among `paths` and below them as clips, and notes on the others.
 
     Files of one skeleton share one body, so that training draws from them together. Raises
     `FileFormatError` where a path holds no motion file, `SkeletonError` where none is usable.
     """
     bodies: dict[tuple[object, ...], BodyFeatures] = {}
-    clips: list[Clip] = []
+    clips: list[TrainingClip] = []
     notes: list[str] = []
     for path in progress([file for given in paths for file in motion_files(given)]):
         try:
@@ -48,7 +48,7 @@ def read_clips(
     return clips, tuple(notes)
 
 
-def clip_of(name: str, canonical: CanonicalMotion, body: BodyFeatures) -> Clip:
+def clip_of(name: str, canonical: CanonicalMotion, body: BodyFeatures) -> TrainingClip:
     """A motion on `body`'s rig as a clip. Raises `SkeletonError` without two feet."""
     rig = canonical.rig
     canonical = at_frame_time(canonical, FRAME_TIME)
@@ -57,7 +57,7 @@ def clip_of(name: str, canonical: CanonicalMotion, body: BodyFeatures) -> Clip:
     if planted.shape[1] != 2:
         raise SkeletonError("has no two feet; pairs for training need them")
     rotations = canonical.rotations[:, body.joints]
-    return Clip(name, body, rotations, hips / rig.hip_height, planted, FRAME_TIME)
+    return TrainingClip(name, body, rotations, hips / rig.hip_height, planted, FRAME_TIME)
 
 
 def _key(skeleton: Skeleton) -> tuple[object, ...]:

@@ -8,8 +8,8 @@
     each file gave (`spark.training.dataset_parts`): a run that stopped goes on, and one
                    with more files reads only those
 
-A clip is what `spark.training.pairs.Clip` says: canonical, at 30 fps, on the network's view of its
-body.
+A clip is what `spark.training.pairs.TrainingClip` says: canonical, at 30 fps, on the network's view
+of its body.
 """
 
 import json
@@ -41,7 +41,7 @@ from spark.rig.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_conj, quat_mul
 from spark.training.clips import read_clips
 from spark.training.dataset_parts import Part, make_part, read_part
-from spark.training.pairs import Clip
+from spark.training.pairs import TrainingClip
 from spark.training.splits import cells, seen_characters, seen_motions
 from spark.training.variants import split_joints
 from spark.transfer.canonical import FRAME_TIME
@@ -97,7 +97,7 @@ def prepare(
 
 def training_clips(
     paths: Sequence[Path], progress: Callable[[Iterable[Path]], Iterable[Path]] = iter
-) -> tuple[list[Clip], tuple[str, ...]]:
+) -> tuple[list[TrainingClip], tuple[str, ...]]:
     """The clips to train on in datasets and in trees of motion files, and notes on what was left
     out. Raises what `read_dataset` and `spark.training.clips.read_clips` raise."""
     clips = [clip for path in paths if is_dataset(path) for clip in read_dataset(path)]
@@ -113,7 +113,7 @@ def is_dataset(path: Path) -> bool:
     return (path / "index.json").is_file() and (path / "numbers.npy").is_file()
 
 
-def read_dataset(path: Path, cell: str | None = "sc+sm") -> list[Clip]:
+def read_dataset(path: Path, cell: str | None = "sc+sm") -> list[TrainingClip]:
     """The clips of one cell of a dataset, by default the one to train on (None: of all), mapped
     into memory. Raises what `read_performances` raises."""
     return [p.clip for p in read_performances(path) if cell in (None, p.cell)]
@@ -153,7 +153,7 @@ class Performance:
     """A clip of a dataset, named after its motion: whose it is, in which cell of the split, and the
     height [m] of its floor in its file."""
 
-    clip: Clip
+    clip: TrainingClip
     character: str
     cell: str
     floor_z: float
@@ -164,10 +164,10 @@ def _mapped(
     body: BodyFeatures,
     numbers: Float[np.ndarray, "N"],
     planted: Bool[np.ndarray, "F 2"],
-) -> Clip:
+) -> TrainingClip:
     at, frames, joints = clip["at"], clip["frames"], len(body.joints)
     path = at + frames * joints * 4
-    return Clip(
+    return TrainingClip(
         clip["motion"],
         body,
         numbers[at:path].reshape(frames, joints, 4),

@@ -9,12 +9,12 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from spark.training.tensors import Body, Pose
+from spark.training.tensors import Body, PoseTensors
 
 Scalar = Float[Tensor, ""]
 
 
-def reconstruction(predicted: Pose, truth: Pose, body: Body) -> Scalar:
+def reconstruction(predicted: PoseTensors, truth: PoseTensors, body: Body) -> Scalar:
     """L_rec: squared 6D difference, averaged over joint-frame pairs."""
     return _mean(((predicted.rotations - truth.rotations) ** 2).sum(-1), body.valid)
 
@@ -24,7 +24,7 @@ def cycle(latent_a: Float[Tensor, "B T 24 D"], latent_b: Float[Tensor, "B T 24 D
     return ((latent_a - latent_b) ** 2).mean()
 
 
-def root(predicted: Pose, truth: Pose) -> Scalar:
+def root(predicted: PoseTensors, truth: PoseTensors) -> Scalar:
     """L_root: the root's position and its rotation."""
     position = ((predicted.root - truth.root) ** 2).mean()
     return position + ((predicted.rotations[:, :, 0] - truth.rotations[:, :, 0]) ** 2).mean()

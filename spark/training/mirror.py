@@ -30,7 +30,7 @@ def mirrored_body(body: BodyFeatures) -> BodyFeatures:
     )
     groups = groups_of(flipped, role_map)
     return BodyFeatures(
-        Rig(flipped, role_map, groups, rig.tpose, rig.carrier, rig.hip_height),
+        Rig(flipped, role_map, groups, rig.tpose, rig.root_joint, rig.hip_height),
         body.joints,
         flipped,
     )

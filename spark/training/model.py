@@ -32,7 +32,14 @@ from spark.network.config import (
 from spark.rotation import matrix_from_sixd
 from spark.training.attention import Attention, Feedforward, TemporalBlock, sinusoids
 from spark.training.precision import exactly
-from spark.training.tensors import Body, Pose, Start, forward_kinematics, take, world_matrices
+from spark.training.tensors import (
+    Body,
+    PoseTensors,
+    Start,
+    forward_kinematics,
+    take,
+    world_matrices,
+)
 
 
 class DecoderBlock(nn.Module):
@@ -109,7 +116,7 @@ class Encoder(nn.Module):
         self.norm = nn.LayerNorm(width)  # on H: without it the cycle loss shrinks H to zero
 
     def forward(
-        self, pose: Pose, body: Body, embedding: JointEmbedding
+        self, pose: PoseTensors, body: Body, embedding: JointEmbedding
     ) -> Float[Tensor, "B T 24 D"]:
         """The latent H."""
         x = self._joint_features(pose, body) + embedding.joints(body)[:, None]
@@ -142,7 +149,7 @@ class Encoder(nn.Module):
             tokens = block(tokens)
         return self.norm(tokens.view(B, N_TOKENS, T, D).transpose(1, 2))
 
-    def _joint_features(self, pose: Pose, body: Body) -> Float[Tensor, "B T J D"]:
+    def _joint_features(self, pose: PoseTensors, body: Body) -> Float[Tensor, "B T J D"]:
         joints, root = pose.rotations, pose.root
         if self.config.residual:
             joints = _seen(joints)
@@ -178,7 +185,7 @@ class Decoder(nn.Module):
         body: Body,
         embedding: JointEmbedding,
         start: Start | None = None,
-    ) -> Pose:
+    ) -> PoseTensors:
         """The motion on `body`; a residual network corrects `start`, the analytic transfer."""
         B, T = latent.shape[:2]
         y = embedding.joints(body) + _scatter_places(embedding.places(body), body)
@@ -192,7 +199,7 @@ class Decoder(nn.Module):
         y = self._read(y, latent, body.valid)
         assert self.root is not None
         with exactly(y):
-            return Pose(self.rotation(y.float()), self.root(y[:, :, 0].float()))
+            return PoseTensors(self.rotation(y.float()), self.root(y[:, :, 0].float()))
 
     def _correct(
         self,
@@ -200,10 +207,12 @@ class Decoder(nn.Module):
         known: Float[Tensor, "B J D"],
         latent: Float[Tensor, "B T 24 D"],
         body: Body,
-    ) -> Pose:
+    ) -> PoseTensors:
         """`start` with its guesses corrected: they alone are decoded."""
-        joints = torch.arange(start.guess.shape[1], device=known.device).expand_as(start.guess)
-        valid = start.guess == joints
+        joints = torch.arange(start.unmatched.shape[1], device=known.device).expand_as(
+            start.unmatched
+        )
+        valid = start.unmatched == joints
         if not torch.compiler.is_exporting():  # a graph can't cut its tensors by their values
             most = max(1, int(valid.sum(1).max()))
             joints = valid.int().argsort(dim=1, descending=True, stable=True)[:, :most]
@@ -244,13 +253,13 @@ class Spark(nn.Module):
         self.encoder = Encoder(config)
         self.decoder = Decoder(config)
 
-    def encode(self, pose: Pose, body: Body) -> Float[Tensor, "B T 24 D"]:
+    def encode(self, pose: PoseTensors, body: Body) -> Float[Tensor, "B T 24 D"]:
         """H of a motion on its skeleton."""
         return self.encoder(pose, self._withhold(body), self.embedding)
 
     def decode(
         self, latent: Float[Tensor, "B T 24 D"], body: Body, start: Start | None = None
-    ) -> Pose:
+    ) -> PoseTensors:
         """The motion that H describes, on `body`. A residual network must be given its `start`."""
         if self.config.residual and start is None:
             raise ValueError("this network corrects the analytic transfer: `start` is missing")
@@ -258,7 +267,9 @@ class Spark(nn.Module):
             latent, self._withhold(body), self.embedding, start if self.config.residual else None
         )
 
-    def forward(self, pose: Pose, source: Body, target: Body, start: Start | None = None) -> Pose:
+    def forward(
+        self, pose: PoseTensors, source: Body, target: Body, start: Start | None = None
+    ) -> PoseTensors:
         """Retarget `pose` from `source` to `target` (figure 2b)."""
         return self.decode(self.encode(pose, source), target, start)
 
@@ -291,17 +302,17 @@ def _blurred(features: Float[Tensor, "B J F"], noise: float) -> Float[Tensor, "B
     return torch.cat([moved, features[..., 3:]], -1)
 
 
-def _corrected(start: Start, sixd: Float[Tensor, "B T J 6"], body: Body) -> Pose:
+def _corrected(start: Start, sixd: Float[Tensor, "B T J 6"], body: Body) -> PoseTensors:
     """`start` with its guesses turned a little, each in its own axes, by no rotation plus `sixd`.
     What follows a guess goes with it; every other joint keeps its rotation in the world."""
     world = world_matrices(start.rotations, body.parents)
     little = matrix_from_sixd(sixd + sixd.new_tensor(NO_ROTATION))
-    turn = take(world @ little @ world.mT, start.guess.clamp(min=0))
-    world = torch.where((start.guess >= 0)[:, None, :, None, None], turn @ world, world)
+    turn = take(world @ little @ world.mT, start.unmatched.clamp(min=0))
+    world = torch.where((start.unmatched >= 0)[:, None, :, None, None], turn @ world, world)
     upper = take(world, body.parents)
     is_root = (body.parents == torch.arange(world.shape[2], device=world.device))[:, None, :]
     local = torch.where(is_root[..., None, None], world, upper.mT @ world)
-    return Pose(local[..., :2].transpose(-1, -2).flatten(-2), start.root)
+    return PoseTensors(local[..., :2].transpose(-1, -2).flatten(-2), start.root)
 
 
 def _first_owner(groups: Int[Tensor, "B G N"]) -> Bool[Tensor, "B G N"]:

@@ -1,7 +1,7 @@
 """A trained network as ONNX, for engines: one graph for motions of any length, on any two bodies.
 
 What it computes is `Spark.forward` of a network that corrects the analytic transfer; its inputs are
-the fields of `spark.training.tensors.Pose`, `Body` and `Start`, with a batch axis of 1.
+the fields of `spark.training.tensors.PoseTensors`, `Body` and `Start`, with a batch axis of 1.
 """
 
 import logging
@@ -15,7 +15,7 @@ from torch.export import Dim
 from spark.errors import ConventionError, DependencyError
 from spark.files import write_atomically
 from spark.training.checkpoint import Checkpoint
-from spark.training.tensors import Body, Pose, Start
+from spark.training.tensors import Body, PoseTensors, Start
 
 INPUTS = (
     *("rotations", "root"),
@@ -32,7 +32,7 @@ class _Graph(nn.Module):
         self.model = checkpoint.model.eval()
 
     def forward(self, *tensors: Tensor) -> Tensor:
-        pose, rest = Pose(*tensors[:2]), tensors[2:]
+        pose, rest = PoseTensors(*tensors[:2]), tensors[2:]
         size = len(Body._fields)
         source, target = Body(*rest[:size]), Body(*rest[size : 2 * size])
         return self.model(pose, source, target, Start(*rest[2 * size :])).rotations

@@ -7,7 +7,7 @@ from torch import Tensor
 from torch.utils.data import get_worker_info
 
 from spark.training.batch import Batch
-from spark.training.tensors import Body, Pose, Start
+from spark.training.tensors import Body, PoseTensors, Start
 
 _ALIGNED = 64  # bytes
 AHEAD = 2  # batches that a worker may be ahead of the trainer
@@ -60,7 +60,7 @@ class Packed:
         """The batch, on `device`."""
         parts = iter(self._tensors(self.piece.to(device, non_blocking=True)))
         source, target = (Body(*islice(parts, len(Body._fields))) for _ in range(2))
-        pose, truth = (Pose(*islice(parts, len(Pose._fields))) for _ in range(2))
+        pose, truth = (PoseTensors(*islice(parts, len(PoseTensors._fields))) for _ in range(2))
         start = Start(*islice(parts, len(Start._fields)))
         planted, effectors = parts
         return Batch(source, target, pose, truth, start, planted, effectors, self._frame_time)

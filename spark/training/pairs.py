@@ -26,7 +26,15 @@ from spark.rotation import (
     yaw_from_quat,
 )
 from spark.training.mirror import mirrored_body, mirrored_motion
-from spark.training.staging import Stage, begins_of, foot_lift, joined, local_rows, mixed, place
+from spark.training.staging import (
+    StagedBody,
+    begins_of,
+    foot_lift,
+    joined,
+    local_rows,
+    mixed,
+    place,
+)
 from spark.training.variants import random_variant, same_body, split_body
 from spark.transfer.analytic import Correspondence, correspond
 
@@ -36,7 +44,7 @@ _TRIES = 10
 
 
 @dataclass(frozen=True, eq=False)
-class Clip:
+class TrainingClip:
     """A recording in canonical form on the network's view of its own body, at 30 fps.
 
     `rotations` are world rotations since the T-pose, `hips` the hips' path over the floor in hip
@@ -59,12 +67,12 @@ class Clip:
 
 class Pairs(NamedTuple):
     """W windows on two bodies; `start` is the analytic transfer of `source` to the target, and
-    `guess` its `Correspondence.guess`."""
+    `unmatched` its `Correspondence.unmatched`."""
 
     source: Windows
     target: Windows
     start: Windows
-    guess: Int[np.ndarray, "J"]
+    unmatched: Int[np.ndarray, "J"]
     planted: Bool[np.ndarray, "W T 2"]
     frame_time: float
 
@@ -86,7 +94,7 @@ class PairMaker:
 
     def __init__(
         self,
-        clips: Sequence[Clip],
+        clips: Sequence[TrainingClip],
         *,
         window: int = 64,
         variants: int = 256,
@@ -96,7 +104,7 @@ class PairMaker:
     ) -> None:
         self.window, self.variants, self.seed = window, variants, seed
         self.distinct, self.varied = distinct, varied
-        by_body: dict[int, list[Clip]] = {}
+        by_body: dict[int, list[TrainingClip]] = {}
         for clip in clips:
             if len(clip.hips) >= window:
                 by_body.setdefault(id(clip.body), []).append(clip)
@@ -106,8 +114,8 @@ class PairMaker:
         weights = np.array([sum(map(_turning, group)) for group in self._bodies]) ** _POWER
         self._weights = weights / weights.sum()
         self._seen: dict[tuple[int, bool], BodyFeatures] = {}
-        self._stages: dict[tuple[int, bool, int], Stage] = {}
-        self._links: dict[tuple[Stage, Stage], Correspondence] = {}
+        self._stages: dict[tuple[int, bool, int], StagedBody] = {}
+        self._links: dict[tuple[StagedBody, StagedBody], Correspondence] = {}
 
     def draw(self, n: int, windows: int) -> Pairs:
         """Draw number `n`: `windows` windows of one body's clips on one pair of its variants."""
@@ -151,7 +159,14 @@ class PairMaker:
             for k, (body, own) in enumerate(zip(bodies, np.split(poses, ends, 2), strict=True))
         ]
         return [
-            Pairs(seen[k], seen[D + k], seen[2 * D + k], links[k].guess, planted[k], one.frame_time)
+            Pairs(
+                seen[k],
+                seen[D + k],
+                seen[2 * D + k],
+                links[k].unmatched,
+                planted[k],
+                one.frame_time,
+            )
             for k, one in enumerate(drawn)
         ]
 
@@ -168,7 +183,7 @@ class PairMaker:
                 performer %= min(self.variants, len(clips))
             source, target = (self._stage(k, mirrored, number) for number in (performer, receiver))
             link = self._link(source, target)
-            if (link.guess >= 0).any():
+            if (link.unmatched >= 0).any():
                 break
         if self.distinct:
             clips = clips[performer :: self.variants]
@@ -180,7 +195,7 @@ class PairMaker:
         return _Drawn(source, target, link, rows, hips, planted, lift, clips[0].frame_time)
 
     def _cut(
-        self, clips: list[Clip], windows: int, rng: np.random.Generator
+        self, clips: list[TrainingClip], windows: int, rng: np.random.Generator
     ) -> tuple[
         Float[np.ndarray, "W T K 4"],
         Float[np.ndarray, "W T 3"],
@@ -221,7 +236,7 @@ class PairMaker:
             self._seen[k, mirrored] = mirrored_body(same_body(body).body) if mirrored else body
         return self._seen[k, mirrored]
 
-    def _stage(self, k: int, mirrored: bool, number: int) -> Stage:
+    def _stage(self, k: int, mirrored: bool, number: int) -> StagedBody:
         key = (k, mirrored, number)
         if key not in self._stages:
             body = self._body(k, mirrored)
@@ -229,10 +244,10 @@ class PairMaker:
                 variant = (same_body, split_body)[number](body)
             else:
                 variant = random_variant(body, np.random.default_rng((self.seed, *key)))
-            self._stages[key] = Stage(variant)
+            self._stages[key] = StagedBody(variant)
         return self._stages[key]
 
-    def _link(self, source: Stage, target: Stage) -> Correspondence:
+    def _link(self, source: StagedBody, target: StagedBody) -> Correspondence:
         key = (source, target)
         if key not in self._links:
             if len(self._links) > 4096:
@@ -244,8 +259,8 @@ class PairMaker:
 class _Drawn(NamedTuple):
     """What a draw consists of before it is put on its two bodies."""
 
-    source: Stage
-    target: Stage
+    source: StagedBody
+    target: StagedBody
     link: Correspondence
     rotations: Float[np.ndarray, "K W T 4"]
     hips: Float[np.ndarray, "W T 3"]
@@ -265,7 +280,7 @@ def _frames(
     return cut if cut.dtype == bool else cut.astype(np.float32, copy=False)
 
 
-def _turning(clip: Clip) -> float:
+def _turning(clip: TrainingClip) -> float:
     """How much the joints turn in all [rad], with a little for a clip that stands still."""
     rotations = np.asarray(clip.rotations)
     step = quat_angle(rotations[:-1], rotations[1:]).mean() if len(rotations) > 1 else 0.0

@@ -37,7 +37,7 @@ class LegJoints(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class StagedBody:
     """A variant and what putting motion onto it needs."""
 
     variant: Variant
@@ -88,7 +88,7 @@ class Stage:
 
 
 def place(
-    stages: Sequence[Stage],
+    stages: Sequence[StagedBody],
     bases: Sequence[int],
     base: Float[np.ndarray, "R W T 4"],
     hips: Float[np.ndarray, "S W T 3"],

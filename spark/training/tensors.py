@@ -27,7 +27,7 @@ class Body(NamedTuple):
     offsets: Float[Tensor, "B J 3"]  # canonical bone offsets in hip heights
 
 
-class Pose(NamedTuple):
+class PoseTensors(NamedTuple):
     """A batch of motions on a `Body`, in canonical form."""
 
     rotations: Float[Tensor, "B T J 6"]  # local, since the T-pose
@@ -39,17 +39,17 @@ class Start(NamedTuple):
 
     rotations: Float[Tensor, "B T J 6"]
     root: Float[Tensor, "B T 3"]
-    guess: Int[
+    unmatched: Int[
         Tensor, "B J"
-    ]  # `Correspondence.guess`: the joint whose correction moves each; or -1
+    ]  # `Correspondence.unmatched`: the joint whose correction moves each; or -1
 
     @property
-    def pose(self) -> Pose:
+    def pose(self) -> PoseTensors:
         """The motion alone."""
-        return Pose(self.rotations, self.root)
+        return PoseTensors(self.rotations, self.root)
 
 
-def forward_kinematics(pose: Pose, body: Body) -> Float[Tensor, "B T J 3"]:
+def forward_kinematics(pose: PoseTensors, body: Body) -> Float[Tensor, "B T J 3"]:
     """Joint positions in hip heights; a padding joint lies at the root.
 
     Rotations are chained by pointer jumping: in step k every joint takes in its 2^k-th ancestor, so

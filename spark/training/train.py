@@ -37,7 +37,7 @@ from spark.training.model import Spark
 from spark.training.name_encoder import NameEncoder
 from spark.training.name_file import load_names
 from spark.training.packed import AHEAD, Packed, Packer
-from spark.training.pairs import Clip, PairMaker
+from spark.training.pairs import PairMaker, TrainingClip
 from spark.training.precision import fast_products
 from spark.training.settings import TrainConfig
 from spark.training.tensors import forward_kinematics
@@ -131,7 +131,12 @@ class Steps(Dataset[Batch]):
     """Item n: this process's share of step n's windows."""
 
     def __init__(
-        self, clips: Sequence[Clip], names: Names, config: TrainConfig, rank: int, world: int
+        self,
+        clips: Sequence[TrainingClip],
+        names: Names,
+        config: TrainConfig,
+        rank: int,
+        world: int,
     ) -> None:
         self.config, self.rank, self.world = config, rank, world
         self.maker = PairMaker(
@@ -178,7 +183,7 @@ Watch = Callable[[int, dict[str, float]], None]
 
 
 def train(
-    clips: Sequence[Clip],
+    clips: Sequence[TrainingClip],
     config: TrainConfig,
     out: Path,
     *,

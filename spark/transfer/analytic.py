@@ -31,15 +31,16 @@ _SHOULDERS = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE)
 class Correspondence:
     """Target joint j turns `mix[j]` of the way from source joint `first[j]` to `second[j]`.
 
-    -1 in `first` marks joints above the target's carrier: they stay as they rest. `guess[j]` is j
-    where that is a guess, since the source has no joint at this place and the body around it tells
-    what j does (spine, neck, collarbones); the guess that j follows where it only follows; else -1.
+    -1 in `first` marks joints above the target's carrier: they stay as they rest. `unmatched[j]` is
+    j where that is a guess, since the source has no joint at this place and the body around it
+    tells what j does (spine, neck, collarbones); the guess that j follows where it only follows;
+    else -1.
     """
 
     first: Int[np.ndarray, "J"]
     second: Int[np.ndarray, "J"]
     mix: Float[np.ndarray, "J"]
-    guess: Int[np.ndarray, "J"]
+    unmatched: Int[np.ndarray, "J"]
 
     def rotations(
         self, source: Float[np.ndarray, "*n S 4"], target: Rig
@@ -62,7 +63,7 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
     """Which joints of `source` each joint of `target` takes its rotation from."""
     size = len(target.skeleton)
     first, mix = np.full(size, -1), np.zeros(size)
-    second, guess = first.copy(), first.copy()
+    second, unmatched = first.copy(), first.copy()
     known = np.zeros(size, dtype=bool)
 
     def copy(j: int, from_joint: int) -> None:
@@ -91,7 +92,7 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
             mix[j] = (places[j] - at[k]) / span if span > 0 else 0.0
             known[j] = True
             lonely = all(abs(at[joints.index(a)] - places[j]) > _NEAR for a in theirs)
-            guess[j] = j if lonely and len(joints) > 1 else -1
+            unmatched[j] = j if lonely and len(joints) > 1 else -1
 
     names = {name: j for j, name in enumerate(source.skeleton.names)}
     above = target.skeleton.ancestors(target.pelvis)[1:]
@@ -102,7 +103,7 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
         if same is not None and source.roles.roles[same] is not None:
             same = None
         if j in above:
-            if j >= target.carrier:
+            if j >= target.root_joint:
                 carried = same in source.skeleton.ancestors(source.pelvis)[1:]
                 copy(j, same if same is not None and carried else source.pelvis)
             continue
@@ -111,8 +112,8 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
             copy(j, same)
         else:
             first[j], second[j], mix[j] = first[parent], second[parent], mix[parent]
-            guess[j] = j if target.roles.roles[j] in _SHOULDERS else guess[parent]
-    return Correspondence(first, second, mix, guess)
+            unmatched[j] = j if target.roles.roles[j] in _SHOULDERS else unmatched[parent]
+    return Correspondence(first, second, mix, unmatched)
 
 
 def transfer(source: CanonicalMotion, target: Rig) -> CanonicalMotion:

@@ -71,11 +71,11 @@ def from_canonical(canonical: CanonicalMotion) -> Motion:
     root = np.tile(skeleton.offsets[0], (len(canonical), 1))
     positions = world_positions(skeleton, world, root)
     missing = canonical.hips - positions[:, rig.hips].mean(1)
-    if rig.carrier == 0:
+    if rig.root_joint == 0:
         return Motion(skeleton, canonical.frame_time, root + missing, rotations)
-    above = int(skeleton.parents[rig.carrier])
+    above = int(skeleton.parents[rig.root_joint])
     translations = np.tile(skeleton.offsets, (len(canonical), 1, 1))
-    translations[:, rig.carrier] += quat_rotate(quat_conj(world[:, above]), missing)
+    translations[:, rig.root_joint] += quat_rotate(quat_conj(world[:, above]), missing)
     return Motion(skeleton, canonical.frame_time, root, rotations, translations)
 
 

@@ -25,7 +25,7 @@ _SHORTEST_STANCE = 0.1
 _WOBBLE = 0.03
 
 
-def refine(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
+def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
     """`moved`, the transfer of `source`, with its feet standing where the source's stand."""
     scale = moved.rig.hip_height / source.rig.hip_height
     theirs, own = canonical_positions(source), canonical_positions(moved)

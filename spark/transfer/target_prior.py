@@ -47,7 +47,7 @@ def with_own_motion(
     method: Retargeting, source: CanonicalMotion, own: CanonicalMotion
 ) -> CanonicalMotion:
     """What `method` makes of `source` on the rig of `own`, a recording, joints that had to be
-    guessed (`Correspondence.guess`) turned as they turn in `own` with the rest of the body.
+    guessed (`Correspondence.unmatched`) turned as they turn in `own` with the rest of the body.
 
     Unchanged where nothing is a guess, or where `own` is short, doesn't move, or foretells nothing.
     """
@@ -72,7 +72,7 @@ def with_own_motion(
     names = name_list([own.rig.skeleton.names[j] for j in joints])
     return replace(
         moved,
-        rotations=_turned(moved.rotations, joints, link.guess, turns),
+        rotations=_turned(moved.rotations, joints, link.unmatched, turns),
         notes=(*moved.notes, f"{names}: corrected by the target's own motion"),
     )
 
@@ -80,11 +80,11 @@ def with_own_motion(
 def _foretold(source: Rig, target: Rig, link: Correspondence) -> Int[np.ndarray, "K"]:
     """The guesses whose neighbours in the source have a counterpart in the target: what others
     would do in the target's own motion is a guess as well."""
-    guesses = np.flatnonzero(link.guess == np.arange(len(link.guess)))
-    told = correspond(target, source).guess < 0
-    first, second = (told[joints[guesses]] for joints in (link.first, link.second))
-    mix = link.mix[guesses]
-    return guesses[(first | (mix > 1 - _LITTLE)) & (second | (mix < _LITTLE))]
+    unmatched_joints = np.flatnonzero(link.unmatched == np.arange(len(link.unmatched)))
+    told = correspond(target, source).unmatched < 0
+    first, second = (told[joints[unmatched_joints]] for joints in (link.first, link.second))
+    mix = link.mix[unmatched_joints]
+    return unmatched_joints[(first | (mix > 1 - _LITTLE)) & (second | (mix < _LITTLE))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,14 +147,14 @@ def _features(motion: CanonicalMotion) -> Float[np.ndarray, "T F"]:
 def _turned(
     rotations: Float[np.ndarray, "T J 4"],
     joints: Int[np.ndarray, "K"],
-    guess: Int[np.ndarray, "J"],
+    unmatched: Int[np.ndarray, "J"],
     turns: Float[np.ndarray, "T K 4"],
 ) -> Float[np.ndarray, "T J 4"]:
     """Joints turned in their own axes, and what only follows them, with them."""
     out = rotations.copy()
     out[:, joints] = quat_mul(rotations[:, joints], turns)
     for k in joints.tolist():
-        for j in np.flatnonzero(guess == k).tolist():
+        for j in np.flatnonzero(unmatched == k).tolist():
             if j != k:
                 out[:, j] = quat_mul(out[:, k], quat_relative(rotations[:, k], rotations[:, j]))
     return out

@@ -10,10 +10,12 @@ from spark.network.config import NO_ROTATION, RESIDUAL_SCALE, ROTATION_GAIN
 from spark.rotation import matrix_from_sixd
 from spark.training.attention import Attention, TemporalBlock
 from spark.training.model import Spark
-from spark.training.tensors import Body, Pose, Start
+from spark.training.tensors import Body, PoseTensors, Start
 
 
-def retargeted(model: Spark, pose: Pose, source: Body, target: Body, start: Start | None) -> Pose:
+def retargeted(
+    model: Spark, pose: PoseTensors, source: Body, target: Body, start: Start | None
+) -> PoseTensors:
     """What `model` must give for a batch of one without padding, in evaluation."""
     latent = encode(model, pose, source)
     return decode(model, latent, target, start)
@@ -70,7 +72,7 @@ def joint_embeddings(model: Spark, body: Body) -> tuple[Tensor, list[dict[int, T
     return known, places
 
 
-def encode(model: Spark, pose: Pose, body: Body) -> Tensor:
+def encode(model: Spark, pose: PoseTensors, body: Body) -> Tensor:
     """H (T 24 D)."""
     config, encoder = model.config, model.encoder
     joints, root = pose.rotations[0], pose.root[0]
@@ -107,7 +109,7 @@ def encode(model: Spark, pose: Pose, body: Body) -> Tensor:
     return encoder.norm(latent)
 
 
-def decode(model: Spark, latent: Tensor, body: Body, start: Start | None) -> Pose:
+def decode(model: Spark, latent: Tensor, body: Body, start: Start | None) -> PoseTensors:
     """The motion on `body`; the decoder begins with its learned query. A residual network decodes
     the guesses of its start, one window's at a time, and moves them and what follows them."""
     decoder = model.decoder
@@ -116,8 +118,8 @@ def decode(model: Spark, latent: Tensor, body: Body, start: Start | None) -> Pos
         known[j] += next(group[j] for group in places if j in group)
     y = (known + decoder.query).repeat(len(latent), 1, 1)
     if start is not None:
-        guess = start.guess[0].tolist()
-        guessed = [j for j in range(len(known)) if guess[j] == j]
+        unmatched = start.unmatched[0].tolist()
+        guessed = [j for j in range(len(known)) if unmatched[j] == j]
         if not guessed:
             return start.pose
         seen = ROTATION_GAIN * (start.rotations[0][:, guessed] - torch.tensor(NO_ROTATION))
@@ -133,7 +135,7 @@ def decode(model: Spark, latent: Tensor, body: Body, start: Start | None) -> Pos
     y = decoder.norm(y)
     sixd = decoder.rotation(y)
     if start is None:
-        return Pose(sixd[None], decoder.root(y[:, 0])[None])
+        return PoseTensors(sixd[None], decoder.root(y[:, 0])[None])
     little = matrix_from_sixd(
         model.config.shrink * RESIDUAL_SCALE * sixd + torch.tensor(NO_ROTATION)
     )
@@ -144,15 +146,15 @@ def decode(model: Spark, latent: Tensor, body: Body, start: Start | None) -> Pos
         before.append(before[parents[j]] @ local[:, j])
     after = list(before)
     for j in range(len(known)):
-        if guess[j] >= 0:
-            own = before[guess[j]]
-            after[j] = own @ little[:, guessed.index(guess[j])] @ own.mT @ before[j]
+        if unmatched[j] >= 0:
+            own = before[unmatched[j]]
+            after[j] = own @ little[:, guessed.index(unmatched[j])] @ own.mT @ before[j]
     out = [after[0]] + [after[parents[j]].mT @ after[j] for j in range(1, len(known))]
     turned = torch.stack(out, 1)
-    return Pose(torch.cat([turned[..., 0], turned[..., 1]], -1)[None], start.root)
+    return PoseTensors(torch.cat([turned[..., 0], turned[..., 1]], -1)[None], start.root)
 
 
-def positions(pose: Pose, body: Body) -> Tensor:
+def positions(pose: PoseTensors, body: Body) -> Tensor:
     """Joints (T J 3), from the root outwards."""
     local = matrix_from_sixd(pose.rotations[0])
     parents, offsets = body.parents[0].tolist(), body.offsets[0]

@@ -51,7 +51,7 @@ def stick_rig() -> Rig:
         roles=RoleMap(tuple(order), (1.0,) * count, ("by hand",) * count),
         groups=tuple(frozenset() for _ in JOINTS),
         tpose=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
-        carrier=0,
+        root_joint=0,
         hip_height=0.9,
     )
 

@@ -5,7 +5,7 @@ import pytest
 
 from scripts.corruptions import CORRUPTIONS, HARMLESS
 from scripts.report_bench import auc, scores, table
-from sim.report import judge
+from sim.report import assess
 from sim.report.track import track
 from spark.io.recording import read_recording
 from spark.kinematics import forward
@@ -135,8 +135,8 @@ def test_harm_is_told_on_real_clips(
     real: tuple[Motion, Rig], kind: str, measure: str, rise: float
 ) -> None:
     motion, rig = real
-    clean = scores(judge(motion, rig, source=real))
-    harmed = scores(judge(spoilt(kind, motion, rig), rig, source=real))
+    clean = scores(assess(motion, rig, source=real))
+    harmed = scores(assess(spoilt(kind, motion, rig), rig, source=real))
     assert harmed[measure] > clean[measure] + rise
 
 
@@ -145,13 +145,13 @@ def test_no_harm_is_told_of_another_frame_rate(
     real: tuple[Motion, Rig], kind: str, close: float
 ) -> None:
     motion, rig = real
-    clean = scores(judge(motion, rig, source=real))
-    other = scores(judge(spoilt(kind, motion, rig), rig, source=real))
+    clean = scores(assess(motion, rig, source=real))
+    other = scores(assess(spoilt(kind, motion, rig), rig, source=real))
     assert other["any"] == pytest.approx(clean["any"], abs=close)
 
 
 def test_clean_captured_people_are_plausible(real: tuple[Motion, Rig]) -> None:
     motion, rig = real
-    report = judge(motion, rig)
+    report = assess(motion, rig)
     assert report.implausible < 0.1
     assert report.clip.limit_share < 0.03

@@ -17,7 +17,7 @@ from robots.solver.solve import stages_of
 from robots.solver.targets import targets_of
 from robots.stream.frame_targets import LATENCY, Frame, FrameTargets, Watcher, ground_of
 from robots.stream.stream import Stream
-from robots.stream.terms import Stance, Terms
+from robots.stream.terms import FootTargets, Terms
 from robots.tree import forward
 from scripts.robot_bars import COLUMNS, follow, limb_error, measure
 from spark.demo.sample import sample_motion, sample_rig
@@ -108,7 +108,7 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     body_axes = matrix_from_quat(EMBER.to_qpos(q)[:, 3:7])
     for t in range(4):
         one = slice(t, t + 1)
-        stance = Stance(
+        stance = FootTargets(
             np.stack([foot.places[..., t] for foot in footing]),
             np.stack([foot.holds[..., t] for foot in footing]),
         )

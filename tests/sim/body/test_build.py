@@ -36,7 +36,7 @@ def rigid(path: Path) -> tuple[Motion, Rig]:
 def worst_error(model: mujoco.MjModel, motion: Motion, rig: Rig) -> float:
     """The largest distance [m] between MuJoCo's bodies and our joints over the whole clip."""
     data = mujoco.MjData(model)
-    joints = list(rig.skeleton.subtree(rig.carrier))
+    joints = list(rig.skeleton.subtree(rig.root_joint))
     bodies = [model.body(rig.skeleton.names[j]).id for j in joints]
     positions, _ = forward(motion)
     worst = 0.0
@@ -76,7 +76,7 @@ def test_coordinates_are_rotations_since_the_tpose(path: Path) -> None:
     data.qpos[:] = qpos_from_motion(model, motion, rig)[0]
     mujoco.mj_kinematics(model, data)
     since_tpose = quat_mul(forward(motion)[1][0], quat_conj(rig.tpose))
-    for j in rig.skeleton.subtree(rig.carrier):
+    for j in rig.skeleton.subtree(rig.root_joint):
         xquat = data.xquat[model.body(rig.skeleton.names[j]).id]
         assert quat_angle(xquat, since_tpose[j]) < 1e-7
 

@@ -12,7 +12,7 @@ from robots.model.understand import understand_robot
 from robots.registry import find
 from sim.physics.summary import summary, text
 from sim.physics.tracking import Assist, Tracked, track
-from sim.trajectory import GivenBody, given
+from sim.trajectory import ModelTrajectory, model_trajectory
 from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import SkeletonError
 from tests.helpers.stick import standing, stick_rig
@@ -37,22 +37,22 @@ BARE = '<inertial pos="0 0 0" mass="200" diaginertia="1 1 1"/>'
 HINGE = 'type="hinge" axis="0 1 0"'
 
 
-def still(seconds: float, *, up: float = 0.0) -> GivenBody:
+def still(seconds: float, *, up: float = 0.0) -> ModelTrajectory:
     """The stick man in its T-pose, `up` metres above the floor."""
     rig = stick_rig()
-    body = given(rig, standing(rig, int(seconds * FPS) + 1, FPS))
+    body = model_trajectory(rig, standing(rig, int(seconds * FPS) + 1, FPS))
     body.qpos[:, 2] += up
     return body
 
 
-def machine(actuator: str, frames: int, *, joint: str = HINGE) -> GivenBody:
+def machine(actuator: str, frames: int, *, joint: str = HINGE) -> ModelTrajectory:
     """A heavy box with an arm of 2 kg, whose centre lies 0.5 m ahead, held level."""
     spec = mujoco.MjSpec.from_string(MACHINE.format(actuator=actuator, joint=joint))
     model = spec.compile()
-    return GivenBody(spec, model, 1, np.tile(model.qpos0, (frames, 1)))
+    return ModelTrajectory(spec, model, 1, np.tile(model.qpos0, (frames, 1)))
 
 
-def follow(body: GivenBody, *, assist: Assist | None = None) -> Tracked:
+def follow(body: ModelTrajectory, *, assist: Assist | None = None) -> Tracked:
     return track(body, 1 / FPS, height=HEIGHT, assist=assist)
 
 
@@ -82,7 +82,7 @@ def test_a_tpose_stands_without_help() -> None:
 def test_a_walk_is_tracked_with_help() -> None:
     rig = sample_rig("walker")
     motion = sample_motion("walk", rig, FPS)
-    found = summary(follow(given(rig, motion), assist=Assist()))
+    found = summary(follow(model_trajectory(rig, motion), assist=Assist()))
     assert found["fall_frame"] is None
     assert found["error"]["mpjpe_cm"] < 5.0
     assert found["error"]["joints_deg"] < 3.0
@@ -200,7 +200,7 @@ def test_a_robot_stands_on_its_own_servos() -> None:
     robot = understand_robot(find("robot"))
     model = read_mjcf(find("robot"))
     qpos = np.tile(robot.to_qpos(robot.tpose), (91, 1))
-    body = GivenBody(model.spec, model.model, model.root, qpos)
+    body = ModelTrajectory(model.spec, model.model, model.root, qpos)
     found = summary(track(body, 1 / FPS, height=1.32, assist=Assist()))
     assert found["fall_frame"] is None
     assert found["notes"] == []
@@ -231,13 +231,13 @@ def test_one_frame_and_bad_input() -> None:
     spec = mujoco.MjSpec.from_string(bare.format(actuator="", joint=HINGE))
     model = spec.compile()
     with pytest.raises(SkeletonError, match="no shapes"):
-        follow(GivenBody(spec, model, 1, np.tile(model.qpos0, (3, 1))))
+        follow(ModelTrajectory(spec, model, 1, np.tile(model.qpos0, (3, 1))))
 
 
 def test_a_model_that_leaves_contacts_to_its_scene_stands() -> None:
     ghost = MACHINE.replace("<geom ", '<geom contype="0" conaffinity="0" group="3" ')
     spec = mujoco.MjSpec.from_string(ghost.format(actuator="", joint=HINGE))
     model = spec.compile()
-    tracked = follow(GivenBody(spec, model, 1, np.tile(model.qpos0, (61, 1))))
+    tracked = follow(ModelTrajectory(spec, model, 1, np.tile(model.qpos0, (61, 1))))
     assert tracked.record.loads[-1].sum() == pytest.approx(tracked.mass * G, rel=0.02)
     assert any("set to collide" in note for note in tracked.notes)

@@ -15,7 +15,7 @@ import pytest
 from robots import registry
 from robots.model.motion import RobotMotion
 from robots.model.understand import understand_robot
-from sim.report import Report, judge
+from sim.report import Report, assess
 from sim.report.page import report_page, write_report_page
 from sim.report.plots import Plot, svg
 from sim.view.page import Marks, page
@@ -36,7 +36,7 @@ def stumbling() -> tuple[Report, tuple[Motion, Rig], tuple[Motion, Rig]]:
     rig = stick_rig()
     still = standing(rig, 180)
     moved = replace(still, root_pos=still.root_pos + PATH)
-    return judge(moved, rig, source=(still, rig)), (moved, rig), (still, rig)
+    return assess(moved, rig, source=(still, rig)), (moved, rig), (still, rig)
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def robot_text() -> str:
     moved = RobotMotion(robot, robot.from_qpos(qpos), 1 / 60)
     source = standing(stick_rig(), 180), stick_rig()
     motion = moved.motion, robot.rig, moved.body
-    report = judge(moved.motion, robot.rig, source=source, body=moved.body)
+    report = assess(moved.motion, robot.rig, source=source, body=moved.body)
     return report_page(report, motion, source, title=TITLE)
 
 

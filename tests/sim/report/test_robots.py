@@ -19,13 +19,13 @@ from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.model.understand import understand_robot
 from robots.solver.solve import retarget
-from sim.report import Report, judge
+from sim.report import Report, assess
 from sim.report.lowest import lowest_points
 from sim.report.mass import model_mass
 from sim.report.poses import follow
 from sim.report.track import track
 from sim.report.wrench import required_wrench
-from sim.trajectory import GivenBody
+from sim.trajectory import ModelTrajectory
 from spark.errors import FileFormatError, SkeletonError, SparkSimError
 from spark.io.recording import read_recording
 from spark.rig.rig import understand
@@ -56,7 +56,7 @@ def moving(robot: Morphology, qpos: Float[np.ndarray, "T nq"], fps: float = FPS)
 
 
 def judged(on_robot: RobotMotion) -> Report:
-    return judge(on_robot.motion, on_robot.robot.rig, body=on_robot.body)
+    return assess(on_robot.motion, on_robot.robot.rig, body=on_robot.body)
 
 
 def column(robot: Morphology, joint: str) -> int:
@@ -64,7 +64,7 @@ def column(robot: Morphology, joint: str) -> int:
     return int(robot.mjcf.model.joint(joint).qposadr[0])
 
 
-def with_floor(body: GivenBody, height: float) -> tuple[mujoco.MjModel, int]:
+def with_floor(body: ModelTrajectory, height: float) -> tuple[mujoco.MjModel, int]:
     """The body over a plane, and the plane's number."""
     spec = body.spec.copy()
     plane = mujoco.mjtGeom.mjGEOM_PLANE
@@ -120,7 +120,7 @@ def test_lifted_sunk_and_slid_robots_are_told_without_a_source(robot: Morphology
 def test_the_floor_of_a_robot_is_at_zero_whatever_its_source_s_is(robot: Morphology) -> None:
     still = moving(robot, standing(robot))
     raised = replace(still.motion, root_pos=still.motion.root_pos + np.array([0, 0, 0.03]))
-    report = judge(still.motion, robot.rig, body=still.body, source=(raised, robot.rig))
+    report = assess(still.motion, robot.rig, body=still.body, source=(raised, robot.rig))
     assert report.clip.floor_z == 0
     assert report.implausible == 0
     up = standing(robot)
@@ -239,7 +239,7 @@ def test_lowest_points_are_mujocos_distance_from_a_plane(kind: str, size: str) -
     quats = rng.normal(size=(20, 4))
     quats /= np.linalg.norm(quats, axis=1, keepdims=True)
     qpos = np.concatenate([rng.normal(size=(20, 3)) + np.array([0, 0, 3]), quats], axis=1)
-    body = GivenBody(spec, spec.compile(), 1, qpos)
+    body = ModelTrajectory(spec, spec.compile(), 1, qpos)
     names, lowest = lowest_points(body, follow(body))
     assert names == ("b",)
     model, floor = with_floor(body, -5.0)
@@ -254,7 +254,7 @@ def test_lowest_points_are_mujocos_distance_from_a_plane(kind: str, size: str) -
 def test_a_body_with_other_frames_is_refused(robot: Morphology) -> None:
     still = moving(robot, standing(robot, 4))
     with pytest.raises(SkeletonError, match="4 frames, the motion 3"):
-        judge(still.motion.frames(0, 3), robot.rig, body=still.body)
+        assess(still.motion.frames(0, 3), robot.rig, body=still.body)
 
 
 def test_a_walk_put_on_a_robot_is_plausible_and_a_worse_one_is_told(robot: Morphology) -> None:
@@ -262,14 +262,14 @@ def test_a_walk_put_on_a_robot_is_plausible_and_a_worse_one_is_told(robot: Morph
     rig = understand(motion)
     on_robot = retarget(to_canonical(motion, rig), robot)
     source = (motion, rig)
-    report = judge(on_robot.motion, robot.rig, source=source, body=on_robot.body)
+    report = assess(on_robot.motion, robot.rig, source=source, body=on_robot.body)
     assert report.implausible < 0.05, report.text()
     assert report.clip.limit_share == 0
     assert report.drift is not None
     assert report.drift.distance.max() < 0.15
     sunk = on_robot.qpos - np.eye(on_robot.qpos.shape[1])[2] * 0.03
     worse = moving(robot, sunk, motion.fps)
-    assert judge(worse.motion, robot.rig, source=source, body=worse.body).implausible > 0.9
+    assert assess(worse.motion, robot.rig, source=source, body=worse.body).implausible > 0.9
 
 
 def on_command_line(*args: str) -> tuple[int, list[str]]:

@@ -16,7 +16,7 @@ import pytest
 
 import spark_sim
 from sim.interpolate import at_times
-from sim.trajectory import GivenBody
+from sim.trajectory import ModelTrajectory
 from sim.view.page import page, write_page
 from sim.view.render import frames
 from sim.view.scene import Figure, Scene, build_scene
@@ -201,7 +201,7 @@ MACHINE = """
 FACES = ((1, 3, 2), (1, 2, 4), (1, 4, 3), (2, 3, 4))
 
 
-def machine(folder: Path) -> tuple[Rig, Motion, GivenBody]:
+def machine(folder: Path) -> tuple[Rig, Motion, ModelTrajectory]:
     """A model with every kind of joint, off its zero; its motion lends the time alone."""
     corners = ((0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.5))
     lines = [f"v {x} {y} {z}" for x, y, z in corners] + [f"f {a} {b} {c}" for a, b, c in FACES]
@@ -216,7 +216,7 @@ def machine(folder: Path) -> tuple[Rig, Motion, GivenBody]:
     qpos[:, 14] += 0.1 * turn
     qpos[:, 15:17] += np.stack([turn, -turn], -1)
     qpos[:, 17], qpos[:, 19] = np.cos(turn), np.sin(turn)
-    return rig, motion, GivenBody(spec, model, int(model.body("base").id), qpos)
+    return rig, motion, ModelTrajectory(spec, model, int(model.body("base").id), qpos)
 
 
 def test_a_given_model_is_shown_and_nothing_else_of_its_file(tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ from spark.training.checkpoint import Checkpoint, save_checkpoint
 from spark.training.dataset import Performance
 from spark.training.model import Spark
 from spark.training.name_encoder import NameConfig, NameEncoder
-from spark.training.pairs import Clip
+from spark.training.pairs import TrainingClip
 from spark.training.settings import TrainConfig
 from spark.training.train import network
 from spark.training.variants import same_body, split_body, split_joints
@@ -70,10 +70,10 @@ def test_no_pair_is_an_error_that_names_a_way_out(found: list[Performance]) -> N
         recorded_cases(alone)
 
 
-def shorter(clip: Clip, by: int) -> Clip:
+def shorter(clip: TrainingClip, by: int) -> TrainingClip:
     """A clip without its last frames."""
     arrays = (clip.rotations[:-by], clip.hips[:-by], clip.planted[:-by])
-    return Clip(clip.name, clip.body, *arrays, clip.frame_time)
+    return TrainingClip(clip.name, clip.body, *arrays, clip.frame_time)
 
 
 def test_motions_of_other_lengths_are_no_pair(found: list[Performance]) -> None:
@@ -165,7 +165,7 @@ def test_made_answers_stand_where_copies_slide(found: list[Performance]) -> None
         assert mean.mse > 0
         assert mean.truth_foot_speed < 0.7 * mean.foot_speed
     lacking = [c for c in cases if c.structure == "missing"]
-    assert all((correspond(c.source.rig, c.truth.rig).guess >= 0).any() for c in lacking)
+    assert all((correspond(c.source.rig, c.truth.rig).unmatched >= 0).any() for c in lacking)
     # An intra-structural target has the same joints under the same names.
     for case in cases:
         same = case.truth.rig.skeleton.names == case.source.rig.skeleton.names

@@ -27,7 +27,7 @@ from spark.transfer.canonical import (
     canonical_positions,
     to_canonical,
 )
-from spark.transfer.foot_lock import refine
+from spark.transfer.foot_lock import lock_feet
 from tests.helpers.recordings import recording
 from tests.helpers.rigs import RIGS, build, walk
 from tests.helpers.stick import stick_rig
@@ -139,7 +139,7 @@ def test_same_motion_of_other_characters() -> None:
         clips[name] = at_frame_time(to_canonical(motion, understand(motion)), 1 / 30)
     for source, target in permutations(clips.values(), 2):
         moved = transfer(source, target.rig)
-        copied, held = score(moved, target), score(refine(source, moved), target)
+        copied, held = score(moved, target), score(lock_feet(source, moved), target)
         assert copied.mse < 5e-4
         assert copied.relative_mse < 2e-4
         assert held.mse < 1.1 * copied.mse

@@ -22,7 +22,7 @@ from spark.training.model import Spark
 from spark.training.name_encoder import NameConfig, NameEncoder
 from spark.training.onnx import INPUTS, export_onnx
 from spark.training.pairs import PairMaker
-from spark.training.tensors import Pose, Start
+from spark.training.tensors import PoseTensors, Start
 from tests.spark.training.test_model import PRESETS, maker  # noqa: F401
 
 
@@ -57,7 +57,7 @@ def test_the_network_without_torch_is_the_network(
     save_checkpoint(Checkpoint(model, names), tmp_path / "a.safetensors")
     weights = read_weights(tmp_path / "a.safetensors")
     network, vectors = Network(weights), NameNetwork(weights)
-    guesses = 0
+    unmatched_joints = 0
     for n in range(4):
         draw = maker.draw(n, 2)
         batch = Collator(names.encode).batch([draw])
@@ -72,13 +72,13 @@ def test_the_network_without_torch_is_the_network(
         own = network.encode(draw.source, given)
         np.testing.assert_allclose(own, latent.numpy(), atol=2e-4)
         if preset.residual:
-            out = network.correct(own, asked, draw.start, draw.guess)
-            guesses += int((draw.guess >= 0).sum())
+            out = network.correct(own, asked, draw.start, draw.unmatched)
+            unmatched_joints += int((draw.unmatched >= 0).sum())
         else:
             out = network.decode(own, asked, draw.target.body)
         np.testing.assert_allclose(out.rotations, wanted.rotations.numpy(), atol=2e-4)
         np.testing.assert_allclose(out.root, wanted.root.numpy(), atol=2e-4)
-    assert guesses or not preset.residual
+    assert unmatched_joints or not preset.residual
     assert isinstance(batch.start, Start)
 
 
@@ -106,7 +106,7 @@ def test_onnx_is_the_network(maker: PairMaker, tmp_path: Path) -> None:  # noqa:
     for n in (5, 13):
         batch = Collator(names.encode).batch([maker.draw(n, 1)])
         T = 16 - n
-        pose = Pose(*(t[:, :T] for t in batch.pose))
+        pose = PoseTensors(*(t[:, :T] for t in batch.pose))
         start = batch.start._replace(
             rotations=batch.start.rotations[:, :T], root=batch.start.root[:, :T]
         )

@@ -161,9 +161,9 @@ def test_rigs_come_back_to_the_bit(tree: Path) -> None:
     again = rig_from_json(json.loads(json.dumps(rig_to_json(rig))))
     assert again.skeleton.names == rig.skeleton.names
     assert again.roles == rig.roles
-    assert (again.groups, again.carrier, again.hip_height) == (
+    assert (again.groups, again.root_joint, again.hip_height) == (
         rig.groups,
-        rig.carrier,
+        rig.root_joint,
         rig.hip_height,
     )
     for name in ("parents", "offsets", "translating", "end_parents", "end_offsets"):

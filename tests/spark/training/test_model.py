@@ -17,8 +17,15 @@ from spark.training.batch import Batch, Collator
 from spark.training.mirror import mirrored_body, mirrored_motion
 from spark.training.model import Spark, _corrected
 from spark.training.name_encoder import NameEncoder
-from spark.training.pairs import Clip, PairMaker
-from spark.training.tensors import Body, Pose, Start, forward_kinematics, take, world_matrices
+from spark.training.pairs import PairMaker, TrainingClip
+from spark.training.tensors import (
+    Body,
+    PoseTensors,
+    Start,
+    forward_kinematics,
+    take,
+    world_matrices,
+)
 from spark.training.variants import same_body
 from spark.transfer.canonical import to_canonical
 from tests.helpers import plain_spark
@@ -39,7 +46,7 @@ def maker() -> PairMaker:
         body = body_features(rig)
         canonical = to_canonical(motion, rig)
         clips.append(
-            Clip(
+            TrainingClip(
                 build,
                 body,
                 canonical.rotations[:, body.joints],
@@ -63,7 +70,7 @@ def start_of(config: Config, batch: Batch) -> Start | None:
 
 def pad_start(start: Start, extra: int) -> Start:
     pose = pad_pose(start.pose, extra)
-    return Start(*pose, torch.nn.functional.pad(start.guess, (0, extra), value=-1))
+    return Start(*pose, torch.nn.functional.pad(start.unmatched, (0, extra), value=-1))
 
 
 def pad(body: Body, extra: int) -> Body:
@@ -81,8 +88,10 @@ def pad(body: Body, extra: int) -> Body:
     )
 
 
-def pad_pose(pose: Pose, extra: int) -> Pose:
-    return Pose(torch.nn.functional.pad(pose.rotations, (0, 0, 0, extra), value=0.5), pose.root)
+def pad_pose(pose: PoseTensors, extra: int) -> PoseTensors:
+    return PoseTensors(
+        torch.nn.functional.pad(pose.rotations, (0, 0, 0, extra), value=0.5), pose.root
+    )
 
 
 @pytest.mark.parametrize("config", PRESETS)
@@ -126,17 +135,17 @@ def test_only_guesses_are_corrected_and_what_follows_them(maker: PairMaker) -> N
     """Whatever a residual network says: known joints keep their rotation in the world."""
     torch.manual_seed(0)
     batch = Collator(NameEncoder().encode).batch([maker.draw(n, 2) for n in range(8)])
-    start, J = batch.start, batch.start.guess.shape[1]
+    start, J = batch.start, batch.start.unmatched.shape[1]
     moved = _corrected(start, 0.1 * torch.randn_like(start.rotations), batch.target)
     before, after = (world_matrices(p.rotations, batch.target.parents) for p in (start, moved))
-    kept = (start.guess < 0)[:, None, :, None, None]
+    kept = (start.unmatched < 0)[:, None, :, None, None]
     torch.testing.assert_close(before * kept, after * kept, atol=1e-5, rtol=0)
-    guessed = start.guess == torch.arange(J)
+    guessed = start.unmatched == torch.arange(J)
     turned = (before - after).abs().amax((1, 3, 4))
     assert (turned[guessed] > 0.01).all()
-    followers = (start.guess >= 0) & ~guessed
-    relative = take(before, start.guess.clamp(min=0)).mT @ before
-    again = take(after, start.guess.clamp(min=0)).mT @ after
+    followers = (start.unmatched >= 0) & ~guessed
+    relative = take(before, start.unmatched.clamp(min=0)).mT @ before
+    again = take(after, start.unmatched.clamp(min=0)).mT @ after
     shape = followers[:, None, :, None, None]
     torch.testing.assert_close(relative * shape, again * shape, atol=1e-5, rtol=0)
     assert torch.equal(moved.root, start.root)
@@ -149,7 +158,7 @@ def test_one_step_learns_and_every_weight_takes_part(config: Config, batch: Batc
     optimiser = torch.optim.AdamW(model.parameters(), lr=3e-3)
     start = start_of(config, batch)
     # Far from the analytic transfer, so that a residual network has something to learn at once.
-    truth = Pose(batch.truth.rotations, batch.truth.root + 0.2)
+    truth = PoseTensors(batch.truth.rotations, batch.truth.root + 0.2)
     if config.residual:
         truth = _corrected(batch.start, torch.full_like(batch.start.rotations, 0.3), batch.target)
     seen: dict[str, bool] = {}
@@ -181,7 +190,7 @@ def test_network_kinematics_agree_with_ours(maker: PairMaker, batch: Batch) -> N
     body = body_features(rig)
     sixd, root, _ = pose_features(to_canonical(motion, rig), body)
     made = Collator(NameEncoder().encode).bodies([body], [1])
-    pose = Pose(torch.as_tensor(sixd)[None].float(), torch.as_tensor(root)[None].float())
+    pose = PoseTensors(torch.as_tensor(sixd)[None].float(), torch.as_tensor(root)[None].float())
     ours = forward_kinematics(pose, made)[0].numpy() * rig.hip_height
     expected = forward(motion)[0]
     expected = expected - expected[:, rig.hips].mean(1)[:, None]
@@ -204,7 +213,7 @@ def test_causal_network_does_not_see_the_future(batch: Batch) -> None:
     torch.manual_seed(0)
     config = Config(**{**vars(Config.default()), **SMALL, "causal": True, "residual": False})
     model = Spark(config).eval()
-    later = Pose(batch.pose.rotations.clone(), batch.pose.root.clone())
+    later = PoseTensors(batch.pose.rotations.clone(), batch.pose.root.clone())
     later.rotations[:, 8:] = later.rotations[:, 8:].flip(1)
     later.root[:, 8:] += 1
     with torch.no_grad():
@@ -220,7 +229,9 @@ def test_losses_are_zero_at_the_truth_and_ignore_padding(batch: Batch) -> None:
     assert losses.positions(truth, truth, batch.target) == 0
     assert losses.root(batch.truth, batch.truth) == 0
     wrong = batch.truth.rotations + 9 * ~batch.target.valid[:, None, :, None]
-    assert losses.reconstruction(Pose(wrong, batch.truth.root), batch.truth, batch.target) == 0
+    assert (
+        losses.reconstruction(PoseTensors(wrong, batch.truth.root), batch.truth, batch.target) == 0
+    )
 
 
 def test_contact_loss_by_hand() -> None:
@@ -282,7 +293,7 @@ def test_varied_draws_have_something_to_guess(maker: PairMaker) -> None:
     clips = [clip for group in maker._bodies for clip in group]
     varied = PairMaker(clips, window=16, variants=32, varied=True)
     draws = [varied.draw(n, 1) for n in range(20)]
-    assert np.mean([(draw.guess >= 0).any() for draw in draws]) > 0.8
+    assert np.mean([(draw.unmatched >= 0).any() for draw in draws]) > 0.8
     paces = [np.diff(draw.target.root[0, :, 0]).mean() for draw in draws]
     assert len(np.unique(np.round(paces, 6))) > 10
 

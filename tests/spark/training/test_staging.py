@@ -10,14 +10,14 @@ from spark.rig.contacts import planted_feet
 from spark.rig.roles import Group
 from spark.skeleton import Skeleton
 from spark.training.name_encoder import NameEncoder
-from spark.training.pairs import Clip, PairMaker
-from spark.training.staging import Stage, leg_of
+from spark.training.pairs import PairMaker, TrainingClip
+from spark.training.staging import StagedBody, leg_of
 from spark.training.variants import midway, random_variant, same_body
 from spark.transfer.canonical import to_canonical
 
 
 @pytest.fixture(scope="module")
-def clips() -> list[Clip]:
+def clips() -> list[TrainingClip]:
     made = []
     for build in ("walker", "dancer"):
         rig = sample_rig(build)
@@ -25,11 +25,11 @@ def clips() -> list[Clip]:
         body, canonical = body_features(rig), to_canonical(motion, rig)
         planted = planted_feet(rig, forward(motion)[0], motion.frame_time)
         rotations, hips = canonical.rotations[:, body.joints], canonical.hips / rig.hip_height
-        made.append(Clip(build, body, rotations, hips, planted, motion.frame_time))
+        made.append(TrainingClip(build, body, rotations, hips, planted, motion.frame_time))
     return made
 
 
-def test_draws_made_together_are_those_made_alone(clips: list[Clip]) -> None:
+def test_draws_made_together_are_those_made_alone(clips: list[TrainingClip]) -> None:
     maker = PairMaker(clips, window=16, variants=8, varied=True)
     together = maker.draws(range(6), 3)
     assert len({len(draw.source.body.joints) for draw in together}) > 1
@@ -44,11 +44,11 @@ def test_draws_made_together_are_those_made_alone(clips: list[Clip]) -> None:
 
 
 def test_a_planted_foot_rests_as_high_as_the_recorded_one(
-    clips: list[Clip],
+    clips: list[TrainingClip],
 ) -> None:
     """By forward kinematics of the whole body, on other bones, in stances that the leg reaches."""
     clip = clips[0]
-    stage = Stage(random_variant(clip.body, np.random.default_rng(3)))
+    stage = StagedBody(random_variant(clip.body, np.random.default_rng(3)))
     skeleton = stage.variant.body.skeleton
     planted = np.zeros((1, len(clip.hips), 2), bool)
     planted[0, 10:14, 0] = planted[0, 24:28, 1] = True
@@ -72,14 +72,14 @@ def test_a_planted_foot_rests_as_high_as_the_recorded_one(
     np.testing.assert_array_equal(placed[:, above], loose[:, above])
 
 
-def test_feet_touch_the_floor_with_their_last_joint(clips: list[Clip]) -> None:
+def test_feet_touch_the_floor_with_their_last_joint(clips: list[TrainingClip]) -> None:
     for seed in range(8):
         body = random_variant(clips[0].body, np.random.default_rng(seed)).body
         legs = [leg_of(body, group) for group in (Group.LEFT_LEG, Group.RIGHT_LEG)]
         assert body.contacts == tuple(leg.contact for leg in legs)
 
 
-def test_names_read_once_are_the_names_read_together(clips: list[Clip]) -> None:
+def test_names_read_once_are_the_names_read_together(clips: list[TrainingClip]) -> None:
     encoder = NameEncoder().requires_grad_(False)
     remembered = encoder.remembering()
     for clip in (*clips, *clips):

@@ -27,7 +27,7 @@ from spark.training.clips import read_clips
 from spark.training.model import Spark, _corrected
 from spark.training.name_encoder import NameConfig, NameEncoder
 from spark.training.packed import Packer
-from spark.training.pairs import Clip
+from spark.training.pairs import TrainingClip
 from spark.training.settings import TrainConfig, read_settings, toml
 from spark.training.train import Objective, Steps, _batches, network, optimiser_of, take_step, train
 from spark.transfer.analytic import transfer
@@ -44,7 +44,7 @@ SMALL_NAMES = NameConfig(width=16, heads=2, blocks=1)
 
 
 @pytest.fixture(scope="module")
-def clips(tmp_path_factory: pytest.TempPathFactory) -> list[Clip]:
+def clips(tmp_path_factory: pytest.TempPathFactory) -> list[TrainingClip]:
     folder = tmp_path_factory.mktemp("samples")
     sample(folder)
     (folder / "broken.bvh").write_text("HIERARCHY\n")
@@ -61,7 +61,7 @@ def fresh(config: TrainConfig, seed: int = 0) -> Checkpoint:
     return Checkpoint(Spark(network(config, SMALL_NAMES.width)), NameEncoder(SMALL_NAMES))
 
 
-def with_bowed_neck(clip: Clip) -> Clip:
+def with_bowed_neck(clip: TrainingClip) -> TrainingClip:
     """A performance that interpolation does not give: there is something to learn."""
     roles = [clip.body.rig.roles.roles[j] for j in clip.body.joints]
     neck = [k for k, role in enumerate(roles) if role is Role.NECK]
@@ -76,7 +76,7 @@ def weights(checkpoint: Checkpoint) -> dict[str, torch.Tensor]:
 
 @pytest.mark.parametrize("preset", ["tiny", "paper"])
 def test_a_resumed_run_is_the_run_that_never_stopped(
-    clips: list[Clip], tmp_path: Path, preset: str
+    clips: list[TrainingClip], tmp_path: Path, preset: str
 ) -> None:
     config = replace(TINY, preset=preset)
     whole = train(clips, config, tmp_path / "whole", start=fresh(config))
@@ -101,7 +101,7 @@ def test_a_resumed_run_is_the_run_that_never_stopped(
     assert [entry["loss"] for entry in first] == [entry["loss"] for entry in second]
 
 
-def test_workers_change_nothing(clips: list[Clip], tmp_path: Path) -> None:
+def test_workers_change_nothing(clips: list[TrainingClip], tmp_path: Path) -> None:
     config = replace(TINY, steps=2)
     alone = train(clips, config, tmp_path / "a", start=fresh(config))
     helped = train(clips, replace(config, workers=1), tmp_path / "b", start=fresh(config))
@@ -109,7 +109,7 @@ def test_workers_change_nothing(clips: list[Clip], tmp_path: Path) -> None:
         assert torch.equal(value, weights(helped)[name]), name
 
 
-def test_a_packed_batch_is_the_batch(clips: list[Clip]) -> None:
+def test_a_packed_batch_is_the_batch(clips: list[TrainingClip]) -> None:
     batch = Steps(clips, NameEncoder(SMALL_NAMES).encode, TINY, 0, 1)[0]
     again = Packer()(batch).on(torch.device("cpu"))
     for part, other in zip(batch[:5], again[:5], strict=True):
@@ -122,7 +122,7 @@ def test_a_packed_batch_is_the_batch(clips: list[Clip]) -> None:
     assert batch.frame_time == again.frame_time
 
 
-def test_batches_of_a_worker_hold_while_they_are_used(clips: list[Clip]) -> None:
+def test_batches_of_a_worker_hold_while_they_are_used(clips: list[TrainingClip]) -> None:
     """Their memory is used again, but not before the trainer is done with them."""
     steps = Steps(clips, NameEncoder(SMALL_NAMES).encode, replace(TINY, workers=1, steps=14), 0, 1)
     for n, packed in enumerate(_batches(steps, 0)):
@@ -132,7 +132,7 @@ def test_batches_of_a_worker_hold_while_they_are_used(clips: list[Clip]) -> None
         assert torch.equal(batch.pose.root, again.pose.root), n
 
 
-def test_a_checkpoint_keeps_everything(clips: list[Clip], tmp_path: Path) -> None:
+def test_a_checkpoint_keeps_everything(clips: list[TrainingClip], tmp_path: Path) -> None:
     config = replace(TINY, steps=1)
     made = train(clips, config, tmp_path, start=fresh(config))
     read = load_checkpoint(tmp_path / "checkpoint.safetensors")
@@ -291,13 +291,13 @@ def test_nothing_to_train_on(tmp_path: Path) -> None:
         read_clips([tmp_path])
 
 
-def test_a_handful_of_pairs_is_learned_by_heart(clips: list[Clip]) -> None:
+def test_a_handful_of_pairs_is_learned_by_heart(clips: list[TrainingClip]) -> None:
     """Where the answer is that the guesses turn as the source walks on, they come to do so."""
     config = TINY.changed("test", rate=3e-3, steps=120, batch=2, variants=16)
     checkpoint = fresh(config)
     assert isinstance(checkpoint.names, NameEncoder)
     steps = Steps(clips, checkpoint.names.encode, config, 0, 1)
-    batch = max((steps[n] for n in range(12)), key=lambda b: int((b.start.guess >= 0).sum()))
+    batch = max((steps[n] for n in range(12)), key=lambda b: int((b.start.unmatched >= 0).sum()))
     bent = torch.zeros_like(batch.truth.rotations)
     bent[..., 1] = 2 + 5 * batch.pose.root[:, :, None, 0]
     bent[..., 3] = -bent[..., 1]
@@ -327,7 +327,7 @@ def test_an_untrained_residual_is_the_analytic_transfer(
 
 
 def test_bodies_that_training_has_not_met_are_left_to_the_transfer(
-    clips: list[Clip], tmp_path: Path
+    clips: list[TrainingClip], tmp_path: Path
 ) -> None:
     trained = learned(train(clips, TINY, tmp_path, start=fresh(TINY)), tmp_path)
     source, known = without(sample_rig("walker"), Role.NECK), sample_rig("dancer")
@@ -342,7 +342,7 @@ def test_bodies_that_training_has_not_met_are_left_to_the_transfer(
     assert left.notes[-1].endswith("interpolated, or following")
 
 
-def test_windows_agree_with_the_whole(clips: list[Clip], tmp_path: Path) -> None:
+def test_windows_agree_with_the_whole(clips: list[TrainingClip], tmp_path: Path) -> None:
     """Chunks, as long clips need them, against the clip in one piece: within 1e-3 of the height."""
     config = TINY.changed("test", steps=25, rate=1e-3, window=48, batch=4, save_every=100)
     bowed = [with_bowed_neck(clip) for clip in clips]

@@ -35,7 +35,7 @@ def under_a_root(rig: Rig, moves: bool) -> Rig:
         ),
         roles=RoleMap(roles, (1.0,) * len(roles), ("by hand",) * len(roles)),
         tpose=np.concatenate([[[1.0, 0, 0, 0]], rig.tpose]),
-        carrier=1 if moves else 0,
+        root_joint=1 if moves else 0,
     )
 
 

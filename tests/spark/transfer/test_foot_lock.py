@@ -10,7 +10,7 @@ from spark.rig.contacts import planted_feet, speeds
 from spark.rig.rig import Rig, understand
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import canonical_positions, from_canonical, to_canonical
-from spark.transfer.foot_lock import refine
+from spark.transfer.foot_lock import lock_feet
 from spark.transfer.leg_ik import blend_between, stance_correction
 from tests.helpers.recordings import recording
 
@@ -37,7 +37,7 @@ def test_standing_feet_slow_down_threefold_and_little_else_moves(source: str, ta
     _, other = read(target)
     canonical = to_canonical(motion, rig)  # type: ignore[arg-type]
     copied = transfer(canonical, other)
-    refined = refine(canonical, copied)
+    refined = lock_feet(canonical, copied)
     planted = planted_feet(rig, canonical_positions(canonical), canonical.frame_time)
     before, after = canonical_positions(copied), canonical_positions(refined)
     fast, slow = (foot_speed(p, other, planted, canonical.frame_time) for p in (before, after))
@@ -51,7 +51,7 @@ def test_standing_feet_slow_down_threefold_and_little_else_moves(source: str, ta
 def test_feet_that_already_stand_are_left_alone(name: str) -> None:
     rig = sample_rig("walker")
     canonical = to_canonical(sample_motion(name, rig, 60.0), rig)
-    same = refine(canonical, transfer(canonical, rig))
+    same = lock_feet(canonical, transfer(canonical, rig))
     moved = canonical_positions(same) - canonical_positions(canonical)
     assert np.abs(moved).max() < 0.01
 
@@ -61,7 +61,7 @@ def test_made_motions_stand_on_the_other_rig(name: str) -> None:
     """The walker's longer trunk and shorter legs: its dancer's feet rest on the floor, unmoved."""
     source, target = sample_rig("walker"), sample_rig("dancer")
     canonical = to_canonical(sample_motion(name, source, 60.0), source)
-    refined = refine(canonical, transfer(canonical, target))
+    refined = lock_feet(canonical, transfer(canonical, target))
     motion = from_canonical(refined)
     positions, _ = forward(motion)
     planted = planted_feet(source, canonical_positions(canonical), canonical.frame_time)

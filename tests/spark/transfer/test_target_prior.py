@@ -114,7 +114,7 @@ def test_a_guess_beside_another_guess_is_left_alone() -> None:
 
     target = keeping(middle, top)
     for source, told in ((keeping(low, top), False), (keeping(top), True)):
-        assert correspond(source.rig, target.rig).guess[middle] == middle
+        assert correspond(source.rig, target.rig).unmatched[middle] == middle
         turns = with_own_motion(transfer, source, target).rotations[:, middle]
         plain = transfer(source, target.rig).rotations[:, middle]
         assert bool(quat_angle(turns, plain).max() > 0.01) is told
