@@ -16,8 +16,8 @@ from tqdm import tqdm
 
 from scripts.corruptions import CORRUPTIONS, HARMLESS
 from sim.report import Report, assess
+from sim.report.clip_poses import pose_clip
 from sim.report.thresholds import PLAUSIBILITY_V1
-from sim.report.track import track
 from spark.errors import SkeletonError, SparkSimError
 from spark.io.recording import read_recording
 from spark.motion import Motion
@@ -91,7 +91,7 @@ def clips(data: Path) -> Iterator[tuple[str, Motion, Rig]]:
                 motion = read_recording(path).motion
                 motion = motion.frames(0, int(SECONDS / motion.frame_time))
                 rig = understand(motion)
-                lowest = track(motion, rig).lowest_point
+                lowest = pose_clip(motion, rig).lowest_point
             except SparkSimError as error:
                 print(f"left out: {error}", file=sys.stderr)
                 continue

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from sim.report.clip_metrics import ClipMetrics, measure
+from sim.report.clip_poses import ClipPoses, pose_clip
 from sim.report.findings import find
 from sim.report.measures import (
     ContactMatch,
@@ -19,7 +20,6 @@ from sim.report.measures import (
 )
 from sim.report.result import Report
 from sim.report.thresholds import PLAUSIBILITY_V1
-from sim.report.track import Track, track
 from sim.report.truth import accuracy
 from sim.trajectory import ModelTrajectory
 from spark.errors import SkeletonError
@@ -54,51 +54,51 @@ def assess(
     Raises SkeletonError for a body without feet, for a clip without frames, and for a truth that is
     on another skeleton or has other frames.
     """
-    clip_track = _track("the motion", motion, rig, body)
+    clip_poses = _posed("the motion", motion, rig, body)
     known = None if truth is None else accuracy(motion, truth, rig)
-    notes = _about_model(clip_track)
+    notes = _about_model(clip_poses)
     if source is None:
-        clip = measure(clip_track, _own_floor(clip_track))
+        clip = measure(clip_poses, _own_floor(clip_poses))
         if body is None:
             notes = (
                 "the floor is the clip's own: one that floats or sinks as a whole can't be told",
             )
-        notes += _slope(clip_track, "the")
+        notes += _slope(clip_poses, "the")
         return Report(clip, None, None, None, find(clip, None), notes, known)
-    source_track = _track("the source", *source)
-    source_floor = _own_floor(source_track)
+    source_poses = _posed("the source", *source)
+    source_floor = _own_floor(source_poses)
     floor = 0.0
     if body is None:
-        floor, notes = _floor_from_source(clip_track, source_track.rig, source_floor)
-    source_clip = measure(source_track, source_floor)
-    times = np.arange(len(clip_track)) * motion.frame_time
-    scale = rig.hip_height / source_track.rig.hip_height
-    clip = _beyond_source(measure(clip_track, floor), source_clip, times, scale)
-    drift = _drift(clip_track, source_track, times, scale)
-    contacts = _contacts(clip_track, source_track, times)
-    notes += _slope(source_track, "the source's")
-    difference = abs(source_track.motion.duration - motion.duration)
+        floor, notes = _floor_from_source(clip_poses, source_poses.rig, source_floor)
+    source_clip = measure(source_poses, source_floor)
+    times = np.arange(len(clip_poses)) * motion.frame_time
+    scale = rig.hip_height / source_poses.rig.hip_height
+    clip = _beyond_source(measure(clip_poses, floor), source_clip, times, scale)
+    drift = _drift(clip_poses, source_poses, times, scale)
+    contacts = _contacts(clip_poses, source_poses, times)
+    notes += _slope(source_poses, "the source's")
+    difference = abs(source_poses.motion.duration - motion.duration)
     if difference > max(0.1, 2 * motion.frame_time):
         notes += (f"the source's duration differs by {difference:.1f} s: frames may not match",)
     return Report(clip, source_clip, drift, contacts, find(clip, drift), notes, known)
 
 
-def _track(name: str, motion: Motion, rig: Rig, body: ModelTrajectory | None = None) -> Track:
+def _posed(name: str, motion: Motion, rig: Rig, body: ModelTrajectory | None = None) -> ClipPoses:
     if not len(motion):
         raise SkeletonError(f"{name} has no frames: nothing to judge")
-    return track(motion, rig, body)
+    return pose_clip(motion, rig, body)
 
 
-def _about_model(track: Track) -> tuple[str, ...]:
+def _about_model(poses: ClipPoses) -> tuple[str, ...]:
     """Notes where a model has nothing that collides, and where its floor seems to be elsewhere."""
-    body, notes = track.body, []
+    body, notes = poses.body, []
     if body is None:
         return ()
     own = body.model.body_rootid[body.model.geom_bodyid] == body.root
     if not ((body.model.geom_contype | body.model.geom_conaffinity)[own] != 0).any():
         notes.append("none of the model's shapes collide: self-penetration is not measured")
-    height = floor_height(track.lowest_point)
-    if abs(height) > PLAUSIBILITY_V1.scaled(track.rig.hip_height).penetration:
+    height = floor_height(poses.lowest_point)
+    if abs(height) > PLAUSIBILITY_V1.scaled(poses.rig.hip_height).penetration:
         notes.append(
             f"the model's floor is at z = 0; the clip's own (the 5th percentile of its lowest sole "
             f"point) is {100 * abs(height):.1f} cm {'above' if height > 0 else 'below'} that"
@@ -106,17 +106,17 @@ def _about_model(track: Track) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _own_floor(track: Track) -> float:
-    return floor_height(track.lowest_point) if track.body is None else 0.0
+def _own_floor(poses: ClipPoses) -> float:
+    return floor_height(poses.lowest_point) if poses.body is None else 0.0
 
 
 def _floor_from_source(
-    track: Track, source_rig: Rig, source_floor: float
+    poses: ClipPoses, source_rig: Rig, source_floor: float
 ) -> tuple[float, tuple[str, ...]]:
-    scaled = source_floor * track.rig.hip_height / source_rig.hip_height
+    scaled = source_floor * poses.rig.hip_height / source_rig.hip_height
     if abs(source_floor) < _FLOOR_AT_ZERO * source_rig.hip_height:
         return scaled, ()
-    own = floor_height(track.lowest_point)
+    own = floor_height(poses.lowest_point)
     floor = min((0.0, scaled, source_floor), key=lambda z: abs(z - own))
     return floor, (
         f"the source's floor is at z = {source_floor:.2f} m; for the motion it is taken to be at "
@@ -136,19 +136,21 @@ def _beyond_source(
     return replace(clip, self_depth=np.maximum(depth, 0.0))
 
 
-def _drift(track: Track, source: Track, times: Float[np.ndarray, "T"], scale: float) -> Drift:
+def _drift(
+    poses: ClipPoses, source: ClipPoses, times: Float[np.ndarray, "T"], scale: float
+) -> Drift:
     frame_time = source.motion.frame_time
     return root_drift(
-        track.hips,
-        track.heading,
+        poses.hips,
+        poses.heading,
         at_times(source.hips, frame_time, times),
         at_times(source.heading, frame_time, times),
         scale,
     )
 
 
-def _contacts(track: Track, source: Track, times: Float[np.ndarray, "T"]) -> ContactMatch:
-    ours, theirs = _planted(track), _planted(source)
+def _contacts(poses: ClipPoses, source: ClipPoses, times: Float[np.ndarray, "T"]) -> ContactMatch:
+    ours, theirs = _planted(poses), _planted(source)
     sides = [side for side in ours if side in theirs]
     frame_time = source.motion.frame_time
     return contact_match(
@@ -160,12 +162,12 @@ def _contacts(track: Track, source: Track, times: Float[np.ndarray, "T"]) -> Con
     )
 
 
-def _slope(track: Track, whose: str) -> tuple[str, ...]:
+def _slope(poses: ClipPoses, whose: str) -> tuple[str, ...]:
     """A note where the feet stand on a slope: recorded floors are off level by a degree or two."""
-    lowest = track.points[np.arange(len(track)), track.points[..., 2].argmin(axis=1)]
-    planted = np.any(list(_planted(track).values()), axis=0)
+    lowest = poses.points[np.arange(len(poses)), poses.points[..., 2].argmin(axis=1)]
+    planted = np.any(list(_planted(poses).values()), axis=0)
     angle, rise = floor_slope(lowest[planted])
-    if rise < PLAUSIBILITY_V1.scaled(track.rig.hip_height).floating / 2:
+    if rise < PLAUSIBILITY_V1.scaled(poses.rig.hip_height).floating / 2:
         return ()
     return (
         f"{whose} floor slopes by {np.degrees(angle):.1f}°: the feet stand {100 * rise:.0f} cm "
@@ -173,9 +175,9 @@ def _slope(track: Track, whose: str) -> tuple[str, ...]:
     )
 
 
-def _planted(track: Track) -> dict[str, Bool[np.ndarray, "T"]]:
+def _planted(poses: ClipPoses) -> dict[str, Bool[np.ndarray, "T"]]:
     """When each foot stands, by side."""
-    rig = track.rig
+    rig = poses.rig
     sides = [str(rig.roles.roles[j]).split("_")[0] for j in rig.contact_joints]
-    planted = planted_feet(rig, track.positions, track.motion.frame_time)
+    planted = planted_feet(rig, poses.positions, poses.motion.frame_time)
     return dict(zip(sides, planted.T, strict=True))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from sim.report.clip_poses import ClipPoses
 from sim.report.derivatives import derivative
 from sim.report.hinges import hinge_excess, hinge_rates
 from sim.report.limits import LimitExcess, limit_excess
@@ -13,7 +14,6 @@ from sim.report.selfcollision import capsules, self_penetration
 from sim.report.smoothness import joint_rates
 from sim.report.support import support
 from sim.report.thresholds import GRAVITY, PLAUSIBILITY_V1, Thresholds
-from sim.report.track import Track
 
 FLAGS = {"P": "penetration", "F": "floating", "S": "skating", "R": "root wrench"}
 """The per-frame flags: letter and name."""
@@ -110,29 +110,29 @@ class ClipMetrics:
         return float(np.any(over, axis=0).mean()) if over else 0.0
 
 
-def measure(track: Track, floor_z: float) -> ClipMetrics:
+def measure(poses: ClipPoses, floor_z: float) -> ClipMetrics:
     """All measures of a motion over a floor at `floor_z` [m]."""
-    thresholds = PLAUSIBILITY_V1.scaled(track.rig.hip_height)
-    frame_time, window = track.motion.frame_time, thresholds.window
-    held = support(track, floor_z, thresholds)
+    thresholds = PLAUSIBILITY_V1.scaled(poses.rig.hip_height)
+    frame_time, window = poses.motion.frame_time, thresholds.window
+    held = support(poses, floor_z, thresholds)
     soles = len(held.feet)
-    parts = track.parts[..., 2] - floor_z
+    parts = poses.parts[..., 2] - floor_z
     depth = penetration_depth(np.concatenate([held.heights[:, :soles], parts], axis=1))
     clearance = held.heights.min(axis=1)
-    acceleration = derivative(track.mass.com[:, 2], frame_time, 2, window)
+    acceleration = derivative(poses.mass.com[:, 2], frame_time, 2, window)
     # The window smears take-off and landing over itself.
     fall_error = least_within(np.abs(acceleration + GRAVITY), frame_time, window)
     skates = held.skating()
     wrench = held.unexplained()
-    if track.body is None or track.poses is None:
-        limits = limit_excess(track.since_tpose, track.rig)
-        pairs, self_depth = self_penetration(capsules(track))
-        rates = joint_rates(track.world, track.rig, frame_time, window)
+    if poses.body is None or poses.model_poses is None:
+        limits = limit_excess(poses.since_tpose, poses.rig)
+        pairs, self_depth = self_penetration(capsules(poses))
+        rates = joint_rates(poses.world, poses.rig, frame_time, window)
         self_bound = thresholds.self_penetration
     else:
-        limits = hinge_excess(track.body)
-        pairs, self_depth = track.poses.pairs, track.poses.depth
-        rates = hinge_rates(track.body, frame_time, window)
+        limits = hinge_excess(poses.body)
+        pairs, self_depth = poses.model_poses.pairs, poses.model_poses.depth
+        rates = hinge_rates(poses.body, frame_time, window)
         self_bound = thresholds.shape_penetration
     joint_names, joint_speed, joint_jerk = rates
     return ClipMetrics(
@@ -147,11 +147,11 @@ def measure(track: Track, floor_z: float) -> ClipMetrics:
             | (wrench[:, 1] > thresholds.wrench_torque),
         },
         depth=depth,
-        depth_names=(*track.sides, *track.part_names),
+        depth_names=(*poses.sides, *poses.part_names),
         clearance=clearance,
         skating=skates,
         speeds=held.speeds[:, :soles],
-        sides=track.sides,
+        sides=poses.sides,
         unexplained=wrench,
         imbalance=held.imbalance(),
         limits=limits,

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from sim.report.poses import ModelPoses, part_name
+from sim.report.model_poses import ModelPoses, part_name
 from sim.trajectory import ModelTrajectory
 from spark.rotation import quat_conj, quat_rotate
 

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.body.anthropometry import segments
-from sim.report.poses import ModelPoses
+from sim.report.model_poses import ModelPoses
 from sim.trajectory import ModelTrajectory
 from spark.rig.rig import Rig
 from spark.rotation import quat_mul, quat_rotate

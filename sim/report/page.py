@@ -11,10 +11,10 @@ from jaxtyping import UInt8
 
 from sim.report.assess import Source
 from sim.report.clip_metrics import FLAGS, ClipMetrics
+from sim.report.clip_poses import pose_clip
 from sim.report.plots import flag_strips, plots, svg
 from sim.report.result import Finding, Report
 from sim.report.text import figures, of_which, shares
-from sim.report.track import track
 from sim.trajectory import ModelTrajectory
 from sim.view.page import Marks, page
 from sim.view.render import frames
@@ -98,8 +98,8 @@ def report_page(
 def _marks(
     measured: ClipMetrics, motion: Motion, rig: Rig, body: ModelTrajectory | None = None
 ) -> Marks:
-    followed = track(motion, rig, body)
-    heights = followed.points[..., 2] - measured.floor_z
+    poses = pose_clip(motion, rig, body)
+    heights = poses.points[..., 2] - measured.floor_z
     states = np.zeros(heights.shape, dtype=np.uint8)
     states[heights < measured.thresholds.skate_height] = _STANDS
     states[measured.skating] = _SLIDES
@@ -107,7 +107,7 @@ def _marks(
     letters = [
         [letter for letter in FLAGS if measured.flags[letter][t]] for t in range(len(measured))
     ]
-    return Marks(followed.points, states, tuple(" ".join(each) for each in letters))
+    return Marks(poses.points, states, tuple(" ".join(each) for each in letters))
 
 
 def _cards(report: Report) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.body.anthropometry import RADII
-from sim.report.track import Track
+from sim.report.clip_poses import ClipPoses
 from spark.rig.feet import standing_height
 from spark.rig.roles import Role
 from spark.rotation import quat_rotate
@@ -45,19 +45,19 @@ class Capsules:
     radii: Float[np.ndarray, "C"]
 
 
-def capsules(track: Track) -> Capsules:
+def capsules(poses: ClipPoses) -> Capsules:
     """The parts the rig has: chest, hips, head, and three for each limb."""
-    roles, height = track.rig.roles, standing_height(track.rig)
+    roles, height = poses.rig.roles, standing_height(poses.rig)
     place = {
-        role: track.positions[:, joints[-1]] for role in Role if (joints := roles.joints(role))
+        role: poses.positions[:, joints[-1]] for role in Role if (joints := roles.joints(role))
     }
     parts: dict[str, tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"], str]] = {}
     top = place.get(Role.NECK, place.get(Role.SPINE))
     if top is not None:
-        parts["chest"] = (track.hips + _TRUNK_FROM * (top - track.hips), top, "spine")
+        parts["chest"] = (poses.hips + _TRUNK_FROM * (top - poses.hips), top, "spine")
     if (head := roles.joint(Role.HEAD)) is not None:
         up = np.array([0.0, 0.0, _HEAD * height])
-        middle = place[Role.HEAD] + quat_rotate(track.since_tpose[:, head], up)
+        middle = place[Role.HEAD] + quat_rotate(poses.since_tpose[:, head], up)
         parts["head"] = (middle, middle, "head")
     for side in ("left", "right"):
         chains = (("upper_arm", "forearm", "hand"), ("upper_leg", "lower_leg", "foot", "toe"))
@@ -73,10 +73,10 @@ def capsules(track: Track) -> Capsules:
         if hand is not None and forearm is not None:
             # In the T-pose the hands carry on the arms.
             along = np.array([0.0, _PALM * height * (1 if side == "left" else -1), 0.0])
-            turn = track.since_tpose[:, roles.require(Role(f"{side}_hand"))]
+            turn = poses.since_tpose[:, roles.require(Role(f"{side}_hand"))]
             parts[f"{side} hand"] = (hand, hand + quat_rotate(turn, along), "hand")
-    if len(track.rig.hips) == 2:
-        left, right = (track.positions[:, j] for j in track.rig.hips)
+    if len(poses.rig.hips) == 2:
+        left, right = (poses.positions[:, j] for j in poses.rig.hips)
         inwards = _HIPS_FROM * (right - left)
         parts["hips"] = (left + inwards, right - inwards, "pelvis")
     return Capsules(

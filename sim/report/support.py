@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from sim.report.clip_poses import ClipPoses
 from sim.report.derivatives import derivative
 from sim.report.measures import horizontal_speed, least_within, outside_hull
 from sim.report.thresholds import HUMAN_HIP_HEIGHT, Thresholds
-from sim.report.track import Track
 from sim.report.wrench import required_wrench, unexplained
 
 
@@ -74,12 +74,12 @@ class Support:
         return outside
 
 
-def support(track: Track, floor_z: float, thresholds: Thresholds) -> Support:
+def support(poses: ClipPoses, floor_z: float, thresholds: Thresholds) -> Support:
     """The support of a body whose soles' corners are the first points."""
-    frame_time, window = track.motion.frame_time, thresholds.window
-    flesh = track.parts - track.flesh[:, None] * np.array([0.0, 0.0, 1.0])
-    points = np.concatenate([track.points, flesh], axis=1)
-    com = track.mass.com
+    frame_time, window = poses.motion.frame_time, thresholds.window
+    flesh = poses.parts - poses.flesh[:, None] * np.array([0.0, 0.0, 1.0])
+    points = np.concatenate([poses.points, flesh], axis=1)
+    com = poses.mass.com
     heights = points[..., 2] - floor_z
     speeds = horizontal_speed(points, frame_time, window)
     com_speed = np.linalg.norm(derivative(com, frame_time, 1, window), axis=1)
@@ -90,13 +90,13 @@ def support(track: Track, floor_z: float, thresholds: Thresholds) -> Support:
     )
     return Support(
         thresholds=thresholds,
-        feet=track.sides,
+        feet=poses.sides,
         heights=heights,
         speeds=speeds,
         arms=points - com[:, None],
         touching=least_within(heights, frame_time, window) < thresholds.contact_height,
         resting=least_within(speeds, frame_time, window) <= thresholds.skate_speed,
-        wrench=required_wrench(track.mass, frame_time, window),
+        wrench=required_wrench(poses.mass, frame_time, window),
         static=least_within(still, frame_time, thresholds.static_time) > 0,
-        length=track.rig.hip_height / HUMAN_HIP_HEIGHT,
+        length=poses.rig.hip_height / HUMAN_HIP_HEIGHT,
     )

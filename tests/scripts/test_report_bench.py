@@ -6,7 +6,7 @@ import pytest
 from scripts.corruptions import CORRUPTIONS, HARMLESS
 from scripts.report_bench import auc, scores, table
 from sim.report import assess
-from sim.report.track import track
+from sim.report.clip_poses import pose_clip
 from spark.io.recording import read_recording
 from spark.kinematics import forward
 from spark.motion import Motion
@@ -47,7 +47,7 @@ def test_the_root_moves_as_told() -> None:
     for kind, speed in (("slide 0.3 m/s", 0.3), ("drift 10 cm/s", 0.1)):
         moved = spoilt(kind, motion, rig).root_pos - motion.root_pos
         np.testing.assert_allclose(np.linalg.norm(moved, axis=1), speed * np.arange(120) / 60)
-    hips = track(spoilt("in place", motion, rig), rig).hips
+    hips = pose_clip(spoilt("in place", motion, rig), rig).hips
     np.testing.assert_allclose(np.ptp(hips[:, :2], axis=0), 0, atol=1e-12)
 
 
@@ -59,8 +59,8 @@ def test_jitter_has_the_size_it_says() -> None:
 
 def test_leaning_tips_the_body_forward_about_the_floor() -> None:
     motion, rig = standing(stick_rig(), 3), stick_rig()
-    com = track(motion, rig).mass.com[0]
-    tipped = track(spoilt("lean 15°", motion, rig), rig).mass.com[0]
+    com = pose_clip(motion, rig).mass.com[0]
+    tipped = pose_clip(spoilt("lean 15°", motion, rig), rig).mass.com[0]
     angle = np.radians(15)
     expected = [
         np.cos(angle) * com[0] + np.sin(angle) * com[2],
@@ -85,7 +85,7 @@ def test_another_frame_rate_is_the_same_motion(fps: int) -> None:
 
 def test_the_mirror_swaps_the_knees() -> None:
     motion, rig = pacing()
-    before, after = track(motion, rig), track(spoilt("mirrored", motion, rig), rig)
+    before, after = pose_clip(motion, rig), pose_clip(spoilt("mirrored", motion, rig), rig)
     left, right = joint(Role.LEFT_FOOT), joint(Role.RIGHT_FOOT)
     np.testing.assert_allclose(
         after.positions[:, right], before.positions[:, left] * [1, -1, 1], atol=1e-9

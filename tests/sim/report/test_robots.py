@@ -20,10 +20,10 @@ from robots.model.motion import RobotMotion
 from robots.model.understand import understand_robot
 from robots.solver.solve import retarget
 from sim.report import Report, assess
+from sim.report.clip_poses import pose_clip
 from sim.report.lowest import lowest_points
 from sim.report.mass import model_mass
-from sim.report.poses import follow
-from sim.report.track import track
+from sim.report.model_poses import pose_model
 from sim.report.wrench import required_wrench
 from sim.trajectory import ModelTrajectory
 from spark.errors import FileFormatError, SkeletonError, SparkSimError
@@ -87,9 +87,9 @@ def test_every_robot_stands_with_its_soles_on_the_floor(name: str) -> None:
     assert report.clip.limit_share == 0
     assert report.clip.self_penetration.sum() == 0
     assert report.implausible == 0, report.text()
-    followed = track(still.motion, robot.rig, still.body)
+    poses = pose_clip(still.motion, robot.rig, still.body)
     if still.body.soles:
-        np.testing.assert_allclose(followed.points[..., 2], 0, atol=3e-3)
+        np.testing.assert_allclose(poses.points[..., 2], 0, atol=3e-3)
         model, floor = with_floor(still.body, 0.02)
         feet = {int(model.body_weldid[b]) for sole in still.body.soles for b in sole.bodies}
         data = mujoco.MjData(model)
@@ -138,7 +138,7 @@ def test_required_wrench_is_the_root_of_mujocos_inverse_dynamics(robot: Morpholo
     qpos[:, 3:7] /= np.linalg.norm(qpos[:, 3:7], axis=1, keepdims=True)
     qpos[:, 7:] += 0.3 * waves[:, 7:]
     body = moving(robot, qpos, 1 / dt).body
-    ours = required_wrench(model_mass(body, follow(body)), dt, 0.004)
+    ours = required_wrench(model_mass(body, pose_model(body)), dt, 0.004)
 
     model = body.model
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
@@ -240,7 +240,7 @@ def test_lowest_points_are_mujocos_distance_from_a_plane(kind: str, size: str) -
     quats /= np.linalg.norm(quats, axis=1, keepdims=True)
     qpos = np.concatenate([rng.normal(size=(20, 3)) + np.array([0, 0, 3]), quats], axis=1)
     body = ModelTrajectory(spec, spec.compile(), 1, qpos)
-    names, lowest = lowest_points(body, follow(body))
+    names, lowest = lowest_points(body, pose_model(body))
     assert names == ("b",)
     model, floor = with_floor(body, -5.0)
     data = mujoco.MjData(model)

@@ -6,10 +6,10 @@ import pytest
 
 from sim.body.build import build_body
 from sim.body.qpos import qpos_from_motion
+from sim.report.clip_poses import pose_clip
 from sim.report.mass import Mass
 from sim.report.support import Support
 from sim.report.thresholds import PLAUSIBILITY_V1
-from sim.report.track import track
 from sim.report.wrench import angular_momentum, required_wrench, unexplained
 from spark.motion import Motion
 from spark.rotation import quat_about, quat_from_rotvec, quat_mul
@@ -63,8 +63,8 @@ def test_required_wrench_is_the_root_of_mujocos_inverse_dynamics() -> None:
 
     turns = np.stack([wave(len(rig.skeleton), 0.4) for _ in range(3)], axis=-1)
     motion = Motion(rig.skeleton, dt, still.root_pos + wave(3, 0.2), quat_from_rotvec(turns))
-    followed = track(motion, rig)
-    ours = required_wrench(followed.mass, dt, 0.004)
+    poses = pose_clip(motion, rig)
+    ours = required_wrench(poses.mass, dt, 0.004)
 
     model = build_body(rig).compile()
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)

@@ -26,7 +26,7 @@ class ModelPoses:
     depth: Float[np.ndarray, "T K"]
 
 
-def follow(body: ModelTrajectory) -> ModelPoses:
+def pose_model(body: ModelTrajectory) -> ModelPoses:
     """Run MuJoCo's kinematics and collision detection over all frames.
 
     Shapes collide as the file says: by its bits, excludes and pairs, never with their parents.

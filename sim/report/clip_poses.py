@@ -1,4 +1,4 @@
-"""What the measures look at: a motion's points, mass and path, computed once."""
+"""A clip posed: where its soles, parts and mass are in every frame, computed once."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from jaxtyping import Float
 from sim.body.anthropometry import RADII
 from sim.report.lowest import lowest_points
 from sim.report.mass import Mass, human_mass, model_mass
-from sim.report.poses import ModelPoses, follow
+from sim.report.model_poses import ModelPoses, pose_model
 from sim.trajectory import ModelSole, ModelTrajectory
 from spark.errors import SkeletonError
 from spark.kinematics import forward
@@ -23,15 +23,16 @@ _NO_FLESH = ("foot", "toe", "clavicle")
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
-    """A motion's points over time [m, world].
+class ClipPoses:
+    """Where a moving body is in every frame [m, world].
 
     `points` are the soles' corners, each of the foot in `sides` ("left foot"). `parts` are what may
     touch the floor besides, named by `part_names`: the other joints with a role, inside spheres of
     flesh of radius `flesh` [m], or the lowest points of a given body's own shapes. `hips` is the
     middle of the hip joints, `heading` [rad] the pelvis's turn about Z since the T-pose, without
     jumps. `positions` and `world` are the joints' as `forward` gives them; `since_tpose` is G, each
-    joint's rotation since the T-pose in world axes. `poses` is there where a body is given.
+    joint's rotation since the T-pose in world axes. `model_poses` are
+    those of `body`, where a model is given.
     """
 
     motion: Motion
@@ -48,7 +49,7 @@ class Track:
     world: Float[np.ndarray, "T J 4"]
     since_tpose: Float[np.ndarray, "T J 4"]
     body: ModelTrajectory | None
-    poses: ModelPoses | None
+    model_poses: ModelPoses | None
 
     def __len__(self) -> int:
         return len(self.hips)
@@ -59,8 +60,8 @@ class Track:
         return self.points[..., 2].min(axis=1)
 
 
-def track(motion: Motion, rig: Rig, body: ModelTrajectory | None = None) -> Track:
-    """Follow the motion, on `body` where that is given.
+def pose_clip(motion: Motion, rig: Rig, body: ModelTrajectory | None = None) -> ClipPoses:
+    """Where the motion has the body, and the model `body` where that is given.
 
     Raises SkeletonError where the rig has no foot or no leg to stand on, and where the body has
     another number of frames.
@@ -68,25 +69,25 @@ def track(motion: Motion, rig: Rig, body: ModelTrajectory | None = None) -> Trac
     positions, world = forward(motion)
     since_tpose = quat_mul(world, quat_conj(rig.tpose))
     if body is None:
-        poses, mass = None, human_mass(rig, positions, world)
+        model_poses, mass = None, human_mass(rig, positions, world)
         part_names, parts, flesh = _flesh(rig, positions)
     else:
         if len(body.qpos) != len(motion):
             raise SkeletonError(
                 f"the body has {len(body.qpos)} frames, the motion {len(motion)}; expected as many"
             )
-        poses = follow(body)
-        mass = model_mass(body, poses)
-        part_names, parts = lowest_points(body, poses)
+        model_poses = pose_model(body)
+        mass = model_mass(body, model_poses)
+        part_names, parts = lowest_points(body, model_poses)
         flesh = np.zeros(len(part_names))
-    if poses is not None and body is not None and body.soles:
+    if model_poses is not None and body is not None and body.soles:
         sides = tuple(f"{sole.side} foot" for sole in body.soles for _ in sole.bodies)
-        points = np.concatenate([_given_corners(sole, poses) for sole in body.soles], axis=1)
+        points = np.concatenate([_given_corners(sole, model_poses) for sole in body.soles], axis=1)
     else:
         soles = _soles(rig)
         sides = tuple(f"{sole.side} foot" for sole in soles for _ in SOLE_POINTS)
         points = np.concatenate([sole_positions(s, positions, world) for s in soles], axis=1)
-    return Track(
+    return ClipPoses(
         motion=motion,
         rig=rig,
         points=points,
@@ -101,7 +102,7 @@ def track(motion: Motion, rig: Rig, body: ModelTrajectory | None = None) -> Trac
         world=world,
         since_tpose=since_tpose,
         body=body,
-        poses=poses,
+        model_poses=model_poses,
     )
 
 
