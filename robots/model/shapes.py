@@ -9,12 +9,13 @@ from jaxtyping import Float, Int
 from scipy.spatial import ConvexHull, QhullError
 
 from robots.model.mjcf import Mjcf
+from sim.outline import outline
 from spark.rotation import quat_between
 
 _NEAR_LOWEST = 0.08  # of the foot's length: points this low belong to the sole
 _TILTED, _COPLANAR = np.radians(40), np.radians(3)
 _LONG = 0.7  # a sole's width as a share of its length, up to which its length is known
-_PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)
+_RING = 12  # points on either edge of a cylinder
 
 # Towards the faces, edges and corners of a cube.
 DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
@@ -35,8 +36,11 @@ def surface(mjcf: Mjcf, bodies: Iterable[int]) -> Float[np.ndarray, "P 3"]:
 
 def surface_of(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Float[np.ndarray, "P 3"]:
     """Points on one shape, where `data` places it; none for what has no surface of its own."""
+    points, radius = outline(model, geom, ellipsoid=DIRECTIONS, mesh=DIRECTIONS, ring=_RING)
+    if radius:
+        points = (points[:, None] + radius * DIRECTIONS).reshape(-1, 3)
     rotation = data.geom_xmat[geom].reshape(3, 3)
-    return _corners(model, geom) @ rotation.T + data.geom_xpos[geom]
+    return points @ rotation.T + data.geom_xpos[geom]
 
 
 def corners(points: Float[np.ndarray, "P 3"]) -> list[int]:
@@ -92,28 +96,3 @@ def sole_heading(points: Float[np.ndarray, "P 3"]) -> float:
 def _lowest(points: Float[np.ndarray, "P 3"]) -> Int[np.ndarray, "_"]:
     length = float(np.ptp(points[:, 0]))
     return np.flatnonzero(points[:, 2] <= points[:, 2].min() + _NEAR_LOWEST * length)
-
-
-def _corners(model: mujoco.MjModel, geom: int) -> Float[np.ndarray, "P 3"]:
-    """Outermost points of a shape in its own frame."""
-    kind, size = int(model.geom_type[geom]), model.geom_size[geom]
-    if kind == _SPHERE:
-        return DIRECTIONS * size[0]
-    if kind == _CAPSULE:
-        ends = np.array([[0, 0, size[1]], [0, 0, -size[1]]])
-        return np.concatenate([DIRECTIONS * size[0] + end for end in ends])
-    if kind == _ELLIPSOID:
-        scaled = DIRECTIONS * size
-        return scaled * size / np.linalg.norm(scaled, axis=1, keepdims=True)
-    if kind == _CYLINDER:
-        angle = np.arange(12) * np.pi / 6
-        ring = np.stack([size[0] * np.cos(angle), size[0] * np.sin(angle)], axis=1)
-        return np.concatenate([np.insert(ring, 2, z, axis=1) for z in (-size[1], size[1])])
-    if kind == _BOX:
-        return np.array(list(product((-1.0, 1.0), repeat=3))) * size
-    if kind == _MESH:
-        mesh = int(model.geom_dataid[geom])
-        start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-        vertices = model.mesh_vert[start : start + count].astype(np.float64)
-        return vertices[np.unique((vertices @ DIRECTIONS.T).argmax(0))]
-    return np.zeros((0, 3))

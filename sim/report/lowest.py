@@ -1,17 +1,16 @@
 """The lowest points of a model's parts."""
 
-from itertools import product
-
-import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from sim.outline import fibonacci_sphere, outline
 from sim.report.model_poses import ModelPoses, part_name
 from sim.trajectory import ModelTrajectory
 from spark.rotation import quat_conj, quat_rotate
 
-_PLANE, _HFIELD, _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = range(8)
-_RING = 16  # points on a cylinder's edge
+# Of round meshes the lowest point is found to within a millimetre or so.
+_DETAIL = {"ellipsoid": fibonacci_sphere(200), "mesh": fibonacci_sphere(100)}
+_RING = 16  # points on either edge of a cylinder
 
 
 def lowest_points(
@@ -29,7 +28,7 @@ def lowest_points(
     colliding = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
     outlines: dict[int, list[tuple[int, Float[np.ndarray, "P 3"], float]]] = {}
     for g in colliding or geoms:
-        points, radius = _outline(model, g)
+        points, radius = outline(model, g, **_DETAIL, ring=_RING)
         if len(points):
             at = int(model.geom_bodyid[g])
             placed = quat_rotate(model.geom_quat[g], points) + model.geom_pos[g]
@@ -52,35 +51,3 @@ def _lowest(
     """The lowest of a body's points [m, world]."""
     up = quat_rotate(quat_conj(quat), np.array([0.0, 0.0, 1.0]))
     return pos + quat_rotate(quat, points[(up @ points.T).argmin(axis=1)])
-
-
-def _outline(model: mujoco.MjModel, geom: int) -> tuple[Float[np.ndarray, "P 3"], float]:
-    """Points in the shape's own axes and the radius [m] around them; none for a plane."""
-    kind, size = int(model.geom_type[geom]), model.geom_size[geom]
-    if kind == _SPHERE:
-        return np.zeros((1, 3)), float(size[0])
-    if kind == _CAPSULE:
-        return np.array([[0, 0, size[1]], [0, 0, -size[1]]]), float(size[0])
-    if kind == _ELLIPSOID:
-        scaled = _sphere(200) * size
-        return scaled * size / np.linalg.norm(scaled, axis=1, keepdims=True), 0.0
-    if kind == _CYLINDER:
-        angle = 2 * np.pi * np.arange(_RING) / _RING
-        ring = np.stack([size[0] * np.cos(angle), size[0] * np.sin(angle)], axis=1)
-        return np.concatenate([np.insert(ring, 2, z, axis=1) for z in (-size[1], size[1])]), 0.0
-    if kind == _BOX:
-        return np.array(list(product((-1.0, 1.0), repeat=3))) * size, 0.0
-    if kind == _MESH:
-        mesh = int(model.geom_dataid[geom])
-        start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-        vertices = model.mesh_vert[start : start + count].astype(np.float64)
-        return vertices[np.unique((vertices @ _sphere(100).T).argmax(axis=0))], 0.0
-    return np.zeros((0, 3)), 0.0
-
-
-def _sphere(count: int) -> Float[np.ndarray, "N 3"]:
-    """Evenly spread directions: a Fibonacci lattice."""
-    k = np.arange(count) + 0.5
-    z, angle = 1 - 2 * k / count, np.pi * (1 + np.sqrt(5)) * k
-    across = np.sqrt(1 - z**2)
-    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)

@@ -1,0 +1,56 @@
+"""Points on the surface of a MuJoCo geom, in the geom's own axes."""
+
+from itertools import product
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+_SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = (
+    int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"))
+    for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")
+)
+
+
+def outline(
+    model: mujoco.MjModel,
+    geom: int,
+    *,
+    ellipsoid: Float[np.ndarray, "D 3"],
+    mesh: Float[np.ndarray, "E 3"],
+    ring: int,
+) -> tuple[Float[np.ndarray, "P 3"], float]:
+    """Points [m] and the radius [m] of the ball around each of them that together span the geom.
+
+    Spheres, capsules and boxes are exact. An ellipsoid has a point for each of the unit directions
+    `ellipsoid`, a mesh the vertex that is furthest along each of the directions `mesh`, a cylinder
+    `ring` points on either edge. A plane and a height field have none.
+    """
+    kind, size = int(model.geom_type[geom]), model.geom_size[geom]
+    if kind == _SPHERE:
+        return np.zeros((1, 3)), float(size[0])
+    if kind == _CAPSULE:
+        return np.array([[0, 0, size[1]], [0, 0, -size[1]]]), float(size[0])
+    if kind == _ELLIPSOID:
+        scaled = ellipsoid * size
+        return scaled * size / np.linalg.norm(scaled, axis=1, keepdims=True), 0.0
+    if kind == _CYLINDER:
+        angle = 2 * np.pi * np.arange(ring) / ring
+        edge = np.stack([size[0] * np.cos(angle), size[0] * np.sin(angle)], axis=1)
+        return np.concatenate([np.insert(edge, 2, z, axis=1) for z in (-size[1], size[1])]), 0.0
+    if kind == _BOX:
+        return np.array(list(product((-1.0, 1.0), repeat=3))) * size, 0.0
+    if kind == _MESH:
+        k = int(model.geom_dataid[geom])
+        start, count = int(model.mesh_vertadr[k]), int(model.mesh_vertnum[k])
+        vertices = model.mesh_vert[start : start + count].astype(np.float64)
+        return vertices[np.unique((vertices @ mesh.T).argmax(axis=0))], 0.0
+    return np.zeros((0, 3)), 0.0
+
+
+def fibonacci_sphere(count: int) -> Float[np.ndarray, "N 3"]:
+    """Evenly spread unit directions: a Fibonacci lattice (Gonzalez 2010)."""
+    k = np.arange(count) + 0.5
+    z, angle = 1 - 2 * k / count, np.pi * (1 + np.sqrt(5)) * k
+    across = np.sqrt(1 - z**2)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
