@@ -17,10 +17,25 @@ DISTRIBUTION = "spark-sim"
 
 if TYPE_CHECKING:
     from spark.errors import SparkSimError
-    from spark_sim.clip import Clip, load, play, report, retarget, sample
-    from spark_sim.robot import Retargeter, RobotClip
-    from spark_sim.show import Simulated, simulate
+    from spark_sim.api import play, report, retarget, sample
+    from spark_sim.clips import Clip, RobotClip
+    from spark_sim.live import Retargeter
+    from spark_sim.loading import load
+    from spark_sim.simulation import Simulated, simulate
 
+_MODULE_OF = {
+    "Clip": "spark_sim.clips",
+    "Retargeter": "spark_sim.live",
+    "RobotClip": "spark_sim.clips",
+    "Simulated": "spark_sim.simulation",
+    "SparkSimError": "spark.errors",
+    "load": "spark_sim.loading",
+    "play": "spark_sim.api",
+    "report": "spark_sim.api",
+    "retarget": "spark_sim.api",
+    "sample": "spark_sim.api",
+    "simulate": "spark_sim.simulation",
+}
 __all__ = [
     "Clip",
     "Retargeter",
@@ -34,13 +49,6 @@ __all__ = [
     "sample",
     "simulate",
 ]
-_ELSEWHERE = {
-    "SparkSimError": "spark.errors",
-    "Retargeter": "spark_sim.robot",
-    "RobotClip": "spark_sim.robot",
-    "Simulated": "spark_sim.show",
-    "simulate": "spark_sim.show",
-}
 
 
 def __getattr__(name: str) -> Any:
@@ -48,11 +56,11 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version(DISTRIBUTION)
-    if name not in __all__:
+    if name not in _MODULE_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(_ELSEWHERE.get(name, "spark_sim.clip")), name)
+    return getattr(import_module(_MODULE_OF[name]), name)
 
 
 def __dir__() -> list[str]:

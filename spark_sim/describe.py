@@ -7,7 +7,7 @@ import numpy as np
 from spark.errors import SkeletonError
 from spark.io.convention import Convention
 from spark.rotation import quat_angle, quat_identity
-from spark_sim.clip import AnyClip, Clip
+from spark_sim.clips import AnyClip, Clip
 from spark_sim.console import columns
 
 

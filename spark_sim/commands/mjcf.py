@@ -45,7 +45,7 @@ def configure(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     from spark.errors import SkeletonError
     from spark_sim import console
-    from spark_sim.clip import Clip
+    from spark_sim.clips import Clip
 
     out = Path(args.output or f"{Path(args.rig).stem}.xml")
     rig = load(args, args.rig)

@@ -4,7 +4,7 @@ from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from spark_sim.clip import AnyClip
+    from spark_sim.clips import AnyClip
 
 
 def add_corrections(parser: ArgumentParser, file: str, prefix: str = "") -> None:
@@ -61,19 +61,20 @@ def load(args: Namespace, path: str, prefix: str = "", *, humanoid: bool = True)
     Options go to the kinds of file that they are for, so that one command takes several kinds.
     Raises `SkeletonError` where the body is no `humanoid` and must be one.
     """
-    from spark_sim import clip, console
+    from spark_sim import console, loading
+    from spark_sim.clips import Clip
 
     given: dict[str, Any] = vars(args)
     wanted: dict[str, Any] = {}
     for name in ("unit", "up", "roles", "robot", "quat", "fps"):
         option = f"{prefix}{'map' if name == 'roles' else name}"
         value = given.get(option.replace("-", "_"))
-        if value is not None and name in clip.takes(path):
+        if value is not None and name in loading.takes(path):
             wanted[name] = value
         elif value is not None:
             console.note(f"{path}: --{option} is not for such a file")
-    loaded = clip.load(path, **wanted)
-    if isinstance(loaded, clip.Clip) and not humanoid:
+    loaded = loading.load(path, **wanted)
+    if isinstance(loaded, Clip) and not humanoid:
         console.notes(path, loaded.recording.notes)
     else:
         console.notes(path, loaded.notes)

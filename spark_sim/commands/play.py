@@ -47,7 +47,7 @@ def configure(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     from spark.errors import ConventionError
-    from spark_sim import clip, console
+    from spark_sim import api, console
 
     if not args.physics and (args.assist or args.json):
         raise ConventionError("--assist and --json go with --physics")
@@ -58,7 +58,7 @@ def run(args: Namespace) -> int:
         shown = _simulated(args, shown)
     if wanted or not args.json:
         progress = partial(console.progress, label="video")
-        clip.play(*shown, **wanted, force=args.force, progress=progress)
+        api.play(*shown, **wanted, force=args.force, progress=progress)
     for out in wanted.values():
         size = f"{out}: {out.stat().st_size / 1000:.0f} kB"
         console.note(size) if args.json else console.say(size)
@@ -68,7 +68,7 @@ def run(args: Namespace) -> int:
 def _simulated(args: Namespace, clips: list[Any]) -> list[Any]:
     """The clips as they come out of the simulation; the report is printed."""
     from spark_sim import console
-    from spark_sim.show import LIMITS, simulate
+    from spark_sim.simulation import LIMITS, simulate
 
     made = [simulate(each, assist=args.assist) for each in clips]
     for path, each in zip(args.files, made, strict=True):

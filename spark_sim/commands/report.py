@@ -64,16 +64,16 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    from spark_sim import clip, console
+    from spark_sim import api, console
 
     judged = load(args, args.file)
     others = {path: load(args, path) for path in args.compare}
     source = None if args.source is None else load(args, args.source, "source-")
     truth = None if args.truth is None else load(args, args.truth)
-    report = clip.report(judged, source=source, truth=truth, html=args.html, force=args.force)
+    report = api.report(judged, source=source, truth=truth, html=args.html, force=args.force)
     reports = {args.file: report}
     reports |= {
-        path: clip.report(other, source=source, truth=truth) for path, other in others.items()
+        path: api.report(other, source=source, truth=truth) for path, other in others.items()
     }
     if args.json:
         records = {path: each.json() for path, each in reports.items()}

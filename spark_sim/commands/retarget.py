@@ -15,7 +15,7 @@ from spark_sim.commands.options import (
 )
 
 if TYPE_CHECKING:
-    from spark_sim.clip import AnyClip
+    from spark_sim.clips import AnyClip
 
 SUMMARY = "put motions on another body"
 USAGE = "SRC... --to TARGET [-o OUT] [options]"
@@ -134,7 +134,8 @@ def run(args: Namespace) -> int:
 def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> dict[str, Any]:
     from robots.formats import format_of, unsaid
     from spark_sim import console
-    from spark_sim.clip import Clip, retarget
+    from spark_sim.api import retarget
+    from spark_sim.clips import Clip
 
     clip = load(args, str(source))
     result = retarget(
@@ -163,7 +164,7 @@ def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> di
 
 def _joints(clip: "AnyClip") -> int:
     """The joints of a skeleton, or the hinges of a robot."""
-    from spark_sim.clip import Clip
+    from spark_sim.clips import Clip
 
     if isinstance(clip, Clip):
         return len(clip.motion.skeleton)

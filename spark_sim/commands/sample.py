@@ -22,8 +22,8 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    from spark_sim import clip, console
+    from spark_sim import api, console
 
-    for path in clip.sample(args.folder, force=args.force):
+    for path in api.sample(args.folder, force=args.force):
         console.say(str(path))
     return 0

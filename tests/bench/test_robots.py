@@ -20,7 +20,7 @@ from spark.kinematics import world_positions
 from spark.rig.roles import Role
 from spark.rotation import quat_mul, quat_rotate
 from spark.transfer.canonical import from_canonical
-from spark_sim.robot import load_robot
+from spark_sim.loading import load_robot
 
 pytestmark = pytest.mark.bench
 

@@ -23,7 +23,7 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_import_is_light() -> None:
     code = (
         "import sys, spark_sim\n"
-        "assert not {'numpy', 'mujoco', 'torch', 'spark_sim.clip'} & set(sys.modules)\n"
+        "assert not {'numpy', 'mujoco', 'torch', 'spark_sim.clips'} & set(sys.modules)\n"
         "spark_sim.load\n"
         "assert 'numpy' in sys.modules and not {'mujoco', 'torch'} & set(sys.modules)\n"
     )

@@ -21,7 +21,8 @@ from robots.model.understand import understand_robot
 from sim.interpolate import velocities
 from spark.errors import ConventionError, FileFormatError, OutputError, SparkSimError
 from spark.files import write_atomically
-from spark_sim.robot import RobotClip, load_motion
+from spark_sim.clips import RobotClip
+from spark_sim.loading import load_robot_motion
 from tests.helpers.recordings import recordings
 
 FPS, FRAMES = 30.0, 40
@@ -160,7 +161,7 @@ def test_isaac_lab_s_order_is_seen(
     if quat == "xyzw":
         arrays["body_quat_w"] = np.roll(arrays["body_quat_w"], -1, axis=-1)
     np.savez(tmp_path / "isaac.npz", **arrays)
-    back = load_motion(tmp_path / "isaac.npz", robot="robot")
+    back = load_robot_motion(tmp_path / "isaac.npz", robot="robot")
     np.testing.assert_allclose(back.on_robot.qpos[:, 7:], qpos[:, 7:], atol=1e-6)
     assert any(f"breadth-first order, quaternions as {quat}" in note for note in back.notes)
 
@@ -170,7 +171,7 @@ def test_mjlab_of_another_robot_is_refused(clip: RobotClip, tmp_path: Path) -> N
     arrays["body_pos_w"][:, 5:] += 0.1
     np.savez(tmp_path / "other.npz", **arrays)
     with pytest.raises(FileFormatError, match="of another robot"):
-        load_motion(tmp_path / "other.npz", robot="robot")
+        load_robot_motion(tmp_path / "other.npz", robot="robot")
 
 
 def test_few_bodies_may_leave_the_order_open(clip: RobotClip, tmp_path: Path) -> None:
@@ -179,7 +180,7 @@ def test_few_bodies_may_leave_the_order_open(clip: RobotClip, tmp_path: Path) ->
     for kept, says in (([0, 6, 12, 29], "as the bodies' places show"), ([0], "don't show it")):
         few = {k: v[:, kept] if k.startswith("body") else v for k, v in arrays.items()}
         np.savez(tmp_path / "few.npz", **few)
-        read = load_motion(tmp_path / "few.npz", robot="robot")
+        read = load_robot_motion(tmp_path / "few.npz", robot="robot")
         np.testing.assert_allclose(read.on_robot.qpos[:, 7:], clip.on_robot.qpos[:, 7:], atol=1e-6)
         assert any("depth-first" in note and says in note for note in read.notes)
 
@@ -215,7 +216,7 @@ def test_pickles_of_any_protocol_are_read(
         "link_body_list": None,
     }
     (tmp_path / "gmr.pkl").write_bytes(pickle.dumps(entries, protocol=protocol))
-    back = load_motion(tmp_path / "gmr.pkl", robot="robot")
+    back = load_robot_motion(tmp_path / "gmr.pkl", robot="robot")
     np.testing.assert_allclose(back.on_robot.qpos[:, 7:], qpos[:, 7:], atol=1e-12)
 
 
@@ -234,7 +235,7 @@ def test_a_pickle_s_program_is_not_run(tmp_path: Path) -> None:
     data = pickle.dumps({"fps": 30, "root_pos": Evil(mark, write_atomically)})
     (tmp_path / "evil.pkl").write_bytes(data)
     with pytest.raises(FileFormatError, match="can run any program"):
-        load_motion(tmp_path / "evil.pkl", robot="robot")
+        load_robot_motion(tmp_path / "evil.pkl", robot="robot")
     assert not mark.exists()
     pickle.loads(data)  # the attack is one
     assert mark.exists()
@@ -245,7 +246,7 @@ def test_only_the_making_of_arrays_may_be_called(what: str, tmp_path: Path) -> N
     module, name = what.split()
     (tmp_path / "evil.pkl").write_bytes(f"c{module}\n{name}\n(S'1'\ntR.".encode())
     with pytest.raises(FileFormatError, match=f"{module}.{name}"):
-        load_motion(tmp_path / "evil.pkl", robot="robot")
+        load_robot_motion(tmp_path / "evil.pkl", robot="robot")
 
 
 def rows(qpos: Float[np.ndarray, "T nq"]) -> list[str]:
@@ -310,7 +311,7 @@ def test_small_deviations_are_normalised_and_said(
     rough = qpos.copy()
     rough[:, 3:7] *= 1.01
     (tmp_path / "clip.csv").write_text("\n".join(rows(rough)))
-    read = load_motion(tmp_path / "clip.csv", robot="robot", quat="xyzw", fps=FPS)
+    read = load_robot_motion(tmp_path / "clip.csv", robot="robot", quat="xyzw", fps=FPS)
     np.testing.assert_allclose(np.linalg.norm(read.on_robot.qpos[:, 3:7], axis=1), 1)
     assert any("0.01 off unit length" in note for note in read.notes)
 
@@ -344,7 +345,7 @@ def test_spoilt_npz(
     arrays = {k: v for k, v in (arrays | change).items() if v is not None}
     np.savez(tmp_path / "bad.npz", **arrays)
     with pytest.raises(SparkSimError, match=says):
-        load_motion(tmp_path / "bad.npz", robot="robot")
+        load_robot_motion(tmp_path / "bad.npz", robot="robot")
 
 
 @pytest.mark.parametrize(
@@ -358,7 +359,7 @@ def test_spoilt_npz(
 def test_spoilt_pickle(entries: object, says: str, tmp_path: Path) -> None:
     (tmp_path / "bad.pkl").write_bytes(pickle.dumps(entries))
     with pytest.raises(FileFormatError, match=says):
-        load_motion(tmp_path / "bad.pkl", robot="robot")
+        load_robot_motion(tmp_path / "bad.pkl", robot="robot")
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".pkl", ".csv"])
@@ -387,7 +388,7 @@ def test_npz_with_objects_is_not_unpickled(clip: RobotClip, tmp_path: Path) -> N
     mark = tmp_path / "mark"
     np.savez(tmp_path / "evil.npz", qpos=np.array([Evil(mark, write_atomically)], dtype=object))
     with pytest.raises(FileFormatError, match="is no npz"):
-        load_motion(tmp_path / "evil.npz", robot="robot")
+        load_robot_motion(tmp_path / "evil.npz", robot="robot")
     assert not mark.exists()
 
 
@@ -438,7 +439,7 @@ def test_limits_that_are_left_are_said(
     far = qpos.copy()
     far[:, 10] = 3.0
     (tmp_path / "clip.csv").write_text("\n".join(rows(far)))
-    read = load_motion(tmp_path / "clip.csv", robot="robot", quat="xyzw", fps=FPS)
+    read = load_robot_motion(tmp_path / "clip.csv", robot="robot", quat="xyzw", fps=FPS)
     assert any("'left_knee' goes 29 degrees beyond" in note for note in read.notes)
 
 
@@ -449,11 +450,11 @@ def test_other_units_and_robots_are_suspected(
     far = qpos.copy()
     far[:, :3] *= 100
     path.write_text("\n".join(rows(far)))
-    read = load_motion(path, robot="robot", quat="xyzw", fps=FPS)
+    read = load_robot_motion(path, robot="robot", quat="xyzw", fps=FPS)
     assert any("the base is 70 m high: positions are read as metres" in n for n in read.notes)
     path.write_text("\n".join(row.rsplit(",", 10)[0] for row in rows(qpos)))
     with pytest.raises(FileFormatError, match="of another robot, such as 'unitree_h1'"):
-        load_motion(path, robot="robot", quat="xyzw", fps=FPS)
+        load_robot_motion(path, robot="robot", quat="xyzw", fps=FPS)
 
 
 @pytest.mark.parametrize("path", recordings("g1moves/M_ShortMove1*.csv"))

@@ -28,7 +28,7 @@ from spark.rig.rig import Rig, understand
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_from_yaw, quat_mul, quat_rotate
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
-from spark_sim.robot import load_robot
+from spark_sim.loading import load_robot
 from tests.helpers.recordings import recording
 
 

@@ -18,7 +18,7 @@ from spark.kinematics import forward
 from spark.rig.roles import Role
 from spark.transfer.canonical import to_canonical
 from spark_sim.cli import run
-from spark_sim.robot import RobotClip
+from spark_sim.clips import RobotClip
 
 # A humanoid of hinges, 1.2 m high: hips and shoulders of three, knees, elbows and ankles.
 LEG = """

@@ -33,7 +33,7 @@ from spark.rotation import (
     quat_rotate,
 )
 from spark.transfer.canonical import canonical_positions, to_canonical
-from spark_sim.robot import load_robot
+from spark_sim.loading import load_robot
 from tests.helpers.recordings import recording
 
 RIG = sample_rig("walker")

@@ -31,7 +31,7 @@ from spark.io.recording import read_recording
 from spark.rig.rig import understand
 from spark.transfer.canonical import to_canonical
 from spark_sim.cli import run
-from spark_sim.robot import RobotClip
+from spark_sim.clips import RobotClip
 from tests.helpers.recordings import recording
 
 FPS, FRAMES = 60.0, 90

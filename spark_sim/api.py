@@ -1,0 +1,215 @@
+"""What can be done with clips: the Python API. The command line is a layer over it."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, overload
+
+from spark.errors import ConventionError
+from spark.io.bvh import write_bvh
+from spark.io.encoding import encode, encode_new
+from spark.transfer.analytic import transfer
+from spark.transfer.canonical import CanonicalMotion, from_canonical
+from spark.transfer.foot_lock import lock_feet
+from spark_sim import files
+from spark_sim.clips import AnyClip, Clip, File, RobotClip
+from spark_sim.loading import clip_of
+
+if TYPE_CHECKING:
+    from sim.report import Report
+    from spark.network.retarget import Learned
+    from spark_sim.simulation import Simulated
+
+METHODS = ("copy", "spark")
+_PAGE = (".html", ".htm")
+
+
+@overload
+def retarget(
+    source: AnyClip | File,
+    target: Clip,
+    *,
+    method: str = "spark",
+    checkpoint: File | None = None,
+    refine: bool = True,
+) -> Clip: ...
+@overload
+def retarget(
+    source: AnyClip | File,
+    target: AnyClip | File,
+    *,
+    method: str = "spark",
+    checkpoint: File | None = None,
+    refine: bool = True,
+) -> AnyClip: ...
+def retarget(
+    source: AnyClip | File,
+    target: AnyClip | File,
+    *,
+    method: str = "spark",
+    checkpoint: File | None = None,
+    refine: bool = True,
+) -> AnyClip:
+    """The motion of `source` on the body of `target`, in the hierarchy and units of its file.
+
+    Both are clips, or what `load` takes: `target` may be a robot's name or MJCF. Each joint turns
+    as its counterpart does, in world axes; what the source has no counterpart of is filled in by
+    interpolation (method "copy") or ("spark") on rigs like those that it has met by a trained
+    network, that of `checkpoint` or the one that ships, and as far as the target's own motion shows
+    what they do. Robots are solved for. With `refine`, feet are held where the source's stand.
+    Raises `SkeletonError` where one is no humanoid.
+    """
+    if method not in METHODS:
+        raise ConventionError(f"method {method!r} is not known; expected 'copy' or 'spark'")
+    if method != "spark" and checkpoint is not None:
+        raise ConventionError("a checkpoint goes with method 'spark', and with no other")
+    source, target = clip_of(source), clip_of(target)
+    if not isinstance(target, Clip):
+        if checkpoint is not None:
+            raise ConventionError("method 'spark' is for characters; robots are solved for")
+        return _onto_robot(source, target, refine=refine)
+    canonical = source.canonical
+    if method == "copy":
+        moved = transfer(canonical, target.rig)
+    else:
+        moved = _filled_in(canonical, target, _learned(checkpoint))
+    if refine:
+        moved = lock_feet(canonical, moved)
+    motion = from_canonical(moved)
+    bvh, notes = encode(motion, target.recording)
+    file = target.recording.bvh.path
+    if file is not None and file.suffix.lower() == ".fbx":
+        notes += ("written as a BVH of its own; FBX files are read only",)
+    recording = replace(target.recording, bvh=bvh, motion=motion, notes=(*moved.notes, *notes))
+    # The rig is given: what is known of a body does not depend on the motion that it makes.
+    return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig)
+
+
+def _onto_robot(source: AnyClip, target: RobotClip, *, refine: bool) -> RobotClip:
+    """The motion of `source` on a robot: solved for as a whole, within limits, feet planted where
+    the source's are; without `refine`, only projected on the robot's hinges."""
+    from robots.solver.solve import copy
+    from robots.solver.solve import retarget as solve
+
+    robot = target.on_robot.robot
+    moved = solve(source.canonical, robot) if refine else copy(source.canonical, robot)
+    return RobotClip(moved, f"{source.name} on {target.name}", source.path)
+
+
+def _filled_in(source: CanonicalMotion, target: Clip, network: "Learned") -> CanonicalMotion:
+    """As a network says and, where it corrects the transfer, the target's own motion."""
+    from spark.transfer.target_prior import with_own_motion
+
+    if not network.network.config.residual:
+        return network(source, target.rig)
+    return with_own_motion(network, source, target.canonical)
+
+
+def _learned(checkpoint: File | None) -> "Learned":
+    """The network of a checkpoint, or the one that ships."""
+    from spark.network.retarget import Learned
+    from spark.network.weights import read_weights
+
+    return _shipped() if checkpoint is None else Learned(read_weights(Path(checkpoint)))
+
+
+@cache
+def _shipped() -> "Learned":
+    from spark.network.retarget import Learned
+    from spark.network.weights import SHIPPED, read_weights
+
+    return Learned(read_weights(SHIPPED))
+
+
+def report(
+    clip: AnyClip | File,
+    *,
+    source: AnyClip | File | None = None,
+    truth: AnyClip | File | None = None,
+    html: File | None = None,
+    force: bool = False,
+) -> "Report":
+    """How believable a motion is; with `source`, beside the motion it was made from, and with
+    `truth`, on the same skeleton, how far from what it should have been.
+
+    With `html`, also written as a web page. Raises `OutputError` where that exists, unless forced.
+    """
+    from sim.report import assess
+
+    if html is not None:
+        files.claim(Path(html), force=force, endings=_PAGE)
+    clip = clip_of(clip)
+    origin, names = None, (clip.name, "source")
+    if source is not None:
+        source = clip_of(source)
+        origin, names = (source.motion, source.rig, source.body), (clip.name, source.name)
+    known = None if truth is None else clip_of(truth).motion
+    judged = assess(clip.motion, clip.rig, source=origin, body=clip.body, truth=known)
+    if html is not None:
+        from sim.report.page import write_report_page
+
+        motion = clip.motion, clip.rig, clip.body
+        write_report_page(judged, html, motion, origin, title=clip.name, names=names)
+    return judged
+
+
+def play(
+    *clips: "AnyClip | Simulated | File",
+    video: File | None = None,
+    html: File | None = None,
+    strip: File | None = None,
+    force: bool = False,
+    progress: Callable[[Iterable[int]], Iterable[int]] = iter,
+) -> None:
+    """Show motions side by side: as a video (MP4), a web page or a strip of moments (PNG), as many
+    of them as are named; in a window where none is. What `simulate` yields is shown with its target
+    as a ghost.
+
+    `progress` wraps the frames of the video. Raises `DependencyError` where there is no display, or
+    nothing to draw or encode with, and `OutputError` where a file exists, unless forced.
+    """
+    from sim.view.scene import build_scene
+
+    for path, endings in ((video, (".mp4",)), (html, _PAGE), (strip, (".png",))):
+        if path is not None:
+            files.claim(Path(path), force=force, endings=endings)
+    shown = [clip_of(c) if isinstance(c, str | Path) else c for c in clips]
+    figures = [figure for clip in shown for figure in clip.figures()]
+    scene = build_scene(figures)
+    if video is not None:
+        from sim.view.video import write_video
+
+        write_video(scene, video, progress=progress)
+    if html is not None:
+        from sim.view.page import write_page
+
+        write_page(figures, html, title=" · ".join(c.name for c in shown))
+    if strip is not None:
+        from sim.view.video import write_strip
+
+        write_strip(scene, strip)
+    if video is html is strip is None:
+        from sim.view.window import open_window
+
+        open_window(scene)
+
+
+def sample(folder: File = "samples", *, force: bool = False) -> tuple[Path, ...]:
+    """Write the demo motions as BVH files into `folder`: each of them on two different rigs.
+
+    Raises `OutputError` where one of the files exists, unless forced.
+    """
+    from spark.demo.sample import BUILDS, MOTIONS, sample_motion, sample_rig
+
+    written = {
+        (rig, motion): Path(folder) / f"{rig}_{motion}.bvh" for rig in BUILDS for motion in MOTIONS
+    }
+    for path in written.values():
+        files.claim(path, force=force)
+    for name, build in BUILDS.items():
+        rig = sample_rig(name)
+        for motion in MOTIONS:
+            made = sample_motion(motion, rig, build.fps)
+            write_bvh(encode_new(made, unit=build.unit, up=build.up), written[name, motion])
+    return tuple(written.values())

@@ -1,0 +1,94 @@
+"""Files and robots' names into clips, and what can be told of which file."""
+
+from pathlib import Path
+
+from robots import formats, registry
+from spark.errors import ConventionError, FileFormatError
+from spark.io.reading import read_motion
+from spark_sim import rolemap
+from spark_sim.clips import AnyClip, Clip, File, RobotClip
+
+_NOT_YET = {
+    ".glb": "glTF files can't be read yet; expected a BVH or FBX file",
+    ".gltf": "glTF files can't be read yet; expected a BVH or FBX file",
+    ".amc": "AMC files can't be read yet; expected a BVH or FBX file",
+}
+
+
+def load(
+    path: File,
+    *,
+    unit: str | float | None = None,
+    up: str | None = None,
+    roles: File | None = None,
+    robot: File | None = None,
+    quat: str | None = None,
+    fps: float | None = None,
+) -> AnyClip:
+    """Read a motion, or a body. What is not given is inferred, and said in the clip's `notes`.
+
+    Of a BVH or FBX file, `unit` is m, dm, cm, mm, inch, cmu or a number of metres; `up` is x, y or
+    z; `roles` is a map of joints in TOML, as `spark-sim inspect --save-map` writes it.
+    Of a robot's own motion (.npz, .csv, .pkl), `robot` is its name or MJCF; `quat`, xyzw or wxyz,
+    and `fps` are what a CSV does not say.
+    A robot's name or MJCF alone yields one frame, in its T-pose; `roles` is then a map by bodies.
+    """
+    path = Path(path)
+    given = {"unit": unit, "up": up, "roles": roles, "robot": robot, "quat": quat, "fps": fps}
+    for name, value in given.items():
+        if value is not None and name not in takes(path):
+            raise ConventionError(f"{path}: {name} can't be told of such a file; leave it out")
+    if registry.is_robot(path):
+        return load_robot(path, roles=roles)
+    if path.suffix.lower() in formats.SUFFIXES:
+        return load_robot_motion(path, robot=robot, quat=quat, fps=fps)
+    if path.suffix.lower() in _NOT_YET:
+        raise FileFormatError(path, None, _NOT_YET[path.suffix.lower()])
+    recording = read_motion(path, unit=unit, up=up)
+    names = None if roles is None else rolemap.read(roles, recording.motion.skeleton)
+    return Clip(recording, path.stem, names)
+
+
+def takes(path: File) -> tuple[str, ...]:
+    """What `load` can be told of such a file."""
+    if registry.is_robot(path):
+        return ("roles",)
+    suffix = Path(path).suffix.lower()
+    if suffix in formats.SUFFIXES:
+        return ("robot", "quat", "fps") if suffix == ".csv" else ("robot",)
+    return ("unit", "up", "roles")
+
+
+def clip_of(clip: AnyClip | File) -> AnyClip:
+    """The clip itself, or the one that `load` reads."""
+    return load(clip) if isinstance(clip, str | Path) else clip
+
+
+def load_robot(robot: File, *, roles: File | None = None) -> RobotClip:
+    """A robot by its name or its MJCF file: one frame, in its T-pose. `roles` is a map by bodies.
+
+    Raises `SparkSimError` where none is called that, or where its model does not compile, has no
+    legs, or can't stand in a T-pose.
+    """
+    from robots.model.known import known
+    from robots.model.mjcf import read_mjcf
+    from robots.model.motion import RobotMotion
+    from robots.model.understand import parts_of, understand_robot
+
+    if roles is None:
+        found = known(robot)
+    else:
+        mjcf = read_mjcf(registry.find(robot), visuals=False)
+        found = understand_robot(mjcf, rolemap.read(roles, parts_of(mjcf)))
+    return RobotClip(RobotMotion(found, found.tpose, 1.0, found.notes), Path(robot).stem)
+
+
+def load_robot_motion(
+    path: Path, *, robot: File | None = None, quat: str | None = None, fps: float | None = None
+) -> RobotClip:
+    """A robot's own motion, of a file in any of `robots.formats`."""
+    from robots.formats import dispatch
+    from robots.model.known import known
+
+    moving = None if robot is None else known(robot)
+    return RobotClip(dispatch.read(path, moving, quat=quat, fps=fps), path.stem, path)
