@@ -7,9 +7,9 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, Int
 
-from sim.report.measures import at_times
 from spark.kinematics import forward, local_rotations
 from spark.motion import Motion
+from spark.resample import rotations_at, values_at
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import (
@@ -20,7 +20,6 @@ from spark.rotation import (
     quat_from_yaw,
     quat_mul,
     quat_rotate,
-    quat_slerp,
     yaw_from_quat,
 )
 from spark.transfer.canonical import CanonicalMotion, from_canonical, to_canonical
@@ -78,18 +77,13 @@ def faster(motion: Motion, rig: Rig, rng: np.random.Generator, *, factor: float)
 def resampled(motion: Motion, rig: Rig, rng: np.random.Generator, *, fps: float) -> Motion:
     """The same motion at another frame rate."""
     times = np.arange(int(motion.duration * fps + 1e-9) + 1) / fps
-    frames = np.clip(times / motion.frame_time, 0, len(motion) - 1)
-    first = np.minimum(frames.astype(np.int64), max(len(motion) - 2, 0))
-    second = np.minimum(first + 1, len(motion) - 1)
-    place = partial(at_times, frame_time=motion.frame_time, times=times)
+    at = times / motion.frame_time
     return replace(
         motion,
         frame_time=1 / fps,
-        root_pos=place(motion.root_pos),
-        rotations=quat_slerp(
-            motion.rotations[first], motion.rotations[second], (frames - first)[:, None]
-        ),
-        translations=None if motion.translations is None else place(motion.translations),
+        root_pos=values_at(motion.root_pos, at),
+        rotations=rotations_at(motion.rotations, at),
+        translations=(None if motion.translations is None else values_at(motion.translations, at)),
     )
 
 
@@ -205,9 +199,7 @@ def _opposite(rig: Rig) -> Int[np.ndarray, "J"]:
             parent = int(rig.skeleton.parents[j])
             opposite[j] = opposite[parent] if parent >= 0 else j
             continue
-        side, _, part = role.partition("_")
-        other = {"left": f"right_{part}", "right": f"left_{part}"}.get(side, role)
         rank = roles.joints(role).index(j)
-        partners = roles.joints(Role(other))
+        partners = roles.joints(role.mirrored)
         opposite[j] = partners[rank] if rank < len(partners) else j
     return opposite

@@ -15,7 +15,7 @@ import torch
 from spark.motion import Motion
 from spark.network.features import body_features
 from spark.network.name_words import rig_words
-from spark.rig.name_conventions import CONVENTIONS, split_side
+from spark.rig.name_conventions import CONVENTIONS
 from spark.rig.rig import understand
 from spark.rig.roles import Role
 from spark.training.name_rigs import OTHER, Named, rig_of
@@ -30,7 +30,7 @@ def named_rig(chains: str) -> list[Named]:
     body = body_features(understand(Motion(skeleton, 1 / 30, skeleton.offsets[:1], still)))
     roles = [right[j] for j in body.joints.tolist()]
     return [
-        (name, *(split_side(role) if role else ("", OTHER)))
+        (name, *((role.side, role.part) if role else ("", OTHER)))
         for name, role in zip(body.skeleton.names, roles, strict=True)
     ]
 

@@ -25,6 +25,7 @@ from robots.stream.stream import Stream
 from spark.io.recording import read_recording
 from spark.rig.rig import understand
 from spark.rig.roles import Role
+from spark.runs import true_runs
 from spark.transfer.canonical import (
     CanonicalMotion,
     canonical_positions,
@@ -122,8 +123,7 @@ def stays_on_floor(source: CanonicalMotion) -> bool:
     speed = np.linalg.norm(np.gradient(toes, source.frame_time, axis=0), axis=-1)
     height = toes[..., 2] - np.percentile(toes[..., 2], 1, axis=0)
     raised = ((speed < SLOW) & (height > RAISED)).any(1) & (height > PLANTED).all(1)
-    edges = np.flatnonzero(np.diff(raised.astype(int), prepend=0, append=0))
-    longest = max((edges[1::2] - edges[::2]).tolist(), default=0)
+    longest = max((stop - start for start, stop in true_runs(raised)), default=0)
     return bool(longest * source.frame_time < RESTS)
 
 
@@ -221,8 +221,7 @@ def next_joint(roles: object, role: Role) -> int | None:
         "upper_arm": "forearm",
         "forearm": "hand",
     }
-    side, part = role.value.split("_", 1)
-    return roles.joint(Role(f"{side}_{order[part]}"))  # type: ignore[attr-defined]
+    return roles.joint(Role(f"{role.side}_{order[role.part]}"))  # type: ignore[attr-defined]
 
 
 def self_collision(result: RobotMotion) -> float:

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
-from spark.rotation import quat_slerp
+from spark.resample import rotations_at, values_at
 
 _FREE, _BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
 
@@ -17,17 +17,11 @@ def at_times(
 ) -> Float[np.ndarray, "S nq"]:
     """Positions and angles interpolated linearly, rotations on the sphere; the first and the last
     frame hold beyond the ends."""
-    place = np.clip(times / frame_time, 0, len(qpos) - 1)
-    before = np.minimum(np.floor(place + 1e-6).astype(int), len(qpos) - 1)
-    after = np.minimum(before + 1, len(qpos) - 1)
-    share = np.clip(place - before, 0, 1)
-    out = qpos[before] + share[:, None] * (qpos[after] - qpos[before])
-    turns, between = quaternions(model), np.flatnonzero(share > 1e-6)[:, None, None]
-    out[between, turns] = quat_slerp(
-        qpos[before[between], turns],
-        qpos[after[between], turns],
-        np.broadcast_to(share[between[..., 0]], (len(between), len(turns))),
-    )
+    frames = times / frame_time
+    # A time that misses its frame by less than rounding does is that frame's.
+    frames = np.maximum(frames, np.floor(frames + 1e-6))
+    out, columns = values_at(qpos, frames), quaternions(model)
+    out[:, columns] = rotations_at(qpos[:, columns], frames)
     return out
 
 

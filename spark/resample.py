@@ -1,31 +1,45 @@
-"""Motions at fractional frames."""
+"""Interpolation in time: the one place where anything is looked up between frames or keys.
+
+A time is given as a fractional frame: 2.25 is a quarter of the way from frame 2 to frame 3. The
+first and the last frame hold beyond the ends, and a whole frame comes out as it went in.
+"""
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from spark.rotation import quat_slerp
 
 
+def values_at(
+    values: Float[np.ndarray, "T *n"], at: Float[np.ndarray, "N"]
+) -> Float[np.ndarray, "N *n"]:
+    """Positions, angles or other numbers at fractional frames, linearly."""
+    before, after, fraction = _neighbours(at, len(values))
+    fraction = fraction.reshape(-1, *(1,) * (values.ndim - 1))
+    return (1 - fraction) * values[before] + fraction * values[after]
+
+
 def rotations_at(
-    rotations: Float[np.ndarray, "T J 4"], at: Float[np.ndarray, "N"]
-) -> Float[np.ndarray, "N J 4"]:
-    """Rotations at fractional frames; the first and last frame hold beyond the ends."""
-    low, high, share = _neighbours(at, len(rotations))
-    mix = np.broadcast_to(share[:, None], (len(at), rotations.shape[1]))
-    return quat_slerp(rotations[low], rotations[high], mix)
+    rotations: Float[np.ndarray, "T *n 4"], at: Float[np.ndarray, "N"]
+) -> Float[np.ndarray, "N *n 4"]:
+    """Rotations at fractional frames, by slerp along the shorter arc."""
+    before, after, fraction = _neighbours(at, len(rotations))
+    fraction = fraction.reshape(-1, *(1,) * (rotations.ndim - 2))
+    fraction = np.broadcast_to(fraction, (len(at), *rotations.shape[1:-1]))
+    return quat_slerp(rotations[before], rotations[after], fraction)
 
 
-def positions_at(
-    path: Float[np.ndarray, "T 3"], at: Float[np.ndarray, "N"]
-) -> Float[np.ndarray, "N 3"]:
-    """A path at fractional frames; the first and last frame hold beyond the ends."""
-    low, high, share = _neighbours(at, len(path))
-    return path[low] + share[:, None] * (path[high] - path[low])
+def frames_of_keys(
+    key_times: Float[np.ndarray, "K"], times: Float[np.ndarray, "N"]
+) -> Float[np.ndarray, "N"]:
+    """Times [s] as fractional frames of keys that lie at `key_times` [s], in rising order."""
+    return np.interp(times, key_times, np.arange(len(key_times)))
 
 
 def _neighbours(
     at: Float[np.ndarray, "N"], count: int
-) -> tuple[np.ndarray, np.ndarray, Float[np.ndarray, "N"]]:
+) -> tuple[Int[np.ndarray, "N"], Int[np.ndarray, "N"], Float[np.ndarray, "N"]]:
+    """The frames before and after, and the fraction of the way from the one to the other."""
     at = np.clip(at, 0, count - 1)
-    low = np.minimum(at.astype(int), max(count - 2, 0))
-    return low, np.minimum(low + 1, count - 1), at - low
+    before = np.minimum(at.astype(int), max(count - 2, 0))
+    return before, np.minimum(before + 1, count - 1), at - before

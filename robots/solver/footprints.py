@@ -16,6 +16,7 @@ from robots.solver.targets import Targets
 from robots.tree import Coordinates, Frames, forward
 from spark.kinematics import world_positions
 from spark.rotation import quat_rotate
+from spark.runs import true_runs
 
 WOBBLE = 0.05  # hip heights that a standing foot may stray from its mean place without having moved
 TURN = np.radians(12)  # and how far it may turn
@@ -65,8 +66,7 @@ def _moved(foot: Footing, corners: Float[np.ndarray, "4 3 T"]) -> Footing:
     """Each footprint shifted and turned, over the floor, as the sole's corners are on average."""
     places = foot.places.copy()
     held = foot.holds[:, 0].max(0)
-    edges = np.flatnonzero(np.diff(held > 0, prepend=False, append=False)).tolist()
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+    for start, stop in true_runs(held > 0):
         weight = held[start:stop] / held[start:stop].sum()
         here = slice(start, stop)
         flat = [points[:, 0, here] + 1j * points[:, 1, here] for points in (places, corners)]
@@ -129,12 +129,11 @@ def _stances(
     """The stretches in which heel or toe stand; each with the frames around it that are nearer to
     it than to others, up to some number."""
     standing = contacts[:, 0] | contacts[:, 1]
-    edges = np.flatnonzero(np.diff(standing.astype(np.int8), prepend=0, append=0)).tolist()
-    spans = list(zip(edges[::2], edges[1::2], strict=True))
+    runs = true_runs(standing)
     out = []
-    for k, (start, stop) in enumerate(spans):
-        before = (spans[k - 1][1] + start) // 2 if k else 0
-        after = (stop + spans[k + 1][0]) // 2 if k + 1 < len(spans) else len(standing)
+    for k, (start, stop) in enumerate(runs):
+        before = (runs[k - 1][1] + start) // 2 if k else 0
+        after = (stop + runs[k + 1][0]) // 2 if k + 1 < len(runs) else len(standing)
         around_it = max(before, start - around), min(after, stop + around)
         out.append(((start, stop), around_it))
     return out

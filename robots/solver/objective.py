@@ -179,9 +179,8 @@ def _follow(
 ) -> None:
     link = int(robot.links[j])
     axes = block.turning(link)
-    kind = role.value.removeprefix("left_").removeprefix("right_")
     wanted = np.moveaxis(matrix_from_quat(targets.world[:, j]), 0, -1)
-    block.turn(turn_rows(frames.turns[link], wanted, axes, TURNS.get(kind, TURN)))
+    block.turn(turn_rows(frames.turns[link], wanted, axes, TURNS.get(role.part, TURN)))
     if role in targets.bones and (bone := robot.bones.get(role)) is not None:
         now = frames.direction(link, bone)
         block.turn(direction_rows(now, targets.bones[role].T, axes, DIRECTION))

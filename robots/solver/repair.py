@@ -9,7 +9,7 @@ Arms that would have to pass through something are led around it.
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool
 from scipy.ndimage import binary_dilation, maximum_filter1d
 
 from robots.model.morphology import Morphology
@@ -21,6 +21,7 @@ from robots.solver.footprints import Footing, corners_of
 from robots.solver.smoothness import jolted, rush
 from robots.solver.targets import Targets
 from robots.tree import Coordinates, forward
+from spark.runs import true_runs
 
 _ROUNDS, _FIRMER = 6, 3.0
 _LED = 3  # rounds after which arms are led out of what they are stuck in
@@ -42,7 +43,8 @@ def mend(
     around = max(2, round(_AROUND / targets.frame_time))
     wide = np.ones(2 * around + 1, dtype=bool)
     wrong = wrong_in(robot, targets, q, stage, stride_of(targets))
-    for frames in stretches(binary_dilation(wrong | jolting(robot, targets, q, stage), wide)):
+    for start, stop in true_runs(binary_dilation(wrong | jolting(robot, targets, q, stage), wide)):
+        frames = np.arange(start, stop)
         # Ties reach two frames: so many at its ends stay, but for the trajectory's.
         fixed = np.zeros(len(frames), dtype=bool)
         fixed[:2] = frames[0] > 0
@@ -100,12 +102,6 @@ def _led_out(
     rest = robot.tpose.angles[0, joints]
     angles[:, joints] += share[:, None] * (rest - angles[:, joints])
     return Coordinates(q.pos, q.quat, angles, q.turns).clipped(robot.tree, SHORT_OF_LIMIT)
-
-
-def stretches(mask: Bool[np.ndarray, "T"]) -> list[Int[np.ndarray, "S"]]:
-    """The frames of each stretch that is true."""
-    frames = np.flatnonzero(mask)
-    return [part for part in np.split(frames, np.flatnonzero(np.diff(frames) > 1) + 1) if len(part)]
 
 
 def jolting(

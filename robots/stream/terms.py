@@ -247,9 +247,8 @@ class Terms:
         for j, role in enumerate(rig.roles.roles):
             own = j == 0 or links[j] != links[int(rig.skeleton.parents[j])]
             if role is not None and own:
-                kind = role.value.removeprefix("left_").removeprefix("right_")
                 followed.append(j)
-                weights.append(TURNS.get(kind, TURN))
+                weights.append(TURNS.get(role.part, TURN))
         self._followed = np.array(followed)
         turned = [*(links[j] for j in followed), links[rig.chest]]
         bodies = [self._body(link) for link in turned]

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from sim.body.inertia import Inertias, held_torques
 from sim.body.joints import Axis, mirrored
 from sim.body.parts import DETAIL, joint_kind_of, kept_joints, side_of
+from spark.constants import GRAVITY
 from spark.kinematics import world_positions
 from spark.rig.feet import FOOT_LENGTH, sole_corners, sole_positions, standing_height
 from spark.rig.rig import Rig
@@ -29,7 +30,7 @@ _ANKLE_TO_TIP, _BALL_TO_TIP = 0.75 * FOOT_LENGTH, 0.25 * FOOT_LENGTH
 def strengths(rig: Rig, bodies: Inertias) -> dict[str, float]:
     """The strength [N m] of each kind of joint: that of the one with the heaviest duty."""
     held = held_torques(rig, bodies)
-    weight, height = 9.81 * bodies.masses.sum(), standing_height(rig)
+    weight, height = GRAVITY * bodies.masses.sum(), standing_height(rig)
     levers = _levers(rig)
     found: dict[str, float] = {}
     for j in kept_joints(rig):

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.body.anthropometry import segments
+from spark.constants import GRAVITY
 from spark.kinematics import world_positions
 from spark.rig.rig import Rig
 from spark.rotation import matrix_from_quat
@@ -58,4 +59,4 @@ def held_torques(rig: Rig, bodies: Inertias) -> Float[np.ndarray, "J"]:
         parent = int(rig.skeleton.parents[j])
         masses[parent] += masses[j]
         moments[parent] += moments[j]
-    return 9.81 * np.linalg.norm(moments - masses[:, None] * positions, axis=1)
+    return GRAVITY * np.linalg.norm(moments - masses[:, None] * positions, axis=1)

@@ -17,7 +17,7 @@ def kind_of(rig: Rig, joint: int) -> str:
     carries one that has a role, else "detail": fingers, face, hair."""
     role = rig.roles.roles[joint]
     if role is not None:
-        return role.value.removeprefix("left_").removeprefix("right_")
+        return role.part
     carries = any(rig.roles.roles[k] for k in rig.skeleton.subtree(joint))
     return LINK if carries else DETAIL
 
@@ -33,8 +33,7 @@ def side_of(rig: Rig, joint: int) -> str:
     for k in rig.skeleton.ancestors(joint):
         role = rig.roles.roles[k]
         if role is not None:
-            side = role.value.split("_")[0]
-            return side if side in ("left", "right") else ""
+            return role.side
     return ""
 
 

@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 
 from sim.trajectory import ModelTrajectory
+from spark.constants import GRAVITY
 from spark.errors import SkeletonError
 
 SOFTNESS = 0.1  # [rad] from the target at which a servo of ours gives all that its motor can
-GRAVITY = 9.81  # [m/s²]
 STRENGTH = 0.1  # torque of a joint whose limit is not told, in body weights times height
 _RESOLVED = 0.5  # servos of ours are no faster than this many radians of their swing a step
 _HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)

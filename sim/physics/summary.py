@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.interpolate import quaternions
-from sim.physics.servos import GRAVITY
 from sim.physics.tracking import Tracked
+from spark.constants import GRAVITY
 from spark.rotation import quat_relative, rotvec_from_quat
 
 SCHEMA = "spark-sim physics 1"

@@ -12,7 +12,6 @@ from sim.report.findings import find
 from sim.report.measures import (
     ContactMatch,
     Drift,
-    at_times,
     contact_match,
     floor_height,
     floor_slope,
@@ -24,6 +23,7 @@ from sim.report.truth import accuracy
 from sim.trajectory import ModelTrajectory
 from spark.errors import SkeletonError
 from spark.motion import Motion
+from spark.resample import values_at
 from spark.rig.contacts import planted_feet
 from spark.rig.rig import Rig
 
@@ -128,7 +128,7 @@ def _beyond_source(
     clip: ClipMetrics, source: ClipMetrics, times: Float[np.ndarray, "T"], scale: float
 ) -> ClipMetrics:
     """Self-penetration only counts as far as it goes beyond the source's own."""
-    theirs = at_times(source.self_depth, source.frame_time, times) * scale
+    theirs = values_at(source.self_depth, times / source.frame_time) * scale
     column = {pair: k for k, pair in enumerate(source.self_pairs)}
     known = [k for k, pair in enumerate(clip.self_pairs) if pair in column]
     depth = clip.self_depth.copy()
@@ -139,12 +139,12 @@ def _beyond_source(
 def _drift(
     poses: ClipPoses, source: ClipPoses, times: Float[np.ndarray, "T"], scale: float
 ) -> Drift:
-    frame_time = source.motion.frame_time
+    at = times / source.motion.frame_time
     return root_drift(
         poses.hips,
         poses.heading,
-        at_times(source.hips, frame_time, times),
-        at_times(source.heading, frame_time, times),
+        values_at(source.hips, at),
+        values_at(source.heading, at),
         scale,
     )
 
@@ -152,13 +152,10 @@ def _drift(
 def _contacts(poses: ClipPoses, source: ClipPoses, times: Float[np.ndarray, "T"]) -> ContactMatch:
     ours, theirs = _planted(poses), _planted(source)
     sides = [side for side in ours if side in theirs]
-    frame_time = source.motion.frame_time
+    planted = np.stack([theirs[side] for side in sides], axis=1).astype(float)
     return contact_match(
         np.stack([ours[side] for side in sides], axis=1),
-        at_times(
-            np.stack([theirs[side] for side in sides], axis=1).astype(float), frame_time, times
-        )
-        > 0.5,
+        values_at(planted, times / source.motion.frame_time) > 0.5,
     )
 
 
@@ -178,6 +175,7 @@ def _slope(poses: ClipPoses, whose: str) -> tuple[str, ...]:
 def _planted(poses: ClipPoses) -> dict[str, Bool[np.ndarray, "T"]]:
     """When each foot stands, by side."""
     rig = poses.rig
-    sides = [str(rig.roles.roles[j]).split("_")[0] for j in rig.contact_joints]
+    roles = [rig.roles.roles[j] for j in rig.contact_joints]
+    sides = [role.side for role in roles if role is not None]
     planted = planted_feet(rig, poses.positions, poses.motion.frame_time)
     return dict(zip(sides, planted.T, strict=True))

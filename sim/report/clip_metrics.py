@@ -13,7 +13,8 @@ from sim.report.measures import floating, least_within, penetration_depth
 from sim.report.selfcollision import capsules, self_penetration
 from sim.report.smoothness import joint_rates
 from sim.report.support import support
-from sim.report.thresholds import GRAVITY, PLAUSIBILITY_V1, Thresholds
+from sim.report.thresholds import PLAUSIBILITY_V1, Thresholds
+from spark.constants import GRAVITY
 
 FLAGS = {"P": "penetration", "F": "floating", "S": "skating", "R": "root wrench"}
 """The per-frame flags: letter and name."""

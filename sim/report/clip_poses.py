@@ -15,7 +15,6 @@ from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig.feet import SOLE_POINTS, Sole, sole_corners, sole_positions, standing_height
 from spark.rig.rig import Rig
-from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_mul, quat_rotate, yaw_from_quat
 
 # They have soles, or lie inside other flesh.
@@ -106,11 +105,6 @@ def pose_clip(motion: Motion, rig: Rig, body: ModelTrajectory | None = None) -> 
     )
 
 
-def kind_of(role: Role) -> str:
-    """`left_foot` to `foot`."""
-    return role.removeprefix("left_").removeprefix("right_")
-
-
 def _flesh(
     rig: Rig, positions: Float[np.ndarray, "T J 3"]
 ) -> tuple[tuple[str, ...], Float[np.ndarray, "T B 3"], Float[np.ndarray, "B"]]:
@@ -118,9 +112,9 @@ def _flesh(
     others = [
         (j, role)
         for j, role in enumerate(rig.roles.roles)
-        if role is not None and kind_of(role) not in _NO_FLESH
+        if role is not None and role.part not in _NO_FLESH
     ]
-    radii = standing_height(rig) * np.array([RADII[kind_of(role)] for _, role in others])
+    radii = standing_height(rig) * np.array([RADII[role.part] for _, role in others])
     names = tuple(role.replace("_", " ") for _, role in others)
     return names, positions[:, [j for j, _ in others]], radii
 

@@ -5,8 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from sim.report.clip_metrics import ClipMetrics
-from sim.report.measures import Drift, spans
+from sim.report.measures import Drift
 from sim.report.result import Finding
+from spark.runs import true_runs
 
 # Flags of one kind that are no further apart than this [s] are one event.
 _GAP = 0.1
@@ -25,7 +26,7 @@ def find(clip: ClipMetrics, drift: Drift | None) -> tuple[Finding, ...]:
 def _sinking(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     for name in dict.fromkeys(clip.depth_names):
         depth = clip.depth[:, [n == name for n in clip.depth_names]].max(axis=1)
-        for start, stop in spans(depth > clip.thresholds.penetration, gap):
+        for start, stop in true_runs(depth > clip.thresholds.penetration, gap):
             deepest = start + int(depth[start:stop].argmax())
             amount = float(depth[deepest])
             sentence = f"{name} sinks {100 * amount:.1f} cm under the floor"
@@ -33,7 +34,7 @@ def _sinking(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
 
 
 def _floating(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
-    for start, stop in spans(clip.flags["F"], gap):
+    for start, stop in true_runs(clip.flags["F"], gap):
         amount = float(clip.clearance[start:stop].max())
         sentence = f"the body floats {100 * amount:.1f} cm above the floor"
         yield Finding("floating", "body", start, stop, amount, "m", sentence)
@@ -43,7 +44,7 @@ def _sliding(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     for side in dict.fromkeys(clip.sides):
         columns = [s == side for s in clip.sides]
         speed = np.where(clip.skating, clip.speeds, 0.0)[:, columns].max(axis=1)
-        for start, stop in spans(speed > 0, gap):
+        for start, stop in true_runs(speed > 0, gap):
             amount = float(speed[start:stop].sum()) * clip.frame_time
             sentence = f"{side} slides {100 * amount:.1f} cm"
             yield Finding("skating", side, start, stop, amount, "m", sentence)
@@ -51,7 +52,7 @@ def _sliding(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
 
 def _pushed(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     force, torque = clip.unexplained.T
-    for start, stop in spans(clip.flags["R"] & ~clip.flags["F"], gap):
+    for start, stop in true_runs(clip.flags["R"] & ~clip.flags["F"], gap):
         amount, unit = float(force[start:stop].max()), "bw"
         sentence = f"the body is pushed by {amount:.2f} body weights that nothing gives"
         if amount <= clip.thresholds.wrench_force:
@@ -63,7 +64,7 @@ def _pushed(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
 def _bending(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     for limit in clip.limits:
         for excess, movement in zip(limit.excess.T, limit.movements, strict=True):
-            for start, stop in spans(excess > 0, gap):
+            for start, stop in true_runs(excess > 0, gap):
                 amount = float(excess[start:stop].max())
                 if amount < _LEAST_BEND:
                     continue
@@ -73,7 +74,7 @@ def _bending(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
 
 def _piercing(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     for (one, other), depth in zip(clip.self_pairs, clip.self_depth.T, strict=True):
-        for start, stop in spans(depth > clip.self_bound, gap):
+        for start, stop in true_runs(depth > clip.self_bound, gap):
             amount = float(depth[start:stop].max())
             where = f"{one}, {other}"
             sentence = f"{one} and {other} go {100 * amount:.1f} cm into each other"
@@ -82,7 +83,7 @@ def _piercing(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
 
 def _tipping(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     outside = np.nan_to_num(clip.imbalance)
-    for start, stop in spans(outside > clip.thresholds.balance, gap):
+    for start, stop in true_runs(outside > clip.thresholds.balance, gap):
         amount = float(outside[start:stop].max())
         sentence = f"the body stands still {100 * amount:.1f} cm beside its feet, and would tip"
         yield Finding("balance", "body", start, stop, amount, "m", sentence)

@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import minimum_filter1d
 
 from sim.report.derivatives import derivative
+from spark.resample import values_at
 
 
 def floor_height(lowest: Float[np.ndarray, "T"]) -> float:
@@ -43,7 +44,7 @@ def least_within(
     times = np.arange(len(values)) * frame_time
     least = minimum_filter1d(values, 2 * int(window / frame_time) + 1, axis=0, mode="nearest")
     for edge in (-window, window):
-        least = np.minimum(least, at_times(values, frame_time, times + edge))
+        least = np.minimum(least, values_at(values, (times + edge) / frame_time))
     return least
 
 
@@ -52,18 +53,6 @@ def horizontal_speed(
 ) -> Float[np.ndarray, "T P"]:
     """Speed along the floor [m/s]."""
     return np.linalg.norm(derivative(points[..., :2], frame_time, 1, window), axis=-1)
-
-
-def spans(flags: Bool[np.ndarray, "T"], gap: int = 0) -> list[tuple[int, int]]:
-    """The runs of True as [start, stop); runs that at most `gap` frames separate are one."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    merged: list[tuple[int, int]] = []
-    for start, stop in edges.reshape(-1, 2).tolist():
-        if merged and start - merged[-1][1] <= gap:
-            merged[-1] = (merged[-1][0], stop)
-        else:
-            merged.append((start, stop))
-    return merged
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,17 +86,6 @@ def root_drift(
         path_length=float(np.linalg.norm(np.diff(source_path, axis=0), axis=-1).sum()),
         heading=turned,
     )
-
-
-def at_times(
-    values: Float[np.ndarray, "T *n"], frame_time: float, times: Float[np.ndarray, "K"]
-) -> Float[np.ndarray, "K *n"]:
-    """Values between frames, linearly; before and after the clip those of its ends."""
-    frames = np.clip(times / frame_time, 0, len(values) - 1)
-    first = np.minimum(frames.astype(np.int64), max(len(values) - 2, 0))
-    second = np.minimum(first + 1, len(values) - 1)
-    fraction = (frames - first).reshape(-1, *(1,) * (values.ndim - 1))
-    return (1 - fraction) * values[first] + fraction * values[second]
 
 
 def outside_hull(

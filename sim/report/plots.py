@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from sim.report.clip_metrics import FLAGS, ClipMetrics
-from sim.report.measures import spans
 from sim.report.result import Report
+from spark.runs import true_runs
 
 WIDTH, _HEIGHT, _STRIP = 1000.0, 88, 14
 _POINTS = 500  # of a line: more can't be seen
@@ -141,7 +141,7 @@ def _shades(flags: Bool[np.ndarray, "T"], height: int) -> str:
     return "".join(
         f'<rect x="{start * step:.1f}" width="{max((stop - start) * step, 1.5):.1f}" y="0" '
         f'height="{height}"/>'
-        for start, stop in spans(flags)
+        for start, stop in true_runs(flags)
     )
 
 

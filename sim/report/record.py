@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from sim.report.clip_metrics import FLAGS, ClipMetrics
-from sim.report.measures import Drift, spans
+from sim.report.measures import Drift
 from sim.report.result import Finding, Report
 from sim.report.truth import Accuracy
+from spark.runs import true_runs
 
 SCHEMA = "spark-sim report 1"
 
@@ -68,7 +69,7 @@ def _measured(clip: ClipMetrics) -> dict[str, Any]:
         "flags": {
             FLAGS[letter]: {
                 "share": clip.shares[letter],
-                "spans": [list(span) for span in spans(flag)],
+                "spans": [list(span) for span in true_runs(flag)],
             }
             for letter, flag in clip.flags.items()
         },

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 
-GRAVITY = 9.81  # [m/s²]
 HUMAN_HIP_HEIGHT = 0.9  # [m]
 
 

@@ -11,7 +11,7 @@ from scipy.optimize import nnls
 
 from sim.report.derivatives import derivative
 from sim.report.mass import Mass
-from sim.report.thresholds import GRAVITY
+from spark.constants import GRAVITY
 from spark.rotation import matrix_from_quat, quat_conj, quat_continuous, quat_mul
 
 _EDGES = 8  # of the pyramid in a friction cone

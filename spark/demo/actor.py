@@ -8,7 +8,7 @@ from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import Axis, quat_about, quat_conj, quat_mul
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
-from spark.transfer.leg_ik import Leg, bend_leg
+from spark.transfer.leg_ik import bend_leg, leg_of
 
 
 class Actor:
@@ -53,13 +53,12 @@ class Actor:
     ) -> None:
         """Bring an ankle to a path [m, world] and turn its foot and toes since the T-pose."""
         skeleton, roles = self.rig.skeleton, self.rig.roles
-        upper, lower, foot = (roles.require(role) for role in LIMBS[leg][:3])
+        joints = leg_of(skeleton, roles.roles, leg)
+        assert joints is not None  # the demo's rigs have legs
         positions = self.positions()
-        thigh = set(skeleton.subtree(upper)) - set(skeleton.subtree(lower))
-        shank = set(skeleton.subtree(lower)) - set(skeleton.subtree(foot))
-        chain = Leg(upper, lower, foot, foot, tuple(thigh), tuple(shank))
-        self.rotations = bend_leg(self.rotations, positions, chain, ankle - positions[:, foot])
-        self.rotations[:, list(skeleton.subtree(foot))] = q_foot[:, None]
+        move = ankle - positions[:, joints.foot]
+        self.rotations = bend_leg(self.rotations, positions, joints, move)
+        self.rotations[:, list(skeleton.subtree(joints.foot))] = q_foot[:, None]
         for toe in roles.joints(LIMBS[leg][3]):
             self.rotations[:, list(skeleton.subtree(toe))] = q_toe[:, None]
 

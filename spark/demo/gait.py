@@ -144,7 +144,7 @@ class _Foot:
         toe = rig.roles.joint(LIMBS[side][3])
         hip, knee, ankle = (actor.tpose[rig.roles.require(role)] for role in LIMBS[side][:3])
         self.thigh, self.shank = np.linalg.norm(knee - hip), np.linalg.norm(ankle - knee)
-        sole = next(s for s in sole_corners(rig) if s.side == side.value.split("_")[0])
+        sole = next(s for s in sole_corners(rig) if s.side == side.side)
         points = actor.tpose[sole.joints] + quat_rotate(rig.tpose[sole.joints], sole.offsets)
         self.heel = points[:2].mean(0) - ankle
         tip = points[4:].mean(0)

@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import DependencyError, FileFormatError, name_list
-from spark.rotation import matrix_from_quat, quat_slerp
+from spark.resample import frames_of_keys, rotations_at, values_at
+from spark.rotation import matrix_from_quat
 
 # Frames times nodes that a file may ask for: 12 hours of a body with fingers at 30 fps.
 _LARGEST = 100_000_000
@@ -182,8 +183,8 @@ def _vectors_at(
     """Keyed vectors at `times`; the first and last key hold beyond the ends."""
     if not len(keys):
         return otherwise
-    columns = [np.interp(times, keys["time"], keys["value"][axis]) for axis in "xyz"]
-    return np.stack(columns, axis=-1)
+    values = np.stack([keys["value"][axis] for axis in "xyz"], axis=-1)
+    return values_at(values, frames_of_keys(keys["time"], times))
 
 
 def _quats_at(
@@ -193,8 +194,4 @@ def _quats_at(
     if not len(keys):
         return otherwise
     quats = np.stack([keys["value"][axis] for axis in "wxyz"], axis=-1)
-    after = np.clip(np.searchsorted(keys["time"], times, side="right"), 1, max(len(keys) - 1, 1))
-    before, after = after - 1, np.minimum(after, len(keys) - 1)
-    start, end = keys["time"][before], keys["time"][after]
-    share = np.clip((times - start) / np.where(end > start, end - start, 1.0), 0.0, 1.0)
-    return quat_slerp(quats[before], quats[after], share)
+    return rotations_at(quats, frames_of_keys(keys["time"], times))

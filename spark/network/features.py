@@ -13,7 +13,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.kinematics import local_rotations, world_rotations
-from spark.rig.name_conventions import split_side
 from spark.rig.rig import Rig
 from spark.rig.roles import Group, Role
 from spark.rotation import (
@@ -98,7 +97,7 @@ class BodyFeatures:
     def sides(self) -> Float[np.ndarray, "K 2"]:
         """1 at the joints of the left and of the right side."""
         roles = [self.rig.roles.roles[j] for j in self.joints.tolist()]
-        sides = [split_side(role)[0] if role else "" for role in roles]
+        sides = [role.side if role else "" for role in roles]
         return np.array([[side == "left", side == "right"] for side in sides], dtype=float)
 
     @cached_property

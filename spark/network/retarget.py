@@ -25,7 +25,7 @@ from spark.network.known_bodies import nearness
 from spark.network.names import NameNetwork
 from spark.network.weights import Weights
 from spark.network.windows import Windows
-from spark.resample import positions_at, rotations_at
+from spark.resample import rotations_at, values_at
 from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_normalize
 from spark.transfer.analytic import correspond, transfer
@@ -83,7 +83,7 @@ class Learned:
         return replace(
             start,
             rotations=quat_mul(rotations_at(turned, at), start.rotations),
-            hips=start.hips + positions_at(slow.hips - slow_start.hips, at),
+            hips=start.hips + values_at(slow.hips - slow_start.hips, at),
         )
 
     def _blended(

@@ -92,9 +92,9 @@ def name_joints(roles: Iterable[Role | None], convention: str) -> list[str]:
             continue
         count = counts.get(role, 0)
         counts[role] = count + 1
-        side, kind = split_side(role)
+        side = role.side
         names.append(
-            templates[kind].format(
+            templates[role.part].format(
                 i=count,
                 n=count + 1,
                 m=count or "",
@@ -107,9 +107,3 @@ def name_joints(roles: Iterable[Role | None], convention: str) -> list[str]:
             )
         )
     return names
-
-
-def split_side(role: Role) -> tuple[str, str]:
-    """`left_foot` to ("left", "foot"); ("", "head") for what has no side."""
-    side, _, kind = role.value.partition("_")
-    return (side, kind) if side in ("left", "right") else ("", role.value)

@@ -7,7 +7,23 @@ from functools import cached_property
 from spark.errors import SkeletonError
 
 
-class Role(StrEnum):
+class _Sided(StrEnum):
+    """What a body has one of (`spine`) or, by its value's prefix, one on each side
+    (`left_foot`)."""
+
+    @property
+    def side(self) -> str:
+        """ "left", "right", or "" on the midline."""
+        side, _, _ = self.value.partition("_")
+        return side if side in ("left", "right") else ""
+
+    @property
+    def part(self) -> str:
+        """The value without its side: "foot" of `left_foot`."""
+        return self.value.removeprefix(f"{self.side}_") if self.side else self.value
+
+
+class Role(_Sided):
     """The joints that humanoids share. `SPINE` and `NECK` may be held by several joints."""
 
     PELVIS = "pelvis"
@@ -31,8 +47,14 @@ class Role(StrEnum):
     RIGHT_FOOT = "right_foot"
     RIGHT_TOE = "right_toe"
 
+    @property
+    def mirrored(self) -> "Role":
+        """The same part on the other side; on the midline, itself."""
+        other = {"left": "right", "right": "left"}.get(self.side)
+        return Role(f"{other}_{self.part}") if other else self
 
-class Group(StrEnum):
+
+class Group(_Sided):
     """The paper's six body parts (section 4.1)."""
 
     TORSO = "torso"

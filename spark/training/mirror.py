@@ -5,9 +5,8 @@ from jaxtyping import Bool, Float
 
 from spark.network.features import BodyFeatures
 from spark.rig.groups import groups_of
-from spark.rig.name_conventions import split_side
 from spark.rig.rig import Rig
-from spark.rig.roles import Role, RoleMap
+from spark.rig.roles import RoleMap
 from spark.skeleton import Skeleton
 
 _ACROSS = np.array([1.0, -1.0, 1.0])  # y points left
@@ -18,7 +17,7 @@ def mirrored_body(body: BodyFeatures) -> BodyFeatures:
     """`body` seen in a mirror: every joint keeps its number, and takes role and name of the one on
     the other side. `body` must be a variant (`spark.training.variants.same_body`)."""
     rig, skeleton = body.rig, body.skeleton
-    roles = tuple(_other_side(role) for role in rig.roles.roles)
+    roles = tuple(role and role.mirrored for role in rig.roles.roles)
     names = list(skeleton.names)
     for j, role in enumerate(roles):
         partners = rig.roles.joints(role) if role is not None else ()
@@ -44,10 +43,3 @@ def mirrored_motion(
     """What a body's motion is in the mirror, on the mirrored body; in the precision it comes in."""
     turned, across = _TURNED.astype(rotations.dtype), _ACROSS.astype(hips.dtype)
     return rotations * turned, hips * across, planted[..., ::-1]
-
-
-def _other_side(role: Role | None) -> Role | None:
-    side, kind = split_side(role) if role is not None else ("", "")
-    if not side:
-        return role
-    return Role(f"{'right' if side == 'left' else 'left'}_{kind}")

@@ -12,10 +12,10 @@ from typing import TypeVar
 import numpy as np
 
 from spark.network.name_words import rig_words
-from spark.rig.name_conventions import CONVENTIONS, name_joints, split_side
+from spark.rig.name_conventions import CONVENTIONS, name_joints
 from spark.rig.roles import Role
 
-KINDS = tuple(dict.fromkeys(split_side(role)[1] for role in Role))
+KINDS = tuple(dict.fromkeys(role.part for role in Role))
 OTHER = "other"
 """The kind of a joint without a role."""
 
@@ -66,7 +66,7 @@ _T = TypeVar("_T")
 def rig_of(convention: str, roles: Sequence[Role]) -> list[Named]:
     """The joints that hold `roles`, as `convention` names them."""
     names = name_joints(roles, convention)
-    return [(name, *split_side(role)) for name, role in zip(names, roles, strict=True)]
+    return [(name, role.side, role.part) for name, role in zip(names, roles, strict=True)]
 
 
 def made_up_rig(rng: np.random.Generator, conventions: Sequence[str]) -> list[Named]:
@@ -84,7 +84,7 @@ def made_up_rig(rng: np.random.Generator, conventions: Sequence[str]) -> list[Na
     rig: list[Named] = []
     counts: dict[Role, int] = {}
     for role in roles:
-        side, kind = split_side(role)
+        side, kind = role.side, role.part
         count = counts[role] = counts.get(role, -1) + 1
         if kind in chains:
             words, number = chains[kind][count % len(chains[kind])], count // len(chains[kind])
@@ -108,14 +108,14 @@ def _chain(kind: str, word: str, conventions: Sequence[str], rng: np.random.Gene
 
 def _roles(rng: np.random.Generator) -> list[Role]:
     absent = {kind for kind, chance in _ABSENT.items() if rng.random() < chance}
-    roles = [role for role in Role if split_side(role)[1] not in absent]
+    roles = [role for role in Role if role.part not in absent]
     roles += [Role.SPINE] * int(rng.integers(0, 4))
     if "neck" not in absent and rng.random() < 0.25:
         roles.append(Role.NECK)
     alone = rng.random()
     if alone < 0.5:  # the two sides say the same: half of the rigs show one of them
         shown = "left" if alone < 0.25 else "right"
-        roles = [role for role in roles if split_side(role)[0] in ("", shown)]
+        roles = [role for role in roles if role.side in ("", shown)]
     return roles
 
 

@@ -14,10 +14,10 @@ from jaxtyping import Bool, Float, Int
 
 from spark.kinematics import world_positions
 from spark.network.features import BodyFeatures
-from spark.rig.roles import LIMBS, Group, Role
+from spark.rig.roles import Group
 from spark.rotation import quat_mul, quat_relative, quat_rotate, quat_slerp
 from spark.training.variants import Variant
-from spark.transfer.leg_ik import Leg, leg_turns, stance_correction
+from spark.transfer.leg_ik import Leg, leg_of, leg_turns, stance_correction
 
 
 class LegBones(NamedTuple):
@@ -45,7 +45,7 @@ class StagedBody:
     @cached_property
     def legs(self) -> tuple[Leg, Leg]:
         body = self.variant.body
-        return leg_of(body, Group.LEFT_LEG), leg_of(body, Group.RIGHT_LEG)
+        return _leg(body, Group.LEFT_LEG), _leg(body, Group.RIGHT_LEG)
 
     @cached_property
     def leg_bones(self) -> LegBones:
@@ -135,7 +135,7 @@ def foot_lift(
     body: BodyFeatures, rotations: Float[np.ndarray, "T K 4"], hips: Float[np.ndarray, "T 3"]
 ) -> Float[np.ndarray, "T 2 2"]:
     """How much higher ankle and toe of each foot are than in the T-pose [hip heights]."""
-    legs = (leg_of(body, group) for group in (Group.LEFT_LEG, Group.RIGHT_LEG))
+    legs = (_leg(body, group) for group in (Group.LEFT_LEG, Group.RIGHT_LEG))
     joints = np.array([[leg.foot, leg.contact] for leg in legs])
     skeleton = body.skeleton
     heights = world_positions(skeleton, rotations, hips)[..., 2]
@@ -180,20 +180,9 @@ def joined(indices: Sequence[Int[np.ndarray, "_"]], begins: Sequence[int]) -> In
     return np.concatenate([part + begin for part, begin in zip(indices, begins, strict=True)])
 
 
-def leg_of(body: BodyFeatures, group: Group) -> Leg:
+def _leg(body: BodyFeatures, limb: Group) -> Leg:
     """The joints of one leg in the network's numbering."""
     roles = [body.rig.roles.roles[j] for j in body.joints.tolist()]
-    upper, lower, foot, toe = LIMBS[group]
-    place: dict[Role, int] = {role: roles.index(role) for role in LIMBS[group] if role in roles}
-    thigh, shank, ankle = place[upper], place[lower], place[foot]
-    below_knee = set(body.skeleton.subtree(shank))
-    below_ankle = set(body.skeleton.subtree(ankle))
-    leg = set(body.skeleton.subtree(thigh))
-    return Leg(
-        thigh,
-        shank,
-        ankle,
-        place.get(toe, ankle),
-        tuple(sorted(leg - below_knee)),
-        tuple(sorted(below_knee - below_ankle)),
-    )
+    leg = leg_of(body.skeleton, roles, limb)
+    assert leg is not None  # clips are of bodies with two feet (`spark.training.clips`)
+    return leg

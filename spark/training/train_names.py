@@ -12,7 +12,7 @@ import numpy as np
 import torch
 import torch.nn.functional as nnf
 
-from spark.rig.name_conventions import CONVENTIONS, HELD_OUT, name_joints, split_side
+from spark.rig.name_conventions import CONVENTIONS, HELD_OUT, name_joints
 from spark.rig.name_hints import read_names
 from spark.rig.roles import Role
 from spark.training.name_encoder import NameConfig, NameEncoder, tokenize_rigs
@@ -101,10 +101,10 @@ def score_rigs(
                 continue
             total += 1
             found = max(
-                (role for role in roles if split_side(role)[0] == hint.side),
+                (role for role in roles if role.side == hint.side),
                 key=lambda role: row[roles.index(role)],
             )
-            if split_side(found) != (side, kind):
+            if (found.side, found.part) != (side, kind):
                 confused += {side, hint.side} == {"left", "right"}
                 failures.append(Failure(name, f"{side} {kind}".strip(), found.value))
     return NameScore(total, total - len(failures), confused, tuple(failures))

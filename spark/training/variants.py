@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 
 from spark.network.features import BodyFeatures
 from spark.rig.groups import groups_of
-from spark.rig.name_conventions import CONVENTIONS, HELD_OUT, name_joints, split_side
+from spark.rig.name_conventions import CONVENTIONS, HELD_OUT, name_joints
 from spark.rig.rig import Rig
 from spark.rig.roles import Role, RoleMap
 from spark.rotation import quat_slerp
@@ -80,7 +80,7 @@ class _Node:
 
     @property
     def kind(self) -> str:
-        return split_side(self.role)[1] if self.role else ""
+        return self.role.part if self.role else ""
 
 
 def random_variant(
@@ -218,7 +218,7 @@ def _finish(nodes: list[_Node], base: BodyFeatures, convention: str | None = Non
         positions[k] += positions[parents[k]]
     ankles = [k for k, node in enumerate(nodes) if node.kind == "foot"]
     base_roles = [base.rig.roles.roles[j] for j in base.joints.tolist()]
-    base_ankles = [k for k, role in enumerate(base_roles) if role and split_side(role)[1] == "foot"]
+    base_ankles = [k for k, role in enumerate(base_roles) if role and role.part == "foot"]
     ankle_height = 1 + base.skeleton.rest_positions[base_ankles, 2].mean()
     hips = [k for k, node in enumerate(nodes) if node.kind == "upper_leg"]
     height = positions[hips, 2].mean() - positions[ankles, 2].mean() + ankle_height

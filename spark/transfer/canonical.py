@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from spark.kinematics import forward, local_rotations, world_positions
 from spark.motion import Motion
-from spark.resample import positions_at, rotations_at
+from spark.resample import rotations_at, values_at
 from spark.rig.contacts import floor_height
 from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_rotate
@@ -91,7 +91,7 @@ def at_frame_time(canonical: CanonicalMotion, frame_time: float) -> CanonicalMot
         canonical.rig,
         frame_time,
         rotations_at(canonical.rotations, at),
-        positions_at(canonical.hips, at),
+        values_at(canonical.hips, at),
         canonical.floor_z,
         canonical.notes,
     )

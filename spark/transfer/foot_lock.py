@@ -16,8 +16,9 @@ from spark.rig.contacts import planted_points
 from spark.rig.feet import standing_height
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
+from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
-from spark.transfer.leg_ik import Leg, bend_leg, blend_between
+from spark.transfer.leg_ik import bend_leg, blend_between, leg_of
 
 # A foot that stands for less [s] is passing by.
 _SHORTEST_STANCE = 0.1
@@ -31,7 +32,8 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
     theirs, own = canonical_positions(source), canonical_positions(moved)
     rotations = moved.rotations
     for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
-        leg, contact = _leg(moved.rig, group), _contact(source.rig, moved.rig, group)
+        leg = leg_of(moved.rig.skeleton, moved.rig.roles.roles, group)
+        contact = _contact(source.rig, moved.rig, group)
         if leg is None or contact is None:
             continue
         from_joint, to_joint = contact
@@ -72,24 +74,11 @@ def _small_part(path: Float[np.ndarray, "P 2"], radius: float) -> Float[np.ndarr
 
 def _stances(planted: Bool[np.ndarray, "T"], frame_time: float) -> Bool[np.ndarray, "T"]:
     """Without the stances that are too short to be one."""
-    edges = np.flatnonzero(np.diff(planted.astype(np.int8), prepend=0, append=0))
     kept = planted.copy()
-    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for start, stop in true_runs(planted):
         if (stop - start) * frame_time < _SHORTEST_STANCE:
             kept[start:stop] = False
     return kept
-
-
-def _leg(rig: Rig, group: Group) -> Leg | None:
-    upper, lower, foot, _ = (rig.roles.joint(role) for role in LIMBS[group])
-    if upper is None or lower is None or foot is None:
-        return None
-    skeleton = rig.skeleton
-    below_knee, below_ankle = set(skeleton.subtree(lower)), set(skeleton.subtree(foot))
-    thigh = set(skeleton.subtree(upper)) - below_knee
-    return Leg(
-        upper, lower, foot, foot, tuple(sorted(thigh)), tuple(sorted(below_knee - below_ankle))
-    )
 
 
 def _contact(source: Rig, target: Rig, group: Group) -> tuple[int, int] | None:

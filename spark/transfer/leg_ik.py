@@ -6,12 +6,15 @@ stances the correction blends from one to the next, so nothing jumps. The leg fo
 two-bone inverse kinematics in its own bending plane; the foot keeps its rotation in the world.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_between, quat_from_rotvec, quat_mul, quat_rotate
+from spark.skeleton import Skeleton
 
 # A leg is never stretched to more than this share of its length: the knee would lock and flip.
 _REACH = 0.999
@@ -26,6 +29,25 @@ class Leg(NamedTuple):
     contact: int
     with_thigh: tuple[int, ...]
     with_shank: tuple[int, ...]
+
+
+def leg_of(skeleton: Skeleton, roles: Sequence[Role | None], limb: Group) -> Leg | None:
+    """The leg `limb` of a skeleton whose joints hold `roles`; None without a knee or an ankle."""
+    held = [next((j for j, own in enumerate(roles) if own is role), None) for role in LIMBS[limb]]
+    upper, lower, foot, toe = held
+    if upper is None or lower is None or foot is None:
+        return None
+    below_hip, below_knee, below_ankle = (
+        set(skeleton.subtree(joint)) for joint in (upper, lower, foot)
+    )
+    return Leg(
+        upper,
+        lower,
+        foot,
+        foot if toe is None else toe,
+        tuple(sorted(below_hip - below_knee)),
+        tuple(sorted(below_knee - below_ankle)),
+    )
 
 
 def stance_correction(

@@ -416,9 +416,9 @@ def walk(
     phase = np.linspace(0, 4 * np.pi, frames)
     rotvec = np.zeros((frames, len(skeleton), 3))
     for j, role in enumerate(roles):
-        if role is None or role.value.split("_")[0] not in ("left", "right"):
+        if role is None or not role.side:
             continue
-        side, part = role.value.split("_", 1)
+        side, part = role.side, role.part
         sign = 1.0 if side == "left" else -1.0
         swing = np.sin(phase) * sign
         if part == "upper_leg":

@@ -10,7 +10,6 @@ import pytest
 from sim.report.derivatives import derivative
 from sim.report.limits import limit_excess, swing_and_twist
 from sim.report.measures import (
-    at_times,
     contact_match,
     floating,
     floor_height,
@@ -20,7 +19,6 @@ from sim.report.measures import (
     outside_hull,
     penetration_depth,
     root_drift,
-    spans,
 )
 from sim.report.selfcollision import Capsules, segment_distance, self_penetration
 from sim.report.smoothness import joint_rates
@@ -79,13 +77,6 @@ def test_speed_is_horizontal_and_per_second() -> None:
     np.testing.assert_allclose(horizontal_speed(points, 1 / 60, 0.05), 0.5, rtol=1e-9)
 
 
-def test_spans_are_half_open_and_small_gaps_close() -> None:
-    flags = np.array([1, 1, 0, 1, 0, 0, 0, 1], dtype=bool)
-    assert spans(flags) == [(0, 2), (3, 4), (7, 8)]
-    assert spans(flags, gap=1) == [(0, 4), (7, 8)]
-    assert spans(np.zeros(3, dtype=bool)) == []
-
-
 def test_drift_compares_scaled_paths_from_a_common_start() -> None:
     # The source walks 3 m along X; a body half its size should walk 1.5 m, and walks 1.5 m along Y.
     ahead = np.linspace(0, 3, 4)
@@ -96,13 +87,6 @@ def test_drift_compares_scaled_paths_from_a_common_start() -> None:
     assert drift.path_length == pytest.approx(1.5)
     np.testing.assert_allclose(drift.distance, 0.5 * ahead * np.sqrt(2))
     np.testing.assert_allclose(drift.heading, 0.1)
-
-
-def test_values_between_frames_are_linear_and_held_at_the_ends() -> None:
-    values = np.array([[0.0, 1.0], [2.0, 3.0]])
-    at = at_times(values, 0.5, np.array([-1.0, 0.25, 9.0]))
-    np.testing.assert_allclose(at, [[0, 1], [1, 2], [2, 3]])
-    np.testing.assert_allclose(at_times(values[:1], 0.5, np.array([3.0])), [[0, 1]])
 
 
 def test_swing_and_twist_add_up_for_a_turn_about_one_axis() -> None:

@@ -267,17 +267,10 @@ def mirrored(motion: Motion) -> Motion:
     )
 
 
-def swap(role: Role | None) -> Role | None:
-    if role is None or role.value.split("_")[0] not in ("left", "right"):
-        return role
-    side, part = role.value.split("_", 1)
-    return Role(f"{'right' if side == 'left' else 'left'}_{part}")
-
-
 def test_sides_come_from_the_front_where_names_say_nothing() -> None:
     skeleton, right = build(RIGS["lafan1"], names="joint_{}")
     motion = mirrored(walk(skeleton, right))
-    swapped = tuple(map(swap, right))
+    swapped = tuple(role and role.mirrored for role in right)
     assert wrong(motion.skeleton, assign_roles(motion.skeleton, motion), swapped) == {}
 
 
@@ -573,3 +566,12 @@ def test_misleading_names_never_give_an_unsound_map(
     except SkeletonError:
         return
     check_sound(skeleton, roles)
+
+
+@pytest.mark.parametrize("role", Role)
+def test_a_roles_side_and_part_make_its_name_again(role: Role) -> None:
+    assert "_".join(filter(None, (role.side, role.part))) == role.value
+    assert role.side in ("", "left", "right")
+    assert role.mirrored.mirrored is role
+    assert (role.mirrored is role) == (role.side == "")
+    assert role.mirrored.part == role.part
