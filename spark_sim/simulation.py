@@ -7,7 +7,6 @@ from sim.physics.summary import LIMITS, summary, text
 from sim.physics.tracking import Assist, Tracked, track
 from sim.trajectory import model_trajectory
 from sim.view.scene import Figure
-from spark.rig.feet import standing_height
 from spark_sim.clips import AnyClip, File
 from spark_sim.loading import clip_of
 
@@ -59,7 +58,7 @@ def simulate(clip: AnyClip | File, *, assist: bool = False) -> Simulated:
     tracked = track(
         clip.body or model_trajectory(clip.rig, clip.motion),
         clip.motion.frame_time,
-        height=standing_height(clip.rig),
+        height=clip.rig.standing_height,
         floor_z=clip.floor_z,
         assist=Assist() if assist else None,
     )

@@ -10,7 +10,7 @@ from robots.model.morphology import Morphology, Sole
 from robots.model.shapes import surface
 from robots.tree import forward
 from spark.rig.contacts import planted_points
-from spark.rig.feet import Side, sole_corners, sole_positions, standing_height
+from spark.rig.feet import Side, sole_positions
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_mul, quat_rotate
@@ -130,7 +130,7 @@ def feet_of(
     rig = source.rig
     world = quat_mul(source.rotations, rig.tpose)
     paths = np.zeros((len(positions), len(robot.soles), 2, 3))
-    theirs = {sole.side: sole for sole in sole_corners(rig)}
+    theirs = {sole.side: sole for sole in rig.soles}
     for s, sole in enumerate(robot.soles):
         side = side_of(robot, sole)
         if side not in theirs:
@@ -153,7 +153,7 @@ def _touches(
     """Whether heels and toes stand, be it for a frame."""
     stands = np.zeros(paths.shape[:-1], dtype=bool)
     for s in np.flatnonzero(paths.any(axis=(0, 2, 3))).tolist():
-        stands[:, s] = planted_points(paths[:, s], source.frame_time, standing_height(source.rig))
+        stands[:, s] = planted_points(paths[:, s], source.frame_time, source.rig.standing_height)
     return stands
 
 

@@ -13,7 +13,6 @@ from robots.solver.footprints import EASE, TURN, WOBBLE, flat_sole
 from robots.stream.frame_targets import FrameTargets, Watcher
 from robots.stream.terms import FootTargets
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
-from spark.rig.feet import standing_height
 
 _LET_GO = 1.5  # times the speed and height at which a foot comes to stand: there it is let go
 
@@ -26,7 +25,7 @@ class Feet:
         self._robot, self._scale = watcher.robot, watcher.scale
         self._low = watcher.ground.low
         self._frame_time, self._ahead = frame_time, ahead
-        size = standing_height(watcher.source) / ADULT_HEIGHT
+        size = watcher.source.standing_height / ADULT_HEIGHT
         self._slow, self._near = PLANTED_SPEED * size, PLANTED_HEIGHT * size
         self._reach = max(1, round(SPEED_WINDOW / 2 / frame_time))
         self._known = watcher.has_feet[:, None]

@@ -19,7 +19,6 @@ from robots.solver.targets import (
     side_of,
 )
 from spark.errors import FrameError
-from spark.rig.feet import sole_corners
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import matrix_from_quat, quat_conj
@@ -186,7 +185,7 @@ class Watcher:
     def _watch_feet(self) -> None:
         """The source's heels and toes that the robot's soles follow."""
         source, robot = self.source, self.robot
-        theirs = {sole.side: sole for sole in sole_corners(source)}
+        theirs = {sole.side: sole for sole in source.soles}
         sides = [side_of(robot, sole) for sole in robot.soles]
         self.has_feet = np.array([side in theirs for side in sides], dtype=bool)
         heels, offsets, toes = [], [], []

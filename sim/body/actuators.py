@@ -15,7 +15,7 @@ from sim.body.joints import Axis, mirrored
 from sim.body.parts import DETAIL, joint_kind_of, kept_joints, side_of
 from spark.constants import GRAVITY
 from spark.kinematics import world_positions
-from spark.rig.feet import FOOT_LENGTH, sole_corners, sole_positions, standing_height
+from spark.rig.feet import FOOT_LENGTH, sole_positions
 from spark.rig.rig import Rig
 
 SAG = np.radians(0.8)
@@ -30,7 +30,7 @@ _ANKLE_TO_TIP, _BALL_TO_TIP = 0.75 * FOOT_LENGTH, 0.25 * FOOT_LENGTH
 def strengths(rig: Rig, bodies: Inertias) -> dict[str, float]:
     """The strength [N m] of each kind of joint: that of the one with the heaviest duty."""
     held = held_torques(rig, bodies)
-    weight, height = GRAVITY * bodies.masses.sum(), standing_height(rig)
+    weight, height = GRAVITY * bodies.masses.sum(), rig.standing_height
     levers = _levers(rig)
     found: dict[str, float] = {}
     for j in kept_joints(rig):
@@ -50,9 +50,9 @@ def _levers(rig: Rig) -> dict[str, float]:
     """How far [m] the tips of the toes lie from ankle and ball, along the floor of the T-pose; at
     least as far as a human's."""
     positions = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
-    height = standing_height(rig)
+    height = rig.standing_height
     levers = {"ankle": height * _ANKLE_TO_TIP, "toe": height * _BALL_TO_TIP}
-    for sole in sole_corners(rig):
+    for sole in rig.soles:
         tip = sole_positions(sole, positions, rig.tpose)[4:, :2].mean(0)
         for joint in {int(sole.joints[0]), int(sole.joints[-1])}:
             kind = joint_kind_of(rig, joint)

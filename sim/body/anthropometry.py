@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from spark.errors import SkeletonError
 from spark.kinematics import world_positions
-from spark.rig.feet import sole_corners, sole_positions, standing_height
+from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import matrix_from_quat, quat_conj, quat_rotate
@@ -94,7 +94,7 @@ class _Builder:
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
-        self.height = standing_height(rig)
+        self.height = rig.standing_height
         self.pos = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
         self.joints: list[int] = []
         self.masses: list[float] = []
@@ -207,7 +207,7 @@ class _Builder:
             )
 
     def _feet(self) -> None:
-        for sole in sole_corners(self.rig):
+        for sole in self.rig.soles:
             foot = int(sole.joints[0])
             points = sole_positions(sole, self.pos, self.rig.tpose)
             heel, toe = points[:2].mean(axis=0), points[4:].mean(axis=0)

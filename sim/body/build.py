@@ -24,7 +24,6 @@ from sim.body.sensors import add_sensors, add_sites
 from sim.body.shapes import add_materials, add_shapes
 from spark.errors import SkeletonError
 from spark.kinematics import world_positions
-from spark.rig.feet import standing_height
 from spark.rig.rig import Rig
 
 BODY_MASS_INDEX = 22.0  # kg / m²: the middle of the healthy range
@@ -49,7 +48,7 @@ def build_body(
     """
     if mass is not None and not (np.isfinite(mass) and mass > 0):
         raise SkeletonError(f"mass is {mass} kg; expected a positive number")
-    height = standing_height(rig)
+    height = rig.standing_height
     masses = inertias(rig, BODY_MASS_INDEX * height**2 if mass is None else mass)
     hulls, mesh_notes = ({}, ()) if mesh is None else hulls_of(mesh, rig)
     spec = mujoco.MjSpec()

@@ -5,7 +5,7 @@ from jaxtyping import Float
 
 from sim.body.inertia import Inertias
 from spark.kinematics import world_positions
-from spark.rig.feet import sole_corners, sole_positions
+from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_about, quat_conj, quat_mul, quat_rotate
@@ -31,7 +31,7 @@ def standing_position(rig: Rig, world: Float[np.ndarray, "J 4"]) -> Float[np.nda
     soles, or without feet of the T-pose's floor, at z = 0."""
     positions = world_positions(rig.skeleton, world, np.zeros(3))
     hips = positions[rig.hips].mean(0)
-    points = [sole_positions(sole, positions, world) for sole in sole_corners(rig)]
+    points = [sole_positions(sole, positions, world) for sole in rig.soles]
     floor = np.concatenate(points)[:, 2].min() if points else hips[2] - rig.hip_height
     return positions[rig.root_joint] - [hips[0], hips[1], floor]
 
@@ -58,7 +58,7 @@ def lean(rig: Rig, world: Float[np.ndarray, "J 4"], masses: Inertias) -> float:
 
 def _leaning(rig: Rig, world: Float[np.ndarray, "J 4"], angle: float) -> Float[np.ndarray, "J 4"]:
     leaning = quat_mul(quat_about("y", np.array(angle)), world)
-    feet = [k for sole in sole_corners(rig) for k in rig.skeleton.subtree(int(sole.joints[0]))]
+    feet = [k for sole in rig.soles for k in rig.skeleton.subtree(int(sole.joints[0]))]
     leaning[feet] = world[feet]
     return leaning
 
@@ -68,7 +68,7 @@ def _weight(
 ) -> tuple[float, float] | None:
     """Where the centre of mass lies between the heels (0) and the tips of the toes (1), and its
     height, in lengths of the feet; None without feet."""
-    soles = sole_corners(rig)
+    soles = rig.soles
     if not soles:
         return None
     positions = world_positions(rig.skeleton, world, np.zeros(3))

@@ -6,7 +6,7 @@ import numpy as np
 from sim.body.inertia import Inertias
 from sim.body.parts import DETAIL
 from spark.kinematics import world_positions
-from spark.rig.feet import sole_corners, sole_positions
+from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 
@@ -28,7 +28,7 @@ def add_sites(bodies: dict[int, mujoco.MjsBody], rig: Rig, inertias: Inertias) -
         if joint in bodies:
             bodies[joint].add_site(name=name, pos=inertias.coms[joint], **site)
     positions = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
-    for sole in sole_corners(rig):
+    for sole in rig.soles:
         foot = int(sole.joints[0])
         center = sole_positions(sole, positions, rig.tpose).mean(0) - positions[foot]
         bodies[foot].add_site(name=f"{sole.side}_foot", pos=center, **site)

@@ -13,7 +13,7 @@ from sim.body.anthropometry import RADII
 from sim.body.mesh import Hull
 from sim.body.parts import DETAIL, kind_of, side_of
 from spark.kinematics import end_positions, world_positions
-from spark.rig.feet import sole_corners, sole_positions, standing_height
+from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
 
 _DETAIL = 0.006  # radius of fingers, face and helpers, as a fraction of the standing height
@@ -65,7 +65,7 @@ class _Shapes:
 
     def __init__(self, spec: mujoco.MjSpec, bodies: dict[int, mujoco.MjsBody], rig: Rig) -> None:
         self.spec, self.bodies, self.rig = spec, bodies, rig
-        self.height = standing_height(rig)
+        self.height = rig.standing_height
         self.pos = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
         self.ends = end_positions(rig.skeleton, self.pos, rig.tpose)
 
@@ -103,7 +103,7 @@ class _Shapes:
     def feet(self, hulls: Mapping[int, Hull]) -> None:
         """A box under each foot and one under its toes, with their lower faces on the soles; out of
         sight where the foot has a hull."""
-        for sole in sole_corners(self.rig):
+        for sole in self.rig.soles:
             foot, toe = int(sole.joints[0]), int(sole.joints[-1])
             points = sole_positions(sole, self.pos, self.rig.tpose)
             if toe == foot:

@@ -13,7 +13,7 @@ from sim.trajectory import ModelSole, ModelTrajectory
 from spark.errors import SkeletonError
 from spark.kinematics import forward
 from spark.motion import Motion
-from spark.rig.feet import SOLE_POINTS, Sole, sole_corners, sole_positions, standing_height
+from spark.rig.feet import SOLE_POINTS, Sole, sole_positions
 from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_rotate, yaw_from_quat
 
@@ -114,13 +114,13 @@ def _flesh(
         for j, role in enumerate(rig.roles.roles)
         if role is not None and role.part not in _NO_FLESH
     ]
-    radii = standing_height(rig) * np.array([RADII[role.part] for _, role in others])
+    radii = rig.standing_height * np.array([RADII[role.part] for _, role in others])
     names = tuple(role.replace("_", " ") for _, role in others)
     return names, positions[:, [j for j, _ in others]], radii
 
 
 def _soles(rig: Rig) -> tuple[Sole, ...]:
-    soles = sole_corners(rig)
+    soles = rig.soles
     if not soles:
         raise SkeletonError(
             "the body has no foot: floor contact can't be measured; name its feet in a role map"

@@ -8,7 +8,6 @@ from jaxtyping import Float
 
 from sim.body.anthropometry import RADII
 from sim.report.clip_poses import ClipPoses
-from spark.rig.feet import standing_height
 from spark.rig.roles import Role
 from spark.rotation import quat_rotate
 
@@ -47,7 +46,7 @@ class Capsules:
 
 def capsules(poses: ClipPoses) -> Capsules:
     """The parts the rig has: chest, hips, head, and three for each limb."""
-    roles, height = poses.rig.roles, standing_height(poses.rig)
+    roles, height = poses.rig.roles, poses.rig.standing_height
     place = {
         role: poses.positions[:, joints[-1]] for role in Role if (joints := roles.joints(role))
     }

@@ -14,7 +14,6 @@ from sim.view.display import add_display
 from spark.errors import SkeletonError
 from spark.kinematics import forward
 from spark.motion import Motion
-from spark.rig.feet import standing_height
 from spark.rig.rig import Rig
 from spark.rotation import quat_about, quat_conj, quat_mul, quat_rotate
 
@@ -98,7 +97,7 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
     frame_time = first.frame_time * step
     longest = max(figure.motion.duration for figure in figures)
     times = np.arange(int(np.floor(longest / frame_time + 1e-6)) + 1) * frame_time
-    heights = [standing_height(figure.rig) for figure in figures]
+    heights = [figure.rig.standing_height for figure in figures]
     lanes = _lanes(figures, heights)
     turn = _turn(figures[0])
     coordinates: list[Float[np.ndarray, "T n"]] = []

@@ -13,7 +13,6 @@ from jaxtyping import Float
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from spark.demo.actor import Actor
-from spark.rig.feet import sole_corners
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_about, quat_from_yaw, quat_mul, quat_rotate
@@ -144,7 +143,7 @@ class _Foot:
         toe = rig.roles.joint(LIMBS[side][3])
         hip, knee, ankle = (actor.tpose[rig.roles.require(role)] for role in LIMBS[side][:3])
         self.thigh, self.shank = np.linalg.norm(knee - hip), np.linalg.norm(ankle - knee)
-        sole = next(s for s in sole_corners(rig) if s.side == side.side)
+        sole = next(s for s in rig.soles if s.side == side.side)
         points = actor.tpose[sole.joints] + quat_rotate(rig.tpose[sole.joints], sole.offsets)
         self.heel = points[:2].mean(0) - ankle
         tip = points[4:].mean(0)

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from spark.rig.feet import sole_corners, sole_positions, standing_height
+from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
 
 # A foot is planted while it is slower and lower than this; for a body 1.75 m tall, scaled with it.
@@ -21,7 +21,7 @@ def floor_height(
 
     A body without feet has its floor at 0.
     """
-    soles = sole_corners(rig)
+    soles = rig.soles
     if not soles:
         return 0.0
     points = [sole_positions(sole, positions, world)[..., 2] for sole in soles]
@@ -58,4 +58,4 @@ def planted_feet(
     rig: Rig, positions: Float[np.ndarray, "T J 3"], frame_time: float
 ) -> Bool[np.ndarray, "T F"]:
     """For each of the rig's feet, whether its toe stands (the ankle where there is no toe)."""
-    return planted_points(positions[:, rig.contact_joints], frame_time, standing_height(rig))
+    return planted_points(positions[:, rig.contact_joints], frame_time, rig.standing_height)

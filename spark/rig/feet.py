@@ -11,11 +11,17 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.kinematics import end_positions, world_positions
-from spark.rig.rig import Rig
-from spark.rig.roles import Role
+from spark.rig.roles import Role, RoleMap
 from spark.rotation import quat_conj, quat_rotate
+from spark.skeleton import Skeleton
 
 Side = Literal["left", "right"]
+
+FEET: dict[Side, tuple[Role, Role]] = {
+    "left": (Role.LEFT_FOOT, Role.LEFT_TOE),
+    "right": (Role.RIGHT_FOOT, Role.RIGHT_TOE),
+}
+UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
 
 # Fractions of the standing height: Drillis and Contini 1966, as in Winter, "Biomechanics and Motor
 # Control of Human Movement", fig. 4.1; the ankle and the ball divide the foot at 1/4 and 3/4.
@@ -41,26 +47,22 @@ class Sole:
     offsets: Float[np.ndarray, "6 3"]
 
 
-def standing_height(rig: Rig) -> float:
-    """The height [m] of a human with this rig's hip height."""
-    return rig.hip_height / HIP_HEIGHT
+def human_soles(
+    skeleton: Skeleton, roles: RoleMap, tpose: Float[np.ndarray, "J 4"], hip_height: float
+) -> tuple[Sole, ...]:
+    """The soles of the feet a rig has, left before right; a side without a foot has none.
 
-
-def sole_corners(rig: Rig) -> tuple[Sole, ...]:
-    """The soles of the feet the rig has, left before right; a side without a foot has none.
-
-    All points lie on the floor in the T-pose: `hip_height` below the hips' middle. Lengths come
+    All points lie on the floor in the T-pose: `hip_height` [m] below the hips' middle. Lengths come
     from the rig where it has a toe joint or a toe tip, otherwise, like the width, from its height.
     """
-    pos = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
-    sides: tuple[tuple[Side, Role, Role], ...] = (
-        ("left", Role.LEFT_FOOT, Role.LEFT_TOE),
-        ("right", Role.RIGHT_FOOT, Role.RIGHT_TOE),
-    )
+    pos = world_positions(skeleton, tpose, np.zeros(3))
+    height = hip_height / HIP_HEIGHT
+    hips = [j for role in UPPER_LEGS for j in roles.joints(role)]
+    floor_z = float(pos[hips, 2].mean()) - hip_height
     return tuple(
-        _sole(rig, pos, side, foot, rig.roles.joint(toe_role))
-        for side, foot_role, toe_role in sides
-        if (foot := rig.roles.joint(foot_role)) is not None
+        _sole(skeleton, tpose, pos, side, foot, roles.joint(toe_role), height, floor_z)
+        for side, (foot_role, toe_role) in FEET.items()
+        if (foot := roles.joint(foot_role)) is not None
     )
 
 
@@ -71,15 +73,19 @@ def sole_positions(
     return pos_world[..., sole.joints, :] + quat_rotate(q_world[..., sole.joints, :], sole.offsets)
 
 
-def _sole(rig: Rig, pos: Float[np.ndarray, "J 3"], side: Side, foot: int, toe: int | None) -> Sole:
-    height = standing_height(rig)
-    upper_legs = [
-        j for role in (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG) for j in rig.roles.joints(role)
-    ]
-    floor_z = pos[upper_legs, 2].mean() - rig.hip_height
-
-    below = list(rig.skeleton.subtree(foot))
-    ends = end_positions(rig.skeleton, pos, rig.tpose)[np.isin(rig.skeleton.end_parents, below)]
+def _sole(
+    skeleton: Skeleton,
+    tpose: Float[np.ndarray, "J 4"],
+    pos: Float[np.ndarray, "J 3"],
+    side: Side,
+    foot: int,
+    toe: int | None,
+    height: float,
+    floor_z: float,
+) -> Sole:
+    """The sole of a body of some standing height [m] that is at `pos` in its T-pose."""
+    below = list(skeleton.subtree(foot))
+    ends = end_positions(skeleton, pos, tpose)[np.isin(skeleton.end_parents, below)]
     points = np.concatenate([pos[below], ends])[:, :2] - pos[foot, :2]
     tip = points[np.argmax(points[:, 0])]
     length = float(np.linalg.norm(tip))
@@ -102,4 +108,4 @@ def _sole(rig: Rig, pos: Float[np.ndarray, "J 3"], side: Side, foot: int, toe: i
     world[:, 2] = floor_z
     joints = np.full(6, foot)
     joints[4:] = foot if toe is None else toe
-    return Sole(side, joints, quat_rotate(quat_conj(rig.tpose[joints]), world - pos[joints]))
+    return Sole(side, joints, quat_rotate(quat_conj(tpose[joints]), world - pos[joints]))

@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from spark.kinematics import end_positions, world_positions
 from spark.motion import Motion
+from spark.rig.feet import FEET, HIP_HEIGHT, UPPER_LEGS, Sole, human_soles
 from spark.rig.groups import groups_of
 from spark.rig.role_assignment import Override, assign_roles
 from spark.rig.roles import Group, Role, RoleMap
@@ -20,8 +21,6 @@ _CHAINS: dict[Role, tuple[Role, Role | None]] = {
     Role.SPINE: (Role.PELVIS, None),
     Role.NECK: (Role.SPINE, Role.HEAD),
 }
-_UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
-_FEET = ((Role.LEFT_FOOT, Role.LEFT_TOE), (Role.RIGHT_FOOT, Role.RIGHT_TOE))
 
 
 class Chain(NamedTuple):
@@ -64,7 +63,17 @@ class Rig:
     @cached_property
     def hips(self) -> list[int]:
         """The upper-leg joints; their middle is the point that carries the body's path."""
-        return [j for role in _UPPER_LEGS for j in self.roles.joints(role)[:1]]
+        return [j for role in UPPER_LEGS for j in self.roles.joints(role)[:1]]
+
+    @property
+    def standing_height(self) -> float:
+        """The height [m] of a human with this rig's hip height."""
+        return self.hip_height / HIP_HEIGHT
+
+    @cached_property
+    def soles(self) -> tuple[Sole, ...]:
+        """The soles of its feet, left before right; a side without a foot has none."""
+        return human_soles(self.skeleton, self.roles, self.tpose, self.hip_height)
 
     @cached_property
     def tpose_positions(self) -> Float[np.ndarray, "J 3"]:
@@ -89,7 +98,7 @@ class Rig:
     @cached_property
     def contact_joints(self) -> list[int]:
         """The joint of each foot that touches the floor: its toe, or the ankle without one."""
-        pairs = ((self.roles.joint(toe), self.roles.joint(foot)) for foot, toe in _FEET)
+        pairs = ((self.roles.joint(toe), self.roles.joint(foot)) for foot, toe in FEET.values())
         return [j for toe, foot in pairs if (j := foot if toe is None else toe) is not None]
 
 
@@ -113,8 +122,8 @@ def hip_height(skeleton: Skeleton, roles: RoleMap, tpose: Float[np.ndarray, "J 4
     legs where there are no feet."""
     positions = world_positions(skeleton, tpose, np.zeros(3))
     ends = end_positions(skeleton, positions, tpose)
-    hips = [j for role in _UPPER_LEGS for j in roles.joints(role)[:1]]
-    feet = [j for foot, _ in _FEET for j in roles.joints(foot)] or hips
+    hips = [j for role in UPPER_LEGS for j in roles.joints(role)[:1]]
+    feet = [j for foot, _ in FEET.values() for j in roles.joints(foot)] or hips
     below = sorted({k for j in feet for k in skeleton.subtree(j)})
     heights = [*positions[below, 2], *ends[np.isin(skeleton.end_parents, below), 2]]
     return float(positions[hips, 2].mean() - min(heights))

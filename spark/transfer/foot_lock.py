@@ -13,7 +13,6 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from spark.rig.contacts import planted_points
-from spark.rig.feet import standing_height
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
 from spark.runs import true_runs
@@ -39,7 +38,7 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
         from_joint, to_joint = contact
         path = theirs[:, from_joint] - [0, 0, source.floor_z]
         stance = _stances(
-            planted_points(path, source.frame_time, standing_height(source.rig)),
+            planted_points(path, source.frame_time, source.rig.standing_height),
             source.frame_time,
         )
         frames = np.flatnonzero(stance)

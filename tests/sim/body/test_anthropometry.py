@@ -8,7 +8,6 @@ import pytest
 from sim.body.anthropometry import Segments, segments
 from spark.errors import SkeletonError
 from spark.kinematics import forward
-from spark.rig.feet import standing_height
 from spark.rig.rig import Rig
 from spark.rig.roles import Role, RoleMap
 from spark.rotation import quat_rotate
@@ -36,7 +35,7 @@ def test_the_body_mirrors_and_its_centre_of_mass_is_a_humans() -> None:
     com = parts.masses @ coms_world(rig, parts)
     assert com[1] == pytest.approx(0, abs=1e-12)
     # Arms raised to the side: about 57 % of the height, a little above that of arms hanging.
-    assert com[2] / standing_height(rig) == pytest.approx(0.57, abs=0.03)
+    assert com[2] / rig.standing_height == pytest.approx(0.57, abs=0.03)
 
 
 def test_a_thigh_weighs_and_balances_as_de_leva_measured() -> None:

@@ -11,7 +11,7 @@ from sim.report import Finding, Report, assess, compare
 from spark.errors import SkeletonError, SparkSimError
 from spark.io.recording import read_recording
 from spark.motion import Motion
-from spark.rig.feet import FOOT_LENGTH, standing_height
+from spark.rig.feet import FOOT_LENGTH
 from spark.rig.rig import Rig, understand
 from spark.rig.roles import Role, RoleMap
 from spark.rotation import quat_about, quat_from_yaw, quat_mul, quat_rotate
@@ -303,7 +303,7 @@ def test_a_tiptoe_stands_on_its_toes() -> None:
     tiptoe = along(tiptoe, 2, ball - 0.1)
     report = assess(tiptoe, rig, source=(standing(rig, 60), rig))
     assert report.implausible == 0
-    heel = 0.25 * FOOT_LENGTH * standing_height(rig)
+    heel = 0.25 * FOOT_LENGTH * rig.standing_height
     flat = along(tiptoe, 2, -heel * 0.3)
     assert shares(assess(flat, rig, source=(standing(rig, 60), rig)))["P"] == 1
 

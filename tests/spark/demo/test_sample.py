@@ -12,7 +12,7 @@ from spark.io.bvh import write_bvh
 from spark.io.encoding import encode_new
 from spark.io.recording import read_recording
 from spark.kinematics import forward, local_rotations
-from spark.rig.feet import sole_corners, sole_positions
+from spark.rig.feet import sole_positions
 from spark.rig.roles import Role
 from spark.rotation import quat_angle, rotvec_from_quat
 from spark.transfer.canonical import to_canonical
@@ -27,7 +27,7 @@ def soles(name: str, build: str) -> np.ndarray:
     """Support points: frames, left and right, `SOLE_POINTS`, xyz [m]."""
     rig = sample_rig(build)
     positions, world = forward(sample_motion(name, rig, FPS))
-    return np.stack([sole_positions(s, positions, world) for s in sole_corners(rig)], axis=1)
+    return np.stack([sole_positions(s, positions, world) for s in rig.soles], axis=1)
 
 
 def strides(build: str, side: int) -> np.ndarray:

@@ -7,7 +7,7 @@ import pytest
 
 from spark.kinematics import forward
 from spark.motion import Motion
-from spark.rig.feet import FOOT_LENGTH, FOOT_WIDTH, sole_corners, sole_positions, standing_height
+from spark.rig.feet import FOOT_LENGTH, FOOT_WIDTH, sole_positions
 from spark.rig.rig import Rig
 from spark.rig.roles import Role, RoleMap
 from spark.rotation import quat_about, quat_rotate
@@ -16,7 +16,7 @@ from tests.helpers.stick import joint, standing, stick_rig
 
 def soles_of(rig: Rig, motion: Motion) -> np.ndarray:
     pos, world = forward(motion)
-    return np.stack([sole_positions(sole, pos, world) for sole in sole_corners(rig)], axis=1)
+    return np.stack([sole_positions(sole, pos, world) for sole in rig.soles], axis=1)
 
 
 def test_in_the_tpose_the_soles_lie_on_the_floor_and_mirror_each_other() -> None:
@@ -28,7 +28,7 @@ def test_in_the_tpose_the_soles_lie_on_the_floor_and_mirror_each_other() -> None
 
 def test_lengths_come_from_the_rig_and_the_width_from_its_height() -> None:
     rig = stick_rig()
-    height = standing_height(rig)
+    height = rig.standing_height
     assert height == pytest.approx(0.9 / 0.53)
     left = soles_of(rig, standing(rig, 1))[0, 0]
     heel = -0.25 * FOOT_LENGTH * height
@@ -50,8 +50,8 @@ def test_without_toes_the_foot_has_human_proportions() -> None:
         rig, skeleton=skeleton, roles=RoleMap(roles, rig.roles.confidence, rig.roles.reasons)
     )
     left = soles_of(rig, standing(rig, 1))[0, 0]
-    assert np.ptp(left[:, 0]) == pytest.approx(FOOT_LENGTH * standing_height(rig))
-    assert set(sole_corners(rig)[0].joints) == {joint(Role.LEFT_FOOT)}
+    assert np.ptp(left[:, 0]) == pytest.approx(FOOT_LENGTH * rig.standing_height)
+    assert set(rig.soles[0].joints) == {joint(Role.LEFT_FOOT)}
 
 
 def test_toes_bend_while_heel_and_ball_stay() -> None:
@@ -87,4 +87,4 @@ def test_a_leg_without_a_foot_has_no_sole() -> None:
     rig = stick_rig()
     roles = tuple(None if r is Role.RIGHT_FOOT else r for r in rig.roles.roles)
     rig = replace(rig, roles=RoleMap(roles, rig.roles.confidence, rig.roles.reasons))
-    assert [sole.side for sole in sole_corners(rig)] == ["left"]
+    assert [sole.side for sole in rig.soles] == ["left"]
