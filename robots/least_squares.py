@@ -1,8 +1,9 @@
-"""Least squares over whole trajectories: normal equations a frame, coupled by smoothness in time.
+"""Gauss-Newton steps over whole trajectories: one frame's normal equations, coupled by smoothness.
 
-A problem's unknowns are a step in D columns for each of T frames. Its residuals see one frame each;
-only the accelerations tie neighbours together. So the normal equations are banded, of width 2 D,
-and a banded Cholesky solves them in time linear in T (Golub and Van Loan, section 4.3).
+The unknowns are a step in D degrees of freedom (dofs) for each of T frames. A residual sees one
+frame; only velocities and accelerations couple neighbours. So the normal equations are banded, with
+a half-bandwidth of 2 D, and a banded Cholesky factorisation solves them in time linear in T (Golub
+and Van Loan, "Matrix Computations", section 4.3).
 """
 
 from collections.abc import Sequence
@@ -13,111 +14,118 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.linalg import solveh_banded
 
-_IMMOVABLE = 1e8
-REACH = 2  # an acceleration ties a frame to the two next
-_BEND = (1.0, -2.0, 1.0)
+_HELD = 1e8  # damping that keeps a dof where it is: far above any weight squared
+COUPLED = 2  # an acceleration couples a frame to the next two
+_SECOND_DIFFERENCE = (1.0, -2.0, 1.0)
 
 
-class Normal:
-    """Normal equations `H step = -g` being added up; `cost` is half the sum of squares."""
+class NormalEquations:
+    """The normal equations `H step = -g` of weighted residuals r, a frame each, being summed up.
 
-    def __init__(self, frames: int, columns: int, rows: bool = True) -> None:
-        self.rows = rows
-        self.H = np.zeros((frames, columns, columns) if rows else (0, 0, 0))
-        self.g = np.zeros((frames, columns) if rows else (0, 0))
+    H = J'J [T D D] and g = J'r [T D], J the Jacobian of r by the dofs; `cost` = r'r / 2 [T]. With
+    `with_jacobian` False only the cost is summed, and H and g are empty.
+    """
+
+    def __init__(self, frames: int, dofs: int, with_jacobian: bool = True) -> None:
+        self.with_jacobian = with_jacobian
+        self.H = np.zeros((frames, dofs, dofs) if with_jacobian else (0, 0, 0))
+        self.g = np.zeros((frames, dofs) if with_jacobian else (0, 0))
         self.cost = np.zeros(frames)
 
     def add(
         self,
-        columns: Sequence[int],
+        dofs: Sequence[int],
         J: Float[np.ndarray, "T C M"],
         residuals: Float[np.ndarray, "M T"],
     ) -> None:
-        """M weighted residuals a frame, and how fast they grow with some columns."""
+        """M weighted residuals a frame, and their transposed Jacobian by C of the dofs."""
         self.cost += 0.5 * np.einsum("mt,mt->t", residuals, residuals)
-        if not self.rows or not len(columns):
+        if not self.with_jacobian or not len(dofs):
             return
         H = J @ J.transpose(0, 2, 1)
         g = (J @ residuals.T[:, :, None])[:, :, 0]
-        runs = _runs(columns)
+        runs = _runs(dofs)
         for here, there in runs:
             self.g[:, there] += g[:, here]
             for here2, there2 in runs:
                 self.H[:, there, there2] += H[:, here, here2]
 
-    def add_some(
+    def add_at(
         self,
         frames: Int[np.ndarray, "S"],
-        columns: Sequence[int],
+        dofs: Sequence[int],
         J: Float[np.ndarray, "C S"],
         residuals: Float[np.ndarray, "S"],
     ) -> None:
-        """One weighted residual in some of the frames."""
+        """One weighted residual in S of the frames, and its Jacobian by C of the dofs."""
         self.cost[frames] += 0.5 * residuals**2
-        at = np.asarray(columns)
+        at = np.asarray(dofs)
         self.g[frames[:, None], at] += (J * residuals).T
         self.H[frames[:, None, None], at[:, None], at] += np.einsum("cs,ds->scd", J, J)
 
     def add_diagonal(
-        self, rows: Float[np.ndarray, "T D"], residuals: Float[np.ndarray, "T D"]
+        self, J: Float[np.ndarray, "T D"], residuals: Float[np.ndarray, "T D"]
     ) -> None:
-        """One residual for each column, that grows with no other."""
+        """One weighted residual a dof that depends on that dof alone; `J` is its derivative."""
         self.cost += 0.5 * (residuals**2).sum(1)
-        if self.rows:
+        if self.with_jacobian:
             at = np.arange(self.g.shape[1])
-            self.H[:, at, at] += rows**2
-            self.g += rows * residuals
+            self.H[:, at, at] += J**2
+            self.g += J * residuals
 
-    def mixed(self, other: "Normal", share: Float[np.ndarray, "T"]) -> "Normal":
-        """So much of other ones, a frame, and the rest of these."""
-        out = Normal(0, 0)
+    def blended(self, other: "NormalEquations", share: Float[np.ndarray, "T"]) -> "NormalEquations":
+        """`1 - share` of these and `share` of the others, frame by frame."""
+        out = NormalEquations(0, 0)
         out.H = self.H + share[:, None, None] * (other.H - self.H)
         out.g = self.g + share[:, None] * (other.g - self.g)
         out.cost = self.cost + share * (other.cost - self.cost)
         return out
 
-    def pin(self, pinned: Bool[np.ndarray, "T D"]) -> None:
-        """Keep some columns from moving."""
-        free = np.where(pinned, 0.0, 1.0)
+    def hold(self, held: Bool[np.ndarray, "T D"]) -> None:
+        """Keep some dofs from moving: their rows and columns become the identity's."""
+        free = np.where(held, 0.0, 1.0)
         self.H *= free[:, :, None] * free[:, None]
         at = np.arange(free.shape[1])
         self.H[:, at, at] += 1.0 - free
         self.g *= free
 
-    def solve_apart(self, damping: float) -> Float[np.ndarray, "T D"]:
-        """The step, each frame for itself."""
+    def solve_per_frame(self, damping: float) -> Float[np.ndarray, "T D"]:
+        """The Gauss-Newton step of each frame for itself; `damping` is added to H's diagonal."""
         D = self.g.shape[1]
         return -np.linalg.solve(self.H + damping * np.eye(D), self.g[..., None])[..., 0]
 
-    def solve_together(
+    def solve_coupled(
         self,
-        ties: "Ties",
+        smoothness: "Smoothness",
         damping: Float[np.ndarray, "T"],
-        limits: Float[np.ndarray, "T D"],
+        at_limits: Float[np.ndarray, "T D"],
     ) -> Float[np.ndarray, "T D"]:
-        """The step that also lessens what ties neighbours together. Columns with `limits` of 1 (-1)
-        are at their upper (lower) one, and don't move where that would take them beyond."""
+        """The Gauss-Newton step of all frames together, `smoothness` included; `damping` is added
+        to H's diagonal. Dofs that stand at their upper (`at_limits` +1) or lower limit (-1) do not
+        move where the gradient would take them beyond it."""
         T, D = self.g.shape
-        band = np.zeros((REACH * D + 1, T, D))
+        band = np.zeros((COUPLED * D + 1, T, D))
         for i in range(D):
             for k in range(D - i):
                 band[k, :, i] = self.H[:, i + k, i]
-        weights = ties.smoothness**2
-        for first, second in combinations_with_replacement(range(REACH + 1), 2):
+        weights = smoothness.acceleration_weights**2
+        for first, second in combinations_with_replacement(range(COUPLED + 1), 2):
             at = slice(first, first + len(weights))
-            band[(second - first) * D, at] += _BEND[first] * _BEND[second] * weights
-        g = self.g + spread(weights * ties.accelerations, T)
-        if len(ties.rush):
-            fast = np.where(ties.rush != 0, ties.rush_weight**2, 0.0)
+            product = _SECOND_DIFFERENCE[first] * _SECOND_DIFFERENCE[second]
+            band[(second - first) * D, at] += product * weights
+        g = self.g + second_differences_transposed(weights * smoothness.accelerations, T)
+        if len(smoothness.overspeed):
+            squared = smoothness.overspeed_weight**2
+            fast = np.where(smoothness.overspeed != 0, squared, 0.0)
             band[0, :-1] += fast
             band[0, 1:] += fast
             band[D, :-1] -= fast
-            g[:-1] -= ties.rush_weight**2 * ties.rush
-            g[1:] += ties.rush_weight**2 * ties.rush
-        held = limits * g < 0
-        band[0] += np.where(held, _IMMOVABLE, damping[:, None])
+            g[:-1] -= squared * smoothness.overspeed
+            g[1:] += squared * smoothness.overspeed
+        held = at_limits * g < 0
+        band[0] += np.where(held, _HELD, damping[:, None])
         step = solveh_banded(
-            band.reshape(REACH * D + 1, T * D),
+            band.reshape(COUPLED * D + 1, T * D),
             np.where(held, 0.0, g).ravel(),
             lower=True,
             overwrite_ab=True,
@@ -127,31 +135,35 @@ class Normal:
 
 
 @dataclass(frozen=True, eq=False)
-class Ties:
-    """What ties frames to their neighbours: weighted squares of `accelerations`, the columns'
-    second differences (A = T - 2), and of `rush`, by how much their first differences (V = T - 1)
-    are too large; 0 where they are not."""
+class Smoothness:
+    """What couples neighbouring frames: two weighted residuals a dof.
 
-    smoothness: Float[np.ndarray, "A D"]
+    r = `acceleration_weights` x `accelerations`, the dofs' second differences (A = T - 2), and
+    r = `overspeed_weight` x `overspeed`, by how much their first differences (V = T - 1) exceed the
+    fastest allowed; 0 where they do not.
+    """
+
+    acceleration_weights: Float[np.ndarray, "A D"]
     accelerations: Float[np.ndarray, "A D"]
-    rush_weight: Float[np.ndarray, "V 1"]
-    rush: Float[np.ndarray, "V D"]
+    overspeed_weight: Float[np.ndarray, "V 1"]
+    overspeed: Float[np.ndarray, "V D"]
 
     def cost(self, frames: int) -> Float[np.ndarray, "T"]:
-        """Half the weighted squares, told by frame."""
+        """Half the squares of the residuals: an acceleration's at its middle frame, an overspeed's
+        at the later one."""
         out = np.zeros(frames)
         if len(self.accelerations):
-            out[1:-1] += 0.5 * ((self.smoothness * self.accelerations) ** 2).sum(1)
-        if len(self.rush):
-            out[1:] += 0.5 * ((self.rush_weight * self.rush) ** 2).sum(1)
+            out[1:-1] += 0.5 * ((self.acceleration_weights * self.accelerations) ** 2).sum(1)
+        if len(self.overspeed):
+            out[1:] += 0.5 * ((self.overspeed_weight * self.overspeed) ** 2).sum(1)
         return out
 
 
-def _runs(columns: Sequence[int]) -> list[tuple[slice, slice]]:
-    """Columns that follow each other, as slices of the list and of what it indexes."""
-    breaks = np.flatnonzero(np.diff(columns) != 1) + 1
-    edges = [0, *breaks.tolist(), len(columns)]
-    return [(slice(a, b), slice(columns[a], columns[a] + b - a)) for a, b in pairwise(edges)]
+def _runs(dofs: Sequence[int]) -> list[tuple[slice, slice]]:
+    """Dofs that follow each other, as slices of the list and of what it indexes."""
+    breaks = np.flatnonzero(np.diff(dofs) != 1) + 1
+    edges = [0, *breaks.tolist(), len(dofs)]
+    return [(slice(a, b), slice(dofs[a], dofs[a] + b - a)) for a, b in pairwise(edges)]
 
 
 def second_differences(values: Float[np.ndarray, "T *n"]) -> Float[np.ndarray, "A *n"]:
@@ -161,11 +173,13 @@ def second_differences(values: Float[np.ndarray, "T *n"]) -> Float[np.ndarray, "
     return values[2:] - 2 * values[1:-1] + values[:-2]
 
 
-def spread(accelerations: Float[np.ndarray, "A D"], frames: int) -> Float[np.ndarray, "T D"]:
-    """The transpose of `second_differences`."""
-    out = np.zeros((frames, accelerations.shape[1]))
-    if len(accelerations):
-        out[:-2] += accelerations
-        out[1:-1] -= 2 * accelerations
-        out[2:] += accelerations
+def second_differences_transposed(
+    values: Float[np.ndarray, "A D"], frames: int
+) -> Float[np.ndarray, "T D"]:
+    """The transpose of `second_differences`, as a matrix, times `values`."""
+    out = np.zeros((frames, values.shape[1]))
+    if len(values):
+        out[:-2] += values
+        out[1:-1] -= 2 * values
+        out[2:] += values
     return out

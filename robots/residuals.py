@@ -1,99 +1,113 @@
-"""Residuals of poses and how fast they grow: the terms that objectives are made of.
+"""Residuals of poses and their Jacobians: the terms that objectives are sums of.
 
-Rows are `C M T`: the M residuals' derivatives by C columns, over T frames, both already weighted.
+The cost of a term is half the sum of its squared residuals. A residual r is weighted, so it has no
+unit; the weight's unit is one over that of what it weighs: 1/rad for angles and unit vectors'
+chords, 1/m for lengths. A Jacobian is stored transposed, `C M T`: the derivatives of M residuals by
+C degrees of freedom (dofs; `robots.tree.Tree`) in T frames, weighted as the residuals are.
+
+`axes` [C 3 T] are the world axes of the dofs that turn a link, its `angular_jacobian`.
 """
 
 import numpy as np
 from jaxtyping import Float
 
-from robots.tree import Coordinates, Frames, Tree, cross
+from robots.tree import Coordinates, LinkPoses, Tree, cross
 
-Rows = tuple[Float[np.ndarray, "C M T"], Float[np.ndarray, "M T"]]
+Linearized = tuple[Float[np.ndarray, "C M T"], Float[np.ndarray, "M T"]]
+"""The transposed Jacobian of some residuals, and these."""
 
 
-def direction_rows(
-    now: Float[np.ndarray, "3 T"],
-    wanted: Float[np.ndarray, "3 T"],
+def direction_residual(
+    direction: Float[np.ndarray, "3 T"],
+    target: Float[np.ndarray, "3 T"],
     axes: Float[np.ndarray, "C 3 T"],
     weight: float | Float[np.ndarray, "T"],
-) -> Rows:
-    """A unit vector of a link that should point somewhere: its chord, nearly the angle [rad]."""
-    rows = np.empty_like(axes)
-    for column, axis in enumerate(axes):
-        cross(axis, now, rows[column])
-    return rows * weight, (now - wanted) * weight
+) -> Linearized:
+    """A unit vector d that is fixed in a link should be d*: r = w (d - d*), dr/dq = w axis x d.
 
-
-def turn_rows(
-    now: Float[np.ndarray, "3 3 T"],
-    wanted: Float[np.ndarray, "3 3 T"],
-    axes: Float[np.ndarray, "C 3 T"],
-    weight: float | Float[np.ndarray, "T"],
-) -> Rows:
-    """A link that should be turned some way: it costs 1 - cos of the angle between, whose gradient
-    is the sine of that angle about its axis.
-
-    Three residuals are that sine; the fourth, which has no rows, is what of the cost their squares
-    lack.
+    |d - d*| is the chord of the angle between them, 2 sin(angle / 2); the weight [1/rad].
     """
-    axial = np.zeros((4, now.shape[2]))
-    crossed = np.empty_like(axial[:3])
-    for k in range(3):  # the axial vector of now wanted^T
-        cross(wanted[:, k], now[:, k], crossed)
-        axial[:3] += 0.5 * crossed
-    axial[3] = (3.0 - (now * wanted).sum((0, 1))) / 2
-    rows = np.zeros((len(axes), 4, now.shape[2]))
-    rows[:, :3] = axes * weight
-    return rows, axial * weight
+    jacobian = np.empty_like(axes)
+    for dof, axis in enumerate(axes):
+        cross(axis, direction, jacobian[dof])
+    return jacobian * weight, (direction - target) * weight
 
 
-def point_columns(
-    frames: Frames,
+def rotation_residual(
+    rotation: Float[np.ndarray, "3 3 T"],
+    target: Float[np.ndarray, "3 3 T"],
+    axes: Float[np.ndarray, "C 3 T"],
+    weight: float | Float[np.ndarray, "T"],
+) -> Linearized:
+    """A link's rotation R should be R*: the cost is w² (1 - cos a), a the angle of R R*'.
+
+    r = w (sin(a) n, 1 - cos a), n the unit axis of R R*': four residuals. The Jacobian is that at
+    a = 0, w (axis, 0), with which J'r is the cost's exact gradient at any a. The weight [1/rad].
+    """
+    residual = np.zeros((4, rotation.shape[2]))
+    crossed = np.empty_like(residual[:3])
+    for k in range(3):  # sin(a) n is half the sum of these, over the axes of R* and R
+        cross(target[:, k], rotation[:, k], crossed)
+        residual[:3] += 0.5 * crossed
+    residual[3] = (3.0 - (rotation * target).sum((0, 1))) / 2
+    jacobian = np.zeros((len(axes), 4, rotation.shape[2]))
+    jacobian[:, :3] = axes * weight
+    return jacobian, residual * weight
+
+
+def point_jacobian(
+    poses: LinkPoses,
     chain: tuple[int, ...],
     axes: Float[np.ndarray, "C 3 T"],
     point: Float[np.ndarray, "3 T"],
     *,
     base: bool,
 ) -> Float[np.ndarray, "K 3 T"]:
-    """How fast a point of a link moves with the columns of a chain of joints; `axes` are theirs.
+    """The Jacobian of a link's point [m] by the dofs of a chain of joints.
 
-    With `base` the base's six come before them, and its three axes before theirs.
+    With `base` the base's six dofs come first (K = C + 3: its shifts have no axis), and `axes`
+    begin with its three.
     """
     if not base:
-        return frames.point_columns(chain, axes, point)
-    columns = np.empty((3 + len(axes), 3, point.shape[1]))
-    columns[:3] = np.eye(3)[:, :, None]
-    arm = point - frames.places[-1]
+        return poses.point_jacobian(chain, axes, point)
+    jacobian = np.empty((3 + len(axes), 3, point.shape[1]))
+    jacobian[:3] = np.eye(3)[:, :, None]
+    arm = point - poses.positions[-1]
     for k in range(3):
-        cross(axes[k], arm, columns[3 + k])
-    columns[6:] = frames.point_columns(chain, axes[3:], point)
-    return columns
+        cross(axes[k], arm, jacobian[3 + k])
+    jacobian[6:] = poses.point_jacobian(chain, axes[3:], point)
+    return jacobian
 
 
 def one_sided(
-    over: Float[np.ndarray, "*n"], ease: float | Float[np.ndarray, "*n"]
+    excess: Float[np.ndarray, "*n"], width: float | Float[np.ndarray, "*n"]
 ) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
-    """A residual that grows with what is over zero, and its slope; bent over a width of `ease`.
+    """max(excess, 0), rounded over `width` (both in the same unit), and its derivative.
 
-    A sharp bend would let Gauss-Newton step over it back and forth.
+    r = (x + sqrt(x² + width²)) / 2. The kink of the maximum itself would let Gauss-Newton step over
+    it back and forth.
     """
-    root = np.sqrt(over**2 + ease**2)
-    return (root + over) / 2, (1 + over / root) / 2
+    root = np.sqrt(excess**2 + width**2)
+    return (root + excess) / 2, (1 + excess / root) / 2
 
 
-def limit_rows(
+def limit_residual(
     tree: Tree, q: Coordinates, *, margin: float, weight: float
 ) -> tuple[Float[np.ndarray, "T D"], Float[np.ndarray, "T D"]]:
-    """Hinges nearer than `margin` [rad] to a limit (less where the range is small): a residual for
-    each column, and how fast it grows with that column."""
-    rows, residuals = np.zeros((2, len(q), tree.size))
+    """Hinges should keep `margin` [rad] from their limits: a residual for each dof, and its
+    derivative by that dof.
+
+    r = w (one_sided(angle - (upper - m)) - one_sided(lower + m - angle)), m the margin or a tenth
+    of a small range, rounded over a quarter of `margin`. The weight [1/rad].
+    """
+    derivatives, residuals = np.zeros((2, len(q), tree.nv))
     hinges = ~tree.balls
-    at = tree.starts[hinges]
+    at = tree.dof_starts[hinges]
     lower, upper = tree.lower[hinges], tree.upper[hinges]
-    near = np.minimum(margin, 0.1 * (upper - lower))
+    m = np.minimum(margin, 0.1 * (upper - lower))
     angles = q.angles[:, hinges]
-    above, rising = one_sided(angles - (upper - near), margin / 4)
-    below, falling = one_sided(lower + near - angles, margin / 4)
-    rows[:, at] = weight * (rising + falling)
+    above, rising = one_sided(angles - (upper - m), margin / 4)
+    below, falling = one_sided(lower + m - angles, margin / 4)
+    derivatives[:, at] = weight * (rising + falling)
     residuals[:, at] = weight * (above - below)
-    return residuals, rows
+    return residuals, derivatives

@@ -1,9 +1,11 @@
-"""Forward kinematics of hinges and balls for a whole trajectory at once, and its derivatives.
+"""Forward kinematics of a tree of hinges and balls, and its Jacobians, for whole trajectories.
 
-Everything is told in the rest pose (MuJoCo's `qpos0`): a joint is an axis through an anchor, and a
-motion is a product of exponentials (Brockett 1984; Lynch and Park, "Modern Robotics", ch. 4). So
-axes need not meet in a point, and no body frames are needed.
-Time is the last axis of every array in here: numpy then runs over long contiguous rows.
+Everything is given in the rest pose (MuJoCo's `qpos0`): a joint is an axis through an anchor, and a
+link's pose is a product of exponentials of the joint twists above it (Brockett 1984; Lynch and
+Park, "Modern Robotics", ch. 4). So axes need not meet in a point, and no body frames are needed.
+
+Time is the last axis of the arrays of `LinkPoses` and of the Jacobians: numpy then runs over long
+contiguous rows. `Coordinates` has it first, as files and other trajectories do.
 """
 
 from collections.abc import Iterable
@@ -22,16 +24,20 @@ from spark.rotation import (
     quat_normalize,
 )
 
-BASE = 6  # columns of the base: its position, then its rotation, both in world axes
-ROOT = -1  # the base as a link
+BASE = 6  # degrees of freedom of the base: a shift [m], then a rotation vector [rad], world axes
+ROOT = -1  # the base's number as a link
 
 
 @dataclass(frozen=True, eq=False)
 class Tree:
     """Joints with parents before children; joint i moves link i, and -1 is the base.
 
-    `anchors` [m] and `axes` are in the rest pose's world; a ball has three axes, the world's.
+    `anchors` [m] and unit `axes` are in the rest pose's world; a ball has three axes, the world's.
     `lower` and `upper` [rad] limit hinges, measured from the rest pose; infinite where unlimited.
+    `base` [m] is the place of the base in the rest pose.
+
+    A small change of the coordinates is a vector of `nv` degrees of freedom (dofs): six of the
+    base, then one a hinge [rad] and three a ball (a rotation vector [rad] in the parent's axes).
     """
 
     parents: Int[np.ndarray, "N"]
@@ -46,20 +52,20 @@ class Tree:
         return len(self.parents)
 
     @cached_property
-    def starts(self) -> Int[np.ndarray, "N"]:
-        """The first column of each joint; the base has the first six."""
+    def dof_starts(self) -> Int[np.ndarray, "N"]:
+        """The first dof of each joint; the base has the first six."""
         widths = np.where(self.balls, 3, 1)
         return BASE + np.cumsum(widths) - widths
 
     @cached_property
-    def size(self) -> int:
-        """The number of columns."""
+    def nv(self) -> int:
+        """The number of dofs (MuJoCo's nv)."""
         return BASE + int(np.where(self.balls, 3, 1).sum())
 
-    def within(self, short: float) -> tuple[Float[np.ndarray, "N"], Float[np.ndarray, "N"]]:
-        """The limits drawn in by some angle [rad], or by a twentieth of a small range."""
+    def limits_within(self, margin: float) -> tuple[Float[np.ndarray, "N"], Float[np.ndarray, "N"]]:
+        """Lower and upper limits drawn in by `margin` [rad], or by 1/20 of a small range."""
         with np.errstate(invalid="ignore"):
-            kept = np.minimum(short, 0.05 * (self.upper - self.lower))
+            kept = np.minimum(margin, 0.05 * (self.upper - self.lower))
         return self.lower + kept, self.upper - kept
 
     def chain(self, link: int) -> tuple[int, ...]:
@@ -70,184 +76,192 @@ class Tree:
             link = int(self.parents[link])
         return tuple(reversed(joints))
 
-    def columns(self, joints: tuple[int, ...]) -> list[int]:
-        """The columns of some joints, in order."""
-        return [int(self.starts[j]) + k for j in joints for k in range(3 if self.balls[j] else 1)]
+    def dofs(self, joints: tuple[int, ...]) -> list[int]:
+        """The dofs of some joints, in order."""
+        return [
+            int(self.dof_starts[j]) + k for j in joints for k in range(3 if self.balls[j] else 1)
+        ]
 
 
 @dataclass(frozen=True, eq=False)
 class Coordinates:
-    """A trajectory: the base's place and rotation since the rest pose, hinge angles since the rest
-    pose [rad] and, where there are balls, their rotations in the parent link (`q_parent_joint`).
+    """A trajectory of T frames, all since the rest pose: the base's position [m] and rotation, the
+    hinges' angles [rad] and, where there are balls, their rotations in the parent link
+    (`q_parent_joint`, wxyz); a joint's entry in the other kind's array is meaningless.
     """
 
     pos: Float[np.ndarray, "T 3"]
     quat: Float[np.ndarray, "T 4"]
     angles: Float[np.ndarray, "T N"]
-    turns: Float[np.ndarray, "T N 4"] | None = None
+    ball_quats: Float[np.ndarray, "T N 4"] | None = None
 
     def __len__(self) -> int:
         return len(self.pos)
 
-    def at_limits(self, tree: Tree, short: float) -> Float[np.ndarray, "T D"]:
-        """For each column 1 where its hinge stands `short` [rad] of its upper limit or beyond (less
-        where its range is small), -1 at the lower, 0 elsewhere."""
-        out = np.zeros((len(self), tree.size))
+    def at_limits(self, tree: Tree, margin: float) -> Float[np.ndarray, "T D"]:
+        """For each dof +1 where its hinge is within `margin` [rad] of its upper limit (less where
+        its range is small), -1 at the lower limit, 0 elsewhere."""
+        out = np.zeros((len(self), tree.nv))
         hinges = ~tree.balls
-        lower, upper = tree.within(short)
+        lower, upper = tree.limits_within(margin)
         angles = self.angles[:, hinges]
-        out[:, tree.starts[hinges]] = (angles >= upper[hinges] - 1e-9) * 1.0 - (
+        out[:, tree.dof_starts[hinges]] = (angles >= upper[hinges] - 1e-9) * 1.0 - (
             angles <= lower[hinges] + 1e-9
         )
         return out
 
-    def clipped(self, tree: Tree, short: float) -> "Coordinates":
-        """The same with hinges no nearer to their limits than `short` [rad]."""
-        lower, upper = tree.within(short)
+    def clipped(self, tree: Tree, margin: float) -> "Coordinates":
+        """The same with hinges at least `margin` [rad] from their limits."""
+        lower, upper = tree.limits_within(margin)
         angles = np.where(tree.balls, self.angles, np.clip(self.angles, lower, upper))
-        return Coordinates(self.pos, self.quat, angles, self.turns)
+        return Coordinates(self.pos, self.quat, angles, self.ball_quats)
 
     def at(self, frames: slice | Int[np.ndarray, "S"]) -> "Coordinates":
         """Those of some frames."""
-        turns = None if self.turns is None else self.turns[frames]
-        return Coordinates(self.pos[frames], self.quat[frames], self.angles[frames], turns)
+        balls = None if self.ball_quats is None else self.ball_quats[frames]
+        return Coordinates(self.pos[frames], self.quat[frames], self.angles[frames], balls)
 
     def replaced(self, frames: Int[np.ndarray, "S"], others: "Coordinates") -> "Coordinates":
-        """The same but for some frames."""
+        """The same with some frames taken from `others`."""
         pos, quat, angles = self.pos.copy(), self.quat.copy(), self.angles.copy()
         pos[frames], quat[frames], angles[frames] = others.pos, others.quat, others.angles
-        turns = None
-        if self.turns is not None:
-            turns = self.turns.copy()
-            turns[frames] = others.turns
-        return Coordinates(pos, quat, angles, turns)
+        balls = None
+        if self.ball_quats is not None:
+            balls = self.ball_quats.copy()
+            balls[frames] = others.ball_quats
+        return Coordinates(pos, quat, angles, balls)
 
     def every(self, stride: int) -> "Coordinates":
         """Those of every `stride`-th frame."""
         return self.at(slice(None, None, stride))
 
-    def between(self, stride: int, frames: int) -> "Coordinates":
-        """The cubic splines through these, for `stride` times as many frames."""
+    def upsampled(self, stride: int, frames: int) -> "Coordinates":
+        """The inverse of `every`: natural cubic splines through these, at `frames` frames."""
         time = np.arange(frames) / stride
 
         def spline(values: Float[np.ndarray, "K *n"]) -> Float[np.ndarray, "T *n"]:
             return CubicSpline(np.arange(len(values)), values, bc_type="natural")(time)
 
-        turns = self.turns
+        balls = self.ball_quats
         return Coordinates(
             spline(self.pos),
             quat_normalize(spline(quat_continuous(self.quat))),
             spline(self.angles),
-            None if turns is None else quat_normalize(spline(quat_continuous(turns))),
+            None if balls is None else quat_normalize(spline(quat_continuous(balls))),
         )
 
-    def moved(self, tree: Tree, step: Float[np.ndarray, "T D"]) -> "Coordinates":
-        """The trajectory after a small step in the tree's columns."""
+    def integrated(self, tree: Tree, step: Float[np.ndarray, "T D"]) -> "Coordinates":
+        """The trajectory after a small step in the tree's dofs (MuJoCo's mj_integratePos):
+        rotations by the exponential map, from the left."""
         hinges = ~tree.balls
         angles = self.angles.copy()
-        angles[:, hinges] += step[:, tree.starts[hinges]]
-        turns = None
-        if self.turns is not None:
-            turns = self.turns.copy()
+        angles[:, hinges] += step[:, tree.dof_starts[hinges]]
+        balls = None
+        if self.ball_quats is not None:
+            balls = self.ball_quats.copy()
             for j in np.flatnonzero(tree.balls):
-                at = tree.starts[j]
-                turns[:, j] = quat_mul(quat_from_rotvec(step[:, at : at + 3]), turns[:, j])
+                at = tree.dof_starts[j]
+                balls[:, j] = quat_mul(quat_from_rotvec(step[:, at : at + 3]), balls[:, j])
         quat = quat_mul(quat_from_rotvec(step[:, 3:6]), self.quat)
-        return Coordinates(self.pos + step[:, :3], quat, angles, turns)
+        return Coordinates(self.pos + step[:, :3], quat, angles, balls)
 
 
 @dataclass(frozen=True, eq=False)
-class Frames:
-    """Where every link is: rotations since the rest pose, and places of the joints' anchors [m].
+class LinkPoses:
+    """Where every link is in every frame: its rotation matrix since the rest pose, and the position
+    of its joint's anchor [m, world].
 
-    The last entry of the arrays is the base, so that index -1 means what it says.
+    The arrays have L = N + 1 entries: the last is the base, so that index -1 means what it says.
     """
 
     tree: Tree
-    turns: Float[np.ndarray, "L 3 3 T"]
-    places: Float[np.ndarray, "L 3 T"]
+    rotations: Float[np.ndarray, "L 3 3 T"]
+    positions: Float[np.ndarray, "L 3 T"]
 
-    def at(self, frames: Int[np.ndarray, "S"], links: Iterable[int] | None = None) -> "Frames":
-        """The same in some of the frames; only `links` where they are named."""
+    def at(self, frames: Int[np.ndarray, "S"], links: Iterable[int] | None = None) -> "LinkPoses":
+        """The same in some of the frames; only `links` where they are named, the rest undefined."""
         if links is None:
-            return Frames(self.tree, self.turns[..., frames], self.places[..., frames])
-        turns = np.empty((*self.turns.shape[:-1], len(frames)))
-        places = np.empty((*self.places.shape[:-1], len(frames)))
+            return LinkPoses(self.tree, self.rotations[..., frames], self.positions[..., frames])
+        rotations = np.empty((*self.rotations.shape[:-1], len(frames)))
+        positions = np.empty((*self.positions.shape[:-1], len(frames)))
         for link in links:
-            turns[link] = self.turns[link][..., frames]
-            places[link] = self.places[link][..., frames]
-        return Frames(self.tree, turns, places)
+            rotations[link] = self.rotations[link][..., frames]
+            positions[link] = self.positions[link][..., frames]
+        return LinkPoses(self.tree, rotations, positions)
 
     def point(self, link: int, rest: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 T"]:
-        """A point of a link, given where it is in the rest pose [m, world]."""
+        """The path [m] of a point of a link, given where it is in the rest pose [m, world]."""
         anchor = self.tree.base if link < 0 else self.tree.anchors[link]
-        return self.places[link] + self.direction(link, rest - anchor)
+        return self.positions[link] + self.direction(link, rest - anchor)
 
     def direction(self, link: int, rest: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 T"]:
         """A direction that is fixed in a link, given in the rest pose's world."""
-        return _apply(self.turns[link], rest)
+        return _apply(self.rotations[link], rest)
 
     def axis(self, joint: int, k: int) -> Float[np.ndarray, "3 T"]:
-        """The axis [world] of a joint's column k."""
+        """The axis [world] of a joint's dof k."""
         parent = int(self.tree.parents[joint])
         if self.tree.balls[joint]:
-            return self.turns[parent][:, k]
+            return self.rotations[parent][:, k]
         return self.direction(parent, self.tree.axes[joint])
 
-    def turn_columns(self, joints: tuple[int, ...]) -> Float[np.ndarray, "C 3 T"]:
-        """How fast [1] a link's rotation vector grows with each column of some joints above it."""
+    def angular_jacobian(self, joints: tuple[int, ...]) -> Float[np.ndarray, "C 3 T"]:
+        """The Jacobian of a link's rotation vector [rad, world] by the C dofs of some joints above
+        it: their axes."""
         tree = self.tree
         return np.stack(
             [self.axis(j, k) for j in joints for k in range(3 if tree.balls[j] else 1)]
-            or [np.zeros((3, self.places.shape[2]))]
-        )[: len(tree.columns(joints))]
+            or [np.zeros((3, self.positions.shape[2]))]
+        )[: len(tree.dofs(joints))]
 
-    def point_columns(
+    def point_jacobian(
         self,
         joints: tuple[int, ...],
         axes: Float[np.ndarray, "C 3 T"],
         point: Float[np.ndarray, "3 T"],
     ) -> Float[np.ndarray, "C 3 T"]:
-        """How fast a point moves with each column of some joints above it; `axes` are theirs."""
+        """The Jacobian of a link's point [m] by the C dofs [rad] of some joints above it: their
+        twists there, axis x (point - anchor); `axes` is their `angular_jacobian`."""
         out = np.empty_like(axes)
         row = 0
         for j in joints:
-            arm = point - self.places[j]
+            arm = point - self.positions[j]
             for _ in range(3 if self.tree.balls[j] else 1):
                 cross(axes[row], arm, out[row])
                 row += 1
         return out
 
 
-def forward(tree: Tree, q: Coordinates) -> Frames:
-    """All links in all frames."""
+def forward_kinematics(tree: Tree, q: Coordinates) -> LinkPoses:
+    """The poses of all links in all frames."""
     count, time = len(tree), len(q)
-    turns = np.empty((count + 1, 3, 3, time))
-    places = np.empty((count + 1, 3, time))
-    turns[-1] = np.moveaxis(matrix_from_quat(q.quat), 0, -1)
-    places[-1] = q.pos.T
+    rotations = np.empty((count + 1, 3, 3, time))
+    positions = np.empty((count + 1, 3, time))
+    rotations[-1] = np.moveaxis(matrix_from_quat(q.quat), 0, -1)
+    positions[-1] = q.pos.T
     sin, cos = np.sin(q.angles.T), np.cos(q.angles.T)
     for j, parent in enumerate(tree.parents.tolist()):
-        above = turns[parent]
+        above = rotations[parent]
         anchor = tree.base if parent < 0 else tree.anchors[parent]
-        places[j] = places[parent] + _apply(above, tree.anchors[j] - anchor)
+        positions[j] = positions[parent] + _apply(above, tree.anchors[j] - anchor)
         if tree.balls[j]:
-            assert q.turns is not None
-            local = np.moveaxis(matrix_from_quat(q.turns[:, j]), 0, -1)
-            turns[j] = np.einsum("ijt,jkt->ikt", above, local)
+            assert q.ball_quats is not None
+            local = np.moveaxis(matrix_from_quat(q.ball_quats[:, j]), 0, -1)
+            rotations[j] = np.einsum("ijt,jkt->ikt", above, local)
         else:
+            # Rodrigues' formula: R (1 + sin K + (1 - cos) K^2), K the axis' cross product matrix
             K = skew(tree.axes[j])
             rows = above.transpose(1, 0, 2).reshape(3, -1)  # columns of R, rows and time together
             crossed = (K.T @ rows).reshape(3, 3, time)
             twice = (K.T @ crossed.reshape(3, -1)).reshape(3, 3, time)
-            turns[j] = above + (sin[j] * crossed + (1 - cos[j]) * twice).transpose(1, 0, 2)
-    return Frames(tree, turns, places)
+            rotations[j] = above + (sin[j] * crossed + (1 - cos[j]) * twice).transpose(1, 0, 2)
+    return LinkPoses(tree, rotations, positions)
 
 
 def _apply(
-    turns: Float[np.ndarray, "3 3 T"], v: Float[np.ndarray, "3"]
+    rotations: Float[np.ndarray, "3 3 T"], v: Float[np.ndarray, "3"]
 ) -> Float[np.ndarray, "3 T"]:
-    return turns[:, 0] * v[0] + turns[:, 1] * v[1] + turns[:, 2] * v[2]
+    return rotations[:, 0] * v[0] + rotations[:, 1] * v[1] + rotations[:, 2] * v[2]
 
 
 def skew(v: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:

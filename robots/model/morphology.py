@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 
 from robots.model.mjcf import Mjcf
 from robots.model.tpose import rest_pose
-from robots.tree import Coordinates, Tree, forward
+from robots.tree import Coordinates, Tree, forward_kinematics
 from spark.kinematics import world_positions
 from spark.motion import Motion
 from spark.rig.rig import Rig
@@ -84,7 +84,8 @@ class Morphology:
         return data.xquat[self.mjcf.root].copy(), data.xquat[bodies].reshape(-1, 4).copy()
 
     def to_qpos(self, q: Coordinates) -> Float[np.ndarray, "T nq"]:
-        """MuJoCo's coordinates: position, quaternion wxyz, joints; the rest as in `qpos0`."""
+        """MuJoCo's qpos: base position [m], base quaternion wxyz, joints [rad; wxyz for balls], in
+        the order of the model; what is not the robot's stays at `qpos0`."""
         model, tree = self.mjcf.model, self.tree
         qpos = np.tile(model.qpos0, (len(q), 1))
         root_quat, body_quats = self._rest_quats
@@ -94,10 +95,10 @@ class Morphology:
         hinges = ~tree.balls
         qpos[:, self._addresses[hinges]] += q.angles[:, hinges]
         for j in np.flatnonzero(tree.balls):
-            assert q.turns is not None
+            assert q.ball_quats is not None
             at = int(self._addresses[j])
-            turn = quat_relative(body_quats[j], quat_mul(q.turns[:, j], body_quats[j]))
-            qpos[:, at : at + 4] = quat_continuous(turn)
+            local = quat_relative(body_quats[j], quat_mul(q.ball_quats[:, j], body_quats[j]))
+            qpos[:, at : at + 4] = quat_continuous(local)
         return qpos
 
     def from_qpos(self, qpos: Float[np.ndarray, "T nq"]) -> Coordinates:
@@ -108,16 +109,16 @@ class Morphology:
         angles = np.zeros((len(qpos), len(tree)))
         hinges = ~tree.balls
         angles[:, hinges] = qpos[:, self._addresses[hinges]] - model.qpos0[self._addresses[hinges]]
-        turns = None
+        balls = None
         if tree.balls.any():
-            turns = np.tile([1.0, 0, 0, 0], (len(qpos), len(tree), 1))
+            balls = np.tile([1.0, 0, 0, 0], (len(qpos), len(tree), 1))
             for j in np.flatnonzero(tree.balls):
                 at = int(self._addresses[j])
-                turn = quat_normalize(qpos[:, at : at + 4])
-                turns[:, j] = quat_mul(body_quats[j], quat_mul(turn, quat_conj(body_quats[j])))
+                local = quat_normalize(qpos[:, at : at + 4])
+                balls[:, j] = quat_mul(body_quats[j], quat_mul(local, quat_conj(body_quats[j])))
         quat = quat_normalize(qpos[:, base + 3 : base + 7])
         return Coordinates(
-            qpos[:, base : base + 3].copy(), quat_mul(quat, quat_conj(root_quat)), angles, turns
+            qpos[:, base : base + 3].copy(), quat_mul(quat, quat_conj(root_quat)), angles, balls
         )
 
     def sole_offsets(self, sole: Sole) -> tuple[Int[np.ndarray, "4"], Float[np.ndarray, "4 3"]]:
@@ -138,15 +139,15 @@ class Morphology:
     def motion(self, q: Coordinates, frame_time: float) -> Motion:
         """The same motion on the rig's skeleton. Axes that miss each other move the joints' centres
         against each other by millimetres: `translations` says so."""
-        frames = forward(self.tree, q)
-        world = quat_from_matrix(np.moveaxis(frames.turns[self.links], -1, 0))
-        places = np.stack(
-            [frames.point(int(k), c).T for k, c in zip(self.links, self.centers, strict=True)], 1
+        poses = forward_kinematics(self.tree, q)
+        world = quat_from_matrix(np.moveaxis(poses.rotations[self.links], -1, 0))
+        positions = np.stack(
+            [poses.point(int(k), c).T for k, c in zip(self.links, self.centers, strict=True)], 1
         )
         parents = self.rig.skeleton.parents[1:]
-        local, offsets = world.copy(), places.copy()
+        local, offsets = world.copy(), positions.copy()
         local[:, 1:] = quat_relative(world[:, parents], world[:, 1:])
         turned = matrix_from_quat(quat_conj(world[:, parents]))
-        steps = places[:, 1:] - places[:, parents]
+        steps = positions[:, 1:] - positions[:, parents]
         offsets[:, 1:] = (turned @ steps[..., None])[..., 0]
-        return Motion(self.rig.skeleton, frame_time, places[:, 0], local, offsets)
+        return Motion(self.rig.skeleton, frame_time, positions[:, 0], local, offsets)

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from robots.least_squares import Normal
-from robots.residuals import Rows, direction_rows, limit_rows, turn_rows
-from robots.tree import BASE, Coordinates, Tree, forward
+from robots.least_squares import NormalEquations
+from robots.residuals import Linearized, direction_residual, limit_residual, rotation_residual
+from robots.tree import BASE, Coordinates, Tree, forward_kinematics
 from spark.rig.bones import RigPose
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import matrix_from_quat, quat_between, quat_from_matrix, quat_mul, quat_rotate
@@ -54,9 +54,9 @@ def search_tpose(
     damping = 1e-2
     for _ in range(_STEPS):
         normal = _linearize(tree, q, roles, links, ideal, goals, flexes, skeleton)
-        normal.pin(q.at_limits(tree, 0.0) * normal.g < 0)
-        step = normal.solve_apart(damping)
-        after = q.moved(tree, np.clip(step, -0.3, 0.3)).clipped(tree, 0.0)
+        normal.hold(q.at_limits(tree, 0.0) * normal.g < 0)
+        step = normal.solve_per_frame(damping)
+        after = q.integrated(tree, np.clip(step, -0.3, 0.3)).clipped(tree, 0.0)
         moved = max(np.abs(after.angles - q.angles).max(initial=0.0), np.abs(step[:, 3:6]).max())
         q = after
         if moved < _STILL:
@@ -66,10 +66,10 @@ def search_tpose(
         q.pos[[best]],
         q.quat[[best]],
         q.angles[[best]],
-        None if q.turns is None else q.turns[[best]],
+        None if q.ball_quats is None else q.ball_quats[[best]],
     )
-    frames = forward(tree, one)
-    world = quat_from_matrix(np.moveaxis(frames.turns[links], -1, 0))[0]
+    poses = forward_kinematics(tree, one)
+    world = quat_from_matrix(np.moveaxis(poses.rotations[links], -1, 0))[0]
     misses = {}
     fixes = {}
     for j, (bone, goal) in goals.items():
@@ -133,45 +133,47 @@ def _linearize(
     goals: dict[int, tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]],
     flexes: dict[int, tuple[int, Float[np.ndarray, "3"]]],
     skeleton: Skeleton,
-) -> Normal:
+) -> NormalEquations:
     count = len(q)
-    frames = forward(tree, q)
-    normal = Normal(count, tree.size)
+    poses = forward_kinematics(tree, q)
+    normal = NormalEquations(count, tree.nv)
     for j, role in enumerate(roles.roles):
         link = int(links[j])
         if role is None or (j and link == links[int(skeleton.parents[j])]):
             continue
         chain = tree.chain(link)
-        columns = [3, 4, 5, *tree.columns(chain)]
-        axes = np.concatenate([np.eye(3)[:, :, None].repeat(count, 2), frames.turn_columns(chain)])
+        columns = [3, 4, 5, *tree.dofs(chain)]
+        axes = np.concatenate(
+            [np.eye(3)[:, :, None].repeat(count, 2), poses.angular_jacobian(chain)]
+        )
         trunk = role in (Role.PELVIS, Role.SPINE, Role.NECK, Role.HEAD)
         weight = _TRUNK if trunk else _FOOT if str(role).endswith("foot") else _TURN
         target = matrix_from_quat(ideal[j])[:, :, None].repeat(count, 2)
-        _add(normal, columns, turn_rows(frames.turns[link], target, axes, weight))
+        _add(normal, columns, rotation_residual(poses.rotations[link], target, axes, weight))
         if j in goals:
             bone, goal = goals[j]
             wanted = goal[:, None].repeat(count, 1)
-            now = frames.direction(link, bone)
-            _add(normal, columns, direction_rows(now, wanted, axes, _BONE))
+            now = poses.direction(link, bone)
+            _add(normal, columns, direction_residual(now, wanted, axes, _BONE))
         if role in _BENDING and j in flexes:
             first, flex = flexes[j]
             wanted = _BENDING[role][:, None].repeat(count, 1)
             above = tree.chain(int(tree.parents[first]))
-            n = 3 + len(tree.columns(above))
-            axis = frames.direction(int(tree.parents[first]), flex)
-            _add(normal, columns[:n], direction_rows(axis, wanted, axes[:n], _HINGE))
-    at_rest = np.zeros((count, tree.size))
-    hinges = tree.starts[~tree.balls]
+            n = 3 + len(tree.dofs(above))
+            axis = poses.direction(int(tree.parents[first]), flex)
+            _add(normal, columns[:n], direction_residual(axis, wanted, axes[:n], _HINGE))
+    at_rest = np.zeros((count, tree.nv))
+    hinges = tree.dof_starts[~tree.balls]
     at_rest[:, hinges] = _REST * q.angles[:, ~tree.balls]
     damped = np.full(at_rest.shape, 1e-3)
     damped[:, BASE:] = _REST
     normal.add_diagonal(damped, at_rest)
-    over, slope = limit_rows(tree, q, margin=np.radians(1.0), weight=3.0)
+    over, slope = limit_residual(tree, q, margin=np.radians(1.0), weight=3.0)
     normal.add_diagonal(slope, over)
     return normal
 
 
-def _add(normal: Normal, columns: list[int], rows: Rows) -> None:
+def _add(normal: NormalEquations, columns: list[int], rows: Linearized) -> None:
     J, residuals = rows
     normal.add(columns, np.ascontiguousarray(J.transpose(2, 0, 1)), residuals)
 

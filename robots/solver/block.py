@@ -36,11 +36,11 @@ class Stage:
 
     def turning(self, joints: tuple[int, ...]) -> list[int]:
         """Where the columns of some joints are among the stage's."""
-        return [self.columns.index(column) for column in self.tree.columns(joints)]
+        return [self.columns.index(column) for column in self.tree.dofs(joints)]
 
     @cached_property
     def _free(self) -> frozenset[int]:
         return frozenset(self.joints)
 
     def _of(self, joints: tuple[int, ...]) -> list[int]:
-        return [*(range(BASE) if self.base else ()), *self.tree.columns(joints)]
+        return [*(range(BASE) if self.base else ()), *self.tree.dofs(joints)]

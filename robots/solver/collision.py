@@ -10,13 +10,13 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Float, Int
 
-from robots.least_squares import Normal
+from robots.least_squares import NormalEquations
 from robots.model.morphology import Morphology
 from robots.model.shapes import DIRECTIONS
 from robots.residuals import one_sided
 from robots.solver.block import Stage
 from robots.solver.hulls import Shape, ShapePair, meet, shapes_of
-from robots.tree import Frames, Tree, forward
+from robots.tree import LinkPoses, Tree, forward_kinematics
 
 APART = 0.0  # [m] that shapes keep between them; less where the T-pose has less
 EASE = 0.003  # [m]
@@ -46,11 +46,13 @@ class Collisions:
     pairs: tuple[ShapePair, ...]
     _known: dict[Stage, dict[Shape, list[Watched]]] = field(default_factory=dict)
 
-    def near(self, frames: Frames, stage: Stage, stride: int, within: float = NEAR) -> list[Near]:
+    def near(
+        self, frames: LinkPoses, stage: Stage, stride: int, within: float = NEAR
+    ) -> list[Near]:
         """The pairs that the stage moves against each other, where they are `within` so much [m];
         looked for in every `stride`-th frame and the last. Parts that a later stage moves have to
         give way in that one."""
-        count = frames.places.shape[2]
+        count = frames.positions.shape[2]
         looks = np.unique(np.append(np.arange(0, count, stride), count - 1))
         some = frames.at(looks)
         shapes = {x.geom: x for pair in self.pairs for x in (pair.small, pair.large)}
@@ -98,8 +100,8 @@ class Collisions:
 
     def add_to(
         self,
-        normal: Normal,
-        frames: Frames,
+        normal: NormalEquations,
+        frames: LinkPoses,
         stage: Stage,
         nears: Sequence[Near],
         weight: float,
@@ -123,25 +125,25 @@ class Collisions:
                 here = at[deep]
                 residual, slope = one_sided(over[s, deep], EASE / firm[here])
                 heavy = weight * firm[here]
-                if not normal.rows:
+                if not normal.with_jacobian:
                     normal.cost[here] += 0.5 * (heavy * residual) ** 2
                     continue
                 touched = frames.at(here, links)
                 beyond = DIRECTIONS @ seen[:, s, deep] - pair.large.reach[:, None]
                 side_here = DIRECTIONS[beyond.argmax(0)].T
-                push = np.einsum("ijt,jt->it", touched.turns[pair.large.link], side_here)
+                push = np.einsum("ijt,jt->it", touched.rotations[pair.large.link], side_here)
                 point = touched.point(pair.small.link, sphere)
                 J = [
                     approach(touched, moves, point, sign * push)
                     for moves, sign in zip(near.moves, (-1.0, 1.0), strict=True)
                     if moves
                 ]
-                normal.add_some(here, columns, np.concatenate(J) * slope * heavy, residual * heavy)
+                normal.add_at(here, columns, np.concatenate(J) * slope * heavy, residual * heavy)
 
 
 def _seen_from_large(
     tree: Tree,
-    frames: Frames,
+    frames: LinkPoses,
     pair: ShapePair,
     points: Float[np.ndarray, "S 3"],
     at: Int[np.ndarray, "N"],
@@ -150,9 +152,9 @@ def _seen_from_large(
     a, b = pair.small.link, pair.large.link
     anchor_a = tree.base if a < 0 else tree.anchors[a]
     anchor_b = tree.base if b < 0 else tree.anchors[b]
-    turn_b = frames.turns[b][..., at]
-    relative = np.einsum("jit,jkt->ikt", turn_b, frames.turns[a][..., at])
-    apart = np.einsum("jit,jt->it", turn_b, frames.places[a][:, at] - frames.places[b][:, at])
+    turn_b = frames.rotations[b][..., at]
+    relative = np.einsum("jit,jkt->ikt", turn_b, frames.rotations[a][..., at])
+    apart = np.einsum("jit,jt->it", turn_b, frames.positions[a][:, at] - frames.positions[b][:, at])
     turned = (points - anchor_a) @ relative
     turned += (apart + anchor_b[:, None])[:, None]
     return turned
@@ -160,7 +162,7 @@ def _seen_from_large(
 
 def _distance(
     tree: Tree,
-    frames: Frames,
+    frames: LinkPoses,
     pair: ShapePair,
     points: Float[np.ndarray, "S 3"],
     at: Int[np.ndarray, "N"],
@@ -181,13 +183,13 @@ def _outside(shape: Shape, points: Float[np.ndarray, "3 S N"]) -> Float[np.ndarr
 
 
 def approach(
-    frames: Frames,
+    frames: LinkPoses,
     joints: tuple[int, ...],
     point: Float[np.ndarray, "3 N"],
     along: Float[np.ndarray, "3 N"],
 ) -> Float[np.ndarray, "C N"]:
     """How fast a point moves along a direction with the columns of some joints."""
-    moved = frames.point_columns(joints, frames.turn_columns(joints), point)
+    moved = frames.point_jacobian(joints, frames.angular_jacobian(joints), point)
     return (moved * along).sum(1)
 
 
@@ -197,7 +199,7 @@ def collisions_of(robot: Morphology) -> Collisions:
     that the file excludes. What touches in the T-pose may stay as near as it is there."""
     mjcf, tree = robot.mjcf, robot.tree
     shapes = shapes_of(mjcf, robot.mj_joints)
-    frames = forward(tree, robot.tpose)
+    frames = forward_kinematics(tree, robot.tpose)
     pairs = []
     for i, a in enumerate(shapes):
         for b in shapes[i + 1 :]:

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
-from robots.least_squares import Normal, Ties
+from robots.least_squares import NormalEquations, Smoothness
 from robots.model.morphology import Morphology
 from robots.solver.block import Stage
 from robots.solver.collision import collisions_of
@@ -14,7 +14,7 @@ from robots.solver.footprints import Footing
 from robots.solver.objective import linearize
 from robots.solver.smoothness import jolted, ties_of
 from robots.solver.targets import Targets
-from robots.tree import Coordinates, forward
+from robots.tree import Coordinates, forward_kinematics
 
 _AROUND = 0.15  # [s] before and after a frame in which a step must not do harm
 _WIDE, _GIVEN = 0.5, 0.5  # [s] around it, and of what is gained there a frame may lose so much
@@ -73,14 +73,14 @@ def solve_stage(
     damping = least
     start = q if apart else None
     stride = 1 if mending else stride_of(targets)
-    nears = collisions_of(robot).near(forward(tree, q), stage, stride) if apart else []
+    nears = collisions_of(robot).near(forward_kinematics(tree, q), stage, stride) if apart else []
     stiffer = np.ones((max(len(q) - 2, 0), len(stage.columns)))
 
-    def look(q: Coordinates, rows: bool = True) -> Normal:
+    def look(q: Coordinates, rows: bool = True) -> NormalEquations:
         exact = mending is not None
         return linearize(robot, targets, footing, q, stage, nears, firm, rows=rows, exact=exact)
 
-    def tie(q: Coordinates) -> Ties:
+    def tie(q: Coordinates) -> Smoothness:
         return ties_of(robot, q, start, targets.frame_time, stage.columns, stiffer, firm)
 
     normal, idle = look(q), 0
@@ -89,15 +89,15 @@ def solve_stage(
         ties = tie(q)
         cost = uniform_filter1d(normal.cost + ties.cost(len(q)), window)
         limits = q.at_limits(tree, SHORT_OF_LIMIT)[:, stage.columns]
-        step = np.zeros((len(q), tree.size))
-        step[:, stage.columns] = normal.solve_together(ties, damping, limits)
+        step = np.zeros((len(q), tree.nv))
+        step[:, stage.columns] = normal.solve_coupled(ties, damping, limits)
         long = np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(1), 1e-9))
         step *= eased(long, window)[:, None]
         share = np.ones(len(q))
         for _ in range(_HALVINGS if mending else 1):
-            trial = q.moved(tree, step).clipped(tree, SHORT_OF_LIMIT)
+            trial = q.integrated(tree, step).clipped(tree, SHORT_OF_LIMIT)
             if apart and k % _WATCH == _WATCH - 1:
-                nears = collisions_of(robot).near(forward(tree, trial), stage, stride)
+                nears = collisions_of(robot).near(forward_kinematics(tree, trial), stage, stride)
             there = look(trial, rows=k < most - 1)
             after = uniform_filter1d(there.cost + tie(trial).cost(len(q)), window)
             if not mending or after.sum() <= cost.sum():
@@ -112,8 +112,8 @@ def solve_stage(
         damping = np.maximum(damping, least)
         if worse.any():
             share = eased(1.0 - worse, window)
-            trial = q.moved(tree, step * share[:, None]).clipped(tree, SHORT_OF_LIMIT)
-            there = normal.mixed(there, share) if there.rows else there
+            trial = q.integrated(tree, step * share[:, None]).clipped(tree, SHORT_OF_LIMIT)
+            there = normal.blended(there, share) if there.with_jacobian else there
         q, normal = trial, there
         left = (cost + share * (after - cost)).sum()
         idle = idle + 1 if left > (1 - little) * cost.sum() else 0

@@ -8,13 +8,13 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from robots.least_squares import Normal
+from robots.least_squares import NormalEquations
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
 from robots.solver.block import Stage
 from robots.solver.collision import APART, EASE, Collisions, Near, approach, collisions_of
 from robots.solver.hulls import ShapePair
-from robots.tree import Frames
+from robots.tree import LinkPoses
 
 _FELT = 0.02  # [m] beyond which distances are not told apart
 
@@ -52,9 +52,9 @@ class Contacts:
 
     def add_to(
         self,
-        normal: Normal,
+        normal: NormalEquations,
         qpos: Float[np.ndarray, "T nq"],
-        frames: Frames,
+        frames: LinkPoses,
         stage: Stage,
         nears: Sequence[Near],
         weight: float,
@@ -69,7 +69,7 @@ class Contacts:
             here = x.frames[felt]
             heavy = weight * firm[here]
             residual, slope = one_sided(over[felt], EASE / firm[here])
-            if not normal.rows:
+            if not normal.with_jacobian:
                 normal.cost[here] += 0.5 * (heavy * residual) ** 2
                 continue
             touched = frames.at(here)
@@ -81,7 +81,7 @@ class Contacts:
                 if moves
             ]
             columns = stage.turning((*x.near.moves[0], *x.near.moves[1]))
-            normal.add_some(here, columns, np.concatenate(J) * slope * heavy, residual * heavy)
+            normal.add_at(here, columns, np.concatenate(J) * slope * heavy, residual * heavy)
 
     @cached_property
     def _apart(self) -> dict[ShapePair, float]:

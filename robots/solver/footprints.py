@@ -13,7 +13,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from robots.model.morphology import Morphology, Sole
 from robots.solver.targets import Targets
-from robots.tree import Coordinates, Frames, forward
+from robots.tree import Coordinates, LinkPoses, forward_kinematics
 from spark.kinematics import world_positions
 from spark.rotation import quat_rotate
 from spark.runs import true_runs
@@ -28,7 +28,7 @@ _SLIDE = 0.03  # of how firmly feet stand, so that they can slide to where they 
 class Footing:
     """For each corner of a sole: where it should stand [m, world], and how firmly (0 to 1)."""
 
-    places: Float[np.ndarray, "4 3 T"]
+    positions: Float[np.ndarray, "4 3 T"]
     holds: Float[np.ndarray, "4 3 T"]
 
     def every(self, stride: int) -> "Footing":
@@ -37,11 +37,11 @@ class Footing:
 
     def at(self, frames: slice | Int[np.ndarray, "S"]) -> "Footing":
         """That of some frames."""
-        return Footing(self.places[..., frames], self.holds[..., frames])
+        return Footing(self.positions[..., frames], self.holds[..., frames])
 
     def sliding(self) -> "Footing":
         """The same over the floor, but hardly held there."""
-        return Footing(self.places, self.holds * np.array([[_SLIDE], [_SLIDE], [1.0]]))
+        return Footing(self.positions, self.holds * np.array([[_SLIDE], [_SLIDE], [1.0]]))
 
 
 def plan_footing(robot: Morphology, targets: Targets) -> list[Footing]:
@@ -56,7 +56,7 @@ def plan_footing(robot: Morphology, targets: Targets) -> list[Footing]:
 def within_reach(robot: Morphology, footing: Sequence[Footing], q: Coordinates) -> list[Footing]:
     """Footprints where the feet of `q` stand on average: hips may not open as wide, or turn as far,
     as the planned ones ask."""
-    frames = forward(robot.tree, q)
+    frames = forward_kinematics(robot.tree, q)
     return [
         _moved(f, corners_of(frames, sole)) for f, sole in zip(footing, robot.soles, strict=True)
     ]
@@ -64,7 +64,7 @@ def within_reach(robot: Morphology, footing: Sequence[Footing], q: Coordinates) 
 
 def _moved(foot: Footing, corners: Float[np.ndarray, "4 3 T"]) -> Footing:
     """Each footprint shifted and turned, over the floor, as the sole's corners are on average."""
-    places = foot.places.copy()
+    places = foot.positions.copy()
     held = foot.holds[:, 0].max(0)
     for start, stop in true_runs(held > 0):
         weight = held[start:stop] / held[start:stop].sum()
@@ -79,7 +79,7 @@ def _moved(foot: Footing, corners: Float[np.ndarray, "4 3 T"]) -> Footing:
     return Footing(places, foot.holds)
 
 
-def corners_of(frames: Frames, sole: Sole) -> Float[np.ndarray, "4 3 T"]:
+def corners_of(frames: LinkPoses, sole: Sole) -> Float[np.ndarray, "4 3 T"]:
     """The corners of a sole [m, world]."""
     pairs = zip(sole.links, sole.points, strict=True)
     return np.stack([frames.point(int(link), point) for link, point in pairs])

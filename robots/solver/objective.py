@@ -8,15 +8,22 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from robots.least_squares import Normal
+from robots.least_squares import NormalEquations
 from robots.model.morphology import Morphology
-from robots.residuals import Rows, direction_rows, limit_rows, one_sided, point_columns, turn_rows
+from robots.residuals import (
+    Linearized,
+    direction_residual,
+    limit_residual,
+    one_sided,
+    point_jacobian,
+    rotation_residual,
+)
 from robots.solver.block import Stage
 from robots.solver.collision import Near, collisions_of
 from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.footprints import Footing
 from robots.solver.targets import Targets
-from robots.tree import Coordinates, Frames, forward
+from robots.tree import Coordinates, LinkPoses, forward_kinematics
 from spark.rig.roles import Role
 from spark.rotation import matrix_from_quat
 
@@ -52,21 +59,21 @@ class Block:
     Without `rows` only the residuals count: then there are no columns to look at.
     """
 
-    def __init__(self, stage: Stage, frames: Frames, link: int, rows: bool) -> None:
-        self.stage, self.frames = stage, frames
+    def __init__(self, stage: Stage, poses: LinkPoses, link: int, rows: bool) -> None:
+        self.stage, self.poses = stage, poses
         self.base = stage.base and rows
         self.joints = stage.free(link) if rows else ()
-        self.axes = frames.turn_columns(self.joints)
+        self.axes = poses.angular_jacobian(self.joints)
         if self.base:
-            self.axes = np.concatenate([_base_axes(frames), self.axes])
-        self.parts: list[tuple[int, Rows]] = []
+            self.axes = np.concatenate([_base_axes(poses), self.axes])
+        self.parts: list[tuple[int, Linearized]] = []
 
     def turning(self, link: int) -> Float[np.ndarray, "C 3 T"]:
         """The axes of the columns that turn a link of the chain."""
-        kept = len(self.frames.tree.columns(self._until(link)))
+        kept = len(self.poses.tree.dofs(self._until(link)))
         return self.axes[: kept + (3 if self.base else 0)]
 
-    def turn(self, rows: Rows) -> None:
+    def turn(self, rows: Linearized) -> None:
         """Residuals of a direction or a rotation."""
         self.parts.append((3 if self.base else 0, rows))
 
@@ -79,10 +86,10 @@ class Block:
     ) -> None:
         """Residuals of a point's place."""
         chain, axes = self._until(link), self.turning(link)
-        moved = point_columns(self.frames, chain, axes, point, base=self.base)
+        moved = point_jacobian(self.poses, chain, axes, point, base=self.base)
         self.parts.append((0, (moved * weight, (point - wanted) * weight)))
 
-    def add_to(self, normal: Normal) -> None:
+    def add_to(self, normal: NormalEquations) -> None:
         """Into the stage's normal equations."""
         if not self.parts:
             return
@@ -97,7 +104,7 @@ class Block:
         normal.add(columns, J, residuals)
 
     def _until(self, link: int) -> tuple[int, ...]:
-        chain = self.frames.tree.chain(link)
+        chain = self.poses.tree.chain(link)
         return tuple(j for j in self.joints if j in chain)
 
 
@@ -112,14 +119,14 @@ def linearize(
     *,
     rows: bool = True,
     exact: bool = False,
-) -> Normal:
+) -> NormalEquations:
     """The normal equations of a stage at `q`; without `rows` nothing but what it costs. `firm` is
     by how much touching and sinking weigh more, a frame; `exact` measures where parts touch."""
     tree, rig = robot.tree, robot.rig
-    frames = forward(tree, q)
-    normal = Normal(len(q), len(stage.columns), rows)
+    poses = forward_kinematics(tree, q)
+    normal = NormalEquations(len(q), len(stage.columns), rows)
     firm = np.ones(len(q)) if firm is None else firm
-    blocks = {link: Block(stage, frames, link, rows) for link in _ends(robot, stage)}
+    blocks = {link: Block(stage, poses, link, rows) for link in _ends(robot, stage)}
     chest = rig.chest
     for j, role in enumerate(rig.roles.roles):
         link = int(robot.links[j])
@@ -128,34 +135,38 @@ def linearize(
             continue
         own = j == 0 or link != robot.links[int(rig.skeleton.parents[j])]
         if own and (link in stage.joints or (stage.base and (link < 0 or j == rig.pelvis))):
-            _follow(robot, targets, frames, block, j, role)
+            _follow(robot, targets, poses, block, j, role)
         if j == chest and stage.base:
             wanted = np.moveaxis(matrix_from_quat(targets.chest), 0, -1)
-            block.turn(turn_rows(frames.turns[link], wanted, block.turning(link), TURNS["chest"]))
+            block.turn(
+                rotation_residual(
+                    poses.rotations[link], wanted, block.turning(link), TURNS["chest"]
+                )
+            )
     if stage.base:
-        _stand(robot, targets, footing, frames, blocks, firm)
+        _stand(robot, targets, footing, poses, blocks, firm)
     elif targets.hands is not None:
-        _clap(robot, targets, frames, stage, normal, rows)
+        _clap(robot, targets, poses, stage, normal, rows)
     for block in blocks.values():
         block.add_to(normal)
     touch = TOUCH_LEGS if stage.base else TOUCH
     if exact:
-        exact_contacts_of(robot).add_to(normal, robot.to_qpos(q), frames, stage, nears, touch, firm)
+        exact_contacts_of(robot).add_to(normal, robot.to_qpos(q), poses, stage, nears, touch, firm)
     else:
-        collisions_of(robot).add_to(normal, frames, stage, nears, touch, firm)
-    over, slope = limit_rows(tree, q, margin=MARGIN, weight=LIMIT)
+        collisions_of(robot).add_to(normal, poses, stage, nears, touch, firm)
+    over, slope = limit_residual(tree, q, margin=MARGIN, weight=LIMIT)
     normal.add_diagonal(slope[:, stage.columns], over[:, stage.columns])
-    idle, away = np.full((2, len(q), tree.size), 1e-3)
+    idle, away = np.full((2, len(q), tree.nv), 1e-3)
     away[:] = 0.0
     hinges = ~tree.balls
-    idle[:, tree.starts[hinges]] = IDLE
-    away[:, tree.starts[hinges]] = IDLE * (q.angles - robot.tpose.angles)[:, hinges]
+    idle[:, tree.dof_starts[hinges]] = IDLE
+    away[:, tree.dof_starts[hinges]] = IDLE * (q.angles - robot.tpose.angles)[:, hinges]
     normal.add_diagonal(idle[:, stage.columns], away[:, stage.columns])
     return normal
 
 
-def _base_axes(frames: Frames) -> Float[np.ndarray, "3 3 T"]:
-    return np.broadcast_to(np.eye(3)[:, :, None], (3, 3, frames.places.shape[2]))
+def _base_axes(poses: LinkPoses) -> Float[np.ndarray, "3 3 T"]:
+    return np.broadcast_to(np.eye(3)[:, :, None], (3, 3, poses.positions.shape[2]))
 
 
 def _ends(robot: Morphology, stage: Stage) -> list[int]:
@@ -175,22 +186,22 @@ def _block_of(blocks: dict[int, Block], robot: Morphology, link: int) -> Block |
 
 
 def _follow(
-    robot: Morphology, targets: Targets, frames: Frames, block: Block, j: int, role: Role
+    robot: Morphology, targets: Targets, poses: LinkPoses, block: Block, j: int, role: Role
 ) -> None:
     link = int(robot.links[j])
     axes = block.turning(link)
     wanted = np.moveaxis(matrix_from_quat(targets.world[:, j]), 0, -1)
-    block.turn(turn_rows(frames.turns[link], wanted, axes, TURNS.get(role.part, TURN)))
+    block.turn(rotation_residual(poses.rotations[link], wanted, axes, TURNS.get(role.part, TURN)))
     if role in targets.bones and (bone := robot.bones.get(role)) is not None:
-        now = frames.direction(link, bone)
-        block.turn(direction_rows(now, targets.bones[role].T, axes, DIRECTION))
+        now = poses.direction(link, bone)
+        block.turn(direction_residual(now, targets.bones[role].T, axes, DIRECTION))
 
 
 def _stand(
     robot: Morphology,
     targets: Targets,
     footing: Sequence[Footing],
-    frames: Frames,
+    poses: LinkPoses,
     blocks: dict[int, Block],
     firm: Float[np.ndarray, "T"],
 ) -> None:
@@ -201,14 +212,14 @@ def _stand(
     assert block is not None
     middle = robot.centers[robot.rig.hips].mean(0)
     path = np.repeat(PATH[:, None], count, axis=1)
-    block.point(pelvis, frames.point(pelvis, middle), targets.hips.T, path)
+    block.point(pelvis, poses.point(pelvis, middle), targets.hips.T, path)
     for sole, foot in zip(robot.soles, footing, strict=True):
         for c, (link, rest) in enumerate(zip(sole.links, sole.points, strict=True)):
             foot_block = _block_of(blocks, robot, int(link))
             assert foot_block is not None
-            point = frames.point(int(link), rest)
+            point = poses.point(int(link), rest)
             weight = STAND[:, None] * foot.holds[c]
-            foot_block.point(int(link), point, foot.places[c], weight)
+            foot_block.point(int(link), point, foot.positions[c], weight)
             # Not below the floor, whether it stands or not.
             depth, slope = one_sided(-point[2], SINK_EASE / firm)
             up = np.stack([np.zeros(count), np.zeros(count), -SINK * firm * slope])
@@ -218,9 +229,9 @@ def _stand(
 def _clap(
     robot: Morphology,
     targets: Targets,
-    frames: Frames,
+    poses: LinkPoses,
     stage: Stage,
-    normal: Normal,
+    normal: NormalEquations,
     rows: bool,
 ) -> None:
     """Hands that are near each other stay as near."""
@@ -232,8 +243,8 @@ def _clap(
     for sign, j in zip((1.0, -1.0), hands, strict=True):
         link = int(robot.links[j])
         own = stage.free(link) if rows else ()
-        place = frames.point(link, robot.centers[j])
-        moved = point_columns(frames, own, frames.turn_columns(own), place, base=False)
+        place = poses.point(link, robot.centers[j])
+        moved = point_jacobian(poses, own, poses.angular_jacobian(own), place, base=False)
         joints += own
         parts.append(sign * moved * weight)
         places.append(place)

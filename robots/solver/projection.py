@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from robots.model.morphology import Morphology
-from robots.tree import Coordinates, Frames, Tree, forward
+from robots.tree import Coordinates, LinkPoses, Tree, forward_kinematics
 from spark.rotation import (
     quat_from_rotvec,
     quat_mul,
@@ -51,10 +51,12 @@ def project(
             turned = quat_mul(turned, quat_from_rotvec(tree.axes[j] * angles[:, [j]]))
         links[group[-1]] = turned
     q = Coordinates(np.tile(tree.base, (count, 1)), links[-1], angles, turns)
-    return Coordinates(q.pos + hips - hips_of(robot, forward(tree, q)), q.quat, angles, turns)
+    return Coordinates(
+        q.pos + hips - hips_of(robot, forward_kinematics(tree, q)), q.quat, angles, turns
+    )
 
 
-def hips_of(robot: Morphology, frames: Frames) -> Float[np.ndarray, "T 3"]:
+def hips_of(robot: Morphology, frames: LinkPoses) -> Float[np.ndarray, "T 3"]:
     """The path [m] of the middle of the hip joints."""
     pelvis = int(robot.links[robot.rig.pelvis])
     places = [frames.point(pelvis, robot.centers[j]).T for j in robot.rig.hips]

@@ -20,7 +20,7 @@ from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.footprints import Footing, corners_of
 from robots.solver.smoothness import jolted, rush
 from robots.solver.targets import Targets
-from robots.tree import Coordinates, forward
+from robots.tree import Coordinates, forward_kinematics
 from spark.runs import true_runs
 
 _ROUNDS, _FIRMER = 6, 3.0
@@ -101,7 +101,7 @@ def _led_out(
     angles = q.angles.copy()
     rest = robot.tpose.angles[0, joints]
     angles[:, joints] += share[:, None] * (rest - angles[:, joints])
-    return Coordinates(q.pos, q.quat, angles, q.turns).clipped(robot.tree, SHORT_OF_LIMIT)
+    return Coordinates(q.pos, q.quat, angles, q.ball_quats).clipped(robot.tree, SHORT_OF_LIMIT)
 
 
 def jolting(
@@ -119,7 +119,7 @@ def wrong_in(
 ) -> Bool[np.ndarray, "T"]:
     """The frames in which parts that a stage moves are where, or as fast as, they must not be;
     collisions are looked for in every `stride`-th and, near these, in all."""
-    frames = forward(robot.tree, q)
+    frames = forward_kinematics(robot.tree, q)
     nears = collisions_of(robot).near(frames, stage, stride, _CLOSE)
     wrong = exact_contacts_of(robot).depth(robot.to_qpos(q), nears) > _DEEP
     fast = np.abs(rush(robot, q, targets.frame_time)[:, stage.columns]).max(1, initial=0.0)

@@ -16,7 +16,7 @@ from robots.solver.projection import project
 from robots.solver.repair import mend
 from robots.solver.smoothness import unhurried
 from robots.solver.targets import Targets, targets_of
-from robots.tree import Coordinates, forward
+from robots.tree import Coordinates, forward_kinematics
 from spark.transfer.canonical import CanonicalMotion
 
 _STEPS = (12, 10)  # Gauss-Newton steps of the stages, at most
@@ -46,7 +46,7 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     q = unhurried(robot, project(robot, few.world, few.hips), few.frame_time)
     q = solve(robot, few, [foot.every(stride) for foot in footing], q)
     if stride > 1:
-        q = solve(robot, targets, footing, q.between(stride, len(targets)), polish=True)
+        q = solve(robot, targets, footing, q.upsampled(stride, len(targets)), polish=True)
     return RobotMotion(robot, q, source.frame_time, (*robot.notes, *targets.notes))
 
 
@@ -75,7 +75,9 @@ def solve(
             q = solve_stage(robot, targets, sliding, q, stage, *ends, apart=False)
         if stage.base:
             footing = within_reach(robot, footing, q)
-        if polish or collisions_of(robot).near(forward(robot.tree, q), stage, stride_of(targets)):
+        if polish or collisions_of(robot).near(
+            forward_kinematics(robot.tree, q), stage, stride_of(targets)
+        ):
             q = solve_stage(robot, targets, footing, q, stage, *ends, apart=True)
         q = mend(robot, targets, footing, q, stage)
     return q

@@ -8,7 +8,7 @@ from scipy.ndimage import uniform_filter1d
 
 from robots.model.morphology import Morphology, Sole
 from robots.model.shapes import surface
-from robots.tree import forward
+from robots.tree import forward_kinematics
 from spark.rig.contacts import planted_points
 from spark.rig.feet import Side, sole_positions
 from spark.rig.rig import Rig
@@ -184,7 +184,7 @@ def palm_thickness(robot: Morphology, role: Role) -> float:
     link = int(robot.links[j])
     body = int(robot.mjcf.model.jnt_bodyid[robot.mj_joints[link]])
     points = surface(robot.mjcf, [body]) - robot.centers[j]
-    down = -forward(robot.tree, robot.tpose).turns[link][2, :, 0]
+    down = -forward_kinematics(robot.tree, robot.tpose).rotations[link][2, :, 0]
     return float(np.max(points @ down, initial=0.0))
 
 

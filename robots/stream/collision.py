@@ -22,8 +22,8 @@ _REACH = 0.03  # [m] that shapes may move between the frame that is looked at an
 class WindowPoses:
     """Where a model's bodies and joints are in some frames, as MuJoCo says it."""
 
-    turns: Float[np.ndarray, "T B 3 3"]
-    places: Float[np.ndarray, "T B 3"]
+    rotations: Float[np.ndarray, "T B 3 3"]
+    positions: Float[np.ndarray, "T B 3"]
     axes: Float[np.ndarray, "T N 3"]
     anchors: Float[np.ndarray, "T N 3"]
 
@@ -87,10 +87,10 @@ class Touch:
             return
         pairs = self._pairs[near[felt]]
         small, large = self._shapes[self._small[pairs]], self._shapes[self._large[pairs]]
-        point = _turned(poses.turns[frames, small], self._spheres[near[felt]])
-        arm = (point + poses.places[frames, small])[:, None] - anchors[frames]
+        point = _turned(poses.rotations[frames, small], self._spheres[near[felt]])
+        arm = (point + poses.positions[frames, small])[:, None] - anchors[frames]
         push = _turned(self._turns[large].transpose(0, 2, 1), DIRECTIONS[side[frames, felt]])
-        push = _turned(poses.turns[frames, large], push)
+        push = _turned(poses.rotations[frames, large], push)
         residual, slope = one_sided(deep[frames, felt], EASE)
         # axis x arm . push = axis . arm x push
         (a, b, c), (x, y, z) = np.moveaxis(arm, 2, 0), push.T[:, :, None]
@@ -109,9 +109,9 @@ class Touch:
         """How deep [m] spheres are in the shapes of their pairs, and the nearest side of these."""
         pairs = self._pairs[near]
         small, large = self._shapes[self._small[pairs]], self._shapes[self._large[pairs]]
-        away = _placed(poses, small, self._spheres[near]) - poses.places[:, large]
+        away = _placed(poses, small, self._spheres[near]) - poses.positions[:, large]
         # In the rest pose of the large shape: its sides are known there.
-        back = self._turns @ poses.turns.transpose(0, 1, 3, 2)
+        back = self._turns @ poses.rotations.transpose(0, 1, 3, 2)
         inside = _turned(back[:, large], away) + self._places[large]
         over = inside @ DIRECTIONS.T - self._reach[pairs]
         side = over.argmax(2)
@@ -129,7 +129,7 @@ class Touch:
     ) -> None:
         """Which columns move the pairs together (-1) and apart, of the links that give way."""
         tree = robot.tree
-        self._signs = np.zeros((len(pairs), tree.size))
+        self._signs = np.zeros((len(pairs), tree.nv))
         self._weights = np.full(len(pairs), TOUCH)
         for k, pair in enumerate(pairs):
             chains = [tree.chain(part.link) for part in (pair.small, pair.large)]
@@ -139,13 +139,13 @@ class Touch:
                 self._weights[k] = TOUCH_LEGS
             for sign, chain in zip((-1.0, 1.0), chains, strict=True):
                 moving = tuple(j for j in chain if j not in both and (j in first) == early)
-                self._signs[k, tree.columns(moving)] = sign
+                self._signs[k, tree.dofs(moving)] = sign
 
 
 def _placed(
     poses: WindowPoses, bodies: Int[np.ndarray, "K"], points: Float[np.ndarray, "K 3"]
 ) -> Float[np.ndarray, "T K 3"]:
-    return _turned(poses.turns[:, bodies], points) + poses.places[:, bodies]
+    return _turned(poses.rotations[:, bodies], points) + poses.positions[:, bodies]
 
 
 def _turned(

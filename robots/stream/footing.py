@@ -62,7 +62,7 @@ class Feet:
                 turn = _turn(before.world[sole.foot], now.world[sole.foot])
                 wobble = WOBBLE * self._robot.rig.hip_height
                 mark.follow(moved, turn, float(self._holds[s].max()), wobble)
-            places[s, :, :2] = mark.places(self._flat[s])
+            places[s, :, :2] = mark.positions(self._flat[s])
         self._holds = self._holds + step
         corners = np.repeat(self._holds, 2, axis=1)
         return FootTargets(places, np.repeat(corners[..., None], 3, axis=2))
@@ -99,7 +99,7 @@ class Footprint:
         self._turned = float(np.clip(turn, -TURN, TURN))
         self._heading += (1 - hold) * turned + (turn - self._turned)
 
-    def places(self, flat: Float[np.ndarray, "4 2"]) -> Float[np.ndarray, "4 2"]:
+    def positions(self, flat: Float[np.ndarray, "4 2"]) -> Float[np.ndarray, "4 2"]:
         """Where the corners of the sole stand."""
         cos, sin = np.cos(self._heading), np.sin(self._heading)
         return self._pivot + (flat - flat[2:].mean(0)) @ np.array([[cos, sin], [-sin, cos]])

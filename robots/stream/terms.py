@@ -31,7 +31,7 @@ Linear = tuple[Float[np.ndarray, "T R 3 D"], Float[np.ndarray, "T R 3"], Float[n
 class FootTargets:
     """For each corner of each sole: where it should stand [m], and how firmly (0 to 1)."""
 
-    places: Float[np.ndarray, "S 4 3"]
+    positions: Float[np.ndarray, "S 4 3"]
     holds: Float[np.ndarray, "S 4 3"]
 
 
@@ -57,7 +57,7 @@ class Terms:
         self._first[[*stages_of(robot)[0].joints, -1]] = True
         joints = np.array(robot.mj_joints, dtype=int)
         self._joints = np.repeat(joints, np.where(tree.balls, 3, 1))
-        self._hinge_columns = tree.starts[~tree.balls]
+        self._hinge_columns = tree.dof_starts[~tree.balls]
         hinges = joints[~tree.balls]
         self._hinge_qpos = self._model.jnt_qposadr[hinges]
         rest = self._model.qpos0[self._hinge_qpos]
@@ -91,7 +91,7 @@ class Terms:
 
     def bones(self, poses: WindowPoses) -> Float[np.ndarray, "T B 3"]:
         """Where the bones point."""
-        return (poses.turns[:, self._bone_bodies] @ self._bones[:, :, None])[..., 0]
+        return (poses.rotations[:, self._bone_bodies] @ self._bones[:, :, None])[..., 0]
 
     def angles(self, q: Float[np.ndarray, "T nq"]) -> Float[np.ndarray, "T H"]:
         """The hinges' part of a `qpos`."""
@@ -113,9 +113,10 @@ class Terms:
         of such poses."""
         poses = self.poses(q)
         axes, anchors = self._columns(poses)
-        # Parts that should be turned some way: an axial vector each (`robots.residuals.turn_rows`).
+        # Parts that should be turned some way: an axial vector each
+        # (`robots.residuals.rotation_residual`).
         wanted = np.concatenate([targets.world[:, self._followed], targets.chest[:, None]], axis=1)
-        M = poses.turns[:, self._turned] @ (wanted @ self._turned_rest).transpose(0, 1, 3, 2)
+        M = poses.rotations[:, self._turned] @ (wanted @ self._turned_rest).transpose(0, 1, 3, 2)
         axial = np.empty((*M.shape[:2], 3))
         np.subtract(M[..., 2, 1], M[..., 1, 2], out=axial[..., 0])
         np.subtract(M[..., 0, 2], M[..., 2, 0], out=axial[..., 1])
@@ -136,19 +137,19 @@ class Terms:
     ) -> tuple[Float[np.ndarray, "T D 3"], Float[np.ndarray, "T D 3"]]:
         """The columns' axes, none for a shift, and what these turn about."""
         root = self.robot.mjcf.root
-        axes, anchors = np.zeros((2, len(poses.places), BASE + len(self._joints), 3))
-        axes[:, 3:BASE] = poses.turns[:, root].transpose(0, 2, 1)
-        anchors[:, 3:BASE] = poses.places[:, None, root]
+        axes, anchors = np.zeros((2, len(poses.positions), BASE + len(self._joints), 3))
+        axes[:, 3:BASE] = poses.rotations[:, root].transpose(0, 2, 1)
+        anchors[:, 3:BASE] = poses.positions[:, None, root]
         axes[:, BASE:] = poses.axes[:, self._joints]
         anchors[:, BASE:] = poses.anchors[:, self._joints]
         for link in np.flatnonzero(self.robot.tree.balls).tolist():
-            at = int(self.robot.tree.starts[link])
-            axes[:, at : at + 3] = poses.turns[:, self._body(link)].transpose(0, 2, 1)
+            at = int(self.robot.tree.dof_starts[link])
+            axes[:, at : at + 3] = poses.rotations[:, self._body(link)].transpose(0, 2, 1)
         return axes, anchors
 
     def _points(self, poses: WindowPoses) -> Float[np.ndarray, "T P 3"]:
-        turns = poses.turns[:, self._point_bodies]
-        return (turns @ self._arms[:, :, None])[..., 0] + poses.places[:, self._point_bodies]
+        turns = poses.rotations[:, self._point_bodies]
+        return (turns @ self._arms[:, :, None])[..., 0] + poses.positions[:, self._point_bodies]
 
     def _rows(
         self,
@@ -202,7 +203,7 @@ class Terms:
         count = 4 * len(self.robot.soles)
         firm = (objective.STAND * stance.holds.reshape(-1, 3)) ** 2
         weights[:, :count] = firm
-        forces[:, :count] = firm * (points[:, :count] - stance.places.reshape(-1, 3))
+        forces[:, :count] = firm * (points[:, :count] - stance.positions.reshape(-1, 3))
         depth, slope = one_sided(-points[:, :count, 2], objective.SINK_EASE)
         weights[:, :count, 2] += (objective.SINK * slope) ** 2
         forces[:, :count, 2] -= objective.SINK**2 * slope * depth
@@ -233,11 +234,11 @@ class Terms:
     def _mask(self, links: Sequence[int]) -> Bool[np.ndarray, "K D"]:
         """The columns that move some links, in the stage that is theirs."""
         tree = self.robot.tree
-        out = np.zeros((len(links), tree.size), dtype=bool)
+        out = np.zeros((len(links), tree.nv), dtype=bool)
         for k, link in enumerate(links):
             out[k, :BASE] = self._first[link]
             same = [j for j in tree.chain(link) if self._first[j] == self._first[link]]
-            out[k, tree.columns(tuple(same))] = True
+            out[k, tree.dofs(tuple(same))] = True
         return out
 
     def _watch_turns(self) -> None:

@@ -38,19 +38,20 @@ class Window:
             dofs += range(start, start + (3 if ball else 1))
         self._dofs = np.array(dofs)
         hinges = ~tree.balls
-        self._columns = tree.starts[hinges]
+        self._columns = tree.dof_starts[hinges]
         self._angles = self._model.jnt_qposadr[np.array(robot.mj_joints)[hinges]]
-        lower, upper = tree.within(SHORT_OF_LIMIT)
+        lower, upper = tree.limits_within(SHORT_OF_LIMIT)
         rest = self._model.qpos0[self._angles]
         self._lower, self._upper = lower[hinges] + rest, upper[hinges] + rest
-        # What ties frames together: as `robots.least_squares.Ties`, those that are gone immovable.
+        # What ties frames together: as `robots.least_squares.Smoothness`, those that are gone
+        # immovable.
         weights = smoothness(robot) * (objective.SMOOTH / SMOOTH / frame_time) ** 2
         self._stiff = weights**2
         second, self._first = (np.diff(np.eye(gone + free), k, axis=0)[:, gone:] for k in (2, 1))
         self._second = second
         self._ties = np.kron(second.T @ second, np.diag(self._stiff))
         self._rush = (RUSH / frame_time) ** 2
-        self._most = np.full(tree.size, np.inf)
+        self._most = np.full(tree.nv, np.inf)
         self._most[self._columns] = FAST * frame_time
 
     def solve(

@@ -11,7 +11,7 @@ import pytest
 from robots.model.mjcf import read_mjcf
 from robots.model.morphology import Morphology
 from robots.model.understand import understand_robot
-from robots.tree import forward
+from robots.tree import forward_kinematics
 from spark.errors import FileFormatError, SkeletonError
 from spark.kinematics import forward as skeleton_forward
 from spark.rig.roles import Role
@@ -172,13 +172,13 @@ def test_the_t_pose_lies_within_the_limits_and_is_one(name: str) -> None:
     angles = robot.tpose.angles[0]
     assert (angles >= robot.tree.lower - 1e-9).all()
     assert (angles <= robot.tree.upper + 1e-9).all()
-    frames = forward(robot.tree, robot.tpose)
+    poses = forward_kinematics(robot.tree, robot.tpose)
     rig = robot.rig
-    pelvis = frames.turns[robot.links[rig.pelvis]][:, :, 0]
+    pelvis = poses.rotations[robot.links[rig.pelvis]][:, :, 0]
     assert np.allclose(pelvis @ rig_up(robot), [0, 0, 1], atol=0.02)
     for sole in robot.soles:
         heights = [
-            frames.point(int(link), point)[2, 0]
+            poses.point(int(link), point)[2, 0]
             for link, point in zip(sole.links, sole.points, strict=True)
         ]
         assert np.ptp(heights) < 0.01
@@ -199,7 +199,7 @@ def test_our_kinematics_are_those_of_mujoco(name: str) -> None:
     rng = np.random.default_rng(3)
     q = robot.from_qpos(random_qpos(robot, rng, 7))
     qpos = robot.to_qpos(q)
-    frames = forward(robot.tree, q)
+    poses = forward_kinematics(robot.tree, q)
     data, rest = mujoco.MjData(model), mujoco.MjData(model)
     mujoco.mj_kinematics(model, rest)
     for t in range(len(qpos)):
@@ -207,10 +207,10 @@ def test_our_kinematics_are_those_of_mujoco(name: str) -> None:
         mujoco.mj_kinematics(model, data)
         for i, joint in enumerate(robot.mj_joints):
             body = int(model.jnt_bodyid[joint])
-            assert np.allclose(frames.places[i, :, t], data.xanchor[joint], atol=1e-6)
+            assert np.allclose(poses.positions[i, :, t], data.xanchor[joint], atol=1e-6)
             if i + 1 == len(robot.mj_joints) or robot.tree.parents[i + 1] != i:
                 turn = data.xmat[body].reshape(3, 3) @ rest.xmat[body].reshape(3, 3).T
-                assert np.allclose(frames.turns[i, :, :, t], turn, atol=1e-6)
+                assert np.allclose(poses.rotations[i, :, :, t], turn, atol=1e-6)
 
 
 def random_qpos(robot: Morphology, rng: np.random.Generator, frames: int) -> np.ndarray:
@@ -233,9 +233,9 @@ def test_the_rig_s_motion_moves_the_parts_as_mujoco_does(name: str) -> None:
         np.allclose(robot.to_qpos(q)[:, 7:], qpos[:, 7:], atol=1e-12)
     )
     positions, _ = skeleton_forward(robot.motion(q, 0.02))
-    frames = forward(robot.tree, q)
+    poses = forward_kinematics(robot.tree, q)
     for j, (link, center) in enumerate(zip(robot.links, robot.centers, strict=True)):
-        assert np.allclose(positions[:, j], frames.point(int(link), center).T, atol=1e-9)
+        assert np.allclose(positions[:, j], poses.point(int(link), center).T, atol=1e-9)
 
 
 def test_hinges_of_a_hip_make_one_joint_where_their_axes_meet() -> None:

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from robots.least_squares import Normal, Ties, second_differences
+from robots.least_squares import NormalEquations, Smoothness, second_differences
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.registry import find
@@ -19,7 +19,7 @@ from robots.solver.repair import mend, wrong_in
 from robots.solver.smoothness import jolted, unhurried
 from robots.solver.solve import copy, retarget, stages_of
 from robots.solver.targets import targets_of
-from robots.tree import Coordinates, forward
+from robots.tree import Coordinates, forward_kinematics
 from scripts.robot_bars import COLUMNS, limb_error, measure, misses
 from spark.demo.sample import sample_motion, sample_rig
 from spark.io.recording import read_recording
@@ -88,19 +88,19 @@ def test_the_gradient_is_that_of_the_cost(
     rng = np.random.default_rng(0)
     tree = ember.tree
     q = project(ember, targets.world, targets.hips)
-    q = q.moved(tree, rng.normal(size=(4, tree.size)) * 0.05).clipped(tree, 0.05)
+    q = q.integrated(tree, rng.normal(size=(4, tree.nv)) * 0.05).clipped(tree, 0.05)
     which = stages_of(ember)[stage]
-    nears = collisions_of(ember).near(forward(tree, q), which, 1)
+    nears = collisions_of(ember).near(forward_kinematics(tree, q), which, 1)
     normal = linearize(ember, targets, footing, q, which, nears, exact=exact)
     for k, column in enumerate(which.columns):
-        step = np.zeros((4, tree.size))
+        step = np.zeros((4, tree.nv))
         step[:, column] = 1e-6
         after, before = (
             linearize(
                 ember,
                 targets,
                 footing,
-                q.moved(tree, s * step),
+                q.integrated(tree, s * step),
                 which,
                 nears,
                 rows=False,
@@ -115,12 +115,12 @@ def test_the_gradient_is_that_of_the_cost(
 def test_frames_are_tied_as_by_one_large_matrix() -> None:
     rng = np.random.default_rng(1)
     T, D = 7, 3
-    normal = Normal(T, D)
+    normal = NormalEquations(T, D)
     J = rng.normal(size=(T, D, 5))
     normal.add([0, 1, 2], J, rng.normal(size=(5, T)))
     smooth, values = rng.uniform(1, 2, (T - 2, D)), rng.normal(size=(T, D))
-    ties = Ties(smooth, second_differences(values), np.ones((T - 1, 1)), np.zeros((T - 1, D)))
-    step = normal.solve_together(ties, np.full(T, 0.1), np.zeros((T, D)))
+    ties = Smoothness(smooth, second_differences(values), np.ones((T - 1, 1)), np.zeros((T - 1, D)))
+    step = normal.solve_coupled(ties, np.full(T, 0.1), np.zeros((T, D)))
     A = np.zeros((T - 2, T))
     for row in range(T - 2):
         A[row, row : row + 3] = 1, -2, 1
@@ -134,11 +134,11 @@ def test_frames_are_tied_as_by_one_large_matrix() -> None:
 
 
 def test_a_column_at_its_limit_does_not_go_beyond() -> None:
-    normal = Normal(3, 2)
+    normal = NormalEquations(3, 2)
     normal.add_diagonal(np.ones((3, 2)), -np.ones((3, 2)))
-    ties = Ties(np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((2, 1)), np.zeros((2, 2)))
+    ties = Smoothness(np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((2, 1)), np.zeros((2, 2)))
     limits = np.array([[1.0, 0], [-1, 0], [0, 0]])
-    step = normal.solve_together(ties, np.zeros(3), limits)
+    step = normal.solve_coupled(ties, np.zeros(3), limits)
     np.testing.assert_allclose(step, [[0, 1], [1, 1], [1, 1]], atol=1e-6)
 
 
@@ -170,7 +170,7 @@ def test_only_hinges_that_jolt_are_made_stiffer(ember: Morphology) -> None:
     angles[45:, 1] = 0.2
     still = np.tile([1.0, 0, 0, 0], (90, 1))
     stiffer = jolted(ember, Coordinates(np.zeros((90, 3)), still, angles), 1 / 60)
-    first, second = ember.tree.starts[:2]
+    first, second = ember.tree.dof_starts[:2]
     assert (stiffer[:, first] == 1).all()
     assert stiffer[43, second] > 5
     assert (stiffer[:30, second] == 1).all()
@@ -212,7 +212,7 @@ def test_what_is_measured_is_what_mujoco_finds(ember: Morphology) -> None:
     angles = rng.uniform(lower, upper, (count, len(tree)))
     q = Coordinates(np.zeros((count, 3)), still, angles)
     whole = Stage(tree, tuple(range(len(tree))), True)
-    nears = collisions_of(ember).near(forward(tree, q), whole, 1)
+    nears = collisions_of(ember).near(forward_kinematics(tree, q), whole, 1)
     qpos = ember.to_qpos(q)
     depth = exact_contacts_of(ember).depth(qpos, nears)
     watched = {frozenset((p.small.geom, p.large.geom)) for p in collisions_of(ember).pairs}
@@ -250,7 +250,7 @@ def test_what_passes_between_two_looks_is_seen(walked: RobotMotion, ember: Morph
         swung = angles.copy()
         swung[:, j] += np.linspace(-0.8, 0.8, count)
         q = Coordinates(base, still, swung).clipped(tree, 0.02)
-        frames, qpos = forward(tree, q), ember.to_qpos(q)
+        frames, qpos = forward_kinematics(tree, q), ember.to_qpos(q)
         every, ends = (
             exact_contacts_of(ember).depth(qpos, collisions_of(ember).near(frames, arms, stride))
             for stride in (1, count - 1)

@@ -18,7 +18,7 @@ from robots.solver.targets import targets_of
 from robots.stream.frame_targets import LATENCY, Frame, FrameTargets, Watcher, ground_of
 from robots.stream.stream import Stream
 from robots.stream.terms import FootTargets, Terms
-from robots.tree import forward
+from robots.tree import forward_kinematics
 from scripts.robot_bars import COLUMNS, follow, limb_error, measure
 from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import ConventionError, FrameError
@@ -87,7 +87,7 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     tree = EMBER.tree
     rng = np.random.default_rng(0)
     q = project(EMBER, targets.world, targets.hips)
-    q = q.moved(tree, rng.normal(size=(4, tree.size)) * 0.05).clipped(tree, 0.02)
+    q = q.integrated(tree, rng.normal(size=(4, tree.nv)) * 0.05).clipped(tree, 0.02)
     watcher = Watcher(RIG, EMBER, ground_of(source, EMBER))
     terms = Terms(EMBER, watcher.bones, hands=True)
     assert targets.hands is not None
@@ -101,7 +101,7 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     )
 
     def near(stage: Stage) -> list[Near]:
-        return collisions_of(EMBER).near(forward(tree, q), stage, 1)
+        return collisions_of(EMBER).near(forward_kinematics(tree, q), stage, 1)
 
     assert near(stages_of(EMBER)[1])
     # A stance is of one time: frames are asked for one by one.
@@ -109,13 +109,13 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     for t in range(4):
         one = slice(t, t + 1)
         stance = FootTargets(
-            np.stack([foot.places[..., t] for foot in footing]),
+            np.stack([foot.positions[..., t] for foot in footing]),
             np.stack([foot.holds[..., t] for foot in footing]),
         )
         here = FrameTargets(*(getattr(seen, name)[one] for name in FrameTargets.__annotations__))
         qpos = EMBER.to_qpos(q.at(one))
         H, g = terms.linearize(qpos, here, stance, terms.relaxed, terms.near(qpos))
-        turn = np.eye(tree.size)
+        turn = np.eye(tree.nv)
         turn[3:6, 3:6] = body_axes[t]
         H, g = turn @ H[0] @ turn.T, turn @ g[0]
         for stage in stages_of(EMBER):
@@ -158,7 +158,9 @@ def test_a_t_pose_is_the_robots(robot: str) -> None:
     source = to_canonical(standing(1, 0.0), RIG)
     posed = RobotMotion(found, q, 1 / 60)
     assert limb_error(source, canonical_positions(source), posed) < 2
-    soles = np.concatenate([corners_of(forward(found.tree, q), sole) for sole in found.soles])
+    soles = np.concatenate(
+        [corners_of(forward_kinematics(found.tree, q), sole) for sole in found.soles]
+    )
     assert np.abs(soles[:, 2]).max() < 0.005
 
 
@@ -167,7 +169,7 @@ def test_standing_feet_stay_while_the_source_trembles(robot: str) -> None:
     found = known(robot)
     q = found.from_qpos(said(standing(50, 0.002), robot))
     for sole in found.soles:
-        at = corners_of(forward(found.tree, q), sole)
+        at = corners_of(forward_kinematics(found.tree, q), sole)
         assert np.ptp(at, axis=2).max() < 0.005
 
 
