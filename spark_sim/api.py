@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from spark_sim.simulation import Simulated
 
 METHODS = ("copy", "spark")
+COPIED = "each pose is copied to the robot's hinges: feet are not held, parts may collide"
+"""What is to know of a motion that was copied to a robot, and not solved for."""
 _PAGE = (".html", ".htm")
 
 
@@ -53,12 +55,19 @@ def retarget(
 ) -> AnyClip:
     """The motion of `source` on the body of `target`, in the hierarchy and units of its file.
 
-    Both are clips, or what `load` takes: `target` may be a robot's name or MJCF. Each joint turns
-    as its counterpart does, in world axes; what the source has no counterpart of is filled in by
-    interpolation (method "copy") or ("spark") on rigs like those that it has met by a trained
-    network, that of `checkpoint` or the one that ships, and as far as the target's own motion shows
-    what they do. Robots are solved for. With `refine`, feet are held where the source's stand.
-    Raises `SkeletonError` where one is no humanoid.
+    Both are clips, or what `load` takes: `target` may be a robot's name or MJCF.
+
+    On a character each joint turns as its counterpart does, in world axes. A joint of spine, neck
+    or shoulders that the source has no counterpart of is filled in: with method "copy" by
+    interpolation between its neighbours; with "spark" by a trained network (`checkpoint`, or the
+    one that ships) on rigs like those that it was trained on, and by the target's own motion, where
+    its file has one. With `refine`, each foot is then held where the source's foot stands.
+
+    On a robot the whole trajectory is solved for, within the joints' limits, feet held. With method
+    "copy" or without `refine`, each pose is only copied to the robot's hinges, as a baseline.
+
+    Raises `SkeletonError` where one of the two is no humanoid, and `ConventionError` for a method
+    that is not known or does not go with the rest.
     """
     if method not in METHODS:
         raise ConventionError(f"method {method!r} is not known; expected 'copy' or 'spark'")
@@ -67,8 +76,8 @@ def retarget(
     source, target = clip_of(source), clip_of(target)
     if not isinstance(target, Clip):
         if checkpoint is not None:
-            raise ConventionError("method 'spark' is for characters; robots are solved for")
-        return _onto_robot(source, target, refine=refine)
+            raise ConventionError("a checkpoint is for characters; robots are solved for")
+        return _onto_robot(source, target, solved=refine and method != "copy")
     canonical = source.canonical
     if method == "copy":
         moved = transfer(canonical, target.rig)
@@ -86,14 +95,18 @@ def retarget(
     return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig)
 
 
-def _onto_robot(source: AnyClip, target: RobotClip, *, refine: bool) -> RobotClip:
+def _onto_robot(source: AnyClip, target: RobotClip, *, solved: bool) -> RobotClip:
     """The motion of `source` on a robot: solved for as a whole, within limits, feet planted where
-    the source's are; without `refine`, only projected on the robot's hinges."""
+    the source's are; or, where it is not `solved`, each pose copied to the robot's hinges."""
     from robots.solver.solve import copy
     from robots.solver.solve import retarget as solve
 
     robot = target.on_robot.robot
-    moved = solve(source.canonical, robot) if refine else copy(source.canonical, robot)
+    if solved:
+        moved = solve(source.canonical, robot)
+    else:
+        moved = copy(source.canonical, robot)
+        moved = replace(moved, notes=(*moved.notes, COPIED))
     return RobotClip(moved, f"{source.name} on {target.name}", source.path)
 
 
@@ -138,7 +151,7 @@ def report(
     from sim.report import assess
 
     if html is not None:
-        files.claim(Path(html), force=force, endings=_PAGE)
+        files.claim(Path(html), force=force, endings=_PAGE, what="a page")
     clip = clip_of(clip)
     origin, names = None, (clip.name, "source")
     if source is not None:
@@ -171,9 +184,13 @@ def play(
     """
     from sim.view.scene import build_scene
 
-    for path, endings in ((video, (".mp4",)), (html, _PAGE), (strip, (".png",))):
+    for path, endings, what in (
+        (video, (".mp4",), "a video"),
+        (html, _PAGE, "a page"),
+        (strip, (".png",), "a strip"),
+    ):
         if path is not None:
-            files.claim(Path(path), force=force, endings=endings)
+            files.claim(Path(path), force=force, endings=endings, what=what)
     shown = [clip_of(c) if isinstance(c, str | Path) else c for c in clips]
     figures = [figure for clip in shown for figure in clip.figures()]
     scene = build_scene(figures)

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from argparse import Action, ArgumentParser, Namespace, RawDescriptionHelpFormatter
+from argparse import Action, ArgumentError, ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
@@ -37,6 +37,9 @@ examples:
   spark-sim play walk.bvh walk_on_mutant.bvh    # watch both, side by side
   spark-sim report walk_on_mutant.bvh --source walk.bvh
 
+FBX files, videos and most robots need extras:
+  pip install 'spark-sim[fbx,video,robots]'
+
 spark-sim COMMAND --help tells more of each command.
 """
 
@@ -64,11 +67,25 @@ def _terminal_width() -> int:
         return 80
 
 
+class _Once(Action):
+    """Keeps an option's value, and refuses a second one: only the last would count."""
+
+    def __call__(
+        self, parser: ArgumentParser, args: Namespace, values: Any, option: str | None = None
+    ) -> None:
+        given = vars(args).setdefault("_given", set())
+        if option is not None and self.dest in given:
+            raise ArgumentError(self, "given twice; only one can count")
+        given.add(self.dest)
+        setattr(args, self.dest, values)
+
+
 class _Parser(ArgumentParser):
     """Errors in two lines: what is wrong, and where help is."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(formatter_class=_Formatter, allow_abbrev=False, **settings)
+        self.register("action", None, _Once)
 
     def error(self, message: str) -> NoReturn:
         self.exit(FAILED, f"spark-sim: error: {message}\nSee {self.prog} --help\n")

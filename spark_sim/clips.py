@@ -23,6 +23,8 @@ if TYPE_CHECKING:  # these load MuJoCo, which a character's clip can do without
     from sim.view.scene import Figure
 
 File: TypeAlias = str | Path
+CHARACTER_ENDINGS = (".bvh",)
+"""What the motion of a character is written as."""
 
 
 class _AnyClip(ABC):
@@ -106,9 +108,12 @@ class Clip(_AnyClip):
         return (*self.recording.notes, *self.rig.notes)
 
     def save(self, path: File, *, force: bool = False) -> Path:
-        """Write the motion as BVH. Raises `OutputError` where `path` exists, unless forced."""
+        """Write the motion as BVH.
+
+        Raises `OutputError` where `path` exists, unless forced, or does not end in .bvh.
+        """
         path = Path(path)
-        files.claim(path, force=force)
+        files.claim(path, force=force, endings=CHARACTER_ENDINGS, what="a character's motion")
         write_bvh(self.recording.bvh, path)
         return path
 
@@ -131,7 +136,7 @@ class Clip(_AnyClip):
 
         spec = build_body(self.rig, joints=joints, mesh=mesh)
         body, *beside = paths_of(spec, path)
-        files.claim(body, force=force, endings=(".xml",))
+        files.claim(body, force=force, endings=(".xml",), what="a MuJoCo model")
         for written in beside:
             files.claim(written, force=force)
         return write_mjcf(spec, path), notes_of(spec)

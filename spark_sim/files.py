@@ -1,4 +1,5 @@
-"""Where results go: nothing is overwritten unasked, and that is said before the work, not after."""
+"""Where results go: nothing is overwritten unasked, and no file has an ending that says what it is
+not. Both are said before the work, not after."""
 
 import os
 from pathlib import Path
@@ -14,13 +15,20 @@ def check_free(path: Path, *, force: bool) -> None:
         raise OutputError(f"{path}: exists; give another name, or overwrite it with --force")
 
 
-def claim(path: Path, *, force: bool, endings: tuple[str, ...] = ()) -> None:
+def check_ending(path: Path, endings: tuple[str, ...], what: str) -> None:
+    """Raise `OutputError` where `path` has none of the `endings` of `what` is written there."""
+    if path.suffix.lower() not in endings:
+        has = f"not as {path.suffix}" if path.suffix else "and the name has no ending"
+        raise OutputError(f"{path}: {what} is written as {' or '.join(endings)}, {has}")
+
+
+def claim(path: Path, *, force: bool, endings: tuple[str, ...] = (), what: str = "it") -> None:
     """Make the folders on the way to `path`. Raises `OutputError` where it is not free, can't be
-    written, or has none of the `endings` of what goes there: a motion is never overwritten by a
+    written, or has none of the `endings` of `what` goes there: a motion is never overwritten by a
     model or a page of it, not even by force."""
     check_free(path, force=force)
-    if endings and path.suffix.lower() not in endings:
-        raise OutputError(f"{path}: expected a name that ends in {' or '.join(endings)}")
+    if endings:
+        check_ending(path, endings, what)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -87,9 +87,8 @@ def run(args: Namespace) -> int:
 
     outputs = [Path(output) for output in args.output]
     for path in outputs:
-        if path.suffix.lower() not in (".md", ".json", ".csv"):
-            raise ConventionError(f"{path}: expected a name that ends in .md, .json or .csv")
         files.check_free(path, force=args.force)
+        files.check_ending(path, (".md", ".json", ".csv"), "a table")
     if args.limit is not None and (args.limit < 1 or not args.made):
         raise ConventionError(f"--limit {args.limit}: expected 1 or more, together with --made")
     results = dict(_named(result) for result in args.result)

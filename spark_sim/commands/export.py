@@ -33,7 +33,7 @@ def run(args: Namespace) -> int:
     from spark_sim import console, files
 
     out = Path(args.output)
-    files.claim(out, force=args.force, endings=(".onnx",))
+    files.claim(out, force=args.force, endings=(".onnx",), what="the network")
     try:
         from spark.training.checkpoint import load_checkpoint
         from spark.training.onnx import export_onnx

@@ -45,7 +45,7 @@ def run(args: Namespace) -> int:
     if out is not None:
         if len(args.files) > 1:
             raise OutputError("--save-map takes one FILE; each rig has a map of its own")
-        files.claim(out, force=args.force)
+        files.claim(out, force=args.force, endings=(".toml",), what="a map of joints")
     for path in args.files:
         clip = load(args, path, humanoid=False)
         described = describe(clip)

@@ -54,35 +54,37 @@ def configure(parser: ArgumentParser) -> None:
         "-o",
         "--output",
         metavar="OUT",
-        help="the file to write; a folder for several motions "
-        "(default: SRC_on_TARGET.bvh, or .npz of a robot, in the current folder)",
+        help="the file to write, or a folder (named with a / at its end) for several motions. "
+        "Default: SRC_on_TARGET.bvh, for a robot .npz, in the current folder",
     )
     parser.add_argument(
         "--format",
         choices=tuple(FORMATS),
         metavar="NAME",
-        help="of a robot's motion, where the ending leaves it open: npz (default), mjlab (the npz "
-        "of BeyondMimic and mjlab), csv (Unitree's, xyzw; default), csv-wxyz, gmr (.pkl)",
+        help="of a robot's motion, where the ending leaves it open. For .npz: npz (default) or "
+        "mjlab (of mjlab and BeyondMimic). For .csv: csv (Unitree's, quaternions xyzw; default) "
+        "or csv-wxyz. For .pkl: gmr",
     )
     parser.add_argument(
         "--method",
         choices=("spark", "copy"),
         default="spark",
-        help="how joints turn that SRC has no counterpart of; the others turn as theirs do, in "
-        "world axes. spark: as a trained network says, on rigs like those it has met, and as they "
-        "turn in TARGET's own motion, if its file has one (default); copy: in between their "
-        "neighbours",
+        help="spark (default) or copy. On a character both turn each joint as its counterpart "
+        "turns; where SRC has no counterpart, copy interpolates between the neighbours, and spark "
+        "asks a trained network and TARGET's own motion. On a robot, spark solves for the whole "
+        "trajectory; copy only copies each pose to the hinges, as a baseline",
     )
     parser.add_argument(
         "--checkpoint",
         metavar="FILE",
-        help="what `spark-sim train` wrote, instead of the network that ships",
+        help="a network that `spark-sim train` wrote, instead of the one that ships (characters "
+        "only)",
     )
     parser.add_argument(
         "--no-refine",
         dest="refine",
         action="store_false",
-        help="leave the feet as the method puts them, instead of holding them where SRC's stand",
+        help="do not hold the feet where SRC's stand. On a robot: the same as --method copy",
     )
     add_force(parser)
     add_json(parser, "one line for each result")
@@ -97,6 +99,7 @@ def run(args: Namespace) -> int:
     from spark.errors import OutputError, SparkSimError
     from spark.io.reading import SUFFIXES as CHARACTERS
     from spark_sim import console, files
+    from spark_sim.clips import CHARACTER_ENDINGS
 
     robot = is_robot(args.to) or Path(args.to).suffix.lower() in SUFFIXES
     if args.format is not None and not robot:
@@ -108,6 +111,8 @@ def run(args: Namespace) -> int:
         files.check_free(out, force=args.force)
         if robot:
             format_of(out, args.format)
+        else:
+            files.check_ending(out, CHARACTER_ENDINGS, "a character's motion")
     target = load(args, args.to, "to-")
     failures = 0
     for source, out in console.progress(jobs, "retarget"):
@@ -148,11 +153,14 @@ def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> di
         new = [note for note in result.notes if note not in target.notes]
         console.notes(out, [*new, *unsaid(format_of(out, args.format), result.motion.fps)])
         result.save(out, force=args.force, format=args.format)
+    method = args.method
+    if not isinstance(result, Clip):
+        method = "trajectory" if args.refine and args.method != "copy" else "copy"
     return {
         "source": str(source),
         "target": args.to,
         "output": str(out),
-        "method": args.method if isinstance(result, Clip) else "trajectory",
+        "method": method,
         "frames": len(result.motion),
         "fps": result.motion.fps,
         "source_joints": _joints(clip),

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import spark_sim
-from spark.errors import ConventionError, OutputError, SkeletonError
+from spark.errors import ConventionError, DependencyError, OutputError, SkeletonError
 from spark.kinematics import forward
 from spark.rotation import quat_angle
+from tests.helpers.fbx_text import Fbx, Node
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +70,22 @@ def test_paths_and_clips_are_alike(samples: Path) -> None:
     by_clip = spark_sim.retarget(spark_sim.load(walk), spark_sim.load(wave))
     np.testing.assert_array_equal(by_path.motion.rotations, by_clip.motion.rotations)
     assert by_path.name == by_clip.name == "walker_walk on dancer_wave"
+
+
+@pytest.mark.parametrize("name", ["samba.fbx", "samba.glb", "walk.csv", "walk.npz", "walk"])
+def test_no_file_is_named_what_it_is_not(name: str, samples: Path, tmp_path: Path) -> None:
+    walk = spark_sim.load(samples / "walker_walk.bvh")
+    with pytest.raises(OutputError, match=r"a character's motion is written as \.bvh"):
+        walk.save(tmp_path / name, force=True)
+    assert not list(tmp_path.iterdir())
+    assert walk.save(tmp_path / "walk.BVH").exists()
+
+
+def test_fbx_without_its_extra_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = Fbx([Node("Hips"), Node("Spine", 0)]).write(tmp_path / "dance.fbx")
+    monkeypatch.setitem(sys.modules, "pufbx", None)
+    with pytest.raises(DependencyError, match=r"pip install 'spark-sim\[fbx\]'"):
+        spark_sim.load(path)
 
 
 def test_nothing_is_overwritten_unasked(samples: Path, tmp_path: Path) -> None:

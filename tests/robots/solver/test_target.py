@@ -17,6 +17,7 @@ from spark.errors import ConventionError, SparkSimError
 from spark.kinematics import forward
 from spark.rig.roles import Role
 from spark.transfer.canonical import to_canonical
+from spark_sim.api import COPIED
 from spark_sim.cli import run
 from spark_sim.clips import RobotClip
 
@@ -341,10 +342,16 @@ def test_formats_are_for_robots(walk_path: Path, tmp_path: Path) -> None:
     assert "the format 'gmr' is written as .pkl" in stderr[-1]
 
 
-def test_without_refining_the_pose_is_only_projected(walk: spark_sim.Clip, model: Path) -> None:
+def test_a_copy_is_each_pose_on_the_hinges_and_says_so(walk: spark_sim.Clip, model: Path) -> None:
     plain = spark_sim.retarget(walk, model, refine=False)
+    copied = spark_sim.retarget(walk, model, method="copy")
     assert isinstance(plain, RobotClip)
+    assert isinstance(copied, RobotClip)
+    np.testing.assert_array_equal(copied.on_robot.qpos, plain.on_robot.qpos)
+    assert COPIED in plain.notes
+    assert COPIED in copied.notes
     solved = spark_sim.retarget(walk, model)
+    assert COPIED not in solved.notes
     assert np.abs(plain.motion.rotations - solved.motion.rotations).max() > 0.01
     with pytest.raises(ConventionError, match="robots are solved for"):
         spark_sim.retarget(walk, model, method="spark", checkpoint="none")

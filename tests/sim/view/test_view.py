@@ -321,10 +321,10 @@ def test_coordinates_between_frames(tmp_path: Path) -> None:
 def test_a_motion_is_not_overwritten_by_what_shows_it(option: str, tmp_path: Path) -> None:
     (walk, *_) = spark_sim.sample(tmp_path)
     before = walk.read_bytes()
-    with pytest.raises(OutputError, match=r"expected a name that ends in \.(html|mp4|png)"):
+    with pytest.raises(OutputError, match=r"is written as \.(html|mp4|png)"):
         spark_sim.play(walk, force=True, **{option: walk})  # type: ignore[arg-type]
-    with pytest.raises(OutputError, match=r"expected a name that ends in \.html"):
+    with pytest.raises(OutputError, match=r"a page is written as \.html"):
         spark_sim.report(walk, html=walk, force=True)
-    with pytest.raises(OutputError, match=r"expected a name that ends in \.xml"):
+    with pytest.raises(OutputError, match=r"a MuJoCo model is written as \.xml"):
         spark_sim.load(walk).save_mjcf(walk, force=True)  # type: ignore[union-attr]
     assert walk.read_bytes() == before
