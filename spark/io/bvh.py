@@ -19,6 +19,7 @@ from jaxtyping import Float, Int
 
 from spark.errors import FileFormatError, SkeletonError
 from spark.files import write_atomically
+from spark.io.charset import to_utf8
 from spark.io.scanner import LARGEST, Scanner, number, shown
 
 Vector = tuple[float, float, float]
@@ -56,13 +57,15 @@ class Bvh:
     """A BVH file: joints depth-first, as they nest, and one row of channel values a frame.
 
     `frame_time` [s]; `values` hold the channels of all joints one after the other, in file units
-    and degrees. `path` is where it was read from.
+    and degrees. `path` is where it was read from, and `encoding` how its names are written as
+    bytes.
     """
 
     joints: tuple[BvhJoint, ...]
     frame_time: float
     values: Float[np.ndarray, "T C"]
     path: Path | None = None
+    encoding: str = "utf-8"
 
     def __post_init__(self) -> None:
         channels = sum(len(joint.channels) for joint in self.joints)
@@ -121,15 +124,16 @@ def read_bvh(path: str | Path) -> Bvh:
     """The file at `path`, exactly: writing it and reading it again gives equal values.
 
     Takes tabs, any line ends, a byte order mark, keywords in any case, names with any characters
-    but braces (UTF-8, else Latin-1), rows wrapped over several lines, and no frames at all. Raises
-    `FileFormatError` with the line for anything else; memory goes with the size of the file, not
-    with what it claims.
+    but braces (UTF-8, else Shift-JIS, else Latin-1), rows wrapped over several lines, and no frames
+    at all. Raises `FileFormatError` with the line for anything else; memory goes with the size of
+    the file, not with what it claims.
     """
     path = Path(path)
-    scanner = Scanner(path, _read(path))
+    data, encoding = to_utf8(_read(path))
+    scanner = Scanner(path, data)
     joints = _parse_hierarchy(scanner)
     frame_time, values = _parse_motion(scanner, sum(len(joint.channels) for joint in joints))
-    return Bvh(joints, frame_time, values, path)
+    return Bvh(joints, frame_time, values, path, encoding)
 
 
 def write_bvh(bvh: Bvh, path: str | Path) -> None:
@@ -140,7 +144,7 @@ def write_bvh(bvh: Bvh, path: str | Path) -> None:
     lines = ["HIERARCHY", *_hierarchy_lines(bvh.joints)]
     lines += ["MOTION", f"Frames: {len(bvh)}", f"Frame Time: {_text([bvh.frame_time])}"]
     text = "\n".join(chain(lines, map(_text, bvh.values.tolist()), [""]))
-    write_atomically(Path(path), text.encode())
+    write_atomically(Path(path), text.encode(bvh.encoding))
 
 
 def _text(numbers: Iterable[float]) -> str:
@@ -189,13 +193,6 @@ def _read(path: Path) -> bytes:
     raise FileFormatError(
         path, 1, f"starts with {shown(data.split()[0])}; a BVH file starts with HIERARCHY"
     )
-
-
-def _decoded(name: bytes) -> str:
-    try:
-        return name.decode()
-    except UnicodeDecodeError:
-        return name.decode("latin-1")
 
 
 def _parse_hierarchy(scanner: Scanner) -> tuple[BvhJoint, ...]:
@@ -247,7 +244,7 @@ class _OpenJoint:
 
 
 def _open_joint(scanner: Scanner, joints: list[_OpenJoint], parent: int) -> int:
-    name = _decoded(scanner.label())
+    name = scanner.label().decode()
     if not name:
         scanner.fail("expected the name of a joint")
     scanner.expect("{")

@@ -42,7 +42,7 @@ def encode(motion: Motion, template: Recording) -> tuple[Bvh, tuple[str, ...]]:
     values = np.zeros((len(motion), bvh.values.shape[1]))
     notes = _encode_rotations(motion, bvh, convention, values)
     notes += _encode_positions(motion, template, values)
-    return Bvh(bvh.joints, motion.frame_time, values), notes
+    return Bvh(bvh.joints, motion.frame_time, values, encoding=bvh.encoding), notes
 
 
 def encode_new(motion: Motion, *, unit: str | float = "cm", up: str = "y") -> Bvh:

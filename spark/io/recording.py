@@ -25,6 +25,8 @@ _SAMPLES = 32
 # [s] 1000 to 1 frames a second.
 _USUAL_FRAME = (0.001, 1.0)
 
+_ENCODINGS = {"cp932": "Shift-JIS", "latin-1": "Latin-1"}
+
 # Positions that stay within this fraction of the body's height are constant.
 _STILL = 1e-6
 
@@ -81,6 +83,8 @@ def read_recording(
 def _decode(bvh: Bvh) -> tuple[Motion, bool, tuple[str, ...]]:
     """The motion in file units and axes, whether positions add to the offsets, and notes."""
     notes: list[str] = []
+    if bvh.encoding != "utf-8":
+        notes.append(f"joint names are not UTF-8: read as {_ENCODINGS[bvh.encoding]}")
     if not _USUAL_FRAME[0] <= bvh.frame_time <= _USUAL_FRAME[1]:
         notes.append(
             f"a frame lasts {bvh.frame_time:g} s, which is unusual; Frame Time is in seconds"

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from spark.errors import FileFormatError, OutputError, SkeletonError, SparkSimError
 from spark.io.bvh import CHANNELS, Bvh, BvhJoint, read_bvh, write_bvh
+from spark.io.charset import to_utf8
 from spark.io.encoding import encode
 from spark.io.recording import read_recording
 from tests.helpers.recordings import recordings
@@ -139,9 +140,39 @@ def test_names_are_kept(tmp_path: Path, name: str) -> None:
     assert_same(read_bvh(tmp_path / "b.bvh"), bvh)
 
 
-def test_names_may_be_latin_1(tmp_path: Path) -> None:
-    bvh = read_text(tmp_path, swap("JOINT Head", "JOINT größe").encode("latin-1"))
-    assert bvh.joints[1].name == "größe"
+@pytest.mark.parametrize(
+    ("name", "encoding"),
+    [
+        ("größe", "latin-1"),
+        ("Épaule_G", "latin-1"),
+        ("TÊTE", "latin-1"),
+        ("左ひじ", "cp932"),
+        ("右足ＩＫ", "cp932"),
+        ("ボーン1", "cp932"),  # its first letter's second byte is a brace
+        ("L_ｾﾝﾀｰ親", "cp932"),
+    ],
+)
+def test_names_that_are_not_utf_8_are_read_and_written_as_they_are(
+    tmp_path: Path, name: str, encoding: str
+) -> None:
+    with pytest.raises(UnicodeDecodeError):
+        name.encode(encoding).decode()
+    bvh = read_text(tmp_path, swap("JOINT Head", f"JOINT {name}").encode(encoding))
+    assert (bvh.joints[1].name, bvh.encoding) == (name, encoding)
+    write_bvh(bvh, tmp_path / "b.bvh")
+    assert_same(read_bvh(tmp_path / "b.bvh"), bvh)
+    assert f"JOINT {name}\n".encode(encoding) in (tmp_path / "b.bvh").read_bytes()
+    recording = read_recording(tmp_path / "b.bvh", unit="cm", up="y")
+    said = {"cp932": "Shift-JIS", "latin-1": "Latin-1"}[encoding]
+    assert f"joint names are not UTF-8: read as {said}" in recording.notes
+    assert encode(recording.motion, recording)[0].encoding == encoding
+
+
+@given(name=st.text(st.characters(codec="latin-1"), max_size=8))
+def test_any_bytes_are_some_text_and_give_themselves_again(name: str) -> None:
+    data = name.encode("latin-1")
+    text, encoding = to_utf8(data)
+    assert text.decode().encode(encoding) == data
 
 
 def test_names_may_repeat(tmp_path: Path) -> None:
