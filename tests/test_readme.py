@@ -57,4 +57,4 @@ def test_links_and_pictures_exist() -> None:
     assert "docs/images/strip.png" in places
     for place in places:
         assert (CHECKOUT / place).exists(), place
-    assert (CHECKOUT / "docs" / "images" / "strip.png").stat().st_size < 400_000
+    assert (CHECKOUT / "docs" / "images" / "strip.png").stat().st_size < 150_000

@@ -76,7 +76,7 @@ def write_strip(
     path = Path(path)
     if width is None:
         width = round(height * fitting_aspect(scene))
-    count = count or (5 if width < 1.2 * height else 3)
+    count = count or (5 if width < 2 * height else 3)
     picked = np.linspace(0, len(scene.qpos) - 1, count).round().astype(int).tolist()
     pictures = list(frames(scene, picked, width=width, height=height))
     try:

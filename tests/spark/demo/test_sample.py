@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sim.report import assess
 from spark.demo.gait import FOOT_FLAT, HEEL_OFF, MID_STANCE, TOE_OFF, stride_time
 from spark.demo.sample import BUILDS, MOTIONS, sample_motion, sample_rig
 from spark.io.bvh import write_bvh
@@ -15,7 +16,8 @@ from spark.kinematics import forward, local_rotations
 from spark.rig.feet import sole_positions
 from spark.rig.roles import Role
 from spark.rotation import quat_angle, rotvec_from_quat
-from spark.transfer.canonical import to_canonical
+from spark.transfer.analytic import transfer
+from spark.transfer.canonical import from_canonical, to_canonical
 
 EVERY = [(name, build) for name in MOTIONS for build in BUILDS]
 FPS = 60.0
@@ -49,6 +51,24 @@ def knees(name: str, build: str) -> np.ndarray:
         cosine = (thigh * shank).sum(-1) / np.linalg.norm(thigh, axis=-1)
         angles.append(np.degrees(np.arccos(cosine / np.linalg.norm(shank, axis=-1))))
     return np.stack(angles, axis=1)
+
+
+@pytest.mark.parametrize("fps", [24.0, 30.0, 60.0, 120.0])
+@pytest.mark.parametrize(("name", "build"), EVERY)
+def test_the_report_finds_nothing_to_mend(name: str, build: str, fps: float) -> None:
+    rig = sample_rig(build)
+    report = assess(sample_motion(name, rig, fps), rig)
+    assert report.implausible == 0
+    assert report.findings == ()
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_the_report_finds_nothing_to_mend_on_the_other_body(name: str) -> None:
+    walker, dancer = (sample_rig(build) for build in BUILDS)
+    source = sample_motion(name, walker, FPS)
+    made = from_canonical(transfer(to_canonical(source, walker), dancer))
+    assert assess(made, dancer).findings == ()
+    assert assess(made, dancer, source=(source, walker)).findings == ()
 
 
 @pytest.mark.parametrize(("name", "build"), EVERY)
