@@ -24,9 +24,9 @@ FREE, BALL, SLIDE, HINGE = (
     )
 )
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
-_LEAST_MASS, _LEAST_INERTIA = 1e-4, 1e-8
-_FAR = 1e4  # [m]
-_SECOND = 0.5  # a second tree with this share of the joints is another robot
+_MIN_MASS, _MIN_INERTIA = 1e-4, 1e-8  # [kg], [kg m²] of bodies whose mass went with their meshes
+_MAX_OFFSET = 1e4  # [m] of a body from its parent: beyond, floats lose millimetres; it is a mistake
+_RIVAL_SHARE = 0.5  # a second tree with this share of the first one's joints is another robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,20 +67,23 @@ class Mjcf:
 
     def joint_name(self, joint: int) -> str:
         """The joint's name, or where it sits if it has none."""
-        return self.model.joint(joint).name or f"joint {joint} of {self.body_name(self._at(joint))}"
+        return (
+            self.model.joint(joint).name
+            or f"joint {joint} of {self.body_name(self._body_of(joint))}"
+        )
 
     def body_name(self, body: int) -> str:
         """The body's name, or its number if it has none."""
         return self.model.body(body).name or f"body {body}"
 
-    def _at(self, joint: int) -> int:
+    def _body_of(self, joint: int) -> int:
         return int(self.model.jnt_bodyid[joint])
 
 
 def read_mjcf(path: str | Path, *, visuals: bool = True) -> Mjcf:
     """Read and compile an MJCF (or a scene that includes one).
 
-    Without `visuals`, meshes that are only looked at are left out: coordinates are the same, and
+    Without `visuals`, meshes that do not collide are left out: coordinates are the same, and
     reading is several times faster. Raises FileFormatError where MuJoCo can't compile the file, and
     SkeletonError where it holds no robot or several.
     """
@@ -89,31 +92,33 @@ def read_mjcf(path: str | Path, *, visuals: bool = True) -> Mjcf:
         what = "is a folder" if path.is_dir() else "no such file"
         raise FileFormatError(path, None, f"{what}; expected an MJCF (.xml)")
     notes: list[str] = []
-    with _warnings_as(notes):
+    with _warnings_as_notes(notes):
         try:
             spec = mujoco.MjSpec.from_file(str(path))
         except (ValueError, RuntimeError) as error:
-            raise FileFormatError(path, None, f"MuJoCo can't read it: {_first(error)}") from error
+            raise FileFormatError(path, None, f"MuJoCo can't read it: {_line(error)}") from error
         if not visuals:
             _drop_visuals(spec)
         root = _find_root(spec, path, notes)
         _free_root(spec, root, path, notes)
         model = _compile(spec, path, notes)
-    _say_what_is_ignored(model, notes)
-    if not (np.abs(model.body_pos) < _FAR).all() or not np.isfinite(model.jnt_axis).all():
-        raise FileFormatError(path, None, f"a body's place is no number of metres below {_FAR:g}")
+    _note_ignored(model, notes)
+    if not (np.abs(model.body_pos) < _MAX_OFFSET).all() or not np.isfinite(model.jnt_axis).all():
+        raise FileFormatError(
+            path, None, f"a body's place is no number of metres below {_MAX_OFFSET:g}"
+        )
     return Mjcf(model, spec, int(model.body(root).id), path, tuple(notes))
 
 
 @contextmanager
-def _warnings_as(notes: list[str]) -> Iterator[None]:
-    """What MuJoCo warns of as notes, each once: by itself it prints them, and leaves a log file in
-    the current folder."""
+def _warnings_as_notes(notes: list[str]) -> Iterator[None]:
+    """Collect MuJoCo's warnings as notes, each once: by itself it prints them, and leaves a log
+    file in the current folder."""
 
     def note(message: str) -> None:
-        said = f"MuJoCo warns: {message}"
-        if said not in notes:
-            notes.append(said)
+        text = f"MuJoCo warns: {message}"
+        if text not in notes:
+            notes.append(text)
 
     mujoco.set_mju_user_warning(note)
     try:
@@ -152,7 +157,7 @@ def _find_root(spec: mujoco.MjSpec, path: Path, notes: list[str]) -> str:
     if not ranked:
         raise SkeletonError(f"{path}: the model has no joints; expected a humanoid with hinges")
     first, others = ranked[0], ranked[1:]
-    rivals = [n for n in others if counts[n] >= _SECOND * counts[first]]
+    rivals = [n for n in others if counts[n] >= _RIVAL_SHARE * counts[first]]
     if rivals:
         both = ", ".join(repr(n) for n in (first, *rivals))
         if any(_is_free(j) for n in (first, *rivals) for j in spec.body(n).joints):
@@ -207,7 +212,7 @@ def _compile(spec: mujoco.MjSpec, path: Path, notes: list[str]) -> mujoco.MjMode
     try:
         return spec.compile()
     except (ValueError, RuntimeError) as error:
-        message = _first(error)
+        message = _line(error)
     assets = [mesh.file for mesh in spec.meshes if mesh.file]
     if not (assets or list(spec.textures) or list(spec.hfields)):
         raise FileFormatError(path, None, f"MuJoCo can't compile it: {message}")
@@ -216,7 +221,9 @@ def _compile(spec: mujoco.MjSpec, path: Path, notes: list[str]) -> mujoco.MjMode
         model = spec.compile()
     except (ValueError, RuntimeError) as again:
         raise FileFormatError(
-            path, None, f"MuJoCo can't compile it: {message}; nor without meshes: {_first(again)}"
+            path,
+            None,
+            f"MuJoCo can't compile it: {message}; nor without meshes: {_line(again)}",
         ) from again
     notes.append(f"read without meshes and textures ({message}): shapes and masses are incomplete")
     return model
@@ -234,11 +241,11 @@ def _drop_assets(spec: mujoco.MjSpec) -> None:
     for kind in ("skins", "materials", "textures", "hfields", "meshes"):
         for element in list(getattr(spec, kind)):
             spec.delete(element)
-    spec.compiler.boundmass = _LEAST_MASS
-    spec.compiler.boundinertia = _LEAST_INERTIA
+    spec.compiler.boundmass = _MIN_MASS
+    spec.compiler.boundinertia = _MIN_INERTIA
 
 
-def _say_what_is_ignored(model: mujoco.MjModel, notes: list[str]) -> None:
+def _note_ignored(model: mujoco.MjModel, notes: list[str]) -> None:
     slides = [model.joint(j).name for j in range(model.njnt) if int(model.jnt_type[j]) == SLIDE]
     if slides:
         notes.append(f"{len(slides)} sliding joints stay at 0 ({slides[0]!r}, ...)")
@@ -246,6 +253,6 @@ def _say_what_is_ignored(model: mujoco.MjModel, notes: list[str]) -> None:
         notes.append(f"{model.neq} equality constraints between joints or bodies are ignored")
 
 
-def _first(error: Exception) -> str:
+def _line(error: Exception) -> str:
     """MuJoCo's message on one line."""
     return " ".join(str(error).split())

@@ -12,35 +12,36 @@ from spark.rig.name_hints import read_names
 from spark.skeleton import Skeleton
 
 
-def labels_of(segments: Sequence[Segment]) -> tuple[str, ...]:
-    """What each part is called for reading its role: the name of the body or of its first joint,
-    whichever says more. A joint's comes first: `Left_Elbow_Yaw` may move a `left_hand_link`."""
-    tried = [
-        [_plain(segment.names[min(k, len(segment.names) - 1)]) for segment in segments]
+def telling_names(segments: Sequence[Segment]) -> tuple[str, ...]:
+    """For each part the name that says most about its role: of its first joint, that joint's body,
+    or its own body. Of equals the joint's wins: `Left_Elbow_Yaw` may move a `left_hand_link`."""
+    candidates = [
+        [_without_kind(segment.names[min(k, len(segment.names) - 1)]) for segment in segments]
         for k in (1, 2, 0)
     ]
-    hints = [read_names(names) for names in tried]
-    labels = []
+    hints = [read_names(names) for names in candidates]
+    telling = []
     for i in range(len(segments)):
-        said = [max(h[i].parts.values(), default=0.0) + 0.1 * bool(h[i].side) for h in hints]
-        labels.append(tried[int(np.argmax(said))][i])
-    return tuple(labels)
+        # A part named for sure counts 1; a side breaks ties between names of the same part.
+        scores = [max(h[i].parts.values(), default=0.0) + 0.1 * bool(h[i].side) for h in hints]
+        telling.append(candidates[int(np.argmax(scores))][i])
+    return tuple(telling)
 
 
-def _plain(name: str) -> str:
-    """The name without the word that says what kind of element it is."""
+def _without_kind(name: str) -> str:
+    """The name without its ending for the kind of element: `left_knee_joint` -> `left_knee`."""
     for word in ("_joint", "_link", "_body"):
         if name.lower().endswith(word):
             return name[: -len(word)]
     return name
 
 
-def points_of(mjcf: Mjcf, segments: Sequence[Segment]) -> list[Float[np.ndarray, "_ 3"]]:
+def surface_points(mjcf: Mjcf, segments: Sequence[Segment]) -> list[Float[np.ndarray, "_ 3"]]:
     """Points on the surface of each part, in the rest pose's world [m]."""
-    return [surface(mjcf, _rigid_with(mjcf, segment.body, segments)) for segment in segments]
+    return [surface(mjcf, _welded_to(mjcf, segment.body, segments)) for segment in segments]
 
 
-def _rigid_with(mjcf: Mjcf, body: int, segments: Sequence[Segment]) -> list[int]:
+def _welded_to(mjcf: Mjcf, body: int, segments: Sequence[Segment]) -> list[int]:
     """The body and those that are welded to it, but for those that are parts of their own."""
     own = {segment.body for segment in segments} - {body}
     model = mjcf.model
@@ -57,7 +58,7 @@ def skeleton_of(
     points: Sequence[Float[np.ndarray, "_ 3"]],
     names: tuple[str, ...],
 ) -> Skeleton:
-    """The parts as joints; an End Site at the far end of each part that carries no other."""
+    """The parts as joints of a skeleton; an End Site at the far end of each childless part."""
     parents = np.array([segment.parent for segment in segments])
     centers = np.array([segment.center for segment in segments])
     offsets = centers - np.where(parents[:, None] < 0, 0.0, centers[parents])
@@ -74,7 +75,7 @@ def skeleton_of(
 
 
 def _far_end(points: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "3"]:
-    """The end of a part along the way from its joint to its middle."""
+    """The end [m, from the joint] of a part, on the line from its joint through its middle."""
     middle = (points.max(0) + points.min(0)) / 2
     length = float(np.linalg.norm(middle))
     if length < 1e-6:

@@ -13,26 +13,42 @@ from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import matrix_from_quat, quat_between, quat_from_matrix, quat_mul, quat_rotate
 from spark.skeleton import Skeleton
 
-_STEPS = 60
-_STILL = 1e-5  # the search ends where no column moves further [rad]
-_BENDING = {  # joint: the axis about which it bends in the T-pose
+_MAX_ITER = 60
+_STEP_TOL = 1e-5  # [rad] the search ends where no dof moves further
+_MAX_STEP = 0.3  # [rad] of a dof in one step: beyond, the linearisation says little
+_DAMPING = 1e-2  # [1] added to the normal equations' diagonal
+_BEND_AXES = {  # the world axis about which a knee or elbow bends, by growing angles, in the T-pose
     Role.LEFT_LOWER_LEG: np.array([0.0, 1, 0]),
     Role.RIGHT_LOWER_LEG: np.array([0.0, 1, 0]),
     Role.LEFT_FOREARM: np.array([0.0, 0, -1]),
     Role.RIGHT_FOREARM: np.array([0.0, 0, 1]),
 }
-_BONE, _TRUNK, _FOOT, _HINGE, _TURN, _REST = 4.0, 20.0, 1.0, 0.5, 0.15, 0.01  # weights
-_ENDS = ("hand", "toe")  # what the limbs' straightness is not judged by
+# Weights [1/rad] of residuals that are angles or chords of unit vectors, strongest wish first.
+_W_TRUNK_ROTATION = 20.0  # upright: the trunk must not lean to bring a limb nearer
+_W_LIMB_DIRECTION = 4.0  # arms out, legs down: this is what makes a T-pose
+_W_FOOT_ROTATION = 1.0  # soles flat and ahead
+_W_BEND_AXIS = 0.5  # knees bend forwards, elbows in the horizontal plane: the twist of the limb
+_W_OTHER_ROTATION = 0.15  # what the above leaves open: hands, clavicles
+_W_REST_ANGLE = 0.01  # hinges that nothing determines stay at rest; keeps H regular
+_W_BASE = 1e-3  # keeps H regular for the base's position, which no term sees
+_W_LIMIT, _LIMIT_MARGIN = 3.0, np.radians(1.0)  # soft; hard ones by clipping
+_SAME_RANGE = 0.2  # [rad] ranges to both sides of straight that differ by less say nothing
+_BENT = 0.05  # [rad] of a joint in the rest pose that is bent, not merely drawn askew
+_NOT_JUDGED = ("hand", "toe")  # ends of limbs: whether a limb is straight is not asked of them
 
 
 @dataclass(frozen=True, eq=False)
 class TPose:
-    """The robot's coordinates in its T-pose, the rotations of its joints (with the bones of arms
-    and legs made exact), and how far [rad] each of those bones is from where it should point."""
+    """The T-pose of a robot: its `coordinates` within the limits (one frame), and the rotations of
+    its joints (`q_world_joint`) with the bones of arms and legs turned to where they should point.
+
+    `direction_errors` says by how much [rad] each of those bones, but for hands' and toes', had to
+    be turned for that.
+    """
 
     coordinates: Coordinates
     world: Float[np.ndarray, "J 4"]
-    misses: dict[int, float]
+    direction_errors: dict[int, float]
 
 
 def search_tpose(
@@ -42,81 +58,80 @@ def search_tpose(
     links: Int[np.ndarray, "J"],
     ideal: Float[np.ndarray, "J 4"],
 ) -> TPose:
-    """The nearest pose within the limits to the rotations `ideal`, which know no limits.
+    """The pose within the limits that is nearest to the joints' rotations `ideal` [q_world_joint],
+    which know no limits.
 
-    Directions of arms and legs count most, then the axes that knees and elbows bend about, then the
-    turns of everything else. The search starts from several poses at once.
+    Damped Gauss-Newton from several initial guesses at once, as frames of one trajectory; the one
+    with the least cost wins. The residuals are those of `_linearize`.
     """
-    q = _starts(tree)
+    q = _initial_guesses(tree)
     pose = rest_pose(skeleton, roles)
-    goals = _bone_goals(pose, links)
-    flexes = _flexes(tree, pose, links)
-    damping = 1e-2
-    for _ in range(_STEPS):
-        normal = _linearize(tree, q, roles, links, ideal, goals, flexes, skeleton)
+    bone_targets = _bone_targets(pose, links)
+    bend_hinges = _bend_hinges(tree, pose, links)
+
+    def linearize(q: Coordinates) -> NormalEquations:
+        return _linearize(tree, q, roles, links, ideal, bone_targets, bend_hinges, skeleton)
+
+    for _ in range(_MAX_ITER):
+        normal = linearize(q)
         normal.hold(q.at_limits(tree, 0.0) * normal.g < 0)
-        step = normal.solve_per_frame(damping)
-        after = q.integrated(tree, np.clip(step, -0.3, 0.3)).clipped(tree, 0.0)
+        step = normal.solve_per_frame(_DAMPING)
+        after = q.integrated(tree, np.clip(step, -_MAX_STEP, _MAX_STEP)).clipped(tree, 0.0)
         moved = max(np.abs(after.angles - q.angles).max(initial=0.0), np.abs(step[:, 3:6]).max())
         q = after
-        if moved < _STILL:
+        if moved < _STEP_TOL:
             break
-    best = int(np.argmin(_linearize(tree, q, roles, links, ideal, goals, flexes, skeleton).cost))
-    one = Coordinates(
-        q.pos[[best]],
-        q.quat[[best]],
-        q.angles[[best]],
-        None if q.ball_quats is None else q.ball_quats[[best]],
-    )
+    one = q.at(np.array([np.argmin(linearize(q).cost)]))
     poses = forward_kinematics(tree, one)
     world = quat_from_matrix(np.moveaxis(poses.rotations[links], -1, 0))[0]
-    misses = {}
-    fixes = {}
-    for j, (bone, goal) in goals.items():
+    direction_errors = {}
+    corrections = {}
+    for j, (bone, target) in bone_targets.items():
         now = quat_rotate(world[j], bone)
-        fixes[j] = quat_between(now, goal)
-        if not str(roles.roles[j]).endswith(_ENDS):
-            cos = now @ goal / np.linalg.norm(now)
-            misses[j] = float(np.arccos(np.clip(cos, -1, 1)))
-    for j, fix in fixes.items():
-        world[j] = quat_mul(fix, world[j])
-    return TPose(one, world, misses)
+        corrections[j] = quat_between(now, target)
+        if not str(roles.roles[j]).endswith(_NOT_JUDGED):
+            cos = now @ target / np.linalg.norm(now)
+            direction_errors[j] = float(np.arccos(np.clip(cos, -1, 1)))
+    for j, correction in corrections.items():
+        world[j] = quat_mul(correction, world[j])
+    return TPose(one, world, direction_errors)
 
 
-def _starts(tree: Tree) -> Coordinates:
+def _initial_guesses(tree: Tree) -> Coordinates:
     """The rest pose, the middle of the limits, and poses between, as frames."""
     rest = np.clip(np.zeros(len(tree)), tree.lower, tree.upper)
     bounded = np.isfinite(tree.lower) & np.isfinite(tree.upper)
     middle = np.where(bounded, (np.where(bounded, tree.lower + tree.upper, 0.0)) / 2, 0.0)
     angles = np.stack([rest, middle, (rest + middle) / 2, rest + 0.3 * (middle - rest)])
     angles[:, tree.balls] = 0.0
-    turns = None
+    balls = None
     if tree.balls.any():
-        turns = np.tile([1.0, 0, 0, 0], (len(angles), len(tree), 1))
+        balls = np.tile([1.0, 0, 0, 0], (len(angles), len(tree), 1))
     return Coordinates(
         np.tile(tree.base, (len(angles), 1)),
         np.tile([1.0, 0, 0, 0], (len(angles), 1)),
         angles,
-        turns,
+        balls,
     )
 
 
-def _bone_goals(
+def _bone_targets(
     rest: RigPose, links: Int[np.ndarray, "J"]
 ) -> dict[int, tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]]:
-    """For each joint of arms and legs that can turn: its bone in the rest pose and where it points
-    in the T-pose."""
-    goals = {}
+    """For each joint of arms and legs that can turn: the unit direction of its bone in the rest
+    pose, and in a T-pose."""
+    targets = {}
     for group, limb in LIMBS.items():
         arm = group in (Group.LEFT_ARM, Group.RIGHT_ARM)
+        down = np.array([0.0, 0, -1])
         out = np.array([0.0, 1.0 if group is Group.LEFT_ARM else -1.0, 0.0])
         for role in limb[1:] if arm else limb[:2]:
             for j in rest.roles.joints(role):
                 bone = rest.bone(j)
                 parent = int(rest.skeleton.parents[j])
                 if bone is not None and links[j] != links[parent]:
-                    goals[j] = bone / np.linalg.norm(bone), out if arm else np.array([0.0, 0, -1])
-    return goals
+                    targets[j] = bone / np.linalg.norm(bone), out if arm else down
+    return targets
 
 
 def rest_pose(skeleton: Skeleton, roles: RoleMap) -> RigPose:
@@ -130,10 +145,16 @@ def _linearize(
     roles: RoleMap,
     links: Int[np.ndarray, "J"],
     ideal: Float[np.ndarray, "J 4"],
-    goals: dict[int, tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]],
-    flexes: dict[int, tuple[int, Float[np.ndarray, "3"]]],
+    bone_targets: dict[int, tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]],
+    bend_hinges: dict[int, tuple[int, Float[np.ndarray, "3"]]],
     skeleton: Skeleton,
 ) -> NormalEquations:
+    """The weighted residuals of the T-pose at `q`, each frame for itself.
+
+    For each part with a role of its own: `rotation_residual` to `ideal`; for bones of arms and legs
+    `direction_residual` to `bone_targets`; for the axes of `bend_hinges` `direction_residual` to
+    `_BEND_AXES`; soft limits, and a pull to the rest pose. All are angles [rad] or chords.
+    """
     count = len(q)
     poses = forward_kinematics(tree, q)
     normal = NormalEquations(count, tree.nv)
@@ -142,59 +163,60 @@ def _linearize(
         if role is None or (j and link == links[int(skeleton.parents[j])]):
             continue
         chain = tree.chain(link)
-        columns = [3, 4, 5, *tree.dofs(chain)]
+        dofs = [3, 4, 5, *tree.dofs(chain)]
         axes = np.concatenate(
             [np.eye(3)[:, :, None].repeat(count, 2), poses.angular_jacobian(chain)]
         )
-        trunk = role in (Role.PELVIS, Role.SPINE, Role.NECK, Role.HEAD)
-        weight = _TRUNK if trunk else _FOOT if str(role).endswith("foot") else _TURN
+        if role in (Role.PELVIS, Role.SPINE, Role.NECK, Role.HEAD):
+            weight = _W_TRUNK_ROTATION
+        else:
+            weight = _W_FOOT_ROTATION if role.part == "foot" else _W_OTHER_ROTATION
         target = matrix_from_quat(ideal[j])[:, :, None].repeat(count, 2)
-        _add(normal, columns, rotation_residual(poses.rotations[link], target, axes, weight))
-        if j in goals:
-            bone, goal = goals[j]
-            wanted = goal[:, None].repeat(count, 1)
-            now = poses.direction(link, bone)
-            _add(normal, columns, direction_residual(now, wanted, axes, _BONE))
-        if role in _BENDING and j in flexes:
-            first, flex = flexes[j]
-            wanted = _BENDING[role][:, None].repeat(count, 1)
+        _add(normal, dofs, rotation_residual(poses.rotations[link], target, axes, weight))
+        if j in bone_targets:
+            bone, wanted = bone_targets[j]
+            now, goal = poses.direction(link, bone), wanted[:, None].repeat(count, 1)
+            _add(normal, dofs, direction_residual(now, goal, axes, _W_LIMB_DIRECTION))
+        if role in _BEND_AXES and j in bend_hinges:
+            first, bend_axis = bend_hinges[j]
+            goal = _BEND_AXES[role][:, None].repeat(count, 1)
             above = tree.chain(int(tree.parents[first]))
             n = 3 + len(tree.dofs(above))
-            axis = poses.direction(int(tree.parents[first]), flex)
-            _add(normal, columns[:n], direction_residual(axis, wanted, axes[:n], _HINGE))
-    at_rest = np.zeros((count, tree.nv))
+            axis = poses.direction(int(tree.parents[first]), bend_axis)
+            _add(normal, dofs[:n], direction_residual(axis, goal, axes[:n], _W_BEND_AXIS))
+    from_rest = np.zeros((count, tree.nv))
     hinges = tree.dof_starts[~tree.balls]
-    at_rest[:, hinges] = _REST * q.angles[:, ~tree.balls]
-    damped = np.full(at_rest.shape, 1e-3)
-    damped[:, BASE:] = _REST
-    normal.add_diagonal(damped, at_rest)
-    over, slope = limit_residual(tree, q, margin=np.radians(1.0), weight=3.0)
-    normal.add_diagonal(slope, over)
+    from_rest[:, hinges] = _W_REST_ANGLE * q.angles[:, ~tree.balls]
+    derivatives = np.full(from_rest.shape, _W_BASE)
+    derivatives[:, BASE:] = _W_REST_ANGLE
+    normal.add_diagonal(derivatives, from_rest)
+    beyond, derivatives = limit_residual(tree, q, margin=_LIMIT_MARGIN, weight=_W_LIMIT)
+    normal.add_diagonal(derivatives, beyond)
     return normal
 
 
-def _add(normal: NormalEquations, columns: list[int], rows: Linearized) -> None:
-    J, residuals = rows
-    normal.add(columns, np.ascontiguousarray(J.transpose(2, 0, 1)), residuals)
+def _add(normal: NormalEquations, dofs: list[int], term: Linearized) -> None:
+    J, residuals = term
+    normal.add(dofs, np.ascontiguousarray(J.transpose(2, 0, 1)), residuals)
 
 
-def _flexes(
+def _bend_hinges(
     tree: Tree, rest: RigPose, links: Int[np.ndarray, "J"]
 ) -> dict[int, tuple[int, Float[np.ndarray, "3"]]]:
-    """For each knee and elbow with hinges: the one that bends it, and the axis about which it
-    bends by growing angles, in the rest pose."""
+    """For each knee and elbow with hinges: the hinge that bends it, and the unit axis, in the rest
+    pose, about which growing angles bend it."""
     out = {}
-    for role in _BENDING:
+    for role in _BEND_AXES:
         for j in rest.roles.joints(role):
             link = int(links[j])
             moves = link >= 0 and link != links[int(rest.skeleton.parents[j])]
             if moves and not tree.balls[link]:
-                first = _own_first(tree, rest.skeleton, links, j)
+                first = _first_own_hinge(tree, rest.skeleton, links, j)
                 out[j] = first, tree.axes[first] * _bend_sign(tree, rest, j, first)
     return out
 
 
-def _own_first(tree: Tree, skeleton: Skeleton, links: Int[np.ndarray, "J"], j: int) -> int:
+def _first_own_hinge(tree: Tree, skeleton: Skeleton, links: Int[np.ndarray, "J"], j: int) -> int:
     """The first of a joint's own hinges: the one that bends a knee or an elbow."""
     above = int(links[int(skeleton.parents[j])])
     own = int(links[j])
@@ -204,7 +226,8 @@ def _own_first(tree: Tree, skeleton: Skeleton, links: Int[np.ndarray, "J"], j: i
 
 
 def _bend_sign(tree: Tree, rest: RigPose, j: int, hinge: int) -> float:
-    """+1 where a growing angle bends the joint: to the side where its range is larger."""
+    """+1 where a growing angle bends the joint, -1 where a falling one does: joints bend to the
+    side to which they have the larger range, measured from straight."""
     upper, lower = rest.bone(int(rest.skeleton.parents[j])), rest.bone(j)
     if upper is None or lower is None:
         return 1.0
@@ -212,7 +235,7 @@ def _bend_sign(tree: Tree, rest: RigPose, j: int, hinge: int) -> float:
     across = lower @ upper - (lower @ axis) * (upper @ axis)
     straight = float(np.arctan2(np.cross(lower, upper) @ axis, across))
     above, below = tree.upper[hinge] - straight, straight - tree.lower[hinge]
-    if np.isclose(above, below, atol=0.2):
-        # As wide to both sides: the way it is bent already, or else as the file turns it.
-        return -1.0 if straight > 0.05 else 1.0
+    if np.isclose(above, below, atol=_SAME_RANGE):
+        # As wide to both sides: the way it is bent already, or else by growing angles.
+        return -1.0 if straight > _BENT else 1.0
     return 1.0 if above > below else -1.0

@@ -1,7 +1,7 @@
-"""What any humanoid MJCF is, without configuration.
+"""From any humanoid's MJCF to its morphology, without configuration.
 
 Hinge chains become one joint a limb segment (`robots.model.segments`); a trunk that carries the
-legs below a waist is re-rooted at the pelvis; names and build say what is what.
+legs below a waist is re-rooted at the pelvis; names and build give the roles.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from robots.model.mjcf import Mjcf, read_mjcf
 from robots.model.morphology import Morphology
-from robots.model.parts import labels_of, points_of, skeleton_of
+from robots.model.parts import skeleton_of, surface_points, telling_names
 from robots.model.segments import Segment, segments_of, tree_of
 from robots.model.soles import place_feet, soles_of, with_soles
 from robots.model.tpose import TPose, search_tpose
@@ -27,11 +27,12 @@ from spark.rig.roles import Role, RoleMap
 from spark.rig.tpose import find_tpose
 from spark.skeleton import Skeleton
 
-_FAR_FROM_T, _NOT_A_T = np.radians(5), np.radians(40)
+_NOTED = np.radians(5)  # a limb farther from the T-pose is noted: its motions lean by as much
+_REFUSED = np.radians(40)  # farther is nearly an A-pose (45): no rotation copied from it would do
 
 
 def understand_robot(source: Mjcf | str | Path, override: Override | None = None) -> Morphology:
-    """What any humanoid MJCF is; no configuration. `override` gives roles to `parts_of` it.
+    """The morphology of any humanoid MJCF. `override` gives roles to joints of `parts_of` it.
 
     Raises SkeletonError where it has no legs, or limits that forbid a T-pose.
     """
@@ -46,18 +47,17 @@ def understand_robot(source: Mjcf | str | Path, override: Override | None = None
 
 
 def parts_of(mjcf: Mjcf) -> Skeleton:
-    """The robot's parts, called as their bodies are: what an `override` of roles counts."""
+    """The robot's parts, called as their bodies are: the joints that an `override` names."""
     tree, joints = tree_of(mjcf)
     segments = segments_of(mjcf, tree, joints)
-    points = points_of(mjcf, segments)
+    points = surface_points(mjcf, segments)
     return skeleton_of(segments, points, tuple(segment.names[0] for segment in segments))
 
 
 def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | None) -> Morphology:
     segments = segments_of(mjcf, tree, joints)
-    points = points_of(mjcf, segments)
-    labels = labels_of(segments)
-    found = assign_roles(skeleton_of(segments, points, labels), None, override)
+    points = surface_points(mjcf, segments)
+    found = assign_roles(skeleton_of(segments, points, telling_names(segments)), None, override)
     segments, order = _rerooted(segments, found)
     points = [points[k] for k in order]
     roles = RoleMap(
@@ -66,23 +66,23 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
         tuple(found.reasons[k] for k in order),
     )
     skeleton = skeleton_of(segments, points, tuple(segment.names[0] for segment in segments))
-    still = Motion(skeleton, 1.0, skeleton.offsets[:1], _still(len(skeleton)))
-    ideal, _ = find_tpose(still, roles)
+    rest = Motion(skeleton, 1.0, skeleton.offsets[:1], _identity(len(skeleton)))
+    ideal, _ = find_tpose(rest, roles)  # as if joints had no limits
 
     links = np.array([segment.link for segment in segments])
     place_feet(skeleton, roles, points, ideal)
     soles = soles_of(skeleton, roles, points, ideal, links)
     skeleton = with_soles(skeleton, soles, links)
     tree, assumed = _assume_limits(tree, segments, roles)
-    t = search_tpose(tree, skeleton, roles, links, ideal)
-    notes = (*mjcf.notes, *assumed, *_say_how_near(t, skeleton))
+    tpose = search_tpose(tree, skeleton, roles, links, ideal)
+    notes = (*mjcf.notes, *assumed, *_check_tpose(tpose, skeleton))
     rig = Rig(
         skeleton=skeleton,
         roles=roles,
         groups=groups_of(skeleton, roles),
-        tpose=t.world,
+        tpose=tpose.world,
         root_joint=0,
-        hip_height=hip_height(skeleton, roles, t.world),
+        hip_height=hip_height(skeleton, roles, tpose.world),
         notes=notes,
     )
     return Morphology(
@@ -93,13 +93,13 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
         links=links,
         centers=np.array([segment.center for segment in segments]),
         soles=soles,
-        tpose=t.coordinates,
+        tpose=tpose.coordinates,
         notes=notes,
     )
 
 
 def _rerooted(segments: list[Segment], roles: RoleMap) -> tuple[list[Segment], list[int]]:
-    """The parts with the pelvis as their root, and the old number of each."""
+    """The parts with the pelvis as their root, parents first, and the old number of each."""
     root = roles.require(Role.PELVIS)
     hips = [
         segments[roles.require(role)].center for role in (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
@@ -128,7 +128,7 @@ def _rerooted(segments: list[Segment], roles: RoleMap) -> tuple[list[Segment], l
 def _assume_limits(
     tree: Tree, segments: Sequence[Segment], roles: RoleMap
 ) -> tuple[Tree, tuple[str, ...]]:
-    """Limits where the file gives none: one turn to either side."""
+    """Limits where the file gives none: half a turn to either side, with a note."""
     unlimited = ~np.isfinite(tree.lower) & ~tree.balls
     if not unlimited.any():
         return tree, ()
@@ -138,12 +138,14 @@ def _assume_limits(
     return replace(tree, lower=lower, upper=upper), (note,)
 
 
-def _say_how_near(t: TPose, skeleton: Skeleton) -> tuple[str, ...]:
-    worst = max(t.misses, key=lambda j: t.misses[j], default=None)
-    if worst is None or t.misses[worst] < _FAR_FROM_T:
+def _check_tpose(tpose: TPose, skeleton: Skeleton) -> tuple[str, ...]:
+    """A note where the limits keep a limb from the T-pose. Raises SkeletonError where by much."""
+    errors = tpose.direction_errors
+    worst = max(errors, key=lambda j: errors[j], default=None)
+    if worst is None or errors[worst] < _NOTED:
         return ()
-    what = f"{skeleton.names[worst]!r} stays {np.degrees(t.misses[worst]):.0f} degrees from it"
-    if t.misses[worst] > _NOT_A_T:
+    what = f"{skeleton.names[worst]!r} stays {np.degrees(errors[worst]):.0f} degrees from it"
+    if errors[worst] > _REFUSED:
         raise SkeletonError(
             f"the joint limits forbid a T-pose (legs down, arms out): {what}; check the ranges of "
             "the joints above it"
@@ -151,5 +153,5 @@ def _say_how_near(t: TPose, skeleton: Skeleton) -> tuple[str, ...]:
     return (f"the limits allow no exact T-pose: {what}",)
 
 
-def _still(joints: int) -> Float[np.ndarray, "1 J 4"]:
+def _identity(joints: int) -> Float[np.ndarray, "1 J 4"]:
     return np.tile([1.0, 0.0, 0.0, 0.0], (1, joints, 1))
