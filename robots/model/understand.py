@@ -20,8 +20,9 @@ from robots.model.tpose import TPose, search_tpose
 from robots.tree import Tree
 from spark.errors import SkeletonError
 from spark.motion import Motion
+from spark.rig.feet import hip_height
 from spark.rig.groups import groups_of
-from spark.rig.rig import Rig, hip_height
+from spark.rig.rig import Rig
 from spark.rig.role_assignment import Override, assign_roles
 from spark.rig.roles import Role, RoleMap
 from spark.rig.tpose import find_tpose

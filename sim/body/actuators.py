@@ -53,8 +53,8 @@ def _levers(rig: Rig) -> dict[str, float]:
     height = rig.standing_height
     levers = {"ankle": height * _ANKLE_TO_TIP, "toe": height * _BALL_TO_TIP}
     for sole in rig.soles:
-        tip = sole_positions(sole, positions, rig.tpose)[4:, :2].mean(0)
-        for joint in {int(sole.joints[0]), int(sole.joints[-1])}:
+        tip = sole_positions(sole, positions, rig.tpose)[-2:, :2].mean(0)
+        for joint in {*sole.joints.tolist()}:
             kind = joint_kind_of(rig, joint)
             length = float(np.linalg.norm(tip - positions[joint, :2]))
             levers[kind] = max(levers[kind], length)

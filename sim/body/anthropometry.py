@@ -208,9 +208,9 @@ class _Builder:
 
     def _feet(self) -> None:
         for sole in self.rig.soles:
-            foot = int(sole.joints[0])
+            foot = sole.foot
             points = sole_positions(sole, self.pos, self.rig.tpose)
-            heel, toe = points[:2].mean(axis=0), points[4:].mean(axis=0)
+            heel, toe = points[:2].mean(axis=0), points[-2:].mean(axis=0)
             com = heel + 0.42 * (toe - heel)
             com[2] = 0.5 * (com[2] + self.pos[foot, 2])
             forward = (toe - heel) / np.linalg.norm(toe - heel)

@@ -58,7 +58,7 @@ def lean(rig: Rig, world: Float[np.ndarray, "J 4"], masses: Inertias) -> float:
 
 def _leaning(rig: Rig, world: Float[np.ndarray, "J 4"], angle: float) -> Float[np.ndarray, "J 4"]:
     leaning = quat_mul(quat_about("y", np.array(angle)), world)
-    feet = [k for sole in rig.soles for k in rig.skeleton.subtree(int(sole.joints[0]))]
+    feet = [k for sole in rig.soles for k in rig.skeleton.subtree(sole.foot)]
     leaning[feet] = world[feet]
     return leaning
 

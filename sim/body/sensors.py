@@ -29,7 +29,7 @@ def add_sites(bodies: dict[int, mujoco.MjsBody], rig: Rig, inertias: Inertias) -
             bodies[joint].add_site(name=name, pos=inertias.coms[joint], **site)
     positions = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
     for sole in rig.soles:
-        foot = int(sole.joints[0])
+        foot = sole.foot
         center = sole_positions(sole, positions, rig.tpose).mean(0) - positions[foot]
         bodies[foot].add_site(name=f"{sole.side}_foot", pos=center, **site)
 

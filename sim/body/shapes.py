@@ -101,12 +101,12 @@ class _Shapes:
         )
 
     def feet(self, hulls: Mapping[int, Hull]) -> None:
-        """A box under each foot and one under its toes, with their lower faces on the soles; out of
-        sight where the foot has a hull."""
+        """A box under each foot and one under its toes, their lower corners the soles' points; out
+        of sight where the foot has a hull."""
         for sole in self.rig.soles:
-            foot, toe = int(sole.joints[0]), int(sole.joints[-1])
+            foot, toe = sole.foot, sole.toe
             points = sole_positions(sole, self.pos, self.rig.tpose)
-            if toe == foot:
+            if toe is None:
                 self._box(foot, points, hidden=foot in hulls)
                 continue
             self._box(foot, points[:4], hidden=foot in hulls)
@@ -145,7 +145,7 @@ class _Shapes:
         return "visual" if foot or kind_of(self.rig, joint) == DETAIL else "collision"
 
     def _box(self, joint: int, points: Float[np.ndarray, "P 3"], *, hidden: bool) -> None:
-        """A flat box over points of the sole; thinner than the joint is high."""
+        """A flat box between points of the sole; thinner than the joint is high."""
         low, high = points.min(0) - self.pos[joint], points.max(0) - self.pos[joint]
         half = (high - low) / 2
         half[2] = min(_FOOT * self.height, max(-low[2], 0.01)) / 2

@@ -13,7 +13,7 @@ from sim.trajectory import ModelSole, ModelTrajectory
 from spark.errors import SkeletonError
 from spark.kinematics import forward
 from spark.motion import Motion
-from spark.rig.feet import SOLE_POINTS, Sole, sole_positions
+from spark.rig.feet import Sole, sole_positions
 from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_rotate, yaw_from_quat
 
@@ -84,7 +84,7 @@ def pose_clip(motion: Motion, rig: Rig, body: ModelTrajectory | None = None) -> 
         points = np.concatenate([_given_corners(sole, model_poses) for sole in body.soles], axis=1)
     else:
         soles = _soles(rig)
-        sides = tuple(f"{sole.side} foot" for sole in soles for _ in SOLE_POINTS)
+        sides = tuple(f"{sole.side} foot" for sole in soles for _ in sole.joints)
         points = np.concatenate([sole_positions(s, positions, world) for s in soles], axis=1)
     return ClipPoses(
         motion=motion,

@@ -157,7 +157,7 @@ class _Foot:
         sole = next(s for s in rig.soles if s.side == side.side)
         points = actor.tpose[sole.joints] + quat_rotate(rig.tpose[sole.joints], sole.offsets)
         self.heel = points[:2].mean(0) - ankle
-        tip = points[4:].mean(0)
+        tip = points[-2:].mean(0)
         # Without a toe joint the whole foot rolls over its tip.
         ball = tip if toe is None else actor.tpose[toe]
         self.ball, self.tip = ball - ankle, tip - ball

@@ -1,7 +1,11 @@
-"""The soles of a rig's feet: the points with which a body stands on the floor.
+"""The soles of feet: the points with which a body stands on the floor.
 
-BVH gives an ankle, often a toe joint, sometimes a toe tip, and never a heel or a width. Those are
-made here from the T-pose, in which the soles lie on the floor, and from body proportions.
+There is one definition for all bodies: a right and a left point at the heel, at the ball where a
+toe joint bends the foot there, and at the toes' end. A robot's shapes show where they are
+(`robots.model.soles`). BVH gives an ankle, often a toe joint, sometimes a toe tip, and never a heel
+or a width: there they are made from the T-pose, in which feet lie flat and straight ahead, and from
+body proportions. A body that is built on such a rig (`sim.body.shapes`) has its feet's lower faces
+between these very points.
 """
 
 from dataclasses import dataclass
@@ -30,21 +34,48 @@ FOOT_LENGTH = 0.152
 FOOT_WIDTH = 0.055
 _HEEL, _BALL, _TIP = -0.25 * FOOT_LENGTH, 0.5 * FOOT_LENGTH, 0.75 * FOOT_LENGTH
 
-SOLE_POINTS = ("heel inner", "heel outer", "ball inner", "ball outer", "toe inner", "toe outer")
-
 
 @dataclass(frozen=True, eq=False)
 class Sole:
-    """One foot's support points, in the order of `SOLE_POINTS`.
+    """One foot's support points: heel, ball and end of the toes, a right and a left one each; no
+    ball where no toe joint bends the foot, so that there are six or four.
 
     `joints[p]` carries point p and `offsets[p]` [m] is its place in that joint's own axes, like a
-    skeleton's offset. Heel and ball move with the foot joint; the toes with the toe joint where
-    there is one.
+    skeleton's offset. Heel and ball move with the foot joint, the toes' end with the toe joint.
     """
 
     side: Side
-    joints: Int[np.ndarray, "6"]
-    offsets: Float[np.ndarray, "6 3"]
+    joints: Int[np.ndarray, "P"]
+    offsets: Float[np.ndarray, "P 3"]
+
+    def __len__(self) -> int:
+        return len(self.joints)
+
+    @property
+    def foot(self) -> int:
+        """The foot joint."""
+        return int(self.joints[0])
+
+    @property
+    def toe(self) -> int | None:
+        """The toe joint; None where the sole is rigid."""
+        return int(self.joints[-1]) if self.joints[-1] != self.foot else None
+
+
+def sole_positions(
+    sole: Sole, pos_world: Float[np.ndarray, "*n J 3"], q_world: Float[np.ndarray, "*n J 4"]
+) -> Float[np.ndarray, "*n P 3"]:
+    """The points [m, world] for joint positions and rotations as `forward` gives them."""
+    return pos_world[..., sole.joints, :] + quat_rotate(q_world[..., sole.joints, :], sole.offsets)
+
+
+def hip_height(skeleton: Skeleton, roles: RoleMap, tpose: Float[np.ndarray, "J 4"]) -> float:
+    """Height [m] of the hips' middle above the lowest point of the feet in the T-pose; of the whole
+    legs where there are no feet."""
+    pose = _TPose(skeleton, roles, tpose)
+    feet = [j for role, _ in FEET.values() for j in roles.joints(role)]
+    points = [pose.foot(j) for j in feet] or [pose.below(j) for j in pose.hips]
+    return float(pose.positions[pose.hips, 2].mean() - min(each[:, 2].min() for each in points))
 
 
 def human_soles(
@@ -55,57 +86,55 @@ def human_soles(
     All points lie on the floor in the T-pose: `hip_height` [m] below the hips' middle. Lengths come
     from the rig where it has a toe joint or a toe tip, otherwise, like the width, from its height.
     """
-    pos = world_positions(skeleton, tpose, np.zeros(3))
+    pose = _TPose(skeleton, roles, tpose)
     height = hip_height / HIP_HEIGHT
-    hips = [j for role in UPPER_LEGS for j in roles.joints(role)]
-    floor_z = float(pos[hips, 2].mean()) - hip_height
-    return tuple(
-        _sole(skeleton, tpose, pos, side, foot, roles.joint(toe_role), height, floor_z)
-        for side, (foot_role, toe_role) in FEET.items()
-        if (foot := roles.joint(foot_role)) is not None
-    )
+    floor_z = pose.positions[pose.hips, 2].mean() - hip_height
+    soles = []
+    for side, (foot_role, toe_role) in FEET.items():
+        foot, toe = roles.joint(foot_role), roles.joint(toe_role)
+        if foot is None:
+            continue
+        ankle = pose.positions[foot]
+        tip_at = float(pose.foot(foot)[:, 0].max() - ankle[0])
+        rows = [(foot, _HEEL * height)]
+        if toe is None:
+            rows.append((foot, max(tip_at, _TIP * height)))
+        else:
+            ball_at = max(float(pose.positions[toe, 0] - ankle[0]), 0.3 * _BALL * height)
+            rows.append((foot, ball_at))
+            rows.append((toe, max(tip_at, ball_at + 0.5 * (_TIP - _BALL) * height)))
+        half_width = 0.5 * FOOT_WIDTH * height
+        joints = np.repeat([joint for joint, _ in rows], 2)
+        world = np.array(
+            [
+                (ankle[0] + ahead, ankle[1] + left, floor_z)
+                for _, ahead in rows
+                for left in (-half_width, half_width)
+            ]
+        )
+        offsets = quat_rotate(quat_conj(tpose[joints]), world - pose.positions[joints])
+        soles.append(Sole(side, joints, offsets))
+    return tuple(soles)
 
 
-def sole_positions(
-    sole: Sole, pos_world: Float[np.ndarray, "*n J 3"], q_world: Float[np.ndarray, "*n J 4"]
-) -> Float[np.ndarray, "*n 6 3"]:
-    """The points [m, world] for joint positions and rotations as `forward` gives them."""
-    return pos_world[..., sole.joints, :] + quat_rotate(q_world[..., sole.joints, :], sole.offsets)
+class _TPose:
+    """Where joints and End Sites are in the T-pose [m, the root at the origin]."""
 
+    def __init__(self, skeleton: Skeleton, roles: RoleMap, tpose: Float[np.ndarray, "J 4"]) -> None:
+        self.skeleton = skeleton
+        self.positions = world_positions(skeleton, tpose, np.zeros(3))
+        self.ends = end_positions(skeleton, self.positions, tpose)
+        self.hips = [j for role in UPPER_LEGS for j in roles.joints(role)[:1]]
 
-def _sole(
-    skeleton: Skeleton,
-    tpose: Float[np.ndarray, "J 4"],
-    pos: Float[np.ndarray, "J 3"],
-    side: Side,
-    foot: int,
-    toe: int | None,
-    height: float,
-    floor_z: float,
-) -> Sole:
-    """The sole of a body of some standing height [m] that is at `pos` in its T-pose."""
-    below = list(skeleton.subtree(foot))
-    ends = end_positions(skeleton, pos, tpose)[np.isin(skeleton.end_parents, below)]
-    points = np.concatenate([pos[below], ends])[:, :2] - pos[foot, :2]
-    tip = points[np.argmax(points[:, 0])]
-    length = float(np.linalg.norm(tip))
-    # A tip nearer than this is a sole or a heel marker, not the end of the foot.
-    forward = tip / length if length > 0.3 * _TIP * height else np.array([1.0, 0.0])
+    def below(self, joint: int) -> Float[np.ndarray, "K 3"]:
+        """A joint, and the joints and End Sites below it."""
+        joints = list(self.skeleton.subtree(joint))
+        ends = self.ends[np.isin(self.skeleton.end_parents, joints)]
+        return np.concatenate([self.positions[joints], ends])
 
-    tip_at = max(length, _TIP * height) if toe is None else length
-    if toe is None:
-        ball_at = tip_at * _BALL / _TIP
-    else:
-        ball_at = max(float(forward @ (pos[toe, :2] - pos[foot, :2])), 0.3 * _BALL * height)
-        tip_at = max(tip_at, ball_at + 0.5 * (_TIP - _BALL) * height)
-    inner = np.array([forward[1], -forward[0]]) * (1.0 if side == "left" else -1.0)
-    half_width = 0.5 * FOOT_WIDTH * height
-
-    world = np.empty((6, 3))
-    for row, along in enumerate((_HEEL * height, ball_at, tip_at)):
-        for column, across in enumerate((half_width, -half_width)):
-            world[2 * row + column, :2] = pos[foot, :2] + along * forward + across * inner
-    world[:, 2] = floor_z
-    joints = np.full(6, foot)
-    joints[4:] = foot if toe is None else toe
-    return Sole(side, joints, quat_rotate(quat_conj(tpose[joints]), world - pos[joints]))
+    def foot(self, joint: int) -> Float[np.ndarray, "K 3"]:
+        """The points of a foot. No foot is longer than its leg: an End Site that is farther away is
+        in other units than the rest."""
+        points, ankle = self.below(joint), self.positions[joint]
+        leg = np.linalg.norm(self.positions[self.hips].mean(axis=0) - ankle)
+        return points[np.linalg.norm(points - ankle, axis=1) <= leg]

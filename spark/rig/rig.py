@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from spark.kinematics import end_positions, world_positions
+from spark.kinematics import world_positions
 from spark.motion import Motion
-from spark.rig.feet import FEET, HIP_HEIGHT, UPPER_LEGS, Sole, human_soles
+from spark.rig.feet import FEET, HIP_HEIGHT, UPPER_LEGS, Sole, hip_height, human_soles
 from spark.rig.groups import groups_of
 from spark.rig.role_assignment import Override, assign_roles
 from spark.rig.roles import Group, Role, RoleMap
@@ -115,15 +115,3 @@ def understand(motion: Motion, override: Override | None = None) -> Rig:
     root_joint = root_joint_of(skeleton, pelvis)
     height = hip_height(skeleton, roles, tpose)
     return Rig(skeleton, roles, groups_of(skeleton, roles), tpose, root_joint, height, notes)
-
-
-def hip_height(skeleton: Skeleton, roles: RoleMap, tpose: Float[np.ndarray, "J 4"]) -> float:
-    """Height [m] of the hips' middle above the lowest point of the feet in the T-pose; of the whole
-    legs where there are no feet."""
-    positions = world_positions(skeleton, tpose, np.zeros(3))
-    ends = end_positions(skeleton, positions, tpose)
-    hips = [j for role in UPPER_LEGS for j in roles.joints(role)[:1]]
-    feet = [j for foot, _ in FEET.values() for j in roles.joints(foot)] or hips
-    below = sorted({k for j in feet for k in skeleton.subtree(j)})
-    heights = [*positions[below, 2], *ends[np.isin(skeleton.end_parents, below), 2]]
-    return float(positions[hips, 2].mean() - min(heights))

@@ -26,7 +26,7 @@ SIDES = ("left", "right")
 
 @cache
 def soles(name: str, build: str) -> np.ndarray:
-    """Support points: frames, left and right, `SOLE_POINTS`, xyz [m]."""
+    """Support points: frames, left and right, heel, ball and toes (right, left), xyz [m]."""
     rig = sample_rig(build)
     positions, world = forward(sample_motion(name, rig, FPS))
     return np.stack([sole_positions(s, positions, world) for s in rig.soles], axis=1)

@@ -7,7 +7,7 @@ import pytest
 
 from spark.kinematics import forward
 from spark.motion import Motion
-from spark.rig.feet import FOOT_LENGTH, FOOT_WIDTH, sole_positions
+from spark.rig.feet import FOOT_LENGTH, FOOT_WIDTH, hip_height, sole_positions
 from spark.rig.rig import Rig
 from spark.rig.roles import Role, RoleMap
 from spark.rotation import quat_about, quat_rotate
@@ -23,7 +23,8 @@ def test_in_the_tpose_the_soles_lie_on_the_floor_and_mirror_each_other() -> None
     rig = stick_rig()
     left, right = soles_of(rig, standing(rig, 1))[0]
     np.testing.assert_allclose(left[:, 2], 0, atol=1e-12)
-    np.testing.assert_allclose(left * [1, -1, 1], right, atol=1e-12)
+    mirrored = (left * [1, -1, 1]).reshape(3, 2, 3)[:, ::-1].reshape(6, 3)
+    np.testing.assert_allclose(mirrored, right, atol=1e-12)
 
 
 def test_lengths_come_from_the_rig_and_the_width_from_its_height() -> None:
@@ -88,3 +89,26 @@ def test_a_leg_without_a_foot_has_no_sole() -> None:
     roles = tuple(None if r is Role.RIGHT_FOOT else r for r in rig.roles.roles)
     rig = replace(rig, roles=RoleMap(roles, rig.roles.confidence, rig.roles.reasons))
     assert [sole.side for sole in rig.soles] == ["left"]
+
+
+def test_a_rigid_foot_has_no_ball() -> None:
+    rig = stick_rig()
+    bent = rig.soles[0]
+    roles = tuple(None if r is Role.LEFT_TOE else r for r in rig.roles.roles)
+    rigid = replace(rig, roles=replace(rig.roles, roles=roles)).soles[0]
+    assert (len(bent), bent.toe) == (6, joint(Role.LEFT_TOE))
+    assert (len(rigid), rigid.toe) == (4, None)
+    np.testing.assert_allclose(rigid.offsets[:2], bent.offsets[:2], atol=1e-12)
+
+
+@pytest.mark.parametrize("scale", [100.0, 0.01])
+def test_a_toe_tip_in_other_units_moves_no_floor(scale: float) -> None:
+    """It is no part of the foot: as if there were none."""
+    rig = stick_rig()
+    down = rig.skeleton.end_offsets - [0, 0, 0.005]
+    skeleton = replace(rig.skeleton, end_offsets=down * scale)
+    odd = hip_height(skeleton, rig.roles, rig.tpose)
+    none = replace(rig.skeleton, end_offsets=rig.skeleton.end_offsets * 0)
+    assert odd == pytest.approx(hip_height(none, rig.roles, rig.tpose), abs=1e-3)
+    soles = [replace(rig, skeleton=each).soles[0] for each in (skeleton, none)]
+    np.testing.assert_allclose(soles[0].offsets, soles[1].offsets, atol=1e-3)
