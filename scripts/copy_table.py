@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 
 import spark_sim
-from sim.report.clip_metrics import FLAGS, ClipMetrics
+from sim.report import ClipMetrics
+from sim.report.names import FLAGS, LABELS
 
 
 def row(name: str, clips: list[ClipMetrics]) -> str:
     """Shares over the frames of all clips together."""
-    flags = [np.concatenate([clip.flags[letter] for clip in clips]) for letter in FLAGS]
+    flags = [np.concatenate([clip.flags[name] for clip in clips]) for name in FLAGS]
     shares = [np.any(flags, axis=0), *flags]
     return f"| {name} | " + " | ".join(f"{100 * share.mean():.1f} %" for share in shares) + " |"
 
@@ -23,7 +24,8 @@ def main(folder: str, *targets: str) -> None:
     sources = [spark_sim.load(path) for path in sorted(Path(folder).glob("*.bvh"))]
     frames = sum(len(source.motion) for source in sources)
     print(f"{len(sources)} clips, {frames} frames\n")
-    print(f"| | implausible | {' | '.join(FLAGS.values())} |\n|---|{'---|' * (len(FLAGS) + 1)}")
+    heads = " | ".join(LABELS[name] for name in FLAGS)
+    print(f"| | implausible | {heads} |\n|---|{'---|' * (len(FLAGS) + 1)}")
     print(row("the source itself", [spark_sim.report(s).clip for s in sources]))
     for target in map(spark_sim.load, targets):
         for name, refine in (("`copy` alone", False), ("`copy`, feet held", True)):

@@ -15,8 +15,9 @@ from scipy.stats import rankdata
 from tqdm import tqdm
 
 from scripts.corruptions import CORRUPTIONS, HARMLESS
-from sim.report import Report, assess
+from sim.report import Report, Subject, assess
 from sim.report.clip_poses import pose_clip
+from sim.report.names import FLAGS
 from sim.report.thresholds import PLAUSIBILITY_V1
 from spark.errors import SkeletonError, SparkSimError
 from spark.io.recording import read_recording
@@ -33,10 +34,7 @@ DRIFT, HEADING, CONTACTS = 0.02, np.radians(5), 0.1
 
 MEASURES = (
     "any",
-    "P",
-    "F",
-    "S",
-    "R",
+    *FLAGS,
     "limits",
     "self",
     "drift",
@@ -91,7 +89,7 @@ def clips(data: Path) -> Iterator[tuple[str, Motion, Rig]]:
                 motion = read_recording(path).motion
                 motion = motion.frames(0, int(SECONDS / motion.frame_time))
                 rig = understand(motion)
-                lowest = pose_clip(motion, rig).lowest_point
+                lowest = pose_clip(Subject(motion, rig)).lowest_point
             except SparkSimError as error:
                 print(f"left out: {error}", file=sys.stderr)
                 continue
@@ -109,8 +107,8 @@ def bench(data: Path) -> tuple[int, dict[str, dict[str, float]]]:
     spoilt: dict[str, dict[str, dict[str, float]]] = {name: {} for name in CORRUPTIONS}
     for name, motion, rig in tqdm(list(clips(data)), file=sys.stderr, disable=None):
         rng = np.random.default_rng(len(clean))
-        source = (motion, rig)
-        report = assess(motion, rig, source=source)
+        source = Subject(motion, rig)
+        report = assess(source, source=source)
         clean[name] = scores(report)
         assert report.drift is not None
         for kind, corrupt in CORRUPTIONS.items():
@@ -121,8 +119,9 @@ def bench(data: Path) -> tuple[int, dict[str, dict[str, float]]]:
             except SkeletonError:  # it spoils a joint that this body lacks
                 continue
             # A mirrored motion walks another path by intent: it is its own source.
-            origin = (changed, rig) if kind == "mirrored" else source
-            spoilt[kind][name] = scores(assess(changed, rig, source=origin))
+            subject = Subject(changed, rig)
+            origin = subject if kind == "mirrored" else source
+            spoilt[kind][name] = scores(assess(subject, source=origin))
     return len(clean), {
         kind: {
             measure: auc([clean[n][measure] for n in rows], [rows[n][measure] for n in rows])

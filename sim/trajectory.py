@@ -1,4 +1,4 @@
-"""A motion on a MuJoCo model: one that exists already, or one that is built from a rig."""
+"""A motion on a body: on a MuJoCo model that exists already, or on one that is built from a rig."""
 
 from dataclasses import dataclass
 
@@ -37,6 +37,16 @@ class ModelTrajectory:
     qpos: Float[np.ndarray, "T nq"]
     soles: tuple[ModelSole, ...] = ()
     tpose: Float[np.ndarray, "nq"] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """Who is looked at: a motion on its rig and, where there is one, a model that moves as it does,
+    whose masses, shapes, soles and joint limits count then."""
+
+    motion: Motion
+    rig: Rig
+    body: ModelTrajectory | None = None
 
 
 def model_trajectory(rig: Rig, motion: Motion) -> ModelTrajectory:

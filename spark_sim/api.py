@@ -148,23 +148,24 @@ def report(
 
     With `html`, also written as a web page. Raises `OutputError` where that exists, unless forced.
     """
-    from sim.report import assess
+    from sim.report import Subject, assess
 
     if html is not None:
         files.claim(Path(html), force=force, endings=_PAGE, what="a page")
     clip = clip_of(clip)
-    origin, names = None, (clip.name, "source")
+    subject, origin = Subject(clip.motion, clip.rig, clip.body), None
+    names = clip.name, "source"
     if source is not None:
         source = clip_of(source)
-        origin, names = (source.motion, source.rig, source.body), (clip.name, source.name)
+        origin = Subject(source.motion, source.rig, source.body)
+        names = clip.name, source.name
     known = None if truth is None else clip_of(truth).motion
-    judged = assess(clip.motion, clip.rig, source=origin, body=clip.body, truth=known)
+    assessed = assess(subject, source=origin, truth=known)
     if html is not None:
         from sim.report.page import write_report_page
 
-        motion = clip.motion, clip.rig, clip.body
-        write_report_page(judged, html, motion, origin, title=clip.name, names=names)
-    return judged
+        write_report_page(assessed, html, subject, origin, title=clip.name, names=names)
+    return assessed
 
 
 def play(

@@ -1,7 +1,6 @@
 """Judge a motion: how plausible it is, and how it differs from the motion it was made from."""
 
 from dataclasses import replace
-from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -17,10 +16,10 @@ from sim.report.measures import (
     floor_slope,
     root_drift,
 )
-from sim.report.result import Report
+from sim.report.report import Report
 from sim.report.thresholds import PLAUSIBILITY_V1
 from sim.report.truth import accuracy
-from sim.trajectory import ModelTrajectory
+from sim.trajectory import Subject
 from spark.errors import SkeletonError
 from spark.motion import Motion
 from spark.resample import values_at
@@ -31,44 +30,37 @@ from spark.rig.rig import Rig
 _FLOOR_AT_ZERO = 0.1
 
 
-Source: TypeAlias = tuple[Motion, Rig] | tuple[Motion, Rig, ModelTrajectory | None]
-
-
 def assess(
-    motion: Motion,
-    rig: Rig,
-    *,
-    source: Source | None = None,
-    body: ModelTrajectory | None = None,
-    truth: Motion | None = None,
+    subject: Subject, *, source: Subject | None = None, truth: Motion | None = None
 ) -> Report:
-    """The plausibility report of `motion`, and its difference to `source` where that is given.
+    """The plausibility report of a motion, and its difference to `source` where that is given.
 
-    With `body`, a model that moves as `motion` does, its own masses, shapes, soles and joint limits
-    count, otherwise a human's on the rig's bones. `truth` is what the motion should have been.
+    Masses, shapes, soles and joint limits are those of the subject's model, or a human's on the
+    rig's bones where it has none. `truth` is what the motion should have been.
 
-    The floor of a given body is at z = 0, as in its simulator. Else it is the source's (the 5th
+    The floor of a model is at z = 0, as in its simulator. Else it is the source's (the 5th
     percentile of its lowest sole point), scaled by the hip heights' ratio; without a source it is
     the motion's own, and a motion that floats or sinks as a whole can't be told. The source is
     compared at the same times; its frame rate may be another.
     Raises SkeletonError for a body without feet, for a clip without frames, and for a truth that is
     on another skeleton or has other frames.
     """
-    clip_poses = _posed("the motion", motion, rig, body)
+    motion, rig = subject.motion, subject.rig
+    clip_poses = _posed("the motion", subject)
     known = None if truth is None else accuracy(motion, truth, rig)
     notes = _about_model(clip_poses)
     if source is None:
         clip = measure(clip_poses, _own_floor(clip_poses))
-        if body is None:
+        if subject.body is None:
             notes = (
                 "the floor is the clip's own: one that floats or sinks as a whole can't be told",
             )
         notes += _slope(clip_poses, "the")
         return Report(clip, None, None, None, find(clip, None), notes, known)
-    source_poses = _posed("the source", *source)
+    source_poses = _posed("the source", source)
     source_floor = _own_floor(source_poses)
     floor = 0.0
-    if body is None:
+    if subject.body is None:
         floor, notes = _floor_from_source(clip_poses, source_poses.rig, source_floor)
     source_clip = measure(source_poses, source_floor)
     times = np.arange(len(clip_poses)) * motion.frame_time
@@ -83,10 +75,10 @@ def assess(
     return Report(clip, source_clip, drift, contacts, find(clip, drift), notes, known)
 
 
-def _posed(name: str, motion: Motion, rig: Rig, body: ModelTrajectory | None = None) -> ClipPoses:
-    if not len(motion):
-        raise SkeletonError(f"{name} has no frames: nothing to judge")
-    return pose_clip(motion, rig, body)
+def _posed(name: str, subject: Subject) -> ClipPoses:
+    if not len(subject.motion):
+        raise SkeletonError(f"{name} has no frames: nothing to assess")
+    return pose_clip(subject)
 
 
 def _about_model(poses: ClipPoses) -> tuple[str, ...]:

@@ -16,15 +16,12 @@ from sim.report.support import support
 from sim.report.thresholds import PLAUSIBILITY_V1, Thresholds
 from spark.constants import GRAVITY
 
-FLAGS = {"P": "penetration", "F": "floating", "S": "skating", "R": "root wrench"}
-"""The per-frame flags: letter and name."""
-
 
 @dataclass(frozen=True, eq=False)
 class ClipMetrics:
     """One clip's measures over time; heights are above the floor [m].
 
-    `flags` holds one row per letter of `FLAGS`.
+    `flags` are those of `sim.report.names.FLAGS`, by name.
     `depth` [m]: how deep the parts `depth_names` (feet, then others) lie under the floor.
     `clearance` [m]: the height of the body's lowest point.
     `skating`, `speeds` [m/s]: of the soles' corners, on the feet `sides`.
@@ -70,8 +67,8 @@ class ClipMetrics:
 
     @property
     def shares(self) -> dict[str, float]:
-        """The share of frames with each flag, by letter."""
-        return {letter: float(flag.mean()) for letter, flag in self.flags.items()}
+        """The share of frames with each flag, by name."""
+        return {name: float(flag.mean()) for name, flag in self.flags.items()}
 
     @property
     def at_limit_shares(self) -> dict[str, float]:
@@ -141,10 +138,10 @@ def measure(poses: ClipPoses, floor_z: float) -> ClipMetrics:
         floor_z=floor_z,
         thresholds=thresholds,
         flags={
-            "P": depth.max(axis=1) > thresholds.penetration,
-            "F": floating(clearance, fall_error, thresholds.floating, thresholds.free_fall),
-            "S": np.any(skates, axis=1),
-            "R": (wrench[:, 0] > thresholds.wrench_force)
+            "penetration": depth.max(axis=1) > thresholds.penetration,
+            "floating": floating(clearance, fall_error, thresholds.floating, thresholds.free_fall),
+            "skating": np.any(skates, axis=1),
+            "root_wrench": (wrench[:, 0] > thresholds.wrench_force)
             | (wrench[:, 1] > thresholds.wrench_torque),
         },
         depth=depth,

@@ -9,7 +9,7 @@ from sim.body.anthropometry import RADII
 from sim.report.lowest import lowest_points
 from sim.report.mass import Mass, human_mass, model_mass
 from sim.report.model_poses import ModelPoses, pose_model
-from sim.trajectory import ModelSole, ModelTrajectory
+from sim.trajectory import ModelSole, ModelTrajectory, Subject
 from spark.errors import SkeletonError
 from spark.kinematics import forward
 from spark.motion import Motion
@@ -59,12 +59,13 @@ class ClipPoses:
         return self.points[..., 2].min(axis=1)
 
 
-def pose_clip(motion: Motion, rig: Rig, body: ModelTrajectory | None = None) -> ClipPoses:
-    """Where the motion has the body, and the model `body` where that is given.
+def pose_clip(subject: Subject) -> ClipPoses:
+    """Pose a motion frame by frame, on its model where it has one.
 
     Raises SkeletonError where the rig has no foot or no leg to stand on, and where the body has
     another number of frames.
     """
+    motion, rig, body = subject.motion, subject.rig, subject.body
     positions, world = forward(motion)
     since_tpose = quat_mul(world, quat_conj(rig.tpose))
     if body is None:

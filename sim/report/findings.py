@@ -34,7 +34,7 @@ def _sinking(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
 
 
 def _floating(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
-    for start, stop in true_runs(clip.flags["F"], gap):
+    for start, stop in true_runs(clip.flags["floating"], gap):
         amount = float(clip.clearance[start:stop].max())
         sentence = f"the body floats {100 * amount:.1f} cm above the floor"
         yield Finding("floating", "body", start, stop, amount, "m", sentence)
@@ -52,13 +52,13 @@ def _sliding(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
 
 def _pushed(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     force, torque = clip.unexplained.T
-    for start, stop in true_runs(clip.flags["R"] & ~clip.flags["F"], gap):
+    for start, stop in true_runs(clip.flags["root_wrench"] & ~clip.flags["floating"], gap):
         amount, unit = float(force[start:stop].max()), "bw"
         sentence = f"the body is pushed by {amount:.2f} body weights that nothing gives"
         if amount <= clip.thresholds.wrench_force:
             amount, unit = float(torque[start:stop].max()), "bw_m"
             sentence = f"the body is turned by {amount:.2f} body weights x 1 m that nothing gives"
-        yield Finding("root wrench", "body", start, stop, amount, unit, sentence)
+        yield Finding("root_wrench", "body", start, stop, amount, unit, sentence)
 
 
 def _bending(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
@@ -69,7 +69,7 @@ def _bending(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
                 if amount < _LEAST_BEND:
                     continue
                 sentence = f"{limit.joint} {movement} {np.degrees(amount):.0f}° beyond its limit"
-                yield Finding("joint limit", limit.joint, start, stop, amount, "rad", sentence)
+                yield Finding("joint_limit", limit.joint, start, stop, amount, "rad", sentence)
 
 
 def _piercing(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
@@ -78,7 +78,7 @@ def _piercing(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
             amount = float(depth[start:stop].max())
             where = f"{one}, {other}"
             sentence = f"{one} and {other} go {100 * amount:.1f} cm into each other"
-            yield Finding("self-penetration", where, start, stop, amount, "m", sentence)
+            yield Finding("self_penetration", where, start, stop, amount, "m", sentence)
 
 
 def _tipping(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
@@ -94,9 +94,9 @@ def _straying(drift: Drift) -> Iterator[Finding]:
     amount = float(drift.distance[worst])
     if amount > 0.05 * max(drift.path_length, 1.0):
         sentence = f"the root strays {amount:.2f} m from the source's path"
-        yield Finding("root drift", "root", worst, worst + 1, amount, "m", sentence)
+        yield Finding("root_drift", "root", worst, worst + 1, amount, "m", sentence)
     worst = int(np.abs(drift.heading).argmax())
     amount = float(np.abs(drift.heading[worst]))
     if amount > np.radians(10):
         sentence = f"the heading is {np.degrees(amount):.0f}° off the source's"
-        yield Finding("root drift", "heading", worst, worst + 1, amount, "rad", sentence)
+        yield Finding("root_drift", "heading", worst, worst + 1, amount, "rad", sentence)

@@ -26,7 +26,7 @@ def floating(
     height: float,
     free_fall: float,
 ) -> Bool[np.ndarray, "T"]:
-    """F: nothing of the body is within `height` [m] of the floor, and yet it does not fall.
+    """Floating: nothing of the body is within `height` [m] of the floor, and yet it does not fall.
 
     `clearance` [m] is the height of the body's lowest point; `fall_error` [m/s²] is how far the
     vertical acceleration of the centre of mass is from gravity's, up to `free_fall` in free fall.

@@ -9,36 +9,37 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
-from sim.report.assess import Source
-from sim.report.clip_metrics import FLAGS, ClipMetrics
+from sim.report.clip_metrics import ClipMetrics
 from sim.report.clip_poses import pose_clip
+from sim.report.names import FLAGS, LABELS
+from sim.report.palette import MARKS, css, grade
 from sim.report.plots import flag_strips, plots, svg
-from sim.report.result import Finding, Report
-from sim.report.text import figures, of_which, shares
-from sim.trajectory import ModelTrajectory
+from sim.report.record import record
+from sim.report.result import Finding, Result
+from sim.report.table import shares
+from sim.report.text import details, share_base
+from sim.trajectory import Subject
 from sim.view.page import Marks, page
 from sim.view.render import frames
 from sim.view.scene import Figure, build_scene
 from spark.errors import DependencyError, OutputError
-from spark.motion import Motion
-from spark.rig.rig import Rig
 
-_MOMENTS = 6
-_LISTED = 200
-_STANDS, _SLIDES, _SINKS = 1, 2, 3
+_MOMENTS = 6  # pictures
+_LISTED = 200  # findings
+_STANDS, _SLIDES, _SINKS = range(1, 4)  # marks, in the order of `MARKS`
 
 
 def write_report_page(
-    report: Report,
+    result: Result,
     path: str | Path,
-    motion: Source,
-    source: Source | None = None,
+    subject: Subject,
+    source: Subject | None = None,
     *,
     title: str,
     names: tuple[str, str] = ("motion", "source"),
 ) -> None:
-    """Write the page of `report`, which `assess` made of `motion` and `source`, to `path`."""
-    text = report_page(report, motion, source, title=title, names=names)
+    """Write the page of `result`, which `assess` made of `subject` and `source`, to `path`."""
+    text = report_page(result, subject, source, title=title, names=names)
     try:
         Path(path).write_text(text, encoding="utf-8")
     except OSError as error:
@@ -46,46 +47,50 @@ def write_report_page(
 
 
 def report_page(
-    report: Report,
-    motion: Source,
-    source: Source | None = None,
+    result: Result,
+    subject: Subject,
+    source: Subject | None = None,
     *,
     title: str,
     names: tuple[str, str] = ("motion", "source"),
 ) -> str:
     """The page as text; it opens offline. Where nothing can be drawn off screen its pictures are
     left out, and it says so."""
-    shown = [(motion, report.clip, names[0])]
-    if source is not None and report.source is not None:
-        shown.append((source, report.source, names[1]))
-    bodies = [
-        Figure(rig, clip, name, measured.floor_z, body[0] if body else None)
-        for (clip, rig, *body), measured, name in shown
+    shown = [(subject, result.clip, names[0])]
+    if source is not None and result.source is not None:
+        shown.append((source, result.source, names[1]))
+    figures = [
+        Figure(each.rig, each.motion, name, metrics.floor_z, each.body)
+        for each, metrics, name in shown
     ]
-    marks = [_marks(measured, *judged) for judged, measured, _ in shown]
-    clip, frame_time = report.clip, report.clip.frame_time
+    marks = [_marks(metrics, each) for each, metrics, _ in shown]
+    clip, frame_time = result.clip, result.clip.frame_time
     duration = (len(clip) - 1) * frame_time
-    source_duration = motion[0].duration if source is None else source[0].duration
-    moments, note = _moments(report, bodies)
+    source_duration = (subject if source is None else source).motion.duration
+    moments, note = _moments(result, figures)
     beside = ""
-    if report.source is not None:
-        beside = f"; of the source's {100 * report.source.implausible_share:.1f} %"
+    if result.source is not None:
+        beside = f"; of the source's {100 * result.source.implausible_share:.1f} %"
     fields = {
         "TITLE": html.escape(title),
-        "GRADE": _grade(report.implausible),
-        "HEADLINE": f"{100 * report.implausible:.1f} % of the frames are implausible",
+        "PALETTE": css(),
+        "GRADE": grade(100 * result.implausible),
+        "HEADLINE": f"{100 * result.implausible:.1f} % of the frames are implausible",
         "ABOUT": f"{len(clip)} frames, {duration:.1f} s{beside}",
-        "CARDS": _cards(report),
-        "REPLAY": html.escape(page(bodies, title="", marks=marks)),
-        "FINDINGS": _list(report),
+        "CARDS": _cards(result),
+        "KEY": "".join(
+            f'<i style="background:{color}"></i>{name}' for name, color in MARKS.items()
+        ),
+        "REPLAY": html.escape(page(figures, title="", marks=marks)),
+        "FINDINGS": _list(result),
         "MOMENTS": moments,
         "STRIPS": flag_strips(clip),
-        "PLOTS": "".join(svg(plot, duration, source_duration) for plot in plots(report)),
+        "PLOTS": "".join(svg(plot, duration, source_duration) for plot in plots(result)),
         "NOTES": "<br>".join(
-            html.escape(line) for line in (*report.notes, *note, clip.thresholds.version)
+            html.escape(line) for line in (*result.notes, *note, clip.thresholds.version)
         ),
         "DURATION": repr(duration),
-        "RECORD": json.dumps(report.json(), allow_nan=False).replace("</", "<\\/"),
+        "RECORD": json.dumps(record(result), allow_nan=False).replace("</", "<\\/"),
     }
     text = (Path(__file__).with_name("page.html")).read_text(encoding="utf-8")
     head, *rest = text.split("__")
@@ -95,60 +100,65 @@ def report_page(
     )
 
 
-def _marks(
-    measured: ClipMetrics, motion: Motion, rig: Rig, body: ModelTrajectory | None = None
-) -> Marks:
-    poses = pose_clip(motion, rig, body)
-    heights = poses.points[..., 2] - measured.floor_z
+def _marks(clip: ClipMetrics, subject: Subject) -> Marks:
+    """The soles' corners as dots, and the labels of each frame's flags."""
+    poses = pose_clip(subject)
+    heights = poses.points[..., 2] - clip.floor_z
     states = np.zeros(heights.shape, dtype=np.uint8)
-    states[heights < measured.thresholds.skate_height] = _STANDS
-    states[measured.skating] = _SLIDES
-    states[heights < -measured.thresholds.penetration] = _SINKS
-    letters = [
-        [letter for letter in FLAGS if measured.flags[letter][t]] for t in range(len(measured))
-    ]
-    return Marks(poses.points, states, tuple(" ".join(each) for each in letters))
+    states[heights < clip.thresholds.skate_height] = _STANDS
+    states[clip.skating] = _SLIDES
+    states[heights < -clip.thresholds.penetration] = _SINKS
+    labels = tuple(
+        tuple(LABELS[name] for name in FLAGS if clip.flags[name][t]) for t in range(len(clip))
+    )
+    return Marks(poses.points, states, labels, tuple(MARKS.values()))
 
 
-def _cards(report: Report) -> str:
-    theirs = {} if report.source is None else dict(shares(report.source))
-    cards = [
-        f'<div class="card"><small>{html.escape(name)}</small>'
-        f'<b class="{_grade(share)}">{100 * share:.1f} %</b>'
-        + (f"<small>source {100 * theirs[name]:.1f} %</small>" if name in theirs else "")
-        + (f"<small>{rest}</small>" if (rest := of_which(report.clip, name)) else "")
-        + "</div>"
-        for name, share in shares(report.clip)
-    ]
-    for name, words in figures(report):
+def _cards(result: Result) -> str:
+    """A card for each measure."""
+    theirs = {} if result.source is None else shares(result.source)
+    cards = []
+    for measure, percent in shares(result.clip).items():
+        if percent is None:
+            continue
+        small = [] if (their := theirs.get(measure)) is None else [f"source {their:.1f} %"]
+        if base := share_base(result.clip, measure):
+            small.append(base)
+        cards.append(_card(LABELS[measure], f"{percent:.1f} %", small, grade(percent)))
+    for label, words in details(result):
         value, _, rest = words.strip().partition("  ")
-        cards.append(
-            f'<div class="card"><small>{html.escape(name)}</small><b>{html.escape(value)}</b>'
-            f"<small>{html.escape(rest.strip())}</small></div>"
-        )
+        cards.append(_card(label, value, [rest.strip()]))
     return "".join(cards)
 
 
-def _list(report: Report) -> str:
-    frame_time = report.clip.frame_time
+def _card(label: str, value: str, small: list[str], grade: str = "") -> str:
+    lines = "".join(f"<small>{html.escape(line)}</small>" for line in small)
+    return (
+        f'<div class="card"><small>{html.escape(label)}</small>'
+        f'<b class="{grade}">{html.escape(value)}</b>{lines}</div>'
+    )
+
+
+def _list(result: Result) -> str:
+    frame_time = result.clip.frame_time
     rows = [
         f'<li><button data-time="{finding.start * frame_time:.3f}">'
         f"{html.escape(finding.sentence)} <small>{finding.place(frame_time)}</small></button></li>"
-        for finding in report.findings[:_LISTED]
+        for finding in result.findings[:_LISTED]
     ]
-    if len(report.findings) > _LISTED:
-        rows.append(f"<li><button>... and {len(report.findings) - _LISTED} more</button></li>")
+    if len(result.findings) > _LISTED:
+        rows.append(f"<li><button>... and {len(result.findings) - _LISTED} more</button></li>")
     return "".join(rows) or "<li><button>nothing to mend</button></li>"
 
 
-def _moments(report: Report, bodies: list[Figure]) -> tuple[str, tuple[str, ...]]:
+def _moments(result: Result, figures: list[Figure]) -> tuple[str, tuple[str, ...]]:
     """Pictures of the gravest finding of each measure, and a note where they can't be made."""
-    gravest = {finding.measure: finding for finding in reversed(report.findings)}
+    gravest = {finding.measure: finding for finding in reversed(result.findings)}
     picked = list(gravest.values())[::-1][:_MOMENTS]
     if not picked:
         return "", ()
-    scene = build_scene(bodies)
-    frame_time = report.clip.frame_time
+    scene = build_scene(figures)
+    frame_time = result.clip.frame_time
     at = [
         min(round(_middle(f) * frame_time / scene.frame_time), len(scene.qpos) - 1) for f in picked
     ]
@@ -179,7 +189,3 @@ def _jpeg(picture: UInt8[np.ndarray, "H W 3"]) -> str:
     height = len(picture)
     Image.fromarray(picture[height // 8 : -height // 8]).save(buffer, format="JPEG", quality=85)
     return base64.b64encode(buffer.getvalue()).decode()
-
-
-def _grade(share: float) -> str:
-    return "good" if share <= 0.01 else "fair" if share <= 0.05 else "bad"

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sim.report.clip_metrics import FLAGS, ClipMetrics
-from sim.report.result import Report
+from sim.report.clip_metrics import ClipMetrics
+from sim.report.names import FLAGS, LABELS
+from sim.report.result import Result
 from spark.runs import true_runs
 
 WIDTH, _HEIGHT, _STRIP = 1000.0, 88, 14
@@ -29,16 +30,16 @@ class Plot:
     least: float = 1.0
 
 
-def plots(report: Report) -> list[Plot]:
+def plots(result: Result) -> list[Plot]:
     """What is worth a look over time."""
-    clip, source, limits = report.clip, report.source, report.clip.thresholds
+    clip, source, limits = result.clip, result.source, result.clip.thresholds
     flags = clip.flags
     made = [
         Plot(
             "lowest point above the floor",
             "cm",
             100 * _lowest(clip),
-            flags["P"] | flags["F"],
+            flags["penetration"] | flags["floating"],
             -100 * limits.penetration,
             None if source is None else 100 * _lowest(source),
             lowest=True,
@@ -47,7 +48,7 @@ def plots(report: Report) -> list[Plot]:
             "sliding foot",
             "m/s",
             _sliding(clip),
-            flags["S"],
+            flags["skating"],
             None,
             None if source is None else _sliding(source),
             least=limits.skate_speed,
@@ -56,7 +57,7 @@ def plots(report: Report) -> list[Plot]:
             "force that nothing gives",
             "body weights",
             clip.unexplained[:, 0],
-            flags["R"],
+            flags["root_wrench"],
             limits.wrench_force,
             None if source is None else source.unexplained[:, 0],
         ),
@@ -84,13 +85,13 @@ def plots(report: Report) -> list[Plot]:
             None if source is None else source.joint_speed.max(axis=1, initial=0.0),
         ),
     ]
-    if report.drift is not None:
+    if result.drift is not None:
         never = np.zeros(len(clip), dtype=bool)
-        made.append(Plot("root drift", "cm", 100 * report.drift.distance, never, None))
-    if report.truth is not None:
+        made.append(Plot("root drift", "cm", 100 * result.drift.distance, never, None))
+    if result.truth is not None:
         never = np.zeros(len(clip), dtype=bool)
         made.append(
-            Plot("distance from the truth", "% of height", report.truth.errors, never, None)
+            Plot("distance from the truth", "% of height", result.truth.errors, never, None)
         )
     return made
 
@@ -129,10 +130,10 @@ def _high(values: Float[np.ndarray, "N"]) -> float:
 def flag_strips(clip: ClipMetrics) -> str:
     """When each flag is up: one strip a flag."""
     return "".join(
-        f"<figure class=strip><figcaption>{letter} {html.escape(name)}</figcaption>"
+        f"<figure class=strip><figcaption>{LABELS[name]}</figcaption>"
         f'<svg viewBox="0 0 {WIDTH:g} {_STRIP}" preserveAspectRatio="none">'
-        f"{_shades(clip.flags[letter], _STRIP)}</svg></figure>"
-        for letter, name in FLAGS.items()
+        f"{_shades(clip.flags[name], _STRIP)}</svg></figure>"
+        for name in FLAGS
     )
 
 

@@ -5,33 +5,33 @@ from typing import Any
 
 import numpy as np
 
-from sim.report.clip_metrics import FLAGS, ClipMetrics
+from sim.report.clip_metrics import ClipMetrics
 from sim.report.measures import Drift
-from sim.report.result import Finding, Report
+from sim.report.result import Finding, Result
 from sim.report.truth import Accuracy
 from spark.runs import true_runs
 
 SCHEMA = "spark-sim report 1"
 
 
-def record(report: Report) -> dict[str, Any]:
+def record(result: Result) -> dict[str, Any]:
     """Numbers in SI, units in the keys; frames count from 0 and spans are [start, stop)."""
-    clip = report.clip
+    clip = result.clip
     return {
         "schema": SCHEMA,
         "thresholds": clip.thresholds.version,
         "threshold_values": _threshold_values(clip),
         "frames": len(clip),
         "frame_time_s": clip.frame_time,
-        "implausible_share": report.implausible,
-        "clip": _measured(clip),
-        "source": None if report.source is None else _measured(report.source),
-        "difference_to_source": None if report.source is None else _difference(report),
-        "root_drift": None if report.drift is None else _drift(report.drift),
-        "foot_contacts": None if report.contacts is None else asdict(report.contacts),
-        "ground_truth": None if report.truth is None else _truth(report.truth),
-        "findings": [_finding(finding, clip.frame_time) for finding in report.findings],
-        "notes": list(report.notes),
+        "implausible_share": result.implausible,
+        "clip": _clip(clip),
+        "source": None if result.source is None else _clip(result.source),
+        "difference_to_source": None if result.source is None else _difference(result),
+        "root_drift": None if result.drift is None else _drift(result.drift),
+        "foot_contacts": None if result.contacts is None else asdict(result.contacts),
+        "ground_truth": None if result.truth is None else _truth(result.truth),
+        "findings": [_finding(finding, clip.frame_time) for finding in result.findings],
+        "notes": list(result.notes),
     }
 
 
@@ -62,16 +62,16 @@ def _threshold_values(clip: ClipMetrics) -> dict[str, float]:
     return {f"{name}_{unit}" if unit else name: values[name] for name, unit in _UNITS.items()}
 
 
-def _measured(clip: ClipMetrics) -> dict[str, Any]:
+def _clip(clip: ClipMetrics) -> dict[str, Any]:
     return {
         "implausible_share": clip.implausible_share,
         "floor_z_m": clip.floor_z,
         "flags": {
-            FLAGS[letter]: {
-                "share": clip.shares[letter],
+            name: {
+                "share": clip.shares[name],
                 "spans": [list(span) for span in true_runs(flag)],
             }
-            for letter, flag in clip.flags.items()
+            for name, flag in clip.flags.items()
         },
         "deepest_m": float(clip.depth.max()),
         "highest_clearance_m": float(clip.clearance.max()),
@@ -97,11 +97,11 @@ def _measured(clip: ClipMetrics) -> dict[str, Any]:
     }
 
 
-def _difference(report: Report) -> dict[str, float]:
-    assert report.source is not None
-    ours, theirs = report.clip.shares, report.source.shares
-    shares = {f"{FLAGS[letter]}_share": ours[letter] - theirs[letter] for letter in ours}
-    return {"implausible_share": report.implausible - report.source.implausible_share, **shares}
+def _difference(result: Result) -> dict[str, float]:
+    assert result.source is not None
+    ours, theirs = result.clip.shares, result.source.shares
+    shares = {f"{name}_share": ours[name] - theirs[name] for name in ours}
+    return {"implausible_share": result.implausible - result.source.implausible_share, **shares}
 
 
 def _drift(drift: Drift) -> dict[str, Any]:

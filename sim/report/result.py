@@ -1,7 +1,6 @@
-"""The report as data; `text` and `json` are two views of it."""
+"""What an assessment finds, as data."""
 
 from dataclasses import dataclass
-from typing import Any
 
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.measures import ContactMatch, Drift
@@ -12,8 +11,8 @@ from sim.report.truth import Accuracy
 class Finding:
     """One thing to look at: what, where, in which frames [start, stop), how much.
 
-    `amount` is in `unit` ("m", "rad", "bw" body weights, "bw_m"); `sentence` says it all, without
-    the frames.
+    `measure` is a name of `sim.report.names`. `amount` is in `unit` ("m", "rad", "bw" body weights,
+    "bw_m"); `sentence` says it all, without the frames.
     """
 
     measure: str
@@ -35,7 +34,7 @@ class Finding:
 
 
 @dataclass(frozen=True, eq=False)
-class Report:
+class Result:
     """How believable a motion is, beside the motion it was made from where there is one, and how
     far from the ground truth where that is known.
 
@@ -54,15 +53,3 @@ class Report:
     def implausible(self) -> float:
         """The headline: the share of frames with any flag."""
         return self.clip.implausible_share
-
-    def text(self, *, color: bool = False) -> str:
-        """What a person reads: headline, parts, and what to mend; with ANSI colours on request."""
-        from sim.report.text import render  # it reads this class
-
-        return render(self, color=color)
-
-    def json(self) -> dict[str, Any]:
-        """The report for a program, as plain dicts, lists and numbers; SI, units in the keys."""
-        from sim.report.record import record  # it reads this class
-
-        return record(self)

@@ -40,7 +40,7 @@ class Support:
         )
 
     def skating(self) -> Bool[np.ndarray, "T S"]:
-        """S: the sole corners that slide under load, not those of a foot that swings by low.
+        """The sole corners that slide under load, not those of a foot that swings by low.
 
         They are low and fast, and the foot lies flat, or the points at rest can't hold the body.
         """

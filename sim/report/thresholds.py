@@ -10,19 +10,19 @@ class Thresholds:
     """`plausibility v1`: what counts as implausible, for a body whose hips stand 0.9 m high."""
 
     version: str = "plausibility v1"
-    # P: the lowest point lies deeper than this under the floor [m].
+    # Penetration: the lowest point lies deeper than this under the floor [m].
     penetration: float = 0.01
-    # F: the lowest point is higher than this [m], and the centre of mass is not in free fall: its
+    # Floating: the lowest point is higher than this [m], and the centre of mass is not in free fall: its
     # vertical acceleration differs from gravity's by more than this [m/s²] all over the window.
     floating: float = 0.04
     free_fall: float = 4.0
-    # S: a sole's corner lower than this [m] moves along the floor faster than this [m/s], and its
+    # Skating: a sole's corner lower than this [m] moves along the floor faster than this [m/s], and its
     # foot lies flat (all corners within `contact_height`), or the points at rest leave more than
     # this of the body's weight to it [body weights, body weights x 1 m].
     skate_height: float = 0.025
     skate_speed: float = 0.2
     skate_load: float = 0.1
-    # R: the force [body weights] or torque [body weights x 1 m] that the floor can't give, with
+    # Root wrench: the force [body weights] or torque [body weights x 1 m] that the floor can't give, with
     # friction cones of this coefficient at the points lower than this [m].
     wrench_force: float = 0.15
     wrench_torque: float = 0.15

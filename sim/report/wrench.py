@@ -1,4 +1,4 @@
-"""R: what the floor cannot explain of the forces that a motion needs.
+"""The root wrench: what the floor cannot explain of the forces that a motion needs.
 
 The six root rows of inverse dynamics are Newton's and Euler's equations of the whole body: the
 floor must give the force m (a + g) and, about the centre of mass, the torque dL/dt. It pushes at

@@ -36,13 +36,15 @@ _PRIMITIVES = {
 class Marks:
     """What to draw on a figure besides its body, in every frame of its own motion.
 
-    `points` [m, world, where the motion has them] are dots: 0 hidden, 1 stands, 2 slides, 3 sinks.
-    `flags` is written over the figure's head.
+    `points` [m, world, where the motion has them] are dots: those of state 0 are hidden, those of
+    state k have `colors[k - 1]` (CSS), the gravest last. `labels` are written over the figure's
+    head.
     """
 
     points: Float[np.ndarray, "T M 3"]
     states: UInt8[np.ndarray, "T M"]
-    flags: tuple[str, ...]
+    labels: tuple[tuple[str, ...], ...]
+    colors: tuple[str, ...]
 
 
 def write_page(figures: Sequence[Figure], path: str | Path, *, title: str) -> None:
@@ -109,11 +111,12 @@ def _figure(
         "joints": base64.b64encode(whole.tobytes()).decode(),
     }
     if marks is not None:
-        frames, states, flags = _thinned(marks, figure.motion.frame_time, scene)
+        frames, states, labels = _thinned(marks, figure.motion.frame_time, scene)
         out["marks"] = {
             **_packed(placed(marks.points[frames])),
             "states": base64.b64encode(states.tobytes()).decode(),
-            "flags": flags,
+            "labels": labels,
+            "colors": marks.colors,
         }
     return out
 
@@ -123,17 +126,17 @@ def _thinned(
 ) -> tuple[Int[np.ndarray, "F"], UInt8[np.ndarray, "F M"], list[str]]:
     """The motion's frames that the scene's are nearest to, and the marks of all frames around
     each: what lasts for one frame is not lost."""
-    count, last = len(scene.qpos), len(marks.flags) - 1
+    count, last = len(scene.qpos), len(marks.labels) - 1
     times = np.arange(count) * scene.frame_time
     frames = np.minimum(np.round(times / frame_time).astype(int), last)
     nearest = np.round(np.arange(last + 1) * frame_time / scene.frame_time).astype(int)
     nearest = np.minimum(nearest, count - 1)
     states = marks.states[frames]
     np.maximum.at(states, nearest, marks.states)
-    flags = [{*marks.flags[t].split()} for t in frames]
+    labels = [dict.fromkeys(marks.labels[t]) for t in frames]
     for t, frame in enumerate(nearest):
-        flags[frame] |= {*marks.flags[t].split()}
-    return frames, states, [" ".join(sorted(each)) for each in flags]
+        labels[frame] |= dict.fromkeys(marks.labels[t])
+    return frames, states, ["\n".join(each) for each in labels]
 
 
 def _body(model: mujoco.MjModel, body: int, root: int, column: int) -> dict[str, Any]:

@@ -13,7 +13,7 @@ import pytest
 
 from sim.body.build import build_body
 from sim.body.qpos import qpos_from_motion
-from sim.report import assess
+from sim.report import Subject, assess
 from spark.demo.sample import BUILDS, Build, make_skeleton, sample_motion, sample_rig
 from spark.io.bvh import read_bvh, write_bvh
 from spark.io.encoding import encode_new
@@ -132,7 +132,7 @@ def test_playback(benchmark: Any, frames: int) -> None:
 @pytest.mark.parametrize("frames", FRAMES)
 def test_report(benchmark: Any, frames: int) -> None:
     motion, rig = clip(frames)
-    benchmark(assess, motion, rig)
+    benchmark(assess, Subject(motion, rig))
 
 
 def test_body(benchmark: Any) -> None:

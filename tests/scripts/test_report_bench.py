@@ -5,7 +5,7 @@ import pytest
 
 from scripts.corruptions import CORRUPTIONS, HARMLESS
 from scripts.report_bench import auc, scores, table
-from sim.report import assess
+from sim.report import Subject, assess
 from sim.report.clip_poses import pose_clip
 from spark.io.recording import read_recording
 from spark.kinematics import forward
@@ -47,7 +47,7 @@ def test_the_root_moves_as_told() -> None:
     for kind, speed in (("slide 0.3 m/s", 0.3), ("drift 10 cm/s", 0.1)):
         moved = spoilt(kind, motion, rig).root_pos - motion.root_pos
         np.testing.assert_allclose(np.linalg.norm(moved, axis=1), speed * np.arange(120) / 60)
-    hips = pose_clip(spoilt("in place", motion, rig), rig).hips
+    hips = pose_clip(Subject(spoilt("in place", motion, rig), rig)).hips
     np.testing.assert_allclose(np.ptp(hips[:, :2], axis=0), 0, atol=1e-12)
 
 
@@ -59,8 +59,8 @@ def test_jitter_has_the_size_it_says() -> None:
 
 def test_leaning_tips_the_body_forward_about_the_floor() -> None:
     motion, rig = standing(stick_rig(), 3), stick_rig()
-    com = pose_clip(motion, rig).mass.com[0]
-    tipped = pose_clip(spoilt("lean 15°", motion, rig), rig).mass.com[0]
+    com = pose_clip(Subject(motion, rig)).mass.com[0]
+    tipped = pose_clip(Subject(spoilt("lean 15°", motion, rig), rig)).mass.com[0]
     angle = np.radians(15)
     expected = [
         np.cos(angle) * com[0] + np.sin(angle) * com[2],
@@ -85,7 +85,10 @@ def test_another_frame_rate_is_the_same_motion(fps: int) -> None:
 
 def test_the_mirror_swaps_the_knees() -> None:
     motion, rig = pacing()
-    before, after = pose_clip(motion, rig), pose_clip(spoilt("mirrored", motion, rig), rig)
+    before, after = (
+        pose_clip(Subject(motion, rig)),
+        pose_clip(Subject(spoilt("mirrored", motion, rig), rig)),
+    )
     left, right = joint(Role.LEFT_FOOT), joint(Role.RIGHT_FOOT)
     np.testing.assert_allclose(
         after.positions[:, right], before.positions[:, left] * [1, -1, 1], atol=1e-9
@@ -113,10 +116,10 @@ def test_the_table_marks_harm_that_is_told_and_only_that() -> None:
 
 # What must tell each harm, on each of these clips.
 TOLD = [
-    ("float 5 cm", "F", 0.5),
-    ("sink 3 cm", "P", 0.5),
-    ("slide 0.3 m/s", "S", 0.05),
-    ("jitter 2°", "R", 0.5),
+    ("float 5 cm", "floating", 0.5),
+    ("sink 3 cm", "penetration", 0.5),
+    ("slide 0.3 m/s", "skating", 0.05),
+    ("jitter 2°", "root_wrench", 0.5),
     ("knee backwards 40°", "limits", 0.9),
     ("hand in chest", "self", 0.9),
     ("drift 10 cm/s", "drift", 0.2),
@@ -135,8 +138,8 @@ def test_harm_is_told_on_real_clips(
     real: tuple[Motion, Rig], kind: str, measure: str, rise: float
 ) -> None:
     motion, rig = real
-    clean = scores(assess(motion, rig, source=real))
-    harmed = scores(assess(spoilt(kind, motion, rig), rig, source=real))
+    clean = scores(assess(Subject(motion, rig), source=Subject(*real)))
+    harmed = scores(assess(Subject(spoilt(kind, motion, rig), rig), source=Subject(*real)))
     assert harmed[measure] > clean[measure] + rise
 
 
@@ -145,13 +148,13 @@ def test_no_harm_is_told_of_another_frame_rate(
     real: tuple[Motion, Rig], kind: str, close: float
 ) -> None:
     motion, rig = real
-    clean = scores(assess(motion, rig, source=real))
-    other = scores(assess(spoilt(kind, motion, rig), rig, source=real))
+    clean = scores(assess(Subject(motion, rig), source=Subject(*real)))
+    other = scores(assess(Subject(spoilt(kind, motion, rig), rig), source=Subject(*real)))
     assert other["any"] == pytest.approx(clean["any"], abs=close)
 
 
 def test_clean_captured_people_are_plausible(real: tuple[Motion, Rig]) -> None:
     motion, rig = real
-    report = assess(motion, rig)
+    report = assess(Subject(motion, rig))
     assert report.implausible < 0.1
     assert report.clip.limit_share < 0.03

@@ -15,14 +15,12 @@ import pytest
 from robots import registry
 from robots.model.motion import RobotMotion
 from robots.model.understand import understand_robot
-from sim.report import Report, assess
+from sim.report import Report, Subject, assess
 from sim.report.page import report_page, write_report_page
 from sim.report.plots import Plot, svg
 from sim.view.page import Marks, page
 from sim.view.scene import Figure
 from spark.errors import OutputError
-from spark.motion import Motion
-from spark.rig.rig import Rig
 from tests.helpers.stick import standing, stick_rig
 
 # Stands for a second, sinks for one, slides for one.
@@ -32,17 +30,18 @@ PATH[120:, 0] = 0.5 * np.arange(60) / 60
 TITLE = "a & b __X__ </script>"
 
 
-def stumbling() -> tuple[Report, tuple[Motion, Rig], tuple[Motion, Rig]]:
+def stumbling() -> tuple[Report, Subject, Subject]:
     rig = stick_rig()
     still = standing(rig, 180)
     moved = replace(still, root_pos=still.root_pos + PATH)
-    return assess(moved, rig, source=(still, rig)), (moved, rig), (still, rig)
+    subject, source = Subject(moved, rig), Subject(still, rig)
+    return assess(subject, source=source), subject, source
 
 
 @pytest.fixture(scope="module")
 def text() -> str:
-    report, motion, source = stumbling()
-    return report_page(report, motion, source, title=TITLE)
+    report, subject, source = stumbling()
+    return report_page(report, subject, source, title=TITLE)
 
 
 @pytest.fixture(scope="module")
@@ -54,10 +53,10 @@ def robot_text() -> str:
     pelvis = robot.motion(robot.from_qpos(qpos[:1]), 1.0).root_pos[0, 2]
     qpos[:, :3] += PATH - np.array([0.0, 0.0, lowest + pelvis])
     moved = RobotMotion(robot, robot.from_qpos(qpos), 1 / 60)
-    source = standing(stick_rig(), 180), stick_rig()
-    motion = moved.motion, robot.rig, moved.body
-    report = assess(moved.motion, robot.rig, source=source, body=moved.body)
-    return report_page(report, motion, source, title=TITLE)
+    source = Subject(standing(stick_rig(), 180), stick_rig())
+    subject = Subject(moved.motion, robot.rig, moved.body)
+    report = assess(subject, source=source)
+    return report_page(report, subject, source, title=TITLE)
 
 
 def test_it_is_one_file_that_asks_for_nothing(text: str) -> None:
@@ -100,9 +99,9 @@ def test_marks_of_one_frame_outlast_the_thinning() -> None:
     rig = stick_rig()
     still = standing(rig, 60)
     states = np.zeros((60, 1), dtype=np.uint8)
-    states[31], flags = 2, [""] * 60
-    flags[41] = "F"
-    marks = Marks(np.zeros((60, 1, 3)), states, tuple(flags))
+    states[31], labels = 2, [()] * 60
+    labels[41] = ("floating",)
+    marks = Marks(np.zeros((60, 1, 3)), states, tuple(labels), ("green", "red"))
     data = re.search(
         r"const DATA = (.*);", page([Figure(rig, still, "x")], title="", marks=[marks])
     )
@@ -111,13 +110,13 @@ def test_marks_of_one_frame_outlast_the_thinning() -> None:
     seen = np.frombuffer(base64.b64decode(shown["states"]), dtype=np.uint8)
     assert len(seen) == 30
     assert np.flatnonzero(seen).tolist() in ([15], [16])
-    assert np.flatnonzero(shown["flags"]).tolist() in ([20], [21])
+    assert np.flatnonzero(shown["labels"]).tolist() in ([20], [21])
 
 
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
-    report, motion, source = stumbling()
+    report, subject, source = stumbling()
     with pytest.raises(OutputError, match="nowhere"):
-        write_report_page(report, tmp_path / "nowhere" / "r.html", motion, source, title="t")
+        write_report_page(report, tmp_path / "nowhere" / "r.html", subject, source, title="t")
 
 
 @pytest.mark.parametrize("body", ["text", "robot_text"])

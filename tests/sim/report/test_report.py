@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.report import Finding, Report, assess, compare
+from sim.report import Finding, Report, Subject, assess, compare
+from sim.report.names import LABELS
 from spark.errors import SkeletonError, SparkSimError
 from spark.io.recording import read_recording
 from spark.motion import Motion
@@ -47,7 +48,7 @@ def texts(report: Report) -> list[str]:
 def test_a_body_that_stands_is_plausible() -> None:
     rig = stick_rig()
     still = standing(rig, 120)
-    report = assess(still, rig, source=(still, rig))
+    report = assess(Subject(still, rig), source=Subject(still, rig))
     assert report.implausible == 0
     assert report.findings == ()
     assert "nothing to mend" in report.text()
@@ -56,8 +57,8 @@ def test_a_body_that_stands_is_plausible() -> None:
 def test_a_body_held_five_centimetres_up_floats_in_all_frames() -> None:
     rig = stick_rig()
     still = standing(rig, 120)
-    report = assess(along(still, 2, 0.05), rig, source=(still, rig))
-    assert shares(report) == {"P": 0, "F": 1, "S": 0, "R": 1}
+    report = assess(Subject(along(still, 2, 0.05), rig), source=Subject(still, rig))
+    assert shares(report) == {"penetration": 0, "floating": 1, "skating": 0, "root_wrench": 1}
     assert texts(report) == ["the body floats 5.0 cm above the floor in frames 0-119 (0.0-2.0 s)"]
 
 
@@ -66,7 +67,7 @@ def test_a_jump_is_no_floating() -> None:
     still = standing(rig, 120)
     t = seconds(still) - 0.5
     height = np.where((t > 0) & (t < 0.6), 0.5 * 9.81 * t * (0.6 - t), 0.0)
-    report = assess(along(still, 2, height), rig, source=(still, rig))
+    report = assess(Subject(along(still, 2, height), rig), source=Subject(still, rig))
     assert report.implausible == 0
 
 
@@ -75,16 +76,16 @@ def test_the_same_path_at_a_quarter_of_gravity_floats() -> None:
     still = standing(rig, 180)
     t = seconds(still) - 0.5
     height = np.where((t > 0) & (t < 1.2), 0.125 * 9.81 * t * (1.2 - t), 0.0)
-    report = assess(along(still, 2, height), rig, source=(still, rig))
-    assert shares(report)["F"] == pytest.approx(height[height > 0.04].size / 180, abs=0.03)
+    report = assess(Subject(along(still, 2, height), rig), source=Subject(still, rig))
+    assert shares(report)["floating"] == pytest.approx(height[height > 0.04].size / 180, abs=0.03)
 
 
 def test_a_body_three_centimetres_down_sinks_with_both_feet() -> None:
     rig = stick_rig()
     still = standing(rig, 120)
     deep = np.where(np.arange(120) == 57, -0.032, 0.0)
-    report = assess(along(still, 2, deep), rig, source=(still, rig))
-    assert shares(report)["P"] == pytest.approx(1 / 120)
+    report = assess(Subject(along(still, 2, deep), rig), source=Subject(still, rig))
+    assert shares(report)["penetration"] == pytest.approx(1 / 120)
     assert texts(report) == [
         f"{side} foot sinks 3.2 cm under the floor at frame 57 (0.95 s)"
         for side in ("left", "right")
@@ -95,9 +96,9 @@ def test_a_foot_that_slides_at_0_4_metres_a_second_is_reported_at_that() -> None
     rig = stick_rig()
     still = standing(rig, 120)
     t = np.clip(seconds(still) - 0.5, 0, 1.0)
-    report = assess(along(still, 0, 0.4 * t), rig, source=(still, rig))
+    report = assess(Subject(along(still, 0, 0.4 * t), rig), source=Subject(still, rig))
     assert report.json()["clip"]["fastest_skate_m_s"] == pytest.approx(0.4, rel=0.01)
-    assert shares(report)["S"] == pytest.approx(0.5, abs=0.02)
+    assert shares(report)["skating"] == pytest.approx(0.5, abs=0.02)
     slid = [f.amount for f in report.findings if f.measure == "skating"]
     np.testing.assert_allclose(slid, 0.4, atol=0.02)
 
@@ -110,7 +111,7 @@ def test_one_foot_that_slides_flat_is_named_though_the_other_could_carry_the_bod
     swing = 0.15 * np.sin(0.3 / 0.8 / 0.15 * seconds(still))
     moving.rotations[:, joint(Role.LEFT_UPPER_LEG)] = quat_about("y", -swing)
     moving.rotations[:, joint(Role.LEFT_FOOT)] = quat_about("y", swing)
-    report = assess(moving, rig, source=(still, rig))
+    report = assess(Subject(moving, rig), source=Subject(still, rig))
     assert report.json()["clip"]["fastest_skate_m_s"] == pytest.approx(0.3, rel=0.05)
     assert {f.where for f in report.findings if f.measure == "skating"} == {"left foot"}
 
@@ -118,7 +119,7 @@ def test_one_foot_that_slides_flat_is_named_though_the_other_could_carry_the_bod
 def test_a_slow_slide_is_drift_but_no_skating() -> None:
     rig = stick_rig()
     still = standing(rig, 120)
-    report = assess(along(still, 1, 0.1 * seconds(still)), rig, source=(still, rig))
+    report = assess(Subject(along(still, 1, 0.1 * seconds(still)), rig), source=Subject(still, rig))
     assert report.implausible == 0
     assert report.json()["root_drift"]["final_m"] == pytest.approx(0.1 * still.duration)
     assert any("strays 0.20 m" in text for text in texts(report))
@@ -129,7 +130,7 @@ def test_a_knee_bent_backwards_is_named() -> None:
     bent = standing(rig, 60)
     bent.rotations[20:40, joint(Role.LEFT_LOWER_LEG)] = quat_about("y", np.radians(-60))
     bent.rotations[20:40, joint(Role.LEFT_FOOT)] = quat_about("y", np.radians(60))
-    report = assess(bent, rig)
+    report = assess(Subject(bent, rig))
     assert report.json()["clip"]["joint_limits"]["left knee"] == {
         "share": pytest.approx(20 / 60),
         "at_limit_share": pytest.approx(20 / 60),
@@ -148,7 +149,7 @@ def test_a_joint_is_at_its_limit_within_half_a_degree(
     rig = stick_rig()
     bent = standing(rig, 60)
     bent.rotations[:, joint(Role.LEFT_LOWER_LEG)] = quat_about("y", np.radians(-degrees))
-    clip = assess(bent, rig).clip
+    clip = assess(Subject(bent, rig)).clip
     assert clip.at_limit_shares["left knee"] == at
     assert (clip.at_limit_share, clip.limit_share) == (at, beyond)
 
@@ -158,13 +159,13 @@ def test_a_hand_under_the_floor_is_named_and_a_man_lying_down_does_not_float() -
     lying = standing(rig, 60)
     lying.rotations[:, 0] = quat_about("y", np.array(-np.pi / 2))  # on his back
     lying.root_pos[:, 2] = 0.1
-    report = assess(lying, rig, source=(standing(rig, 60), rig))
-    assert shares(report)["F"] == 0
+    report = assess(Subject(lying, rig), source=Subject(standing(rig, 60), rig))
+    assert shares(report)["floating"] == 0
     sunk = along(lying, 2, -0.15)
     assert any(
         text.startswith("right hand sinks")
-        for text in texts(assess(sunk, rig))
-        + texts(assess(sunk, rig, source=(standing(rig, 60), rig)))
+        for text in texts(assess(Subject(sunk, rig)))
+        + texts(assess(Subject(sunk, rig), source=Subject(standing(rig, 60), rig)))
     )
 
 
@@ -182,7 +183,8 @@ def test_a_body_that_leans_as_no_one_can_stand_needs_a_hand() -> None:
         for foot in (Role.LEFT_FOOT, Role.RIGHT_FOOT):
             leaning.rotations[:, joint(foot)] = quat_about("y", np.radians(-float(degrees)))
         leaning = along(leaning, 2, 0.1 * (1 - np.cos(np.radians(degrees))))
-        assert shares(assess(leaning, rig, source=(still, rig)))["R"] == expected
+        report = assess(Subject(leaning, rig), source=Subject(still, rig))
+        assert shares(report)["root_wrench"] == expected
 
 
 @pytest.mark.parametrize("fps", [15.0, 30.0, 120.0])
@@ -195,11 +197,14 @@ def test_the_frame_rate_changes_no_share(fps: float) -> None:
         path = np.stack([0.6 * np.sin(2 * t) / 2, 0 * t, 0.045 + 0.02 * np.sin(3 * t)], axis=-1)
         return moved(still, path - [0, 0, 0.03])
 
-    source = standing(rig, 60), rig
-    ours, reference = assess(clip(fps), rig, source=source), assess(clip(60), rig, source=source)
+    source = Subject(standing(rig, 60), rig)
+    ours, reference = (
+        assess(Subject(clip(fps), rig), source=source),
+        assess(Subject(clip(60), rig), source=source),
+    )
     assert 0.1 < reference.implausible < 0.9
-    for letter, share in shares(ours).items():
-        assert share == pytest.approx(shares(reference)[letter], abs=0.02)
+    for name, share in shares(ours).items():
+        assert share == pytest.approx(shares(reference)[name], abs=0.02)
 
 
 def test_turning_and_moving_the_world_changes_nothing() -> None:
@@ -216,10 +221,10 @@ def test_turning_and_moving_the_world_changes_nothing() -> None:
         rotations=motion.rotations.copy(),
     )
     turned.rotations[:, 0] = quat_mul(yaw, turned.rotations[:, 0])
-    before, after = assess(motion, rig), assess(turned, rig)
+    before, after = assess(Subject(motion, rig)), assess(Subject(turned, rig))
     assert 0 < before.implausible < 1
-    for letter in before.clip.flags:
-        np.testing.assert_array_equal(before.clip.flags[letter], after.clip.flags[letter])
+    for name in before.clip.flags:
+        np.testing.assert_array_equal(before.clip.flags[name], after.clip.flags[name])
 
 
 def scaled(rig: Rig, factor: float) -> Rig:
@@ -233,18 +238,19 @@ def scaled(rig: Rig, factor: float) -> Rig:
 
 def test_thresholds_grow_with_the_body() -> None:
     small, big = stick_rig(), scaled(stick_rig(), 4.0)
-    source = standing(small, 60), small
+    source = Subject(standing(small, 60), small)
     sunk = along(standing(big, 60), 2, -0.03)
-    assert assess(sunk, big, source=source).implausible == 0
-    assert assess(along(sunk, 2, -0.02), big, source=source).implausible == 1
-    assert assess(sunk, big, source=source).json()["threshold_values"]["penetration_m"] == 0.04
+    assert assess(Subject(sunk, big), source=source).implausible == 0
+    assert assess(Subject(along(sunk, 2, -0.02), big), source=source).implausible == 1
+    record = assess(Subject(sunk, big), source=source).json()
+    assert record["threshold_values"]["penetration_m"] == 0.04
 
 
 def test_a_scaled_body_that_walks_the_scaled_path_does_not_drift() -> None:
     small, big = stick_rig(), scaled(stick_rig(), 2.0)
     walk = along(standing(small, 120), 0, 1.3 * np.arange(120) / 60)
     big_walk = along(standing(big, 120), 0, 2.6 * np.arange(120) / 60)
-    drift = assess(big_walk, big, source=(walk, small)).json()["root_drift"]
+    drift = assess(Subject(big_walk, big), source=Subject(walk, small)).json()["root_drift"]
     assert drift["largest_m"] == pytest.approx(0, abs=1e-9)
     assert drift["source_path_m"] == pytest.approx(2.6 * 119 / 60)
 
@@ -254,23 +260,51 @@ def test_a_source_floor_far_from_zero_is_found_where_the_motion_has_it() -> None
     still = standing(rig, 60)
     upstairs = along(still, 2, 3.0)
     for motion in (still, upstairs):
-        report = assess(motion, rig, source=(upstairs, rig))
+        report = assess(Subject(motion, rig), source=Subject(upstairs, rig))
         assert report.implausible == 0
         assert any("floor" in note for note in report.notes)
 
 
 def test_json_is_json_and_says_what_it_is() -> None:
     rig = stick_rig()
-    record = assess(standing(rig, 30), rig, source=(standing(rig, 30), rig)).json()
+    record = assess(Subject(standing(rig, 30), rig), source=Subject(standing(rig, 30), rig)).json()
     again = json.loads(json.dumps(record, allow_nan=False))
     assert again == record
     assert again["schema"] == "spark-sim report 1"
     assert again["thresholds"] == "plausibility v1"
 
 
+def test_rows_hold_what_the_record_does_beside_the_source() -> None:
+    rig = stick_rig()
+    still = standing(rig, 60)
+    report = assess(Subject(along(still, 2, 0.05), rig), source=Subject(still, rig))
+    rows = {row["measure"]: row for row in report.rows()}
+    record = report.json()
+    for name, flag in record["clip"]["flags"].items():
+        assert rows[name]["value"] == 100 * flag["share"]
+        assert rows[name]["source"] == 100 * record["source"]["flags"][name]["share"]
+    assert rows["floating"] == {"measure": "floating", "value": 100, "unit": "%", "source": 0}
+    assert rows["balance"]["value"] is None  # nothing is near the floor
+    assert rows["root_drift"]["source"] is None
+    assert rows["ground_truth_mse"]["value"] is None
+    assert set(rows) == set(LABELS)
+    assert {finding.measure for finding in report.findings} <= set(LABELS)
+
+
+def test_a_report_shows_itself_in_a_line_and_in_a_notebook() -> None:
+    rig = stick_rig()
+    report = assess(Subject(standing(rig, 60), rig))
+    assert len(repr(report)) < 200
+    assert "60 frames" in repr(report)
+    assert "root_wrench 0.0%" in repr(report)
+    shown = report._repr_html_()
+    assert shown.count("<tr>") == 1 + sum(row["value"] is not None for row in report.rows())
+    assert "root wrench [%]" in shown
+
+
 def test_text_has_colour_only_on_request() -> None:
     rig = stick_rig()
-    report = assess(standing(rig, 30), rig)
+    report = assess(Subject(standing(rig, 30), rig))
     assert "\x1b[" in report.text(color=True)
     assert "\x1b[" not in report.text()
     assert "clip's own" in report.text()
@@ -279,17 +313,18 @@ def test_text_has_colour_only_on_request() -> None:
 @pytest.mark.parametrize("frames", [1, 2, 3])
 def test_the_shortest_clips_are_judged(frames: int) -> None:
     rig = stick_rig()
-    assert assess(standing(rig, frames), rig, source=(standing(rig, 1), rig)).implausible == 0
+    source = Subject(standing(rig, 1), rig)
+    assert assess(Subject(standing(rig, frames), rig), source=source).implausible == 0
 
 
 def test_bodies_that_cannot_be_judged_are_refused() -> None:
     rig = stick_rig()
     with pytest.raises(SkeletonError, match="no frames"):
-        assess(standing(rig, 0), rig)
+        assess(Subject(standing(rig, 0), rig))
     roles = tuple(None if r and "foot" in r else r for r in rig.roles.roles)
     footless = replace(rig, roles=RoleMap(roles, rig.roles.confidence, rig.roles.reasons))
     with pytest.raises(SkeletonError, match="no foot"):
-        assess(standing(rig, 3), footless)
+        assess(Subject(standing(rig, 3), footless))
 
 
 def test_a_tiptoe_stands_on_its_toes() -> None:
@@ -301,11 +336,12 @@ def test_a_tiptoe_stands_on_its_toes() -> None:
         tiptoe.rotations[:, joint(foot)] = quat_about("y", np.array(np.pi / 6))
         tiptoe.rotations[:, joint(toe)] = quat_about("y", np.array(-np.pi / 6))
     tiptoe = along(tiptoe, 2, ball - 0.1)
-    report = assess(tiptoe, rig, source=(standing(rig, 60), rig))
+    report = assess(Subject(tiptoe, rig), source=Subject(standing(rig, 60), rig))
     assert report.implausible == 0
     heel = 0.25 * FOOT_LENGTH * rig.standing_height
     flat = along(tiptoe, 2, -heel * 0.3)
-    assert shares(assess(flat, rig, source=(standing(rig, 60), rig)))["P"] == 1
+    report = assess(Subject(flat, rig), source=Subject(standing(rig, 60), rig))
+    assert shares(report)["penetration"] == 1
 
 
 def test_a_hand_in_the_chest_is_named() -> None:
@@ -316,15 +352,15 @@ def test_a_hand_in_the_chest_is_named() -> None:
     upper = quat_from_yaw(np.array(-np.radians(110.0)))
     pierced.rotations[:, joint(Role.LEFT_UPPER_ARM)] = upper
     pierced.rotations[:, joint(Role.LEFT_FOREARM)] = quat_from_yaw(np.array(-np.radians(150.0)))
-    report = assess(pierced, rig, source=(still, rig))
+    report = assess(Subject(pierced, rig), source=Subject(still, rig))
     assert any(
         {"chest"} < set(f.where.split(", ")) and "left" in f.where
         for f in report.findings
-        if f.measure == "self-penetration"
+        if f.measure == "self_penetration"
     )
     assert report.json()["clip"]["self_penetration_share"] == 1
     # What the source does too is not held against the motion.
-    again = assess(pierced, rig, source=(pierced, rig))
+    again = assess(Subject(pierced, rig), source=Subject(pierced, rig))
     assert again.json()["clip"]["self_penetration_share"] == 0
     assert again.json()["source"]["self_penetration_share"] == 1
 
@@ -336,10 +372,12 @@ def test_contacts_are_compared_at_the_same_times_whatever_the_frame_rates() -> N
         still = standing(rig, int(4 * fps), fps)
         return along(still, 2, 0.3 * np.maximum(np.sin(2 * np.pi * seconds(still)), 0))
 
-    same = assess(hops(30), rig, source=(hops(120), rig)).contacts
+    same = assess(Subject(hops(30), rig), source=Subject(hops(120), rig)).contacts
     assert same is not None
     assert same.f1 == pytest.approx(1, abs=0.05)
-    never = assess(along(hops(30), 0, 2 * seconds(hops(30))), rig, source=(hops(120), rig)).contacts
+    never = assess(
+        Subject(along(hops(30), 0, 2 * seconds(hops(30))), rig), source=Subject(hops(120), rig)
+    ).contacts
     assert never is not None
     assert never.recall == 0
 
@@ -347,14 +385,14 @@ def test_contacts_are_compared_at_the_same_times_whatever_the_frame_rates() -> N
 def test_a_statue_beside_its_feet_is_out_of_balance() -> None:
     rig = stick_rig()
     still = standing(rig, 60)
-    assert assess(still, rig).clip.unbalanced_share == 0
+    assert assess(Subject(still, rig)).clip.unbalanced_share == 0
     leaning = standing(rig, 60)
     angle = np.radians(30.0)
     leaning.rotations[:, 0] = quat_about("y", angle)
     for side in ("left", "right"):
         leaning.rotations[:, joint(Role(f"{side}_foot"))] = quat_about("y", -angle)
     leaning = along(leaning, 2, -0.8 * (1 - np.cos(angle)))
-    report = assess(leaning, rig, source=(still, rig))
+    report = assess(Subject(leaning, rig), source=Subject(still, rig))
     assert report.clip.unbalanced_share == 1
     # The ankles lie 0.8 sin 30° behind the hips, the toes 0.2 ahead of them; the centre of mass is
     # a little above the hips.
@@ -379,8 +417,8 @@ def test_results_stand_beside_each_other_with_the_least_marked() -> None:
     still = standing(rig, 60)
     table = compare(
         {
-            "good": assess(still, rig, source=(still, rig)),
-            "floats": assess(along(still, 2, 0.05), rig, source=(still, rig)),
+            "good": assess(Subject(still, rig), source=Subject(still, rig)),
+            "floats": assess(Subject(along(still, 2, 0.05), rig), source=Subject(still, rig)),
         }
     ).splitlines()
     assert table[0].split() == ["good", "floats"]
@@ -397,7 +435,7 @@ def test_every_recorded_body_is_judged_or_was_refused(path: Path) -> None:
         rig = understand(motion)
     except SparkSimError:
         return
-    report = assess(motion, rig, source=(motion, rig))
+    report = assess(Subject(motion, rig), source=Subject(motion, rig))
     json.dumps(report.json(), allow_nan=False)
     assert report.text()
     assert report.drift is not None

@@ -19,7 +19,7 @@ from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.model.understand import understand_robot
 from robots.solver.solve import retarget
-from sim.report import Report, assess
+from sim.report import Report, Subject, assess
 from sim.report.clip_poses import pose_clip
 from sim.report.lowest import lowest_points
 from sim.report.mass import model_mass
@@ -56,7 +56,7 @@ def moving(robot: Morphology, qpos: Float[np.ndarray, "T nq"], fps: float = FPS)
 
 
 def judged(on_robot: RobotMotion) -> Report:
-    return assess(on_robot.motion, on_robot.robot.rig, body=on_robot.body)
+    return assess(Subject(on_robot.motion, on_robot.robot.rig, on_robot.body))
 
 
 def column(robot: Morphology, joint: str) -> int:
@@ -87,7 +87,7 @@ def test_every_robot_stands_with_its_soles_on_the_floor(name: str) -> None:
     assert report.clip.limit_share == 0
     assert report.clip.self_penetration.sum() == 0
     assert report.implausible == 0, report.text()
-    poses = pose_clip(still.motion, robot.rig, still.body)
+    poses = pose_clip(Subject(still.motion, robot.rig, still.body))
     if still.body.soles:
         np.testing.assert_allclose(poses.points[..., 2], 0, atol=3e-3)
         model, floor = with_floor(still.body, 0.02)
@@ -108,9 +108,9 @@ def test_every_robot_stands_with_its_soles_on_the_floor(name: str) -> None:
 
 def test_lifted_sunk_and_slid_robots_are_told_without_a_source(robot: Morphology) -> None:
     for axis, path, flag in (
-        (2, 0.05, "F"),
-        (2, -0.02, "P"),
-        (0, 0.4 * np.arange(FRAMES) / FPS, "S"),
+        (2, 0.05, "floating"),
+        (2, -0.02, "penetration"),
+        (0, 0.4 * np.arange(FRAMES) / FPS, "skating"),
     ):
         qpos = standing(robot)
         qpos[:, axis] += path
@@ -120,7 +120,7 @@ def test_lifted_sunk_and_slid_robots_are_told_without_a_source(robot: Morphology
 def test_the_floor_of_a_robot_is_at_zero_whatever_its_source_s_is(robot: Morphology) -> None:
     still = moving(robot, standing(robot))
     raised = replace(still.motion, root_pos=still.motion.root_pos + np.array([0, 0, 0.03]))
-    report = assess(still.motion, robot.rig, body=still.body, source=(raised, robot.rig))
+    report = assess(Subject(still.motion, robot.rig, still.body), source=Subject(raised, robot.rig))
     assert report.clip.floor_z == 0
     assert report.implausible == 0
     up = standing(robot)
@@ -173,7 +173,7 @@ def test_a_hinge_beyond_its_range_is_named_with_the_excess(robot: Morphology) ->
     assert np.degrees(knee["largest_excess_rad"]) == pytest.approx(10, abs=0.02)
     assert all(joint["share"] == 0 for joint in found.values())
     assert report.clip.limit_share == pytest.approx(20 / 60)
-    bent = [f for f in report.findings if f.measure == "joint limit"]
+    bent = [f for f in report.findings if f.measure == "joint_limit"]
     assert [(f.where, f.start, f.stop) for f in bent] == [("left_knee", 20, 40)]
     assert "10° beyond its limit" in bent[0].sentence
 
@@ -254,22 +254,22 @@ def test_lowest_points_are_mujocos_distance_from_a_plane(kind: str, size: str) -
 def test_a_body_with_other_frames_is_refused(robot: Morphology) -> None:
     still = moving(robot, standing(robot, 4))
     with pytest.raises(SkeletonError, match="4 frames, the motion 3"):
-        assess(still.motion.frames(0, 3), robot.rig, body=still.body)
+        assess(Subject(still.motion.frames(0, 3), robot.rig, still.body))
 
 
 def test_a_walk_put_on_a_robot_is_plausible_and_a_worse_one_is_told(robot: Morphology) -> None:
     motion = read_recording(recording("cmu_asf/cmu_02_05.bvh")).motion.frames(0, 200)
     rig = understand(motion)
     on_robot = retarget(to_canonical(motion, rig), robot)
-    source = (motion, rig)
-    report = assess(on_robot.motion, robot.rig, source=source, body=on_robot.body)
+    source = Subject(motion, rig)
+    report = assess(Subject(on_robot.motion, robot.rig, on_robot.body), source=source)
     assert report.implausible < 0.05, report.text()
     assert report.clip.limit_share == 0
     assert report.drift is not None
     assert report.drift.distance.max() < 0.15
     sunk = on_robot.qpos - np.eye(on_robot.qpos.shape[1])[2] * 0.03
     worse = moving(robot, sunk, motion.fps)
-    assert assess(worse.motion, robot.rig, source=source, body=worse.body).implausible > 0.9
+    assert assess(Subject(worse.motion, robot.rig, worse.body), source=source).implausible > 0.9
 
 
 def on_command_line(*args: str) -> tuple[int, list[str]]:

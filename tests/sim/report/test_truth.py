@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.report import assess, compare
+from sim.report import Subject, assess, compare
 from sim.report.page import report_page
 from spark.errors import SkeletonError
 from spark.rig.roles import Role
@@ -20,28 +20,28 @@ HEIGHT = 1.77 + np.hypot(0.13, 0.08)
 def test_the_truth_itself_is_right() -> None:
     rig = stick_rig()
     still = standing(rig, 30)
-    record = assess(still, rig, truth=still).json()["ground_truth"]
+    record = assess(Subject(still, rig), truth=still).json()["ground_truth"]
     assert record == {
         "mse": 0,
         "root_relative_mse": 0,
         "mpjpe_percent_of_height": 0,
         "largest_error_percent_of_height": 0,
     }
-    assert assess(still, rig).json()["ground_truth"] is None
+    assert assess(Subject(still, rig)).json()["ground_truth"] is None
 
 
 def test_a_body_three_centimetres_beside_the_truth() -> None:
     rig = stick_rig()
     still = standing(rig, 30)
     beside = replace(still, root_pos=still.root_pos + np.array([0.0, 0.03, 0.0]))
-    report = assess(beside, rig, truth=still)
+    report = assess(Subject(beside, rig), truth=still)
     assert report.truth is not None
     assert report.truth.mpjpe == pytest.approx(3 / HEIGHT)
     assert report.truth.mse == pytest.approx((0.03 / HEIGHT) ** 2 / 3)
     assert report.truth.relative_mse == pytest.approx(0)
     np.testing.assert_allclose(report.truth.errors, 3 / HEIGHT)
     assert f"{3 / HEIGHT:.2f} %        of the height" in report.text()
-    page = report_page(report, (beside, rig), title="t")
+    page = report_page(report, Subject(beside, rig), title="t")
     assert "distance from the truth" in page
 
 
@@ -50,7 +50,7 @@ def test_one_bent_elbow_moves_one_hand() -> None:
     rig = stick_rig()
     still, bent = standing(rig, 10), standing(rig, 10)
     bent.rotations[5:, joint(Role.LEFT_FOREARM)] = quat_about("z", np.array(-np.pi / 2))
-    truth = assess(bent, rig, truth=still).truth
+    truth = assess(Subject(bent, rig), truth=still).truth
     assert truth is not None
     away = 100 * 0.25 * np.sqrt(2) / 18 / HEIGHT
     np.testing.assert_allclose(truth.errors, [0] * 5 + [away] * 5, atol=1e-9)
@@ -62,10 +62,13 @@ def test_it_stands_in_the_table_where_it_is_known() -> None:
     rig = stick_rig()
     still = standing(rig, 30)
     beside = replace(still, root_pos=still.root_pos + np.array([0.0, 0.03, 0.0]))
-    known = {"good": assess(still, rig, truth=still), "bad": assess(beside, rig, truth=still)}
+    known = {
+        "good": assess(Subject(still, rig), truth=still),
+        "bad": assess(Subject(beside, rig), truth=still),
+    }
     rows = {line[:34].strip(): line[34:].split() for line in compare(known).splitlines()}
     assert rows["ground-truth MPJPE [% of height]"] == ["0.00*", f"{3 / HEIGHT:.2f}"]
-    assert "ground-truth" not in compare({"good": assess(still, rig)})
+    assert "ground-truth" not in compare({"good": assess(Subject(still, rig))})
 
 
 def test_what_is_no_truth_is_refused() -> None:
@@ -81,4 +84,4 @@ def test_what_is_no_truth_is_refused() -> None:
         (replace(still, skeleton=long), "another build.*4.0 cm"),
     ):
         with pytest.raises(SkeletonError, match=message):
-            assess(still, rig, truth=other)
+            assess(Subject(still, rig), truth=other)

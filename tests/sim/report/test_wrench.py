@@ -11,6 +11,7 @@ from sim.report.mass import Mass
 from sim.report.support import Support
 from sim.report.thresholds import PLAUSIBILITY_V1
 from sim.report.wrench import angular_momentum, required_wrench, unexplained
+from sim.trajectory import Subject
 from spark.motion import Motion
 from spark.rotation import quat_about, quat_from_rotvec, quat_mul
 from tests.helpers.stick import standing, stick_rig
@@ -63,7 +64,7 @@ def test_required_wrench_is_the_root_of_mujocos_inverse_dynamics() -> None:
 
     turns = np.stack([wave(len(rig.skeleton), 0.4) for _ in range(3)], axis=-1)
     motion = Motion(rig.skeleton, dt, still.root_pos + wave(3, 0.2), quat_from_rotvec(turns))
-    poses = pose_clip(motion, rig)
+    poses = pose_clip(Subject(motion, rig))
     ours = required_wrench(poses.mass, dt, 0.004)
 
     model = build_body(rig).compile()

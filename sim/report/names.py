@@ -1,0 +1,23 @@
+"""What the measures are called: by name in code, JSON and tables, by label in text and plots."""
+
+FLAGS = ("penetration", "floating", "skating", "root_wrench")
+"""Any of these makes a frame implausible."""
+
+LABELS = {
+    "implausible": "implausible",
+    "penetration": "penetration",
+    "floating": "floating",
+    "skating": "skating",
+    "root_wrench": "root wrench",
+    "joint_limit": "joint limits",
+    "at_limit": "at a limit",
+    "self_penetration": "self-penetration",
+    "balance": "out of balance",
+    "missed_contact": "contacts missed",
+    "invented_contact": "contacts invented",
+    "root_drift": "root drift",
+    "joint_speed": "joint speed",
+    "joint_jerk": "joint jerk",
+    "ground_truth_mse": "ground-truth MSE",
+    "ground_truth_mpjpe": "ground-truth MPJPE",
+}

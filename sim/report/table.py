@@ -1,0 +1,79 @@
+"""The report as rows of a table: one number a measure, less is better in all."""
+
+import html
+from collections.abc import Callable, Sequence
+from typing import TypedDict
+
+from sim.report.clip_metrics import ClipMetrics
+from sim.report.names import FLAGS, LABELS
+from sim.report.result import Result
+
+
+class Row(TypedDict):
+    """One measure of a motion and the same of its source, in `unit`; None where it has none."""
+
+    measure: str
+    value: float | None
+    unit: str
+    source: float | None
+
+
+def shares(clip: ClipMetrics) -> dict[str, float | None]:
+    """The measures that are shares of frames [%], by name; None of a clip that never rests."""
+    balance = clip.unbalanced_share
+    return {
+        **{name: 100 * clip.shares[name] for name in FLAGS},
+        "joint_limit": 100 * clip.limit_share,
+        "at_limit": 100 * clip.at_limit_share,
+        "self_penetration": 100 * float(clip.self_penetration.mean()),
+        "balance": None if balance is None else 100 * balance,
+    }
+
+
+RATES: dict[str, tuple[str, Callable[[ClipMetrics], float]]] = {
+    "joint_speed": ("rad/s", lambda clip: float(clip.joint_speed.max(initial=0.0))),
+    "joint_jerk": ("rad/s³", lambda clip: clip.jerk_rms),
+}
+"""The measures of how joints move: unit and value."""
+
+
+def rows(result: Result) -> list[Row]:
+    """A row for each measure; those against a source or a ground truth have no source's value."""
+    clip, source = result.clip, result.source
+    contacts, drift, truth = result.contacts, result.drift, result.truth
+    theirs = {} if source is None else shares(source)
+    recall, precision = (None, None) if contacts is None else (contacts.recall, contacts.precision)
+    return [
+        _row(
+            "implausible",
+            100 * result.implausible,
+            "%",
+            None if source is None else 100 * source.implausible_share,
+        ),
+        *(_row(name, value, "%", theirs.get(name)) for name, value in shares(clip).items()),
+        _row("missed_contact", None if recall is None else 100 * (1 - recall), "%"),
+        _row("invented_contact", None if precision is None else 100 * (1 - precision), "%"),
+        _row("root_drift", None if drift is None else 100 * float(drift.distance.max()), "cm"),
+        *(
+            _row(name, value(clip), unit, None if source is None else value(source))
+            for name, (unit, value) in RATES.items()
+        ),
+        _row("ground_truth_mse", None if truth is None else 1e4 * truth.mse, "1e-4"),
+        _row("ground_truth_mpjpe", None if truth is None else truth.mpjpe, "% of height"),
+    ]
+
+
+def to_html(rows: Sequence[Row]) -> str:
+    """The rows that are known, as a table for a notebook."""
+    cells = "".join(
+        f"<tr><th>{html.escape(LABELS[row['measure']])} [{row['unit']}]</th>"
+        f"<td>{row['value']:.2f}</td>"
+        f"<td>{'' if row['source'] is None else format(row['source'], '.2f')}</td></tr>"
+        for row in rows
+        if row["value"] is not None
+    )
+    return f"<table><tr><th></th><th>motion</th><th>source</th></tr>{cells}</table>"
+
+
+def _row(measure: str, value: float | None, unit: str, source: float | None = None) -> Row:
+    return {"measure": measure, "value": value, "unit": unit, "source": source}
