@@ -2,39 +2,55 @@
 
 from dataclasses import dataclass, replace
 
-HUMAN_HIP_HEIGHT = 0.9  # [m]
+HUMAN_HIP_HEIGHT = 0.9  # [m] of an adult: the size that the thresholds are given for
 
 
 @dataclass(frozen=True)
 class Thresholds:
-    """`plausibility v1`: what counts as implausible, for a body whose hips stand 0.9 m high."""
+    """`plausibility v1`: what counts as implausible, for a body whose hips stand 0.9 m high.
+
+    Those of skating were chosen on clean recordings of people, which must show little of it; the
+    others are set to what a viewer sees and captured people hardly reach. `scripts/report_bench.py`
+    measures on spoilt recordings what they tell apart: docs/report.md has its table.
+    """
 
     version: str = "plausibility v1"
+
     # Penetration: the lowest point lies deeper than this under the floor [m].
     penetration: float = 0.01
-    # Floating: the lowest point is higher than this [m], and the centre of mass is not in free fall: its
-    # vertical acceleration differs from gravity's by more than this [m/s²] all over the window.
+
+    # Floating: the lowest point is higher than this [m], and the centre of mass is not in free
+    # fall: its vertical acceleration differs from gravity's by more than this [m/s²] all over the
+    # window.
     floating: float = 0.04
     free_fall: float = 4.0
-    # Skating: a sole's corner lower than this [m] moves along the floor faster than this [m/s], and its
-    # foot lies flat (all corners within `contact_height`), or the points at rest leave more than
-    # this of the body's weight to it [body weights, body weights x 1 m].
+
+    # Skating: a sole's corner lower than this [m] moves along the floor faster than this [m/s], and
+    # its foot lies flat (all corners within `contact_height`), or the points at rest leave more
+    # than this of the body's weight to it [body weights, body weights x 1 m]. Without the last
+    # condition a toe that swings by low counts: a quarter of the frames of a clean walk.
     skate_height: float = 0.025
     skate_speed: float = 0.2
     skate_load: float = 0.1
-    # Root wrench: the force [body weights] or torque [body weights x 1 m] that the floor can't give, with
-    # friction cones of this coefficient at the points lower than this [m].
+
+    # A point lower than this [m] may touch the floor. It is as high as `floating`: what does not
+    # float may be held up.
+    contact_height: float = 0.04
+
+    # Root wrench: the force [body weights] or torque [body weights x 1 m] that the floor can't give
+    # with friction cones of this coefficient (rubber on dry concrete: 0.6 to 1).
     wrench_force: float = 0.15
     wrench_torque: float = 0.15
-    contact_height: float = 0.04
     friction: float = 1.0
+
     # Self-penetration: a part of the body is deeper in another, no neighbour, than this [m] beyond
-    # what it is in the source.
+    # what it is in the source. Flesh gives; the shapes of a model are hard.
     self_penetration: float = 0.02
-    # The same for the shapes of a model that was given: they are hard [m].
     shape_penetration: float = 0.01
-    # At its limit: a joint is within this [rad] of its limit, or beyond.
+
+    # At its limit: a joint is within this [rad] of its limit, or beyond: half a degree.
     limit_margin: float = 0.0087
+
     # Balance, where the centre of mass is slower than this [m/s] and accelerates less than this
     # [m/s²] for this time [s] before and after: it lies further outside the points near the floor
     # than this [m].
@@ -42,7 +58,9 @@ class Thresholds:
     static_acceleration: float = 0.5
     static_time: float = 0.2
     balance: float = 0.03
-    # Time [s] over which velocities and accelerations are taken, whatever the frame rate.
+
+    # Time [s] before and after a frame over which velocities and accelerations are taken, whatever
+    # the frame rate: 3 frames at 60 fps.
     window: float = 0.05
 
     def scaled(self, hip_height: float) -> "Thresholds":
