@@ -1,0 +1,131 @@
+"""Unit and up axis: inferred from what a file holds, or given."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from spark.errors import ConventionError
+from spark.io.bvh import Bvh, BvhJoint
+from spark.io.convention import UNITS
+from spark.io.recording import read_recording
+from spark.kinematics import forward
+from tests.helpers.bvh_by_hand import human, save, to_file, zxy
+from tests.helpers.recordings import recording
+
+# What each set is, as its README says. fair1 is about 3.5 to 4 cm: between inch and CMU's unit.
+CONVENTIONS = {
+    "cmu_asf/*": ("cm", "y"),
+    "cmu_expmap/*": ("cmu", "y"),
+    "reactidle/*": ("m", "y"),
+    "mesh2motion/*": ("m", "y"),
+    "makehuman/*": ("dm", "z"),
+    "animateddrawings/jesse_dance": ("cm", "y"),
+    "animateddrawings/jumping_jacks": ("cmu", "y"),
+    "animateddrawings/dab": ("cmu", "z"),
+    "zoo/ad_cmu1": ("cmu", "y"),
+    "zoo/ad_fair1_zup": ("cmu", "z"),
+    "zoo/ad_rokoko_mixamo": ("cm", "y"),
+    "zoo/cmu_asf_cm": ("cm", "y"),
+    "zoo/cmu_cgspeed_31j": ("cmu", "y"),
+    "zoo/cmu_max_131": ("cmu", "y"),
+    "zoo/cmu_scaled_metre": ("m", "y"),
+    "zoo/m2m_*": ("m", "y"),
+    "zoo/makehuman_*": ("dm", "z"),
+    "zoo/reactidle_blender": ("m", "y"),
+}
+
+
+@pytest.mark.parametrize("pattern", CONVENTIONS)
+def test_conventions_of_recordings_are_inferred(pattern: str) -> None:
+    folder = recording(pattern).parent
+    paths = sorted(folder.glob(recording(pattern).name + ".bvh"))
+    assert paths
+    for path in paths[:: 1 + len(paths) // 12]:
+        found = read_recording(path)
+        assert (found.convention.unit, found.convention.up) == CONVENTIONS[pattern], path
+
+
+@pytest.mark.parametrize("unit", UNITS)
+@pytest.mark.parametrize("tall", [1.3, 1.5, 1.8, 2.0])
+def test_people_of_all_sizes_show_the_unit(tmp_path: Path, unit: str, tall: float) -> None:
+    found = read_recording(save(human("z", UNITS[unit], scale=tall / 1.7), tmp_path))
+    assert (found.convention.unit, found.convention.up) == (unit, "z")
+    assert f"unit {unit} " in found.notes[0]
+
+
+def test_a_size_between_two_units_is_pointed_out(tmp_path: Path) -> None:
+    found = read_recording(save(human("y", 0.0375), tmp_path))
+    assert {found.convention.unit, "inch"} == {"cmu", "inch"}
+    assert "unit inch (1.10 m) is nearly as likely" in " ".join(found.notes)
+
+
+def test_a_height_no_human_has_is_pointed_out(tmp_path: Path) -> None:
+    found = read_recording(save(human("y", 1.0, scale=60), tmp_path), up="y")
+    assert found.convention.unit == "cm"
+    found = read_recording(save(human("y", 1.0, scale=3), tmp_path), up="y")
+    assert "no human's height" in " ".join(found.notes)
+
+
+@pytest.mark.parametrize(("rest", "up"), [("z", "y"), ("x", "y"), ("y", "z")])
+def test_the_motion_and_not_the_rest_pose_shows_what_is_up(
+    tmp_path: Path, rest: str, up: str
+) -> None:
+    """The rest pose stands along `rest`; the root's rotation stands it along `up`."""
+    bvh = human(rest)
+    turn = Rotation.align_vectors([np.eye(3)["xyz".index(up)]], [np.eye(3)["xyz".index(rest)]])[0]
+    values = bvh.values.copy()
+    values[:, :3] = to_file((0.3, 0.5, 0.93), up, 0.01)
+    values[:, 3:6] = zxy(turn)
+    found = read_recording(save(Bvh(bvh.joints, 0.1, values), tmp_path))
+    assert found.convention.up == up
+    positions, _ = forward(found.motion)
+    assert positions[0, 3, 2] - positions[0, 10, 2] == pytest.approx(1.52)  # head above foot
+
+
+@pytest.mark.parametrize("heading", [0.0, 30.0, 45.0, 90.0])
+def test_a_body_that_lies_on_the_floor_does_not_turn_the_world(
+    tmp_path: Path, heading: float
+) -> None:
+    lying = Rotation.from_euler("Y", heading, degrees=True) * Rotation.from_euler("X", np.pi / 2)
+    turns = np.tile(zxy(lying), (4, 1))
+    found = read_recording(save(human("y", turns=turns, root=(1.3, 2.2, 0.15)), tmp_path))
+    assert found.convention.up == "y"
+
+
+def test_what_cannot_be_known_is_called_a_guess(tmp_path: Path) -> None:
+    bvh = human()
+    joints = tuple(BvhJoint(f"b{j}", *_rest(joint)) for j, joint in enumerate(bvh.joints))
+    notes = " ".join(read_recording(save(Bvh(joints, 0.1, bvh.values), tmp_path)).notes)
+    assert "judged by its longest chain of bones" in notes
+    assert "up axis y, a guess" in notes
+
+
+def _rest(joint: BvhJoint) -> tuple[object, ...]:
+    return joint.parent, joint.offset, joint.channels, joint.ends
+
+
+def test_a_body_upside_down_is_pointed_out(tmp_path: Path) -> None:
+    turns = np.tile([0.0, 180.0, 0.0], (4, 1))
+    found = read_recording(save(human("y", turns=turns, root=(3.0, 2.0, 1.7)), tmp_path))
+    assert found.convention.up == "y"
+    assert "upside down along y; check, and give --up" in found.notes[-1]
+
+
+def test_a_skeleton_in_one_point_needs_a_unit(tmp_path: Path) -> None:
+    path = save(human(scale=0.0), tmp_path)
+    with pytest.raises(ConventionError, match=f"{path}: all joints lie in one point.*--unit"):
+        read_recording(path)
+    assert read_recording(path, unit="m", up="y").motion.skeleton.offsets.max() == 0.0
+
+
+@pytest.mark.parametrize("unit", ["yard", "", "nan", "-1", "0", 0.0, float("inf")])
+def test_unknown_units_are_refused(tmp_path: Path, unit: str | float) -> None:
+    with pytest.raises(ConventionError, match="expected one of m, cm, cmu, inch, mm, dm"):
+        read_recording(tmp_path / "never read", unit=unit)
+
+
+def test_unknown_axes_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConventionError, match="expected one of x, y, z"):
+        read_recording(tmp_path / "never read", up="w")

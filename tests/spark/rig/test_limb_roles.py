@@ -1,0 +1,60 @@
+"""Sides: from names where they say them, else from the body's front."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spark.rig.role_assignment import assign_roles
+from spark.rig.roles import Role
+from tests.helpers.rigs import RIGS, build, walk
+from tests.helpers.role_tables import mirrored, wrong
+
+
+def test_sides_come_from_the_front_where_names_say_nothing() -> None:
+    skeleton, right = build(RIGS["lafan1"], names="joint_{}")
+    motion = mirrored(walk(skeleton, right))
+    swapped = tuple(role and role.mirrored for role in right)
+    assert wrong(motion.skeleton, assign_roles(motion.skeleton, motion), swapped) == {}
+
+
+@pytest.mark.parametrize("part", ["Leg|Foot|Toe", "Arm|Hand|Shoulder"])
+def test_sides_that_names_give_to_one_pair_hold_for_the_other(part: str) -> None:
+    skeleton, right = build(RIGS["lafan1"])
+    names = tuple(
+        name if any(word in name for word in part.split("|")) else f"joint_{j}"
+        for j, name in enumerate(skeleton.names)
+    )
+    named = replace(skeleton, names=names)
+    assert wrong(named, assign_roles(named, walk(named, right)), right) == {}
+    motion = mirrored(walk(named, right))
+    assert wrong(motion.skeleton, assign_roles(motion.skeleton, motion), right) == {}
+
+
+def test_a_name_on_the_other_side_of_the_body_is_doubted() -> None:
+    skeleton, right = build(RIGS["lafan1"])
+    motion = mirrored(walk(skeleton, right))
+    roles = assign_roles(motion.skeleton, motion)
+    assert wrong(motion.skeleton, roles, right) == {}
+    knee = skeleton.names.index("LeftLeg")
+    assert "other side" in roles.reasons[knee]
+    assert roles.confidence[knee] < 0.7 < assign_roles(skeleton).confidence[knee]
+
+
+def test_a_side_that_nothing_shows_is_a_guess_and_says_so() -> None:
+    """Straight knees and elbows, no feet: a body that is its own mirror image."""
+    skeleton, _ = build(
+        """
+        a P > b S > c N > d H
+        b > u{L} U > v{L} F > w{L} W
+        a > t{L} T > k{L} K > f{L} A
+        """,
+        ends=False,
+        names="joint_{}",
+    )
+    offsets = skeleton.offsets * np.array([0.0, 1.0, 1.0])
+    roles = assign_roles(replace(skeleton, offsets=offsets))
+    legs = roles.joints(Role.LEFT_UPPER_LEG) + roles.joints(Role.RIGHT_LOWER_LEG)
+    assert len(legs) == 2
+    assert all(roles.confidence[j] <= 0.5 for j in legs)
+    assert all("guess" in roles.reasons[j] for j in legs)

@@ -1,0 +1,183 @@
+"""Roles: from names, from topology, from shape, and from all of them."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spark.io.recording import read_recording
+from spark.rig.role_assignment import assign_roles
+from spark.rotation import quat_from_rotvec, quat_mul
+from spark.skeleton import Skeleton
+from tests.helpers.recordings import recordings
+from tests.helpers.rigs import RIGS, build, walk
+from tests.helpers.role_tables import (
+    CMU_ASF,
+    SAMPLES,
+    as_strings,
+    expected,
+    known_recordings,
+    table,
+    wrong,
+)
+
+
+@pytest.mark.parametrize("path", known_recordings(*SAMPLES))
+def test_roles_of_recordings_are_those_of_the_table(path: Path) -> None:
+    text = expected(path)
+    assert text is not None
+    motion = read_recording(path).motion
+    roles = assign_roles(motion.skeleton, motion)
+    assert as_strings(motion.skeleton, roles) == table(text)
+    assert all(c >= 0.8 for c, r in zip(roles.confidence, roles.roles, strict=True) if r)
+    assert all(roles.reasons)
+
+
+@pytest.mark.parametrize(
+    "path",
+    recordings(
+        "zoo/cmu_*.bvh", "zoo/ad_*.bvh", "zoo/reactidle*.bvh", "zoo/m2m_human.bvh",
+        "cmu_expmap/test_*_1.bvh", "reactidle/*.bvh",
+    ),
+)  # fmt: skip
+def test_roles_without_names_are_the_same(path: Path) -> None:
+    motion = read_recording(path).motion
+    names = tuple(f"joint_{j}" for j in range(len(motion.skeleton)))
+    motion = replace(motion, skeleton=replace(motion.skeleton, names=names))
+    text = expected(path)
+    assert text is not None
+    if text is CMU_ASF:  # the twist of its forearm is a joint: only the name tells it from a wrist
+        text = text.replace("{l}wrist", "{l}hand")
+    originals = read_recording(path).motion.skeleton.names
+    roles = assign_roles(motion.skeleton, motion)
+    found = dict(zip(originals, roles.roles, strict=True))
+    assert {n: str(r) for n, r in found.items() if r is not None} == table(text)
+    assert all(c <= 0.9 for c in roles.confidence), "without names nothing is sure"
+
+
+@pytest.mark.parametrize("ends", [True, False], ids=["ends", "no-ends"])
+@pytest.mark.parametrize("convention", RIGS)
+def test_roles_of_the_ecosystems_rigs(convention: str, ends: bool) -> None:
+    skeleton, right = build(RIGS[convention], ends=ends)
+    motion = walk(skeleton, right, turn=1.0)
+    assert wrong(skeleton, assign_roles(skeleton), right) == {}
+    assert wrong(skeleton, assign_roles(skeleton, motion), right) == {}
+    roles = assign_roles(skeleton, motion)
+    assert min(c for c, r in zip(roles.confidence, right, strict=True) if r) > 0.8
+
+
+PREFIXES = {"mixamorig:": "mixamorig1:", "mixamorig:L": "mixamorig_L", "mixamorig:Hips": "Hips"}
+
+
+@pytest.mark.parametrize("prefix", ["mixamorig1:", "mixamorig_", "", "Bob_", "Scene|rig:", "bob."])
+def test_prefixes_say_nothing(prefix: str) -> None:
+    skeleton, right = build(RIGS["mixamo"])
+    names = tuple(name.replace("mixamorig:", prefix) for name in skeleton.names)
+    skeleton = replace(skeleton, names=names)
+    assert wrong(skeleton, assign_roles(skeleton), right) == {}
+
+
+# Without names these are open: arms that hang on the neck, legs on the spine...
+OPEN_WITHOUT_NAMES = ("biped", "biped, legs on the spine")
+
+# ... and the head, where one joint (a jaw, eyebrows) follows it as it follows the neck.
+OPEN_HEADS = ("iclone", "source engine", "synty", "advanced skeleton", "auto-rig pro")
+
+
+@pytest.mark.parametrize("pose", ["walks", "lies on its back", "lies on its face", "on its side"])
+@pytest.mark.parametrize("convention", [c for c in RIGS if c not in OPEN_WITHOUT_NAMES])
+def test_meaningless_names(convention: str, pose: str) -> None:
+    skeleton, right = build(RIGS[convention], names="joint_{}")
+    motion = walk(skeleton, right, turn=2.0)
+    tilt = {"walks": (0, 0, 0), "lies on its back": (0, -1.6, 0), "on its side": (1.6, 0, 0)}
+    turn = quat_from_rotvec(np.array(tilt.get(pose, (0, 1.6, 0)), dtype=np.float64))
+    rotations = motion.rotations.copy()
+    rotations[:, 0] = quat_mul(turn, rotations[:, 0])
+    motion = replace(motion, rotations=rotations)
+    found = wrong(skeleton, assign_roles(skeleton, motion), right)
+    if convention in OPEN_HEADS:
+        found = {n: pair for n, pair in found.items() if not {"neck", "head"} & {*pair}}
+    assert found == {}
+
+
+def test_a_rest_pose_on_one_line_is_no_hindrance() -> None:
+    """LAFAN1 and Rokoko: every bone along its joint's x axis, the pose in the rotations."""
+    skeleton, right = build(RIGS["xsens"], names="joint_{}")
+    motion = walk(skeleton, right)
+    own = np.zeros((len(skeleton), 4))  # q_old_new of each joint's axes
+    own[:, 0] = 1.0
+    for j in range(len(skeleton)):
+        tips = [*skeleton.offsets[list(skeleton.children[j])]]
+        tips += [*skeleton.end_offsets[skeleton.end_parents == j]]
+        if len(tips) == 1:
+            axis = np.cross([1.0, 0.0, 0.0], tips[0])
+            angle = np.arctan2(np.linalg.norm(axis), tips[0][0])
+            unit = axis / max(np.linalg.norm(axis), 1e-12)
+            own[j] = quat_from_rotvec(angle * (unit if unit.any() else np.array([0.0, 0, 1])))
+    above = own[skeleton.parents]
+    above[0] = (1.0, 0.0, 0.0, 0.0)
+    back = np.array([1.0, -1, -1, -1])
+
+    def turned(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        pure = np.concatenate([np.zeros((*v.shape[:-1], 1)), v], axis=-1)
+        return quat_mul(quat_mul(q * back, pure), q)[..., 1:]
+
+    line = replace(
+        skeleton,
+        offsets=turned(above, skeleton.offsets),
+        end_offsets=turned(own[skeleton.end_parents], skeleton.end_offsets),
+    )
+    shin = skeleton.names.index("joint_17")
+    assert abs(line.offsets[shin]) @ [0, 1, 1] < 1e-9 < line.offsets[shin, 0]
+    rotations = quat_mul(quat_mul(above * back, motion.rotations), own)
+    motion = replace(motion, skeleton=line, rotations=rotations)
+    assert wrong(line, assign_roles(line, motion), right) == {}
+
+
+@pytest.mark.parametrize("convention", ["mixamo", "smpl", "unreal"])
+def test_the_order_of_joints_in_the_file_changes_nothing(convention: str) -> None:
+    skeleton, right = build(RIGS[convention])
+    rng = np.random.default_rng(5)
+    order: list[int] = []
+    open_ = [0]
+    while open_:
+        order.append(open_.pop(int(rng.integers(len(open_)))))
+        open_ += skeleton.children[order[-1]]
+    place = {old: new for new, old in enumerate(order)}
+    shuffled = Skeleton(
+        names=tuple(skeleton.names[j] for j in order),
+        parents=np.array([place.get(int(skeleton.parents[j]), -1) for j in order]),
+        offsets=skeleton.offsets[order],
+        translating=skeleton.translating[order],
+        end_parents=np.array([place[j] for j in skeleton.end_parents.tolist()]),
+        end_offsets=skeleton.end_offsets,
+    )
+    assert order != sorted(order)
+    assert wrong(shuffled, assign_roles(shuffled), tuple(right[j] for j in order)) == {}
+
+
+@pytest.mark.parametrize("drop", ["Foot", "Hand", "Shoulder", "Neck", "Toe", "Spine"])
+def test_missing_joints_leave_the_others_in_place(drop: str) -> None:
+    chains = [
+        " > ".join(item for item in line.split(" > ") if drop not in item)
+        for line in RIGS["lafan1"].replace("Spine2 >", "Chest >").splitlines()
+    ]
+    text = "\n".join(chains).replace("Spine2 S", "Chest S")
+    text = text.replace("Hips > Spine S > Spine1 S", "Hips > Spine S > Spine1 S")
+    if drop == "Spine":
+        text = text.replace("Hips > Neck", "Hips > Chest S > Neck")
+    if drop == "Foot":
+        text = text.replace(" > {Left}Toe B", "")
+    skeleton, right = build(text)
+    assert wrong(skeleton, assign_roles(skeleton), right) == {}
+
+
+def test_reasons_say_where_a_role_comes_from() -> None:
+    skeleton, _ = build(RIGS["unreal"])
+    roles = assign_roles(skeleton)
+    reason = dict(zip(skeleton.names, roles.reasons, strict=True))
+    assert reason["thigh_l"] == "name 'thigh_l'"
+    assert reason["thumb_01_l"] == "a finger, by its name"
+    assert reason["calf_twist_01_l"] == "a twist bone, by its name"
+    assert reason["ik_foot_l"] == "a helper, by its name"
