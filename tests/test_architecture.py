@@ -1,4 +1,5 @@
-"""Imports run one way, and only the network needs torch. Each guard is shown to catch a breach."""
+"""Imports run one way and in no circle, and only the network needs torch. Each guard is shown to
+catch a breach."""
 
 import ast
 import subprocess
@@ -36,10 +37,21 @@ PACKAGES = ("spark", "sim", "robots", "spark_sim", "scripts")
 COMMAND_LINE = {"spark_sim.cli", "spark_sim.__main__"}  # they start the commands
 
 
-def imports(source: str) -> set[str]:
-    """The names that a module imports, dotted, at its top or inside a function."""
+def imports(source: str, *, typing: bool = True) -> set[str]:
+    """The names that a module imports, dotted, at its top or inside a function; with `typing` also
+    those under `if TYPE_CHECKING`."""
     found: set[str] = set()
-    for node in ast.walk(ast.parse(source)):
+    tree = ast.parse(source)
+    unseen = [
+        inner
+        for node in ast.walk(tree)
+        if not typing and isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+        for statement in node.body
+        for inner in ast.walk(statement)
+    ]
+    for node in ast.walk(tree):
+        if node in unseen:
+            continue
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -99,6 +111,50 @@ def test_imports_run_one_way() -> None:
 )
 def test_the_guard_sees_breaches(module: str, source: str, found: set[str]) -> None:
     assert breaches(module, source) == found
+
+
+def graph(sources: dict[str, str]) -> dict[str, set[str]]:
+    """Which of the files import which, by dotted names; what only type checkers see is left out."""
+    return {
+        name: {
+            next(file for file in (target, target.rpartition(".")[0]) if file in sources)
+            for target in imports(source, typing=False)
+            if {target, target.rpartition(".")[0]} & sources.keys()
+        }
+        - {name}
+        for name, source in sources.items()
+    }
+
+
+def circles(imported: dict[str, set[str]]) -> set[str]:
+    """The files that import themselves by way of others: what is left when those that import
+    nothing, or only what is gone already, are taken away, and then those that nothing imports."""
+    left = dict(imported)
+    while done := {name for name, targets in left.items() if not targets & left.keys()}:
+        left = {name: targets for name, targets in left.items() if name not in done}
+    while done := left.keys() - set().union(*left.values()):
+        left = {name: targets for name, targets in left.items() if name not in done}
+    return set(left)
+
+
+def test_no_files_import_each_other_in_a_circle() -> None:
+    files = modules(*PACKAGES)
+    assert circles(graph({name: path.read_text() for name, path in files.items()})) == set()
+
+
+def test_the_guard_sees_circles() -> None:
+    a, b, c, d = (f"sim.report.{letter}" for letter in "abcd")
+    sources = {
+        a: f"from {b} import x",
+        b: f"from sim.report import c\ndef f():\n    from {d} import x",
+        c: f"from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from {a} import x",
+        d: f"import numpy\nimport {c}",
+    }
+    assert graph(sources) == {a: {b}, b: {c, d}, c: set(), d: {c}}
+    assert circles(graph(sources)) == set()
+    inside = f"def f():\n    from {b} import x"
+    assert circles(graph({**sources, d: inside})) == {b, d}
+    assert circles(graph({**sources, c: f"from {a} import x"})) == {a, b, c, d}
 
 
 def loads_torch(code: str) -> bool:

@@ -10,8 +10,8 @@ class Thresholds:
     """`plausibility v1`: what counts as implausible, for a body whose hips stand 0.9 m high.
 
     Those of skating were chosen on clean recordings of people, which must show little of it; the
-    others are set to what a viewer sees and captured people hardly reach. `scripts/report_bench.py`
-    measures on spoilt recordings what they tell apart: docs/report.md has its table.
+    others were set beforehand. `scripts/report_bench.py` measures on spoilt recordings what they
+    tell apart: docs/report.md has its table.
     """
 
     version: str = "plausibility v1"
@@ -38,7 +38,7 @@ class Thresholds:
     contact_height: float = 0.04
 
     # Root wrench: the force [body weights] or torque [body weights x 1 m] that the floor can't give
-    # with friction cones of this coefficient (rubber on dry concrete: 0.6 to 1).
+    # with friction cones of this coefficient: a generous one, so that what counts no floor gives.
     wrench_force: float = 0.15
     wrench_torque: float = 0.15
     friction: float = 1.0
