@@ -23,6 +23,7 @@ from spark.rotation import (
     quat_mul,
     quat_normalize,
 )
+from spark.summary import brief
 
 BASE = 6  # degrees of freedom of the base: a shift [m], then a rotation vector [rad], world axes
 ROOT = -1  # the base's number as a link
@@ -47,6 +48,8 @@ class Tree:
     lower: Float[np.ndarray, "N"]
     upper: Float[np.ndarray, "N"]
     base: Float[np.ndarray, "3"]
+
+    __repr__ = brief
 
     def __len__(self) -> int:
         return len(self.parents)
@@ -94,6 +97,8 @@ class Coordinates:
     quat: Float[np.ndarray, "T 4"]
     angles: Float[np.ndarray, "T N"]
     ball_quats: Float[np.ndarray, "T N 4"] | None = None
+
+    __repr__ = brief
 
     def __len__(self) -> int:
         return len(self.pos)
@@ -177,6 +182,8 @@ class LinkPoses:
     tree: Tree
     rotations: Float[np.ndarray, "L 3 3 T"]
     positions: Float[np.ndarray, "L 3 T"]
+
+    __repr__ = brief
 
     def at(self, frames: Int[np.ndarray, "S"], links: Iterable[int] | None = None) -> "LinkPoses":
         """The same in some of the frames; only `links` where they are named, the rest undefined."""

@@ -10,6 +10,7 @@ from sim.body.build import build_body
 from sim.body.qpos import qpos_from_motion
 from spark.motion import Motion
 from spark.rig.rig import Rig
+from spark.summary import brief
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,6 +21,8 @@ class ModelSole:
     side: str
     bodies: Int[np.ndarray, "C"]
     points: Float[np.ndarray, "C 3"]
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +40,8 @@ class ModelTrajectory:
     qpos: Float[np.ndarray, "T nq"]
     soles: tuple[ModelSole, ...] = ()
     tpose: Float[np.ndarray, "nq"] | None = None
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True, eq=False)

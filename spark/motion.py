@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from spark.errors import SkeletonError
 from spark.skeleton import Skeleton
+from spark.summary import counted, time_span
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +24,10 @@ class Motion:
     root_pos: Float[np.ndarray, "T 3"]
     rotations: Float[np.ndarray, "T J 4"]
     translations: Float[np.ndarray, "T J 3"] | None = None
+
+    def __repr__(self) -> str:
+        span = time_span(len(self), self.frame_time)
+        return f"Motion({span}, {counted(len(self.skeleton), 'joint')})"
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.frame_time) and self.frame_time > 0):

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from spark.errors import SkeletonError
+from spark.summary import counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +26,9 @@ class Skeleton:
     translating: Bool[np.ndarray, "J"]
     end_parents: Int[np.ndarray, "E"] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     end_offsets: Float[np.ndarray, "E 3"] = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def __repr__(self) -> str:
+        return f"Skeleton({counted(len(self), 'joint')} from {self.names[0]!r})"
 
     def __post_init__(self) -> None:
         if not self.names:

@@ -16,15 +16,18 @@ from typing import TYPE_CHECKING, Any
 DISTRIBUTION = "spark-sim"
 
 if TYPE_CHECKING:
+    from sim.report import Report
     from spark.errors import SparkSimError
     from spark_sim.api import play, report, retarget, sample
-    from spark_sim.clips import Clip, RobotClip
+    from spark_sim.clips import AnyClip, Clip, RobotClip
     from spark_sim.live import Retargeter
     from spark_sim.loading import load
     from spark_sim.simulation import Simulated, simulate
 
 _MODULE_OF = {
+    "AnyClip": "spark_sim.clips",
     "Clip": "spark_sim.clips",
+    "Report": "sim.report",
     "Retargeter": "spark_sim.live",
     "RobotClip": "spark_sim.clips",
     "Simulated": "spark_sim.simulation",
@@ -37,7 +40,9 @@ _MODULE_OF = {
     "simulate": "spark_sim.simulation",
 }
 __all__ = [
+    "AnyClip",
     "Clip",
+    "Report",
     "Retargeter",
     "RobotClip",
     "Simulated",

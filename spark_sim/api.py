@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, get_args, overload
 
 from spark.errors import ConventionError
 from spark.io.bvh import write_bvh
@@ -13,6 +13,7 @@ from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, from_canonical
 from spark.transfer.foot_lock import lock_feet
 from spark_sim import files
+from spark_sim.choices import Method, RobotName
 from spark_sim.clips import AnyClip, Clip, File, RobotClip
 from spark_sim.loading import clip_of
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from spark.network.retarget import Learned
     from spark_sim.simulation import Simulated
 
-METHODS = ("copy", "spark")
 COPIED = "each pose is copied to the robot's hinges: feet are not held, parts may collide"
 """What is to know of a motion that was copied to a robot, and not solved for."""
 _PAGE = (".html", ".htm")
@@ -32,16 +32,24 @@ def retarget(
     source: AnyClip | File,
     target: Clip,
     *,
-    method: str = "spark",
+    method: Method = "spark",
     checkpoint: File | None = None,
     refine: bool = True,
 ) -> Clip: ...
 @overload
 def retarget(
     source: AnyClip | File,
+    target: RobotClip | RobotName,
+    *,
+    method: Method = "spark",
+    refine: bool = True,
+) -> RobotClip: ...
+@overload
+def retarget(
+    source: AnyClip | File,
     target: AnyClip | File,
     *,
-    method: str = "spark",
+    method: Method = "spark",
     checkpoint: File | None = None,
     refine: bool = True,
 ) -> AnyClip: ...
@@ -69,7 +77,7 @@ def retarget(
     Raises `SkeletonError` where one of the two is no humanoid, and `ConventionError` for a method
     that is not known or does not go with the rest.
     """
-    if method not in METHODS:
+    if method not in get_args(Method):
         raise ConventionError(f"method {method!r} is not known; expected 'copy' or 'spark'")
     if method != "spark" and checkpoint is not None:
         raise ConventionError("a checkpoint goes with method 'spark', and with no other")

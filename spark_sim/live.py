@@ -31,6 +31,7 @@ class Retargeter:
         if fps is not None and not (np.isfinite(fps) and fps > 0):
             raise ConventionError(f"fps is {fps}; expected a positive number")
         self.robot = target.on_robot.robot
+        self._source = source.name
         frame_time = source.motion.frame_time if fps is None else 1.0 / fps
         ground = ground_of(source.canonical, self.robot)
         self._stream = Stream(source.rig, self.robot, frame_time, ground)
@@ -48,6 +49,9 @@ class Retargeter:
         on as if it had not been there.
         """
         return self._stream.step(Frame(*frame))
+
+    def __repr__(self) -> str:
+        return f"Retargeter({self._source!r}, {self.robot!r})"
 
     def reset(self) -> None:
         """Begin anew: the next frame is a first one, before which the source stood still."""

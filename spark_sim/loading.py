@@ -1,12 +1,17 @@
 """Files and robots' names into clips, and what can be told of which file."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING, overload
 
 from robots import formats, registry
 from spark.errors import ConventionError, FileFormatError
 from spark.io.reading import read_motion
 from spark_sim import rolemap
+from spark_sim.choices import Quat, RobotName, Unit
 from spark_sim.clips import AnyClip, Clip, File, RobotClip
+
+if TYPE_CHECKING:
+    from spark_sim.choices import Up
 
 _NOT_YET = {
     ".glb": "glTF files can't be read yet; expected a BVH or FBX file",
@@ -15,6 +20,29 @@ _NOT_YET = {
 }
 
 
+@overload
+def load(path: RobotName, *, roles: File | None = None) -> RobotClip: ...
+@overload
+def load(
+    path: File, *, robot: File, quat: Quat | None = None, fps: float | None = None
+) -> RobotClip: ...
+@overload
+def load(
+    path: File, *, unit: Unit | float, up: "Up | None" = None, roles: File | None = None
+) -> Clip: ...
+@overload
+def load(path: File, *, up: "Up", roles: File | None = None) -> Clip: ...
+@overload
+def load(
+    path: File,
+    *,
+    unit: Unit | float | None = None,
+    up: "Up | None" = None,
+    roles: File | None = None,
+    robot: File | None = None,
+    quat: Quat | None = None,
+    fps: float | None = None,
+) -> AnyClip: ...
 def load(
     path: File,
     *,

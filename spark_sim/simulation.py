@@ -20,6 +20,9 @@ class Simulated:
     clip: AnyClip
     tracked: Tracked
 
+    def __repr__(self) -> str:
+        return f"Simulated({self.clip!r})"
+
     @property
     def name(self) -> str:
         """What pictures and messages call it."""

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from spark.errors import FileFormatError, SkeletonError
+from spark.summary import brief
 
 FREE, BALL, SLIDE, HINGE = (
     int(kind)
@@ -39,6 +40,8 @@ class Mjcf:
     root: int
     path: Path
     notes: tuple[str, ...] = ()
+
+    __repr__ = brief
 
     @property
     def free_joint(self) -> int:

@@ -24,6 +24,7 @@ from spark.rotation import (
     quat_relative,
     quat_rotate,
 )
+from spark.summary import brief, counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +35,8 @@ class Sole:
     foot: int
     links: Int[np.ndarray, "4"]
     points: Float[np.ndarray, "4 3"]
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +56,9 @@ class Morphology:
     soles: tuple[Sole, ...]
     tpose: Coordinates
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"Morphology({self.mjcf.path.name!r}, {counted(len(self.mj_joints), 'joint')})"
 
     @property
     def joint_names(self) -> tuple[str, ...]:

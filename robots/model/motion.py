@@ -14,6 +14,7 @@ from sim.trajectory import ModelSole, ModelTrajectory
 from spark.motion import Motion
 from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_rotate
+from spark.summary import time_span
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +25,9 @@ class RobotMotion:
     coordinates: Coordinates
     frame_time: float
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"RobotMotion({time_span(len(self), self.frame_time)}, {self.robot!r})"
 
     def __len__(self) -> int:
         return len(self.coordinates)

@@ -16,6 +16,7 @@ from sim.interpolate import at_times, velocities
 from sim.physics.servos import with_servos
 from sim.trajectory import ModelTrajectory
 from spark.errors import SkeletonError
+from spark.summary import brief
 
 FALL_DROP = 0.2  # of the standing height: how much lower than its target the root is
 FALL_TILT = 60.0  # [deg] between what is upward in the root and in its target
@@ -64,6 +65,8 @@ class Record:
     loads: Float[np.ndarray, "T nbody"]
     fallen: Bool[np.ndarray, "T"]
 
+    __repr__ = brief
+
 
 @dataclass(frozen=True, eq=False)
 class Tracked:
@@ -83,6 +86,8 @@ class Tracked:
     assist: Assist | None
     diverged: int | None
     notes: tuple[str, ...]
+
+    __repr__ = brief
 
     @property
     def body(self) -> ModelTrajectory:

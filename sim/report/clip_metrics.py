@@ -15,6 +15,7 @@ from sim.report.smoothness import joint_rates
 from sim.report.support import support
 from sim.report.thresholds import PLAUSIBILITY_V1, Thresholds
 from spark.constants import GRAVITY
+from spark.summary import time_span
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +52,10 @@ class ClipMetrics:
     joint_names: tuple[str, ...]
     joint_speed: Float[np.ndarray, "T B"]
     joint_jerk: Float[np.ndarray, "T B"]
+
+    def __repr__(self) -> str:
+        span = time_span(len(self), self.frame_time)
+        return f"ClipMetrics({span}, {100 * self.implausible_share:.1f} % implausible)"
 
     def __len__(self) -> int:
         return len(self.clearance)

@@ -18,6 +18,7 @@ from jaxtyping import Float
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_relative, quat_swing_twist, rotvec_from_quat
+from spark.summary import brief
 
 _X, _Y, _Z = 0, 1, 2
 
@@ -128,6 +129,8 @@ class LimitExcess:
     joint: str
     beyond: Float[np.ndarray, "T E"]
     movements: tuple[str, ...]
+
+    __repr__ = brief
 
     @property
     def excess(self) -> Float[np.ndarray, "T E"]:

@@ -8,6 +8,7 @@ from scipy.ndimage import minimum_filter1d
 
 from sim.report.derivatives import derivative
 from spark.resample import values_at
+from spark.summary import brief
 
 
 def floor_height(lowest: Float[np.ndarray, "T"]) -> float:
@@ -66,6 +67,8 @@ class Drift:
     distance: Float[np.ndarray, "T"]
     path_length: float
     heading: Float[np.ndarray, "T"]
+
+    __repr__ = brief
 
 
 def root_drift(

@@ -63,6 +63,9 @@ class Thresholds:
     # the frame rate: 3 frames at 60 fps.
     window: float = 0.05
 
+    def __repr__(self) -> str:
+        return f"Thresholds({self.version!r}, penetration {self.penetration:.3g} m, ...)"
+
     def scaled(self, hip_height: float) -> "Thresholds":
         """The same table for a body of another size: lengths and speeds grow with the hip height.
 

@@ -21,6 +21,7 @@ from spark.errors import FileFormatError, SkeletonError
 from spark.files import write_atomically
 from spark.io.charset import to_utf8
 from spark.io.scanner import LARGEST, Scanner, number, shown
+from spark.summary import counted, time_span
 
 Vector = tuple[float, float, float]
 
@@ -66,6 +67,11 @@ class Bvh:
     values: Float[np.ndarray, "T C"]
     path: Path | None = None
     encoding: str = "utf-8"
+
+    def __repr__(self) -> str:
+        file = "" if self.path is None else f"{self.path.name!r}, "
+        span = time_span(len(self.values), self.frame_time)
+        return f"Bvh({file}{span}, {counted(len(self.joints), 'joint')})"
 
     def __post_init__(self) -> None:
         channels = sum(len(joint.channels) for joint in self.joints)

@@ -45,6 +45,9 @@ class Recording:
     notes: tuple[str, ...] = ()
     adds_offset: bool = False
 
+    def __repr__(self) -> str:
+        return f"Recording({self.bvh!r}, unit {self.convention.unit}, {self.convention.up} up)"
+
 
 def read_recording(
     path: str | Path, *, unit: str | float | None = None, up: str | None = None

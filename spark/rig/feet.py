@@ -18,6 +18,7 @@ from spark.kinematics import end_positions, world_positions
 from spark.rig.roles import Role, RoleMap
 from spark.rotation import quat_conj, quat_rotate
 from spark.skeleton import Skeleton
+from spark.summary import brief
 
 Side = Literal["left", "right"]
 
@@ -47,6 +48,8 @@ class Sole:
     side: Side
     joints: Int[np.ndarray, "P"]
     offsets: Float[np.ndarray, "P 3"]
+
+    __repr__ = brief
 
     def __len__(self) -> int:
         return len(self.joints)

@@ -15,6 +15,7 @@ from spark.rig.role_assignment import Override, assign_roles
 from spark.rig.roles import Group, Role, RoleMap
 from spark.rig.tpose import find_tpose, root_joint_of
 from spark.skeleton import Skeleton
+from spark.summary import counted
 
 # Roles that several joints hold, and those between which they lie.
 _CHAINS: dict[Role, tuple[Role, Role | None]] = {
@@ -49,6 +50,11 @@ class Rig:
     root_joint: int
     hip_height: float
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        held = sum(role is not None for role in self.roles.roles)
+        joints = counted(len(self.skeleton), "joint")
+        return f"Rig({joints}, {held} with a role, hips {self.hip_height:.3g} m high)"
 
     @cached_property
     def pelvis(self) -> int:

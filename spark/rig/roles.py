@@ -5,6 +5,7 @@ from enum import StrEnum
 from functools import cached_property
 
 from spark.errors import SkeletonError
+from spark.summary import counted
 
 
 class _Sided(StrEnum):
@@ -91,6 +92,10 @@ class RoleMap:
     roles: tuple[Role | None, ...]
     confidence: tuple[float, ...]
     reasons: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        held = sum(role is not None for role in self.roles)
+        return f"RoleMap({counted(len(self.roles), 'joint')}, {held} with a role)"
 
     @cached_property
     def _joints(self) -> dict[Role, tuple[int, ...]]:

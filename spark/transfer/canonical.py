@@ -11,6 +11,7 @@ from spark.resample import rotations_at, values_at
 from spark.rig.contacts import floor_height
 from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_rotate
+from spark.summary import counted, time_span
 
 FRAME_TIME = 1 / 30  # [s] at which motions are learned from: what the network reads, and priors
 
@@ -30,6 +31,10 @@ class CanonicalMotion:
     hips: Float[np.ndarray, "T 3"]
     floor_z: float = 0.0
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        span = time_span(len(self), self.frame_time)
+        return f"CanonicalMotion({span}, {counted(len(self.rig.skeleton), 'joint')})"
 
     def __len__(self) -> int:
         return len(self.hips)

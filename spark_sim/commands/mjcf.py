@@ -43,14 +43,10 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    from spark.errors import SkeletonError
     from spark_sim import console
-    from spark_sim.clips import Clip
 
     out = Path(args.output or f"{Path(args.rig).stem}.xml")
     rig = load(args, args.rig)
-    if not isinstance(rig, Clip):
-        raise SkeletonError(f"{args.rig}: a robot has a model already; expected a BVH or FBX file")
     written, notes = rig.save_mjcf(out, joints=args.joints, mesh=args.mesh, force=args.force)
     console.notes(out, notes)
     for path in written:

@@ -32,8 +32,9 @@ def test_import_is_light() -> None:
 
 
 def test_names() -> None:
-    for name in spark_sim.__all__:
+    for name in set(spark_sim.__all__) - {"AnyClip"}:
         assert getattr(spark_sim, name).__name__ == name
+    assert spark_sim.AnyClip == spark_sim.Clip | spark_sim.RobotClip
     assert set(spark_sim.__all__) < set(dir(spark_sim))
     with pytest.raises(AttributeError, match="nonsense"):
         _ = spark_sim.nonsense
@@ -51,7 +52,8 @@ def test_onto_its_own_body_a_motion_stays(samples: Path) -> None:
     np.testing.assert_allclose(forward(same.motion)[0], forward(walk.motion)[0], atol=1e-6)
     assert quat_angle(same.motion.rotations, walk.motion.rotations).max() < 1e-6
     held = spark_sim.retarget(walk, walk)
-    np.testing.assert_allclose(forward(held.motion)[0], forward(walk.motion)[0], atol=5e-3)
+    # A foot that is held stands still; the source's own rolls by millimetres before it lifts.
+    np.testing.assert_allclose(forward(held.motion)[0], forward(walk.motion)[0], atol=1e-2)
 
 
 def test_there_and_back(samples: Path) -> None:
