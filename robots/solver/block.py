@@ -1,4 +1,4 @@
-"""Which part of a robot's coordinates is solved for at a time."""
+"""Block coordinate descent: which part of a robot's coordinates is solved for at a time."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,10 +7,10 @@ from robots.tree import BASE, Tree
 
 
 @dataclass(frozen=True)
-class Stage:
-    """Part of the columns: those that are solved for while the others are given.
+class Block:
+    """The degrees of freedom (dofs) that are solved for while the others are given.
 
-    `joints` are the tree's joints, in order; `base` says whether the base is free, too.
+    `joints` are the tree's joints that are free, in order; `base` says whether the base is.
     """
 
     tree: Tree
@@ -18,29 +18,30 @@ class Stage:
     base: bool
 
     @cached_property
-    def columns(self) -> list[int]:
-        """The tree's columns that are the stage's."""
-        return self._of(self.joints)
+    def dofs(self) -> list[int]:
+        """The tree's dofs that are free."""
+        return self._dofs_of(self.joints)
 
-    def local(self, joints: tuple[int, ...]) -> list[int]:
-        """Where the columns of some joints, and the base's if it is free, are among the stage's."""
-        return [self.columns.index(column) for column in self._of(joints)]
+    def local_dofs(self, joints: tuple[int, ...]) -> list[int]:
+        """The indices, among the block's dofs, of those of some joints, and of the base's before
+        them if it is free."""
+        return [self.dofs.index(dof) for dof in self._dofs_of(joints)]
 
-    def free(self, link: int) -> tuple[int, ...]:
-        """The free joints on the way to a link."""
+    def local_joint_dofs(self, joints: tuple[int, ...]) -> list[int]:
+        """The indices, among the block's dofs, of those of some joints."""
+        return [self.dofs.index(dof) for dof in self.tree.dofs(joints)]
+
+    def free_joints(self, link: int) -> tuple[int, ...]:
+        """The free joints on the way from the base to a link."""
         return tuple(j for j in self.tree.chain(link) if j in self._free)
 
-    def moves(self, link: int) -> bool:
-        """Whether all joints on the way to a link are free."""
-        return len(self.free(link)) == len(self.tree.chain(link))
-
-    def turning(self, joints: tuple[int, ...]) -> list[int]:
-        """Where the columns of some joints are among the stage's."""
-        return [self.columns.index(column) for column in self.tree.dofs(joints)]
+    def frees(self, link: int) -> bool:
+        """Whether all joints on the way from the base to a link are free."""
+        return len(self.free_joints(link)) == len(self.tree.chain(link))
 
     @cached_property
     def _free(self) -> frozenset[int]:
         return frozenset(self.joints)
 
-    def _of(self, joints: tuple[int, ...]) -> list[int]:
+    def _dofs_of(self, joints: tuple[int, ...]) -> list[int]:
         return [*(range(BASE) if self.base else ()), *self.tree.dofs(joints)]

@@ -1,4 +1,4 @@
-"""Gauss-Newton in some columns of a robot's trajectory, over all of its frames at once."""
+"""Gauss-Newton in a block of a robot's coordinates, over all frames of the trajectory at once."""
 
 from dataclasses import dataclass
 
@@ -8,124 +8,142 @@ from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from robots.least_squares import NormalEquations, Smoothness
 from robots.model.morphology import Morphology
-from robots.solver.block import Stage
-from robots.solver.collision import collisions_of
+from robots.solver.block import Block
+from robots.solver.collision import Candidate, collisions_of
 from robots.solver.footprints import Footing
 from robots.solver.objective import linearize
-from robots.solver.smoothness import jolted, ties_of
+from robots.solver.smoothness import jerk_stiffening, smoothness_of
 from robots.solver.targets import Targets
 from robots.tree import Coordinates, forward_kinematics
 
-_AROUND = 0.15  # [s] before and after a frame in which a step must not do harm
-_WIDE, _GIVEN = 0.5, 0.5  # [s] around it, and of what is gained there a frame may lose so much
-_HALVINGS = 6  # of a step, when mending
-_PATIENCE = 2  # steps without progress, while many frames refuse them
-_WATCH = 5  # steps from one look for collisions to the next
-_LONGEST = 1.0  # [rad, m] a column moves in a step
-_LOOK = 0.06  # [s] between the frames that are looked at for collisions
-_DAMPING, _CAREFUL, _IMMOVABLE = 1e-3, 0.1, 1e8
-SHORT_OF_LIMIT = np.radians(0.75)
+_WINDOW = 0.15  # [s] before and after a frame over which its cost is averaged to judge a step
+_WIDE_WINDOW = 0.5  # [s] the same for what is gained nearby,
+_ALLOWED_LOSS = 0.5  # and the share of that by which a frame's cost may rise
+_MAX_HALVINGS = 6  # of a step in a repair
+_PATIENCE = 2  # steps without progress that are allowed while many frames reject them
+_COLLISION_PERIOD = 5  # steps from one search for collision candidates to the next
+_COLLISION_INTERVAL = 0.06  # [s] between the frames that are searched
+_MAX_STEP = 1.0  # [rad, m] of a dof in one step
+_MIN_DAMPING = 1e-3  # [1] on the diagonal of the normal equations
+_REJECTED_DAMPING = 0.1  # at least, where a step was rejected
+_FIXED_DAMPING = 1e8  # where a frame must stay
+LIMIT_CLEARANCE = np.radians(0.75)  # that hinges keep from their limits: hard, by clipping
 
 
 @dataclass(frozen=True, eq=False)
-class Mending:
-    """Frames that are solved again: `firm` is how much firmer than elsewhere their parts are kept
-    apart, their feet above the floor and their hinges slow; `fixed` ones stay."""
+class Repair:
+    """How frames are solved again: `penalty_scale` multiplies the weights of collisions, floor and
+    overspeed; `fixed` frames stay."""
 
-    firm: Float[np.ndarray, "T"]
+    penalty_scale: Float[np.ndarray, "T"]
     fixed: Bool[np.ndarray, "T"]
 
 
-def stride_of(targets: Targets) -> int:
-    """The frames from one look for collisions to the next."""
-    return max(1, round(_LOOK / targets.frame_time))
+def collision_stride(targets: Targets) -> int:
+    """The number of frames from one that is searched for collisions to the next."""
+    return max(1, round(_COLLISION_INTERVAL / targets.frame_time))
 
 
-def solve_stage(
+def solve_block(
     robot: Morphology,
     targets: Targets,
     footing: list[Footing],
     q: Coordinates,
-    stage: Stage,
-    most: int,
-    little: float,
-    refused: float,
+    block: Block,
+    max_iter: int,
+    rel_tol: float,
+    max_rejected: float,
     *,
-    apart: bool,
-    mending: Mending | None = None,
+    avoid_collisions: bool,
+    repair: Repair | None = None,
 ) -> Coordinates:
-    """Gauss-Newton in the stage's columns, from `q`, damped where it would do harm.
+    """At most `max_iter` Gauss-Newton steps in the block's dofs, from `q`.
 
-    With `apart`, parts that run into each other give way, without haste: what changes `q` is
-    smoother than `q`. When `mending`, steps are judged as a whole and halved until they do no harm.
+    With `avoid_collisions`, parts in each other are pushed apart, by a change of `q` that is
+    smoother than `q`. In a `repair`, a step is judged as a whole, and halved until the cost falls.
 
-    A step is judged where it is taken: frames that get worse, with what is around them, by more
-    than a share of what is gained nearby, keep their place and are damped more from then on
-    (Levenberg and Marquardt's rule, a frame). Where some stay and others go, the normal equations
-    are mixed alike: that is exact on a parabola.
+    Otherwise it is judged frame by frame: where the cost around a frame rises by more than a share
+    of what is gained nearby, the step is rejected there and damping grows (Levenberg and
+    Marquardt's rule, a frame each). Between rejected and accepted frames the step is blended, and
+    the normal equations with it: exact where the cost is a parabola.
+
+    It ends where a step lowers the cost by less than `rel_tol` of it and at most `max_rejected` of
+    the frames reject it.
     """
     tree = robot.tree
-    window = max(1, 2 * round(_AROUND / targets.frame_time) + 1)
-    wide = max(1, 2 * round(_WIDE / targets.frame_time) + 1)
-    firm, least = np.ones(len(q)), np.full(len(q), _DAMPING)
-    if mending:
-        firm, least = mending.firm, np.where(mending.fixed, _IMMOVABLE, _DAMPING)
-    damping = least
-    start = q if apart else None
-    stride = 1 if mending else stride_of(targets)
-    nears = collisions_of(robot).near(forward_kinematics(tree, q), stage, stride) if apart else []
-    stiffer = np.ones((max(len(q) - 2, 0), len(stage.columns)))
+    window = max(1, 2 * round(_WINDOW / targets.frame_time) + 1)
+    wide = max(1, 2 * round(_WIDE_WINDOW / targets.frame_time) + 1)
+    penalty_scale, min_damping = np.ones(len(q)), np.full(len(q), _MIN_DAMPING)
+    if repair:
+        penalty_scale = repair.penalty_scale
+        min_damping = np.where(repair.fixed, _FIXED_DAMPING, _MIN_DAMPING)
+    damping = min_damping
+    start = q if avoid_collisions else None
+    stride = 1 if repair else collision_stride(targets)
+    candidates: list[Candidate] = []
 
-    def look(q: Coordinates, rows: bool = True) -> NormalEquations:
-        exact = mending is not None
-        return linearize(robot, targets, footing, q, stage, nears, firm, rows=rows, exact=exact)
+    def find_candidates(q: Coordinates) -> list[Candidate]:
+        return collisions_of(robot).candidates(forward_kinematics(tree, q), block, stride)
 
-    def tie(q: Coordinates) -> Smoothness:
-        return ties_of(robot, q, start, targets.frame_time, stage.columns, stiffer, firm)
+    if avoid_collisions:
+        candidates = find_candidates(q)
+    stiffening = np.ones((max(len(q) - 2, 0), len(block.dofs)))
 
-    normal, idle = look(q), 0
-    for k in range(most):
-        stiffer = np.maximum(stiffer, jolted(robot, q, targets.frame_time)[:, stage.columns])
-        ties = tie(q)
-        cost = uniform_filter1d(normal.cost + ties.cost(len(q)), window)
-        limits = q.at_limits(tree, SHORT_OF_LIMIT)[:, stage.columns]
+    def linearize_at(q: Coordinates, with_jacobian: bool = True) -> NormalEquations:
+        terms = robot, targets, footing, q, block, candidates, penalty_scale
+        return linearize(*terms, with_jacobian=with_jacobian, exact=repair is not None)
+
+    def smoothness_at(q: Coordinates) -> Smoothness:
+        return smoothness_of(
+            robot, q, start, targets.frame_time, block.dofs, stiffening, penalty_scale
+        )
+
+    normal, stalled = linearize_at(q), 0
+    for k in range(max_iter):
+        jerky = jerk_stiffening(robot, q, targets.frame_time)[:, block.dofs]
+        stiffening = np.maximum(stiffening, jerky)
+        coupling = smoothness_at(q)
+        cost = uniform_filter1d(normal.cost + coupling.cost(len(q)), window)
+        limits = q.at_limits(tree, LIMIT_CLEARANCE)[:, block.dofs]
         step = np.zeros((len(q), tree.nv))
-        step[:, stage.columns] = normal.solve_coupled(ties, damping, limits)
-        long = np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(1), 1e-9))
-        step *= eased(long, window)[:, None]
+        step[:, block.dofs] = normal.solve_coupled(coupling, damping, limits)
+        shortening = np.minimum(1.0, _MAX_STEP / np.maximum(np.abs(step).max(1), 1e-9))
+        step *= smooth_lower_envelope(shortening, window)[:, None]
         share = np.ones(len(q))
-        for _ in range(_HALVINGS if mending else 1):
-            trial = q.integrated(tree, step).clipped(tree, SHORT_OF_LIMIT)
-            if apart and k % _WATCH == _WATCH - 1:
-                nears = collisions_of(robot).near(forward_kinematics(tree, trial), stage, stride)
-            there = look(trial, rows=k < most - 1)
-            after = uniform_filter1d(there.cost + tie(trial).cost(len(q)), window)
-            if not mending or after.sum() <= cost.sum():
+        for _ in range(_MAX_HALVINGS if repair else 1):
+            trial = q.integrated(tree, step).clipped(tree, LIMIT_CLEARANCE)
+            if avoid_collisions and k % _COLLISION_PERIOD == _COLLISION_PERIOD - 1:
+                candidates = find_candidates(trial)
+            trial_normal = linearize_at(trial, with_jacobian=k < max_iter - 1)
+            after = uniform_filter1d(trial_normal.cost + smoothness_at(trial).cost(len(q)), window)
+            if not repair or after.sum() <= cost.sum():
                 break
             step *= 0.5
-        if mending:
-            worse = np.full(len(q), after.sum() > cost.sum())
+        if repair:
+            rejected = np.full(len(q), after.sum() > cost.sum())
         else:
             gained = np.maximum(uniform_filter1d(cost - after, wide), 0.0)
-            worse = after > cost * (1 + 1e-3) + _GIVEN * gained + 1e-9
-        damping = np.where(worse, np.maximum(damping * 10, _CAREFUL), damping / 10)
-        damping = np.maximum(damping, least)
-        if worse.any():
-            share = eased(1.0 - worse, window)
-            trial = q.integrated(tree, step * share[:, None]).clipped(tree, SHORT_OF_LIMIT)
-            there = normal.blended(there, share) if there.with_jacobian else there
-        q, normal = trial, there
-        left = (cost + share * (after - cost)).sum()
-        idle = idle + 1 if left > (1 - little) * cost.sum() else 0
-        if idle > (_PATIENCE if worse.mean() > refused else 0):
+            rejected = after > cost * (1 + 1e-3) + _ALLOWED_LOSS * gained + 1e-9
+        damping = np.where(rejected, np.maximum(damping * 10, _REJECTED_DAMPING), damping / 10)
+        damping = np.maximum(damping, min_damping)
+        if rejected.any():
+            share = smooth_lower_envelope(1.0 - rejected, window)
+            trial = q.integrated(tree, step * share[:, None]).clipped(tree, LIMIT_CLEARANCE)
+            if trial_normal.with_jacobian:
+                trial_normal = normal.blended(trial_normal, share)
+        q, normal = trial, trial_normal
+        remaining = (cost + share * (after - cost)).sum()
+        stalled = stalled + 1 if remaining > (1 - rel_tol) * cost.sum() else 0
+        if stalled > (_PATIENCE if rejected.mean() > max_rejected else 0):
             break
     return q
 
 
-def eased(scale: Float[np.ndarray, "T"], window: int) -> Float[np.ndarray, "T"]:
-    """A smooth curve that nowhere exceeds `scale`: without kinks, which steps would take over."""
-    least = minimum_filter1d(scale, window, mode="nearest")
+def smooth_lower_envelope(scale: Float[np.ndarray, "T"], window: int) -> Float[np.ndarray, "T"]:
+    """A smooth curve that nowhere exceeds `scale`: a kink in a step's size would be one in the
+    trajectory."""
+    envelope = minimum_filter1d(scale, window, mode="nearest")
     box = max(1, 2 * (window // 6) + 1)
     for _ in range(3):
-        least = uniform_filter1d(least, box, mode="nearest")
-    return least
+        envelope = uniform_filter1d(envelope, box, mode="nearest")
+    return envelope

@@ -18,9 +18,11 @@ from spark.kinematics import world_positions
 from spark.rotation import quat_rotate
 from spark.runs import true_runs
 
-WOBBLE = 0.05  # hip heights that a standing foot may stray from its mean place without having moved
-TURN = np.radians(12)  # and how far it may turn
-EASE = 0.05  # [s] over which a foot is taken hold of and let go
+MAX_WOBBLE = (
+    0.05  # hip heights that a standing foot may stray from its mean place without having moved
+)
+MAX_TWIST = np.radians(12)  # and how far it may turn
+RAMP = 0.05  # [s] over which a foot is taken hold of and let go
 _SLIDE = 0.03  # of how firmly feet stand, so that they can slide to where they like to stand
 
 
@@ -53,7 +55,9 @@ def plan_footing(robot: Morphology, targets: Targets) -> list[Footing]:
     return [_footing(robot, targets, positions, s) for s in range(len(robot.soles))]
 
 
-def within_reach(robot: Morphology, footing: Sequence[Footing], q: Coordinates) -> list[Footing]:
+def reachable_footing(
+    robot: Morphology, footing: Sequence[Footing], q: Coordinates
+) -> list[Footing]:
     """Footprints where the feet of `q` stand on average: hips may not open as wide, or turn as far,
     as the planned ones ask."""
     frames = forward_kinematics(robot.tree, q)
@@ -98,16 +102,16 @@ def _footing(
     length = float(np.linalg.norm(flat[2:].mean(0) - flat[:2].mean(0)))
     ahead = np.stack([np.cos(heading), np.sin(heading)], axis=1)
     pivot, turn = toe.copy(), heading.copy()
-    stances = _stances(contacts, round(2 * EASE / frame_time))
+    stances = _stances(contacts, round(2 * RAMP / frame_time))
     for (start, stop), (before, after) in stances:
         # The toe is the pivot; where only the heel stands, it is where the toe will come down.
         on_toe = np.flatnonzero(contacts[start:stop, 1]) + start
         frames = on_toe if len(on_toe) else np.arange(start, stop)
         own = toe[frames] if len(on_toe) else (heel + length * ahead)[frames]
         moved = _beyond(
-            targets.feet[frames, s, int(len(on_toe) > 0)], WOBBLE * robot.rig.hip_height
+            targets.feet[frames, s, int(len(on_toe) > 0)], MAX_WOBBLE * robot.rig.hip_height
         )
-        turned = _beyond(heading[frames, None], TURN)[:, 0]
+        turned = _beyond(heading[frames, None], MAX_TWIST)[:, 0]
         time = np.arange(before, after)
         for axis in range(2):
             place = own[:, axis].mean() + moved[:, axis]
@@ -118,8 +122,8 @@ def _footing(
     for corner, (x, y) in enumerate(flat - flat[2:].mean(0)):
         places[corner, 0] = pivot[:, 0] + cos * x - sin * y
         places[corner, 1] = pivot[:, 1] + sin * x + cos * y
-    ease = max(1, round(EASE / frame_time))
-    still, low = _eased(contacts, ease), _eased(contacts | targets.touches[:, s], ease)
+    ease = max(1, round(RAMP / frame_time))
+    still, low = _eased(contacts, ease), _eased(contacts | targets.raw_contacts[:, s], ease)
     return Footing(places, np.stack([still, still, low], axis=1)[[0, 0, 1, 1]])
 
 

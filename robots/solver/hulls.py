@@ -1,7 +1,7 @@
-"""The shapes of a robot that can meet, each told in two ways.
+"""The shapes of a robot that can collide, each approximated in two ways.
 
-Of two shapes, the one is spheres along its length, the other a polytope of 26 sides around it (a
-k-DOP: Klosowski et al. 1998): the signed distance to one is a matrix product and a maximum.
+Of a pair, the small shape is spheres along its length, the large one a polytope of 26 sides (a
+k-DOP: Klosowski et al. 1998): the signed distance to it is a matrix product and a maximum.
 """
 
 from collections.abc import Sequence
@@ -14,9 +14,12 @@ from jaxtyping import Float
 from robots.model.mjcf import Mjcf
 from robots.model.shapes import DIRECTIONS, surface_of
 
-_MOST_SPHERES = 6  # along a shape
-_ALL_SPHERES = 24
-_CORNER, _OUTSTANDING = 0.008, 0.006  # [m]
+_MAX_ALONG = 6  # spheres along a shape, at most
+_MAX_SPHERES = 24  # of a shape, its corners included
+_MAX_PROTRUSION = (
+    0.006  # [m] of a shape's corner beyond its spheres: above, it gets one of its own,
+)
+_CORNER_RADIUS = 0.008  # [m] of this radius
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,11 +39,12 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class ShapePair:
-    """Two shapes, and how near [m] they may come."""
+    """Two shapes, and how near [m] they may come (`clearance`, negative where the T-pose has them
+    in each other)."""
 
     small: Shape
     large: Shape
-    apart: float
+    clearance: float
 
 
 def shapes_of(mjcf: Mjcf, joints: Sequence[int]) -> list[Shape]:
@@ -77,7 +81,7 @@ def _shape(link: int, body: int, geom: int, points: Float[np.ndarray, "P 3"]) ->
     # A rod is a row of spheres, a plate a grid of them.
     radius = float((thin + middle_half) / 2 if middle_half < 1.3 * thin else thin)
     grids = []
-    for reach, most in ((middle_half, 3), (long_half, _MOST_SPHERES)):
+    for reach, most in ((middle_half, 3), (long_half, _MAX_ALONG)):
         spare = max(float(reach) - radius, 0.0)
         count = int(np.clip(np.ceil(spare / max(radius, 1e-3)) + 1, 1, most))
         grids.append(np.linspace(-spare, spare, count) if count > 1 else np.zeros(1))
@@ -104,18 +108,18 @@ def _with_corners(
     reach: Float[np.ndarray, "26"],
 ) -> tuple[Float[np.ndarray, "R 3"], Float[np.ndarray, "R"]]:
     """With small spheres where the shape stands out from the ones that it has."""
-    while len(spheres) < _ALL_SPHERES:
+    while len(spheres) < _MAX_SPHERES:
         short = reach - ((DIRECTIONS @ spheres.T) + radii).max(1)
         side = int(short.argmax())
-        if short[side] < _OUTSTANDING:
+        if short[side] < _MAX_PROTRUSION:
             break
         corner = points[int((points @ DIRECTIONS[side]).argmax())]
-        spheres = np.concatenate([spheres, [corner - _CORNER * DIRECTIONS[side]]])
-        radii = np.append(radii, _CORNER)
+        spheres = np.concatenate([spheres, [corner - _CORNER_RADIUS * DIRECTIONS[side]]])
+        radii = np.append(radii, _CORNER_RADIUS)
     return spheres, radii
 
 
-def meet(mjcf: Mjcf, a: Shape, b: Shape) -> bool:
+def can_collide(mjcf: Mjcf, a: Shape, b: Shape) -> bool:
     """Whether MuJoCo would let the two shapes collide."""
     model = mjcf.model
     if a.link == b.link:

@@ -1,6 +1,8 @@
-"""What the solver weighs: one place for every term and its weight.
+"""The solver's objective in one frame: its residuals, summed into normal equations, and weights.
 
-Residuals are angles [rad] of weight 1 for a limb's direction; lengths [m] are weighed against them.
+The cost is half the sum of squared residuals. These have no unit: angles [rad] are weighed in
+1/rad, lengths [m] in 1/m, all against the direction of a limb. What couples frames is in
+`robots.solver.smoothness`, with its weights here.
 """
 
 from collections.abc import Sequence
@@ -18,8 +20,8 @@ from robots.residuals import (
     point_jacobian,
     rotation_residual,
 )
-from robots.solver.block import Stage
-from robots.solver.collision import Near, collisions_of
+from robots.solver.block import Block
+from robots.solver.collision import Candidate, collisions_of
 from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.footprints import Footing
 from robots.solver.targets import Targets
@@ -27,83 +29,90 @@ from robots.tree import Coordinates, LinkPoses, forward_kinematics
 from spark.rig.roles import Role
 from spark.rotation import matrix_from_quat
 
-DIRECTION = 2.0  # of arms and legs
-TURNS = {  # how a part is turned: beside the directions, little matters but what sees or stands
-    "pelvis": 0.8,
+W_LIMB_DIRECTION = 2.0  # [1/rad] of upper and lower arms and legs: what a pose looks like
+W_ROTATION = {  # [1/rad] of a part by its role; low where the directions of limbs say enough,
+    "pelvis": 0.8,  # higher where they say nothing: the trunk,
     "chest": 0.8,
-    "head": 0.5,
+    "head": 0.5,  # what looks somewhere,
     "neck": 0.1,
     "hand": 0.25,
-    "foot": 0.6,
+    "foot": 0.6,  # and what stands on the floor
     "spine": 0.1,
     "clavicle": 0.2,
 }
-TURN = 0.08  # the rest
-PATH = np.array([1.5, 1.5, 1.5])  # of the hips [1 / m]
-STAND = np.array([25.0, 25.0, 20.0])  # of a sole's corner [1 / m]
-SINK, SINK_EASE = 80.0, 0.004  # of a sole's corner below the floor [1 / m]; [m]
-LIMIT, MARGIN = 8.0, np.radians(2.0)  # of a hinge near its limit
-CLAP, NEAR = 20.0, 0.12  # of hands [1 / m] that are as near as this [m]
-TOUCH, TOUCH_LEGS = 75.0, 90.0  # of parts that run into each other [1 / m]
-IDLE = 0.02  # of hinges that nothing else asks for: stay as in the T-pose
-SMOOTH = 3.3  # [Hz] above which a limb's motion fades
-ANKLE = 0.5  # of how the accelerations of other hinges weigh, those of ankles do
-CALM = 2.2  # [Hz] above which a limb that gives way to another does not
-JOLT = 430.0  # [rad/s³], RMS, above which a hinge is smoothed the more
-FAST, RUSH = 12.0, 0.5  # [rad/s] above which a hinge is held back, and how much [s]
+W_OTHER_ROTATION = 0.08  # [1/rad] of the rest: the twist of limbs
+W_HIPS_POSITION = np.array([1.5, 1.5, 1.5])  # [1/m] soft: the base makes way for feet and limbs
+W_FOOT_HOLD = np.array([25.0, 25.0, 20.0])  # [1/m] of a standing sole's corner: 1 cm is 7 degrees
+W_FLOOR = 80.0  # [1/m] of a sole's corner below the floor: three times a foothold's
+FLOOR_ROUNDING = 0.004  # [m] over which that sets in
+W_LIMIT = 8.0  # [1/rad] of a hinge in the margin of its limit
+LIMIT_MARGIN = np.radians(2.0)
+W_HANDS = 20.0  # [1/m] of the offset between hands that touch; falls with their distance over
+HANDS_RANGE = 0.12  # [m] as exp(-(distance / range)²)
+W_COLLISION = 75.0  # [1/m] of the depth of parts in each other: as firm as the floor
+W_LEG_COLLISION = 90.0  # [1/m] between legs, where footholds pull the other way
+W_TPOSE = 0.02  # [1/rad] of hinges that nothing else asks for: they stay as in the T-pose
+W_REGULAR = 1e-3  # [1/rad, 1/m] of a step in any dof: keeps the normal equations regular
+SMOOTH_CUTOFF = 3.3  # [Hz] above which a limb's motion fades: accelerations weigh 1 / (2 pi f)²
+ANKLE_SHARE = 0.5  # of that weight for hinges of the ankles, whose feet are weighed less, too
+AVOIDANCE_CUTOFF = 2.2  # [Hz] above which the change fades by which a limb gives way to another
+MAX_JERK = 430.0  # [rad/s³], RMS, above which a hinge is smoothed more: the bar is 400 in the mean
+MAX_HINGE_SPEED = 12.0  # [rad/s] above which a hinge is held back; the bar is 15
+W_OVERSPEED = 0.5  # [s/rad] of the speed beyond
 
 
-class Block:
-    """Residuals that grow with the columns of one chain alone, added up in one go.
+class ChainTerms:
+    """The residuals of one chain of links, and their Jacobian by the block's dofs on it, collected
+    to be added to the normal equations in one product.
 
-    Without `rows` only the residuals count: then there are no columns to look at.
+    With `with_jacobian` False only the residuals count: then no dof is looked at.
     """
 
-    def __init__(self, stage: Stage, poses: LinkPoses, link: int, rows: bool) -> None:
-        self.stage, self.poses = stage, poses
-        self.base = stage.base and rows
-        self.joints = stage.free(link) if rows else ()
+    def __init__(self, block: Block, poses: LinkPoses, link: int, with_jacobian: bool) -> None:
+        self.block, self.poses = block, poses
+        self.base = block.base and with_jacobian
+        self.joints = block.free_joints(link) if with_jacobian else ()
         self.axes = poses.angular_jacobian(self.joints)
         if self.base:
             self.axes = np.concatenate([_base_axes(poses), self.axes])
         self.parts: list[tuple[int, Linearized]] = []
 
-    def turning(self, link: int) -> Float[np.ndarray, "C 3 T"]:
-        """The axes of the columns that turn a link of the chain."""
-        kept = len(self.poses.tree.dofs(self._until(link)))
+    def axes_of(self, link: int) -> Float[np.ndarray, "C 3 T"]:
+        """The angular Jacobian of a link of the chain: its free dofs' axes, the base's first."""
+        kept = len(self.poses.tree.dofs(self._joints_above(link)))
         return self.axes[: kept + (3 if self.base else 0)]
 
-    def turn(self, rows: Linearized) -> None:
-        """Residuals of a direction or a rotation."""
-        self.parts.append((3 if self.base else 0, rows))
+    def add_rotational(self, term: Linearized) -> None:
+        """Residuals of a direction or a rotation, made with `axes_of`."""
+        self.parts.append((3 if self.base else 0, term))  # the base's shifts turn nothing
 
-    def point(
+    def add_point(
         self,
         link: int,
         point: Float[np.ndarray, "3 T"],
-        wanted: Float[np.ndarray, "3 T"],
+        target: Float[np.ndarray, "3 T"],
         weight: Float[np.ndarray, "3 T"],
     ) -> None:
-        """Residuals of a point's place."""
-        chain, axes = self._until(link), self.turning(link)
-        moved = point_jacobian(self.poses, chain, axes, point, base=self.base)
-        self.parts.append((0, (moved * weight, (point - wanted) * weight)))
+        """A link's point p [m] should be at p*: r = w (p - p*), the weight [1/m] by axis."""
+        chain, axes = self._joints_above(link), self.axes_of(link)
+        jacobian = point_jacobian(self.poses, chain, axes, point, base=self.base)
+        self.parts.append((0, (jacobian * weight, (point - target) * weight)))
 
     def add_to(self, normal: NormalEquations) -> None:
-        """Into the stage's normal equations."""
+        """Into the block's normal equations."""
         if not self.parts:
             return
         residuals = np.concatenate([residual for _, (_, residual) in self.parts])
-        columns = self.stage.local(self.joints) if self.base or self.joints else []
-        J = np.zeros((residuals.shape[1], len(columns), len(residuals)))
+        dofs = self.block.local_dofs(self.joints) if self.base or self.joints else []
+        J = np.zeros((residuals.shape[1], len(dofs), len(residuals)))
         row = 0
-        for start, (rows, residual) in self.parts:
+        for start, (jacobian, residual) in self.parts:
             M = len(residual)
-            J[:, start : start + len(rows), row : row + M] = rows.transpose(2, 0, 1)
+            J[:, start : start + len(jacobian), row : row + M] = jacobian.transpose(2, 0, 1)
             row += M
-        normal.add(columns, J, residuals)
+        normal.add(dofs, J, residuals)
 
-    def _until(self, link: int) -> tuple[int, ...]:
+    def _joints_above(self, link: int) -> tuple[int, ...]:
         chain = self.poses.tree.chain(link)
         return tuple(j for j in self.joints if j in chain)
 
@@ -113,55 +122,63 @@ def linearize(
     targets: Targets,
     footing: Sequence[Footing],
     q: Coordinates,
-    stage: Stage,
-    nears: Sequence[Near],
-    firm: Float[np.ndarray, "T"] | None = None,
+    block: Block,
+    candidates: Sequence[Candidate],
+    penalty_scale: Float[np.ndarray, "T"] | None = None,
     *,
-    rows: bool = True,
+    with_jacobian: bool = True,
     exact: bool = False,
 ) -> NormalEquations:
-    """The normal equations of a stage at `q`; without `rows` nothing but what it costs. `firm` is
-    by how much touching and sinking weigh more, a frame; `exact` measures where parts touch."""
+    """The normal equations of a block at `q`, each frame for itself; the cost alone where
+    `with_jacobian` is False.
+
+    Per frame: the rotation of each part with a role and the direction of each limb (`_add_pose`);
+    hips, footholds and the floor, where the base is free; hands that touch, where it is not;
+    the depth of the colliding `candidates`, approximate or `exact`; limits; a pull to the T-pose.
+    `penalty_scale` multiplies the weights of collisions and the floor, frame by frame.
+    """
     tree, rig = robot.tree, robot.rig
     poses = forward_kinematics(tree, q)
-    normal = NormalEquations(len(q), len(stage.columns), rows)
-    firm = np.ones(len(q)) if firm is None else firm
-    blocks = {link: Block(stage, poses, link, rows) for link in _ends(robot, stage)}
+    normal = NormalEquations(len(q), len(block.dofs), with_jacobian)
+    penalty_scale = np.ones(len(q)) if penalty_scale is None else penalty_scale
+    chains = {link: ChainTerms(block, poses, link, with_jacobian) for link in _ends(robot, block)}
     chest = rig.chest
     for j, role in enumerate(rig.roles.roles):
         link = int(robot.links[j])
-        block = _block_of(blocks, robot, link)
-        if role is None or block is None:
+        terms = _chain_of(chains, robot, link)
+        if role is None or terms is None:
             continue
         own = j == 0 or link != robot.links[int(rig.skeleton.parents[j])]
-        if own and (link in stage.joints or (stage.base and (link < 0 or j == rig.pelvis))):
-            _follow(robot, targets, poses, block, j, role)
-        if j == chest and stage.base:
+        if own and (link in block.joints or (block.base and (link < 0 or j == rig.pelvis))):
+            _add_pose(robot, targets, poses, terms, j, role)
+        if j == chest and block.base:
             wanted = np.moveaxis(matrix_from_quat(targets.chest), 0, -1)
-            block.turn(
+            terms.add_rotational(
                 rotation_residual(
-                    poses.rotations[link], wanted, block.turning(link), TURNS["chest"]
+                    poses.rotations[link], wanted, terms.axes_of(link), W_ROTATION["chest"]
                 )
             )
-    if stage.base:
-        _stand(robot, targets, footing, poses, blocks, firm)
+    if block.base:
+        _add_hips_feet_and_floor(robot, targets, footing, poses, chains, penalty_scale)
     elif targets.hands is not None:
-        _clap(robot, targets, poses, stage, normal, rows)
-    for block in blocks.values():
-        block.add_to(normal)
-    touch = TOUCH_LEGS if stage.base else TOUCH
+        _add_hands(robot, targets, poses, block, normal, with_jacobian)
+    for terms in chains.values():
+        terms.add_to(normal)
+    weight = W_LEG_COLLISION if block.base else W_COLLISION
     if exact:
-        exact_contacts_of(robot).add_to(normal, robot.to_qpos(q), poses, stage, nears, touch, firm)
+        exact_contacts_of(robot).add_to(
+            normal, robot.to_qpos(q), poses, block, candidates, weight, penalty_scale
+        )
     else:
-        collisions_of(robot).add_to(normal, poses, stage, nears, touch, firm)
-    over, slope = limit_residual(tree, q, margin=MARGIN, weight=LIMIT)
-    normal.add_diagonal(slope[:, stage.columns], over[:, stage.columns])
-    idle, away = np.full((2, len(q), tree.nv), 1e-3)
-    away[:] = 0.0
+        collisions_of(robot).add_to(normal, poses, block, candidates, weight, penalty_scale)
+    beyond, derivatives = limit_residual(tree, q, margin=LIMIT_MARGIN, weight=W_LIMIT)
+    normal.add_diagonal(derivatives[:, block.dofs], beyond[:, block.dofs])
+    from_tpose, derivatives = np.zeros((2, len(q), tree.nv))
+    derivatives[:] = W_REGULAR
     hinges = ~tree.balls
-    idle[:, tree.dof_starts[hinges]] = IDLE
-    away[:, tree.dof_starts[hinges]] = IDLE * (q.angles - robot.tpose.angles)[:, hinges]
-    normal.add_diagonal(idle[:, stage.columns], away[:, stage.columns])
+    derivatives[:, tree.dof_starts[hinges]] = W_TPOSE
+    from_tpose[:, tree.dof_starts[hinges]] = W_TPOSE * (q.angles - robot.tpose.angles)[:, hinges]
+    normal.add_diagonal(derivatives[:, block.dofs], from_tpose[:, block.dofs])
     return normal
 
 
@@ -169,85 +186,94 @@ def _base_axes(poses: LinkPoses) -> Float[np.ndarray, "3 3 T"]:
     return np.broadcast_to(np.eye(3)[:, :, None], (3, 3, poses.positions.shape[2]))
 
 
-def _ends(robot: Morphology, stage: Stage) -> list[int]:
-    """The last links of the stage's chains."""
-    joints = set(stage.joints)
+def _ends(robot: Morphology, block: Block) -> list[int]:
+    """The last links of the block's chains; the base where it has none."""
+    joints = set(block.joints)
     inner = {int(robot.tree.parents[j]) for j in joints}
-    ends = [j for j in stage.joints if j not in inner]
-    return ends or ([-1] if stage.base else [])
+    ends = [j for j in block.joints if j not in inner]
+    return ends or ([-1] if block.base else [])
 
 
-def _block_of(blocks: dict[int, Block], robot: Morphology, link: int) -> Block | None:
+def _chain_of(chains: dict[int, ChainTerms], robot: Morphology, link: int) -> ChainTerms | None:
     """The first chain that the link lies on."""
-    for end, block in blocks.items():
+    for end, terms in chains.items():
         if link < 0 or link in robot.tree.chain(end):
-            return block
+            return terms
     return None
 
 
-def _follow(
-    robot: Morphology, targets: Targets, poses: LinkPoses, block: Block, j: int, role: Role
+def _add_pose(
+    robot: Morphology, targets: Targets, poses: LinkPoses, terms: ChainTerms, j: int, role: Role
 ) -> None:
+    """The rotation of joint j's part, and the direction of its bone where it is a limb's."""
     link = int(robot.links[j])
-    axes = block.turning(link)
+    axes = terms.axes_of(link)
     wanted = np.moveaxis(matrix_from_quat(targets.world[:, j]), 0, -1)
-    block.turn(rotation_residual(poses.rotations[link], wanted, axes, TURNS.get(role.part, TURN)))
+    terms.add_rotational(
+        rotation_residual(
+            poses.rotations[link], wanted, axes, W_ROTATION.get(role.part, W_OTHER_ROTATION)
+        )
+    )
     if role in targets.bones and (bone := robot.bones.get(role)) is not None:
         now = poses.direction(link, bone)
-        block.turn(direction_residual(now, targets.bones[role].T, axes, DIRECTION))
+        terms.add_rotational(direction_residual(now, targets.bones[role].T, axes, W_LIMB_DIRECTION))
 
 
-def _stand(
+def _add_hips_feet_and_floor(
     robot: Morphology,
     targets: Targets,
     footing: Sequence[Footing],
     poses: LinkPoses,
-    blocks: dict[int, Block],
-    firm: Float[np.ndarray, "T"],
+    chains: dict[int, ChainTerms],
+    penalty_scale: Float[np.ndarray, "T"],
 ) -> None:
-    """The hips' path, the standing feet, and the floor."""
+    """The middle of the hips on its path; for each corner of a sole its foothold, and the floor.
+
+    With z the corner's height, the floor's r = w one_sided(-z), w = `W_FLOOR` x `penalty_scale`.
+    """
     count = len(targets)
     pelvis = int(robot.links[robot.rig.pelvis])
-    block = _block_of(blocks, robot, pelvis)
-    assert block is not None
+    terms = _chain_of(chains, robot, pelvis)
+    assert terms is not None
     middle = robot.centers[robot.rig.hips].mean(0)
-    path = np.repeat(PATH[:, None], count, axis=1)
-    block.point(pelvis, poses.point(pelvis, middle), targets.hips.T, path)
+    path = np.repeat(W_HIPS_POSITION[:, None], count, axis=1)
+    terms.add_point(pelvis, poses.point(pelvis, middle), targets.hips.T, path)
     for sole, foot in zip(robot.soles, footing, strict=True):
         for c, (link, rest) in enumerate(zip(sole.links, sole.points, strict=True)):
-            foot_block = _block_of(blocks, robot, int(link))
-            assert foot_block is not None
+            foot_terms = _chain_of(chains, robot, int(link))
+            assert foot_terms is not None
             point = poses.point(int(link), rest)
-            weight = STAND[:, None] * foot.holds[c]
-            foot_block.point(int(link), point, foot.positions[c], weight)
-            # Not below the floor, whether it stands or not.
-            depth, slope = one_sided(-point[2], SINK_EASE / firm)
-            up = np.stack([np.zeros(count), np.zeros(count), -SINK * firm * slope])
-            foot_block.point(int(link), point, point + depth / np.maximum(slope, 1e-9), up)
+            weight = W_FOOT_HOLD[:, None] * foot.holds[c]
+            foot_terms.add_point(int(link), point, foot.positions[c], weight)
+            # As a point's residual: its weight is dr/dz, its distance what makes the product r.
+            depth, slope = one_sided(-point[2], FLOOR_ROUNDING / penalty_scale)
+            up = np.stack([np.zeros(count), np.zeros(count), -W_FLOOR * penalty_scale * slope])
+            foot_terms.add_point(int(link), point, point + depth / np.maximum(slope, 1e-9), up)
 
 
-def _clap(
+def _add_hands(
     robot: Morphology,
     targets: Targets,
     poses: LinkPoses,
-    stage: Stage,
+    block: Block,
     normal: NormalEquations,
-    rows: bool,
+    with_jacobian: bool,
 ) -> None:
-    """Hands that are near each other stay as near."""
+    """The offset d [m] from the right wrist to the left one should be d*: r = w (d - d*), where
+    w = `W_HANDS` exp(-(|d*| / `HANDS_RANGE`)²): only hands that are near each other are held."""
     assert targets.hands is not None
     hands = [robot.rig.roles.require(role) for role in (Role.LEFT_HAND, Role.RIGHT_HAND)]
-    weight = CLAP * np.exp(-((np.linalg.norm(targets.hands, axis=1) / NEAR) ** 2))
-    parts, places = [], []
+    weight = W_HANDS * np.exp(-((np.linalg.norm(targets.hands, axis=1) / HANDS_RANGE) ** 2))
+    parts, positions = [], []
     joints: tuple[int, ...] = ()
     for sign, j in zip((1.0, -1.0), hands, strict=True):
         link = int(robot.links[j])
-        own = stage.free(link) if rows else ()
-        place = poses.point(link, robot.centers[j])
-        moved = point_jacobian(poses, own, poses.angular_jacobian(own), place, base=False)
+        own = block.free_joints(link) if with_jacobian else ()
+        position = poses.point(link, robot.centers[j])
+        jacobian = point_jacobian(poses, own, poses.angular_jacobian(own), position, base=False)
         joints += own
-        parts.append(sign * moved * weight)
-        places.append(place)
-    residual = (places[0] - places[1] - targets.hands.T) * weight
+        parts.append(sign * jacobian * weight)
+        positions.append(position)
+    residual = (positions[0] - positions[1] - targets.hands.T) * weight
     J = np.ascontiguousarray(np.concatenate(parts).transpose(2, 0, 1))
-    normal.add(stage.local(joints), J, residual)
+    normal.add(block.local_dofs(joints), J, residual)

@@ -21,8 +21,8 @@ from spark.rotation import (
     quat_rotate,
 )
 
-_BEYOND = 1.0  # what leaving the limits costs against jumping, both in squared radians
-_FAR = 1e-6  # and what being far from the rest pose does, where all else is equal
+_W_BEYOND_LIMITS = 1.0  # what leaving the limits costs against jumping, both in squared radians
+_W_FROM_REST = 1e-6  # and what being far from the rest pose does, where all else is equal
 
 
 def project(
@@ -34,15 +34,15 @@ def project(
     count = len(world)
     wanted = {int(link): world[:, j] for j, link in reversed(list(enumerate(robot.links)))}
     angles = np.zeros((count, len(tree)))
-    turns = np.tile([1.0, 0, 0, 0], (count, len(tree), 1)) if tree.balls.any() else None
+    balls = np.tile([1.0, 0, 0, 0], (count, len(tree), 1)) if tree.balls.any() else None
     links = {-1: wanted.get(-1, np.tile([1.0, 0, 0, 0], (count, 1)))}
-    for group in _groups(robot):
+    for group in _hinge_groups(robot):
         above = links[int(tree.parents[group[0]])]
         target = wanted[group[-1]]
         local = quat_relative(above, target)
         if tree.balls[group[0]]:
-            assert turns is not None
-            turns[:, group[0]] = local
+            assert balls is not None
+            balls[:, group[0]] = local
             links[group[-1]] = target
             continue
         angles[:, group] = _solve(tree, group, local)
@@ -50,20 +50,20 @@ def project(
         for j in group:
             turned = quat_mul(turned, quat_from_rotvec(tree.axes[j] * angles[:, [j]]))
         links[group[-1]] = turned
-    q = Coordinates(np.tile(tree.base, (count, 1)), links[-1], angles, turns)
+    q = Coordinates(np.tile(tree.base, (count, 1)), links[-1], angles, balls)
     return Coordinates(
-        q.pos + hips - hips_of(robot, forward_kinematics(tree, q)), q.quat, angles, turns
+        q.pos + hips - hips_of(robot, forward_kinematics(tree, q)), q.quat, angles, balls
     )
 
 
 def hips_of(robot: Morphology, frames: LinkPoses) -> Float[np.ndarray, "T 3"]:
     """The path [m] of the middle of the hip joints."""
     pelvis = int(robot.links[robot.rig.pelvis])
-    places = [frames.point(pelvis, robot.centers[j]).T for j in robot.rig.hips]
-    return np.mean(places, axis=0)
+    positions = [frames.point(pelvis, robot.centers[j]).T for j in robot.rig.hips]
+    return np.mean(positions, axis=0)
 
 
-def _groups(robot: Morphology) -> list[tuple[int, ...]]:
+def _hinge_groups(robot: Morphology) -> list[tuple[int, ...]]:
     """The tree's joints by the part of the rig that they move together, parents first."""
     ends = {int(link) for link in robot.links}
     groups: list[tuple[int, ...]] = []
@@ -81,19 +81,19 @@ def _solve(
     """Angles within the limits of a group of hinges that turn by `local`, as nearly as they can."""
     axes, lower, upper = (part[list(group)] for part in (tree.axes, tree.lower, tree.upper))
     if len(group) == 1:
-        return _limited(_twist(local, axes[0])[:, None], lower, upper)[0]
+        return _clip_to_limits(_twist(local, axes[0])[:, None], lower, upper)[0]
     if len(group) == 2:
-        return _limited(_two(local, axes), lower, upper)[0]
+        return _clip_to_limits(_two_hinges(local, axes), lower, upper)[0]
     if len(group) == 3:
-        branches = [_limited(branch, lower, upper) for branch in _three(local, axes)]
-        return _steadiest(*(np.stack(part) for part in zip(*branches, strict=True)))
+        branches = [_clip_to_limits(branch, lower, upper) for branch in _three_hinges(local, axes)]
+        return _steadiest_branches(*(np.stack(part) for part in zip(*branches, strict=True)))
     # More hinges than a rotation needs: the first ones stay at rest.
     out = np.zeros((len(local), len(group)))
     out[:, -3:] = _solve(tree, group[-3:], local)
     return out
 
 
-def _limited(
+def _clip_to_limits(
     angles: Float[np.ndarray, "T K"], lower: Float[np.ndarray, "K"], upper: Float[np.ndarray, "K"]
 ) -> tuple[Float[np.ndarray, "T K"], Float[np.ndarray, "T K"]]:
     """The angles within their limits, and how far they were from them.
@@ -119,7 +119,9 @@ def _twist(q: Float[np.ndarray, "T 4"], axis: Float[np.ndarray, "3"]) -> Float[n
     return 2 * np.arctan2(q[:, 1:] @ axis, q[:, 0])
 
 
-def _two(q: Float[np.ndarray, "T 4"], axes: Float[np.ndarray, "2 3"]) -> Float[np.ndarray, "T 2"]:
+def _two_hinges(
+    q: Float[np.ndarray, "T 4"], axes: Float[np.ndarray, "2 3"]
+) -> Float[np.ndarray, "T 2"]:
     """The pair of angles whose product comes nearest to `q`.
 
     The inner product of q with q1(a) q2(b) is bilinear in (cos a/2, sin a/2) and (cos b/2, sin
@@ -136,7 +138,7 @@ def _two(q: Float[np.ndarray, "T 4"], axes: Float[np.ndarray, "2 3"]) -> Float[n
     )
 
 
-def _three(
+def _three_hinges(
     q: Float[np.ndarray, "T 4"], axes: Float[np.ndarray, "3 3"]
 ) -> list[Float[np.ndarray, "T 3"]]:
     """Both solutions of three angles; the nearest where the axes reach no exact one."""
@@ -162,11 +164,11 @@ def _three(
     return solutions
 
 
-def _steadiest(
+def _steadiest_branches(
     branches: Float[np.ndarray, "2 T K"], beyond: Float[np.ndarray, "2 T K"]
 ) -> Float[np.ndarray, "T K"]:
     """In each frame one of two branches, so that limits and jumps cost least in all (Viterbi)."""
-    stays = (_BEYOND * beyond**2 + _FAR * branches**2).sum(-1)  # 2 T
+    stays = (_W_BEYOND_LIMITS * beyond**2 + _W_FROM_REST * branches**2).sum(-1)  # 2 T
     jumps = ((branches[:, None, 1:] - branches[None, :, :-1]) ** 2).sum(-1)  # to, from, T - 1
     (s0, s1), ((j00, j01), (j10, j11)) = stays.tolist(), jumps.tolist()
     best0, best1 = s0[0], s1[0]

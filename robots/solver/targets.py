@@ -17,8 +17,8 @@ from spark.rotation import quat_mul, quat_rotate
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
-_GAP = 0.08  # contacts and breaks shorter than this [s] are noise
-BONES = (  # the limbs' segments, by the roles at their ends
+_MIN_DURATION = 0.08  # contacts and breaks shorter than this [s] are noise
+LIMB_SEGMENTS = (  # the limbs' segments, by the roles at their ends
     (Role.LEFT_UPPER_LEG, Role.LEFT_LOWER_LEG),
     (Role.LEFT_LOWER_LEG, Role.LEFT_FOOT),
     (Role.RIGHT_UPPER_LEG, Role.RIGHT_LOWER_LEG),
@@ -28,7 +28,7 @@ BONES = (  # the limbs' segments, by the roles at their ends
     (Role.RIGHT_UPPER_ARM, Role.RIGHT_FOREARM),
     (Role.RIGHT_FOREARM, Role.RIGHT_HAND),
 )
-OUT = {
+TPOSE_DIRECTIONS = {
     **{
         role: np.array([0.0, 0, -1]) for g in (Group.LEFT_LEG, Group.RIGHT_LEG) for role in LIMBS[g]
     },
@@ -42,7 +42,7 @@ class Targets:
     """Over frames, floor at z = 0: `world`, the rig's joints' rotations (`q_world_joint`); `chest`,
     that of the topmost part of the trunk; `hips`, the path of the hips' middle [m]; `bones`, unit
     directions by the role at a segment's upper end; `contacts`, whether heel and toe of each of the
-    robot's soles stand, and `touches`, whether they do for a moment; `feet`, the paths of the
+    robot's soles stand, and `raw_contacts`, whether they do for a moment; `feet`, the paths of the
     source's heels and toes over the floor [m]; `hands`, from the right hand to the left [m].
     """
 
@@ -52,7 +52,7 @@ class Targets:
     hips: Float[np.ndarray, "T 3"]
     bones: dict[Role, Float[np.ndarray, "T 3"]]
     contacts: Bool[np.ndarray, "T S 2"]
-    touches: Bool[np.ndarray, "T S 2"]
+    raw_contacts: Bool[np.ndarray, "T S 2"]
     feet: Float[np.ndarray, "T S 2 2"]
     hands: Float[np.ndarray, "T 3"] | None
     notes: tuple[str, ...]
@@ -62,8 +62,8 @@ class Targets:
 
     def every(self, stride: int) -> "Targets":
         """Those of every `stride`-th frame."""
-        few = self.at(slice(None, None, stride))
-        return replace(few, frame_time=stride * self.frame_time)
+        coarse = self.at(slice(None, None, stride))
+        return replace(coarse, frame_time=stride * self.frame_time)
 
     def at(self, frames: slice | Int[np.ndarray, "S"]) -> "Targets":
         """Those of some frames."""
@@ -74,7 +74,7 @@ class Targets:
             hips=self.hips[frames],
             bones={role: bone[frames] for role, bone in self.bones.items()},
             contacts=self.contacts[frames],
-            touches=self.touches[frames],
+            raw_contacts=self.raw_contacts[frames],
             feet=self.feet[frames],
             hands=None if self.hands is None else self.hands[frames],
         )
@@ -86,17 +86,17 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
     positions = canonical_positions(source)
     rig = source.rig
     own_chest = robot.rig.chest
-    paths = feet_of(source, positions, robot)
+    paths = source_feet(source, positions, robot)
     scale = robot.rig.hip_height / rig.hip_height
-    touches = _touches(source, paths)
+    raw_contacts = _raw_contacts(source, paths)
     return Targets(
         frame_time=source.frame_time,
         world=quat_mul(moved.rotations, robot.rig.tpose),
         chest=quat_mul(source.rotations[:, rig.chest], robot.rig.tpose[own_chest]),
         hips=moved.hips - np.array([0.0, 0.0, moved.floor_z]),
         bones=bone_directions(rig, positions, source.rotations),
-        contacts=_without_flicker(touches, max(1, round(_GAP / source.frame_time))),
-        touches=touches,
+        contacts=_without_flicker(raw_contacts, max(1, round(_MIN_DURATION / source.frame_time))),
+        raw_contacts=raw_contacts,
         feet=scale * paths[..., :2],
         hands=_between_hands(rig, positions, robot),
         notes=moved.notes,
@@ -109,7 +109,7 @@ def bone_directions(
     """Where the segments of arms and legs point: from joint to joint, or, where the joint at the
     far end is missing, as its rotation since the T-pose says."""
     out = {}
-    for upper, lower in BONES:
+    for upper, lower in LIMB_SEGMENTS:
         a, b = rig.roles.joint(upper), rig.roles.joint(lower)
         if a is None:
             continue
@@ -119,25 +119,25 @@ def bone_directions(
             if length.min() > 1e-6:
                 out[upper] = bone / length
                 continue
-        out[upper] = quat_rotate(rotations[:, a], OUT[upper])
+        out[upper] = quat_rotate(rotations[:, a], TPOSE_DIRECTIONS[upper])
     return out
 
 
-def feet_of(
+def source_feet(
     source: CanonicalMotion, positions: Float[np.ndarray, "T J 3"], robot: Morphology
 ) -> Float[np.ndarray, "T S 2 3"]:
     """The source's heel and toe [m] for each of the robot's soles; 0 where it has no such foot."""
     rig = source.rig
     world = quat_mul(source.rotations, rig.tpose)
     paths = np.zeros((len(positions), len(robot.soles), 2, 3))
-    theirs = {sole.side: sole for sole in rig.soles}
+    source_soles = {sole.side: sole for sole in rig.soles}
     for s, sole in enumerate(robot.soles):
         side = side_of(robot, sole)
-        if side not in theirs:
+        if side not in source_soles:
             continue
         toe = rig.roles.joint(Role(f"{side}_toe"))
         foot = rig.roles.require(Role(f"{side}_foot"))
-        paths[:, s, 0] = sole_positions(theirs[side], positions, world)[:, :2].mean(1)
+        paths[:, s, 0] = sole_positions(source_soles[side], positions, world)[:, :2].mean(1)
         paths[:, s, 1] = positions[:, foot if toe is None else toe]
     return paths
 
@@ -147,7 +147,7 @@ def side_of(robot: Morphology, sole: Sole) -> Side:
     return "left" if robot.rig.roles.roles[sole.foot] is Role.LEFT_FOOT else "right"
 
 
-def _touches(
+def _raw_contacts(
     source: CanonicalMotion, paths: Float[np.ndarray, "T S 2 3"]
 ) -> Bool[np.ndarray, "T S 2"]:
     """Whether heels and toes stand, be it for a frame."""

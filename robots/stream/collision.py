@@ -10,11 +10,11 @@ from jaxtyping import Float, Int
 from robots.model.morphology import Morphology
 from robots.model.shapes import DIRECTIONS
 from robots.residuals import one_sided
-from robots.solver.collision import EASE, collisions_of
+from robots.solver.collision import DEPTH_ROUNDING, collisions_of
 from robots.solver.hulls import ShapePair
-from robots.solver.objective import TOUCH, TOUCH_LEGS
+from robots.solver.objective import W_COLLISION, W_LEG_COLLISION
 
-_ACTIVE = 3 * EASE  # [m] beyond which a shape is not felt
+_ACTIVE = 3 * DEPTH_ROUNDING  # [m] beyond which a shape is not felt
 _REACH = 0.03  # [m] that shapes may move between the frame that is looked at and the others
 
 
@@ -28,7 +28,7 @@ class WindowPoses:
     anchors: Float[np.ndarray, "T N 3"]
 
 
-class Touch:
+class WindowCollisions:
     """A robot's pairs of shapes that can meet. `bodies` are those of the tree's links and, last, of
     the base; `rest` is where all bodies are in the rest pose; `first` are the links that are solved
     for first: later ones give way to them."""
@@ -50,7 +50,8 @@ class Touch:
         self._small = np.array([number[pair.small.geom] for pair in pairs], dtype=int)
         self._large = np.array([number[pair.large.geom] for pair in pairs], dtype=int)
         bounds = [
-            pair.small.bound + pair.large.bound + pair.apart + _ACTIVE + _REACH for pair in pairs
+            pair.small.bound + pair.large.bound + pair.clearance + _ACTIVE + _REACH
+            for pair in pairs
         ]
         self._bounds = np.array(bounds) ** 2
         self._reach = np.array([pair.large.reach for pair in pairs]).reshape(-1, 26)
@@ -58,40 +59,40 @@ class Touch:
         self._pairs = np.repeat(np.arange(len(pairs)), counts)
         spheres = [s for pair in pairs for s in pair.small.spheres]
         self._spheres = self._local(spheres, self._shapes[self._small[self._pairs]])
-        radii = [r + pair.apart for pair in pairs for r in pair.small.radii]
+        radii = [r + pair.clearance for pair in pairs for r in pair.small.radii]
         self._radii = np.array(radii)
         self._watch_columns(robot, pairs, set(first.tolist()))
 
-    def near(self, poses: WindowPoses) -> Int[np.ndarray, "K"]:
+    def candidates(self, poses: WindowPoses) -> Int[np.ndarray, "K"]:
         """The spheres that are near enough to be felt, now or soon."""
         centers = _placed(poses, self._shapes, self._centers)
         x, y, z = (centers[:, self._small] - centers[:, self._large]).transpose(2, 0, 1)
         pairs = (x * x + y * y + z * z < self._bounds).any(0)
-        near = np.flatnonzero(pairs[self._pairs])
-        return near[(self._depth(poses, near)[0] > -_ACTIVE - _REACH).any(0)]
+        candidates = np.flatnonzero(pairs[self._pairs])
+        return candidates[(self._depth(poses, candidates)[0] > -_ACTIVE - _REACH).any(0)]
 
     def add_to(
         self,
         poses: WindowPoses,
         axes: Float[np.ndarray, "T D 3"],
         anchors: Float[np.ndarray, "T D 3"],
-        near: Int[np.ndarray, "K"],
+        candidates: Int[np.ndarray, "K"],
         H: Float[np.ndarray, "T D D"],
         g: Float[np.ndarray, "T D"],
     ) -> None:
-        """Add how deep shapes are in each other to the normal equations; `near` are the spheres to
-        look at."""
-        deep, side = self._depth(poses, near)
+        """Add how deep shapes are in each other to the normal equations; `candidates` are the
+        spheres to look at."""
+        deep, side = self._depth(poses, candidates)
         frames, felt = np.nonzero(deep > -_ACTIVE)
         if not len(felt):
             return
-        pairs = self._pairs[near[felt]]
+        pairs = self._pairs[candidates[felt]]
         small, large = self._shapes[self._small[pairs]], self._shapes[self._large[pairs]]
-        point = _turned(poses.rotations[frames, small], self._spheres[near[felt]])
+        point = _turned(poses.rotations[frames, small], self._spheres[candidates[felt]])
         arm = (point + poses.positions[frames, small])[:, None] - anchors[frames]
         push = _turned(self._turns[large].transpose(0, 2, 1), DIRECTIONS[side[frames, felt]])
         push = _turned(poses.rotations[frames, large], push)
-        residual, slope = one_sided(deep[frames, felt], EASE)
+        residual, slope = one_sided(deep[frames, felt], DEPTH_ROUNDING)
         # axis x arm . push = axis . arm x push
         (a, b, c), (x, y, z) = np.moveaxis(arm, 2, 0), push.T[:, :, None]
         u, v, w = np.moveaxis(axes[frames], 2, 0)
@@ -104,18 +105,18 @@ class Touch:
             g[t] += residual[frames == t] @ rows
 
     def _depth(
-        self, poses: WindowPoses, near: Int[np.ndarray, "K"]
+        self, poses: WindowPoses, candidates: Int[np.ndarray, "K"]
     ) -> tuple[Float[np.ndarray, "T K"], Int[np.ndarray, "T K"]]:
         """How deep [m] spheres are in the shapes of their pairs, and the nearest side of these."""
-        pairs = self._pairs[near]
+        pairs = self._pairs[candidates]
         small, large = self._shapes[self._small[pairs]], self._shapes[self._large[pairs]]
-        away = _placed(poses, small, self._spheres[near]) - poses.positions[:, large]
+        away = _placed(poses, small, self._spheres[candidates]) - poses.positions[:, large]
         # In the rest pose of the large shape: its sides are known there.
         back = self._turns @ poses.rotations.transpose(0, 1, 3, 2)
         inside = _turned(back[:, large], away) + self._places[large]
         over = inside @ DIRECTIONS.T - self._reach[pairs]
         side = over.argmax(2)
-        return self._radii[near] - np.take_along_axis(over, side[..., None], 2)[..., 0], side
+        return self._radii[candidates] - np.take_along_axis(over, side[..., None], 2)[..., 0], side
 
     def _local(
         self, points: list[Float[np.ndarray, "3"]], bodies: Int[np.ndarray, "K"]
@@ -130,13 +131,13 @@ class Touch:
         """Which columns move the pairs together (-1) and apart, of the links that give way."""
         tree = robot.tree
         self._signs = np.zeros((len(pairs), tree.nv))
-        self._weights = np.full(len(pairs), TOUCH)
+        self._weights = np.full(len(pairs), W_COLLISION)
         for k, pair in enumerate(pairs):
             chains = [tree.chain(part.link) for part in (pair.small, pair.large)]
             both = set(chains[0]) & set(chains[1])
             early = all(j in first for chain in chains for j in chain)
             if early:
-                self._weights[k] = TOUCH_LEGS
+                self._weights[k] = W_LEG_COLLISION
             for sign, chain in zip((-1.0, 1.0), chains, strict=True):
                 moving = tuple(j for j in chain if j not in both and (j in first) == early)
                 self._signs[k, tree.dofs(moving)] = sign

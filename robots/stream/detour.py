@@ -9,29 +9,29 @@ import numpy as np
 from jaxtyping import Float
 
 from robots.solver.projection import project
-from robots.stream.frame_targets import LATENCY, FrameTargets, Watcher
+from robots.stream.frame_targets import LATENCY, FrameReader, FrameTargets
 from robots.stream.terms import Posture, Terms
 from spark.rotation import quat_from_matrix
 
-_LOST, _FOUND = np.cos(np.radians(55)), np.cos(np.radians(25))  # of a bone's error
+_COS_LOST, _COS_FOUND = np.cos(np.radians(55)), np.cos(np.radians(25))  # of a bone's error
 _PATIENCE = 0.15  # [s] before a limb that is lost is led
-_LONGEST = 0.6  # [s] that it is led, and that it is then left alone
-_FIRM = 2.0
-_FAST = 8.0  # [rad/s] that it is led
+_MAX_DURATION = 0.6  # [s] that it is led, and that it is then left alone
+_W_DETOUR = 2.0
+_SPEED = 8.0  # [rad/s] that it is led
 
 
 class Detours:
     """Looks after the limbs of a robot, and tells where hinges should tend to."""
 
-    def __init__(self, watcher: Watcher, terms: Terms, frame_time: float) -> None:
-        self._robot, self._terms, self._frame_time = watcher.robot, terms, frame_time
+    def __init__(self, reader: FrameReader, terms: Terms, frame_time: float) -> None:
+        self._robot, self._terms, self._frame_time = reader.robot, terms, frame_time
         robot = self._robot
         trunk = robot.rig.pelvis, robot.rig.chest
         inner = {k for j in trunk for k in robot.tree.chain(int(robot.links[j]))}
         numbers = np.cumsum(~robot.tree.balls) - 1  # of the tree's hinges
         self._limbs = []
-        for k in range(len(watcher.bones) - 1):
-            upper, lower = (robot.rig.roles.require(role) for role in watcher.bones[k : k + 2])
+        for k in range(len(reader.bones) - 1):
+            upper, lower = (robot.rig.roles.require(role) for role in reader.bones[k : k + 2])
             if int(robot.rig.skeleton.parents[lower]) != upper:
                 continue
             chain = [j for j in robot.tree.chain(int(robot.links[lower])) if j not in inner]
@@ -50,11 +50,11 @@ class Detours:
         """What hinges should tend to, when bones point like this and hinges stand at `angles`."""
         right = (bones * targets.bones).sum(1)
         worst = np.array([right[rows].min() for rows, _ in self._limbs])
-        self._lost = np.where(worst < _LOST, self._lost + self._frame_time, 0.0)
+        self._lost = np.where(worst < _COS_LOST, self._lost + self._frame_time, 0.0)
         led = self._led > 0
         self._led -= np.clip(self._led, -self._frame_time, self._frame_time)
-        for limb in np.flatnonzero(led & ((worst > _FOUND) | (self._led == 0))):
-            self._led[limb] = -_LONGEST
+        for limb in np.flatnonzero(led & ((worst > _COS_FOUND) | (self._led == 0))):
+            self._led[limb] = -_MAX_DURATION
             self._goals[self._limbs[limb][1]] = np.nan
         lost = np.flatnonzero((self._lost > _PATIENCE) & (self._led == 0))
         if len(lost):
@@ -63,16 +63,16 @@ class Detours:
             there = (self._terms.bones(self._terms.poses(q))[0] * targets.bones).sum(1)
             for limb in lost:
                 rows, hinges = self._limbs[limb]
-                better = there[rows].min() > _FOUND
-                self._led[limb] = _LONGEST if better else -_LONGEST
+                better = there[rows].min() > _COS_FOUND
+                self._led[limb] = _MAX_DURATION if better else -_MAX_DURATION
                 self._goals[hinges] = self._terms.angles(q)[0, hinges] if better else np.nan
         relaxed, on_the_way = self._terms.relaxed, np.isfinite(self._goals)
         if not on_the_way.any():
             return relaxed
         # The frames that are solved for lie ahead.
-        most = _FAST * self._frame_time * (LATENCY + 1)
+        most = _SPEED * self._frame_time * (LATENCY + 1)
         next_angles = angles + np.clip(self._goals - angles, -most, most)
         return Posture(
             np.where(on_the_way, next_angles, relaxed.angles),
-            np.where(on_the_way, _FIRM, relaxed.weights),
+            np.where(on_the_way, _W_DETOUR, relaxed.weights),
         )

@@ -9,26 +9,28 @@ from collections import deque
 import numpy as np
 from jaxtyping import Float
 
-from robots.solver.footprints import EASE, TURN, WOBBLE, flat_sole
-from robots.stream.frame_targets import FrameTargets, Watcher
+from robots.solver.footprints import MAX_TWIST, MAX_WOBBLE, RAMP, flat_sole
+from robots.stream.frame_targets import FrameReader, FrameTargets
 from robots.stream.terms import FootTargets
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
 
-_LET_GO = 1.5  # times the speed and height at which a foot comes to stand: there it is let go
+_RELEASE_FACTOR = (
+    1.5  # times the speed and height at which a foot comes to stand: there it is let go
+)
 
 
-class Feet:
+class ContactTracker:
     """The contacts of a stream's feet and the robot's footprints, `ahead` frames after they
     happen: so much is known of what comes next."""
 
-    def __init__(self, watcher: Watcher, frame_time: float, ahead: int) -> None:
-        self._robot, self._scale = watcher.robot, watcher.scale
-        self._low = watcher.ground.low
+    def __init__(self, reader: FrameReader, frame_time: float, ahead: int) -> None:
+        self._robot, self._scale = reader.robot, reader.scale
+        self._low = reader.ground.low
         self._frame_time, self._ahead = frame_time, ahead
-        size = watcher.source.standing_height / ADULT_HEIGHT
+        size = reader.source.standing_height / ADULT_HEIGHT
         self._slow, self._near = PLANTED_SPEED * size, PLANTED_HEIGHT * size
         self._reach = max(1, round(SPEED_WINDOW / 2 / frame_time))
-        self._known = watcher.has_feet[:, None]
+        self._known = reader.has_feet[:, None]
         self._flat = [flat_sole(self._robot, sole) for sole in self._robot.soles]
         self._length = self._reach + ahead + 1
         self._seen: deque[FrameTargets] = deque(maxlen=self._length)
@@ -48,9 +50,9 @@ class Feet:
         way = self._seen[here + after].feet - self._seen[here - self._reach].feet
         speed = np.hypot(way[..., 0], way[..., 1]) / ((self._reach + after) * self._frame_time)
         height = now.feet[..., 2] - self._low
-        more = np.where(self._stands, _LET_GO, 1.0)
+        more = np.where(self._stands, _RELEASE_FACTOR, 1.0)
         self._stands = self._known & (speed < more * self._slow) & (height < more * self._near)
-        ramp = 1.0 if first else self._frame_time / EASE
+        ramp = 1.0 if first else self._frame_time / RAMP
         step = np.clip(self._stands - self._holds, -ramp, ramp)
         places = np.zeros_like(corners)
         for s, (sole, mark) in enumerate(zip(self._robot.soles, self._prints, strict=True)):
@@ -60,7 +62,7 @@ class Feet:
             else:
                 moved = self._scale * (now.feet - before.feet)[s, point, :2]
                 turn = _turn(before.world[sole.foot], now.world[sole.foot])
-                wobble = WOBBLE * self._robot.rig.hip_height
+                wobble = MAX_WOBBLE * self._robot.rig.hip_height
                 mark.follow(moved, turn, float(self._holds[s].max()), wobble)
             places[s, :, :2] = mark.positions(self._flat[s])
         self._holds = self._holds + step
@@ -96,7 +98,7 @@ class Footprint:
         self._away = away * min(1.0, wobble / max(far, 1e-12))
         self._pivot = self._pivot + (1 - hold) * moved + (away - self._away)
         turn = self._turned + hold * turned
-        self._turned = float(np.clip(turn, -TURN, TURN))
+        self._turned = float(np.clip(turn, -MAX_TWIST, MAX_TWIST))
         self._heading += (1 - hold) * turned + (turn - self._turned)
 
     def positions(self, flat: Float[np.ndarray, "4 2"]) -> Float[np.ndarray, "4 2"]:

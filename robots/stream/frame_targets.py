@@ -11,12 +11,12 @@ from jaxtyping import Float
 
 from robots.model.morphology import Morphology
 from robots.solver.targets import (
-    BONES,
-    OUT,
+    LIMB_SEGMENTS,
+    TPOSE_DIRECTIONS,
     arm_length,
-    feet_of,
     palm_thickness,
     side_of,
+    source_feet,
 )
 from spark.errors import FrameError
 from spark.rig.rig import Rig
@@ -26,7 +26,7 @@ from spark.transfer.analytic import correspond
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
 LATENCY = 2  # [frames] between what a stream has seen and what it says
-_UNIT = 0.05  # by how much a quaternion's length may differ from 1
+_MAX_NORM_ERROR = 0.05  # by how much a quaternion's length may differ from 1
 
 
 class Frame(NamedTuple):
@@ -53,8 +53,8 @@ class FrameTargets:
     """`robots.solver.targets.Targets` of one frame, or of some (T), floor at z = 0, turns as
     matrices (`R_world_joint`).
 
-    `bones` are in the order of `Watcher.bones`. `feet` are the source's heel and toe of each of the
-    robot's soles [m, the source's own world].
+    `bones` are in the order of `FrameReader.bones`. `feet` are the source's heel and toe of each of
+    the robot's soles [m, the source's own world].
     """
 
     world: Float[np.ndarray, "*T J 3 3"]
@@ -65,7 +65,7 @@ class FrameTargets:
     feet: Float[np.ndarray, "*T S 2 3"]
 
 
-def together(targets: Sequence[FrameTargets]) -> FrameTargets:
+def stack_targets(targets: Sequence[FrameTargets]) -> FrameTargets:
     """Those of some frames in one."""
     names = [field.name for field in fields(FrameTargets)]
     return FrameTargets(*(np.stack([getattr(one, name) for one in targets]) for name in names))
@@ -73,11 +73,11 @@ def together(targets: Sequence[FrameTargets]) -> FrameTargets:
 
 def ground_of(source: CanonicalMotion, robot: Morphology) -> Ground:
     """The floor of a clip; of a T-pose alone, its soles' height."""
-    feet = feet_of(source, canonical_positions(source), robot)
+    feet = source_feet(source, canonical_positions(source), robot)
     return Ground(source.floor_z, np.percentile(feet[..., 2], 1, axis=0))
 
 
-class Watcher:
+class FrameReader:
     """Reads frames of motions on one rig as targets for one robot."""
 
     def __init__(self, source: Rig, robot: Morphology, ground: Ground) -> None:
@@ -122,21 +122,21 @@ class Watcher:
         root, rotations, translations = Frame(*frame)
         names, offsets = self.source.skeleton.names, self.source.skeleton.offsets
         local = offsets if translations is None else translations
-        for what, given, like in (
+        for what, array, like in (
             ("root_pos", root, offsets[0]),
             ("rotations", rotations, self.source.tpose),
             ("translations", local, offsets),
         ):
-            if np.shape(given) != like.shape:
+            if np.shape(array) != like.shape:
                 raise FrameError(
-                    f"{what} has shape {np.shape(given)}; expected {like.shape}, as the source's "
+                    f"{what} has shape {np.shape(array)}; expected {like.shape}, as the source's "
                     "skeleton has it"
                 )
-            if not np.isfinite(given).all():
-                where = f" of joint {names[_first_bad(given)]!r}" * (like.ndim - 1)
+            if not np.isfinite(array).all():
+                where = f" of joint {names[_first_bad(array)]!r}" * (like.ndim - 1)
                 raise FrameError(f"{what}{where} is not finite; leave the frame out")
         length = np.sqrt((rotations * rotations).sum(1))
-        if np.abs(length - 1).max() > _UNIT:
+        if np.abs(length - 1).max() > _MAX_NORM_ERROR:
             j = int(np.abs(length - 1).argmax())
             raise FrameError(
                 f"the quaternion of joint {names[j]!r} has length {length[j]:.3g}; expected 1"
@@ -185,14 +185,14 @@ class Watcher:
     def _watch_feet(self) -> None:
         """The source's heels and toes that the robot's soles follow."""
         source, robot = self.source, self.robot
-        theirs = {sole.side: sole for sole in source.soles}
+        source_soles = {sole.side: sole for sole in source.soles}
         sides = [side_of(robot, sole) for sole in robot.soles]
-        self.has_feet = np.array([side in theirs for side in sides], dtype=bool)
+        self.has_feet = np.array([side in source_soles for side in sides], dtype=bool)
         heels, offsets, toes = [], [], []
-        for side in (side for side in sides if side in theirs):
+        for side in (side for side in sides if side in source_soles):
             foot, toe = source.roles.require(Role(f"{side}_foot")), Role(f"{side}_toe")
             heels.append(foot)
-            offsets.append(theirs[side].offsets[:2].mean(0))
+            offsets.append(source_soles[side].offsets[:2].mean(0))
             toes.append(next(iter(source.roles.joints(toe)), foot))
         self._heels, self._toes = np.array(heels, dtype=int), np.array(toes, dtype=int)
         self._heel_offsets = np.array(offsets).reshape(-1, 3)
@@ -203,12 +203,12 @@ class Watcher:
         roles, rest = self.source.roles, self.source.skeleton.rest_positions
         self.bones: list[Role] = []
         upper, lower, self._blind = [], [], []
-        for role, far in BONES:
+        for role, far in LIMB_SEGMENTS:
             a, b = roles.joint(role), roles.joint(far)
             if a is None or role not in self.robot.bones:
                 continue
             if b is None or np.linalg.norm(rest[b] - rest[a]) < 1e-6:
-                self._blind.append((len(self.bones), a, OUT[role]))
+                self._blind.append((len(self.bones), a, TPOSE_DIRECTIONS[role]))
                 b = a
             self.bones.append(role)
             upper.append(a)
@@ -219,13 +219,13 @@ class Watcher:
         """The wrists of a source and a robot that have both, in which scale, and how near [m] the
         robot's may come."""
         roles = (Role.LEFT_HAND, Role.RIGHT_HAND)
-        theirs = [self.source.roles.joint(role) for role in roles]
+        source_soles = [self.source.roles.joint(role) for role in roles]
         own = [self.robot.rig.roles.joint(role) for role in roles]
         self.hands: tuple[list[int], float, float] | None = None
-        if None not in (*theirs, *own):
+        if None not in (*source_soles, *own):
             scale = arm_length(self.robot.rig) / arm_length(self.source)
             least = sum(palm_thickness(self.robot, role) for role in roles)
-            self.hands = [int(j) for j in theirs if j is not None], scale, least
+            self.hands = [int(j) for j in source_soles if j is not None], scale, least
 
 
 def _first_bad(values: Float[np.ndarray, "N *D"]) -> int:

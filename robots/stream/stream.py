@@ -12,18 +12,25 @@ from jaxtyping import Float
 from robots.model.morphology import Morphology
 from robots.solver.projection import project
 from robots.stream.detour import Detours
-from robots.stream.footing import Feet
-from robots.stream.frame_targets import LATENCY, Frame, FrameTargets, Ground, Watcher, together
+from robots.stream.footing import ContactTracker
+from robots.stream.frame_targets import (
+    LATENCY,
+    Frame,
+    FrameReader,
+    FrameTargets,
+    Ground,
+    stack_targets,
+)
 from robots.stream.terms import FootTargets, Terms
 from robots.stream.window import Window
 from spark.errors import FrameError
 from spark.rig.rig import Rig
 from spark.rotation import quat_from_matrix
 
-_GONE = 2  # frames before the free ones
-_FRAMES = _GONE + LATENCY + 1
-_ONWARD = np.array([*range(1, _FRAMES), _FRAMES - 1])
-_FIRST_STEPS = 20
+_FIXED = 2  # frames before the free ones
+_FRAMES = _FIXED + LATENCY + 1
+_SHIFTED = np.array([*range(1, _FRAMES), _FRAMES - 1])
+_FIRST_ITERATIONS = 20
 
 
 class Stream:
@@ -34,9 +41,9 @@ class Stream:
 
     def __init__(self, source: Rig, robot: Morphology, frame_time: float, ground: Ground) -> None:
         self.robot, self.frame_time = robot, frame_time
-        self._watcher = Watcher(source, robot, ground)
-        self._terms = Terms(robot, self._watcher.bones, self._watcher.hands is not None)
-        self._window = Window(robot, self._terms, frame_time, gone=_GONE, free=LATENCY + 1)
+        self._reader = FrameReader(source, robot, ground)
+        self._terms = Terms(robot, self._reader.bones, self._reader.hands is not None)
+        self._window = Window(robot, self._terms, frame_time, fixed=_FIXED, free=LATENCY + 1)
         self.reset()
 
     def reset(self) -> None:
@@ -44,8 +51,8 @@ class Stream:
         self._count = 0
         self._targets: list[FrameTargets] = []
         self._q = np.zeros((_FRAMES, self.robot.mjcf.model.nq))
-        self._feet = Feet(self._watcher, self.frame_time, LATENCY)
-        self._detours = Detours(self._watcher, self._terms, self.frame_time)
+        self._contacts = ContactTracker(self._reader, self.frame_time, LATENCY)
+        self._detours = Detours(self._reader, self._terms, self.frame_time)
 
     def step(self, frame: Frame) -> Float[np.ndarray, "nq"]:
         """The next frame of the source; MuJoCo's coordinates of the robot `LATENCY` frames before
@@ -54,33 +61,35 @@ class Stream:
         Raises `FrameError` where the frame is broken; it is then as if it had not been there.
         """
         try:
-            targets = self._watcher.targets(frame)
+            targets = self._reader.targets(frame)
         except FrameError as error:
             raise FrameError(f"frame {self._count} of the stream: {error}") from error
         if self._count:
-            q = self._q[_ONWARD]
+            q = self._q[_SHIFTED]
             self._targets = [*self._targets[1:], targets]
-            poses = self._terms.poses(q[_GONE : _GONE + 1])  # what is next to be said
-            stance = self._feet.look(targets, self._terms.corners(poses)[0])
-            bones, angles = self._terms.bones(poses)[0], self._terms.angles(q)[_GONE]
+            poses = self._terms.poses(q[_FIXED : _FIXED + 1])  # what is next to be said
+            foot_targets = self._contacts.look(targets, self._terms.corners(poses)[0])
+            bones, angles = self._terms.bones(poses)[0], self._terms.angles(q)[_FIXED]
             posture = self._detours.look(self._targets[0], bones, angles)
-            self._q = self._window.solve(q, together(self._targets), stance, posture)
+            self._q = self._window.solve(q, stack_targets(self._targets), foot_targets, posture)
         else:
             self._targets = [targets] * (LATENCY + 1)
             self._q = self._first(targets)
         self._count += 1
-        return self._q[_GONE].copy()
+        return self._q[_FIXED].copy()
 
     def _first(self, targets: FrameTargets) -> Float[np.ndarray, "W nq"]:
         """A pose at rest: first as it comes, then with the feet that stand where they are in it."""
-        robot, wanted = self.robot, together(self._targets)
+        robot, wanted = self.robot, stack_targets(self._targets)
         projected = project(robot, quat_from_matrix(targets.world)[None], targets.hips[None])
         q = robot.to_qpos(projected)[np.zeros(_FRAMES, dtype=int)]
         soles = len(robot.soles)
-        stance = FootTargets(np.zeros((soles, 4, 3)), np.zeros((soles, 4, 3)))
+        foot_targets = FootTargets(np.zeros((soles, 4, 3)), np.zeros((soles, 4, 3)))
         for held in (False, True):
             if held:
-                stance = self._feet.look(targets, self._terms.corners(self._terms.poses(q))[0])
-            q = self._window.settle(q, wanted, stance, _FIRST_STEPS)
+                foot_targets = self._contacts.look(
+                    targets, self._terms.corners(self._terms.poses(q))[0]
+                )
+            q = self._window.settle(q, wanted, foot_targets, _FIRST_ITERATIONS)
             q[:] = q[-1]
         return q

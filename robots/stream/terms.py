@@ -17,9 +17,9 @@ from jaxtyping import Bool, Float, Int
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
 from robots.solver import objective
-from robots.solver.objective import TURN, TURNS
-from robots.solver.solve import stages_of
-from robots.stream.collision import Touch, WindowPoses
+from robots.solver.objective import W_OTHER_ROTATION, W_ROTATION
+from robots.solver.solve import blocks_of
+from robots.stream.collision import WindowCollisions, WindowPoses
 from robots.stream.frame_targets import FrameTargets
 from robots.tree import BASE
 from spark.rig.roles import Role
@@ -54,7 +54,7 @@ class Terms:
         mujoco.mj_kinematics(self._model, self._data)
         self._rest = self._data.xmat.reshape(-1, 3, 3).copy(), self._data.xpos.copy()
         self._first = np.zeros(len(tree) + 1, dtype=bool)  # of the links, and -1
-        self._first[[*stages_of(robot)[0].joints, -1]] = True
+        self._first[[*blocks_of(robot)[0].joints, -1]] = True
         joints = np.array(robot.mj_joints, dtype=int)
         self._joints = np.repeat(joints, np.where(tree.balls, 3, 1))
         self._hinge_columns = tree.dof_starts[~tree.balls]
@@ -62,12 +62,14 @@ class Terms:
         self._hinge_qpos = self._model.jnt_qposadr[hinges]
         rest = self._model.qpos0[self._hinge_qpos]
         lower, upper = (limit[~tree.balls] + rest for limit in (tree.lower, tree.upper))
-        margin = np.minimum(objective.MARGIN, 0.1 * (upper - lower))
+        margin = np.minimum(objective.LIMIT_MARGIN, 0.1 * (upper - lower))
         self._soft = lower + margin, upper - margin
         angles = robot.tpose.angles[0, ~tree.balls] + rest
-        self.relaxed = Posture(angles, np.full(len(angles), objective.IDLE))
+        self.relaxed = Posture(angles, np.full(len(angles), objective.W_TPOSE))
         bodies = np.array([self._body(link) for link in (*range(len(tree)), -1)])
-        self._touch = Touch(robot, bodies, self._rest, np.flatnonzero(self._first[:-1]))
+        self._collisions = WindowCollisions(
+            robot, bodies, self._rest, np.flatnonzero(self._first[:-1])
+        )
         self._watch_turns()
         self._watch_bones(bones)
         self._watch_points(hands)
@@ -97,20 +99,20 @@ class Terms:
         """The hinges' part of a `qpos`."""
         return q[:, self._hinge_qpos]
 
-    def near(self, q: Float[np.ndarray, "T nq"]) -> Int[np.ndarray, "K"]:
+    def candidates(self, q: Float[np.ndarray, "T nq"]) -> Int[np.ndarray, "K"]:
         """Which parts may run into each other, in these poses and others that are not far away."""
-        return self._touch.near(self.poses(q))
+        return self._collisions.candidates(self.poses(q))
 
     def linearize(
         self,
         q: Float[np.ndarray, "T nq"],
         targets: FrameTargets,
-        stance: FootTargets,
+        foot_targets: FootTargets,
         posture: Posture,
-        near: Int[np.ndarray, "K"],
+        candidates: Int[np.ndarray, "K"],
     ) -> tuple[Float[np.ndarray, "T D D"], Float[np.ndarray, "T D"]]:
-        """The normal equations of each frame for itself: `H step = -g`. `near` is what `near` says
-        of such poses."""
+        """The normal equations of each frame for itself: `H step = -g`. `candidates` is what
+        `candidates` says of such poses."""
         poses = self.poses(q)
         axes, anchors = self._columns(poses)
         # Parts that should be turned some way: an axial vector each
@@ -123,12 +125,12 @@ class Terms:
         np.subtract(M[..., 1, 0], M[..., 0, 1], out=axial[..., 2])
         H = self._turn_gram * (axes @ axes.transpose(0, 2, 1))
         g = 0.5 * (axes * (self._turn_mask @ axial)).sum(2)
-        J, weights, forces = self._rows(poses, axes, anchors, targets, stance)
+        J, weights, forces = self._rows(poses, axes, anchors, targets, foot_targets)
         rows = J.reshape(len(q), -1, J.shape[3])
         across = rows.transpose(0, 2, 1)
         H += across @ (rows * weights.reshape(len(q), -1, 1))
         g += (across @ forces.reshape(len(q), -1, 1))[..., 0]
-        self._touch.add_to(poses, axes, anchors, near, H, g)
+        self._collisions.add_to(poses, axes, anchors, candidates, H, g)
         self._limit(q, posture, H, g)
         return H, g
 
@@ -157,7 +159,7 @@ class Terms:
         axes: Float[np.ndarray, "T D 3"],
         anchors: Float[np.ndarray, "T D 3"],
         targets: FrameTargets,
-        stance: FootTargets,
+        foot_targets: FootTargets,
     ) -> Linear:
         """How directions and points grow with all columns, the squares of their weights, and
         residuals times these."""
@@ -176,16 +178,16 @@ class Terms:
         J[:, B:, :, :3] = np.eye(3)
         J *= self._row_mask
         weights, forces = np.empty((2, count, B + P, 3))
-        weights[:, :B] = objective.DIRECTION**2
-        forces[:, :B] = objective.DIRECTION**2 * (bones - targets.bones)
-        self._weigh_soles(points, stance, weights[:, B:], forces[:, B:])
+        weights[:, :B] = objective.W_LIMB_DIRECTION**2
+        forces[:, :B] = objective.W_LIMB_DIRECTION**2 * (bones - targets.bones)
+        self._weigh_soles(points, foot_targets, weights[:, B:], forces[:, B:])
         hips = B + 4 * len(self.robot.soles)
-        weights[:, hips] = objective.PATH**2
-        forces[:, hips] = objective.PATH**2 * (points[:, hips - B] - targets.hips)
+        weights[:, hips] = objective.W_HIPS_POSITION**2
+        forces[:, hips] = objective.W_HIPS_POSITION**2 * (points[:, hips - B] - targets.hips)
         if self._hands:
             # Of two points the difference: that of the rows.
             far = (targets.hands**2).sum(1, keepdims=True)
-            weight = (objective.CLAP * np.exp(-far / objective.NEAR**2)) ** 2
+            weight = (objective.W_HANDS * np.exp(-far / objective.HANDS_RANGE**2)) ** 2
             J[:, hips + 1] -= J[:, hips + 2]
             weights[:, hips + 1], weights[:, hips + 2] = weight, 0.0
             between = points[:, -2] - points[:, -1] - targets.hands
@@ -195,18 +197,20 @@ class Terms:
     def _weigh_soles(
         self,
         points: Float[np.ndarray, "T P 3"],
-        stance: FootTargets,
+        foot_targets: FootTargets,
         weights: Float[np.ndarray, "T P 3"],
         forces: Float[np.ndarray, "T P 3"],
     ) -> None:
         """Corners stand where they should, and none is below the floor."""
         count = 4 * len(self.robot.soles)
-        firm = (objective.STAND * stance.holds.reshape(-1, 3)) ** 2
-        weights[:, :count] = firm
-        forces[:, :count] = firm * (points[:, :count] - stance.positions.reshape(-1, 3))
-        depth, slope = one_sided(-points[:, :count, 2], objective.SINK_EASE)
-        weights[:, :count, 2] += (objective.SINK * slope) ** 2
-        forces[:, :count, 2] -= objective.SINK**2 * slope * depth
+        penalty_scale = (objective.W_FOOT_HOLD * foot_targets.holds.reshape(-1, 3)) ** 2
+        weights[:, :count] = penalty_scale
+        forces[:, :count] = penalty_scale * (
+            points[:, :count] - foot_targets.positions.reshape(-1, 3)
+        )
+        depth, slope = one_sided(-points[:, :count, 2], objective.FLOOR_ROUNDING)
+        weights[:, :count, 2] += (objective.W_FLOOR * slope) ** 2
+        forces[:, :count, 2] -= objective.W_FLOOR**2 * slope * depth
 
     def _limit(
         self,
@@ -218,13 +222,13 @@ class Terms:
         """Keep hinges from their limits, and what nothing else asks for as it tends to be."""
         angles = self.angles(q)
         lower, upper = self._soft
-        above, rising = one_sided(angles - upper, objective.MARGIN / 4)
-        below, falling = one_sided(lower - angles, objective.MARGIN / 4)
+        above, rising = one_sided(angles - upper, objective.LIMIT_MARGIN / 4)
+        below, falling = one_sided(lower - angles, objective.LIMIT_MARGIN / 4)
         idle = posture.weights**2
         diagonal = np.full(g.shape, 1e-6)
-        diagonal[:, self._hinge_columns] = idle + (objective.LIMIT * (rising + falling)) ** 2
+        diagonal[:, self._hinge_columns] = idle + (objective.W_LIMIT * (rising + falling)) ** 2
         H.reshape(len(q), -1)[:, :: H.shape[1] + 1] += diagonal
-        push = objective.LIMIT**2 * (rising + falling) * (above - below)
+        push = objective.W_LIMIT**2 * (rising + falling) * (above - below)
         g[:, self._hinge_columns] += push + idle * (angles - posture.angles)
 
     def _body(self, link: int) -> int:
@@ -249,14 +253,14 @@ class Terms:
             own = j == 0 or links[j] != links[int(rig.skeleton.parents[j])]
             if role is not None and own:
                 followed.append(j)
-                weights.append(TURNS.get(role.part, TURN))
+                weights.append(W_ROTATION.get(role.part, W_OTHER_ROTATION))
         self._followed = np.array(followed)
         turned = [*(links[j] for j in followed), links[rig.chest]]
         bodies = [self._body(link) for link in turned]
         self._turned = np.array(bodies)
         self._turned_rest = self._rest[0][bodies]
         mask = self._mask(turned)
-        self._turn_mask = (mask * np.array([[*weights, TURNS["chest"]]]).T ** 2).T
+        self._turn_mask = (mask * np.array([[*weights, W_ROTATION["chest"]]]).T ** 2).T
         self._turn_gram = self._turn_mask @ mask
 
     def _watch_bones(self, bones: Sequence[Role]) -> None:

@@ -3,21 +3,21 @@
 import mujoco
 import numpy as np
 import pytest
+from robots.solver.acceleration_weights import jerk_stiffening, limit_speed
 
 from robots.least_squares import NormalEquations, Smoothness, second_differences
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.registry import find
-from robots.solver.block import Stage
+from robots.solver.block import Block
 from robots.solver.collision import collisions_of
-from robots.solver.descent import eased
+from robots.solver.descent import smooth_lower_envelope
 from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.footprints import plan_footing
 from robots.solver.objective import linearize
 from robots.solver.projection import project
-from robots.solver.repair import mend, wrong_in
-from robots.solver.smoothness import jolted, unhurried
-from robots.solver.solve import copy, retarget, stages_of
+from robots.solver.repair import repair, violations
+from robots.solver.solve import blocks_of, copy, retarget
 from robots.solver.targets import targets_of
 from robots.tree import Coordinates, forward_kinematics
 from scripts.robot_bars import COLUMNS, limb_error, measure, misses
@@ -80,7 +80,7 @@ def clap(rig: Rig, apart: np.ndarray) -> CanonicalMotion:
 @pytest.mark.parametrize("exact", [False, True])
 @pytest.mark.parametrize("stage", [0, 1])
 def test_the_gradient_is_that_of_the_cost(
-    walk: CanonicalMotion, ember: Morphology, stage: int, exact: bool
+    walk: CanonicalMotion, ember: Morphology, block: int, exact: bool
 ) -> None:
     source = walk.frames(0, 4)
     targets = targets_of(source, ember)
@@ -89,10 +89,10 @@ def test_the_gradient_is_that_of_the_cost(
     tree = ember.tree
     q = project(ember, targets.world, targets.hips)
     q = q.integrated(tree, rng.normal(size=(4, tree.nv)) * 0.05).clipped(tree, 0.05)
-    which = stages_of(ember)[stage]
-    nears = collisions_of(ember).near(forward_kinematics(tree, q), which, 1)
-    normal = linearize(ember, targets, footing, q, which, nears, exact=exact)
-    for k, column in enumerate(which.columns):
+    which = blocks_of(ember)[block]
+    candidates = collisions_of(ember).candidates(forward_kinematics(tree, q), which, 1)
+    normal = linearize(ember, targets, footing, q, which, candidates, exact=exact)
+    for k, column in enumerate(which.dofs):
         step = np.zeros((4, tree.nv))
         step[:, column] = 1e-6
         after, before = (
@@ -102,8 +102,8 @@ def test_the_gradient_is_that_of_the_cost(
                 footing,
                 q.integrated(tree, s * step),
                 which,
-                nears,
-                rows=False,
+                candidates,
+                with_jacobian=False,
                 exact=exact,
             )
             for s in (1, -1)
@@ -148,7 +148,7 @@ def test_unhurried_angles_turn_no_faster_and_slow_ones_stay(ember: Morphology) -
     angles[30:, 0] = 3.0
     angles[:, 1] = np.sin(np.arange(count) / 10)
     still = np.tile([1.0, 0, 0, 0], (count, 1))
-    q = unhurried(ember, Coordinates(np.zeros((count, 3)), still, angles), 1 / 60)
+    q = limit_speed(ember, Coordinates(np.zeros((count, 3)), still, angles), 1 / 60)
     assert np.abs(np.diff(q.angles, axis=0)).max() * 60 < fast + 1e-9
     np.testing.assert_allclose(q.angles[:, 1], angles[:, 1], atol=1e-12)
     assert q.angles[0, 0] == 0
@@ -158,7 +158,7 @@ def test_unhurried_angles_turn_no_faster_and_slow_ones_stay(ember: Morphology) -
 def test_what_is_eased_stays_below_and_has_no_kinks() -> None:
     scale = np.ones(120)
     scale[60] = 0.0
-    curve = eased(scale, 19)
+    curve = smooth_lower_envelope(scale, 19)
     assert (curve <= scale + 1e-12).all()
     assert curve[60] == pytest.approx(0, abs=1e-12)
     assert np.abs(np.diff(curve, 2)).max() < 0.3 * np.abs(np.diff(curve)).max()
@@ -169,20 +169,20 @@ def test_only_hinges_that_jolt_are_made_stiffer(ember: Morphology) -> None:
     angles[:, 0] = np.sin(2 * np.pi * np.arange(90) / 60)  # 248 rad/s³ at most
     angles[45:, 1] = 0.2
     still = np.tile([1.0, 0, 0, 0], (90, 1))
-    stiffer = jolted(ember, Coordinates(np.zeros((90, 3)), still, angles), 1 / 60)
+    stiffening = jerk_stiffening(ember, Coordinates(np.zeros((90, 3)), still, angles), 1 / 60)
     first, second = ember.tree.dof_starts[:2]
-    assert (stiffer[:, first] == 1).all()
-    assert stiffer[43, second] > 5
-    assert (stiffer[:30, second] == 1).all()
+    assert (stiffening[:, first] == 1).all()
+    assert stiffening[43, second] > 5
+    assert (stiffening[:30, second] == 1).all()
 
 
 def test_arms_in_the_body_are_led_out_and_the_rest_stays(
     walk: CanonicalMotion, walked: RobotMotion, ember: Morphology
 ) -> None:
-    arms = stages_of(ember)[1]
+    arms = blocks_of(ember)[1]
     targets = targets_of(walk, ember)
     q, footing = walked.coordinates, plan_footing(ember, targets)
-    assert not wrong_in(ember, targets, q, arms, 1).any()
+    assert not violations(ember, targets, q, arms, 1).any()
     middle = len(q) // 2
     shoulder = ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)]
     angles = q.angles.copy()
@@ -194,12 +194,12 @@ def test_arms_in_the_body_are_led_out_and_the_rest_stays(
             tried = angles.copy()
             tried[:, j] += sign * 0.7 * bump
             pushed = Coordinates(q.pos, q.quat, tried).clipped(ember.tree, 0.02)
-            sides.append((wrong_in(ember, targets, pushed, arms, 1)[middle], pushed))
+            sides.append((violations(ember, targets, pushed, arms, 1)[middle], pushed))
     into = [pushed for wrong, pushed in sides if wrong]
     assert into
     for pushed in into:
-        mended = mend(ember, targets, footing, pushed, arms)
-        assert not wrong_in(ember, targets, mended, arms, 1).any()
+        mended = repair(ember, targets, footing, pushed, arms)
+        assert not violations(ember, targets, mended, arms, 1).any()
         np.testing.assert_array_equal(mended.angles[: middle - 50], pushed.angles[: middle - 50])
 
 
@@ -211,10 +211,10 @@ def test_what_is_measured_is_what_mujoco_finds(ember: Morphology) -> None:
     still = np.tile([1.0, 0, 0, 0], (count, 1))
     angles = rng.uniform(lower, upper, (count, len(tree)))
     q = Coordinates(np.zeros((count, 3)), still, angles)
-    whole = Stage(tree, tuple(range(len(tree))), True)
-    nears = collisions_of(ember).near(forward_kinematics(tree, q), whole, 1)
+    whole = Block(tree, tuple(range(len(tree))), True)
+    candidates = collisions_of(ember).candidates(forward_kinematics(tree, q), whole, 1)
     qpos = ember.to_qpos(q)
-    depth = exact_contacts_of(ember).depth(qpos, nears)
+    depth = exact_contacts_of(ember).depth(qpos, candidates)
     watched = {frozenset((p.small.geom, p.large.geom)) for p in collisions_of(ember).pairs}
     data = mujoco.MjData(model)
     found = np.full(count, -np.inf)
@@ -239,7 +239,7 @@ def test_feet_slide_but_stay_on_the_floor(walk: CanonicalMotion, ember: Morpholo
 
 def test_what_passes_between_two_looks_is_seen(walked: RobotMotion, ember: Morphology) -> None:
     """A hanging arm that swings through the body in six frames, looked at in the first and last."""
-    arms = stages_of(ember)[1]
+    arms = blocks_of(ember)[1]
     tree, count = ember.tree, 7
     angles = np.repeat(walked.coordinates.angles[:1], count, axis=0)
     shoulder = int(ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)])
@@ -252,7 +252,9 @@ def test_what_passes_between_two_looks_is_seen(walked: RobotMotion, ember: Morph
         q = Coordinates(base, still, swung).clipped(tree, 0.02)
         frames, qpos = forward_kinematics(tree, q), ember.to_qpos(q)
         every, ends = (
-            exact_contacts_of(ember).depth(qpos, collisions_of(ember).near(frames, arms, stride))
+            exact_contacts_of(ember).depth(
+                qpos, collisions_of(ember).candidates(frames, arms, stride)
+            )
             for stride in (1, count - 1)
         )
         passed += (every > 0.01).any()

@@ -8,14 +8,14 @@ import pytest
 import spark_sim
 from robots.model.known import known
 from robots.model.motion import RobotMotion
-from robots.solver.block import Stage
-from robots.solver.collision import Near, collisions_of
+from robots.solver.block import Block
+from robots.solver.collision import Candidate, collisions_of
 from robots.solver.footprints import corners_of, plan_footing
 from robots.solver.objective import linearize
 from robots.solver.projection import project
-from robots.solver.solve import stages_of
+from robots.solver.solve import blocks_of
 from robots.solver.targets import targets_of
-from robots.stream.frame_targets import LATENCY, Frame, FrameTargets, Watcher, ground_of
+from robots.stream.frame_targets import LATENCY, Frame, FrameReader, FrameTargets, ground_of
 from robots.stream.stream import Stream
 from robots.stream.terms import FootTargets, Terms
 from robots.tree import forward_kinematics
@@ -88,40 +88,40 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     rng = np.random.default_rng(0)
     q = project(EMBER, targets.world, targets.hips)
     q = q.integrated(tree, rng.normal(size=(4, tree.nv)) * 0.05).clipped(tree, 0.02)
-    watcher = Watcher(RIG, EMBER, ground_of(source, EMBER))
-    terms = Terms(EMBER, watcher.bones, hands=True)
+    reader = FrameReader(RIG, EMBER, ground_of(source, EMBER))
+    terms = Terms(EMBER, reader.bones, hands=True)
     assert targets.hands is not None
     seen = FrameTargets(
         world=matrix_from_quat(targets.world),
         chest=matrix_from_quat(targets.chest),
         hips=targets.hips,
-        bones=np.stack([targets.bones[role] for role in watcher.bones], axis=1),
+        bones=np.stack([targets.bones[role] for role in reader.bones], axis=1),
         hands=targets.hands,
         feet=np.zeros((4, 2, 2, 3)),
     )
 
-    def near(stage: Stage) -> list[Near]:
-        return collisions_of(EMBER).near(forward_kinematics(tree, q), stage, 1)
+    def near(block: Block) -> list[Candidate]:
+        return collisions_of(EMBER).candidates(forward_kinematics(tree, q), block, 1)
 
-    assert near(stages_of(EMBER)[1])
+    assert near(blocks_of(EMBER)[1])
     # A stance is of one time: frames are asked for one by one.
     body_axes = matrix_from_quat(EMBER.to_qpos(q)[:, 3:7])
     for t in range(4):
         one = slice(t, t + 1)
-        stance = FootTargets(
+        foot_targets = FootTargets(
             np.stack([foot.positions[..., t] for foot in footing]),
             np.stack([foot.holds[..., t] for foot in footing]),
         )
         here = FrameTargets(*(getattr(seen, name)[one] for name in FrameTargets.__annotations__))
         qpos = EMBER.to_qpos(q.at(one))
-        H, g = terms.linearize(qpos, here, stance, terms.relaxed, terms.near(qpos))
+        H, g = terms.linearize(qpos, here, foot_targets, terms.relaxed, terms.candidates(qpos))
         turn = np.eye(tree.nv)
         turn[3:6, 3:6] = body_axes[t]
         H, g = turn @ H[0] @ turn.T, turn @ g[0]
-        for stage in stages_of(EMBER):
-            wanted = linearize(EMBER, targets, footing, q, stage, near(stage))
-            at = np.ix_(stage.columns, stage.columns)
-            np.testing.assert_allclose(g[stage.columns], wanted.g[t], atol=1e-8)
+        for block in blocks_of(EMBER):
+            wanted = linearize(EMBER, targets, footing, q, block, near(block))
+            at = np.ix_(block.dofs, block.dofs)
+            np.testing.assert_allclose(g[block.dofs], wanted.g[t], atol=1e-8)
             np.testing.assert_allclose(H[at], wanted.H[t], atol=1e-7)
 
 
