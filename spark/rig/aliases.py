@@ -163,6 +163,22 @@ ASIDE: dict[str, str] = {
     for word in words.split()
 }
 
+# Which finger a word means, below a hand.
+FINGERS: dict[str, str] = {
+    word: finger
+    for finger, words in {
+        "thumb": "thumb oyayubi 親指",
+        "index": "index pointer hitosashiyubi 人指 人差指",
+        "middle": "middle mid nakayubi 中指",
+        "ring": "ring kusuriyubi 薬指",
+        "little": "little pinky pinkie pink koyubi 小指",
+    }.items()
+    for word in words.split()
+}
+FINGER_TIP = _set("end nub tip leaf site")
+# Joints inside the palm; those of a thumb, which bend as its first bone, aside.
+METACARPAL = _set("metacarpal metacarpals carpal palm in cup")
+
 MODIFIERS = _set("upper lower front hind rear base bend bone center c m x stretch")
 NOISE = _set("jnt joint bn jt link def org bind skin sk rig j b bip biped valve mixamorig")
 # A robot's hinge axes: "roll" is a twist bone elsewhere.

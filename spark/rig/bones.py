@@ -1,6 +1,5 @@
 """Where a rig's bones point, in the pose that its T-pose is found from."""
 
-import re
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,14 +7,12 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.kinematics import end_positions, world_positions, world_rotations
+from spark.rig.fingers import fingers_below
 from spark.rig.roles import LIMBS, RoleMap
 from spark.rotation import quat_conj, quat_rotate
 from spark.skeleton import Skeleton
 
 SHORT = 1e-6  # vectors shorter than this [m] have no direction
-_THUMB = re.compile(r"thumb|親指|finger_?0|finger1-", re.IGNORECASE)
-_INDEX = re.compile(r"index|人指|人差指|finger2-", re.IGNORECASE)
-_LITTLE = re.compile(r"pink|little|小指|finger5-", re.IGNORECASE)
 _THUMB_DROOP = np.radians(20)
 
 Vector = Float[np.ndarray, "3"]
@@ -58,7 +55,7 @@ class RigPose:
                 for j in self.roles.joints(after):
                     if j in below and (vector := self._vector(joint, [j], [])) is not None:
                         return vector
-        thumbs = {k for j in self._named(joint, _THUMB) for k in self.skeleton.subtree(j)}
+        thumbs = {k for j in self._finger(joint, "thumb") for k in self.skeleton.subtree(j)}
         fingers = [j for j in below if j not in thumbs]
         return self._vector(joint, fingers[1:], fingers)
 
@@ -66,19 +63,19 @@ class RigPose:
         """The vector towards the thumb's side of a hand, and how far [rad] it points below the
         plane of the palm: a thumb hangs a little, a row of fingers doesn't. None where the
         fingers have no known names."""
-        index, little = self._named(hand, _INDEX), self._named(hand, _LITTLE)
+        index, little = self._finger(hand, "index"), self._finger(hand, "little")
         if index and little:
             across = self.positions[index[0]] - self.positions[little[0]]
             if np.linalg.norm(across) > SHORT:
                 return self.seen_from(hand, across), 0.0
-        thumb = self._named(hand, _THUMB)
+        thumb = self._finger(hand, "thumb")
         joints = list(self.skeleton.subtree(thumb[0])) if thumb else []
         vector = self._vector(hand, joints, joints) if joints else None
         return None if vector is None else (vector, _THUMB_DROOP)
 
-    def _named(self, hand: int, pattern: re.Pattern[str]) -> list[int]:
-        below = self.skeleton.subtree(hand)[1:]
-        return [j for j in below if pattern.search(self.skeleton.names[j])]
+    def _finger(self, hand: int, name: str) -> list[int]:
+        fingers = fingers_below(self.skeleton, hand)
+        return [j for j, finger in fingers.items() if finger == name]
 
     def _vector(self, joint: int, joints: list[int], tipped: list[int]) -> Vector | None:
         """From `joint` to the middle of other joints and of the End Sites on `tipped`."""

@@ -62,7 +62,7 @@ class NameHint:
 
 def read_names(names: Sequence[str]) -> list[NameHint]:
     """What each name of a skeleton says; a prefix or suffix that most names share says nothing."""
-    cut = [_pieces(name) for name in names]
+    cut = [split_name(name) for name in names]
     if len(names) >= 5:
         _strip_common(cut, 0)
         _strip_common(cut, -1)
@@ -70,7 +70,9 @@ def read_names(names: Sequence[str]) -> list[NameHint]:
     return [_read(tuple(pieces), axes) for pieces in cut]
 
 
-def _pieces(name: str) -> list[str]:
+def split_name(name: str) -> list[str]:
+    """The pieces of a name between capitals, digits and other signs, in lower case and without its
+    namespace: left, hand, index, 1 of `mixamorig:LeftHandIndex1`."""
     name = unicodedata.normalize("NFKC", name)
     name = re.split(r"[:|]", name)[-1]
     return [piece.lower() for piece in _PIECES.findall(name)]

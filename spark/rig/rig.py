@@ -10,6 +10,7 @@ from jaxtyping import Float
 from spark.kinematics import world_positions
 from spark.motion import Motion
 from spark.rig.feet import FEET, HIP_HEIGHT, UPPER_LEGS, Sole, hip_height, human_soles
+from spark.rig.fingers import FingerBone, finger_bones
 from spark.rig.groups import groups_of
 from spark.rig.role_assignment import Override, assign_roles
 from spark.rig.roles import Group, Role, RoleMap
@@ -100,6 +101,11 @@ class Rig:
         bones = np.diff(self.tpose_positions[joints], axis=0)
         *arc, length = np.cumsum(np.linalg.norm(bones, axis=1)).tolist()
         return Chain(joints, [0.0, *(a / (length or 1.0) for a in arc), 1.0])
+
+    @cached_property
+    def fingers(self) -> dict[FingerBone, int]:
+        """The joints of the fingers, as far as names tell them."""
+        return finger_bones(self.skeleton, self.roles)
 
     @cached_property
     def contact_joints(self) -> list[int]:

@@ -3,8 +3,8 @@
 Joints of the same role turn alike. Where spine or neck have other joints, or the same number in
 other places, rotations are interpolated by normalised arc length, with the pelvis at 0 and the
 topmost spine joint at 1 (for the neck: topmost spine joint and head). Joints without a role copy
-those of the same name in the same place, or follow their parent. This is the row "copy" of every
-table.
+those of the same name in the same place; fingers the same bone of the same finger, whatever its
+name; all others follow their parent. This is the row "copy" of every table.
 """
 
 from bisect import bisect_right
@@ -13,13 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from spark.errors import name_list
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
-from spark.rotation import quat_conj, quat_slerp
+from spark.rotation import quat_angle, quat_conj, quat_slerp
 from spark.transfer.canonical import CanonicalMotion
 
 _SAME_PLACE = 0.3  # joints of equally long chains, taken one by one, lie nearer to one another
 _NEAR = 0.26  # further than this from any of the source's joints, what a joint does is a guess
+
+_FINGER_BENDS = np.radians(5)  # a finger that bends less against its hand is at rest
 
 # A floor further than this from z = 0, in hip heights, is moved to 0.
 _FLOOR_TOLERANCE = 0.1
@@ -95,6 +98,9 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
             unmatched[j] = j if lonely and len(joints) > 1 else -1
 
     names = {name: j for j, name in enumerate(source.skeleton.names)}
+    fingers = {
+        j: source.fingers[bone] for bone, j in target.fingers.items() if bone in source.fingers
+    }
     above = target.skeleton.ancestors(target.pelvis)[1:]
     for j in range(size):
         if known[j]:
@@ -110,6 +116,8 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
         parent = int(target.skeleton.parents[j])
         if same is not None and not mix[parent] and _hangs(source, same, int(first[parent])):
             copy(j, same)
+        elif j in fingers:
+            copy(j, fingers[j])
         else:
             first[j], second[j], mix[j] = first[parent], second[parent], mix[parent]
             unmatched[j] = j if target.roles.roles[j] in _SHOULDERS else unmatched[parent]
@@ -124,7 +132,7 @@ def transfer(source: CanonicalMotion, target: Rig) -> CanonicalMotion:
     """
     rotations = correspond(source.rig, target).rotations(source.rotations, target)
     scale = target.hip_height / source.rig.hip_height
-    notes = (*source.notes, *_without_arms(source.rig, target))
+    notes = (*source.notes, *_without_arms(source.rig, target), *_without_fingers(source, target))
     lift = 0.0
     if abs(source.floor_z) > _FLOOR_TOLERANCE * source.rig.hip_height:
         lift = source.floor_z
@@ -145,6 +153,27 @@ def _without_arms(source: Rig, target: Rig) -> tuple[str, ...]:
     if own and not theirs:
         return ("the source has no arms: the target's stay out to the sides, as in the T-pose",)
     return ()
+
+
+def _without_fingers(source: CanonicalMotion, target: Rig) -> tuple[str, ...]:
+    """Which fingers of the source are left out, where they bend, and which of the target follow
+    their hands."""
+    theirs = {bone: j for bone, j in source.rig.fingers.items() if bone.number}
+    own = {bone: j for bone, j in target.fingers.items() if bone.number}
+    notes: tuple[str, ...] = ()
+    lost = [j for bone, j in theirs.items() if bone not in own]
+    hands = [source.rig.roles.require(Role(f"{b.side}_hand")) for b in theirs if b not in own]
+    bends = quat_angle(source.rotations[:, hands], source.rotations[:, lost])
+    bent = [j for j, angle in zip(lost, bends.T, strict=True) if angle.max() > _FINGER_BENDS]
+    if bent:
+        notes += (
+            f"{name_list([source.rig.skeleton.names[j] for j in bent])}: left out, fingers that "
+            f"the target lacks (they bend by up to {np.degrees(bends.max()):.0f} degrees)",
+        )
+    still = [target.skeleton.names[j] for bone, j in own.items() if bone not in theirs]
+    if still:
+        notes += (f"{name_list(still)}: fingers that the source lacks, they follow their hands",)
+    return notes
 
 
 def _hangs(rig: Rig, joint: int, ancestor: int) -> bool:

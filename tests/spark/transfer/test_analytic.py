@@ -11,14 +11,15 @@ from spark.io.recording import read_recording
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig.contacts import floor_height, planted_feet
+from spark.rig.fingers import FingerBone
 from spark.rig.rig import Rig, understand
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import quat_about, quat_angle, quat_mul, quat_normalize, quat_rotate
 from spark.skeleton import Skeleton
 from spark.transfer.analytic import correspond, transfer
-from spark.transfer.canonical import from_canonical, to_canonical
+from spark.transfer.canonical import CanonicalMotion, from_canonical, to_canonical
 from tests.helpers.humanoids import ONE_A_RIG
-from tests.helpers.recordings import DATA, recordings
+from tests.helpers.recordings import DATA, recording, recordings
 from tests.helpers.stick import joint, standing, stick_rig, without
 
 
@@ -151,35 +152,128 @@ def test_planted_feet_of_a_walk() -> None:
     assert planted.any(1).mean() > 0.9, "one foot stands at all times"
 
 
-def with_fingers(names: tuple[str, str]) -> Rig:
-    """The stick man with a joint on each hand."""
+def with_fingers(*rows: tuple[str, Role | str]) -> Rig:
+    """The stick man with joints, each by its name and what it hangs on: a hand, or a name."""
     rig = stick_rig()
-    skeleton = rig.skeleton
-    hands = [joint(Role.LEFT_HAND), joint(Role.RIGHT_HAND)]
+    skeleton, size = rig.skeleton, len(rig.skeleton) + len(rows)
+    names = [*skeleton.names, *(name for name, _ in rows)]
+    outwards = [[0.0, 0.1 if names.index(str(on)) < 15 else -0.1, 0] for _, on in rows]
     return replace(
         rig,
         skeleton=Skeleton(
-            (*skeleton.names, *names),
-            np.append(skeleton.parents, hands),
-            np.concatenate([skeleton.offsets, [[0.0, 0.1, 0], [0.0, -0.1, 0]]]),
-            np.append(skeleton.translating, [False, False]),
+            tuple(names),
+            np.append(skeleton.parents, [names.index(str(on)) for _, on in rows]),
+            np.concatenate([skeleton.offsets, outwards]),
+            np.append(skeleton.translating, [False] * len(rows)),
             skeleton.end_parents,
             skeleton.end_offsets,
         ),
-        roles=RoleMap((*rig.roles.roles, None, None), (1.0,) * 20, ("",) * 20),
-        tpose=np.tile([1.0, 0, 0, 0], (20, 1)),
+        roles=RoleMap((*rig.roles.roles, *[None] * len(rows)), (1.0,) * size, ("",) * size),
+        tpose=np.tile([1.0, 0, 0, 0], (size, 1)),
     )
 
 
+def on_hands(left: str, right: str) -> list[tuple[str, Role | str]]:
+    return [(left, Role.LEFT_HAND), (right, Role.RIGHT_HAND)]
+
+
+def hands(template: str, *fingers: str, bones: int = 3) -> Rig:
+    """The stick man with fingers of some bones on both hands."""
+    rows: list[tuple[str, Role | str]] = []
+    for hand in (Role.LEFT_HAND, Role.RIGHT_HAND):
+        for finger in fingers:
+            on: Role | str = hand
+            for n in range(1, bones + 1):
+                name = template.format(
+                    Left=hand.side.title(), L=hand.side[0].upper(), f=finger, n=n
+                )
+                rows.append((name, on))
+                on = name
+    return with_fingers(*rows)
+
+
+MIXAMO = ("mixamorig:{Left}Hand{f}{n}", "Thumb", "Index", "Middle", "Ring", "Pinky")
+RIGIFY = ("DEF-{f}.0{n}.{L}", "f_pinky", "f_ring", "f_middle", "f_index", "thumb")
+
+
+def turning(rig: Rig) -> CanonicalMotion:
+    """Arms and all that hangs on them turned at random."""
+    q = quat_normalize(np.random.default_rng(3).normal(size=(4, len(rig.skeleton), 4)))
+    q[:, : joint(Role.LEFT_UPPER_ARM)] = (1, 0, 0, 0)
+    return to_canonical(replace(standing(rig, 4), rotations=q, skeleton=rig.skeleton), rig)
+
+
+def test_fingers_turn_alike_under_other_names_and_in_another_order() -> None:
+    source, target = turning(hands(*MIXAMO)), hands(*RIGIFY)
+    moved = transfer(source, target)
+    assert len(target.fingers) == 30
+    for bone, j in target.fingers.items():
+        theirs = source.rig.fingers[bone]
+        np.testing.assert_array_equal(moved.rotations[:, j], source.rotations[:, theirs])
+    assert moved.notes == ()
+
+
+def test_fingers_without_a_counterpart_are_named_and_follow() -> None:
+    """A third phalanx goes with the second, a finger with its hand; what is left out is said, if
+    it does anything."""
+    source, target = turning(hands(*MIXAMO[:3], bones=2)), hands(RIGIFY[0], "thumb", "f_ring")
+    moved = transfer(source, target)
+    at = {name: j for j, name in enumerate(target.skeleton.names)}
+    for joint_name, goes_with in (
+        ("DEF-thumb.03.L", at["DEF-thumb.02.L"]),
+        ("DEF-f_ring.01.R", joint(Role.RIGHT_HAND)),
+        ("DEF-f_ring.02.R", joint(Role.RIGHT_HAND)),
+    ):
+        np.testing.assert_array_equal(
+            moved.rotations[:, at[joint_name]], moved.rotations[:, goes_with]
+        )
+    left_out, follow = moved.notes
+    assert left_out.startswith(
+        "'mixamorig:LeftHandIndex1', 'mixamorig:LeftHandIndex2', 'mixamorig:RightHandIndex1', "
+        "'mixamorig:RightHandIndex2': left out, fingers that the target lacks"
+    )
+    assert "'DEF-thumb.03.L', 'DEF-f_ring.01.L'" in follow
+    assert "they follow their hands" in follow
+    still = to_canonical(replace(standing(source.rig, 2)), source.rig)
+    assert transfer(still, target).notes == (follow,)
+
+
+def bends(motion: Motion, rig: Rig) -> dict[FingerBone, np.ndarray]:
+    """How far [rad] each finger's second bone is bent against its first."""
+    at, out = forward(motion)[0], {}
+    for bone in rig.fingers:
+        joints = [rig.fingers.get(bone._replace(number=n)) for n in (1, 2, 3)]
+        if bone.number == 1 and None not in joints:
+            a, b = np.moveaxis(np.diff(at[:, joints], axis=1), 1, 0)
+            lengths = np.linalg.norm(a, axis=-1) * np.linalg.norm(b, axis=-1)
+            out[bone] = np.arccos(np.clip((a * b).sum(-1) / lengths, -1, 1))
+    return out
+
+
+def test_a_recorded_hand_bends_on_another_makers_rig_as_it_did() -> None:
+    """Mixamo to MakeHuman, which counts its fingers: both hands bend alike from where they rest."""
+    source = read_recording(recording("mixamo_pairs/Remy/idle_301f_2.bvh")).motion
+    theirs = understand(source)
+    own = understand(read_recording(recording("makehuman/benchmark.bvh")).motion)
+    moved = transfer(to_canonical(source, theirs), own)
+    before, after = bends(source, theirs), bends(from_canonical(moved), own)
+    assert len(after) == 10
+    for bone, angle in after.items():
+        change = (angle - angle[0]) - (before[bone] - before[bone][0])
+        assert np.degrees(np.abs(change)).max() < 2
+    largest = np.degrees([np.ptp(angle) for angle in before.values()])
+    assert (largest > 6).sum() >= 4, "fingers that kept still would pass"
+
+
 def test_joints_without_a_role_copy_their_namesakes_or_follow() -> None:
-    source = with_fingers(("LeftIndex1", "RightIndex1"))
+    source = with_fingers(*on_hands("LeftTail", "RightTail"))
     rotations = np.tile([1.0, 0, 0, 0], (4, 20, 1))
     rotations[:, 18] = quat_about("x", np.array(0.7))
     canonical = to_canonical(
         replace(standing(source, 4), rotations=rotations, skeleton=source.skeleton), source
     )
-    same = transfer(canonical, with_fingers(("LeftIndex1", "Tail")))
-    other = transfer(canonical, with_fingers(("Strap", "Tail")))
+    same = transfer(canonical, with_fingers(*on_hands("LeftTail", "Tail")))
+    other = transfer(canonical, with_fingers(*on_hands("Strap", "Tail")))
     assert np.allclose(same.rotations[:, 18], rotations[:, 18])
     assert np.allclose(same.rotations[:, 19], [1, 0, 0, 0])
     assert np.allclose(other.rotations[:, 18], [1, 0, 0, 0])

@@ -1,0 +1,124 @@
+"""Fingers: which joint is which bone of which finger of a hand.
+
+Names tell the finger, and the order below the hand tells the bone. Conventions name fingers
+(`LeftHandIndex1`, `f_index.01.L`, `CC_Base_L_Mid1`) or count them from the thumb on (`finger2-1.L`,
+`Bip01 L Finger01`, `LeftFinger1Proximal`).
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+from spark.rig.aliases import FINGER_TIP, FINGERS, METACARPAL
+from spark.rig.name_hints import split_name
+from spark.rig.roles import Role, RoleMap
+from spark.skeleton import Skeleton
+
+FINGER_NAMES = tuple(dict.fromkeys(FINGERS.values()))
+"""The five fingers, from the thumb on."""
+ALL_FINGERS = "fingers"
+"""One joint for all of them, or for all but the thumb."""
+
+_PREFIX = "(?:l|r|left|right|左|右)?(?:hand)?"
+_NAMED = re.compile(rf"{_PREFIX}({'|'.join(FINGERS)})(?:finger)?s?")
+_COUNTED = re.compile(rf"{_PREFIX}(?:fingers?|指)")
+_PHALANGES = 3
+
+
+class FingerBone(NamedTuple):
+    """A bone of a finger: its hand's side, the finger, and its number from the palm outwards.
+
+    0 is the metacarpal, inside the palm; 1 to 3 are the phalanges. A thumb's metacarpal bends as a
+    phalanx does, and is its first.
+    """
+
+    side: str
+    finger: str
+    number: int
+
+
+def finger_bones(skeleton: Skeleton, roles: RoleMap) -> dict[FingerBone, int]:
+    """The joints of a rig's fingers. Tips, which have no bone below them, are left out."""
+    found: dict[FingerBone, int] = {}
+    for hand_role in (Role.LEFT_HAND, Role.RIGHT_HAND):
+        hand = roles.joint(hand_role)
+        if hand is None:
+            continue
+        chains: dict[str, list[int]] = {}
+        for joint, finger in fingers_below(skeleton, hand).items():
+            chain = chains.setdefault(finger, [])
+            tip = FINGER_TIP.intersection(split_name(skeleton.names[joint]))
+            if not tip and (not chain or chain[-1] in skeleton.ancestors(joint)):
+                chain.append(joint)
+        for finger, chain in chains.items():
+            palm = _in_palm([split_name(skeleton.names[j]) for j in chain], finger)
+            for joint in chain[palm - 1 : palm]:
+                found[FingerBone(hand_role.side, finger, 0)] = joint
+            for number, joint in enumerate(chain[palm:][:_PHALANGES], start=1):
+                found[FingerBone(hand_role.side, finger, number)] = joint
+    return found
+
+
+def fingers_below(skeleton: Skeleton, hand: int) -> dict[int, str]:
+    """The joints below a hand whose names tell a finger, parents first, and the finger."""
+    pieces = {j: split_name(skeleton.names[j]) for j in skeleton.subtree(hand)[1:]}
+    named = {j: finger for j, words in pieces.items() if (finger := _named(words))}
+    counts = {j: _count(words) for j, words in pieces.items() if j not in named}
+    counted = {j: count for j, count in counts.items() if count is not None}
+    fingers = _fingers_of_counts(skeleton, counted, "thumb" in named.values())
+    return dict(sorted((named | fingers).items()))
+
+
+def _named(pieces: Sequence[str]) -> str | None:
+    """The finger that a name's pieces name."""
+    matches = (_NAMED.fullmatch(piece) for piece in pieces)
+    return next((FINGERS[match[1]] for match in matches if match), None)
+
+
+def _count(pieces: Sequence[str]) -> str | None:
+    """The digits behind the word finger, of which the first counts fingers, or "" without any;
+    None where that word is not there.
+
+    "0", "01" and "02" are the bones of finger 0 (Biped), and so are "0" and "1", "0" and "2".
+    """
+    for i, piece in enumerate(pieces):
+        if _COUNTED.fullmatch(piece):
+            digits = [p for p in pieces[i + 1 : i + 3] if p.isdecimal()]
+            return str(int(digits[0])) if len(digits) > 1 else "".join(digits)
+    return None
+
+
+def _fingers_of_counts(
+    skeleton: Skeleton, counts: Mapping[int, str], has_thumb: bool
+) -> dict[int, str]:
+    """The fingers of counted joints: from the thumb on or, where that has a name, from the index.
+
+    Joints without a number, with a single one other than Biped's 0, or with numbers that go on
+    along a finger are one finger for all.
+    """
+    numbers = sorted({int(digits[0]) for digits in counts.values() if digits})
+    nested = any(
+        digits[:1] and counts.get(above, "")[:1] not in ("", digits[0])
+        for j, digits in counts.items()
+        for above in skeleton.ancestors(j)
+    )
+    if nested or (len(numbers) < 2 and "0" not in counts.values()):
+        return dict.fromkeys(counts, ALL_FINGERS)
+    first = numbers[0] if has_thumb else min(numbers[0], 1)
+    names = FINGER_NAMES[1:] if has_thumb else FINGER_NAMES
+    return {
+        j: names[int(digits[0]) - first] if digits else ALL_FINGERS
+        for j, digits in counts.items()
+        if int(digits[:1] or 0) - first < len(names)
+    }
+
+
+def _in_palm(names: Sequence[Sequence[str]], finger: str) -> int:
+    """How many of a finger's joints, from the palm outwards, lie inside the palm: those that are
+    called so, and a helper above a joint of the same name (`__Index1_L`, `Index1_L`)."""
+    called = [finger != "thumb" and bool(METACARPAL.intersection(pieces)) for pieces in names]
+    twice = [above == below for above, below in pairwise(names)]
+    inside = [i for i, holds in enumerate(called, start=1) if holds]
+    inside += [i for i, holds in enumerate(twice, start=1) if holds]
+    return max(inside, default=0)
