@@ -23,7 +23,6 @@ from spark.training.name_encoder import NameConfig, NameEncoder
 from spark.training.onnx import INPUTS, export_onnx
 from spark.training.pairs import PairMaker
 from spark.training.tensors import PoseTensors, Start
-from tests.spark.training.test_model import PRESETS, maker  # noqa: F401
 
 
 def small(config: Config, **changes: object) -> Config:
@@ -47,7 +46,7 @@ def awake(model: torch.nn.Module) -> None:
 def test_the_network_without_torch_is_the_network(
     preset: Config,
     changes: dict[str, bool],
-    maker: PairMaker,  # noqa: F811
+    maker: PairMaker,
     tmp_path: Path,
 ) -> None:
     torch.manual_seed(0)
@@ -82,7 +81,7 @@ def test_the_network_without_torch_is_the_network(
     assert isinstance(batch.start, Start)
 
 
-def test_onnx_is_the_network(maker: PairMaker, tmp_path: Path) -> None:  # noqa: F811
+def test_onnx_is_the_network(maker: PairMaker, tmp_path: Path) -> None:
     """One graph, on bodies and lengths that it was not traced with."""
     torch.manual_seed(0)
     names = NameEncoder(NameConfig(width=16, heads=2, blocks=1, rig_blocks=1)).eval()
@@ -121,7 +120,7 @@ def test_onnx_is_the_network(maker: PairMaker, tmp_path: Path) -> None:  # noqa:
         export_onnx(Checkpoint(Spark(small(Config.paper(), name_width=18)), names), tmp_path / "b")
 
 
-def test_weights_that_lack_a_tensor_are_damaged(maker: PairMaker, tmp_path: Path) -> None:  # noqa: F811
+def test_weights_that_lack_a_tensor_are_damaged(maker: PairMaker, tmp_path: Path) -> None:
     names = NameEncoder(NameConfig(width=16, heads=2, blocks=1, rig_blocks=1))
     checkpoint = Checkpoint(Spark(small(Config.default(), name_width=18)), names)
     save_checkpoint(checkpoint, tmp_path / "a.safetensors")

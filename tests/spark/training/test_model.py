@@ -1,23 +1,14 @@
 """Laws of the network: what padding, initialisation and time must not change."""
 
-import numpy as np
 import pytest
 import torch
 
-from spark.demo.sample import sample_motion, sample_rig
-from spark.kinematics import forward, world_positions
 from spark.network.config import Config
-from spark.network.features import body_features, canonical_from_features, pose_features
-from spark.rig.contacts import planted_feet
-from spark.rig.name_conventions import CONVENTIONS, name_joints
-from spark.rig.roles import Role
-from spark.rotation import matrix_from_sixd, quat_angle
 from spark.training import losses
 from spark.training.batch import Batch, Collator
-from spark.training.mirror import mirrored_body, mirrored_motion
 from spark.training.model import Spark, _corrected
 from spark.training.name_encoder import NameEncoder
-from spark.training.pairs import PairMaker, TrainingClip
+from spark.training.pairs import PairMaker
 from spark.training.tensors import (
     Body,
     PoseTensors,
@@ -26,46 +17,8 @@ from spark.training.tensors import (
     take,
     world_matrices,
 )
-from spark.training.variants import same_body
-from spark.transfer.canonical import to_canonical
 from tests.helpers import plain_spark
-
-SMALL = {"width": 32, "heads": 2, "encoder_blocks": 1, "decoder_blocks": 2}
-PRESETS = [
-    pytest.param(Config(**{**vars(Config.paper()), **SMALL}), id="paper"),
-    pytest.param(Config(**{**vars(Config.default()), **SMALL}), id="default"),
-]
-
-
-@pytest.fixture(scope="module")
-def maker() -> PairMaker:
-    clips = []
-    for build in ("walker", "dancer"):
-        rig = sample_rig(build)
-        motion = sample_motion("walk", rig, 30.0)
-        body = body_features(rig)
-        canonical = to_canonical(motion, rig)
-        clips.append(
-            TrainingClip(
-                build,
-                body,
-                canonical.rotations[:, body.joints],
-                canonical.hips / rig.hip_height,
-                planted_feet(rig, forward(motion)[0], motion.frame_time),
-                motion.frame_time,
-            )
-        )
-    return PairMaker(clips, window=16, variants=8)
-
-
-@pytest.fixture(scope="module")
-def batch(maker: PairMaker) -> Batch:
-    torch.manual_seed(0)
-    return Collator(NameEncoder().encode).batch([maker.draw(n, 2) for n in range(3)])
-
-
-def start_of(config: Config, batch: Batch) -> Start | None:
-    return batch.start if config.residual else None
+from tests.helpers.training import PRESETS, SMALL, start_of
 
 
 def pad_start(start: Start, extra: int) -> Start:
@@ -183,32 +136,6 @@ def test_one_step_learns_and_every_weight_takes_part(config: Config, batch: Batc
     assert all("query" in name or "arc" in name for name in unused), unused
 
 
-def test_network_kinematics_agree_with_ours(maker: PairMaker, batch: Batch) -> None:
-    """Pointer jumping on torch against the level-wise walk on numpy."""
-    rig = sample_rig("dancer")
-    motion = sample_motion("wave", rig, 30.0)
-    body = body_features(rig)
-    sixd, root, _ = pose_features(to_canonical(motion, rig), body)
-    made = Collator(NameEncoder().encode).bodies([body], [1])
-    pose = PoseTensors(torch.as_tensor(sixd)[None].float(), torch.as_tensor(root)[None].float())
-    ours = forward_kinematics(pose, made)[0].numpy() * rig.hip_height
-    expected = forward(motion)[0]
-    expected = expected - expected[:, rig.hips].mean(1)[:, None]
-    heads = [rig.roles.require(r) for r in (Role.HEAD, Role.LEFT_HAND, Role.RIGHT_TOE)]
-    places = [body.joints.tolist().index(j) for j in heads]
-    np.testing.assert_allclose((ours - ours[:, :1])[:, places], expected[:, heads], atol=1e-5)
-
-
-@pytest.mark.parametrize("name", ["walk", "wave"])
-def test_features_turn_back_into_the_motion(name: str) -> None:
-    rig = sample_rig("walker")
-    canonical = to_canonical(sample_motion(name, rig, 30.0), rig)
-    body = body_features(rig)
-    back = canonical_from_features(*pose_features(canonical, body), body, canonical)
-    assert quat_angle(back.rotations, canonical.rotations).max() < 1e-6
-    np.testing.assert_allclose(back.hips, canonical.hips, atol=1e-9)
-
-
 def test_causal_network_does_not_see_the_future(batch: Batch) -> None:
     torch.manual_seed(0)
     config = Config(**{**vars(Config.default()), **SMALL, "causal": True, "residual": False})
@@ -221,96 +148,6 @@ def test_causal_network_does_not_see_the_future(batch: Batch) -> None:
         b = model(later, batch.source, batch.target).rotations
     torch.testing.assert_close(a[:, :8], b[:, :8], atol=1e-5, rtol=0)
     assert (a[:, 8:] - b[:, 8:]).abs().max() > 1e-4
-
-
-def test_losses_are_zero_at_the_truth_and_ignore_padding(batch: Batch) -> None:
-    truth = forward_kinematics(batch.truth, batch.target)
-    assert losses.reconstruction(batch.truth, batch.truth, batch.target) == 0
-    assert losses.positions(truth, truth, batch.target) == 0
-    assert losses.root(batch.truth, batch.truth) == 0
-    wrong = batch.truth.rotations + 9 * ~batch.target.valid[:, None, :, None]
-    assert (
-        losses.reconstruction(PoseTensors(wrong, batch.truth.root), batch.truth, batch.target) == 0
-    )
-
-
-def test_contact_loss_by_hand() -> None:
-    """A planted joint that slides 0.1 hip heights a frame at 10 Hz has speed 1, squared 1."""
-    positions = torch.zeros(1, 3, 2, 3)
-    positions[0, :, 1, 0] = torch.tensor([0.0, 0.1, 0.2])
-    planted = torch.tensor([[[False, True]] * 3])
-    body = Body(
-        *[torch.zeros(1, 2, 1)] * 5, torch.ones(1, 2, dtype=torch.bool), *[torch.zeros(1)] * 2
-    )
-    assert losses.contact(positions, planted, 0.1, body).item() == pytest.approx(1.0)
-
-
-def test_draws_are_reproducible_whatever_came_before(maker: PairMaker) -> None:
-    first = maker.draw(5, 2)
-    maker.draw(6, 2)
-    again = maker.draw(5, 2)
-    np.testing.assert_array_equal(first.target.rotations, again.target.rotations)
-    other = PairMaker([*maker._bodies[0], *maker._bodies[1]], window=16, variants=8)
-    np.testing.assert_array_equal(first.start.rotations, other.draw(5, 2).start.rotations)
-
-
-def test_the_answer_stands_where_the_copy_slides(maker: PairMaker) -> None:
-    """On bodies with toes: without, the ankle is the contact, and rises over a standing toe."""
-    speeds: dict[str, list[float]] = {"truth": [], "start": []}
-    collator = Collator(NameEncoder().encode)
-    for n in range(20):
-        draw = maker.draw(n, 2)
-        if Role.LEFT_TOE not in draw.target.body.rig.roles.roles:
-            continue
-        made = collator.batch([draw])
-        for name, pose in (("truth", made.truth), ("start", made.start.pose)):
-            positions = forward_kinematics(pose, made.target)
-            speeds[name].append(
-                losses.contact(positions, made.planted, made.frame_time, made.target).item()
-            )
-    assert np.mean(speeds["truth"]) < 0.5 * np.mean(speeds["start"])
-
-
-def test_a_mirrored_body_moves_as_in_a_mirror(maker: PairMaker) -> None:
-    clip = maker._bodies[0][0]
-    body = same_body(clip.body).body
-    mirrored = mirrored_body(body)
-    rotations, hips, _ = mirrored_motion(clip.rotations, clip.hips, clip.planted)
-    straight, flipped = (
-        world_positions(body.skeleton, clip.rotations, clip.hips),
-        world_positions(mirrored.skeleton, rotations, hips),
-    )
-    np.testing.assert_allclose(flipped, straight * [1, -1, 1], atol=1e-12)
-    left, right = (body.rig.roles.require(r) for r in (Role.LEFT_HAND, Role.RIGHT_HAND))
-    assert mirrored.rig.roles.roles[left] is Role.RIGHT_HAND
-    assert mirrored.skeleton.names[left] == body.skeleton.names[right]
-    again = mirrored_body(mirrored)
-    assert again.skeleton.names == body.skeleton.names
-    assert again.rig.roles.roles == body.rig.roles.roles
-
-
-def test_varied_draws_have_something_to_guess(maker: PairMaker) -> None:
-    clips = [clip for group in maker._bodies for clip in group]
-    varied = PairMaker(clips, window=16, variants=32, varied=True)
-    draws = [varied.draw(n, 1) for n in range(20)]
-    assert np.mean([(draw.unmatched >= 0).any() for draw in draws]) > 0.8
-    paces = [np.diff(draw.target.root[0, :, 0]).mean() for draw in draws]
-    assert len(np.unique(np.round(paces, 6))) > 10
-
-
-def test_rotations_of_pairs_are_rotations(batch: Batch) -> None:
-    for pose in (batch.pose, batch.truth, batch.start):
-        R = matrix_from_sixd(pose.rotations)
-        torch.testing.assert_close(
-            R @ R.transpose(-1, -2), torch.eye(3).expand_as(R), atol=1e-5, rtol=0
-        )
-
-
-@pytest.mark.parametrize("convention", CONVENTIONS)
-def test_conventions_name_every_joint_apart(convention: str) -> None:
-    roles = [Role.PELVIS, Role.SPINE, Role.SPINE, Role.NECK, *list(Role)[3:]]
-    names = name_joints(roles, convention)
-    assert len(set(names)) == len(names)
 
 
 def test_a_group_may_have_more_joints_than_places(batch: Batch) -> None:

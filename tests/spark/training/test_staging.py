@@ -3,34 +3,16 @@
 import numpy as np
 import pytest
 
-from spark.demo.sample import sample_motion, sample_rig
-from spark.kinematics import forward, world_positions
-from spark.network.features import body_features
-from spark.rig.contacts import planted_feet
-from spark.rig.roles import Group
+from spark.kinematics import world_positions
 from spark.skeleton import Skeleton
 from spark.training.name_encoder import NameEncoder
 from spark.training.pairs import PairMaker, TrainingClip
-from spark.training.staging import StagedBody, leg_of
+from spark.training.staging import StagedBody
 from spark.training.variants import midway, random_variant, same_body
-from spark.transfer.canonical import to_canonical
 
 
-@pytest.fixture(scope="module")
-def clips() -> list[TrainingClip]:
-    made = []
-    for build in ("walker", "dancer"):
-        rig = sample_rig(build)
-        motion = sample_motion("walk", rig, 30.0)
-        body, canonical = body_features(rig), to_canonical(motion, rig)
-        planted = planted_feet(rig, forward(motion)[0], motion.frame_time)
-        rotations, hips = canonical.rotations[:, body.joints], canonical.hips / rig.hip_height
-        made.append(TrainingClip(build, body, rotations, hips, planted, motion.frame_time))
-    return made
-
-
-def test_draws_made_together_are_those_made_alone(clips: list[TrainingClip]) -> None:
-    maker = PairMaker(clips, window=16, variants=8, varied=True)
+def test_draws_made_together_are_those_made_alone(walks: list[TrainingClip]) -> None:
+    maker = PairMaker(walks, window=16, variants=8, varied=True)
     together = maker.draws(range(6), 3)
     assert len({len(draw.source.body.joints) for draw in together}) > 1
     for n, draw in enumerate(together):
@@ -44,10 +26,10 @@ def test_draws_made_together_are_those_made_alone(clips: list[TrainingClip]) -> 
 
 
 def test_a_planted_foot_rests_as_high_as_the_recorded_one(
-    clips: list[TrainingClip],
+    walks: list[TrainingClip],
 ) -> None:
     """By forward kinematics of the whole body, on other bones, in stances that the leg reaches."""
-    clip = clips[0]
+    clip = walks[0]
     stage = StagedBody(random_variant(clip.body, np.random.default_rng(3)))
     skeleton = stage.variant.body.skeleton
     planted = np.zeros((1, len(clip.hips), 2), bool)
@@ -72,17 +54,16 @@ def test_a_planted_foot_rests_as_high_as_the_recorded_one(
     np.testing.assert_array_equal(placed[:, above], loose[:, above])
 
 
-def test_feet_touch_the_floor_with_their_last_joint(clips: list[TrainingClip]) -> None:
+def test_feet_touch_the_floor_with_their_last_joint(walks: list[TrainingClip]) -> None:
     for seed in range(8):
-        body = random_variant(clips[0].body, np.random.default_rng(seed)).body
-        legs = [leg_of(body, group) for group in (Group.LEFT_LEG, Group.RIGHT_LEG)]
-        assert body.contacts == tuple(leg.contact for leg in legs)
+        stage = StagedBody(random_variant(walks[0].body, np.random.default_rng(seed)))
+        assert stage.variant.body.contacts == tuple(leg.contact for leg in stage.legs)
 
 
-def test_names_read_once_are_the_names_read_together(clips: list[TrainingClip]) -> None:
+def test_names_read_once_are_the_names_read_together(walks: list[TrainingClip]) -> None:
     encoder = NameEncoder().requires_grad_(False)
     remembered = encoder.remembering()
-    for clip in (*clips, *clips):
+    for clip in (*walks, *walks):
         names = same_body(clip.body).body.skeleton.names
         np.testing.assert_allclose(remembered(names), encoder.encode(names), atol=1e-5)
 

@@ -1,0 +1,61 @@
+"""Checkpoints keep everything; what is none is refused."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import torch
+from safetensors.torch import save_file
+
+from spark.errors import FileFormatError
+from spark.network.weights import VERSION, read_weights
+from spark.training.checkpoint import load_checkpoint, save_checkpoint
+from spark.training.name_encoder import NameEncoder
+from spark.training.pairs import TrainingClip
+from spark.training.settings import TrainConfig
+from spark.training.train import train
+from tests.helpers.training import TINY, fresh
+
+
+def test_a_checkpoint_keeps_everything(clips: list[TrainingClip], tmp_path: Path) -> None:
+    config = replace(TINY, steps=1)
+    made = train(clips, config, tmp_path, start=fresh(config))
+    read = load_checkpoint(tmp_path / "checkpoint.safetensors")
+    assert read.model.config == made.model.config
+    assert read.step == 1
+    assert TrainConfig.of("paper").changed("file", **read.settings) == config
+    assert isinstance(read.names, NameEncoder)
+    assert isinstance(made.names, NameEncoder)
+    torch.testing.assert_close(read.names.encode(["Hips"]), made.names.encode(["Hips"]))
+    assert {k.partition("/")[2] for k in read.optimizer} == {"step", "exp_avg", "exp_avg_sq"}
+
+
+def test_what_is_no_checkpoint_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "x.safetensors"
+    with pytest.raises(FileFormatError, match="no such file"):
+        load_checkpoint(path)
+    path.write_bytes(b"no tensors")
+    with pytest.raises(FileFormatError, match="no safetensors"):
+        load_checkpoint(path)
+    save_file({"a": torch.zeros(1)}, path)
+    with pytest.raises(FileFormatError, match="no spark-sim checkpoint"):
+        load_checkpoint(path)
+    for version, message in (("1", "version '1'"), (str(VERSION), "damaged")):
+        metadata = {"format": "spark-sim checkpoint", "version": version, "config": "{}"}
+        save_file({"a": torch.zeros(1)}, path, metadata)
+        with pytest.raises(FileFormatError, match=message):
+            load_checkpoint(path)
+    header: dict[str, object] = {"network": {}, "names": {}, "step": 0, "settings": {}}
+    for body in ({"Spine": (0.0, 0.0)}, {"Spine": "up!"}, ["Spine"], {"Spine": 1.0}):
+        metadata["config"] = json.dumps({**header, "bodies": [body]})
+        save_file({"a": torch.zeros(1)}, path, metadata)
+        with pytest.raises(FileFormatError, match="damaged"):
+            read_weights(path)
+    good = replace(fresh(TINY), bodies=[{"Spine": (0.0, 0.0, 0.25)}])
+    save_checkpoint(good, path)
+    assert load_checkpoint(path).bodies == good.bodies
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(FileFormatError, match="no safetensors"):
+        load_checkpoint(path)

@@ -1,0 +1,41 @@
+"""Clips to train on."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spark.demo.sample import sample_motion, sample_rig
+from spark.errors import FileFormatError, SkeletonError
+from spark.rotation import quat_angle
+from spark.training.clips import read_clips
+from spark.transfer.canonical import at_frame_time, to_canonical
+from spark_sim import sample
+
+
+def test_clips_at_30_fps() -> None:
+    rig = sample_rig("walker")
+    fine = to_canonical(sample_motion("walk", rig, 120.0), rig)
+    coarse = at_frame_time(fine, 1 / 30)
+    expected = to_canonical(sample_motion("walk", rig, 30.0), rig)
+    count = min(len(coarse), len(expected))
+    np.testing.assert_allclose(coarse.hips[:count], expected.hips[:count], atol=1e-6)
+    assert quat_angle(coarse.rotations[:count], expected.rotations[:count]).max() < 1e-5
+
+
+def test_nothing_to_train_on(tmp_path: Path) -> None:
+    with pytest.raises(FileFormatError, match=r"holds no \.bvh"):
+        read_clips([tmp_path])
+    (tmp_path / "a.bvh").write_text("HIERARCHY\n")
+    with pytest.raises(SkeletonError, match="no recording of a humanoid"):
+        read_clips([tmp_path])
+
+
+def test_a_broken_file_is_left_out_and_named(tmp_path: Path) -> None:
+    sample(tmp_path)
+    (tmp_path / "broken.bvh").write_text("HIERARCHY\n")
+    found, notes = read_clips([tmp_path])
+    assert len(found) == 6
+    assert len({id(clip.body) for clip in found}) == 2
+    assert len(notes) == 1
+    assert "broken.bvh" in notes[0]

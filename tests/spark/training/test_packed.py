@@ -1,0 +1,35 @@
+"""Batches on their way from a worker to the trainer."""
+
+import time
+from dataclasses import replace
+
+import torch
+
+from spark.training.name_encoder import NameEncoder
+from spark.training.packed import Packer
+from spark.training.pairs import TrainingClip
+from spark.training.train import Steps, _batches
+from tests.helpers.training import SMALL_NAMES, TINY
+
+
+def test_a_packed_batch_is_the_batch(clips: list[TrainingClip]) -> None:
+    batch = Steps(clips, NameEncoder(SMALL_NAMES).encode, TINY, 0, 1)[0]
+    again = Packer()(batch).on(torch.device("cpu"))
+    for part, other in zip(batch[:5], again[:5], strict=True):
+        assert type(part) is type(other)
+        for a, b in zip(part, other, strict=True):
+            assert a.dtype == b.dtype
+            assert torch.equal(a, b)
+    assert torch.equal(batch.planted, again.planted)
+    assert torch.equal(batch.effectors, again.effectors)
+    assert batch.frame_time == again.frame_time
+
+
+def test_batches_of_a_worker_hold_while_they_are_used(clips: list[TrainingClip]) -> None:
+    """Their memory is used again, but not before the trainer is done with them."""
+    steps = Steps(clips, NameEncoder(SMALL_NAMES).encode, replace(TINY, workers=1, steps=14), 0, 1)
+    for n, packed in enumerate(_batches(steps, 0)):
+        time.sleep(0.02)  # so that the worker is as far ahead as it may be
+        batch, again = steps[n], packed.on(torch.device("cpu"))
+        assert torch.equal(batch.truth.rotations, again.truth.rotations), n
+        assert torch.equal(batch.pose.root, again.pose.root), n
