@@ -3,9 +3,9 @@
 At its zero pose the body stands in the T-pose and all its frames are parallel to the world's (X
 forward, Y left, Z up), whatever the axes of the rig's joints: a ball joint's coordinates are the
 rotation since the T-pose, relative to the parent's. Body origins are the rig's joints, so that
-MuJoCo's `xpos` is our forward kinematics. Joints above the rig's carrier do not move the body and
-are left out; the carrier takes the free joint. With hinges in place of balls, joints without a role
-are fixed.
+MuJoCo's `xpos` is our forward kinematics. Joints above the rig's root joint do not move the body
+and are left out; the root joint becomes the free joint. With hinges in place of balls, joints
+without a role are fixed.
 """
 
 from pathlib import Path
@@ -14,21 +14,21 @@ import mujoco
 import numpy as np
 
 from sim.body.actuators import add_servos, ctrl_of_qpos, set_strength, strengths
+from sim.body.geoms import add_geoms, add_materials
 from sim.body.inertia import Inertias, inertias
 from sim.body.joints import CONES, HINGES, JointType, Range, mirrored
-from sim.body.keyframes import arms_down, balanced, lean, standing_position
+from sim.body.keyframes import arms_down, balanced, balancing_lean, standing_position
 from sim.body.mesh import hulls_of
-from sim.body.parts import DETAIL, LINK, hinges_of, joint_kind_of, kept_joints, kind_of, side_of
+from sim.body.parts import DETAIL, LINK, hinges_of, joint_class_of, kept_joints, part_of, side_of
 from sim.body.qpos import qpos_of_pose
 from sim.body.sensors import add_sensors, add_sites
-from sim.body.shapes import add_materials, add_shapes
 from spark.errors import SkeletonError
 from spark.kinematics import world_positions
 from spark.rig.rig import Rig
 
 BODY_MASS_INDEX = 22.0  # kg / m²: the middle of the healthy range
-_NEAR = 3  # joints
-_ROOT = "body"  # the class of everything
+_EXCLUDE_WITHIN = 3  # joints apart: parts so near each other touch in everyday poses
+_MAIN_CLASS = "body"  # the default class above all others
 
 
 def build_body(
@@ -59,7 +59,7 @@ def build_body(
     _add_defaults(spec, rig, masses, joints)
     add_materials(spec)
     bodies = _add_bodies(spec, rig, masses, joints)
-    add_shapes(spec, bodies, rig, hulls)
+    add_geoms(spec, bodies, rig, hulls)
     add_sites(bodies, rig, masses)
     add_servos(spec, rig)
     add_sensors(spec, bodies, rig)
@@ -72,7 +72,7 @@ def build_body(
 def _notes(rig: Rig, masses: Inertias, joints: JointType) -> list[str]:
     """What its user should know of the body."""
     notes = []
-    if (angle := lean(rig, rig.tpose, masses)) != 0.0:
+    if (angle := balancing_lean(rig, rig.tpose, masses)) != 0.0:
         notes.append(
             f"the body's weight would not lie above its soles: in the keyframes it leans "
             f"{np.degrees(abs(angle)):.0f} degrees {'forward' if angle > 0 else 'back'}"
@@ -92,7 +92,7 @@ def _add_keyframes(spec: mujoco.MjSpec, rig: Rig, masses: Inertias) -> None:
 
 def _add_defaults(spec: mujoco.MjSpec, rig: Rig, masses: Inertias, joints: JointType) -> None:
     """A class for what is seen, what collides and the soles, and one for each kind of joint."""
-    root = spec.add_default(_ROOT, spec.default)
+    root = spec.add_default(_MAIN_CLASS, spec.default)
     if joints == "ball":
         root.joint.type = mujoco.mjtJoint.mjJNT_BALL
     for name in ("visual", "collision"):
@@ -107,26 +107,26 @@ def _add_defaults(spec: mujoco.MjSpec, rig: Rig, masses: Inertias, joints: Joint
         detail = spec.add_default(DETAIL, root)
         detail.joint.armature = 2e-4
         detail.joint.stiffness[0], detail.joint.damping[0] = 0.2, 0.01
-    for kind, strength in strengths(rig, masses).items():
+    for joint_class, strength in strengths(rig, masses).items():
         if joints == "ball":
-            default = spec.add_default(kind, root)
+            default = spec.add_default(joint_class, root)
             set_strength(default, strength)
-            _set_range(default, (0, CONES[kind]), (-CONES[kind], CONES[kind]))
-        elif kind in HINGES:
-            default = spec.add_default(kind, root)
+            _limit(default, (0, CONES[joint_class]), (-CONES[joint_class], CONES[joint_class]))
+        elif joint_class in HINGES:
+            default = spec.add_default(joint_class, root)
             set_strength(default, strength)
-            hinges = HINGES[kind]
+            hinges = HINGES[joint_class]
             for hinge in hinges:
                 one = (
                     default
                     if len(hinges) == 1
-                    else spec.add_default(f"{kind}_{hinge.name}", default)
+                    else spec.add_default(f"{joint_class}_{hinge.name}", default)
                 )
                 one.joint.axis = hinge.axis
-                _set_range(one, hinge.range_deg, hinge.range_deg)
+                _limit(one, hinge.range_deg, hinge.range_deg)
 
 
-def _set_range(default: mujoco.MjsDefault, joint_deg: Range, ctrl_deg: Range) -> None:
+def _limit(default: mujoco.MjsDefault, joint_deg: Range, ctrl_deg: Range) -> None:
     default.joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
     default.joint.range = joint_deg
     default.actuator.ctrlrange = np.radians(ctrl_deg)
@@ -141,7 +141,7 @@ def _add_bodies(
         name = rig.skeleton.names[j]
         if j == rig.root_joint:
             start = standing_position(rig, rig.tpose)
-            body = spec.worldbody.add_body(name=name, pos=start, childclass=_ROOT)
+            body = spec.worldbody.add_body(name=name, pos=start, childclass=_MAIN_CLASS)
             body.add_freejoint(name=name)
         else:
             parent = int(rig.skeleton.parents[j])
@@ -159,13 +159,15 @@ def _add_bodies(
 def _add_joints(
     spec: mujoco.MjSpec, body: mujoco.MjsBody, rig: Rig, joint: int, joints: JointType
 ) -> None:
-    kind = joint_kind_of(rig, joint)
+    joint_class = joint_class_of(rig, joint)
     if joints == "ball":
-        body.add_joint(spec.find_default(kind), name=rig.skeleton.names[joint])
+        body.add_joint(spec.find_default(joint_class), name=rig.skeleton.names[joint])
         return
     hinges = hinges_of(rig, joint)
     for name, hinge in hinges:
-        default = spec.find_default(kind if len(hinges) == 1 else f"{kind}_{hinge.name}")
+        default = spec.find_default(
+            joint_class if len(hinges) == 1 else f"{joint_class}_{hinge.name}"
+        )
         body.add_joint(default, name=name, axis=mirrored(hinge.axis, side_of(rig, joint)))
 
 
@@ -174,13 +176,13 @@ def _add_excludes(spec: mujoco.MjSpec, rig: Rig) -> None:
     overlaps in a keyframe. MuJoCo itself lets parent and child be; links count as parts of what
     they hang on."""
     skeleton = rig.skeleton
-    solid = [j for j in kept_joints(rig) if kind_of(rig, j) != DETAIL]
+    solid = [j for j in kept_joints(rig) if part_of(rig, j) != DETAIL]
     above = {j: set(skeleton.ancestors(j)) & set(solid) for j in solid}
-    moving = {j for j in solid if kind_of(rig, j) != LINK}
+    moving = {j for j in solid if part_of(rig, j) != LINK}
     for a, j in enumerate(solid):
         for k in solid[a + 1 :]:
             apart = len((above[j] ^ above[k]) & moving)
-            if apart <= _NEAR and int(skeleton.parents[k]) != j:
+            if apart <= _EXCLUDE_WITHIN and int(skeleton.parents[k]) != j:
                 spec.add_exclude(bodyname1=skeleton.names[j], bodyname2=skeleton.names[k])
     model = spec.compile()
     data = mujoco.MjData(model)

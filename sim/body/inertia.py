@@ -11,8 +11,8 @@ from spark.kinematics import world_positions
 from spark.rig.rig import Rig
 from spark.rotation import matrix_from_quat
 
-LEAST_MASS = 1e-3  # [kg] of fingers and helpers: MuJoCo needs some
-_LEAST_SPREAD = 0.01  # [m], radius of gyration of what has the least mass
+MIN_MASS = 1e-3  # [kg] of fingers and helpers: MuJoCo refuses moving bodies without mass
+_MIN_GYRATION = 0.01  # [m], radius of gyration of a body of `MIN_MASS`
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Inertias:
 
 def inertias(rig: Rig, total: float) -> Inertias:
     """How a human of `total` [kg] is spread over the joints of a rig; those that carry nothing of
-    it get `LEAST_MASS`."""
+    it get `MIN_MASS`."""
     pieces = segments(rig)
     count = len(rig.skeleton)
     R = matrix_from_quat(rig.tpose[pieces.joints])
@@ -35,8 +35,8 @@ def inertias(rig: Rig, total: float) -> Inertias:
     masses, moments = np.zeros(count), np.zeros((count, 3))
     np.add.at(masses, pieces.joints, pieces.masses * total)
     np.add.at(moments, pieces.joints, (pieces.masses * total)[:, None] * piece_coms)
-    light = masses < LEAST_MASS
-    masses[light], moments[light] = LEAST_MASS, 0.0
+    light = masses < MIN_MASS
+    masses[light], moments[light] = MIN_MASS, 0.0
     coms = moments / masses[:, None]
 
     away = piece_coms - coms[pieces.joints]
@@ -45,11 +45,11 @@ def inertias(rig: Rig, total: float) -> Inertias:
     tensors = np.zeros((count, 3, 3))
     np.add.at(tensors, pieces.joints, (pieces.masses * total)[:, None, None] * about_com)
     tensors[light] = 0.0
-    tensors += LEAST_MASS * _LEAST_SPREAD**2 * np.eye(3)
+    tensors += MIN_MASS * _MIN_GYRATION**2 * np.eye(3)
     return Inertias(masses, coms, tensors)
 
 
-def held_torques(rig: Rig, bodies: Inertias) -> Float[np.ndarray, "J"]:
+def holding_torques(rig: Rig, bodies: Inertias) -> Float[np.ndarray, "J"]:
     """The torque [N m] with which gravity pulls at each joint of the T-pose when all that hangs on
     it is held out horizontally."""
     positions = world_positions(rig.skeleton, rig.tpose, np.zeros(3))

@@ -1,4 +1,4 @@
-"""What the joints of a human are called, how they turn and how far they go.
+"""The joints of a human: names, hinge axes and ranges.
 
 Axes are those of a left limb or of the trunk in the T-pose (X forward, Y left, Z up); `mirrored`
 gives the right limb's, so that the same angle is the same movement on both sides. Ranges are those
@@ -16,7 +16,7 @@ _Number = int | float
 Range = tuple[_Number, _Number]
 Axis = tuple[_Number, _Number, _Number]
 
-JOINTS: dict[str, str] = {
+JOINT_NAMES: dict[str, str] = {
     "upper_leg": "hip",
     "lower_leg": "knee",
     "foot": "ankle",
@@ -26,8 +26,8 @@ JOINTS: dict[str, str] = {
 }
 """The joint that turns each kind of body part, where it has a name of its own."""
 
-# Half the opening [deg] of the one cone, about the T-pose, that a MuJoCo ball joint has. Generous:
-# it also holds the twist; the report's own limits tell swing from twist.
+# Half the opening angle [deg] of the one cone, about the T-pose, that a MuJoCo ball joint has.
+# Generous: it also holds the twist; the report's own limits tell swing from twist.
 CONES: dict[str, int] = {
     "pelvis": 60,
     "spine": 70,
@@ -47,7 +47,7 @@ CONES: dict[str, int] = {
 
 @dataclass(frozen=True)
 class Hinge:
-    """One axis of a joint: what it does, the unit axis of the left side, its range [deg]."""
+    """One hinge of a joint: what it does, its unit axis on the left side, its range [deg]."""
 
     name: str
     axis: Axis

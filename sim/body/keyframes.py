@@ -1,4 +1,4 @@
-"""Poses to stand in: soles on the floor, the weight above them."""
+"""Poses for keyframes: soles on the floor, the centre of mass above them."""
 
 import numpy as np
 from jaxtyping import Float
@@ -10,10 +10,10 @@ from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_about, quat_conj, quat_mul, quat_rotate
 
-_ARMS_DOWN = np.radians(75)
-# Where the weight may lie between the heels (0) and the tips of the toes (1), and where it is put
-# when it lies elsewhere. Beyond the balls of the feet the toes would carry it.
-_WITHIN, _AIM = (0.1, 0.65), 0.4
+_ARMS_DOWN = np.radians(75)  # from the T-pose: hands clear of the thighs
+# Where the centre of mass may lie between the heels (0) and the tips of the toes (1), and where it
+# is put when it lies elsewhere. Beyond the balls of the feet the toes would carry the body.
+_COM_RANGE, _COM_TARGET = (0.1, 0.65), 0.4
 
 
 def arms_down(rig: Rig) -> Float[np.ndarray, "J 4"]:
@@ -27,7 +27,7 @@ def arms_down(rig: Rig) -> Float[np.ndarray, "J 4"]:
 
 
 def standing_position(rig: Rig, world: Float[np.ndarray, "J 4"]) -> Float[np.ndarray, "3"]:
-    """Where the carrier is [m] when the hips stand above the origin and the lowest point of the
+    """Where the root joint is [m] when the hips stand above the origin and the lowest point of the
     soles, or without feet of the T-pose's floor, at z = 0."""
     positions = world_positions(rig.skeleton, world, np.zeros(3))
     hips = positions[rig.hips].mean(0)
@@ -39,31 +39,33 @@ def standing_position(rig: Rig, world: Float[np.ndarray, "J 4"]) -> Float[np.nda
 def balanced(
     rig: Rig, world: Float[np.ndarray, "J 4"], masses: Inertias
 ) -> Float[np.ndarray, "J 4"]:
-    """The pose, leaning at the ankles where its weight would not lie above the soles."""
-    return _leaning(rig, world, lean(rig, world, masses))
+    """The pose, leant at the ankles where its centre of mass would not lie above the soles."""
+    return _lean_at_ankles(rig, world, balancing_lean(rig, world, masses))
 
 
-def lean(rig: Rig, world: Float[np.ndarray, "J 4"], masses: Inertias) -> float:
-    """The angle [rad] forward that brings the weight above the soles; 0 where it lies there, and
-    for a body without feet."""
-    found = _weight(rig, world, masses)
-    if found is None or _WITHIN[0] <= found[0] <= _WITHIN[1]:
+def balancing_lean(rig: Rig, world: Float[np.ndarray, "J 4"], masses: Inertias) -> float:
+    """The angle [rad] forward at the ankles that brings the centre of mass above the soles; 0 where
+    it lies there, and for a body without feet."""
+    found = _com_over_feet(rig, world, masses)
+    if found is None or _COM_RANGE[0] <= found[0] <= _COM_RANGE[1]:
         return 0.0
     angle = 0.0
     for _ in range(4):  # the body is an inverted pendulum: nearly linear
-        at, height = _weight(rig, _leaning(rig, world, angle), masses) or found
-        angle += (_AIM - at) / height
+        at, height = _com_over_feet(rig, _lean_at_ankles(rig, world, angle), masses) or found
+        angle += (_COM_TARGET - at) / height
     return angle
 
 
-def _leaning(rig: Rig, world: Float[np.ndarray, "J 4"], angle: float) -> Float[np.ndarray, "J 4"]:
-    leaning = quat_mul(quat_about("y", np.array(angle)), world)
+def _lean_at_ankles(
+    rig: Rig, world: Float[np.ndarray, "J 4"], angle: float
+) -> Float[np.ndarray, "J 4"]:
+    leant = quat_mul(quat_about("y", np.array(angle)), world)
     feet = [k for sole in rig.soles for k in rig.skeleton.subtree(sole.foot)]
-    leaning[feet] = world[feet]
-    return leaning
+    leant[feet] = world[feet]
+    return leant
 
 
-def _weight(
+def _com_over_feet(
     rig: Rig, world: Float[np.ndarray, "J 4"], masses: Inertias
 ) -> tuple[float, float] | None:
     """Where the centre of mass lies between the heels (0) and the tips of the toes (1), and its

@@ -25,8 +25,8 @@ from spark.rig.tpose import find_tpose
 from spark.rotation import quat_rotate
 from spark.skeleton import Skeleton
 
-_SHORT = 0.01  # [m]: bones below this say nothing about the scale
-_ALIKE = 0.1  # share by which bones of one body differ in length
+_MIN_BONE = 0.01  # [m]: shorter bones say nothing about the scale
+_MAX_SPREAD = 0.1  # relative: by more than this the bones of one body do not differ in length
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,12 +130,12 @@ def _scale(
         if parent in theirs:
             ours = float(np.linalg.norm(positions[j] - positions[parent]))
             length = float(np.linalg.norm(joints[k] - joints[theirs[parent]]))
-            if ours > _SHORT and length > 0:
+            if ours > _MIN_BONE and length > 0:
                 ratios.append(ours / length)
     scale = float(np.median(ratios))
     spread = float(np.percentile(np.abs(np.array(ratios) / scale - 1), 80))
     note = f"scaled by {scale:.4g}, the median of the lengths of {len(ratios)} bones"
-    if spread > _ALIKE:
+    if spread > _MAX_SPREAD:
         note += f", which differ by {100 * spread:.0f} %: is it the same body?"
     return scale, note
 

@@ -1,20 +1,19 @@
-"""Which joints of a rig move its body, and what each of them is called on it."""
+"""Which joints of a rig get a MuJoCo body, and what its part, joint and hinges are called."""
 
-from sim.body.joints import HINGES, JOINTS, Hinge
+from sim.body.joints import HINGES, JOINT_NAMES, Hinge
 from spark.rig.rig import Rig
 
-LINK = "link"
-DETAIL = "detail"
+LINK = "link"  # the part of a joint without a role that carries one with a role
+DETAIL = "detail"  # and of one that does not: fingers, face, hair
 
 
 def kept_joints(rig: Rig) -> tuple[int, ...]:
-    """The joints that have a body: the carrier and all below it, parents first."""
+    """The joints that get a body: the root joint and all below it, parents first."""
     return rig.skeleton.subtree(rig.root_joint)
 
 
-def kind_of(rig: Rig, joint: int) -> str:
-    """The role without its side (`left_foot`: "foot"); of a joint without a role, "link" where it
-    carries one that has a role, else "detail": fingers, face, hair."""
+def part_of(rig: Rig, joint: int) -> str:
+    """The role without its side (`left_foot`: "foot"), or `LINK` or `DETAIL`."""
     role = rig.roles.roles[joint]
     if role is not None:
         return role.part
@@ -22,10 +21,10 @@ def kind_of(rig: Rig, joint: int) -> str:
     return LINK if carries else DETAIL
 
 
-def joint_kind_of(rig: Rig, joint: int) -> str:
-    """What the joint that turns such a part is called: "knee" for a lower leg."""
-    kind = kind_of(rig, joint)
-    return JOINTS.get(kind, kind)
+def joint_class_of(rig: Rig, joint: int) -> str:
+    """The default class of the joint that turns such a part: "knee" for a lower leg."""
+    part = part_of(rig, joint)
+    return JOINT_NAMES.get(part, part)
 
 
 def side_of(rig: Rig, joint: int) -> str:
@@ -39,10 +38,10 @@ def side_of(rig: Rig, joint: int) -> str:
 
 def hinges_of(rig: Rig, joint: int) -> tuple[tuple[str, Hinge], ...]:
     """The hinges of a joint on a body of hinges, outermost first, and their names on it; none for
-    the carrier and for joints without a role."""
+    the root joint and for joints without a role."""
     if joint == rig.root_joint:
         return ()
-    hinges = HINGES.get(joint_kind_of(rig, joint), ())
+    hinges = HINGES.get(joint_class_of(rig, joint), ())
     name = rig.skeleton.names[joint]
     if len(hinges) == 1:
         return ((name, hinges[0]),)

@@ -4,7 +4,7 @@ There is one definition for all bodies: a right and a left point at the heel, at
 toe joint bends the foot there, and at the toes' end. A robot's shapes show where they are
 (`robots.model.soles`). BVH gives an ankle, often a toe joint, sometimes a toe tip, and never a heel
 or a width: there they are made from the T-pose, in which feet lie flat and straight ahead, and from
-body proportions. A body that is built on such a rig (`sim.body.shapes`) has its feet's lower faces
+body proportions. A body that is built on such a rig (`sim.body.geoms`) has its feet's lower faces
 between these very points.
 """
 

@@ -11,7 +11,7 @@ import pytest
 
 from sim.body.actuators import ctrl_of_qpos
 from sim.body.inertia import inertias
-from sim.body.keyframes import lean
+from sim.body.keyframes import balancing_lean
 from sim.body.qpos import qpos_of_pose
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
@@ -169,11 +169,11 @@ def test_weight_behind_the_heels_is_leant_above_the_feet() -> None:
     """A body on short feet set forward, worked by hand: the angle brings the weight over them."""
     rig = stick_rig()
     masses = inertias(rig, 70.0)
-    assert lean(rig, rig.tpose, masses) == 0.0
+    assert balancing_lean(rig, rig.tpose, masses) == 0.0
     offsets = rig.skeleton.offsets.copy()
     for knee in (joint(Role.LEFT_LOWER_LEG), joint(Role.RIGHT_LOWER_LEG)):
         offsets[knee, 0] += 0.1
     forward = replace(rig, skeleton=replace(rig.skeleton, offsets=offsets))
-    angle = lean(forward, forward.tpose, inertias(forward, 70.0))
+    angle = balancing_lean(forward, forward.tpose, inertias(forward, 70.0))
     # The weight, 0.9 m above ankles 0.1 m too far ahead, moves to 40 % of a foot 0.26 m long.
     assert np.degrees(angle) == pytest.approx(np.degrees(0.13 / 0.9), abs=3)

@@ -1,4 +1,4 @@
-"""What a body looks like and collides with: capsules along bones, a head, flat feet.
+"""The geoms of a body, seen and collided with: capsules along bones, a head, flat feet.
 
 All of it is placed in T-pose world axes, from the joint that carries it: those are a body's axes.
 """
@@ -11,15 +11,16 @@ from jaxtyping import Float
 
 from sim.body.anthropometry import RADII
 from sim.body.mesh import Hull
-from sim.body.parts import DETAIL, kind_of, side_of
+from sim.body.parts import DETAIL, part_of, side_of
 from spark.kinematics import end_positions, world_positions
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
 
-_DETAIL = 0.006  # radius of fingers, face and helpers, as a fraction of the standing height
-_HEAD = np.array([0.055, 0.045, 0.068])  # half axes of the head
-_HEAD_CENTER = np.array([0.015, 0.0, 0.055])  # from its joint
-_FOOT = 0.022  # the height of a foot's box
+# Fractions of the standing height.
+_DETAIL_RADIUS = 0.006  # of fingers, face and helpers
+_HEAD_SIZE = np.array([0.055, 0.045, 0.068])  # half axes of the ellipsoid
+_HEAD_CENTER = np.array([0.015, 0.0, 0.055])  # from the head's joint
+_FOOT_HEIGHT = 0.022  # of a foot's box
 
 # Warm on the left, cool on the right: a swapped side is seen at once.
 _MATERIALS = {
@@ -40,7 +41,7 @@ def material_of(rig: Rig, joint: int) -> str:
     return side_of(rig, joint) or "middle"
 
 
-def add_shapes(
+def add_geoms(
     spec: mujoco.MjSpec,
     bodies: dict[int, mujoco.MjsBody],
     rig: Rig,
@@ -48,19 +49,19 @@ def add_shapes(
 ) -> None:
     """Give every body its geoms: its hull where it has one, else simple ones. Those of details, and
     what lies in a foot, are only seen: feet stand on boxes, which a foot's hull hides."""
-    shapes = _Shapes(spec, bodies, rig)
+    geoms = _GeomBuilder(spec, bodies, rig)
     for j in bodies:
-        kind = kind_of(rig, j)
+        part = part_of(rig, j)
         if j in hulls:
-            shapes.hull(j, hulls[j])
-        elif kind == "head":
-            shapes.head(j)
-        elif kind not in ("foot", "toe"):
-            shapes.bones(j, kind)
-    shapes.feet(hulls)
+            geoms.hull(j, hulls[j])
+        elif part == "head":
+            geoms.head(j)
+        elif part not in ("foot", "toe"):
+            geoms.bones(j, part)
+    geoms.feet(hulls)
 
 
-class _Shapes:
+class _GeomBuilder:
     """Adds geoms to the bodies of a rig in its T-pose."""
 
     def __init__(self, spec: mujoco.MjSpec, bodies: dict[int, mujoco.MjsBody], rig: Rig) -> None:
@@ -69,11 +70,11 @@ class _Shapes:
         self.pos = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
         self.ends = end_positions(rig.skeleton, self.pos, rig.tpose)
 
-    def bones(self, joint: int, kind: str) -> None:
+    def bones(self, joint: int, part: str) -> None:
         """A capsule along each of the joint's bones; a shank's ends above the sole."""
-        radius = RADII.get(kind, _DETAIL) * self.height
+        radius = RADII.get(part, _DETAIL_RADIUS) * self.height
         for tip in self._tips(joint):
-            if kind == "lower_leg":
+            if part == "lower_leg":
                 tip = tip * max(0.5, 1.0 - radius / float(np.linalg.norm(tip)))
             self._capsule(joint, tip, radius, self._class(joint))
 
@@ -96,7 +97,7 @@ class _Shapes:
             self.spec.find_default("collision"),
             type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
             pos=_HEAD_CENTER * self.height,
-            size=_HEAD * self.height,
+            size=_HEAD_SIZE * self.height,
             material=material_of(self.rig, joint),
         )
 
@@ -120,7 +121,7 @@ class _Shapes:
         limb, at all children and End Sites."""
         rig, skeleton = self.rig, self.rig.skeleton
         children = skeleton.children[joint]
-        kept = [c for c in children if kind_of(rig, c) != DETAIL]
+        kept = [c for c in children if part_of(rig, c) != DETAIL]
         tips = [self.pos[c] for c in kept or children]
         if not kept:
             tips += list(self.ends[skeleton.end_parents == joint])
@@ -141,14 +142,14 @@ class _Shapes:
 
     def _class(self, joint: int) -> str:
         above = self.rig.skeleton.ancestors(joint)
-        foot = any(kind_of(self.rig, k) == "foot" for k in above)
-        return "visual" if foot or kind_of(self.rig, joint) == DETAIL else "collision"
+        foot = any(part_of(self.rig, k) == "foot" for k in above)
+        return "visual" if foot or part_of(self.rig, joint) == DETAIL else "collision"
 
     def _box(self, joint: int, points: Float[np.ndarray, "P 3"], *, hidden: bool) -> None:
         """A flat box between points of the sole; thinner than the joint is high."""
         low, high = points.min(0) - self.pos[joint], points.max(0) - self.pos[joint]
         half = (high - low) / 2
-        half[2] = min(_FOOT * self.height, max(-low[2], 0.01)) / 2
+        half[2] = min(_FOOT_HEIGHT * self.height, max(-low[2], 0.01)) / 2
         box = self.bodies[joint].add_geom(
             self.spec.find_default("foot"),
             type=mujoco.mjtGeom.mjGEOM_BOX,
