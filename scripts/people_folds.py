@@ -17,7 +17,7 @@ from pathlib import Path
 from spark.evaluation.cases import Case, made_cases
 from spark.evaluation.evaluate import Method, Positions, by, evaluate
 from spark.evaluation.tables import markdown
-from spark.network.retarget import Learned
+from spark.network.retarget import NetworkRetargeter
 from spark.network.weights import read_weights
 from spark.training.dataset import Performance, read_performances
 from spark.training.pairs import TrainingClip
@@ -34,13 +34,13 @@ def folds_of(found: list[Performance]) -> dict[str, int]:
     return {name: i % _FOLDS for i, name in enumerate(sorted({p.character for p in found}))}
 
 
-def trained(clips: list[TrainingClip], config: TrainConfig, out: Path) -> Learned:
+def trained(clips: list[TrainingClip], config: TrainConfig, out: Path) -> NetworkRetargeter:
     """The recipe's network of these clips."""
     path = out / "checkpoint.safetensors"
     if not path.exists():
         out.mkdir(parents=True, exist_ok=True)
         train(clips, config, out, start=fresh_checkpoint(config))
-    return Learned(read_weights(path))
+    return NetworkRetargeter(read_weights(path))
 
 
 def main(dataset: str, runs: str, names: str) -> None:
@@ -61,7 +61,9 @@ def main(dataset: str, runs: str, names: str) -> None:
     methods: dict[str, Method] = {
         "copy": cache(by(transfer)),
         "spark": cache(learned),
-        "spark, own motion, feet held": cache(partial(learned, own_motion=True, feet_held=True)),
+        "spark, target prior, feet held": cache(
+            partial(learned, target_prior=True, feet_held=True)
+        ),
     }
     rows = [evaluate(name, method, cases) for name, method in methods.items()]
     print(markdown(rows))

@@ -19,7 +19,7 @@ from spark_sim.loading import clip_of
 
 if TYPE_CHECKING:
     from sim.report import Report
-    from spark.network.retarget import Learned
+    from spark.network.retarget import NetworkRetargeter
     from spark_sim.simulation import Simulated
 
 COPIED = "each pose is copied to the robot's hinges: feet are not held, parts may collide"
@@ -118,29 +118,31 @@ def _onto_robot(source: AnyClip, target: RobotClip, *, solved: bool) -> RobotCli
     return RobotClip(moved, f"{source.name} on {target.name}", source.path)
 
 
-def _filled_in(source: CanonicalMotion, target: Clip, network: "Learned") -> CanonicalMotion:
+def _filled_in(
+    source: CanonicalMotion, target: Clip, network: "NetworkRetargeter"
+) -> CanonicalMotion:
     """As a network says and, where it corrects the transfer, the target's own motion."""
-    from spark.transfer.target_prior import with_own_motion
+    from spark.transfer.target_prior import with_target_prior
 
     if not network.network.config.residual:
         return network(source, target.rig)
-    return with_own_motion(network, source, target.canonical)
+    return with_target_prior(network, source, target.canonical)
 
 
-def _learned(checkpoint: File | None) -> "Learned":
+def _learned(checkpoint: File | None) -> "NetworkRetargeter":
     """The network of a checkpoint, or the one that ships."""
-    from spark.network.retarget import Learned
+    from spark.network.retarget import NetworkRetargeter
     from spark.network.weights import read_weights
 
-    return _shipped() if checkpoint is None else Learned(read_weights(Path(checkpoint)))
+    return _shipped() if checkpoint is None else NetworkRetargeter(read_weights(Path(checkpoint)))
 
 
 @cache
-def _shipped() -> "Learned":
-    from spark.network.retarget import Learned
+def _shipped() -> "NetworkRetargeter":
+    from spark.network.retarget import NetworkRetargeter
     from spark.network.weights import SHIPPED, read_weights
 
-    return Learned(read_weights(SHIPPED))
+    return NetworkRetargeter(read_weights(SHIPPED))
 
 
 def report(

@@ -20,7 +20,7 @@ from spark.io.reading import SUFFIXES, read_motion
 from spark.rig.rig import understand
 from spark.transfer.canonical import FRAME_TIME, at_frame_time, canonical_positions, to_canonical
 from spark.transfer.foot_lock import lock_feet
-from spark.transfer.target_prior import Retargeting, with_own_motion
+from spark.transfer.target_prior import RetargetMethod, with_target_prior
 
 Positions = Float[np.ndarray, "_ _ 3"]  # frames, joints
 Method = Callable[[Case], Positions]
@@ -91,14 +91,14 @@ def evaluate(
     )
 
 
-def by(method: Retargeting, *, own_motion: bool = False, feet_held: bool = False) -> Method:
-    """The analytic transfer, or a trained network; with `own_motion`, corrected by a recording of
+def by(method: RetargetMethod, *, target_prior: bool = False, feet_held: bool = False) -> Method:
+    """The analytic transfer, or a trained network; with `target_prior`, corrected by a recording of
     the target's own (`spark.transfer.target_prior`), with `feet_held`, then its feet held where the
     source's stand: all of it is what `retarget` does."""
 
     def run(case: Case) -> Positions:
-        if own_motion and case.own is not None:
-            moved = with_own_motion(method, case.source, case.own)
+        if target_prior and case.own is not None:
+            moved = with_target_prior(method, case.source, case.own)
         else:
             moved = method(case.source, case.truth.rig)
         return canonical_positions(lock_feet(case.source, moved) if feet_held else moved)

@@ -34,7 +34,7 @@ from spark.transfer.canonical import FRAME_TIME, CanonicalMotion, at_frame_time
 _AT_A_TIME = 32
 
 
-class Learned:
+class NetworkRetargeter:
     """The network of a checkpoint, ready to run. Raises `FileFormatError` where it is damaged."""
 
     def __init__(self, weights: Weights) -> None:

@@ -9,8 +9,8 @@ from spark.rig.limb_roles import Labels
 from spark.rig.measurements import Measurements
 from spark.rig.topology import LimbPair
 
-_FOOT, _KNEE, _ELBOW = 1.0, 3.0, 2.0  # how surely each shows the front
-_GROUND = 0.3  # hands lower than this share of the hip height stand on the ground
+_FOOT_WEIGHT, _KNEE_WEIGHT, _ELBOW_WEIGHT = 1.0, 3.0, 2.0  # how surely each shows the front
+_HAND_ON_GROUND = 0.3  # hands lower than this share of the hip height stand on the ground
 
 
 @dataclass(frozen=True)
@@ -23,24 +23,24 @@ class LabelledPair:
     def joint(self, side: int, part: str) -> int | None:
         """The joint that is `part` of the first (0) or second (1) limb."""
         chain = (self.pair.first, self.pair.second)[side]
-        place = self.labels[side].places.get(part)
+        place = self.labels[side].index.get(part)
         return None if place is None else chain[place]
 
 
 def first_is_left(
-    stance: Measurements, legs: LabelledPair, arms: LabelledPair | None, above: int | None
+    measured: Measurements, legs: LabelledPair, arms: LabelledPair | None, above: int | None
 ) -> float:
     """Evidence that the pairs' `first` limbs are the left ones: sure at 0.3, against below 0.
 
     Feet point forward, knees bend forward and elbows backward; `above` is a joint of the upper
     body, if there is one. The frame is the body's own, so the pose may sit, lie or hang.
     """
-    at = stance.joints
+    at = measured.joints
     hips = [legs.joint(side, "upper_leg") or 0 for side in (0, 1)]
     across = at[:, hips[0]] - at[:, hips[1]]
     middle = at[:, hips].mean(axis=1)
     if above is None:
-        up = middle - np.mean([stance.tip(root) for root in legs.pair.roots], axis=0)
+        up = middle - np.mean([measured.tip(root) for root in legs.pair.roots], axis=0)
     else:
         up = at[:, above] - middle
     forward = np.cross(across, up)
@@ -48,18 +48,18 @@ def first_is_left(
 
     evidence = 0.0
     for side in (0, 1):
-        evidence += _KNEE * _bend(
-            stance, legs, side, ("upper_leg", "lower_leg", "foot"), forward
-        ) + _FOOT * _foot(stance, legs, side, forward)
+        evidence += _KNEE_WEIGHT * _bend(
+            measured, legs, side, ("upper_leg", "lower_leg", "foot"), forward
+        ) + _FOOT_WEIGHT * _foot(measured, legs, side, forward)
         if arms is not None:
-            evidence -= _ELBOW * _bend(
-                stance, arms, side, ("upper_arm", "forearm", "hand"), forward
+            evidence -= _ELBOW_WEIGHT * _bend(
+                measured, arms, side, ("upper_arm", "forearm", "hand"), forward
             )
     return evidence
 
 
 def _bend(
-    stance: Measurements,
+    measured: Measurements,
     limb: LabelledPair,
     side: int,
     parts: tuple[str, str, str],
@@ -69,8 +69,8 @@ def _bend(
     upper, middle, _ = joints = [limb.joint(side, part) for part in parts]
     if upper is None or middle is None:
         return 0.0
-    at = stance.joints
-    end = stance.tip(middle) if joints[2] is None else at[:, joints[2]]
+    at = measured.joints
+    end = measured.tip(middle) if joints[2] is None else at[:, joints[2]]
     begin = at[:, upper]
     line = end - begin
     length = np.maximum(np.linalg.norm(line, axis=-1), 1e-9)
@@ -80,13 +80,13 @@ def _bend(
 
 
 def _foot(
-    stance: Measurements, legs: LabelledPair, side: int, forward: Float[np.ndarray, "T 3"]
+    measured: Measurements, legs: LabelledPair, side: int, forward: Float[np.ndarray, "T 3"]
 ) -> float:
     """How much the foot points forward: 1 straight ahead."""
     ankle = legs.joint(side, "foot")
     if ankle is None:
         return 0.0
-    foot = stance.tip(ankle) - stance.joints[:, ankle]
+    foot = measured.tip(ankle) - measured.joints[:, ankle]
     length = np.linalg.norm(foot, axis=-1)
     if np.median(length) < 1e-6:
         return 0.0
@@ -94,20 +94,20 @@ def _foot(
 
 
 def stands_on_four(
-    stance: Measurements, rest: Measurements, legs: LimbPair, arms: LimbPair
+    measured: Measurements, rest: Measurements, legs: LimbPair, arms: LimbPair
 ) -> bool:
     """Whether the tips of `arms` are as low as those of `legs`, seen from the legs' carrier.
 
     The rest pose tells where it is a stance, the typical frame of the motion otherwise: a fallen
     biped does not become a quadruped.
     """
-    for seen in (rest, stance):
+    for seen in (rest, measured):
         feet = seen.lowest[:, legs.roots].mean(axis=1)
         hands = seen.lowest[:, arms.roots].mean(axis=1)
         hips = seen.joints[:, legs.roots, 2].mean(axis=1)
         leg = max(seen.reach[legs.roots[0]], 1e-9)
         standing = hips - feet > 0.5 * leg
         if standing.any():
-            low = (hands - feet)[standing] < _GROUND * (hips - feet)[standing]
+            low = (hands - feet)[standing] < _HAND_ON_GROUND * (hips - feet)[standing]
             return bool(low.mean() > 0.5)
     return False

@@ -14,38 +14,38 @@ from spark.rig.name_hints import NameHint
 LEG = ("upper_leg", "lower_leg", "foot", "toe")
 ARM = ("clavicle", "upper_arm", "forearm", "hand")
 
-_NAME = 3.0  # what a sure name weighs against the geometry's few units
-_BENDS = 0.2  # a chain that bends less than this [rad] in a motion says nothing
-_LONGEST = 10  # joints of a chain that are looked at: a hand's fingers are beyond
+_NAME_WEIGHT = 3.0  # what a sure name weighs against the geometry's few units
+_MIN_BEND = 0.2  # a chain that bends less than this [rad] in a motion says nothing
+_MAX_CHAIN = 10  # joints of a chain that are looked at: a hand's fingers are beyond
 
 
 @dataclass(frozen=True)
 class Labels:
     """Part of a limb to its place in the chain, and how well it fits."""
 
-    places: Mapping[str, int]
+    index: Mapping[str, int]
     score: float
 
 
 def label_limb(
-    stance: Measurements,
+    measured: Measurements,
     hints: Sequence[NameHint],
     chains: Sequence[tuple[int, ...]],
     parts: tuple[str, ...],
 ) -> list[Labels]:
     """The best labels of each chain; mirrored chains of one length get the same places."""
     if len({len(chain) for chain in chains}) == 1:
-        return [_best(stance, hints, chains, parts)] * len(chains)
-    return [_best(stance, hints, [chain], parts) for chain in chains]
+        return [_best_labels(measured, hints, chains, parts)] * len(chains)
+    return [_best_labels(measured, hints, [chain], parts) for chain in chains]
 
 
-def _best(
-    stance: Measurements,
+def _best_labels(
+    measured: Measurements,
     hints: Sequence[NameHint],
     chains: Sequence[tuple[int, ...]],
     parts: tuple[str, ...],
 ) -> Labels:
-    length = min(len(chains[0]), _LONGEST)
+    length = min(len(chains[0]), _MAX_CHAIN)
     # A joint that is aside by name (a twist bone, a finger) stands for nothing.
     free = [i for i in range(length) if not any(hints[chain[i]].aside for chain in chains)]
     names = {
@@ -53,16 +53,16 @@ def _best(
         for part in parts
         for i in free
     }
-    along = [_arc_lengths(stance, chain) for chain in chains]
-    stiff = np.mean([_stiffness(stance, chain) for chain in chains], axis=0)
+    along = [_arc_lengths(measured, chain) for chain in chains]
+    stiff = np.mean([_stiffness(measured, chain) for chain in chains], axis=0)
     shape = _leg_shape if parts is LEG else _arm_shape
     best = Labels({}, float("-inf"))
-    for places in _placements(free, parts):
-        score = _NAME * sum(names[part, i] for part, i in places.items())
-        score += sum(shape(places, at) for at in along) / len(chains)
-        score -= stiff[places["lower_leg" if parts is LEG else "forearm"]]
+    for index in _placements(free, parts):
+        score = _NAME_WEIGHT * sum(names[part, i] for part, i in index.items())
+        score += sum(shape(index, at) for at in along) / len(chains)
+        score -= stiff[index["lower_leg" if parts is LEG else "forearm"]]
         if score > best.score + 1e-9:
-            best = Labels(places, score)
+            best = Labels(index, score)
     return best
 
 
@@ -80,50 +80,50 @@ def _name_score(hint: NameHint, part: str, parts: tuple[str, ...]) -> float:
     return -0.6 if any(other in hint.parts for other in parts) else 0.0
 
 
-def _arc_lengths(stance: Measurements, chain: tuple[int, ...]) -> list[float]:
+def _arc_lengths(measured: Measurements, chain: tuple[int, ...]) -> list[float]:
     """Distance along the chain from its carrier to each joint, and last to the tip [m]."""
-    at = [float(stance.bones[chain[0]])]
+    at = [float(measured.bones[chain[0]])]
     for joint in chain[1:]:
-        at.append(at[-1] + float(stance.bones[joint]))
-    return [*at, at[-1] + float(stance.end_reach[chain[-1]])]
+        at.append(at[-1] + float(measured.bones[joint]))
+    return [*at, at[-1] + float(measured.end_reach[chain[-1]])]
 
 
-def _stiffness(stance: Measurements, chain: tuple[int, ...]) -> Float[np.ndarray, "_"]:
+def _stiffness(measured: Measurements, chain: tuple[int, ...]) -> Float[np.ndarray, "_"]:
     """1 for joints that never bend in a motion in which others of the chain do, 0 otherwise."""
-    bending = stance.bending(chain)
+    bending = measured.bending(chain)
     most = np.nanmax(bending, initial=0.0)
-    return np.where((most > _BENDS) & (bending < 0.05 * most), 1.0, 0.0)
+    return np.where((most > _MIN_BEND) & (bending < 0.05 * most), 1.0, 0.0)
 
 
-def _leg_shape(places: Mapping[str, int], at: list[float]) -> float:
+def _leg_shape(index: Mapping[str, int], at: list[float]) -> float:
     """Thigh and shank are about equal and make most of the leg; the foot is about half of one."""
-    hip, knee = at[places["upper_leg"]], at[places["lower_leg"]]
-    ankle = at[places["foot"]] if "foot" in places else at[-1]
+    hip, knee = at[index["upper_leg"]], at[index["lower_leg"]]
+    ankle = at[index["foot"]] if "foot" in index else at[-1]
     thigh, shank, foot = knee - hip, ankle - knee, at[-1] - ankle
-    score = _near(thigh, shank, 1.0, 0.3) - max(0.0, hip / (thigh + 1e-6) - 0.7)
-    if "foot" not in places:
+    score = _log_likelihood(thigh, shank, 1.0, 0.3) - max(0.0, hip / (thigh + 1e-6) - 0.7)
+    if "foot" not in index:
         return score - 2.5
-    score += _near(foot, shank, 0.45, 0.9)
-    if "toe" in places:
-        score += 0.4 + _near(at[places["toe"]] - ankle, shank, 0.35, 0.9)
+    score += _log_likelihood(foot, shank, 0.45, 0.9)
+    if "toe" in index:
+        score += 0.4 + _log_likelihood(at[index["toe"]] - ankle, shank, 0.35, 0.9)
     return score
 
 
-def _arm_shape(places: Mapping[str, int], at: list[float]) -> float:
+def _arm_shape(index: Mapping[str, int], at: list[float]) -> float:
     """Upper arm and forearm are about equal; hand and clavicle are about half of one."""
-    shoulder, elbow = at[places["upper_arm"]], at[places["forearm"]]
-    wrist = at[places["hand"]] if "hand" in places else at[-1]
+    shoulder, elbow = at[index["upper_arm"]], at[index["forearm"]]
+    wrist = at[index["hand"]] if "hand" in index else at[-1]
     upper, fore, hand = elbow - shoulder, wrist - elbow, at[-1] - wrist
-    score = _near(upper, fore, 1.1, 0.3)
-    score += _near(hand, fore, 0.6, 1.0) if "hand" in places else -1.0
-    if "clavicle" in places:
-        score += 0.2 + _near(shoulder - at[places["clavicle"]], upper, 0.5, 1.0)
+    score = _log_likelihood(upper, fore, 1.1, 0.3)
+    score += _log_likelihood(hand, fore, 0.6, 1.0) if "hand" in index else -1.0
+    if "clavicle" in index:
+        score += 0.2 + _log_likelihood(shoulder - at[index["clavicle"]], upper, 0.5, 1.0)
     else:
-        score -= 0.3 * places["upper_arm"]
+        score -= 0.3 * index["upper_arm"]
     return score
 
 
-def _near(length: float, other: float, ratio: float, spread: float) -> float:
+def _log_likelihood(length: float, other: float, ratio: float, spread: float) -> float:
     """Log of a Gaussian on the log of length/other, no worse than -4.
 
     A last segment without a length has no End Site to tell it: that says little.

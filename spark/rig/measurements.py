@@ -132,9 +132,9 @@ def measure(skeleton: Skeleton, motion: Motion | None) -> Measurements:
         None if motion.translations is None else motion.translations[::step],
     )
     joints, world = forward(some)
-    stance = Measurements(skeleton, joints, end_positions(skeleton, joints, world), True)
+    measured = Measurements(skeleton, joints, end_positions(skeleton, joints, world), True)
     own = np.linalg.norm(skeleton.offsets[1:], axis=-1).sum()
-    if motion.translations is not None and not 0.5 * own < stance.bones.sum() < 2.0 * own:
+    if motion.translations is not None and not 0.5 * own < measured.bones.sum() < 2.0 * own:
         joints, world = forward(Motion(skeleton, 1.0, some.root_pos, some.rotations))
-        stance = Measurements(skeleton, joints, end_positions(skeleton, joints, world), True)
-    return stance
+        measured = Measurements(skeleton, joints, end_positions(skeleton, joints, world), True)
+    return measured

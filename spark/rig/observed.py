@@ -17,7 +17,7 @@ from spark.rotation import (
 )
 
 # A joint that never bends further than this does not show which way it bends.
-_BEND = np.sin(np.radians(25))
+_MIN_BEND_SINE = np.sin(np.radians(25))
 
 # The 24 turns of a cube: motion capture systems build rigs with joint axes at right angles.
 _RIGHT_ANGLES = quat_normalize(
@@ -60,7 +60,7 @@ def bend_axis(
     sines = np.cross(upper_bone, turned) / length
     axis = np.linalg.eigh(sines.T @ sines)[1][:, -1]
     along = sines @ axis
-    if np.percentile(np.abs(along), 95) < _BEND:
+    if np.percentile(np.abs(along), 95) < _MIN_BEND_SINE:
         return None
     # Deep bends tell the sign: a knee may be stretched a little beyond straight.
     return axis if (along * np.abs(along)).sum() > 0 else -axis

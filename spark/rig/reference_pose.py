@@ -12,9 +12,9 @@ from spark.rig.observed import mean_rotations, nearest_right_angle
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import quat_identity
 
-_LEAN = np.radians(35)  # a body this near to an axis stands along it
-_HIPS_TILT = np.radians(10)
-_BUILT = np.radians(10)  # bones this near to their joint's axes were put there on purpose
+_MAX_LEAN = np.radians(35)  # a body this near to an axis stands along it
+_MAX_HIP_TILT = np.radians(10)
+_ALIGNED = np.radians(10)  # bones this near to their joint's axes were put there on purpose
 
 _UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
 _UPPER_ARMS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
@@ -78,7 +78,7 @@ def _stands(rest: RigPose) -> bool:
 def _at_right_angles(rest: RigPose) -> bool:
     """Whether all limb bones lie along coordinate axes of their joints."""
     bones = (rest.bone(j) for group in LIMBS for j in _limb(rest.roles, group)[:-1])
-    return all(bone is None or tilt(bone) < _BUILT for bone in bones)
+    return all(bone is None or tilt(bone) < _ALIGNED for bone in bones)
 
 
 def pelvis_frame(reference: Reference) -> Float[np.ndarray, "3 3"]:
@@ -88,13 +88,13 @@ def pelvis_frame(reference: Reference) -> Float[np.ndarray, "3 3"]:
     lateral, up = pose.seen_from(pelvis, _lateral(pose)), pose.seen_from(pelvis, _trunk(pose))
     # Artists build along the axes, whichever way the trunk leans; so do motion capture systems.
     if reference.posed:
-        lateral = snap(lateral, _HIPS_TILT)
+        lateral = snap(lateral, _MAX_HIP_TILT)
         feet, *higher = _landmarks(pose)
         body = min((_across(pose.seen_from(pelvis, v - feet), lateral) for v in higher), key=tilt)
-        up = snap(body, _LEAN) if tilt(body) < _LEAN else up
+        up = snap(body, _MAX_LEAN) if tilt(body) < _MAX_LEAN else up
     elif reference.square:
         lateral = snap(lateral, np.pi)
-        up = snap(_across(up, lateral), _LEAN)
+        up = snap(_across(up, lateral), _MAX_LEAN)
     up = _across(up, lateral)
     length = np.linalg.norm(up)
     if length < SHORT:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from spark.errors import SkeletonError
 from spark.motion import Motion
-from spark.rig.body_plan import BodyPlan, plan_body
+from spark.rig.anatomy import Anatomy, find_anatomy
 from spark.rig.facing import LabelledPair
 from spark.rig.measurements import measure
 from spark.rig.name_hints import NameHint, read_names
@@ -15,8 +15,8 @@ from spark.skeleton import Skeleton
 __all__ = ["Override", "assign_roles"]
 
 # How often each kind of evidence alone is right.
-_BY_NAME, _BY_CHAIN, _BY_SHAPE = 0.85, 0.6, 0.6
-_SIDE_SURE = 0.15
+_NAME_RELIABILITY, _CHAIN_RELIABILITY, _SHAPE_RELIABILITY = 0.85, 0.6, 0.6
+_CLEAR_SIDE = 0.15
 
 
 def assign_roles(
@@ -34,7 +34,7 @@ def assign_roles(
     try:
         found = _infer(skeleton, motion, hints)
     except SkeletonError as error:
-        missing = [role.value for role in _NEEDED if not override.get(role)]
+        missing = [role.value for role in _REQUIRED if not override.get(role)]
         if override and missing:
             raise SkeletonError(f"{error}; the one given lacks {', '.join(missing)}") from error
         if missing:
@@ -46,7 +46,7 @@ def assign_roles(
     return roles
 
 
-_NEEDED = (
+_REQUIRED = (
     Role.PELVIS,
     Role.LEFT_UPPER_LEG,
     Role.LEFT_LOWER_LEG,
@@ -59,51 +59,59 @@ Found = dict[int, tuple[Role, float, str]]
 
 def _infer(skeleton: Skeleton, motion: Motion | None, hints: Sequence[NameHint]) -> Found:
     """Joint to role, confidence and reason."""
-    plan = plan_body(measure(skeleton, motion), hints)
+    anatomy = find_anatomy(measure(skeleton, motion), hints)
     found: Found = {}
-    pelvis = hints[plan.pelvis].parts.get("pelvis", 0.0) > 0.3
-    found[plan.pelvis] = (Role.PELVIS, _sure(pelvis, True, True), "carries the legs")
+    pelvis = hints[anatomy.pelvis].parts.get("pelvis", 0.0) > 0.3
+    found[anatomy.pelvis] = (Role.PELVIS, _confidence(pelvis, True, True), "carries the legs")
     for joints, role, part, reason in (
-        (plan.spine, Role.SPINE, "spine", "between the pelvis and the arms"),
-        (plan.neck, Role.NECK, "neck", "between the arms and the head"),
-        (() if plan.head is None else (plan.head,), Role.HEAD, "head", "top of the trunk"),
+        (anatomy.spine, Role.SPINE, "spine", "between the pelvis and the arms"),
+        (anatomy.neck, Role.NECK, "neck", "between the arms and the head"),
+        (() if anatomy.head is None else (anatomy.head,), Role.HEAD, "head", "top of the trunk"),
     ):
         for j in joints:
             named = part in hints[j].parts
             why = f"name {skeleton.names[j]!r}" if named else reason
-            found[j] = (role, _sure(named, True, role is not Role.HEAD), why)
-    for limb in (plan.legs, plan.arms):
+            found[j] = (role, _confidence(named, True, role is not Role.HEAD), why)
+    for limb in (anatomy.legs, anatomy.arms):
         if limb is not None:
-            _infer_limb(skeleton, hints, plan, limb, found)
+            _infer_limb(skeleton, hints, anatomy, limb, found)
     return found
 
 
 def _infer_limb(
-    skeleton: Skeleton, hints: Sequence[NameHint], plan: BodyPlan, limb: LabelledPair, found: Found
+    skeleton: Skeleton,
+    hints: Sequence[NameHint],
+    anatomy: Anatomy,
+    limb: LabelledPair,
+    found: Found,
 ) -> None:
-    is_leg = limb is plan.legs
-    sides = ("left", "right") if limb.pair.sided or plan.sides >= 0 else ("right", "left")
-    agreement = plan.sides if limb.pair.sided else abs(plan.sides)
+    is_leg = limb is anatomy.legs
+    sides = ("left", "right") if limb.pair.sided or anatomy.sides >= 0 else ("right", "left")
+    agreement = anatomy.sides if limb.pair.sided else abs(anatomy.sides)
     for index, side in enumerate(sides):
-        for part in limb.labels[index].places:
+        for part in limb.labels[index].index:
             joint = limb.joint(index, part)
             assert joint is not None
             named = hints[joint].parts.get(part, 0.0) > 0.3
-            sure = _sure(named, joint in plan.mirrored, agreement > _SIDE_SURE)
+            sure = _confidence(named, joint in anatomy.mirrored, agreement > _CLEAR_SIDE)
             why = f"chain from the {'pelvis down' if is_leg else 'trunk outwards'}"
             if named:
                 why = f"name {skeleton.names[joint]!r}"
-            if limb.pair.sided and agreement < -_SIDE_SURE:
+            if limb.pair.sided and agreement < -_CLEAR_SIDE:
                 sure, why = 0.6 * sure, f"{why}, though it lies on the other side of the body"
-            elif not limb.pair.sided and agreement < _SIDE_SURE:
+            elif not limb.pair.sided and agreement < _CLEAR_SIDE:
                 sure, why = 0.6 * sure, f"{why}; the side is a guess"
             found[joint] = (Role(f"{side}_{part}"), sure, why)
 
 
-def _sure(named: bool, chained: bool, shaped: bool) -> float:
+def _confidence(named: bool, chained: bool, shaped: bool) -> float:
     """Independent pieces of evidence: wrong only where all of them are."""
     wrong = 1.0
-    for holds, right in ((named, _BY_NAME), (chained, _BY_CHAIN), (shaped, _BY_SHAPE)):
+    for holds, right in (
+        (named, _NAME_RELIABILITY),
+        (chained, _CHAIN_RELIABILITY),
+        (shaped, _SHAPE_RELIABILITY),
+    ):
         wrong *= 1.0 - right if holds else 1.0
     return round(1.0 - wrong, 3)
 
@@ -121,9 +129,9 @@ def _merge(
         elif j in found and found[j][0] not in override:
             entry = found[j]
         elif hints[j].aside:
-            entry = (None, _BY_NAME, f"{hints[j].aside}, by its name")
+            entry = (None, _NAME_RELIABILITY, f"{hints[j].aside}, by its name")
         else:
-            entry = (None, _BY_CHAIN, "follows its parent")
+            entry = (None, _CHAIN_RELIABILITY, "follows its parent")
         roles.append(entry[0])
         sure.append(entry[1])
         reasons.append(entry[2])

@@ -30,11 +30,11 @@ class LimbPair:
         return self.first[0], self.second[0]
 
 
-def chain_below(stance: Measurements, joint: int) -> tuple[int, ...]:
+def chain_below(measured: Measurements, joint: int) -> tuple[int, ...]:
     """`joint` and the joints after it along the longest way down."""
     chain = [joint]
-    while below := stance.skeleton.children[chain[-1]]:
-        chain.append(max(below, key=lambda c: stance.reach[c] + stance.bones[c]))
+    while below := measured.skeleton.children[chain[-1]]:
+        chain.append(max(below, key=lambda c: measured.reach[c] + measured.bones[c]))
     return tuple(chain)
 
 
@@ -53,13 +53,13 @@ def common_ancestor(skeleton: Skeleton, a: int, b: int) -> int:
 
 
 def named_pair(
-    stance: Measurements, hints: Sequence[NameHint], parts: frozenset[str], least: float
+    measured: Measurements, hints: Sequence[NameHint], parts: frozenset[str], least: float
 ) -> LimbPair | None:
     """The left and right limb whose joints' names mean `parts`, at least `least` in all a side.
 
     On the way from the root to a joint each part counts once, as its surest name means it.
     """
-    skeleton = stance.skeleton
+    skeleton = measured.skeleton
     tips: list[int] = []
     for side in ("left", "right"):
         met: list[dict[str, float]] = []
@@ -76,26 +76,26 @@ def named_pair(
     root_joint = common_ancestor(skeleton, *tips)
     if root_joint in tips:
         return None
-    left, right = (_through(stance, root_joint, tip) for tip in tips)
+    left, right = (_through(measured, root_joint, tip) for tip in tips)
     return LimbPair(root_joint, left, right, sided=True)
 
 
-def _through(stance: Measurements, root_joint: int, tip: int) -> tuple[int, ...]:
+def _through(measured: Measurements, root_joint: int, tip: int) -> tuple[int, ...]:
     """The chain that leaves `root_joint` towards `tip` and goes on as far as it can."""
-    up = stance.skeleton.ancestors(tip)
+    up = measured.skeleton.ancestors(tip)
     down = tuple(reversed(up[: up.index(root_joint)]))
-    return (*down, *chain_below(stance, tip)[1:])
+    return (*down, *chain_below(measured, tip)[1:])
 
 
 def mirrored_pairs(
-    stance: Measurements, hints: Sequence[NameHint], shortest: float
+    measured: Measurements, hints: Sequence[NameHint], shortest: float
 ) -> tuple[LimbPair, ...]:
     """Pairs of similar chains that one joint carries, each at least `shortest` [m] long.
 
     Chains whose first joint is by name a finger, hair, cloth, ... do not count, and of a pair
     within a pair (fingers of a hand) only the outer one does.
     """
-    skeleton = stance.skeleton
+    skeleton = measured.skeleton
     pairs: list[LimbPair] = []
     inside: set[int] = set()
     for root_joint in range(len(skeleton)):
@@ -105,15 +105,15 @@ def mirrored_pairs(
             child
             for child in skeleton.children[root_joint]
             if hints[child].aside not in _NEVER_LIMBS
-            and stance.reach[child] + stance.bones[child] >= shortest
+            and measured.reach[child] + measured.bones[child] >= shortest
         ]
         # No body carries more limbs at one joint; a star of bones must not cost its cube.
-        starts.sort(key=lambda child: -(stance.reach[child] + stance.bones[child]))
-        chains = [chain_below(stance, child) for child in starts[:12]] if len(starts) > 1 else []
+        starts.sort(key=lambda child: -(measured.reach[child] + measured.bones[child]))
+        chains = [chain_below(measured, child) for child in starts[:12]] if len(starts) > 1 else []
         while len(chains) >= 2:
             a, b, difference = min(
                 (
-                    (a, b, _difference(stance, a, b))
+                    (a, b, _difference(measured, a, b))
                     for i, a in enumerate(chains)
                     for b in chains[i + 1 :]
                 ),
@@ -138,10 +138,10 @@ _NEVER_LIMBS = (
 )
 
 
-def _difference(stance: Measurements, a: tuple[int, ...], b: tuple[int, ...]) -> float:
+def _difference(measured: Measurements, a: tuple[int, ...], b: tuple[int, ...]) -> float:
     """How unlike two chains are: bone by bone, as a share of their length."""
     if len(a) != len(b):
         return np.inf
-    one = np.array([*stance.bones[list(a)], stance.end_reach[a[-1]]])
-    two = np.array([*stance.bones[list(b)], stance.end_reach[b[-1]]])
+    one = np.array([*measured.bones[list(a)], measured.end_reach[a[-1]]])
+    two = np.array([*measured.bones[list(b)], measured.end_reach[b[-1]]])
     return float(np.abs(one - two).sum() / max(one.sum(), two.sum(), 1e-9))

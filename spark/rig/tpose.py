@@ -34,9 +34,9 @@ from spark.rotation import (
 )
 from spark.skeleton import Skeleton
 
-_ROLL = np.radians(100)  # a forearm is seldom rolled further than this from its middle
-_SPREAD = np.radians(35)  # fingers this near to an axis of the hand lie along it
-_STEEP = np.radians(-75)  # a foot that points further down than this at rest does not stand
+_MAX_ROLL = np.radians(100)  # a forearm is seldom rolled further than this from its middle
+_MAX_FINGER_SPREAD = np.radians(35)  # fingers this near to an axis of the hand lie along it
+_STEEPEST_FOOT = np.radians(-75)  # a foot that points further down than this at rest does not stand
 
 _LEFT, _UP = np.eye(3)[1:]
 _FEET = (Role.LEFT_FOOT, Role.RIGHT_FOOT)
@@ -104,13 +104,13 @@ def _place(reference: Reference, joint: int, role: Role, q: Quat, q_parent: Quat
         return q
     goal = _OUT.get(GROUP_OF[role], -_UP)
     if reference.square and role in _HANDS:
-        bone = snap(bone, _SPREAD)
+        bone = snap(bone, _MAX_FINGER_SPREAD)
     q = quat_mul(quat_between(quat_rotate(q, bone), goal), q)
     if role in _BENT and not reference.posed:
         q = quat_mul(_twist_to_bend(reference, joint, bone, role, q, goal), q)
     if reference.square:
         straight = quat_mul(quat_between(quat_rotate(q_parent, bone), goal), q_parent)
-        if role in _ROLLING and quat_angle(q, straight) < _ROLL:
+        if role in _ROLLING and quat_angle(q, straight) < _MAX_ROLL:
             q = straight
         q = _square(q, goal, _UP if GROUP_OF[role] in _OUT else _LEFT)
     return q
@@ -126,7 +126,7 @@ def _place_foot(reference: Reference, joint: int, role: Role, q: Quat, q_pelvis:
         if bone is None:
             return q
         x, y, z = quat_rotate(q, bone)
-        if np.arctan2(z, np.hypot(x, y)) > _STEEP:
+        if np.arctan2(z, np.hypot(x, y)) > _STEEPEST_FOOT:
             return quat_mul(quat_from_yaw(-np.arctan2(y, x)), q)
     if bone is None:
         return q
@@ -160,7 +160,9 @@ def _twist_to_bend(
     if lower is None or lower_bone is None:
         return quat_identity(goal)
     bent = bend_axis(reference.motion, upper, lower, bone, lower_bone)
-    return quat_identity(goal) if bent is None else _turn(quat_rotate(q, bent), axis, goal)
+    return (
+        quat_identity(goal) if bent is None else _rotation_about(quat_rotate(q, bent), axis, goal)
+    )
 
 
 def _square(q: Quat, about: Vector, side: Vector) -> Quat:
@@ -168,7 +170,7 @@ def _square(q: Quat, about: Vector, side: Vector) -> Quat:
     axes = quat_rotate(q, np.concatenate([np.eye(3), -np.eye(3)]))
     across = axes - np.outer(axes @ about, about)
     nearest = across[np.argmax(across @ side)]
-    return quat_mul(_turn(nearest, side, about), q)
+    return quat_mul(_rotation_about(nearest, side, about), q)
 
 
 def _palm_down(pose: RigPose, hand: int, q: Quat) -> tuple[Quat, tuple[str, ...]]:
@@ -185,7 +187,7 @@ def _palm_down(pose: RigPose, hand: int, q: Quat) -> tuple[Quat, tuple[str, ...]
     return quat_mul(quat_from_rotvec(-_LEFT * (turns * np.pi / 2)), q), (note,)
 
 
-def _turn(start: Vector, end: Vector, about: Vector) -> Quat:
+def _rotation_about(start: Vector, end: Vector, about: Vector) -> Quat:
     """The rotation about a unit vector that brings `start` as near to `end` as it can."""
     start = start - about * (start @ about)
     return quat_from_rotvec(about * np.arctan2(np.cross(start, end) @ about, start @ end))

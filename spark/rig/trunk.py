@@ -20,18 +20,18 @@ def find_pelvis(skeleton: Skeleton, hints: Sequence[NameHint], legs: LimbPair) -
 
 
 def find_trunk(
-    stance: Measurements,
+    measured: Measurements,
     hints: Sequence[NameHint],
     pelvis: int,
     legs: LimbPair,
     arms: LimbPair | None,
 ) -> tuple[tuple[int, ...], tuple[int, ...], int | None]:
     """Spine and neck from the pelvis upwards, and the head."""
-    skeleton = stance.skeleton
+    skeleton = measured.skeleton
     limbs = {j for p in (legs, arms) if p is not None for r in p.roots for j in skeleton.subtree(r)}
     top = pelvis if arms is None else arms.root_joint
-    head = _head(stance, hints, pelvis, top, legs, limbs)
-    spine = list(_between(stance, pelvis, top))
+    head = _head(measured, hints, pelvis, top, legs, limbs)
+    spine = list(_between(measured, pelvis, top))
     if top != pelvis:
         spine.append(top)
     rising: list[int] = []
@@ -50,23 +50,23 @@ def find_trunk(
     return tuple(spine), tuple(rising), head
 
 
-def _between(stance: Measurements, pelvis: int, top: int) -> tuple[int, ...]:
+def _between(measured: Measurements, pelvis: int, top: int) -> tuple[int, ...]:
     """The trunk's joints between two others.
 
     A common ancestor of both that lies at the pelvis only carries them (MakeHuman's Root).
     """
-    skeleton = stance.skeleton
+    skeleton = measured.skeleton
     if pelvis == top:
         return ()
     joint = common_ancestor(skeleton, pelvis, top)
-    way = stance.joints[:, top] - stance.joints[:, pelvis]
-    part = ((stance.joints[:, joint] - stance.joints[:, pelvis]) * way).sum(-1)
+    way = measured.joints[:, top] - measured.joints[:, pelvis]
+    part = ((measured.joints[:, joint] - measured.joints[:, pelvis]) * way).sum(-1)
     inside = np.median(part / np.maximum((way**2).sum(-1), 1e-12)) > 0.15
     return tuple(j for j in path_between(skeleton, pelvis, top) if j != joint or inside)
 
 
 def _head(
-    stance: Measurements,
+    measured: Measurements,
     hints: Sequence[NameHint],
     pelvis: int,
     top: int,
@@ -74,7 +74,7 @@ def _head(
     limbs: set[int],
 ) -> int | None:
     """The joint named head, or the end of the chain that leaves the arms' carrier upwards."""
-    skeleton = stance.skeleton
+    skeleton = measured.skeleton
     named = [
         j
         for j in range(len(skeleton))
@@ -85,21 +85,23 @@ def _head(
     # From the joint that carries the arms, the chain that is no limb and leads up.
     trunk = set(skeleton.ancestors(pelvis))
     starts = [c for c in skeleton.children[top] if c not in limbs and c not in trunk]
-    starts = [c for c in starts if not hints[c].aside and _rises(stance, c, pelvis, top, legs)]
+    starts = [c for c in starts if not hints[c].aside and _rises(measured, c, pelvis, top, legs)]
     if not starts:
         return None
-    chain = chain_below(stance, max(starts, key=lambda c: stance.reach[c] + stance.bones[c]))
+    chain = chain_below(measured, max(starts, key=lambda c: measured.reach[c] + measured.bones[c]))
     for j in chain:
         if len(skeleton.children[j]) > 1:
             return j
     # A leaf without an End Site, where other leaves have one, is the crown and no joint.
-    nub = len(chain) > 1 and not stance.end_reach[chain[-1]] and len(skeleton.end_parents) > 0
+    nub = len(chain) > 1 and not measured.end_reach[chain[-1]] and len(skeleton.end_parents) > 0
     return chain[-2] if nub else chain[-1]
 
 
-def _rises(stance: Measurements, joint: int, pelvis: int, top: int, legs: LimbPair) -> bool:
+def _rises(measured: Measurements, joint: int, pelvis: int, top: int, legs: LimbPair) -> bool:
     """Whether a chain leaves the trunk away from the legs, in most frames."""
-    at = stance.joints
-    below = at[:, pelvis] if top != pelvis else np.mean([stance.tip(j) for j in legs.roots], axis=0)
+    at = measured.joints
+    below = (
+        at[:, pelvis] if top != pelvis else np.mean([measured.tip(j) for j in legs.roots], axis=0)
+    )
     up = at[:, top] - below
-    return bool(np.mean(((stance.tip(joint) - at[:, top]) * up).sum(-1) > 0) >= 0.5)
+    return bool(np.mean(((measured.tip(joint) - at[:, top]) * up).sum(-1) > 0) >= 0.5)

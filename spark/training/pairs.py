@@ -28,12 +28,12 @@ from spark.rotation import (
 from spark.training.mirror import mirrored_body, mirrored_motion
 from spark.training.staging import (
     StagedBody,
-    begins_of,
     foot_lift,
-    joined,
     local_rows,
     mixed,
     place,
+    shifted,
+    starts_of,
 )
 from spark.training.variants import random_variant, same_body, split_body
 from spark.transfer.analytic import Correspondence, correspond
@@ -133,17 +133,17 @@ class PairMaker:
         lift = np.stack([one.lift for one in drawn])
         rows = place(
             stages,
-            2 * begins_of([one.rotations for one in drawn]),
+            2 * starts_of([one.rotations for one in drawn]),
             np.concatenate([one.rotations for one in drawn]),
             np.concatenate([hips, hips]),
             np.concatenate([planted, planted]),
             np.concatenate([lift, lift]),
         )
-        begins = begins_of([body.joints for body in bodies])
+        begins = starts_of([body.joints for body in bodies])
         copied = mixed(
             rows,
-            joined([link.first for link in links], begins[:D]),
-            joined([link.second for link in links], begins[:D]),
+            shifted([link.first for link in links], begins[:D]),
+            shifted([link.second for link in links], begins[:D]),
             np.concatenate([link.mix for link in links]),
         )
         # Windows are seen from their first frames, as `spark.network.features.pose_features` sees
@@ -153,7 +153,7 @@ class PairMaker:
         bodies += bodies[D:]
         local = local_rows(np.concatenate([rows, copied]), bodies, np.tile(back, (3, 1, 1, 1)))
         poses = np.moveaxis(sixd_from_quat(local), 0, 2)
-        ends = begins_of([body.joints for body in bodies])[1:]
+        ends = starts_of([body.joints for body in bodies])[1:]
         seen = [
             Windows(body, own, roots[k % D])
             for k, (body, own) in enumerate(zip(bodies, np.split(poses, ends, 2), strict=True))

@@ -17,7 +17,7 @@ from spark.network.features import BodyFeatures
 from spark.rig.roles import Group
 from spark.rotation import quat_mul, quat_relative, quat_rotate, quat_slerp
 from spark.training.variants import Variant
-from spark.transfer.leg_ik import Leg, leg_of, leg_turns, stance_correction
+from spark.transfer.leg_ik import Leg, leg_of, leg_rotations, stance_correction
 
 
 class LegBones(NamedTuple):
@@ -101,17 +101,17 @@ def place(
     variants = [stage.variant for stage in stages]
     rows = mixed(
         base,
-        joined([v.first for v in variants], bases),
-        joined([v.second for v in variants], bases),
+        shifted([v.first for v in variants], bases),
+        shifted([v.second for v in variants], bases),
         np.concatenate([v.mix for v in variants]),
     )
-    begins = begins_of([v.first for v in variants])
+    begins = starts_of([v.first for v in variants])
     bones = [stage.leg_bones for stage in stages]
     along = quat_rotate(
-        rows[joined([b.joints for b in bones], begins)],
+        rows[shifted([b.joints for b in bones], begins)],
         np.concatenate([b.offsets for b in bones]).astype(rows.dtype)[:, None, None],
     )
-    parts = joined([b.begins for b in bones], begins_of([b.joints for b in bones]))
+    parts = shifted([b.begins for b in bones], starts_of([b.joints for b in bones]))
     limbs = np.add.reduceat(along, parts, axis=0).reshape(len(stages), 2, 4, *along.shape[1:])
     contact = hips[:, None] + limbs.sum(2)
     touching, rest = (np.stack(each) for each in zip(*(s.contacts for s in stages), strict=True))
@@ -119,14 +119,14 @@ def place(
     for s, side in np.ndindex(touching.shape):
         wanted[s, side, ..., 2] = rest[s, side] + lift[s, ..., side, touching[s, side]]
     move = stance_correction(contact, wanted, np.moveaxis(planted, -1, 1))
-    uppers = joined([np.array([leg.upper_leg for leg in s.legs]) for s in stages], begins)
-    turns = leg_turns(
+    uppers = shifted([np.array([leg.upper_leg for leg in s.legs]) for s in stages], begins)
+    turns = leg_rotations(
         limbs[:, :, 1], limbs[:, :, 2], rows[uppers].reshape(*move.shape[:-1], 4), move
     )
     turned = np.stack(turns, 2).reshape(-1, *rows.shape[1:])
     joints = [stage.leg_joints for stage in stages]
-    at = joined([j.joints for j in joints], begins)
-    by = joined([j.parts for j in joints], range(0, 4 * len(stages), 4))
+    at = shifted([j.joints for j in joints], begins)
+    by = shifted([j.parts for j in joints], range(0, 4 * len(stages), 4))
     rows[at] = quat_mul(turned[by], rows[at])
     return rows
 
@@ -163,19 +163,19 @@ def local_rows(
     back: Float[np.ndarray, "S W 1 4"],
 ) -> Float[np.ndarray, "N W T 4"]:
     """Local rotations of the bodies' rows, each pelvis turned by `back`."""
-    begins = begins_of([body.joints for body in bodies])
-    parents = joined([np.maximum(body.skeleton.parents, 0) for body in bodies], begins)
+    begins = starts_of([body.joints for body in bodies])
+    parents = shifted([np.maximum(body.skeleton.parents, 0) for body in bodies], begins)
     local = quat_relative(rows[parents], rows)
     local[begins] = quat_mul(back, rows[begins])
     return local
 
 
-def begins_of(parts: Sequence[Sized]) -> list[int]:
+def starts_of(parts: Sequence[Sized]) -> list[int]:
     """Where each of several parts begins in their concatenation."""
     return [0, *np.cumsum([len(part) for part in parts])[:-1].tolist()]
 
 
-def joined(indices: Sequence[Int[np.ndarray, "_"]], begins: Sequence[int]) -> Int[np.ndarray, "N"]:
+def shifted(indices: Sequence[Int[np.ndarray, "_"]], begins: Sequence[int]) -> Int[np.ndarray, "N"]:
     """Indices into parts as indices into their concatenation."""
     return np.concatenate([part + begin for part, begin in zip(indices, begins, strict=True)])
 

@@ -102,14 +102,14 @@ def bend_leg(
 ) -> Float[np.ndarray, "*n J 4"]:
     """Rotations with the ankle moved by `move`, or as near to it as the leg reaches."""
     hip, knee, ankle = (positions[..., j, :] for j in leg[:3])
-    turns = leg_turns(knee - hip, ankle - knee, rotations[..., leg.upper_leg, :], move)
+    turns = leg_rotations(knee - hip, ankle - knee, rotations[..., leg.upper_leg, :], move)
     out = rotations.copy()
     for joints, turned in zip((leg.with_thigh, leg.with_shank), turns, strict=True):
         out[..., list(joints), :] = quat_mul(turned[..., None, :], rotations[..., list(joints), :])
     return out
 
 
-def leg_turns(
+def leg_rotations(
     thigh: Float[np.ndarray, "*n 3"],
     shank: Float[np.ndarray, "*n 3"],
     upper_leg: Float[np.ndarray, "*n 4"],

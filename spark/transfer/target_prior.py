@@ -39,12 +39,12 @@ _PARTS = (  # each seen from the chest, or from the pelvis
 )
 
 
-Retargeting = Callable[[CanonicalMotion, Rig], CanonicalMotion]
+RetargetMethod = Callable[[CanonicalMotion, Rig], CanonicalMotion]
 """Puts a motion on a rig: the analytic transfer, or a trained network."""
 
 
-def with_own_motion(
-    method: Retargeting, source: CanonicalMotion, own: CanonicalMotion
+def with_target_prior(
+    method: RetargetMethod, source: CanonicalMotion, own: CanonicalMotion
 ) -> CanonicalMotion:
     """What `method` makes of `source` on the rig of `own`, a recording, joints that had to be
     guessed (`Correspondence.unmatched`) turned as they turn in `own` with the rest of the body.

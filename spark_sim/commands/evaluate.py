@@ -10,7 +10,7 @@ from spark_sim.commands.options import add_force
 if TYPE_CHECKING:
     from spark.evaluation.cases import Case
     from spark.evaluation.evaluate import Row
-    from spark.transfer.target_prior import Retargeting
+    from spark.transfer.target_prior import RetargetMethod
 
 SUMMARY = "measure methods against a ground truth"
 USAGE = "DATA [--checkpoint RUN]... [--result NAME=DIR]..."
@@ -33,8 +33,8 @@ examples:
 _WAYS: dict[str, dict[str, bool]] = {  # rows of one method, as they are named
     "": {},
     ", feet held": {"feet_held": True},
-    ", own motion": {"own_motion": True},
-    ", own motion, feet held": {"own_motion": True, "feet_held": True},
+    ", target prior": {"target_prior": True},
+    ", target prior, feet held": {"target_prior": True, "feet_held": True},
 }
 
 
@@ -110,15 +110,15 @@ def run(args: Namespace) -> int:
 
     rows: list[Row] = []
 
-    def add(name: str, method: "Retargeting", ways: "Sequence[str]", **about: Any) -> None:
+    def add(name: str, method: "RetargetMethod", ways: "Sequence[str]", **about: Any) -> None:
         rows.extend(row(name + way, by(method, **_WAYS[way]), cases, **about) for way in ways)
 
     plain, held, own, both = _WAYS
     add("copy", transfer, (plain, held, own))
     for name, weights in checkpoints.items():
-        from spark.network.retarget import Learned
+        from spark.network.retarget import NetworkRetargeter
 
-        network = Learned(weights)
+        network = NetworkRetargeter(weights)
         ways = (plain, own, both) if network.network.config.residual else (plain,)
         add(name, network, ways, settings=weights.settings)
     for name, folder in results.items():

@@ -21,14 +21,14 @@ from spark.kinematics import forward
 from spark.motion import Motion
 from spark.network.features import body_features
 from spark.network.known_bodies import trunk_of
-from spark.network.retarget import Learned
+from spark.network.retarget import NetworkRetargeter
 from spark.network.weights import SHIPPED, read_weights
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.skeleton import Skeleton
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, from_canonical, to_canonical
-from spark.transfer.target_prior import with_own_motion
+from spark.transfer.target_prior import with_target_prior
 
 pytestmark = pytest.mark.bench
 
@@ -98,7 +98,7 @@ def without_a_neck(frames: int) -> CanonicalMotion:
 def test_transfer_by_the_network(benchmark: Any, frames: int) -> None:
     """Onto a rig of which the source lacks joints."""
     source, target = without_a_neck(frames), sample_rig("dancer")
-    network = Learned(read_weights(SHIPPED))
+    network = NetworkRetargeter(read_weights(SHIPPED))
     network.bodies.append(trunk_of(body_features(target)))
     assert "network" in network(source, target).notes[-1]
     benchmark.pedantic(lambda: network(source, target), rounds=3)
@@ -111,8 +111,8 @@ def test_transfer_with_own_motion(benchmark: Any, frames: int) -> None:
     squat = to_canonical(sample_motion("squat", target, 30.0), target)
     again = np.arange(1000) % len(squat)
     own = replace(squat, rotations=squat.rotations[again], hips=squat.hips[again])
-    network = Learned(read_weights(SHIPPED))
-    benchmark.pedantic(lambda: with_own_motion(network, source, own), rounds=3)
+    network = NetworkRetargeter(read_weights(SHIPPED))
+    benchmark.pedantic(lambda: with_target_prior(network, source, own), rounds=3)
 
 
 @pytest.mark.parametrize("frames", FRAMES)

@@ -284,8 +284,8 @@ def test_command(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     rows = [line.split("|")[1].strip() for line in done.stdout.splitlines()[2:8]]
-    both = "run", "run, own motion", "run, own motion, feet held"
-    assert rows == ["copy", "copy, feet held", "copy, own motion", *both]
+    both = "run", "run, target prior", "run, target prior, feet held"
+    assert rows == ["copy", "copy, feet held", "copy, target prior", *both]
     assert (tmp_path / "t.md").read_text() == done.stdout
     assert json.loads((tmp_path / "t.json").read_text())["data"] == str(tree)
     assert (tmp_path / "t.csv").read_text().startswith("method,")

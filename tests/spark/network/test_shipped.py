@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spark.io.reading import read_motion
-from spark.network.retarget import Learned
+from spark.network.retarget import NetworkRetargeter
 from spark.network.weights import SHIPPED, read_weights
 from spark.rig.rig import understand
 from spark.rig.roles import Role
@@ -17,8 +17,8 @@ from tests.helpers.stick import without
 
 
 @pytest.fixture(scope="module")
-def network() -> Learned:
-    return Learned(read_weights(SHIPPED))
+def network() -> NetworkRetargeter:
+    return NetworkRetargeter(read_weights(SHIPPED))
 
 
 def motion_of(name: str) -> CanonicalMotion:
@@ -39,7 +39,9 @@ def over_the_hips(motion: CanonicalMotion) -> np.ndarray:
         ("cmu_asf/cmu_03_01.bvh", 0.8),  # whom training has not seen
     ],
 )
-def test_a_neck_and_a_spine_that_the_source_lacks(network: Learned, name: str, most: float) -> None:
+def test_a_neck_and_a_spine_that_the_source_lacks(
+    network: NetworkRetargeter, name: str, most: float
+) -> None:
     truth = motion_of(name)
     rig = truth.rig
     topmost = rig.roles.joints(Role.SPINE)[-1]
@@ -53,7 +55,7 @@ def test_a_neck_and_a_spine_that_the_source_lacks(network: Learned, name: str, m
     assert filled < most * copied
 
 
-def test_a_rig_that_it_has_not_met_is_left_to_the_transfer(network: Learned) -> None:
+def test_a_rig_that_it_has_not_met_is_left_to_the_transfer(network: NetworkRetargeter) -> None:
     truth = motion_of("zoo/m2m_human.bvh")
     source = replace(truth, rig=without(truth.rig, Role.NECK))
     moved = network(source, truth.rig)

@@ -12,7 +12,7 @@ from spark.rig.roles import Role
 from spark.rotation import quat_about, quat_angle, quat_from_yaw, quat_mul
 from spark.transfer.analytic import correspond, transfer
 from spark.transfer.canonical import CanonicalMotion, to_canonical
-from spark.transfer.target_prior import with_own_motion
+from spark.transfer.target_prior import with_target_prior
 from tests.helpers.recordings import recording
 from tests.helpers.stick import joint, stick_rig, without
 
@@ -49,7 +49,7 @@ def errors(moved: CanonicalMotion, truth: CanonicalMotion, joints: object = NECK
 def test_habits_are_found_again_in_another_motion(fps: float) -> None:
     truth, own = bowing(5, phase=1.0), bowing(20, fps=fps)
     source = lacking(truth)
-    moved = with_own_motion(transfer, source, own)
+    moved = with_target_prior(transfer, source, own)
     copied = transfer(source, own.rig)
     assert errors(copied, truth).mean() > 20
     assert errors(moved, truth).max() < 3
@@ -63,7 +63,7 @@ def test_it_does_not_matter_where_and_whereto_it_was_recorded() -> None:
     truth, own = bowing(5, phase=1.0), bowing(20)
     turned = quat_mul(quat_from_yaw(np.array(2.0)), own.rotations)
     elsewhere = replace(own, rotations=turned, hips=own.hips + np.array([3, -4, 0]))
-    one, other = (with_own_motion(transfer, lacking(truth), m) for m in (own, elsewhere))
+    one, other = (with_target_prior(transfer, lacking(truth), m) for m in (own, elsewhere))
     np.testing.assert_allclose(one.rotations, other.rotations, atol=1e-9)
 
 
@@ -81,7 +81,7 @@ def test_where_it_tells_nothing_the_method_is_left_alone(why: str) -> None:
         own = replace(own.frames(0, 1), frame_time=10.0)
     if why == "nothing missing":
         source = bowing(5)
-    moved, copied = with_own_motion(transfer, source, own), transfer(source, own.rig)
+    moved, copied = with_target_prior(transfer, source, own), transfer(source, own.rig)
     np.testing.assert_array_equal(moved.rotations, copied.rotations)
     assert moved.notes == copied.notes
 
@@ -96,7 +96,7 @@ def test_what_cannot_be_foretold_does_no_harm() -> None:
     copied = transfer(lacking(own), own.rig).rotations[:, NECK]
     rotations = own.rotations.copy()
     rotations[:, NECK] = quat_mul(copied, quat_about("x", wobble))
-    moved = with_own_motion(transfer, lacking(truth), replace(own, rotations=rotations))
+    moved = with_target_prior(transfer, lacking(truth), replace(own, rotations=rotations))
     assert errors(moved, transfer(lacking(truth), own.rig)).mean() < 4
 
 
@@ -115,7 +115,7 @@ def test_a_guess_beside_another_guess_is_left_alone() -> None:
     target = keeping(middle, top)
     for source, told in ((keeping(low, top), False), (keeping(top), True)):
         assert correspond(source.rig, target.rig).unmatched[middle] == middle
-        turns = with_own_motion(transfer, source, target).rotations[:, middle]
+        turns = with_target_prior(transfer, source, target).rotations[:, middle]
         plain = transfer(source, target.rig).rotations[:, middle]
         assert bool(quat_angle(turns, plain).max() > 0.01) is told
 
@@ -141,7 +141,7 @@ def test_people_keep_their_habits(
         other = read_motion(recording(own)).motion
     truth = to_canonical(motion, rig)
     source = lacking(truth, *gone)
-    moved = with_own_motion(transfer, source, to_canonical(other, rig))
+    moved = with_target_prior(transfer, source, to_canonical(other, rig))
     joints = rig.roles.joints(Role.NECK)
     squared = [np.square(errors(m, truth, joints)).mean() for m in (moved, transfer(source, rig))]
     assert squared[0] < most * squared[1]

@@ -14,12 +14,12 @@ from spark.rig.topology import LimbPair, mirrored_pairs, named_pair
 from spark.rig.trunk import find_pelvis, find_trunk
 from spark.skeleton import Skeleton
 
-_SURE = 1.5  # names that mean a limb's parts this much in all settle which limb it is
+_CLEAR_NAMES = 1.5  # names that mean a limb's parts this much in all settle which limb it is
 _REMEDY = "a map file can say which joint is what (spark-sim inspect --help)"
 
 
 @dataclass(frozen=True)
-class BodyPlan:
+class Anatomy:
     """What holds which role; `sides` is the evidence that `first` limbs are left (see `facing`)."""
 
     pelvis: int
@@ -32,45 +32,45 @@ class BodyPlan:
     mirrored: frozenset[int]
 
 
-def plan_body(stance: Measurements, hints: Sequence[NameHint]) -> BodyPlan:
+def find_anatomy(measured: Measurements, hints: Sequence[NameHint]) -> Anatomy:
     """The plan of a two-legged body; SkeletonError with the reason where it is none."""
-    skeleton = stance.skeleton
-    if stance.reach[0] <= 0:
+    skeleton = measured.skeleton
+    if measured.reach[0] <= 0:
         raise SkeletonError(f"all bones of the skeleton ({len(skeleton)} joints) are 0 m long")
-    pairs = mirrored_pairs(stance, hints, 0.12 * float(stance.reach[0]))
-    legs = named_pair(stance, hints, frozenset(LEG), _SURE)
-    arms = named_pair(stance, hints, frozenset((*ARM, "wing")), 0.5 * _SURE)
+    pairs = mirrored_pairs(measured, hints, 0.12 * float(measured.reach[0]))
+    legs = named_pair(measured, hints, frozenset(LEG), _CLEAR_NAMES)
+    arms = named_pair(measured, hints, frozenset((*ARM, "wing")), 0.5 * _CLEAR_NAMES)
     human_arms = arms is not None and _human(hints, arms)
     if legs is None:
-        legs = _legs_by_shape(stance, hints, pairs, arms)
+        legs = _legs_by_shape(measured, hints, pairs, arms)
     if legs is None:
         raise SkeletonError(_no_legs(skeleton, hints, arms))
-    others = _others(stance, skeleton, pairs, legs)
+    others = _others(measured, skeleton, pairs, legs)
     if arms is None and others:
-        arms = max(others, key=lambda pair: stance.reach[pair.first[0]])
+        arms = max(others, key=lambda pair: measured.reach[pair.first[0]])
     if not human_arms:
-        _refuse_other_plans(stance, hints, legs, arms, others)
+        _refuse_other_plans(measured, hints, legs, arms, others)
 
-    leg_labels = label_limb(stance, hints, (legs.first, legs.second), LEG)
+    leg_labels = label_limb(measured, hints, (legs.first, legs.second), LEG)
     labelled_legs = LabelledPair(legs, (leg_labels[0], leg_labels[-1]))
-    if any("lower_leg" not in label.places for label in leg_labels):
+    if any("lower_leg" not in label.index for label in leg_labels):
         raise SkeletonError(
             f"not a humanoid: the limbs that begin at {skeleton.names[legs.first[0]]!r} and "
             f"{skeleton.names[legs.second[0]]!r} have no knees; {_REMEDY}"
         )
     labelled_arms = None
     if arms is not None:
-        arm_labels = label_limb(stance, hints, (arms.first, arms.second), ARM)
-        if all("forearm" in label.places for label in arm_labels):
+        arm_labels = label_limb(measured, hints, (arms.first, arms.second), ARM)
+        if all("forearm" in label.index for label in arm_labels):
             labelled_arms = LabelledPair(arms, (arm_labels[0], arm_labels[-1]))
     pelvis = find_pelvis(skeleton, hints, legs)
-    spine, neck, head = find_trunk(stance, hints, pelvis, legs, arms if labelled_arms else None)
+    spine, neck, head = find_trunk(measured, hints, pelvis, legs, arms if labelled_arms else None)
     if labelled_arms is not None:
-        labelled_legs, labelled_arms = _align(stance, labelled_legs, labelled_arms)
+        labelled_legs, labelled_arms = _align(measured, labelled_legs, labelled_arms)
     above = next((j for j in (head, *reversed(neck), *reversed(spine)) if j is not None), None)
-    sides = first_is_left(stance, labelled_legs, labelled_arms, above)
+    sides = first_is_left(measured, labelled_legs, labelled_arms, above)
     mirrored = frozenset(j for p in pairs for j in (*p.first, *p.second))
-    return BodyPlan(pelvis, spine, neck, head, labelled_legs, labelled_arms, sides, mirrored)
+    return Anatomy(pelvis, spine, neck, head, labelled_legs, labelled_arms, sides, mirrored)
 
 
 def _human(hints: Sequence[NameHint], arms: LimbPair) -> bool:
@@ -79,23 +79,23 @@ def _human(hints: Sequence[NameHint], arms: LimbPair) -> bool:
 
 
 def _others(
-    stance: Measurements, skeleton: Skeleton, pairs: Sequence[LimbPair], legs: LimbPair
+    measured: Measurements, skeleton: Skeleton, pairs: Sequence[LimbPair], legs: LimbPair
 ) -> list[LimbPair]:
     """The pairs that are no part of the legs and long enough to be limbs beside them."""
     inside = {j for root in legs.roots for j in skeleton.subtree(root)}
     above = set(skeleton.ancestors(legs.roots[0])) | set(skeleton.ancestors(legs.roots[1]))
-    least = 0.4 * float(stance.reach[legs.roots[0]])
+    least = 0.4 * float(measured.reach[legs.roots[0]])
     return [
         pair
         for pair in pairs
         if not inside & set(pair.roots)
         and not above & set(pair.roots)
-        and stance.reach[pair.first[0]] >= least
+        and measured.reach[pair.first[0]] >= least
     ]
 
 
 def _legs_by_shape(
-    stance: Measurements,
+    measured: Measurements,
     hints: Sequence[NameHint],
     pairs: Sequence[LimbPair],
     arms: LimbPair | None,
@@ -107,19 +107,19 @@ def _legs_by_shape(
     """
     taken = set() if arms is None else {*arms.first, *arms.second}
     able = [p for p in pairs if not taken & set(p.roots) and min(len(p.first), len(p.second)) >= 2]
-    rest = rest_measurements(stance.skeleton)
+    rest = rest_measurements(measured.skeleton)
 
     def height(pair: LimbPair) -> float:
-        lifts = [lift for seen in (stance, rest) if not np.isnan(lift := seen.lift(pair.roots))]
+        lifts = [lift for seen in (measured, rest) if not np.isnan(lift := seen.lift(pair.roots))]
         return float(np.mean(lifts)) if lifts else 0.5
 
     def unlike(pair: LimbPair) -> float:
         as_leg, as_arm = (
-            label_limb(stance, hints, (pair.first, pair.second), parts)[0].score
+            label_limb(measured, hints, (pair.first, pair.second), parts)[0].score
             for parts in (LEG, ARM)
         )
         fit = float(np.clip(as_leg - as_arm, -4, 4))
-        return height(pair) - 0.05 * fit + 0.02 * len(stance.skeleton.ancestors(pair.root_joint))
+        return height(pair) - 0.05 * fit + 0.02 * len(measured.skeleton.ancestors(pair.root_joint))
 
     legs = min(able, key=unlike, default=None)
     return legs if legs is not None and height(legs) <= 0.5 else None
@@ -140,7 +140,7 @@ def _no_legs(skeleton: Skeleton, hints: Sequence[NameHint], arms: LimbPair | Non
 
 
 def _refuse_other_plans(
-    stance: Measurements,
+    measured: Measurements,
     hints: Sequence[NameHint],
     legs: LimbPair,
     arms: LimbPair | None,
@@ -149,19 +149,21 @@ def _refuse_other_plans(
     forks = [
         child
         for joint in legs.first
-        for child in stance.skeleton.children[joint]
-        if child not in legs.first and stance.reach[child] > 0.5 * stance.reach[legs.first[0]]
+        for child in measured.skeleton.children[joint]
+        if child not in legs.first and measured.reach[child] > 0.5 * measured.reach[legs.first[0]]
     ]
     if forks:
         raise SkeletonError(
             f"not a humanoid: it has {2 + 2 * len(forks)} legs, all of them carried by "
-            f"{stance.skeleton.names[legs.root_joint]!r}; {_REMEDY}"
+            f"{measured.skeleton.names[legs.root_joint]!r}; {_REMEDY}"
         )
     if len(others) > 1:
         wings = any("wing" in hint.parts for hint in hints)
         what = f"it has {1 + len(others)} pairs of limbs" + (", one of them wings" if wings else "")
         raise SkeletonError(f"not a humanoid: {what}; {_REMEDY}")
-    if arms is not None and stands_on_four(stance, rest_measurements(stance.skeleton), legs, arms):
+    if arms is not None and stands_on_four(
+        measured, rest_measurements(measured.skeleton), legs, arms
+    ):
         raise SkeletonError(
             "not a humanoid: it walks on four legs, its front limbs reach the ground as its hind "
             f"legs do; {_REMEDY}"
@@ -169,13 +171,13 @@ def _refuse_other_plans(
 
 
 def _align(
-    stance: Measurements, legs: LabelledPair, arms: LabelledPair
+    measured: Measurements, legs: LabelledPair, arms: LabelledPair
 ) -> tuple[LabelledPair, LabelledPair]:
     """Both with the limbs of one side first; where names tell one pair's sides, both know them."""
     if legs.pair.sided and arms.pair.sided:
         return legs, arms
-    across = np.subtract(*(stance.joints[:, legs.joint(i, "upper_leg") or 0] for i in (0, 1)))
-    between = np.subtract(*(stance.joints[:, arms.joint(i, "upper_arm") or 0] for i in (0, 1)))
+    across = np.subtract(*(measured.joints[:, legs.joint(i, "upper_leg") or 0] for i in (0, 1)))
+    between = np.subtract(*(measured.joints[:, arms.joint(i, "upper_arm") or 0] for i in (0, 1)))
     crossed = bool((across * between).sum(-1).mean() < 0)
     if legs.pair.sided:
         return legs, _ordered(arms, crossed, sided=True)
