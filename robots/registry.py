@@ -96,15 +96,39 @@ ENTRIES = (
         "dm-control",
     ),
 )
-ALIASES = {"ember": DEFAULT}
+ALIASES = {
+    "ember": DEFAULT,
+    "g1": "unitree_g1",
+    "h1": "unitree_h1",
+    "t1": "booster_t1",
+    "apollo": "apptronik_apollo",
+    "op3": "robotis_op3",
+}
+"""Short names, as people call the robots."""
 
 
 def is_robot(target: str | Path) -> bool:
-    """Whether `target` can only be the name of a robot or the path of a model: not a motion."""
+    """Whether `target` is the name of a robot or the path of a model, and not a motion.
+
+    A robot's name wins over a file or folder of that name; any other word is a robot's, perhaps
+    misspelt, unless there is a file or folder of that name.
+    """
     path = Path(target)
-    if path.suffix.lower() in SUFFIXES or str(target) in (*ALIASES, *(e.name for e in ENTRIES)):
+    if path.suffix.lower() in SUFFIXES or _is_known(target):
         return True
     return _is_name(target) and not path.exists()
+
+
+def shadowed(robot: str | Path) -> tuple[str, ...]:
+    """A note where a robot's name is also that of a file or folder here, which is not looked at."""
+    path = Path(robot)
+    if not (_is_known(robot) and path.exists()):
+        return ()
+    what = "folder" if path.is_dir() else "file"
+    return (
+        f"taken as the robot's name; the {what} {path.name!r} here is not looked at: a model is "
+        f"named with its ending, such as {path.name}/{path.name}.xml",
+    )
 
 
 def find(robot: str | Path) -> Path:
@@ -134,7 +158,7 @@ def find(robot: str | Path) -> Path:
 
 
 def name_of(model: str | Path) -> str | None:
-    """The name under which `find` gives this file; None where it has none."""
+    """The name under which `find` gives this file, not an alias; None where it has none."""
     path = Path(model).resolve()
     known = ((entry.name, entry.path) for entry in ENTRIES)
     return next((name for name, own in known if own is not None and own.resolve() == path), None)
@@ -146,6 +170,11 @@ def downloads() -> tuple[str, ...]:
     folder = _folder(_DOWNLOADS)
     found = () if folder is None else folder.glob("*_mj_description.py")
     return tuple(sorted(path.stem for path in found))
+
+
+def _is_known(robot: str | Path) -> bool:
+    names = (*ALIASES, *(entry.name for entry in ENTRIES))
+    return str(robot) in names or str(robot) in downloads()
 
 
 def _is_name(robot: str | Path) -> bool:
@@ -173,10 +202,10 @@ def _downloaded(name: str) -> Path:
 def _unknown(name: str) -> str:
     names = [*(entry.name for entry in ENTRIES), *ALIASES, *downloads()]
     near = get_close_matches(name.lower(), names, n=3, cutoff=0.5)
-    # What people call a robot is often the end of its name: g1, t1, apollo.
+    # A word of a name is nearer than any spelling: cmu, gymnasium, berkeley.
     near = [n for n in names if name.lower() in n.split("_") and n not in near][:3] + near
-    said = f"did you mean {' or '.join(map(repr, near[:3]))}? " if near else ""
+    question = f"did you mean {' or '.join(map(repr, near[:3]))}? " if near else ""
     return (
-        f"no robot is called {name!r}; {said}`spark-sim robots` lists those that are known. A file "
-        "is named with its ending: g1.xml, walk.bvh"
+        f"no robot is called {name!r}; {question}`spark-sim robots` lists those that are known. A "
+        "file is named with its ending: g1.xml, walk.bvh"
     )

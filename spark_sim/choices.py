@@ -32,6 +32,11 @@ RobotName = Literal[
     "gymnasium_humanoid",
     "dm_control_humanoid",
     "dm_control_cmu",
+    "g1",
+    "h1",
+    "t1",
+    "apollo",
+    "op3",
 ]
 """The robots that `spark-sim robots` lists, and their aliases. A type checker knows that onto one
 of these names `retarget` gives a `RobotClip`; of a path it can't."""

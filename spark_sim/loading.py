@@ -108,7 +108,8 @@ def load_robot(robot: File, *, roles: File | None = None) -> RobotClip:
     else:
         mjcf = read_mjcf(registry.find(robot), visuals=False)
         found = understand_robot(mjcf, rolemap.read(roles, parts_of(mjcf)))
-    return RobotClip(RobotMotion(found, found.tpose, 1.0, found.notes), Path(robot).stem)
+    notes = (*registry.shadowed(robot), *found.notes)
+    return RobotClip(RobotMotion(found, found.tpose, 1.0, notes), Path(robot).stem)
 
 
 def load_robot_motion(

@@ -27,14 +27,16 @@ def write_npz(motion: RobotMotion, path: Path, *, source: Path | None = None) ->
     `qpos` [T, nq] is position [m], quaternion wxyz, then joints [rad] in `joint_names`' order;
     `qvel` [T, nv] is the base's linear velocity in world axes, its angular one in its own, then the
     joints', by central differences; `frame_time` [s] is the step. `about` is JSON: the robot's
-    name, its model and `source` with their SHA-256, the conventions, and what was assumed.
+    name, the names of its model and of `source` with their SHA-256, the conventions, and what was
+    assumed. No folder of this machine is written: the model's is its path from `path`'s folder
+    where it lies in that, and its bare name where not.
     Raises `OutputError` where `path` can't be written.
     """
     model = motion.robot.mjcf.path
     about = {
         "schema": SCHEMA,
         "robot": registry.name_of(model),
-        "model": str(model),
+        "model": _portable(model, path),
         "model_sha256": model_sha256(model),
         "source": None if source is None else source.name,
         "source_sha256": None if source is None else _sha256(source),
@@ -43,7 +45,7 @@ def write_npz(motion: RobotMotion, path: Path, *, source: Path | None = None) ->
         "angle_unit": "rad",
         "up_axis": "z",
         "qvel": "linear velocity in world axes, angular velocity in the body's",
-        "notes": motion.notes,
+        "notes": [_without_folder(note, model) for note in motion.notes],
     }
     mjcf = motion.robot.mjcf
     out = io.BytesIO()
@@ -77,7 +79,7 @@ def read_npz(
         raise FileFormatError(
             path,
             None,
-            f"was made for {about.get('model')!r}, not for {str(robot.mjcf.path)!r}: {differs}",
+            f"was made for {about.get('model')!r}, not for {robot.mjcf.path.name!r}: {differs}",
         )
     model = robot.mjcf.model
     qpos = number_array(arrays, "qpos", path, (None, int(model.nq)))
@@ -115,13 +117,33 @@ def _about(arrays: dict[str, np.ndarray], path: Path) -> dict[str, Any]:
     return about
 
 
+def _portable(model: Path, path: Path) -> str:
+    """How `model` is called in a file at `path`, without a folder above it."""
+    folder = path.resolve().parent
+    found = model.resolve()
+    return found.relative_to(folder).as_posix() if found.is_relative_to(folder) else model.name
+
+
+def _without_folder(note: str, model: Path) -> str:
+    """A note in which MuJoCo may have named files beside the model by their whole path."""
+    for folder in {model.parent.resolve(), model.parent.absolute()}:
+        note = note.replace(f"{folder}/", "")
+    return note
+
+
 def _model(about: dict[str, Any], path: Path) -> str | Path:
-    """The robot that the motion was made for."""
+    """The robot that the motion was made for: its name, or its model, looked for from the folder
+    of `path`, then from the working directory. Older files hold an absolute path."""
     name, model = about.get("robot"), about.get("model")
     if isinstance(name, str):
         return name
-    if isinstance(model, str) and Path(model).is_file():
-        return Path(model)
+    tried = [] if not isinstance(model, str) else [path.parent / model, Path(model)]
+    for candidate in tried:
+        if candidate.is_file():
+            return candidate
     raise FileFormatError(
-        path, None, f"was made for the robot {model!r}, which is not there; name it with --robot"
+        path,
+        None,
+        f"was made for the robot {model!r}, which is neither beside it nor here; name it with "
+        "--robot",
     )

@@ -4,11 +4,13 @@ import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 import pytest
 
+import spark_sim
 from robots import registry
 from robots.model.known import known
 from robots.model.mjcf import read_mjcf
@@ -84,9 +86,9 @@ def test_listing_and_finding_import_nothing() -> None:
 @pytest.mark.parametrize(
     ("name", "says"),
     [
-        ("g1", "did you mean 'unitree_g1'"),
+        ("cmu", "did you mean 'dm_control_cmu'"),
         ("unitree_g2", "did you mean 'unitree_g1' or 'unitree_h1'"),
-        ("Apollo", "did you mean 'apptronik_apollo'"),
+        ("Apollo", "did you mean 'apollo'"),
         ("nothing_like_it_xyz", "no robot is called 'nothing_like_it_xyz'; `spark-sim robots`"),
     ],
 )
@@ -109,6 +111,48 @@ def test_paths_are_models() -> None:
     for path in ("g1.urdf", "walk.bvh", "folder/g1", "."):
         with pytest.raises(FileFormatError, match="expected an MJCF"):
             registry.find(path)
+
+
+@pytest.mark.parametrize("alias", registry.ALIASES)
+def test_aliases_are_other_names_of_robots(alias: str) -> None:
+    entry = next(entry for entry in ENTRIES if entry.name == registry.ALIASES[alias])
+    if entry.path is None:
+        pytest.skip(f"{entry.name}: {entry.module} is not installed")
+    assert registry.find(alias) == registry.find(entry.name) == entry.path
+    assert registry.name_of(registry.find(alias)) == entry.name
+
+
+def test_no_alias_hides_a_robot() -> None:
+    assert not set(registry.ALIASES) & set(NAMES)
+
+
+@pytest.mark.parametrize("name", ["g1", "unitree_g1", "robot", "h9_mj_description"])
+@pytest.mark.parametrize("make", [Path.mkdir, Path.touch])
+def test_what_is_called_as_a_robot_is_not_in_its_way(
+    name: str, make: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(registry, "downloads", lambda: ("h9_mj_description",))
+    assert registry.is_robot(name)
+    assert not registry.shadowed(name)
+    make(tmp_path / name)
+    assert registry.is_robot(name)
+    kind = "folder" if make is Path.mkdir else "file"
+    assert f"the {kind} '{name}' here is not looked at" in registry.shadowed(name)[0]
+    assert not registry.shadowed("takes")
+
+
+def test_a_robot_is_found_beside_a_folder_of_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    plain = spark_sim.load("ember")
+    (tmp_path / "ember").mkdir()
+    clip = spark_sim.load("ember")
+    assert isinstance(clip, spark_sim.RobotClip)
+    assert clip.on_robot.robot is plain.on_robot.robot
+    assert len(clip.notes) == len(plain.notes) + 1
+    assert "the folder 'ember' here is not looked at" in clip.notes[0]
 
 
 def test_a_name_wins_over_a_folder_of_that_name(

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 import spark_sim
 from robots import registry
 from robots.formats import FORMATS
+from robots.formats.native import write_npz
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.model.understand import understand_robot
@@ -408,6 +409,51 @@ def test_a_changed_model_is_said_and_another_refused(clip: RobotClip, tmp_path: 
     with pytest.raises(FileFormatError, match="name it with --robot"):
         spark_sim.load(written)
     assert spark_sim.load(written, robot="robot").motion.frame_time == pytest.approx(1 / FPS)
+
+
+def test_our_npz_names_no_folder_of_the_machine(clip: RobotClip, tmp_path: Path) -> None:
+    """Its model is found beside it or where one works, and by the absolute path of older files."""
+    elsewhere = tmp_path / "at_home"
+    elsewhere.mkdir()
+    (elsewhere / "own.xml").write_text(registry.find("robot").read_text())
+    for place in (elsewhere, tmp_path / "out", elsewhere / "takes"):
+        place.mkdir(exist_ok=True)
+        own = understand_robot(elsewhere / "own.xml")
+        notes = (f"no mesh '{elsewhere}/hand.stl'",)
+        coordinates = own.from_qpos(clip.on_robot.qpos)
+        written = place / "clip.npz"
+        write_npz(RobotMotion(own, coordinates, 1 / FPS, notes), written, source=tmp_path / "a.bvh")
+        with np.load(written) as stored:
+            assert str(tmp_path) not in str(stored["about"])
+            assert json.loads(str(stored["about"]))["model"] == "own.xml"
+            assert json.loads(str(stored["about"]))["notes"] == ["no mesh 'hand.stl'"]
+    assert spark_sim.load(elsewhere / "clip.npz").frame_time == pytest.approx(1 / FPS)
+    with pytest.raises(FileFormatError, match=r"'own.xml', which is neither beside it nor here"):
+        spark_sim.load(tmp_path / "out" / "clip.npz")
+
+
+def test_a_model_is_found_where_one_works_and_where_older_files_say(
+    clip: RobotClip, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "models").mkdir()
+    model = tmp_path / "models" / "own.xml"
+    model.write_text(registry.find("robot").read_text())
+    own = understand_robot(model)
+    written = tmp_path / "clip.npz"
+    write_npz(RobotMotion(own, own.from_qpos(clip.on_robot.qpos), 1 / FPS), written)
+    with np.load(written) as stored:
+        assert json.loads(str(stored["about"]))["model"] == "models/own.xml"
+        arrays = dict(stored)
+    moved = tmp_path / "far" / "clip.npz"
+    moved.parent.mkdir()
+    written.rename(moved)
+    monkeypatch.chdir(tmp_path)
+    assert spark_sim.load(moved).on_robot.robot.mjcf.path.name == "own.xml"
+    about = json.loads(str(arrays["about"]))
+    about["model"] = str(model)  # as the first versions wrote it
+    monkeypatch.chdir(moved.parent)
+    np.savez(moved, **{**arrays, "about": np.array(json.dumps(about))})
+    assert spark_sim.load(moved).on_robot.robot.mjcf.path == model
 
 
 def test_an_included_model_that_changed_is_seen(clip: RobotClip, tmp_path: Path) -> None:
