@@ -89,7 +89,7 @@ def clips(data: Path) -> Iterator[tuple[str, Motion, Rig]]:
                 motion = read_recording(path).motion
                 motion = motion.frames(0, int(SECONDS / motion.frame_time))
                 rig = understand(motion)
-                lowest = pose_clip(Subject(motion, rig)).lowest_point
+                lowest = pose_clip(Subject(motion, rig)).lowest_corner
             except SparkSimError as error:
                 print(f"left out: {error}", file=sys.stderr)
                 continue

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float
 
 from sim.report.clip_metrics import ClipMetrics, measure
 from sim.report.clip_poses import ClipPoses, pose_clip
-from sim.report.findings import find
+from sim.report.findings import findings_of
 from sim.report.measures import (
     ContactMatch,
     Drift,
@@ -46,7 +46,7 @@ def assess(
     on another skeleton or has other frames.
     """
     motion, rig = subject.motion, subject.rig
-    clip_poses = _posed("the motion", subject)
+    clip_poses = _pose("the motion", subject)
     known = None if truth is None else accuracy(motion, truth, rig)
     notes = _about_model(clip_poses)
     if source is None:
@@ -56,8 +56,8 @@ def assess(
                 "the floor is the clip's own: one that floats or sinks as a whole can't be told",
             )
         notes += _slope(clip_poses, "the")
-        return Report(clip, None, None, None, find(clip, None), notes, known)
-    source_poses = _posed("the source", source)
+        return Report(clip, None, None, None, findings_of(clip, None), notes, known)
+    source_poses = _pose("the source", source)
     source_floor = _own_floor(source_poses)
     floor = 0.0
     if subject.body is None:
@@ -72,10 +72,10 @@ def assess(
     difference = abs(source_poses.motion.duration - motion.duration)
     if difference > max(0.1, 2 * motion.frame_time):
         notes += (f"the source's duration differs by {difference:.1f} s: frames may not match",)
-    return Report(clip, source_clip, drift, contacts, find(clip, drift), notes, known)
+    return Report(clip, source_clip, drift, contacts, findings_of(clip, drift), notes, known)
 
 
-def _posed(name: str, subject: Subject) -> ClipPoses:
+def _pose(name: str, subject: Subject) -> ClipPoses:
     if not len(subject.motion):
         raise SkeletonError(f"{name} has no frames: nothing to assess")
     return pose_clip(subject)
@@ -89,7 +89,7 @@ def _about_model(poses: ClipPoses) -> tuple[str, ...]:
     own = body.model.body_rootid[body.model.geom_bodyid] == body.root
     if not ((body.model.geom_contype | body.model.geom_conaffinity)[own] != 0).any():
         notes.append("none of the model's shapes collide: self-penetration is not measured")
-    height = floor_height(poses.lowest_point)
+    height = floor_height(poses.lowest_corner)
     if abs(height) > PLAUSIBILITY_V1.scaled(poses.rig.hip_height).penetration:
         notes.append(
             f"the model's floor is at z = 0; the clip's own (the 5th percentile of its lowest sole "
@@ -99,7 +99,7 @@ def _about_model(poses: ClipPoses) -> tuple[str, ...]:
 
 
 def _own_floor(poses: ClipPoses) -> float:
-    return floor_height(poses.lowest_point) if poses.body is None else 0.0
+    return floor_height(poses.lowest_corner) if poses.body is None else 0.0
 
 
 def _floor_from_source(
@@ -108,7 +108,7 @@ def _floor_from_source(
     scaled = source_floor * poses.rig.hip_height / source_rig.hip_height
     if abs(source_floor) < _FLOOR_AT_ZERO * source_rig.hip_height:
         return scaled, ()
-    own = floor_height(poses.lowest_point)
+    own = floor_height(poses.lowest_corner)
     floor = min((0.0, scaled, source_floor), key=lambda z: abs(z - own))
     return floor, (
         f"the source's floor is at z = {source_floor:.2f} m; for the motion it is taken to be at "
@@ -153,7 +153,7 @@ def _contacts(poses: ClipPoses, source: ClipPoses, times: Float[np.ndarray, "T"]
 
 def _slope(poses: ClipPoses, whose: str) -> tuple[str, ...]:
     """A note where the feet stand on a slope: recorded floors are off level by a degree or two."""
-    lowest = poses.points[np.arange(len(poses)), poses.points[..., 2].argmin(axis=1)]
+    lowest = poses.corners[np.arange(len(poses)), poses.corners[..., 2].argmin(axis=1)]
     planted = np.any(list(_planted(poses).values()), axis=0)
     angle, rise = floor_slope(lowest[planted])
     if rise < PLAUSIBILITY_V1.scaled(poses.rig.hip_height).floating / 2:

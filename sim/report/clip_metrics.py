@@ -1,4 +1,4 @@
-"""One clip's measures over time, all of them, without regard to any other clip."""
+"""All measures of one clip over time, without regard to any other clip."""
 
 from dataclasses import dataclass
 
@@ -7,12 +7,12 @@ from jaxtyping import Bool, Float
 
 from sim.report.clip_poses import ClipPoses
 from sim.report.derivatives import derivative
-from sim.report.hinges import hinge_excess, hinge_rates
 from sim.report.limits import LimitExcess, limit_excess
-from sim.report.measures import floating, least_within, penetration_depth
-from sim.report.selfcollision import capsules, self_penetration
+from sim.report.measures import floating, penetration_depth, windowed_min
+from sim.report.model_joints import model_joint_rates, model_limit_excess
+from sim.report.self_penetration import capsules, self_penetration
 from sim.report.smoothness import joint_rates
-from sim.report.support import support
+from sim.report.support import support_of
 from sim.report.thresholds import PLAUSIBILITY_V1, Thresholds
 from spark.constants import GRAVITY
 from spark.summary import time_span
@@ -20,13 +20,15 @@ from spark.summary import time_span
 
 @dataclass(frozen=True, eq=False)
 class ClipMetrics:
-    """One clip's measures over time; heights are above the floor [m].
+    """All measures of one clip over its T frames; heights are above the floor at `floor_z` [m].
 
-    `flags` are those of `sim.report.names.FLAGS`, by name.
-    `depth` [m]: how deep the parts `depth_names` (feet, then others) lie under the floor.
+    `flags`: the frames that are implausible, by each name of `sim.report.names.FLAGS`.
+    `depth` [m]: of the parts `depth_names` (sole corners by foot, then others) under the floor.
     `clearance` [m]: the height of the body's lowest point.
-    `skating`, `speeds` [m/s]: of the soles' corners, on the feet `sides`.
-    `unexplained`: the force [body weights] and torque [body weights x m] the floor can't give.
+    `corner_skates`, `corner_speeds` [m/s]: whether each sole corner skates, and how fast it moves
+    along the floor, on the feet `corner_feet`.
+    `unexplained_wrench`: the force [body weights] and the torque [body weights x 1 m] that the
+    floor can't give.
     `imbalance` [m]: how far the centre of mass lies outside the support; nan in frames that move.
     `self_depth` [m]: how deep the parts of each of `self_pairs` are in each other; more than
     `self_bound` is too deep.
@@ -40,10 +42,10 @@ class ClipMetrics:
     depth: Float[np.ndarray, "T N"]
     depth_names: tuple[str, ...]
     clearance: Float[np.ndarray, "T"]
-    skating: Bool[np.ndarray, "T P"]
-    speeds: Float[np.ndarray, "T P"]
-    sides: tuple[str, ...]
-    unexplained: Float[np.ndarray, "T 2"]
+    corner_skates: Bool[np.ndarray, "T C"]
+    corner_speeds: Float[np.ndarray, "T C"]
+    corner_feet: tuple[str, ...]
+    unexplained_wrench: Float[np.ndarray, "T 2"]
     imbalance: Float[np.ndarray, "T"]
     limits: tuple[LimitExcess, ...]
     self_pairs: tuple[tuple[str, str], ...]
@@ -114,28 +116,28 @@ class ClipMetrics:
 
 
 def measure(poses: ClipPoses, floor_z: float) -> ClipMetrics:
-    """All measures of a motion over a floor at `floor_z` [m]."""
+    """The measures of a posed clip over a floor at `floor_z` [m]."""
     thresholds = PLAUSIBILITY_V1.scaled(poses.rig.hip_height)
     frame_time, window = poses.motion.frame_time, thresholds.window
-    held = support(poses, floor_z, thresholds)
-    soles = len(held.feet)
-    parts = poses.parts[..., 2] - floor_z
-    depth = penetration_depth(np.concatenate([held.heights[:, :soles], parts], axis=1))
-    clearance = held.heights.min(axis=1)
+    support = support_of(poses, floor_z, thresholds)
+    corners = len(support.feet)
+    parts = poses.part_points[..., 2] - floor_z
+    depth = penetration_depth(np.concatenate([support.heights[:, :corners], parts], axis=1))
+    clearance = support.heights.min(axis=1)
     acceleration = derivative(poses.mass.com[:, 2], frame_time, 2, window)
     # The window smears take-off and landing over itself.
-    fall_error = least_within(np.abs(acceleration + GRAVITY), frame_time, window)
-    skates = held.skating()
-    wrench = held.unexplained()
+    fall_error = windowed_min(np.abs(acceleration + GRAVITY), frame_time, window)
+    skates = support.skating()
+    wrench = support.unexplained_wrench()
     if poses.body is None or poses.model_poses is None:
         limits = limit_excess(poses.since_tpose, poses.rig)
         pairs, self_depth = self_penetration(capsules(poses))
-        rates = joint_rates(poses.world, poses.rig, frame_time, window)
+        rates = joint_rates(poses.rotations, poses.rig, frame_time, window)
         self_bound = thresholds.self_penetration
     else:
-        limits = hinge_excess(poses.body)
+        limits = model_limit_excess(poses.body)
         pairs, self_depth = poses.model_poses.pairs, poses.model_poses.depth
-        rates = hinge_rates(poses.body, frame_time, window)
+        rates = model_joint_rates(poses.body, frame_time, window)
         self_bound = thresholds.shape_penetration
     joint_names, joint_speed, joint_jerk = rates
     return ClipMetrics(
@@ -150,13 +152,13 @@ def measure(poses: ClipPoses, floor_z: float) -> ClipMetrics:
             | (wrench[:, 1] > thresholds.wrench_torque),
         },
         depth=depth,
-        depth_names=(*poses.sides, *poses.part_names),
+        depth_names=(*poses.corner_feet, *poses.part_names),
         clearance=clearance,
-        skating=skates,
-        speeds=held.speeds[:, :soles],
-        sides=poses.sides,
-        unexplained=wrench,
-        imbalance=held.imbalance(),
+        corner_skates=skates,
+        corner_speeds=support.speeds[:, :corners],
+        corner_feet=poses.corner_feet,
+        unexplained_wrench=wrench,
+        imbalance=support.imbalance(),
         limits=limits,
         self_pairs=pairs,
         self_depth=self_depth,

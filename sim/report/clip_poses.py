@@ -25,27 +25,27 @@ _NO_FLESH = ("foot", "toe", "clavicle")
 class ClipPoses:
     """Where a moving body is in every frame [m, world].
 
-    `points` are the soles' corners, each of the foot in `sides` ("left foot"). `parts` are what may
-    touch the floor besides, named by `part_names`: the other joints with a role, inside spheres of
-    flesh of radius `flesh` [m], or the lowest points of a given body's own shapes. `hips` is the
-    middle of the hip joints, `heading` [rad] the pelvis's turn about Z since the T-pose, without
-    jumps. `positions` and `world` are the joints' as `forward` gives them; `since_tpose` is G, each
-    joint's rotation since the T-pose in world axes. `model_poses` are
-    those of `body`, where a model is given.
+    `corners` are those of the soles, on the feet `corner_feet` ("left foot"). `part_points` are
+    what else may touch the floor, of the parts `part_names`: the other joints with a role, inside
+    spheres of flesh of `part_radii` [m], or the lowest points of a model's own geoms (radius 0).
+    `hips` is the middle of the hip joints, `heading` [rad] the pelvis's turn about Z since the
+    T-pose, without jumps. `positions` and `rotations` are those of the joints as `forward` gives
+    them, `since_tpose` their rotations G since the T-pose in world axes. `model_poses` are those of
+    `body`, where the motion has a model.
     """
 
     motion: Motion
     rig: Rig
-    points: Float[np.ndarray, "T P 3"]
-    sides: tuple[str, ...]
-    parts: Float[np.ndarray, "T B 3"]
+    corners: Float[np.ndarray, "T P 3"]
+    corner_feet: tuple[str, ...]
+    part_points: Float[np.ndarray, "T B 3"]
     part_names: tuple[str, ...]
-    flesh: Float[np.ndarray, "B"]
+    part_radii: Float[np.ndarray, "B"]
     mass: Mass
     hips: Float[np.ndarray, "T 3"]
     heading: Float[np.ndarray, "T"]
     positions: Float[np.ndarray, "T J 3"]
-    world: Float[np.ndarray, "T J 4"]
+    rotations: Float[np.ndarray, "T J 4"]
     since_tpose: Float[np.ndarray, "T J 4"]
     body: ModelTrajectory | None
     model_poses: ModelPoses | None
@@ -54,9 +54,9 @@ class ClipPoses:
         return len(self.hips)
 
     @property
-    def lowest_point(self) -> Float[np.ndarray, "T"]:
+    def lowest_corner(self) -> Float[np.ndarray, "T"]:
         """Height [m, world] of the lowest sole corner in each frame."""
-        return self.points[..., 2].min(axis=1)
+        return self.corners[..., 2].min(axis=1)
 
 
 def pose_clip(subject: Subject) -> ClipPoses:
@@ -66,11 +66,11 @@ def pose_clip(subject: Subject) -> ClipPoses:
     another number of frames.
     """
     motion, rig, body = subject.motion, subject.rig, subject.body
-    positions, world = forward(motion)
-    since_tpose = quat_mul(world, quat_conj(rig.tpose))
+    positions, rotations = forward(motion)
+    since_tpose = quat_mul(rotations, quat_conj(rig.tpose))
     if body is None:
-        model_poses, mass = None, human_mass(rig, positions, world)
-        part_names, parts, flesh = _flesh(rig, positions)
+        model_poses, mass = None, human_mass(rig, positions, rotations)
+        part_names, part_points, part_radii = _flesh(rig, positions)
     else:
         if len(body.qpos) != len(motion):
             raise SkeletonError(
@@ -78,28 +78,28 @@ def pose_clip(subject: Subject) -> ClipPoses:
             )
         model_poses = pose_model(body)
         mass = model_mass(body, model_poses)
-        part_names, parts = lowest_points(body, model_poses)
-        flesh = np.zeros(len(part_names))
+        part_names, part_points = lowest_points(body, model_poses)
+        part_radii = np.zeros(len(part_names))
     if model_poses is not None and body is not None and body.soles:
-        sides = tuple(f"{sole.side} foot" for sole in body.soles for _ in sole.bodies)
-        points = np.concatenate([_given_corners(sole, model_poses) for sole in body.soles], axis=1)
+        corner_feet = tuple(f"{sole.side} foot" for sole in body.soles for _ in sole.bodies)
+        corners = np.concatenate([_model_corners(sole, model_poses) for sole in body.soles], axis=1)
     else:
         soles = _soles(rig)
-        sides = tuple(f"{sole.side} foot" for sole in soles for _ in sole.joints)
-        points = np.concatenate([sole_positions(s, positions, world) for s in soles], axis=1)
+        corner_feet = tuple(f"{sole.side} foot" for sole in soles for _ in sole.joints)
+        corners = np.concatenate([sole_positions(s, positions, rotations) for s in soles], axis=1)
     return ClipPoses(
         motion=motion,
         rig=rig,
-        points=points,
-        sides=sides,
-        parts=parts,
+        corners=corners,
+        corner_feet=corner_feet,
+        part_points=part_points,
         part_names=part_names,
-        flesh=flesh,
+        part_radii=part_radii,
         mass=mass,
         hips=positions[:, rig.hips].mean(axis=1),
         heading=np.unwrap(yaw_from_quat(since_tpose[:, rig.pelvis])),
         positions=positions,
-        world=world,
+        rotations=rotations,
         since_tpose=since_tpose,
         body=body,
         model_poses=model_poses,
@@ -129,6 +129,6 @@ def _soles(rig: Rig) -> tuple[Sole, ...]:
     return soles
 
 
-def _given_corners(sole: ModelSole, poses: ModelPoses) -> Float[np.ndarray, "T C 3"]:
+def _model_corners(sole: ModelSole, poses: ModelPoses) -> Float[np.ndarray, "T C 3"]:
     turned = quat_rotate(poses.quat[:, sole.bodies], sole.points)
     return poses.pos[:, sole.bodies] + turned

@@ -10,20 +10,28 @@ from sim.report.result import Finding
 from spark.runs import true_runs
 
 # Flags of one kind that are no further apart than this [s] are one event.
-_GAP = 0.1
+_MERGE_GAP = 0.1
 # A joint beyond its limit by less than this [rad] is nothing to mend.
-_LEAST_BEND = np.radians(1.0)
+_MIN_EXCESS = np.radians(1.0)
 
 
-def find(clip: ClipMetrics, drift: Drift | None) -> tuple[Finding, ...]:
+def findings_of(clip: ClipMetrics, drift: Drift | None) -> tuple[Finding, ...]:
     """All events of a clip, the gravest of each measure first."""
-    gap = int(_GAP / clip.frame_time)
-    kinds = (_sinking, _floating, _sliding, _pushed, _bending, _piercing, _tipping)
+    gap = int(_MERGE_GAP / clip.frame_time)
+    kinds = (
+        _penetration,
+        _floating,
+        _skating,
+        _root_wrench,
+        _joint_limits,
+        _self_penetration,
+        _balance,
+    )
     found = (f for kind in kinds for f in sorted(kind(clip, gap), key=lambda f: -f.amount))
-    return (*found, *(_straying(drift) if drift else ()))
+    return (*found, *(_root_drift(drift) if drift else ()))
 
 
-def _sinking(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
+def _penetration(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     for name in dict.fromkeys(clip.depth_names):
         depth = clip.depth[:, [n == name for n in clip.depth_names]].max(axis=1)
         for start, stop in true_runs(depth > clip.thresholds.penetration, gap):
@@ -40,18 +48,18 @@ def _floating(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
         yield Finding("floating", "body", start, stop, amount, "m", sentence)
 
 
-def _sliding(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
-    for side in dict.fromkeys(clip.sides):
-        columns = [s == side for s in clip.sides]
-        speed = np.where(clip.skating, clip.speeds, 0.0)[:, columns].max(axis=1)
+def _skating(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
+    for side in dict.fromkeys(clip.corner_feet):
+        columns = [s == side for s in clip.corner_feet]
+        speed = np.where(clip.corner_skates, clip.corner_speeds, 0.0)[:, columns].max(axis=1)
         for start, stop in true_runs(speed > 0, gap):
             amount = float(speed[start:stop].sum()) * clip.frame_time
             sentence = f"{side} slides {100 * amount:.1f} cm"
             yield Finding("skating", side, start, stop, amount, "m", sentence)
 
 
-def _pushed(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
-    force, torque = clip.unexplained.T
+def _root_wrench(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
+    force, torque = clip.unexplained_wrench.T
     for start, stop in true_runs(clip.flags["root_wrench"] & ~clip.flags["floating"], gap):
         amount, unit = float(force[start:stop].max()), "bw"
         sentence = f"the body is pushed by {amount:.2f} body weights that nothing gives"
@@ -61,18 +69,18 @@ def _pushed(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
         yield Finding("root_wrench", "body", start, stop, amount, unit, sentence)
 
 
-def _bending(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
+def _joint_limits(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     for limit in clip.limits:
         for excess, movement in zip(limit.excess.T, limit.movements, strict=True):
             for start, stop in true_runs(excess > 0, gap):
                 amount = float(excess[start:stop].max())
-                if amount < _LEAST_BEND:
+                if amount < _MIN_EXCESS:
                     continue
                 sentence = f"{limit.joint} {movement} {np.degrees(amount):.0f}° beyond its limit"
                 yield Finding("joint_limit", limit.joint, start, stop, amount, "rad", sentence)
 
 
-def _piercing(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
+def _self_penetration(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     for (one, other), depth in zip(clip.self_pairs, clip.self_depth.T, strict=True):
         for start, stop in true_runs(depth > clip.self_bound, gap):
             amount = float(depth[start:stop].max())
@@ -81,7 +89,7 @@ def _piercing(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
             yield Finding("self_penetration", where, start, stop, amount, "m", sentence)
 
 
-def _tipping(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
+def _balance(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
     outside = np.nan_to_num(clip.imbalance)
     for start, stop in true_runs(outside > clip.thresholds.balance, gap):
         amount = float(outside[start:stop].max())
@@ -89,7 +97,7 @@ def _tipping(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
         yield Finding("balance", "body", start, stop, amount, "m", sentence)
 
 
-def _straying(drift: Drift) -> Iterator[Finding]:
+def _root_drift(drift: Drift) -> Iterator[Finding]:
     worst = int(drift.distance.argmax())
     amount = float(drift.distance[worst])
     if amount > 0.05 * max(drift.path_length, 1.0):

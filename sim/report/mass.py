@@ -18,13 +18,13 @@ class Mass:
     """Rigid pieces over time; the mass `fractions` sum to 1.
 
     `coms` [m, world] are their centres of mass; `inertias` [m²] are the tensors about those for
-    unit mass, in axes of their own that `turns` maps into the world.
+    unit mass, in axes of their own that `rotations` maps into the world.
     """
 
     fractions: Float[np.ndarray, "S"]
     inertias: Float[np.ndarray, "S 3 3"]
     coms: Float[np.ndarray, "T S 3"]
-    turns: Float[np.ndarray, "T S 4"]
+    rotations: Float[np.ndarray, "T S 4"]
 
     @cached_property
     def com(self) -> Float[np.ndarray, "T 3"]:
@@ -38,9 +38,9 @@ def human_mass(
 ) -> Mass:
     """A human's mass on the rig's bones (`sim.body.anthropometry`)."""
     body = segments(rig)
-    turns = world[:, body.joints]
-    coms = positions[:, body.joints] + quat_rotate(turns, body.coms)
-    return Mass(body.masses, body.inertias, coms, turns)
+    rotations = world[:, body.joints]
+    coms = positions[:, body.joints] + quat_rotate(rotations, body.coms)
+    return Mass(body.masses, body.inertias, coms, rotations)
 
 
 def model_mass(body: ModelTrajectory, poses: ModelPoses) -> Mass:

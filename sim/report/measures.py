@@ -35,7 +35,7 @@ def floating(
     return (clearance > height) & (fall_error > free_fall)
 
 
-def least_within(
+def windowed_min(
     values: Float[np.ndarray, "T *n"], frame_time: float, window: float
 ) -> Float[np.ndarray, "T *n"]:
     """The least value from `window` seconds before each frame to as long after it.
@@ -91,7 +91,7 @@ def root_drift(
     )
 
 
-def outside_hull(
+def distance_outside_hull(
     place: Float[np.ndarray, "T 2"],
     points: Float[np.ndarray, "T P 2"],
     use: Bool[np.ndarray, "T P"],

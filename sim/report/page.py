@@ -103,15 +103,15 @@ def report_page(
 def _marks(clip: ClipMetrics, subject: Subject) -> Marks:
     """The soles' corners as dots, and the labels of each frame's flags."""
     poses = pose_clip(subject)
-    heights = poses.points[..., 2] - clip.floor_z
+    heights = poses.corners[..., 2] - clip.floor_z
     states = np.zeros(heights.shape, dtype=np.uint8)
     states[heights < clip.thresholds.skate_height] = _STANDS
-    states[clip.skating] = _SLIDES
+    states[clip.corner_skates] = _SLIDES
     states[heights < -clip.thresholds.penetration] = _SINKS
     labels = tuple(
         tuple(LABELS[name] for name in FLAGS if clip.flags[name][t]) for t in range(len(clip))
     )
-    return Marks(poses.points, states, labels, tuple(MARKS.values()))
+    return Marks(poses.corners, states, labels, tuple(MARKS.values()))
 
 
 def _cards(result: Result) -> str:

@@ -26,48 +26,48 @@ class Plot:
     flagged: Bool[np.ndarray, "T"]
     limit: float | None
     source: Float[np.ndarray, "S"] | None = None
-    lowest: bool = False  # of many points in one pixel, show the least
-    least: float = 1.0
+    worst_is_low: bool = False  # of many points in one pixel, show the least
+    min_range: float = 1.0
 
 
 def plots(result: Result) -> list[Plot]:
     """What is worth a look over time."""
     clip, source, limits = result.clip, result.source, result.clip.thresholds
     flags = clip.flags
-    made = [
+    shown = [
         Plot(
             "lowest point above the floor",
             "cm",
-            100 * _lowest(clip),
+            100 * _lowest_point(clip),
             flags["penetration"] | flags["floating"],
             -100 * limits.penetration,
-            None if source is None else 100 * _lowest(source),
-            lowest=True,
+            None if source is None else 100 * _lowest_point(source),
+            worst_is_low=True,
         ),
         Plot(
             "sliding foot",
             "m/s",
-            _sliding(clip),
+            _skate_speed(clip),
             flags["skating"],
             None,
-            None if source is None else _sliding(source),
-            least=limits.skate_speed,
+            None if source is None else _skate_speed(source),
+            min_range=limits.skate_speed,
         ),
         Plot(
             "force that nothing gives",
             "body weights",
-            clip.unexplained[:, 0],
+            clip.unexplained_wrench[:, 0],
             flags["root_wrench"],
             limits.wrench_force,
-            None if source is None else source.unexplained[:, 0],
+            None if source is None else source.unexplained_wrench[:, 0],
         ),
         Plot(
             "joints beyond their limits",
             "°",
-            _beyond(clip),
-            _beyond(clip) > 0,
+            _limit_excess(clip),
+            _limit_excess(clip) > 0,
             None,
-            None if source is None else _beyond(source),
+            None if source is None else _limit_excess(source),
         ),
         Plot(
             "body parts in each other",
@@ -87,19 +87,19 @@ def plots(result: Result) -> list[Plot]:
     ]
     if result.drift is not None:
         never = np.zeros(len(clip), dtype=bool)
-        made.append(Plot("root drift", "cm", 100 * result.drift.distance, never, None))
+        shown.append(Plot("root drift", "cm", 100 * result.drift.distance, never, None))
     if result.truth is not None:
         never = np.zeros(len(clip), dtype=bool)
-        made.append(
+        shown.append(
             Plot("distance from the truth", "% of height", result.truth.errors, never, None)
         )
-    return made
+    return shown
 
 
 def svg(plot: Plot, duration: float, source_duration: float) -> str:
     """One plot, `duration` [s] wide: flagged frames shaded, the source behind, the limit dashed."""
     series = [plot.values] + ([] if plot.source is None else [plot.source])
-    top = max(1.2 * max(_high(v) for v in series), plot.limit or 0.0, plot.least)
+    top = max(1.2 * max(_peak(v) for v in series), plot.limit or 0.0, plot.min_range)
     bottom = min(0.0, 1.2 * min(float(v.min()) for v in series), 1.5 * (plot.limit or 0.0))
 
     def y(value: Float[np.ndarray, "N"] | float) -> Float[np.ndarray, "N"]:
@@ -111,9 +111,9 @@ def svg(plot: Plot, duration: float, source_duration: float) -> str:
     if plot.limit is not None:
         parts.append(f'<path class="limit" d="M0 {y(plot.limit)[0]:.1f}H{WIDTH:g}"/>')
     if plot.source is not None:
-        across = WIDTH * (source_duration / duration if duration else 1.0)
-        parts.append(_line(y(plot.source), across, plot.lowest, "source"))
-    parts.append(_line(y(plot.values), WIDTH, plot.lowest, "clip"))
+        width = WIDTH * (source_duration / duration if duration else 1.0)
+        parts.append(_line(y(plot.source), width, plot.worst_is_low, "source"))
+    parts.append(_line(y(plot.values), WIDTH, plot.worst_is_low, "clip"))
     return (
         f"<figure><figcaption>{html.escape(plot.name)} <small>[{plot.unit}], "
         f"{bottom:.3g} to {top:.3g}</small></figcaption>"
@@ -122,7 +122,7 @@ def svg(plot: Plot, duration: float, source_duration: float) -> str:
     )
 
 
-def _high(values: Float[np.ndarray, "N"]) -> float:
+def _peak(values: Float[np.ndarray, "N"]) -> float:
     """The 99.5th percentile of what is above zero: one spike must not flatten the rest."""
     return float(np.percentile(values[values > 0], 99.5)) if np.any(values > 0) else 0.0
 
@@ -146,25 +146,25 @@ def _shades(flags: Bool[np.ndarray, "T"], height: int) -> str:
     )
 
 
-def _line(y: Float[np.ndarray, "T"], across: float, lowest: bool, kind: str) -> str:
+def _line(y: Float[np.ndarray, "T"], width: float, worst_is_low: bool, kind: str) -> str:
     """A path of at most `_POINTS` points; the worst of the frames that fall on one is shown."""
     size = max(1, -(-len(y) // _POINTS))
     padded = np.pad(y, (0, -len(y) % size), mode="edge").reshape(-1, size)
-    worst = padded.max(axis=1) if lowest else padded.min(axis=1)  # y points down
-    x = np.linspace(0, across, len(worst))
+    worst = padded.max(axis=1) if worst_is_low else padded.min(axis=1)  # y points down
+    x = np.linspace(0, width, len(worst))
     points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, worst, strict=True))
     return f'<polyline class="{kind}" points="{points}"/>'
 
 
-def _lowest(clip: ClipMetrics) -> Float[np.ndarray, "T"]:
+def _lowest_point(clip: ClipMetrics) -> Float[np.ndarray, "T"]:
     return np.where(clip.depth.max(axis=1) > 0, -clip.depth.max(axis=1), clip.clearance)
 
 
-def _sliding(clip: ClipMetrics) -> Float[np.ndarray, "T"]:
-    return np.where(clip.skating, clip.speeds, 0.0).max(axis=1)
+def _skate_speed(clip: ClipMetrics) -> Float[np.ndarray, "T"]:
+    return np.where(clip.corner_skates, clip.corner_speeds, 0.0).max(axis=1)
 
 
-def _beyond(clip: ClipMetrics) -> Float[np.ndarray, "T"]:
+def _limit_excess(clip: ClipMetrics) -> Float[np.ndarray, "T"]:
     if not clip.limits:
         return np.zeros(len(clip))
     return np.degrees(np.max([limit.excess.max(axis=1) for limit in clip.limits], axis=0))

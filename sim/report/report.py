@@ -3,10 +3,12 @@
 from dataclasses import dataclass
 from typing import Any
 
+from sim.report.names import LABELS
 from sim.report.record import record
 from sim.report.result import Result
-from sim.report.table import Row, rows, to_html
+from sim.report.table import Row, rows
 from sim.report.text import render
+from spark.summary import html_table, time_span
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -27,8 +29,18 @@ class Report(Result):
         return rows(self)
 
     def __repr__(self) -> str:
-        parts = ", ".join(f"{name} {share:.1%}" for name, share in self.clip.shares.items())
-        return f"<Report: {self.implausible:.1%} of {len(self.clip)} frames implausible; {parts}>"
+        span = time_span(len(self.clip), self.clip.frame_time)
+        parts = ", ".join(f"{name} {100 * share:.1f}" for name, share in self.clip.shares.items())
+        return f"Report({span}, {100 * self.implausible:.1f} % implausible: {parts})"
 
     def _repr_html_(self) -> str:
-        return to_html(self.rows())
+        cells = [
+            (f"{LABELS[r['measure']]} [{r['unit']}]", _number(r["value"]), _number(r["source"]))
+            for r in self.rows()
+            if r["value"] is not None
+        ]
+        return html_table("report", [("", "motion", "source"), *cells], self.notes)
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.2f}"

@@ -26,10 +26,10 @@ def joint_rates(
     names = tuple(str(roles[j]).replace("_", " ") for j, _ in pairs)
     joints, parents = [j for j, _ in pairs], [above for _, above in pairs]
     turn = quat_relative(world[:, parents], world[:, joints])
-    return names, *turning(turn, frame_time, window)
+    return names, *angular_rates(turn, frame_time, window)
 
 
-def turning(
+def angular_rates(
     turn: Float[np.ndarray, "T B 4"], frame_time: float, window: float
 ) -> tuple[Float[np.ndarray, "T B"], Float[np.ndarray, "T B"]]:
     """The angular speed [rad/s] of rotations over time, and the size of the angular velocity's

@@ -1,4 +1,4 @@
-"""What holds the body up: the points near the floor, which of them rest, and what they can give."""
+"""What holds the body up: points near the floor, which of them rest, what force they can give."""
 
 from dataclasses import dataclass
 
@@ -7,9 +7,9 @@ from jaxtyping import Bool, Float
 
 from sim.report.clip_poses import ClipPoses
 from sim.report.derivatives import derivative
-from sim.report.measures import horizontal_speed, least_within, outside_hull
+from sim.report.measures import distance_outside_hull, horizontal_speed, windowed_min
 from sim.report.thresholds import HUMAN_HIP_HEIGHT, Thresholds
-from sim.report.wrench import required_wrench, unexplained
+from sim.report.wrench import required_wrench, unexplained_wrench
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,14 +33,14 @@ class Support:
     static: Bool[np.ndarray, "T"]
     length: float
 
-    def unexplained(self) -> Float[np.ndarray, "T 2"]:
+    def unexplained_wrench(self) -> Float[np.ndarray, "T 2"]:
         """Force [body weights] and torque [body weights x 1 m] that the floor can't give."""
-        return unexplained(
+        return unexplained_wrench(
             self.wrench, self.arms, self.touching, self.thresholds.friction, self.length
         )
 
     def skating(self) -> Bool[np.ndarray, "T S"]:
-        """The sole corners that slide under load, not those of a foot that swings by low.
+        """The sole corners that slide under load; those of a foot that swings by low do not count.
 
         They are low and fast, and the foot lies flat, or the points at rest can't hold the body.
         """
@@ -51,12 +51,16 @@ class Support:
         near = heights < limits.contact_height
         flat = np.stack([near[:, own].all(axis=1) for own in self._corners()], axis=1)
         loaded = np.zeros(len(heights), dtype=bool)
-        asked = low_fast.any(axis=1)
+        selected = low_fast.any(axis=1)
         resting = self.touching & self.resting
-        missing = unexplained(
-            self.wrench[asked], self.arms[asked], resting[asked], limits.friction, self.length
+        missing = unexplained_wrench(
+            self.wrench[selected],
+            self.arms[selected],
+            resting[selected],
+            limits.friction,
+            self.length,
         )
-        loaded[asked] = (missing > limits.skate_load * np.array([1.0, self.length])).any(axis=1)
+        loaded[selected] = (missing > limits.skate_load * np.array([1.0, self.length])).any(axis=1)
         return low_fast & (flat | loaded[:, None])
 
     def _corners(self) -> list[list[int]]:
@@ -67,18 +71,20 @@ class Support:
         """How far the centre of mass lies outside what it stands on [m]; nan in frames that move,
         and where nothing is near the floor."""
         near = self.heights < self.thresholds.contact_height
-        asked = self.static & near.any(axis=1)
+        selected = self.static & near.any(axis=1)
         outside = np.full(len(near), np.nan)
-        below = np.zeros((int(asked.sum()), 2))
-        outside[asked] = outside_hull(below, self.arms[asked][..., :2], near[asked])
+        below = np.zeros((int(selected.sum()), 2))
+        outside[selected] = distance_outside_hull(
+            below, self.arms[selected][..., :2], near[selected]
+        )
         return outside
 
 
-def support(poses: ClipPoses, floor_z: float, thresholds: Thresholds) -> Support:
+def support_of(poses: ClipPoses, floor_z: float, thresholds: Thresholds) -> Support:
     """The support of a body whose soles' corners are the first points."""
     frame_time, window = poses.motion.frame_time, thresholds.window
-    flesh = poses.parts - poses.flesh[:, None] * np.array([0.0, 0.0, 1.0])
-    points = np.concatenate([poses.points, flesh], axis=1)
+    flesh = poses.part_points - poses.part_radii[:, None] * np.array([0.0, 0.0, 1.0])
+    points = np.concatenate([poses.corners, flesh], axis=1)
     com = poses.mass.com
     heights = points[..., 2] - floor_z
     speeds = horizontal_speed(points, frame_time, window)
@@ -90,13 +96,13 @@ def support(poses: ClipPoses, floor_z: float, thresholds: Thresholds) -> Support
     )
     return Support(
         thresholds=thresholds,
-        feet=poses.sides,
+        feet=poses.corner_feet,
         heights=heights,
         speeds=speeds,
         arms=points - com[:, None],
-        touching=least_within(heights, frame_time, window) < thresholds.contact_height,
-        resting=least_within(speeds, frame_time, window) <= thresholds.skate_speed,
+        touching=windowed_min(heights, frame_time, window) < thresholds.contact_height,
+        resting=windowed_min(speeds, frame_time, window) <= thresholds.skate_speed,
         wrench=required_wrench(poses.mass, frame_time, window),
-        static=least_within(still, frame_time, thresholds.static_time) > 0,
+        static=windowed_min(still, frame_time, thresholds.static_time) > 0,
         length=poses.rig.hip_height / HUMAN_HIP_HEIGHT,
     )

@@ -1,11 +1,10 @@
 """The report as rows of a table: one number a measure, less is better in all."""
 
-import html
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TypedDict
 
 from sim.report.clip_metrics import ClipMetrics
-from sim.report.names import FLAGS, LABELS
+from sim.report.names import FLAGS
 from sim.report.result import Result
 
 
@@ -61,18 +60,6 @@ def rows(result: Result) -> list[Row]:
         _row("ground_truth_mse", None if truth is None else 1e4 * truth.mse, "1e-4"),
         _row("ground_truth_mpjpe", None if truth is None else truth.mpjpe, "% of height"),
     ]
-
-
-def to_html(rows: Sequence[Row]) -> str:
-    """The rows that are known, as a table for a notebook."""
-    cells = "".join(
-        f"<tr><th>{html.escape(LABELS[row['measure']])} [{row['unit']}]</th>"
-        f"<td>{row['value']:.2f}</td>"
-        f"<td>{'' if row['source'] is None else format(row['source'], '.2f')}</td></tr>"
-        for row in rows
-        if row["value"] is not None
-    )
-    return f"<table><tr><th></th><th>motion</th><th>source</th></tr>{cells}</table>"
 
 
 def _row(measure: str, value: float | None, unit: str, source: float | None = None) -> Row:

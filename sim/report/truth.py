@@ -14,7 +14,7 @@ from spark.rig.rig import Rig
 from spark.transfer.canonical import canonical_positions, to_canonical
 
 # Bones that differ by more than this share of the hip height are not the same.
-_BONES = 0.01
+_BONE_TOLERANCE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ def _check_skeletons(motion: Motion, truth: Motion, rig: Rig) -> None:
             )
     # Where the root stands is motion, not build.
     apart = np.linalg.norm(own.offsets - theirs.offsets, axis=1)[1:]
-    if apart.max(initial=0.0) > _BONES * rig.hip_height:
+    if apart.max(initial=0.0) > _BONE_TOLERANCE * rig.hip_height:
         j = int(apart.argmax()) + 1
         raise SkeletonError(
             f"the ground truth is on a body of another build: its joint {own.names[j]!r} lies "

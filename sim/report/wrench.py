@@ -29,18 +29,18 @@ def required_wrench(mass: Mass, frame_time: float, window: float) -> Float[np.nd
 
 def angular_momentum(mass: Mass, frame_time: float) -> Float[np.ndarray, "T 3"]:
     """About the centre of mass, for a body of unit mass [m²/s], world axes."""
-    if len(mass.turns) < 2:
-        return np.zeros((len(mass.turns), 3))
+    if len(mass.rotations) < 2:
+        return np.zeros((len(mass.rotations), 3))
     arms = mass.coms - mass.com[:, None]
     orbital = np.cross(arms, np.gradient(arms, frame_time, axis=0))
-    q = quat_continuous(mass.turns)
+    q = quat_continuous(mass.rotations)
     omega = 2 * quat_mul(np.gradient(q, frame_time, axis=0), quat_conj(q))[..., 1:]
-    R = matrix_from_quat(mass.turns)
+    R = matrix_from_quat(mass.rotations)
     spin = np.einsum("tsij,sjk,tslk,tsl->tsi", R, mass.inertias, R, omega, optimize=True)
     return np.einsum("s,tsx->tx", mass.fractions, orbital + spin)
 
 
-def unexplained(
+def unexplained_wrench(
     wrench: Float[np.ndarray, "T 6"],
     arms: Float[np.ndarray, "T P 3"],
     touching: Bool[np.ndarray, "T P"],

@@ -11,16 +11,16 @@ from sim.report.derivatives import derivative
 from sim.report.limits import limit_excess, swing_and_twist
 from sim.report.measures import (
     contact_match,
+    distance_outside_hull,
     floating,
     floor_height,
     floor_slope,
     horizontal_speed,
-    least_within,
-    outside_hull,
     penetration_depth,
     root_drift,
+    windowed_min,
 )
-from sim.report.selfcollision import Capsules, segment_distance, self_penetration
+from sim.report.self_penetration import Capsules, segment_distance, self_penetration
 from sim.report.smoothness import joint_rates
 from sim.report.thresholds import PLAUSIBILITY_V1
 from spark.kinematics import forward
@@ -66,9 +66,9 @@ def test_floating_needs_height_and_no_free_fall() -> None:
 @pytest.mark.parametrize("frame_time", [1.0, 0.5, 0.25])
 def test_the_least_of_a_slope_within_a_window_lies_at_its_edge(frame_time: float) -> None:
     slope = 2.0 * np.arange(int(10 / frame_time)) * frame_time
-    least = least_within(slope, frame_time, 0.6)
+    least = windowed_min(slope, frame_time, 0.6)
     np.testing.assert_allclose(least, np.maximum(slope - 2 * 0.6, 0))
-    np.testing.assert_allclose(least_within(-slope, frame_time, 0.6)[0], -2 * 0.6)
+    np.testing.assert_allclose(windowed_min(-slope, frame_time, 0.6)[0], -2 * 0.6)
 
 
 def test_speed_is_horizontal_and_per_second() -> None:
@@ -101,8 +101,8 @@ def test_distance_from_a_square_of_support() -> None:
     use = np.array([[True, True, True, True, False]] * 4)
     place = np.array([[0.5, 0.5], [1.3, 0.5], [2.0, 2.0], [0.5, -0.2]])
     expected = [0, 0.3, np.sqrt(2), 0.2]
-    np.testing.assert_allclose(outside_hull(place, square, use), expected, rtol=1e-3)
-    assert outside_hull(place[:1], square[:1], ~use[:1] & False) == [np.inf]
+    np.testing.assert_allclose(distance_outside_hull(place, square, use), expected, rtol=1e-3)
+    assert distance_outside_hull(place[:1], square[:1], ~use[:1] & False) == [np.inf]
 
 
 def test_the_slope_of_the_floor_and_how_far_it_rises() -> None:

@@ -77,7 +77,7 @@ def test_a_line_shows_the_worst_of_the_frames_that_share_a_pixel() -> None:
     values[12345] = 1.0
     never = np.zeros(20000, dtype=bool)
     for lowest, spike in ((False, values), (True, -values)):
-        drawn = svg(Plot("x", "m", spike, never, None, lowest=lowest), 1.0, 1.0)
+        drawn = svg(Plot("x", "m", spike, never, None, worst_is_low=lowest), 1.0, 1.0)
         points = re.search(r'class="clip" points="([^"]*)"', drawn)
         assert points
         y = [float(point.split(",")[1]) for point in points[1].split()]

@@ -295,8 +295,8 @@ def test_a_report_shows_itself_in_a_line_and_in_a_notebook() -> None:
     rig = stick_rig()
     report = assess(Subject(standing(rig, 60), rig))
     assert len(repr(report)) < 200
-    assert "60 frames" in repr(report)
-    assert "root_wrench 0.0%" in repr(report)
+    assert "60 frames, 60 fps, 0.0 % implausible" in repr(report)
+    assert "root_wrench 0.0)" in repr(report)
     shown = report._repr_html_()
     assert shown.count("<tr>") == 1 + sum(row["value"] is not None for row in report.rows())
     assert "root wrench [%]" in shown

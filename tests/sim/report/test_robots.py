@@ -89,7 +89,7 @@ def test_every_robot_stands_with_its_soles_on_the_floor(name: str) -> None:
     assert report.implausible == 0, report.text()
     poses = pose_clip(Subject(still.motion, robot.rig, still.body))
     if still.body.soles:
-        np.testing.assert_allclose(poses.points[..., 2], 0, atol=3e-3)
+        np.testing.assert_allclose(poses.corners[..., 2], 0, atol=3e-3)
         model, floor = with_floor(still.body, 0.02)
         feet = {int(model.body_weldid[b]) for sole in still.body.soles for b in sole.bodies}
         data = mujoco.MjData(model)

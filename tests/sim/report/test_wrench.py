@@ -10,7 +10,7 @@ from sim.report.clip_poses import pose_clip
 from sim.report.mass import Mass
 from sim.report.support import Support
 from sim.report.thresholds import PLAUSIBILITY_V1
-from sim.report.wrench import angular_momentum, required_wrench, unexplained
+from sim.report.wrench import angular_momentum, required_wrench, unexplained_wrench
 from sim.trajectory import Subject
 from spark.motion import Motion
 from spark.rotation import quat_about, quat_from_rotvec, quat_mul
@@ -19,9 +19,9 @@ from tests.helpers.stick import standing, stick_rig
 G = 9.81
 
 
-def rod(path: np.ndarray, turns: np.ndarray) -> Mass:
+def rod(path: np.ndarray, rotations: np.ndarray) -> Mass:
     """One body of unit mass with moments 1, 2, 3 m²."""
-    return Mass(np.ones(1), np.diag([1.0, 2.0, 3.0])[None], path[:, None], turns[:, None])
+    return Mass(np.ones(1), np.diag([1.0, 2.0, 3.0])[None], path[:, None], rotations[:, None])
 
 
 def test_the_momentum_of_a_spinning_body_is_inertia_times_rate() -> None:
@@ -62,8 +62,8 @@ def test_required_wrench_is_the_root_of_mujocos_inverse_dynamics() -> None:
     def wave(count: int, size: float) -> np.ndarray:
         return size * np.sin(times * rng.uniform(3, 9, count) + rng.uniform(0, 6, count))
 
-    turns = np.stack([wave(len(rig.skeleton), 0.4) for _ in range(3)], axis=-1)
-    motion = Motion(rig.skeleton, dt, still.root_pos + wave(3, 0.2), quat_from_rotvec(turns))
+    rotvecs = np.stack([wave(len(rig.skeleton), 0.4) for _ in range(3)], axis=-1)
+    motion = Motion(rig.skeleton, dt, still.root_pos + wave(3, 0.2), quat_from_rotvec(rotvecs))
     poses = pose_clip(Subject(motion, rig))
     ours = required_wrench(poses.mass, dt, 0.004)
 
@@ -91,9 +91,9 @@ def test_required_wrench_is_the_root_of_mujocos_inverse_dynamics() -> None:
 
 def residual(wrench: list[float], points: list[list[float]], length: float = 1.0) -> np.ndarray:
     touching = np.ones((1, len(points)), dtype=bool)
-    return unexplained(np.array([wrench], dtype=float), np.array([points]), touching, 1.0, length)[
-        0
-    ]
+    return unexplained_wrench(
+        np.array([wrench], dtype=float), np.array([points]), touching, 1.0, length
+    )[0]
 
 
 def test_a_body_over_its_feet_is_explained() -> None:
@@ -110,7 +110,9 @@ def test_the_floor_cannot_pull() -> None:
 
 def test_without_contact_all_is_unexplained() -> None:
     wrench = np.array([[0.3, 0.4, 0.0, 0.0, 0.0, 0.2]])
-    nothing = unexplained(wrench, np.zeros((1, 1, 3)), np.zeros((1, 1), dtype=bool), 1.0, 2.0)
+    nothing = unexplained_wrench(
+        wrench, np.zeros((1, 1, 3)), np.zeros((1, 1), dtype=bool), 1.0, 2.0
+    )
     np.testing.assert_allclose(nothing, [[0.5, 0.2]])
 
 

@@ -6,7 +6,7 @@ from jaxtyping import Float
 
 from sim.report.derivatives import derivative
 from sim.report.limits import LimitExcess
-from sim.report.smoothness import turning
+from sim.report.smoothness import angular_rates
 from sim.trajectory import ModelTrajectory
 from spark.rotation import quat_normalize, rotvec_from_quat
 
@@ -15,7 +15,7 @@ _HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL
 _ROUNDING = 1e-4
 
 
-def hinge_excess(body: ModelTrajectory) -> tuple[LimitExcess, ...]:
+def model_limit_excess(body: ModelTrajectory) -> tuple[LimitExcess, ...]:
     """How far each hinge is beyond its range in the file, and each ball beyond its cone.
 
     Joints without limits are left out.
@@ -38,7 +38,7 @@ def hinge_excess(body: ModelTrajectory) -> tuple[LimitExcess, ...]:
     return tuple(found)
 
 
-def hinge_rates(
+def model_joint_rates(
     body: ModelTrajectory, frame_time: float, window: float
 ) -> tuple[tuple[str, ...], Float[np.ndarray, "T B"], Float[np.ndarray, "T B"]]:
     """Names, angular speeds [rad/s] and jerks [rad/s³] of the model's joints."""
@@ -48,7 +48,7 @@ def hinge_rates(
     velocity = derivative(body.qpos[:, model.jnt_qposadr[hinges]], frame_time, 1, window)
     jerk = derivative(velocity, frame_time, 2, window)
     turns = body.qpos[:, model.jnt_qposadr[balls][:, None] + np.arange(4)]
-    ball_speed, ball_jerk = turning(quat_normalize(turns), frame_time, window)
+    ball_speed, ball_jerk = angular_rates(quat_normalize(turns), frame_time, window)
     return (
         tuple(_name(model, joint) for joint in (*hinges, *balls)),
         np.concatenate([np.abs(velocity), ball_speed], axis=1),

@@ -13,12 +13,12 @@ from spark.rotation import quat_rotate
 
 # Fractions of the standing height: from the head's joint to its middle, from the wrist to the
 # middle of the palm.
-_HEAD, _PALM = 0.055, 0.05
+_HEAD_CENTER, _PALM_CENTER = 0.055, 0.05
 # The parts of trunk, thigh and hips that are left out near the hip joints, where flesh overlaps.
 _TRUNK_FROM, _THIGH_FROM, _HIPS_FROM = 0.35, 0.3, 0.2
 
 # Neighbours: they touch by nature.
-_NEAR = {
+_NEIGHBOURS = {
     frozenset(pair)
     for side in ("left", "right")
     for pair in (
@@ -55,7 +55,7 @@ def capsules(poses: ClipPoses) -> Capsules:
     if top is not None:
         parts["chest"] = (poses.hips + _TRUNK_FROM * (top - poses.hips), top, "spine")
     if (head := roles.joint(Role.HEAD)) is not None:
-        up = np.array([0.0, 0.0, _HEAD * height])
+        up = np.array([0.0, 0.0, _HEAD_CENTER * height])
         middle = place[Role.HEAD] + quat_rotate(poses.since_tpose[:, head], up)
         parts["head"] = (middle, middle, "head")
     for side in ("left", "right"):
@@ -71,7 +71,7 @@ def capsules(poses: ClipPoses) -> Capsules:
         hand, forearm = place.get(Role(f"{side}_hand")), place.get(Role(f"{side}_forearm"))
         if hand is not None and forearm is not None:
             # In the T-pose the hands carry on the arms.
-            along = np.array([0.0, _PALM * height * (1 if side == "left" else -1), 0.0])
+            along = np.array([0.0, _PALM_CENTER * height * (1 if side == "left" else -1), 0.0])
             turn = poses.since_tpose[:, roles.require(Role(f"{side}_hand"))]
             parts[f"{side} hand"] = (hand, hand + quat_rotate(turn, along), "hand")
     if len(poses.rig.hips) == 2:
@@ -94,7 +94,7 @@ def self_penetration(
         (a, b)
         for a in range(len(names))
         for b in range(a + 1, len(names))
-        if frozenset((names[a], names[b])) not in _NEAR
+        if frozenset((names[a], names[b])) not in _NEIGHBOURS
     ]
     first, second = [a for a, _ in pairs], [b for _, b in pairs]
     gap = segment_distance(body.ends[:, first], body.ends[:, second])
