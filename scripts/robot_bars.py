@@ -180,7 +180,7 @@ def sole_corners_by_mujoco(result: RobotMotion) -> np.ndarray:
     mujoco.mj_kinematics(model, data)
     local = []
     for sole in robot.soles:
-        for link, point in zip(sole.links, sole.points, strict=True):
+        for link, point in zip(*robot.sole_points(sole), strict=True):
             body = int(model.jnt_bodyid[robot.mj_joints[link]])
             local.append((body, data.xmat[body].reshape(3, 3).T @ (point - data.xpos[body])))
     out = np.empty((len(result), len(local), 3))

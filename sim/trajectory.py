@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from sim.body.build import build_body
 from sim.body.qpos import qpos_from_motion
@@ -14,31 +14,17 @@ from spark.summary import brief
 
 
 @dataclass(frozen=True, eq=False)
-class ModelSole:
-    """The corners of one foot's sole: `bodies[c]` of the model carries corner c, which is at
-    `points[c]` [m] in that body's axes."""
-
-    side: str
-    bodies: Int[np.ndarray, "C"]
-    points: Float[np.ndarray, "C 3"]
-
-    __repr__ = brief
-
-
-@dataclass(frozen=True, eq=False)
 class ModelTrajectory:
     """`spec` compiles to `model`; `root` is the humanoid's body with the free joint; `qpos` holds
     MuJoCo's coordinates of each frame (position [m], quaternion wxyz, joints [rad]).
 
-    `soles`, left before right, and `tpose`, the coordinates of the T-pose, are what a report needs
-    to know of the model, where they are known.
+    `tpose` holds the coordinates of the T-pose, where they are known.
     """
 
     spec: mujoco.MjSpec
     model: mujoco.MjModel
     root: int
     qpos: Float[np.ndarray, "T nq"]
-    soles: tuple[ModelSole, ...] = ()
     tpose: Float[np.ndarray, "nq"] | None = None
 
     __repr__ = brief

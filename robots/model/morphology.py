@@ -10,8 +10,8 @@ from jaxtyping import Float, Int
 from robots.model.mjcf import Mjcf
 from robots.model.tpose import rest_pose
 from robots.tree import Coordinates, Tree, forward_kinematics
-from spark.kinematics import world_positions
 from spark.motion import Motion
+from spark.rig.feet import Sole
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import (
@@ -22,30 +22,14 @@ from spark.rotation import (
     quat_mul,
     quat_normalize,
     quat_relative,
-    quat_rotate,
 )
-from spark.summary import brief, counted
-
-
-@dataclass(frozen=True, eq=False)
-class Sole:
-    """The corners of a foot's sole: heel right and left, toe right and left. `links[c]` moves
-    corner c, which is at `points[c]` [m] in the rest pose. `foot` is the joint of the rig."""
-
-    foot: int
-    links: Int[np.ndarray, "4"]
-    points: Float[np.ndarray, "4 3"]
-
-    __repr__ = brief
+from spark.summary import counted
 
 
 @dataclass(frozen=True, eq=False)
 class Morphology:
     """What a robot is. Joint j of `rig.skeleton` is the part that tree link `links[j]` moves (-1:
-    the base), and `centers[j]` [m] is where it turns, in the rest pose.
-
-    `soles` are those of the feet that have a shape, left before right.
-    """
+    the base), and `centers[j]` [m] is where it turns, in the rest pose."""
 
     mjcf: Mjcf
     tree: Tree
@@ -53,7 +37,6 @@ class Morphology:
     rig: Rig
     links: Int[np.ndarray, "J"]
     centers: Float[np.ndarray, "J 3"]
-    soles: tuple[Sole, ...]
     tpose: Coordinates
     notes: tuple[str, ...] = ()
 
@@ -127,20 +110,14 @@ class Morphology:
             qpos[:, base : base + 3].copy(), quat_mul(quat, quat_conj(root_quat)), angles, balls
         )
 
-    def sole_offsets(self, sole: Sole) -> tuple[Int[np.ndarray, "4"], Float[np.ndarray, "4 3"]]:
-        """The rig's joint that each corner of a sole turns with, and its place in that joint's axes
-        [m]."""
-        skeleton = self.rig.skeleton
-        below = skeleton.subtree(sole.foot)
-        j = np.array([next(j for j in below if self.links[j] == link) for link in sole.links])
-        return j, sole.points - skeleton.rest_positions[j]
+    @property
+    def soles(self) -> tuple[Sole, ...]:
+        """The soles of its feet, left before right."""
+        return self.rig.soles
 
-    def standing_sole(self, sole: Sole) -> Float[np.ndarray, "4 3"]:
-        """The corners of a sole in the T-pose [m, from the pelvis]."""
-        rig = self.rig
-        at = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
-        j, offsets = self.sole_offsets(sole)
-        return at[j] + quat_rotate(rig.tpose[j], offsets)
+    def sole_points(self, sole: Sole) -> tuple[Int[np.ndarray, "P"], Float[np.ndarray, "P 3"]]:
+        """The link that moves each point of a sole, and the point's place in the rest pose [m]."""
+        return self.links[sole.joints], self.rig.skeleton.rest_positions[sole.joints] + sole.offsets
 
     def motion(self, q: Coordinates, frame_time: float) -> Motion:
         """The same motion on the rig's skeleton. Axes that miss each other move the joints' centres

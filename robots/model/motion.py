@@ -3,17 +3,14 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from robots.model.mjcf import read_mjcf
-from robots.model.morphology import Morphology, Sole
+from robots.model.morphology import Morphology
 from robots.tree import Coordinates
-from sim.trajectory import ModelSole, ModelTrajectory
+from sim.trajectory import ModelTrajectory
 from spark.motion import Motion
-from spark.rig.roles import Role
-from spark.rotation import quat_conj, quat_rotate
 from spark.summary import time_span
 
 
@@ -51,18 +48,5 @@ class RobotMotion:
             model=mjcf.model,
             root=mjcf.root,
             qpos=self.qpos,
-            soles=tuple(self._sole(sole) for sole in robot.soles),
             tpose=robot.to_qpos(robot.tpose)[0],
         )
-
-    def _sole(self, sole: Sole) -> ModelSole:
-        """A sole in the axes of the model's bodies."""
-        robot = self.robot
-        model = robot.mjcf.model
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        joints = [robot.mj_joints[link] for link in sole.links]
-        bodies = model.jnt_bodyid[joints].astype(np.int64)
-        q_body_world = quat_conj(data.xquat[bodies])
-        side = "left" if robot.rig.roles.roles[sole.foot] == Role.LEFT_FOOT else "right"
-        return ModelSole(side, bodies, quat_rotate(q_body_world, sole.points - data.xpos[bodies]))

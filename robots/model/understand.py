@@ -73,7 +73,7 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
     links = np.array([segment.link for segment in segments])
     place_feet(skeleton, roles, points, ideal)
     soles = soles_of(skeleton, roles, points, ideal, links)
-    skeleton = with_soles(skeleton, soles, links)
+    skeleton = with_soles(skeleton, soles)
     tree, assumed = _assume_limits(tree, segments, roles)
     tpose = search_tpose(tree, skeleton, roles, links, ideal)
     notes = (*mjcf.notes, *assumed, *_check_tpose(tpose, skeleton))
@@ -85,6 +85,7 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
         root_joint=0,
         hip_height=hip_height(skeleton, roles, tpose.world),
         notes=notes,
+        shaped_soles=soles,
     )
     return Morphology(
         mjcf=mjcf,
@@ -93,7 +94,6 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
         rig=rig,
         links=links,
         centers=np.array([segment.center for segment in segments]),
-        soles=soles,
         tpose=tpose.coordinates,
         notes=notes,
     )

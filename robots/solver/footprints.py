@@ -11,11 +11,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from robots.model.morphology import Morphology, Sole
+from robots.model.morphology import Morphology
 from robots.solver.targets import Targets
 from robots.tree import Coordinates, LinkPoses, forward_kinematics
 from spark.kinematics import world_positions
-from spark.rotation import quat_rotate
+from spark.rig.feet import Sole, sole_positions
 from spark.runs import true_runs
 
 MAX_WOBBLE = (
@@ -28,10 +28,10 @@ _SLIDE = 0.03  # of how firmly feet stand, so that they can slide to where they 
 
 @dataclass(frozen=True, eq=False)
 class Footing:
-    """For each corner of a sole: where it should stand [m, world], and how firmly (0 to 1)."""
+    """For each point of a sole: where it should stand [m, world], and how firmly (0 to 1)."""
 
-    positions: Float[np.ndarray, "4 3 T"]
-    holds: Float[np.ndarray, "4 3 T"]
+    positions: Float[np.ndarray, "P 3 T"]
+    holds: Float[np.ndarray, "P 3 T"]
 
     def every(self, stride: int) -> "Footing":
         """That of every `stride`-th frame."""
@@ -62,18 +62,19 @@ def reachable_footing(
     as the planned ones ask."""
     frames = forward_kinematics(robot.tree, q)
     return [
-        _moved(f, corners_of(frames, sole)) for f, sole in zip(footing, robot.soles, strict=True)
+        _moved(f, points_of(robot, frames, sole))
+        for f, sole in zip(footing, robot.soles, strict=True)
     ]
 
 
-def _moved(foot: Footing, corners: Float[np.ndarray, "4 3 T"]) -> Footing:
-    """Each footprint shifted and turned, over the floor, as the sole's corners are on average."""
+def _moved(foot: Footing, stands: Float[np.ndarray, "P 3 T"]) -> Footing:
+    """Each footprint shifted and turned, over the floor, as the sole's points are on average."""
     places = foot.positions.copy()
     held = foot.holds[:, 0].max(0)
     for start, stop in true_runs(held > 0):
         weight = held[start:stop] / held[start:stop].sum()
         here = slice(start, stop)
-        flat = [points[:, 0, here] + 1j * points[:, 1, here] for points in (places, corners)]
+        flat = [points[:, 0, here] + 1j * points[:, 1, here] for points in (places, stands)]
         planned, stood = (points - points.mean(0) for points in flat)
         turn = complex(((stood * planned.conj()).sum(0) * weight).sum())
         turn /= max(abs(turn), 1e-12)
@@ -83,9 +84,9 @@ def _moved(foot: Footing, corners: Float[np.ndarray, "4 3 T"]) -> Footing:
     return Footing(places, foot.holds)
 
 
-def corners_of(frames: LinkPoses, sole: Sole) -> Float[np.ndarray, "4 3 T"]:
-    """The corners of a sole [m, world]."""
-    pairs = zip(sole.links, sole.points, strict=True)
+def points_of(robot: Morphology, frames: LinkPoses, sole: Sole) -> Float[np.ndarray, "P 3 T"]:
+    """The points of a sole [m, world]."""
+    pairs = zip(*robot.sole_points(sole), strict=True)
     return np.stack([frames.point(int(link), point) for link, point in pairs])
 
 
@@ -93,13 +94,12 @@ def _footing(
     robot: Morphology, targets: Targets, positions: Float[np.ndarray, "T J 3"], s: int
 ) -> Footing:
     sole, contacts, frame_time = robot.soles[s], targets.contacts[:, s], targets.frame_time
-    j, offsets = robot.sole_offsets(sole)
-    at = positions[:, j, :2] + quat_rotate(targets.world[:, j], offsets)[..., :2]  # T 4 2
-    heel, toe = at[:, :2].mean(1), at[:, 2:].mean(1)
+    at = sole_positions(sole, positions, targets.world)[..., :2]  # T P 2
+    heel, toe = at[:, :2].mean(1), at[:, -2:].mean(1)
     along = toe - heel
     heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
     flat = flat_sole(robot, sole)
-    length = float(np.linalg.norm(flat[2:].mean(0) - flat[:2].mean(0)))
+    length = float(np.linalg.norm(flat[-2:].mean(0) - flat[:2].mean(0)))
     ahead = np.stack([np.cos(heading), np.sin(heading)], axis=1)
     pivot, turn = toe.copy(), heading.copy()
     stances = _stances(contacts, round(2 * RAMP / frame_time))
@@ -118,13 +118,13 @@ def _footing(
             pivot[before:after, axis] = np.interp(time, frames, place)
         turn[before:after] = np.interp(time, frames, heading[frames].mean() + turned)
     cos, sin = np.cos(turn), np.sin(turn)
-    places = np.zeros((4, 3, len(turn)))
-    for corner, (x, y) in enumerate(flat - flat[2:].mean(0)):
-        places[corner, 0] = pivot[:, 0] + cos * x - sin * y
-        places[corner, 1] = pivot[:, 1] + sin * x + cos * y
+    places = np.zeros((len(sole), 3, len(turn)))
+    for p, (x, y) in enumerate(flat - flat[-2:].mean(0)):
+        places[p, 0] = pivot[:, 0] + cos * x - sin * y
+        places[p, 1] = pivot[:, 1] + sin * x + cos * y
     ease = max(1, round(RAMP / frame_time))
     still, low = _eased(contacts, ease), _eased(contacts | targets.raw_contacts[:, s], ease)
-    return Footing(places, np.stack([still, still, low], axis=1)[[0, 0, 1, 1]])
+    return Footing(places, on_points(sole, np.stack([still, still, low], axis=1)))
 
 
 def _stances(
@@ -156,10 +156,19 @@ def _eased(contacts: Bool[np.ndarray, "T 2"], frames: int) -> Float[np.ndarray, 
     return uniform_filter1d(wider, 2 * frames + 1, axis=0, mode="nearest").T
 
 
-def flat_sole(robot: Morphology, sole: Sole) -> Float[np.ndarray, "4 2"]:
-    """The corners on the floor, heading along X, as the T-pose has them."""
-    at = robot.standing_sole(sole)[:, :2]
-    along = at[2:].mean(0) - at[:2].mean(0)
+def on_points(sole: Sole, holds: Float[np.ndarray, "2 *n"]) -> Float[np.ndarray, "P *n"]:
+    """How firmly heel and toes are held, for each point of a sole: its ball as they both are, for
+    it leaves the floor with the heel."""
+    heel, toes = holds
+    rows = [heel, np.minimum(heel, toes), toes] if len(sole) == 6 else [heel, toes]
+    return np.repeat(rows, 2, axis=0)
+
+
+def flat_sole(robot: Morphology, sole: Sole) -> Float[np.ndarray, "P 2"]:
+    """The points on the floor, heading along X, as the T-pose has them."""
+    rig = robot.rig
+    at = sole_positions(sole, rig.tpose_positions, rig.tpose)[:, :2]
+    along = at[-2:].mean(0) - at[:2].mean(0)
     angle = np.arctan2(along[1], along[0]) if np.linalg.norm(along) > 1e-6 else 0.0
     cos, sin = np.cos(angle), np.sin(angle)
     return at @ np.array([[cos, -sin], [sin, cos]])

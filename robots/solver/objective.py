@@ -239,7 +239,7 @@ def _add_hips_feet_and_floor(
     path = np.repeat(W_HIPS_POSITION[:, None], count, axis=1)
     terms.add_point(pelvis, poses.point(pelvis, middle), targets.hips.T, path)
     for sole, foot in zip(robot.soles, footing, strict=True):
-        for c, (link, rest) in enumerate(zip(sole.links, sole.points, strict=True)):
+        for c, (link, rest) in enumerate(zip(*robot.sole_points(sole), strict=True)):
             foot_terms = _chain_of(chains, robot, int(link))
             assert foot_terms is not None
             point = poses.point(int(link), rest)

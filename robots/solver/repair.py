@@ -23,7 +23,7 @@ from robots.solver.descent import (
     solve_block,
 )
 from robots.solver.exact_contact import exact_contacts_of
-from robots.solver.footprints import Footing, corners_of
+from robots.solver.footprints import Footing, points_of
 from robots.solver.smoothness import jerk_stiffening, overspeed
 from robots.solver.targets import Targets
 from robots.tree import Coordinates, forward_kinematics
@@ -146,5 +146,5 @@ def violations(
     violated[1:] |= fast > _MAX_OVERSPEED * targets.frame_time
     if block.base:
         for sole in robot.soles:
-            violated |= corners_of(poses, sole)[:, 2].min(0) < -_MAX_SINKING
+            violated |= points_of(robot, poses, sole)[:, 2].min(0) < -_MAX_SINKING
     return violated

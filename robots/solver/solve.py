@@ -93,7 +93,7 @@ def blocks_of(robot: Morphology) -> tuple[Block, Block]:
     """Base, trunk and legs; then the rest: arms and head."""
     tree = robot.tree
     links = {int(robot.links[robot.rig.chest])}
-    links |= {int(link) for sole in robot.soles for link in sole.links}
+    links |= {int(link) for sole in robot.soles for link in robot.sole_points(sole)[0]}
     links |= {int(robot.links[j]) for j in robot.rig.contact_joints}
     first = sorted({j for link in links for j in tree.chain(link)})
     rest = tuple(j for j in range(len(tree)) if j not in first)

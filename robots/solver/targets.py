@@ -6,11 +6,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.ndimage import uniform_filter1d
 
-from robots.model.morphology import Morphology, Sole
+from robots.model.morphology import Morphology
 from robots.model.shapes import surface
 from robots.tree import forward_kinematics
 from spark.rig.contacts import planted_points
-from spark.rig.feet import Side, sole_positions
+from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_mul, quat_rotate
@@ -132,7 +132,7 @@ def source_feet(
     paths = np.zeros((len(positions), len(robot.soles), 2, 3))
     source_soles = {sole.side: sole for sole in rig.soles}
     for s, sole in enumerate(robot.soles):
-        side = side_of(robot, sole)
+        side = sole.side
         if side not in source_soles:
             continue
         toe = rig.roles.joint(Role(f"{side}_toe"))
@@ -140,11 +140,6 @@ def source_feet(
         paths[:, s, 0] = sole_positions(source_soles[side], positions, world)[:, :2].mean(1)
         paths[:, s, 1] = positions[:, foot if toe is None else toe]
     return paths
-
-
-def side_of(robot: Morphology, sole: Sole) -> Side:
-    """Whose foot a sole is."""
-    return "left" if robot.rig.roles.roles[sole.foot] is Role.LEFT_FOOT else "right"
 
 
 def _raw_contacts(

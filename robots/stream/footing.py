@@ -9,7 +9,7 @@ from collections import deque
 import numpy as np
 from jaxtyping import Float
 
-from robots.solver.footprints import MAX_TWIST, MAX_WOBBLE, RAMP, flat_sole
+from robots.solver.footprints import MAX_TWIST, MAX_WOBBLE, RAMP, flat_sole, on_points
 from robots.stream.frame_targets import FrameReader, FrameTargets
 from robots.stream.terms import FootTargets
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
@@ -39,9 +39,9 @@ class ContactTracker:
         self._holds = np.zeros((soles, 2))
         self._prints = [Footprint() for _ in range(soles)]
 
-    def look(self, targets: FrameTargets, corners: Float[np.ndarray, "S 4 3"]) -> FootTargets:
+    def look(self, targets: FrameTargets, points: Float[np.ndarray, "P 3"]) -> FootTargets:
         """Takes in the newest frame, and says how the feet stand `ahead` frames before it, when
-        the robot's are at `corners`."""
+        the points of the robot's soles are at `points`."""
         first = not self._seen
         self._seen.extend([targets] * (self._length if first else 1))
         here = len(self._seen) - 1 - self._ahead
@@ -54,20 +54,21 @@ class ContactTracker:
         self._stands = self._known & (speed < more * self._slow) & (height < more * self._near)
         ramp = 1.0 if first else self._frame_time / RAMP
         step = np.clip(self._stands - self._holds, -ramp, ramp)
-        places = np.zeros_like(corners)
+        places, holds, end = np.zeros_like(points), np.zeros_like(points), 0
         for s, (sole, mark) in enumerate(zip(self._robot.soles, self._prints, strict=True)):
+            own = slice(end, end := end + len(sole))
             point = int(self._stands[s, 1] or not self._stands[s, 0])
             if not self._holds[s].any():
-                mark.put(corners[s], self._flat[s], on_toe=point == 1)
+                mark.put(points[own], self._flat[s], on_toe=point == 1)
             else:
                 moved = self._scale * (now.feet - before.feet)[s, point, :2]
                 turn = _turn(before.world[sole.foot], now.world[sole.foot])
                 wobble = MAX_WOBBLE * self._robot.rig.hip_height
                 mark.follow(moved, turn, float(self._holds[s].max()), wobble)
-            places[s, :, :2] = mark.positions(self._flat[s])
-        self._holds = self._holds + step
-        corners = np.repeat(self._holds, 2, axis=1)
-        return FootTargets(places, np.repeat(corners[..., None], 3, axis=2))
+            places[own, :2] = mark.positions(self._flat[s])
+            self._holds[s] += step[s]
+            holds[own] = on_points(sole, self._holds[s])[:, None]
+        return FootTargets(places, holds)
 
 
 class Footprint:
@@ -78,14 +79,14 @@ class Footprint:
         self._heading = self._turned = 0.0
 
     def put(
-        self, corners: Float[np.ndarray, "4 3"], flat: Float[np.ndarray, "4 2"], *, on_toe: bool
+        self, points: Float[np.ndarray, "P 3"], flat: Float[np.ndarray, "P 2"], *, on_toe: bool
     ) -> None:
         """Where the foot is; on its heel, where its toes will come down."""
-        heel, toe = corners[:2, :2].mean(0), corners[2:, :2].mean(0)
+        heel, toe = points[:2, :2].mean(0), points[-2:, :2].mean(0)
         along = toe - heel
         self._heading = float(np.arctan2(along[1], along[0]))
         ahead = np.array([np.cos(self._heading), np.sin(self._heading)])
-        length = flat[2:].mean(0)[0] - flat[:2].mean(0)[0]
+        length = flat[-2:].mean(0)[0] - flat[:2].mean(0)[0]
         self._pivot = toe if on_toe else heel + length * ahead
         self._away, self._turned = np.zeros(2), 0.0
 
@@ -101,10 +102,10 @@ class Footprint:
         self._turned = float(np.clip(turn, -MAX_TWIST, MAX_TWIST))
         self._heading += (1 - hold) * turned + (turn - self._turned)
 
-    def positions(self, flat: Float[np.ndarray, "4 2"]) -> Float[np.ndarray, "4 2"]:
-        """Where the corners of the sole stand."""
+    def positions(self, flat: Float[np.ndarray, "P 2"]) -> Float[np.ndarray, "P 2"]:
+        """Where the points of the sole stand."""
         cos, sin = np.cos(self._heading), np.sin(self._heading)
-        return self._pivot + (flat - flat[2:].mean(0)) @ np.array([[cos, sin], [-sin, cos]])
+        return self._pivot + (flat - flat[-2:].mean(0)) @ np.array([[cos, sin], [-sin, cos]])
 
 
 def _turn(before: Float[np.ndarray, "3 3"], now: Float[np.ndarray, "3 3"]) -> float:

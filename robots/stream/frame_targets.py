@@ -15,7 +15,6 @@ from robots.solver.targets import (
     TPOSE_DIRECTIONS,
     arm_length,
     palm_thickness,
-    side_of,
     source_feet,
 )
 from spark.errors import FrameError
@@ -186,7 +185,7 @@ class FrameReader:
         """The source's heels and toes that the robot's soles follow."""
         source, robot = self.source, self.robot
         source_soles = {sole.side: sole for sole in source.soles}
-        sides = [side_of(robot, sole) for sole in robot.soles]
+        sides = [sole.side for sole in robot.soles]
         self.has_feet = np.array([side in source_soles for side in sides], dtype=bool)
         heels, offsets, toes = [], [], []
         for side in (side for side in sides if side in source_soles):

@@ -68,7 +68,7 @@ class Stream:
             q = self._q[_SHIFTED]
             self._targets = [*self._targets[1:], targets]
             poses = self._terms.poses(q[_FIXED : _FIXED + 1])  # what is next to be said
-            foot_targets = self._contacts.look(targets, self._terms.corners(poses)[0])
+            foot_targets = self._contacts.look(targets, self._terms.sole_points(poses)[0])
             bones, angles = self._terms.bones(poses)[0], self._terms.angles(q)[_FIXED]
             posture = self._detours.look(self._targets[0], bones, angles)
             self._q = self._window.solve(q, stack_targets(self._targets), foot_targets, posture)
@@ -83,12 +83,12 @@ class Stream:
         robot, wanted = self.robot, stack_targets(self._targets)
         projected = project(robot, quat_from_matrix(targets.world)[None], targets.hips[None])
         q = robot.to_qpos(projected)[np.zeros(_FRAMES, dtype=int)]
-        soles = len(robot.soles)
-        foot_targets = FootTargets(np.zeros((soles, 4, 3)), np.zeros((soles, 4, 3)))
+        points = sum(map(len, robot.soles))
+        foot_targets = FootTargets(np.zeros((points, 3)), np.zeros((points, 3)))
         for held in (False, True):
             if held:
                 foot_targets = self._contacts.look(
-                    targets, self._terms.corners(self._terms.poses(q))[0]
+                    targets, self._terms.sole_points(self._terms.poses(q))[0]
                 )
             q = self._window.settle(q, wanted, foot_targets, _FIRST_ITERATIONS)
             q[:] = q[-1]

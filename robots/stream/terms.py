@@ -29,10 +29,10 @@ Linear = tuple[Float[np.ndarray, "T R 3 D"], Float[np.ndarray, "T R 3"], Float[n
 
 @dataclass(frozen=True, eq=False)
 class FootTargets:
-    """For each corner of each sole: where it should stand [m], and how firmly (0 to 1)."""
+    """For each point of the soles: where it should stand [m], and how firmly (0 to 1)."""
 
-    positions: Float[np.ndarray, "S 4 3"]
-    holds: Float[np.ndarray, "S 4 3"]
+    positions: Float[np.ndarray, "P 3"]
+    holds: Float[np.ndarray, "P 3"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,10 +86,9 @@ class Terms:
             axes[t], anchors[t] = data.xaxis, data.xanchor
         return WindowPoses(turns.reshape(count, -1, 3, 3), places, axes, anchors)
 
-    def corners(self, poses: WindowPoses) -> Float[np.ndarray, "T S 4 3"]:
-        """The corners of the soles [m, world]."""
-        soles = len(self.robot.soles)
-        return self._points(poses)[:, : 4 * soles].reshape(-1, soles, 4, 3)
+    def sole_points(self, poses: WindowPoses) -> Float[np.ndarray, "T P 3"]:
+        """The points of the soles [m, world]."""
+        return self._points(poses)[:, : self._stood_on]
 
     def bones(self, poses: WindowPoses) -> Float[np.ndarray, "T B 3"]:
         """Where the bones point."""
@@ -181,7 +180,7 @@ class Terms:
         weights[:, :B] = objective.W_LIMB_DIRECTION**2
         forces[:, :B] = objective.W_LIMB_DIRECTION**2 * (bones - targets.bones)
         self._weigh_soles(points, foot_targets, weights[:, B:], forces[:, B:])
-        hips = B + 4 * len(self.robot.soles)
+        hips = B + self._stood_on
         weights[:, hips] = objective.W_HIPS_POSITION**2
         forces[:, hips] = objective.W_HIPS_POSITION**2 * (points[:, hips - B] - targets.hips)
         if self._hands:
@@ -201,13 +200,11 @@ class Terms:
         weights: Float[np.ndarray, "T P 3"],
         forces: Float[np.ndarray, "T P 3"],
     ) -> None:
-        """Corners stand where they should, and none is below the floor."""
-        count = 4 * len(self.robot.soles)
-        penalty_scale = (objective.W_FOOT_HOLD * foot_targets.holds.reshape(-1, 3)) ** 2
+        """Points of soles stand where they should, and none is below the floor."""
+        count = self._stood_on
+        penalty_scale = (objective.W_FOOT_HOLD * foot_targets.holds) ** 2
         weights[:, :count] = penalty_scale
-        forces[:, :count] = penalty_scale * (
-            points[:, :count] - foot_targets.positions.reshape(-1, 3)
-        )
+        forces[:, :count] = penalty_scale * (points[:, :count] - foot_targets.positions)
         depth, slope = one_sided(-points[:, :count, 2], objective.FLOOR_ROUNDING)
         weights[:, :count, 2] += (objective.W_FLOOR * slope) ** 2
         forces[:, :count, 2] -= objective.W_FLOOR**2 * slope * depth
@@ -271,11 +268,13 @@ class Terms:
         self._bones = np.einsum("bji,bj->bi", self._rest[0][self._bone_bodies], along)
 
     def _watch_points(self, hands: bool) -> None:
-        """The soles' corners, the middle of the hips and, where asked, both wrists; the columns
+        """The soles' points, the middle of the hips and, where asked, both wrists; the columns
         that move these and the bones."""
         robot = self.robot
-        links = [link for sole in robot.soles for link in sole.links.tolist()]
-        rest = [point for sole in robot.soles for point in sole.points]
+        soles = [robot.sole_points(sole) for sole in robot.soles]
+        links = [link for own, _ in soles for link in own.tolist()]
+        rest = [point for _, points in soles for point in points]
+        self._stood_on = len(links)
         links.append(int(robot.links[robot.rig.pelvis]))
         rest.append(robot.centers[robot.rig.hips].mean(0))
         self._hands = hands

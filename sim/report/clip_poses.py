@@ -9,13 +9,13 @@ from sim.body.anthropometry import RADII
 from sim.report.lowest import lowest_points
 from sim.report.mass import Mass, human_mass, model_mass
 from sim.report.model_poses import ModelPoses, pose_model
-from sim.trajectory import ModelSole, ModelTrajectory, Subject
+from sim.trajectory import ModelTrajectory, Subject
 from spark.errors import SkeletonError
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig.feet import Sole, sole_positions
 from spark.rig.rig import Rig
-from spark.rotation import quat_conj, quat_mul, quat_rotate, yaw_from_quat
+from spark.rotation import quat_conj, quat_mul, yaw_from_quat
 
 # They have soles, or lie inside other flesh.
 _NO_FLESH = ("foot", "toe", "clavicle")
@@ -78,15 +78,11 @@ def pose_clip(subject: Subject) -> ClipPoses:
             )
         model_poses = pose_model(body)
         mass = model_mass(body, model_poses)
-        part_names, part_points = lowest_points(body, model_poses)
+        part_names, part_points = lowest_points(body, model_poses, _feet_of(body, rig))
         part_radii = np.zeros(len(part_names))
-    if model_poses is not None and body is not None and body.soles:
-        corner_feet = tuple(f"{sole.side} foot" for sole in body.soles for _ in sole.bodies)
-        corners = np.concatenate([_model_corners(sole, model_poses) for sole in body.soles], axis=1)
-    else:
-        soles = _soles(rig)
-        corner_feet = tuple(f"{sole.side} foot" for sole in soles for _ in sole.joints)
-        corners = np.concatenate([sole_positions(s, positions, rotations) for s in soles], axis=1)
+    soles = _soles(rig)
+    corner_feet = tuple(f"{sole.side} foot" for sole in soles for _ in sole.joints)
+    corners = np.concatenate([sole_positions(s, positions, rotations) for s in soles], axis=1)
     return ClipPoses(
         motion=motion,
         rig=rig,
@@ -129,6 +125,11 @@ def _soles(rig: Rig) -> tuple[Sole, ...]:
     return soles
 
 
-def _model_corners(sole: ModelSole, poses: ModelPoses) -> Float[np.ndarray, "T C 3"]:
-    turned = quat_rotate(poses.quat[:, sole.bodies], sole.points)
-    return poses.pos[:, sole.bodies] + turned
+def _feet_of(body: ModelTrajectory, rig: Rig) -> dict[int, str]:
+    """The model's parts that carry soles, by the number of their first body."""
+    names, model = rig.skeleton.names, body.model
+    return {
+        int(model.body_weldid[model.body(names[j]).id]): f"{sole.side} foot"
+        for sole in rig.soles
+        for j in sole.joints.tolist()
+    }

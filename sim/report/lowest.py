@@ -14,16 +14,15 @@ _RING = 16  # points on either edge of a cylinder
 
 
 def lowest_points(
-    body: ModelTrajectory, poses: ModelPoses
+    body: ModelTrajectory, poses: ModelPoses, feet: dict[int, str]
 ) -> tuple[tuple[str, ...], Float[np.ndarray, "T B 3"]]:
     """The names of the model's parts, and the lowest point of each [m, world].
 
     They are those of the shapes that collide, or of all where none does; of round meshes to within
-    a millimetre or so. What carries a sole is called a foot, as the soles are.
+    a millimetre or so. `feet` are what those parts are called that carry soles.
     """
     model = body.model
     weld = model.body_weldid
-    feet = {int(weld[b]): f"{sole.side} foot" for sole in body.soles for b in sole.bodies}
     geoms = [int(g) for g in np.flatnonzero(np.isin(model.geom_bodyid, poses.bodies))]
     colliding = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
     outlines: dict[int, list[tuple[int, Float[np.ndarray, "P 3"], float]]] = {}

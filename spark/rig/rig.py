@@ -41,7 +41,8 @@ class Rig:
     arms out along +-Y, palms down. `groups[j]` are the body parts of joint j; the hip joint and the
     topmost spine joint belong to several. `root_joint` is the joint that takes the body's motion
     through the world: the pelvis, or the joint above it that the file can move.
-    `hip_height` [m] is the height of the hips' middle above the sole in the T-pose.
+    `hip_height` [m] is the height of the hips' middle above the sole in the T-pose. `shaped_soles`
+    are those that the shapes of a model's feet show, left before right.
     """
 
     skeleton: Skeleton
@@ -51,6 +52,7 @@ class Rig:
     root_joint: int
     hip_height: float
     notes: tuple[str, ...] = ()
+    shaped_soles: tuple[Sole, ...] = ()
 
     def __repr__(self) -> str:
         held = sum(role is not None for role in self.roles.roles)
@@ -80,7 +82,9 @@ class Rig:
     @cached_property
     def soles(self) -> tuple[Sole, ...]:
         """The soles of its feet, left before right; a side without a foot has none."""
-        return human_soles(self.skeleton, self.roles, self.tpose, self.hip_height)
+        return self.shaped_soles or human_soles(
+            self.skeleton, self.roles, self.tpose, self.hip_height
+        )
 
     @cached_property
     def tpose_positions(self) -> Float[np.ndarray, "J 3"]:

@@ -179,7 +179,7 @@ def test_the_t_pose_lies_within_the_limits_and_is_one(name: str) -> None:
     for sole in robot.soles:
         heights = [
             poses.point(int(link), point)[2, 0]
-            for link, point in zip(sole.links, sole.points, strict=True)
+            for link, point in zip(*robot.sole_points(sole), strict=True)
         ]
         assert np.ptp(heights) < 0.01
     if name in EXACT_T:

@@ -10,7 +10,7 @@ from robots.model.known import known
 from robots.model.motion import RobotMotion
 from robots.solver.block import Block
 from robots.solver.collision import Candidate, collisions_of
-from robots.solver.footprints import corners_of, plan_footing
+from robots.solver.footprints import plan_footing, points_of
 from robots.solver.objective import linearize
 from robots.solver.projection import project
 from robots.solver.solve import blocks_of
@@ -109,8 +109,8 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     for t in range(4):
         one = slice(t, t + 1)
         foot_targets = FootTargets(
-            np.stack([foot.positions[..., t] for foot in footing]),
-            np.stack([foot.holds[..., t] for foot in footing]),
+            np.concatenate([foot.positions[..., t] for foot in footing]),
+            np.concatenate([foot.holds[..., t] for foot in footing]),
         )
         here = FrameTargets(*(getattr(seen, name)[one] for name in FrameTargets.__annotations__))
         qpos = EMBER.to_qpos(q.at(one))
@@ -159,7 +159,7 @@ def test_a_t_pose_is_the_robots(robot: str) -> None:
     posed = RobotMotion(found, q, 1 / 60)
     assert limb_error(source, canonical_positions(source), posed) < 2
     soles = np.concatenate(
-        [corners_of(forward_kinematics(found.tree, q), sole) for sole in found.soles]
+        [points_of(found, forward_kinematics(found.tree, q), sole) for sole in found.soles]
     )
     assert np.abs(soles[:, 2]).max() < 0.005
 
@@ -169,7 +169,7 @@ def test_standing_feet_stay_while_the_source_trembles(robot: str) -> None:
     found = known(robot)
     q = found.from_qpos(said(standing(50, 0.002), robot))
     for sole in found.soles:
-        at = corners_of(forward_kinematics(found.tree, q), sole)
+        at = points_of(found, forward_kinematics(found.tree, q), sole)
         assert np.ptp(at, axis=2).max() < 0.005
 
 

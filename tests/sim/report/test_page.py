@@ -21,6 +21,7 @@ from sim.report.plots import Plot, svg
 from sim.view.page import Marks, page
 from sim.view.scene import Figure
 from spark.errors import OutputError
+from spark.rig.feet import sole_positions
 from tests.helpers.stick import standing, stick_rig
 
 # Stands for a second, sinks for one, slides for one.
@@ -49,7 +50,10 @@ def robot_text() -> str:
     """The same of a robot, beside the stick man."""
     robot = understand_robot(registry.find("robot"))
     qpos = np.tile(robot.to_qpos(robot.tpose)[0], (180, 1))
-    lowest = min(robot.standing_sole(sole)[:, 2].min() for sole in robot.soles)
+    rig = robot.rig
+    lowest = min(
+        sole_positions(sole, rig.tpose_positions, rig.tpose)[:, 2].min() for sole in rig.soles
+    )
     pelvis = robot.motion(robot.from_qpos(qpos[:1]), 1.0).root_pos[0, 2]
     qpos[:, :3] += PATH - np.array([0.0, 0.0, lowest + pelvis])
     moved = RobotMotion(robot, robot.from_qpos(qpos), 1 / 60)

@@ -28,6 +28,7 @@ from sim.report.wrench import required_wrench
 from sim.trajectory import ModelTrajectory
 from spark.errors import FileFormatError, SkeletonError, SparkSimError
 from spark.io.recording import read_recording
+from spark.rig.feet import sole_positions
 from spark.rig.rig import understand
 from spark.transfer.canonical import to_canonical
 from spark_sim.cli import run
@@ -46,8 +47,10 @@ def robot() -> Morphology:
 def standing(robot: Morphology, frames: int = FRAMES) -> Float[np.ndarray, "T nq"]:
     """The T-pose, its soles on z = 0."""
     qpos = np.tile(robot.to_qpos(robot.tpose)[0], (frames, 1))
-    sole = np.concatenate([robot.standing_sole(sole) for sole in robot.soles])
-    qpos[:, 2] += -sole[:, 2].min() - robot.motion(robot.from_qpos(qpos[:1]), 1.0).root_pos[0, 2]
+    rig = robot.rig
+    soles = [sole_positions(sole, rig.tpose_positions, rig.tpose) for sole in rig.soles]
+    lowest = np.concatenate(soles)[:, 2].min()
+    qpos[:, 2] += -lowest - robot.motion(robot.from_qpos(qpos[:1]), 1.0).root_pos[0, 2]
     return qpos
 
 
@@ -88,22 +91,22 @@ def test_every_robot_stands_with_its_soles_on_the_floor(name: str) -> None:
     assert report.clip.self_penetration.sum() == 0
     assert report.implausible == 0, report.text()
     poses = pose_clip(Subject(still.motion, robot.rig, still.body))
-    if still.body.soles:
-        np.testing.assert_allclose(poses.corners[..., 2], 0, atol=3e-3)
-        model, floor = with_floor(still.body, 0.02)
-        feet = {int(model.body_weldid[b]) for sole in still.body.soles for b in sole.bodies}
-        data = mujoco.MjData(model)
-        data.qpos[:] = still.body.qpos[0]
-        mujoco.mj_forward(model, data)
-        gaps = [
-            mujoco.mj_geomDistance(model, data, floor, g, 1.0, None)
-            for g in range(model.ngeom)
-            if int(model.body_weldid[model.geom_bodyid[g]]) in feet
-            and model.geom_contype[g] | model.geom_conaffinity[g]
-            and g != floor
-        ]
-        if gaps:
-            assert min(gaps) == pytest.approx(-0.02, abs=3e-3)
+    np.testing.assert_allclose(poses.corners[..., 2], 0, atol=3e-3)
+    model, floor = with_floor(still.body, 0.02)
+    names = [robot.rig.skeleton.names[j] for sole in robot.soles for j in sole.joints]
+    feet = {int(model.body_weldid[model.body(name).id]) for name in names}
+    data = mujoco.MjData(model)
+    data.qpos[:] = still.body.qpos[0]
+    mujoco.mj_forward(model, data)
+    gaps = [
+        mujoco.mj_geomDistance(model, data, floor, g, 1.0, None)
+        for g in range(model.ngeom)
+        if int(model.body_weldid[model.geom_bodyid[g]]) in feet
+        and model.geom_contype[g] | model.geom_conaffinity[g]
+        and g != floor
+    ]
+    if gaps:
+        assert min(gaps) == pytest.approx(-0.02, abs=3e-3)
 
 
 def test_lifted_sunk_and_slid_robots_are_told_without_a_source(robot: Morphology) -> None:
@@ -240,7 +243,7 @@ def test_lowest_points_are_mujocos_distance_from_a_plane(kind: str, size: str) -
     quats /= np.linalg.norm(quats, axis=1, keepdims=True)
     qpos = np.concatenate([rng.normal(size=(20, 3)) + np.array([0, 0, 3]), quats], axis=1)
     body = ModelTrajectory(spec, spec.compile(), 1, qpos)
-    names, lowest = lowest_points(body, pose_model(body))
+    names, lowest = lowest_points(body, pose_model(body), {})
     assert names == ("b",)
     model, floor = with_floor(body, -5.0)
     data = mujoco.MjData(model)
