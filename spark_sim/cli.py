@@ -1,9 +1,12 @@
 """The command line: one parser, one way to fail."""
 
 import os
+import re
 import sys
 from argparse import Action, ArgumentError, ArgumentParser, Namespace, RawDescriptionHelpFormatter
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
+from itertools import takewhile
 from typing import Any, NoReturn
 
 from spark.errors import SparkSimError
@@ -99,8 +102,9 @@ class _Version(Action):
         parser.exit()
 
 
-def build_parser() -> ArgumentParser:
-    """The whole command line. Imports nothing heavy, so that help comes at once."""
+def build_parser() -> tuple[ArgumentParser, Mapping[str, ArgumentParser]]:
+    """The whole command line, and the parser of each command. Imports nothing heavy, so that help
+    comes at once."""
     parser = _Parser(
         prog="spark-sim",
         usage="spark-sim COMMAND ...",
@@ -122,7 +126,35 @@ def build_parser() -> ArgumentParser:
         )
         command.configure(subparser)
         subparser.set_defaults(run=command.run)
-    return parser
+    return parser, subparsers.choices
+
+
+def parse(argv: Sequence[str]) -> Namespace:
+    """The arguments of one command line. Names of commands and options that are not known are
+    refused first, with the nearest that are; argparse would first ask for what is missing."""
+    parser, commands = build_parser()
+    name, *rest = argv or ("",)
+    if name and not name.startswith("-") and name not in commands:
+        parser.error(f"no command is called {name!r}{_nearest(name, commands)}")
+    command, tokens = (commands[name], rest) if name in commands else (parser, argv)
+    known = command._option_string_actions
+    for token in takewhile("--".__ne__, tokens):
+        option = token.partition("=")[0]
+        short = len(option) > 1 and option[:2] in known and not option.startswith("--")
+        if re.match(r"-[^\d.]", option) and option not in known and not short:
+            command.error(f"no option is called {option}{_nearest(option, known)}")
+    args, left = parser.parse_known_args(argv)
+    if left:
+        command.error(
+            f"don't know what {' '.join(left)} is for; files stand side by side, and an option "
+            "takes one value"
+        )
+    return args
+
+
+def _nearest(name: str, known: Iterable[str]) -> str:
+    near = get_close_matches(name, known, n=1)
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 def run(argv: Sequence[str]) -> int:
@@ -131,10 +163,9 @@ def run(argv: Sequence[str]) -> int:
     Exit codes: 0 done; 1 `report --fail-over` found too much; 2 wrong input or usage; 70 a fault of
     spark-sim itself; 130 interrupted; 141 the reader of stdout went away.
     """
-    parser = build_parser()
-    args = parser.parse_args(argv)
+    args = parse(argv)
     if args.command is None:
-        parser.print_help(sys.stderr)
+        build_parser()[0].print_help(sys.stderr)
         return FAILED
     try:
         code = _run(args)

@@ -53,7 +53,7 @@ def describe(clip: "AnyClip") -> dict[str, Any]:
     ]
     body = {
         "hip_height": rig.hip_height,
-        "carrier": rig.skeleton.names[rig.root_joint],
+        "root_joint": rig.skeleton.names[rig.root_joint],
         "joints": joints,
     }
     return facts | {"body": body, "notes": list(clip.notes)}
@@ -86,7 +86,7 @@ def text(facts: dict[str, Any]) -> str:
     ]
     lines = [
         *head,
-        f"  hips {body['hip_height']:.3g} m above the soles; {body['carrier']} carries the body",
+        f"  hips {body['hip_height']:.3g} m above the soles; root joint {body['root_joint']}",
         "",
         *columns(rows),
     ]

@@ -68,6 +68,8 @@ def load(
             raise ConventionError(f"{path}: {name} can't be told of such a file; leave it out")
     if registry.is_robot(path):
         return load_robot(path, roles=roles)
+    if path.is_dir():
+        raise FileFormatError(path, None, "is a folder; expected a file, or a robot's name")
     if path.suffix.lower() in formats.SUFFIXES:
         return load_robot_motion(path, robot=robot, quat=quat, fps=fps)
     if path.suffix.lower() in _NOT_YET:

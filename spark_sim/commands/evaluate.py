@@ -15,13 +15,14 @@ if TYPE_CHECKING:
 SUMMARY = "measure methods against a ground truth"
 USAGE = "DATA [--checkpoint RUN]... [--result NAME=DIR]..."
 DESCRIPTION = """\
-Put motions on other bodies and measure how far that is from what is known to
-be right. DATA is a dataset that `spark-sim prepare` made, or a folder with one
-folder a character, as Mixamo downloads lie: a motion that is there on two
-characters is one with a known answer. Rows: copy (the analytic transfer), each
---checkpoint, each --result; the first two also with feet held, and corrected
-by another recording of the target's own, as `retarget` does it. Columns: the
-paper's tables 1 and 2; the metrics of docs/evaluation.md."""
+Put motions on other bodies and measure how far the results are from the right
+answers. DATA is a dataset that `spark-sim prepare` made, or a folder with one
+folder a character. A motion that two characters share has a known answer.
+
+The table has a row for copy (the analytic transfer), for each --checkpoint and
+for each --result. The first two also appear with feet held, and with another
+recording of the target as a guide, as `retarget` uses it. The columns are
+those of tables 1 and 2 of the paper; docs/evaluation.md defines the metrics."""
 EXAMPLES = """\
 examples:
   spark-sim evaluate mixamo/
@@ -45,7 +46,7 @@ def configure(parser: ArgumentParser) -> None:
         metavar="[NAME=]RUN",
         action="append",
         default=[],
-        help="a folder that `spark-sim train` wrote, or the checkpoint in it",
+        help="a network that `spark-sim train` wrote: its folder or its checkpoint",
     )
     parser.add_argument(
         "--result",
@@ -57,13 +58,18 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--made",
         action="store_true",
-        help="answers on changed copies of each clip's own body, where no two bodies share motions",
+        help="make the right answers: change each clip's own body. For data in which no two bodies "
+        "share a motion",
     )
     parser.add_argument(
-        "--limit", metavar="N", type=int, help="with --made: N clips of each cell, drawn"
+        "--limit", metavar="N", type=int, help="with --made: draw N clips of each cell"
     )
     parser.add_argument(
-        "--seed", metavar="N", type=int, default=0, help="of what is made and drawn (default 0)"
+        "--seed",
+        metavar="N",
+        type=int,
+        default=0,
+        help="seed of what is made and drawn (default 0)",
     )
     parser.add_argument(
         "-o",
@@ -71,7 +77,7 @@ def configure(parser: ArgumentParser) -> None:
         metavar="FILE",
         action="append",
         default=[],
-        help="also write it: .md, .json or .csv; may be repeated",
+        help="also write the table to a .md, .json or .csv file; may be given several times",
     )
     add_force(parser)
 

@@ -1,4 +1,4 @@
-"""`spark-sim export`: the network for engines."""
+"""`spark-sim export`: the network as ONNX."""
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
@@ -8,8 +8,9 @@ from spark_sim.commands.options import add_force
 SUMMARY = "write the network as ONNX"
 USAGE = "OUT.onnx [--checkpoint FILE]"
 DESCRIPTION = """\
-Write a trained network as ONNX, for engines: one graph for motions of any
-length, from any body to any other. docs/model.md tells what goes in."""
+Write a trained network as ONNX, for game engines and other runtimes. One graph
+serves motions of any length, from any body to any other. docs/model.md lists
+its inputs and outputs."""
 EXAMPLES = """\
 examples:
   spark-sim export spark.onnx                      # the network that ships
@@ -18,11 +19,11 @@ examples:
 
 
 def configure(parser: ArgumentParser) -> None:
-    parser.add_argument("output", metavar="OUT.onnx")
+    parser.add_argument("output", metavar="OUT.onnx", help="the file to write")
     parser.add_argument(
         "--checkpoint",
         metavar="FILE",
-        help="what `spark-sim train` wrote, instead of the network that ships",
+        help="a network that `spark-sim train` wrote, instead of the one that ships",
     )
     add_force(parser)
 

@@ -14,10 +14,10 @@ from spark_sim.commands.options import (
 SUMMARY = "show what is understood of a file"
 USAGE = "FILE... [--save-map TOML] [options]"
 DESCRIPTION = """\
-Show what is understood of each FILE: unit, up axis, frame rate, and the body:
-which joint is what, how sure that is and why, the body parts, and how far the
-rest pose is from a T-pose. What is wrong can be corrected: save the map, edit
-it, and give it back with --map."""
+Show what is understood of each FILE: unit, up axis, frame rate, and the role
+of each joint, with the confidence, the reason, the body parts that the joint
+belongs to, and the angle between its rest pose and the T-pose. To correct a
+role, save the map, edit it, and give it back with --map."""
 EXAMPLES = """\
 examples:
   spark-sim inspect mutant.bvh
@@ -28,8 +28,15 @@ examples:
 
 
 def configure(parser: ArgumentParser) -> None:
-    parser.add_argument("files", metavar="FILE", nargs="+", help="motions, or robots")
-    parser.add_argument("--save-map", metavar="TOML", help="write the roles of FILE for editing")
+    parser.add_argument(
+        "files",
+        metavar="FILE",
+        nargs="+",
+        help="a BVH or FBX file, a robot's motion, or a robot's name",
+    )
+    parser.add_argument(
+        "--save-map", metavar="TOML", help="write the map of joints of FILE, to edit"
+    )
     add_force(parser)
     add_json(parser, "one line for each FILE")
     add_corrections(parser, "FILE")

@@ -9,10 +9,9 @@ SUMMARY = "make a MuJoCo body from a BVH skeleton"
 USAGE = "RIG [-o OUT] [options]"
 DESCRIPTION = """\
 Write a MuJoCo model (MJCF) of the skeleton in RIG: one body a bone, capsules
-along the bones, boxes under the feet, human masses, servos that are strong
-enough to stand, sensors, and a free joint that carries it all. OUT holds the
-body alone; OUT_scene.xml, beside it, puts it on a floor and is the one to open
-in a viewer."""
+along the bones, boxes under the feet, human masses, servos strong enough to
+stand, sensors, and a free joint at the root. OUT holds the body alone.
+OUT_scene.xml, beside it, puts the body on a floor: open that one in a viewer."""
 EXAMPLES = """\
 examples:
   spark-sim mjcf mutant.bvh            # writes mutant.xml, mutant_scene.xml
@@ -24,13 +23,16 @@ examples:
 def configure(parser: ArgumentParser) -> None:
     parser.add_argument("rig", metavar="RIG", help="a BVH or FBX file; its motion is not needed")
     parser.add_argument(
-        "-o", "--output", metavar="OUT", help="the file to write (default: RIG.xml, here)"
+        "-o",
+        "--output",
+        metavar="OUT",
+        help="the file to write (default: RIG.xml in the current folder)",
     )
     parser.add_argument(
         "--joints",
         choices=("ball", "hinge"),
         default="ball",
-        help="ball joints (default), or hinges: one at elbows and knees, else three",
+        help="ball joints (default), or hinges: one at an elbow or knee, three elsewhere",
     )
     parser.add_argument(
         "--mesh",

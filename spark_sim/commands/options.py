@@ -8,12 +8,12 @@ if TYPE_CHECKING:
 
 
 def add_corrections(parser: ArgumentParser, file: str, prefix: str = "") -> None:
-    """`--unit`, `--up` and `--map`: what the user knows better of `file` than we infer.
+    """`--unit`, `--up` and `--map`: what the user corrects of what is inferred from `file`.
 
     A file that comes with the option `--NAME` has `--NAME-unit`, `--NAME-up` and `--NAME-map`.
     """
     dest = prefix.replace("-", "_")
-    group = parser.add_argument_group(f"corrections for {file} (all is inferred where not given)")
+    group = parser.add_argument_group(f"corrections for {file} (what is not given is inferred)")
     group.add_argument(
         f"--{prefix}unit",
         dest=f"{dest}unit",
@@ -21,7 +21,7 @@ def add_corrections(parser: ArgumentParser, file: str, prefix: str = "") -> None
         help="m, dm, cm, mm, inch, cmu (5.644 cm), or metres as a number",
     )
     group.add_argument(
-        f"--{prefix}up", dest=f"{dest}up", metavar="AXIS", help="axis that points up: x, y or z"
+        f"--{prefix}up", dest=f"{dest}up", metavar="AXIS", help="the axis that points up: x, y or z"
     )
     group.add_argument(
         f"--{prefix}map",
@@ -42,16 +42,17 @@ def add_robot_motion(parser: ArgumentParser, file: str, prefix: str = "") -> Non
         f"--{prefix}robot",
         dest=f"{dest}robot",
         metavar="ROBOT",
-        help="the robot that moves: a name (`spark-sim robots`) or an MJCF; our .npz say it",
+        help="the robot that moves: a name (`spark-sim robots`) or an MJCF file; the .npz that "
+        "spark-sim writes says it",
     )
     group.add_argument(
         f"--{prefix}quat",
         dest=f"{dest}quat",
         choices=("xyzw", "wxyz"),
-        help="the order of a CSV's quaternions; Unitree's are xyzw",
+        help="order of the quaternions in a CSV; Unitree writes xyzw",
     )
     group.add_argument(
-        f"--{prefix}fps", dest=f"{dest}fps", metavar="N", type=float, help="a CSV's frame rate"
+        f"--{prefix}fps", dest=f"{dest}fps", metavar="N", type=float, help="frame rate of a CSV"
     )
 
 
@@ -83,7 +84,7 @@ def load(args: Namespace, path: str, prefix: str = "", *, humanoid: bool = True)
 
 def add_force(parser: ArgumentParser) -> None:
     """`--force`: nothing is overwritten without it."""
-    parser.add_argument("--force", action="store_true", help="overwrite what exists")
+    parser.add_argument("--force", action="store_true", help="overwrite files that exist")
 
 
 def add_json(parser: ArgumentParser, what: str) -> None:

@@ -11,11 +11,12 @@ from spark_sim.commands.options import add_corrections, add_force, add_json, add
 SUMMARY = "watch motions: window, video, web page, picture"
 USAGE = "FILE... [--video MP4] [--html HTML] [--strip PNG]"
 DESCRIPTION = """\
-Show the motion of each FILE on a MuJoCo body, several side by side: people on
-bodies made from their skeletons, robots on their own models. Opens a window;
-with --video, --html or --strip it writes files instead and needs no display.
-With --physics, position servos track the motion in simulation, and a report
-says how long it stays up, how far off it is, and what it takes."""
+Show the motions of all FILEs side by side, characters on MuJoCo bodies made
+from their skeletons, robots on their own models. This opens a window. With
+--video, --html or --strip it writes files instead and needs no display.
+
+With --physics, position servos track each motion in simulation. A summary says
+how long the body stays up, how far it is from the motion, and the torques."""
 EXAMPLES = """\
 examples:
   spark-sim play walk.bvh              # a window
@@ -28,18 +29,22 @@ examples:
 
 def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
-        "files", metavar="FILE", nargs="+", help="a BVH, an FBX, or a robot's motion"
+        "files", metavar="FILE", nargs="+", help="a BVH or FBX file, or a robot's motion"
     )
     parser.add_argument("--video", metavar="MP4", help="write a video")
     parser.add_argument("--html", metavar="HTML", help="write one web page with a 3D replay")
     parser.add_argument("--strip", metavar="PNG", help="write a strip of moments as one picture")
     parser.add_argument(
-        "--physics", action="store_true", help="track each FILE in simulation, and report on it"
+        "--physics",
+        action="store_true",
+        help="track each motion in simulation, and print a summary",
     )
     parser.add_argument(
-        "--assist", action="store_true", help="with --physics: help by a wrench on the root"
+        "--assist",
+        action="store_true",
+        help="with --physics: a force and a torque on the root help",
     )
-    add_json(parser, "the report of --physics")
+    add_json(parser, "the summary of --physics")
     add_force(parser)
     add_corrections(parser, "every FILE")
     add_robot_motion(parser, "every FILE")

@@ -9,12 +9,13 @@ from spark_sim.commands.options import add_force
 SUMMARY = "make a dataset to train on"
 USAGE = "SRC... -o DATASET [options]"
 DESCRIPTION = """\
-Read every BVH and FBX file below each SRC and write one dataset: 30 frames a
-second, bodies without fingers, hair and clothes, canonical rotations. Made for
-Mixamo downloads, one folder a character, and good for any tree of files.
-Characters and motions are split into those that training sees and the others:
-the paper's characters by name, the rest drawn. A run that stopped goes on
-where it was; run again with more files, it reads only those."""
+Read every BVH and FBX file below each SRC and write one dataset: canonical
+rotations at 30 frames a second, without fingers, hair and clothes. It is made
+for Mixamo downloads, one folder a character, and takes any tree of files.
+
+Some characters and motions are set aside for testing: those of the paper by
+name, others by a draw. A run that was interrupted continues where it stopped.
+A second run with more files reads only the new ones."""
 EXAMPLES = """\
 examples:
   spark-sim prepare mixamo/ -o dataset
@@ -25,10 +26,14 @@ examples:
 
 def configure(parser: ArgumentParser) -> None:
     parser.add_argument("sources", metavar="SRC", nargs="+", help="folders, or BVH and FBX files")
-    parser.add_argument("-o", "--output", metavar="DATASET", required=True, help="the folder")
-    parser.add_argument("--seed", metavar="N", type=int, default=0, help="of the split (default 0)")
     parser.add_argument(
-        "--workers", metavar="N", type=int, help="processes (default: one for each core)"
+        "-o", "--output", metavar="DATASET", required=True, help="the folder to write"
+    )
+    parser.add_argument(
+        "--seed", metavar="N", type=int, default=0, help="seed of the draw (default 0)"
+    )
+    parser.add_argument(
+        "--workers", metavar="N", type=int, help="number of processes (default: one a core)"
     )
     add_force(parser)
 

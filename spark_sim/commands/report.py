@@ -15,12 +15,14 @@ from spark_sim.commands.options import (
 SUMMARY = "measure how believable a motion is"
 USAGE = "FILE [--source SRC] [--html OUT] [options]"
 DESCRIPTION = """\
-Measure the physical plausibility of the motion in FILE: feet below the floor,
-floating, skating, forces that the floor can't give, joint limits, the body in
-itself; with --source also what the motion it came from does, how well the foot
-contacts agree, and how far the root drifts from it; with --truth how far it is
-from what it should have been. A robot's motion, of any tool, is judged on the
-robot's own model: its masses, shapes, soles and joint limits."""
+Measure how plausible the motion in FILE is: penetration of the floor,
+floating, skating, forces that the floor can't give, joint limits,
+self-penetration. With --source, also measure the motion that it was made from,
+how well the foot contacts agree, and how far the root drifts. With --truth,
+also measure how far it is from the right answer.
+
+A robot's motion, from any tool, is measured on the robot's own model: its
+masses, shapes, soles and joint limits."""
 EXAMPLES = """\
 examples:
   spark-sim report walk_on_mutant.bvh --source walk.bvh
@@ -37,23 +39,25 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="a BVH or FBX file, or a robot's motion")
     parser.add_argument("--source", metavar="SRC", help="the motion that FILE was made from")
     parser.add_argument(
-        "--truth", metavar="TRUTH", help="what FILE should have been, on the same body"
+        "--truth",
+        metavar="TRUTH",
+        help="the right answer: the motion that FILE should be, on the same body",
     )
     parser.add_argument(
-        "--html", metavar="OUT", help="write a page too: replay, worst moments, plots over time"
+        "--html", metavar="OUT", help="also write a page: replay, worst moments, plots over time"
     )
     parser.add_argument(
         "--compare",
         metavar="OTHER",
         nargs="+",
         default=[],
-        help="judge these files too, with the same options, and print one table",
+        help="measure these files too, with the same options, and print one table",
     )
     parser.add_argument(
         "--fail-over",
         metavar="PERCENT",
         type=_percentage,
-        help="exit with code 1 where more of the frames are implausible",
+        help="exit with code 1 if more than this share of the frames is implausible",
     )
     add_json(parser, "the report")
     add_force(parser)

@@ -21,10 +21,9 @@ SUMMARY = "put motions on another body"
 USAGE = "SRC... --to TARGET [-o OUT] [options]"
 DESCRIPTION = """\
 Put the motion of each SRC on the body of TARGET. Both may be any humanoid rig
-or robot: joints are matched by what they are, not by name or order, and rest
-poses, axes, units and proportions may differ. The result is a BVH in TARGET's
-own hierarchy, channels, unit and axes; of a robot, its coordinates (.npz,
-.csv, .pkl)."""
+or robot. Rest poses, axes, units, proportions and joint names may differ. On a
+character the result is a BVH file with TARGET's own hierarchy, channels, unit
+and axes. On a robot it is the coordinates of its joints (.npz, .csv, .pkl)."""
 EXAMPLES = """\
 examples:
   spark-sim retarget walk.bvh --to mutant.bvh       # writes walk_on_mutant.bvh

@@ -7,9 +7,9 @@ from spark_sim.commands.options import add_json
 SUMMARY = "list the robots that have names"
 USAGE = "[--json]"
 DESCRIPTION = """\
-List the robots that `--to` and `--robot` know by name: hinges, height, where
-the model comes from, under which licence, and how to get it where it is not
-installed. Any other humanoid's MJCF is given by its path."""
+List the robots that `--to` and `--robot` know by name: number of joints,
+height, origin and licence of the model, and how to install it. Any other
+humanoid robot is given by the path of its MJCF file."""
 EXAMPLES = """\
 examples:
   spark-sim robots

@@ -7,8 +7,8 @@ from spark_sim.commands.options import add_force
 SUMMARY = "write demo motions"
 USAGE = "[DIR] [options]"
 DESCRIPTION = """\
-Write demo motions into DIR: a walk, a wave and a squat, made by code, on two
-rigs that differ in names, proportions, rest pose, axes and unit."""
+Write six demo motions into DIR: a walk, a wave and a squat, each on two rigs.
+The rigs differ in joint names, proportions, rest pose, axes and unit."""
 EXAMPLES = """\
 examples:
   spark-sim sample                     # writes into samples/
@@ -17,7 +17,13 @@ examples:
 
 
 def configure(parser: ArgumentParser) -> None:
-    parser.add_argument("folder", metavar="DIR", nargs="?", default="samples")
+    parser.add_argument(
+        "folder",
+        metavar="DIR",
+        nargs="?",
+        default="samples",
+        help="the folder to write to (default: samples)",
+    )
     add_force(parser)
 
 

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 SUMMARY = "train the network that retargets"
 USAGE = "DATA... -o DIR [--config TOML] [--resume] [options]"
 DESCRIPTION = """\
-Train on each DATA: a dataset that `spark-sim prepare` made, or the BVH and FBX
-files below a folder. Writes DIR/checkpoint.safetensors, the settings as
-DIR/config.toml and the loss of each step as DIR/log.jsonl."""
+Train a network on each DATA: a dataset that `spark-sim prepare` made, or a
+folder of BVH and FBX files. Writes DIR/checkpoint.safetensors, the settings to
+DIR/config.toml, and the losses of each step to DIR/log.jsonl."""
 EXAMPLES = """\
 examples:
   spark-sim train motions/ -o run --preset tiny
@@ -24,28 +24,46 @@ examples:
   spark-sim train -o run --resume      # goes on where run stopped
   torchrun --nproc-per-node 4 -m spark_sim train motions/ -o run
 """
-_FLAGS = ("steps", "batch", "window", "rate", "seed", "workers")
+_FLAGS = {
+    "steps": "number of training steps",
+    "batch": "windows in one step",
+    "window": "frames in one window",
+    "rate": "learning rate",
+    "seed": "seed of all that is drawn",
+    "workers": "processes that load data",
+}
 # What the weights in a checkpoint were made for.
 _OF_THE_NETWORK = ("preset", "ablate", "width", "heads", "blocks", "names", "t5")
 
 
 def configure(parser: ArgumentParser) -> None:
     parser.add_argument("data", metavar="DATA", nargs="*", help="datasets, or folders of files")
-    parser.add_argument("-o", "--output", metavar="DIR", required=True, help="where the run lies")
-    parser.add_argument("--config", metavar="TOML", help="settings, as DIR/config.toml has them")
-    parser.add_argument("--resume", action="store_true", help="go on from DIR's checkpoint")
-    parser.add_argument("--preset", metavar="NAME", help="default, paper or tiny")
+    parser.add_argument(
+        "-o", "--output", metavar="DIR", required=True, help="the folder of the run"
+    )
+    parser.add_argument("--config", metavar="TOML", help="read the settings from this file")
+    parser.add_argument("--resume", action="store_true", help="continue from the checkpoint in DIR")
+    parser.add_argument(
+        "--preset", metavar="NAME", help="the settings to start from: default, paper or tiny"
+    )
     parser.add_argument(
         "--ablate",
         metavar="SWITCH",
         action="append",
-        help="leave out share, mask or fk, switch pos, or mix motions; may be repeated",
+        help="leave out share, mask or fk, switch pos, or mix motions; may be given several times",
     )
-    for name in _FLAGS:
-        parser.add_argument(f"--{name}", metavar="N", type=float if name == "rate" else int)
-    parser.add_argument("--names", metavar="FILE", help="a learned encoder of joint names")
-    parser.add_argument("--t5", metavar="MODEL", help="a T5 for names: a folder or a hub name")
-    parser.add_argument("--tensorboard", action="store_true", help="write DIR for TensorBoard, too")
+    for name, what in _FLAGS.items():
+        number = float if name == "rate" else int
+        parser.add_argument(f"--{name}", metavar="N", type=number, help=what)
+    parser.add_argument(
+        "--names", metavar="FILE", help="an encoder of joint names that was trained before"
+    )
+    parser.add_argument(
+        "--t5", metavar="MODEL", help="encode joint names with a T5: a folder, or a name on the hub"
+    )
+    parser.add_argument(
+        "--tensorboard", action="store_true", help="also write logs for TensorBoard into DIR"
+    )
     parser.add_argument("--force", action="store_true", help="overwrite the run in DIR")
 
 
