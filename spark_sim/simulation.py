@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
-from sim.physics.summary import LIMITS, summary, text
-from sim.physics.tracking import Assist, Tracked, track
+from sim.physics.summary import LIMITS, render, summarize
+from sim.physics.tracking import Assist, TrackingResult, track
 from sim.trajectory import model_trajectory
 from sim.view.scene import Figure
 from spark_sim.clips import AnyClip, File
@@ -18,7 +18,7 @@ class Simulated:
     """A clip, and what became of it in simulation."""
 
     clip: AnyClip
-    tracked: Tracked
+    tracked: TrackingResult
 
     def __repr__(self) -> str:
         return f"Simulated({self.clip!r})"
@@ -35,11 +35,11 @@ class Simulated:
 
     def json(self) -> dict[str, Any]:
         """The measures (docs/playback.md), with a schema version."""
-        return summary(self.tracked)
+        return summarize(self.tracked)
 
     def text(self) -> str:
         """The measures in words."""
-        return text(self.json(), self.clip.name)
+        return render(self.json(), self.clip.name)
 
     def figures(self) -> list[Figure]:
         """What is shown: the motion as simulated, and its target as a ghost."""

@@ -7,11 +7,11 @@ from sim.trajectory import ModelTrajectory
 from spark.constants import GRAVITY
 from spark.errors import SkeletonError
 
-SOFTNESS = 0.1  # [rad] from the target at which a servo of ours gives all that its motor can
-STRENGTH = 0.1  # torque of a joint whose limit is not told, in body weights times height
-_RESOLVED = 0.5  # servos of ours are no faster than this many radians of their swing a step
+FULL_TORQUE_ERROR = 0.1  # [rad] from its target: a servo of ours gives its full torque there
+DEFAULT_TORQUE = 0.1  # [body weights x height] of a joint whose file tells no limit
+_MAX_PHASE = 0.5  # [rad] of its own oscillation that a servo of ours runs through in one step
 _HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
-_SLOWEST_STEP = 0.002  # [s]
+_MAX_TIMESTEP = 0.002  # [s]
 _COLLISION_GROUP = 3  # by custom; viewers don't show it
 
 
@@ -35,7 +35,7 @@ def with_servos(
             contype=1 | _bits(body.model, "conaffinity"),
             conaffinity=1 | _bits(body.model, "contype"),
         )
-    timestep = min(float(body.model.opt.timestep), _SLOWEST_STEP)
+    timestep = min(float(body.model.opt.timestep), _MAX_TIMESTEP)
     _replace_motors(spec, body.model, height, timestep, notes)
     spec.option.timestep, spec.option.gravity = timestep, [0.0, 0.0, -GRAVITY]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -82,11 +82,11 @@ def _replace_motors(
     servos = [a for a in range(model.nu) if is_servo(model, a)]
     if model.nu and len(servos) == model.nu:
         return
-    moved = {_joint(model, a): a for a in range(model.nu) if a not in servos}
+    motors = {_joint_of(model, a): a for a in range(model.nu) if a not in servos}
     joints = [j for j in range(model.njnt) if int(model.jnt_type[j]) in (_HINGE, _BALL)]
     if model.nu:
-        joints = [j for j in joints if j in moved]
-    limits = {j: _torque(model, j, moved.get(j), height) for j in joints}
+        joints = [j for j in joints if j in motors]
+    limits = {j: _torque_limit(model, j, motors.get(j), height) for j in joints}
     for a, actuator in enumerate(list(spec.actuators)):
         if a not in servos:
             spec.delete(actuator)
@@ -95,7 +95,7 @@ def _replace_motors(
         start = int(model.jnt_dofadr[j])
         width = 3 if int(model.jnt_type[j]) == _BALL else 1
         inertia = float(model.dof_M0[start : start + width].mean())
-        kp = min(limits[j] / SOFTNESS, inertia * (_RESOLVED / timestep) ** 2)
+        kp = min(limits[j] / FULL_TORQUE_ERROR, inertia * (_MAX_PHASE / timestep) ** 2)
         if not elements[j].name:
             elements[j].name = f"joint_{j}"
         for axis in range(width):
@@ -110,29 +110,30 @@ def _replace_motors(
             servo.forcerange = [-limits[j], limits[j]]
     what = "its motors" if model.nu else "joints without actuators"
     notes.append(
-        f"{what} are driven by servos of ours: full torque at {SOFTNESS:g} rad from the target"
+        f"{what} are driven by servos of ours: full torque at {FULL_TORQUE_ERROR:g} rad from the "
+        "target"
     )
 
 
-def _joint(model: mujoco.MjModel, actuator: int) -> int:
-    """The joint that an actuator turns; -1 where it is no single one."""
+def _joint_of(model: mujoco.MjModel, actuator: int) -> int:
+    """The joint that an actuator drives; -1 where it is no single one."""
     kinds = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
     if int(model.actuator_trntype[actuator]) not in kinds:
         return -1
     return int(model.actuator_trnid[actuator, 0])
 
 
-def _torque(model: mujoco.MjModel, joint: int, motor: int | None, height: float) -> float:
-    """The most that a joint gives [N m], as far as its file says."""
-    told = []
+def _torque_limit(model: mujoco.MjModel, joint: int, motor: int | None, height: float) -> float:
+    """A joint's torque limit [N m]: the lowest that its file tells, else by `DEFAULT_TORQUE`."""
+    limits = []
     if model.jnt_actfrclimited[joint]:
-        told.append(np.abs(model.jnt_actfrcrange[joint]).max())
+        limits.append(np.abs(model.jnt_actfrcrange[joint]).max())
     if motor is not None:
         gear = float(np.abs(model.actuator_gear[motor]).max())
         if model.actuator_forcelimited[motor]:
-            told.append(gear * np.abs(model.actuator_forcerange[motor]).max())
+            limits.append(gear * np.abs(model.actuator_forcerange[motor]).max())
         if model.actuator_ctrllimited[motor]:
             gain = abs(float(model.actuator_gainprm[motor, 0]))
-            told.append(gear * gain * np.abs(model.actuator_ctrlrange[motor]).max())
+            limits.append(gear * gain * np.abs(model.actuator_ctrlrange[motor]).max())
     weight = float(model.body_mass.sum()) * GRAVITY
-    return float(min(told)) if told else STRENGTH * weight * height
+    return float(min(limits)) if limits else DEFAULT_TORQUE * weight * height

@@ -1,4 +1,4 @@
-"""What a simulated motion shows: numbers for scripts, and the same in words."""
+"""What a simulated motion shows, as plain data for JSON and as text."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.interpolate import quaternions
-from sim.physics.tracking import Tracked
+from sim.physics.tracking import TrackingResult
 from spark.constants import GRAVITY
 from spark.rotation import quat_relative, rotvec_from_quat
 
@@ -18,31 +18,31 @@ LIMITS = (
     "air. Compare only what the same servos tracked."
 )
 _HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
-_LISTED = 8
+_LISTED = 8  # joints and bodies in the text: the most loaded ones
 
 
-def summary(tracked: Tracked) -> dict[str, Any]:
+def summarize(tracked: TrackingResult) -> dict[str, Any]:
     """The measures as JSON: lengths in cm, angles in degrees, efforts as shares of body weight (and
     height), torques in N m. Errors are those before the fall."""
-    record, model = tracked.record, tracked.model
-    frames = len(record.fallen)
+    rollout, model = tracked.rollout, tracked.model
+    frames = len(rollout.fallen)
     weight = tracked.mass * GRAVITY
-    falls = np.flatnonzero(record.fallen)
+    falls = np.flatnonzero(rollout.fallen)
     fall = int(falls[0]) if len(falls) else None
     upright = slice(0, max(fall, 1) if fall is not None else frames)
-    apart = record.points[upright] - tracked.target_points[upright]
-    forces, torques = np.split(record.wrench[1:], 2, axis=1)
+    apart = rollout.points[upright] - tracked.target_points[upright]
+    forces, torques = np.split(rollout.wrench[1:], 2, axis=1)
     assist = None
     if tracked.assist is not None:
         assist = {
             "cap_force": tracked.assist.force,
             "cap_torque": tracked.assist.torque,
-            "force": _mean_and_max(forces / weight),
-            "carried": _finite(record.wrench[1:, 2] / weight, np.mean),
-            "torque": _mean_and_max(torques / (weight * tracked.height)),
-            "work_j": round(float(record.work.sum()), 3),
+            "force": _mean_and_max_norm(forces / weight),
+            "carried": _reduced(rollout.wrench[1:, 2] / weight, np.mean),
+            "torque": _mean_and_max_norm(torques / (weight * tracked.height)),
+            "work_j": round(float(rollout.work.sum()), 3),
         }
-    loads = record.loads / weight
+    loads = rollout.loads / weight
     return {
         "schema": SCHEMA,
         "frames": frames,
@@ -53,20 +53,20 @@ def summary(tracked: Tracked) -> dict[str, Any]:
         "fall_frame": fall,
         "diverged_frame": tracked.diverged,
         "error": {
-            "joints_deg": _root_mean_square(np.degrees(_joint_errors(tracked, upright))),
-            "mpjpe_cm": _mean_length(100 * apart),
-            "mpjpe_root_cm": _mean_length(100 * (apart - apart[:, :1])),
+            "joints_deg": _rms(np.degrees(_joint_errors(tracked, upright))),
+            "mpjpe_cm": _mean_norm(100 * apart),
+            "mpjpe_root_cm": _mean_norm(100 * (apart - apart[:, :1])),
         },
         "assist": assist,
         "joints": [
             {
                 "name": model.joint(j).name,
-                "peak_nm": round(float(record.peak[:, j].max()), 3),
-                "rms_nm": round(float(np.sqrt(_finite(record.square[1:, j], np.mean))), 3),
-                "saturated": _finite(record.saturated[1:, j], np.mean),
+                "peak_nm": round(float(rollout.peak[:, j].max()), 3),
+                "rms_nm": round(float(np.sqrt(_reduced(rollout.square[1:, j], np.mean))), 3),
+                "saturated": _reduced(rollout.saturated[1:, j], np.mean),
             }
-            for j in np.argsort(-record.peak.max(0), kind="stable")
-            if record.peak[:, j].max() > 0
+            for j in np.argsort(-rollout.peak.max(0), kind="stable")
+            if rollout.peak[:, j].max() > 0
         ],
         "floor": [
             {
@@ -82,8 +82,8 @@ def summary(tracked: Tracked) -> dict[str, Any]:
     }
 
 
-def text(found: dict[str, Any], name: str) -> str:
-    """A summary in words."""
+def render(found: dict[str, Any], name: str) -> str:
+    """The text of what `summarize` found of the motion `name`."""
     assist, error = found["assist"], found["error"]
     end = (found["frames"] - 1) * found["frame_time"]
     if found["diverged_frame"] is not None:
@@ -130,11 +130,11 @@ def text(found: dict[str, Any], name: str) -> str:
     return "\n".join(lines)
 
 
-def _joint_errors(tracked: Tracked, frames: slice) -> Float[np.ndarray, "T N"]:
+def _joint_errors(tracked: TrackingResult, frames: slice) -> Float[np.ndarray, "T N"]:
     """How far each hinge and each ball is from its target [rad]."""
     model = tracked.model
-    made, wanted = tracked.record.qpos[frames], tracked.target.qpos[frames]
-    inside = _moved(tracked)
+    made, wanted = tracked.rollout.qpos[frames], tracked.target.qpos[frames]
+    inside = _driven_joints(tracked)
     hinges = [int(model.jnt_qposadr[j]) for j in inside if int(model.jnt_type[j]) == _HINGE]
     starts = {int(model.jnt_qposadr[j]) for j in inside if int(model.jnt_type[j]) == _BALL}
     balls = np.array([q for q in quaternions(model) if int(q[0]) in starts], dtype=int)
@@ -144,25 +144,25 @@ def _joint_errors(tracked: Tracked, frames: slice) -> Float[np.ndarray, "T N"]:
     return np.concatenate([angles, np.linalg.norm(turns, axis=-1)], axis=1)
 
 
-def _moved(tracked: Tracked) -> list[int]:
+def _driven_joints(tracked: TrackingResult) -> list[int]:
     """The joints that have a servo."""
     model = tracked.model
     return sorted({int(model.actuator_trnid[a, 0]) for a in range(model.nu)})
 
 
-def _mean_and_max(vectors: Float[np.ndarray, "T 3"]) -> dict[str, float]:
+def _mean_and_max_norm(vectors: Float[np.ndarray, "T 3"]) -> dict[str, float]:
     sizes = np.linalg.norm(vectors, axis=-1)
-    return {"mean": _finite(sizes, np.mean), "max": _finite(sizes, np.max)}
+    return {"mean": _reduced(sizes, np.mean), "max": _reduced(sizes, np.max)}
 
 
-def _mean_length(vectors: Float[np.ndarray, "T B 3"]) -> float:
+def _mean_norm(vectors: Float[np.ndarray, "T B 3"]) -> float:
     return round(float(np.linalg.norm(vectors, axis=-1).mean()), 4)
 
 
-def _root_mean_square(values: Float[np.ndarray, "T N"]) -> float:
+def _rms(values: Float[np.ndarray, "T N"]) -> float:
     return round(float(np.sqrt((values**2).mean())), 4) if values.size else 0.0
 
 
-def _finite(values: Float[np.ndarray, "T"], of: Any) -> float:
-    """Of one frame alone there are no efforts: 0."""
+def _reduced(values: Float[np.ndarray, "T"], of: Any) -> float:
+    """`of(values)`, rounded; 0 where there are none: a single frame has no efforts."""
     return round(float(of(values)), 5) if len(values) else 0.0

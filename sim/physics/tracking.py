@@ -18,14 +18,16 @@ from sim.trajectory import ModelTrajectory
 from spark.errors import SkeletonError
 from spark.summary import brief
 
-FALL_DROP = 0.2  # of the standing height: how much lower than its target the root is
-FALL_TILT = 60.0  # [deg] between what is upward in the root and in its target
-_FREQUENCY = 10.0  # [rad/s] of the assisting spring, critically damped
-_GYRATION = 0.25  # of the height: radius of gyration that the assisting torque reckons with
-_AT_LIMIT = 0.999
-_JUMP = 30.0  # [rad/s], [m/s]: a first frame that is left faster is another pose, not a motion
-_BLOCK = 256  # frames whose targets are laid out at once
-_BAD = tuple(
+# The body counts as fallen where its root is lower than its target by more than this fraction of
+# the standing height, or tilted against it by more than this angle [deg].
+FALL_DROP, FALL_TILT = 0.2, 60.0
+_ASSIST_FREQUENCY = 10.0  # [rad/s] of the assisting spring, critically damped
+_GYRATION_RADIUS = 0.25  # of the standing height, of a body about its root
+_SATURATED = 0.999  # of a torque limit: at it, but for rounding
+# [rad/s] and [m/s]: a first frame that is left faster is another pose, not part of the motion.
+_MAX_START_SPEED = 30.0
+_BLOCK_FRAMES = 256  # frames whose targets are interpolated at once: bounds the memory
+_DIVERGED = tuple(
     int(kind)
     for kind in (
         mujoco.mjtWarning.mjWARN_BADQPOS,
@@ -45,12 +47,12 @@ class Assist:
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
-    """What happened in each frame; efforts are those of the steps since the frame before.
+class Rollout:
+    """What the simulation did, frame by frame; efforts are of the steps since the frame before.
 
     `points` [m] are the origins of the bodies that have joints, the root first. `peak` [N m] and
     `square` [N² m², a mean] are of the torque of each joint's servos, `saturated` the share of the
-    steps in which they gave all they can. `wrench` is the mean assist on the root, [N] and [N m] in
+    steps in which it was at its limit. `wrench` is the mean assist on the root, [N] and [N m] in
     world axes; `work` [J] its mechanical work, positive and negative counted alike. `loads` [N] is
     how hard each body presses on the floor.
     """
@@ -69,7 +71,7 @@ class Record:
 
 
 @dataclass(frozen=True, eq=False)
-class Tracked:
+class TrackingResult:
     """A simulated motion, and the target that it followed, on one body.
 
     `model` is what was simulated. From frame `diverged` on, where there is one, the simulation gave
@@ -79,7 +81,7 @@ class Tracked:
     model: mujoco.MjModel
     target: ModelTrajectory
     target_points: Float[np.ndarray, "T B 3"]
-    record: Record
+    rollout: Rollout
     frame_time: float
     height: float
     mass: float
@@ -92,7 +94,7 @@ class Tracked:
     @property
     def body(self) -> ModelTrajectory:
         """The body as it moved in the simulation."""
-        return replace(self.target, qpos=self.record.qpos)
+        return replace(self.target, qpos=self.rollout.qpos)
 
 
 def track(
@@ -102,7 +104,7 @@ def track(
     height: float,
     floor_z: float = 0.0,
     assist: Assist | None = None,
-) -> Tracked:
+) -> TrackingResult:
     """Simulate the body of `target` while its servos follow the target's coordinates.
 
     It begins in the first frame, with its velocity, or at rest where that is a jump. `height` [m]
@@ -117,15 +119,15 @@ def track(
     simulation = _Simulation(model, root, height, assist)
     speeds = velocities(model, target.qpos, frame_time)
     start, fastest = speeds[0], float(np.abs(speeds[0]).max())
-    if fastest > _JUMP:
+    if fastest > _MAX_START_SPEED:
         start = np.zeros_like(start)
         notes += (f"the first frame is left at {fastest:.0f} rad/s: the simulation begins at rest",)
-    record, target_points, diverged = simulation.run(target.qpos, speeds, start, frame_time, steps)
-    return Tracked(
+    rollout, target_points, diverged = simulation.run(target.qpos, speeds, start, frame_time, steps)
+    return TrackingResult(
         model,
         target,
         target_points,
-        record,
+        rollout,
         frame_time,
         height,
         simulation.mass,
@@ -136,7 +138,7 @@ def track(
 
 
 class _Simulation:
-    """The stepping: servos, the assist, and what is noted down."""
+    """The stepping: servos, the assist, and the log."""
 
     def __init__(
         self, model: mujoco.MjModel, root: int, height: float, assist: Assist | None
@@ -153,7 +155,7 @@ class _Simulation:
             if int(model.body_parentid[b]) in inside:
                 inside.add(b)
         self.points = [b for b in sorted(inside) if int(model.body_jntnum[b])]
-        self.on_joint = np.array([_joint_of(model, a) for a in range(model.nu)], dtype=int)
+        self.actuator_joint = np.array([_joint_of(model, a) for a in range(model.nu)], dtype=int)
         limited = np.asarray(model.actuator_forcelimited, dtype=bool)
         self.force_limit = np.where(limited, model.actuator_forcerange[:, 1], np.inf)
         limited = np.asarray(model.jnt_actfrclimited, dtype=bool)
@@ -170,11 +172,11 @@ class _Simulation:
         start: Float[np.ndarray, "nv"],
         frame_time: float,
         steps: int,
-    ) -> tuple[Record, Float[np.ndarray, "T B 3"], int | None]:
+    ) -> tuple[Rollout, Float[np.ndarray, "T B 3"], int | None]:
         """The record, where the target has the record's points, and the frame that diverged. The
         velocities are those of the target, and that of the body at first."""
         model, data, frames = self.model, self.data, len(target)
-        record = self._empty(frames)
+        rollout = self._empty(frames)
         target_points = np.zeros((frames, len(self.points), 3))
         ups = np.zeros((frames, 3))  # what is upward in the target, in its root's own axes
         for t in range(frames):
@@ -185,25 +187,25 @@ class _Simulation:
         mujoco.mj_resetData(model, data)
         data.qpos[:], data.qvel[:] = target[0], start
         diverged = None
-        with _without_messages():
-            self._note(record, 0, target_points, ups)
-            for t, qpos, qvel in _laid_out(model, target, speeds, frame_time, steps):
-                self._frame(record, t, qpos, qvel)
-                if self._is_bad():
+        with _without_warnings():
+            self._log(rollout, 0, target_points, ups)
+            for t, qpos, qvel in _interpolated_targets(model, target, speeds, frame_time, steps):
+                self._step_to(rollout, t, qpos, qvel)
+                if self._has_diverged():
                     diverged = t
                     break
-                self._note(record, t, target_points, ups)
+                self._log(rollout, t, target_points, ups)
         if diverged is not None:
-            for held in (record.qpos, record.points):
-                held[diverged:] = held[diverged - 1]
-            for efforts in (record.peak, record.square, record.saturated, record.wrench):
+            for poses in (rollout.qpos, rollout.points):
+                poses[diverged:] = poses[diverged - 1]
+            for efforts in (rollout.peak, rollout.square, rollout.saturated, rollout.wrench):
                 efforts[diverged:] = 0.0
-            record.work[diverged:], record.fallen[diverged:] = 0.0, True
-        return record, target_points, diverged
+            rollout.work[diverged:], rollout.fallen[diverged:] = 0.0, True
+        return rollout, target_points, diverged
 
-    def _empty(self, frames: int) -> Record:
+    def _empty(self, frames: int) -> Rollout:
         model = self.model
-        return Record(
+        return Rollout(
             qpos=np.zeros((frames, model.nq)),
             points=np.zeros((frames, len(self.points), 3)),
             peak=np.zeros((frames, model.njnt)),
@@ -215,36 +217,37 @@ class _Simulation:
             fallen=np.zeros(frames, dtype=bool),
         )
 
-    def _frame(
+    def _step_to(
         self,
-        record: Record,
+        rollout: Rollout,
         t: int,
         qpos: Float[np.ndarray, "K nq"],
         qvel: Float[np.ndarray, "K nv"],
     ) -> None:
         """The steps that lead to frame `t`."""
         model, data = self.model, self.data
-        share = 1.0 / len(qpos)
+        step_share = 1.0 / len(qpos)
         for wanted, speed in zip(qpos, qvel, strict=True):
             mujoco.mj_step1(model, data)
             mujoco.mj_differentiatePos(model, self.error, 1.0, data.qpos, wanted)
-            self._drive(speed)
+            self._set_controls(speed)
             if self.assist is not None:
-                self._help(self.assist, speed)
-                record.wrench[t] += share * self.wrench
+                self._apply_assist(self.assist, speed)
+                rollout.wrench[t] += step_share * self.wrench
                 power = self.wrench[:3] @ data.qvel[self.root_dofs][:3]
                 power += data.qfrc_applied[self.root_dofs][3:] @ data.qvel[self.root_dofs][3:]
-                record.work[t] += abs(power) * model.opt.timestep
+                rollout.work[t] += abs(power) * model.opt.timestep
             mujoco.mj_step2(model, data)
-            given = data.qfrc_actuator**2
-            torque = np.sqrt(np.add.reduceat(given, model.jnt_dofadr))
-            record.peak[t] = np.maximum(record.peak[t], torque)
-            record.square[t] += share * torque**2
-            full = torque >= _AT_LIMIT * self.joint_limit
-            full[self.on_joint[np.abs(data.actuator_force) >= _AT_LIMIT * self.force_limit]] = True
-            record.saturated[t] += share * full
+            squared = data.qfrc_actuator**2
+            torque = np.sqrt(np.add.reduceat(squared, model.jnt_dofadr))
+            rollout.peak[t] = np.maximum(rollout.peak[t], torque)
+            rollout.square[t] += step_share * torque**2
+            saturated = torque >= _SATURATED * self.joint_limit
+            at_limit = np.abs(data.actuator_force) >= _SATURATED * self.force_limit
+            saturated[self.actuator_joint[at_limit]] = True
+            rollout.saturated[t] += step_share * saturated
 
-    def _drive(self, speed: Float[np.ndarray, "nv"]) -> None:
+    def _set_controls(self, speed: Float[np.ndarray, "nv"]) -> None:
         """Controls with which every servo sees its error along the joints' own rotations, which a
         ball joint's rotation vector only is for small angles, and damps what the target's velocity
         leaves."""
@@ -259,19 +262,20 @@ class _Simulation:
         data.ctrl[:] = data.actuator_length + self.moment @ self.error
         data.ctrl += self.lag * (self.moment @ speed)
 
-    def _help(self, assist: Assist, speed: Float[np.ndarray, "nv"]) -> None:
+    def _apply_assist(self, assist: Assist, speed: Float[np.ndarray, "nv"]) -> None:
         """The assist on the free joint: a force in world axes and a torque in the root's own."""
         data, dofs = self.data, self.root_dofs
-        pull = _FREQUENCY**2 * self.error[dofs] + 2 * _FREQUENCY * (speed - data.qvel)[dofs]
-        force = _capped(self.mass * pull[:3], assist.force * self.weight)
-        inertia = self.mass * (_GYRATION * self.height) ** 2
-        torque = _capped(inertia * pull[3:], assist.torque * self.weight * self.height)
+        omega, slower = _ASSIST_FREQUENCY, speed - data.qvel
+        acceleration = omega**2 * self.error[dofs] + 2 * omega * slower[dofs]
+        force = _clip_norm(self.mass * acceleration[:3], assist.force * self.weight)
+        inertia = self.mass * (_GYRATION_RADIUS * self.height) ** 2
+        torque = _clip_norm(inertia * acceleration[3:], assist.torque * self.weight * self.height)
         data.qfrc_applied[dofs] = np.concatenate([force, torque])
         self.wrench = np.concatenate([force, data.xmat[self.root].reshape(3, 3) @ torque])
 
-    def _note(
+    def _log(
         self,
-        record: Record,
+        rollout: Rollout,
         t: int,
         target_points: Float[np.ndarray, "T B 3"],
         ups: Float[np.ndarray, "T 3"],
@@ -279,20 +283,20 @@ class _Simulation:
         """Where the body is in frame `t`, whether it has fallen, and what stands on the floor."""
         model, data = self.model, self.data
         mujoco.mj_kinematics(model, data)
-        record.qpos[t] = data.qpos
-        record.points[t] = data.xpos[self.points]
+        rollout.qpos[t] = data.qpos
+        rollout.points[t] = data.xpos[self.points]
         tilt = data.xmat[self.root].reshape(3, 3)[2] @ ups[t]
-        drop = target_points[t, 0, 2] - record.points[t, 0, 2]
-        record.fallen[t] = drop > FALL_DROP * self.height or tilt < np.cos(np.radians(FALL_TILT))
+        drop = target_points[t, 0, 2] - rollout.points[t, 0, 2]
+        rollout.fallen[t] = drop > FALL_DROP * self.height or tilt < np.cos(np.radians(FALL_TILT))
         force = np.zeros(6)
         for k in range(data.ncon):
             bodies = model.geom_bodyid[data.contact[k].geom]
             if not bodies.min():
                 mujoco.mj_contactForce(model, data, k, force)
-                record.loads[t, bodies.max()] += force[0]
+                rollout.loads[t, bodies.max()] += force[0]
 
-    def _is_bad(self) -> bool:
-        warned = any(self.data.warning[kind].number for kind in _BAD)
+    def _has_diverged(self) -> bool:
+        warned = any(self.data.warning[kind].number for kind in _DIVERGED)
         return warned or not np.isfinite(self.data.qpos).all()
 
 
@@ -303,11 +307,11 @@ def _joint_of(model: mujoco.MjModel, actuator: int) -> int:
     return int(model.actuator_trnid[actuator, 0]) if single else 0
 
 
-def _capped(vector: Float[np.ndarray, "3"], most: float) -> Float[np.ndarray, "3"]:
-    return vector * min(1.0, most / max(float(np.linalg.norm(vector)), 1e-12))
+def _clip_norm(vector: Float[np.ndarray, "3"], limit: float) -> Float[np.ndarray, "3"]:
+    return vector * min(1.0, limit / max(float(np.linalg.norm(vector)), 1e-12))
 
 
-def _laid_out(
+def _interpolated_targets(
     model: mujoco.MjModel,
     target: Float[np.ndarray, "T nq"],
     speeds: Float[np.ndarray, "T nv"],
@@ -315,22 +319,22 @@ def _laid_out(
     steps: int,
 ) -> Iterator[tuple[int, Float[np.ndarray, "K nq"], Float[np.ndarray, "K nv"]]]:
     """Each frame but the first, with its targets at the end of each step that leads to it."""
-    for start in range(0, len(target) - 1, _BLOCK):
-        frames = slice(start, start + _BLOCK + 1)
+    for start in range(0, len(target) - 1, _BLOCK_FRAMES):
+        frames = slice(start, start + _BLOCK_FRAMES + 1)
         count = len(target[frames]) - 1
         place = np.arange(1, count * steps + 1) / steps
         qpos = at_times(model, target[frames], 1.0, place)
         before = np.minimum(place.astype(int), count - 1)
-        share = (place - before)[:, None]
+        fraction = (place - before)[:, None]
         own = speeds[frames]
-        qvel = (1 - share) * own[before] + share * own[before + 1]
+        qvel = (1 - fraction) * own[before] + fraction * own[before + 1]
         for k in range(count):
             rows = slice(k * steps, (k + 1) * steps)
             yield start + k + 1, qpos[rows], qvel[rows]
 
 
 @contextmanager
-def _without_messages() -> Iterator[None]:
+def _without_warnings() -> Iterator[None]:
     """MuJoCo writes warnings to the terminal and a file; here they are results."""
     mujoco.set_mju_user_warning(lambda message: None)
     try:

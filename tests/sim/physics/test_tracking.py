@@ -10,8 +10,8 @@ import pytest
 from robots.model.mjcf import read_mjcf
 from robots.model.understand import understand_robot
 from robots.registry import find
-from sim.physics.summary import summary, text
-from sim.physics.tracking import Assist, Tracked, track
+from sim.physics.summary import render, summarize
+from sim.physics.tracking import Assist, TrackingResult, track
 from sim.trajectory import ModelTrajectory, model_trajectory
 from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import SkeletonError
@@ -52,14 +52,14 @@ def machine(actuator: str, frames: int, *, joint: str = HINGE) -> ModelTrajector
     return ModelTrajectory(spec, model, 1, np.tile(model.qpos0, (frames, 1)))
 
 
-def follow(body: ModelTrajectory, *, assist: Assist | None = None) -> Tracked:
+def follow(body: ModelTrajectory, *, assist: Assist | None = None) -> TrackingResult:
     return track(body, 1 / FPS, height=HEIGHT, assist=assist)
 
 
-def center_of_mass(tracked: Tracked) -> np.ndarray:
+def center_of_mass(tracked: TrackingResult) -> np.ndarray:
     model, root = tracked.model, tracked.target.root
-    data, out = mujoco.MjData(model), np.zeros((len(tracked.record.qpos), 3))
-    for t, qpos in enumerate(tracked.record.qpos):
+    data, out = mujoco.MjData(model), np.zeros((len(tracked.rollout.qpos), 3))
+    for t, qpos in enumerate(tracked.rollout.qpos):
         data.qpos[:] = qpos
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
@@ -69,20 +69,20 @@ def center_of_mass(tracked: Tracked) -> np.ndarray:
 
 def test_a_tpose_stands_without_help() -> None:
     tracked = follow(still(2.0))
-    found = summary(tracked)
+    found = summarize(tracked)
     assert found["fall_frame"] is None
     assert found["assist"] is None
     assert found["error"]["mpjpe_cm"] < 1.0
     assert found["error"]["joints_deg"] < 1.0
     # The floor carries the whole weight, with nothing but the feet on it.
-    assert tracked.record.loads[-30:].sum(1).mean() == pytest.approx(tracked.mass * G, rel=0.01)
+    assert tracked.rollout.loads[-30:].sum(1).mean() == pytest.approx(tracked.mass * G, rel=0.01)
     assert {each["body"].split("_")[1] for each in found["floor"]} <= {"foot", "toe"}
 
 
 def test_a_walk_is_tracked_with_help() -> None:
     rig = sample_rig("walker")
     motion = sample_motion("walk", rig, FPS)
-    found = summary(follow(model_trajectory(rig, motion), assist=Assist()))
+    found = summarize(follow(model_trajectory(rig, motion), assist=Assist()))
     assert found["fall_frame"] is None
     assert found["error"]["mpjpe_cm"] < 5.0
     assert found["error"]["joints_deg"] < 3.0
@@ -92,28 +92,28 @@ def test_a_walk_is_tracked_with_help() -> None:
 
 def test_free_fall_is_gravity_alone() -> None:
     tracked = follow(still(0.6, up=3.0))
-    t = np.arange(len(tracked.record.qpos)) / FPS
+    t = np.arange(len(tracked.rollout.qpos)) / FPS
     np.testing.assert_allclose(
         center_of_mass(tracked)[:, 2] - center_of_mass(tracked)[0, 2],
         -G * t * (t + tracked.model.opt.timestep) / 2,  # the integrator's own sum
         atol=1e-4,
     )
-    assert not tracked.record.loads.any()
-    assert np.sqrt(tracked.record.square).max() < 1.0, "nothing to hold"
+    assert not tracked.rollout.loads.any()
+    assert np.sqrt(tracked.rollout.square).max() < 1.0, "nothing to hold"
     drop = 0.2 * HEIGHT
-    assert summary(tracked)["fall_frame"] == pytest.approx(FPS * np.sqrt(2 * drop / G), abs=1)
+    assert summarize(tracked)["fall_frame"] == pytest.approx(FPS * np.sqrt(2 * drop / G), abs=1)
 
 
 def test_held_in_the_air_the_assist_is_the_whole_weight() -> None:
     tracked = follow(still(3.0, up=2.0), assist=Assist(force=2.0))
     weight = tracked.mass * G
-    force, torque = np.split(tracked.record.wrench[-60:].mean(0), 2)
+    force, torque = np.split(tracked.rollout.wrench[-60:].mean(0), 2)
     np.testing.assert_allclose(force / weight, [0, 0, 1], atol=0.005)
     # It hangs below its target where the spring of 10 rad/s carries it: g / 10².
-    sag = tracked.target.qpos[-1, 2] - tracked.record.qpos[-1, 2]
+    sag = tracked.target.qpos[-1, 2] - tracked.rollout.qpos[-1, 2]
     assert sag == pytest.approx(G / 100, rel=0.01)
     # A force at the pelvis holds a body whose centre of mass is elsewhere only with a torque.
-    arm = center_of_mass(tracked)[-60:].mean(0) - tracked.record.points[-60:, 0].mean(0)
+    arm = center_of_mass(tracked)[-60:].mean(0) - tracked.rollout.points[-60:, 0].mean(0)
     np.testing.assert_allclose(torque, np.cross(arm, [0, 0, weight]), atol=0.01 * weight)
 
 
@@ -125,7 +125,7 @@ def test_the_assist_reported_is_what_moves_the_body() -> None:
     tracked = follow(body, assist=Assist(force=3.0))
     com = center_of_mass(tracked)
     momentum = tracked.mass * (np.diff(com[-2:], axis=0) - np.diff(com[5:7], axis=0))[0] * FPS
-    force = tracked.record.wrench[6:, :3] - [0, 0, tracked.mass * G]
+    force = tracked.rollout.wrench[6:, :3] - [0, 0, tracked.mass * G]
     impulse = ((force[1:] + force[:-1]) / 2).sum(0) / FPS
     np.testing.assert_allclose(momentum, impulse, atol=0.02 * tracked.mass)
     assert momentum[0] > 0.5 * tracked.mass
@@ -133,7 +133,7 @@ def test_the_assist_reported_is_what_moves_the_body() -> None:
 
 def test_the_assist_is_cut_off() -> None:
     tracked = follow(still(0.5, up=2.0), assist=Assist(force=0.3, torque=0.02))
-    force = np.linalg.norm(tracked.record.wrench[:, :3], axis=1)
+    force = np.linalg.norm(tracked.rollout.wrench[:, :3], axis=1)
     assert force.max() == pytest.approx(0.3 * tracked.mass * G)
     com = center_of_mass(tracked)[:, 2]
     fallen = com[0] - com[-1]
@@ -142,12 +142,12 @@ def test_the_assist_is_cut_off() -> None:
 
 def test_torque_is_what_the_arm_weighs() -> None:
     strong = follow(machine('<motor joint="elbow" gear="20" ctrlrange="-2 2"/>', 121))
-    found = {row["name"]: row for row in summary(strong)["joints"]}["elbow"]
-    assert np.sqrt(strong.record.square[-30:, 1].mean()) == pytest.approx(2 * G * 0.5, rel=0.02)
+    found = {row["name"]: row for row in summarize(strong)["joints"]}["elbow"]
+    assert np.sqrt(strong.rollout.square[-30:, 1].mean()) == pytest.approx(2 * G * 0.5, rel=0.02)
     assert found["peak_nm"] < 40
     assert found["saturated"] < 0.05
     weak = follow(machine('<motor joint="elbow" gear="2" ctrlrange="-2 2"/>', 61))
-    found = {row["name"]: row for row in summary(weak)["joints"]}["elbow"]
+    found = {row["name"]: row for row in summarize(weak)["joints"]}["elbow"]
     assert found["peak_nm"] == pytest.approx(4.0)
     assert found["saturated"] > 0.9
     assert "servos of ours" in weak.notes[0]
@@ -156,7 +156,7 @@ def test_torque_is_what_the_arm_weighs() -> None:
 def test_own_servos_stay_as_they_are() -> None:
     tracked = follow(machine('<position joint="elbow" kp="200" kv="20"/>', 121))
     assert tracked.notes == ()
-    sag = abs(float(tracked.record.qpos[-1, 7]))
+    sag = abs(float(tracked.rollout.qpos[-1, 7]))
     assert 200 * sag == pytest.approx(2 * G * 0.5 * np.cos(sag), rel=0.01)
 
 
@@ -169,14 +169,14 @@ def test_a_ball_is_followed_round_and_round() -> None:
     body = machine(axes, 121, joint='type="ball"')
     turn = np.linspace(0, 4 * np.pi, 121)
     body.qpos[:, 7], body.qpos[:, 10] = np.cos(turn / 2), np.sin(turn / 2)
-    found = summary(follow(body))
+    found = summarize(follow(body))
     assert found["error"]["joints_deg"] < 5.0
 
 
 def test_the_same_input_gives_the_same_output() -> None:
     first, second = (follow(still(0.5), assist=Assist()) for _ in range(2))
-    assert first.record.qpos.tobytes() == second.record.qpos.tobytes()
-    assert json.dumps(summary(first)) == json.dumps(summary(second))
+    assert first.rollout.qpos.tobytes() == second.rollout.qpos.tobytes()
+    assert json.dumps(summarize(first)) == json.dumps(summarize(second))
 
 
 def test_divergence_is_said_and_nothing_is_nan(
@@ -187,11 +187,11 @@ def test_divergence_is_said_and_nothing_is_nan(
     body.qpos[1:, 7] = 1.0
     tracked = follow(body)
     assert tracked.diverged is not None
-    for values in vars(tracked.record).values():
+    for values in vars(tracked.rollout).values():
         assert np.isfinite(values).all()
-    found = summary(tracked)
+    found = summarize(tracked)
     json.dumps(found, allow_nan=False)
-    assert f"diverged at frame {tracked.diverged}" in text(found, "arm")
+    assert f"diverged at frame {tracked.diverged}" in render(found, "arm")
     assert capfd.readouterr() == ("", "")
     assert not list(tmp_path.iterdir()), "MuJoCo keeps its warnings to itself"
 
@@ -201,7 +201,7 @@ def test_a_robot_stands_on_its_own_servos() -> None:
     model = read_mjcf(find("robot"))
     qpos = np.tile(robot.to_qpos(robot.tpose), (91, 1))
     body = ModelTrajectory(model.spec, model.model, model.root, qpos)
-    found = summary(track(body, 1 / FPS, height=1.32, assist=Assist()))
+    found = summarize(track(body, 1 / FPS, height=1.32, assist=Assist()))
     assert found["fall_frame"] is None
     assert found["notes"] == []
     assert len(found["joints"]) == 29
@@ -215,11 +215,11 @@ def test_a_first_frame_of_another_pose_is_no_velocity() -> None:
     tracked = follow(body, assist=Assist())
     assert "begins at rest" in tracked.notes[0]
     assert tracked.diverged is None
-    assert not tracked.record.fallen.any()
+    assert not tracked.rollout.fallen.any()
 
 
 def test_one_frame_and_bad_input() -> None:
-    found = summary(follow(still(0.0), assist=Assist()))
+    found = summarize(follow(still(0.0), assist=Assist()))
     assert (found["frames"], found["fall_frame"], found["stays_up_s"]) == (1, None, 0.0)
     assert found["assist"]["work_j"] == 0
     json.dumps(found, allow_nan=False)
@@ -239,5 +239,5 @@ def test_a_model_that_leaves_contacts_to_its_scene_stands() -> None:
     spec = mujoco.MjSpec.from_string(ghost.format(actuator="", joint=HINGE))
     model = spec.compile()
     tracked = follow(ModelTrajectory(spec, model, 1, np.tile(model.qpos0, (61, 1))))
-    assert tracked.record.loads[-1].sum() == pytest.approx(tracked.mass * G, rel=0.02)
+    assert tracked.rollout.loads[-1].sum() == pytest.approx(tracked.mass * G, rel=0.02)
     assert any("set to collide" in note for note in tracked.notes)
