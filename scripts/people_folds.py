@@ -15,7 +15,7 @@ from functools import cache, partial
 from pathlib import Path
 
 from spark.evaluation.cases import Case, made_cases
-from spark.evaluation.evaluate import Method, Positions, by, evaluate
+from spark.evaluation.evaluate import Method, Positions, as_method, evaluate
 from spark.evaluation.tables import markdown
 from spark.network.retarget import NetworkRetargeter
 from spark.network.weights import read_weights
@@ -55,11 +55,11 @@ def main(dataset: str, runs: str, names: str) -> None:
     cases = [c for c in made_cases(unseen) if c.structure == "missing"]
 
     def learned(case: Case, **as_retarget: bool) -> Positions:
-        return by(networks[left_out[case.performer]], **as_retarget)(case)
+        return as_method(networks[left_out[case.performer]], **as_retarget)(case)
 
     # The rows of each body take up what those of all have made; the last does as `retarget` does.
     methods: dict[str, Method] = {
-        "copy": cache(by(transfer)),
+        "copy": cache(as_method(transfer)),
         "spark": cache(learned),
         "spark, target prior, feet held": cache(
             partial(learned, target_prior=True, feet_held=True)

@@ -1,9 +1,9 @@
-"""What a method is asked for and what the answer is: pairs of one motion on two bodies.
+"""Test cases: pairs of one motion on two bodies.
 
 Everything is as the network sees bodies (`spark.network.features`), in hip heights of the body in
 question. A case is *intra-structural* where both bodies have the same roles, each in as many
 joints, and *cross-structural* else. *Missing* are made cases whose source lacks joints of the
-target's spine, neck or shoulders, which any method has to guess.
+target's spine, neck or shoulders, so that these are unmatched.
 """
 
 import zlib
@@ -26,7 +26,7 @@ from spark.training.staging import StagedBody
 from spark.training.variants import Variant, random_variant, same_body, scaled_body, split_body
 from spark.transfer.analytic import correspond
 from spark.transfer.canonical import CanonicalMotion
-from spark.transfer.target_prior import SHORTEST
+from spark.transfer.target_prior import MIN_DURATION
 
 Structure = Literal["intra", "cross", "missing"]
 STRUCTURES: tuple[Structure, ...] = ("intra", "cross", "missing")
@@ -34,8 +34,8 @@ STRUCTURES: tuple[Structure, ...] = ("intra", "cross", "missing")
 # Of one motion on two characters a frame or two may be lost in resampling; more is another motion.
 SPARE_FRAMES = 3
 # Made targets of each body and structure: its clips share them, so that results can be compared.
-_TARGETS = 3
-_TRIES = 50
+_TARGETS_PER_BODY = 3
+_MAX_TRIES = 50  # random variants of a body
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +43,8 @@ class Case:
     """`source` is to be put on `truth.rig`; `truth` is the answer.
 
     `height` is the target's in SAN's metric [hip heights], `answer` the clip that the truth is
-    where it was recorded and not made, `performer` the source's character, `own` another recording
-    of the target, if there is one.
+    where it was recorded and not made, `performer` the source's character, `target_recording`
+    another recording of the target, if there is one.
     """
 
     motion: str
@@ -56,7 +56,7 @@ class Case:
     truth: CanonicalMotion
     height: float
     answer: Performance | None = None
-    own: CanonicalMotion | None = None
+    target_recording: CanonicalMotion | None = None
 
 
 def performances(path: Path, workers: int = 1) -> list[Performance]:
@@ -115,49 +115,49 @@ def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = 
     answers the feet are planted while the recording's stand, and as high.
 
     The target's own recording is the longest other clip of the body; of a body with one clip, its
-    first half, and the second is asked for, if that much is left.
+    first half, and the second is the case, if that much is left.
 
     Of each cell at most `limit` clips, drawn by `seed`. Training does not meet these targets,
     whatever its seed: it draws other ones.
     """
-    stages: dict[tuple[int, Structure, int], StagedBody] = {}
+    staged: dict[tuple[int, Structure, int], StagedBody] = {}
     cases = []
-    for i, one in _drawn(found, seed, limit):
-        body, (clip, other) = one.clip.body, _asked_and_own(one.clip, found)
+    for i, one in _limited(found, seed, limit):
+        body, (clip, other) = one.clip.body, _case_and_recording(one.clip, found)
         unchanged = StagedBody(same_body(body))
         recorded = _canonical(clip, unchanged.variant, len(clip.hips))
         for structure in STRUCTURES:
-            number = i % _TARGETS
+            number = i % _TARGETS_PER_BODY
             key = (id(body), structure, number)
-            if key not in stages:
+            if key not in staged:
                 name = zlib.crc32(one.character.encode())
                 rng = np.random.default_rng((seed, name, number, STRUCTURES.index(structure)))
                 make = {"intra": scaled_body, "cross": random_variant, "missing": lacking_body}
-                stages[key] = StagedBody(make[structure](body, rng))
-            ends = unchanged, stages[key]
+                staged[key] = StagedBody(make[structure](body, rng))
+            ends = unchanged, staged[key]
             source, target = ends[::-1] if structure == "missing" else ends
             cases.append(
                 Case(
                     *(one.clip.name, one.character, f"{one.character} {structure} {number}"),
                     *(one.cell, structure),
-                    recorded if source is unchanged else _placed(clip, source),
-                    truth := _placed(clip, target),
+                    recorded if source is unchanged else _made_motion(clip, source),
+                    truth := _made_motion(clip, target),
                     san_height(truth.rig),
-                    own=None if other is None else _placed(other, target),
+                    target_recording=None if other is None else _made_motion(other, target),
                 )
             )
     return cases
 
 
-def _asked_and_own(
+def _case_and_recording(
     clip: TrainingClip, found: Sequence[Performance]
 ) -> tuple[TrainingClip, TrainingClip | None]:
-    """What of a clip is asked for, and another recording of its body."""
+    """The part of a clip that is the case, and another recording of its body."""
     others = [p.clip for p in found if p.clip.body is clip.body and p.clip is not clip]
     if others:
         return clip, _longest(others)
     half = len(clip.hips) // 2
-    if half * clip.frame_time < SHORTEST:
+    if half * clip.frame_time < MIN_DURATION:
         return clip, None
     return _part(clip, slice(half, None)), _part(clip, slice(half))
 
@@ -171,18 +171,18 @@ def _part(clip: TrainingClip, frames: slice) -> TrainingClip:
     return replace(clip, rotations=rotations, hips=hips, planted=planted)
 
 
-def _placed(clip: TrainingClip, stage: StagedBody) -> CanonicalMotion:
+def _made_motion(clip: TrainingClip, body: StagedBody) -> CanonicalMotion:
     """A recording on a changed copy of its body, the feet planted where they stand."""
     rotations, hips = (np.asarray(x, np.float64)[None] for x in (clip.rotations, clip.hips))
     planted = np.asarray(clip.planted)[None]
-    placed = stage.place(rotations, hips, planted, clip.lift[None])[0]
-    return CanonicalMotion(stage.variant.body.rig, clip.frame_time, placed, hips[0])
+    placed = body.pose(rotations, hips, planted, clip.lift[None])[0]
+    return CanonicalMotion(body.variant.body.rig, clip.frame_time, placed, hips[0])
 
 
 def lacking_body(body: BodyFeatures, rng: np.random.Generator) -> Variant:
-    """A random variant that lacks joints of `body` which any method has to guess, if it can."""
+    """A random variant from which some joint of `body` is unmatched, if one is found."""
     own = same_body(body).body.rig
-    for _ in range(_TRIES):
+    for _ in range(_MAX_TRIES):
         variant = random_variant(body, rng)
         if (correspond(variant.body.rig, own).unmatched >= 0).any():
             break
@@ -192,18 +192,18 @@ def lacking_body(body: BodyFeatures, rng: np.random.Generator) -> Variant:
 def _recorded(
     motion: str, source: Performance, target: Performance, frames: int, own: TrainingClip | None
 ) -> list[Case]:
-    given_body, theirs = source.clip.body, target.clip.body
-    height = san_height(theirs.rig) / theirs.rig.hip_height
-    given = _canonical(source.clip, same_body(given_body), frames)
-    targets: dict[Structure, Variant] = {"cross": same_body(theirs)}
-    if _structure(given_body) == _structure(theirs):
-        targets = {"intra": same_body(theirs), "cross": split_body(theirs)}
+    source_body, target_body = source.clip.body, target.clip.body
+    height = san_height(target_body.rig) / target_body.rig.hip_height
+    source_motion = _canonical(source.clip, same_body(source_body), frames)
+    targets: dict[Structure, Variant] = {"cross": same_body(target_body)}
+    if _structure(source_body) == _structure(target_body):
+        targets = {"intra": same_body(target_body), "cross": split_body(target_body)}
     return [
         Case(
-            *(motion, source.character, target.character, target.cell, structure, given),
+            *(motion, source.character, target.character, target.cell, structure, source_motion),
             _canonical(target.clip, variant, frames),
             height,
-            target if variant.body.skeleton.names == theirs.skeleton.names else None,
+            target if variant.body.skeleton.names == target_body.skeleton.names else None,
             None if own is None else _canonical(own, variant, len(own.hips)),
         )
         for structure, variant in targets.items()
@@ -228,7 +228,7 @@ def _canonical(clip: TrainingClip, variant: Variant, frames: int) -> CanonicalMo
     return CanonicalMotion(variant.body.rig, clip.frame_time, rotations, hips)
 
 
-def _drawn(
+def _limited(
     found: Sequence[Performance], seed: int, limit: int | None
 ) -> list[tuple[int, Performance]]:
     by_cell: dict[str, list[tuple[int, Performance]]] = defaultdict(list)

@@ -30,7 +30,7 @@ CELLS = ("sc+sm", "sc+um", "uc+sm", "uc+um")
 
 
 @dataclass(frozen=True)
-class Cell:
+class CellScore:
     """The mean score of one method over a structure's cases of one cell."""
 
     score: Score
@@ -38,7 +38,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Row:
+class MethodScores:
     """One method: its scores by structure and cell, and over all cases of a structure together.
 
     `settings` are those of the training of a checkpoint. `sensitivity`: `source_sensitivity`, the
@@ -46,7 +46,7 @@ class Row:
     """
 
     name: str
-    cells: Mapping[tuple[Structure, str], Cell]
+    cells: Mapping[tuple[Structure, str], CellScore]
     sensitivity: Mapping[Structure, float]
     settings: Mapping[str, object] = field(default_factory=dict)
 
@@ -63,13 +63,13 @@ def evaluate(
     *,
     settings: Mapping[str, object] | None = None,
     progress: Callable[[Iterable[Case]], Iterable[Case]] = iter,
-) -> Row:
+) -> MethodScores:
     """The row of one method. Means go over a character's clips first, then over characters."""
     scores: dict[tuple[Structure, str], dict[str, list[Score]]] = defaultdict(
         lambda: defaultdict(list)
     )
-    received: dict[tuple[Structure, str, str], list[tuple[Positions, Positions]]] = defaultdict(
-        list
+    positions_by_pair: dict[tuple[Structure, str, str], list[tuple[Positions, Positions]]] = (
+        defaultdict(list)
     )
     for case in progress(cases):
         truth = canonical_positions(case.truth)
@@ -77,28 +77,32 @@ def evaluate(
         rig = case.truth.rig
         scored = score_positions(own, truth, rig, case.truth.frame_time, case.height)
         scores[case.structure, case.cell][case.target].append(scored)
-        received[case.structure, case.target, case.performer].append(
+        positions_by_pair[case.structure, case.target, case.performer].append(
             (_relative(own), _relative(truth))
         )
-    return Row(
+    return MethodScores(
         name,
         {
-            key: Cell(mean_score(of_one), sum(map(len, of_one.values())))
-            for key, of_one in sorted(scores.items(), key=lambda item: _place(*item[0]))
+            key: CellScore(mean_score(of_one), sum(map(len, of_one.values())))
+            for key, of_one in sorted(scores.items(), key=lambda item: _table_order(*item[0]))
         },
-        {structure: _sensitivity(structure, received) for structure in STRUCTURES},
+        {structure: _sensitivity(structure, positions_by_pair) for structure in STRUCTURES},
         settings or {},
     )
 
 
-def by(method: RetargetMethod, *, target_prior: bool = False, feet_held: bool = False) -> Method:
-    """The analytic transfer, or a trained network; with `target_prior`, corrected by a recording of
-    the target's own (`spark.transfer.target_prior`), with `feet_held`, then its feet held where the
-    source's stand: all of it is what `retarget` does."""
+def as_method(
+    method: RetargetMethod, *, target_prior: bool = False, feet_held: bool = False
+) -> Method:
+    """A retarget method as `evaluate` takes one.
+
+    With `target_prior` it is corrected by another recording of the target
+    (`spark.transfer.target_prior`), with `feet_held` its feet are then locked where the source's
+    stand (`spark.transfer.foot_lock`). Both together are what `retarget` does."""
 
     def run(case: Case) -> Positions:
-        if target_prior and case.own is not None:
-            moved = with_target_prior(method, case.source, case.own)
+        if target_prior and case.target_recording is not None:
+            moved = with_target_prior(method, case.source, case.target_recording)
         else:
             moved = method(case.source, case.truth.rig)
         return canonical_positions(lock_feet(case.source, moved) if feet_held else moved)
@@ -178,15 +182,15 @@ def _relative(positions: Positions) -> Positions:
 
 def _sensitivity(
     structure: Structure,
-    received: Mapping[tuple[Structure, str, str], Sequence[tuple[Positions, Positions]]],
+    positions_by_pair: Mapping[tuple[Structure, str, str], Sequence[tuple[Positions, Positions]]],
 ) -> float:
     found = [
         source_sensitivity(*zip(*pairs, strict=True))
-        for (kind, _, _), pairs in received.items()
+        for (kind, _, _), pairs in positions_by_pair.items()
         if kind == structure and len(pairs) > 1
     ]
     return sum(found) / len(found) if found else float("nan")
 
 
-def _place(structure: Structure, cell: str) -> tuple[int, int]:
+def _table_order(structure: Structure, cell: str) -> tuple[int, int]:
     return STRUCTURES.index(structure), CELLS.index(cell) if cell in CELLS else 0

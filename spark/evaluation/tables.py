@@ -9,7 +9,7 @@ from dataclasses import asdict, fields
 from typing import Any
 
 from spark.evaluation.cases import STRUCTURES, Structure
-from spark.evaluation.evaluate import Row
+from spark.evaluation.evaluate import MethodScores
 from spark.evaluation.metrics import Score
 
 FORMAT, VERSION = "spark-sim evaluation", 1
@@ -23,15 +23,15 @@ _TITLES = {
 _ABLATIONS = {"share": "w/o share", "mask": "w/o mask", "pos": "w/ pos", "fk": "w/o FK", "": "full"}
 
 
-def markdown(rows: Sequence[Row]) -> str:
+def markdown(rows: Sequence[MethodScores]) -> str:
     """Table 1 (MSE by cells), table 2 (ablations, where there are any), and all metrics."""
     parts = [_cells_table(rows), _ablations_table(rows), _metrics_table(rows)]
     return "\n".join(part for part in parts if part)
 
 
-def as_json(rows: Sequence[Row], about: dict[str, Any]) -> str:
+def as_json(rows: Sequence[MethodScores], about: dict[str, Any]) -> str:
     """Everything there is, NaN as null; `about` says what was evaluated."""
-    told = [
+    records = [
         {
             "name": row.name,
             "training": dict(row.settings) or None,
@@ -44,11 +44,12 @@ def as_json(rows: Sequence[Row], about: dict[str, Any]) -> str:
         for row in rows
     ]
     return (
-        json.dumps({"format": FORMAT, "version": VERSION, **about, "rows": told}, indent=1) + "\n"
+        json.dumps({"format": FORMAT, "version": VERSION, **about, "rows": records}, indent=1)
+        + "\n"
     )
 
 
-def as_csv(rows: Sequence[Row]) -> str:
+def as_csv(rows: Sequence[MethodScores]) -> str:
     """One line for each method, structure and cell."""
     out = io.StringIO()
     names = [f.name for f in fields(Score)]
@@ -60,7 +61,7 @@ def as_csv(rows: Sequence[Row]) -> str:
     return out.getvalue()
 
 
-def _cells_table(rows: Sequence[Row]) -> str:
+def _cells_table(rows: Sequence[MethodScores]) -> str:
     titles: list[str] = []
     lines = [[row.name] for row in rows]
     for kind in _kinds(rows):
@@ -78,9 +79,9 @@ def _cells_table(rows: Sequence[Row]) -> str:
     return _table(["MSE", *titles], lines) + f"\nCases: {', '.join(counts)}.\n"
 
 
-def _ablations_table(rows: Sequence[Row]) -> str:
+def _ablations_table(rows: Sequence[MethodScores]) -> str:
     """The paper's table 2: (a) all characters have motions of their own, (b) they share them."""
-    found: dict[tuple[str, bool], Row] = {}
+    found: dict[tuple[str, bool], MethodScores] = {}
     for row in rows:
         thrown = [str(switch) for switch in _listed(row.settings.get("ablate"))]
         others = [switch for switch in thrown if switch != "mix"]
@@ -103,7 +104,7 @@ def _ablations_table(rows: Sequence[Row]) -> str:
     return _table(["MSE of the paper's preset", *titles], lines) if len(found) > 1 else ""
 
 
-def _metrics_table(rows: Sequence[Row]) -> str:
+def _metrics_table(rows: Sequence[MethodScores]) -> str:
     titles = (
         "root-relative MSE",
         "MPJPE, % of height",
@@ -130,7 +131,7 @@ def _metrics_table(rows: Sequence[Row]) -> str:
     return "\n".join(parts) + "\nIn brackets what the ground truth itself does.\n"
 
 
-def _kinds(rows: Sequence[Row]) -> list[Structure]:
+def _kinds(rows: Sequence[MethodScores]) -> list[Structure]:
     return [kind for kind in STRUCTURES if any(kind == own for own, _ in rows[0].cells)]
 
 

@@ -1,6 +1,7 @@
 """What makes one SPARK network differ from another. No torch here: inference needs none."""
 
 from dataclasses import dataclass
+from math import log
 
 N_GROUPS = 6
 QUERIES_PER_GROUP = 4
@@ -12,9 +13,12 @@ SHAPE_FEATURES = 6  # bone offset, depth, leaf flag, degrees of freedom
 RESIDUAL_SCALE = 0.1
 
 NO_ROTATION = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)  # in 6D
-ROTATION_GAIN = (
-    4.0  # brings the deviations from it, mostly small, to the size of the other features
-)
+# Deviations from no rotation are small: multiplied by this they are of the other features' size.
+ROTATION_GAIN = 4.0
+
+# Positions in time turn pairs of features at rates from 1 to 1/base radians a frame.
+LN_SINUSOID_BASE = log(1e4)  # of absolute positions, as Vaswani et al. (2017) have it
+LN_ROTARY_BASE = 6.9078  # of rotary ones: ln 1000, to the digits that networks were trained with
 
 
 @dataclass(frozen=True)
@@ -32,7 +36,7 @@ class Config:
     blur_bodies: float = 0.0  # noise on joints' positions in the T-pose, in training [hip heights]
     share_joints: bool = True  # False: the ablation "w/o share"
     positions_in: bool = False  # True: the ablation "w/ pos"
-    residual: bool = False  # correct the analytic transfer's guesses
+    residual: bool = False  # correct the analytic transfer's unmatched joints
     shrink: float = 1.0  # share of a correction that is made: others are not quite like those seen
     noise: bool = True  # decoder starts from noise, as in the paper, or from a learned query
     shape_features: bool = False
@@ -47,7 +51,7 @@ class Config:
 
     @classmethod
     def default(cls) -> "Config":
-        """Corrects the analytic transfer's guesses: starts equal to it."""
+        """Corrects the unmatched joints of the analytic transfer: starts equal to it."""
         return cls(
             mask_joints=0.3,
             drop_names=0.1,

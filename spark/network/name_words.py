@@ -15,9 +15,9 @@ from jaxtyping import Int
 
 _PIECES = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+|[^\W\d_A-Za-z]+")
 PAD, END, BYTE_OFFSET = 0, 1, 3
-_MAX_BYTES = 48
-_FEW = 6
-_SHARED = 0.7
+_MAX_BYTES = 48  # of a name: tokens beyond them cost time and tell no more
+_MIN_NAMES = 6  # of a rig, for what most of them share to be a prefix and no word for a joint
+_SHARED_FRACTION = 0.7  # of the names that begin or end with a word that is then taken away
 
 
 def rig_words(names: Sequence[str]) -> list[str]:
@@ -28,7 +28,7 @@ def rig_words(names: Sequence[str]) -> list[str]:
     """
     cut = [_PIECES.findall(_local(name)) or [name] for name in names]
     cut = [[piece.lower() for piece in pieces] for pieces in cut]
-    if len(names) >= _FEW:
+    if len(names) >= _MIN_NAMES:
         for end in (0, -1):
             while shared := _shared(cut, end):
                 for pieces in cut:
@@ -64,4 +64,4 @@ def _shared(cut: Sequence[list[str]], end: int) -> str | None:
     """The word at one end of most names."""
     counts = Counter(pieces[end] for pieces in cut if len(pieces) > 1)
     word, count = counts.most_common(1)[0] if counts else ("", 0)
-    return word if count >= _SHARED * len(cut) else None
+    return word if count >= _SHARED_FRACTION * len(cut) else None

@@ -1,9 +1,10 @@
 """Retargeting with a trained network: motions of any length, by windows that overlap and blend.
 
-The network reads 30 frames a second and its own window's length. A window says how the motion
-differs from the analytic transfer; where two overlap their answers are blended, the weights rising
-and falling linearly. The windows lie on a fixed grid, so how many are worked on at a time changes
-nothing. What was found at 30 fps is carried to the motion's own frame rate.
+The network reads windows of the length that it was trained on, at 30 frames a second. Its output
+for a window is a correction of the analytic transfer; where windows overlap their outputs are
+blended, with weights that rise and fall linearly. The windows lie on a fixed grid, so that the
+result does not depend on how many are run at once. The correction is then resampled to the motion's
+frame rate.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,7 +22,7 @@ from spark.network.features import (
     pose_features,
 )
 from spark.network.forward import Network
-from spark.network.known_bodies import nearness
+from spark.network.known_bodies import similarity
 from spark.network.names import NameNetwork
 from spark.network.weights import Weights
 from spark.network.windows import Windows
@@ -31,16 +32,16 @@ from spark.rotation import quat_conj, quat_mul, quat_normalize
 from spark.transfer.analytic import correspond, transfer
 from spark.transfer.canonical import FRAME_TIME, CanonicalMotion, at_frame_time
 
-_AT_A_TIME = 32
+_WINDOWS_AT_ONCE = 32  # bounds memory
 
 
 class NetworkRetargeter:
-    """The network of a checkpoint, ready to run. Raises `FileFormatError` where it is damaged."""
+    """Retargets by a trained network. Raises `FileFormatError` where its checkpoint is damaged."""
 
     def __init__(self, weights: Weights) -> None:
         try:
             self.network = Network(weights)
-            self._encode = _names_of(weights)
+            self._encode = _name_encoder(weights)
             self.window = int(weights.settings.get("window", 64))
             self.bodies = weights.bodies
         except (KeyError, TypeError, ValueError) as error:
@@ -51,14 +52,15 @@ class NetworkRetargeter:
     ) -> CanonicalMotion:
         """`source`'s motion on `target`; any length, 1 frame too.
 
-        `window` [frames at 30 fps] is the training's where it is not given. Where the transfer has
-        nothing to guess, or the network has met no body like the target, what corrects guesses
-        leaves them as they are; less is corrected the less they are alike.
+        `window` [frames at 30 fps] is the training's by default. A residual network corrects the
+        joints that the analytic transfer leaves unmatched, the less the less the target resembles
+        the bodies that it was trained on (`similarity`); a body unlike all of them is left as it
+        is.
         """
         start = transfer(source, target)
         bodies = body_features(source.rig), body_features(target)
         unmatched = unmatched_joints(source.rig, bodies[1])
-        share = 1.0
+        strength = 1.0
         if self.network.config.residual:
             if not (unmatched >= 0).any():
                 return start
@@ -66,78 +68,82 @@ class NetworkRetargeter:
                 target.skeleton.names[bodies[1].joints[j]]
                 for j in np.unique(unmatched[unmatched >= 0])
             ]
-            share = nearness(bodies[1], self.bodies)
-            who = "the network fills them in" if share else "interpolated, or following"
+            strength = similarity(bodies[1], self.bodies)
+            who = "the network fills them in" if strength else "interpolated, or following"
             note = f"no counterpart in the source: {name_list(names)}; {who}"
             start = replace(start, notes=(*start.notes, note))
-            if not share:
+            if not strength:
                 return start
-        slow_source, slow_start = (at_frame_time(c, FRAME_TIME) for c in (source, start))
-        slow = self._blended(
-            slow_source, slow_start, bodies, unmatched, share, window or self.window
+        source_30fps, start_30fps = (at_frame_time(c, FRAME_TIME) for c in (source, start))
+        blended = self._blend_windows(
+            source_30fps, start_30fps, bodies, unmatched, strength, window or self.window
         )
-        if slow_start is start:
-            return slow
-        turned = quat_mul(slow.rotations, quat_conj(slow_start.rotations))
+        if start_30fps is start:
+            return blended
+        correction = quat_mul(blended.rotations, quat_conj(start_30fps.rotations))
         at = np.arange(len(start)) * start.frame_time / FRAME_TIME
         return replace(
             start,
-            rotations=quat_mul(rotations_at(turned, at), start.rotations),
-            hips=start.hips + values_at(slow.hips - slow_start.hips, at),
+            rotations=quat_mul(rotations_at(correction, at), start.rotations),
+            hips=start.hips + values_at(blended.hips - start_30fps.hips, at),
         )
 
-    def _blended(
+    def _blend_windows(
         self,
         source: CanonicalMotion,
         start: CanonicalMotion,
         bodies: tuple[BodyFeatures, BodyFeatures],
         unmatched: Int[np.ndarray, "J"],
-        share: float,
+        strength: float,
         window: int,
     ) -> CanonicalMotion:
-        """The windows' answers laid over one another; quaternions are averaged as vectors."""
+        """The windows' outputs, blended; quaternions are averaged as vectors."""
         count, size = len(start), min(window, len(start))
         hop = max(3 * size // 4, 1)
-        firsts = sorted({*range(0, count - size + 1, hop), count - size})
-        rise = np.minimum(np.arange(size) + 1, np.arange(size)[::-1] + 1).astype(np.float64)
+        starts = sorted({*range(0, count - size + 1, hop), count - size})
+        weight = np.minimum(np.arange(size) + 1, np.arange(size)[::-1] + 1).astype(np.float64)
         rotations, hips = np.zeros_like(start.rotations), np.zeros_like(start.hips)
         total = np.zeros(count)
-        for k in range(0, len(firsts), _AT_A_TIME):
-            spans = [slice(at, at + size) for at in firsts[k : k + _AT_A_TIME]]
-            given = [source.frames(span.start, span.stop) for span in spans]
-            copied = [start.frames(span.start, span.stop) for span in spans]
-            answers = self._answers(given, copied, bodies, unmatched, share)
-            for span, answer in zip(spans, answers, strict=True):
-                same = np.sign((answer.rotations * start.rotations[span]).sum(-1, keepdims=True))
+        for k in range(0, len(starts), _WINDOWS_AT_ONCE):
+            spans = [slice(at, at + size) for at in starts[k : k + _WINDOWS_AT_ONCE]]
+            sources = [source.frames(span.start, span.stop) for span in spans]
+            copies = [start.frames(span.start, span.stop) for span in spans]
+            outputs = self._run(sources, copies, bodies, unmatched, strength)
+            for span, output in zip(spans, outputs, strict=True):
+                same = np.sign((output.rotations * start.rotations[span]).sum(-1, keepdims=True))
                 rotations[span] += (
-                    rise[:, None, None] * np.where(same < 0, -1, 1) * answer.rotations
+                    weight[:, None, None] * np.where(same < 0, -1, 1) * output.rotations
                 )
-                hips[span] += rise[:, None] * answer.hips
-                total[span] += rise
+                hips[span] += weight[:, None] * output.hips
+                total[span] += weight
         return replace(start, rotations=quat_normalize(rotations), hips=hips / total[:, None])
 
-    def _answers(
+    def _run(
         self,
         sources: list[CanonicalMotion],
         starts: list[CanonicalMotion],
         bodies: tuple[BodyFeatures, BodyFeatures],
         unmatched: Int[np.ndarray, "J"],
-        share: float,
+        strength: float,
     ) -> list[CanonicalMotion]:
-        """What the network makes of windows of one length."""
-        given, asked = bodies
-        read = [pose_features(window, given) for window in sources]
-        copied = [pose_features(window, asked) for window in starts]
-        known, wanted = (
+        """The network's output for windows of one length."""
+        source_body, target_body = bodies
+        source_features = [pose_features(window, source_body) for window in sources]
+        start_features = [pose_features(window, target_body) for window in starts]
+        source_names, target_names = (
             np.concatenate([self._encode(body.skeleton.names), body.sides], -1) for body in bodies
         )
-        latent = self.network.encode(_windows(given, read), known)
+        latent = self.network.encode(_windows(source_body, source_features), source_names)
         if self.network.config.residual:
-            out = self.network.correct(latent, wanted, _windows(asked, copied), unmatched, share)
+            out = self.network.correct(
+                latent, target_names, _windows(target_body, start_features), unmatched, strength
+            )
         else:
-            out = self.network.decode(latent, wanted, asked)
+            out = self.network.decode(latent, target_names, target_body)
         return [
-            canonical_from_features(out.rotations[w], out.root[w], copied[w][2], asked, starts[w])
+            canonical_from_features(
+                out.rotations[w], out.root[w], start_features[w][2], target_body, starts[w]
+            )
             for w in range(len(starts))
         ]
 
@@ -149,8 +155,8 @@ def unmatched_joints(source: Rig, target: BodyFeatures) -> Int[np.ndarray, "J"]:
     return np.array([place.get(int(j), -1) for j in found])
 
 
-def _names_of(weights: Weights) -> Callable[[Sequence[str]], Float[np.ndarray, "_ E"]]:
-    """What turns a rig's names into vectors, each rig's once."""
+def _name_encoder(weights: Weights) -> Callable[[Sequence[str]], Float[np.ndarray, "_ E"]]:
+    """A function from a rig's names to vectors, which remembers rigs."""
     encode: Callable[[tuple[str, ...]], Float[np.ndarray, "_ E"]]
     if "t5" in weights.names:
         try:
@@ -166,5 +172,7 @@ def _names_of(weights: Weights) -> Callable[[Sequence[str]], Float[np.ndarray, "
     return lambda names: encode(tuple(names))
 
 
-def _windows(body: BodyFeatures, read: Sequence[tuple[np.ndarray, np.ndarray, object]]) -> Windows:
-    return Windows(body, np.stack([r[0] for r in read]), np.stack([r[1] for r in read]))
+def _windows(
+    body: BodyFeatures, features: Sequence[tuple[np.ndarray, np.ndarray, object]]
+) -> Windows:
+    return Windows(body, np.stack([f[0] for f in features]), np.stack([f[1] for f in features]))

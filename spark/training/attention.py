@@ -11,6 +11,7 @@ import torch.nn.functional as nnf
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
+from spark.network.config import LN_ROTARY_BASE, LN_SINUSOID_BASE
 from spark.training.precision import exactly
 
 Heads = Float[Tensor, "M H _ C"]  # of any number of tokens
@@ -31,30 +32,30 @@ class Attention(nn.Module):
         context: Float[Tensor, "M K D"] | None = None,
         mask: Bool[Tensor, "M #Q K"] | None = None,
     ) -> Float[Tensor, "M Q D"]:
-        """`x` looks at `context`, or at itself, where `mask` is True."""
+        """`x` attends to `context`, or to itself, where `mask` is True."""
         if context is None:
             q, k, v = self._split(self.qkv(x), 3)
         else:
             q, (k, v) = self.queries(x), self.keys_and_values(context)
         if self.rotary:
             q, k = _rotary(q), _rotary(k)
-        return self.look(q, k, v, mask)
+        return self.attend(q, k, v, mask)
 
     def queries(self, x: Float[Tensor, "M Q D"]) -> Heads:
-        """What `x` asks for."""
+        """The queries of `x`."""
         weight, bias = self.qkv.weight[: self.width], self.qkv.bias[: self.width]
         return self._split(nnf.linear(x, weight, bias), 1)[0]
 
     def keys_and_values(self, context: Float[Tensor, "M K D"]) -> tuple[Heads, Heads]:
-        """What `context` answers to, and with."""
+        """The keys and values of `context`."""
         weight, bias = self.qkv.weight[self.width :], self.qkv.bias[self.width :]
         k, v = self._split(nnf.linear(context, weight, bias), 2)
         return k, v
 
-    def look(
+    def attend(
         self, q: Heads, k: Heads, v: Heads, mask: Bool[Tensor, "M #Q K"] | None
     ) -> Float[Tensor, "M Q D"]:
-        """The values at the keys that fit the queries."""
+        """Scaled dot-product attention, its heads joined."""
         allowed = None if mask is None else mask[:, None]
         if q.device.type == "cpu":
             with exactly(q):
@@ -72,9 +73,9 @@ class Attention(nn.Module):
 class Feedforward(nn.Sequential):
     """Position-wise network of one hidden layer."""
 
-    def __init__(self, given: int, hidden: int, width: int) -> None:
+    def __init__(self, width_in: int, hidden: int, width: int) -> None:
         gelu = nn.GELU(approximate="tanh")
-        super().__init__(nn.Linear(given, hidden), gelu, nn.Linear(hidden, width))
+        super().__init__(nn.Linear(width_in, hidden), gelu, nn.Linear(hidden, width))
 
 
 class TemporalBlock(nn.Module):
@@ -95,7 +96,7 @@ class TemporalBlock(nn.Module):
 def sinusoids(T: int, D: int, like: Tensor) -> Float[Tensor, "T D"]:
     """Absolute positions in time (Vaswani et al. 2017)."""
     time = torch.arange(T, device=like.device, dtype=torch.float32)[:, None]
-    rate = torch.exp(torch.arange(0, D, 2, device=like.device) * (-9.21034 / D))
+    rate = torch.exp(torch.arange(0, D, 2, device=like.device) * (-LN_SINUSOID_BASE / D))
     return torch.cat([torch.sin(time * rate), torch.cos(time * rate)], -1).to(like.dtype)
 
 
@@ -103,7 +104,7 @@ def _rotary(x: Float[Tensor, "M H T C"]) -> Float[Tensor, "M H T C"]:
     """Rotary positions (Su et al. 2021): attention then depends on differences of time alone."""
     half = x.shape[-1] // 2
     time = torch.arange(x.shape[-2], device=x.device, dtype=torch.float32)[:, None]
-    rate = torch.exp(torch.arange(half, device=x.device) * (-6.9078 / half))
+    rate = torch.exp(torch.arange(half, device=x.device) * (-LN_ROTARY_BASE / half))
     cos, sin = torch.cos(time * rate).to(x.dtype), torch.sin(time * rate).to(x.dtype)
     a, b = x[..., :half], x[..., half:]
     return torch.cat([a * cos - b * sin, a * sin + b * cos], -1)

@@ -49,7 +49,7 @@ from spark.transfer.canonical import FRAME_TIME
 FORMAT, VERSION = "spark-sim dataset", 2
 
 # Skeletons whose bones differ by less than this, in hip heights, are one body.
-_SAME = 1e-3
+_SAME_BODY = 1e-3
 
 Index = dict[str, Any]
 Progress = Callable[[Iterable[tuple[Path, str]], int], Iterable[tuple[Path, str]]]
@@ -77,7 +77,7 @@ def prepare(
     files = sorted({path.resolve() for source in sources for path in motion_files(source)})
     parts = out / "parts"
     parts.mkdir(parents=True, exist_ok=True)
-    digests = dict(progress(_made(files, parts, workers), len(files)))
+    digests = dict(progress(_make_parts(files, parts, workers), len(files)))
     index = _index({path: digests[path] for path in files}, parts, seed)
     if not index["clips"]:
         why = "; ".join(f"{left['file']}: {left['why']}" for left in index["left_out"][:3])
@@ -91,7 +91,7 @@ def prepare(
     # An index that is there tells of arrays that are whole.
     (out / "index.json").unlink(missing_ok=True)
     _write_arrays(out, index, parts)
-    write_atomically(out / "index.json", _lines(index).encode())
+    write_atomically(out / "index.json", _to_json(index).encode())
     return index
 
 
@@ -199,7 +199,7 @@ def _clips_there(out: Path, seed: int) -> dict[str, str]:
     return clips
 
 
-def _made(files: list[Path], parts: Path, workers: int) -> Iterator[tuple[Path, str]]:
+def _make_parts(files: list[Path], parts: Path, workers: int) -> Iterator[tuple[Path, str]]:
     """The files with their hashes, as their parts get ready."""
     if workers <= 1:
         for path in files:
@@ -293,7 +293,7 @@ def _body_of(rig: Rig, bodies: list[dict[str, Any]], folder: str) -> int:
             and np.array_equal(other.skeleton.parents, skeleton.parents)
             and other.roles.roles == rig.roles.roles
             and np.allclose(
-                other.skeleton.offsets[1:], skeleton.offsets[1:], 0.0, _SAME * rig.hip_height
+                other.skeleton.offsets[1:], skeleton.offsets[1:], 0.0, _SAME_BODY * rig.hip_height
             )
         ):
             return i
@@ -338,7 +338,7 @@ def _on_body(part: Part, rig: Rig) -> Float[np.ndarray, "N"]:
     return np.concatenate([rotations.ravel(), hips.ravel()])
 
 
-def _lines(index: Index) -> str:
+def _to_json(index: Index) -> str:
     """JSON with one body, clip or file a line."""
     parts = []
     for key, value in index.items():

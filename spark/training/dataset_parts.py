@@ -42,7 +42,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Refused:
+class Rejected:
     """Why a file gives nothing."""
 
     why: str
@@ -59,18 +59,18 @@ def make_part(path: Path, parts: Path) -> str:
     except OSError as error:
         digest = hashlib.sha256(f"{path}: {error}".encode()).hexdigest()
     if read_part(parts, digest) is None:
-        write_atomically(_place(parts, digest), _encoded(_understood(path)))
+        write_atomically(_part_path(parts, digest), _encoded(_understood(path)))
     return digest
 
 
-def read_part(parts: Path, digest: str) -> Part | Refused | None:
+def read_part(parts: Path, digest: str) -> Part | Rejected | None:
     """The part of a file; None where there is none, or only a damaged one."""
     try:
-        file = io.BytesIO(_place(parts, digest).read_bytes())
+        file = io.BytesIO(_part_path(parts, digest).read_bytes())
         with np.load(file, allow_pickle=False) as stored:
             about = json.loads(stored["about"].tobytes())
             if "why" in about:
-                return Refused(about["why"])
+                return Rejected(about["why"])
             rig = rig_from_json(about["rig"])
             return Part(
                 rig,
@@ -84,17 +84,17 @@ def read_part(parts: Path, digest: str) -> Part | Refused | None:
         return None
 
 
-def _understood(path: Path) -> Part | Refused:
+def _understood(path: Path) -> Part | Rejected:
     try:
         motion = read_motion(path).motion
         rig = understand(motion)
         if len(motion) < 2:
-            return Refused("holds a single frame; expected a motion")
+            return Rejected("holds a single frame; expected a motion")
         canonical = to_canonical(motion, rig)
         clip = clip_of(path.stem, canonical, body_features(rig))
     except SparkSimError as error:
         why = str(error).removeprefix(f"{path}: ").replace(f"{path}:", "line ")
-        return Refused(why.replace(str(path), path.name))
+        return Rejected(why.replace(str(path), path.name))
     return Part(
         rig,
         clip.rotations.astype(np.float32),
@@ -105,10 +105,10 @@ def _understood(path: Path) -> Part | Refused:
     )
 
 
-def _encoded(part: Part | Refused) -> bytes:
+def _encoded(part: Part | Rejected) -> bytes:
     about: dict[str, Any] = {}
     arrays: dict[str, Any] = {}
-    if isinstance(part, Refused):
+    if isinstance(part, Rejected):
         about = {"why": part.why}
     else:
         about = {"rig": rig_to_json(part.rig), "fps": part.fps, "floor_z": part.floor_z}
@@ -118,5 +118,5 @@ def _encoded(part: Part | Refused) -> bytes:
     return file.getvalue()
 
 
-def _place(parts: Path, digest: str) -> Path:
+def _part_path(parts: Path, digest: str) -> Path:
     return parts / f"{digest[:32]}_v{VERSION}.npz"

@@ -6,7 +6,7 @@ decoder starts from one query a target joint and frame, lets the joints of a fra
 another and at that frame's 24 tokens, and gives each joint a rotation and the root a position.
 
 Two presets of one network. `Config.paper()` is the paper; `Config.default()` corrects the analytic
-transfer where that has to guess, because the source lacks a joint of the target's spine, neck or
+transfer where joints are unmatched, because the source lacks a joint of the target's spine, neck or
 shoulders. The correction is zero at the start, so that before the first step it *is* the analytic
 transfer, and what the transfer knows stays as it is. Each difference is a field of `Config`, so
 each ablation is one of them too.
@@ -93,7 +93,7 @@ class JointEmbedding(nn.Module):
         features = torch.cat([body.tpose, body.shape], -1) if self.shape_features else body.tpose
         return self.name(body.names) + self.tpose(features)
 
-    def places(self, body: Body) -> Float[Tensor, "B 6 N D"]:
+    def positions(self, body: Body) -> Float[Tensor, "B 6 N D"]:
         """E_pos of each place in each group; places beyond the last known one share it."""
         number = torch.arange(body.groups.shape[-1], device=body.groups.device)
         place = self.position[:, number.clamp(max=self.position.shape[1] - 1)]
@@ -126,7 +126,7 @@ class Encoder(nn.Module):
             in_group = in_group & _first_owner(body.groups)
         B, T, _, D = x.shape
         groups = take(x, index.flatten(1)).view(B, T, *index.shape[1:], D)
-        groups = groups + embedding.places(body)[:, None]
+        groups = groups + embedding.positions(body)[:, None]
         if self.training and self.config.mask_joints:
             kept = torch.rand(B, T, *index.shape[1:], 1, device=x.device) >= self.config.mask_joints
             groups = groups * kept
@@ -136,7 +136,7 @@ class Encoder(nn.Module):
         in_group = torch.cat([in_group[..., :1] | empty, in_group[..., 1:]], -1)
         q = self.pool.queries(self.queries)  # of the six groups: the same in all frames
         k, v = self.pool.keys_and_values(groups.flatten(0, 2))
-        z = self.pool.look(
+        z = self.pool.attend(
             q.expand(B * T, *q.shape).flatten(0, 1),
             k,
             v,
@@ -152,7 +152,7 @@ class Encoder(nn.Module):
     def _joint_features(self, pose: PoseTensors, body: Body) -> Float[Tensor, "B T J D"]:
         joints, root = pose.rotations, pose.root
         if self.config.residual:
-            joints = _seen(joints)
+            joints = _rotation_features(joints)
         if self.config.positions_in:
             relative = forward_kinematics(pose, body) - pose.root[:, :, None]
             joints = torch.cat([joints, relative], -1)
@@ -188,7 +188,7 @@ class Decoder(nn.Module):
     ) -> PoseTensors:
         """The motion on `body`; a residual network corrects `start`, the analytic transfer."""
         B, T = latent.shape[:2]
-        y = embedding.joints(body) + _scatter_places(embedding.places(body), body)
+        y = embedding.joints(body) + _scatter_positions(embedding.positions(body), body)
         if start is not None:
             return self._correct(start, y, latent, body)
         J = body.valid.shape[1]
@@ -196,7 +196,7 @@ class Decoder(nn.Module):
             y = y[:, None] + torch.rand(B, T, J, y.shape[-1], device=y.device, dtype=y.dtype) - 0.5
         else:
             y = (y + self.query)[:, None].expand(B, T, J, -1)
-        y = self._read(y, latent, body.valid)
+        y = self._decoder_blocks(y, latent, body.valid)
         assert self.root is not None
         with exactly(y):
             return PoseTensors(self.rotation(y.float()), self.root(y[:, :, 0].float()))
@@ -208,22 +208,22 @@ class Decoder(nn.Module):
         latent: Float[Tensor, "B T 24 D"],
         body: Body,
     ) -> PoseTensors:
-        """`start` with its guesses corrected: they alone are decoded."""
+        """`start` with its unmatched joints corrected: they alone are decoded."""
         joints = torch.arange(start.unmatched.shape[1], device=known.device).expand_as(
             start.unmatched
         )
         valid = start.unmatched == joints
         if not torch.compiler.is_exporting():  # a graph can't cut its tensors by their values
-            most = max(1, int(valid.sum(1).max()))
-            joints = valid.int().argsort(dim=1, descending=True, stable=True)[:, :most]
+            count = max(1, int(valid.sum(1).max()))
+            joints = valid.int().argsort(dim=1, descending=True, stable=True)[:, :count]
             valid = torch.gather(valid, 1, joints)
         assert self.start is not None
         y = (
             take(known[:, None], joints)
             + self.query
-            + self.start(_seen(take(start.rotations, joints)))
+            + self.start(_rotation_features(take(start.rotations, joints)))
         )
-        y = self._read(y, latent, valid | ~valid.any(1, keepdim=True))
+        y = self._decoder_blocks(y, latent, valid | ~valid.any(1, keepdim=True))
         with exactly(y):
             scale = RESIDUAL_SCALE * (1.0 if self.training else self.config.shrink)
             sixd = scale * self.rotation(y.float()) * valid[:, None, :, None]
@@ -232,7 +232,7 @@ class Decoder(nn.Module):
                 start, torch.zeros_like(start.rotations).scatter(2, index, sixd), body
             )
 
-    def _read(
+    def _decoder_blocks(
         self,
         y: Float[Tensor, "B T N D"],
         latent: Float[Tensor, "B T 24 D"],
@@ -291,8 +291,8 @@ def _temporal_block(config: Config) -> TemporalBlock:
     )
 
 
-def _seen(rotations: Float[Tensor, "B T J 6"]) -> Float[Tensor, "B T J 6"]:
-    """What a rotation is besides none at all, in numbers of the size of 1."""
+def _rotation_features(rotations: Float[Tensor, "B T J 6"]) -> Float[Tensor, "B T J 6"]:
+    """The deviation of a rotation from none, scaled to numbers of about 1."""
     return ROTATION_GAIN * (rotations - rotations.new_tensor(NO_ROTATION))
 
 
@@ -303,11 +303,11 @@ def _blurred(features: Float[Tensor, "B J F"], noise: float) -> Float[Tensor, "B
 
 
 def _corrected(start: Start, sixd: Float[Tensor, "B T J 6"], body: Body) -> PoseTensors:
-    """`start` with its guesses turned a little, each in its own axes, by no rotation plus `sixd`.
-    What follows a guess goes with it; every other joint keeps its rotation in the world."""
+    """`start` with its unmatched joints turned a little, each in its own axes, by no rotation plus
+    `sixd`. What follows them goes with them; all other joints keep their rotation in the world."""
     world = world_matrices(start.rotations, body.parents)
-    little = matrix_from_sixd(sixd + sixd.new_tensor(NO_ROTATION))
-    turn = take(world @ little @ world.mT, start.unmatched.clamp(min=0))
+    small = matrix_from_sixd(sixd + sixd.new_tensor(NO_ROTATION))
+    turn = take(world @ small @ world.mT, start.unmatched.clamp(min=0))
     world = torch.where((start.unmatched >= 0)[:, None, :, None, None], turn @ world, world)
     upper = take(world, body.parents)
     is_root = (body.parents == torch.arange(world.shape[2], device=world.device))[:, None, :]
@@ -323,11 +323,11 @@ def _first_owner(groups: Int[Tensor, "B G N"]) -> Bool[Tensor, "B G N"]:
     return ~(same & earlier).any(-1).view_as(groups)
 
 
-def _scatter_places(places: Float[Tensor, "B G N D"], body: Body) -> Float[Tensor, "B J D"]:
+def _scatter_positions(positions: Float[Tensor, "B G N D"], body: Body) -> Float[Tensor, "B J D"]:
     """E_pos of each joint: that of the first group that holds it."""
     B, J = body.valid.shape
     first = (body.groups >= 0) & _first_owner(body.groups)
     target = torch.where(first, body.groups, J).flatten(1)
-    out = places.new_zeros(B, J + 1, places.shape[-1])
-    index = target[..., None].expand(-1, -1, places.shape[-1])
-    return out.scatter(1, index, places.flatten(1, 2))[:, :J]
+    out = positions.new_zeros(B, J + 1, positions.shape[-1])
+    index = target[..., None].expand(-1, -1, positions.shape[-1])
+    return out.scatter(1, index, positions.flatten(1, 2))[:, :J]

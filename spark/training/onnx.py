@@ -51,9 +51,9 @@ def export_onnx(checkpoint: Checkpoint, path: Path) -> None:
             "only networks of the default preset are exported: the paper's starts from noise"
         )
     T, S, J, N, K = (Dim(name, min=2) for name in ("T", "S", "J", "N", "K"))
-    given, asked = _body(5, 3, config.name_width), _body(6, 4, config.name_width)
+    source, target = _body(5, 3, config.name_width), _body(6, 4, config.name_width)
     start = torch.zeros(1, 8, 6, 6), torch.zeros(1, 8, 3), torch.full((1, 6), -1)
-    tensors = torch.zeros(1, 8, 5, 6), torch.zeros(1, 8, 3), *given, *asked, *start
+    tensors = torch.zeros(1, 8, 5, 6), torch.zeros(1, 8, 3), *source, *target, *start
     shapes = ({1: T, 2: S}, {1: T}, *_dims(S, N), *_dims(J, K), {1: T, 2: J}, {1: T}, {1: J})
     logging.getLogger("torch.onnx").setLevel(logging.ERROR)  # libraries that it could do without
     try:

@@ -29,18 +29,20 @@ from spark.training.mirror import mirrored_body, mirrored_motion
 from spark.training.staging import (
     StagedBody,
     foot_lift,
+    in_concatenation,
+    interpolated_rows,
     local_rows,
-    mixed,
-    place,
-    shifted,
+    pose_bodies,
     starts_of,
 )
 from spark.training.variants import random_variant, same_body, split_body
 from spark.transfer.analytic import Correspondence, correspond
 
-_PACE = 0.3  # of the logarithm of a motion's speed
-_POWER = 0.2  # of how much a body turns: how often it is drawn
-_TRIES = 10
+_MAX_LOG_SPEED = 0.3  # a clip is played slower or faster by up to exp(0.3) = 1.35
+# A body is drawn in proportion to this power of how much it turns in all: ten times the motion
+# counts 1.6 times as often.
+_DRAW_EXPONENT = 0.2
+_MAX_TRIES = 10  # draws of a source before one with nothing unmatched is taken after all
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +88,7 @@ class PairMaker:
     set); without, any of them may perform any of the body's clips. With `varied`, the target is the
     body itself under its own names, as real targets are; half of the draws are seen in a mirror,
     half are slowed down or sped up by up to a third, and sources are drawn again where the analytic
-    transfer has nothing to guess: there is nothing to learn there.
+    transfer matches every joint: there is nothing to learn there.
 
     Bodies are drawn by how much they turn, but the more of one there is the less each counts: what
     is to be learned differs between people more than within one.
@@ -111,10 +113,12 @@ class PairMaker:
         self._bodies = list(by_body.values())
         if not self._bodies:
             raise SkeletonError(f"no clip has {window} frames: expected at least one to train on")
-        weights = np.array([sum(map(_turning, group)) for group in self._bodies]) ** _POWER
+        weights = (
+            np.array([sum(map(_total_rotation, group)) for group in self._bodies]) ** _DRAW_EXPONENT
+        )
         self._weights = weights / weights.sum()
         self._seen: dict[tuple[int, bool], BodyFeatures] = {}
-        self._stages: dict[tuple[int, bool, int], StagedBody] = {}
+        self._staged_bodies: dict[tuple[int, bool, int], StagedBody] = {}
         self._links: dict[tuple[StagedBody, StagedBody], Correspondence] = {}
 
     def draw(self, n: int, windows: int) -> Pairs:
@@ -123,35 +127,37 @@ class PairMaker:
 
     def draws(self, numbers: Sequence[int], windows: int) -> list[Pairs]:
         """The draws of these numbers, made together, which is faster."""
-        drawn = [self._drawn(n, windows) for n in numbers]
+        drawn = [self._sample(n, windows) for n in numbers]
         D = len(drawn)
-        stages = [one.source for one in drawn] + [one.target for one in drawn]
-        bodies = [stage.variant.body for stage in stages]
+        staged = [one.source for one in drawn] + [one.target for one in drawn]
+        bodies = [body.variant.body for body in staged]
         links = [one.link for one in drawn]
         hips = np.stack([one.hips for one in drawn])
         planted = np.stack([one.planted for one in drawn])
         lift = np.stack([one.lift for one in drawn])
-        rows = place(
-            stages,
+        rows = pose_bodies(
+            staged,
             2 * starts_of([one.rotations for one in drawn]),
             np.concatenate([one.rotations for one in drawn]),
             np.concatenate([hips, hips]),
             np.concatenate([planted, planted]),
             np.concatenate([lift, lift]),
         )
-        begins = starts_of([body.joints for body in bodies])
-        copied = mixed(
+        starts = starts_of([body.joints for body in bodies])
+        copied = interpolated_rows(
             rows,
-            shifted([link.first for link in links], begins[:D]),
-            shifted([link.second for link in links], begins[:D]),
+            in_concatenation([link.first for link in links], starts[:D]),
+            in_concatenation([link.second for link in links], starts[:D]),
             np.concatenate([link.mix for link in links]),
         )
         # Windows are seen from their first frames, as `spark.network.features.pose_features` sees
         # one. The pelvis turns alike on all bodies.
-        back = quat_from_yaw(-yaw_from_quat(rows[begins[:D], :, :1]))
-        roots = quat_rotate(back, hips - hips[:, :, :1] * np.array([1, 1, 0], hips.dtype))
+        from_heading = quat_from_yaw(-yaw_from_quat(rows[starts[:D], :, :1]))
+        roots = quat_rotate(from_heading, hips - hips[:, :, :1] * np.array([1, 1, 0], hips.dtype))
         bodies += bodies[D:]
-        local = local_rows(np.concatenate([rows, copied]), bodies, np.tile(back, (3, 1, 1, 1)))
+        local = local_rows(
+            np.concatenate([rows, copied]), bodies, np.tile(from_heading, (3, 1, 1, 1))
+        )
         poses = np.moveaxis(sixd_from_quat(local), 0, 2)
         ends = starts_of([body.joints for body in bodies])[1:]
         seen = [
@@ -170,31 +176,33 @@ class PairMaker:
             for k, one in enumerate(drawn)
         ]
 
-    def _drawn(self, n: int, windows: int) -> "_Drawn":
+    def _sample(self, n: int, windows: int) -> "_Draw":
         rng = np.random.default_rng((self.seed, n))
         k = int(rng.choice(len(self._bodies), p=self._weights))
         clips = self._bodies[k]
         mirrored = self.varied and bool(rng.random() < 0.5)
-        for _ in range(_TRIES if self.varied else 1):
+        for _ in range(_MAX_TRIES if self.varied else 1):
             performer, receiver = rng.integers(self.variants, size=2).tolist()
             if self.varied:
                 receiver = 0
             if self.distinct:
                 performer %= min(self.variants, len(clips))
-            source, target = (self._stage(k, mirrored, number) for number in (performer, receiver))
+            source, target = (
+                self._staged_body(k, mirrored, number) for number in (performer, receiver)
+            )
             link = self._link(source, target)
             if (link.unmatched >= 0).any():
                 break
         if self.distinct:
             clips = clips[performer :: self.variants]
-        rotations, hips, planted, lift = self._cut(clips, windows, rng)
+        rotations, hips, planted, lift = self._windows(clips, windows, rng)
         if mirrored:
             rotations, hips, planted = mirrored_motion(rotations, hips, planted)
             lift = lift[:, :, ::-1]
         rows = np.ascontiguousarray(np.moveaxis(rotations, 2, 0))
-        return _Drawn(source, target, link, rows, hips, planted, lift, clips[0].frame_time)
+        return _Draw(source, target, link, rows, hips, planted, lift, clips[0].frame_time)
 
-    def _cut(
+    def _windows(
         self, clips: list[TrainingClip], windows: int, rng: np.random.Generator
     ) -> tuple[
         Float[np.ndarray, "W T K 4"],
@@ -206,7 +214,7 @@ class PairMaker:
         chosen = [clips[i] for i in rng.choice(len(clips), windows, p=lengths / lengths.sum())]
         spans, speeds = [], np.ones((windows, 1))
         for w, clip in enumerate(chosen):
-            speed = float(np.exp(rng.uniform(-_PACE, _PACE)))
+            speed = float(np.exp(rng.uniform(-_MAX_LOG_SPEED, _MAX_LOG_SPEED)))
             frames = int(np.ceil((self.window - 1) * speed)) + 1
             if not self.varied or rng.random() < 0.5 or frames > len(clip.hips):
                 frames, speed = self.window, 1.0
@@ -215,19 +223,19 @@ class PairMaker:
         times = np.arange(self.window) * speeds
         last = np.array([[span.stop - span.start - 1] for span in spans])
         before, nearest = times.astype(int), np.minimum(times.round().astype(int), last)
-        rotations = _frames([clip.rotations for clip in chosen], spans, before)
-        hips = _frames([clip.hips for clip in chosen], spans, before)
-        planted = _frames([clip.planted for clip in chosen], spans, nearest)
-        lift = _frames([clip.lift for clip in chosen], spans, nearest)
-        paced = np.flatnonzero(speeds != 1)
-        if len(paced):
-            share = (times - before)[paced, :, None].astype(np.float32)
-            after = np.minimum(before + 1, last)[paced]
-            chosen, spans = [chosen[w] for w in paced], [spans[w] for w in paced]
-            later = _frames([clip.rotations for clip in chosen], spans, after)
-            rotations[paced] = quat_slerp(rotations[paced], later, share)
-            later = _frames([clip.hips for clip in chosen], spans, after)
-            hips[paced] += share * (later - hips[paced])
+        rotations = _gather([clip.rotations for clip in chosen], spans, before)
+        hips = _gather([clip.hips for clip in chosen], spans, before)
+        planted = _gather([clip.planted for clip in chosen], spans, nearest)
+        lift = _gather([clip.lift for clip in chosen], spans, nearest)
+        other_speed = np.flatnonzero(speeds != 1)
+        if len(other_speed):
+            share = (times - before)[other_speed, :, None].astype(np.float32)
+            after = np.minimum(before + 1, last)[other_speed]
+            chosen, spans = [chosen[w] for w in other_speed], [spans[w] for w in other_speed]
+            later = _gather([clip.rotations for clip in chosen], spans, after)
+            rotations[other_speed] = quat_slerp(rotations[other_speed], later, share)
+            later = _gather([clip.hips for clip in chosen], spans, after)
+            hips[other_speed] += share * (later - hips[other_speed])
         return rotations, hips, planted, lift
 
     def _body(self, k: int, mirrored: bool) -> BodyFeatures:
@@ -236,16 +244,16 @@ class PairMaker:
             self._seen[k, mirrored] = mirrored_body(same_body(body).body) if mirrored else body
         return self._seen[k, mirrored]
 
-    def _stage(self, k: int, mirrored: bool, number: int) -> StagedBody:
+    def _staged_body(self, k: int, mirrored: bool, number: int) -> StagedBody:
         key = (k, mirrored, number)
-        if key not in self._stages:
+        if key not in self._staged_bodies:
             body = self._body(k, mirrored)
             if number < 2:
                 variant = (same_body, split_body)[number](body)
             else:
                 variant = random_variant(body, np.random.default_rng((self.seed, *key)))
-            self._stages[key] = StagedBody(variant)
-        return self._stages[key]
+            self._staged_bodies[key] = StagedBody(variant)
+        return self._staged_bodies[key]
 
     def _link(self, source: StagedBody, target: StagedBody) -> Correspondence:
         key = (source, target)
@@ -256,7 +264,7 @@ class PairMaker:
         return self._links[key]
 
 
-class _Drawn(NamedTuple):
+class _Draw(NamedTuple):
     """What a draw consists of before it is put on its two bodies."""
 
     source: StagedBody
@@ -269,7 +277,7 @@ class _Drawn(NamedTuple):
     frame_time: float
 
 
-def _frames(
+def _gather(
     parts: Sequence[np.ndarray], spans: Sequence[slice], frames: Int[np.ndarray, "W T"]
 ) -> np.ndarray:
     """From a span of each part, these of its frames; in single precision what is not a flag."""
@@ -280,7 +288,7 @@ def _frames(
     return cut if cut.dtype == bool else cut.astype(np.float32, copy=False)
 
 
-def _turning(clip: TrainingClip) -> float:
+def _total_rotation(clip: TrainingClip) -> float:
     """How much the joints turn in all [rad], with a little for a clip that stands still."""
     rotations = np.asarray(clip.rotations)
     step = quat_angle(rotations[:-1], rotations[1:]).mean() if len(rotations) > 1 else 0.0

@@ -1,4 +1,4 @@
-"""Motions put onto many bodies at once: rotations carried over, planted feet planted.
+"""Motions put onto many bodies at once: rotations carried over, planted feet held in place.
 
 Bodies differ in their joints, so the joints of all of them are laid end to end: a *row* is one
 joint of one body over W windows of T frames. A few operations on large arrays then do for all.
@@ -21,12 +21,12 @@ from spark.transfer.leg_ik import Leg, leg_of, leg_rotations, stance_correction
 
 
 class LegBones(NamedTuple):
-    """The bones of both legs: to the hip, the thigh, the shank and the foot, one part after the
-    other. Part p begins with bone `begins[p]`; bone b turns with joint `joints[b]`."""
+    """The bones of both legs, in 8 parts: pelvis to hip, thigh, shank and foot of each. Part p
+    starts with bone `starts[p]`; bone b turns with joint `joints[b]`."""
 
     joints: Int[np.ndarray, "B"]
     offsets: Float[np.ndarray, "B 3"]
-    begins: Int[np.ndarray, "8"]
+    starts: Int[np.ndarray, "8"]
 
 
 class LegJoints(NamedTuple):
@@ -38,7 +38,7 @@ class LegJoints(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StagedBody:
-    """A variant and what putting motion onto it needs."""
+    """A variant with the indices that putting motion onto it needs."""
 
     variant: Variant
 
@@ -52,15 +52,15 @@ class StagedBody:
         skeleton = self.variant.body.skeleton
         joints: list[int] = []
         offsets: list[np.ndarray] = []
-        begins: list[int] = []
+        starts: list[int] = []
         for leg in self.legs:
             for above, below in zip((0, *leg[:3]), leg[:4], strict=True):
-                begins.append(len(joints))
+                starts.append(len(joints))
                 bones = [j for j in skeleton.ancestors(below) if above < j]
                 # Without a toe the foot is no bone: one of no length.
                 joints += [int(skeleton.parents[j]) for j in bones] or [above]
                 offsets += [skeleton.offsets[j] for j in bones] or [np.zeros(3)]
-        return LegBones(np.array(joints), np.array(offsets), np.array(begins))
+        return LegBones(np.array(joints), np.array(offsets), np.array(starts))
 
     @cached_property
     def leg_joints(self) -> LegJoints:
@@ -75,59 +75,65 @@ class StagedBody:
         heights = 1 + self.variant.body.skeleton.rest_positions[own, 2]
         return np.array([leg.contact != leg.foot for leg in self.legs]).astype(int), heights
 
-    def place(
+    def pose(
         self,
         base: Float[np.ndarray, "W T K 4"],
         hips: Float[np.ndarray, "W T 3"],
         planted: Bool[np.ndarray, "W T 2"],
         lift: Float[np.ndarray, "W T 2 2"],
     ) -> Float[np.ndarray, "W T J 4"]:
-        """The base's rotations on this body, with the planted feet planted."""
+        """`pose_bodies` of this body alone."""
         rows = np.ascontiguousarray(np.moveaxis(base, 2, 0))
-        return np.moveaxis(place([self], [0], rows, hips[None], planted[None], lift[None]), 0, 2)
+        return np.moveaxis(
+            pose_bodies([self], [0], rows, hips[None], planted[None], lift[None]), 0, 2
+        )
 
 
-def place(
-    stages: Sequence[StagedBody],
-    bases: Sequence[int],
+def pose_bodies(
+    bodies: Sequence[StagedBody],
+    base_starts: Sequence[int],
     base: Float[np.ndarray, "R W T 4"],
     hips: Float[np.ndarray, "S W T 3"],
     planted: Bool[np.ndarray, "S W T 2"],
     lift: Float[np.ndarray, "S W T 2 2"],
 ) -> Float[np.ndarray, "N W T 4"]:
-    """The bases' rotations on all bodies, one after the other, with the planted feet planted: over
-    the ground where they are on average, as high as the bases' are (`foot_lift`). The base of each
-    stage begins at row `bases[s]`; hips' paths and heights are in hip heights."""
-    variants = [stage.variant for stage in stages]
-    rows = mixed(
+    """World rotations of all S bodies' joints, one body after the other, from those of their bases.
+
+    The base of body s starts at row `base_starts[s]`. Planted feet rest where they are on average
+    over each stance, as high above the floor as the base's (`lift`, as `foot_lift` gives it); the
+    legs follow by inverse kinematics. Hips' paths and heights are in hip heights."""
+    variants = [body.variant for body in bodies]
+    rows = interpolated_rows(
         base,
-        shifted([v.first for v in variants], bases),
-        shifted([v.second for v in variants], bases),
+        in_concatenation([v.first for v in variants], base_starts),
+        in_concatenation([v.second for v in variants], base_starts),
         np.concatenate([v.mix for v in variants]),
     )
-    begins = starts_of([v.first for v in variants])
-    bones = [stage.leg_bones for stage in stages]
+    starts = starts_of([v.first for v in variants])
+    bones = [body.leg_bones for body in bodies]
     along = quat_rotate(
-        rows[shifted([b.joints for b in bones], begins)],
+        rows[in_concatenation([b.joints for b in bones], starts)],
         np.concatenate([b.offsets for b in bones]).astype(rows.dtype)[:, None, None],
     )
-    parts = shifted([b.begins for b in bones], starts_of([b.joints for b in bones]))
-    limbs = np.add.reduceat(along, parts, axis=0).reshape(len(stages), 2, 4, *along.shape[1:])
+    parts = in_concatenation([b.starts for b in bones], starts_of([b.joints for b in bones]))
+    limbs = np.add.reduceat(along, parts, axis=0).reshape(len(bodies), 2, 4, *along.shape[1:])
     contact = hips[:, None] + limbs.sum(2)
-    touching, rest = (np.stack(each) for each in zip(*(s.contacts for s in stages), strict=True))
-    wanted = contact.copy()
-    for s, side in np.ndindex(touching.shape):
-        wanted[s, side, ..., 2] = rest[s, side] + lift[s, ..., side, touching[s, side]]
-    move = stance_correction(contact, wanted, np.moveaxis(planted, -1, 1))
-    uppers = shifted([np.array([leg.upper_leg for leg in s.legs]) for s in stages], begins)
-    turns = leg_rotations(
+    contact_index, rest = (
+        np.stack(each) for each in zip(*(s.contacts for s in bodies), strict=True)
+    )
+    goal = contact.copy()
+    for s, side in np.ndindex(contact_index.shape):
+        goal[s, side, ..., 2] = rest[s, side] + lift[s, ..., side, contact_index[s, side]]
+    move = stance_correction(contact, goal, np.moveaxis(planted, -1, 1))
+    uppers = in_concatenation([np.array([leg.upper_leg for leg in s.legs]) for s in bodies], starts)
+    thighs_and_shanks = leg_rotations(
         limbs[:, :, 1], limbs[:, :, 2], rows[uppers].reshape(*move.shape[:-1], 4), move
     )
-    turned = np.stack(turns, 2).reshape(-1, *rows.shape[1:])
-    joints = [stage.leg_joints for stage in stages]
-    at = shifted([j.joints for j in joints], begins)
-    by = shifted([j.parts for j in joints], range(0, 4 * len(stages), 4))
-    rows[at] = quat_mul(turned[by], rows[at])
+    leg_rows = np.stack(thighs_and_shanks, 2).reshape(-1, *rows.shape[1:])
+    joints = [body.leg_joints for body in bodies]
+    at = in_concatenation([j.joints for j in joints], starts)
+    leg_parts = in_concatenation([j.parts for j in joints], range(0, 4 * len(bodies), 4))
+    rows[at] = quat_mul(leg_rows[leg_parts], rows[at])
     return rows
 
 
@@ -142,7 +148,7 @@ def foot_lift(
     return heights[:, joints] - (1 + skeleton.rest_positions[joints, 2])
 
 
-def mixed(
+def interpolated_rows(
     rows: Float[np.ndarray, "R W T 4"],
     first: Int[np.ndarray, "N"],
     second: Int[np.ndarray, "N"],
@@ -160,13 +166,13 @@ def mixed(
 def local_rows(
     rows: Float[np.ndarray, "N W T 4"],
     bodies: Sequence[BodyFeatures],
-    back: Float[np.ndarray, "S W 1 4"],
+    from_heading: Float[np.ndarray, "S W 1 4"],
 ) -> Float[np.ndarray, "N W T 4"]:
-    """Local rotations of the bodies' rows, each pelvis turned by `back`."""
-    begins = starts_of([body.joints for body in bodies])
-    parents = shifted([np.maximum(body.skeleton.parents, 0) for body in bodies], begins)
+    """Local rotations of the bodies' rows, each pelvis first turned by `from_heading`."""
+    starts = starts_of([body.joints for body in bodies])
+    parents = in_concatenation([np.maximum(body.skeleton.parents, 0) for body in bodies], starts)
     local = quat_relative(rows[parents], rows)
-    local[begins] = quat_mul(back, rows[begins])
+    local[starts] = quat_mul(from_heading, rows[starts])
     return local
 
 
@@ -175,9 +181,11 @@ def starts_of(parts: Sequence[Sized]) -> list[int]:
     return [0, *np.cumsum([len(part) for part in parts])[:-1].tolist()]
 
 
-def shifted(indices: Sequence[Int[np.ndarray, "_"]], begins: Sequence[int]) -> Int[np.ndarray, "N"]:
+def in_concatenation(
+    indices: Sequence[Int[np.ndarray, "_"]], starts: Sequence[int]
+) -> Int[np.ndarray, "N"]:
     """Indices into parts as indices into their concatenation."""
-    return np.concatenate([part + begin for part, begin in zip(indices, begins, strict=True)])
+    return np.concatenate([part + start for part, start in zip(indices, starts, strict=True)])
 
 
 def _leg(body: BodyFeatures, limb: Group) -> Leg:

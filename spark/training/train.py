@@ -23,7 +23,7 @@ from torch.nn.parallel import DistributedDataParallel
 from torch.utils.data import DataLoader, Dataset
 
 from spark.network.config import Config
-from spark.network.known_bodies import distinct
+from spark.network.known_bodies import distinct_trunks
 from spark.network.t5 import NAME_CACHE, T5Names
 from spark.training import losses
 from spark.training.batch import Batch, Collator, Names
@@ -155,7 +155,7 @@ class Steps(Dataset[Batch]):
         return self.collator.batch(self.maker.draws(mine, self.config.per_body))
 
 
-def optimiser_of(model: nn.Module, config: TrainConfig) -> torch.optim.AdamW:
+def make_optimiser(model: nn.Module, config: TrainConfig) -> torch.optim.AdamW:
     """AdamW; weight decay on matrices alone, not on norms, biases, queries and places."""
     matrices = [p for m in model.modules() if isinstance(m, nn.Linear) for p in [m.weight]]
     decayed = {id(p) for p in matrices}
@@ -195,16 +195,16 @@ def train(
     `watch` is told the loss terms after each step that is logged. On a GPU the network is compiled
     and computes in bf16. Under `torchrun` the first process writes.
     """
-    rank, world, device = _place()
+    rank, world, device = _join_processes()
     model = start.model.to(device)
     objective = Objective(model, config).to(device)
-    optimiser = optimiser_of(model, config)
+    optimiser = make_optimiser(model, config)
     restore_optimizer(optimiser, model, start.optimizer)
-    runner = shared(objective) if world > 1 else objective
+    runner = distributed(objective) if world > 1 else objective
     if device.type == "cuda":
         runner = torch.compile(runner, dynamic=True)  # type: ignore[assignment]
     steps = Steps(clips, name_vectors(start.names), config, rank, world)
-    bodies = distinct(clip.body for clip in clips)
+    bodies = distinct_trunks(clip.body for clip in clips)
     checkpoint = start
     model.train()
     began = perf_counter()
@@ -229,7 +229,7 @@ def train(
     return checkpoint
 
 
-def shared(objective: Objective) -> nn.Module:
+def distributed(objective: Objective) -> nn.Module:
     """`objective` in each of several processes, their gradients averaged."""
     # The published network leaves some of the parameters that there are unused.
     unused = not objective.model.config.residual
@@ -256,7 +256,7 @@ def take_step(
     return {"loss": loss.detach(), **{k: v.detach() for k, v in terms.items()}}
 
 
-def _place() -> tuple[int, int, torch.device]:
+def _join_processes() -> tuple[int, int, torch.device]:
     """This process's rank, how many there are, and its device; joins what torchrun started."""
     world = int(os.environ.get("WORLD_SIZE", "1"))
     cuda = torch.cuda.is_available()

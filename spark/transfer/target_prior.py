@@ -1,9 +1,10 @@
-"""What a body's own recording tells of the joints that a source lacks.
+"""A prior from the target's own recording, for the joints that a source lacks.
 
-A target is often a recording itself. Put on the source's skeleton and back, its motion shows what
-copying loses between these two: how its spine shares a bend, how its wearer holds neck and
-shoulders. A ridge regression from the parts of the body that the source has tells the same of any
-motion. How far it is trusted is how well it foretells quarters of the recording from the others.
+A target is often a recording itself. Put on the source's skeleton and back, it shows what copying
+loses between these two rigs: how the target's spine shares a bend, how its wearer holds neck and
+shoulders. A ridge regression predicts that loss from the parts of the body that the source has.
+Each joint's correction is scaled by how well quarters of the recording are predicted from the
+others (cross-validation).
 """
 
 from collections.abc import Callable
@@ -25,15 +26,15 @@ from spark.rotation import (
 from spark.transfer.analytic import Correspondence, correspond, transfer
 from spark.transfer.canonical import FRAME_TIME, CanonicalMotion, at_frame_time
 
-_SPANS, _SPAN = 10, 100  # so many parts of a recording, of so many frames at 30 fps, are looked at
-SHORTEST = 2.0  # [s] of a recording that tells anything
-_STILL = 0.2  # a body whose features all stay closer than this stands, as in a T-pose
-_LITTLE = 0.05  # of the way from one joint to another
-_FOLDS = 4
-_RIDGE = 0.2  # of the variance of a feature
-_LEAST = 0.1  # a feature that varies less, in units of a rotation matrix, isn't blown up
-_RANGE = 2.5  # standard deviations beyond which a feature says nothing more
-_PARTS = (  # each seen from the chest, or from the pelvis
+MIN_DURATION = 2.0  # [s] of a recording that a prior is learned from
+_MAX_CLIPS, _CLIP_FRAMES = 10, 100  # what is looked at: clips spread over it, frames at 30 fps each
+_MIN_RANGE = 0.2  # of rotation matrix entries; a body whose features all vary less stands still
+_MIN_MIX = 0.05  # of the way between two joints; a joint this near to one depends on it alone
+_FOLDS = 4  # of the cross-validation
+_RIDGE = 0.2  # regularisation, in variances of a feature
+_MIN_SPREAD = 0.1  # of rotation matrix entries; a feature that varies less isn't blown up
+_CLIP_AT = 2.5  # [standard deviations] a feature further from its mean predicts no more than this
+_FEATURES = (  # seen from the chest, and from the pelvis
     (Role.HEAD, Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM),
     (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG),
 )
@@ -44,75 +45,82 @@ RetargetMethod = Callable[[CanonicalMotion, Rig], CanonicalMotion]
 
 
 def with_target_prior(
-    method: RetargetMethod, source: CanonicalMotion, own: CanonicalMotion
+    method: RetargetMethod, source: CanonicalMotion, recording: CanonicalMotion
 ) -> CanonicalMotion:
-    """What `method` makes of `source` on the rig of `own`, a recording, joints that had to be
-    guessed (`Correspondence.unmatched`) turned as they turn in `own` with the rest of the body.
+    """What `method` makes of `source` on the rig of `recording`, with its unmatched joints
+    (`Correspondence.unmatched`) turned as they turn in `recording` with the rest of the body.
 
-    Unchanged where nothing is a guess, or where `own` is short, doesn't move, or foretells nothing.
+    Unchanged where all joints are matched, or where `recording` is short, stands still, or predicts
+    nothing.
     """
-    moved = method(source, own.rig)
-    link = correspond(source.rig, own.rig)
-    joints = _foretold(source.rig, own.rig, link)
-    spans = _spans(own) if len(joints) else []
-    if not spans:
+    rig = recording.rig
+    moved = method(source, rig)
+    link = correspond(source.rig, rig)
+    joints = _predictable(source.rig, rig, link)
+    clips = _clips(recording) if len(joints) else []
+    if not clips:
         return moved
-    backs = [method(transfer(span, source.rig), own.rig) for span in spans]
+    returned = [method(transfer(clip, source.rig), rig) for clip in clips]
     lost = [
-        rotvec_from_quat(quat_relative(back.rotations[:, joints], span.rotations[:, joints]))
-        for back, span in zip(backs, spans, strict=True)
+        rotvec_from_quat(quat_relative(back.rotations[:, joints], clip.rotations[:, joints]))
+        for back, clip in zip(returned, clips, strict=True)
     ]
-    features = np.concatenate([_features(back) for back in backs])
-    if np.ptp(features, axis=0).max() < _STILL:
+    features = np.concatenate([_features(back) for back in returned])
+    if np.ptp(features, axis=0).max() < _MIN_RANGE:
         return moved
-    habits = _learn(features, np.concatenate(lost))
-    if not habits.share.any():
+    prior = _fit(features, np.concatenate(lost))
+    if not prior.trust.any():
         return moved
-    turns = quat_from_rotvec(habits.of(_features(moved)))
-    names = name_list([own.rig.skeleton.names[j] for j in joints])
+    corrections = quat_from_rotvec(prior.predict(_features(moved)))
+    names = name_list([rig.skeleton.names[j] for j in joints])
     return replace(
         moved,
-        rotations=_turned(moved.rotations, joints, link.unmatched, turns),
+        rotations=_corrected(moved.rotations, joints, link.unmatched, corrections),
         notes=(*moved.notes, f"{names}: corrected by the target's own motion"),
     )
 
 
-def _foretold(source: Rig, target: Rig, link: Correspondence) -> Int[np.ndarray, "K"]:
-    """The guesses whose neighbours in the source have a counterpart in the target: what others
-    would do in the target's own motion is a guess as well."""
-    unmatched_joints = np.flatnonzero(link.unmatched == np.arange(len(link.unmatched)))
-    told = correspond(target, source).unmatched < 0
-    first, second = (told[joints[unmatched_joints]] for joints in (link.first, link.second))
-    mix = link.mix[unmatched_joints]
-    return unmatched_joints[(first | (mix > 1 - _LITTLE)) & (second | (mix < _LITTLE))]
+def _predictable(source: Rig, target: Rig, link: Correspondence) -> Int[np.ndarray, "K"]:
+    """The unmatched joints whose neighbours in the source have a counterpart in the target. What
+    the others would do is not known from the recording either."""
+    joints = np.flatnonzero(link.unmatched == np.arange(len(link.unmatched)))
+    matched = correspond(target, source).unmatched < 0
+    first, second = (matched[ends[joints]] for ends in (link.first, link.second))
+    mix = link.mix[joints]
+    return joints[(first | (mix > 1 - _MIN_MIX)) & (second | (mix < _MIN_MIX))]
 
 
 @dataclass(frozen=True, eq=False)
-class _Habits:
-    """What K joints do, linear in F features: `rest`, `slopes` [rad]; how far that is trusted."""
+class _Prior:
+    """The correction [rad] of K joints, linear in F features: `offset + slopes @ scaled features`,
+    times the joint's `trust`, 0 to 1."""
 
     center: Float[np.ndarray, "F"]
     spread: Float[np.ndarray, "F"]
-    rest: Float[np.ndarray, "D"]
+    offset: Float[np.ndarray, "D"]
     slopes: Float[np.ndarray, "F D"]
-    share: Float[np.ndarray, "K"]
+    trust: Float[np.ndarray, "K"]
 
-    def of(self, features: Float[np.ndarray, "T F"]) -> Float[np.ndarray, "T K 3"]:
-        told = self.rest + _scaled(features, self.center, self.spread) @ self.slopes
-        return self.share[:, None] * told.reshape(len(told), -1, 3)
+    def predict(self, features: Float[np.ndarray, "T F"]) -> Float[np.ndarray, "T K 3"]:
+        """Rotation vectors in the joints' own axes."""
+        out = self.offset + _scaled(features, self.center, self.spread) @ self.slopes
+        return self.trust[:, None] * out.reshape(len(out), -1, 3)
 
 
-def _learn(features: Float[np.ndarray, "T F"], lost: Float[np.ndarray, "T K 3"]) -> _Habits:
-    center, spread = features.mean(0), np.maximum(features.std(0), _LEAST)
+def _fit(features: Float[np.ndarray, "T F"], lost: Float[np.ndarray, "T K 3"]) -> _Prior:
+    center, spread = features.mean(0), np.maximum(features.std(0), _MIN_SPREAD)
     X, Y = _scaled(features, center, spread), lost.reshape(len(lost), -1)
-    told = np.empty_like(Y)
+    predicted = np.empty_like(Y)
     for fold in np.array_split(np.arange(len(Y)), _FOLDS):
         others = np.delete(np.arange(len(Y)), fold)
-        rest, slopes = _ridge(X[others], Y[others])
-        told[fold] = rest + X[fold] @ slopes
-    agree, size = ((told * of).reshape(lost.shape).sum((0, 2)) for of in (Y, told))
-    share = np.clip(agree / np.maximum(size, 1e-12), 0.0, 1.0)
-    return _Habits(center, spread, *_ridge(X, Y), share)
+        offset, slopes = _ridge(X[others], Y[others])
+        predicted[fold] = offset + X[fold] @ slopes
+    # The factor that brings the predictions nearest to what was lost, in least squares.
+    agreement, size = (
+        (predicted * other).reshape(lost.shape).sum((0, 2)) for other in (Y, predicted)
+    )
+    trust = np.clip(agreement / np.maximum(size, 1e-12), 0.0, 1.0)
+    return _Prior(center, spread, *_ridge(X, Y), trust)
 
 
 def _ridge(
@@ -130,29 +138,29 @@ def _scaled(
     center: Float[np.ndarray, "F"],
     spread: Float[np.ndarray, "F"],
 ) -> Float[np.ndarray, "T F"]:
-    return _RANGE * np.tanh((features - center) / spread / _RANGE)
+    return _CLIP_AT * np.tanh((features - center) / spread / _CLIP_AT)
 
 
 def _features(motion: CanonicalMotion) -> Float[np.ndarray, "T F"]:
-    """How chest, head, arms and legs are turned against each other, as columns of matrices: those
-    don't jump."""
+    """How chest, head, arms and legs are turned against each other, as columns of matrices, which
+    are continuous."""
     rig, rotations = motion.rig, motion.rotations
     seen = [quat_relative(rotations[:, rig.pelvis], rotations[:, rig.chest])]
-    for base, roles in zip((rig.chest, rig.pelvis), _PARTS, strict=True):
+    for base, roles in zip((rig.chest, rig.pelvis), _FEATURES, strict=True):
         parts = [rig.roles.joint(role) for role in roles]
         seen += [quat_relative(rotations[:, base], rotations[:, j]) for j in parts if j is not None]
     return np.concatenate([sixd_from_quat(q) for q in seen], -1)
 
 
-def _turned(
+def _corrected(
     rotations: Float[np.ndarray, "T J 4"],
     joints: Int[np.ndarray, "K"],
     unmatched: Int[np.ndarray, "J"],
-    turns: Float[np.ndarray, "T K 4"],
+    corrections: Float[np.ndarray, "T K 4"],
 ) -> Float[np.ndarray, "T J 4"]:
-    """Joints turned in their own axes, and what only follows them, with them."""
+    """Joints turned in their own axes, and with them the unmatched joints that follow them."""
     out = rotations.copy()
-    out[:, joints] = quat_mul(rotations[:, joints], turns)
+    out[:, joints] = quat_mul(rotations[:, joints], corrections)
     for k in joints.tolist():
         for j in np.flatnonzero(unmatched == k).tolist():
             if j != k:
@@ -160,11 +168,11 @@ def _turned(
     return out
 
 
-def _spans(own: CanonicalMotion) -> list[CanonicalMotion]:
-    """Parts of a recording, spread over it; none of a short one."""
-    if len(own) * own.frame_time < SHORTEST:
+def _clips(recording: CanonicalMotion) -> list[CanonicalMotion]:
+    """Clips spread over a recording, at 30 fps; none of a short one."""
+    if len(recording) * recording.frame_time < MIN_DURATION:
         return []
-    size = min(max(1, round(_SPAN * FRAME_TIME / own.frame_time)), len(own))
-    count = min(_SPANS, len(own) // size)
-    firsts = np.linspace(0, len(own) - size, count).astype(int).tolist()
-    return [at_frame_time(own.frames(at, at + size), FRAME_TIME) for at in firsts]
+    size = min(max(1, round(_CLIP_FRAMES * FRAME_TIME / recording.frame_time)), len(recording))
+    count = min(_MAX_CLIPS, len(recording) // size)
+    starts = np.linspace(0, len(recording) - size, count).astype(int).tolist()
+    return [at_frame_time(recording.frames(at, at + size), FRAME_TIME) for at in starts]

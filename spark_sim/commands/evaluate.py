@@ -9,7 +9,7 @@ from spark_sim.commands.options import add_force
 
 if TYPE_CHECKING:
     from spark.evaluation.cases import Case
-    from spark.evaluation.evaluate import Row
+    from spark.evaluation.evaluate import MethodScores
     from spark.transfer.target_prior import RetargetMethod
 
 SUMMARY = "measure methods against a ground truth"
@@ -85,7 +85,7 @@ def configure(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     from spark.errors import ConventionError
     from spark.evaluation.cases import made_cases, performances, recorded_cases
-    from spark.evaluation.evaluate import by, evaluate, results_in
+    from spark.evaluation.evaluate import as_method, evaluate, results_in
     from spark.evaluation.tables import markdown
     from spark.files import write_atomically
     from spark.transfer.analytic import transfer
@@ -109,15 +109,19 @@ def run(args: Namespace) -> int:
         for note in notes:
             console.note(note)
 
-    def row(name: str, method: "Callable[[Case], Any]", of: "Sequence[Case]", **more: Any) -> "Row":
+    def row(
+        name: str, method: "Callable[[Case], Any]", of: "Sequence[Case]", **more: Any
+    ) -> "MethodScores":
         return evaluate(
             name, method, of, progress=lambda it: console.progress(it, name, len(of)), **more
         )
 
-    rows: list[Row] = []
+    rows: list[MethodScores] = []
 
     def add(name: str, method: "RetargetMethod", ways: "Sequence[str]", **about: Any) -> None:
-        rows.extend(row(name + way, by(method, **_WAYS[way]), cases, **about) for way in ways)
+        rows.extend(
+            row(name + way, as_method(method, **_WAYS[way]), cases, **about) for way in ways
+        )
 
     plain, held, own, both = _WAYS
     add("copy", transfer, (plain, held, own))
@@ -137,7 +141,7 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _text(path: Path, rows: "Sequence[Row]", about: dict[str, Any]) -> str:
+def _text(path: Path, rows: "Sequence[MethodScores]", about: dict[str, Any]) -> str:
     from spark.evaluation.tables import as_csv, as_json, markdown
 
     if path.suffix.lower() == ".json":

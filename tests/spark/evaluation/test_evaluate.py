@@ -19,9 +19,9 @@ from spark.demo.sample import sample_rig
 from spark.errors import FileFormatError, SkeletonError, SparkSimError
 from spark.evaluation.cases import Case, made_cases, performances, recorded_cases
 from spark.evaluation.evaluate import (
-    Cell,
-    Row,
-    by,
+    CellScore,
+    MethodScores,
+    as_method,
     evaluate,
     results_in,
 )
@@ -29,7 +29,7 @@ from spark.evaluation.metrics import Score
 from spark.evaluation.tables import as_csv, as_json, markdown
 from spark.io.bvh import read_bvh, write_bvh
 from spark.network.features import body_features
-from spark.network.known_bodies import distinct
+from spark.network.known_bodies import distinct_trunks
 from spark.rig.contacts import planted_feet, speeds
 from spark.training.checkpoint import Checkpoint, save_checkpoint
 from spark.training.dataset import Performance
@@ -70,9 +70,9 @@ def test_no_pair_is_an_error_that_names_a_way_out(found: list[Performance]) -> N
         recorded_cases(alone)
 
 
-def shorter(clip: TrainingClip, by: int) -> TrainingClip:
+def shorter(clip: TrainingClip, as_method: int) -> TrainingClip:
     """A clip without its last frames."""
-    arrays = (clip.rotations[:-by], clip.hips[:-by], clip.planted[:-by])
+    arrays = (clip.rotations[:-as_method], clip.hips[:-as_method], clip.planted[:-as_method])
     return TrainingClip(clip.name, clip.body, *arrays, clip.frame_time)
 
 
@@ -101,11 +101,11 @@ def test_the_same_body_twice_is_both_structures_and_copy_is_right(
         write_bvh(replace(bvh, joints=joints), tmp_path / name / "walk.bvh")
     cases, _ = recorded_cases(performances(tmp_path))
     assert sorted(c.structure for c in cases) == ["cross", "cross", "intra", "intra"]
-    row = evaluate("copy", by(transfer), [c for c in cases if c.structure == "intra"])
+    row = evaluate("copy", as_method(transfer), [c for c in cases if c.structure == "intra"])
     assert row.mean("intra").mse < 1e-12
     # A tool's results know no split targets.
     assert math.isnan(row.mean("cross").mse)
-    table = markdown([evaluate("copy", by(transfer), cases), replace(row, name="results")])
+    table = markdown([evaluate("copy", as_method(transfer), cases), replace(row, name="results")])
     assert re.search(r"^\| results \| \S+ \| - \|$", table, re.M)
     split = next(c for c in cases if c.structure == "cross")
     assert split.answer is None
@@ -159,7 +159,7 @@ def test_made_answers_stand_where_copies_slide(found: list[Performance]) -> None
     assert {c.motion for c in made_cases(found, seed=3, limit=1)} <= {c.motion for c in cases}
     assert len(made_cases(found, seed=3, limit=1)) == 3
     walks = [c for c in cases if c.motion == "walk"]
-    row = evaluate("copy", by(transfer), walks)
+    row = evaluate("copy", as_method(transfer), walks)
     for structure in ("intra", "cross", "missing"):
         mean = row.mean(structure)
         assert mean.mse > 0
@@ -182,13 +182,13 @@ def test_a_new_network_is_copy(found: list[Performance], tmp_path: Path) -> None
     config = TrainConfig.of("tiny")
     torch.manual_seed(0)
     cases = made_cases(found, limit=2)
-    bodies = distinct(body_features(case.truth.rig) for case in cases)
+    bodies = distinct_trunks(body_features(case.truth.rig) for case in cases)
     checkpoint = Checkpoint(
         Spark(network(config, 16)), names, settings={"window": 32}, bodies=bodies
     )
     run = nets.learned(checkpoint, tmp_path)
     for held in (False, True):
-        both = (by(method, feet_held=held) for method in (transfer, run))
+        both = (as_method(method, feet_held=held) for method in (transfer, run))
         copy, new = (evaluate("", method, cases).mean("missing") for method in both)
         assert new.mse == pytest.approx(copy.mse, rel=1e-3)
 
@@ -236,12 +236,12 @@ def test_sans_split_joints() -> None:
 SCORE = Score(1e-4, 5e-5, 2.0, 0.05, 0.01, 100.0, float("nan"))
 
 
-def row(name: str, **settings: object) -> Row:
+def row(name: str, **settings: object) -> MethodScores:
     worse = replace(SCORE, mse=3e-4)
-    cells = {("intra", "sc+sm"): Cell(SCORE, 3), ("intra", "uc+um"): Cell(worse, 1)}
-    cells |= {("cross", "sc+sm"): Cell(worse, 4)}
+    cells = {("intra", "sc+sm"): CellScore(SCORE, 3), ("intra", "uc+um"): CellScore(worse, 1)}
+    cells |= {("cross", "sc+sm"): CellScore(worse, 4)}
     nothing = float("nan")
-    return Row(name, cells, {"intra": 0.9, "cross": nothing, "missing": nothing}, settings)
+    return MethodScores(name, cells, {"intra": 0.9, "cross": nothing, "missing": nothing}, settings)
 
 
 def test_tables_by_hand() -> None:
@@ -266,10 +266,10 @@ def test_tables_by_hand() -> None:
     assert read[1]["method"] == "copy"
     assert float(read[1]["mse"]) == 3e-4
     assert read[1]["truth_jerk"] == ""
-    told = json.loads(as_json(rows, {"data": "x"}))
-    assert told["rows"][1]["training"] == {"preset": "paper", "ablate": ["mask"]}
-    assert told["rows"][0]["cells"][0]["truth_jerk"] is None
-    assert told["rows"][0]["sensitivity"] == {"intra": 0.9, "cross": None, "missing": None}
+    records = json.loads(as_json(rows, {"data": "x"}))
+    assert records["rows"][1]["training"] == {"preset": "paper", "ablate": ["mask"]}
+    assert records["rows"][0]["cells"][0]["truth_jerk"] is None
+    assert records["rows"][0]["sensitivity"] == {"intra": 0.9, "cross": None, "missing": None}
 
 
 def test_command(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -292,7 +292,7 @@ def test_command(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(console, "note", lambda text: None)
     for args, reason in (
         ((tree, "-o", "t.md"), "exists"),
-        ((tree, "-o", "t.txt"), "ends in .md, .json or .csv"),
+        ((tree, "-o", "t.txt"), "written as .md or .json or .csv"),
         ((tree / "walker",), "no motion is on two characters"),
         ((tree, "--result", "mine"), "expected NAME=DIR"),
         ((tree, "--result", f"mine={tmp_path}"), "no such result"),

@@ -6,7 +6,7 @@ import pytest
 
 from spark.demo.sample import sample_rig
 from spark.network.features import BodyFeatures, body_features
-from spark.network.known_bodies import distinct, nearness, trunk_of
+from spark.network.known_bodies import distinct_trunks, similarity, trunk_of
 from spark.rig.roles import Role
 
 
@@ -31,22 +31,22 @@ def test_the_further_off_the_less_is_known(
     body: BodyFeatures, apart: float, expected: float
 ) -> None:
     other = changed(body, Role.SPINE, (0, 0.6 * apart, 0.8 * apart))
-    assert nearness(other, [trunk_of(body)]) == pytest.approx(expected, abs=0.003)
+    assert similarity(other, [trunk_of(body)]) == pytest.approx(expected, abs=0.003)
     far = trunk_of(changed(body, Role.SPINE, (0, 0, -0.09)))
-    assert nearness(other, [far, trunk_of(body), far]) == nearness(other, [trunk_of(body)])
+    assert similarity(other, [far, trunk_of(body), far]) == similarity(other, [trunk_of(body)])
 
 
 def test_names_count_and_limbs_do_not(body: BodyFeatures) -> None:
     names = tuple(f"{name}_" for name in body.skeleton.names)
     renamed = replace(body, skeleton=replace(body.skeleton, names=names))
-    assert nearness(renamed, [trunk_of(body)]) == 0.0
-    assert nearness(body_features(sample_rig("walker")), [trunk_of(body)]) == 0.0
-    assert nearness(body, []) == 0.0
+    assert similarity(renamed, [trunk_of(body)]) == 0.0
+    assert similarity(body_features(sample_rig("walker")), [trunk_of(body)]) == 0.0
+    assert similarity(body, []) == 0.0
     for role in (Role.LEFT_FOREARM, Role.RIGHT_LOWER_LEG):
-        assert nearness(changed(body, role, (0, 0.2, 0)), [trunk_of(body)]) == 1.0
+        assert similarity(changed(body, role, (0, 0.2, 0)), [trunk_of(body)]) == 1.0
 
 
 def test_of_equal_bodies_one_is_kept(body: BodyFeatures) -> None:
     other = changed(body, Role.SPINE, (0, 0, 0.02))
     same = changed(body, Role.SPINE, (0, 0, 0.0002))
-    assert distinct([body, other, same]) == [trunk_of(body), trunk_of(other)]
+    assert distinct_trunks([body, other, same]) == [trunk_of(body), trunk_of(other)]

@@ -35,8 +35,8 @@ def test_a_planted_foot_rests_as_high_as_the_recorded_one(
     planted = np.zeros((1, len(clip.hips), 2), bool)
     planted[0, 10:14, 0] = planted[0, 24:28, 1] = True
     base, lift = (np.asarray(clip.rotations)[None], np.asarray(clip.hips)[None]), clip.lift[None]
-    loose = stage.place(*base, np.zeros_like(planted), lift)[0]
-    placed = stage.place(*base, planted, lift)[0]
+    loose = stage.pose(*base, np.zeros_like(planted), lift)[0]
+    placed = stage.pose(*base, planted, lift)[0]
     recorded = world_positions(clip.body.skeleton, clip.rotations, clip.hips)
     before, after = (world_positions(skeleton, r, clip.hips) for r in (loose, placed))
     for side, stance in ((0, slice(10, 14)), (1, slice(24, 28))):

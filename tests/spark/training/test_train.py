@@ -14,7 +14,7 @@ from spark.training.checkpoint import Checkpoint, load_checkpoint
 from spark.training.model import _corrected
 from spark.training.name_encoder import NameEncoder
 from spark.training.pairs import TrainingClip
-from spark.training.train import Objective, Steps, optimiser_of, take_step, train
+from spark.training.train import Objective, Steps, make_optimiser, take_step, train
 from spark_sim import sample
 from tests.helpers.training import TINY, fresh
 
@@ -62,7 +62,7 @@ def test_workers_change_nothing(clips: list[TrainingClip], tmp_path: Path) -> No
 
 def test_norms_and_queries_do_not_decay() -> None:
     model = fresh(TINY).model
-    decayed, others = optimiser_of(model, TINY).param_groups
+    decayed, others = make_optimiser(model, TINY).param_groups
     assert (decayed["weight_decay"], others["weight_decay"]) == (0.01, 0.0)
     names = {id(p): name for name, p in model.named_parameters()}
     assert len(decayed["params"]) + len(others["params"]) == len(names)
@@ -133,7 +133,7 @@ def test_a_handful_of_pairs_is_learned_by_heart(clips: list[TrainingClip]) -> No
     bent[..., 3] = -bent[..., 1]
     batch = batch._replace(truth=_corrected(batch.start, bent, batch.target))
     model = checkpoint.model.eval()
-    objective, optimiser = Objective(model, config), optimiser_of(model, config)
+    objective, optimiser = Objective(model, config), make_optimiser(model, config)
     terms = [take_step(objective, optimiser, batch, n, config) for n in range(config.steps)]
     assert terms[-1]["fk"] < 0.1 * terms[0]["fk"]
     assert terms[-1]["rec"] < 0.1 * terms[0]["rec"]
