@@ -1,7 +1,7 @@
-"""Where a robot's feet stand: one footprint for each time that a foot is on the floor.
+"""Where a robot's feet stand: one footprint for each contact of a foot with the floor.
 
-The places come from the copied motion. What the source's foot wobbles while it stands is lost, what
-it drifts beyond that is motion and stays.
+Their positions come from the copied motion. Within a contact the source's foot wobbles, which is
+dropped, and may drift beyond that, which is motion and stays.
 """
 
 from collections.abc import Sequence
@@ -18,17 +18,16 @@ from spark.kinematics import world_positions
 from spark.rig.feet import Sole, sole_positions
 from spark.runs import true_runs
 
-MAX_WOBBLE = (
-    0.05  # hip heights that a standing foot may stray from its mean place without having moved
-)
-MAX_TWIST = np.radians(12)  # and how far it may turn
-RAMP = 0.05  # [s] over which a foot is taken hold of and let go
-_SLIDE = 0.03  # of how firmly feet stand, so that they can slide to where they like to stand
+MAX_WOBBLE = 0.05  # hip heights that a standing foot may stray from its mean without having moved
+MAX_TWIST = np.radians(12)  # that it may turn without having turned
+RAMP = 0.05  # [s] over which a foothold sets in before a contact, and fades after it
+_SLIDING = 0.03  # of a foothold's weight along the floor while feet find where they like to stand
 
 
 @dataclass(frozen=True, eq=False)
 class Footing:
-    """For each point of a sole: where it should stand [m, world], and how firmly (0 to 1)."""
+    """The footholds of a sole's points: `positions` [m, world], and by axis the share of the weight
+    with which they are held there (`holds`, 0 to 1)."""
 
     positions: Float[np.ndarray, "P 3 T"]
     holds: Float[np.ndarray, "P 3 T"]
@@ -42,8 +41,8 @@ class Footing:
         return Footing(self.positions[..., frames], self.holds[..., frames])
 
     def sliding(self) -> "Footing":
-        """The same over the floor, but hardly held there."""
-        return Footing(self.positions, self.holds * np.array([[_SLIDE], [_SLIDE], [1.0]]))
+        """The same, hardly held along the floor."""
+        return Footing(self.positions, self.holds * np.array([[_SLIDING], [_SLIDING], [1.0]]))
 
 
 def plan_footing(robot: Morphology, targets: Targets) -> list[Footing]:
@@ -62,26 +61,27 @@ def reachable_footing(
     as the planned ones ask."""
     frames = forward_kinematics(robot.tree, q)
     return [
-        _moved(f, points_of(robot, frames, sole))
+        _fitted(f, points_of(robot, frames, sole))
         for f, sole in zip(footing, robot.soles, strict=True)
     ]
 
 
-def _moved(foot: Footing, stands: Float[np.ndarray, "P 3 T"]) -> Footing:
-    """Each footprint shifted and turned, over the floor, as the sole's points are on average."""
-    places = foot.positions.copy()
+def _fitted(foot: Footing, stands: Float[np.ndarray, "P 3 T"]) -> Footing:
+    """Each footprint moved along the floor, by the shift and turn that fit the sole's points best
+    in the weighted mean."""
+    footholds = foot.positions.copy()
     held = foot.holds[:, 0].max(0)
     for start, stop in true_runs(held > 0):
         weight = held[start:stop] / held[start:stop].sum()
         here = slice(start, stop)
-        flat = [points[:, 0, here] + 1j * points[:, 1, here] for points in (places, stands)]
+        flat = [points[:, 0, here] + 1j * points[:, 1, here] for points in (footholds, stands)]
         planned, stood = (points - points.mean(0) for points in flat)
         turn = complex(((stood * planned.conj()).sum(0) * weight).sum())
         turn /= max(abs(turn), 1e-12)
         shift = ((flat[1] - flat[0]).mean(0) * weight).sum()
         moved = flat[0].mean(0) + shift + turn * planned
-        places[:, 0, start:stop], places[:, 1, start:stop] = moved.real, moved.imag
-    return Footing(places, foot.holds)
+        footholds[:, 0, start:stop], footholds[:, 1, start:stop] = moved.real, moved.imag
+    return Footing(footholds, foot.holds)
 
 
 def points_of(robot: Morphology, frames: LinkPoses, sole: Sole) -> Float[np.ndarray, "P 3 T"]:
@@ -118,13 +118,13 @@ def _footing(
             pivot[before:after, axis] = np.interp(time, frames, place)
         turn[before:after] = np.interp(time, frames, heading[frames].mean() + turned)
     cos, sin = np.cos(turn), np.sin(turn)
-    places = np.zeros((len(sole), 3, len(turn)))
+    footholds = np.zeros((len(sole), 3, len(turn)))
     for p, (x, y) in enumerate(flat - flat[-2:].mean(0)):
-        places[p, 0] = pivot[:, 0] + cos * x - sin * y
-        places[p, 1] = pivot[:, 1] + sin * x + cos * y
+        footholds[p, 0] = pivot[:, 0] + cos * x - sin * y
+        footholds[p, 1] = pivot[:, 1] + sin * x + cos * y
     ease = max(1, round(RAMP / frame_time))
-    still, low = _eased(contacts, ease), _eased(contacts | targets.raw_contacts[:, s], ease)
-    return Footing(places, on_points(sole, np.stack([still, still, low], axis=1)))
+    still, low = _ramped(contacts, ease), _ramped(contacts | targets.raw_contacts[:, s], ease)
+    return Footing(footholds, on_points(sole, np.stack([still, still, low], axis=1)))
 
 
 def _stances(
@@ -144,14 +144,14 @@ def _stances(
 
 
 def _beyond(path: Float[np.ndarray, "P D"], radius: float) -> Float[np.ndarray, "P D"]:
-    """How far a path is from its mean, but for what of that lies within a radius."""
+    """How far a path is beyond a radius around its mean."""
     away = path - path.mean(0)
     far = np.linalg.norm(away, axis=1, keepdims=True)
     return away * np.maximum(1.0 - radius / np.maximum(far, 1e-12), 0.0)
 
 
-def _eased(contacts: Bool[np.ndarray, "T 2"], frames: int) -> Float[np.ndarray, "2 T"]:
-    """1 during contacts, and ramps of some frames before and after them."""
+def _ramped(contacts: Bool[np.ndarray, "T 2"], frames: int) -> Float[np.ndarray, "2 T"]:
+    """1 during contacts, ramps of some frames before and after them, 0 elsewhere."""
     wider = maximum_filter1d(contacts.astype(np.float64), 2 * frames + 1, axis=0, mode="nearest")
     return uniform_filter1d(wider, 2 * frames + 1, axis=0, mode="nearest").T
 

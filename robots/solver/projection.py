@@ -1,10 +1,10 @@
-"""Wanted rotations laid on real hinges, each joint for itself: where the solver starts, and all
-that a plain copy would be.
+"""Target rotations onto real hinges, each joint for itself: the solver's initial guess, and the
+baseline that `copy` is.
 
-One hinge takes the twist about its axis; two take the best pair of angles, a singular value problem
-in half angles; three are solved exactly (Paden and Kahan's subproblems, as in Murray, Li and
-Sastry, "A Mathematical Introduction to Robotic Manipulation", ch. 3), with the branch chosen that
-is within the limits and does not jump.
+A single hinge takes the twist about its axis. Two take the best pair of angles, a singular value
+problem in half angles. Three are solved exactly (Paden and Kahan's subproblems, as in Murray, Li
+and Sastry, "A Mathematical Introduction to Robotic Manipulation", ch. 3), on the branch that is
+within the limits and does not jump.
 """
 
 from collections.abc import Sequence
@@ -21,15 +21,16 @@ from spark.rotation import (
     quat_rotate,
 )
 
-_W_BEYOND_LIMITS = 1.0  # what leaving the limits costs against jumping, both in squared radians
-_W_FROM_REST = 1e-6  # and what being far from the rest pose does, where all else is equal
+_W_BEYOND_LIMITS = 1.0  # [1/rad²] of an angle's square beyond the limits, a jump's square being 1
+_W_FROM_REST = 1e-6  # [1/rad²] of an angle's square, which decides where all else is equal
 
 
 def project(
     robot: Morphology, world: Float[np.ndarray, "T J 4"], hips: Float[np.ndarray, "T 3"]
 ) -> Coordinates:
-    """Coordinates within the limits whose links turn as `world` wants them (`q_world_joint` of the
-    rig's joints), as far as their hinges can; the middle of the hips follows `hips` [m]."""
+    """Coordinates within the limits whose links have the rotations `world` (`q_world_joint` of the
+    rig's joints), as nearly as their hinges can; the middle of the hips is on the path `hips`
+    [m]."""
     tree = robot.tree
     count = len(world)
     wanted = {int(link): world[:, j] for j, link in reversed(list(enumerate(robot.links)))}
@@ -45,7 +46,7 @@ def project(
             balls[:, group[0]] = local
             links[group[-1]] = target
             continue
-        angles[:, group] = _solve(tree, group, local)
+        angles[:, group] = _hinge_angles(tree, group, local)
         turned = above
         for j in group:
             turned = quat_mul(turned, quat_from_rotvec(tree.axes[j] * angles[:, [j]]))
@@ -75,10 +76,11 @@ def _hinge_groups(robot: Morphology) -> list[tuple[int, ...]]:
     return groups
 
 
-def _solve(
+def _hinge_angles(
     tree: Tree, group: Sequence[int], local: Float[np.ndarray, "T 4"]
 ) -> Float[np.ndarray, "T K"]:
-    """Angles within the limits of a group of hinges that turn by `local`, as nearly as they can."""
+    """Angles [rad] within the limits of a group of K hinges that rotate by `local`, as nearly as
+    they can."""
     axes, lower, upper = (part[list(group)] for part in (tree.axes, tree.lower, tree.upper))
     if len(group) == 1:
         return _clip_to_limits(_twist(local, axes[0])[:, None], lower, upper)[0]
@@ -89,7 +91,7 @@ def _solve(
         return _steadiest_branches(*(np.stack(part) for part in zip(*branches, strict=True)))
     # More hinges than a rotation needs: the first ones stay at rest.
     out = np.zeros((len(local), len(group)))
-    out[:, -3:] = _solve(tree, group[-3:], local)
+    out[:, -3:] = _hinge_angles(tree, group[-3:], local)
     return out
 
 

@@ -17,7 +17,7 @@ from spark.rotation import quat_mul, quat_rotate
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
-_MIN_DURATION = 0.08  # contacts and breaks shorter than this [s] are noise
+_MIN_DURATION = 0.08  # [s] of a contact, or of a break in one: shorter ones are noise
 LIMB_SEGMENTS = (  # the limbs' segments, by the roles at their ends
     (Role.LEFT_UPPER_LEG, Role.LEFT_LOWER_LEG),
     (Role.LEFT_LOWER_LEG, Role.LEFT_FOOT),

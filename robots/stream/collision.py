@@ -1,6 +1,4 @@
-"""Parts that run into each other, in a few frames: `robots.solver.collision` for all shapes at
-once.
-"""
+"""Self-collision in a few frames: `robots.solver.collision` for all shapes at once."""
 
 from dataclasses import dataclass
 
@@ -14,13 +12,13 @@ from robots.solver.collision import DEPTH_ROUNDING, collisions_of
 from robots.solver.hulls import ShapePair
 from robots.solver.objective import W_COLLISION, W_LEG_COLLISION
 
-_ACTIVE = 3 * DEPTH_ROUNDING  # [m] beyond which a shape is not felt
-_REACH = 0.03  # [m] that shapes may move between the frame that is looked at and the others
+_ACTIVE = 3 * DEPTH_ROUNDING  # [m] between shapes beyond which the penalty is negligible
+_REACH = 0.03  # [m] that shapes may move between the searched frame and the others
 
 
 @dataclass(frozen=True, eq=False)
 class WindowPoses:
-    """Where a model's bodies and joints are in some frames, as MuJoCo says it."""
+    """The poses of a model's bodies, and its joints' axes and anchors, in T frames [world]."""
 
     rotations: Float[np.ndarray, "T B 3 3"]
     positions: Float[np.ndarray, "T B 3"]
@@ -30,17 +28,17 @@ class WindowPoses:
 
 class WindowCollisions:
     """A robot's pairs of shapes that can meet. `bodies` are those of the tree's links and, last, of
-    the base; `rest` is where all bodies are in the rest pose; `first` are the links that are solved
-    for first: later ones give way to them."""
+    the base; `rest` is where all bodies are in the rest pose; `first_block` are the links that are
+    solved for first: later ones give way to them."""
 
     def __init__(
         self,
         robot: Morphology,
         bodies: Int[np.ndarray, "L"],
         rest: tuple[Float[np.ndarray, "B 3 3"], Float[np.ndarray, "B 3"]],
-        first: Int[np.ndarray, "F"],
+        first_block: Int[np.ndarray, "F"],
     ) -> None:
-        self._turns, self._places = rest
+        self._rest_rotations, self._rest_positions = rest
         pairs = collisions_of(robot).pairs
         shapes = {x.geom: x for pair in pairs for x in (pair.small, pair.large)}
         number = {geom: k for k, geom in enumerate(shapes)}
@@ -61,10 +59,10 @@ class WindowCollisions:
         self._spheres = self._local(spheres, self._shapes[self._small[self._pairs]])
         radii = [r + pair.clearance for pair in pairs for r in pair.small.radii]
         self._radii = np.array(radii)
-        self._watch_columns(robot, pairs, set(first.tolist()))
+        self._index_dofs(robot, pairs, set(first_block.tolist()))
 
     def candidates(self, poses: WindowPoses) -> Int[np.ndarray, "K"]:
-        """The spheres that are near enough to be felt, now or soon."""
+        """The spheres that collide, or may soon."""
         centers = _placed(poses, self._shapes, self._centers)
         x, y, z = (centers[:, self._small] - centers[:, self._large]).transpose(2, 0, 1)
         pairs = (x * x + y * y + z * z < self._bounds).any(0)
@@ -82,17 +80,19 @@ class WindowCollisions:
     ) -> None:
         """Add how deep shapes are in each other to the normal equations; `candidates` are the
         spheres to look at."""
-        deep, side = self._depth(poses, candidates)
-        frames, felt = np.nonzero(deep > -_ACTIVE)
-        if not len(felt):
+        depth, side = self._depth(poses, candidates)
+        frames, active = np.nonzero(depth > -_ACTIVE)
+        if not len(active):
             return
-        pairs = self._pairs[candidates[felt]]
+        pairs = self._pairs[candidates[active]]
         small, large = self._shapes[self._small[pairs]], self._shapes[self._large[pairs]]
-        point = _turned(poses.rotations[frames, small], self._spheres[candidates[felt]])
+        point = _turned(poses.rotations[frames, small], self._spheres[candidates[active]])
         arm = (point + poses.positions[frames, small])[:, None] - anchors[frames]
-        push = _turned(self._turns[large].transpose(0, 2, 1), DIRECTIONS[side[frames, felt]])
+        push = _turned(
+            self._rest_rotations[large].transpose(0, 2, 1), DIRECTIONS[side[frames, active]]
+        )
         push = _turned(poses.rotations[frames, large], push)
-        residual, slope = one_sided(deep[frames, felt], DEPTH_ROUNDING)
+        residual, slope = one_sided(depth[frames, active], DEPTH_ROUNDING)
         # axis x arm . push = axis . arm x push
         (a, b, c), (x, y, z) = np.moveaxis(arm, 2, 0), push.T[:, :, None]
         u, v, w = np.moveaxis(axes[frames], 2, 0)
@@ -112,8 +112,8 @@ class WindowCollisions:
         small, large = self._shapes[self._small[pairs]], self._shapes[self._large[pairs]]
         away = _placed(poses, small, self._spheres[candidates]) - poses.positions[:, large]
         # In the rest pose of the large shape: its sides are known there.
-        back = self._turns @ poses.rotations.transpose(0, 1, 3, 2)
-        inside = _turned(back[:, large], away) + self._places[large]
+        back = self._rest_rotations @ poses.rotations.transpose(0, 1, 3, 2)
+        inside = _turned(back[:, large], away) + self._rest_positions[large]
         over = inside @ DIRECTIONS.T - self._reach[pairs]
         side = over.argmax(2)
         return self._radii[candidates] - np.take_along_axis(over, side[..., None], 2)[..., 0], side
@@ -122,11 +122,11 @@ class WindowCollisions:
         self, points: list[Float[np.ndarray, "3"]], bodies: Int[np.ndarray, "K"]
     ) -> Float[np.ndarray, "K 3"]:
         """Points of the rest pose in the axes of their bodies."""
-        away = np.array(points).reshape(-1, 3) - self._places[bodies]
-        return np.einsum("kji,kj->ki", self._turns[bodies], away)
+        away = np.array(points).reshape(-1, 3) - self._rest_positions[bodies]
+        return np.einsum("kji,kj->ki", self._rest_rotations[bodies], away)
 
-    def _watch_columns(
-        self, robot: Morphology, pairs: tuple[ShapePair, ...], first: set[int]
+    def _index_dofs(
+        self, robot: Morphology, pairs: tuple[ShapePair, ...], first_block: set[int]
     ) -> None:
         """Which columns move the pairs together (-1) and apart, of the links that give way."""
         tree = robot.tree
@@ -135,11 +135,11 @@ class WindowCollisions:
         for k, pair in enumerate(pairs):
             chains = [tree.chain(part.link) for part in (pair.small, pair.large)]
             both = set(chains[0]) & set(chains[1])
-            early = all(j in first for chain in chains for j in chain)
+            early = all(j in first_block for chain in chains for j in chain)
             if early:
                 self._weights[k] = W_LEG_COLLISION
             for sign, chain in zip((-1.0, 1.0), chains, strict=True):
-                moving = tuple(j for j in chain if j not in both and (j in first) == early)
+                moving = tuple(j for j in chain if j not in both and (j in first_block) == early)
                 self._signs[k, tree.dofs(moving)] = sign
 
 

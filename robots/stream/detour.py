@@ -1,8 +1,8 @@
-"""Ways out for limbs that are stuck behind their limits.
+"""Detours for limbs that are stuck behind their limits.
 
-Steps downhill follow a limb wherever it goes, also into a corner that it can't leave downhill: an
-arm that came up on the wrong side. Hinge by hinge (`robots.solver.projection`) it may be reached
-from another one; then the limb is led there, as fast as it may turn.
+Descent follows a limb wherever it goes, also into a local minimum: an arm that came up on the wrong
+side. The rotations projected onto its hinges (`robots.solver.projection`) may have another
+solution; then the limb is led there.
 """
 
 import numpy as np
@@ -13,15 +13,16 @@ from robots.stream.frame_targets import LATENCY, FrameReader, FrameTargets
 from robots.stream.terms import Posture, Terms
 from spark.rotation import quat_from_matrix
 
-_COS_LOST, _COS_FOUND = np.cos(np.radians(55)), np.cos(np.radians(25))  # of a bone's error
-_PATIENCE = 0.15  # [s] before a limb that is lost is led
+_COS_LOST = np.cos(np.radians(55))  # a bone farther from its direction is stuck,
+_COS_FOUND = np.cos(np.radians(25))  # a nearer one is free again
+_PATIENCE = 0.15  # [s] that a limb is stuck before it is led
 _MAX_DURATION = 0.6  # [s] that it is led, and that it is then left alone
-_W_DETOUR = 2.0
-_SPEED = 8.0  # [rad/s] that it is led
+_W_DETOUR = 2.0  # [1/rad] of the angles that it is led to
+_SPEED = 8.0  # [rad/s] at which it is led
 
 
 class Detours:
-    """Looks after the limbs of a robot, and tells where hinges should tend to."""
+    """Finds limbs that are stuck, and the posture that leads them out."""
 
     def __init__(self, reader: FrameReader, terms: Terms, frame_time: float) -> None:
         self._robot, self._terms, self._frame_time = reader.robot, terms, frame_time
@@ -37,42 +38,43 @@ class Detours:
             chain = [j for j in robot.tree.chain(int(robot.links[lower])) if j not in inner]
             hinges = [int(numbers[j]) for j in chain if not robot.tree.balls[j]]
             self._limbs.append(([k, k + 1], hinges))
-        self._lost = np.zeros(len(self._limbs))  # [s]
+        self._stuck = np.zeros(len(self._limbs))  # [s]
         self._led = np.zeros(len(self._limbs))  # [s] left; below 0 it is left alone
-        self._goals = np.full(len(terms.relaxed.angles), np.nan)
+        self._goals = np.full(len(terms.at_tpose.angles), np.nan)
 
-    def look(
+    def update(
         self,
         targets: FrameTargets,
         bones: Float[np.ndarray, "B 3"],
         angles: Float[np.ndarray, "H"],
     ) -> Posture:
-        """What hinges should tend to, when bones point like this and hinges stand at `angles`."""
+        """The posture that hinges are pulled to, where bones have the directions `bones` and hinges
+        are at `angles` [rad]."""
         right = (bones * targets.bones).sum(1)
         worst = np.array([right[rows].min() for rows, _ in self._limbs])
-        self._lost = np.where(worst < _COS_LOST, self._lost + self._frame_time, 0.0)
+        self._stuck = np.where(worst < _COS_LOST, self._stuck + self._frame_time, 0.0)
         led = self._led > 0
         self._led -= np.clip(self._led, -self._frame_time, self._frame_time)
         for limb in np.flatnonzero(led & ((worst > _COS_FOUND) | (self._led == 0))):
             self._led[limb] = -_MAX_DURATION
             self._goals[self._limbs[limb][1]] = np.nan
-        lost = np.flatnonzero((self._lost > _PATIENCE) & (self._led == 0))
-        if len(lost):
+        stuck = np.flatnonzero((self._stuck > _PATIENCE) & (self._led == 0))
+        if len(stuck):
             world = quat_from_matrix(targets.world)[None]
             q = self._robot.to_qpos(project(self._robot, world, targets.hips[None]))
             there = (self._terms.bones(self._terms.poses(q))[0] * targets.bones).sum(1)
-            for limb in lost:
+            for limb in stuck:
                 rows, hinges = self._limbs[limb]
                 better = there[rows].min() > _COS_FOUND
                 self._led[limb] = _MAX_DURATION if better else -_MAX_DURATION
                 self._goals[hinges] = self._terms.angles(q)[0, hinges] if better else np.nan
-        relaxed, on_the_way = self._terms.relaxed, np.isfinite(self._goals)
+        at_tpose, on_the_way = self._terms.at_tpose, np.isfinite(self._goals)
         if not on_the_way.any():
-            return relaxed
-        # The frames that are solved for lie ahead.
+            return at_tpose
+        # `LATENCY` frames lie ahead of the one at `angles`.
         most = _SPEED * self._frame_time * (LATENCY + 1)
         next_angles = angles + np.clip(self._goals - angles, -most, most)
         return Posture(
-            np.where(on_the_way, next_angles, relaxed.angles),
-            np.where(on_the_way, _W_DETOUR, relaxed.weights),
+            np.where(on_the_way, next_angles, at_tpose.angles),
+            np.where(on_the_way, _W_DETOUR, at_tpose.weights),
         )

@@ -1,4 +1,4 @@
-"""Which feet stand, told as frames come in, and where they are held.
+"""The contacts of a stream's feet, and the robot's footholds.
 
 A foot is held where it comes down. What the source's foot wobbles while it stands is lost, what it
 drifts beyond that is motion and stays; as in `robots.solver.footprints`, which sees the whole clip.
@@ -20,52 +20,60 @@ _RELEASE_FACTOR = (
 
 
 class ContactTracker:
-    """The contacts of a stream's feet and the robot's footprints, `ahead` frames after they
-    happen: so much is known of what comes next."""
+    """The contacts of a stream's feet and the robot's footholds, with a lookahead of `ahead`
+    frames."""
 
     def __init__(self, reader: FrameReader, frame_time: float, ahead: int) -> None:
         self._robot, self._scale = reader.robot, reader.scale
         self._low = reader.ground.low
         self._frame_time, self._ahead = frame_time, ahead
         size = reader.source.standing_height / ADULT_HEIGHT
-        self._slow, self._near = PLANTED_SPEED * size, PLANTED_HEIGHT * size
+        self._max_speed, self._max_height = PLANTED_SPEED * size, PLANTED_HEIGHT * size
         self._reach = max(1, round(SPEED_WINDOW / 2 / frame_time))
-        self._known = reader.has_feet[:, None]
+        self._has_foot = reader.has_feet[:, None]
         self._flat = [flat_sole(self._robot, sole) for sole in self._robot.soles]
         self._length = self._reach + ahead + 1
-        self._seen: deque[FrameTargets] = deque(maxlen=self._length)
+        self._history: deque[FrameTargets] = deque(maxlen=self._length)
         soles = len(self._robot.soles)
-        self._stands = np.zeros((soles, 2), dtype=bool)
+        self._planted = np.zeros((soles, 2), dtype=bool)
         self._holds = np.zeros((soles, 2))
-        self._prints = [Footprint() for _ in range(soles)]
+        self._footprints = [Footprint() for _ in range(soles)]
 
-    def look(self, targets: FrameTargets, points: Float[np.ndarray, "P 3"]) -> FootTargets:
+    def update(self, targets: FrameTargets, points: Float[np.ndarray, "P 3"]) -> FootTargets:
         """Takes in the newest frame, and says how the feet stand `ahead` frames before it, when
         the points of the robot's soles are at `points`."""
-        first = not self._seen
-        self._seen.extend([targets] * (self._length if first else 1))
-        here = len(self._seen) - 1 - self._ahead
-        now, before = self._seen[here], self._seen[here - 1]
+        first = not self._history
+        self._history.extend([targets] * (self._length if first else 1))
+        here = len(self._history) - 1 - self._ahead
+        now, before = self._history[here], self._history[here - 1]
         after = min(self._reach, self._ahead)
-        way = self._seen[here + after].feet - self._seen[here - self._reach].feet
-        speed = np.hypot(way[..., 0], way[..., 1]) / ((self._reach + after) * self._frame_time)
+        travelled = self._history[here + after].feet - self._history[here - self._reach].feet
+        speed = np.hypot(travelled[..., 0], travelled[..., 1]) / (
+            (self._reach + after) * self._frame_time
+        )
         height = now.feet[..., 2] - self._low
-        more = np.where(self._stands, _RELEASE_FACTOR, 1.0)
-        self._stands = self._known & (speed < more * self._slow) & (height < more * self._near)
+        factor = np.where(self._planted, _RELEASE_FACTOR, 1.0)
+        self._planted = (
+            self._has_foot
+            & (speed < factor * self._max_speed)
+            & (height < factor * self._max_height)
+        )
         ramp = 1.0 if first else self._frame_time / RAMP
-        step = np.clip(self._stands - self._holds, -ramp, ramp)
+        step = np.clip(self._planted - self._holds, -ramp, ramp)
         places, holds, end = np.zeros_like(points), np.zeros_like(points), 0
-        for s, (sole, mark) in enumerate(zip(self._robot.soles, self._prints, strict=True)):
+        for s, (sole, footprint) in enumerate(
+            zip(self._robot.soles, self._footprints, strict=True)
+        ):
             own = slice(end, end := end + len(sole))
-            point = int(self._stands[s, 1] or not self._stands[s, 0])
+            point = int(self._planted[s, 1] or not self._planted[s, 0])
             if not self._holds[s].any():
-                mark.put(points[own], self._flat[s], on_toe=point == 1)
+                footprint.put(points[own], self._flat[s], on_toe=point == 1)
             else:
                 moved = self._scale * (now.feet - before.feet)[s, point, :2]
-                turn = _turn(before.world[sole.foot], now.world[sole.foot])
+                turn = _yaw_between(before.world[sole.foot], now.world[sole.foot])
                 wobble = MAX_WOBBLE * self._robot.rig.hip_height
-                mark.follow(moved, turn, float(self._holds[s].max()), wobble)
-            places[own, :2] = mark.positions(self._flat[s])
+                footprint.follow(moved, turn, float(self._holds[s].max()), wobble)
+            places[own, :2] = footprint.positions(self._flat[s])
             self._holds[s] += step[s]
             holds[own] = on_points(sole, self._holds[s])[:, None]
         return FootTargets(places, holds)
@@ -108,7 +116,7 @@ class Footprint:
         return self._pivot + (flat - flat[-2:].mean(0)) @ np.array([[cos, sin], [-sin, cos]])
 
 
-def _turn(before: Float[np.ndarray, "3 3"], now: Float[np.ndarray, "3 3"]) -> float:
-    """By how much [rad] something turned about the vertical."""
+def _yaw_between(before: Float[np.ndarray, "3 3"], now: Float[np.ndarray, "3 3"]) -> float:
+    """The rotation about the vertical [rad] from one frame to the next."""
     R = now @ before.T
     return float(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]))

@@ -1,5 +1,5 @@
 """One frame of a source as a robot's targets: what `robots.solver.targets` makes of a clip, without
-what only a clip can tell, in a tenth of its time."""
+what needs the whole clip, in a tenth of its time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -24,8 +24,8 @@ from spark.rotation import matrix_from_quat, quat_conj
 from spark.transfer.analytic import correspond
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
-LATENCY = 2  # [frames] between what a stream has seen and what it says
-_MAX_NORM_ERROR = 0.05  # by how much a quaternion's length may differ from 1
+LATENCY = 2  # [frames] between the newest frame of a stream and its answer
+_MAX_NORM_ERROR = 0.05  # of a quaternion: beyond, it is not one that was merely rounded
 
 
 class Frame(NamedTuple):
@@ -40,8 +40,8 @@ class Frame(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """What a clip says about the floor: its height [m], and how low [m] heel and toe of the feet
-    that each of the robot's soles follows come (1st percentile)."""
+    """The floor under a clip: its height `z` [m], and the lowest heights [m] of heel and toe of the
+    feet that the robot's soles follow (1st percentile)."""
 
     z: float
     low: Float[np.ndarray, "S 2"]
@@ -77,7 +77,7 @@ def ground_of(source: CanonicalMotion, robot: Morphology) -> Ground:
 
 
 class FrameReader:
-    """Reads frames of motions on one rig as targets for one robot."""
+    """Turns frames of motions on one rig into targets for one robot."""
 
     def __init__(self, source: Rig, robot: Morphology, ground: Ground) -> None:
         self.source, self.robot, self.ground = source, robot, ground
@@ -86,15 +86,17 @@ class FrameReader:
         self._untpose = matrix_from_quat(quat_conj(source.tpose))
         self._tpose = matrix_from_quat(robot.rig.tpose)
         self._chest = source.chest
-        self._turns = correspond(source, robot.rig)
-        self._held = np.flatnonzero(self._turns.first < 0)
-        self._between = np.flatnonzero((self._turns.mix != 0) & (self._turns.first >= 0))
-        self._watch_feet()
-        self._watch_bones()
-        self._watch_hands()
+        self._correspondence = correspond(source, robot.rig)
+        self._at_rest = np.flatnonzero(self._correspondence.first < 0)
+        self._interpolated = np.flatnonzero(
+            (self._correspondence.mix != 0) & (self._correspondence.first >= 0)
+        )
+        self._index_feet()
+        self._index_bones()
+        self._index_hands()
 
     def targets(self, frame: Frame) -> FrameTargets:
-        """What a frame asks of the robot.
+        """The targets that a frame sets for the robot.
 
         Raises `FrameError` where it is not a frame of the source's skeleton.
         """
@@ -102,7 +104,7 @@ class FrameReader:
         turns = world @ self._untpose
         bones = joints[self._lower] - joints[self._upper]
         bones /= np.maximum(np.sqrt((bones * bones).sum(1, keepdims=True)), 1e-12)
-        for row, joint, out in self._blind:
+        for row, joint, out in self._by_rotation:
             bones[row] = turns[joint] @ out
         hips = joints[self.source.hips].mean(0)
         hips[2] -= self.ground.z
@@ -151,17 +153,21 @@ class FrameReader:
 
     def _own(self, turns: Float[np.ndarray, "N 3 3"]) -> Float[np.ndarray, "J 3 3"]:
         """How the robot's joints turn since the T-pose: as `Correspondence.rotations` says."""
-        first, second, mix = self._turns.first, self._turns.second, self._turns.mix
+        first, second, mix = (
+            self._correspondence.first,
+            self._correspondence.second,
+            self._correspondence.mix,
+        )
         out = turns[first]
-        for j in self._between.tolist():
-            a, b, toward, matrix = np.empty(4), np.empty(4), np.empty(3), np.empty(9)
+        for j in self._interpolated.tolist():
+            a, b, rotvec, matrix = np.empty(4), np.empty(4), np.empty(3), np.empty(9)
             mujoco.mju_mat2Quat(a, turns[first[j]].ravel())
             mujoco.mju_mat2Quat(b, turns[second[j]].ravel())
-            mujoco.mju_subQuat(toward, b, a)
-            mujoco.mju_quatIntegrate(a, toward, mix[j])
+            mujoco.mju_subQuat(rotvec, b, a)
+            mujoco.mju_quatIntegrate(a, rotvec, mix[j])
             mujoco.mju_quat2Mat(matrix, a)
             out[j] = matrix.reshape(3, 3)
-        out[self._held] = self._tpose[self._held].transpose(0, 2, 1)
+        out[self._at_rest] = self._tpose[self._at_rest].transpose(0, 2, 1)
         return out
 
     def _feet(
@@ -181,7 +187,7 @@ class FrameReader:
         distance = float(np.sqrt(between @ between))
         return between * (max(distance, least) / max(distance, 1e-9))
 
-    def _watch_feet(self) -> None:
+    def _index_feet(self) -> None:
         """The source's heels and toes that the robot's soles follow."""
         source, robot = self.source, self.robot
         source_soles = {sole.side: sole for sole in source.soles}
@@ -196,25 +202,25 @@ class FrameReader:
         self._heels, self._toes = np.array(heels, dtype=int), np.array(toes, dtype=int)
         self._heel_offsets = np.array(offsets).reshape(-1, 3)
 
-    def _watch_bones(self) -> None:
+    def _index_bones(self) -> None:
         """The segments of the limbs that both have, and between which joints they point; where the
         far one is missing, the rotation says it."""
         roles, rest = self.source.roles, self.source.skeleton.rest_positions
         self.bones: list[Role] = []
-        upper, lower, self._blind = [], [], []
+        upper, lower, self._by_rotation = [], [], []
         for role, far in LIMB_SEGMENTS:
             a, b = roles.joint(role), roles.joint(far)
             if a is None or role not in self.robot.bones:
                 continue
             if b is None or np.linalg.norm(rest[b] - rest[a]) < 1e-6:
-                self._blind.append((len(self.bones), a, TPOSE_DIRECTIONS[role]))
+                self._by_rotation.append((len(self.bones), a, TPOSE_DIRECTIONS[role]))
                 b = a
             self.bones.append(role)
             upper.append(a)
             lower.append(b)
         self._upper, self._lower = np.array(upper, dtype=int), np.array(lower, dtype=int)
 
-    def _watch_hands(self) -> None:
+    def _index_hands(self) -> None:
         """The wrists of a source and a robot that have both, in which scale, and how near [m] the
         robot's may come."""
         roles = (Role.LEFT_HAND, Role.RIGHT_HAND)

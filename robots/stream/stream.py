@@ -1,9 +1,8 @@
 """Retargeting onto a robot while the source moves: for teleoperation.
 
-What `robots.solver.solve` does for a whole clip, over the last frames alone: two frames that are
-gone, which the next ones are tied to by their accelerations, and three that are still free. Every
-new frame moves the window on by one, and what leaves it is the answer: `LATENCY` frames old, by
-what has been seen since a better one.
+The objective of `robots.solver` over a window of the last frames: two that are fixed, to which
+accelerations couple the next, and three that are free. Every new frame moves the window on by one.
+What becomes fixed is the answer: `LATENCY` frames old, and the better for what has come since.
 """
 
 import numpy as np
@@ -68,9 +67,9 @@ class Stream:
             q = self._q[_SHIFTED]
             self._targets = [*self._targets[1:], targets]
             poses = self._terms.poses(q[_FIXED : _FIXED + 1])  # what is next to be said
-            foot_targets = self._contacts.look(targets, self._terms.sole_points(poses)[0])
+            foot_targets = self._contacts.update(targets, self._terms.sole_points(poses)[0])
             bones, angles = self._terms.bones(poses)[0], self._terms.angles(q)[_FIXED]
-            posture = self._detours.look(self._targets[0], bones, angles)
+            posture = self._detours.update(self._targets[0], bones, angles)
             self._q = self._window.solve(q, stack_targets(self._targets), foot_targets, posture)
         else:
             self._targets = [targets] * (LATENCY + 1)
@@ -87,7 +86,7 @@ class Stream:
         foot_targets = FootTargets(np.zeros((points, 3)), np.zeros((points, 3)))
         for held in (False, True):
             if held:
-                foot_targets = self._contacts.look(
+                foot_targets = self._contacts.update(
                     targets, self._terms.sole_points(self._terms.poses(q))[0]
                 )
             q = self._window.settle(q, wanted, foot_targets, _FIRST_ITERATIONS)

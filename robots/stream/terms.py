@@ -2,9 +2,9 @@
 
 The terms and weights are those of `robots.solver.objective`, and so is the order: arms and head
 hang on base, trunk and legs, and don't move them. There every term walks its own chain, over
-thousands of frames; here MuJoCo says where bodies are, and all columns of all terms are made at
-once. The columns are MuJoCo's degrees of freedom, in the order of `robots.tree`: the base turns
-about its own axes, and so do balls.
+thousands of frames; here MuJoCo gives the bodies' poses, and the Jacobian of all terms is made at
+once. Its columns are MuJoCo's dofs, in the order of `robots.tree`: the base rotates about its own
+axes, and so do balls.
 """
 
 from collections.abc import Sequence
@@ -24,12 +24,16 @@ from robots.stream.frame_targets import FrameTargets
 from robots.tree import BASE
 from spark.rig.roles import Role
 
-Linear = tuple[Float[np.ndarray, "T R 3 D"], Float[np.ndarray, "T R 3"], Float[np.ndarray, "T R 3"]]
+LinearTerms = tuple[
+    Float[np.ndarray, "T R 3 D"], Float[np.ndarray, "T R 3"], Float[np.ndarray, "T R 3"]
+]
+"""J, squared weights, and squared weights times residuals, of R directions and points."""
 
 
 @dataclass(frozen=True, eq=False)
 class FootTargets:
-    """For each point of the soles: where it should stand [m], and how firmly (0 to 1)."""
+    """The footholds of the soles' points: `positions` [m, world], and by axis the share of the
+    weight with which they are held there (`holds`, 0 to 1)."""
 
     positions: Float[np.ndarray, "P 3"]
     holds: Float[np.ndarray, "P 3"]
@@ -37,15 +41,15 @@ class FootTargets:
 
 @dataclass(frozen=True, eq=False)
 class Posture:
-    """What hinges tend to [rad, as in qpos], and how much."""
+    """The angles that hinges are pulled to [rad, as in qpos], and the weights of that [1/rad]."""
 
     angles: Float[np.ndarray, "H"]
     weights: Float[np.ndarray, "H"]
 
 
 class Terms:
-    """What the poses of a robot cost. `bones` are those whose directions are known, `hands` says
-    whether the way between both is."""
+    """The residuals of a robot's poses, as normal equations. `bones` are the limbs' segments whose
+    directions the source gives, `hands` says whether it gives the offset between both."""
 
     def __init__(self, robot: Morphology, bones: Sequence[Role], hands: bool) -> None:
         self.robot, tree = robot, robot.tree
@@ -53,45 +57,45 @@ class Terms:
         self._data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, self._data)
         self._rest = self._data.xmat.reshape(-1, 3, 3).copy(), self._data.xpos.copy()
-        self._first = np.zeros(len(tree) + 1, dtype=bool)  # of the links, and -1
-        self._first[[*blocks_of(robot)[0].joints, -1]] = True
+        self._in_first_block = np.zeros(len(tree) + 1, dtype=bool)  # of the links, and -1
+        self._in_first_block[[*blocks_of(robot)[0].joints, -1]] = True
         joints = np.array(robot.mj_joints, dtype=int)
         self._joints = np.repeat(joints, np.where(tree.balls, 3, 1))
-        self._hinge_columns = tree.dof_starts[~tree.balls]
+        self._hinge_dofs = tree.dof_starts[~tree.balls]
         hinges = joints[~tree.balls]
         self._hinge_qpos = self._model.jnt_qposadr[hinges]
         rest = self._model.qpos0[self._hinge_qpos]
         lower, upper = (limit[~tree.balls] + rest for limit in (tree.lower, tree.upper))
         margin = np.minimum(objective.LIMIT_MARGIN, 0.1 * (upper - lower))
-        self._soft = lower + margin, upper - margin
+        self._soft_limits = lower + margin, upper - margin
         angles = robot.tpose.angles[0, ~tree.balls] + rest
-        self.relaxed = Posture(angles, np.full(len(angles), objective.W_TPOSE))
+        self.at_tpose = Posture(angles, np.full(len(angles), objective.W_TPOSE))
         bodies = np.array([self._body(link) for link in (*range(len(tree)), -1)])
         self._collisions = WindowCollisions(
-            robot, bodies, self._rest, np.flatnonzero(self._first[:-1])
+            robot, bodies, self._rest, np.flatnonzero(self._in_first_block[:-1])
         )
-        self._watch_turns()
-        self._watch_bones(bones)
-        self._watch_points(hands)
+        self._index_rotations()
+        self._index_bones(bones)
+        self._index_points(hands)
 
     def poses(self, q: Float[np.ndarray, "T nq"]) -> WindowPoses:
-        """Where everything is in the frames of a `qpos`."""
+        """The poses of all bodies and joints, by MuJoCo."""
         model, data, count = self._model, self._data, len(q)
-        turns, places = np.empty((count, model.nbody, 9)), np.empty((count, model.nbody, 3))
+        rotations, positions = np.empty((count, model.nbody, 9)), np.empty((count, model.nbody, 3))
         axes, anchors = np.empty((2, count, model.njnt, 3))
         for t in range(count):
             data.qpos = q[t]
             mujoco.mj_kinematics(model, data)
-            turns[t], places[t] = data.xmat, data.xpos
+            rotations[t], positions[t] = data.xmat, data.xpos
             axes[t], anchors[t] = data.xaxis, data.xanchor
-        return WindowPoses(turns.reshape(count, -1, 3, 3), places, axes, anchors)
+        return WindowPoses(rotations.reshape(count, -1, 3, 3), positions, axes, anchors)
 
     def sole_points(self, poses: WindowPoses) -> Float[np.ndarray, "T P 3"]:
         """The points of the soles [m, world]."""
-        return self._points(poses)[:, : self._stood_on]
+        return self._points(poses)[:, : self._sole_count]
 
     def bones(self, poses: WindowPoses) -> Float[np.ndarray, "T B 3"]:
-        """Where the bones point."""
+        """The unit directions of the bones [world]."""
         return (poses.rotations[:, self._bone_bodies] @ self._bones[:, :, None])[..., 0]
 
     def angles(self, q: Float[np.ndarray, "T nq"]) -> Float[np.ndarray, "T H"]:
@@ -99,7 +103,7 @@ class Terms:
         return q[:, self._hinge_qpos]
 
     def candidates(self, q: Float[np.ndarray, "T nq"]) -> Int[np.ndarray, "K"]:
-        """Which parts may run into each other, in these poses and others that are not far away."""
+        """The collision candidates, in these poses and others that are not far away."""
         return self._collisions.candidates(self.poses(q))
 
     def linearize(
@@ -110,33 +114,37 @@ class Terms:
         posture: Posture,
         candidates: Int[np.ndarray, "K"],
     ) -> tuple[Float[np.ndarray, "T D D"], Float[np.ndarray, "T D"]]:
-        """The normal equations of each frame for itself: `H step = -g`. `candidates` is what
-        `candidates` says of such poses."""
+        """H and g of the normal equations `H step = -g`, each frame for itself. `candidates` are
+        those of poses near these."""
         poses = self.poses(q)
-        axes, anchors = self._columns(poses)
+        axes, anchors = self._dof_axes(poses)
         # Parts that should be turned some way: an axial vector each
         # (`robots.residuals.rotation_residual`).
-        wanted = np.concatenate([targets.world[:, self._followed], targets.chest[:, None]], axis=1)
-        M = poses.rotations[:, self._turned] @ (wanted @ self._turned_rest).transpose(0, 1, 3, 2)
+        target = np.concatenate(
+            [targets.world[:, self._rotation_joints], targets.chest[:, None]], axis=1
+        )
+        M = poses.rotations[:, self._rotation_bodies] @ (target @ self._rotation_rest).transpose(
+            0, 1, 3, 2
+        )
         axial = np.empty((*M.shape[:2], 3))
         np.subtract(M[..., 2, 1], M[..., 1, 2], out=axial[..., 0])
         np.subtract(M[..., 0, 2], M[..., 2, 0], out=axial[..., 1])
         np.subtract(M[..., 1, 0], M[..., 0, 1], out=axial[..., 2])
-        H = self._turn_gram * (axes @ axes.transpose(0, 2, 1))
-        g = 0.5 * (axes * (self._turn_mask @ axial)).sum(2)
-        J, weights, forces = self._rows(poses, axes, anchors, targets, foot_targets)
-        rows = J.reshape(len(q), -1, J.shape[3])
-        across = rows.transpose(0, 2, 1)
-        H += across @ (rows * weights.reshape(len(q), -1, 1))
+        H = self._rotation_gram * (axes @ axes.transpose(0, 2, 1))
+        g = 0.5 * (axes * (self._rotation_weights @ axial)).sum(2)
+        J, weights, forces = self._linear_terms(poses, axes, anchors, targets, foot_targets)
+        J_rows = J.reshape(len(q), -1, J.shape[3])
+        across = J_rows.transpose(0, 2, 1)
+        H += across @ (J_rows * weights.reshape(len(q), -1, 1))
         g += (across @ forces.reshape(len(q), -1, 1))[..., 0]
         self._collisions.add_to(poses, axes, anchors, candidates, H, g)
-        self._limit(q, posture, H, g)
+        self._add_limits_and_posture(q, posture, H, g)
         return H, g
 
-    def _columns(
+    def _dof_axes(
         self, poses: WindowPoses
     ) -> tuple[Float[np.ndarray, "T D 3"], Float[np.ndarray, "T D 3"]]:
-        """The columns' axes, none for a shift, and what these turn about."""
+        """The dofs' axes [world], 0 for the base's shifts, and the points they rotate about."""
         root = self.robot.mjcf.root
         axes, anchors = np.zeros((2, len(poses.positions), BASE + len(self._joints), 3))
         axes[:, 3:BASE] = poses.rotations[:, root].transpose(0, 2, 1)
@@ -149,19 +157,18 @@ class Terms:
         return axes, anchors
 
     def _points(self, poses: WindowPoses) -> Float[np.ndarray, "T P 3"]:
-        turns = poses.rotations[:, self._point_bodies]
-        return (turns @ self._arms[:, :, None])[..., 0] + poses.positions[:, self._point_bodies]
+        rotations = poses.rotations[:, self._point_bodies]
+        return (rotations @ self._arms[:, :, None])[..., 0] + poses.positions[:, self._point_bodies]
 
-    def _rows(
+    def _linear_terms(
         self,
         poses: WindowPoses,
         axes: Float[np.ndarray, "T D 3"],
         anchors: Float[np.ndarray, "T D 3"],
         targets: FrameTargets,
         foot_targets: FootTargets,
-    ) -> Linear:
-        """How directions and points grow with all columns, the squares of their weights, and
-        residuals times these."""
+    ) -> LinearTerms:
+        """The residuals of directions and points, as `robots.residuals` has them."""
         points = self._points(poses)
         bones = self.bones(poses)
         (count, B, _), P, D = bones.shape, points.shape[1], axes.shape[1]
@@ -175,106 +182,108 @@ class Terms:
         np.subtract(az * x, ax * z, out=J[:, :, 1])
         np.subtract(ax * y, ay * x, out=J[:, :, 2])
         J[:, B:, :, :3] = np.eye(3)
-        J *= self._row_mask
+        J *= self._dof_mask
         weights, forces = np.empty((2, count, B + P, 3))
         weights[:, :B] = objective.W_LIMB_DIRECTION**2
         forces[:, :B] = objective.W_LIMB_DIRECTION**2 * (bones - targets.bones)
-        self._weigh_soles(points, foot_targets, weights[:, B:], forces[:, B:])
-        hips = B + self._stood_on
+        self._add_soles(points, foot_targets, weights[:, B:], forces[:, B:])
+        hips = B + self._sole_count
         weights[:, hips] = objective.W_HIPS_POSITION**2
         forces[:, hips] = objective.W_HIPS_POSITION**2 * (points[:, hips - B] - targets.hips)
         if self._hands:
-            # Of two points the difference: that of the rows.
-            far = (targets.hands**2).sum(1, keepdims=True)
-            weight = (objective.W_HANDS * np.exp(-far / objective.HANDS_RANGE**2)) ** 2
+            # The residual is the difference of two points, so is its Jacobian.
+            squared = (targets.hands**2).sum(1, keepdims=True)
+            weight = (objective.W_HANDS * np.exp(-squared / objective.HANDS_RANGE**2)) ** 2
             J[:, hips + 1] -= J[:, hips + 2]
             weights[:, hips + 1], weights[:, hips + 2] = weight, 0.0
             between = points[:, -2] - points[:, -1] - targets.hands
             forces[:, hips + 1], forces[:, hips + 2] = weight * between, 0.0
         return J, weights, forces
 
-    def _weigh_soles(
+    def _add_soles(
         self,
         points: Float[np.ndarray, "T P 3"],
         foot_targets: FootTargets,
         weights: Float[np.ndarray, "T P 3"],
         forces: Float[np.ndarray, "T P 3"],
     ) -> None:
-        """Points of soles stand where they should, and none is below the floor."""
-        count = self._stood_on
-        penalty_scale = (objective.W_FOOT_HOLD * foot_targets.holds) ** 2
-        weights[:, :count] = penalty_scale
-        forces[:, :count] = penalty_scale * (points[:, :count] - foot_targets.positions)
+        """The footholds of the soles' points, and the floor; weights squared."""
+        count = self._sole_count
+        hold_weights = (objective.W_FOOT_HOLD * foot_targets.holds) ** 2
+        weights[:, :count] = hold_weights
+        forces[:, :count] = hold_weights * (points[:, :count] - foot_targets.positions)
         depth, slope = one_sided(-points[:, :count, 2], objective.FLOOR_ROUNDING)
         weights[:, :count, 2] += (objective.W_FLOOR * slope) ** 2
         forces[:, :count, 2] -= objective.W_FLOOR**2 * slope * depth
 
-    def _limit(
+    def _add_limits_and_posture(
         self,
         q: Float[np.ndarray, "T nq"],
         posture: Posture,
         H: Float[np.ndarray, "T D D"],
         g: Float[np.ndarray, "T D"],
     ) -> None:
-        """Keep hinges from their limits, and what nothing else asks for as it tends to be."""
+        """Limits, as `limit_residual` has them, and the pull to the posture."""
         angles = self.angles(q)
-        lower, upper = self._soft
+        lower, upper = self._soft_limits
         above, rising = one_sided(angles - upper, objective.LIMIT_MARGIN / 4)
         below, falling = one_sided(lower - angles, objective.LIMIT_MARGIN / 4)
-        idle = posture.weights**2
+        pull = posture.weights**2
         diagonal = np.full(g.shape, 1e-6)
-        diagonal[:, self._hinge_columns] = idle + (objective.W_LIMIT * (rising + falling)) ** 2
+        diagonal[:, self._hinge_dofs] = pull + (objective.W_LIMIT * (rising + falling)) ** 2
         H.reshape(len(q), -1)[:, :: H.shape[1] + 1] += diagonal
-        push = objective.W_LIMIT**2 * (rising + falling) * (above - below)
-        g[:, self._hinge_columns] += push + idle * (angles - posture.angles)
+        gradient = objective.W_LIMIT**2 * (rising + falling) * (above - below)
+        g[:, self._hinge_dofs] += gradient + pull * (angles - posture.angles)
 
     def _body(self, link: int) -> int:
         robot = self.robot
         return int(self._model.jnt_bodyid[robot.mj_joints[link]]) if link >= 0 else robot.mjcf.root
 
     def _mask(self, links: Sequence[int]) -> Bool[np.ndarray, "K D"]:
-        """The columns that move some links, in the stage that is theirs."""
+        """The dofs that move some links, of the block that solves for these."""
         tree = self.robot.tree
         out = np.zeros((len(links), tree.nv), dtype=bool)
         for k, link in enumerate(links):
-            out[k, :BASE] = self._first[link]
-            same = [j for j in tree.chain(link) if self._first[j] == self._first[link]]
+            out[k, :BASE] = self._in_first_block[link]
+            same = [
+                j for j in tree.chain(link) if self._in_first_block[j] == self._in_first_block[link]
+            ]
             out[k, tree.dofs(tuple(same))] = True
         return out
 
-    def _watch_turns(self) -> None:
-        """Which parts are turned some way, and how much that weighs."""
+    def _index_rotations(self) -> None:
+        """The parts with a target rotation, and their weights."""
         rig, links = self.robot.rig, self.robot.links.tolist()
-        followed, weights = [], []
+        joints, weights = [], []
         for j, role in enumerate(rig.roles.roles):
             own = j == 0 or links[j] != links[int(rig.skeleton.parents[j])]
             if role is not None and own:
-                followed.append(j)
+                joints.append(j)
                 weights.append(W_ROTATION.get(role.part, W_OTHER_ROTATION))
-        self._followed = np.array(followed)
-        turned = [*(links[j] for j in followed), links[rig.chest]]
-        bodies = [self._body(link) for link in turned]
-        self._turned = np.array(bodies)
-        self._turned_rest = self._rest[0][bodies]
-        mask = self._mask(turned)
-        self._turn_mask = (mask * np.array([[*weights, W_ROTATION["chest"]]]).T ** 2).T
-        self._turn_gram = self._turn_mask @ mask
+        self._rotation_joints = np.array(joints)
+        rotated = [*(links[j] for j in joints), links[rig.chest]]
+        bodies = [self._body(link) for link in rotated]
+        self._rotation_bodies = np.array(bodies)
+        self._rotation_rest = self._rest[0][bodies]
+        mask = self._mask(rotated)
+        self._rotation_weights = (mask * np.array([[*weights, W_ROTATION["chest"]]]).T ** 2).T
+        self._rotation_gram = self._rotation_weights @ mask
 
-    def _watch_bones(self, bones: Sequence[Role]) -> None:
+    def _index_bones(self, bones: Sequence[Role]) -> None:
         robot = self.robot
         self._bone_links = [int(robot.links[robot.rig.roles.require(role)]) for role in bones]
         self._bone_bodies = np.array([self._body(link) for link in self._bone_links], dtype=int)
         along = np.array([robot.bones[role] for role in bones]).reshape(-1, 3)
         self._bones = np.einsum("bji,bj->bi", self._rest[0][self._bone_bodies], along)
 
-    def _watch_points(self, hands: bool) -> None:
-        """The soles' points, the middle of the hips and, where asked, both wrists; the columns
-        that move these and the bones."""
+    def _index_points(self, hands: bool) -> None:
+        """The soles' points, the middle of the hips and, where asked, both wrists; the dofs that
+        move these and the bones."""
         robot = self.robot
         soles = [robot.sole_points(sole) for sole in robot.soles]
         links = [link for own, _ in soles for link in own.tolist()]
         rest = [point for _, points in soles for point in points]
-        self._stood_on = len(links)
+        self._sole_count = len(links)
         links.append(int(robot.links[robot.rig.pelvis]))
         rest.append(robot.centers[robot.rig.hips].mean(0))
         self._hands = hands
@@ -284,7 +293,7 @@ class Terms:
                 links.append(int(robot.links[j]))
                 rest.append(robot.centers[j])
         self._point_bodies = np.array([self._body(link) for link in links])
-        turns, places = (part[self._point_bodies] for part in self._rest)
-        self._arms = np.einsum("pji,pj->pi", turns, np.array(rest) - places)
+        rotations, positions = (part[self._point_bodies] for part in self._rest)
+        self._arms = np.einsum("pji,pj->pi", rotations, np.array(rest) - positions)
         mask = self._mask([*self._bone_links, *links])
-        self._row_mask = mask[:, None].astype(np.float64)
+        self._dof_mask = mask[:, None].astype(np.float64)

@@ -13,20 +13,18 @@ from robots.solver.smoothness import acceleration_weights
 from robots.stream.frame_targets import FrameTargets
 from robots.stream.terms import FootTargets, Posture, Terms
 
-SMOOTH_CUTOFF = (
-    5.5  # [Hz] above which a motion fades: more than in hindsight, or it would lag behind
-)
-_DAMPING = 1e-3
-_LONE_DAMPING = 0.02  # where nothing else keeps steps small
-_FIXED_DAMPING = 1e8
-_MAX_STEP = 0.2  # [rad, m] a column moves in one step
-_MAX_ITER = 2  # at most,
-_STEP_TOL = 0.1  # [rad, m] and none after one that is shorter
+SMOOTH_CUTOFF = 5.5  # [Hz] above which motion fades: below, without later frames, it would lag
+_DAMPING = 1e-3  # [1] on the diagonal of the normal equations,
+_LONE_DAMPING = 0.02  # where frames are not coupled,
+_HELD = 1e8  # and at a limit
+_MAX_STEP = 0.2  # [rad, m] of a dof in one step
+_MAX_ITER = 2  # steps a frame, at most
+_STEP_TOL = 0.1  # [rad, m] after a shorter step there is no further one
 
 
 class Window:
-    """Solves for the last frames of a trajectory in `qpos`: `free` ones, after some that are
-    `fixed`, which they are tied to."""
+    """Solves for the last frames of a trajectory of qpos: `free` frames, coupled by accelerations
+    and speeds to each other and to the `fixed` ones before them."""
 
     def __init__(
         self, robot: Morphology, terms: Terms, frame_time: float, *, fixed: int, free: int
@@ -40,24 +38,27 @@ class Window:
             dofs += range(start, start + (3 if ball else 1))
         self._dofs = np.array(dofs)
         hinges = ~tree.balls
-        self._columns = tree.dof_starts[hinges]
+        self._hinge_dofs = tree.dof_starts[hinges]
         self._angles = self._model.jnt_qposadr[np.array(robot.mj_joints)[hinges]]
         lower, upper = tree.limits_within(LIMIT_CLEARANCE)
         rest = self._model.qpos0[self._angles]
         self._lower, self._upper = lower[hinges] + rest, upper[hinges] + rest
-        # What ties frames together: as `robots.least_squares.Smoothness`, those that are gone
-        # immovable.
+        # As `robots.least_squares.Smoothness`, for the free frames alone; weights squared.
         weights = (
             acceleration_weights(robot)
             * (objective.SMOOTH_CUTOFF / SMOOTH_CUTOFF / frame_time) ** 2
         )
-        self._stiff = weights**2
-        second, self._first = (np.diff(np.eye(fixed + free), k, axis=0)[:, fixed:] for k in (2, 1))
-        self._second = second
-        self._ties = np.kron(second.T @ second, np.diag(self._stiff))
-        self._rush = (W_OVERSPEED / frame_time) ** 2
-        self._most = np.full(tree.nv, np.inf)
-        self._most[self._columns] = MAX_HINGE_SPEED * frame_time
+        self._acceleration_weights = weights**2
+        second_difference, self._first_difference = (
+            np.diff(np.eye(fixed + free), k, axis=0)[:, fixed:] for k in (2, 1)
+        )
+        self._second_difference = second_difference
+        self._coupling = np.kron(
+            second_difference.T @ second_difference, np.diag(self._acceleration_weights)
+        )
+        self._overspeed_weight = (W_OVERSPEED / frame_time) ** 2
+        self._max_steps = np.full(tree.nv, np.inf)
+        self._max_steps[self._hinge_dofs] = MAX_HINGE_SPEED * frame_time
 
     def solve(
         self,
@@ -66,7 +67,7 @@ class Window:
         foot_targets: FootTargets,
         posture: Posture,
     ) -> Float[np.ndarray, "T nq"]:
-        """`q` with its free frames, those that have targets, as these and the others want them."""
+        """`q` with its free frames, which `targets` are for, after at most `_MAX_ITER` steps."""
         candidates = self._terms.candidates(q[-1:])
         for _ in range(_MAX_ITER):
             q, length = self._step(q, targets, foot_targets, posture, candidates)
@@ -81,11 +82,16 @@ class Window:
         foot_targets: FootTargets,
         steps: int,
     ) -> Float[np.ndarray, "T nq"]:
-        """`q` with its free frames as their targets want them, each for itself."""
+        """`q` with its free frames after some steps, each frame for itself."""
         for _ in range(steps):
             candidates = self._terms.candidates(q[-1:])
             q, _ = self._step(
-                q, targets, foot_targets, self._terms.relaxed, candidates, alone=_LONE_DAMPING
+                q,
+                targets,
+                foot_targets,
+                self._terms.at_tpose,
+                candidates,
+                lone_damping=_LONE_DAMPING,
             )
         return q
 
@@ -97,22 +103,23 @@ class Window:
         posture: Posture,
         candidates: Int[np.ndarray, "K"],
         *,
-        alone: float | None = None,
+        lone_damping: float | None = None,
     ) -> tuple[Float[np.ndarray, "T nq"], float]:
-        """One step, and how long it was; `alone`, damped by so much, without the ties."""
+        """One Gauss-Newton step, and its largest entry [rad, m]; with `lone_damping`, frames are
+        not coupled, and damped by so much."""
         model, free = self._model, self._free
         H, g = self._terms.linearize(q[-free:], targets, foot_targets, posture, candidates)
         D = g.shape[1]
-        whole = self._ties * (alone is None)
+        whole = self._coupling * (lone_damping is None)
         blocks = whole.reshape(free, D, free, D)
         for t in range(free):
             blocks[t, :, t] += H[t]
-        if alone is None:
-            self._tie(q, blocks, g)
+        if lone_damping is None:
+            self._couple(q, blocks, g)
         held = self._at_limits(q[-free:], g)
         g[held] = 0.0
         whole.reshape(-1)[:: free * D + 1] += np.where(
-            held, _FIXED_DAMPING, alone or _DAMPING
+            held, _HELD, lone_damping or _DAMPING
         ).ravel()
         _, step, _ = dposv(whole.T, g.ravel(), overwrite_a=True)
         length = float(np.abs(step).max())
@@ -124,32 +131,34 @@ class Window:
         q[:, self._angles] = np.clip(q[:, self._angles], self._lower, self._upper)
         return q, length
 
-    def _tie(
+    def _couple(
         self,
         q: Float[np.ndarray, "T nq"],
         blocks: Float[np.ndarray, "F D F D"],
         g: Float[np.ndarray, "F D"],
     ) -> None:
-        """Add the pull of the accelerations, and hold back hinges that turn too fast."""
+        """Add the residuals of accelerations and overspeed to the normal equations."""
         steps = np.empty((len(q) - 1, self._model.nv))
         for t in range(len(q) - 1):
             mujoco.mj_differentiatePos(self._model, steps[t], 1.0, q[t], q[t + 1])
         steps = steps[:, self._dofs]
-        g += self._stiff * (self._second.T @ (steps[1:] - steps[:-1]))
-        haste = steps - np.clip(steps, -self._most, self._most)
-        if haste.any():
-            first, at = self._first, np.arange(g.shape[1])
-            g += self._rush * (first.T @ haste)
-            ties = np.einsum("vs,vt,vd->std", first, first, self._rush * (haste != 0))
-            for s, t in np.ndindex(ties.shape[:2]):
-                blocks[s, at, t, at] += ties[s, t]
+        g += self._acceleration_weights * (self._second_difference.T @ (steps[1:] - steps[:-1]))
+        overspeed = steps - np.clip(steps, -self._max_steps, self._max_steps)
+        if overspeed.any():
+            first, at = self._first_difference, np.arange(g.shape[1])
+            g += self._overspeed_weight * (first.T @ overspeed)
+            pulls = np.einsum(
+                "vs,vt,vd->std", first, first, self._overspeed_weight * (overspeed != 0)
+            )
+            for s, t in np.ndindex(pulls.shape[:2]):
+                blocks[s, at, t, at] += pulls[s, t]
 
     def _at_limits(
         self, q: Float[np.ndarray, "F nq"], g: Float[np.ndarray, "F D"]
     ) -> Bool[np.ndarray, "F D"]:
-        """Hinges at their limits that would go beyond."""
+        """The dofs of hinges at their limits that the gradient would take beyond."""
         held = np.zeros(g.shape, dtype=bool)
-        angles, push = q[:, self._angles], g[:, self._columns]
+        angles, gradient = q[:, self._angles], g[:, self._hinge_dofs]
         below, above = angles <= self._lower + 1e-9, angles >= self._upper - 1e-9
-        held[:, self._columns] = (above & (push < 0)) | (below & (push > 0))
+        held[:, self._hinge_dofs] = (above & (gradient < 0)) | (below & (gradient > 0))
         return held
