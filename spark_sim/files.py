@@ -18,8 +18,10 @@ def check_free(path: Path, *, force: bool) -> None:
 def check_ending(path: Path, endings: tuple[str, ...], what: str) -> None:
     """Raise `OutputError` where `path` has none of the `endings` of `what` is written there."""
     if path.suffix.lower() not in endings:
+        *several, last = endings
+        known = f"{', '.join(several)} or {last}" if several else last
         has = f"not as {path.suffix}" if path.suffix else "and the name has no ending"
-        raise OutputError(f"{path}: {what} is written as {' or '.join(endings)}, {has}")
+        raise OutputError(f"{path}: {what} is written as {known}, {has}")
 
 
 def claim(path: Path, *, force: bool, endings: tuple[str, ...] = (), what: str = "it") -> None:

@@ -292,7 +292,7 @@ def test_command(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(console, "note", lambda text: None)
     for args, reason in (
         ((tree, "-o", "t.md"), "exists"),
-        ((tree, "-o", "t.txt"), "written as .md or .json or .csv"),
+        ((tree, "-o", "t.txt"), "written as .md, .json or .csv"),
         ((tree / "walker",), "no motion is on two characters"),
         ((tree, "--result", "mine"), "expected NAME=DIR"),
         ((tree, "--result", f"mine={tmp_path}"), "no such result"),
@@ -301,6 +301,6 @@ def test_command(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         ((tree, "--checkpoint", "t.csv"), "no safetensors"),
         (("nowhere",), "nowhere"),
     ):
-        parsed = cli.build_parser().parse_args(["evaluate", *map(str, args)])
+        parsed = cli.parse(["evaluate", *map(str, args)])
         with pytest.raises(SparkSimError, match=re.escape(reason)):
             parsed.run(parsed)
