@@ -104,9 +104,10 @@ class _AnyClip(ABC):
 
     def figures(self) -> "list[Figure]":
         """What a picture or a video shows of the clip."""
+        from sim.trajectory import Subject
         from sim.view.scene import Figure
 
-        return [Figure(self.rig, self.motion, self.name, self.floor_z, self.body)]
+        return [Figure(Subject(self.motion, self.rig, self.body), self.name, self.floor_z)]
 
     def save_mjcf(
         self,

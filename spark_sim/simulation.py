@@ -5,7 +5,7 @@ from typing import Any
 
 from sim.physics.summary import LIMITS, render, summarize
 from sim.physics.tracking import Assist, TrackingResult, track
-from sim.trajectory import model_trajectory
+from sim.trajectory import Subject, model_trajectory
 from sim.view.scene import Figure
 from spark_sim.clips import AnyClip, File
 from spark_sim.loading import clip_of
@@ -44,10 +44,10 @@ class Simulated:
     def figures(self) -> list[Figure]:
         """What is shown: the motion as simulated, and its target as a ghost."""
         clip, tracked = self.clip, self.tracked
-        place = clip.rig, clip.motion
+        made, wanted = (Subject(clip.motion, clip.rig, b) for b in (tracked.body, tracked.target))
         return [
-            Figure(*place, self.name, clip.floor_z, tracked.body),
-            Figure(*place, "target", clip.floor_z, tracked.target, ghost=True),
+            Figure(made, self.name, clip.floor_z),
+            Figure(wanted, "target", clip.floor_z, ghost=True),
         ]
 
 

@@ -12,21 +12,21 @@ from jaxtyping import UInt8
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.clip_poses import pose_clip
 from sim.report.names import FLAGS, LABELS
-from sim.report.palette import MARKS, css, grade
+from sim.report.palette import CORNER_COLORS, css, grade
 from sim.report.plots import flag_strips, plots, svg
 from sim.report.record import record
 from sim.report.result import Finding, Result
 from sim.report.table import shares
 from sim.report.text import details, share_base
 from sim.trajectory import Subject
-from sim.view.page import Marks, page
+from sim.view.page import Overlay, page
 from sim.view.render import frames
 from sim.view.scene import Figure, build_scene
 from spark.errors import DependencyError, OutputError
 
 _MOMENTS = 6  # pictures
 _LISTED = 200  # findings
-_STANDS, _SLIDES, _SINKS = range(1, 4)  # marks, in the order of `MARKS`
+_STANDS, _SLIDES, _SINKS = range(1, 4)  # states of a corner, in the order of `CORNER_COLORS`
 
 
 def write_report_page(
@@ -59,11 +59,8 @@ def report_page(
     shown = [(subject, result.clip, names[0])]
     if source is not None and result.source is not None:
         shown.append((source, result.source, names[1]))
-    figures = [
-        Figure(each.rig, each.motion, name, metrics.floor_z, each.body)
-        for each, metrics, name in shown
-    ]
-    marks = [_marks(metrics, each) for each, metrics, _ in shown]
+    figures = [Figure(each, name, metrics.floor_z) for each, metrics, name in shown]
+    overlays = [_overlay(metrics, each) for each, metrics, _ in shown]
     clip, frame_time = result.clip, result.clip.frame_time
     duration = (len(clip) - 1) * frame_time
     source_duration = (subject if source is None else source).motion.duration
@@ -79,9 +76,9 @@ def report_page(
         "ABOUT": f"{len(clip)} frames, {duration:.1f} s{beside}",
         "CARDS": _cards(result),
         "KEY": "".join(
-            f'<i style="background:{color}"></i>{name}' for name, color in MARKS.items()
+            f'<i style="background:{color}"></i>{name}' for name, color in CORNER_COLORS.items()
         ),
-        "REPLAY": html.escape(page(figures, title="", marks=marks)),
+        "REPLAY": html.escape(page(figures, title="", overlays=overlays)),
         "FINDINGS": _list(result),
         "MOMENTS": moments,
         "STRIPS": flag_strips(clip),
@@ -100,7 +97,7 @@ def report_page(
     )
 
 
-def _marks(clip: ClipMetrics, subject: Subject) -> Marks:
+def _overlay(clip: ClipMetrics, subject: Subject) -> Overlay:
     """The soles' corners as dots, and the labels of each frame's flags."""
     poses = pose_clip(subject)
     heights = poses.corners[..., 2] - clip.floor_z
@@ -111,7 +108,7 @@ def _marks(clip: ClipMetrics, subject: Subject) -> Marks:
     labels = tuple(
         tuple(LABELS[name] for name in FLAGS if clip.flags[name][t]) for t in range(len(clip))
     )
-    return Marks(poses.corners, states, labels, tuple(MARKS.values()))
+    return Overlay(poses.corners, states, labels, tuple(CORNER_COLORS.values()))
 
 
 def _cards(result: Result) -> str:

@@ -34,7 +34,7 @@ _DARK = {
 }
 
 # The dots of the soles' corners in the replay, which is light and dark too.
-MARKS = {"stands": "#1f9d55", "slides": "#f08c00", "sinks": "#e03131"}
+CORNER_COLORS = {"stands": "#1f9d55", "slides": "#f08c00", "sinks": "#e03131"}
 
 # ANSI codes of a terminal (ECMA-48, "select graphic rendition").
 TERMINAL: dict[Grade, int] = {"good": 32, "fair": 33, "bad": 31}

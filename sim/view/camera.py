@@ -10,12 +10,12 @@ from sim.view.scene import Scene
 
 AZIMUTH, ELEVATION = 210.0, -10.0  # [deg], MuJoCo's: of the direction in which the camera looks
 FIELD_OF_VIEW = 35.0  # [deg] up and down
-_ASPECTS = np.arange(0.5, 2.25, 0.05)
-_REACH = 0.42  # of the height, to each side of the root
-_MARGIN = 1.06
+_ASPECT_RATIOS = np.arange(0.5, 2.25, 0.05)
+_REACH = 0.42  # of the standing height: how far arms reach to each side of the root
+_MARGIN = 1.06  # of the distance: room around the figures
 
 
-def distance(
+def camera_distance(
     scene: Scene, *, aspect: float, half_view: float = np.tan(np.radians(FIELD_OF_VIEW / 2))
 ) -> float:
     """How far [m] from the figures' middle a camera must stand that sees `half_view` (the tangent
@@ -24,13 +24,13 @@ def distance(
     ahead = _direction(azimuth, elevation)
     right, up = _direction(azimuth - np.pi / 2, 0.0), _direction(azimuth, elevation + np.pi / 2)
     needed = [0.5 * scene.height / half_view]
-    for placed in scene.placed:
-        path = scene.path(placed)
-        for end in (-0.03 * placed.height, placed.height):
+    for placement in scene.placements:
+        path = scene.path(placement)
+        for end in (-0.03 * placement.height, placement.height):
             corner = path - scene.centers
             corner[:, 2] = np.maximum(end, path[:, 2] + 0.55 * end) - scene.centers[:, 2]
-            depth = corner @ ahead - 0.5 * _REACH * placed.height
-            side = np.abs(corner @ right) + _REACH * placed.height
+            depth = corner @ ahead - 0.5 * _REACH * placement.height
+            side = np.abs(corner @ right) + _REACH * placement.height
             needed.append(float((side / (half_view * aspect) - depth).max()))
             needed.append(float((np.abs(corner @ up) / half_view - depth).max()))
     return _MARGIN * max(needed)
@@ -38,8 +38,10 @@ def distance(
 
 def fitting_aspect(scene: Scene) -> float:
     """Width by height of a picture that is hardly wider than the figures."""
-    far = distance(scene, aspect=float(_ASPECTS[-1]))
-    return next(float(a) for a in _ASPECTS if distance(scene, aspect=float(a)) <= 1.1 * far)
+    far = camera_distance(scene, aspect=float(_ASPECT_RATIOS[-1]))
+    return next(
+        float(a) for a in _ASPECT_RATIOS if camera_distance(scene, aspect=float(a)) <= 1.1 * far
+    )
 
 
 def _direction(azimuth: float, elevation: float) -> Float[np.ndarray, "3"]:

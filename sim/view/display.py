@@ -12,11 +12,11 @@ from jaxtyping import Float, Int
 from sim.trajectory import ModelTrajectory
 from sim.view.simplify import Mesh, simplify_together
 
-FACES = 40_000  # of one figure's meshes
+MAX_FACES = 40_000  # of one figure's meshes
 GHOST_RGBA = (0.35, 0.42, 0.55, 0.3)
 
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
-_SHOWN = (
+_SHOWN_TYPES = (
     int(mujoco.mjtGeom.mjGEOM_SPHERE),
     int(mujoco.mjtGeom.mjGEOM_CAPSULE),
     int(mujoco.mjtGeom.mjGEOM_ELLIPSOID),
@@ -24,7 +24,7 @@ _SHOWN = (
     int(mujoco.mjtGeom.mjGEOM_BOX),
     _MESH,
 )
-_GROUPS = 3  # viewers show the groups below this one
+_SHOWN_GROUPS = 3  # viewers show the groups below this one
 _UNSET_RGBA = (0.5, 0.5, 0.5, 1.0)
 _WIDTHS = {int(mujoco.mjtJoint.mjJNT_FREE): 7, int(mujoco.mjtJoint.mjJNT_BALL): 4}
 
@@ -40,8 +40,8 @@ def add_display(
     model = body.model
     inside = _subtree(model, body.root)
     shown = [g for g in range(model.ngeom) if int(model.geom_bodyid[g]) in inside]
-    shown = [g for g in shown if int(model.geom_type[g]) in _SHOWN]
-    visible = [g for g in shown if int(model.geom_group[g]) < _GROUPS]
+    shown = [g for g in shown if int(model.geom_type[g]) in _SHOWN_TYPES]
+    visible = [g for g in shown if int(model.geom_group[g]) < _SHOWN_GROUPS]
     meshes = _add_meshes(spec, model, visible or shown, prefix)
     columns: list[int] = []
     bodies: dict[int, mujoco.MjsBody] = {}
@@ -120,9 +120,9 @@ def rgba_of(model: mujoco.MjModel, geom: int) -> Float[np.ndarray, "4"]:
 def _add_meshes(
     spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: list[int], prefix: str
 ) -> dict[int, str]:
-    """The meshes of some geoms, with at most about `FACES` faces in all, and their names."""
+    """The meshes of some geoms, with at most about `MAX_FACES` faces in all, and their names."""
     used = sorted({int(model.geom_dataid[g]) for g in geoms if int(model.geom_type[g]) == _MESH})
-    found = simplify_together({mesh: _mesh(model, mesh) for mesh in used}, FACES)
+    found = simplify_together({mesh: _mesh(model, mesh) for mesh in used}, MAX_FACES)
     names = {mesh: f"{prefix}mesh{mesh}" for mesh in used}
     for mesh, (vertices, faces) in found.items():
         spec.add_mesh(

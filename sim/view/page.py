@@ -16,8 +16,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from sim.view.camera import distance
-from sim.view.scene import Figure, Placed, Scene, build_scene
+from sim.view.camera import camera_distance
+from sim.view.scene import Figure, Placement, Scene, build_scene
 from spark.errors import OutputError
 
 _HALF_VIEW = 0.26  # tan of half the page's angle, less what its bar and labels take
@@ -33,8 +33,8 @@ _PRIMITIVES = {
 
 
 @dataclass(frozen=True, eq=False)
-class Marks:
-    """What to draw on a figure besides its body, in every frame of its own motion.
+class Overlay:
+    """What is drawn over a figure in every frame of its own motion.
 
     `points` [m, world, where the motion has them] are dots: those of state 0 are hidden, those of
     state k have `colors[k - 1]` (CSS), the gravest last. `labels` are written over the figure's
@@ -57,12 +57,12 @@ def write_page(figures: Sequence[Figure], path: str | Path, *, title: str) -> No
 
 
 def page(
-    figures: Sequence[Figure], *, title: str, marks: Sequence[Marks | None] | None = None
+    figures: Sequence[Figure], *, title: str, overlays: Sequence[Overlay | None] | None = None
 ) -> str:
     """The page as text. Frames are thinned to at most 30 a second: the page blends between them.
 
-    `marks` has one entry for each figure. Inside another page's frame, a message `{seek: seconds}`
-    sets the time, and messages `{time: seconds}` tell it.
+    `overlays` has one entry for each figure. Inside another page's frame, a message
+    `{seek: seconds}` sets the time, and messages `{time: seconds}` tell it.
     """
     scene = build_scene(figures, max_fps=30.0)
     meshes: dict[bytes, dict[str, Any]] = {}
@@ -70,12 +70,12 @@ def page(
         "frames": len(scene.qpos),
         "frame_time": scene.frame_time,
         "file_frame_time": figures[0].motion.frame_time,
-        "distance": distance(scene, half_view=_HALF_VIEW, aspect=1.6),
+        "distance": camera_distance(scene, half_view=_HALF_VIEW, aspect=1.6),
         "height": scene.height,
         "figures": [
-            _figure(scene, placed, figure, mark, meshes)
-            for placed, figure, mark in zip(
-                scene.placed, figures, marks or [None] * len(figures), strict=True
+            _figure(scene, placement, figure, overlay, meshes)
+            for placement, figure, overlay in zip(
+                scene.placements, figures, overlays or [None] * len(figures), strict=True
             )
         ],
         "meshes": list(meshes.values()),
@@ -87,20 +87,20 @@ def page(
 
 def _figure(
     scene: Scene,
-    placed: Placed,
+    placement: Placement,
     figure: Figure,
-    marks: Marks | None,
+    overlay: Overlay | None,
     meshes: dict[bytes, dict[str, Any]],
 ) -> dict[str, Any]:
     """A figure's tree of bodies, what they look like, and its coordinates in every frame."""
-    model, bodies = scene.model, placed.bodies
-    qpos = scene.qpos[:, placed.columns]
+    model, bodies = scene.model, placement.bodies
+    qpos = scene.qpos[:, placement.columns]
     angles = float(max(np.abs(qpos[:, 3:]).max(), 1.0)) / _STEPS
     whole = np.round(qpos[:, 3:] / angles).astype("<i2")
     out = {
         "label": figure.label,
         "alpha": float(model.geom_rgba[model.geom_bodyid == bodies[0], 3].min(initial=1.0)),
-        "bodies": [_body(model, b, bodies[0], placed.columns.start) for b in bodies],
+        "bodies": [_body(model, b, bodies[0], placement.columns.start) for b in bodies],
         "geoms": [
             _geom(model, g, bodies[0], meshes)
             for g in range(model.ngeom)
@@ -110,32 +110,32 @@ def _figure(
         "angles": angles,
         "joints": base64.b64encode(whole.tobytes()).decode(),
     }
-    if marks is not None:
-        frames, states, labels = _thinned(marks, figure.motion.frame_time, scene)
-        out["marks"] = {
-            **_packed(placed(marks.points[frames])),
+    if overlay is not None:
+        frames, states, labels = _thinned(overlay, figure.motion.frame_time, scene)
+        out["overlay"] = {
+            **_packed(placement.to_scene(overlay.points[frames])),
             "states": base64.b64encode(states.tobytes()).decode(),
             "labels": labels,
-            "colors": marks.colors,
+            "colors": overlay.colors,
         }
     return out
 
 
 def _thinned(
-    marks: Marks, frame_time: float, scene: Scene
+    overlay: Overlay, frame_time: float, scene: Scene
 ) -> tuple[Int[np.ndarray, "F"], UInt8[np.ndarray, "F M"], list[str]]:
-    """The motion's frames that the scene's are nearest to, and the marks of all frames around
+    """The motion's frames that the scene's are nearest to, and the overlay of all frames around
     each: what lasts for one frame is not lost."""
-    count, last = len(scene.qpos), len(marks.labels) - 1
+    count, last = len(scene.qpos), len(overlay.labels) - 1
     times = np.arange(count) * scene.frame_time
     frames = np.minimum(np.round(times / frame_time).astype(int), last)
     nearest = np.round(np.arange(last + 1) * frame_time / scene.frame_time).astype(int)
     nearest = np.minimum(nearest, count - 1)
-    states = marks.states[frames]
-    np.maximum.at(states, nearest, marks.states)
-    labels = [dict.fromkeys(marks.labels[t]) for t in frames]
+    states = overlay.states[frames]
+    np.maximum.at(states, nearest, overlay.states)
+    labels = [dict.fromkeys(overlay.labels[t]) for t in frames]
     for t, frame in enumerate(nearest):
-        labels[frame] |= dict.fromkeys(marks.labels[t])
+        labels[frame] |= dict.fromkeys(overlay.labels[t])
     return frames, states, ["\n".join(each) for each in labels]
 
 

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from jaxtyping import UInt8
 
-from sim.view.camera import AZIMUTH, ELEVATION, FIELD_OF_VIEW, distance
+from sim.view.camera import AZIMUTH, ELEVATION, FIELD_OF_VIEW, camera_distance
 from sim.view.scene import Scene
 from spark.errors import DependencyError
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def frames(
-    scene: Scene, picked: Iterable[int], *, width: int = 960, height: int = 540
+    scene: Scene, indices: Iterable[int], *, width: int = 960, height: int = 540
 ) -> Iterator[UInt8[np.ndarray, "H W 3"]]:
     """The scene at the picked frames, seen by a camera that follows the figures.
 
@@ -28,10 +28,10 @@ def frames(
     option.sitegroup[:] = 0
     camera = mujoco.MjvCamera()
     camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
-    camera.distance = distance(scene, aspect=width / height)
+    camera.distance = camera_distance(scene, aspect=width / height)
     scene.model.vis.global_.fovy = FIELD_OF_VIEW
     try:
-        for frame in picked:
+        for frame in indices:
             data.qpos[:] = scene.qpos[frame]
             mujoco.mj_kinematics(scene.model, data)
             mujoco.mj_camlight(scene.model, data)

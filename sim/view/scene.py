@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.interpolate import at_times
-from sim.trajectory import ModelTrajectory, model_trajectory
+from sim.trajectory import Subject, model_trajectory
 from sim.view.display import add_display
 from spark.errors import SkeletonError
 from spark.kinematics import forward
@@ -17,42 +17,49 @@ from spark.motion import Motion
 from spark.rig.rig import Rig
 from spark.rotation import quat_about, quat_conj, quat_mul, quat_rotate
 
-_SPACING = 0.8  # of the mean of two neighbours' standing heights, between them
+_SPACING = 0.8  # of two neighbours' mean standing height, between their roots: arms do not meet
 
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """A motion on its rig, with what to call it and where its floor is [m].
+    """A moving body to show, with what to call it and where its floor is [m].
 
-    Where `body` is given it is what is seen, else a body is built from the rig. A `ghost` is seen
-    through, and stands where the figure before it stands.
+    Where the subject has no model, one is built from its rig. A `ghost` is seen through, and stands
+    where the figure before it stands.
     """
 
-    rig: Rig
-    motion: Motion
+    subject: Subject
     label: str
     floor_z: float = 0.0
-    body: ModelTrajectory | None = None
     ghost: bool = False
+
+    @property
+    def motion(self) -> Motion:
+        return self.subject.motion
+
+    @property
+    def rig(self) -> Rig:
+        return self.subject.rig
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
-    """How a figure's own world lies in the scene's: turned about Z by `turn`, then moved [m].
+class Placement:
+    """Where a figure stands in the scene: its own world, rotated about Z by `turn`, then moved by
+    `translation` [m].
 
-    Its coordinates are `columns` of the scene's; its bodies are `bodies`, its root the first. Its
-    standing `height` is in metres.
+    Of the scene's model it has the coordinates `columns` and the bodies `bodies`, its root first.
+    Its standing `height` is in metres.
     """
 
     turn: Float[np.ndarray, "4"]
-    shift: Float[np.ndarray, "3"]
+    translation: Float[np.ndarray, "3"]
     columns: slice
     bodies: range
     height: float
 
-    def __call__(self, points: Float[np.ndarray, "*N 3"]) -> Float[np.ndarray, "*N 3"]:
-        """The figure's own points in the scene."""
-        return quat_rotate(self.turn, points) + self.shift
+    def to_scene(self, points: Float[np.ndarray, "*N 3"]) -> Float[np.ndarray, "*N 3"]:
+        """Points of the figure's own world in the scene's."""
+        return quat_rotate(self.turn, points) + self.translation
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,24 +69,24 @@ class Scene:
     model: mujoco.MjModel
     qpos: Float[np.ndarray, "T nq"]
     frame_time: float
-    placed: tuple[Placed, ...]
+    placements: tuple[Placement, ...]
 
     @property
     def height(self) -> float:
         """The standing height [m] of the tallest figure."""
-        return max(placed.height for placed in self.placed)
+        return max(placement.height for placement in self.placements)
 
     @cached_property
     def centers(self) -> Float[np.ndarray, "T 3"]:
         """The path of the figures' middle, for a camera to follow."""
-        paths = np.stack([self.path(placed) for placed in self.placed])
+        paths = np.stack([self.path(placement) for placement in self.placements])
         centers = (paths.min(0) + paths.max(0)) / 2
         centers[:, 2] = 0.48 * self.height
         return centers
 
-    def path(self, placed: Placed) -> Float[np.ndarray, "T 3"]:
+    def path(self, placement: Placement) -> Float[np.ndarray, "T 3"]:
         """Where a figure's root is."""
-        return self.qpos[:, placed.columns][:, :3]
+        return self.qpos[:, placement.columns][:, :3]
 
 
 def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
@@ -99,29 +106,31 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
     times = np.arange(int(np.floor(longest / frame_time + 1e-6)) + 1) * frame_time
     heights = [figure.rig.standing_height for figure in figures]
     lanes = _lanes(figures, heights)
-    turn = _turn(figures[0])
+    turn = _turn_to_front(figures[0])
     coordinates: list[Float[np.ndarray, "T n"]] = []
-    placed: list[Placed] = []
+    placements: list[Placement] = []
     column = 0
     for k, figure in enumerate(figures):
-        body = figure.body or model_trajectory(figure.rig, figure.motion)
+        body = figure.subject.body or model_trajectory(figure.rig, figure.motion)
         first_body = len(list(world.bodies))
         columns = add_display(world, body, f"{k}_", ghost=figure.ghost)
         qpos = at_times(body.model, body.qpos, figure.motion.frame_time, times)[:, columns]
-        if figure.ghost and placed:
-            shift = placed[-1].shift
+        if figure.ghost and placements:
+            translation = placements[-1].translation
         else:
             start = quat_rotate(turn, qpos[0, :3])
-            shift = np.array([-start[0], lanes[k] - start[1], -figure.floor_z])
-        qpos[:, :3] = quat_rotate(turn, qpos[:, :3]) + shift
+            translation = np.array([-start[0], lanes[k] - start[1], -figure.floor_z])
+        qpos[:, :3] = quat_rotate(turn, qpos[:, :3]) + translation
         qpos[:, 3:7] = quat_mul(turn, qpos[:, 3:7])
         coordinates.append(qpos)
         following = column + len(columns)
         bodies = range(first_body, len(list(world.bodies)))
-        placed.append(Placed(turn, shift, slice(column, following), bodies, heights[k]))
+        placements.append(
+            Placement(turn, translation, slice(column, following), bodies, heights[k])
+        )
         column = following
     qpos = np.concatenate(coordinates, axis=1)
-    return Scene(world.compile(), qpos, frame_time, tuple(placed))
+    return Scene(world.compile(), qpos, frame_time, tuple(placements))
 
 
 def _lanes(figures: Sequence[Figure], heights: Sequence[float]) -> Float[np.ndarray, "K"]:
@@ -133,7 +142,7 @@ def _lanes(figures: Sequence[Figure], heights: Sequence[float]) -> Float[np.ndar
     return lanes - lanes[-1] / 2
 
 
-def _turn(figure: Figure) -> Float[np.ndarray, "4"]:
+def _turn_to_front(figure: Figure) -> Float[np.ndarray, "4"]:
     """The turn about Z after which the figure faces +X in its first frame."""
     rig = figure.rig
     pelvis = forward(figure.motion.frames(0, 1))[1][0, rig.root_joint]

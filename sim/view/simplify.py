@@ -10,7 +10,7 @@ Mesh = tuple[Float[np.ndarray, "_ 3"], Int[np.ndarray, "_ 3"]]
 
 # A grid's cells leave about this many faces on cell² of a smooth surface; of others more.
 _FACES_A_CELL = 2.5
-_TRIES = 5
+_MAX_ATTEMPTS = 5
 
 
 def simplify_together(meshes: dict[int, Mesh], faces: int) -> dict[int, Mesh]:
@@ -19,7 +19,7 @@ def simplify_together(meshes: dict[int, Mesh], faces: int) -> dict[int, Mesh]:
     if count <= faces:
         return meshes
     cell = np.sqrt(_FACES_A_CELL * sum(area(*mesh) for mesh in meshes.values()) / faces)
-    for _ in range(_TRIES):
+    for _ in range(_MAX_ATTEMPTS):
         fewer = {key: simplify(*mesh, float(cell)) for key, mesh in meshes.items()}
         count = sum(len(mesh[1]) for mesh in fewer.values())
         if count <= faces:

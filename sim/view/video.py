@@ -38,8 +38,8 @@ def write_video(
         assert process.stdin is not None
         assert process.stderr is not None
         try:
-            picked = progress(range(len(scene.qpos)))
-            for picture in frames(scene, picked, width=width, height=height):
+            indices = progress(range(len(scene.qpos)))
+            for picture in frames(scene, indices, width=width, height=height):
                 process.stdin.write(picture.tobytes())
             process.stdin.close()
             message = process.stderr.read().decode(errors="replace").strip()
@@ -77,8 +77,8 @@ def write_strip(
     if width is None:
         width = round(height * fitting_aspect(scene))
     count = count or (5 if width < 2 * height else 3)
-    picked = np.linspace(0, len(scene.qpos) - 1, count).round().astype(int).tolist()
-    pictures = list(frames(scene, picked, width=width, height=height))
+    indices = np.linspace(0, len(scene.qpos) - 1, count).round().astype(int).tolist()
+    pictures = list(frames(scene, indices, width=width, height=height))
     try:
         Image.fromarray(np.concatenate(pictures, axis=1)).save(path, format="PNG", optimize=True)
     except OSError as error:

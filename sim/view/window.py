@@ -3,7 +3,7 @@
 import time
 
 from sim import has_display
-from sim.view.camera import AZIMUTH, ELEVATION, distance
+from sim.view.camera import AZIMUTH, ELEVATION, camera_distance
 from sim.view.scene import Scene
 from spark.errors import DependencyError
 
@@ -32,7 +32,7 @@ def open_window(scene: Scene) -> None:
         scene.model, data, key_callback=on_key, show_left_ui=False, show_right_ui=False
     ) as viewer:
         viewer.cam.azimuth, viewer.cam.elevation = AZIMUTH, ELEVATION
-        viewer.cam.distance = distance(scene, half_view=_HALF_VIEW, aspect=1.5)
+        viewer.cam.distance = camera_distance(scene, half_view=_HALF_VIEW, aspect=1.5)
         viewer.cam.lookat[:] = scene.centers[0]
         viewer.opt.sitegroup[:] = 0
         while viewer.is_running():

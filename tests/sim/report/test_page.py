@@ -18,7 +18,7 @@ from robots.model.understand import understand_robot
 from sim.report import Report, Subject, assess
 from sim.report.page import report_page, write_report_page
 from sim.report.plots import Plot, svg
-from sim.view.page import Marks, page
+from sim.view.page import Overlay, page
 from sim.view.scene import Figure
 from spark.errors import OutputError
 from spark.rig.feet import sole_positions
@@ -98,19 +98,20 @@ def test_the_scale_is_of_what_is_drawn() -> None:
     assert "0 to 1<" in svg(Plot("x", "m", noise, never, None), 1.0, 1.0)
 
 
-def test_marks_of_one_frame_outlast_the_thinning() -> None:
+def test_an_overlay_of_one_frame_outlasts_the_thinning() -> None:
     """60 frames a second, of which the page has every other one: one slides, one floats."""
     rig = stick_rig()
     still = standing(rig, 60)
     states = np.zeros((60, 1), dtype=np.uint8)
     states[31], labels = 2, [()] * 60
     labels[41] = ("floating",)
-    marks = Marks(np.zeros((60, 1, 3)), states, tuple(labels), ("green", "red"))
+    overlay = Overlay(np.zeros((60, 1, 3)), states, tuple(labels), ("green", "red"))
     data = re.search(
-        r"const DATA = (.*);", page([Figure(rig, still, "x")], title="", marks=[marks])
+        r"const DATA = (.*);",
+        page([Figure(Subject(still, rig), "x")], title="", overlays=[overlay]),
     )
     assert data
-    shown = json.loads(data[1])["figures"][0]["marks"]
+    shown = json.loads(data[1])["figures"][0]["overlay"]
     seen = np.frombuffer(base64.b64decode(shown["states"]), dtype=np.uint8)
     assert len(seen) == 30
     assert np.flatnonzero(seen).tolist() in ([15], [16])

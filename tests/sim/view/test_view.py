@@ -16,7 +16,7 @@ import pytest
 
 import spark_sim
 from sim.interpolate import at_times
-from sim.trajectory import ModelTrajectory
+from sim.trajectory import ModelTrajectory, Subject
 from sim.view.page import page, write_page
 from sim.view.render import frames
 from sim.view.scene import Figure, Scene, build_scene
@@ -33,7 +33,7 @@ def figures() -> list[Figure]:
     made = []
     for build, fps in (("walker", 30.0), ("dancer", 60.0)):
         rig = sample_rig(build)
-        made.append(Figure(rig, sample_motion("wave", rig, fps), build))
+        made.append(Figure(Subject(sample_motion("wave", rig, fps), rig), build))
     return made
 
 
@@ -61,7 +61,7 @@ def test_figures_share_time_and_stand_apart(scene: Scene) -> None:
 
 def test_fast_clips_are_thinned_not_slowed() -> None:
     rig = sample_rig("walker")
-    scene = build_scene([Figure(rig, sample_motion("wave", rig, 240.0), "fast")])
+    scene = build_scene([Figure(Subject(sample_motion("wave", rig, 240.0), rig), "fast")])
     assert scene.frame_time == pytest.approx(1 / 60)
     assert len(scene.qpos) == 241
 
@@ -144,7 +144,7 @@ def test_page_moves_in_a_browser(tmp_path: Path) -> None:
     """Headless Chromium draws it without an error; it has our colours, and another moment looks
     different; the page's kinematics are MuJoCo's."""
     robot, motion, body = machine(tmp_path)
-    shown = [*figures(), Figure(robot, motion, "machine", body=body)]
+    shown = [*figures(), Figure(Subject(motion, robot, body), "machine")]
     result = in_browser(page(shown, title="test"), [0.0, 2.0], tmp_path)
     assert result["seen"] == []
     assert result["time"] == pytest.approx(0.5), "it plays"
@@ -221,7 +221,7 @@ def machine(folder: Path) -> tuple[Rig, Motion, ModelTrajectory]:
 
 def test_a_given_model_is_shown_and_nothing_else_of_its_file(tmp_path: Path) -> None:
     rig, motion, body = machine(tmp_path)
-    scene = build_scene([Figure(rig, motion, "machine", body=body)])
+    scene = build_scene([Figure(Subject(motion, rig, body), "machine")])
     model, own = scene.model, body.model
     assert (model.nu, model.nsensor, model.neq, model.nkey) == (0, 0, 0, 0)
     assert (model.nlight, model.ngeom, model.nbody) == (2, 5, 5)
@@ -235,10 +235,10 @@ def test_a_given_model_is_shown_and_nothing_else_of_its_file(tmp_path: Path) -> 
         ours.qpos[:], theirs.qpos[:] = scene.qpos[t], body.qpos[t]
         mujoco.mj_kinematics(model, ours)
         mujoco.mj_kinematics(own, theirs)
-        placed = scene.placed[0](theirs.geom_xpos[seen[1:]])
+        placed = scene.placements[0].to_scene(theirs.geom_xpos[seen[1:]])
         np.testing.assert_allclose(ours.geom_xpos[2:], placed, atol=1e-6)
         # A mesh's frame is its own affair; its corners are not.
-        block = scene.placed[0](corners_of(own, theirs, seen[0]))
+        block = scene.placements[0].to_scene(corners_of(own, theirs, seen[0]))
         apart = np.linalg.norm(corners_of(model, ours, 1)[:, None] - block, axis=-1)
         np.testing.assert_allclose(apart.min(1), 0, atol=1e-6)
 
@@ -255,7 +255,7 @@ def test_a_ghost_stands_where_its_figure_stands() -> None:
     first, second = figures()
     ghost = replace(first, ghost=True)
     scene = build_scene([first, ghost, second])
-    here, there = (scene.path(scene.placed[k]) for k in (0, 1))
+    here, there = (scene.path(scene.placements[k]) for k in (0, 1))
     np.testing.assert_allclose(here, there)
     alphas = [{float(a) for a in scene.model.geom_rgba[g, 3]} for g in shapes_of(scene)]
     assert [max(a) < 0.5 for a in alphas] == [False, True, False]
@@ -264,7 +264,9 @@ def test_a_ghost_stands_where_its_figure_stands() -> None:
 def shapes_of(scene: Scene) -> list[list[int]]:
     """The shapes of each figure."""
     owners = scene.model.geom_bodyid
-    return [[g for g, b in enumerate(owners) if b in placed.bodies] for placed in scene.placed]
+    return [
+        [g for g, b in enumerate(owners) if b in placement.bodies] for placement in scene.placements
+    ]
 
 
 def test_all_face_the_camera_and_stay_in_its_picture() -> None:
@@ -275,12 +277,14 @@ def test_all_face_the_camera_and_stay_in_its_picture() -> None:
     rotations = motion.rotations.copy()
     rotations[:, 0] = quat_mul(turn, rotations[:, 0])
     aside = replace(motion, rotations=rotations, root_pos=quat_rotate(turn, motion.root_pos))
-    for figure in (Figure(rig, motion, "ahead"), Figure(rig, aside, "aside")):
-        path = build_scene([figure]).path(build_scene([figure]).placed[0])
+    for figure in (Figure(Subject(motion, rig), "ahead"), Figure(Subject(aside, rig), "aside")):
+        path = build_scene([figure]).path(build_scene([figure]).placements[0])
         gone = path[-1] - path[0]
         assert gone[0] > 1.0
         assert abs(gone[1]) < 0.1 * gone[0]
-    scene = build_scene([Figure(rig, motion, "walks"), Figure(rig, motion.frames(0, 2), "stays")])
+    scene = build_scene(
+        [Figure(Subject(motion, rig), "walks"), Figure(Subject(motion.frames(0, 2), rig), "stays")]
+    )
     for picture in draw(scene, [0, len(scene.qpos) - 1]):
         limbs = np.ptp(picture.astype(int), axis=-1) > 60
         edge = np.concatenate([limbs[0], limbs[-1], limbs[:, 0], limbs[:, -1]])
