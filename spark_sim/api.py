@@ -1,4 +1,4 @@
-"""What can be done with clips: the Python API. The command line is a layer over it."""
+"""The Python API: what can be done with clips. The command line is a layer over it."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -121,7 +121,7 @@ def _onto_robot(source: AnyClip, target: RobotClip, *, solved: bool) -> RobotCli
 def _filled_in(
     source: CanonicalMotion, target: Clip, network: "NetworkRetargeter"
 ) -> CanonicalMotion:
-    """As a network says and, where it corrects the transfer, the target's own motion."""
+    """The joints without a counterpart as a network fills them in, and the target's own motion."""
     from spark.transfer.target_prior import with_target_prior
 
     if not network.network.config.residual:
@@ -153,28 +153,27 @@ def report(
     html: File | None = None,
     force: bool = False,
 ) -> "Report":
-    """How believable a motion is; with `source`, beside the motion it was made from, and with
-    `truth`, on the same skeleton, how far from what it should have been.
+    """Measure how plausible a motion is.
 
-    With `html`, also written as a web page. Raises `OutputError` where that exists, unless forced.
+    `source` is the motion that it was made from, to compare with. `truth` is the right answer, on
+    the same skeleton, to measure the distance from. With `html`, the report is also written as a
+    web page. Raises `OutputError` where that exists, unless forced.
     """
-    from sim.report import Subject, assess
+    from sim.report import assess
 
     if html is not None:
         files.claim(Path(html), force=force, endings=_PAGE, what="a page")
     clip = clip_of(clip)
-    subject, origin = Subject(clip.motion, clip.rig, clip.body), None
-    names = clip.name, "source"
+    origin, names = None, (clip.name, "source")
     if source is not None:
         source = clip_of(source)
-        origin = Subject(source.motion, source.rig, source.body)
-        names = clip.name, source.name
+        origin, names = source.subject, (clip.name, source.name)
     known = None if truth is None else clip_of(truth).motion
-    assessed = assess(subject, source=origin, truth=known)
+    assessed = assess(clip.subject, source=origin, truth=known)
     if html is not None:
         from sim.report.page import write_report_page
 
-        write_report_page(assessed, html, subject, origin, title=clip.name, names=names)
+        write_report_page(assessed, html, clip.subject, origin, title=clip.name, names=names)
     return assessed
 
 
@@ -186,9 +185,9 @@ def play(
     force: bool = False,
     progress: Callable[[Iterable[int]], Iterable[int]] = iter,
 ) -> None:
-    """Show motions side by side: as a video (MP4), a web page or a strip of moments (PNG), as many
-    of them as are named; in a window where none is. What `simulate` yields is shown with its target
-    as a ghost.
+    """Show motions side by side: in a window, or as the files that are named, a video (MP4), a web
+    page (HTML) and a strip of moments (PNG). What `simulate` returns is shown with its target as a
+    ghost.
 
     `progress` wraps the frames of the video. Raises `DependencyError` where there is no display, or
     nothing to draw or encode with, and `OutputError` where a file exists, unless forced.

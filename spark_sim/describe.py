@@ -1,4 +1,4 @@
-"""What is understood of a clip: as data, and as text for people."""
+"""What is understood of a clip, for `spark-sim inspect`: as data, and as text."""
 
 from typing import Any
 

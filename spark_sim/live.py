@@ -13,14 +13,14 @@ from spark_sim.loading import clip_of
 class Retargeter:
     """A robot that follows a source frame by frame, while it moves: for teleoperation.
 
-    `source` is any clip of the one who moves, or what `load` takes: it says which skeleton the
-    frames are of, what they are called, and where the floor is. `target` is a robot's name, MJCF or
-    clip. Frames come `fps` times a second, or as often as the clip's.
+    `source` is any clip of the one who moves, or what `load` takes. It gives the skeleton of the
+    frames and the height of the floor. `target` is a robot's name, MJCF or clip. Frames come `fps`
+    times a second, by default at the rate of the clip.
     Raises `SkeletonError` where the source is no humanoid.
     """
 
     latency = LATENCY
-    """How many frames old the answer is."""
+    """By how many frames an answer lags behind."""
 
     def __init__(
         self, source: AnyClip | File, target: AnyClip | File, *, fps: float | None = None
@@ -40,13 +40,13 @@ class Retargeter:
         self,
         frame: Frame | tuple[Float[np.ndarray, "..."], ...],
     ) -> Float[np.ndarray, "nq"]:
-        """Takes the source's next frame; yields MuJoCo's coordinates of the robot (position [m],
-        quaternion wxyz, joints [rad]) `latency` frames before it.
+        """Take the source's next frame, and return the robot's coordinates of `latency` frames ago:
+        position [m], quaternion wxyz, joints [rad], as MuJoCo has them.
 
-        A frame is as `Motion` has it, in metres, Z up: `root_pos[t]` (3), `rotations[t]` (N 4), all
-        joints' local rotations (wxyz), and `translations[t]` (N 3) where there are any. It changes
-        nothing that was said before. Raises `FrameError` where it is broken; the stream then goes
-        on as if it had not been there.
+        A frame is as `Motion` has it, in metres, Z up: `root_pos[t]` (3), `rotations[t]` (N 4), the
+        local rotations of all joints (wxyz), and `translations[t]` (N 3) where there are any.
+        Answers given before stay as they are. Raises `FrameError` where the frame is broken; the
+        stream then goes on without it.
         """
         return self._stream.step(Frame(*frame))
 
@@ -54,5 +54,5 @@ class Retargeter:
         return f"Retargeter({self._source!r}, {self.robot!r})"
 
     def reset(self) -> None:
-        """Begin anew: the next frame is a first one, before which the source stood still."""
+        """Start again: the next frame is the first, and the source stood still before it."""
         self._stream.reset()

@@ -1,4 +1,4 @@
-"""Files and robots' names into clips, and what can be told of which file."""
+"""Reading clips: from files, and from the names of robots."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
@@ -53,19 +53,24 @@ def load(
     quat: str | None = None,
     fps: float | None = None,
 ) -> AnyClip:
-    """Read a motion, or a body. What is not given is inferred, and said in the clip's `notes`.
+    """Read a motion from a file, or a robot by its name. What is not given is inferred, and the
+    clip's `notes` say so.
 
-    Of a BVH or FBX file, `unit` is m, dm, cm, mm, inch, cmu or a number of metres; `up` is x, y or
-    z; `roles` is a map of joints in TOML, as `spark-sim inspect --save-map` writes it.
-    Of a robot's own motion (.npz, .csv, .pkl), `robot` is its name or MJCF; `quat`, xyzw or wxyz,
-    and `fps` are what a CSV does not say.
-    A robot's name or MJCF alone yields one frame, in its T-pose; `roles` is then a map by bodies.
+    - A BVH or FBX file is a `Clip`. `unit` is m, dm, cm, mm, inch, cmu or a number of metres; `up`
+      is x, y or z; `roles` is a map of joints in TOML, as `spark-sim inspect --save-map` writes it.
+    - A robot's motion (.npz, .csv, .pkl) is a `RobotClip`. `robot` is the robot's name or MJCF.
+      `quat` (xyzw or wxyz) and `fps` are what a CSV does not say.
+    - A robot's name or MJCF is a `RobotClip` of one frame, in its T-pose. `roles` is then a map by
+      bodies.
+
+    Raises `FileFormatError` where the file is broken, `ConventionError` where something has to be
+    given or can't be, and `DependencyError` where an extra is missing (FBX, most robots).
     """
     path = Path(path)
     given = {"unit": unit, "up": up, "roles": roles, "robot": robot, "quat": quat, "fps": fps}
     for name, value in given.items():
         if value is not None and name not in takes(path):
-            raise ConventionError(f"{path}: {name} can't be told of such a file; leave it out")
+            raise ConventionError(f"{path}: {name} does not go with such a file; leave it out")
     if registry.is_robot(path):
         return load_robot(path, roles=roles)
     if path.is_dir():
@@ -80,7 +85,7 @@ def load(
 
 
 def takes(path: File) -> tuple[str, ...]:
-    """What `load` can be told of such a file."""
+    """Which options of `load` go with such a file."""
     if registry.is_robot(path):
         return ("roles",)
     suffix = Path(path).suffix.lower()

@@ -15,7 +15,7 @@ __all__ = ["LIMITS", "Simulated", "simulate"]
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """A clip, and what became of it in simulation."""
+    """A clip, and the motion that the simulation made of it."""
 
     clip: AnyClip
     tracked: TrackingResult
@@ -52,8 +52,9 @@ class Simulated:
 
 
 def simulate(clip: AnyClip | File, *, assist: bool = False) -> Simulated:
-    """Track a motion with position servos under simulation with contacts: of a robot its own, of
-    other bodies those that are built with them. With `assist`, a wrench on the root helps.
+    """Track a motion with position servos, in simulation with contacts. A robot has its own servos;
+    the body of a character is built with them. With `assist`, a force and a torque on the root
+    help.
 
     Raises `SkeletonError` where the body is no humanoid, or has no shape that collides.
     """

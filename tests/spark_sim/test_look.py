@@ -76,7 +76,7 @@ def test_reprs_tell_what_one_asks_first(
     assert repr(walk.rig).startswith("Rig(22 joints, 22 with a role, hips 0.")
     assert repr(walk.recording).endswith(", unit cm, y up)")
     report = spark_sim.report(walk)
-    assert f"{report.implausible:.1%} of {frames} frames implausible" in repr(report)
+    assert f"{frames} frames, 30 fps, {100 * report.implausible:.1f} % implausible" in repr(report)
 
 
 def test_notebooks_show_a_table(walk: spark_sim.Clip, on_robot: spark_sim.RobotClip) -> None:

@@ -326,7 +326,7 @@ def test_options_that_a_file_does_not_have_are_said(walk_path: Path, tmp_path: P
     assert code == 0
     assert "spark-sim: note: robot: --to-unit is not for such a file" in stderr
     assert f"spark-sim: note: {walk_path}: --quat is not for such a file" in stderr
-    with pytest.raises(ConventionError, match="quat can't be told"):
+    with pytest.raises(ConventionError, match="quat does not go with"):
         spark_sim.load(walk_path, quat="xyzw")
 
 
