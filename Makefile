@@ -1,6 +1,7 @@
 # make demo    from nothing: environment, demo motions, retargeting, report, video, page, picture
-# make test    the test suite                make check   lint, format, types, architecture
-# make bench   benchmarks                    make wheel   build, install elsewhere, run
+# make test    the test suite                make quick   its quick part, in two minutes
+# make check   lint, format, types, rooms    make bench   benchmarks
+# make wheel   build, install elsewhere, run
 # make clean   remove what these made
 
 PYTHON ?= python3
@@ -9,7 +10,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test check bench wheel clean
+.PHONY: demo test quick check bench wheel clean
 .DELETE_ON_ERROR:
 
 $(BIN)/python:
@@ -35,6 +36,9 @@ demo: $(VENV)/.video $(VENV)/.gl
 
 test: $(VENV)/.dev $(VENV)/.gl
 	$(BIN)/pytest -n 2 -rs -m "not bench"
+
+quick: $(VENV)/.dev $(VENV)/.gl
+	$(BIN)/pytest -n 2 -m "not slow and not bench"
 
 check: $(VENV)/.dev
 	$(BIN)/ruff check

@@ -1,11 +1,47 @@
 """Fixtures that tests of several packages share."""
 
+import os
 from pathlib import Path
+
+# One thread a process, here and in what tests start: two workers on two cores, each with threads
+# for both, take several times as long. Before anything that reads it is imported.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pytest
 
 import sim  # noqa: F401  (it chooses how MuJoCo draws before a test imports MuJoCo)
 import spark_sim
+from tests.helpers.recordings import DATA
+
+# What `make quick` leaves out: files and tests that start processes, train, render in a browser or
+# solve for seconds. Whatever runs on a real recording is left out too.
+SLOW = (
+    "tests/robots/solver/test_solve.py",
+    "tests/robots/solver/test_target.py",
+    "tests/scripts/",
+    "tests/sim/physics/",
+    "tests/sim/report/test_page.py",
+    "tests/spark/evaluation/test_evaluate.py",
+    "tests/spark/network/test_forward.py::test_onnx_is_the_network",
+    "tests/spark/network/test_retarget.py::test_windows_agree_with_the_whole",
+    "tests/spark/rig/test_any_tree.py",
+    "tests/spark/training/test_dataset.py",
+    "tests/spark/training/test_name_encoder.py::test_names_are_learned",
+    "tests/spark/training/test_train.py",
+    "tests/spark_sim/test_cli.py",
+    "tests/spark_sim/test_train_command.py",
+    "tests/test_packaging.py",
+    "tests/test_readme.py",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        callspec = getattr(item, "callspec", None)
+        values = callspec.params.values() if callspec else ()
+        recorded = any(isinstance(value, Path) and value.is_relative_to(DATA) for value in values)
+        if recorded or item.nodeid.startswith(SLOW):
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture(scope="module")

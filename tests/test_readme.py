@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.helpers.program import Program
+
 CHECKOUT = Path(__file__).parents[1]
 README = (CHECKOUT / "README.md").read_text()
 
@@ -18,18 +20,15 @@ def blocks(language: str) -> list[str]:
 def test_commands_and_python_run(tmp_path: Path) -> None:
     lines = [line for block in blocks("sh") for line in block.splitlines()]
     assert len(lines) >= 10
-    program = f"{shlex.quote(sys.executable)} -m spark_sim"
-    script = [line.replace("spark-sim", program, 1) for line in lines]
     assert all(line.startswith("spark-sim ") for line in lines)
-    environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    done = subprocess.run(
-        ["bash", "-e", "-c", "\n".join(script)],
-        cwd=tmp_path,
-        env=environment | {"PYTHONPATH": str(CHECKOUT)},
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
+    with Program(tmp_path) as spark_sim:
+        for line in lines:
+            _, *words = shlex.split(line, comments=True)
+            words, file = (words[:-2], words[-1]) if ">" in words else (words, None)
+            done = spark_sim(*words)
+            assert done.code == 0, f"{line}\n{done.stderr}"
+            if file:
+                (tmp_path / file).write_text(done.stdout)
     for name in ("out.html", "squat.mp4", "squat.png", "dancer_walk_scene.xml", "report.json"):
         assert (tmp_path / name).stat().st_size > 500
     assert len(list((tmp_path / "many").iterdir())) == 6
@@ -38,7 +37,7 @@ def test_commands_and_python_run(tmp_path: Path) -> None:
     subprocess.run(
         [sys.executable, "-c", python],
         cwd=tmp_path,
-        env=environment | {"PYTHONPATH": str(CHECKOUT)},
+        env=os.environ | {"PYTHONPATH": str(CHECKOUT)},
         capture_output=True,
         check=True,
     )

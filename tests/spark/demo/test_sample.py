@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.report import assess
+from sim.report import Subject, assess
 from spark.demo.gait import FOOT_FLAT, HEEL_OFF, MID_STANCE, TOE_OFF, stride_time
 from spark.demo.sample import BUILDS, MOTIONS, sample_motion, sample_rig
 from spark.io.bvh import write_bvh
@@ -57,7 +57,7 @@ def knees(name: str, build: str) -> np.ndarray:
 @pytest.mark.parametrize(("name", "build"), EVERY)
 def test_the_report_finds_nothing_to_mend(name: str, build: str, fps: float) -> None:
     rig = sample_rig(build)
-    report = assess(sample_motion(name, rig, fps), rig)
+    report = assess(Subject(sample_motion(name, rig, fps), rig))
     assert report.implausible == 0
     assert report.findings == ()
 
@@ -67,8 +67,9 @@ def test_the_report_finds_nothing_to_mend_on_the_other_body(name: str) -> None:
     walker, dancer = (sample_rig(build) for build in BUILDS)
     source = sample_motion(name, walker, FPS)
     made = from_canonical(transfer(to_canonical(source, walker), dancer))
-    assert assess(made, dancer).findings == ()
-    assert assess(made, dancer, source=(source, walker)).findings == ()
+    subject = Subject(made, dancer)
+    assert assess(subject).findings == ()
+    assert assess(subject, source=Subject(source, walker)).findings == ()
 
 
 @pytest.mark.parametrize(("name", "build"), EVERY)
