@@ -27,11 +27,8 @@ Vector = tuple[float, float, float]
 
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
 
-# Deeper trees than any creature has: what lies beyond is a broken file.
-_MAX_DEPTH = 512
-
-# [s] A nanosecond: shorter frames are a broken file.
-_SHORTEST_FRAME = 1e-9
+_MAX_DEPTH = 512  # joints above a joint: no creature has as many, a deeper tree is a broken file
+_MIN_FRAME_TIME = 1e-9  # [s] a shorter one is a broken file
 
 _NAME = re.compile(r"[^\s{}]([^\r\n{}]*[^\s{}])?", re.ASCII)
 
@@ -296,7 +293,7 @@ def _parse_motion(scanner: Scanner, channels: int) -> tuple[float, Float[np.ndar
     frames = scanner.count("Frames")
     scanner.expect_label("Frame", "Time")
     frame_time = scanner.number("Frame Time")
-    if frame_time < _SHORTEST_FRAME:
+    if frame_time < _MIN_FRAME_TIME:
         scanner.fail(f"Frame Time is {frame_time:g}; expected seconds a frame, such as 0.0333333")
     values = _parse_rows(scanner.data[scanner.end :], frames, channels)
     if values is None:

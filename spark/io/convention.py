@@ -22,18 +22,19 @@ UPS: tuple[Up, ...] = get_args(Up)
 # Metres in a unit. CMU's is 1/0.45 of an inch, from the scale line of its ASF files.
 UNITS = {"m": 1.0, "cm": 0.01, "cmu": 0.0254 / 0.45, "inch": 0.0254, "mm": 0.001, "dm": 0.1}
 
-# How much rarer than metres and centimetres a unit is, as the logarithm of its probability.
-_RARITY = {"m": 0.0, "cm": 0.0, "cmu": -1.0, "inch": -1.0, "mm": -1.0, "dm": -1.5}
+# How much rarer than metres and centimetres a unit is: the logarithm of its probability.
+_LOG_PRIOR = {"m": 0.0, "cm": 0.0, "cmu": -1.0, "inch": -1.0, "mm": -1.0, "dm": -1.5}
 
-# Adults and children, and what the measures below miss it by, as a log-normal distribution.
+# [m] The median height of people, and the standard deviation of its logarithm: adults, children,
+# and the error of the measures below.
 _HEIGHT, _HEIGHT_SPREAD = 1.7, 0.3
-_PLAUSIBLE = (0.5, 3.0)
+HUMAN_HEIGHTS = (0.5, 3.0)  # [m] beyond them a note says so
 
 # Units or axes this close in log-probability are named in a note.
-_CLOSE = 0.6
+_CLOSE = 0.6  # the second is more than half as likely
 
-# Along its bones, from a fingertip or toe to the farthest other one, a body measures 1.5 heights.
-_REACH = 1.5
+# [heights] From a fingertip or toe to the farthest other one, along the bones.
+_LONGEST_PATH = 1.5
 
 _FEET = re.compile(r"foot|feet|toe|ankle|hoof|paw", re.IGNORECASE)
 _HEAD = re.compile(r"head|skull", re.IGNORECASE)
@@ -106,7 +107,7 @@ def infer_unit(motion: Motion) -> tuple[float, tuple[str, ...]]:
             "all joints lie in one point, so there is no height to tell the unit by; give --unit"
         )
     chances = {
-        name: _RARITY[name] - 0.5 * (np.log(size * metres / _HEIGHT) / _HEIGHT_SPREAD) ** 2
+        name: _LOG_PRIOR[name] - 0.5 * (np.log(size * metres / _HEIGHT) / _HEIGHT_SPREAD) ** 2
         for name, metres in UNITS.items()
     }
     best, second = sorted(UNITS, key=lambda name: -chances[name])[:2]
@@ -117,7 +118,7 @@ def infer_unit(motion: Motion) -> tuple[float, tuple[str, ...]]:
             f"unit {second} ({size * UNITS[second]:.2f} m) is nearly as likely; check, and give "
             "--unit"
         )
-    elif not _PLAUSIBLE[0] < tall < _PLAUSIBLE[1]:
+    elif not HUMAN_HEIGHTS[0] < tall < HUMAN_HEIGHTS[1]:
         notes.append(f"{tall:.2f} m is no human's height; check, and give --unit")
     return UNITS[best], tuple(notes)
 
@@ -191,7 +192,7 @@ def _stature(motion: Motion) -> tuple[float, str]:
         _deepen(deepest[parent], float(np.linalg.norm(length)))
     for j in range(len(skeleton) - 1, 0, -1):
         _deepen(deepest[skeleton.parents[j]], bones[j] + deepest[j, 0])
-    return float(deepest.sum(axis=1).max()) / _REACH, "judged by its longest chain of bones"
+    return float(deepest.sum(axis=1).max()) / _LONGEST_PATH, "judged by its longest chain of bones"
 
 
 def _deepen(two_deepest: Float[np.ndarray, "2"], depth: float) -> None:

@@ -15,10 +15,9 @@ from spark.motion import Motion
 from spark.rotation import quat_angle, quat_identity
 from spark.skeleton import Skeleton
 
-# What channels can't express goes without a note up to this angle [rad], and up to this fraction
-# of the longest bone.
-_LOST_ANGLE = 1e-4
-_LOST_LENGTH = 1e-4
+# What channels can't express is said in a note beyond these: 0.006 degrees, and 0.05 mm of a thigh.
+_MAX_LOST_ANGLE = 1e-4  # [rad]
+_MAX_LOST_LENGTH = 1e-4  # of the longest bone
 
 _POSITIONS = ("Xposition", "Yposition", "Zposition")
 _ROTATIONS = ("Zrotation", "Xrotation", "Yrotation")
@@ -87,7 +86,7 @@ def _encode_rotations(
         values[:, columns] = np.round(np.degrees(angles), 6) + 0.0  # no "-0.0"
         lost[:, members] = quat_angle(quat_from_angles(angles, order), in_file[:, members])
     worst = lost.max(axis=0)
-    names = [bvh.joints[j].name for j in np.flatnonzero(worst > _LOST_ANGLE)]
+    names = [bvh.joints[j].name for j in np.flatnonzero(worst > _MAX_LOST_ANGLE)]
     if not names:
         return ()
     return (
@@ -116,7 +115,7 @@ def _encode_positions(
     lost[:, joints, axes] = 0.0
     worst = lost.max(axis=(0, 2))
     longest = np.linalg.norm(motion.skeleton.offsets, axis=-1).max()
-    names = [bvh.joints[j].name for j in np.flatnonzero(worst > _LOST_LENGTH * longest)]
+    names = [bvh.joints[j].name for j in np.flatnonzero(worst > _MAX_LOST_LENGTH * longest)]
     if not names:
         return ()
     return (

@@ -5,7 +5,7 @@ from jaxtyping import Float
 
 from spark.rotation import AXES, euler_from_quat, quat_about, quat_mul
 
-# A middle angle this near to 90 degrees leaves only a sum of the other two defined [rad].
+# [rad] A middle angle this near to 90 degrees leaves only a sum of the other two defined.
 _SINGULAR = 1e-6
 
 

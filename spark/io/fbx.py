@@ -12,7 +12,14 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import ConventionError, FileFormatError
-from spark.io.convention import Convention, given_unit, given_up, infer_unit, infer_up
+from spark.io.convention import (
+    HUMAN_HEIGHTS,
+    Convention,
+    given_unit,
+    given_up,
+    infer_unit,
+    infer_up,
+)
 from spark.io.encoding import encode_new
 from spark.io.fbx_scene import FbxScene
 from spark.io.fbx_settings import FbxSettings, read_settings
@@ -22,10 +29,9 @@ from spark.motion import Motion
 from spark.rotation import quat_conj, quat_continuous, quat_from_matrix, quat_rotate
 from spark.skeleton import Skeleton
 
-# A joint moves in its parent where its place changes by more than this share of the body's size.
-_STILL = 1e-4
-# Humans [m], as `spark.io.convention` has them.
-_PLAUSIBLE = (0.5, 3.0)
+# Of the body's size: positions in the parent that vary less are constant. FBX keys are single
+# precision.
+_CONSTANT = 1e-4
 
 
 def read_fbx(
@@ -58,7 +64,7 @@ def read_fbx(
     convention = Convention(unit_m, up_axis)
     motion = in_si(motion, convention)
     tall = float(np.ptp(motion.skeleton.rest_positions[:, 2]))
-    if unit is None and not _PLAUSIBLE[0] < tall < _PLAUSIBLE[1]:
+    if unit is None and not HUMAN_HEIGHTS[0] < tall < HUMAN_HEIGHTS[1]:
         notes += (f"{tall:.3g} m is no human's height; check, and give --unit",)
     bvh = replace(encode_new(motion, unit=unit_m, up=up_axis), path=path)
     return Recording(bvh, motion, convention, notes)
@@ -94,7 +100,7 @@ def _read_motion(path: Path, frame_time: float) -> tuple[Motion, tuple[str, ...]
     local[:, 1:] = quat_rotate(quat_conj(world[:, above]), positions[:, 1:] - positions[:, above])
     middle = np.median(local[:, 1:], axis=0)
     size = float(np.ptp(rest[0], axis=0).max())
-    moves = np.r_[True, np.abs(local[:, 1:] - middle).max(axis=(0, 2)) > _STILL * size]
+    moves = np.r_[True, np.abs(local[:, 1:] - middle).max(axis=(0, 2)) > _CONSTANT * size]
     offsets[1:] = middle
     local[:, ~moves] = offsets[~moves]
     skeleton = Skeleton(names, parents, offsets, moves)

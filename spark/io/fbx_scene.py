@@ -11,8 +11,8 @@ from spark.errors import DependencyError, FileFormatError, name_list
 from spark.resample import frames_of_keys, rotations_at, values_at
 from spark.rotation import matrix_from_quat
 
-# Frames times nodes that a file may ask for: 12 hours of a body with fingers at 30 fps.
-_LARGEST = 100_000_000
+# Frames times nodes of a file: 12 hours of a body with fingers at 30 fps. More is a broken file.
+_MAX_VALUES = 100_000_000
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class FbxScene:
             notes += (f"animation {stacks[best].name!r} is read, not {name_list(others)}",)
         begin, end = baked[best].key_time_min, baked[best].key_time_max
         count = int((end - begin) / frame_time + 1e-3) + 1
-        if not 0 < count * len(self._nodes) < _LARGEST:
+        if not 0 < count * len(self._nodes) < _MAX_VALUES:
             raise FileFormatError(
                 self.path, None, f"has keys from {begin:g} s to {end:g} s; expected hours at most"
             )

@@ -19,16 +19,13 @@ from spark.motion import Motion
 from spark.rotation import quat_identity
 from spark.skeleton import Skeleton
 
-# Frames that unit and up axis are read off.
-_SAMPLES = 32
-
-# [s] 1000 to 1 frames a second.
-_USUAL_FRAME = (0.001, 1.0)
+_SAMPLES = 32  # frames that unit and up axis are inferred from
+_USUAL_FRAME_TIME = (0.001, 1.0)  # [s] 1000 to 1 frames a second
 
 _ENCODINGS = {"cp932": "Shift-JIS", "latin-1": "Latin-1"}
 
-# Positions that stay within this fraction of the body's height are constant.
-_STILL = 1e-6
+# Of the body's height: positions that vary less are constant.
+_CONSTANT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +85,7 @@ def _decode(bvh: Bvh) -> tuple[Motion, bool, tuple[str, ...]]:
     notes: list[str] = []
     if bvh.encoding != "utf-8":
         notes.append(f"joint names are not UTF-8: read as {_ENCODINGS[bvh.encoding]}")
-    if not _USUAL_FRAME[0] <= bvh.frame_time <= _USUAL_FRAME[1]:
+    if not _USUAL_FRAME_TIME[0] <= bvh.frame_time <= _USUAL_FRAME_TIME[1]:
         notes.append(
             f"a frame lasts {bvh.frame_time:g} s, which is unusual; Frame Time is in seconds"
         )
@@ -100,23 +97,23 @@ def _decode(bvh: Bvh) -> tuple[Motion, bool, tuple[str, ...]]:
         values = np.zeros((1, values.shape[1]))
         values[0, columns] = offsets[placed, axes]
 
-    places = values[:, columns]
+    positions = values[:, columns]
     child = placed > 0
-    middle = np.median(places, axis=0)
+    middle = np.median(positions, axis=0)
     adds_offset = _adds_offset(middle, offsets[placed, axes], placed)
     if adds_offset:
         notes.append("position channels of child joints are small: read as additions to the OFFSET")
         start = np.where(child, offsets[placed, axes], 0.0)
-        places, middle = places + start, middle + start
+        positions, middle = positions + start, middle + start
     root_pos = np.repeat(offsets[:1], len(values), axis=0)
-    root_pos[:, axes[~child]] = places[:, ~child]
+    root_pos[:, axes[~child]] = positions[:, ~child]
     rest = offsets.copy()
     rest[placed[child], axes[child]] = middle[child]
-    still = _STILL * np.linalg.norm(rest[1:], axis=-1).max(initial=0.0)
+    still = _CONSTANT * np.linalg.norm(rest[1:], axis=-1).max(initial=0.0)
     translations = None
-    if np.any(np.ptp(places[:, child], axis=0) > still):
+    if np.any(np.ptp(positions[:, child], axis=0) > still):
         translations = np.repeat(offsets[None], len(values), axis=0)
-        translations[:, placed, axes] = places
+        translations[:, placed, axes] = positions
 
     rotations = np.repeat(quat_identity(offsets)[None], len(values), axis=0)
     for order, (members, angle_columns) in bvh.rotation_channels.items():

@@ -1,4 +1,4 @@
-"""The plan of a body: which chains are its legs, arms, trunk, neck and head."""
+"""The anatomy of a skeleton: which chains are its legs, arms, trunk, neck and head."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,13 +14,16 @@ from spark.rig.topology import LimbPair, mirrored_pairs, named_pair
 from spark.rig.trunk import find_pelvis, find_trunk
 from spark.skeleton import Skeleton
 
-_CLEAR_NAMES = 1.5  # names that mean a limb's parts this much in all settle which limb it is
+# The certainties of a limb's joints' names (1.0 a sure one), summed, above which they settle which
+# limb it is: a sure name and a doubtful one.
+_CLEAR_NAMES = 1.5
 _REMEDY = "a map file can say which joint is what (spark-sim inspect --help)"
 
 
 @dataclass(frozen=True)
 class Anatomy:
-    """What holds which role; `sides` is the evidence that `first` limbs are left (see `facing`)."""
+    """The joints of each part of the body; `sides` is the evidence that the `first` limbs are the
+    left ones (`first_is_left`)."""
 
     pelvis: int
     spine: tuple[int, ...]
@@ -33,7 +36,7 @@ class Anatomy:
 
 
 def find_anatomy(measured: Measurements, hints: Sequence[NameHint]) -> Anatomy:
-    """The plan of a two-legged body; SkeletonError with the reason where it is none."""
+    """The anatomy of a two-legged body; SkeletonError with the reason where it is none."""
     skeleton = measured.skeleton
     if measured.reach[0] <= 0:
         raise SkeletonError(f"all bones of the skeleton ({len(skeleton)} joints) are 0 m long")

@@ -12,8 +12,8 @@ from spark.rig.roles import LIMBS, RoleMap
 from spark.rotation import quat_conj, quat_rotate
 from spark.skeleton import Skeleton
 
-SHORT = 1e-6  # vectors shorter than this [m] have no direction
-_THUMB_DROOP = np.radians(20)
+SHORT = 1e-6  # [m] shorter vectors have no direction
+_THUMB_DROOP = np.radians(20)  # of a thumb below the plane of the palm, about, in artists' rigs
 
 Vector = Float[np.ndarray, "3"]
 

@@ -9,8 +9,10 @@ from spark.rig.limb_roles import Labels
 from spark.rig.measurements import Measurements
 from spark.rig.topology import LimbPair
 
-_FOOT_WEIGHT, _KNEE_WEIGHT, _ELBOW_WEIGHT = 1.0, 3.0, 2.0  # how surely each shows the front
-_HAND_ON_GROUND = 0.3  # hands lower than this share of the hip height stand on the ground
+# How surely each shows the front. Knees and elbows bend to one side only, but by little in many
+# poses; feet may be turned out.
+_FOOT_WEIGHT, _KNEE_WEIGHT, _ELBOW_WEIGHT = 1.0, 3.0, 2.0
+_HAND_ON_GROUND = 0.3  # [hip heights over the feet] lower hands carry weight
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,8 @@ def _foot(
 def stands_on_four(
     measured: Measurements, rest: Measurements, legs: LimbPair, arms: LimbPair
 ) -> bool:
-    """Whether the tips of `arms` are as low as those of `legs`, seen from the legs' carrier.
+    """Whether the tips of `arms` are as low as those of `legs`, measured from the joint that
+    carries the legs.
 
     The rest pose tells where it is a stance, the typical frame of the motion otherwise: a fallen
     biped does not become a quadruped.

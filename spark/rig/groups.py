@@ -19,8 +19,8 @@ def groups_of(skeleton: Skeleton, roles: RoleMap) -> tuple[frozenset[Group], ...
 
     The hip joint is shared by torso and legs, the topmost spine joint by torso, arms and head; the
     pelvis stands in for a spine that isn't there. A joint without a role is in its parent's group,
-    on the way between a limb's carrier and its first role in the limb's; above all roles, in the
-    torso.
+    on the way between the joint that a limb hangs on and its first role in the limb's; above all
+    roles, in the torso.
     """
     groups: list[frozenset[Group]] = []
     top = roles.joints(Role.SPINE)[-1:] or roles.joints(Role.PELVIS)

@@ -14,9 +14,9 @@ from spark.rig.name_hints import NameHint
 LEG = ("upper_leg", "lower_leg", "foot", "toe")
 ARM = ("clavicle", "upper_arm", "forearm", "hand")
 
-_NAME_WEIGHT = 3.0  # what a sure name weighs against the geometry's few units
-_MIN_BEND = 0.2  # a chain that bends less than this [rad] in a motion says nothing
-_MAX_CHAIN = 10  # joints of a chain that are looked at: a hand's fingers are beyond
+_NAME_WEIGHT = 3.0  # of a sure name, in units of the log-likelihoods of lengths below
+_MIN_BEND = 0.2  # [rad] in a motion; of a chain that bends less, no joint is called stiff
+_MAX_CHAIN = 10  # joints of a chain that are tried as a limb's: more would be a hand's fingers
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def _name_score(hint: NameHint, part: str, parts: tuple[str, ...]) -> float:
 
 
 def _arc_lengths(measured: Measurements, chain: tuple[int, ...]) -> list[float]:
-    """Distance along the chain from its carrier to each joint, and last to the tip [m]."""
+    """Distance [m] along the chain from the joint that it hangs on to each joint and the tip."""
     at = [float(measured.bones[chain[0]])]
     for joint in chain[1:]:
         at.append(at[-1] + float(measured.bones[joint]))

@@ -16,7 +16,7 @@ from spark.rotation import (
     quat_rotate,
 )
 
-# A joint that never bends further than this does not show which way it bends.
+# A joint that bends less than 25 degrees throughout does not show which way it bends.
 _MIN_BEND_SINE = np.sin(np.radians(25))
 
 # The 24 turns of a cube: motion capture systems build rigs with joint axes at right angles.

@@ -12,9 +12,9 @@ from spark.rig.observed import mean_rotations, nearest_right_angle
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import quat_identity
 
-_MAX_LEAN = np.radians(35)  # a body this near to an axis stands along it
-_MAX_HIP_TILT = np.radians(10)
-_ALIGNED = np.radians(10)  # bones this near to their joint's axes were put there on purpose
+_MAX_LEAN = np.radians(35)  # of a trunk from the axis that the body was built along
+_MAX_HIP_TILT = np.radians(10)  # of the line of the hips from the axis across the body
+_ALIGNED = np.radians(10)  # of a bone from an axis of its joint that it was put along on purpose
 
 _UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
 _UPPER_ARMS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)

@@ -24,7 +24,7 @@ def rig_to_json(rig: Rig) -> dict[str, Any]:
         "reasons": list(roles.reasons),
         "groups": [sorted(group.value for group in groups) for groups in rig.groups],
         "tpose": rig.tpose.tolist(),
-        "carrier": rig.root_joint,
+        "root_joint": rig.root_joint,
         "hip_height": rig.hip_height,
         "notes": list(rig.notes),
     }
@@ -50,7 +50,7 @@ def rig_from_json(record: dict[str, Any]) -> Rig:
         roles,
         tuple(frozenset(Group(group) for group in groups) for groups in record["groups"]),
         np.array(record["tpose"], dtype=np.float64),
-        int(record["carrier"]),
+        int(record["root_joint"]),
         float(record["hip_height"]),
         tuple(record["notes"]),
     )

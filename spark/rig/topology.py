@@ -9,7 +9,7 @@ from spark.rig.measurements import Measurements
 from spark.rig.name_hints import NameHint
 from spark.skeleton import Skeleton
 
-SIMILAR = 0.2  # bones of a mirrored pair differ by less than this share of the chain
+MAX_ASYMMETRY = 0.2  # bones of a mirrored pair differ by less than this share of the chain
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def mirrored_pairs(
                 ),
                 key=lambda found: found[2],
             )
-            if difference > SIMILAR:
+            if difference > MAX_ASYMMETRY:
                 break
             chains = [chain for chain in chains if chain not in (a, b)]
             pairs.append(LimbPair(root_joint, a, b, sided=False))

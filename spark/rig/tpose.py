@@ -34,9 +34,9 @@ from spark.rotation import (
 )
 from spark.skeleton import Skeleton
 
-_MAX_ROLL = np.radians(100)  # a forearm is seldom rolled further than this from its middle
-_MAX_FINGER_SPREAD = np.radians(35)  # fingers this near to an axis of the hand lie along it
-_STEEPEST_FOOT = np.radians(-75)  # a foot that points further down than this at rest does not stand
+_MAX_ROLL = np.radians(100)  # of a forearm from its middle: pronation and supination reach 85 each
+_MAX_FINGER_SPREAD = np.radians(35)  # of the fingers' middle from the hand's axis they lie along
+_STEEPEST_FOOT = np.radians(-75)  # a foot that points further down at rest is not standing
 
 _LEFT, _UP = np.eye(3)[1:]
 _FEET = (Role.LEFT_FOOT, Role.RIGHT_FOOT)
@@ -60,7 +60,7 @@ def find_tpose(motion: Motion, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"]
     """Each joint's `q_world_joint` in the T-pose, and notes on what was assumed.
 
     Pelvis upright facing +X, legs straight down, arms straight along +-Y with palms down, feet
-    towards +X with their soles flat. Joints above the one that carries the body stay as they rest.
+    towards +X with their soles flat. Joints above the root joint stay as they rest.
     Raises SkeletonError where the rig has no lateral axis or no legs.
     """
     skeleton = motion.skeleton
@@ -93,7 +93,7 @@ def find_tpose(motion: Motion, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"]
 
 def root_joint_of(skeleton: Skeleton, pelvis: int) -> int:
     """The joint that takes the body through the world: the pelvis, or the nearest joint above it
-    that the file can move."""
+    whose position the file animates."""
     return next((j for j in skeleton.ancestors(pelvis) if skeleton.translating[j]), 0)
 
 
@@ -180,11 +180,11 @@ def _palm_down(pose: RigPose, hand: int, q: Quat) -> tuple[Quat, tuple[str, ...]
         return q, ()
     side, droop = found
     seen = quat_rotate(q, side)
-    turns = round((np.arctan2(-seen[2], seen[0]) - droop) / (np.pi / 2))
-    if turns == 0:
+    quarter_turns = round((np.arctan2(-seen[2], seen[0]) - droop) / (np.pi / 2))
+    if quarter_turns == 0:
         return q, ()
-    note = f"{pose.skeleton.names[hand]} is turned by {90 * turns} degrees: palms face down"
-    return quat_mul(quat_from_rotvec(-_LEFT * (turns * np.pi / 2)), q), (note,)
+    note = f"{pose.skeleton.names[hand]} is turned by {90 * quarter_turns} degrees: palms face down"
+    return quat_mul(quat_from_rotvec(-_LEFT * (quarter_turns * np.pi / 2)), q), (note,)
 
 
 def _rotation_about(start: Vector, end: Vector, about: Vector) -> Quat:

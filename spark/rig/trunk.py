@@ -73,7 +73,7 @@ def _head(
     legs: LimbPair,
     limbs: set[int],
 ) -> int | None:
-    """The joint named head, or the end of the chain that leaves the arms' carrier upwards."""
+    """The joint named head, or the end of the chain that leaves the joint of the arms upwards."""
     skeleton = measured.skeleton
     named = [
         j

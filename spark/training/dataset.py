@@ -4,9 +4,9 @@
                    cell, where in the arrays, on which floor), every file with its SHA-256, what was
                    left out of the dataset and why
     numbers.npy    float32: of each clip its rotations (T, K, 4), then its hips' path (T, 3)
-    planted.npy    bool (frames, 2): whether the left and the right foot stand parts/         what
-    each file gave (`spark.training.dataset_parts`): a run that stopped goes on, and one
-                   with more files reads only those
+    planted.npy    bool (frames, 2): whether the left and the right foot stand
+    parts/         what each file gave (`spark.training.dataset_parts`): a run that stopped goes on,
+                   and one with more files reads only those
 
 A clip is what `spark.training.pairs.TrainingClip` says: canonical, at 30 fps, on the network's view
 of its body.
@@ -46,7 +46,7 @@ from spark.training.splits import cells, seen_characters, seen_motions
 from spark.training.variants import split_joints
 from spark.transfer.canonical import FRAME_TIME
 
-FORMAT, VERSION = "spark-sim dataset", 2
+FORMAT, VERSION = "spark-sim dataset", 3
 
 # Skeletons whose bones differ by less than this, in hip heights, are one body.
 _SAME_BODY = 1e-3

@@ -25,13 +25,13 @@ from spark.training.clips import clip_of
 from spark.transfer.canonical import to_canonical
 
 # Goes up whenever the same file gives another part.
-VERSION = 2
+VERSION = 3
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A file as a `spark.training.pairs.Clip` on its own rig, at 30 fps; its own frame rate, and
-    the height [m] of the floor that its feet stand on, which the path counts from."""
+    """A file as a `spark.training.pairs.TrainingClip` on its own rig, at 30 fps; its own frame
+    rate, and the height [m] of the floor that its feet stand on, which the path counts from."""
 
     rig: Rig
     rotations: Float[np.ndarray, "T K 4"]

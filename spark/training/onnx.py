@@ -21,7 +21,7 @@ INPUTS = (
     *("rotations", "root"),
     *(f"source_{field}" for field in Body._fields),
     *(f"target_{field}" for field in Body._fields),
-    *("start_rotations", "start_root", "start_guess"),
+    *("start_rotations", "start_root", "start_unmatched"),
 )
 _OPSET = 20
 

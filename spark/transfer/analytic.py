@@ -19,12 +19,16 @@ from spark.rig.roles import Role
 from spark.rotation import quat_angle, quat_conj, quat_slerp
 from spark.transfer.canonical import CanonicalMotion
 
-_SAME_PLACE = 0.3  # joints of equally long chains, taken one by one, lie nearer to one another
-_NEAR = 0.26  # further than this from any of the source's joints, what a joint does is a guess
+# Normalised arc length along a chain, 0 to 1. Joints of two chains of equal length are taken one by
+# one where none lies further than this from its counterpart.
+_MAX_OFFSET = 0.3
+# A joint further than this from all of the source's joints of its chain is unmatched: a little more
+# than the step between the joints of a spine of four.
+_MAX_GAP = 0.26
 
-_FINGER_BENDS = np.radians(5)  # a finger that bends less against its hand is at rest
+_MIN_FINGER_BEND = np.radians(5)  # a finger that bends less against its hand is at rest
 
-# A floor further than this from z = 0, in hip heights, is moved to 0.
+# [hip heights] A floor further than this from z = 0 is moved to 0.
 _FLOOR_TOLERANCE = 0.1
 
 _SHOULDERS = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE)
@@ -34,10 +38,9 @@ _SHOULDERS = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE)
 class Correspondence:
     """Target joint j turns `mix[j]` of the way from source joint `first[j]` to `second[j]`.
 
-    -1 in `first` marks joints above the target's carrier: they stay as they rest. `unmatched[j]` is
-    j where that is a guess, since the source has no joint at this place and the body around it
-    tells what j does (spine, neck, collarbones); the guess that j follows where it only follows;
-    else -1.
+    -1 in `first` marks joints above the target's root joint: they stay as they rest.
+    `unmatched[j]` is j for a joint of spine, neck or shoulders without a counterpart in the source;
+    for a joint without a role that follows one of these, the one that it follows; else -1.
     """
 
     first: Int[np.ndarray, "J"]
@@ -49,17 +52,17 @@ class Correspondence:
         self, source: Float[np.ndarray, "*n S 4"], target: Rig
     ) -> Float[np.ndarray, "*n J 4"]:
         """The target's rotations since the T-pose from the source's."""
-        turned = source[..., self.first, :]
+        out = source[..., self.first, :]
         between = np.flatnonzero(self.mix)
         if len(between):
-            turned[..., between, :] = quat_slerp(
-                turned[..., between, :],
+            out[..., between, :] = quat_slerp(
+                out[..., between, :],
                 source[..., self.second[between], :],
                 np.broadcast_to(self.mix[between], (*source.shape[:-2], len(between))),
             )
-        held = np.flatnonzero(self.first < 0)
-        turned[..., held, :] = quat_conj(target.tpose[held])
-        return turned
+        above = np.flatnonzero(self.first < 0)
+        out[..., above, :] = quat_conj(target.tpose[above])
+        return out
 
 
 def correspond(source: Rig, target: Rig) -> Correspondence:
@@ -80,22 +83,24 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
                 copy(j, from_joint)
     for role, (joints, at) in source.chains.items():
         theirs, own = source.roles.joints(role), target.roles.joints(role)
-        places = dict(zip(*target.chains[role], strict=True))
-        moved = (abs(at[joints.index(a)] - places[j]) for a, j in zip(theirs, own, strict=False))
-        if len(theirs) == len(own) and max(moved, default=0.0) < _SAME_PLACE:
+        positions = dict(zip(*target.chains[role], strict=True))
+        offsets = (
+            abs(at[joints.index(a)] - positions[j]) for a, j in zip(theirs, own, strict=False)
+        )
+        if len(theirs) == len(own) and max(offsets, default=0.0) < _MAX_OFFSET:
             for from_joint, j in zip(theirs, own, strict=True):
                 copy(j, from_joint)
         for j in own:
             if known[j]:
                 continue
-            k = bisect_right(at, places[j]) - 1
+            k = bisect_right(at, positions[j]) - 1
             after = min(k + 1, len(at) - 1)
             span = at[after] - at[k]
             first[j], second[j] = joints[k], joints[after]
-            mix[j] = (places[j] - at[k]) / span if span > 0 else 0.0
+            mix[j] = (positions[j] - at[k]) / span if span > 0 else 0.0
             known[j] = True
-            lonely = all(abs(at[joints.index(a)] - places[j]) > _NEAR for a in theirs)
-            unmatched[j] = j if lonely and len(joints) > 1 else -1
+            alone = all(abs(at[joints.index(a)] - positions[j]) > _MAX_GAP for a in theirs)
+            unmatched[j] = j if alone and len(joints) > 1 else -1
 
     names = {name: j for j, name in enumerate(source.skeleton.names)}
     fingers = {
@@ -110,8 +115,8 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
             same = None
         if j in above:
             if j >= target.root_joint:
-                carried = same in source.skeleton.ancestors(source.pelvis)[1:]
-                copy(j, same if same is not None and carried else source.pelvis)
+                above_pelvis = same in source.skeleton.ancestors(source.pelvis)[1:]
+                copy(j, same if same is not None and above_pelvis else source.pelvis)
             continue
         parent = int(target.skeleton.parents[j])
         if same is not None and not mix[parent] and _hangs(source, same, int(first[parent])):
@@ -164,7 +169,7 @@ def _without_fingers(source: CanonicalMotion, target: Rig) -> tuple[str, ...]:
     lost = [j for bone, j in theirs.items() if bone not in own]
     hands = [source.rig.roles.require(Role(f"{b.side}_hand")) for b in theirs if b not in own]
     bends = quat_angle(source.rotations[:, hands], source.rotations[:, lost])
-    bent = [j for j, angle in zip(lost, bends.T, strict=True) if angle.max() > _FINGER_BENDS]
+    bent = [j for j, angle in zip(lost, bends.T, strict=True) if angle.max() > _MIN_FINGER_BEND]
     if bent:
         notes += (
             f"{name_list([source.rig.skeleton.names[j] for j in bent])}: left out, fingers that "

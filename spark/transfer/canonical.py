@@ -13,7 +13,7 @@ from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_rotate
 from spark.summary import counted, time_span
 
-FRAME_TIME = 1 / 30  # [s] at which motions are learned from: what the network reads, and priors
+FRAME_TIME = 1 / 30  # [s] of what the network and the target prior read: 30 fps
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ def to_canonical(motion: Motion, rig: Rig) -> CanonicalMotion:
 
 
 def canonical_positions(canonical: CanonicalMotion) -> Float[np.ndarray, "T J 3"]:
-    """Where the joints are [m, world]; those above the carrier as if they were rigid with it."""
+    """Where the joints are [m, world]; those above the root joint as if rigid with it."""
     rig = canonical.rig
     world = quat_mul(canonical.rotations, rig.tpose)
     positions = world_positions(rig.skeleton, world, np.zeros((len(canonical), 3)))
@@ -68,7 +68,7 @@ def canonical_positions(canonical: CanonicalMotion) -> Float[np.ndarray, "T J 3"
 def from_canonical(canonical: CanonicalMotion) -> Motion:
     """The motion on the rig's own skeleton: the inverse of `to_canonical`.
 
-    The rig's carrier takes the path through the world; joints above it stay where they rest.
+    The rig's root joint takes the path through the world; joints above it stay where they rest.
     """
     rig, skeleton = canonical.rig, canonical.rig.skeleton
     world = quat_mul(canonical.rotations, rig.tpose)
@@ -86,7 +86,7 @@ def from_canonical(canonical: CanonicalMotion) -> Motion:
 
 def at_frame_time(canonical: CanonicalMotion, frame_time: float) -> CanonicalMotion:
     """`canonical` at another frame rate: rotations by slerp, the path linearly; the first frame
-    stays. A motion that has this frame time already is given back as it is."""
+    stays. A motion that has this frame time already is returned as it is."""
     if abs(canonical.frame_time - frame_time) < 1e-3 * frame_time:
         return canonical
     last = len(canonical) - 1

@@ -1,10 +1,11 @@
-"""Feet that stay where the source's feet stay: what copied rotations alone cannot promise.
+"""Foot lock: feet that stay where the source's feet stay.
 
 Copied rotations on legs of other proportions make standing feet slide, float or sink. Here each
-foot's point of contact (its toe, or its ankle where one of the two rigs has no toe) is held while
-the source's stands: over the ground at the mean place of that stance, in height as far above its
-sole as the source's is above its own. In between the correction blends. What a source's foot
-wobbles while it stands is capture noise and goes; what it drifts beyond that is motion and stays.
+foot's contact point (its toe, or its ankle where one of the two rigs has no toe) is held during
+each stance of the source: over the ground at its mean position of that stance, in height as far
+above its sole as the source's is above its own. Between stances the correction is blended. Where
+the source's own foot moves during a stance, the first `_CAPTURE_NOISE` from its mean position is
+taken for noise and removed; what goes beyond is motion and kept.
 """
 
 from dataclasses import replace
@@ -19,16 +20,14 @@ from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.leg_ik import bend_leg, blend_between, leg_of
 
-# A foot that stands for less [s] is passing by.
-_SHORTEST_STANCE = 0.1
-# A standing foot that strays less than this [hip heights] from its mean place has not moved.
-_WOBBLE = 0.03
+_MIN_STANCE = 0.1  # [s] a shorter one is a swinging foot that is slow and low for a moment
+_CAPTURE_NOISE = 0.03  # [hip heights] 3 cm of an adult
 
 
 def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
-    """`moved`, the transfer of `source`, with its feet standing where the source's stand."""
+    """`moved`, the transfer of `source`, with its feet held while the source's stand."""
     scale = moved.rig.hip_height / source.rig.hip_height
-    theirs, own = canonical_positions(source), canonical_positions(moved)
+    source_positions, positions = canonical_positions(source), canonical_positions(moved)
     rotations = moved.rotations
     for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
         leg = leg_of(moved.rig.skeleton, moved.rig.roles.roles, group)
@@ -36,7 +35,7 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
         if leg is None or contact is None:
             continue
         from_joint, to_joint = contact
-        path = theirs[:, from_joint] - [0, 0, source.floor_z]
+        path = source_positions[:, from_joint] - [0, 0, source.floor_z]
         stance = _stances(
             planted_points(path, source.frame_time, source.rig.standing_height),
             source.frame_time,
@@ -44,38 +43,41 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
         frames = np.flatnonzero(stance)
         if not len(frames):
             continue
-        wanted = path[frames] * scale
-        wanted[:, 2] -= scale * _rest_height(source.rig, from_joint)
-        here = own[frames, to_joint] - [0, 0, moved.floor_z + _rest_height(moved.rig, to_joint)]
-        wanted[:, :2] = _without_mean(wanted[:, :2], frames)
-        wanted[:, :2] -= _small_part(wanted[:, :2], _WOBBLE * moved.rig.hip_height)
-        here[:, :2] = _without_mean(here[:, :2], frames)
-        error = wanted - here
-        rotations = bend_leg(rotations, own, leg, blend_between(error, frames, len(own)))
+        desired = path[frames] * scale
+        desired[:, 2] -= scale * _rest_height(source.rig, from_joint)
+        rest_z = moved.floor_z + _rest_height(moved.rig, to_joint)
+        current = positions[frames, to_joint] - [0, 0, rest_z]
+        desired[:, :2] = _without_mean(desired[:, :2], frames)
+        desired[:, :2] -= _clamped(desired[:, :2], _CAPTURE_NOISE * moved.rig.hip_height)
+        current[:, :2] = _without_mean(current[:, :2], frames)
+        error = desired - current
+        rotations = bend_leg(
+            rotations, positions, leg, blend_between(error, frames, len(positions))
+        )
     return replace(moved, rotations=rotations)
 
 
 def _without_mean(
     path: Float[np.ndarray, "P 2"], frames: Int[np.ndarray, "P"]
 ) -> Float[np.ndarray, "P 2"]:
-    """A path over stances, each seen from its own mean place."""
+    """A path over stances, each relative to its own mean position."""
     starts = np.flatnonzero(np.diff(frames, prepend=-2) > 1)
     counts = np.diff(starts, append=len(frames))
     means = np.add.reduceat(path, starts) / counts[:, None]
     return path - np.repeat(means, counts, axis=0)
 
 
-def _small_part(path: Float[np.ndarray, "P 2"], radius: float) -> Float[np.ndarray, "P 2"]:
-    """What of each vector lies within `radius` of zero."""
+def _clamped(path: Float[np.ndarray, "P 2"], radius: float) -> Float[np.ndarray, "P 2"]:
+    """Each vector, cut off at length `radius`."""
     length = np.linalg.norm(path, axis=-1, keepdims=True)
     return path * np.minimum(1.0, radius / np.maximum(length, 1e-12))
 
 
 def _stances(planted: Bool[np.ndarray, "T"], frame_time: float) -> Bool[np.ndarray, "T"]:
-    """Without the stances that are too short to be one."""
+    """The frames of stances that are long enough to be one."""
     kept = planted.copy()
     for start, stop in true_runs(planted):
-        if (stop - start) * frame_time < _SHORTEST_STANCE:
+        if (stop - start) * frame_time < _MIN_STANCE:
             kept[start:stop] = False
     return kept
 

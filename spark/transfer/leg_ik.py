@@ -1,9 +1,9 @@
-"""Planted feet: move each stance foot to one place and bend the leg after it.
+"""Two-bone inverse kinematics of legs, and the corrections that hold planted feet.
 
-Works on rotations since the T-pose in world axes, for any leading batch axes. A foot's point of
-contact (its toe, or its ankle where there is no toe) is held in one place over each stance; between
-stances the correction blends from one to the next, so nothing jumps. The leg follows by
-two-bone inverse kinematics in its own bending plane; the foot keeps its rotation in the world.
+Works on rotations since the T-pose in world axes, for any leading batch axes. A foot's contact
+point (its toe, or its ankle where there is no toe) is held in one position over each stance;
+between stances the correction is eased from one to the next. The leg bends in its own plane; the
+foot keeps its rotation in the world.
 """
 
 from collections.abc import Sequence
@@ -16,8 +16,9 @@ from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_between, quat_from_rotvec, quat_mul, quat_rotate
 from spark.skeleton import Skeleton
 
-# A leg is never stretched to more than this share of its length: the knee would lock and flip.
-_REACH = 0.999
+# Of the leg's length: at full stretch the knee would lock, and the direction it bends in flip.
+_MAX_REACH = 0.999
+_STRAIGHT = 0.02  # sine of the knee's angle; below it the bones show no plane to bend in
 
 
 class Leg(NamedTuple):
@@ -55,10 +56,10 @@ def stance_correction(
     wanted_pos: Float[np.ndarray, "*n T 3"],
     planted: Bool[np.ndarray, "*n T"],
 ) -> Float[np.ndarray, "*n T 3"]:
-    """What must be added to contact points' paths so that they rest while planted, where those
-    wanted are on average [same unit]; in between as `blend_between` does it."""
-    begins = planted & ~np.concatenate([np.zeros_like(planted[..., :1]), planted[..., :-1]], -1)
-    stance = begins.cumsum().reshape(planted.shape)  # a number for each stance of each path
+    """What must be added to contact points' paths so that over each stance they rest at the mean of
+    the wanted path [same unit]; in between as `blend_between` does it."""
+    starts = planted & ~np.concatenate([np.zeros_like(planted[..., :1]), planted[..., :-1]], -1)
+    stance = starts.cumsum().reshape(planted.shape)  # a number for each stance of each path
     frames = planted.nonzero()
     counts = np.maximum(np.bincount(stance[frames]), 1)
     held = np.zeros_like(contact_pos)
@@ -102,9 +103,9 @@ def bend_leg(
 ) -> Float[np.ndarray, "*n J 4"]:
     """Rotations with the ankle moved by `move`, or as near to it as the leg reaches."""
     hip, knee, ankle = (positions[..., j, :] for j in leg[:3])
-    turns = leg_rotations(knee - hip, ankle - knee, rotations[..., leg.upper_leg, :], move)
+    both = leg_rotations(knee - hip, ankle - knee, rotations[..., leg.upper_leg, :], move)
     out = rotations.copy()
-    for joints, turned in zip((leg.with_thigh, leg.with_shank), turns, strict=True):
+    for joints, turned in zip((leg.with_thigh, leg.with_shank), both, strict=True):
         out[..., list(joints), :] = quat_mul(turned[..., None, :], rotations[..., list(joints), :])
     return out
 
@@ -115,17 +116,18 @@ def leg_rotations(
     upper_leg: Float[np.ndarray, "*n 4"],
     move: Float[np.ndarray, "*n 3"],
 ) -> tuple[Float[np.ndarray, "*n 4"], Float[np.ndarray, "*n 4"]]:
-    """How thigh and shank turn in the world, so that the ankle moves by `move` or as near to it as
-    the leg reaches. `upper_leg` is the thigh's rotation since the T-pose."""
+    """By which thigh and shank are turned, in world axes, so that the ankle moves by `move` or as
+    near to it as the leg reaches. `thigh` and `shank` are the bones [m, world], `upper_leg` is the
+    thigh's rotation since the T-pose."""
     a, b = _length(thigh), _length(shank)
     goal = thigh + shank + move
-    reach = np.clip(_length(goal), abs(a - b) * 1.01 + 1e-9, (a + b) * _REACH)
+    reach = np.clip(_length(goal), abs(a - b) * 1.01 + 1e-9, (a + b) * _MAX_REACH)
 
     lateral = quat_rotate(upper_leg, np.array([0, 1, 0], upper_leg.dtype))
     axis = np.cross(thigh, shank)
     sine = _length(axis)
     # A straight leg bends about the body's lateral axis, backwards.
-    straight = (sine < 0.02 * a * b)[..., None]
+    straight = (sine < _STRAIGHT * a * b)[..., None]
     axis = np.where(straight, lateral, axis)
     axis = axis / _length(axis)[..., None]
     now = np.arctan2(sine, np.einsum("...i,...i", thigh, shank))

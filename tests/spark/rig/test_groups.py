@@ -22,7 +22,7 @@ def test_groups_share_the_hips_and_the_chest() -> None:
 
 
 @pytest.mark.parametrize("convention", RIGS)
-def test_every_joint_has_a_group_and_every_group_its_carrier(convention: str) -> None:
+def test_every_joint_has_a_group_and_every_group_the_joint_it_hangs_on(convention: str) -> None:
     skeleton, _ = build(RIGS[convention])
     roles = assign_roles(skeleton)
     groups = groups_of(skeleton, roles)

@@ -299,7 +299,7 @@ def test_what_the_source_lacks_follows_or_lies_between() -> None:
     assert (correspond(rig, rig).unmatched == -1).all()
 
 
-def test_joints_between_carrier_and_pelvis_move_as_the_sources_do() -> None:
+def test_joints_between_root_joint_and_pelvis_move_as_the_sources_do() -> None:
     """Trunk and legs may hang side by side on the joint that carries the body."""
     rig = stick_rig()
     skeleton = rig.skeleton

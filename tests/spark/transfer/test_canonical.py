@@ -55,7 +55,7 @@ def wild(rig: Rig, frames: int = 7, *, root: bool, pelvis: bool) -> Motion:
     return Motion(rig.skeleton, 1 / 60, root_pos, rotations, translations)
 
 
-def test_a_motion_that_only_the_carrier_moves_comes_back_whole() -> None:
+def test_a_motion_that_only_the_root_joint_moves_comes_back_whole() -> None:
     for rig in (stick_rig(), under_a_root(stick_rig(), moves=False)):
         motion = wild(rig, root=True, pelvis=False)
         back = from_canonical(to_canonical(motion, rig))
