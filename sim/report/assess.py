@@ -1,4 +1,4 @@
-"""Judge a motion: how plausible it is, and how it differs from the motion it was made from."""
+"""Assess a motion: how plausible it is, and how it differs from the motion it was made from."""
 
 from dataclasses import replace
 
@@ -26,8 +26,9 @@ from spark.resample import values_at
 from spark.rig.contacts import planted_feet
 from spark.rig.rig import Rig
 
-# A source whose floor is further from z = 0 than this, in hip heights, may have been put on it.
-_FLOOR_AT_ZERO = 0.1
+# Hip heights: a source whose floor is further from z = 0 than this does not stand on z = 0, and
+# what was made of it may have been put there.
+_MAX_FLOOR_OFFSET = 0.1
 
 
 def assess(
@@ -106,7 +107,7 @@ def _floor_from_source(
     poses: ClipPoses, source_rig: Rig, source_floor: float
 ) -> tuple[float, tuple[str, ...]]:
     scaled = source_floor * poses.rig.hip_height / source_rig.hip_height
-    if abs(source_floor) < _FLOOR_AT_ZERO * source_rig.hip_height:
+    if abs(source_floor) < _MAX_FLOOR_OFFSET * source_rig.hip_height:
         return scaled, ()
     own = floor_height(poses.lowest_corner)
     floor = min((0.0, scaled, source_floor), key=lambda z: abs(z - own))

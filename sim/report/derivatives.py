@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import make_interp_spline
 
-# Where the window is sampled, in halves of it: so densely that the count does not matter.
+# Sample times within the window, in halves of it: so dense that their number does not matter.
 _OFFSETS = np.linspace(-1.0, 1.0, 11)
 
 

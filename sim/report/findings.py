@@ -1,4 +1,4 @@
-"""From flags to sentences that one can act on."""
+"""Findings: what is wrong where and when, in sentences that one can act on."""
 
 from collections.abc import Iterator
 
@@ -9,16 +9,19 @@ from sim.report.measures import Drift
 from sim.report.result import Finding
 from spark.runs import true_runs
 
-# Flags of one kind that are no further apart than this [s] are one event.
+# Flagged frames of one measure that are no further apart than this [s] are one event to a viewer.
 _MERGE_GAP = 0.1
-# A joint beyond its limit by less than this [rad] is nothing to mend.
+# A joint beyond its limit by less than this [rad] is nothing to mend: the ranges are no finer.
 _MIN_EXCESS = np.radians(1.0)
+# The root strays where it is further from the source's path than this share of the path's length,
+# counted as 1 m at least; and where its heading differs by more than this [rad].
+_MAX_DRIFT, _MAX_HEADING = 0.05, np.radians(10)
 
 
 def findings_of(clip: ClipMetrics, drift: Drift | None) -> tuple[Finding, ...]:
     """All events of a clip, the gravest of each measure first."""
     gap = int(_MERGE_GAP / clip.frame_time)
-    kinds = (
+    measures = (
         _penetration,
         _floating,
         _skating,
@@ -27,7 +30,7 @@ def findings_of(clip: ClipMetrics, drift: Drift | None) -> tuple[Finding, ...]:
         _self_penetration,
         _balance,
     )
-    found = (f for kind in kinds for f in sorted(kind(clip, gap), key=lambda f: -f.amount))
+    found = (f for measure in measures for f in sorted(measure(clip, gap), key=lambda f: -f.amount))
     return (*found, *(_root_drift(drift) if drift else ()))
 
 
@@ -49,13 +52,13 @@ def _floating(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
 
 
 def _skating(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
-    for side in dict.fromkeys(clip.corner_feet):
-        columns = [s == side for s in clip.corner_feet]
+    for foot in dict.fromkeys(clip.corner_feet):
+        columns = [f == foot for f in clip.corner_feet]
         speed = np.where(clip.corner_skates, clip.corner_speeds, 0.0)[:, columns].max(axis=1)
         for start, stop in true_runs(speed > 0, gap):
             amount = float(speed[start:stop].sum()) * clip.frame_time
-            sentence = f"{side} slides {100 * amount:.1f} cm"
-            yield Finding("skating", side, start, stop, amount, "m", sentence)
+            sentence = f"{foot} slides {100 * amount:.1f} cm"
+            yield Finding("skating", foot, start, stop, amount, "m", sentence)
 
 
 def _root_wrench(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
@@ -100,11 +103,11 @@ def _balance(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
 def _root_drift(drift: Drift) -> Iterator[Finding]:
     worst = int(drift.distance.argmax())
     amount = float(drift.distance[worst])
-    if amount > 0.05 * max(drift.path_length, 1.0):
+    if amount > _MAX_DRIFT * max(drift.path_length, 1.0):
         sentence = f"the root strays {amount:.2f} m from the source's path"
         yield Finding("root_drift", "root", worst, worst + 1, amount, "m", sentence)
     worst = int(np.abs(drift.heading).argmax())
     amount = float(np.abs(drift.heading[worst]))
-    if amount > np.radians(10):
+    if amount > _MAX_HEADING:
         sentence = f"the heading is {np.degrees(amount):.0f}° off the source's"
         yield Finding("root_drift", "heading", worst, worst + 1, amount, "rad", sentence)

@@ -24,14 +24,14 @@ _X, _Y, _Z = 0, 1, 2
 
 
 _Range = tuple[int, int]
-_Words = tuple[str, str]
+_Movements = tuple[str, str]
 
 
 @dataclass(frozen=True)
 class JointLimit:
     """Ranges [deg] of one joint, of a left limb's or of the trunk's, by T-pose world axis.
 
-    `bone` is the index of the axis along the bone: its range is that of the twist, the others are
+    `axis` is the index of that along the bone: its range is that of the twist, the others are
     those of the swing. `below` holds the roles that the joint may hang on, the nearest first.
     `movements` say what a turn beyond either end of each range is called.
     """
@@ -39,14 +39,14 @@ class JointLimit:
     name: str
     role: str
     below: tuple[str, ...]
-    bone: int
+    axis: int
     ranges: tuple[_Range, _Range, _Range]
-    movements: tuple[_Words, _Words, _Words]
+    movements: tuple[_Movements, _Movements, _Movements]
     paired: bool = True
 
 
-_TWISTS: _Words = ("twists", "twists")
-_SIDEWAYS: _Words = ("bends sideways", "bends sideways")
+_TWISTS: _Movements = ("twists", "twists")
+_SIDEWAYS: _Movements = ("bends sideways", "bends sideways")
 
 # The signs follow from the T-pose (X forward, Y left, Z up): a left arm lies along +Y, so a turn
 # about +X lifts it and one about -Z brings it forward; a leg hangs along -Z, so a turn about -Y
@@ -147,7 +147,7 @@ def limit_excess(since_tpose: Float[np.ndarray, "T J 4"], rig: Rig) -> tuple[Lim
 
     A joint that the rig lacks, or that hangs on nothing, is left out.
     """
-    found = []
+    excesses = []
     for limit in LIMITS:
         for side in ("left", "right") if limit.paired else ("",):
             joint = _joint(rig, side, limit.role)
@@ -156,22 +156,22 @@ def limit_excess(since_tpose: Float[np.ndarray, "T J 4"], rig: Rig) -> tuple[Lim
             )
             if joint is None or parent is None:
                 continue
-            turn = quat_relative(since_tpose[:, parent], since_tpose[:, joint])
+            rotation = quat_relative(since_tpose[:, parent], since_tpose[:, joint])
             if side == "right":
-                turn = turn * np.array([1.0, -1.0, 1.0, -1.0])  # mirrored in the XZ plane
-            found.append(
+                rotation = rotation * np.array([1.0, -1.0, 1.0, -1.0])  # mirrored in the XZ plane
+            excesses.append(
                 LimitExcess(
                     f"{side} {limit.name}".strip(),
-                    _beyond(swing_and_twist(turn, limit.bone), np.radians(limit.ranges)),
+                    _beyond(swing_and_twist(rotation, limit.axis), np.radians(limit.ranges)),
                     tuple(word for words in limit.movements for word in words),
                 )
             )
-    return tuple(found)
+    return tuple(excesses)
 
 
-def swing_and_twist(turn: Float[np.ndarray, "T 4"], bone: int) -> Float[np.ndarray, "T 3"]:
-    """The twist [rad] about axis `bone` in its place, the swing's rotation vector in the others."""
-    swing, twist = quat_swing_twist(turn, np.eye(3)[bone])
+def swing_and_twist(rotation: Float[np.ndarray, "T 4"], axis: int) -> Float[np.ndarray, "T 3"]:
+    """The twist [rad] about axis `axis` in its place, the swing's rotation vector in the others."""
+    swing, twist = quat_swing_twist(rotation, np.eye(3)[axis])
     return rotvec_from_quat(swing) + rotvec_from_quat(twist)
 
 

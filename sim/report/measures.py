@@ -1,4 +1,4 @@
-"""The report's measures: one pure function each, arrays in, arrays out."""
+"""The report's measures: pure functions of arrays."""
 
 from dataclasses import dataclass
 
@@ -9,6 +9,10 @@ from scipy.ndimage import minimum_filter1d
 from sim.report.derivatives import derivative
 from spark.resample import values_at
 from spark.summary import brief
+
+# The slope across a path is only told where the path is wider than this share of its length, and a
+# slope at all where it leaves at most this share of the heights' standard deviation.
+_MIN_WIDTH, _MAX_UNEXPLAINED = 0.3, 0.5
 
 
 def floor_height(lowest: Float[np.ndarray, "T"]) -> float:
@@ -92,9 +96,9 @@ def root_drift(
 
 
 def distance_outside_hull(
-    place: Float[np.ndarray, "T 2"],
+    point: Float[np.ndarray, "T 2"],
     points: Float[np.ndarray, "T P 2"],
-    use: Bool[np.ndarray, "T P"],
+    mask: Bool[np.ndarray, "T P"],
 ) -> Float[np.ndarray, "T"]:
     """How far a place lies outside the convex hull of the points in use [m]; 0 inside.
 
@@ -103,7 +107,7 @@ def distance_outside_hull(
     """
     angle = 2 * np.pi * np.arange(72) / 72
     directions = np.stack([np.cos(angle), np.sin(angle)])
-    reach = np.where(use[..., None], (points - place[:, None]) @ directions, -np.inf).max(axis=1)
+    reach = np.where(mask[..., None], (points - point[:, None]) @ directions, -np.inf).max(axis=1)
     return np.maximum(-reach.min(axis=1), 0.0)
 
 
@@ -141,10 +145,10 @@ def floor_slope(places: Float[np.ndarray, "N 3"]) -> tuple[float, float]:
     """
     if len(places) < 3:
         return 0.0, 0.0
-    ground = places[:, :2] - places[:, :2].mean(axis=0)
-    level = places[:, 2] - places[:, 2].mean()
-    gradient, *_ = np.linalg.lstsq(ground, level, rcond=0.3)
-    plane = ground @ gradient
-    if np.std(level - plane) > 0.5 * np.std(level):
+    horizontal = places[:, :2] - places[:, :2].mean(axis=0)
+    heights = places[:, 2] - places[:, 2].mean()
+    gradient, *_ = np.linalg.lstsq(horizontal, heights, rcond=_MIN_WIDTH)
+    plane = horizontal @ gradient
+    if np.std(heights - plane) > _MAX_UNEXPLAINED * np.std(heights):
         return 0.0, 0.0
     return float(np.arctan(np.linalg.norm(gradient))), float(np.ptp(plane))

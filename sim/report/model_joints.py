@@ -1,4 +1,4 @@
-"""A model's own joints: how far they are beyond their limits, and how fast they move."""
+"""A model's own joints: how far beyond their limits, and how fast they move."""
 
 import mujoco
 import numpy as np
@@ -11,8 +11,8 @@ from sim.trajectory import ModelTrajectory
 from spark.rotation import quat_normalize, rotvec_from_quat
 
 _HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
-# Files round: a joint on its limit may be written this far [rad] beyond.
-_ROUNDING = 1e-4
+# [rad]: files round, so that a joint on its limit may be written this far beyond it.
+_FILE_ROUNDING = 1e-4
 
 
 def model_limit_excess(body: ModelTrajectory) -> tuple[LimitExcess, ...]:
@@ -20,22 +20,22 @@ def model_limit_excess(body: ModelTrajectory) -> tuple[LimitExcess, ...]:
 
     Joints without limits are left out.
     """
-    model, found = body.model, []
+    model, excesses = body.model, []
     for joint in _joints(body):
         if not model.jnt_limited[joint]:
             continue
         low, high = model.jnt_range[joint]
-        name, at = _name(model, joint), int(model.jnt_qposadr[joint])
+        name, address = _name(model, joint), int(model.jnt_qposadr[joint])
         if int(model.jnt_type[joint]) == _HINGE:
-            angle = body.qpos[:, at]
+            angle = body.qpos[:, address]
             beyond = np.stack([low - angle, angle - high], axis=1)
-            words: tuple[str, ...] = ("turns back", "turns on")
+            movements: tuple[str, ...] = ("turns back", "turns on")
         else:
-            turn = rotvec_from_quat(quat_normalize(body.qpos[:, at : at + 4]))
-            beyond = np.linalg.norm(turn, axis=1, keepdims=True) - high
-            words = ("turns",)
-        found.append(LimitExcess(name, beyond - _ROUNDING, words))
-    return tuple(found)
+            rotvec = rotvec_from_quat(quat_normalize(body.qpos[:, address : address + 4]))
+            beyond = np.linalg.norm(rotvec, axis=1, keepdims=True) - high
+            movements = ("turns",)
+        excesses.append(LimitExcess(name, beyond - _FILE_ROUNDING, movements))
+    return tuple(excesses)
 
 
 def model_joint_rates(
@@ -47,8 +47,8 @@ def model_joint_rates(
     balls = [j for j in joints if int(model.jnt_type[j]) == _BALL]
     velocity = derivative(body.qpos[:, model.jnt_qposadr[hinges]], frame_time, 1, window)
     jerk = derivative(velocity, frame_time, 2, window)
-    turns = body.qpos[:, model.jnt_qposadr[balls][:, None] + np.arange(4)]
-    ball_speed, ball_jerk = angular_rates(quat_normalize(turns), frame_time, window)
+    rotations = body.qpos[:, model.jnt_qposadr[balls][:, None] + np.arange(4)]
+    ball_speed, ball_jerk = angular_rates(quat_normalize(rotations), frame_time, window)
     return (
         tuple(_name(model, joint) for joint in (*hinges, *balls)),
         np.concatenate([np.abs(velocity), ball_speed], axis=1),
@@ -68,5 +68,5 @@ def _joints(body: ModelTrajectory) -> list[int]:
 
 
 def _name(model: mujoco.MjModel, joint: int) -> str:
-    at = int(model.jnt_bodyid[joint])
-    return model.joint(joint).name or f"joint {joint} of {model.body(at).name or f'body {at}'}"
+    body = int(model.jnt_bodyid[joint])
+    return model.joint(joint).name or f"joint {joint} of {model.body(body).name or f'body {body}'}"

@@ -1,4 +1,4 @@
-"""Where a body goes through itself: capsules along its bones, non-adjacent pairs."""
+"""Self-penetration: capsules along the bones, and how deep non-adjacent ones are in each other."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -11,13 +11,14 @@ from sim.report.clip_poses import ClipPoses
 from spark.rig.roles import Role
 from spark.rotation import quat_rotate
 
-# Fractions of the standing height: from the head's joint to its middle, from the wrist to the
-# middle of the palm.
+# Fractions of the standing height: from the head's joint to the head's centre, from the wrist to
+# the middle of the palm.
 _HEAD_CENTER, _PALM_CENTER = 0.055, 0.05
-# The parts of trunk, thigh and hips that are left out near the hip joints, where flesh overlaps.
-_TRUNK_FROM, _THIGH_FROM, _HIPS_FROM = 0.35, 0.3, 0.2
+# Where the capsules of trunk, thigh and hips begin, as fractions of their bones from the hip
+# joints, at which flesh overlaps.
+_TRUNK_START, _THIGH_START, _HIPS_START = 0.35, 0.3, 0.2
 
-# Neighbours: they touch by nature.
+# Pairs of parts that touch in everyday poses: they do not count.
 _NEIGHBOURS = {
     frozenset(pair)
     for side in ("left", "right")
@@ -53,7 +54,7 @@ def capsules(poses: ClipPoses) -> Capsules:
     parts: dict[str, tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3"], str]] = {}
     top = place.get(Role.NECK, place.get(Role.SPINE))
     if top is not None:
-        parts["chest"] = (poses.hips + _TRUNK_FROM * (top - poses.hips), top, "spine")
+        parts["chest"] = (poses.hips + _TRUNK_START * (top - poses.hips), top, "spine")
     if (head := roles.joint(Role.HEAD)) is not None:
         up = np.array([0.0, 0.0, _HEAD_CENTER * height])
         middle = place[Role.HEAD] + quat_rotate(poses.since_tpose[:, head], up)
@@ -66,7 +67,7 @@ def capsules(poses: ClipPoses) -> Capsules:
                 if start is None or stop is None:
                     continue
                 if part == "upper_leg":
-                    start = start + _THIGH_FROM * (stop - start)
+                    start = start + _THIGH_START * (stop - start)
                 parts[f"{side} {part.replace('_', ' ')}"] = (start, stop, part)
         hand, forearm = place.get(Role(f"{side}_hand")), place.get(Role(f"{side}_forearm"))
         if hand is not None and forearm is not None:
@@ -76,7 +77,7 @@ def capsules(poses: ClipPoses) -> Capsules:
             parts[f"{side} hand"] = (hand, hand + quat_rotate(turn, along), "hand")
     if len(poses.rig.hips) == 2:
         left, right = (poses.positions[:, j] for j in poses.rig.hips)
-        inwards = _HIPS_FROM * (right - left)
+        inwards = _HIPS_START * (right - left)
         parts["hips"] = (left + inwards, right - inwards, "pelvis")
     return Capsules(
         tuple(parts),

@@ -1,4 +1,4 @@
-"""Joint speed and jerk, over time and not over frames."""
+"""Joint speed and jerk, per second and not per frame."""
 
 import numpy as np
 from jaxtyping import Float
@@ -17,24 +17,24 @@ def joint_rates(
     not matter; the topmost is left out. The jerk is the second derivative of the angular velocity.
     """
     roles, skeleton = rig.roles.roles, rig.skeleton
-    pairs = [
+    joint_parents = [
         (j, above)
         for j, role in enumerate(roles)
         if role is not None
         and (above := next((k for k in skeleton.ancestors(j)[1:] if roles[k]), None)) is not None
     ]
-    names = tuple(str(roles[j]).replace("_", " ") for j, _ in pairs)
-    joints, parents = [j for j, _ in pairs], [above for _, above in pairs]
-    turn = quat_relative(world[:, parents], world[:, joints])
-    return names, *angular_rates(turn, frame_time, window)
+    names = tuple(str(roles[j]).replace("_", " ") for j, _ in joint_parents)
+    joints, parents = [j for j, _ in joint_parents], [above for _, above in joint_parents]
+    rotations = quat_relative(world[:, parents], world[:, joints])
+    return names, *angular_rates(rotations, frame_time, window)
 
 
 def angular_rates(
-    turn: Float[np.ndarray, "T B 4"], frame_time: float, window: float
+    rotations: Float[np.ndarray, "T B 4"], frame_time: float, window: float
 ) -> tuple[Float[np.ndarray, "T B"], Float[np.ndarray, "T B"]]:
     """The angular speed [rad/s] of rotations over time, and the size of the angular velocity's
     second derivative [rad/s³]."""
-    turn = quat_continuous(turn)
-    omega = 2 * quat_mul(derivative(turn, frame_time, 1, window), quat_conj(turn))[..., 1:]
+    q = quat_continuous(rotations)
+    omega = 2 * quat_mul(derivative(q, frame_time, 1, window), quat_conj(q))[..., 1:]
     jerk = derivative(omega, frame_time, 2, window)
     return np.linalg.norm(omega, axis=-1), np.linalg.norm(jerk, axis=-1)

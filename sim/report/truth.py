@@ -13,7 +13,7 @@ from spark.network.features import body_features
 from spark.rig.rig import Rig
 from spark.transfer.canonical import canonical_positions, to_canonical
 
-# Bones that differ by more than this share of the hip height are not the same.
+# Fraction of the hip height: joints whose offsets differ by more are of another body.
 _BONE_TOLERANCE = 0.01
 
 

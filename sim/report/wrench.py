@@ -14,7 +14,7 @@ from sim.report.mass import Mass
 from spark.constants import GRAVITY
 from spark.rotation import matrix_from_quat, quat_conj, quat_continuous, quat_mul
 
-_EDGES = 8  # of the pyramid in a friction cone
+_EDGES = 8  # of the pyramid inside a friction cone: it gives 8 % less at worst (1 - cos 22.5°)
 
 
 def required_wrench(mass: Mass, frame_time: float, window: float) -> Float[np.ndarray, "T 6"]:

@@ -10,7 +10,7 @@ Mesh = tuple[Float[np.ndarray, "_ 3"], Int[np.ndarray, "_ 3"]]
 
 # A grid's cells leave about this many faces on cell² of a smooth surface; of others more.
 _FACES_A_CELL = 2.5
-_MAX_ATTEMPTS = 5
+_MAX_ATTEMPTS = 5  # at a grid that is coarse enough
 
 
 def simplify_together(meshes: dict[int, Mesh], faces: int) -> dict[int, Mesh]:
