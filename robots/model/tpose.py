@@ -101,7 +101,8 @@ def _initial_guesses(tree: Tree) -> Coordinates:
     """The rest pose, the middle of the limits, and poses between, as frames."""
     rest = np.clip(np.zeros(len(tree)), tree.lower, tree.upper)
     bounded = np.isfinite(tree.lower) & np.isfinite(tree.upper)
-    middle = np.where(bounded, (np.where(bounded, tree.lower + tree.upper, 0.0)) / 2, 0.0)
+    lower, upper = (np.where(bounded, limit, 0.0) for limit in (tree.lower, tree.upper))
+    middle = (lower + upper) / 2
     angles = np.stack([rest, middle, (rest + middle) / 2, rest + 0.3 * (middle - rest)])
     angles[:, tree.balls] = 0.0
     balls = None
