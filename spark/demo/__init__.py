@@ -1,1 +1,1 @@
-"""Demo motions made by code: a walk, a wave and a squat on two rigs."""
+"""Makes the demo motions by code: a walk, a wave and a squat, on two rigs."""

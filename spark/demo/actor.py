@@ -25,7 +25,7 @@ class Actor:
         rest = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
         self.tpose = rest - rest[rig.hips].mean(0) + [0, 0, rig.hip_height]
 
-    def turn(self, role: Role, axis: Axis, angle: Float[np.ndarray, "T"]) -> None:
+    def rotate(self, role: Role, axis: Axis, angle: Float[np.ndarray, "T"]) -> None:
         """Turn a joint and all below it by `angle` [rad] about an axis of its parent's frame; the
         joints of a chain share the turn."""
         joints = self.rig.roles.joints(role)
@@ -74,16 +74,16 @@ class Actor:
         still = np.ones(len(self.hips))
         for sign, arm in ((-1.0, Group.LEFT_ARM), (1.0, Group.RIGHT_ARM)):
             _, upper, fore, _ = LIMBS[arm]
-            self.turn(fore, "z", sign * np.radians(elbow) * still)
-            self.turn(upper, "x", sign * np.radians(degrees) * still)
+            self.rotate(fore, "z", sign * np.radians(elbow) * still)
+            self.rotate(upper, "x", sign * np.radians(degrees) * still)
 
     def flex_shoulder(self, arm: Group, angle: Float[np.ndarray, "T"]) -> None:
         """Swing an arm that hangs at the side forwards by `angle` [rad]."""
-        self.turn(LIMBS[arm][1], "y", -angle)
+        self.rotate(LIMBS[arm][1], "y", -angle)
 
     def flex_elbow(self, arm: Group, angle: Float[np.ndarray, "T"]) -> None:
         """Bend an elbow by `angle` [rad]; to be called before its arm is lowered or not."""
-        self.turn(LIMBS[arm][2], "z", angle if arm is Group.RIGHT_ARM else -angle)
+        self.rotate(LIMBS[arm][2], "z", angle if arm is Group.RIGHT_ARM else -angle)
 
     def finish(self, fps: float) -> CanonicalMotion:
         """What was acted."""

@@ -77,7 +77,7 @@ def walk(rig: Rig, fps: float) -> CanonicalMotion:
         path = np.where((u < TOE_OFF)[:, None], foot.standing(u), foot.swinging(u, rise))
         path[:, 0] += (count + start) * _STRIDE * rig.hip_height
         _, _, pitch, toes = _curves(u)
-        actor.place_foot(side, path, foot.turned(pitch), foot.turned(toes))
+        actor.place_foot(side, path, foot.foot_rotation(pitch), foot.foot_rotation(toes))
     actor.hips[:, 0] -= actor.hips[0, 0]
     return actor.finish(fps)
 
@@ -90,12 +90,12 @@ def _body(rig: Rig, phase: Float[np.ndarray, "T"]) -> Actor:
     ahead = np.cos(2 * np.pi * phase)  # 1 when the left foot strikes, -1 when the right one does
     # The left hip is high over the standing leg and sinks with the swinging one.
     left_up = np.sin(2 * np.pi * (phase + 0.08))
-    actor.turn(Role.PELVIS, "z", np.radians(-5) * ahead)
-    actor.turn(Role.PELVIS, "x", np.radians(3.5) * left_up)
-    actor.turn(Role.SPINE, "z", np.radians(11) * ahead)
-    actor.turn(Role.SPINE, "x", np.radians(-3.5) * left_up)
-    actor.turn(Role.SPINE, "y", np.full(len(phase), np.radians(3)))
-    actor.turn(Role.NECK, "z", np.radians(-6) * ahead)
+    actor.rotate(Role.PELVIS, "z", np.radians(-5) * ahead)
+    actor.rotate(Role.PELVIS, "x", np.radians(3.5) * left_up)
+    actor.rotate(Role.SPINE, "z", np.radians(11) * ahead)
+    actor.rotate(Role.SPINE, "x", np.radians(-3.5) * left_up)
+    actor.rotate(Role.SPINE, "y", np.full(len(phase), np.radians(3)))
+    actor.rotate(Role.NECK, "z", np.radians(-6) * ahead)
     actor.lower_arms(83.0, elbow=0.0)
     for sign, arm in ((1.0, Group.LEFT_ARM), (-1.0, Group.RIGHT_ARM)):
         actor.flex_elbow(arm, np.radians(26 - 10 * sign * ahead))
@@ -163,7 +163,7 @@ class _Foot:
         self.ball, self.tip = ball - ankle, tip - ball
         self.flat = np.array([_OVER * self.stride, out * _HALF_WIDTH * rig.hip_height, ankle[2]])
 
-    def turned(self, pitch: Float[np.ndarray, "T"]) -> Float[np.ndarray, "T 4"]:
+    def foot_rotation(self, pitch: Float[np.ndarray, "T"]) -> Float[np.ndarray, "T 4"]:
         """The foot's rotation since the T-pose, toes up by `pitch` [rad]."""
         return quat_mul(self.yaw, quat_about("y", -pitch))
 
@@ -179,7 +179,7 @@ class _Foot:
         self, pivot: Float[np.ndarray, "3"], pitch: Float[np.ndarray, "T"]
     ) -> Float[np.ndarray, "T 3"]:
         """How far turning by `pitch` about a point, seen from the flat foot, moves the foot."""
-        return quat_rotate(self.yaw, pivot) - quat_rotate(self.turned(pitch), pivot)
+        return quat_rotate(self.yaw, pivot) - quat_rotate(self.foot_rotation(pitch), pivot)
 
     def swinging(
         self, u: Float[np.ndarray, "T"], rise: Float[np.ndarray, "3"]

@@ -115,16 +115,16 @@ def _wave(rig: Rig, fps: float) -> CanonicalMotion:
     up = _ease(t / 0.9) * _ease((4 - t) / 0.9)
     actor.hips[:, 2] *= 0.997
     actor.hips[:, 1] = 0.01 * rig.hip_height * up
-    actor.turn(Role.SPINE, "x", np.radians(-3) * up)
-    actor.turn(Role.HEAD, "z", np.radians(-12) * up)
+    actor.rotate(Role.SPINE, "x", np.radians(-3) * up)
+    actor.rotate(Role.HEAD, "z", np.radians(-12) * up)
     actor.flex_elbow(Group.LEFT_ARM, np.full(frames, np.radians(15)))
-    actor.turn(Role.LEFT_UPPER_ARM, "x", np.full(frames, np.radians(-80)))
+    actor.rotate(Role.LEFT_UPPER_ARM, "x", np.full(frames, np.radians(-80)))
     wag = np.radians(24) * np.sin(2 * np.pi * 1.5 * (t - 0.9)) * _ease((t - 0.7) / 0.4) * up
     actor.flex_elbow(Group.RIGHT_ARM, np.radians(15 + 80 * up) + wag)
-    actor.turn(Role.RIGHT_HAND, "z", 0.4 * wag)
+    actor.rotate(Role.RIGHT_HAND, "z", 0.4 * wag)
     # The raised upper arm turns about itself so that the palm faces ahead.
-    actor.turn(Role.RIGHT_UPPER_ARM, "y", np.radians(-85) * up)
-    actor.turn(Role.RIGHT_UPPER_ARM, "x", np.radians(80 - 72 * up))
+    actor.rotate(Role.RIGHT_UPPER_ARM, "y", np.radians(-85) * up)
+    actor.rotate(Role.RIGHT_UPPER_ARM, "x", np.radians(80 - 72 * up))
     actor.stand()
     return actor.finish(fps)
 
@@ -137,9 +137,9 @@ def _squat(rig: Rig, fps: float) -> CanonicalMotion:
     depth = (0.5 - 0.5 * np.cos(2 * np.pi * t / 2.5)) ** 1.2
     actor.hips[:, 2] *= 0.997 - 0.42 * depth
     actor.hips[:, 0] = -0.16 * rig.hip_height * depth
-    actor.turn(Role.PELVIS, "y", np.radians(28) * depth)
-    actor.turn(Role.SPINE, "y", np.radians(10) * depth)
-    actor.turn(Role.NECK, "y", np.radians(-26) * depth)
+    actor.rotate(Role.PELVIS, "y", np.radians(28) * depth)
+    actor.rotate(Role.SPINE, "y", np.radians(10) * depth)
+    actor.rotate(Role.NECK, "y", np.radians(-26) * depth)
     actor.lower_arms(82.0, elbow=0.0)
     for arm in (Group.LEFT_ARM, Group.RIGHT_ARM):
         actor.flex_elbow(arm, np.radians(12 + 20 * depth))

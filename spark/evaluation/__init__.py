@@ -1,1 +1,1 @@
-"""Methods against ground truths: metrics, cases, tables."""
+"""Evaluates retargeting methods against ground truths: metrics, test cases, tables."""

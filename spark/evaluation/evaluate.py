@@ -158,10 +158,10 @@ def _result(folder: Path, motion: str) -> Path:
     return found
 
 
-def _same_joints(path: Path, names: Sequence[str], wanted: Sequence[str]) -> list[int]:
+def _same_joints(path: Path, names: Sequence[str], expected: Sequence[str]) -> list[int]:
     """Where the truth's joints are in a result; a prefix (`mixamorig:`) may have been lost."""
     plain = {_plain(name): j for j, name in reversed(list(enumerate(names)))}
-    missing = [name for name in wanted if _plain(name) not in plain]
+    missing = [name for name in expected if _plain(name) not in plain]
     if missing:
         raise FileFormatError(
             path,
@@ -169,7 +169,7 @@ def _same_joints(path: Path, names: Sequence[str], wanted: Sequence[str]) -> lis
             f"lacks the joints {name_list(missing)} of the ground truth's skeleton; expected a "
             "motion on that skeleton",
         )
-    return [plain[_plain(name)] for name in wanted]
+    return [plain[_plain(name)] for name in expected]
 
 
 def _plain(name: str) -> str:

@@ -123,14 +123,14 @@ def source_sensitivity(
     what ignores it. Positions are root-relative; over the frames that both clips of a pair have.
     """
 
-    def apart(clips: Sequence[Float[np.ndarray, "_ J 3"]], i: int, k: int) -> float:
+    def distance(clips: Sequence[Float[np.ndarray, "_ J 3"]], i: int, k: int) -> float:
         count = min(len(clips[i]), len(clips[k]))
         return float(np.linalg.norm(clips[i][:count] - clips[k][:count], axis=-1).mean())
 
     pairs = [(i, k) for i in range(len(truths)) for k in range(i)]
-    wanted = sum(apart(truths, i, k) for i, k in pairs)
-    found = sum(apart(results, i, k) for i, k in pairs)
-    return float(found / wanted) if wanted > 0 else float("nan")
+    expected = sum(distance(truths, i, k) for i, k in pairs)
+    found = sum(distance(results, i, k) for i, k in pairs)
+    return float(found / expected) if expected > 0 else float("nan")
 
 
 def san_height(rig: Rig) -> float:

@@ -1,1 +1,1 @@
-"""Motion files: read as they are written, turned into SI units and Z-up axes, and written."""
+"""Reads and writes motion files, and converts between their units and axes and SI, Z up."""

@@ -30,11 +30,12 @@ def encode(motion: Motion, template: Recording) -> tuple[Bvh, tuple[str, ...]]:
     can't express: rotations and positions of joints that lack them. Numbers are rounded to 1e-6
     degrees and 1e-8 m. Raises `SkeletonError` where `motion` has other joints than the template.
     """
-    ours, theirs = motion.skeleton, template.motion.skeleton
-    if ours.names != theirs.names or not np.array_equal(ours.parents, theirs.parents):
+    own, expected = motion.skeleton, template.motion.skeleton
+    if own.names != expected.names or not np.array_equal(own.parents, expected.parents):
         raise SkeletonError(
-            f"the motion has {len(ours)} joints, from {ours.names[0]!r} to {ours.names[-1]!r}, and "
-            f"the file {len(theirs)}, from {theirs.names[0]!r} to {theirs.names[-1]!r}; expected "
+            f"the motion has {len(own)} joints, from {own.names[0]!r} to {own.names[-1]!r}, and "
+            f"the file {len(expected)}, from {expected.names[0]!r} to "
+            f"{expected.names[-1]!r}; expected "
             "the same joints in the same order"
         )
     bvh, convention = template.bvh, template.convention
@@ -142,16 +143,16 @@ def _depth_first(motion: Motion) -> Motion:
     while stack:
         order.append(stack.pop())
         stack += reversed(skeleton.children[order[-1]])
-    place = np.argsort(order)
+    new_index = np.argsort(order)
     parents = skeleton.parents[order]
     return replace(
         motion,
         skeleton=Skeleton(
             tuple(skeleton.names[j] for j in order),
-            np.where(parents < 0, -1, place[parents]),
+            np.where(parents < 0, -1, new_index[parents]),
             skeleton.offsets[order],
             skeleton.translating[order],
-            place[skeleton.end_parents],
+            new_index[skeleton.end_parents],
             skeleton.end_offsets,
         ),
         rotations=motion.rotations[:, order],

@@ -1,1 +1,1 @@
-"""The SPARK network's inference, on numpy alone."""
+"""Runs the SPARK network, on numpy alone: its features, forward pass and weights."""

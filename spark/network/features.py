@@ -28,7 +28,7 @@ from spark.skeleton import Skeleton
 from spark.transfer.canonical import CanonicalMotion
 
 # The paper leaves out joints by such words (section 5, "Datasets").
-_LEFT_OUT = re.compile(
+_EXCLUDED_WORDS = re.compile(
     r"finger|thumb|index|middle|ring|pinky|hair|cloth|skirt|cape|eye|jaw|tongue|lip|brow|face|breast"
     r"|metacarp|twist|weapon|sword|shield|prop|ik_|_ik|sleeve|collar|hood|hat$|visor|armou?r|belt"
     r"|pouch|bag|strap|scarf|ribbon|coat|dress|robe|feather|belly|butt|peck|whistle|facial",
@@ -79,7 +79,7 @@ class BodyFeatures:
         features = np.zeros((len(self.joints), 13))
         features[:, :3] = self.skeleton.rest_positions
         features[:, 3:9] = (1, 0, 0, 0, 1, 0)
-        features[:, 12] = self.having(*_FEET)
+        features[:, 12] = self.holding(*_FEET)
         return features
 
     @cached_property
@@ -103,7 +103,7 @@ class BodyFeatures:
     @cached_property
     def effectors(self) -> Float[np.ndarray, "K"]:
         """1 at hands, feet and head."""
-        return self.having(*_EFFECTORS)
+        return self.holding(*_EFFECTORS)
 
     @cached_property
     def contacts(self) -> tuple[int, int]:
@@ -114,7 +114,7 @@ class BodyFeatures:
         )
         return left, right
 
-    def having(self, *roles: Role) -> Float[np.ndarray, "K"]:
+    def holding(self, *roles: Role) -> Float[np.ndarray, "K"]:
         """1 at the joints that hold one of `roles`."""
         return np.array([float(self.rig.roles.roles[j] in roles) for j in self.joints.tolist()])
 
@@ -137,15 +137,15 @@ def body_features(rig: Rig) -> BodyFeatures:
         j
         for j in range(len(names))
         if j != pelvis
-        and (roles[j] is not None or (rig.groups[j] and not _LEFT_OUT.search(names[j])))
+        and (roles[j] is not None or (rig.groups[j] and not _EXCLUDED_WORDS.search(names[j])))
         and j not in rig.skeleton.ancestors(pelvis)
     ]
-    place = {j: k for k, j in enumerate(kept)}
+    index = {j: k for k, j in enumerate(kept)}
     parents = [-1] + [
-        next((place[a] for a in rig.skeleton.ancestors(j)[1:] if a in place), 0) for j in kept[1:]
+        next((index[a] for a in rig.skeleton.ancestors(j)[1:] if a in index), 0) for j in kept[1:]
     ]
     positions = rig.tpose_positions[kept]
-    hips = [place[j] for r in _UPPER_LEGS for j in rig.roles.joints(r)[:1]]
+    hips = [index[j] for r in _UPPER_LEGS for j in rig.roles.joints(r)[:1]]
     positions[0] = positions[hips].mean(0)
     positions = (positions - positions[0]) / rig.hip_height
     offsets = positions - np.where(np.array(parents)[:, None] < 0, positions, positions[parents])
@@ -188,16 +188,16 @@ def canonical_from_features(
     to_heading = quat_from_yaw(np.array(origin.yaw))
     local = quat_from_sixd(sixd)
     local[:, 0] = quat_mul(to_heading, local[:, 0])
-    seen = world_rotations(body.skeleton, local)
+    world_of_network = world_rotations(body.skeleton, local)
     rotations = start.rotations.copy()
-    skeleton, place = body.rig.skeleton, {j: k for k, j in enumerate(body.joints.tolist())}
+    skeleton, index = body.rig.skeleton, {j: k for k, j in enumerate(body.joints.tolist())}
     pelvis = int(body.joints[0])
     for j in skeleton.ancestors(pelvis)[1:]:
         from_pelvis = quat_relative(start.rotations[:, pelvis], start.rotations[:, j])
-        rotations[:, j] = quat_mul(seen[:, 0], from_pelvis)
+        rotations[:, j] = quat_mul(world_of_network[:, 0], from_pelvis)
     for j in range(len(skeleton)):
-        if j in place:
-            rotations[:, j] = seen[:, place[j]]
+        if j in index:
+            rotations[:, j] = world_of_network[:, index[j]]
         elif j not in skeleton.ancestors(pelvis):
             parent = int(skeleton.parents[j])
             local_j = quat_relative(start.rotations[:, parent], start.rotations[:, j])

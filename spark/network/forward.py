@@ -123,18 +123,18 @@ class Network:
     def _position_embedding(self, g: int, n: int, arc: float) -> Float[np.ndarray, "D"]:
         """E_pos of the n-th joint of a group."""
         table = self.layers["embedding.position"]
-        place = table[g, min(n, table.shape[1] - 1)]
+        embedding = table[g, min(n, table.shape[1] - 1)]
         if not self.config.relative_time:
-            return place
-        return place + np.float32(arc) * self.layers["embedding.arc.weight"][:, 0]
+            return embedding
+        return embedding + np.float32(arc) * self.layers["embedding.arc.weight"][:, 0]
 
     def _position_embeddings(self, body: BodyFeatures) -> Float[np.ndarray, "J D"]:
         """E_pos of each joint in the first group that holds it."""
-        places = np.zeros((len(body.joints), self.config.width), np.float32)
+        embeddings = np.zeros((len(body.joints), self.config.width), np.float32)
         for g in reversed(range(N_GROUPS)):
             for n, joint in enumerate(body.groups[g]):
-                places[joint] = self._position_embedding(g, n, body.arcs[g][n])
-        return places
+                embeddings[joint] = self._position_embedding(g, n, body.arcs[g][n])
+        return embeddings
 
     def _members(self, body: BodyFeatures) -> list[list[int]]:
         """The joints that each group pools, by their number in the group. Without sharing a joint
@@ -154,8 +154,10 @@ class Network:
         """A group's tokens; a group without joints attends to zeros."""
         W, T, _, D = x.shape
         if members:
-            places = np.stack([self._position_embedding(g, n, body.arcs[g][n]) for n in members])
-            keys = x[:, :, [body.groups[g][n] for n in members]] + places
+            embeddings = np.stack(
+                [self._position_embedding(g, n, body.arcs[g][n]) for n in members]
+            )
+            keys = x[:, :, [body.groups[g][n] for n in members]] + embeddings
         else:
             keys = np.zeros((W, T, 1, D), np.float32)
         return self._attention("encoder.pool", self.layers["encoder.queries"][g], keys)
@@ -225,9 +227,9 @@ def _corrected(
     own = before[:, :, joints]
     correction = quat_mul(quat_mul(own, small), quat_conj(own))
     moved = np.flatnonzero(unmatched >= 0)
-    place = {int(j): n for n, j in enumerate(joints)}
+    index = {int(j): n for n, j in enumerate(joints)}
     world = before.copy()
-    correction = correction[:, :, [place[int(unmatched[j])] for j in moved]]
+    correction = correction[:, :, [index[int(unmatched[j])] for j in moved]]
     world[:, :, moved] = quat_mul(correction, before[:, :, moved])
     return Windows(start.body, sixd_from_quat(local_rotations(skeleton, world)), start.root)
 

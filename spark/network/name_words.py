@@ -45,8 +45,8 @@ def name_tokens(words: str) -> list[int]:
 def relative_buckets(length: int, buckets: int, max_distance: int) -> Int[np.ndarray, "L L"]:
     """T5's buckets of the way from each place to each other one: half of them a direction, exact
     when near and logarithmic further away."""
-    place = np.arange(length)
-    offset = place[None, :] - place[:, None]
+    index = np.arange(length)
+    offset = index[None, :] - index[:, None]
     half = buckets // 2
     exact = half // 2
     distance = np.abs(offset)

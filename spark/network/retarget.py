@@ -150,9 +150,9 @@ class NetworkRetargeter:
 
 def unmatched_joints(source: Rig, target: BodyFeatures) -> Int[np.ndarray, "J"]:
     """`Correspondence.unmatched` in the network's numbering of the target's joints."""
-    place = {int(j): k for k, j in enumerate(target.joints)}
+    index = {int(j): k for k, j in enumerate(target.joints)}
     found = correspond(source, target.rig).unmatched[target.joints]
-    return np.array([place.get(int(j), -1) for j in found])
+    return np.array([index.get(int(j), -1) for j in found])
 
 
 def _name_encoder(weights: Weights) -> Callable[[Sequence[str]], Float[np.ndarray, "_ E"]]:

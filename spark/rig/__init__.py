@@ -1,1 +1,1 @@
-"""What a body is: the roles of its joints, its limbs and trunk, T-pose, feet and their contacts."""
+"""Understands what a body is: its joints' roles, limbs and trunk, T-pose, feet and contacts."""

@@ -25,8 +25,8 @@ class LabelledPair:
     def joint(self, side: int, part: str) -> int | None:
         """The joint that is `part` of the first (0) or second (1) limb."""
         chain = (self.pair.first, self.pair.second)[side]
-        place = self.labels[side].index.get(part)
-        return None if place is None else chain[place]
+        at = self.labels[side].index.get(part)
+        return None if at is None else chain[at]
 
 
 def first_is_left(

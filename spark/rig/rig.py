@@ -30,7 +30,7 @@ class Chain(NamedTuple):
     after them, and where each lies: its normalised arc length in the T-pose, 0 to 1."""
 
     joints: list[int]
-    places: list[float]
+    positions: list[float]
 
 
 @dataclass(frozen=True, eq=False)

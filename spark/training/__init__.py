@@ -1,1 +1,1 @@
-"""The SPARK network's training, with torch: data, model, losses, checkpoints."""
+"""Trains the SPARK network, with torch: data, model, losses, checkpoints."""

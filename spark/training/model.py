@@ -76,7 +76,7 @@ class DecoderBlock(nn.Module):
 
 
 class JointEmbedding(nn.Module):
-    """What the network knows of a joint besides its motion: place, name and T-pose."""
+    """Embeds what is known of a joint besides its motion: position in its group, name, T-pose."""
 
     def __init__(self, config: Config) -> None:
         super().__init__()
@@ -94,11 +94,11 @@ class JointEmbedding(nn.Module):
         return self.name(body.names) + self.tpose(features)
 
     def positions(self, body: Body) -> Float[Tensor, "B 6 N D"]:
-        """E_pos of each place in each group; places beyond the last known one share it."""
+        """E_pos of each position in each group; those beyond `max_group` share the last."""
         number = torch.arange(body.groups.shape[-1], device=body.groups.device)
-        place = self.position[:, number.clamp(max=self.position.shape[1] - 1)]
-        place = place.expand(len(body.groups), -1, -1, -1)
-        return place + self.arc(body.arc[..., None]) if self.arc_length else place
+        embedding = self.position[:, number.clamp(max=self.position.shape[1] - 1)]
+        embedding = embedding.expand(len(body.groups), -1, -1, -1)
+        return embedding + self.arc(body.arc[..., None]) if self.arc_length else embedding
 
 
 class Encoder(nn.Module):

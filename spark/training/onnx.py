@@ -77,19 +77,19 @@ def export_onnx(checkpoint: Checkpoint, path: Path) -> None:
     write_atomically(path, program.model_proto.SerializeToString())
 
 
-def _body(joints: int, places: int, names: int) -> Body:
+def _body(joints: int, group_size: int, names: int) -> Body:
     """A body of this size: what is traced depends on shapes alone."""
     return Body(
         torch.zeros(1, joints, names),
         torch.zeros(1, joints, 13),
         torch.zeros(1, joints, 6),
-        torch.zeros(1, 6, places, dtype=torch.int64),
-        torch.zeros(1, 6, places),
+        torch.zeros(1, 6, group_size, dtype=torch.int64),
+        torch.zeros(1, 6, group_size),
         torch.ones(1, joints, dtype=torch.bool),
         torch.zeros(1, joints, dtype=torch.int64),
         torch.zeros(1, joints, 3),
     )
 
 
-def _dims(joints: Dim, places: Dim) -> list[dict[int, Dim]]:
-    return [{1: joints}] * 3 + [{2: places}] * 2 + [{1: joints}] * 3
+def _dims(joints: Dim, group_size: Dim) -> list[dict[int, Dim]]:
+    return [{1: joints}] * 3 + [{2: group_size}] * 2 + [{1: joints}] * 3

@@ -6,9 +6,9 @@ import torch
 from torch import Tensor
 
 
-def fast_products(device: torch.device, wanted: bool = True) -> AbstractContextManager[object]:
-    """Matrix products in bfloat16, if `wanted` and the device has them; weights stay float32."""
-    if wanted and has_bfloat16(device):
+def fast_products(device: torch.device, enabled: bool = True) -> AbstractContextManager[object]:
+    """Matrix products in bfloat16, if `enabled` and the device has them; weights stay float32."""
+    if enabled and has_bfloat16(device):
         return torch.autocast(device.type, torch.bfloat16)
     return nullcontext()
 

@@ -63,11 +63,11 @@ def train_names(
             group["lr"] = _RATE * min(1.0, (step + 1) / 20) * (1 - 0.95 * step / steps)
         drawn = [made_up_rig(rng, conventions) for _ in range(rigs)]
         tokens = tokenize_rigs([[name for name, _, _ in rig] for rig in drawn])
-        wanted = torch.tensor([_CLASSES.index(kind) for rig in drawn for _, _, kind in rig])
+        targets = torch.tensor([_CLASSES.index(kind) for rig in drawn for _, _, kind in rig])
         with fast_products(tokens.device):
             vectors = encoder(tokens)[tokens.any(-1)]
         scores = vectors.float() @ nnf.normalize(kinds, dim=-1).T / _TEMPERATURE
-        loss = nnf.cross_entropy(scores, wanted)
+        loss = nnf.cross_entropy(scores, targets)
         optimiser.zero_grad()
         torch.autograd.backward(loss)
         optimiser.step()
@@ -89,14 +89,14 @@ def score_rigs(
     `read_names` finds in it, as the bit beside it says in use; not its role's.
     """
     roles = list(Role)
-    places = torch.stack([encoder.encode(name_joints(roles, c)) for c in learned]).mean(0)
+    centroids = torch.stack([encoder.encode(name_joints(roles, c)) for c in learned]).mean(0)
     failures: list[Failure] = []
     total = confused = 0
     for rig in rigs:
         names = [name for name, _, _ in rig]
-        near = encoder.encode(names) @ nnf.normalize(places, dim=-1).T
+        similarities = encoder.encode(names) @ nnf.normalize(centroids, dim=-1).T
         hints = read_names(names)
-        for (name, side, kind), hint, row in zip(rig, hints, near.tolist(), strict=True):
+        for (name, side, kind), hint, row in zip(rig, hints, similarities.tolist(), strict=True):
             if kind == OTHER:
                 continue
             total += 1

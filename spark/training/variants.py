@@ -57,15 +57,15 @@ class Variant:
 
     def rotations(self, base: Float[np.ndarray, "*n J 4"]) -> Float[np.ndarray, "*n K 4"]:
         """World rotations since the T-pose on this skeleton, from those on the base's."""
-        turned = base[..., self.first, :].copy()
+        out = base[..., self.first, :].copy()
         between = np.flatnonzero(self.mix)
         if len(between):
-            turned[..., between, :] = quat_slerp(
+            out[..., between, :] = quat_slerp(
                 base[..., self.first[between], :],
                 base[..., self.second[between], :],
                 np.broadcast_to(self.mix[between], (*base.shape[:-2], len(between))),
             )
-        return turned
+        return out
 
 
 @dataclass
@@ -149,7 +149,7 @@ def _nodes(base: BodyFeatures) -> list[_Node]:
 def _drop(nodes: list[_Node], rng: np.random.Generator) -> list[_Node]:
     """Merge joints into their parents; both sides of a pair go together."""
     sparse = bool(rng.random() < _SPARSE)
-    whole_kind = {
+    chosen_kinds = {
         k: sparse or bool(rng.random() < p) for k, p in _DROP.items() if k not in ("spine", "neck")
     }
     spines = [node for node in nodes if node.role is Role.SPINE]
@@ -157,9 +157,9 @@ def _drop(nodes: list[_Node], rng: np.random.Generator) -> list[_Node]:
     for node in nodes:
         if node.parent is None or node is (spines[-1] if spines else None):
             continue
-        chance = max(_DROP[node.kind], sparse) if node.kind in _DROP else 0.0
+        probability = max(_DROP[node.kind], sparse) if node.kind in _DROP else 0.0
         if (node.role is None and rng.random() < 0.5) or (
-            whole_kind[node.kind] if node.kind in whole_kind else rng.random() < chance
+            chosen_kinds[node.kind] if node.kind in chosen_kinds else rng.random() < probability
         ):
             dropped.append(node)
             for child in nodes:
@@ -171,15 +171,15 @@ def _drop(nodes: list[_Node], rng: np.random.Generator) -> list[_Node]:
 def _split(nodes: list[_Node], base: Skeleton, rng: np.random.Generator) -> list[_Node]:
     """Put a joint into the middle of bones. In the trunk it bends as the base does there, in a limb
     it follows."""
-    whole_kind = {kind: bool(rng.random() < p) for kind, p in _SPLIT.items()}
+    chosen_kinds = {kind: bool(rng.random() < p) for kind, p in _SPLIT.items()}
     out: list[_Node] = []
     for node in nodes:
-        if node.parent is not None and whole_kind.get(node.kind, False):
+        if node.parent is not None and chosen_kinds.get(node.kind, False):
             trunk = node.kind in ("spine", "neck")
             role = node.role if trunk else None
             above = node.parent.first
-            turns = midway(base, above, node.first) if trunk else (above, above, 0.0)
-            middle = _Node(node.parent, node.offset / 2, role, *turns)
+            sources = midway(base, above, node.first) if trunk else (above, above, 0.0)
+            middle = _Node(node.parent, node.offset / 2, role, *sources)
             node.parent, node.offset = middle, node.offset / 2
             out.append(middle)
         out.append(node)
@@ -210,8 +210,8 @@ def _scale(nodes: list[_Node], rng: np.random.Generator) -> None:
 def _finish(nodes: list[_Node], base: BodyFeatures, convention: str | None = None) -> Variant:
     """Measure and name: a `Rig` whose T-pose is its rest pose and whose hips are 1 high. Without a
     convention joints keep their names."""
-    place = {id(node): k for k, node in enumerate(nodes)}
-    parents = np.array([-1 if node.parent is None else place[id(node.parent)] for node in nodes])
+    index = {id(node): k for k, node in enumerate(nodes)}
+    parents = np.array([-1 if node.parent is None else index[id(node.parent)] for node in nodes])
     offsets = np.stack([node.offset for node in nodes])
     positions = offsets.copy()
     for k in range(1, len(nodes)):

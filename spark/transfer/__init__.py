@@ -1,1 +1,1 @@
-"""Motions from one body to another: canonical form, analytic transfer, foot lock, target prior."""
+"""Puts motions on other bodies: canonical form, analytic transfer, foot lock, target prior."""

@@ -83,21 +83,21 @@ import torch
 from dataclasses import replace
 from spark.training.clips import read_clips
 from tests.helpers.training import TINY, fresh
-from spark.training.train import Objective, Steps, _place, shared
+from spark.training.train import Objective, Steps, _join_processes, distributed
 folder, out = Path(sys.argv[1]), Path(sys.argv[2])
-rank, world, _ = _place()
+rank, world, _ = _join_processes()
 checkpoint = fresh(TINY).__class__(fresh(TINY).model.eval(), fresh(TINY).names)
 torch.manual_seed(1)
 torch.nn.init.normal_(checkpoint.model.decoder.rotation.weight, std=0.1)
 objective = Objective(checkpoint.model, TINY)
-runner = shared(objective) if world > 1 else objective
+runner = distributed(objective) if world > 1 else objective
 batch = Steps(read_clips([folder])[0], checkpoint.names.encode, TINY, rank, world)[0]
 runner(batch)[0].backward()
 if rank == 0:
     torch.save({{k: p.grad for k, p in checkpoint.model.named_parameters()}}, out)
 if world > 1:
     paper = replace(TINY, preset="paper")
-    runner = shared(Objective(fresh(paper).model, paper))
+    runner = distributed(Objective(fresh(paper).model, paper))
     for _ in range(2):  # parameters without a gradient would stop the second step
         runner(batch)[0].backward()
     torch.distributed.destroy_process_group()
