@@ -7,6 +7,7 @@ import numpy as np
 from spark.errors import SkeletonError
 from spark.io.convention import Convention
 from spark.rotation import quat_angle, quat_identity
+from spark.summary import counted
 from spark_sim.clips import AnyClip, Clip
 from spark_sim.console import columns
 
@@ -63,8 +64,8 @@ def text(facts: dict[str, Any]) -> str:
     """`describe`'s facts as lines for a terminal."""
     head = [
         facts["file"],
-        f"  {facts['frames']} frames, {facts['fps']:.6g} fps, {facts['duration']:.4g} s, "
-        f"{facts['joints']} joints",
+        f"  {counted(facts['frames'], 'frame')}, {facts['fps']:.6g} fps, "
+        f"{facts['duration']:.4g} s, {counted(facts['joints'], 'joint')}",
         f"  unit {facts['unit']} ({100 * facts['unit_m']:.4g} cm), {facts['up'].upper()} up",
     ]
     body = facts["body"]

@@ -73,7 +73,7 @@ def load(args: Namespace, path: str, prefix: str = "", *, humanoid: bool = True)
         if value is not None and name in loading.takes(path):
             wanted[name] = value
         elif value is not None:
-            console.note(f"{path}: --{option} is not for such a file")
+            console.note(f"{path}: --{option} is left out, it does not apply to such a file")
     loaded = loading.load(path, **wanted)
     if isinstance(loaded, Clip) and not humanoid:
         console.notes(path, loaded.recording.notes)

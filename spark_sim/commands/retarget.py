@@ -128,7 +128,7 @@ def run(args: Namespace) -> int:
         elif summary["output"] is not None:
             console.say(
                 "{output}: {frames} frames, {fps:.6g} fps, {source_joints} -> {joints} joints, "
-                "size x {scale:.3g}".format(**summary)
+                "scaled by {scale:.3g}".format(**summary)
             )
     if failures:
         console.error(f"{failures} of {len(jobs)} motions could not be retargeted")

@@ -166,7 +166,7 @@ def test_retarget(here: Path) -> None:
     done = run("retarget", WALK, "--to", TARGET, cwd=here)
     assert done.returncode == 0
     assert re.fullmatch(
-        rf"{RESULT}: \d+ frames, 30 fps, 22 -> 22 joints, size x 0\.98\n", done.stdout
+        rf"{RESULT}: \d+ frames, 30 fps, 22 -> 22 joints, scaled by 0\.98\n", done.stdout
     )
     assert [line.split(" unit ")[0] for line in done.stderr.splitlines()] == [
         f"spark-sim: note: {TARGET}:",

@@ -324,8 +324,13 @@ def test_options_that_a_file_does_not_have_are_said(walk_path: Path, tmp_path: P
     command = ("retarget", walk_path, "--to", "robot", "--to-unit", "cm", "--quat", "xyzw")
     code, _, stderr = on_command_line(*command, "-o", out)
     assert code == 0
-    assert "spark-sim: note: robot: --to-unit is not for such a file" in stderr
-    assert f"spark-sim: note: {walk_path}: --quat is not for such a file" in stderr
+    assert (
+        "spark-sim: note: robot: --to-unit is left out, it does not apply to such a file" in stderr
+    )
+    assert (
+        f"spark-sim: note: {walk_path}: --quat is left out, it does not apply to such a file"
+        in stderr
+    )
     with pytest.raises(ConventionError, match="quat does not go with"):
         spark_sim.load(walk_path, quat="xyzw")
 
