@@ -1,7 +1,7 @@
 # make demo    from nothing: environment, demo motions, retargeting, report, video, page, picture
 # make test    the test suite                make quick   its quick part, in two minutes
 # make check   lint, format, types, rooms    make bench   benchmarks
-# make wheel   build, install elsewhere, run
+# make docs    the site, in site/            make wheel   build, install elsewhere, run
 # make clean   remove what these made
 
 PYTHON ?= python3
@@ -10,7 +10,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test quick check bench wheel clean
+.PHONY: demo test quick check docs bench wheel clean
 .DELETE_ON_ERROR:
 
 $(BIN)/python:
@@ -26,6 +26,10 @@ $(VENV)/.video: $(BIN)/python pyproject.toml constraints.txt
 $(VENV)/.dev: $(BIN)/python pyproject.toml constraints.txt
 	$(PIP) install --quiet -c constraints.txt -e ".[dev]"
 	@touch $(VENV)/.video $@
+
+$(VENV)/.docs: $(BIN)/python pyproject.toml constraints.txt
+	$(PIP) install --quiet -c constraints.txt -e ".[docs]"
+	@touch $@
 
 $(VENV)/.gl: $(VENV)/.video scripts/headless_gl.sh
 	bash scripts/headless_gl.sh $(BIN)/python
@@ -46,6 +50,10 @@ check: $(VENV)/.dev
 	$(BIN)/mypy
 	$(BIN)/pytest tests/test_architecture.py
 
+docs: $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "Open site/index.html in a browser."
+
 bench: $(VENV)/.dev
 	@mkdir -p out
 	$(BIN)/pytest tests/bench -m bench -o addopts= -q --benchmark-json=out/bench.json \
@@ -56,4 +64,4 @@ wheel: $(VENV)/.dev
 	bash scripts/wheel_test.sh $(BIN)/python
 
 clean:
-	rm -rf $(VENV) build dist out .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) build dist out site .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache

@@ -72,7 +72,7 @@ def test_the_robotics_engineers_page(tmp_path: Path) -> None:
     run_page(CHECKOUT / "docs" / "for-robotics.md", tmp_path)
     made = [np.load(path)["joint_pos"].shape[1] for path in (tmp_path / "g1").iterdir()]
     assert made == [29] * 6
-    assert len([*tmp_path.glob("*_squat_g1.npz")]) == 2
+    assert (tmp_path / "walker_squat_g1.npz").exists()
 
 
 def test_the_animators_page(tmp_path: Path) -> None:
@@ -84,7 +84,7 @@ def test_the_animators_page(tmp_path: Path) -> None:
             rest.names, rest.parents.tolist(), rest.offsets.tolist(), strict=True
         )
     ]
-    arm = rest.names.index("LeftArm")
+    arm = rest.names.index("mixamorig:LeftArm")
     Fbx(nodes, [Take("wave", arm, "Z", (0, 1, 2), (0, 60, 0))]).write(tmp_path / "dance.fbx")
     run_page(CHECKOUT / "docs" / "for-animators.md", tmp_path)
     moved = spark_sim.load(tmp_path / "dance_on_hero.bvh").motion
