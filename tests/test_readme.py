@@ -92,7 +92,6 @@ def test_the_animators_page(tmp_path: Path) -> None:
     assert np.ptp(moved.rotations, axis=0).max() > 0.1
 
 
-@pytest.mark.slow
 def test_the_researchers_page(tmp_path: Path) -> None:
     run_page(CHECKOUT / "docs" / "for-researchers.md", tmp_path)
     assert "missing" in (tmp_path / "table.md").read_text()
