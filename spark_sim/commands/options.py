@@ -1,7 +1,9 @@
 """Options that several commands share."""
 
 from argparse import ArgumentParser, Namespace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
+
+from spark_sim.choices import Quat
 
 if TYPE_CHECKING:
     from spark_sim.clips import AnyClip
@@ -48,7 +50,7 @@ def add_robot_motion(parser: ArgumentParser, file: str, prefix: str = "") -> Non
     group.add_argument(
         f"--{prefix}quat",
         dest=f"{dest}quat",
-        choices=("xyzw", "wxyz"),
+        choices=get_args(Quat),
         help="order of the quaternions in a CSV; Unitree writes xyzw",
     )
     group.add_argument(

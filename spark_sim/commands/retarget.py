@@ -3,9 +3,10 @@
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from robots.formats import FORMATS
+from spark_sim.choices import Method
 from spark_sim.commands.options import (
     add_corrections,
     add_force,
@@ -66,7 +67,7 @@ def configure(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--method",
-        choices=("spark", "copy"),
+        choices=get_args(Method),
         default="spark",
         help="spark (default) or copy. On a character both turn each joint as its counterpart "
         "turns; where SRC has no counterpart, copy interpolates between the neighbours, and spark "
