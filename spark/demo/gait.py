@@ -42,19 +42,17 @@ _CURVES = np.array(
         [1.00, 23, 8, 20, 20],
     ]
 )
-_STRIDE = 1.5  # in hip heights
+_STRIDE = 1.5  # [hip heights]
 _CYCLE = 1.1  # [s] of a leg of 0.92 m; other legs swing as pendulums do
-_HALF_WIDTH = 0.055  # of a step, from the line of walking, in hip heights
+_HALF_WIDTH = 0.055  # [hip heights] of a step, from the line of walking
 _TOE_OUT = np.radians(7)
-_STRAIGHT = np.radians(9)  # no knee is straighter than this: it would lock
-# The body is fastest in the middle of double support, by so much (in hip heights) ahead of an even
-# pace: without it the toes of the standing foot could not hold the body up while the other foot,
-# low and fast, comes down.
-_FASTEST = 0.06
-_FORE_AFT = 0.01
-# The body has passed this share of a stride since heel strike when it is over the ankle.
-_OVER = 0.23
-_INSTANT = 1e-4  # of a stride: for speeds by differences
+_MIN_FLEXION = np.radians(9)  # of a knee: straighter it would lock
+# The body is fastest in the middle of double support and sways ahead of an even pace and behind it:
+# without that the toes of the standing foot could not hold it up while the other foot comes down.
+_FASTEST_PHASE = 0.06  # [strides] after heel strike
+_FORE_AFT_SWAY = 0.01  # [hip heights]
+_OVER_ANKLE = 0.23  # [strides] after heel strike the body is over the ankle
+_PHASE_STEP = 1e-4  # [strides] for speeds by differences
 
 
 def stride_time(rig: Rig) -> float:
@@ -105,7 +103,7 @@ def _body(rig: Rig, phase: Float[np.ndarray, "T"]) -> Actor:
 
 def _path(rig: Rig, phase: Float[np.ndarray, "T"]) -> Float[np.ndarray, "T"]:
     """How far the hips have come [m]: at an even pace, and to and fro twice a stride about it."""
-    ahead = _FORE_AFT * np.sin(4 * np.pi * (phase - _FASTEST))
+    ahead = _FORE_AFT_SWAY * np.sin(4 * np.pi * (phase - _FASTEST_PHASE))
     return rig.hip_height * (_STRIDE * phase + ahead)
 
 
@@ -134,7 +132,7 @@ def _pelvis_rise(rig: Rig) -> Float[np.ndarray, "3"]:
 
     basis = _twice_a_stride(u)
     rise = np.linalg.lstsq(basis, height(_curves(u)[1]), rcond=None)[0]
-    rise[0] -= max(0.0, float(np.max(basis @ rise - height(np.full_like(u, _STRAIGHT)))))
+    rise[0] -= max(0.0, float(np.max(basis @ rise - height(np.full_like(u, _MIN_FLEXION)))))
     return rise
 
 
@@ -161,7 +159,9 @@ class _Foot:
         # Without a toe joint the whole foot rolls over its tip.
         ball = tip if toe is None else actor.tpose[toe]
         self.ball, self.tip = ball - ankle, tip - ball
-        self.flat = np.array([_OVER * self.stride, out * _HALF_WIDTH * rig.hip_height, ankle[2]])
+        self.flat = np.array(
+            [_OVER_ANKLE * self.stride, out * _HALF_WIDTH * rig.hip_height, ankle[2]]
+        )
 
     def foot_rotation(self, pitch: Float[np.ndarray, "T"]) -> Float[np.ndarray, "T 4"]:
         """The foot's rotation since the T-pose, toes up by `pitch` [rad]."""
@@ -186,7 +186,7 @@ class _Foot:
     ) -> Float[np.ndarray, "T 3"]:
         """A foot in the air goes where thigh and knee bring it, corrected near both ends so that it
         leaves the floor and comes down with the place and the speed of the standing foot."""
-        d = _INSTANT
+        d = _PHASE_STEP
         stood = self.standing(np.array([TOE_OFF - d, TOE_OFF, 0.0, d]))
         stood[2:, 0] += self.stride
         flown = self._carried(np.array([TOE_OFF, TOE_OFF + d, 1.0 - d, 1.0]), rise)

@@ -145,7 +145,7 @@ def body_features(rig: Rig) -> BodyFeatures:
         next((index[a] for a in rig.skeleton.ancestors(j)[1:] if a in index), 0) for j in kept[1:]
     ]
     positions = rig.tpose_positions[kept]
-    hips = [index[j] for r in _UPPER_LEGS for j in rig.roles.joints(r)[:1]]
+    hips = [index[j] for j in rig.hips]
     positions[0] = positions[hips].mean(0)
     positions = (positions - positions[0]) / rig.hip_height
     offsets = positions - np.where(np.array(parents)[:, None] < 0, positions, positions[parents])
@@ -156,9 +156,6 @@ def body_features(rig: Rig) -> BodyFeatures:
         np.arange(len(kept)) == 0,
     )
     return BodyFeatures(rig, np.array(kept), skeleton)
-
-
-_UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
 
 
 def pose_features(

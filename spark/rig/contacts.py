@@ -6,12 +6,13 @@ from jaxtyping import Bool, Float
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
 
-# A foot is planted while it is slower and lower than this; for a body 1.75 m tall, scaled with it.
-PLANTED_SPEED = 0.15
-PLANTED_HEIGHT = 0.06
-ADULT_HEIGHT = 1.75
-# The span [s] that a speed is measured over: two frames at 30 fps.
-SPEED_WINDOW = 1 / 15
+# A foot is planted while it is slower and lower than this, on a body of this height; both limits
+# scale with the body. Walking feet roll over heel and ball below them, swinging ones pass at over
+# 1 m/s.
+PLANTED_SPEED = 0.15  # [m/s]
+PLANTED_HEIGHT = 0.06  # [m] over the foot's own lowest height
+ADULT_HEIGHT = 1.75  # [m]
+SPEED_WINDOW = 1 / 15  # [s] that a speed is measured over: two frames at 30 fps
 
 
 def floor_height(

@@ -23,7 +23,7 @@ ALL_FINGERS = "fingers"
 _PREFIX = "(?:l|r|left|right|左|右)?(?:hand)?"
 _NAMED = re.compile(rf"{_PREFIX}({'|'.join(FINGERS)})(?:finger)?s?")
 _COUNTED = re.compile(rf"{_PREFIX}(?:fingers?|指)")
-_PHALANGES = 3
+_PHALANGES = 3  # of a finger; a fourth joint is a tip
 
 
 class FingerBone(NamedTuple):

@@ -11,7 +11,7 @@ from spark.kinematics import end_positions, forward
 from spark.motion import Motion
 from spark.skeleton import Skeleton
 
-MAX_FRAMES = 48
+MAX_FRAMES = 48  # of a motion that are measured, spread over it: more tell no more
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ from torch.nn.utils.rnn import pad_sequence
 
 from spark.network.name_words import BYTE_OFFSET, PAD, name_tokens, relative_buckets, rig_words
 
-_CHUNKS = 4
+_CHUNKS = 4  # of a batch's names, by length: less padding
 
 
 @dataclass(frozen=True)

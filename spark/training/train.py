@@ -43,7 +43,7 @@ from spark.training.settings import TrainConfig
 from spark.training.tensors import forward_kinematics
 from spark.training.train_names import train_names
 
-BETAS = (0.9, 0.99)
+BETAS = (0.9, 0.99)  # of AdamW, as the paper has them
 PAPER_WEIGHTS = {"rec": 1.0, "cyc": 20.0, "root": 7.0, "fk": 100.0}
 PAIR_WEIGHTS = {"rec": 1.0, "root": 7.0, "fk": 100.0, "contact": 1.0, "ends": 100.0}
 

@@ -22,8 +22,8 @@ from spark.training.precision import fast_products
 LEARNED = tuple(c for c in CONVENTIONS if c not in HELD_OUT)
 _ROLES = [*list(Role), Role.SPINE, Role.SPINE, Role.NECK]
 _CLASSES = (*KINDS, OTHER)
-_TEMPERATURE = 0.1
-_RATE = 1e-3
+_TEMPERATURE = 0.1  # of the softmax over cosines
+_RATE = 1e-3  # the highest learning rate
 
 
 class Failure(NamedTuple):

@@ -3,7 +3,6 @@
 import mujoco
 import numpy as np
 import pytest
-from robots.solver.acceleration_weights import jerk_stiffening, limit_speed
 
 from robots.least_squares import NormalEquations, Smoothness, second_differences
 from robots.model.morphology import Morphology
@@ -17,6 +16,7 @@ from robots.solver.footprints import plan_footing
 from robots.solver.objective import linearize
 from robots.solver.projection import project
 from robots.solver.repair import repair, violations
+from robots.solver.smoothness import jerk_stiffening, limit_speed
 from robots.solver.solve import blocks_of, copy, retarget
 from robots.solver.targets import targets_of
 from robots.tree import Coordinates, forward_kinematics
