@@ -32,7 +32,7 @@ def strengths(rig: Rig, bodies: Inertias) -> dict[str, float]:
     duties = holding_torques(rig, bodies)
     weight, height = GRAVITY * bodies.masses.sum(), rig.standing_height
     levers = _levers(rig)
-    found: dict[str, float] = {}
+    strongest: dict[str, float] = {}
     for j in kept_joints(rig):
         joint_class = joint_class_of(rig, j)
         if j == rig.root_joint or joint_class == DETAIL:
@@ -42,8 +42,8 @@ def strengths(rig: Rig, bodies: Inertias) -> dict[str, float]:
             duty = max(duty, weight * levers["toe"])
         elif any(joint_class_of(rig, k) == "ankle" for k in rig.skeleton.subtree(j)):
             duty = max(duty, weight * levers["ankle"])
-        found[joint_class] = max(found.get(joint_class, 0.0), duty)
-    return found
+        strongest[joint_class] = max(strongest.get(joint_class, 0.0), duty)
+    return strongest
 
 
 def _levers(rig: Rig) -> dict[str, float]:

@@ -46,12 +46,12 @@ def balanced(
 def balancing_lean(rig: Rig, world: Float[np.ndarray, "J 4"], masses: Inertias) -> float:
     """The angle [rad] forward at the ankles that brings the centre of mass above the soles; 0 where
     it lies there, and for a body without feet."""
-    found = _com_over_feet(rig, world, masses)
-    if found is None or _COM_RANGE[0] <= found[0] <= _COM_RANGE[1]:
+    upright = _com_over_feet(rig, world, masses)
+    if upright is None or _COM_RANGE[0] <= upright[0] <= _COM_RANGE[1]:
         return 0.0
     angle = 0.0
     for _ in range(4):  # the body is an inverted pendulum: nearly linear
-        at, height = _com_over_feet(rig, _lean_at_ankles(rig, world, angle), masses) or found
+        at, height = _com_over_feet(rig, _lean_at_ankles(rig, world, angle), masses) or upright
         angle += (_COM_TARGET - at) / height
     return angle
 

@@ -69,17 +69,17 @@ def _matched(path: str | Path, mesh: SkinnedMesh, rig: Rig) -> dict[int, int]:
     keys = dict(zip(_keys(mesh.names), range(len(mesh.names)), strict=True))
     kept = kept_joints(rig)
     names = [rig.skeleton.names[j] for j in kept]
-    found = {
+    matches = {
         j: plain.get(name, keys.get(key, -1))
         for j, name, key in zip(kept, names, _keys(names), strict=True)
     }
-    missing = [rig.skeleton.names[j] for j in kept if rig.roles.roles[j] and found[j] < 0]
+    missing = [rig.skeleton.names[j] for j in kept if rig.roles.roles[j] and matches[j] < 0]
     if missing:
         raise SkeletonError(
             f"{path}: no joint is named as {name_list(missing)} of the rig; the mesh hangs on "
             f"{name_list(list(mesh.names))}. Expected a mesh on the rig's own skeleton"
         )
-    return {j: k for j, k in found.items() if k >= 0}
+    return {j: k for j, k in matches.items() if k >= 0}
 
 
 def _keys(names: list[str] | tuple[str, ...]) -> list[str]:

@@ -82,22 +82,24 @@ def summarize(tracked: TrackingResult) -> dict[str, Any]:
     }
 
 
-def render(found: dict[str, Any], name: str) -> str:
-    """The text of what `summarize` found of the motion `name`."""
-    assist, error = found["assist"], found["error"]
-    end = (found["frames"] - 1) * found["frame_time"]
-    if found["diverged_frame"] is not None:
-        stays = f"the simulation diverged at frame {found['diverged_frame']}; no numbers after it"
-    elif found["fall_frame"] is None:
+def render(metrics: dict[str, Any], name: str) -> str:
+    """The text of the `metrics` that `summarize` yields, of the motion `name`."""
+    assist, error = metrics["assist"], metrics["error"]
+    end = (metrics["frames"] - 1) * metrics["frame_time"]
+    if metrics["diverged_frame"] is not None:
+        stays = f"the simulation diverged at frame {metrics['diverged_frame']}; no numbers after it"
+    elif metrics["fall_frame"] is None:
         stays = f"all {end:.2f} s"
     else:
-        stays = f"{found['stays_up_s']:.2f} s of {end:.2f} s: falls at frame {found['fall_frame']}"
+        stays = (
+            f"{metrics['stays_up_s']:.2f} s of {end:.2f} s: falls at frame {metrics['fall_frame']}"
+        )
     lines = [
         f"{name}: tracked in simulation, {'with' if assist else 'without'} assist",
         f"  stays up  {stays}",
         f"  error     {error['joints_deg']:.1f} deg RMS of the joints; joints "
         f"{error['mpjpe_cm']:.1f} cm away, {error['mpjpe_root_cm']:.1f} cm relative to the root"
-        + ("" if found["fall_frame"] is None else " (until the fall)"),
+        + ("" if metrics["fall_frame"] is None else " (until the fall)"),
     ]
     if assist:
         force, torque = assist["force"], assist["torque"]
@@ -109,7 +111,7 @@ def render(found: dict[str, Any], name: str) -> str:
             f"{100 * torque['max']:.1f} % (cap {100 * assist['cap_torque']:.0f} %); work "
             f"{assist['work_j']:.0f} J",
         ]
-    touched = found["floor"]
+    touched = metrics["floor"]
     for k, each in enumerate(touched[:_LISTED]):
         lines.append(
             f"  {'floor' if not k else '':<9} {each['body']:<26} {100 * each['share']:5.1f} % of "
@@ -117,7 +119,7 @@ def render(found: dict[str, Any], name: str) -> str:
         )
     if not touched:
         lines.append("  floor     not touched")
-    rows = found["joints"][:_LISTED]
+    rows = metrics["joints"][:_LISTED]
     if rows:
         lines.append(f"  torque    {'joint':<26} {'peak N m':>9} {'RMS N m':>9} {'at limit':>9}")
     lines += [
@@ -125,8 +127,8 @@ def render(found: dict[str, Any], name: str) -> str:
         f"{100 * row['saturated']:>7.1f} %"
         for row in rows
     ]
-    if len(found["joints"]) > len(rows):
-        lines.append(f"            and {len(found['joints']) - len(rows)} joints with less")
+    if len(metrics["joints"]) > len(rows):
+        lines.append(f"            and {len(metrics['joints']) - len(rows)} joints with less")
     return "\n".join(lines)
 
 

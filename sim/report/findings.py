@@ -30,8 +30,10 @@ def findings_of(clip: ClipMetrics, drift: Drift | None) -> tuple[Finding, ...]:
         _self_penetration,
         _balance,
     )
-    found = (f for measure in measures for f in sorted(measure(clip, gap), key=lambda f: -f.amount))
-    return (*found, *(_root_drift(drift) if drift else ()))
+    findings = (
+        f for measure in measures for f in sorted(measure(clip, gap), key=lambda f: -f.amount)
+    )
+    return (*findings, *(_root_drift(drift) if drift else ()))
 
 
 def _penetration(clip: ClipMetrics, gap: int) -> Iterator[Finding]:

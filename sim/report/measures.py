@@ -128,11 +128,11 @@ def contact_match(
 ) -> ContactMatch:
     """Precision, recall and F1 of `contacts` where `source_contacts` is the truth."""
     right = float((contacts & source_contacts).sum())
-    found, true = float(contacts.sum()), float(source_contacts.sum())
+    claimed, true = float(contacts.sum()), float(source_contacts.sum())
     return ContactMatch(
-        right / found if found else None,
+        right / claimed if claimed else None,
         right / true if true else None,
-        2 * right / (found + true) if found + true else None,
+        2 * right / (claimed + true) if claimed + true else None,
     )
 
 

@@ -37,15 +37,15 @@ def pose_model(body: ModelTrajectory) -> ModelPoses:
         model.opt.disableflags = 0
     data = mujoco.MjData(model)
     bodies = np.flatnonzero(model.body_rootid == body.root)
-    ignored = set() if body.tpose is None else set(_contacts(model, data, body.tpose, bodies))
+    ignored = set() if body.tpose is None else set(_self_contacts(model, data, body.tpose, bodies))
     pos = np.empty((len(body.qpos), model.nbody, 3))
     quat = np.empty((len(body.qpos), model.nbody, 4))
     touching = []
     for t, qpos in enumerate(body.qpos):
-        touching.append(_contacts(model, data, qpos, bodies))
+        touching.append(_self_contacts(model, data, qpos, bodies))
         pos[t], quat[t] = data.xpos, data.xquat
-    pairs = [*dict.fromkeys(p for found in touching for p in found if p not in ignored)]
-    depth = np.array([[found.get(p, 0.0) for p in pairs] for found in touching])
+    pairs = [*dict.fromkeys(p for contacts in touching for p in contacts if p not in ignored)]
+    depth = np.array([[contacts.get(p, 0.0) for p in pairs] for contacts in touching])
     return ModelPoses(bodies, pos, quat, tuple(pairs), depth.reshape(len(touching), len(pairs)))
 
 
@@ -55,7 +55,7 @@ def part_name(model: mujoco.MjModel, body: int) -> str:
     return model.body(part).name.replace("_", " ") or f"body {part}"
 
 
-def _contacts(
+def _self_contacts(
     model: mujoco.MjModel,
     data: mujoco.MjData,
     qpos: Float[np.ndarray, "nq"],
@@ -65,12 +65,12 @@ def _contacts(
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
     mujoco.mj_collision(model, data)
-    found: dict[tuple[str, str], float] = {}
+    contacts: dict[tuple[str, str], float] = {}
     if not data.ncon:
-        return found
+        return contacts
     touching = model.geom_bodyid[data.contact.geom]
     for (a, b), distance in zip(touching, data.contact.dist, strict=True):
         if distance < 0 and a in bodies and b in bodies:
             one, other = sorted((part_name(model, int(a)), part_name(model, int(b))))
-            found[one, other] = max(found.get((one, other), 0.0), -float(distance))
-    return found
+            contacts[one, other] = max(contacts.get((one, other), 0.0), -float(distance))
+    return contacts

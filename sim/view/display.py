@@ -122,9 +122,9 @@ def _add_meshes(
 ) -> dict[int, str]:
     """The meshes of some geoms, with at most about `MAX_FACES` faces in all, and their names."""
     used = sorted({int(model.geom_dataid[g]) for g in geoms if int(model.geom_type[g]) == _MESH})
-    found = simplify_together({mesh: _mesh(model, mesh) for mesh in used}, MAX_FACES)
+    simplified = simplify_together({mesh: _mesh(model, mesh) for mesh in used}, MAX_FACES)
     names = {mesh: f"{prefix}mesh{mesh}" for mesh in used}
-    for mesh, (vertices, faces) in found.items():
+    for mesh, (vertices, faces) in simplified.items():
         spec.add_mesh(
             name=names[mesh],
             uservert=vertices.ravel(),
