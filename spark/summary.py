@@ -33,7 +33,7 @@ def html_table(title: str, rows: Sequence[tuple[str, ...]], notes: Sequence[str]
 
 
 def brief(instance: Any) -> str:
-    """A `__repr__` for dataclasses of arrays: `Sole(foot=3, links=array(4,), ...)`."""
+    """A `__repr__` for dataclasses of arrays: `Sole(side='left', joints=array(6,), ...)`."""
     shown = (f"{field.name}={_brief(getattr(instance, field.name))}" for field in fields(instance))
     return f"{type(instance).__name__}({', '.join(shown)})"
 

@@ -78,7 +78,7 @@ def clap(rig: Rig, apart: np.ndarray) -> CanonicalMotion:
 
 
 @pytest.mark.parametrize("exact", [False, True])
-@pytest.mark.parametrize("stage", [0, 1])
+@pytest.mark.parametrize("block", [0, 1])
 def test_the_gradient_is_that_of_the_cost(
     walk: CanonicalMotion, ember: Morphology, block: int, exact: bool
 ) -> None:
