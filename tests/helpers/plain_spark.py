@@ -111,7 +111,8 @@ def encode(model: Spark, pose: PoseTensors, body: Body) -> Tensor:
 
 def decode(model: Spark, latent: Tensor, body: Body, start: Start | None) -> PoseTensors:
     """The motion on `body`; the decoder begins with its learned query. A residual network decodes
-    the guesses of its start, one window's at a time, and moves them and what follows them."""
+    the unmatched joints of its start, one window's at a time, and moves them and what follows
+    them."""
     decoder = model.decoder
     known, places = joint_embeddings(model, body)
     for j in range(len(known)):
@@ -119,11 +120,11 @@ def decode(model: Spark, latent: Tensor, body: Body, start: Start | None) -> Pos
     y = (known + decoder.query).repeat(len(latent), 1, 1)
     if start is not None:
         unmatched = start.unmatched[0].tolist()
-        guessed = [j for j in range(len(known)) if unmatched[j] == j]
-        if not guessed:
+        corrected_joints = [j for j in range(len(known)) if unmatched[j] == j]
+        if not corrected_joints:
             return start.pose
-        seen = ROTATION_GAIN * (start.rotations[0][:, guessed] - torch.tensor(NO_ROTATION))
-        y = y[:, guessed] + decoder.start(seen)
+        seen = ROTATION_GAIN * (start.rotations[0][:, corrected_joints] - torch.tensor(NO_ROTATION))
+        y = y[:, corrected_joints] + decoder.start(seen)
     for block in decoder.blocks:
         for t in range(len(y)):
             normed = block.norm_self(y[t])
@@ -148,7 +149,7 @@ def decode(model: Spark, latent: Tensor, body: Body, start: Start | None) -> Pos
     for j in range(len(known)):
         if unmatched[j] >= 0:
             own = before[unmatched[j]]
-            after[j] = own @ little[:, guessed.index(unmatched[j])] @ own.mT @ before[j]
+            after[j] = own @ little[:, corrected_joints.index(unmatched[j])] @ own.mT @ before[j]
     out = [after[0]] + [after[parents[j]].mT @ after[j] for j in range(1, len(known))]
     turned = torch.stack(out, 1)
     return PoseTensors(torch.cat([turned[..., 0], turned[..., 1]], -1)[None], start.root)

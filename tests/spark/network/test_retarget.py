@@ -1,4 +1,4 @@
-"""Retargeting with a network: it corrects guesses on bodies that it knows, in windows."""
+"""Retargeting with a network: it corrects unmatched joints on bodies that it knows, in windows."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The network that ships, on recordings: it beats the transfer's guess where it knows the rig."""
+"""The network that ships, on recordings: it beats the transfer where it knows the rig."""
 
 from dataclasses import replace
 

@@ -84,7 +84,7 @@ def test_the_default_network_starts_as_the_analytic_transfer(batch: Batch) -> No
         model(batch.pose, batch.source, batch.target)
 
 
-def test_only_guesses_are_corrected_and_what_follows_them(maker: PairMaker) -> None:
+def test_only_unmatched_joints_are_corrected_and_what_follows_them(maker: PairMaker) -> None:
     """Whatever a residual network says: known joints keep their rotation in the world."""
     torch.manual_seed(0)
     batch = Collator(NameEncoder().encode).batch([maker.draw(n, 2) for n in range(8)])
@@ -93,10 +93,10 @@ def test_only_guesses_are_corrected_and_what_follows_them(maker: PairMaker) -> N
     before, after = (world_matrices(p.rotations, batch.target.parents) for p in (start, moved))
     kept = (start.unmatched < 0)[:, None, :, None, None]
     torch.testing.assert_close(before * kept, after * kept, atol=1e-5, rtol=0)
-    guessed = start.unmatched == torch.arange(J)
+    own_correction = start.unmatched == torch.arange(J)
     turned = (before - after).abs().amax((1, 3, 4))
-    assert (turned[guessed] > 0.01).all()
-    followers = (start.unmatched >= 0) & ~guessed
+    assert (turned[own_correction] > 0.01).all()
+    followers = (start.unmatched >= 0) & ~own_correction
     relative = take(before, start.unmatched.clamp(min=0)).mT @ before
     again = take(after, start.unmatched.clamp(min=0)).mT @ after
     shape = followers[:, None, :, None, None]

@@ -40,7 +40,7 @@ def test_the_answer_stands_where_the_copy_slides(maker: PairMaker) -> None:
     assert np.mean(speeds["truth"]) < 0.5 * np.mean(speeds["start"])
 
 
-def test_varied_draws_have_something_to_guess(maker: PairMaker) -> None:
+def test_varied_draws_have_unmatched_joints(maker: PairMaker) -> None:
     clips = [clip for group in maker._bodies for clip in group]
     varied = PairMaker(clips, window=16, variants=32, varied=True)
     draws = [varied.draw(n, 1) for n in range(20)]

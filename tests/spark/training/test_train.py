@@ -122,7 +122,7 @@ if world > 1:
 
 
 def test_a_handful_of_pairs_is_learned_by_heart(clips: list[TrainingClip]) -> None:
-    """Where the answer is that the guesses turn as the source walks on, they come to do so."""
+    """Where the answer is that unmatched joints turn as the source walks on, they come to do so."""
     config = TINY.changed("test", rate=3e-3, steps=120, batch=2, variants=16)
     checkpoint = fresh(config)
     assert isinstance(checkpoint.names, NameEncoder)

@@ -46,7 +46,7 @@ def errors(moved: CanonicalMotion, truth: CanonicalMotion, joints: object = NECK
 
 
 @pytest.mark.parametrize("fps", [30.0, 120.0])
-def test_habits_are_found_again_in_another_motion(fps: float) -> None:
+def test_a_prior_is_found_again_in_another_motion(fps: float) -> None:
     truth, own = bowing(5, phase=1.0), bowing(20, fps=fps)
     source = lacking(truth)
     moved = with_target_prior(transfer, source, own)
@@ -100,7 +100,7 @@ def test_what_cannot_be_foretold_does_no_harm() -> None:
     assert errors(moved, transfer(lacking(truth), own.rig)).mean() < 4
 
 
-def test_a_guess_beside_another_guess_is_left_alone() -> None:
+def test_an_unmatched_joint_beside_another_is_left_alone() -> None:
     """What a joint of the source does that the target lacks can't be seen in the target's motion:
     here the source's lowest spine joint, next to which the target's middle one lies."""
     rig = understand(read_motion(recording("cmu_asf/cmu_02_01.bvh")).motion)
@@ -129,7 +129,7 @@ def test_a_guess_beside_another_guess_is_left_alone() -> None:
         ("cmu_asf/cmu_03_01.bvh", "cmu_asf/cmu_03_04.bvh", (Role.NECK,), 0.7),
     ],
 )
-def test_people_keep_their_habits(
+def test_the_prior_improves_on_the_transfer(
     asked: str, own: str | None, gone: tuple[Role, ...], most: float
 ) -> None:
     motion = read_motion(recording(asked)).motion
