@@ -43,13 +43,14 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
         frames = np.flatnonzero(stance)
         if not len(frames):
             continue
+        counts = np.array([stop - start for start, stop in true_runs(stance)])
         desired = path[frames] * scale
         desired[:, 2] -= scale * _rest_height(source.rig, from_joint)
         rest_z = moved.floor_z + _rest_height(moved.rig, to_joint)
         current = positions[frames, to_joint] - [0, 0, rest_z]
-        desired[:, :2] = _without_mean(desired[:, :2], frames)
+        desired[:, :2] = _without_mean(desired[:, :2], counts)
         desired[:, :2] -= _clamped(desired[:, :2], _CAPTURE_NOISE * moved.rig.hip_height)
-        current[:, :2] = _without_mean(current[:, :2], frames)
+        current[:, :2] = _without_mean(current[:, :2], counts)
         error = desired - current
         rotations = bend_leg(
             rotations, positions, leg, blend_between(error, frames, len(positions))
@@ -58,11 +59,10 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
 
 
 def _without_mean(
-    path: Float[np.ndarray, "P 2"], frames: Int[np.ndarray, "P"]
+    path: Float[np.ndarray, "P 2"], counts: Int[np.ndarray, "S"]
 ) -> Float[np.ndarray, "P 2"]:
-    """A path over stances, each relative to its own mean position."""
-    starts = np.flatnonzero(np.diff(frames, prepend=-2) > 1)
-    counts = np.diff(starts, append=len(frames))
+    """A path over S stances of so many frames, each relative to its own mean position."""
+    starts = np.cumsum(counts) - counts
     means = np.add.reduceat(path, starts) / counts[:, None]
     return path - np.repeat(means, counts, axis=0)
 
