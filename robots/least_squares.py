@@ -104,7 +104,8 @@ class NormalEquations:
         to H's diagonal. Dofs that stand at their upper (`at_limits` +1) or lower limit (-1) do not
         move where the gradient would take them beyond it."""
         T, D = self.g.shape
-        band = np.zeros((COUPLED * D + 1, T, D))
+        point = smoothness.point
+        band = np.zeros(((COUPLED + 1) * D if point else COUPLED * D + 1, T, D))
         for i in range(D):
             for k in range(D - i):
                 band[k, :, i] = self.H[:, i + k, i]
@@ -122,10 +123,12 @@ class NormalEquations:
             band[D, :-1] -= fast
             g[:-1] -= squared * smoothness.overspeed
             g[1:] += squared * smoothness.overspeed
+        if point:
+            g += point.add_to(band)
         held = at_limits * g < 0
         band[0] += np.where(held, _HELD, damping[:, None])
         step = solveh_banded(
-            band.reshape(COUPLED * D + 1, T * D),
+            band.reshape(len(band), T * D),
             np.where(held, 0.0, g).ravel(),
             lower=True,
             overwrite_ab=True,
@@ -147,6 +150,7 @@ class Smoothness:
     accelerations: Float[np.ndarray, "A D"]
     overspeed_weight: Float[np.ndarray, "V 1"]
     overspeed: Float[np.ndarray, "V D"]
+    point: "PointAcceleration | None" = None
 
     def cost(self, frames: int) -> Float[np.ndarray, "T"]:
         """Half the squares of the residuals: an acceleration's at its middle frame, an overspeed's
@@ -156,7 +160,36 @@ class Smoothness:
             out[1:-1] += 0.5 * ((self.acceleration_weights * self.accelerations) ** 2).sum(1)
         if len(self.overspeed):
             out[1:] += 0.5 * ((self.overspeed_weight * self.overspeed) ** 2).sum(1)
+        if self.point:
+            out[1:-1] += 0.5 * (self.point.residual**2).sum(1)
         return out
+
+
+@dataclass(frozen=True, eq=False)
+class PointAcceleration:
+    """A weighted residual r of a point's second differences, and w times its Jacobian by the dofs:
+    r at t changes with the steps at t, t + 1 and t + 2 as the second difference of J step does."""
+
+    J: Float[np.ndarray, "T D 3"]
+    residual: Float[np.ndarray, "A 3"]
+
+    def add_to(self, band: Float[np.ndarray, "_ T D"]) -> Float[np.ndarray, "T D"]:
+        """Add J'J to the lower band, and give J'r."""
+        T, D = self.J.shape[:2]
+        count = len(self.residual)
+        products = np.zeros((COUPLED + 1, T))  # how often frames t and t + m meet in a residual
+        for first, second in combinations_with_replacement(range(COUPLED + 1), 2):
+            product = _SECOND_DIFFERENCE[first] * _SECOND_DIFFERENCE[second]
+            products[second - first, first : first + count] += product
+        for m in range(COUPLED + 1):
+            here = self.J[: T - m] * products[m, : T - m, None, None]
+            H = self.J[m:] @ here.transpose(0, 2, 1)
+            for i in range(D):
+                rows = slice(i if m == 0 else 0, D)
+                start = m * D + rows.start - i
+                band[start : start + D - rows.start, : T - m, i] += H[:, rows, i].T
+        differences = second_differences_transposed(self.residual, T)
+        return np.einsum("tdx,tx->td", self.J, differences)
 
 
 def _runs(dofs: Sequence[int]) -> list[tuple[slice, slice]]:

@@ -10,9 +10,9 @@ from robots.least_squares import NormalEquations, Smoothness
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.collision import Candidate, collisions_of
-from robots.solver.footprints import Footing
+from robots.solver.foot_path import Footing
 from robots.solver.objective import linearize
-from robots.solver.smoothness import jerk_stiffening, smoothness_of
+from robots.solver.smoothness import com_acceleration, jerk_stiffening, smoothness_of
 from robots.solver.targets import Targets
 from robots.tree import Coordinates, forward_kinematics
 
@@ -94,8 +94,10 @@ def solve_block(
         return linearize(*terms, with_jacobian=with_jacobian, exact=repair is not None)
 
     def smoothness_at(q: Coordinates) -> Smoothness:
+        frame_time = targets.frame_time
+        point = com_acceleration(robot, q, targets.com, frame_time, block)
         return smoothness_of(
-            robot, q, start, targets.frame_time, block.dofs, stiffening, penalty_scale
+            robot, q, start, frame_time, block.dofs, stiffening, penalty_scale, point
         )
 
     normal, stalled = linearize_at(q), 0

@@ -23,7 +23,8 @@ from robots.solver.descent import (
     solve_block,
 )
 from robots.solver.exact_contact import exact_contacts_of
-from robots.solver.footprints import Footing, points_of
+from robots.solver.foot_path import Footing
+from robots.solver.footprints import points_of
 from robots.solver.smoothness import jerk_stiffening, overspeed
 from robots.solver.targets import Targets
 from robots.tree import Coordinates, forward_kinematics

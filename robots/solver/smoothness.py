@@ -7,18 +7,21 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import uniform_filter1d
 
-from robots.least_squares import Smoothness, second_differences
+from robots.least_squares import PointAcceleration, Smoothness, second_differences
 from robots.model.morphology import Morphology
+from robots.solver.block import Block
+from robots.solver.dynamics import center_of_mass, com_jacobian
 from robots.solver.objective import (
-    ANKLE_SHARE,
     AVOIDANCE_CUTOFF,
+    LEG_SHARE,
     MAX_HINGE_SPEED,
     MAX_JERK,
     SMOOTH_CUTOFF,
+    W_COM_ACCELERATION,
     W_HIPS_POSITION,
     W_OVERSPEED,
 )
-from robots.tree import Coordinates
+from robots.tree import Coordinates, forward_kinematics
 from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 
@@ -33,6 +36,7 @@ def smoothness_of(
     dofs: list[int],
     stiffening: Float[np.ndarray, "A C"],
     penalty_scale: Float[np.ndarray, "T"],
+    point: PointAcceleration | None,
 ) -> Smoothness:
     """The residuals that couple the frames of `q`, in some dofs.
 
@@ -52,7 +56,25 @@ def smoothness_of(
         differences,
         W_OVERSPEED / frame_time * penalty_scale[1:, None],
         overspeed(robot, q, frame_time)[:, dofs],
+        point,
     )
+
+
+def com_acceleration(
+    robot: Morphology,
+    q: Coordinates,
+    planned: Float[np.ndarray, "T 3"] | None,
+    frame_time: float,
+    block: Block,
+) -> PointAcceleration | None:
+    """r = w (c'' - c_plan''), of the centre of mass; None without a plan."""
+    if planned is None or len(q) < 3:
+        return None
+    poses = forward_kinematics(robot.tree, q)
+    away = center_of_mass(robot, poses).T - planned
+    J = com_jacobian(robot, poses, block.joints, base=block.base).transpose(2, 0, 1)
+    weight = W_COM_ACCELERATION / frame_time**2
+    return PointAcceleration(weight * J, weight * second_differences(away))
 
 
 def jerk_stiffening(
@@ -90,17 +112,15 @@ def limit_speed(robot: Morphology, q: Coordinates, frame_time: float) -> Coordin
 def acceleration_weights(robot: Morphology) -> Float[np.ndarray, "D"]:
     """The weight w of each dof's acceleration [s²/rad]: 1 / (2 pi `SMOOTH_CUTOFF`)², at which a
     sine of that frequency costs as much as its own absence from a residual of weight 1. The base's
-    position [s²/m] is weighed as the hips' is, ankles less."""
+    position [s²/m] is weighed as the hips' is, legs less."""
     weights = np.full(robot.tree.nv, 1.0 / (2 * np.pi * SMOOTH_CUTOFF) ** 2)
     weights[:3] *= W_HIPS_POSITION
-    roles, tree = robot.rig.roles, robot.tree
-    for side in ("left", "right"):
-        shank, foot = (roles.joint(Role(f"{side}_{part}")) for part in ("lower_leg", "foot"))
-        if shank is None or foot is None:
-            continue
-        to_shank = tree.chain(int(robot.links[shank]))
-        ankle = tuple(j for j in tree.chain(int(robot.links[foot])) if j not in to_shank)
-        weights[tree.dofs(ankle)] *= ANKLE_SHARE
+    tree = robot.tree
+    for sole in robot.soles:
+        leg = robot.rig.roles.require(Role(f"{sole.side}_upper_leg"))
+        trunk = tree.chain(int(robot.links[int(robot.rig.skeleton.parents[leg])]))
+        toes = tree.chain(int(robot.links[sole.joints[-1]]))
+        weights[tree.dofs(tuple(j for j in toes if j not in trunk))] *= LEG_SHARE
     return weights
 
 

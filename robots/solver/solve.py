@@ -12,7 +12,9 @@ from robots.model.motion import RobotMotion
 from robots.solver.block import Block
 from robots.solver.collision import collisions_of
 from robots.solver.descent import collision_stride, solve_block
-from robots.solver.footprints import Footing, plan_footing, reachable_footing
+from robots.solver.foot_path import footing_of
+from robots.solver.footprints import FootPlan, plan_feet, reachable
+from robots.solver.motion_plan import with_dynamics
 from robots.solver.projection import project
 from robots.solver.repair import repair
 from robots.solver.smoothness import limit_speed
@@ -23,7 +25,7 @@ from spark.transfer.canonical import CanonicalMotion
 _MAX_ITER = (12, 10)  # Gauss-Newton steps, by block
 _REL_TOL = (0.02, 0.05)  # of the cost: a block ends where a step gains less,
 _MAX_REJECTED = 0.1  # and no larger share of the frames rejects it
-_POLISH = (1, 0.0, 1.0)  # the same three where splines through a solution are nearly right
+_POLISH = (2, 0.0, 1.0)  # the same three where splines through a solution are nearly right
 _COARSE_INTERVAL = 1 / 20  # [s] between the frames that are solved first
 
 
@@ -42,13 +44,15 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     polished in all frames.
     """
     targets = targets_of(source, robot)
-    footing = plan_footing(robot, targets)
+    feet = plan_feet(robot, targets)
     stride = coarse_stride(targets)
     coarse = targets.every(stride)
     q = limit_speed(robot, project(robot, coarse.world, coarse.hips), coarse.frame_time)
-    q = solve(robot, coarse, [foot.every(stride) for foot in footing], q)
+    q = solve(robot, coarse, [foot.every(stride) for foot in feet], q)
     if stride > 1:
-        q = solve(robot, targets, footing, q.upsampled(stride, len(targets)), polish=True)
+        q = q.upsampled(stride, len(targets))
+    targets, feet = with_dynamics(robot, targets, reachable(robot, feet, q), q)
+    q = solve(robot, targets, feet, q, polish=True)
     return RobotMotion(robot, q, source.frame_time, (*robot.notes, *targets.notes))
 
 
@@ -60,7 +64,7 @@ def coarse_stride(targets: Targets) -> int:
 def solve(
     robot: Morphology,
     targets: Targets,
-    footing: list[Footing],
+    feet: list[FootPlan],
     q: Coordinates,
     *,
     polish: bool = False,
@@ -69,6 +73,7 @@ def solve(
     collisions, and feet held where they came to rest; then repaired. To `polish` what is nearly
     solved, without the first.
     """
+    footing = [footing_of(foot) for foot in feet]
     for block, max_iter, rel_tol in zip(blocks_of(robot), _MAX_ITER, _REL_TOL, strict=True):
         if not block.dofs:
             continue
@@ -76,8 +81,8 @@ def solve(
         if not polish:
             sliding = [foot.sliding() for foot in footing]
             q = solve_block(robot, targets, sliding, q, block, *ends, avoid_collisions=False)
-        if block.base:
-            footing = reachable_footing(robot, footing, q)
+        if block.base and not polish:
+            footing = [footing_of(foot) for foot in reachable(robot, feet, q)]
         if polish or _may_collide(robot, targets, q, block):
             q = solve_block(robot, targets, footing, q, block, *ends, avoid_collisions=True)
         q = repair(robot, targets, footing, q, block)

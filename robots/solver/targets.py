@@ -4,12 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.ndimage import uniform_filter1d
 
 from robots.model.morphology import Morphology
 from robots.model.shapes import surface
+from robots.solver.contacts import schedule
 from robots.tree import forward_kinematics
-from spark.rig.contacts import planted_points
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
@@ -17,7 +16,6 @@ from spark.rotation import quat_mul, quat_rotate
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
-_MIN_DURATION = 0.08  # [s] of a contact, or of a break in one: shorter ones are noise
 LIMB_SEGMENTS = (  # the limbs' segments, by the roles at their ends
     (Role.LEFT_UPPER_LEG, Role.LEFT_LOWER_LEG),
     (Role.LEFT_LOWER_LEG, Role.LEFT_FOOT),
@@ -42,8 +40,10 @@ class Targets:
     """Over frames, floor at z = 0: `world`, the rig's joints' rotations (`q_world_joint`); `chest`,
     that of the topmost part of the trunk; `hips`, the path of the hips' middle [m]; `bones`, unit
     directions by the role at a segment's upper end; `contacts`, whether heel and toe of each of the
-    robot's soles stand, and `raw_contacts`, whether they do for a moment; `feet`, the paths of the
-    source's heels and toes over the floor [m]; `hands`, from the right hand to the left [m].
+    robot's soles stand, `parts`, whether the joints of `part_roles` lie on the floor, `flight`,
+    whether nothing does; `com_acceleration`, the source's, scaled [m/s²]; `feet`, the paths of the
+    source's heels and toes over the floor [m], and `clearance`, how high its soles are, scaled;
+    `hands`, from the right hand to the left [m]. `com` [m] is planned where it is known.
     """
 
     frame_time: float
@@ -52,10 +52,15 @@ class Targets:
     hips: Float[np.ndarray, "T 3"]
     bones: dict[Role, Float[np.ndarray, "T 3"]]
     contacts: Bool[np.ndarray, "T S 2"]
-    raw_contacts: Bool[np.ndarray, "T S 2"]
+    parts: Bool[np.ndarray, "T B"]
+    part_roles: tuple[Role, ...]
+    flight: Bool[np.ndarray, "T"]
+    com_acceleration: Float[np.ndarray, "T 3"]
     feet: Float[np.ndarray, "T S 2 2"]
+    clearance: Float[np.ndarray, "T S"]
     hands: Float[np.ndarray, "T 3"] | None
     notes: tuple[str, ...]
+    com: Float[np.ndarray, "T 3"] | None = None
 
     def __len__(self) -> int:
         return len(self.hips)
@@ -74,8 +79,12 @@ class Targets:
             hips=self.hips[frames],
             bones={role: bone[frames] for role, bone in self.bones.items()},
             contacts=self.contacts[frames],
-            raw_contacts=self.raw_contacts[frames],
+            parts=self.parts[frames],
+            flight=self.flight[frames],
+            com_acceleration=self.com_acceleration[frames],
             feet=self.feet[frames],
+            clearance=self.clearance[frames],
+            com=None if self.com is None else self.com[frames],
             hands=None if self.hands is None else self.hands[frames],
         )
 
@@ -88,16 +97,20 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
     own_chest = robot.rig.chest
     paths = source_feet(source, positions, robot)
     scale = robot.rig.hip_height / rig.hip_height
-    raw_contacts = _raw_contacts(source, paths)
+    touches = schedule(source, positions, paths)
     return Targets(
         frame_time=source.frame_time,
         world=quat_mul(moved.rotations, robot.rig.tpose),
         chest=quat_mul(source.rotations[:, rig.chest], robot.rig.tpose[own_chest]),
         hips=moved.hips - np.array([0.0, 0.0, moved.floor_z]),
         bones=bone_directions(rig, positions, source.rotations),
-        contacts=_without_flicker(raw_contacts, max(1, round(_MIN_DURATION / source.frame_time))),
-        raw_contacts=raw_contacts,
+        contacts=touches.feet,
+        parts=touches.parts,
+        part_roles=touches.part_roles,
+        flight=touches.flight,
+        com_acceleration=scale * touches.com_acceleration,
         feet=scale * paths[..., :2],
+        clearance=scale * source_clearance(source, positions, robot),
         hands=_between_hands(rig, positions, robot),
         notes=moved.notes,
     )
@@ -142,19 +155,19 @@ def source_feet(
     return paths
 
 
-def _raw_contacts(
-    source: CanonicalMotion, paths: Float[np.ndarray, "T S 2 3"]
-) -> Bool[np.ndarray, "T S 2"]:
-    """Whether heels and toes stand, be it for a frame."""
-    stands = np.zeros(paths.shape[:-1], dtype=bool)
-    for s in np.flatnonzero(paths.any(axis=(0, 2, 3))).tolist():
-        stands[:, s] = planted_points(paths[:, s], source.frame_time, source.rig.standing_height)
-    return stands
-
-
-def _without_flicker(mask: Bool[np.ndarray, "T S 2"], frames: int) -> Bool[np.ndarray, "T S 2"]:
-    """The majority over a short window."""
-    return uniform_filter1d(mask.astype(np.float64), frames, axis=0, mode="nearest") > 0.5
+def source_clearance(
+    source: CanonicalMotion, positions: Float[np.ndarray, "T J 3"], robot: Morphology
+) -> Float[np.ndarray, "T S"]:
+    """The height [m] over the floor of the lowest point of the source's sole, for each of the
+    robot's; 0 where it has no such foot."""
+    world = quat_mul(source.rotations, source.rig.tpose)
+    source_soles = {sole.side: sole for sole in source.rig.soles}
+    out = np.zeros((len(positions), len(robot.soles)))
+    for s, sole in enumerate(robot.soles):
+        if (own := source_soles.get(sole.side)) is not None:
+            heights = sole_positions(own, positions, world)[..., 2]
+            out[:, s] = heights.min(axis=1) - source.floor_z
+    return out
 
 
 def _between_hands(

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 import spark_sim
+from robots.metrics import limb_error, measure
 from robots.model.known import known
 from robots.model.motion import RobotMotion
 from robots.solver.block import Block
 from robots.solver.collision import Candidate, collisions_of
-from robots.solver.footprints import plan_footing, points_of
+from robots.solver.foot_path import footing_of
+from robots.solver.footprints import plan_feet, points_of
 from robots.solver.objective import linearize
 from robots.solver.projection import project
 from robots.solver.solve import blocks_of
@@ -19,7 +21,7 @@ from robots.stream.frame_targets import LATENCY, Frame, FrameReader, FrameTarget
 from robots.stream.stream import Stream
 from robots.stream.terms import FootTargets, Terms
 from robots.tree import forward_kinematics
-from scripts.robot_bars import COLUMNS, follow, limb_error, measure
+from scripts.robot_bars import follow
 from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import ConventionError, FrameError
 from spark.io.recording import read_recording
@@ -32,7 +34,7 @@ from spark.rotation import (
     quat_mul,
     quat_rotate,
 )
-from spark.transfer.canonical import canonical_positions, to_canonical
+from spark.transfer.canonical import from_canonical, to_canonical
 from spark_sim.loading import load_robot
 from tests.helpers.recordings import recording
 
@@ -83,7 +85,7 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     """The same normal equations, made in another way."""
     source = to_canonical(WALK.frames(20, 24), RIG)
     targets = targets_of(source, EMBER)
-    footing = plan_footing(EMBER, targets)
+    footing = [footing_of(foot) for foot in plan_feet(EMBER, targets)]
     tree = EMBER.tree
     rng = np.random.default_rng(0)
     q = project(EMBER, targets.world, targets.hips)
@@ -155,9 +157,8 @@ def test_a_t_pose_is_the_robots(robot: str) -> None:
     live = said(standing(12, 0.0), robot)
     np.testing.assert_allclose(live, np.broadcast_to(live[0], live.shape), atol=1e-3)
     q = found.from_qpos(live[-1:])
-    source = to_canonical(standing(1, 0.0), RIG)
     posed = RobotMotion(found, q, 1 / 60)
-    assert limb_error(source, canonical_positions(source), posed) < 2
+    assert limb_error(standing(1, 0.0), RIG, posed) < np.radians(2)
     soles = np.concatenate(
         [points_of(found, forward_kinematics(found.tree, q), sole) for sole in found.soles]
     )
@@ -176,27 +177,27 @@ def test_standing_feet_stay_while_the_source_trembles(robot: str) -> None:
 @pytest.mark.parametrize(("robot", "fps"), [("robot", 24.0), G1_60])
 def test_the_bars_hold_on_the_walk(robot: str, fps: float) -> None:
     source = to_canonical(sample_motion("walk", RIG, fps), RIG)
-    row = dict(zip(COLUMNS, measure(source, follow(source, known(robot)), True), strict=False))
-    assert row["sunk %"] == 0
-    assert row["float %"] <= 1.5
-    assert row["skate"] <= 4
-    assert row["limbs"] <= 4
-    assert row["limit %"] == 0
-    assert row["rad/s"] <= 15
-    assert row["self %"] == 0
+    found = measure(from_canonical(source), RIG, follow(source, known(robot)))
+    assert found.sunk == 0
+    assert found.in_air <= 0.015
+    assert found.skate_m_s <= 0.04
+    assert found.limb_error_rad <= np.radians(4)
+    assert found.at_limit == 0
+    assert found.fastest_rad_s <= 15
+    assert found.self_collision == 0
 
 
 @pytest.mark.parametrize("clip", ["cmu_asf/cmu_02_01.bvh", "animateddrawings/dab.bvh"])
 def test_the_bars_hold_on_real_clips(clip: str) -> None:
     motion = read_recording(recording(clip)).motion
     source = to_canonical(motion.frames(0, 200), understand(motion))
-    row = dict(zip(COLUMNS, measure(source, follow(source, EMBER), True), strict=False))
-    assert row["sunk %"] <= 1
-    assert row["float %"] <= 1.5
-    assert row["skate"] <= 4
-    assert row["limbs"] <= 6
-    assert row["limit %"] == 0
-    assert row["rad/s"] <= 20
+    found = measure(from_canonical(source), source.rig, follow(source, EMBER))
+    assert found.sunk <= 0.01
+    assert found.in_air <= 0.015
+    assert found.skate_m_s <= 0.04
+    assert found.limb_error_rad <= np.radians(6)
+    assert found.at_limit == 0
+    assert found.fastest_rad_s <= 20
 
 
 def test_a_source_that_stalls_makes_no_jump(walked: np.ndarray) -> None:

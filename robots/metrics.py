@@ -1,0 +1,210 @@
+"""How good a motion on a robot is: the bars of the solver, measured on a clip.
+
+What the plausibility report measures is taken from it, on the robot's own model. The rest looks at
+what no report of one motion can see: what became of the source's swings, path and accelerations.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from robots.model.motion import RobotMotion
+from robots.solver.targets import bone_directions
+from robots.tree import forward_kinematics
+from sim.report.assess import assess
+from sim.report.clip_poses import pose_clip
+from sim.report.derivatives import derivative
+from sim.trajectory import Subject
+from spark.kinematics import forward
+from spark.motion import Motion
+from spark.rig.feet import sole_positions
+from spark.rig.rig import Rig
+from spark.rig.roles import Role
+from spark.rotation import quat_conj, quat_mul
+
+SWING_SPEED, SWING_HEIGHT = 0.5, 0.02  # [m/s], [m] above which a foot of the source swings
+MIN_SWINGS = 30  # frames of swing, below which clearance says nothing
+DRAG_HEIGHT = 0.01  # [m] below which a fast sole drags
+PLANTED_SPEED, PLANTED_HEIGHT = 0.15, 0.06  # [m/s], [m] of a standing toe of the source
+IN_AIR = 0.02  # [m] that a planted foot may be above the floor
+AT_LIMIT = np.radians(0.5)
+_WINDOW = 0.05  # [s] before and after a frame over which accelerations are measured
+_LOWER = {
+    "upper_leg": "lower_leg",
+    "lower_leg": "foot",
+    "upper_arm": "forearm",
+    "forearm": "hand",
+}
+
+
+@dataclass(frozen=True)
+class RobotMetrics:
+    """Shares are of frames [0, 1]; those of `source` beside them. `swing_clearance` and the
+    accelerations (99th percentiles, of the middle of the hips and the centre of mass) are over the
+    source's, scaled by the hips' heights; None where there is nothing to compare."""
+
+    implausible: float
+    implausible_source: float
+    penetration: float
+    floating: float
+    floating_source: float
+    skating: float
+    skating_source: float
+    root_wrench: float
+    root_wrench_source: float
+    swing_clearance: float | None
+    dragging: float
+    dragging_source: float
+    hips_acceleration: float | None
+    com_acceleration: float | None
+    heading_rad: float
+    drift_m: float
+    contact_f1: float | None
+    sunk: float
+    deepest_m: float
+    in_air: float
+    skate_m_s: float
+    skate_source_m_s: float
+    limb_error_rad: float
+    at_limit: float
+    fastest_rad_s: float
+    jerk_rad_s3: float
+    self_collision: float
+
+
+def measure(motion: Motion, rig: Rig, result: RobotMotion) -> RobotMetrics:
+    """Of `result`, made from `motion` on `rig`, frame by frame."""
+    robot, frame_time = result.robot, motion.frame_time
+    source, own = Subject(motion, rig), Subject(result.motion, robot.rig, result.body)
+    report = assess(own, source=source)
+    assert report.source is not None
+    assert report.drift is not None
+    assert report.contacts is not None
+    scale = robot.rig.hip_height / rig.hip_height
+    positions, world = forward(motion)
+    soles = [sole_positions(sole, positions, world) for sole in rig.soles]
+    theirs = _Soles(soles, report.source.floor_z, frame_time)
+    ours = _Soles(_robot_soles(result), 0.0, frame_time)
+    planted = _planted(positions[:, rig.contact_joints], frame_time)[:, : len(robot.soles)]
+    count = max(int(planted.sum()), 1)
+    toes = positions[:, rig.contact_joints][:, : len(robot.soles)]
+    own_poses, source_poses = pose_clip(own), pose_clip(source)
+    angles, tree = result.coordinates.angles, robot.tree
+    near = np.minimum(angles - tree.lower, tree.upper - angles) < AT_LIMIT
+    jerk = np.diff(angles, 3, axis=0) / frame_time**3
+    clip, beside = report.clip, report.source
+    return RobotMetrics(
+        implausible=clip.implausible_share,
+        implausible_source=beside.implausible_share,
+        penetration=clip.shares["penetration"],
+        floating=clip.shares["floating"],
+        floating_source=beside.shares["floating"],
+        skating=clip.shares["skating"],
+        skating_source=beside.shares["skating"],
+        root_wrench=clip.shares["root_wrench"],
+        root_wrench_source=beside.shares["root_wrench"],
+        swing_clearance=_swing_clearance(ours, theirs, scale),
+        dragging=ours.dragging,
+        dragging_source=theirs.dragging,
+        hips_acceleration=_over(own_poses.hips, source_poses.hips, scale, frame_time),
+        com_acceleration=_over(own_poses.mass.com, source_poses.mass.com, scale, frame_time),
+        heading_rad=float(np.abs(report.drift.heading).max()),
+        drift_m=float(report.drift.distance.max()),
+        contact_f1=report.contacts.f1,
+        sunk=float((ours.lowest.min(axis=1) < -DRAG_HEIGHT).mean()),
+        deepest_m=max(0.0, -float(ours.lowest.min())),
+        in_air=float((planted & (ours.lowest > IN_AIR)).sum() / count),
+        skate_m_s=float(ours.lowest_speed[planted].sum() / count),
+        skate_source_m_s=float(_speed(toes, frame_time)[planted].sum() / count),
+        limb_error_rad=limb_error(motion, rig, result),
+        at_limit=float(near.any(axis=1).mean()),
+        fastest_rad_s=float(np.abs(np.diff(angles, axis=0)).max(initial=0.0) / frame_time),
+        jerk_rad_s3=float(np.sqrt(np.mean(jerk**2))) if len(jerk) else 0.0,
+        self_collision=float(clip.self_penetration.mean()),
+    )
+
+
+def limb_error(motion: Motion, rig: Rig, result: RobotMotion) -> float:
+    """The mean angle [rad] between the limbs' segments of both."""
+    wanted = _directions(motion, rig)
+    found = _directions(result.motion, result.robot.rig)
+    roles = [role for role in wanted if role in found and _has_end(result.robot.rig, role)]
+    a, b = (np.stack([bones[role] for role in roles], axis=1) for bones in (wanted, found))
+    return float(np.arccos(np.clip((a * b).sum(axis=-1), -1.0, 1.0)).mean())
+
+
+class _Soles:
+    """Points of each foot's sole over time, above a floor."""
+
+    def __init__(
+        self, points: list[Float[np.ndarray, "T _ 3"]], floor_z: float, frame_time: float
+    ) -> None:
+        speeds = [_speed(p, frame_time) for p in points]
+        heights = [p[..., 2] - floor_z for p in points]
+        self.lowest = np.stack([h.min(axis=1) for h in heights], axis=1)
+        self.speed = np.stack([_speed(p.mean(axis=1), frame_time) for p in points], axis=1)
+        at = [h.argmin(axis=1)[:, None] for h in heights]
+        self.lowest_speed = np.stack(
+            [np.take_along_axis(s, k, 1)[:, 0] for s, k in zip(speeds, at, strict=True)], axis=1
+        )
+        drags = [
+            ((h < DRAG_HEIGHT) & (s > SWING_SPEED)).any(axis=1)
+            for h, s in zip(heights, speeds, strict=True)
+        ]
+        self.dragging = float(np.mean(drags))
+
+
+def _robot_soles(result: RobotMotion) -> list[Float[np.ndarray, "T _ 3"]]:
+    poses = forward_kinematics(result.robot.tree, result.coordinates)
+    out = []
+    for sole in result.robot.soles:
+        pairs = zip(*result.robot.sole_points(sole), strict=True)
+        out.append(np.stack([poses.point(int(link), point).T for link, point in pairs], axis=1))
+    return out
+
+
+def _swing_clearance(ours: _Soles, theirs: _Soles, scale: float) -> float | None:
+    """The median height of what swings, over the source's."""
+    swings = (theirs.speed > SWING_SPEED) & (theirs.lowest > SWING_HEIGHT)
+    if swings.sum() < MIN_SWINGS or swings.shape != ours.lowest.shape:
+        return None
+    return float(np.median(ours.lowest[swings]) / (scale * np.median(theirs.lowest[swings])))
+
+
+def _over(
+    ours: Float[np.ndarray, "T 3"],
+    theirs: Float[np.ndarray, "T 3"],
+    scale: float,
+    frame_time: float,
+) -> float | None:
+    """The 99th percentile of an acceleration over the source's, scaled."""
+    own, source = (
+        float(np.percentile(np.linalg.norm(derivative(x, frame_time, 2, _WINDOW), axis=1), 99))
+        for x in (ours, theirs)
+    )
+    return own / (scale * source) if source > 0 else None
+
+
+def _planted(toes: Float[np.ndarray, "T F 3"], frame_time: float) -> Bool[np.ndarray, "T F"]:
+    low = np.percentile(toes[..., 2], 1, axis=0)
+    return (_speed(toes, frame_time) < PLANTED_SPEED) & (toes[..., 2] < low + PLANTED_HEIGHT)
+
+
+def _speed(points: Float[np.ndarray, "T *n 3"], frame_time: float) -> Float[np.ndarray, "T *n"]:
+    """Along the floor [m/s]; a single frame stands still."""
+    if len(points) < 2:
+        return np.zeros(points.shape[:-1])
+    speed: Float[np.ndarray, T * n] = np.linalg.norm(
+        np.gradient(points[..., :2], frame_time, axis=0), axis=-1
+    )
+    return speed
+
+
+def _directions(motion: Motion, rig: Rig) -> dict[Role, Float[np.ndarray, "T 3"]]:
+    positions, world = forward(motion)
+    return bone_directions(rig, positions, quat_mul(world, quat_conj(rig.tpose)))
+
+
+def _has_end(rig: Rig, role: Role) -> bool:
+    return rig.roles.joint(Role(f"{role.side}_{_LOWER[role.part]}")) is not None

@@ -1,0 +1,105 @@
+"""When the source touches the ground, and when it flies: scheduled once for a clip.
+
+A heel or toe stands while it is slow and low (`spark.rig.contacts`). Recorded feet creep, so that
+this alone leaves gaps in which a walk would hang in the air; there the slowest and lowest of them
+stands, unless the whole body falls freely or lies on something else.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.ndimage import uniform_filter1d
+
+from sim.body.anthropometry import RADII
+from sim.report.derivatives import derivative
+from sim.report.mass import human_mass
+from spark.constants import GRAVITY
+from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, planted_points, speeds
+from spark.rig.rig import Rig
+from spark.rig.roles import Role
+from spark.rotation import quat_mul
+from spark.transfer.canonical import CanonicalMotion
+
+MIN_DURATION = 0.08  # contacts and breaks shorter than this [s] are noise
+MAX_CREEP = 0.6  # [m/s, of an adult] of a foot that stands because nothing else does
+FLIGHT_PUSH = 0.35  # [body weights] of push below which nothing holds the body up
+TOUCH_HEIGHT = 0.03  # [m, of an adult] between the floor and the flesh of a part that touches
+_WINDOW = 0.05  # [s] before and after a frame over which accelerations are measured
+_MAY_TOUCH = ("hand", "forearm", "upper_arm", "head", "spine", "pelvis", "lower_leg")
+_PARTS = tuple(role for role in Role if role.part in _MAY_TOUCH)  # and the feet
+
+
+@dataclass(frozen=True, eq=False)
+class Schedule:
+    """`feet`: whether heel and toe of each of S feet stand. `parts`: whether those of
+    `part_roles` touch. `flight`: whether the body falls freely. `com_acceleration` [m/s²]."""
+
+    feet: Bool[np.ndarray, "T S 2"]
+    parts: Bool[np.ndarray, "T B"]
+    part_roles: tuple[Role, ...]
+    flight: Bool[np.ndarray, "T"]
+    com_acceleration: Float[np.ndarray, "T 3"]
+
+
+def schedule(
+    source: CanonicalMotion,
+    positions: Float[np.ndarray, "T J 3"],
+    paths: Float[np.ndarray, "T S 2 3"],
+) -> Schedule:
+    """Of a source whose joints are at `positions` and heels and toes at `paths` [m, world]; feet
+    that it does not have are 0 all over."""
+    rig, frame_time = source.rig, source.frame_time
+    mass = human_mass(rig, positions, quat_mul(source.rotations, rig.tpose))
+    acceleration = derivative(mass.com, frame_time, 2, _WINDOW)
+    flight = np.less(acceleration[:, 2], (FLIGHT_PUSH - 1) * GRAVITY)
+    roles, parts = _touching_parts(rig, positions, source.floor_z)
+    stands = np.zeros(paths.shape[:-1], dtype=bool)
+    exist = np.abs(paths).sum(axis=(0, 2, 3)) > 0
+    for s in np.flatnonzero(exist).tolist():
+        stands[:, s] = planted_points(paths[:, s], frame_time, rig.standing_height)
+    frames = max(1, round(MIN_DURATION / frame_time))
+    feet = _majority(stands, frames)
+    floating = _nothing_holds(feet, parts)
+    floating[flight] = False
+    feet[floating] |= _creeping(source, paths, exist)[floating]
+    return Schedule(_majority(feet, frames), parts, roles, flight, acceleration)
+
+
+def _nothing_holds(
+    feet: Bool[np.ndarray, "T S 2"], parts: Bool[np.ndarray, "T B"]
+) -> Bool[np.ndarray, "T"]:
+    touching = np.concatenate([feet.reshape(len(feet), -1), parts], axis=1)
+    return touching.sum(axis=1) == 0
+
+
+def _touching_parts(
+    rig: Rig, positions: Float[np.ndarray, "T J 3"], floor_z: float
+) -> tuple[tuple[Role, ...], Bool[np.ndarray, "T B"]]:
+    joints = {role: j for role in _PARTS if (j := rig.roles.joint(role)) is not None}
+    flesh = np.array([RADII[role.part] for role in joints]) * rig.standing_height
+    height = positions[:, list(joints.values()), 2] - floor_z - flesh
+    return tuple(joints), height < TOUCH_HEIGHT * rig.standing_height / ADULT_HEIGHT
+
+
+def _creeping(
+    source: CanonicalMotion, paths: Float[np.ndarray, "T S 2 3"], exist: Bool[np.ndarray, "S"]
+) -> Bool[np.ndarray, "T S 2"]:
+    """The slowest and lowest heel or toe, where it is slow enough."""
+    out = np.zeros(paths.shape[:-1], dtype=bool)
+    if not exist.any():
+        return out
+    scale = source.rig.standing_height / ADULT_HEIGHT
+    slowness = speeds(paths, source.frame_time) / (PLANTED_SPEED * scale)
+    height = paths[..., 2] - np.percentile(paths[..., 2], 1, axis=0)
+    cost = slowness + height / (PLANTED_HEIGHT * scale)
+    cost[:, ~exist] = np.inf
+    frames, best = np.arange(len(paths)), cost.reshape(len(paths), -1).argmin(axis=1)
+    slow = slowness.reshape(len(paths), -1)[frames, best] < MAX_CREEP / PLANTED_SPEED
+    out.reshape(len(paths), -1)[frames[slow], best[slow]] = True
+    return out
+
+
+def _majority(mask: Bool[np.ndarray, "T S 2"], frames: int) -> Bool[np.ndarray, "T S 2"]:
+    """Over a short window: without flicker."""
+    return uniform_filter1d(mask.astype(np.float64), frames, axis=0, mode="nearest") > 0.5

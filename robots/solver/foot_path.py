@@ -1,0 +1,137 @@
+"""The way of each point of a sole, standing and swinging: what the whole body follows.
+
+A standing foot stays on its footprint. A swinging one keeps the copied path, carried from the
+footprint behind it to the one before it, and the source's clearance, scaled. The ground is where
+the source's feet stood: a floor that slopes by a few centimetres is level under the robot. Where a
+foot is fast it is lifted, so that it steps and does not drag.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Complex, Float, Int
+
+from robots.solver.footprints import FootPlan, on_points
+from spark.runs import true_runs
+
+# How firmly the points of a sole are held, in x, y and z, as a share of those that stand:
+SWING_HOLD = np.array([0.35, 0.35, 0.6])  # its height in swing is what keeps it off the floor,
+RAISED_HOLD = np.array([0.2, 0.2, 0.3])  # the raised end of a standing foot follows its copy,
+SLIDING_HOLD = 0.03  # and over the floor nearly nothing, while feet find where they can stand
+# Hip heights that a fast foot is above the floor: the report sees feet skate below 0.028.
+STEP_HEIGHT = 0.03
+# Hip heights/s below which a foot may be on the floor, and above which it is lifted: the report
+# sees feet skate above 0.22.
+SLOW, FAST = 0.16, 0.22
+SWING_SPAN, STAND_SPAN = 0.05, 0.02  # [s] before and after a frame for a foot's speed
+LET_DOWN = 0.1  # [s] within which a foot comes down that is in the air where its contact begins
+_ON_FLOOR = 1e-3  # [m]
+
+
+@dataclass(frozen=True, eq=False)
+class Footing:
+    """For each point of a sole: where it should be [m, world], and how firmly (0 to 1)."""
+
+    positions: Float[np.ndarray, "P 3 T"]
+    holds: Float[np.ndarray, "P 3 T"]
+
+    def at(self, frames: Int[np.ndarray, "S"]) -> "Footing":
+        """That of some frames."""
+        return Footing(self.positions[..., frames], self.holds[..., frames])
+
+    def sliding(self) -> "Footing":
+        """The same over the floor, but hardly held there."""
+        along = np.array([[SLIDING_HOLD], [SLIDING_HOLD], [1.0]])
+        return Footing(self.positions, self.holds * along)
+
+
+def footing_of(plan: FootPlan) -> Footing:
+    """Where the points of a planned foot are."""
+    stands = plan.stands
+    offset = plan.prints - np.column_stack([plan.toe, plan.heading])
+    offset[:, 2] = np.remainder(offset[:, 2] + np.pi, 2 * np.pi) - np.pi
+    offset = _between_contacts(offset, stands, plan.toe)
+    turn = np.exp(1j * offset[:, 2])
+    pivot = (plan.toe[:, 0] + offset[:, 0]) + 1j * (plan.toe[:, 1] + offset[:, 1])
+    copied = plan.points[..., 0] + 1j * plan.points[..., 1]
+    own = pivot[:, None] + turn[:, None] * (
+        copied - (plan.toe[:, 0] + 1j * plan.toe[:, 1])[:, None]
+    )
+    flat = pivot[:, None] + np.exp(1j * (plan.heading + offset[:, 2]))[:, None] * (
+        plan.flat[:, 0] + 1j * plan.flat[:, 1]
+    )
+    pitched = plan.points[..., 2] - plan.points[..., 2].min(axis=1, keepdims=True)
+    on = on_points(plan.sole, plan.contacts.T.astype(np.float64)).T > 0
+    low = np.where(stands[:, None], on, pitched < STEP_HEIGHT * plan.hip_height)
+    height = _height(plan, np.where(on, flat, own), low)
+    stands = stands & (height < _ON_FLOOR)
+    on = on & stands[:, None]
+    place = np.where(on, flat, own)
+    z = np.where(on, 0.0, pitched + height[:, None])
+    holds = np.where(stands[:, None, None], RAISED_HOLD, SWING_HOLD)
+    holds = np.where(on[..., None], 1.0, holds)
+    positions = np.stack([place.real, place.imag, z], axis=-1)
+    return Footing(*(np.ascontiguousarray(x.transpose(1, 2, 0)) for x in (positions, holds)))
+
+
+def _height(
+    plan: FootPlan, points: Complex[np.ndarray, "T P"], low: Bool[np.ndarray, "T P"]
+) -> Float[np.ndarray, "T"]:
+    """How high the lowest point of the sole is [m]; `low` points are on the floor, or near it."""
+    stands = plan.stands
+    ground = np.zeros(len(stands))
+    for start, stop in true_runs(stands):
+        ground[start:stop] = plan.clearance[start:stop].min()
+    clearance = plan.clearance - _between_contacts(ground[:, None], stands, plan.toe)[:, 0]
+    drop = np.where(stands, clearance, 0.0)
+    clearance = clearance - _fading(drop, stands, max(1, round(LET_DOWN / plan.frame_time)))
+    height = np.where(stands, 0.0, clearance + plan.lift)
+    spans = (_speed(points, low, plan.frame_time, span) for span in (STAND_SPAN, SWING_SPAN))
+    speed = np.where(stands, *spans) / plan.hip_height
+    lifted = np.clip((speed - SLOW) / (FAST - SLOW), 0.0, 1.0) * STEP_HEIGHT * plan.hip_height
+    return np.maximum(height, lifted)
+
+
+def _speed(
+    points: Complex[np.ndarray, "T P"],
+    low: Bool[np.ndarray, "T P"],
+    frame_time: float,
+    span: float,
+) -> Float[np.ndarray, "T"]:
+    """Of the fastest low point over the floor [m/s]; one-sided at the ends."""
+    reach, frames = max(1, round(span / frame_time)), np.arange(len(points))
+    after, before = np.minimum(frames + reach, len(frames) - 1), np.maximum(frames - reach, 0)
+    way = np.where(low, np.abs(points[after] - points[before]), 0.0).max(axis=1)
+    speed: Float[np.ndarray, T] = way / np.maximum((after - before) * frame_time, 1e-9)
+    return speed
+
+
+def _between_contacts(
+    values: Float[np.ndarray, "T D"], stands: Bool[np.ndarray, "T"], path: Float[np.ndarray, "T 2"]
+) -> Float[np.ndarray, "T D"]:
+    """The values of standing frames, and between these from one to the next by as much of its way
+    as the foot has gone. 0 where it never stands."""
+    at = np.flatnonzero(stands)
+    if not len(at):
+        return np.zeros_like(values)
+    step = np.linalg.norm(np.diff(path, axis=0, prepend=path[:1]), axis=1)
+    way = np.cumsum(step + 1e-4)  # a tenth of a millimetre a frame, for feet that stay in place
+    return np.stack([np.interp(way, way[at], column[at]) for column in values.T], axis=1)
+
+
+def _fading(
+    values: Float[np.ndarray, "T"], stands: Bool[np.ndarray, "T"], reach: int
+) -> Float[np.ndarray, "T"]:
+    """In swing, the values at the end of the contact before and at the beginning of the one after,
+    fading over some frames (a smoothstep)."""
+    frames, at = np.arange(len(values)), np.flatnonzero(stands)
+    out = np.zeros(len(values))
+    if not len(at):
+        return out
+    for side in ("right", "left"):
+        k = np.searchsorted(at, frames, side=side) - (side == "right")
+        near = at[np.clip(k, 0, len(at) - 1)]
+        share = np.clip(1 - np.abs(frames - near) / reach, 0.0, 1.0)
+        inside = (k >= 0) & (k < len(at))
+        out += np.where(inside & ~stands, values[near] * share**2 * (3 - 2 * share), 0.0)
+    return out

@@ -1,0 +1,86 @@
+"""A trajectory's centre of mass planned as physics accepts it, and its hips and feet after that.
+
+The plan starts from what is nearly solved: its feet are where they will be, and its centre of mass
+is the robot's own.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.ndimage import gaussian_filter1d, minimum_filter1d
+
+from robots.model.morphology import Morphology
+from robots.solver.com_plan import Support, plan_com
+from robots.solver.dynamics import angular_momentum, center_of_mass
+from robots.solver.foot_path import footing_of
+from robots.solver.footprints import FootPlan
+from robots.solver.projection import hips_of
+from robots.solver.targets import Targets
+from robots.tree import Coordinates, LinkPoses, forward_kinematics
+
+TOUCH_HEIGHT = 0.03  # hip heights below which a sole's point pushes; the report counts 0.044
+TOUCH_SPAN = 0.04  # [s] before and after a touch in which it pushes, too: the report counts 0.05
+_PATH_FILTER, _MOMENTUM_FILTER = 0.02, 0.04  # [s] of the Gaussians that smooth what is measured
+_HELD_POINTS = 4  # lowest ones of the soles, that push where none is low and yet nothing flies
+
+
+def with_dynamics(
+    robot: Morphology, targets: Targets, feet: Sequence[FootPlan], q: Coordinates
+) -> tuple[Targets, list[FootPlan]]:
+    """Targets with a planned centre of mass and hips that carry it, and feet that rise with it in
+    flight."""
+    poses, frame_time = forward_kinematics(robot.tree, q), targets.frame_time
+    com = center_of_mass(robot, poses).T
+    momentum = angular_momentum(robot, poses, frame_time)[:2].T
+    rate = np.gradient(momentum, frame_time, axis=0) if len(q) > 1 else np.zeros_like(momentum)
+    support = _support(robot, targets, feet, poses)
+    planned = plan_com(
+        gaussian_filter1d(com, _PATH_FILTER / frame_time, axis=0, mode="nearest"),
+        targets.com_acceleration,
+        gaussian_filter1d(rate, _MOMENTUM_FILTER / frame_time, axis=0, mode="nearest"),
+        support,
+        frame_time,
+    )
+    shift = planned - com
+    lift = _over_flights(shift[:, 2], support.flight)
+    targets = replace(targets, hips=hips_of(robot, poses) + shift, com=planned)
+    return targets, [replace(foot, lift=lift) for foot in feet]
+
+
+def _support(
+    robot: Morphology, targets: Targets, feet: Sequence[FootPlan], poses: LinkPoses
+) -> Support:
+    """Sole points that are low, and other parts where the source's touch the floor."""
+    planned = [footing_of(foot).positions for foot in feet]
+    points = np.concatenate([p.transpose(2, 0, 1) for p in planned], axis=1)
+    reach = max(1, round(TOUCH_SPAN / targets.frame_time))
+    low = minimum_filter1d(points[..., 2], 2 * reach + 1, axis=0, mode="nearest")
+    touching: Bool[np.ndarray, "T K"] = low < TOUCH_HEIGHT * robot.rig.hip_height
+    joints = [robot.rig.roles.joint(role) for role in targets.part_roles]
+    known = [k for k, joint in enumerate(joints) if joint is not None]
+    parts = [
+        poses.point(int(robot.links[joint]), robot.centers[joint])[:2].T
+        for joint in joints
+        if joint is not None
+    ]
+    alone = ~touching.any(axis=1) & ~targets.flight & ~targets.parts[:, known].any(axis=1)
+    lowest = points[..., 2].argsort(axis=1)[:, :_HELD_POINTS]
+    touching[np.flatnonzero(alone)[:, None], lowest[alone]] = True
+    return Support(
+        np.concatenate([points[..., :2], *(p[:, None] for p in parts)], axis=1),
+        np.concatenate([touching, targets.parts[:, known]], axis=1),
+        float(feet[0].heading[0]) if feet else 0.0,
+    )
+
+
+def _over_flights(
+    values: Float[np.ndarray, "T"], flight: Bool[np.ndarray, "T"]
+) -> Float[np.ndarray, "T"]:
+    """How far the values rise, in flight, above the straight line from its start to its end."""
+    on = np.flatnonzero(~flight)
+    if not len(on):
+        return np.zeros_like(values)
+    chord = np.interp(np.arange(len(values)), on, values[on])
+    return np.where(flight, np.maximum(values - chord, 0.0), 0.0)
