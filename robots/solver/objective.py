@@ -23,6 +23,7 @@ from robots.residuals import (
 from robots.solver.block import Block
 from robots.solver.collision import Candidate, collisions_of
 from robots.solver.exact_contact import exact_contacts_of
+from robots.solver.floor import add_floor
 from robots.solver.foot_path import Footing
 from robots.solver.targets import Targets
 from robots.tree import Coordinates, LinkPoses, forward_kinematics
@@ -135,7 +136,8 @@ def linearize(
 
     Per frame: the rotation of each part with a role and the direction of each limb (`_add_pose`);
     hips, footholds and the floor, where the base is free; hands that touch, where it is not;
-    the depth of the colliding `candidates`, approximate or `exact`; limits; a pull to the T-pose.
+    the depth of all other parts in the floor, and of the colliding `candidates` in each other,
+    approximate or `exact`; limits; a pull to the T-pose.
     `penalty_scale` multiplies the weights of collisions and the floor, frame by frame.
     """
     tree, rig = robot.tree, robot.rig
@@ -165,6 +167,7 @@ def linearize(
         _add_hands(robot, targets, poses, block, normal, with_jacobian)
     for terms in chains.values():
         terms.add_to(normal)
+    add_floor(robot, poses, block, normal, W_FLOOR * penalty_scale, FLOOR_ROUNDING / penalty_scale)
     weight = W_LEG_COLLISION if block.base else W_COLLISION
     if exact:
         exact_contacts_of(robot).add_to(
