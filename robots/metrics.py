@@ -26,7 +26,9 @@ from spark.rotation import quat_conj, quat_mul
 SWING_SPEED, SWING_HEIGHT = 0.5, 0.02  # [m/s], [m] above which a foot of the source swings
 MIN_SWINGS = 30  # frames of swing, below which clearance says nothing
 DRAG_HEIGHT = 0.01  # [m] below which a fast sole drags
-PLANTED_SPEED, PLANTED_HEIGHT = 0.15, 0.06  # [m/s], [m] of a standing toe of the source
+# [m/s], [m] of a standing toe of the source, whatever its size: the figures that other tools are
+# compared by, apart from what the solver takes for a contact (`spark.rig.contacts`).
+PLANTED_SPEED, PLANTED_HEIGHT = 0.15, 0.06
 IN_AIR = 0.02  # [m] that a planted foot may be above the floor
 AT_LIMIT = np.radians(0.5)
 _WINDOW = 0.05  # [s] before and after a frame over which accelerations are measured

@@ -10,17 +10,35 @@ from robots.model.morphology import Morphology
 from robots.residuals import one_sided, point_jacobian
 from robots.solver.block import Block
 from robots.solver.hulls import Shape, shapes_of
-from robots.tree import LinkPoses
+from robots.tree import LinkPoses, forward_kinematics
 
 _REACH = 0.02  # [m] above the floor within which shapes are looked at
+_FOOT_HEIGHT = 0.02  # [m] above the sole, below which a shape is part of the foot
 _FELT = 3  # roundings above the floor from which on a residual is worth its time
 
 
 @lru_cache(maxsize=16)
 def shapes_over_floor(robot: Morphology) -> tuple[Shape, ...]:
-    """The robot's colliding shapes, but for those of its feet."""
-    feet = {int(link) for sole in robot.soles for link in robot.sole_points(sole)[0]}
-    return tuple(x for x in shapes_of(robot.mjcf, robot.mj_joints) if x.link not in feet)
+    """The robot's colliding shapes, but for its feet: what carries a sole, or is about as low as
+    one in the T-pose."""
+    poses = forward_kinematics(robot.tree, robot.tpose)
+    points = [robot.sole_points(sole) for sole in robot.soles]
+    feet = {int(link) for links, _ in points for link in links}
+    heights = [
+        poses.point(int(link), point)[2, 0]
+        for links, rests in points
+        for link, point in zip(links, rests, strict=True)
+    ]
+    low = min(heights, default=-np.inf) + _FOOT_HEIGHT
+    out = []
+    for shape in shapes_of(robot.mjcf, robot.mj_joints):
+        bottoms = [
+            poses.point(shape.link, center)[2, 0] - radius
+            for center, radius in zip(shape.spheres, shape.radii, strict=True)
+        ]
+        if shape.link not in feet and min(bottoms) > low:
+            out.append(shape)
+    return tuple(out)
 
 
 def add_floor(

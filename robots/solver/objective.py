@@ -1,8 +1,6 @@
-"""The solver's objective in one frame: its residuals, summed into normal equations, and weights.
+"""The solver's objective in one frame: its residuals, summed into normal equations.
 
-The cost is half the sum of squared residuals. These have no unit: angles [rad] are weighed in
-1/rad, lengths [m] in 1/m, all against the direction of a limb. What couples frames is in
-`robots.solver.smoothness`, with its weights here.
+Their weights are in `robots.solver.weights`; what couples frames is in `robots.solver.smoothness`.
 """
 
 from collections.abc import Sequence
@@ -26,41 +24,26 @@ from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.floor import add_floor
 from robots.solver.foot_path import Footing
 from robots.solver.targets import Targets
+from robots.solver.weights import (
+    FLOOR_ROUNDING,
+    HANDS_RANGE,
+    LIMIT_MARGIN,
+    W_COLLISION,
+    W_FLOOR,
+    W_FOOT_HOLD,
+    W_HANDS,
+    W_HIPS_POSITION,
+    W_LEG_COLLISION,
+    W_LIMB_DIRECTION,
+    W_LIMIT,
+    W_OTHER_ROTATION,
+    W_REGULAR,
+    W_ROTATION,
+    W_TPOSE,
+)
 from robots.tree import Coordinates, LinkPoses, forward_kinematics
 from spark.rig.roles import Role
 from spark.rotation import matrix_from_quat
-
-W_LIMB_DIRECTION = 2.0  # [1/rad] of upper and lower arms and legs: what a pose looks like
-W_ROTATION = {  # [1/rad] of a part by its role; low where the directions of limbs say enough,
-    "pelvis": 2.0,  # higher where they say nothing: the trunk, above all where it heads,
-    "chest": 0.8,
-    "head": 0.5,  # what looks somewhere,
-    "neck": 0.1,
-    "hand": 0.25,
-    "foot": 0.6,  # and what stands on the floor
-    "spine": 0.1,
-    "clavicle": 0.2,
-}
-W_OTHER_ROTATION = 0.08  # [1/rad] of the rest: the twist of limbs
-W_HIPS_POSITION = np.array([6.0, 6.0, 6.0])  # [1/m] of their path: 1 cm is 2 degrees of a limb
-W_COM_ACCELERATION = 0.2  # [s²/m] of the planned centre of mass: 1 m/s² is 6 degrees of a limb
-W_FOOT_HOLD = np.array([25.0, 25.0, 20.0])  # [1/m] of a standing sole's corner: 1 cm is 7 degrees
-W_FLOOR = 80.0  # [1/m] of a sole's corner below the floor: three times a foothold's
-FLOOR_ROUNDING = 0.004  # [m] over which that sets in
-W_LIMIT = 8.0  # [1/rad] of a hinge in the margin of its limit
-LIMIT_MARGIN = np.radians(2.0)
-W_HANDS = 20.0  # [1/m] of the offset between hands that touch; falls with their distance over
-HANDS_RANGE = 0.12  # [m] as exp(-(distance / range)²)
-W_COLLISION = 75.0  # [1/m] of the depth of parts in each other: as firm as the floor
-W_LEG_COLLISION = 90.0  # [1/m] between legs, where footholds pull the other way
-W_TPOSE = 0.02  # [1/rad] of hinges that nothing else asks for: they stay as in the T-pose
-W_REGULAR = 1e-3  # [1/rad, 1/m] of a step in any dof: keeps the normal equations regular
-SMOOTH_CUTOFF = 3.3  # [Hz] above which a limb's motion fades: accelerations weigh 1 / (2 pi f)²
-LEG_SHARE = 0.8  # of that weight for hinges of the legs: feet start and stop within 0.1 s
-AVOIDANCE_CUTOFF = 2.2  # [Hz] above which the change fades by which a limb gives way to another
-MAX_JERK = 430.0  # [rad/s³], RMS, above which a hinge is smoothed more: the bar is 400 in the mean
-MAX_HINGE_SPEED = 12.0  # [rad/s] above which a hinge is held back; the bar is 15
-W_OVERSPEED = 0.5  # [s/rad] of the speed beyond
 
 
 class ChainTerms:

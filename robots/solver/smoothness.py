@@ -1,6 +1,6 @@
 """What couples the frames of a robot's trajectory: bounded accelerations, jerk and speed.
 
-The weights and limits are in `robots.solver.objective`.
+The weights and limits are in `robots.solver.weights`.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from robots.least_squares import PointAcceleration, Smoothness, second_differenc
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.dynamics import center_of_mass, com_jacobian
-from robots.solver.objective import (
+from robots.solver.weights import (
     AVOIDANCE_CUTOFF,
     LEG_SHARE,
     MAX_HINGE_SPEED,

@@ -10,7 +10,7 @@ from robots.model.shapes import DIRECTIONS
 from robots.residuals import one_sided
 from robots.solver.collision import DEPTH_ROUNDING, collisions_of
 from robots.solver.hulls import ShapePair
-from robots.solver.objective import W_COLLISION, W_LEG_COLLISION
+from robots.solver.weights import W_COLLISION, W_LEG_COLLISION
 
 _ACTIVE = 3 * DEPTH_ROUNDING  # [m] between shapes beyond which the penalty is negligible
 _REACH = 0.03  # [m] that shapes may move between the searched frame and the others

@@ -1,10 +1,10 @@
 """The objective of a few frames, in a few tenths of a millisecond.
 
-The terms and weights are those of `robots.solver.objective`, and so is the order: arms and head
-hang on base, trunk and legs, and don't move them. There every term walks its own chain, over
-thousands of frames; here MuJoCo gives the bodies' poses, and the Jacobian of all terms is made at
-once. Its columns are MuJoCo's dofs, in the order of `robots.tree`: the base rotates about its own
-axes, and so do balls.
+The terms are those of `robots.solver.objective`, but for the floor under other parts than soles,
+with the same weights, and so is the order: arms and head hang on base, trunk and legs, and don't
+move them. There every term walks its own chain, over thousands of frames; here MuJoCo gives the
+bodies' poses, and the Jacobian of all terms is made at once. Its columns are MuJoCo's dofs, in the
+order of `robots.tree`: the base rotates about its own axes, and so do balls.
 """
 
 from collections.abc import Sequence
@@ -16,9 +16,21 @@ from jaxtyping import Bool, Float, Int
 
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
-from robots.solver import objective
-from robots.solver.objective import W_OTHER_ROTATION, W_ROTATION
 from robots.solver.solve import blocks_of
+from robots.solver.weights import (
+    FLOOR_ROUNDING,
+    HANDS_RANGE,
+    LIMIT_MARGIN,
+    W_FLOOR,
+    W_FOOT_HOLD,
+    W_HANDS,
+    W_HIPS_POSITION,
+    W_LIMB_DIRECTION,
+    W_LIMIT,
+    W_OTHER_ROTATION,
+    W_ROTATION,
+    W_TPOSE,
+)
 from robots.stream.collision import WindowCollisions, WindowPoses
 from robots.stream.frame_targets import FrameTargets
 from robots.tree import BASE
@@ -66,10 +78,10 @@ class Terms:
         self._hinge_qpos = self._model.jnt_qposadr[hinges]
         rest = self._model.qpos0[self._hinge_qpos]
         lower, upper = (limit[~tree.balls] + rest for limit in (tree.lower, tree.upper))
-        margin = np.minimum(objective.LIMIT_MARGIN, 0.1 * (upper - lower))
+        margin = np.minimum(LIMIT_MARGIN, 0.1 * (upper - lower))
         self._soft_limits = lower + margin, upper - margin
         angles = robot.tpose.angles[0, ~tree.balls] + rest
-        self.at_tpose = Posture(angles, np.full(len(angles), objective.W_TPOSE))
+        self.at_tpose = Posture(angles, np.full(len(angles), W_TPOSE))
         bodies = np.array([self._body(link) for link in (*range(len(tree)), -1)])
         self._collisions = WindowCollisions(
             robot, bodies, self._rest, np.flatnonzero(self._in_first_block[:-1])
@@ -184,16 +196,16 @@ class Terms:
         J[:, B:, :, :3] = np.eye(3)
         J *= self._dof_mask
         weights, forces = np.empty((2, count, B + P, 3))
-        weights[:, :B] = objective.W_LIMB_DIRECTION**2
-        forces[:, :B] = objective.W_LIMB_DIRECTION**2 * (bones - targets.bones)
+        weights[:, :B] = W_LIMB_DIRECTION**2
+        forces[:, :B] = W_LIMB_DIRECTION**2 * (bones - targets.bones)
         self._add_soles(points, foot_targets, weights[:, B:], forces[:, B:])
         hips = B + self._sole_count
-        weights[:, hips] = objective.W_HIPS_POSITION**2
-        forces[:, hips] = objective.W_HIPS_POSITION**2 * (points[:, hips - B] - targets.hips)
+        weights[:, hips] = W_HIPS_POSITION**2
+        forces[:, hips] = W_HIPS_POSITION**2 * (points[:, hips - B] - targets.hips)
         if self._hands:
             # The residual is the difference of two points, so is its Jacobian.
             squared = (targets.hands**2).sum(1, keepdims=True)
-            weight = (objective.W_HANDS * np.exp(-squared / objective.HANDS_RANGE**2)) ** 2
+            weight = (W_HANDS * np.exp(-squared / HANDS_RANGE**2)) ** 2
             J[:, hips + 1] -= J[:, hips + 2]
             weights[:, hips + 1], weights[:, hips + 2] = weight, 0.0
             between = points[:, -2] - points[:, -1] - targets.hands
@@ -209,12 +221,12 @@ class Terms:
     ) -> None:
         """The footholds of the soles' points, and the floor; weights squared."""
         count = self._sole_count
-        hold_weights = (objective.W_FOOT_HOLD * foot_targets.holds) ** 2
+        hold_weights = (W_FOOT_HOLD * foot_targets.holds) ** 2
         weights[:, :count] = hold_weights
         forces[:, :count] = hold_weights * (points[:, :count] - foot_targets.positions)
-        depth, slope = one_sided(-points[:, :count, 2], objective.FLOOR_ROUNDING)
-        weights[:, :count, 2] += (objective.W_FLOOR * slope) ** 2
-        forces[:, :count, 2] -= objective.W_FLOOR**2 * slope * depth
+        depth, slope = one_sided(-points[:, :count, 2], FLOOR_ROUNDING)
+        weights[:, :count, 2] += (W_FLOOR * slope) ** 2
+        forces[:, :count, 2] -= W_FLOOR**2 * slope * depth
 
     def _add_limits_and_posture(
         self,
@@ -226,13 +238,13 @@ class Terms:
         """Limits, as `limit_residual` has them, and the pull to the posture."""
         angles = self.angles(q)
         lower, upper = self._soft_limits
-        above, rising = one_sided(angles - upper, objective.LIMIT_MARGIN / 4)
-        below, falling = one_sided(lower - angles, objective.LIMIT_MARGIN / 4)
+        above, rising = one_sided(angles - upper, LIMIT_MARGIN / 4)
+        below, falling = one_sided(lower - angles, LIMIT_MARGIN / 4)
         pull = posture.weights**2
         diagonal = np.full(g.shape, 1e-6)
-        diagonal[:, self._hinge_dofs] = pull + (objective.W_LIMIT * (rising + falling)) ** 2
+        diagonal[:, self._hinge_dofs] = pull + (W_LIMIT * (rising + falling)) ** 2
         H.reshape(len(q), -1)[:, :: H.shape[1] + 1] += diagonal
-        gradient = objective.W_LIMIT**2 * (rising + falling) * (above - below)
+        gradient = W_LIMIT**2 * (rising + falling) * (above - below)
         g[:, self._hinge_dofs] += gradient + pull * (angles - posture.angles)
 
     def _body(self, link: int) -> int:

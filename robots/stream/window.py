@@ -6,10 +6,10 @@ from jaxtyping import Bool, Float, Int
 from scipy.linalg.lapack import dposv
 
 from robots.model.morphology import Morphology
-from robots.solver import objective
 from robots.solver.descent import LIMIT_CLEARANCE
-from robots.solver.objective import MAX_HINGE_SPEED, W_OVERSPEED
 from robots.solver.smoothness import acceleration_weights
+from robots.solver.weights import MAX_HINGE_SPEED, W_OVERSPEED
+from robots.solver.weights import SMOOTH_CUTOFF as WHOLE_CLIP_CUTOFF
 from robots.stream.frame_targets import FrameTargets
 from robots.stream.terms import FootTargets, Posture, Terms
 
@@ -45,8 +45,7 @@ class Window:
         self._lower, self._upper = lower[hinges] + rest, upper[hinges] + rest
         # As `robots.least_squares.Smoothness`, for the free frames alone; weights squared.
         weights = (
-            acceleration_weights(robot)
-            * (objective.SMOOTH_CUTOFF / SMOOTH_CUTOFF / frame_time) ** 2
+            acceleration_weights(robot) * (WHOLE_CLIP_CUTOFF / SMOOTH_CUTOFF / frame_time) ** 2
         )
         self._acceleration_weights = weights**2
         second_difference, self._first_difference = (

@@ -23,7 +23,8 @@ LN_ROTARY_BASE = 6.9078  # of rotary ones: ln 1000, to the digits that networks 
 
 @dataclass(frozen=True)
 class Config:
-    """Everything that makes one network differ from another."""
+    """Everything that makes one network differ from another. `spark.training.settings` sets the
+    sizes of a training run: width, heads and blocks."""
 
     width: int = 128
     heads: int = 4

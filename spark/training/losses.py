@@ -13,6 +13,10 @@ from spark.training.tensors import Body, PoseTensors
 
 Scalar = Float[Tensor, ""]
 
+PAPER_LOSS_WEIGHTS = {"rec": 1.0, "cyc": 20.0, "root": 7.0, "fk": 100.0}
+PAIR_LOSS_WEIGHTS = {"rec": 1.0, "root": 7.0, "fk": 100.0, "contact": 1.0, "ends": 100.0}
+"""Of the terms: the paper's (section 4.5), and those on pairs with exact answers."""
+
 
 def reconstruction(predicted: PoseTensors, truth: PoseTensors, body: Body) -> Scalar:
     """L_rec: squared 6D difference, averaged over joint-frame pairs."""

@@ -44,8 +44,6 @@ from spark.training.tensors import forward_kinematics
 from spark.training.train_names import train_names
 
 BETAS = (0.9, 0.99)  # of AdamW, as the paper has them
-PAPER_WEIGHTS = {"rec": 1.0, "cyc": 20.0, "root": 7.0, "fk": 100.0}
-PAIR_WEIGHTS = {"rec": 1.0, "root": 7.0, "fk": 100.0, "contact": 1.0, "ends": 100.0}
 
 Terms = dict[str, Float[Tensor, ""]]
 
@@ -89,7 +87,7 @@ class Objective(nn.Module):
     def __init__(self, model: Spark, config: TrainConfig) -> None:
         super().__init__()
         self.model = model
-        weights = PAIR_WEIGHTS if model.config.residual else PAPER_WEIGHTS
+        weights = losses.PAIR_LOSS_WEIGHTS if model.config.residual else losses.PAPER_LOSS_WEIGHTS
         self.weights = {k: w for k, w in weights.items() if k != "fk" or "fk" not in config.ablate}
 
     def forward(self, batch: Batch) -> tuple[Float[Tensor, ""], Terms]:
