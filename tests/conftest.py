@@ -16,11 +16,15 @@ from tests.helpers.recordings import DATA
 # What `make quick` leaves out: files and tests that start processes, train, render in a browser or
 # solve for seconds. Whatever runs on a real recording is left out too.
 SLOW = (
+    "tests/robots/solver/test_own_body.py",
     "tests/robots/solver/test_solve.py",
     "tests/robots/solver/test_target.py",
+    "tests/robots/stream/test_stream.py::test_the_bars_hold_on_the_walk",
+    "tests/robots/stream/test_stream.py::test_the_bars_hold_on_real_clips",
     "tests/scripts/",
     "tests/sim/physics/",
     "tests/sim/report/test_page.py",
+    "tests/sim/view/test_view.py::test_page_moves_in_a_browser",
     "tests/spark/evaluation/test_evaluate.py",
     "tests/spark/network/test_forward.py::test_onnx_is_the_network",
     "tests/spark/network/test_retarget.py::test_windows_agree_with_the_whole",
@@ -28,6 +32,7 @@ SLOW = (
     "tests/spark/training/test_dataset.py",
     "tests/spark/training/test_name_encoder.py::test_names_are_learned",
     "tests/spark/training/test_train.py",
+    "tests/spark/transfer/test_analytic.py::test_every_pair_of_humanoids_keeps_limb_directions",
     "tests/spark_sim/test_cli.py",
     "tests/spark_sim/test_train_command.py",
     "tests/test_packaging.py",

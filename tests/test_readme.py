@@ -72,7 +72,7 @@ def test_the_robotics_engineers_page(tmp_path: Path) -> None:
     run_page(CHECKOUT / "docs" / "for-robotics.md", tmp_path)
     made = [np.load(path)["joint_pos"].shape[1] for path in (tmp_path / "g1").iterdir()]
     assert made == [29] * 6
-    assert (tmp_path / "walker_squat_g1.npz").exists()
+    assert (tmp_path / "walker_walk_g1.npz").exists()
 
 
 def test_the_animators_page(tmp_path: Path) -> None:
