@@ -30,7 +30,9 @@ def with_dynamics(
     robot: Morphology, targets: Targets, feet: Sequence[FootPlan], q: Coordinates
 ) -> tuple[Targets, list[FootPlan]]:
     """Targets with a planned centre of mass and hips that carry it, and feet that rise with it in
-    flight."""
+    flight; as they are for a robot without feet, of which nothing says what holds it up."""
+    if not feet:
+        return targets, []
     poses, frame_time = forward_kinematics(robot.tree, q), targets.frame_time
     com = center_of_mass(robot, poses).T
     momentum = angular_momentum(robot, poses, frame_time)[:2].T
@@ -71,7 +73,7 @@ def _support(
     return Support(
         np.concatenate([points[..., :2], *(p[:, None] for p in parts)], axis=1),
         np.concatenate([touching, targets.parts[:, known]], axis=1),
-        float(feet[0].heading[0]) if feet else 0.0,
+        float(feet[0].heading[0]),
     )
 
 

@@ -22,7 +22,6 @@ OTHER = "other"
 Named = tuple[str, str, str]
 """A joint's name, side and kind."""
 
-_MIDLINE = (Role.PELVIS, Role.SPINE, Role.NECK, Role.HEAD)
 # How often a rig is without a kind of joint.
 _ABSENT = {"clavicle": 0.2, "toe": 0.2, "hand": 0.05, "neck": 0.1, "head": 0.03}
 _OTHERS = (

@@ -323,6 +323,13 @@ def test_the_first_frame_is_as_good_as_any(
     assert speed[0].max() < 1.5 * speed.max(axis=1).mean() + 0.02
 
 
+def test_a_robot_without_feet_is_solved_all_the_same(
+    walk: CanonicalMotion, ember: Morphology, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Morphology, "soles", ())
+    assert np.isfinite(retarget(walk.frames(0, 40), ember).qpos).all()
+
+
 @pytest.mark.parametrize("frames", [1, 2, 3, 5])
 def test_short_clips_are_clips(walk: CanonicalMotion, ember: Morphology, frames: int) -> None:
     result = retarget(walk.frames(0, frames), ember)
