@@ -29,6 +29,8 @@ from spark.transfer.canonical import CanonicalMotion, from_canonical, to_canonic
 
 CLEAN = 0.3  # share of implausible frames of a source that the bars are for
 
+CONTACTS = 0.97  # F1 of the feet's contacts, at least
+
 COLUMNS = {  # title: (field, factor, format, the bar: what it must not exceed, given the metrics)
     "implausible %": ("implausible", 100, ".1f", lambda m: m.implausible_source + 0.02),
     "(source)": ("implausible_source", 100, ".1f", None),
@@ -40,6 +42,7 @@ COLUMNS = {  # title: (field, factor, format, the bar: what it must not exceed, 
     "drag %": ("dragging", 100, ".2f", lambda m: m.dragging_source + 0.005),
     "hips acc.": ("hips_acceleration", 1, ".2f", lambda m: 1.0),
     "CoM acc.": ("com_acceleration", 1, ".2f", lambda m: 1.0),
+    "contacts F1": ("contact_f1", 1, ".3f", None),
     "heading": ("heading_rad", 57.3, ".1f", lambda m: np.radians(8)),
     "drift cm": ("drift_m", 100, ".1f", lambda m: 0.1),
     "deep cm": ("deepest_m", 100, ".2f", lambda m: 0.01),
@@ -129,6 +132,8 @@ def misses(metrics: RobotMetrics) -> list[str]:
     clearance = metrics.swing_clearance
     if clearance is not None and not 0.85 <= clearance <= 1.2:
         out.append("clearance")
+    if metrics.contact_f1 is not None and metrics.contact_f1 < CONTACTS:
+        out.append("contacts F1")
     return out
 
 

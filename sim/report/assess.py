@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from sim.report.clip_metrics import ClipMetrics, measure
 from sim.report.clip_poses import ClipPoses, pose_clip
@@ -68,7 +68,7 @@ def assess(
     scale = rig.hip_height / source_poses.rig.hip_height
     clip = _beyond_source(measure(clip_poses, floor), source_clip, times, scale)
     drift = _drift(clip_poses, source_poses, times, scale)
-    contacts = _contacts(clip_poses, source_poses, times)
+    contacts = _contacts(clip, source_clip, times)
     notes += _slope(source_poses, "the source's")
     difference = abs(source_poses.motion.duration - motion.duration)
     if difference > max(0.1, 2 * motion.frame_time):
@@ -142,20 +142,22 @@ def _drift(
     )
 
 
-def _contacts(poses: ClipPoses, source: ClipPoses, times: Float[np.ndarray, "T"]) -> ContactMatch:
-    ours, theirs = _planted(poses), _planted(source)
-    sides = [side for side in ours if side in theirs]
-    planted = np.stack([theirs[side] for side in sides], axis=1).astype(float)
+def _contacts(
+    clip: ClipMetrics, source: ClipMetrics, times: Float[np.ndarray, "T"]
+) -> ContactMatch:
+    """Of the feet that both have; each stands on whatever part of its own sole touches."""
+    feet = [foot for foot in clip.standing if foot in source.standing]
+    theirs = np.stack([source.standing[foot] for foot in feet], axis=1).astype(float)
     return contact_match(
-        np.stack([ours[side] for side in sides], axis=1),
-        values_at(planted, times / source.motion.frame_time) > 0.5,
+        np.stack([clip.standing[foot] for foot in feet], axis=1),
+        values_at(theirs, times / source.frame_time) > 0.5,
     )
 
 
 def _slope(poses: ClipPoses, whose: str) -> tuple[str, ...]:
     """A note where the feet stand on a slope: recorded floors are off level by a degree or two."""
     lowest = poses.corners[np.arange(len(poses)), poses.corners[..., 2].argmin(axis=1)]
-    planted = np.any(list(_planted(poses).values()), axis=0)
+    planted = planted_feet(poses.rig, poses.positions, poses.motion.frame_time).any(axis=1)
     angle, rise = floor_slope(lowest[planted])
     if rise < PLAUSIBILITY_V1.scaled(poses.rig.hip_height).floating / 2:
         return ()
@@ -163,12 +165,3 @@ def _slope(poses: ClipPoses, whose: str) -> tuple[str, ...]:
         f"{whose} floor slopes by {np.degrees(angle):.1f}°: the feet stand {100 * rise:.0f} cm "
         "higher at one end of it, and there count as floating",
     )
-
-
-def _planted(poses: ClipPoses) -> dict[str, Bool[np.ndarray, "T"]]:
-    """When each foot stands, by side."""
-    rig = poses.rig
-    roles = [rig.roles.roles[j] for j in rig.contact_joints]
-    sides = [role.side for role in roles if role is not None]
-    planted = planted_feet(rig, poses.positions, poses.motion.frame_time)
-    return dict(zip(sides, planted.T, strict=True))

@@ -27,6 +27,7 @@ class ClipMetrics:
     `clearance` [m]: the height of the body's lowest point.
     `corner_skates`, `corner_speeds` [m/s]: whether each sole corner skates, and how fast it moves
     along the floor, on the feet `corner_feet`.
+    `standing`: the frames in which each foot stands, by its name.
     `unexplained_wrench`: the force [body weights] and the torque [body weights x 1 m] that the
     floor can't give.
     `imbalance` [m]: how far the centre of mass lies outside the support; nan in frames that move.
@@ -45,6 +46,7 @@ class ClipMetrics:
     corner_skates: Bool[np.ndarray, "T C"]
     corner_speeds: Float[np.ndarray, "T C"]
     corner_feet: tuple[str, ...]
+    standing: dict[str, Bool[np.ndarray, "T"]]
     unexplained_wrench: Float[np.ndarray, "T 2"]
     imbalance: Float[np.ndarray, "T"]
     limits: tuple[LimitExcess, ...]
@@ -157,6 +159,7 @@ def measure(poses: ClipPoses, floor_z: float) -> ClipMetrics:
         corner_skates=skates,
         corner_speeds=support.speeds[:, :corners],
         corner_feet=poses.corner_feet,
+        standing=support.standing(),
         unexplained_wrench=wrench,
         imbalance=support.imbalance(),
         limits=limits,

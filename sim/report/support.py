@@ -63,6 +63,16 @@ class Support:
         loaded[selected] = (missing > limits.skate_load * np.array([1.0, self.length])).any(axis=1)
         return low_fast & (flat | loaded[:, None])
 
+    def standing(self) -> dict[str, Bool[np.ndarray, "T"]]:
+        """When each foot stands, by its name: any corner of its sole is near the floor and slow."""
+        count, limits = len(self.feet), self.thresholds
+        near = self.heights[:, :count] < limits.contact_height
+        stands = near & (self.speeds[:, :count] <= limits.skate_speed)
+        return {
+            foot: np.any(stands[:, [own == foot for own in self.feet]], axis=1)
+            for foot in dict.fromkeys(self.feet)
+        }
+
     def _corners(self) -> list[list[int]]:
         """For each corner, those of its foot."""
         return [[k for k, other in enumerate(self.feet) if other == foot] for foot in self.feet]

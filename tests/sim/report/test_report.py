@@ -382,6 +382,42 @@ def test_contacts_are_compared_at_the_same_times_whatever_the_frame_rates() -> N
     assert never.recall == 0
 
 
+def test_a_foot_stands_on_any_part_of_its_sole() -> None:
+    """On the heel with the toes up, for one second of two; flat in the source."""
+    rig = stick_rig()
+    source = Subject(standing(rig, 120), rig)
+    heels, lift = standing(rig, 120), np.zeros(120)
+    angle, heel = np.radians(25.0), 0.25 * FOOT_LENGTH * rig.standing_height
+    for side in ("left", "right"):
+        heels.rotations[60:, joint(Role(f"{side}_foot"))] = quat_about("y", -angle)
+    lift[60:] = heel * np.sin(angle) - 0.1 * (1 - np.cos(angle))  # the ankle is 0.1 m up
+    report = assess(Subject(along(heels, 2, lift), rig), source=source)
+    assert report.clip.depth.max() < 1e-6
+    assert report.contacts is not None
+    assert report.contacts.f1 == pytest.approx(1, abs=0.03)  # the heels come down moving
+    # One leg swings the foot forward and up: what doesn't stand is not a contact.
+    raised = standing(rig, 120)
+    raised.rotations[60:, joint(Role.LEFT_UPPER_LEG)] = quat_about("y", np.array(-0.6))
+    report = assess(Subject(raised, rig), source=source)
+    assert report.contacts is not None
+    assert report.contacts.precision == 1
+    assert report.contacts.recall == pytest.approx(0.75, abs=0.02)
+
+
+def test_a_foot_above_the_floor_does_not_stand() -> None:
+    rig = stick_rig()
+    source = Subject(standing(rig, 60), rig)
+    for height, recall in ((0.035, 1), (0.05, 0)):
+        contacts = assess(Subject(along(standing(rig, 60), 2, height), rig), source=source).contacts
+        assert contacts is not None
+        assert contacts.recall == recall
+    # By the size of each: on a body four times as large, 15 cm are no more than 4 cm on this one.
+    big = scaled(rig, 4.0)
+    contacts = assess(Subject(along(standing(big, 60), 2, 0.15), big), source=source).contacts
+    assert contacts is not None
+    assert contacts.recall == 1
+
+
 def test_a_statue_beside_its_feet_is_out_of_balance() -> None:
     rig = stick_rig()
     still = standing(rig, 60)
