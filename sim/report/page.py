@@ -1,13 +1,13 @@
 """The report as one self-contained web page: headline, replay, worst moments, plots."""
 
 import base64
-import html
 import io
-import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import UInt8
+from markupsafe import Markup
 
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.clip_poses import pose_clip
@@ -18,6 +18,7 @@ from sim.report.record import record
 from sim.report.result import Finding, Result
 from sim.report.table import shares
 from sim.report.text import details, share_base
+from sim.template import render_page
 from sim.trajectory import Subject
 from sim.view.page import Overlay, page
 from sim.view.render import frames
@@ -68,32 +69,25 @@ def report_page(
     beside = ""
     if result.source is not None:
         beside = f"; of the source's {100 * result.source.implausible_share:.1f} %"
-    fields = {
-        "TITLE": html.escape(title),
-        "PALETTE": css(),
-        "GRADE": grade(100 * result.implausible),
-        "HEADLINE": f"{100 * result.implausible:.1f} % of the frames are implausible",
-        "ABOUT": f"{len(clip)} frames, {duration:.1f} s{beside}",
-        "CARDS": _cards(result),
-        "KEY": "".join(
-            f'<i style="background:{color}"></i>{name}' for name, color in CORNER_COLORS.items()
-        ),
-        "REPLAY": html.escape(page(figures, title="", overlays=overlays)),
-        "FINDINGS": _list(result),
-        "MOMENTS": moments,
-        "STRIPS": flag_strips(clip),
-        "PLOTS": "".join(svg(plot, duration, source_duration) for plot in plots(result)),
-        "NOTES": "<br>".join(
-            html.escape(line) for line in (*result.notes, *note, clip.thresholds.version)
-        ),
-        "DURATION": repr(duration),
-        "RECORD": json.dumps(record(result), allow_nan=False).replace("</", "<\\/"),
-    }
-    text = (Path(__file__).with_name("page.html")).read_text(encoding="utf-8")
-    head, *rest = text.split("__")
-    # Every second piece is a field's name: no field's text is looked through for others.
-    return head + "".join(
-        fields[name] + piece for name, piece in zip(rest[::2], rest[1::2], strict=True)
+    return render_page(
+        "sim.report",
+        framed=("sim.view",),
+        title=title,
+        palette=Markup(css()),
+        grade=grade(100 * result.implausible),
+        headline=f"{100 * result.implausible:.1f} % of the frames are implausible",
+        about=f"{len(clip)} frames, {duration:.1f} s{beside}",
+        cards=_cards(result),
+        key=CORNER_COLORS,
+        replay=page(figures, title="", overlays=overlays),
+        findings=[_line(f, f.start, clip) for f in result.findings[:_LISTED]],
+        unlisted=max(len(result.findings) - _LISTED, 0),
+        moments=moments,
+        strips=flag_strips(clip),
+        plots=Markup().join(svg(plot, duration, source_duration) for plot in plots(result)),
+        notes=(*result.notes, *note, clip.thresholds.version),
+        duration=duration,
+        record=record(result),
     )
 
 
@@ -111,49 +105,41 @@ def _overlay(clip: ClipMetrics, subject: Subject) -> Overlay:
     return Overlay(poses.corners, states, labels, tuple(CORNER_COLORS.values()))
 
 
-def _cards(result: Result) -> str:
+def _cards(result: Result) -> list[dict[str, Any]]:
     """A card for each measure."""
     theirs = {} if result.source is None else shares(result.source)
-    cards = []
+    cards: list[dict[str, Any]] = []
     for measure, percent in shares(result.clip).items():
         if percent is None:
             continue
         small = [] if (their := theirs.get(measure)) is None else [f"source {their:.1f} %"]
         if base := share_base(result.clip, measure):
             small.append(base)
-        cards.append(_card(LABELS[measure], f"{percent:.1f} %", small, grade(percent)))
+        value = f"{percent:.1f} %"
+        cards.append(
+            {"label": LABELS[measure], "value": value, "lines": small, "grade": grade(percent)}
+        )
     for label, words in details(result):
         value, _, rest = words.strip().partition("  ")
-        cards.append(_card(label, value, [rest.strip()]))
-    return "".join(cards)
+        cards.append({"label": label, "value": value, "lines": [rest.strip()], "grade": ""})
+    return cards
 
 
-def _card(label: str, value: str, small: list[str], grade: str = "") -> str:
-    lines = "".join(f"<small>{html.escape(line)}</small>" for line in small)
-    return (
-        f'<div class="card"><small>{html.escape(label)}</small>'
-        f'<b class="{grade}">{html.escape(value)}</b>{lines}</div>'
-    )
+def _line(finding: Finding, frame: int, clip: ClipMetrics) -> dict[str, Any]:
+    """A finding in words, and the time [s] that a click on it goes to."""
+    return {
+        "time": f"{frame * clip.frame_time:.3f}",
+        "sentence": finding.sentence,
+        "place": finding.place(clip.frame_time),
+    }
 
 
-def _list(result: Result) -> str:
-    frame_time = result.clip.frame_time
-    rows = [
-        f'<li><button data-time="{finding.start * frame_time:.3f}">'
-        f"{html.escape(finding.sentence)} <small>{finding.place(frame_time)}</small></button></li>"
-        for finding in result.findings[:_LISTED]
-    ]
-    if len(result.findings) > _LISTED:
-        rows.append(f"<li><button>... and {len(result.findings) - _LISTED} more</button></li>")
-    return "".join(rows) or "<li><button>nothing to mend</button></li>"
-
-
-def _moments(result: Result, figures: list[Figure]) -> tuple[str, tuple[str, ...]]:
+def _moments(result: Result, figures: list[Figure]) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
     """Pictures of the gravest finding of each measure, and a note where they can't be made."""
     gravest = {finding.measure: finding for finding in reversed(result.findings)}
     picked = list(gravest.values())[::-1][:_MOMENTS]
     if not picked:
-        return "", ()
+        return [], ()
     scene = build_scene(figures)
     frame_time = result.clip.frame_time
     at = [
@@ -162,14 +148,11 @@ def _moments(result: Result, figures: list[Figure]) -> tuple[str, tuple[str, ...
     try:
         pictures = [_jpeg(p) for p in frames(scene, at, width=640, height=540)]
     except DependencyError as error:
-        return "", (f"no pictures: {error}",)
-    tiles = "".join(
-        f'<button data-time="{_middle(f) * frame_time:.3f}"><img alt="" '
-        f'src="data:image/jpeg;base64,{picture}"><span>{html.escape(f.sentence)} '
-        f"<small>{f.place(frame_time)}</small></span></button>"
-        for f, picture in zip(picked, pictures, strict=True)
-    )
-    return f'<h2>Worst moments</h2><div class="moments">{tiles}</div>', ()
+        return [], (f"no pictures: {error}",)
+    return [
+        {**_line(finding, _middle(finding), result.clip), "picture": picture}
+        for finding, picture in zip(picked, pictures, strict=True)
+    ], ()
 
 
 def _middle(finding: Finding) -> int:

@@ -1,10 +1,10 @@
 """A report's measures over time, as inline SVG: no script, no library, any zoom."""
 
-import html
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
+from markupsafe import Markup
 
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.names import FLAGS, LABELS
@@ -96,7 +96,7 @@ def plots(result: Result) -> list[Plot]:
     return shown
 
 
-def svg(plot: Plot, duration: float, source_duration: float) -> str:
+def svg(plot: Plot, duration: float, source_duration: float) -> Markup:
     """One plot, `duration` [s] wide: flagged frames shaded, the source behind, the limit dashed."""
     series = [plot.values] + ([] if plot.source is None else [plot.source])
     top = max(1.2 * max(_peak(v) for v in series), plot.limit or 0.0, plot.min_range)
@@ -107,19 +107,18 @@ def svg(plot: Plot, duration: float, source_duration: float) -> str:
         return (1 - (inside - bottom) / (top - bottom)) * (_HEIGHT - 4) + 2
 
     parts = [_shades(plot.flagged, _HEIGHT)]
-    parts.append(f'<path class="zero" d="M0 {y(0.0)[0]:.1f}H{WIDTH:g}"/>')
+    across = Markup('<path class="{}" d="M0 {:.1f}H{:g}"/>')
+    parts.append(across.format("zero", y(0.0)[0], WIDTH))
     if plot.limit is not None:
-        parts.append(f'<path class="limit" d="M0 {y(plot.limit)[0]:.1f}H{WIDTH:g}"/>')
+        parts.append(across.format("limit", y(plot.limit)[0], WIDTH))
     if plot.source is not None:
         width = WIDTH * (source_duration / duration if duration else 1.0)
         parts.append(_line(y(plot.source), width, plot.worst_is_low, "source"))
     parts.append(_line(y(plot.values), WIDTH, plot.worst_is_low, "clip"))
-    return (
-        f"<figure><figcaption>{html.escape(plot.name)} <small>[{plot.unit}], "
-        f"{bottom:.3g} to {top:.3g}</small></figcaption>"
-        f'<svg viewBox="0 0 {WIDTH:g} {_HEIGHT}" preserveAspectRatio="none">{"".join(parts)}'
-        "</svg></figure>"
-    )
+    return Markup(
+        "<figure><figcaption>{} <small>[{}], {:.3g} to {:.3g}</small></figcaption>"
+        '<svg viewBox="0 0 {:g} {}" preserveAspectRatio="none">{}</svg></figure>'
+    ).format(plot.name, plot.unit, bottom, top, WIDTH, _HEIGHT, Markup().join(parts))
 
 
 def _peak(values: Float[np.ndarray, "N"]) -> float:
@@ -127,33 +126,35 @@ def _peak(values: Float[np.ndarray, "N"]) -> float:
     return float(np.percentile(values[values > 0], 99.5)) if np.any(values > 0) else 0.0
 
 
-def flag_strips(clip: ClipMetrics) -> str:
+def flag_strips(clip: ClipMetrics) -> Markup:
     """When each flag is up: one strip a flag."""
-    return "".join(
-        f"<figure class=strip><figcaption>{LABELS[name]}</figcaption>"
-        f'<svg viewBox="0 0 {WIDTH:g} {_STRIP}" preserveAspectRatio="none">'
-        f"{_shades(clip.flags[name], _STRIP)}</svg></figure>"
+    strip = Markup(
+        "<figure class=strip><figcaption>{}</figcaption>"
+        '<svg viewBox="0 0 {:g} {}" preserveAspectRatio="none">{}</svg></figure>'
+    )
+    return Markup().join(
+        strip.format(LABELS[name], WIDTH, _STRIP, _shades(clip.flags[name], _STRIP))
         for name in FLAGS
     )
 
 
-def _shades(flags: Bool[np.ndarray, "T"], height: int) -> str:
+def _shades(flags: Bool[np.ndarray, "T"], height: int) -> Markup:
     step = WIDTH / max(len(flags), 1)
-    return "".join(
-        f'<rect x="{start * step:.1f}" width="{max((stop - start) * step, 1.5):.1f}" y="0" '
-        f'height="{height}"/>'
+    rect = Markup('<rect x="{:.1f}" width="{:.1f}" y="0" height="{}"/>')
+    return Markup().join(
+        rect.format(start * step, max((stop - start) * step, 1.5), height)
         for start, stop in true_runs(flags)
     )
 
 
-def _line(y: Float[np.ndarray, "T"], width: float, worst_is_low: bool, kind: str) -> str:
+def _line(y: Float[np.ndarray, "T"], width: float, worst_is_low: bool, kind: str) -> Markup:
     """A path of at most `_POINTS` points; the worst of the frames that fall on one is shown."""
     size = max(1, -(-len(y) // _POINTS))
     padded = np.pad(y, (0, -len(y) % size), mode="edge").reshape(-1, size)
     worst = padded.max(axis=1) if worst_is_low else padded.min(axis=1)  # y points down
     x = np.linspace(0, width, len(worst))
     points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, worst, strict=True))
-    return f'<polyline class="{kind}" points="{points}"/>'
+    return Markup('<polyline class="{}" points="{}"/>').format(kind, points)
 
 
 def _lowest_point(clip: ClipMetrics) -> Float[np.ndarray, "T"]:

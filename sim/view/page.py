@@ -4,11 +4,8 @@ It holds the scene's bodies, shapes and joint coordinates; the page does the kin
 """
 
 import base64
-import html
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +13,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
+from sim.template import render_page
 from sim.view.camera import camera_distance
 from sim.view.scene import Figure, Placement, Scene, build_scene
 from spark.errors import OutputError
@@ -80,9 +78,7 @@ def page(
         ],
         "meshes": list(meshes.values()),
     }
-    template = (files("sim.view") / "page.html").read_text(encoding="utf-8")
-    packed = json.dumps(data, separators=(",", ":")).replace("</", "<\\/")
-    return template.replace("__TITLE__", html.escape(title)).replace("__DATA__", packed)
+    return render_page("sim.view", title=title, data=data)
 
 
 def _figure(

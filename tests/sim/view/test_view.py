@@ -1,14 +1,10 @@
 """Scenes, pictures, videos and the page: what a person looks at."""
 
-import html
 import json
 import os
 import re
-import shutil
-import subprocess
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -27,6 +23,7 @@ from spark.errors import DependencyError, OutputError
 from spark.motion import Motion
 from spark.rig.rig import Rig
 from spark.rotation import quat_mul, quat_rotate
+from tests.helpers.browser import opened, with_probe
 
 
 def figures() -> list[Figure]:
@@ -96,11 +93,11 @@ def test_page_is_one_file_and_small(tmp_path: Path) -> None:
     assert len(text) < 2_000_000
     assert not re.search(r"(src|href)\s*=\s*[\"']?(https?:)?//", text)
     assert "a &amp; b &lt;/script&gt;" in text
-    data = json.loads(re.search(r"const DATA = (.*);\n", text)[1])  # type: ignore[index]
+    data = json.loads(re.search(r'type="application/json">(.*?)</script>', text)[1])  # type: ignore[index]
     assert [f["label"] for f in data["figures"]] == ["walker", "dancer"]
 
 
-PROBE = """<script>
+PROBE = """
   const seen = []; onerror = console.error = console.warn = m => seen.push(String(m));
   requestAnimationFrame = () => 0; // frames are drawn when asked for, not as time goes by
   setTimeout(() => {
@@ -112,32 +109,7 @@ PROBE = """<script>
     const looks = TIMES.map(look);
     play(true); tick(1000); view.time = 0; tick(1500);
     document.body.dataset.result = JSON.stringify({ seen, looks, time: view.time });
-  }, 100);
-</script></html>"""
-QUIET = (
-    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-sync "
-    "--disable-background-networking --disable-component-update --virtual-time-budget=1000"
-)
-
-
-def in_browser(text: str, times: list[float], folder: Path) -> dict[str, Any]:
-    """What the page says of itself in headless Chromium: errors, and what it drew at some times."""
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-    if chromium is None:
-        assert "CI" not in os.environ, "CI installs chromium"
-        pytest.skip("chromium is not installed")
-    path = folder / "probe.html"
-    path.write_text(text.replace("</html>", PROBE.replace("TIMES", json.dumps(times))))
-    ran = subprocess.run(
-        [chromium, *QUIET.split(), f"--user-data-dir={folder}", "--dump-dom", path.as_uri()],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    found = re.search(r'data-result="([^"]*)"', ran.stdout)
-    assert found, ran.stderr[-500:]
-    return json.loads(html.unescape(found[1]))
+  }, 100);"""
 
 
 def test_page_moves_in_a_browser(tmp_path: Path) -> None:
@@ -145,7 +117,8 @@ def test_page_moves_in_a_browser(tmp_path: Path) -> None:
     different; the page's kinematics are MuJoCo's."""
     robot, motion, body = machine(tmp_path)
     shown = [*figures(), Figure(Subject(motion, robot, body), "machine")]
-    result = in_browser(page(shown, title="test"), [0.0, 2.0], tmp_path)
+    probe = PROBE.replace("TIMES", "[0.0, 2.0]")
+    result = opened(with_probe(page(shown, title="test"), probe), tmp_path)
     assert result["seen"] == []
     assert result["time"] == pytest.approx(0.5), "it plays"
     first, second = result["looks"]
