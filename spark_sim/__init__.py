@@ -11,11 +11,13 @@
 Names are loaded when they are first used, so that the import itself costs nothing.
 """
 
-from typing import TYPE_CHECKING, Any
+TYPE_CHECKING = False  # what type checkers take as true; `typing` itself takes time to import
 
 DISTRIBUTION = "spark-sim"
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from sim.report import Report
     from spark.errors import SparkSimError
     from spark_sim.api import play, report, retarget, sample
@@ -56,7 +58,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     if name == "__version__":
         from importlib.metadata import version
 

@@ -1,9 +1,10 @@
 """The `spark-sim` program: makes sure that the packages are its own, then runs the command line.
 
-Only `sys` is imported here: `sim` and `robots` are common names, and code of another distribution
-must not run any further than its own `__init__`.
+Only `sys` and `signal` are imported here: `sim` and `robots` are common names, and code of another
+distribution must not run any further than its own `__init__`.
 """
 
+import signal
 import sys
 
 DISTRIBUTION = "spark-sim"
@@ -25,6 +26,8 @@ def foreign_package() -> str | None:
 
 def main() -> int:
     """Run the command line; returns the exit code."""
+    # Until the command runs, Ctrl-C ends the process as the system does it, without a traceback.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     problem = foreign_package()
     if problem is not None:
         print(
@@ -37,7 +40,20 @@ def main() -> int:
         return 2
     from spark_sim.cli import run
 
-    return run(sys.argv[1:])
+    return run(sys.argv[1:], ready=_listen)
+
+
+def _listen() -> None:
+    """From now on there may be work to undo, and processes to end."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), _stop)
+
+
+def _stop(number: int, frame: object) -> None:
+    """End as after an error: what is half written is removed."""
+    sys.exit(128 + number)
 
 
 if __name__ == "__main__":

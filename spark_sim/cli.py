@@ -4,7 +4,7 @@ import os
 import re
 import sys
 from argparse import Action, ArgumentError, ArgumentParser, Namespace, RawDescriptionHelpFormatter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from itertools import takewhile
 from typing import Any, NoReturn
@@ -157,8 +157,9 @@ def _nearest(name: str, known: Iterable[str]) -> str:
     return f"; did you mean {near[0]}?" if near else ""
 
 
-def run(argv: Sequence[str]) -> int:
-    """Parse and carry out one command line; every failure ends as one line on stderr.
+def run(argv: Sequence[str], ready: Callable[[], None] = lambda: None) -> int:
+    """Parse and carry out one command line; every failure ends as one line on stderr. `ready` is
+    called in between.
 
     Exit codes: 0 done; 1 `report --fail-over` found too much; 2 wrong input or usage; 70 a fault of
     spark-sim itself; 130 interrupted; 141 the reader of stdout went away.
@@ -168,6 +169,7 @@ def run(argv: Sequence[str]) -> int:
         build_parser()[0].print_help(sys.stderr)
         return FAILED
     try:
+        ready()
         code = _run(args)
         sys.stdout.flush()
     except BrokenPipeError:

@@ -35,5 +35,5 @@ def claim(path: Path, *, force: bool, endings: tuple[str, ...] = (), what: str =
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"{path}: can't make its folder ({error.strerror})") from error
-    if not os.access(path.parent, os.W_OK):
+    if not os.access(Path(os.path.realpath(path)).parent, os.W_OK):
         raise OutputError(f"{path}: can't be written, its folder is read-only")

@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 import mujoco
 
 from spark.errors import OutputError
+from spark.files import write_atomically
 
 _DIGITS = 9  # of every number: nanometres on a body
 _ZERO = 1e-12
@@ -45,15 +46,10 @@ def write_mjcf(spec: mujoco.MjSpec, path: str | Path) -> tuple[Path, Path]:
     spec.modelname = path.stem
     root = _tree(spec)
     body, scene, *_ = paths_of(spec, path)
-    try:
-        for mesh in root.iter("mesh"):
-            _move_to_file(mesh, path)
-        body.write_text(_text(root))
-        scene.write_text(_SCENE.format(name=path.stem, file=path.name))
-    except OSError as error:
-        raise OutputError(
-            f"{error.filename or path}: can't be written ({error.strerror})"
-        ) from error
+    for mesh in root.iter("mesh"):
+        _move_to_file(mesh, path)
+    write_atomically(body, _text(root).encode())
+    write_atomically(scene, _SCENE.format(name=path.stem, file=path.name).encode())
     return body, scene
 
 
@@ -111,6 +107,9 @@ def _move_to_file(mesh: ElementTree.Element, path: Path) -> None:
     faces = [int(word) + 1 for word in mesh.attrib.pop("face").split()]
     lines = [f"v {' '.join(vertices[k : k + 3])}" for k in range(0, len(vertices), 3)]
     lines += [f"f {' '.join(map(str, faces[k : k + 3]))}" for k in range(0, len(faces), 3)]
-    file.parent.mkdir(exist_ok=True)
-    file.write_text("\n".join(lines) + "\n")
+    try:
+        file.parent.mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{file}: can't make its folder ({error.strerror})") from error
+    write_atomically(file, ("\n".join(lines) + "\n").encode())
     mesh.set("file", f"{file.parent.name}/{file.name}")

@@ -23,7 +23,8 @@ from sim.trajectory import Subject
 from sim.view.page import Overlay, page
 from sim.view.render import frames
 from sim.view.scene import Figure, build_scene
-from spark.errors import DependencyError, OutputError
+from spark.errors import DependencyError
+from spark.files import write_atomically
 
 _MOMENTS = 6  # pictures
 _LISTED = 200  # findings
@@ -41,10 +42,7 @@ def write_report_page(
 ) -> None:
     """Write the page of `result`, which `assess` made of `subject` and `source`, to `path`."""
     text = report_page(result, subject, source, title=title, names=names)
-    try:
-        Path(path).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"{path}: can't be written ({error.strerror or error})") from error
+    write_atomically(Path(path), text.encode())
 
 
 def report_page(

@@ -16,7 +16,7 @@ from jaxtyping import Float, Int, UInt8
 from sim.template import render_page
 from sim.view.camera import camera_distance
 from sim.view.scene import Figure, Placement, Scene, build_scene
-from spark.errors import OutputError
+from spark.files import write_atomically
 
 _HALF_VIEW = 0.26  # tan of half the page's angle, less what its bar and labels take
 _STEPS = 32000  # coordinates are kept as 16-bit integers
@@ -48,10 +48,7 @@ class Overlay:
 def write_page(figures: Sequence[Figure], path: str | Path, *, title: str) -> None:
     """Write the replay of some figures side by side to `path`."""
     text = page(figures, title=title)
-    try:
-        Path(path).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise OutputError(f"{path}: can't be written ({error.strerror or error})") from error
+    write_atomically(Path(path), text.encode())
 
 
 def page(

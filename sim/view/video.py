@@ -2,6 +2,7 @@
 
 import subprocess
 from collections.abc import Callable, Iterable
+from io import BytesIO
 from pathlib import Path
 from shutil import which
 
@@ -11,6 +12,7 @@ from sim.view.camera import fitting_aspect
 from sim.view.render import frames
 from sim.view.scene import Scene
 from spark.errors import DependencyError, OutputError
+from spark.files import replacing, write_atomically
 
 Progress = Callable[[Iterable[int]], Iterable[int]]
 
@@ -27,7 +29,14 @@ def write_video(
     path = Path(path)
     if not path.parent.is_dir():
         raise OutputError(f"{path}: there is no folder {path.parent}; make it first")
-    unfinished = path.with_name(f".{path.name}.part")
+    with replacing(path) as unfinished:
+        _encode(scene, unfinished, path, width, height, progress)
+
+
+def _encode(
+    scene: Scene, unfinished: Path, path: Path, width: int, height: int, progress: Progress
+) -> None:
+    """Write the video to `unfinished`; errors call it `path`."""
     encoder = [
         *(_ffmpeg(), "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24"),
         *("-s", f"{width}x{height}", "-r", f"{1 / scene.frame_time:.6f}", "-i", "-"),
@@ -48,12 +57,9 @@ def write_video(
         except BaseException:
             process.kill()
             process.wait()
-            unfinished.unlink(missing_ok=True)
             raise
     if process.returncode:
-        unfinished.unlink(missing_ok=True)
         raise OutputError(f"{path}: the video encoder failed: {message}")
-    unfinished.replace(path)
 
 
 def write_strip(
@@ -79,10 +85,9 @@ def write_strip(
     count = count or (5 if width < 2 * height else 3)
     indices = np.linspace(0, len(scene.qpos) - 1, count).round().astype(int).tolist()
     pictures = list(frames(scene, indices, width=width, height=height))
-    try:
-        Image.fromarray(np.concatenate(pictures, axis=1)).save(path, format="PNG", optimize=True)
-    except OSError as error:
-        raise OutputError(f"{path}: can't be written ({error.strerror or error})") from error
+    buffer = BytesIO()
+    Image.fromarray(np.concatenate(pictures, axis=1)).save(buffer, format="PNG", optimize=True)
+    write_atomically(path, buffer.getvalue())
 
 
 def _ffmpeg() -> str:

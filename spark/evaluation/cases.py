@@ -59,7 +59,7 @@ class Case:
     target_recording: CanonicalMotion | None = None
 
 
-def performances(path: Path, workers: int = 1) -> list[Performance]:
+def performances(path: Path) -> list[Performance]:
     """The clips of a dataset, or of a folder with one folder a character, which has no cells.
 
     Raises what `spark.training.dataset.prepare` and `read_performances` raise.
@@ -67,7 +67,7 @@ def performances(path: Path, workers: int = 1) -> list[Performance]:
     if is_dataset(path):
         return read_performances(path)
     with TemporaryDirectory() as folder:
-        prepare([path], Path(folder), workers=workers)
+        prepare([path], Path(folder))
         found = read_performances(Path(folder))
         return [replace(p, clip=_in_memory(p.clip), cell="") for p in found]
 

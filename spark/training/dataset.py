@@ -2,24 +2,27 @@
 
     index.json     bodies (with the joints that SAN's protocol splits) and clips (whose, in which
                    cell, where in the arrays, on which floor), every file with its SHA-256, what was
-                   left out of the dataset and why
-    numbers.npy    float32: of each clip its rotations (T, K, 4), then its hips' path (T, 3)
-    planted.npy    bool (frames, 2): whether the left and the right foot stand
+                   left out of the dataset and why; the names of the arrays
+    numbers-*.npy  float32: of each clip its rotations (T, K, 4), then its hips' path (T, 3)
+    planted-*.npy  bool (frames, 2): whether the left and the right foot stand
     parts/         what each file gave (`spark.training.dataset_parts`): a run that stopped goes on,
                    and one with more files reads only those
+
+The index is written last, and names arrays that are whole: a run that is killed or finds the disk
+full leaves the dataset that was there.
 
 A clip is what `spark.training.pairs.TrainingClip` says: canonical, at 30 fps, on the network's view
 of its body.
 """
 
+import hashlib
+import io
 import json
 import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from multiprocessing import get_context
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -30,10 +33,9 @@ from spark.errors import (
     FileFormatError,
     OutputError,
     SkeletonError,
-    SparkSimError,
     name_list,
 )
-from spark.files import write_atomically
+from spark.files import alone, write_atomically
 from spark.io.reading import motion_files
 from spark.network.features import BodyFeatures, body_features
 from spark.rig.rig import Rig
@@ -42,6 +44,7 @@ from spark.rotation import quat_conj, quat_mul
 from spark.training.clips import read_clips
 from spark.training.dataset_parts import Part, make_part, read_part
 from spark.training.pairs import TrainingClip
+from spark.training.part_workers import parts_in_processes
 from spark.training.splits import cells, seen_characters, seen_motions
 from spark.training.variants import split_joints
 from spark.transfer.canonical import FRAME_TIME
@@ -50,6 +53,9 @@ FORMAT, VERSION = "spark-sim dataset", 3
 
 # Skeletons whose bones differ by less than this, in hip heights, are one body.
 _SAME_BODY = 1e-3
+
+# What the arrays are called where an index does not say it, as older ones do not.
+_ARRAYS = {"numbers": "numbers.npy", "planted": "planted.npy"}
 
 Index = dict[str, Any]
 Progress = Callable[[Iterable[tuple[Path, str]], int], Iterable[tuple[Path, str]]]
@@ -60,7 +66,7 @@ def prepare(
     out: Path,
     *,
     seed: int = 0,
-    workers: int = 1,
+    workers: int | None = None,
     force: bool = False,
     progress: Progress = lambda items, total: items,
 ) -> Index:
@@ -68,15 +74,23 @@ def prepare(
     index.
 
     A motion is a file's name. A body is a skeleton, named after the folder of its first file.
-    The same files and seed give the same bytes. A dataset that is there takes more files; it loses
-    one, or gets another seed, only with `force`. Raises `OutputError` there, and where `out` holds
-    something else, `FileFormatError` where a source holds no motion file, `SkeletonError` where
-    none is of a humanoid.
+    Files are read in `workers` processes; without a number in this one, which a fault in a library
+    then ends. The same files and seed give the same bytes. A dataset that is there takes more
+    files; it loses one, or gets another seed, only with `force`. Raises `OutputError` there, and
+    where `out` holds something else or another run writes to it, `FileFormatError` where a source
+    holds no motion file, `SkeletonError` where none is of a humanoid.
     """
-    before = {} if force else _clips_there(out, seed)
     files = sorted({path.resolve() for source in sources for path in motion_files(source)})
+    with alone(out):
+        return _prepared(files, out, seed, workers, force, progress)
+
+
+def _prepared(
+    files: list[Path], out: Path, seed: int, workers: int | None, force: bool, progress: Progress
+) -> Index:
+    before = {} if force else _clips_there(out, seed)
     parts = out / "parts"
-    parts.mkdir(parents=True, exist_ok=True)
+    parts.mkdir(exist_ok=True)
     digests = dict(progress(_make_parts(files, parts, workers), len(files)))
     index = _index({path: digests[path] for path in files}, parts, seed)
     if not index["clips"]:
@@ -88,10 +102,11 @@ def prepare(
             f"{out}: holds clips that are not among these files: {name_list(lost)}; give another "
             "folder, or overwrite it with --force"
         )
-    # An index that is there tells of arrays that are whole.
-    (out / "index.json").unlink(missing_ok=True)
-    _write_arrays(out, index, parts)
+    index["arrays"] = _write_arrays(out, index, parts)
     write_atomically(out / "index.json", _to_json(index).encode())
+    for array in chain.from_iterable(out.glob(f"{name}*.npy") for name in _ARRAYS):
+        if array.name not in index["arrays"].values():
+            array.unlink()
     return index
 
 
@@ -110,7 +125,7 @@ def training_clips(
 
 def is_dataset(path: Path) -> bool:
     """Whether `path` is a folder that `prepare` wrote."""
-    return (path / "index.json").is_file() and (path / "numbers.npy").is_file()
+    return (path / "index.json").is_file() and any(path.glob("numbers*.npy"))
 
 
 def read_dataset(path: Path, cell: str | None = "sc+sm") -> list[TrainingClip]:
@@ -128,8 +143,8 @@ def read_performances(path: Path) -> "list[Performance]":
         index = json.loads((path / "index.json").read_bytes())
         if (index["format"], index["version"]) != (FORMAT, VERSION):
             raise ValueError(f"it says {index['format']!r}, version {index['version']!r}")
-        numbers = np.load(path / "numbers.npy", mmap_mode="r")
-        planted = np.load(path / "planted.npy", mmap_mode="r")
+        arrays = index.get("arrays", _ARRAYS)
+        numbers, planted = (np.load(path / arrays[name], mmap_mode="r") for name in _ARRAYS)
         bodies = [body_features(rig_from_json(body["rig"])) for body in index["bodies"]]
         return [
             Performance(
@@ -199,25 +214,11 @@ def _clips_there(out: Path, seed: int) -> dict[str, str]:
     return clips
 
 
-def _make_parts(files: list[Path], parts: Path, workers: int) -> Iterator[tuple[Path, str]]:
+def _make_parts(files: list[Path], parts: Path, workers: int | None) -> Iterable[tuple[Path, str]]:
     """The files with their hashes, as their parts get ready."""
-    if workers <= 1:
-        for path in files:
-            yield path, make_part(path, parts)
-        return
-    # A fresh interpreter each: forking one that has threads can hang.
-    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-        waiting = {pool.submit(make_part, path, parts): path for path in files}
-        try:
-            for done in as_completed(waiting):
-                yield waiting[done], done.result()
-        except BrokenProcessPool as error:
-            raise SparkSimError(
-                "a worker died, perhaps for want of memory; what is read is kept: run it again, "
-                "with fewer --workers"
-            ) from error
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+    if workers is None:
+        return ((path, make_part(path, parts)) for path in files)
+    return parts_in_processes(files, parts, workers)
 
 
 def _index(digests: dict[Path, str], parts: Path, seed: int) -> Index:
@@ -304,28 +305,39 @@ def _body_of(rig: Rig, bodies: list[dict[str, Any]], folder: str) -> int:
     return len(bodies) - 1
 
 
-def _write_arrays(out: Path, index: Index, parts: Path) -> None:
-    """Both arrays, through neighbours that then take their names."""
+def _write_arrays(out: Path, index: Index, parts: Path) -> dict[str, str]:
+    """Both arrays, under names that no others of this dataset have; gives the names.
+
+    They are written and not mapped: on a full disk a mapped file ends the process.
+    """
     rigs = [rig_from_json(body["rig"]) for body in index["bodies"]]
-    frames = sum(clip["frames"] for clip in index["clips"])
     joints = [len(body_features(rig).joints) for rig in rigs]
     size = sum(clip["frames"] * (joints[clip["body"]] * 4 + 3) for clip in index["clips"])
-    shapes = {"numbers": ((size,), np.float32), "planted": ((frames, 2), np.bool_)}
-    arrays = {
-        name: np.lib.format.open_memmap(out / f".{name}.part", "w+", dtype, shape)
-        for name, (shape, dtype) in shapes.items()
-    }
-    for clip in index["clips"]:
-        part = read_part(parts, clip["sha256"])
-        if not isinstance(part, Part):
-            raise FileFormatError(parts, None, "changed while it was read; run it again")
-        numbers = _on_body(part, rigs[clip["body"]])
-        arrays["numbers"][clip["at"] : clip["at"] + len(numbers)] = numbers
-        first = clip["first_frame"]
-        arrays["planted"][first : first + clip["frames"]] = part.planted
-    for name, array in arrays.items():
-        array.flush()
-        (out / f".{name}.part").replace(out / f"{name}.npy")
+    planted: list[Bool[np.ndarray, "T 2"]] = []
+
+    def numbers() -> Iterator[bytes]:
+        yield _npy_header(np.dtype(np.float32), (size,))
+        for clip in index["clips"]:
+            part = read_part(parts, clip["sha256"])
+            if not isinstance(part, Part):
+                raise FileFormatError(parts, None, "changed while it was read; run it again")
+            planted.append(part.planted)
+            yield _on_body(part, rigs[clip["body"]]).astype(np.float32).tobytes()
+
+    token = hashlib.sha256(json.dumps(index).encode()).hexdigest()[:16]
+    names = {name: f"{name}-{token}.npy" for name in _ARRAYS}
+    write_atomically(out / names["numbers"], numbers())
+    standing = np.concatenate(planted)
+    header = _npy_header(standing.dtype, standing.shape)
+    write_atomically(out / names["planted"], header + standing.tobytes())
+    return names
+
+
+def _npy_header(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
+    file = io.BytesIO()
+    about = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
+    np.lib.format.write_array_header_1_0(file, about)
+    return file.getvalue()
 
 
 def _on_body(part: Part, rig: Rig) -> Float[np.ndarray, "N"]:

@@ -7,7 +7,7 @@ only once.
 import hashlib
 import io
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -43,9 +43,11 @@ class Part:
 
 @dataclass(frozen=True)
 class Rejected:
-    """Why a file gives nothing."""
+    """Why a file gives nothing; whether that may be another time's luck, so that it is tried
+    again."""
 
     why: str
+    again: bool = False
 
 
 def make_part(path: Path, parts: Path) -> str:
@@ -54,13 +56,29 @@ def make_part(path: Path, parts: Path) -> str:
     A file that can't be used is a part too, so that it is not tried again. Raises `OutputError`
     where a part can't be written.
     """
-    try:
-        digest = hashlib.sha256(path.suffix.lower().encode() + path.read_bytes()).hexdigest()
-    except OSError as error:
-        digest = hashlib.sha256(f"{path}: {error}".encode()).hexdigest()
-    if read_part(parts, digest) is None:
+    digest = _digest(path)
+    found = read_part(parts, digest)
+    if found is None or (isinstance(found, Rejected) and found.again):
         write_atomically(_part_path(parts, digest), _encoded(_understood(path)))
     return digest
+
+
+def reject_part(path: Path, parts: Path, why: str) -> str:
+    """The SHA-256 of the file at `path`, which is left out this time, and why."""
+    digest = _digest(path)
+    write_atomically(_part_path(parts, digest), _encoded(Rejected(why, again=True)))
+    return digest
+
+
+def _digest(path: Path) -> str:
+    digest = hashlib.sha256(path.suffix.lower().encode())
+    try:
+        with path.open("rb") as file:
+            while block := file.read(1 << 20):
+                digest.update(block)
+    except OSError as error:
+        digest.update(f"{path}: {error}".encode(errors="surrogateescape"))
+    return digest.hexdigest()
 
 
 def read_part(parts: Path, digest: str) -> Part | Rejected | None:
@@ -70,7 +88,7 @@ def read_part(parts: Path, digest: str) -> Part | Rejected | None:
         with np.load(file, allow_pickle=False) as stored:
             about = json.loads(stored["about"].tobytes())
             if "why" in about:
-                return Rejected(about["why"])
+                return Rejected(about["why"], about.get("again", False))
             rig = rig_from_json(about["rig"])
             return Part(
                 rig,
@@ -95,6 +113,10 @@ def _understood(path: Path) -> Part | Rejected:
     except SparkSimError as error:
         why = str(error).removeprefix(f"{path}: ").replace(f"{path}:", "line ")
         return Rejected(why.replace(str(path), path.name))
+    except MemoryError:
+        return Rejected("needs more memory than there is", again=True)
+    except Exception as error:  # one bad file does not end the work on thousands
+        return Rejected(f"a fault of spark-sim: {type(error).__name__}: {error}", again=True)
     return Part(
         rig,
         clip.rotations.astype(np.float32),
@@ -109,7 +131,7 @@ def _encoded(part: Part | Rejected) -> bytes:
     about: dict[str, Any] = {}
     arrays: dict[str, Any] = {}
     if isinstance(part, Rejected):
-        about = {"why": part.why}
+        about = asdict(part)
     else:
         about = {"rig": rig_to_json(part.rig), "fps": part.fps, "floor_z": part.floor_z}
         arrays = {"rotations": part.rotations, "hips": part.hips, "planted": part.planted}

@@ -22,6 +22,7 @@ from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 from torch.utils.data import DataLoader, Dataset
 
+from spark.files import write_atomically
 from spark.network.config import Config
 from spark.network.known_bodies import distinct_trunks
 from spark.network.t5 import NAME_CACHE, T5Names
@@ -298,7 +299,15 @@ def _log(out: Path, step: int, rank: int) -> TextIO:
         return open(os.devnull, "w")
     out.mkdir(parents=True, exist_ok=True)
     path = out / "log.jsonl"
-    lines = path.read_text().splitlines() if path.exists() else []
-    kept = [line for line in lines if json.loads(line)["step"] <= step] if step else []
-    path.write_text("".join(f"{line}\n" for line in kept))
+    lines = path.read_text(errors="replace").splitlines() if path.exists() else []
+    kept = [line for line in lines if _logged_step(line) <= step] if step else []
+    write_atomically(path, "".join(f"{line}\n" for line in kept).encode())
     return path.open("a")
+
+
+def _logged_step(line: str) -> float:
+    """Which step a line of the log tells of; none that was taken where it is half written."""
+    try:
+        return float(json.loads(line)["step"])
+    except (ValueError, KeyError, TypeError):
+        return math.inf

@@ -1,9 +1,14 @@
 """Datasets: what comes out is what the files hold, whoever read them and how often."""
 
 import json
+import os
 import re
+import resource
+import shutil
+import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +16,7 @@ import numpy as np
 import pytest
 
 from spark.errors import FileFormatError, OutputError, SkeletonError
+from spark.files import alone
 from spark.io.bvh import write_bvh
 from spark.io.encoding import encode_new
 from spark.io.reading import motion_files, read_motion
@@ -18,10 +24,10 @@ from spark.network.features import body_features
 from spark.rig.rig import understand
 from spark.rig.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_about, quat_angle, quat_conj, quat_mul
-from spark.training import dataset_parts
+from spark.training import dataset_parts, part_workers
 from spark.training.clips import clip_of
 from spark.training.dataset import _on_body, is_dataset, prepare, read_dataset, training_clips
-from spark.training.dataset_parts import Part
+from spark.training.dataset_parts import Part, Rejected, make_part, read_part
 from spark.training.pairs import PairMaker
 from spark.training.splits import TRAINING, UNSEEN, cells, seen_characters, seen_motions
 from spark.transfer.canonical import to_canonical
@@ -67,7 +73,9 @@ def test_cells(made: Path) -> None:
 
 def test_same_bytes_whoever_reads(tree: Path, made: Path, tmp_path: Path) -> None:
     prepare([tree / "walker", tree / "dancer"], tmp_path / "again", workers=2)
-    for name in ("index.json", "numbers.npy", "planted.npy"):
+    names = [path.name for path in sorted(made.glob("*.*"))]
+    assert len(names) == 4
+    for name in names:
         assert (tmp_path / "again" / name).read_bytes() == (made / name).read_bytes()
 
 
@@ -174,11 +182,11 @@ def test_rigs_come_back_to_the_bit(tree: Path) -> None:
 def test_what_is_no_dataset(tree: Path, made: Path, tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match="spark-sim prepare"):
         read_dataset(tree)
-    for name in ("index.json", "numbers.npy", "planted.npy"):
-        (tmp_path / name).write_bytes((made / name).read_bytes())
+    for path in made.glob("*.*"):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
     assert read_dataset(tmp_path)
-    numbers = (tmp_path / "numbers.npy").read_bytes()
-    (tmp_path / "numbers.npy").write_bytes(numbers[: len(numbers) // 2])
+    numbers = next(tmp_path.glob("numbers-*.npy"))
+    numbers.write_bytes(numbers.read_bytes()[:-100])
     with pytest.raises(FileFormatError, match="is no dataset"):
         read_dataset(tmp_path)
     index = json.loads((made / "index.json").read_text())
@@ -267,6 +275,91 @@ def test_what_is_there_is_not_lost_unasked(tree: Path, tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="no dataset's"):
         prepare([tree], out)
     assert prepare([tree], out, force=True) == whole
+
+
+def test_earlier_datasets_are_read(made: Path, tmp_path: Path) -> None:
+    """Their index does not name its arrays."""
+    index = json.loads((made / "index.json").read_text())
+    for name, file in index.pop("arrays").items():
+        (tmp_path / f"{name}.npy").write_bytes((made / file).read_bytes())
+    (tmp_path / "index.json").write_text(json.dumps(index))
+    assert is_dataset(tmp_path)
+    assert len(read_dataset(tmp_path, None)) == len(read_dataset(made, None))
+
+
+def test_a_good_dataset_survives_a_full_disk(tree: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    prepare([tree / "walker"], out)
+    before = {path: path.read_bytes() for path in out.glob("*.*")}
+    largest = max(len(data) for data in before.values())
+    prepare([tree], tmp_path / "parts")
+    for part in (tmp_path / "parts" / "parts").iterdir():
+        part.replace(out / "parts" / part.name)
+    # No file of this process may grow beyond the old dataset's largest: a disk that is full.
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (largest, limits[1]))
+    try:
+        with pytest.raises(OutputError, match=r"numbers-.*can't be written"):
+            prepare([tree], out)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert {path: path.read_bytes() for path in out.glob("*.*")} == before
+    assert len(read_dataset(out, None)) == 3
+    assert len(prepare([tree], out)["clips"]) == 6
+
+
+def test_one_run_at_a_time(tree: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with alone(out), pytest.raises(OutputError, match="another run is writing to it"):
+        prepare([tree], out)
+    left = out / "parts" / ".spark-sim-1-1.part"
+    left.parent.mkdir()
+    left.write_text("half of it")
+    prepare([tree], out)
+    assert not left.exists()
+
+
+def test_a_file_that_ends_its_process_is_left_out(tree: Path, tmp_path: Path) -> None:
+    """Memory that runs out, a fault in a library: the others go on, in a new process."""
+    files = sorted(tree.rglob("*.bvh"))
+    parts = tmp_path / "parts"
+    parts.mkdir()
+    worker = part_workers._Worker(parts)
+    try:
+        first = worker.digest(files[0])
+        os.kill(worker._process.pid, signal.SIGKILL)
+        lost, again = worker.digest(files[1]), worker.digest(files[2])
+    finally:
+        worker.close()
+    assert isinstance(read_part(parts, first), Part)
+    rejected = read_part(parts, lost)
+    assert isinstance(rejected, Rejected)
+    assert "SIGKILL" in rejected.why
+    assert isinstance(read_part(parts, again), Part)
+    # It may have been chance: another run tries it again.
+    assert isinstance(read_part(parts, make_part(files[1], parts)), Part)
+
+
+def test_a_killed_run_leaves_no_processes(tree: Path, tmp_path: Path) -> None:
+    for k in range(200):
+        shutil.copy(next(tree.rglob("*.bvh")), tmp_path / f"{k}.bvh")
+        with (tmp_path / f"{k}.bvh").open("a") as file:
+            file.write("\n" * k)  # another hash
+    command = [sys.executable, "-m", "spark_sim", "prepare", ".", "-o", "out", "--workers", "2"]
+    process = subprocess.Popen(command, cwd=tmp_path)
+    parts = tmp_path / "out" / "parts"
+    while not (parts.is_dir() and any(parts.glob("*.npz"))):
+        time.sleep(0.05)
+        assert process.poll() is None
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    workers = children.read_text().split()
+    assert len(workers) == 2
+    process.kill()
+    process.wait()
+    deadline = time.monotonic() + 10
+    while any(Path(f"/proc/{worker}").exists() for worker in workers):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
 
 
 def test_linked_folders_are_read_once(tree: Path, tmp_path: Path) -> None:

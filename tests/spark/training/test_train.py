@@ -43,6 +43,8 @@ def test_a_resumed_run_is_the_run_that_never_stopped(
         train(clips, config, tmp_path / "parts", start=fresh(config), watch=stop)
     half = load_checkpoint(tmp_path / "parts" / "checkpoint.safetensors")
     assert half.step == 2
+    with (tmp_path / "parts" / "log.jsonl").open("a") as log:
+        log.write('{"step": 4, "sec')  # a run that was killed as it wrote
     resumed = train(clips, config, tmp_path / "parts", start=half)
     for name, value in weights(whole).items():
         assert torch.equal(value, weights(resumed)[name]), name
