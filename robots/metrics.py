@@ -23,9 +23,7 @@ from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_mul
 
-SWING_SPEED, SWING_HEIGHT = 0.5, 0.02  # [m/s], [m] above which a foot of the source swings
-MIN_SWINGS = 30  # frames of swing, below which clearance says nothing
-DRAG_HEIGHT = 0.01  # [m] below which a fast sole drags
+DRAG_SPEED, DRAG_HEIGHT = 0.5, 0.01  # [m/s], [m] of a sole that is fast, and low: it drags
 # [m/s], [m] of a standing toe of the source, whatever its size: the figures that other tools are
 # compared by, apart from what the solver takes for a contact (`spark.rig.contacts`).
 PLANTED_SPEED, PLANTED_HEIGHT = 0.15, 0.06
@@ -92,6 +90,7 @@ def measure(motion: Motion, rig: Rig, result: RobotMotion) -> RobotMetrics:
     count = max(int(planted.sum()), 1)
     toes = positions[:, rig.contact_joints][:, : len(robot.soles)]
     own_poses, source_poses = pose_clip(own), pose_clip(source)
+    swing, thrown = report.swing, scale * report.source.base_acceleration_p99
     angles, tree = result.coordinates.angles, robot.tree
     near = np.minimum(angles - tree.lower, tree.upper - angles) < AT_LIMIT
     jerk = np.diff(angles, 3, axis=0) / frame_time**3
@@ -106,10 +105,10 @@ def measure(motion: Motion, rig: Rig, result: RobotMotion) -> RobotMetrics:
         skating_source=beside.shares["skating"],
         root_wrench=clip.shares["root_wrench"],
         root_wrench_source=beside.shares["root_wrench"],
-        swing_clearance=_swing_clearance(ours, theirs, scale),
+        swing_clearance=None if swing is None else swing.clearance,
         dragging=ours.dragging,
         dragging_source=theirs.dragging,
-        hips_acceleration=_over(own_poses.hips, source_poses.hips, scale, frame_time),
+        hips_acceleration=report.clip.base_acceleration_p99 / thrown if thrown > 0 else None,
         com_acceleration=_over(own_poses.mass.com, source_poses.mass.com, scale, frame_time),
         heading_rad=float(np.abs(report.drift.heading).max()),
         drift_m=float(report.drift.distance.max()),
@@ -145,13 +144,12 @@ class _Soles:
         speeds = [_speed(p, frame_time) for p in points]
         heights = [p[..., 2] - floor_z for p in points]
         self.lowest = np.stack([h.min(axis=1) for h in heights], axis=1)
-        self.speed = np.stack([_speed(p.mean(axis=1), frame_time) for p in points], axis=1)
         at = [h.argmin(axis=1)[:, None] for h in heights]
         self.lowest_speed = np.stack(
             [np.take_along_axis(s, k, 1)[:, 0] for s, k in zip(speeds, at, strict=True)], axis=1
         )
         drags = [
-            ((h < DRAG_HEIGHT) & (s > SWING_SPEED)).any(axis=1)
+            ((h < DRAG_HEIGHT) & (s > DRAG_SPEED)).any(axis=1)
             for h, s in zip(heights, speeds, strict=True)
         ]
         self.dragging = float(np.mean(drags))
@@ -164,14 +162,6 @@ def _robot_soles(result: RobotMotion) -> list[Float[np.ndarray, "T _ 3"]]:
         pairs = zip(*result.robot.sole_points(sole), strict=True)
         out.append(np.stack([poses.point(int(link), point).T for link, point in pairs], axis=1))
     return out
-
-
-def _swing_clearance(ours: _Soles, theirs: _Soles, scale: float) -> float | None:
-    """The median height of what swings, over the source's."""
-    swings = (theirs.speed > SWING_SPEED) & (theirs.lowest > SWING_HEIGHT)
-    if swings.sum() < MIN_SWINGS or swings.shape != ours.lowest.shape:
-        return None
-    return float(np.median(ours.lowest[swings]) / (scale * np.median(theirs.lowest[swings])))
 
 
 def _over(

@@ -7,11 +7,13 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, Int
 
+from spark.errors import SkeletonError
 from spark.kinematics import forward, local_rotations
 from spark.motion import Motion
 from spark.resample import rotations_at, values_at
+from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
-from spark.rig.roles import Role
+from spark.rig.roles import Group, Role
 from spark.rotation import (
     quat_about,
     quat_between,
@@ -22,7 +24,13 @@ from spark.rotation import (
     quat_rotate,
     yaw_from_quat,
 )
-from spark.transfer.canonical import CanonicalMotion, from_canonical, to_canonical
+from spark.transfer.canonical import (
+    CanonicalMotion,
+    canonical_positions,
+    from_canonical,
+    to_canonical,
+)
+from spark.transfer.leg_ik import bend_leg, leg_of
 
 Corruption = Callable[[Motion, Rig, np.random.Generator], Motion]
 
@@ -145,6 +153,28 @@ def hand_in_chest(motion: Motion, rig: Rig, rng: np.random.Generator) -> Motion:
     return _turned(motion, rig, world, {shoulder: arm, elbow: forearm})
 
 
+def dragging(motion: Motion, rig: Rig, rng: np.random.Generator, *, height: float) -> Motion:
+    """Feet pass over the floor at `height` times as much as they did; those that stand, stand."""
+    canonical = to_canonical(motion, rig)
+    positions, world = forward(motion)
+    lowest = [sole_positions(s, positions, world)[..., 2].min(axis=1) for s in rig.soles]
+    moves = np.zeros((len(lowest), len(motion), 3))
+    for move, z in zip(moves, lowest, strict=True):
+        move[:, 2] = (height - 1) * np.maximum(z - canonical.floor_z, 0.0)
+    return from_canonical(_with_feet_moved(canonical, moves))
+
+
+def thrown(motion: Motion, rig: Rig, rng: np.random.Generator, *, distance: float) -> Motion:
+    """Once a second the hips go to a side and back within 0.2 s, over feet that stay."""
+    canonical = to_canonical(motion, rig)
+    times = np.arange(len(motion)) * motion.frame_time
+    bump = np.where(times % 1.0 < 0.2, 0.5 - 0.5 * np.cos(2 * np.pi * times / 0.2), 0.0)
+    angles = rng.uniform(0, 2 * np.pi, int(times[-1]) + 1)[times.astype(int)]
+    path = distance * bump[:, None] * np.stack([np.cos(angles), np.sin(angles), 0 * angles], 1)
+    away = replace(canonical, hips=canonical.hips + path)
+    return from_canonical(_with_feet_moved(away, np.stack([-path] * len(rig.soles))))
+
+
 CORRUPTIONS: dict[str, Corruption] = {
     "float 5 cm": partial(raised, height=0.05),
     "sink 3 cm": partial(raised, height=-0.03),
@@ -160,6 +190,8 @@ CORRUPTIONS: dict[str, Corruption] = {
     "mirrored": mirrored,
     "knee backwards 40°": partial(knee_backwards, degrees=40.0),
     "hand in chest": hand_in_chest,
+    "feet drag": partial(dragging, height=0.3),
+    "base thrown 6 cm": partial(thrown, distance=0.06),
     "drift 10 cm/s": partial(sliding, speed=0.1),
 }
 """What the test-bench does to clips; the frame rates and the mirror change nothing that matters."""
@@ -173,6 +205,20 @@ def _displaced(motion: Motion, path: Float[np.ndarray, "T 3"]) -> Motion:
         translations = translations.copy()
         translations[:, 0] += path
     return replace(motion, root_pos=motion.root_pos + path, translations=translations)
+
+
+def _with_feet_moved(
+    canonical: CanonicalMotion, moves: Float[np.ndarray, "F T 3"]
+) -> CanonicalMotion:
+    """The ankle of each foot that has a sole moved by so much, by hip and knee."""
+    rig, rotations = canonical.rig, canonical.rotations
+    for sole, move in zip(rig.soles, moves, strict=True):
+        limb = {"left": Group.LEFT_LEG, "right": Group.RIGHT_LEG}[sole.side]
+        leg = leg_of(rig.skeleton, rig.roles.roles, limb)
+        if leg is None:
+            raise SkeletonError("a leg without a knee")
+        rotations = bend_leg(rotations, canonical_positions(canonical), leg, move)
+    return replace(canonical, rotations=rotations)
 
 
 def _turned(

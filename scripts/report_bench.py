@@ -18,7 +18,8 @@ from scripts.corruptions import CORRUPTIONS, HARMLESS
 from sim.report import Report, Subject, assess
 from sim.report.clip_poses import pose_clip
 from sim.report.names import FLAGS
-from sim.report.thresholds import PLAUSIBILITY_V1
+from sim.report.thresholds import PLAUSIBILITY_V2
+from spark.constants import GRAVITY
 from spark.errors import SkeletonError, SparkSimError
 from spark.io.recording import read_recording
 from spark.motion import Motion
@@ -30,7 +31,8 @@ SECONDS = 8.0
 TRAVEL = 2.0  # [m] that a clip must go for "in place" to change it
 # A clean clip is its own source and differs from it by nothing at all: what is smaller than this
 # counts as nothing too [m, rad, share].
-DRIFT, HEADING, CONTACTS = 0.02, np.radians(5), 0.1
+DRIFT, HEADING, CONTACTS, CLEARANCE = 0.02, np.radians(5), 0.1, 0.05
+BASE = 1.05  # times the source's acceleration, or half of gravity where that is more
 
 MEASURES = (
     "any",
@@ -40,6 +42,8 @@ MEASURES = (
     "drift",
     "heading",
     "contacts",
+    "clearance",
+    "base",
     "speed",
     "jerk",
     "balance",
@@ -47,10 +51,12 @@ MEASURES = (
 
 
 def scores(report: Report) -> dict[str, float]:
-    """One number a measure; higher is worse."""
-    clip, drift, contacts = report.clip, report.drift, report.contacts
+    """One number a measure, higher is worse; nan where the clip has nothing of what is measured."""
+    clip, drift, contacts, swing = report.clip, report.drift, report.contacts, report.swing
     assert drift is not None
     assert contacts is not None
+    assert report.source is not None
+    thrown = report.scale * report.source.base_acceleration_p99
     return {
         "any": report.implausible,
         **clip.shares,
@@ -59,6 +65,8 @@ def scores(report: Report) -> dict[str, float]:
         "drift": coarse(float(drift.distance.max()), DRIFT),
         "heading": coarse(float(np.abs(drift.heading).max()), HEADING),
         "contacts": 0.0 if contacts.f1 is None else coarse(1 - contacts.f1, CONTACTS),
+        "clearance": np.nan if swing is None else coarse(abs(1 - swing.clearance), CLEARANCE),
+        "base": coarse(clip.base_acceleration_p99 / max(thrown, 0.5 * GRAVITY), BASE),
         "speed": float(clip.joint_speed.max()),
         "jerk": clip.jerk_rms,
         "balance": clip.unbalanced_share or 0.0,
@@ -94,7 +102,7 @@ def clips(data: Path) -> Iterator[tuple[str, Motion, Rig]]:
                 print(f"left out: {error}", file=sys.stderr)
                 continue
             height = lowest - np.percentile(lowest, 5)
-            limit = PLAUSIBILITY_V1.scaled(rig.hip_height).floating
+            limit = PLAUSIBILITY_V2.scaled(rig.hip_height).floating
             if motion.duration >= 1 and (height > limit).mean() <= 0.1:
                 found.append((path.stem, motion, rig))
         step = max(1, -(-len(found) // PER_FOLDER))
@@ -124,8 +132,9 @@ def bench(data: Path) -> tuple[int, dict[str, dict[str, float]]]:
             spoilt[kind][name] = scores(assess(subject, source=origin))
     return len(clean), {
         kind: {
-            measure: auc([clean[n][measure] for n in rows], [rows[n][measure] for n in rows])
+            measure: auc([clean[n][measure] for n in asked], [rows[n][measure] for n in asked])
             for measure in MEASURES
+            if (asked := [n for n in rows if np.isfinite(clean[n][measure] + rows[n][measure])])
         }
         for kind, rows in spoilt.items()
         if rows

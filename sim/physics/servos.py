@@ -86,7 +86,8 @@ def _replace_motors(
     joints = [j for j in range(model.njnt) if int(model.jnt_type[j]) in (_HINGE, _BALL)]
     if model.nu:
         joints = [j for j in joints if j in motors]
-    limits = {j: _torque_limit(model, j, motors.get(j), height) for j in joints}
+    weight = float(model.body_mass.sum()) * GRAVITY
+    limits = {j: torque_limit(model, j) or DEFAULT_TORQUE * weight * height for j in joints}
     for a, actuator in enumerate(list(spec.actuators)):
         if a not in servos:
             spec.delete(actuator)
@@ -123,17 +124,19 @@ def _joint_of(model: mujoco.MjModel, actuator: int) -> int:
     return int(model.actuator_trnid[actuator, 0])
 
 
-def _torque_limit(model: mujoco.MjModel, joint: int, motor: int | None, height: float) -> float:
-    """A joint's torque limit [N m]: the lowest that its file tells, else by `DEFAULT_TORQUE`."""
+def torque_limit(model: mujoco.MjModel, joint: int) -> float | None:
+    """The most that a joint's actuators give [N m]: the lowest that its file tells, None where it
+    tells nothing."""
     limits = []
     if model.jnt_actfrclimited[joint]:
-        limits.append(np.abs(model.jnt_actfrcrange[joint]).max())
-    if motor is not None:
-        gear = float(np.abs(model.actuator_gear[motor]).max())
-        if model.actuator_forcelimited[motor]:
-            limits.append(gear * np.abs(model.actuator_forcerange[motor]).max())
-        if model.actuator_ctrllimited[motor]:
-            gain = abs(float(model.actuator_gainprm[motor, 0]))
-            limits.append(gear * gain * np.abs(model.actuator_ctrlrange[motor]).max())
-    weight = float(model.body_mass.sum()) * GRAVITY
-    return float(min(limits)) if limits else DEFAULT_TORQUE * weight * height
+        limits.append(float(np.abs(model.jnt_actfrcrange[joint]).max()))
+    for a in range(model.nu):
+        if _joint_of(model, a) != joint:
+            continue
+        gear = float(np.abs(model.actuator_gear[a]).max())
+        if model.actuator_forcelimited[a]:
+            limits.append(gear * float(np.abs(model.actuator_forcerange[a]).max()))
+        if model.actuator_ctrllimited[a] and not is_servo(model, a):
+            gain = abs(float(model.actuator_gainprm[a, 0]))
+            limits.append(gear * gain * float(np.abs(model.actuator_ctrlrange[a]).max()))
+    return min(limits, default=None)

@@ -17,7 +17,8 @@ from sim.report.measures import (
     root_drift,
 )
 from sim.report.report import Report
-from sim.report.thresholds import PLAUSIBILITY_V1
+from sim.report.swing import swing_of
+from sim.report.thresholds import PLAUSIBILITY_V2
 from sim.report.truth import accuracy
 from sim.trajectory import Subject
 from spark.errors import SkeletonError
@@ -57,7 +58,7 @@ def assess(
                 "the floor is the clip's own: one that floats or sinks as a whole can't be told",
             )
         notes += _slope(clip_poses, "the")
-        return Report(clip, None, None, None, findings_of(clip, None), notes, known)
+        return Report(clip, None, None, None, findings_of(clip), notes, known)
     source_poses = _pose("the source", source)
     source_floor = _own_floor(source_poses)
     floor = 0.0
@@ -68,12 +69,15 @@ def assess(
     scale = rig.hip_height / source_poses.rig.hip_height
     clip = _beyond_source(measure(clip_poses, floor), source_clip, times, scale)
     drift = _drift(clip_poses, source_poses, times, scale)
+    swing = swing_of(clip, source_clip, times, scale)
     contacts = _contacts(clip, source_clip, times)
     notes += _slope(source_poses, "the source's")
     difference = abs(source_poses.motion.duration - motion.duration)
     if difference > max(0.1, 2 * motion.frame_time):
         notes += (f"the source's duration differs by {difference:.1f} s: frames may not match",)
-    return Report(clip, source_clip, drift, contacts, findings_of(clip, drift), notes, known)
+    thrown = scale * source_clip.base_acceleration_p99
+    findings = findings_of(clip, drift, swing, thrown)
+    return Report(clip, source_clip, drift, contacts, findings, notes, known, swing, scale)
 
 
 def _pose(name: str, subject: Subject) -> ClipPoses:
@@ -91,7 +95,7 @@ def _about_model(poses: ClipPoses) -> tuple[str, ...]:
     if not ((body.model.geom_contype | body.model.geom_conaffinity)[own] != 0).any():
         notes.append("none of the model's shapes collide: self-penetration is not measured")
     height = floor_height(poses.lowest_corner)
-    if abs(height) > PLAUSIBILITY_V1.scaled(poses.rig.hip_height).penetration:
+    if abs(height) > PLAUSIBILITY_V2.scaled(poses.rig.hip_height).penetration:
         notes.append(
             f"the model's floor is at z = 0; the clip's own (the 5th percentile of its lowest sole "
             f"point) is {100 * abs(height):.1f} cm {'above' if height > 0 else 'below'} that"
@@ -159,7 +163,7 @@ def _slope(poses: ClipPoses, whose: str) -> tuple[str, ...]:
     lowest = poses.corners[np.arange(len(poses)), poses.corners[..., 2].argmin(axis=1)]
     planted = planted_feet(poses.rig, poses.positions, poses.motion.frame_time).any(axis=1)
     angle, rise = floor_slope(lowest[planted])
-    if rise < PLAUSIBILITY_V1.scaled(poses.rig.hip_height).floating / 2:
+    if rise < PLAUSIBILITY_V2.scaled(poses.rig.hip_height).floating / 2:
         return ()
     return (
         f"{whose} floor slopes by {np.degrees(angle):.1f}°: the feet stand {100 * rise:.0f} cm "

@@ -8,12 +8,13 @@ from jaxtyping import Bool, Float
 from sim.report.clip_poses import ClipPoses
 from sim.report.derivatives import derivative
 from sim.report.limits import LimitExcess, limit_excess
-from sim.report.measures import floating, penetration_depth, windowed_min
+from sim.report.measures import floating, horizontal_speed, penetration_depth, windowed_min
 from sim.report.model_joints import model_joint_rates, model_limit_excess
 from sim.report.self_penetration import capsules, self_penetration
 from sim.report.smoothness import joint_rates
 from sim.report.support import support_of
-from sim.report.thresholds import PLAUSIBILITY_V1, Thresholds
+from sim.report.thresholds import PLAUSIBILITY_V2, Thresholds
+from sim.report.torque import JointTorque, joint_torques
 from spark.constants import GRAVITY
 from spark.summary import time_span
 
@@ -27,7 +28,11 @@ class ClipMetrics:
     `clearance` [m]: the height of the body's lowest point.
     `corner_skates`, `corner_speeds` [m/s]: whether each sole corner skates, and how fast it moves
     along the floor, on the feet `corner_feet`.
-    `standing`: the frames in which each foot stands, by its name.
+    `standing`: the frames in which each of `feet` stands, by its name.
+    `sole_heights` [m], `sole_speeds` [m/s]: of the lowest corner of each foot's sole, and of the
+    middle of its corners along the floor.
+    `base_acceleration` [m/s²]: of the middle of the hips.
+    `torques`: of the joints of a model whose file tells what its motors give.
     `unexplained_wrench`: the force [body weights] and the torque [body weights x 1 m] that the
     floor can't give.
     `imbalance` [m]: how far the centre of mass lies outside the support; nan in frames that move.
@@ -47,6 +52,10 @@ class ClipMetrics:
     corner_speeds: Float[np.ndarray, "T C"]
     corner_feet: tuple[str, ...]
     standing: dict[str, Bool[np.ndarray, "T"]]
+    sole_heights: Float[np.ndarray, "T F"]
+    sole_speeds: Float[np.ndarray, "T F"]
+    base_acceleration: Float[np.ndarray, "T"]
+    torques: tuple[JointTorque, ...]
     unexplained_wrench: Float[np.ndarray, "T 2"]
     imbalance: Float[np.ndarray, "T"]
     limits: tuple[LimitExcess, ...]
@@ -108,6 +117,25 @@ class ClipMetrics:
         return float((self.imbalance[static] > self.thresholds.balance).mean())
 
     @property
+    def feet(self) -> tuple[str, ...]:
+        """The feet that have soles."""
+        return tuple(self.standing)
+
+    @property
+    def base_acceleration_p99(self) -> float:
+        """The 99th percentile over the frames [m/s²]: one spike is no habit."""
+        return float(np.percentile(self.base_acceleration, 99))
+
+    @property
+    def overload_share(self) -> float | None:
+        """The share of frames in which a joint needs more torque than it has; None of a body that
+        tells no limits."""
+        if not self.torques:
+            return None
+        over = [each.load > self.thresholds.torque for each in self.torques]
+        return float(np.any(over, axis=0).mean())
+
+    @property
     def jerk_rms(self) -> float:
         """Over all joints and frames [rad/s³]; 0 without joints."""
         return float(np.sqrt(np.mean(self.joint_jerk**2))) if self.joint_names else 0.0
@@ -119,7 +147,7 @@ class ClipMetrics:
 
 def measure(poses: ClipPoses, floor_z: float) -> ClipMetrics:
     """The measures of a posed clip over a floor at `floor_z` [m]."""
-    thresholds = PLAUSIBILITY_V1.scaled(poses.rig.hip_height)
+    thresholds = PLAUSIBILITY_V2.scaled(poses.rig.hip_height)
     frame_time, window = poses.motion.frame_time, thresholds.window
     support = support_of(poses, floor_z, thresholds)
     corners = len(support.feet)
@@ -129,18 +157,32 @@ def measure(poses: ClipPoses, floor_z: float) -> ClipMetrics:
     acceleration = derivative(poses.mass.com[:, 2], frame_time, 2, window)
     # The window smears take-off and landing over itself.
     fall_error = windowed_min(np.abs(acceleration + GRAVITY), frame_time, window)
+    hips = derivative(poses.hips, frame_time, 2, window)
+    feet = support.corners_of
+    middles = np.stack([poses.corners[:, own].mean(axis=1) for own in feet.values()], axis=1)
     skates = support.skating()
     wrench = support.unexplained_wrench()
     if poses.body is None or poses.model_poses is None:
         limits = limit_excess(poses.since_tpose, poses.rig)
         pairs, self_depth = self_penetration(capsules(poses))
         rates = joint_rates(poses.rotations, poses.rig, frame_time, window)
+        torques: tuple[JointTorque, ...] = ()
         self_bound = thresholds.self_penetration
     else:
         limits = model_limit_excess(poses.body)
         pairs, self_depth = poses.model_poses.pairs, poses.model_poses.depth
         rates = model_joint_rates(poses.body, frame_time, window)
         self_bound = thresholds.shape_penetration
+        torques = joint_torques(
+            poses.body,
+            frame_time,
+            window,
+            support.arms + poses.mass.com[:, None],
+            poses.carriers,
+            support.touching,
+            thresholds.friction,
+            support.length,
+        )
     joint_names, joint_speed, joint_jerk = rates
     return ClipMetrics(
         frame_time=frame_time,
@@ -160,6 +202,12 @@ def measure(poses: ClipPoses, floor_z: float) -> ClipMetrics:
         corner_speeds=support.speeds[:, :corners],
         corner_feet=poses.corner_feet,
         standing=support.standing(),
+        sole_heights=np.stack(
+            [support.heights[:, own].min(axis=1) for own in feet.values()], axis=1
+        ),
+        sole_speeds=horizontal_speed(middles, frame_time, window),
+        base_acceleration=np.linalg.norm(hips, axis=1),
+        torques=torques,
         unexplained_wrench=wrench,
         imbalance=support.imbalance(),
         limits=limits,

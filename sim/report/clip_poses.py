@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from sim.body.anthropometry import RADII
 from sim.report.lowest import lowest_points
@@ -28,6 +28,7 @@ class ClipPoses:
     `corners` are those of the soles, on the feet `corner_feet` ("left foot"). `part_points` are
     what else may touch the floor, of the parts `part_names`: the other joints with a role, inside
     spheres of flesh of `part_radii` [m], or the lowest points of a model's own geoms (radius 0).
+    `carriers` are the model's bodies that corners and parts belong to; none without a model.
     `hips` is the middle of the hip joints, `heading` [rad] the pelvis's turn about Z since the
     T-pose, without jumps. `positions` and `rotations` are those of the joints as `forward` gives
     them, `since_tpose` their rotations G since the T-pose in world axes. `model_poses` are those of
@@ -41,6 +42,7 @@ class ClipPoses:
     part_points: Float[np.ndarray, "T B 3"]
     part_names: tuple[str, ...]
     part_radii: Float[np.ndarray, "B"]
+    carriers: Int[np.ndarray, "N"]
     mass: Mass
     hips: Float[np.ndarray, "T 3"]
     heading: Float[np.ndarray, "T"]
@@ -71,6 +73,7 @@ def pose_clip(subject: Subject) -> ClipPoses:
     if body is None:
         model_poses, mass = None, human_mass(rig, positions, rotations)
         part_names, part_points, part_radii = _flesh(rig, positions)
+        part_bodies: tuple[int, ...] = ()
     else:
         if len(body.qpos) != len(motion):
             raise SkeletonError(
@@ -78,10 +81,11 @@ def pose_clip(subject: Subject) -> ClipPoses:
             )
         model_poses = pose_model(body)
         mass = model_mass(body, model_poses)
-        part_names, part_points = lowest_points(body, model_poses, _feet_of(body, rig))
+        part_names, part_points, part_bodies = lowest_points(body, model_poses, _feet_of(body, rig))
         part_radii = np.zeros(len(part_names))
     soles = _soles(rig)
     corner_feet = tuple(f"{sole.side} foot" for sole in soles for _ in sole.joints)
+    corner_bodies = [] if body is None else _bodies_of(body, rig, soles)
     corners = np.concatenate([sole_positions(s, positions, rotations) for s in soles], axis=1)
     return ClipPoses(
         motion=motion,
@@ -91,6 +95,7 @@ def pose_clip(subject: Subject) -> ClipPoses:
         part_points=part_points,
         part_names=part_names,
         part_radii=part_radii,
+        carriers=np.array([*corner_bodies, *part_bodies], dtype=int),
         mass=mass,
         hips=positions[:, rig.hips].mean(axis=1),
         heading=np.unwrap(yaw_from_quat(since_tpose[:, rig.pelvis])),
@@ -123,6 +128,12 @@ def _soles(rig: Rig) -> tuple[Sole, ...]:
             "the body has no foot: floor contact can't be measured; name its feet in a role map"
         )
     return soles
+
+
+def _bodies_of(body: ModelTrajectory, rig: Rig, soles: tuple[Sole, ...]) -> list[int]:
+    """The model's body below each corner."""
+    names = rig.skeleton.names
+    return [int(body.model.body(names[j]).id) for sole in soles for j in sole.joints.tolist()]
 
 
 def _feet_of(body: ModelTrajectory, rig: Rig) -> dict[int, str]:

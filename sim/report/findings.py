@@ -7,6 +7,8 @@ import numpy as np
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.measures import Drift
 from sim.report.result import Finding
+from sim.report.swing import Swing
+from spark.constants import GRAVITY
 from spark.runs import true_runs
 
 # Flagged frames of one measure that are no further apart than this [s] are one event to a viewer.
@@ -16,10 +18,22 @@ _MIN_EXCESS = np.radians(1.0)
 # The root strays where it is further from the source's path than this share of the path's length,
 # counted as 1 m at least; and where its heading differs by more than this [rad].
 _MAX_DRIFT, _MAX_HEADING = 0.05, np.radians(10)
+# Feet pass too low or too high where their clearance is outside these bounds, and the base is
+# thrown where its acceleration is more than this many times the source's: in both, what captured
+# people differ by between two takes of one motion is within.
+_CLEARANCE, _MAX_THROW = (0.7, 1.4), 1.5
 
 
-def findings_of(clip: ClipMetrics, drift: Drift | None) -> tuple[Finding, ...]:
-    """All events of a clip, the gravest of each measure first."""
+def findings_of(
+    clip: ClipMetrics,
+    drift: Drift | None = None,
+    swing: Swing | None = None,
+    thrown: float | None = None,
+) -> tuple[Finding, ...]:
+    """All events of a clip, the gravest of each measure first.
+
+    `thrown` [m/s²] is the 99th percentile of the source's base acceleration, scaled.
+    """
     gap = int(_MERGE_GAP / clip.frame_time)
     measures = (
         _penetration,
@@ -29,11 +43,17 @@ def findings_of(clip: ClipMetrics, drift: Drift | None) -> tuple[Finding, ...]:
         _joint_limits,
         _self_penetration,
         _balance,
+        _torque,
     )
     findings = (
         f for measure in measures for f in sorted(measure(clip, gap), key=lambda f: -f.amount)
     )
-    return (*findings, *(_root_drift(drift) if drift else ()))
+    return (
+        *findings,
+        *(_swing(swing) if swing else ()),
+        *(_base(clip, thrown) if thrown is not None else ()),
+        *(_root_drift(drift) if drift else ()),
+    )
 
 
 def _penetration(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
@@ -100,6 +120,42 @@ def _balance(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
         amount = float(outside[start:stop].max())
         sentence = f"the body stands still {100 * amount:.1f} cm beside its feet, and would tip"
         yield Finding("balance", "body", start, stop, amount, "m", sentence)
+
+
+def _torque(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
+    for each in clip.torques:
+        for start, stop in true_runs(each.load > clip.thresholds.torque, gap):
+            amount = float(np.abs(each.torque[start:stop]).max())
+            sentence = f"{each.joint} needs {amount:.0f} N m, its motor gives {each.limit:.0f}"
+            yield Finding("torque", each.joint, start, stop, amount, "n_m", sentence)
+
+
+def _swing(swing: Swing) -> Iterator[Finding]:
+    low, high = _CLEARANCE
+    if low <= swing.clearance <= high:
+        return
+    sign = 1.0 if swing.clearance < low else -1.0
+    off = np.nan_to_num(sign * swing.deficit, nan=-np.inf)
+    worst, foot = np.unravel_index(int(off.argmax()), off.shape)
+    amount, word = float(off[worst, foot]), "lower" if sign > 0 else "higher"
+    sentence = (
+        f"feet clear the floor by {swing.clearance:.2f} of the source's in swing; the "
+        f"{swing.feet[foot]} passes {100 * amount:.1f} cm {word} than it"
+    )
+    yield Finding(
+        "swing_clearance", swing.feet[foot], int(worst), int(worst) + 1, amount, "m", sentence
+    )
+
+
+def _base(clip: ClipMetrics, thrown: float) -> Iterator[Finding]:
+    found = clip.base_acceleration_p99
+    # In a source that hardly moves, half of gravity is nothing to be thrown by.
+    if found <= max(_MAX_THROW * thrown, 0.5 * GRAVITY):
+        return
+    worst = int(clip.base_acceleration.argmax())
+    amount = float(clip.base_acceleration[worst])
+    sentence = f"the base is thrown by {amount:.0f} m/s², the source's by {thrown:.0f}"
+    yield Finding("base_acceleration", "root", worst, worst + 1, amount, "m_s2", sentence)
 
 
 def _root_drift(drift: Drift) -> Iterator[Finding]:

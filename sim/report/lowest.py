@@ -15,8 +15,8 @@ _RING = 16  # points on either edge of a cylinder
 
 def lowest_points(
     body: ModelTrajectory, poses: ModelPoses, feet: dict[int, str]
-) -> tuple[tuple[str, ...], Float[np.ndarray, "T B 3"]]:
-    """The names of the model's parts, and the lowest point of each [m, world].
+) -> tuple[tuple[str, ...], Float[np.ndarray, "T B 3"], tuple[int, ...]]:
+    """The names of the model's parts, the lowest point of each [m, world], and its first body.
 
     They are those of the shapes that collide, or of all where none does; of round meshes to within
     a millimetre or so. `feet` are what those parts are called that carry soles.
@@ -41,7 +41,7 @@ def lowest_points(
             place[:, 2] -= radius
             better = place[:, 2] < least
             lowest[better, k], least[better] = place[better], place[better, 2]
-    return names, lowest
+    return names, lowest, tuple(outlines)
 
 
 def _lowest(

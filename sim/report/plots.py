@@ -33,7 +33,7 @@ class Plot:
 def plots(result: Result) -> list[Plot]:
     """What is worth a look over time."""
     clip, source, limits = result.clip, result.source, result.clip.thresholds
-    flags = clip.flags
+    flags, never = clip.flags, np.zeros(len(clip), dtype=bool)
     shown = [
         Plot(
             "lowest point above the floor",
@@ -77,19 +77,29 @@ def plots(result: Result) -> list[Plot]:
             100 * clip.self_bound,
         ),
         Plot(
+            "acceleration of the base",
+            "m/s²",
+            clip.base_acceleration,
+            never,
+            None,
+            None if source is None else result.scale * source.base_acceleration,
+        ),
+        Plot(
             "fastest joint",
             "rad/s",
             clip.joint_speed.max(axis=1, initial=0.0),
-            np.zeros(len(clip), dtype=bool),
+            never,
             None,
             None if source is None else source.joint_speed.max(axis=1, initial=0.0),
         ),
     ]
+    if clip.torques:
+        load = np.max([each.load for each in clip.torques], axis=0)
+        name, most = "highest torque", limits.torque
+        shown.append(Plot(name, "of the motor's", load, load > most, most))
     if result.drift is not None:
-        never = np.zeros(len(clip), dtype=bool)
         shown.append(Plot("root drift", "cm", 100 * result.drift.distance, never, None))
     if result.truth is not None:
-        never = np.zeros(len(clip), dtype=bool)
         shown.append(
             Plot("distance from the truth", "% of height", result.truth.errors, never, None)
         )

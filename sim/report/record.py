@@ -8,6 +8,7 @@ import numpy as np
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.measures import Drift
 from sim.report.result import Finding, Result
+from sim.report.swing import Swing
 from sim.report.truth import Accuracy
 from spark.runs import true_runs
 
@@ -29,6 +30,7 @@ def record(result: Result) -> dict[str, Any]:
         "difference_to_source": None if result.source is None else _difference(result),
         "root_drift": None if result.drift is None else _drift(result.drift),
         "foot_contacts": None if result.contacts is None else asdict(result.contacts),
+        "swing": None if result.swing is None else _swing(result.swing),
         "ground_truth": None if result.truth is None else _truth(result.truth),
         "findings": [_finding(finding, clip.frame_time) for finding in result.findings],
         "notes": list(result.notes),
@@ -48,6 +50,11 @@ _UNITS = {
     "friction": "",
     "self_penetration": "m",
     "shape_penetration": "m",
+    "stand_height": "m",
+    "swing_speed": "m_s",
+    "swing_height": "m",
+    "swing_time": "s",
+    "torque": "",
     "limit_margin": "rad",
     "static_speed": "m_s",
     "static_acceleration": "m_s2",
@@ -84,6 +91,8 @@ def _clip(clip: ClipMetrics) -> dict[str, Any]:
         "deepest_self_penetration_m": float(clip.self_depth.max(initial=0.0)),
         "unbalanced_share_of_static": clip.unbalanced_share,
         "static_share": float(np.isfinite(clip.imbalance).mean()),
+        "over_torque_share": clip.overload_share,
+        "base_acceleration_p99_m_s2": clip.base_acceleration_p99,
         "largest_joint_speed_rad_s": float(clip.joint_speed.max(initial=0.0)),
         "joint_jerk_rms_rad_s3": clip.jerk_rms,
         "joint_limits": {
@@ -93,6 +102,22 @@ def _clip(clip: ClipMetrics) -> dict[str, Any]:
                 "largest_excess_rad": float(limit.excess.max()),
             }
             for limit in clip.limits
+        },
+        "joint_rates": {
+            name: {
+                "largest_speed_rad_s": float(clip.joint_speed[:, k].max()),
+                "jerk_rms_rad_s3": float(np.sqrt(np.mean(clip.joint_jerk[:, k] ** 2))),
+            }
+            for k, name in enumerate(clip.joint_names)
+        },
+        "joint_torques": {
+            each.joint: {
+                "limit_n_m": each.limit,
+                "largest_n_m": float(np.abs(each.torque).max()),
+                "rms_n_m": float(np.sqrt(np.mean(each.torque**2))),
+                "over_share": float((each.load > clip.thresholds.torque).mean()),
+            }
+            for each in clip.torques
         },
     }
 
@@ -113,6 +138,15 @@ def _drift(drift: Drift) -> dict[str, Any]:
         "final_share_of_path": float(drift.distance[-1] / length) if length > 0 else None,
         "largest_heading_rad": float(np.abs(drift.heading).max()),
         "final_heading_rad": float(drift.heading[-1]),
+    }
+
+
+def _swing(swing: Swing) -> dict[str, float]:
+    return {
+        "clearance_of_source": swing.clearance,
+        "height_m": swing.height,
+        "scaled_source_height_m": swing.source_height,
+        "swing_s": swing.seconds,
     }
 
 

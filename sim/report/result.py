@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.measures import ContactMatch, Drift
+from sim.report.swing import Swing
 from sim.report.truth import Accuracy
 
 
@@ -38,7 +39,8 @@ class Result:
     """How believable a motion is, beside the motion it was made from where there is one, and how
     far from the ground truth where that is known.
 
-    `clip.self_depth` is then what goes beyond the source's own self-penetration.
+    `clip.self_depth` is then what goes beyond the source's own self-penetration, and `scale` is the
+    hip height over the source's. `swing` is None where the source's feet hardly swing.
     """
 
     clip: ClipMetrics
@@ -48,6 +50,8 @@ class Result:
     findings: tuple[Finding, ...]
     notes: tuple[str, ...]
     truth: Accuracy | None = None
+    swing: Swing | None = None
+    scale: float = 1.0
 
     @property
     def implausible(self) -> float:

@@ -49,7 +49,8 @@ class Support:
         fast = self.speeds[:, :count] > limits.skate_speed
         low_fast = (heights < limits.skate_height) & fast
         near = heights < limits.contact_height
-        flat = np.stack([near[:, own].all(axis=1) for own in self._corners()], axis=1)
+        corners = self.corners_of
+        flat = np.stack([near[:, corners[foot]].all(axis=1) for foot in self.feet], axis=1)
         loaded = np.zeros(len(heights), dtype=bool)
         selected = low_fast.any(axis=1)
         resting = self.touching & self.resting
@@ -64,18 +65,19 @@ class Support:
         return low_fast & (flat | loaded[:, None])
 
     def standing(self) -> dict[str, Bool[np.ndarray, "T"]]:
-        """When each foot stands, by its name: any corner of its sole is near the floor and slow."""
+        """When each foot stands, by its name: any corner of its sole is low and slow."""
         count, limits = len(self.feet), self.thresholds
-        near = self.heights[:, :count] < limits.contact_height
-        stands = near & (self.speeds[:, :count] <= limits.skate_speed)
+        low = self.heights[:, :count] < limits.stand_height
+        stands = low & (self.speeds[:, :count] <= limits.skate_speed)
+        return {foot: np.any(stands[:, own], axis=1) for foot, own in self.corners_of.items()}
+
+    @property
+    def corners_of(self) -> dict[str, list[int]]:
+        """The corners of each foot."""
         return {
-            foot: np.any(stands[:, [own == foot for own in self.feet]], axis=1)
+            foot: [k for k, other in enumerate(self.feet) if other == foot]
             for foot in dict.fromkeys(self.feet)
         }
-
-    def _corners(self) -> list[list[int]]:
-        """For each corner, those of its foot."""
-        return [[k for k, other in enumerate(self.feet) if other == foot] for foot in self.feet]
 
     def imbalance(self) -> Float[np.ndarray, "T"]:
         """How far the centre of mass lies outside what it stands on [m]; nan in frames that move,

@@ -18,28 +18,40 @@ class Row(TypedDict):
 
 
 def shares(clip: ClipMetrics) -> dict[str, float | None]:
-    """The measures that are shares of frames [%], by name; None of a clip that never rests."""
-    balance = clip.unbalanced_share
+    """The measures that are shares of frames [%], by name; None of a clip that never rests,
+    and of a body that tells no limits of its torque."""
+    balance, torque = clip.unbalanced_share, clip.overload_share
     return {
         **{name: 100 * clip.shares[name] for name in FLAGS},
         "joint_limit": 100 * clip.limit_share,
         "at_limit": 100 * clip.at_limit_share,
         "self_penetration": 100 * float(clip.self_penetration.mean()),
         "balance": None if balance is None else 100 * balance,
+        "torque": None if torque is None else 100 * torque,
     }
 
 
 RATES: dict[str, tuple[str, Callable[[ClipMetrics], float]]] = {
+    "base_acceleration": ("m/s²", lambda clip: clip.base_acceleration_p99),
     "joint_speed": ("rad/s", lambda clip: float(clip.joint_speed.max(initial=0.0))),
     "joint_jerk": ("rad/s³", lambda clip: clip.jerk_rms),
 }
-"""The measures of how joints move: unit and value."""
+"""The measures of how fast the base and the joints move: unit and value."""
+
+
+def source_rate(result: Result, measure: str) -> float | None:
+    """The source's value of one of `RATES`; of the base scaled by the hip heights' ratio."""
+    if result.source is None:
+        return None
+    value = RATES[measure][1](result.source)
+    return value * result.scale if measure == "base_acceleration" else value
 
 
 def rows(result: Result) -> list[Row]:
     """A row for each measure; those against a source or a ground truth have no source's value."""
     clip, source = result.clip, result.source
     contacts, drift, truth = result.contacts, result.drift, result.truth
+    swing = result.swing
     theirs = {} if source is None else shares(source)
     recall, precision = (None, None) if contacts is None else (contacts.recall, contacts.precision)
     return [
@@ -52,9 +64,10 @@ def rows(result: Result) -> list[Row]:
         *(_row(name, value, "%", theirs.get(name)) for name, value in shares(clip).items()),
         _row("missed_contact", None if recall is None else 100 * (1 - recall), "%"),
         _row("invented_contact", None if precision is None else 100 * (1 - precision), "%"),
+        _row("swing_clearance", None if swing is None else 100 * abs(1 - swing.clearance), "%"),
         _row("root_drift", None if drift is None else 100 * float(drift.distance.max()), "cm"),
         *(
-            _row(name, value(clip), unit, None if source is None else value(source))
+            _row(name, value(clip), unit, source_rate(result, name))
             for name, (unit, value) in RATES.items()
         ),
         _row("ground_truth_mse", None if truth is None else 1e4 * truth.mse, "1e-4"),

@@ -8,9 +8,14 @@ from sim.report.clip_metrics import ClipMetrics
 from sim.report.names import LABELS
 from sim.report.palette import BOLD, DIM, TERMINAL, grade
 from sim.report.result import Finding, Result
-from sim.report.table import RATES, shares
+from sim.report.table import RATES, shares, source_rate
 
 _SHOWN = 3  # findings of one measure
+_RATE_KINDS = {
+    "base_acceleration": "in 99 % of the frames",
+    "joint_speed": "at most",
+    "joint_jerk": "RMS",
+}
 
 
 def render(result: Result, *, color: bool) -> str:
@@ -63,13 +68,20 @@ def share_base(clip: ClipMetrics, measure: str) -> str:
     """What a share is of, where that isn't all frames."""
     if measure != "balance":
         return ""
-    static = 100 * float(np.isfinite(clip.imbalance).mean())
-    return f"of those at rest, {static:.1f} % of all"
+    at_rest = 100 * float(np.isfinite(clip.imbalance).mean())
+    return f"of the {at_rest:.1f} % of the frames in which the body rests"
 
 
 def details(result: Result) -> Iterator[tuple[str, str]]:
     """The measures that are no shares of frames: label, and value in words."""
-    clip, source, drift, contacts = result.clip, result.source, result.drift, result.contacts
+    clip, drift, contacts = result.clip, result.drift, result.contacts
+    highest = max(clip.torques, key=lambda each: each.load.max(), default=None)
+    if highest is not None:
+        load = 100 * float(highest.load.max())
+        yield (
+            "highest torque",
+            f"{load:>6.0f} %        of what {highest.joint}'s motor gives, {highest.limit:.0f} N m",
+        )
     often = sorted(clip.at_limit_shares.items(), key=lambda item: -item[1])[:_SHOWN]
     if often and often[0][1] > 0:
         others = "".join(f"; {joint} {100 * share:.1f} %" for joint, share in often[1:] if share)
@@ -78,6 +90,13 @@ def details(result: Result) -> Iterator[tuple[str, str]]:
         parts = (("precision", contacts.precision), ("recall", contacts.recall))
         words = "".join(f"; {name} {part:.2f}" for name, part in parts if part is not None)
         yield "foot contacts", f"{contacts.f1:>6.2f}          F1 against the source{words}"
+    if result.swing is not None:
+        swing = result.swing
+        yield (
+            "swing clearance",
+            f"{swing.clearance:>6.2f}          of the source's: {100 * swing.height:.1f} cm where "
+            f"its feet pass {100 * swing.source_height:.1f} cm above the floor, scaled",
+        )
     if drift is not None:
         yield (
             LABELS["root_drift"],
@@ -92,7 +111,9 @@ def details(result: Result) -> Iterator[tuple[str, str]]:
             f"{truth.mpjpe:>6.2f} %        of the height away in the mean; MSE {truth.mse:.2g}, "
             f"root-relative {truth.relative_mse:.2g}",
         )
-    for measure, kind in (("joint_speed", "at most"), ("joint_jerk", "RMS")):
+    for measure, kind in _RATE_KINDS.items():
         unit, value = RATES[measure]
-        beside = "" if source is None else f"; source {value(source):.0f}"
+        theirs = source_rate(result, measure)
+        scaled = ", scaled" if measure == "base_acceleration" else ""
+        beside = "" if theirs is None else f"; source {theirs:.0f}{scaled}"
         yield LABELS[measure], f"{value(clip):>6.0f} {unit:<6}   {kind}{beside}"

@@ -7,14 +7,14 @@ HUMAN_HIP_HEIGHT = 0.9  # [m] of an adult: the size that the thresholds are give
 
 @dataclass(frozen=True)
 class Thresholds:
-    """`plausibility v1`: what counts as implausible, for a body whose hips stand 0.9 m high.
+    """`plausibility v2`: what counts as implausible, for a body whose hips stand 0.9 m high.
 
     Those of skating were chosen on clean recordings of people, which must show little of it; the
     others were set beforehand. `scripts/report_bench.py` measures on spoilt recordings what they
     tell apart: docs/report.md has its table.
     """
 
-    version: str = "plausibility v1"
+    version: str = "plausibility v2"
 
     # Penetration: the lowest point lies deeper than this under the floor [m].
     penetration: float = 0.01
@@ -48,6 +48,20 @@ class Thresholds:
     self_penetration: float = 0.02
     shape_penetration: float = 0.01
 
+    # Foot contacts: a corner of the sole is lower than this [m] over the floor and slower than
+    # `skate_speed`. Higher than `contact_height`: recorded feet that stand hover by some
+    # centimetres, and what is asked is whether the foot stands at the same time.
+    stand_height: float = 0.06
+
+    # Swing clearance, measured where the middle of a sole of the source is faster than this [m/s]
+    # and all of it higher than this [m], over at least this time [s].
+    swing_speed: float = 0.5
+    swing_height: float = 0.02
+    swing_time: float = 0.5
+
+    # Torque: a joint needs more than this share of what its motor gives.
+    torque: float = 1.0
+
     # At its limit: a joint is within this [rad] of its limit, or beyond: half a degree.
     limit_margin: float = 0.0087
 
@@ -80,6 +94,9 @@ class Thresholds:
             skate_speed=self.skate_speed * scale,
             wrench_torque=self.wrench_torque * scale,
             contact_height=self.contact_height * scale,
+            stand_height=self.stand_height * scale,
+            swing_speed=self.swing_speed * scale,
+            swing_height=self.swing_height * scale,
             self_penetration=self.self_penetration * scale,
             shape_penetration=self.shape_penetration * scale,
             static_speed=self.static_speed * scale,
@@ -87,4 +104,4 @@ class Thresholds:
         )
 
 
-PLAUSIBILITY_V1 = Thresholds()
+PLAUSIBILITY_V2 = Thresholds()

@@ -53,8 +53,7 @@ def unexplained_wrench(
     touch, in cones of `friction`, are those that leave the least sum of squares; in it a torque of
     1 body weight x `length` counts as much as a force of 1 body weight.
     """
-    angle = 2 * np.pi * np.arange(_EDGES) / _EDGES
-    edges = np.stack([friction * np.cos(angle), friction * np.sin(angle), np.ones(_EDGES)])
+    edges = friction_edges(friction)
     scale = np.array([1.0, 1.0, 1.0, length, length, length])
     wanted = wrench / scale
     residual = wanted.copy()
@@ -77,6 +76,12 @@ def unexplained_wrench(
         ],
         axis=1,
     )
+
+
+def friction_edges(friction: float) -> Float[np.ndarray, "3 E"]:
+    """The edges of the pyramid inside a friction cone, each with a normal force of 1."""
+    angle = 2 * np.pi * np.arange(_EDGES) / _EDGES
+    return np.stack([friction * np.cos(angle), friction * np.sin(angle), np.ones(_EDGES)])
 
 
 def _cross_matrix(v: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "P 3 3"]:

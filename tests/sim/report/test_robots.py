@@ -243,7 +243,7 @@ def test_lowest_points_are_mujocos_distance_from_a_plane(kind: str, size: str) -
     quats /= np.linalg.norm(quats, axis=1, keepdims=True)
     qpos = np.concatenate([rng.normal(size=(20, 3)) + np.array([0, 0, 3]), quats], axis=1)
     body = ModelTrajectory(spec, spec.compile(), 1, qpos)
-    names, lowest = lowest_points(body, pose_model(body), {})
+    names, lowest, _ = lowest_points(body, pose_model(body), {})
     assert names == ("b",)
     model, floor = with_floor(body, -5.0)
     data = mujoco.MjData(model)
