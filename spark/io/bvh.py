@@ -11,16 +11,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import chain, pairwise
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
-import orjson
 from jaxtyping import Float, Int
 
 from spark.errors import FileFormatError, SkeletonError
 from spark.files import write_atomically
+from spark.io.bvh_rows import parse_motion
 from spark.io.charset import to_utf8
-from spark.io.scanner import LARGEST, Scanner, number, shown
+from spark.io.scanner import Scanner, shown
 from spark.summary import counted, time_span
 
 Vector = tuple[float, float, float]
@@ -28,7 +27,6 @@ Vector = tuple[float, float, float]
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
 
 _MAX_DEPTH = 512  # joints above a joint: no creature has as many, a deeper tree is a broken file
-_MIN_FRAME_TIME = 1e-9  # [s] a shorter one is a broken file
 
 _NAME = re.compile(r"[^\s{}]([^\r\n{}]*[^\s{}])?", re.ASCII)
 
@@ -55,8 +53,8 @@ class Bvh:
     """A BVH file: joints depth-first, as they nest, and one row of channel values a frame.
 
     `frame_time` [s]; `values` hold the channels of all joints one after the other, in file units
-    and degrees. `path` is where it was read from, and `encoding` how its names are written as
-    bytes.
+    and degrees. `path` is where it was read from, `encoding` how its names are written as bytes,
+    and `repairs` say what was mended in reading.
     """
 
     joints: tuple[BvhJoint, ...]
@@ -64,6 +62,7 @@ class Bvh:
     values: Float[np.ndarray, "T C"]
     path: Path | None = None
     encoding: str = "utf-8"
+    repairs: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         file = "" if self.path is None else f"{self.path.name!r}, "
@@ -128,15 +127,17 @@ def read_bvh(path: str | Path) -> Bvh:
 
     Takes tabs, any line ends, a byte order mark, keywords in any case, names with any characters
     but braces (UTF-8, else Shift-JIS, else Latin-1), rows wrapped over several lines, and no frames
-    at all. Raises `FileFormatError` with the line for anything else; memory goes with the size of
-    the file, not with what it claims.
+    at all. Mends whole rows that are missing or too many, and OFFSETs of six numbers. Raises
+    `FileFormatError` with the line for anything else; memory goes with the size of the file, not
+    with what it claims.
     """
     path = Path(path)
     data, encoding = to_utf8(_read(path))
     scanner = Scanner(path, data)
-    joints = _parse_hierarchy(scanner)
-    frame_time, values = _parse_motion(scanner, sum(len(joint.channels) for joint in joints))
-    return Bvh(joints, frame_time, values, path, encoding)
+    joints, repairs = _parse_hierarchy(scanner)
+    channels = sum(len(joint.channels) for joint in joints)
+    frame_time, values, mended = parse_motion(scanner, channels)
+    return Bvh(joints, frame_time, values, path, encoding, repairs + mended)
 
 
 def write_bvh(bvh: Bvh, path: str | Path) -> None:
@@ -198,17 +199,19 @@ def _read(path: Path) -> bytes:
     )
 
 
-def _parse_hierarchy(scanner: Scanner) -> tuple[BvhJoint, ...]:
+def _parse_hierarchy(scanner: Scanner) -> tuple[tuple[BvhJoint, ...], tuple[str, ...]]:
     scanner.expect("HIERARCHY")
     scanner.expect("ROOT")
     joints: list[_OpenJoint] = []
+    six = 0
     open_joints = [_open_joint(scanner, joints, -1)]
     while open_joints:
         joint = joints[open_joints[-1]]
         word = scanner.word()
         match word.lower():
             case b"offset" if joint.offset is None:
-                joint.offset = _parse_vector(scanner, f"the OFFSET of {joint.name!r}")
+                joint.offset, longer = _parse_offset(scanner, f"the OFFSET of {joint.name!r}")
+                six += longer
             case b"channels" if joint.channels is None:
                 joint.channels = _parse_channels(scanner, joint.name)
             case b"joint":
@@ -219,7 +222,9 @@ def _parse_hierarchy(scanner: Scanner) -> tuple[BvhJoint, ...]:
                 scanner.label()
                 scanner.expect("{")
                 scanner.expect("OFFSET")
-                joint.ends.append(_parse_vector(scanner, f"the End Site of {joint.name!r}"))
+                end, longer = _parse_offset(scanner, f"the End Site of {joint.name!r}")
+                joint.ends.append(end)
+                six += longer
                 scanner.expect("}")
             case b"}":
                 if joint.offset is None:
@@ -230,7 +235,12 @@ def _parse_hierarchy(scanner: Scanner) -> tuple[BvhJoint, ...]:
                     f"expected OFFSET, CHANNELS (once each), JOINT, End Site or }} in joint "
                     f"{joint.name!r}, found {shown(word)}"
                 )
-    return tuple(joint.closed() for joint in joints)
+    repairs = (
+        f"{counted(six, 'OFFSET')} of six numbers, as NVIDIA's SOMA has them: the first three are "
+        "the position; the others, a rest rotation, are not needed, since the rows hold whole "
+        "rotations",
+    )
+    return tuple(joint.closed() for joint in joints), repairs if six else ()
 
 
 @dataclass
@@ -255,8 +265,13 @@ def _open_joint(scanner: Scanner, joints: list[_OpenJoint], parent: int) -> int:
     return len(joints) - 1
 
 
-def _parse_vector(scanner: Scanner, what: str) -> Vector:
-    return scanner.number(what), scanner.number(what), scanner.number(what)
+def _parse_offset(scanner: Scanner, what: str) -> tuple[Vector, bool]:
+    """The vector, and whether three more numbers came after it."""
+    vector = scanner.number(what), scanner.number(what), scanner.number(what)
+    longer = scanner.at_number()
+    for _ in range(3 * longer):
+        scanner.number(f"{what} (three, or six as in NVIDIA's SOMA)")
+    return vector, longer
 
 
 def _parse_channels(scanner: Scanner, name: str) -> tuple[str, ...]:
@@ -274,100 +289,3 @@ def _parse_channels(scanner: Scanner, name: str) -> tuple[str, ...]:
             )
         channels.append(channel)
     return tuple(channels)
-
-
-def _parse_motion(scanner: Scanner, channels: int) -> tuple[float, Float[np.ndarray, "T C"]]:
-    word = scanner.word()
-    if word.lower() == b"root":
-        scanner.fail("a second ROOT; expected one skeleton a file: split it")
-    if not word:
-        scanner.fail(
-            "expected MOTION, found the end of the file; a rig without motion ends with the lines "
-            "MOTION, Frames: 0, Frame Time: 0.04"
-        )
-    if word.lower() != b"motion":
-        scanner.fail(f"expected MOTION, found {shown(word)}")
-    if channels == 0:
-        scanner.fail("no joint has CHANNELS, so nothing can move; expected at least one")
-    scanner.expect_label("Frames")
-    frames = scanner.count("Frames")
-    scanner.expect_label("Frame", "Time")
-    frame_time = scanner.number("Frame Time")
-    if frame_time < _MIN_FRAME_TIME:
-        scanner.fail(f"Frame Time is {frame_time:g}; expected seconds a frame, such as 0.0333333")
-    values = _parse_rows(scanner.data[scanner.end :], frames, channels)
-    if values is None:
-        _diagnose(scanner, frames, channels)
-    return frame_time, values
-
-
-# Bytes that a table of numbers may hold.
-_NUMERIC = np.isin(np.arange(256), np.frombuffer(b"0123456789+-.eE \t\r\n\v\f", dtype=np.uint8))
-
-
-def _parse_rows(rows: bytes, frames: int, channels: int) -> Float[np.ndarray, "T C"] | None:
-    """The values, or None where they are not `frames` rows of finite numbers."""
-    letters = np.frombuffer(rows, dtype=np.uint8)
-    blank = (letters == 32) | ((letters >= 9) & (letters <= 13))
-    first = ~blank
-    first[1:] &= blank[:-1]
-    starts = np.flatnonzero(first)
-    if len(starts) != frames * channels:
-        return None
-    breaks = np.flatnonzero((letters == 10) | (letters == 13))
-    per_line = np.diff(np.searchsorted(starts, breaks), prepend=0, append=len(starts))
-    per_line = per_line[per_line > 0]
-    if len(per_line) == frames and np.any(per_line != channels):
-        return None  # one value too many here and one too few there, not wrapped rows
-    if frames == 0:
-        return np.zeros((0, channels))
-    if not _NUMERIC[letters].all():
-        return None
-    try:
-        # A JSON reader is three times as fast as numpy's, but takes no "+1", ".5" or "01".
-        listed = letters.copy()
-        listed[starts[1:] - 1] = ord(",")
-        values = np.array(orjson.loads(b"[" + listed.tobytes() + b"]"), dtype=np.float64)
-    except orjson.JSONDecodeError:
-        try:
-            values = np.fromstring(rows, sep=" ")
-        except (ValueError, DeprecationWarning):
-            return None
-    # Older numpy stops at a word that is no number, with a warning alone.
-    if len(values) != len(starts) or not np.all(np.abs(values) <= LARGEST):
-        return None
-    return values.reshape(frames, channels)
-
-
-def _diagnose(scanner: Scanner, frames: int, channels: int) -> NoReturn:
-    """Say why `_parse_rows` gave up: a slow second pass over the text."""
-    rows = [(at, words) for at, words in scanner.lines() if words]
-    for line, words in rows:
-        for word in words:
-            if number(word) is None:
-                raise FileFormatError(
-                    scanner.path,
-                    line,
-                    f"expected a finite number, at most 1e12, found {shown(word)}",
-                )
-    found, needed = sum(len(words) for _, words in rows), frames * channels
-    odd = [(at, len(words)) for at, words in rows if len(words) != channels]
-    if found == needed:
-        at, width = odd[0]
-        raise FileFormatError(
-            scanner.path, at, f"{width} values in this row; expected {channels}, one a channel"
-        )
-    fault = "cut short" if found < needed else "too long"
-    remedy = (
-        f"; set Frames: {found // channels} to use it"
-        if found % channels == 0
-        else f" ({found // channels} whole frames); fetch or export the file again"
-    )
-    # A few odd rows are the fault; many are rows wrapped over lines.
-    end = rows[-1][0] if rows else None
-    raise FileFormatError(
-        scanner.path,
-        odd[0][0] if 0 < len(odd) < max(2, len(rows) // 2) else end,
-        f"the motion is {fault}: Frames: {frames} with {channels} channels each need {needed} "
-        f"values, not {found}{remedy}",
-    )

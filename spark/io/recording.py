@@ -82,7 +82,7 @@ def read_recording(
 
 def _decode(bvh: Bvh) -> tuple[Motion, bool, tuple[str, ...]]:
     """The motion in file units and axes, whether positions add to the offsets, and notes."""
-    notes: list[str] = []
+    notes = list(bvh.repairs)
     if bvh.encoding != "utf-8":
         notes.append(f"joint names are not UTF-8: read as {_ENCODINGS[bvh.encoding]}")
     if not _USUAL_FRAME_TIME[0] <= bvh.frame_time <= _USUAL_FRAME_TIME[1]:

@@ -12,6 +12,7 @@ from spark.errors import FileFormatError
 _WORD = re.compile(rb"\s*([{}]|[^\s{}]*)")
 _LABEL = re.compile(rb"[^\S\r\n]*([^\r\n{}]*)")
 _LINE_END = re.compile(rb"\r\n|\r|\n")
+_NUMBER_AHEAD = re.compile(rb"\s*[-+.]?\d")
 _NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
 # Squares and sums of numbers up to here stay finite; no length or angle is larger.
@@ -65,6 +66,10 @@ class Scanner:
         if value is None:
             self.fail(f"expected a number for {what}, at most 1e12, found {shown(word)}")
         return value
+
+    def at_number(self) -> bool:
+        """Whether the next word begins like a number."""
+        return bool(_NUMBER_AHEAD.match(self.data, self.end))
 
     def count(self, what: str) -> int:
         """The next word as a whole number, not negative."""

@@ -202,7 +202,8 @@ MALFORMED = {
     "brace too many": (swap("MOTION", "}\nMOTION"), 25, "expected MOTION, found '}'"),
     "no OFFSET": (swap("\t\tOFFSET 0 60 0\n", ""), 17, "'Head' has no OFFSET"),
     "short OFFSET": (swap("0 60 0", "0 60"), 9, "number for the OFFSET of 'Head'"),
-    "long OFFSET": (swap("0 60 0", "0 60 0 0"), 8, "found '0'"),
+    "long OFFSET": (swap("0 60 0", "0 60 0 0"), 9, "three, or six"),
+    "longer OFFSET": (swap("0 60 0", "0 60 0 0 0 0 0"), 8, "found '0'"),
     "two OFFSETs": (swap("\tOFFSET 0 60 0", "OFFSET 0 60 0\nOFFSET 1 1 1"), 9, "once each"),
     "OFFSET nan": (swap("0 60 0", "0 nan 0"), 8, "found 'nan'"),
     "OFFSET huge": (swap("0 60 0", "0 1e300 0"), 8, "at most 1e12"),
@@ -225,8 +226,7 @@ MALFORMED = {
     "Frame Time negative": (swap("0.0333", "-1"), 27, "Frame Time is -1"),
     "Frame Time with a comma": (swap("0.0333", "0,0333"), 27, "found '0,0333'"),
     "cut in a row": (SMALL[:-20], 29, "cut short"),
-    "cut after a row": ("\n".join(SMALL_LINES[:-1]), 28, "set Frames: 1"),
-    "a row too many": (SMALL + SMALL_LINES[-1], 30, "set Frames: 3"),
+    "cut after two rows of five": (swap("Frames: 2", "Frames: 5"), 29, "set Frames: 2"),
     "a value too many": (swap("0 91 0", "0 91 0 0"), 29, "too long"),
     "a value moved to the next row": (
         swap("8 9\n0 91", "8\n9 0 91"),
@@ -289,6 +289,36 @@ def test_a_file_without_permission_is_refused(tmp_path: Path) -> None:
     path.chmod(0)
     with pytest.raises(FileFormatError, match="Permission denied"):
         read_bvh(path)
+
+
+# What is mended
+
+
+@pytest.mark.parametrize(
+    ("claim", "rows"), [(1, 2), (2, 1), (4, 2), (0, 2), (2, 7)], ids=lambda n: str(n)
+)
+def test_whole_rows_count_and_not_the_claim(tmp_path: Path, claim: int, rows: int) -> None:
+    """The last row stands in for others; `Frames:` says `claim`, and `rows` of them follow."""
+    head = [line.replace("Frames: 2", f"Frames: {claim}") for line in SMALL_LINES[:-2]]
+    lines = [SMALL_LINES[-2], *SMALL_LINES[-1:] * (rows - 1)]
+    bvh = read_text(tmp_path, "\n".join([*head, *lines, ""]))
+    np.testing.assert_array_equal(bvh.values[:, 1], [90] + [91] * (rows - 1))
+    assert [f"Frames: says {claim}, but {rows} row" in note for note in bvh.repairs] == [True]
+    assert bvh.repairs[0] in read_recording(tmp_path / "a.bvh").notes
+    write_bvh(bvh, tmp_path / "b.bvh")
+    again = read_bvh(tmp_path / "b.bvh")
+    assert_same(again, bvh)
+    assert again.repairs == ()
+
+
+def test_offsets_of_six_numbers(tmp_path: Path) -> None:
+    """NVIDIA's SOMA: a position and a rest rotation, which the rows hold already."""
+    bvh = read_text(
+        tmp_path, SMALL.replace("0 60 0", "0 60 0 0 -90 1.5").replace("20 5", "20 5 1 2 3")
+    )
+    assert_same(bvh, read_text(tmp_path, SMALL))
+    assert read_text(tmp_path, SMALL).repairs == ()
+    assert "2 OFFSETs of six numbers" in bvh.repairs[0]
 
 
 # What is written
