@@ -5,19 +5,13 @@ from typing import TYPE_CHECKING, overload
 
 from robots import formats, registry
 from spark.errors import ConventionError, FileFormatError
-from spark.io.reading import read_motion
+from spark.io.reading import format_of, holds_person, read_motion
 from spark_sim import rolemap
 from spark_sim.choices import Quat, RobotName, Unit
 from spark_sim.clips import AnyClip, Clip, File, RobotClip
 
 if TYPE_CHECKING:
     from spark_sim.choices import Up
-
-_NOT_YET = {
-    ".glb": "glTF files can't be read yet; expected a BVH or FBX file",
-    ".gltf": "glTF files can't be read yet; expected a BVH or FBX file",
-    ".amc": "AMC files can't be read yet; expected a BVH or FBX file",
-}
 
 
 @overload
@@ -28,10 +22,23 @@ def load(
 ) -> RobotClip: ...
 @overload
 def load(
-    path: File, *, unit: Unit | float, up: "Up | None" = None, roles: File | None = None
+    path: File,
+    *,
+    unit: Unit | float,
+    up: "Up | None" = None,
+    roles: File | None = None,
+    fps: float | None = None,
+    body_model: File | None = None,
 ) -> Clip: ...
 @overload
-def load(path: File, *, up: "Up", roles: File | None = None) -> Clip: ...
+def load(
+    path: File,
+    *,
+    up: "Up",
+    roles: File | None = None,
+    fps: float | None = None,
+    body_model: File | None = None,
+) -> Clip: ...
 @overload
 def load(
     path: File,
@@ -42,6 +49,7 @@ def load(
     robot: File | None = None,
     quat: Quat | None = None,
     fps: float | None = None,
+    body_model: File | None = None,
 ) -> AnyClip: ...
 def load(
     path: File,
@@ -52,12 +60,16 @@ def load(
     robot: File | None = None,
     quat: str | None = None,
     fps: float | None = None,
+    body_model: File | None = None,
 ) -> AnyClip:
     """Read a motion from a file, or a robot by its name. What is not given is inferred, and the
     clip's `notes` say so.
 
-    - A BVH or FBX file is a `Clip`. `unit` is m, dm, cm, mm, inch, cmu or a number of metres; `up`
-      is x, y or z; `roles` is a map of joints in TOML, as `spark-sim inspect --save-map` writes it.
+    - A motion of a character or a person is a `Clip`, in any format of
+      `spark.io.reading.FORMATS`. `unit` is m, dm, cm, mm, inch, cmu or a number of metres; `up` is
+      x, y or z; `roles` is a map of joints in TOML, as `spark-sim inspect --save-map` writes it.
+      `fps` is the rate where the file says none, or a wrong one. `body_model` is your own file of
+      SMPL, SMPL-H or SMPL-X (.npz), for the exact bones of a motion of that family.
     - A robot's motion (.npz, .csv, .pkl) is a `RobotClip`. `robot` is the robot's name or MJCF.
       `quat` (xyzw or wxyz) and `fps` are what a CSV does not say.
     - A robot's name or MJCF is a `RobotClip` of one frame, in its T-pose. `roles` is then a map by
@@ -68,6 +80,7 @@ def load(
     """
     path = Path(path)
     given = {"unit": unit, "up": up, "roles": roles, "robot": robot, "quat": quat, "fps": fps}
+    given["body_model"] = body_model
     for name, value in given.items():
         if value is not None and name not in takes(path):
             raise ConventionError(f"{path}: {name} does not go with such a file; leave it out")
@@ -75,11 +88,9 @@ def load(
         return load_robot(path, roles=roles)
     if path.is_dir():
         raise FileFormatError(path, None, "is a folder; expected a file, or a robot's name")
-    if path.suffix.lower() in formats.SUFFIXES:
+    if path.suffix.lower() in formats.SUFFIXES and not holds_person(path):
         return load_robot_motion(path, robot=robot, quat=quat, fps=fps)
-    if path.suffix.lower() in _NOT_YET:
-        raise FileFormatError(path, None, _NOT_YET[path.suffix.lower()])
-    recording = read_motion(path, unit=unit, up=up)
+    recording = read_motion(path, unit=unit, up=up, fps=fps, body_model=body_model)
     names = None if roles is None else rolemap.read(roles, recording.motion.skeleton)
     return Clip(recording, path.stem, names)
 
@@ -89,9 +100,9 @@ def takes(path: File) -> tuple[str, ...]:
     if registry.is_robot(path):
         return ("roles",)
     suffix = Path(path).suffix.lower()
-    if suffix in formats.SUFFIXES:
+    if suffix in formats.SUFFIXES and not holds_person(Path(path)):
         return ("robot", "quat", "fps") if suffix == ".csv" else ("robot",)
-    return ("unit", "up", "roles")
+    return (*format_of(Path(path)).options, "roles")
 
 
 def clip_of(clip: AnyClip | File) -> AnyClip:

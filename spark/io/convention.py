@@ -136,12 +136,12 @@ def infer_up(motion: Motion) -> tuple[Up, tuple[str, ...]]:
     size = max(float(np.max(np.median(np.ptp(points, axis=1), axis=0))), 1e-300)
     floor = np.median(np.min(points, axis=1), axis=0) / size
 
-    standing = _above_feet(motion, positions)
+    standing = above_feet(motion, positions)
     # Log-probabilities. X-up files hardly exist; bodies that lie down and odd rest poses do, but
     # seldom straight along an axis all the time: hence the cubes. Some stand on their heads.
     chances = np.array([-4.0, 0.0, -1.0])
     chances += np.where(standing > 0, 5.0, -2.0) * standing**3
-    chances += 2.5 * _above_feet(motion, rest) ** 3
+    chances += 2.5 * above_feet(motion, rest) ** 3
     chances += 2.0 * (np.abs(floor) < 0.03)
     best, second = np.argsort(-chances)[:2].tolist()
     up = UPS[best]
@@ -155,7 +155,7 @@ def infer_up(motion: Motion) -> tuple[Up, tuple[str, ...]]:
     return up, tuple(notes)
 
 
-def _above_feet(motion: Motion, positions: Float[np.ndarray, "T J 3"]) -> Float[np.ndarray, "3"]:
+def above_feet(motion: Motion, positions: Float[np.ndarray, "T J 3"]) -> Float[np.ndarray, "3"]:
     """The mean direction from the feet to the rest of the body; zero where no name says foot."""
     feet = np.array([bool(_FEET.search(name)) for name in motion.skeleton.names])
     if feet.all() or not feet.any():

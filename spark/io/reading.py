@@ -1,37 +1,122 @@
 """Motion files of any format, and the folders that hold them."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from spark.errors import FileFormatError
-from spark.io.fbx import read_fbx
-from spark.io.recording import Recording, read_recording
+from spark.errors import ConventionError, FileFormatError
+from spark.io.arrays import npy_shape, npz_names
+from spark.io.recording import Recording
+from spark.io.smpl_layouts import KEYS as SMPL_KEYS
+from spark.io.smpl_layouts import WIDTHS as SMPL_WIDTHS
+from spark.io.tensors import says
 
-SUFFIXES = (".bvh", ".fbx")
+Reader = Callable[..., Recording]
+
+UNIT_AND_UP = ("unit", "up")
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format: what messages call it, the endings of its files, the bytes that they begin with,
+    and the options of `read_motion` that it takes."""
+
+    name: str
+    endings: tuple[str, ...]
+    options: tuple[str, ...]
+    magic: bytes | None = None
+
+
+BVH = Format("BVH", (".bvh",), (*UNIT_AND_UP, "fps"), b"HIERARCHY")
+FBX = Format("FBX", (".fbx",), UNIT_AND_UP, b"Kaydara FBX Binary")
+SMPL = Format("SMPL", (".npz", ".npy", ".pt", ".pth"), (*UNIT_AND_UP, "fps", "body_model"))
+
+FORMATS = (BVH, FBX, SMPL)
+SUFFIXES = tuple(dict.fromkeys(ending for known in FORMATS for ending in known.endings))
 
 
 def read_motion(
-    path: str | Path, *, unit: str | float | None = None, up: str | None = None
+    path: str | Path,
+    *,
+    unit: str | float | None = None,
+    up: str | None = None,
+    fps: float | None = None,
+    body_model: str | Path | None = None,
 ) -> Recording:
-    """The recording in a BVH or FBX file, told apart by the ending of its name (BVH by any other).
+    """The recording in a file of any of the formats, told apart by content and ending.
 
-    Raises what `spark.io.recording.read_recording` and `spark.io.fbx.read_fbx` raise.
+    What is given replaces what the file says, or what would be inferred. Raises what the format's
+    reader raises, and `ConventionError` where an option does not go with the format.
     """
     path = Path(path)
-    read = read_fbx if path.suffix.lower() == ".fbx" else read_recording
-    return read(path, unit=unit, up=up)
+    known = format_of(path)
+    given: dict[str, Any] = {"unit": unit, "up": up, "fps": fps, "body_model": body_model}
+    given = {name: value for name, value in given.items() if value is not None}
+    for name in given:
+        if name not in known.options:
+            raise ConventionError(f"{path}: {name} does not go with {known.name}; leave it out")
+    if fps is not None and not 0.1 <= fps <= 10000:
+        raise ConventionError(f"{fps:g} fps is no frame rate; expected 0.1 to 10000")
+    return _reader(known)(path, **given)
+
+
+def format_of(path: Path) -> Format:
+    """The format of a file, by what it begins with, or else by its ending; BVH by any other."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n")
+    except (OSError, ValueError):
+        head = b""
+    by_content = (f for f in FORMATS if f.magic is not None and head.startswith(f.magic))
+    by_ending = (f for f in FORMATS if path.suffix.lower() in f.endings)
+    return next(by_content, None) or next(by_ending, BVH)
+
+
+def holds_person(path: Path) -> bool:
+    """Whether a file of arrays is the motion of a person, not of a robot or any other numbers."""
+    match path.suffix.lower():
+        case ".npz":
+            return bool(npz_names(path) & SMPL_KEYS)
+        case ".npy":
+            shape = npy_shape(path)
+            return len(shape) == 2 and shape[1] in SMPL_WIDTHS
+        case ".pt" | ".pth":
+            return says(path, (b"global_orient", b"root_orient"))
+        case _:
+            return True
+
+
+def _reader(known: Format) -> Reader:
+    """Readers are loaded when needed: the libraries of one format are no burden on another."""
+    if known is FBX:
+        from spark.io.fbx import read_fbx
+
+        return read_fbx
+    if known is SMPL:
+        from spark.io.smpl import read_smpl
+
+        return read_smpl
+    from spark.io.recording import read_recording
+
+    return read_recording
 
 
 def motion_files(path: Path, suffixes: tuple[str, ...] = SUFFIXES) -> list[Path]:
     """The files of some endings below a folder, in order of their names; a file itself.
 
-    Links are followed. Raises `FileFormatError` where there is none.
+    Links are followed, and files of arrays that are no motion of a person left out. Raises
+    `FileFormatError` where there is none.
     """
     if path.is_file():
         return [path]
     if not path.is_dir():
         raise FileFormatError(path, None, "no such file or folder")
-    found = sorted(p for p in _files(path, set()) if p.suffix.lower() in suffixes)
+    found = sorted(
+        p
+        for p in _files(path, set())
+        if p.suffix.lower() in suffixes and (p.suffix.lower() not in SUFFIXES or holds_person(p))
+    )
     if not found:
         raise FileFormatError(
             path, None, f"holds no {' or '.join(suffixes)} file; expected one or more"

@@ -47,17 +47,24 @@ class Recording:
 
 
 def read_recording(
-    path: str | Path, *, unit: str | float | None = None, up: str | None = None
+    path: str | Path,
+    *,
+    unit: str | float | None = None,
+    up: str | None = None,
+    fps: float | None = None,
 ) -> Recording:
     """The recording in the BVH file at `path`.
 
     `unit` (a name of `spark.io.convention.UNITS` or metres) and `up` (x, y or z) are inferred where
-    not given. A file without frames gives one frame of its rest pose. Raises `FileFormatError` as
-    `read_bvh` does, and `ConventionError` where a convention isn't known or can't be inferred.
+    not given; `fps` replaces the Frame Time. A file without frames gives one frame of its rest
+    pose. Raises `FileFormatError` as `read_bvh` does, and `ConventionError` where a convention
+    isn't known or can't be inferred.
     """
     unit_m = None if unit is None else given_unit(unit)
     up_axis = None if up is None else given_up(up)
     bvh = read_bvh(path)
+    if fps is not None:
+        bvh = replace(bvh, frame_time=1 / fps)
     motion, adds_offset, notes = _decode(bvh)
     picked = np.unique(np.linspace(0, len(motion) - 1, _SAMPLES).astype(int))
     sample = replace(

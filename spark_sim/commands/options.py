@@ -31,6 +31,14 @@ def add_corrections(parser: ArgumentParser, file: str, prefix: str = "") -> None
         metavar="TOML",
         help="which joint is what, as `spark-sim inspect --save-map` writes it",
     )
+    if prefix != "to-":  # a target is a character's file
+        group.add_argument(
+            f"--{prefix}body-model",
+            dest=f"{dest}body_model",
+            metavar="NPZ",
+            help="your own SMPL, SMPL-H or SMPL-X file, for the exact bones of a motion of that "
+            "family",
+        )
 
 
 def add_robot_motion(parser: ArgumentParser, file: str, prefix: str = "") -> None:
@@ -54,7 +62,11 @@ def add_robot_motion(parser: ArgumentParser, file: str, prefix: str = "") -> Non
         help="order of the quaternions in a CSV; Unitree writes xyzw",
     )
     group.add_argument(
-        f"--{prefix}fps", dest=f"{dest}fps", metavar="N", type=float, help="frame rate of a CSV"
+        f"--{prefix}fps",
+        dest=f"{dest}fps",
+        metavar="N",
+        type=float,
+        help="frame rate of a CSV, or of any motion whose file says none",
     )
 
 
@@ -69,8 +81,8 @@ def load(args: Namespace, path: str, prefix: str = "", *, humanoid: bool = True)
 
     given: dict[str, Any] = vars(args)
     wanted: dict[str, Any] = {}
-    for name in ("unit", "up", "roles", "robot", "quat", "fps"):
-        option = f"{prefix}{'map' if name == 'roles' else name}"
+    for name in ("unit", "up", "roles", "body_model", "robot", "quat", "fps"):
+        option = f"{prefix}{'map' if name == 'roles' else name.replace('_', '-')}"
         value = given.get(option.replace("-", "_"))
         if value is not None and name in loading.takes(path):
             wanted[name] = value

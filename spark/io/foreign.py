@@ -1,0 +1,71 @@
+"""Recordings of files that are no BVH: their motion in SI, and the same motion as a new BVH.
+
+Such formats are read only. What is written back, and what a result is written as, is the BVH.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from spark.errors import ConventionError, FileFormatError
+from spark.io.convention import (
+    HUMAN_HEIGHTS,
+    Convention,
+    Up,
+    given_unit,
+    given_up,
+    infer_unit,
+    infer_up,
+)
+from spark.io.encoding import encode_new
+from spark.io.recording import Recording, in_si
+from spark.motion import Motion
+
+
+def foreign_recording(
+    path: Path,
+    motion: Motion,
+    notes: Sequence[str] = (),
+    *,
+    unit: str | float | None,
+    up: str | None,
+    unit_m: float | None = None,
+    up_axis: Up | None = None,
+    says: str = "as the file says",
+) -> Recording:
+    """The recording of a motion that is in a file's units and axes.
+
+    `unit` and `up` are what the user gives; `unit_m` and `up_axis` what the file or its format
+    `says`. What neither tells is inferred. Raises `ConventionError` where it can't be, and
+    `FileFormatError` where numbers are not finite.
+    """
+    found = list(notes)
+    values = (motion.root_pos, motion.rotations, motion.skeleton.offsets)
+    if not all(np.isfinite(value).all() for value in values):
+        raise FileFormatError(path, None, "holds numbers that are not finite")
+    try:
+        if unit is not None:
+            unit_m = given_unit(unit)
+        elif unit_m is not None:
+            found.append(f"unit {100 * unit_m:.4g} cm, {says}")
+        else:
+            unit_m, more = infer_unit(motion)
+            found += more
+        if up is not None:
+            up_axis = given_up(up)
+        elif up_axis is not None:
+            found.append(f"up axis {up_axis}, {says}")
+        else:
+            up_axis, more = infer_up(motion)
+            found += more
+    except ConventionError as error:
+        raise ConventionError(f"{path}: {error}") from error
+    convention = Convention(unit_m, up_axis)
+    motion = in_si(motion, convention)
+    tall = float(np.ptp(motion.skeleton.rest_positions, axis=0).max())
+    if unit is None and not HUMAN_HEIGHTS[0] < tall < HUMAN_HEIGHTS[1]:
+        found.append(f"{tall:.3g} m is no human's height; check, and give --unit")
+    bvh = replace(encode_new(motion, unit=unit_m, up=up_axis), path=path)
+    return Recording(bvh, motion, convention, tuple(found))
