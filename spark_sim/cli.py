@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 from spark.errors import SparkSimError
 from spark_sim import console
 from spark_sim.commands import (
+    batch,
     evaluate,
     export,
     inspect,
@@ -26,7 +27,7 @@ from spark_sim.commands import (
 )
 
 COMMANDS = (
-    *(retarget, robots, inspect, report, play, mjcf, sample),
+    *(retarget, batch, robots, inspect, report, play, mjcf, sample),
     *(prepare, train, evaluate, export),
 )
 

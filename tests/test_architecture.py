@@ -30,6 +30,7 @@ ROOMS = (
     ("spark_sim.loading",),
     ("spark_sim.describe", "spark_sim.live", "spark_sim.simulation"),
     ("spark_sim.api",),
+    ("spark_sim.shelf",),
     ("spark_sim.commands",),
     ("tests.helpers",),
     ("scripts",),

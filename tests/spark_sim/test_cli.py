@@ -19,7 +19,7 @@ import spark_sim
 GOLDENS = Path(__file__).parent / "goldens"
 CHECKOUT = Path(__file__).parents[2]
 COMMANDS = (
-    *("retarget", "robots", "inspect", "report", "play", "mjcf", "sample"),
+    *("retarget", "batch", "robots", "inspect", "report", "play", "mjcf", "sample"),
     *("prepare", "train", "evaluate", "export"),
 )
 WALK, TARGET = "walker_walk.bvh", "dancer_wave.bvh"

@@ -1,0 +1,162 @@
+"""`spark-sim batch`: a shelf of motions onto several bodies."""
+
+import os
+import re
+import sys
+import time
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, get_args
+
+from robots.formats import FORMATS
+from spark_sim.choices import Method
+from spark_sim.commands.options import add_corrections, add_force, add_json, add_robot_motion
+
+if TYPE_CHECKING:
+    from spark_sim.shelf.batch import Backend
+
+SUMMARY = "put a shelf of motions on several bodies"
+USAGE = "IN... --to TARGET [--to TARGET] -o OUT [options]"
+DESCRIPTION = """\
+Put every motion below each IN on every TARGET, and measure each result against
+its source. OUT gets a folder for each target, with the tree of folders below
+IN, and manifest.jsonl, a line for each result: hashes, options, report, notes,
+error.
+
+Run it again and it makes what is missing or changed, and nothing else. It may
+be killed at any moment. A file that fails does not stop the others."""
+EXAMPLES = """\
+examples:
+  spark-sim batch mocap/ --to g1 --to t1 -o out/
+  spark-sim batch mocap/ --to g1 -o out/ --format mjlab
+  spark-sim batch mocap/ --to g1 -o out/ --mirror
+  spark-sim batch mocap/ --to g1 -o out/ --keep "implausible < 5%"
+  spark-sim batch mocap/ --to g1 -o out/ --shard 3/8   # the third of 8 machines
+"""
+_SILENT = 30.0  # [s] between lines of progress where there is no terminal
+
+
+def configure(parser: ArgumentParser) -> None:
+    parser.add_argument("sources", metavar="IN", nargs="+", help="folders of motions, or motions")
+    parser.add_argument(
+        "--to",
+        metavar="TARGET",
+        required=True,
+        action="append",
+        help="a body to put the motions on, as in `spark-sim retarget`; may be given several times",
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="OUT", required=True, help="the folder of the results"
+    )
+    parser.add_argument(
+        "--format",
+        choices=tuple(FORMATS),
+        metavar="NAME",
+        help=f"of robots' motions: {', '.join(FORMATS)} (default npz)",
+    )
+    parser.add_argument("--method", choices=get_args(Method), default="spark", help="see retarget")
+    parser.add_argument(
+        "--keep",
+        metavar="CONDITION",
+        help="write only results that meet it: measures of the report, compared with numbers "
+        "(< <= > >=), joined by and, or, not and parentheses",
+    )
+    parser.add_argument(
+        "--mirror", action="store_true", help="make each motion with left and right exchanged, too"
+    )
+    parser.add_argument(
+        "--workers", metavar="N", type=int, help="number of processes (default: one a core)"
+    )
+    parser.add_argument(
+        "--shard",
+        metavar="I/N",
+        type=_shard,
+        help="do the I-th of N shares (1/N to N/N): for array jobs on several machines",
+    )
+    add_force(parser)
+    add_json(parser, "what the run came to")
+    add_corrections(parser, "every IN")
+    add_robot_motion(parser, "every IN", "source-")
+
+
+def run(args: Namespace) -> int:
+    from spark_sim import console
+    from spark_sim.shelf.batch import Batch, locked
+    from spark_sim.shelf.keep import parse
+    from spark_sim.shelf.plan import Options, plan
+    from spark_sim.shelf.work import target_clip
+
+    out = Path(args.output)
+    given = {
+        "unit": args.unit,
+        "up": args.up,
+        "roles": args.map,
+        "robot": args.source_robot,
+        "quat": args.source_quat,
+        "fps": args.source_fps,
+    }
+    reading = {name: value for name, value in given.items() if value is not None}
+    options = Options(args.method, args.format, reading=reading)
+    keep = None if args.keep is None else parse(args.keep)
+    jobs = plan(args.sources, args.to, out, options, mirror=args.mirror)
+    for target in args.to:
+        console.notes(target, target_clip(target).notes)
+    shard = ""
+    if args.shard is not None:
+        number, count = args.shard
+        jobs, shard = jobs[number - 1 :: count], f"{number}of{count}"
+    start = time.perf_counter()
+    with locked(out, shard), console.meter(len(jobs), 0, "batch") as tell:
+        batch = Batch(out, keep=keep, shard=shard, force=args.force)
+        frames, told = 0, start
+        for count, (job, entries) in enumerate(batch.run(jobs, _backend(args)), 1):
+            if error := entries[0]["error"]:
+                console.error(error if str(job.source) in error else f"{job.source}: {error}")
+            now = time.perf_counter()
+            frames += sum(entry.get("frames", 0) for entry in entries)
+            tell(count, {"frames/s": frames / (now - start)})
+            if now - told > _SILENT and not sys.stderr.isatty():
+                left = (now - start) / count * (len(jobs) - count)
+                console.note(
+                    f"{count} of {len(jobs)} files, {frames / (now - start):,.0f} frames/s, "
+                    f"{left / 60:.0f} min left"
+                )
+                told = now
+    tally = batch.tally
+    if args.json:
+        console.emit_json(
+            {
+                "output": str(out),
+                "jobs": len(jobs),
+                "written": tally.written,
+                "unchanged": tally.unchanged,
+                "left_out": tally.left_out,
+                "failed": tally.failed,
+                "reasons": [{"source": s, "error": error} for s, error in tally.reasons],
+                "seconds": time.perf_counter() - start,
+            }
+        )
+    else:
+        console.say(f"{out}: {tally.sentence()}")
+    return 2 if tally.failed else 0
+
+
+def _backend(args: Namespace) -> "Backend":
+    """Who does the jobs: processes of this machine."""
+    from functools import partial
+
+    from spark.errors import ConventionError
+    from spark_sim.shelf.processes import in_processes
+
+    workers = len(os.sched_getaffinity(0)) if args.workers is None else args.workers
+    if workers < 1:
+        raise ConventionError(f"--workers {workers}: expected 1 or more")
+    return partial(in_processes, workers=workers)
+
+
+def _shard(text: str) -> tuple[int, int]:
+    """`3/8` is the third of eight."""
+    match = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text.strip())
+    if match is None or not 1 <= int(match[1]) <= int(match[2]):
+        raise ArgumentTypeError(f"{text!r} is no share; expected I/N with I from 1 to N, as 3/8")
+    return int(match[1]), int(match[2])

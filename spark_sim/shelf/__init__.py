@@ -1,0 +1,1 @@
+"""A shelf of motions: many files onto many bodies, and what is worth keeping of them."""

@@ -1,0 +1,261 @@
+"""A batch: what is missing or changed is made, and each result takes its name when it is whole."""
+
+import fcntl
+import os
+import shutil
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import TypeAlias
+
+from robots.model.known import model_sha256
+from robots.registry import find, is_robot
+from spark.errors import OutputError
+from spark_sim.shelf.keep import Keep
+from spark_sim.shelf.manifest import SCHEMA, Entry, Manifest, is_still, sha256
+from spark_sim.shelf.plan import Job
+from spark_sim.shelf.processes import Died
+from spark_sim.shelf.work import Done, work
+
+Backend: TypeAlias = Callable[
+    [Callable[[Job], Done], Iterable[Job]], Iterator[tuple[Job, Done | Died]]
+]
+"""Does jobs, in any order; `spark_sim.shelf.processes.in_processes` is one."""
+
+
+@dataclass
+class Tally:
+    """What a run came to: how many motions of each kind, and why those that failed did."""
+
+    written: int = 0
+    unchanged: int = 0
+    left_out: int = 0
+    reasons: list[tuple[str, str]] = field(default_factory=list)
+
+    @property
+    def failed(self) -> int:
+        """How many jobs failed."""
+        return len(self.reasons)
+
+    def sentence(self) -> str:
+        """`11 written, 1 unchanged, 1 failed: walk.bvh: is empty`."""
+        counts = {
+            "written": self.written,
+            "unchanged": self.unchanged,
+            "left out by --keep": self.left_out,
+            "failed": self.failed,
+        }
+        words = ", ".join(f"{n} {what}" for what, n in counts.items() if n) or "nothing to do"
+        kinds = Counter(reason for _, reason in self.reasons)
+        first = {reason: source for source, reason in reversed(self.reasons)}
+        why = [
+            f"{first[reason]}: {reason}" + (f" (and {n - 1} more)" if n > 1 else "")
+            for reason, n in kinds.most_common(3)
+        ]
+        if len(kinds) > 3:
+            why.append(f"and {len(kinds) - 3} other reasons, in the manifest")
+        return words + (f": {'; '.join(why)}" if why else "")
+
+
+class Batch:
+    """A folder of results with its manifest, for the time of one run.
+
+    `shard` is the name of one of several runs that share the folder.
+    """
+
+    def __init__(
+        self, folder: Path, *, keep: Keep | None = None, shard: str = "", force: bool = False
+    ) -> None:
+        self.folder, self.keep, self.force = folder, keep, force
+        self.manifest = Manifest(folder, shard)
+        self.manifest.tidy()
+        self.parts = folder / (f".part-{shard}" if shard else ".part")
+        self.tally = Tally()
+        self._version = version("spark-sim")
+        self._written_by = {
+            output: entry["job"]
+            for entry in self.manifest
+            for output in ([entry["output"]] if entry["status"] == "written" else entry["stale"])
+        }
+
+    def run(self, jobs: Sequence[Job], backend: Backend) -> Iterator[tuple[Job, list[Entry]]]:
+        """Do what is missing or changed, the largest files first; yields each job as it is done,
+        with its lines of the manifest. What is unchanged comes first."""
+        shutil.rmtree(self.parts, ignore_errors=True)
+        targets = {job.target: target_sha256(job.target) for job in jobs}
+        missing = []
+        for job in jobs:
+            if self._is_done(job, targets[job.target]):
+                yield job, self._decided_again(job)
+            elif taken := self._taken(job):
+                yield job, self._commit(job, targets[job.target], Done((), {}, 0.0, taken))
+            else:
+                missing.append(job)
+        missing.sort(key=lambda job: (-_size(job.source), job.source, job.target))
+        try:
+            for job, done in backend(partial(_work_below, self.parts), missing):
+                if isinstance(done, Died):
+                    done = Done((), {}, 0.0, str(done))
+                yield job, self._commit(job, targets[job.target], done)
+        finally:
+            shutil.rmtree(self.parts, ignore_errors=True)
+            self.manifest.tidy()
+
+    def _is_done(self, job: Job, target: str) -> bool:
+        """Whether the manifest's lines of a job, and its files, are what it would make again."""
+        entries = self.manifest.of(job.output.as_posix())
+        return (
+            bool(entries)
+            and len(entries) == entries[0]["pieces"]
+            and all(
+                entry["options"] == job.record
+                and entry["target_sha256"] == target
+                and entry["version"] == self._version
+                and self._is_there(entry)
+                for entry in entries
+            )
+            and is_still(job.source, entries[0], "source")
+        )
+
+    def _is_there(self, entry: Entry) -> bool:
+        if entry["status"] == "written":
+            return is_still(self.folder / entry["output"], entry, "output")
+        return entry["status"] == "left out" and not self._keeps(entry)
+
+    def _keeps(self, entry: Entry) -> bool:
+        return self.keep is None or self.keep(entry["report"])
+
+    def _decided_again(self, job: Job) -> list[Entry]:
+        """The lines of a job that is done, under the `keep` of this run: what was kept may not be
+        any longer."""
+        entries = self.manifest.of(job.output.as_posix())
+        fallen = [e for e in entries if e["status"] == "written" and not self._keeps(e)]
+        if fallen:
+            for entry in fallen:
+                (self.folder / entry["output"]).unlink(missing_ok=True)
+            entries = [{**e, "status": "left out"} if e in fallen else e for e in entries]
+            now = _now()
+            self.manifest.add([{**entry, "finished": now} for entry in entries])
+        kept = sum(entry["status"] == "written" for entry in entries)
+        self.tally.unchanged += kept
+        self.tally.left_out += len(entries) - kept
+        return entries
+
+    def _taken(self, job: Job) -> str | None:
+        """What is wrong where a file that the batch did not write has the name of a result."""
+        return None if self._is_free(job.output, job) else _exists(self.folder / job.output)
+
+    def _is_free(self, output: Path, job: Job) -> bool:
+        owner = self._written_by.get(output.as_posix())
+        if owner is not None:
+            return owner == job.output.as_posix()
+        return self.force or not os.path.lexists(self.folder / output)
+
+    def _commit(self, job: Job, target: str, done: Done) -> list[Entry]:
+        """Give the results of a job their names, and the manifest its lines."""
+        ours = {o for o, job_of in self._written_by.items() if job_of == job.output.as_posix()}
+        outputs = [job.output.with_name(piece.part.name) for piece in done.pieces]
+        error = done.error
+        if taken := [output for output in outputs if not self._is_free(output, job)]:
+            error = _exists(self.folder / taken[0])
+        entry: Entry = {
+            "schema": SCHEMA,
+            "status": "failed",
+            "job": job.output.as_posix(),
+            "output": None,
+            "source": str(job.source),
+            "source_from_here": os.path.relpath(job.source, self.folder),
+            "target": job.target,
+            "target_sha256": target,
+            "options": job.record,
+            "version": self._version,
+            "finished": _now(),
+            "seconds": round(done.seconds, 3),
+            "pieces": 1,
+            "error": error,
+            **done.source,
+        }
+        if error is not None:
+            # What was made before stays, and stays the batch's own.
+            entries = [entry | {"stale": sorted(ours)}]
+            self.manifest.add(entries)
+            self.tally.reasons.append((str(job.source), _reason(error, job.source)))
+            return entries
+        entries = [
+            entry
+            | {"output": output.as_posix(), "stale": [], "pieces": len(outputs)}
+            | dict(piece.facts)
+            for output, piece in zip(outputs, done.pieces, strict=True)
+        ]
+        for each in entries:
+            each["status"] = "written" if self._keeps(each) else "left out"
+        kept = {each["output"] for each in entries if each["status"] == "written"}
+        # The order matters where a kill comes between: a line without its file is made again.
+        for old in ours - kept:
+            (self.folder / old).unlink(missing_ok=True)
+            del self._written_by[old]
+        self.manifest.add(entries)
+        for output, piece in zip(outputs, done.pieces, strict=True):
+            if output.as_posix() in kept:
+                (self.folder / output).parent.mkdir(parents=True, exist_ok=True)
+                piece.part.replace(self.folder / output)
+                self._written_by[output.as_posix()] = job.output.as_posix()
+        shutil.rmtree(self.parts / job.output, ignore_errors=True)
+        self.tally.written += len(kept)
+        self.tally.left_out += len(entries) - len(kept)
+        return entries
+
+
+def _work_below(parts: Path, job: Job) -> Done:
+    return work(job, parts / job.output)
+
+
+def target_sha256(target: str) -> str:
+    """Of a robot's model, or of a character's file."""
+    return model_sha256(find(target)) if is_robot(target) else sha256(Path(target))
+
+
+@contextmanager
+def locked(folder: Path, shard: str = "") -> Iterator[None]:
+    """One run at a time in a folder, or in a shard of it; the lock ends with the process.
+
+    Raises `OutputError` where another run has it, or the folder can't be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = (folder / (f".lock-{shard}" if shard else ".lock")).open("w")
+    except OSError as error:
+        raise OutputError(f"{folder}: can't be written ({error.strerror})") from error
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise OutputError(
+                f"{folder}: another batch is writing here; wait for it, or give another folder"
+            ) from error
+        yield
+
+
+def _reason(error: str, source: Path) -> str:
+    """An error without the file's own name, so that files that fail alike are counted together."""
+    return error.removeprefix(f"{source}: ")
+
+
+def _exists(path: Path) -> str:
+    return f"{path}: exists, and this batch did not write it; move it, or overwrite with --force"
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError:
+        return 0
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="microseconds")

@@ -1,0 +1,146 @@
+"""What a batch has to do: one job for each source, target and side."""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from robots.formats import FORMATS, SUFFIXES
+from robots.registry import is_robot
+from spark.errors import ConventionError, FileFormatError, OutputError
+from spark.io.reading import SUFFIXES as CHARACTERS
+from spark.io.reading import motion_files
+from spark_sim.choices import Format, Method
+
+
+@dataclass(frozen=True)
+class Options:
+    """What is done with every motion.
+
+    `cut` [s] is the longest that a piece may be. `reading` and `target` are what is given of the
+    sources and of the targets, as `spark_sim.load` takes it.
+    """
+
+    method: Method = "spark"
+    format: Format | None = None
+    fps: float | None = None
+    cut: float | None = None
+    reading: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Job:
+    """A motion onto a target, as it is or `mirrored`.
+
+    `output` is the file of the whole motion, relative to the batch's folder; of a motion that is
+    cut, each piece has a file named after it.
+    """
+
+    source: Path
+    target: str
+    output: Path
+    mirrored: bool
+    options: Options
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The options as the manifest has them: the same options make the same file."""
+        options = self.options
+        return {
+            "method": options.method,
+            "format": options.format,
+            "fps": options.fps,
+            "cut": options.cut,
+            "mirrored": self.mirrored,
+            "reading": {name: str(value) for name, value in sorted(options.reading.items())},
+        }
+
+
+def plan(
+    sources: Sequence[str],
+    targets: Sequence[str],
+    out: Path,
+    options: Options,
+    *,
+    mirror: bool = False,
+) -> list[Job]:
+    """Every motion below the sources onto every target: `OUT/TARGET/` holds the tree of folders.
+
+    Below several sources each tree stands in a folder of the source's own name. What lies in `out`
+    is no source. Raises `OutputError` where two results would have one name.
+    """
+    suffixes = CHARACTERS if "robot" not in options.reading else (*CHARACTERS, *SUFFIXES)
+    found = _found(sources, out, suffixes)
+    folders = _folders(targets)
+    jobs: list[Job] = []
+    for source, below in found:
+        for target, folder in zip(targets, folders, strict=True):
+            ending = _ending(target, options.format)
+            jobs += [
+                Job(source, target, Path(folder, f"{below}{side}{ending}"), bool(side), options)
+                for side in (("", "_mirrored") if mirror else ("",))
+            ]
+    _refuse_clashes(jobs)
+    return jobs
+
+
+def _ending(target: str, format: Format | None) -> str:
+    """The ending of results on a target. Raises `OutputError` where the format does not go."""
+    if is_robot(target):
+        return FORMATS[format or "npz"]
+    if format is not None:
+        raise OutputError(f"--format is for robots; {target} is a character")
+    return ".bvh"
+
+
+def _found(sources: Sequence[str], out: Path, suffixes: tuple[str, ...]) -> list[tuple[Path, str]]:
+    """The files to read, and the name of each result without its ending."""
+    folders = [Path(source) for source in sources if Path(source).is_dir()]
+    made, found = out.resolve(), []
+    for source in map(Path, sources):
+        own = Path(source.resolve().name) if len(folders) > 1 else Path()
+        if not source.is_dir():
+            if not source.is_file():
+                raise FileFormatError(source, None, "no such file or folder")
+            found.append((source, Path()))
+            continue
+        paths = [
+            path
+            for path in motion_files(source, suffixes)
+            if not path.resolve().is_relative_to(made)
+        ]
+        if not paths:
+            raise FileFormatError(
+                source, None, f"holds no motion to read outside {out}; expected {suffixes}"
+            )
+        found += [(path, own / path.parent.relative_to(source)) for path in paths]
+    named: list[tuple[Path, str]] = []
+    taken: set[str] = set()
+    for path, below in found:
+        # The second of walk.bvh and walk.fbx keeps its ending.
+        stem = str(below / path.stem)
+        name = str(below / path.name) if stem in taken else stem
+        taken.add(stem)
+        named.append((path, name))
+    return named
+
+
+def _folders(targets: Sequence[str]) -> list[str]:
+    """A folder's name for each target: its own, without folders and ending."""
+    names = [Path(target).stem for target in targets]
+    for name in names:
+        if names.count(name) > 1:
+            both = " and ".join(t for t, n in zip(targets, names, strict=True) if n == name)
+            raise ConventionError(f"{both} would both be written to {name}/; rename one")
+    return names
+
+
+def _refuse_clashes(jobs: Sequence[Job]) -> None:
+    outputs: dict[str, Job] = {}
+    for job in jobs:
+        other = outputs.setdefault(os.path.normcase(job.output), job)
+        if other is not job:
+            raise OutputError(
+                f"{other.source} and {job.source} would both be written to {job.output}; rename one"
+            )

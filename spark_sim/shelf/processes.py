@@ -1,0 +1,149 @@
+"""Jobs in processes of this machine. A process that dies takes nothing with it but its own job."""
+
+import os
+import signal
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
+from typing import Any, Generic, TypeVar
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+ATTEMPTS = 2  # a process may be killed for what another needed; twice is the job's own fault
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Died:
+    """What is left of a job whose process ended, `ATTEMPTS` times: the exit code of the last, or
+    the signal that killed it as a negative number."""
+
+    code: int
+
+    def __str__(self) -> str:
+        if self.code >= 0:
+            return f"its process ended with code {self.code}"
+        name = signal.Signals(-self.code).name
+        return f"its process was killed ({name})" + (
+            "; the memory may not suffice: take fewer --workers" if name == "SIGKILL" else ""
+        )
+
+
+def in_processes(
+    work: Callable[[Job], Result], jobs: Iterable[Job], workers: int
+) -> Iterator[tuple[Job, Result | Died]]:
+    """Each job with its result, in the order in which they are done.
+
+    Only as many jobs are taken from `jobs` as there are `workers`, so that memory does not grow
+    with their number. The processes compute on one thread each, and end when this one does,
+    however it ends.
+    """
+    pool: list[_Worker[Job, Result]] = []
+    waiting = iter(jobs)
+    try:
+        with _one_thread():
+            for job in waiting:
+                pool.append(_Worker(work))
+                pool[-1].start(job)
+                if len(pool) == workers:
+                    break
+        while pool:
+            by_pipe = {worker.pipe: worker for worker in pool}
+            for pipe in wait([*by_pipe]):
+                worker = by_pipe[pipe]  # type: ignore[index]
+                done = worker.finish()
+                if done is None:
+                    with _one_thread():
+                        worker.retry()
+                    continue
+                following = next(waiting, None)
+                if following is None:
+                    pool.remove(worker)
+                    worker.end()
+                else:
+                    with _one_thread():
+                        worker.start(following)
+                yield done
+    finally:
+        for worker in pool:
+            worker.end()
+
+
+class _Worker(Generic[Job, Result]):
+    """A process, and the job that it does."""
+
+    def __init__(self, work: Callable[[Job], Result]) -> None:
+        self._work = work
+        self._attempt = 1
+        self._open()
+
+    def _open(self) -> None:
+        context = get_context("spawn")  # a fork would copy locks that other threads hold
+        self.pipe, other = context.Pipe()
+        self._process = context.Process(target=_serve, args=(other, self._work), daemon=True)
+        self._process.start()
+        other.close()
+
+    def start(self, job: Job) -> None:
+        """Do a job, in a new process where the last one died."""
+        if self._process.exitcode is not None:
+            self.end()
+            self._open()
+        self._job, self._attempt = job, 1
+        self._send()
+
+    def finish(self) -> tuple[Job, Result | Died] | None:
+        """The job with its result; None where the process died and the job may be tried again."""
+        try:
+            return self._job, self.pipe.recv()
+        except (EOFError, ConnectionResetError):
+            self._process.join()
+            if self._attempt < ATTEMPTS:
+                return None
+            return self._job, Died(self._process.exitcode or 0)
+
+    def retry(self) -> None:
+        """The same job in another process."""
+        self.end()
+        self._attempt += 1
+        self._open()
+        self._send()
+
+    def end(self) -> None:
+        """End the process, whatever it does."""
+        self.pipe.close()
+        self._process.terminate()
+        self._process.join()
+
+    def _send(self) -> None:
+        with suppress(BrokenPipeError, ConnectionResetError):  # `finish` finds the process dead
+            self.pipe.send(self._job)
+
+
+def _serve(pipe: Connection, work: Callable[[Any], Any]) -> None:
+    """Do what comes through the pipe until it is closed, as it is when the other process ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that gives the jobs
+    while True:
+        try:
+            job = pipe.recv()
+            pipe.send(work(job))
+        except (EOFError, BrokenPipeError, ConnectionResetError):
+            return
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """What starts meanwhile computes on one thread: libraries read this when they are loaded."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

@@ -1,0 +1,152 @@
+"""`spark-sim batch` as a user meets it."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import spark_sim
+from tests.helpers.program import CHECKOUT, Program
+
+
+@pytest.fixture(scope="module")
+def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("samples")
+    spark_sim.sample(folder)
+    return folder
+
+
+@pytest.fixture
+def shelf(samples: Path, tmp_path: Path) -> Path:
+    """A folder with `in/` of two motions in two folders, a broken one, and a target."""
+    (tmp_path / "in" / "sub").mkdir(parents=True)
+    shutil.copy(samples / "walker_squat.bvh", tmp_path / "in")
+    shutil.copy(samples / "walker_wave.bvh", tmp_path / "in" / "sub")
+    shutil.copy(samples / "dancer_walk.bvh", tmp_path / "mutant.bvh")
+    (tmp_path / "in" / "broken.bvh").write_text("no BVH")
+    return tmp_path
+
+
+@pytest.fixture
+def program(shelf: Path) -> Iterator[Program]:
+    with Program(shelf) as program:
+        yield program
+
+
+def lines(out: Path) -> list[dict[str, object]]:
+    return [json.loads(line) for line in (out / "manifest.jsonl").read_text().splitlines()]
+
+
+def test_a_shelf_onto_two_bodies(shelf: Path, program: Program) -> None:
+    """Files as `retarget` writes them, a line for each, and one bad file that stops nothing."""
+    arguments = ("batch", "in", "--to", "robot", "--to", "mutant.bvh", "-o", "out")
+    done = program(*arguments, "--workers", "2")
+    assert done.code == 2
+    assert done.stderr.count("broken.bvh:1: ") == 2
+    *_, last = done.stdout.splitlines()
+    assert last.startswith("out: 4 written, 2 failed: in/broken.bvh: ")
+    found = {p.relative_to(shelf / "out").as_posix() for p in (shelf / "out").rglob("walker_*")}
+    assert found == {
+        *("robot/walker_squat.npz", "robot/sub/walker_wave.npz"),
+        *("mutant/walker_squat.bvh", "mutant/sub/walker_wave.bvh"),
+    }
+    assert program("retarget", "in/walker_squat.bvh", "--to", "robot", "-o", "alone.npz").code == 0
+    alone = (shelf / "alone.npz").read_bytes()
+    assert alone == (shelf / "out" / "robot" / "walker_squat.npz").read_bytes()
+
+    entries = {entry["job"]: entry for entry in lines(shelf / "out")}
+    assert len(entries) == 6
+    report = program("report", "alone.npz", "--source", "in/walker_squat.bvh", "--json")
+    headline = entries["robot/walker_squat.npz"]["report"]
+    assert isinstance(headline, dict)
+    assert headline["implausible_share"] == json.loads(report.stdout)["implausible_share"]
+    assert entries["robot/broken.npz"]["status"] == "failed"
+
+    again = program(*arguments)
+    assert again.stdout.startswith("out: 4 unchanged, 2 failed: ")
+
+
+def test_mirrored_motions_come_with_the_others(shelf: Path, program: Program) -> None:
+    """The robot's squat is as good in the mirror: its left knee bends as the right one did."""
+    (shelf / "in" / "broken.bvh").unlink()
+    done = program("batch", "in/sub", "--to", "robot", "-o", "out", "--mirror", "--workers", "1")
+    assert done.code == 0, done.stderr
+    one, other = (np.load(path) for path in sorted((shelf / "out" / "robot").iterdir()))
+    names = one["joint_names"].tolist()
+    left, right = names.index("left_elbow"), names.index("right_elbow")
+    waves = [np.ptp(take["qpos"][:, 7:], axis=0) for take in (one, other)]
+    assert max(waves[0][[left, right]]) > 2 * min(waves[0][[left, right]])
+    assert waves[0][left] == pytest.approx(waves[1][right], abs=0.05)
+    assert waves[0][right] == pytest.approx(waves[1][left], abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--to", "no_such_robot"), "no robot is called 'no_such_robot'"),
+        (("--to", "robot", "--keep", "speed < 3"), "no measure is called 'speed'"),
+        (("--to", "robot", "--shard", "9/8"), "'9/8' is no share"),
+        (("--to", "mutant.bvh", "--format", "mjlab"), "is a character"),
+        (("--to", "robot", "--workers", "0"), "expected 1 or more"),
+    ],
+)
+def test_mistakes_are_told_before_the_work(
+    shelf: Path, program: Program, options: tuple[str, ...], says: str
+) -> None:
+    done = program("batch", "in", *options, "-o", "out")
+    assert done.code == 2
+    assert says in done.stderr
+    assert not list((shelf / "out").rglob("*.npz"))
+
+
+def test_shares_are_the_whole(shelf: Path, program: Program) -> None:
+    arguments = ("batch", "in", "--to", "robot", "-o", "out", "--method", "copy", "--workers", "1")
+    for share in ("1/2", "2/2"):
+        program(*arguments, "--shard", share)
+    assert len(list((shelf / "out").rglob("*.npz"))) == 2
+    done = program(*arguments)
+    assert done.stdout.startswith("out: 2 unchanged, 1 failed")
+
+
+def test_killed_its_processes_end_and_a_second_run_goes_on(shelf: Path, program: Program) -> None:
+    arguments = ("batch", "in", "--to", "robot", "--method", "copy", "--workers", "2")
+    process = subprocess.Popen(
+        [sys.executable, "-m", "spark_sim", *arguments, "-o", "out"],
+        cwd=shelf,
+        env=os.environ | {"PYTHONPATH": str(CHECKOUT)},
+        stderr=subprocess.DEVNULL,
+    )
+    children: set[int] = set()
+    while process.poll() is None and not list((shelf / "out").glob("robot/*.npz")):
+        children |= children_of(process.pid)
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert children
+    deadline = time.monotonic() + 60
+    while left := {pid for pid in children if Path(f"/proc/{pid}").exists()}:
+        assert time.monotonic() < deadline, left
+        time.sleep(0.05)
+    done = program(*arguments, "-o", "out")
+    assert "1 failed" in done.stdout
+    assert not list((shelf / "out").glob(".part*"))
+    program(*arguments, "-o", "whole")
+    for path in (shelf / "whole" / "robot").rglob("*.npz"):
+        other = shelf / "out" / path.relative_to(shelf / "whole")
+        assert other.read_bytes() == path.read_bytes()
+
+
+def children_of(pid: int) -> set[int]:
+    try:
+        text = Path(f"/proc/{pid}/task/{pid}/children").read_text()
+    except OSError:
+        return set()
+    return set(map(int, text.split()))
