@@ -24,3 +24,14 @@ LABELS = {
     "ground_truth_mse": "ground-truth MSE",
     "ground_truth_mpjpe": "ground-truth MPJPE",
 }
+
+UNITS = {
+    **dict.fromkeys(LABELS, "%"),  # shares of frames, contacts or height
+    "root_drift": "cm",
+    "base_acceleration": "m/s²",
+    "joint_speed": "rad/s",
+    "joint_jerk": "rad/s³",
+    "ground_truth_mse": "1e-4",
+    "ground_truth_mpjpe": "% of height",
+}
+"""The unit of each measure in text and tables."""

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import TypedDict
 
 from sim.report.clip_metrics import ClipMetrics
-from sim.report.names import FLAGS
+from sim.report.names import FLAGS, UNITS
 from sim.report.result import Result
 
 
@@ -31,19 +31,19 @@ def shares(clip: ClipMetrics) -> dict[str, float | None]:
     }
 
 
-RATES: dict[str, tuple[str, Callable[[ClipMetrics], float]]] = {
-    "base_acceleration": ("m/s²", lambda clip: clip.base_acceleration_p99),
-    "joint_speed": ("rad/s", lambda clip: float(clip.joint_speed.max(initial=0.0))),
-    "joint_jerk": ("rad/s³", lambda clip: clip.jerk_rms),
+RATES: dict[str, Callable[[ClipMetrics], float]] = {
+    "base_acceleration": lambda clip: clip.base_acceleration_p99,
+    "joint_speed": lambda clip: float(clip.joint_speed.max(initial=0.0)),
+    "joint_jerk": lambda clip: clip.jerk_rms,
 }
-"""The measures of how fast the base and the joints move: unit and value."""
+"""The measures of how fast the base and the joints move."""
 
 
 def source_rate(result: Result, measure: str) -> float | None:
     """The source's value of one of `RATES`; of the base scaled by the hip heights' ratio."""
     if result.source is None:
         return None
-    value = RATES[measure][1](result.source)
+    value = RATES[measure](result.source)
     return value * result.scale if measure == "base_acceleration" else value
 
 
@@ -58,22 +58,18 @@ def rows(result: Result) -> list[Row]:
         _row(
             "implausible",
             100 * result.implausible,
-            "%",
             None if source is None else 100 * source.implausible_share,
         ),
-        *(_row(name, value, "%", theirs.get(name)) for name, value in shares(clip).items()),
-        _row("missed_contact", None if recall is None else 100 * (1 - recall), "%"),
-        _row("invented_contact", None if precision is None else 100 * (1 - precision), "%"),
-        _row("swing_clearance", None if swing is None else 100 * abs(1 - swing.clearance), "%"),
-        _row("root_drift", None if drift is None else 100 * float(drift.distance.max()), "cm"),
-        *(
-            _row(name, value(clip), unit, source_rate(result, name))
-            for name, (unit, value) in RATES.items()
-        ),
-        _row("ground_truth_mse", None if truth is None else 1e4 * truth.mse, "1e-4"),
-        _row("ground_truth_mpjpe", None if truth is None else truth.mpjpe, "% of height"),
+        *(_row(name, value, theirs.get(name)) for name, value in shares(clip).items()),
+        _row("missed_contact", None if recall is None else 100 * (1 - recall)),
+        _row("invented_contact", None if precision is None else 100 * (1 - precision)),
+        _row("swing_clearance", None if swing is None else 100 * abs(1 - swing.clearance)),
+        _row("root_drift", None if drift is None else 100 * float(drift.distance.max())),
+        *(_row(name, value(clip), source_rate(result, name)) for name, value in RATES.items()),
+        _row("ground_truth_mse", None if truth is None else 1e4 * truth.mse),
+        _row("ground_truth_mpjpe", None if truth is None else truth.mpjpe),
     ]
 
 
-def _row(measure: str, value: float | None, unit: str, source: float | None = None) -> Row:
-    return {"measure": measure, "value": value, "unit": unit, "source": source}
+def _row(measure: str, value: float | None, source: float | None = None) -> Row:
+    return {"measure": measure, "value": value, "unit": UNITS[measure], "source": source}

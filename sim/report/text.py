@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sim.report.clip_metrics import ClipMetrics
-from sim.report.names import LABELS
+from sim.report.names import LABELS, UNITS
 from sim.report.palette import BOLD, DIM, TERMINAL, grade
 from sim.report.result import Finding, Result
 from sim.report.table import RATES, shares, source_rate
@@ -112,7 +112,7 @@ def details(result: Result) -> Iterator[tuple[str, str]]:
             f"root-relative {truth.relative_mse:.2g}",
         )
     for measure, kind in _RATE_KINDS.items():
-        unit, value = RATES[measure]
+        unit, value = UNITS[measure], RATES[measure]
         theirs = source_rate(result, measure)
         scaled = ", scaled" if measure == "base_acceleration" else ""
         beside = "" if theirs is None else f"; source {theirs:.0f}{scaled}"

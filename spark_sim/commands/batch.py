@@ -20,8 +20,8 @@ USAGE = "IN... --to TARGET [--to TARGET] -o OUT [options]"
 DESCRIPTION = """\
 Put every motion below each IN on every TARGET, and measure each result against
 its source. OUT gets a folder for each target, with the tree of folders below
-IN, and manifest.jsonl, a line for each result: hashes, options, report, notes,
-error.
+IN, and manifest.jsonl: a line for each result, with hashes, options, report,
+notes and error.
 
 Run it again and it makes what is missing or changed, and nothing else. It may
 be killed at any moment. A file that fails does not stop the others."""
@@ -31,7 +31,7 @@ examples:
   spark-sim batch mocap/ --to g1 -o out/ --format mjlab
   spark-sim batch mocap/ --to g1 -o out/ --mirror
   spark-sim batch mocap/ --to g1 -o out/ --keep "implausible < 5%"
-  spark-sim batch mocap/ --to g1 -o out/ --shard 3/8   # the third of 8 machines
+  spark-sim batch mocap/ --to g1 -o out/ --shard 3/8  # the third of 8 machines
 """
 _SILENT = 30.0  # [s] between lines of progress where there is no terminal
 

@@ -3,34 +3,27 @@
 import math
 from typing import TYPE_CHECKING, Final
 
+from sim.report.names import UNITS
+
 if TYPE_CHECKING:
     from sim.report import Report
 
-SCALES: Final = {"%": 0.01, "cm": 0.01, "rad/s": 1.0, "rad/s³": 1.0}
-SUFFIXES: Final = {"%": "share", "cm": "m", "rad/s": "rad_s", "rad/s³": "rad_s3"}
+MEASURES: Final = tuple(name for name in UNITS if not name.startswith("ground_truth"))
+"""The measures of a motion and its source, in the report's order; less is better in all."""
 
-UNITS: Final = {
-    "implausible": "%",
-    "penetration": "%",
-    "floating": "%",
-    "skating": "%",
-    "root_wrench": "%",
-    "joint_limit": "%",
-    "at_limit": "%",
-    "self_penetration": "%",
-    "balance": "%",
-    "missed_contact": "%",
-    "invented_contact": "%",
-    "root_drift": "cm",
-    "joint_speed": "rad/s",
-    "joint_jerk": "rad/s³",
+_SI: Final = {
+    "%": ("share", 0.01),
+    "cm": ("m", 0.01),
+    "m/s²": ("m_s2", 1.0),
+    "rad/s": ("rad_s", 1.0),
+    "rad/s³": ("rad_s3", 1.0),
 }
-"""The measures of a motion and its source, in the report's order and units; less is better."""
+"""What a measure of a unit is called in SI, and how many of that it is."""
 
 
 def key(measure: str) -> str:
     """The name of a measure in JSON and tables, with its unit: `implausible_share`."""
-    return f"{measure}_{SUFFIXES[UNITS[measure]]}"
+    return f"{measure}_{_SI[UNITS[measure]][0]}"
 
 
 def headline(report: "Report") -> dict[str, float | None]:
@@ -39,6 +32,6 @@ def headline(report: "Report") -> dict[str, float | None]:
     return {
         key(measure): None
         if (value := values[measure]) is None or not math.isfinite(value)
-        else value * SCALES[unit]
-        for measure, unit in UNITS.items()
+        else value * _SI[UNITS[measure]][1]
+        for measure in MEASURES
     }

@@ -14,8 +14,9 @@ from difflib import get_close_matches
 from operator import ge, gt, le, lt
 from typing import Final, NoReturn
 
+from sim.report.names import UNITS
 from spark.errors import ConventionError
-from spark_sim.shelf.headline import UNITS, key
+from spark_sim.shelf.headline import MEASURES, key
 
 _COMPARISONS: Final[dict[str, Callable[[float, float], bool]]] = {
     "<": lt,
@@ -23,10 +24,16 @@ _COMPARISONS: Final[dict[str, Callable[[float, float], bool]]] = {
     ">": gt,
     ">=": ge,
 }
-_UNITS: Final = {"%": {"%": 0.01}, "cm": {"cm": 0.01, "m": 1.0}, "rad/s": {"rad/s": 1.0, "": 1.0}}
-_UNITS_OF: Final = {**_UNITS, "rad/s³": {"rad/s3": 1.0, "rad/s³": 1.0, "": 1.0}}
+_SCALES: Final = {
+    "%": {"%": 0.01},
+    "cm": {"cm": 0.01, "m": 1.0},
+    "m/s²": {"m/s²": 1.0, "m/s2": 1.0, "": 1.0},
+    "rad/s": {"rad/s": 1.0, "": 1.0},
+    "rad/s³": {"rad/s³": 1.0, "rad/s3": 1.0, "": 1.0},
+}
+"""How a measure of a unit may be given, and how many of its SI unit (`headline`) that is."""
 _TOKEN = re.compile(
-    r"\s*(?:(?P<number>\d+(?:\.\d*)?|\.\d+)\s*(?P<unit>%|rad/s³|rad/s3|rad/s|cm|m)?"
+    r"\s*(?:(?P<number>\d+(?:\.\d*)?|\.\d+)\s*(?P<unit>%|rad/s[³3]?|cm|m(?:/s[²2])?)?"
     r"|(?P<word>[a-z_][\w-]*)|(?P<mark><=|>=|<|>|\(|\)))",
     re.IGNORECASE,
 )
@@ -111,18 +118,20 @@ class _Parser:
     def measure(self) -> str:
         token = self.peek()
         if token is None or not token["word"]:
-            self.fail(f"expected a measure, one of {', '.join(UNITS)}")
+            self.fail(f"expected a measure, one of {', '.join(MEASURES)}")
         name = token["word"].lower().replace("-", "_")
-        if name not in UNITS:
-            near = get_close_matches(name, UNITS, n=1)
-            hint = f"; did you mean {near[0]}?" if near else f"; expected one of {', '.join(UNITS)}"
+        if name not in MEASURES:
+            near = get_close_matches(name, MEASURES, n=1)
+            hint = (
+                f"; did you mean {near[0]}?" if near else f"; expected one of {', '.join(MEASURES)}"
+            )
             self.fail(f"no measure is called {token['word']!r}{hint}")
         self.at = token.end()
         return name
 
     def limit(self, measure: str) -> float:
         token = self.peek()
-        scales = _UNITS_OF[UNITS[measure]]
+        scales = _SCALES[UNITS[measure]]
         if token is None or not token["number"] or (token["unit"] or "").lower() not in scales:
             example = {"%": "5%", "cm": "30cm"}.get(UNITS[measure], "20")
             self.fail(f"{measure} is compared with a number such as {example}")
