@@ -10,12 +10,12 @@ Roles that a map leaves out are inferred. Joints that share a name are told apar
 
 import json
 import re
-import tomllib
 from difflib import get_close_matches
 from pathlib import Path
 
 from spark.errors import FileFormatError, SkeletonError
 from spark.files import write_atomically
+from spark.opening import parse_toml, read_text
 from spark.rig.override import Override, check_override
 from spark.rig.roles import Role, RoleMap
 from spark.skeleton import Skeleton
@@ -49,20 +49,8 @@ def _quoted(value: str | list[str]) -> str:
 def read(path: str | Path, skeleton: Skeleton) -> Override:
     """The map in the file at `path`, for `skeleton`. Raises `FileFormatError` with the line."""
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-        table = tomllib.loads(text)
-    except OSError as error:
-        raise FileFormatError(path, None, f"can't be read ({error.strerror})") from error
-    except UnicodeDecodeError as error:
-        raise FileFormatError(path, None, "is no text; expected TOML in UTF-8") from error
-    except tomllib.TOMLDecodeError as error:
-        found = re.search(r"\(at line (\d+)", str(error))
-        raise FileFormatError(
-            path,
-            int(found[1]) if found else None,
-            f'{error}; expected lines such as pelvis = "Hips"',
-        ) from error
+    text = read_text(path, expected="a map of roles (TOML)")
+    table = parse_toml(path, text, 'lines such as pelvis = "Hips"')
     reader = _Reader(path, text, skeleton)
     roles = {reader.role(key): value for key, value in table.items()}
     override = {role: reader.joints(role, value) for role, value in roles.items()}

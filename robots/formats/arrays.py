@@ -1,8 +1,5 @@
-"""Files of named arrays: npz, read without pickle, and checked."""
+"""Arrays by their names, as files hold them, and checked."""
 
-import io
-import zipfile
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -10,24 +7,7 @@ import numpy as np
 
 from spark.errors import FileFormatError
 
-_MAGIC = (b"PK", b"\x93NUMPY")  # others numpy takes for pickles
-
-
-def read_arrays(path: Path) -> dict[str, np.ndarray]:
-    """All arrays of an npz. Raises `FileFormatError` where it is none, or needs pickle."""
-    try:
-        content = path.read_bytes()
-        if content and not content.startswith(_MAGIC):
-            raise FileFormatError(path, None, "is no npz; expected the motion of a robot")
-        with np.load(io.BytesIO(content), allow_pickle=False) as stored:
-            if not hasattr(stored, "files"):
-                raise FileFormatError(path, None, "is a single array; expected an npz of several")
-            return {name: stored[name] for name in stored.files}
-    except OSError as error:
-        raise FileFormatError(path, None, f"can't be read ({error.strerror or error})") from error
-    except (ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error, MemoryError) as error:
-        what = "is empty" if not path.stat().st_size else f"is no npz ({_first(error)})"
-        raise FileFormatError(path, None, f"{what}; expected the motion of a robot") from error
+_LARGEST = 300_000  # numbers in lists; arrays may have any number
 
 
 def number_array(
@@ -39,9 +19,12 @@ def number_array(
         raise FileFormatError(
             path, None, f"has no {name!r}; it holds {', '.join(map(repr, arrays)) or 'nothing'}"
         )
+    value = arrays[name]
     try:
-        array = np.asarray(arrays[name], dtype=np.float64)
-    except (ValueError, TypeError) as error:
+        if _count(value, depth=len(shape)) > _LARGEST:
+            raise ValueError("more numbers than the file has bytes for")
+        array = np.array(value, dtype=np.float64)
+    except (ValueError, TypeError, OverflowError) as error:
         raise FileFormatError(path, None, f"{name!r} holds no numbers") from error
     fits = len(array.shape) == len(shape) and all(
         want is None or want == have for want, have in zip(shape, array.shape, strict=True)
@@ -55,10 +38,20 @@ def number_array(
 
 def scalar(arrays: Mapping[str, object], name: str, path: Path) -> float:
     """The number `name`, which may be stored as an array of one."""
-    if name in arrays and np.size(np.asarray(arrays[name], dtype=object)) == 1:
-        arrays = {name: np.asarray(arrays[name]).reshape(())}
+    value = arrays.get(name)
+    if isinstance(value, np.ndarray) and value.size == 1:
+        arrays = {name: value.reshape(())}
     return float(number_array(arrays, name, path, ()))
 
 
-def _first(error: BaseException) -> str:
-    return str(error).splitlines()[0] if str(error) else type(error).__name__
+def _count(value: object, depth: int) -> int:
+    """How many numbers a list of lists stands for, or more than `_LARGEST`: one list may stand in
+    it again and again."""
+    if not isinstance(value, list | tuple):
+        return 1
+    count = 0 if depth else _LARGEST + 1
+    for item in value:
+        if count > _LARGEST:
+            break
+        count += _count(item, depth - 1)
+    return count

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from robots.formats import QUATERNIONS, format_of
-from robots.formats.arrays import read_arrays
 from robots.formats.gmr import read_pkl, write_pkl
 from robots.formats.mjlab import read_mjlab, write_mjlab
 from robots.formats.native import is_native, read_npz, write_npz
@@ -12,6 +11,8 @@ from robots.formats.unitree import ORDERS, likely_order, read_csv, write_csv
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from spark.errors import ConventionError, FileFormatError
+from spark.npz import Npz
+from spark.opening import check_regular
 
 
 def write(
@@ -45,15 +46,14 @@ def read(
     file doesn't say is not given, and `FileFormatError` where it is broken.
     """
     suffix = path.suffix.lower()
-    if not path.is_file():
-        raise FileFormatError(path, None, "no such file")
+    check_regular(path, expected="the motion of a robot")
     if suffix == ".csv":
         _need(path, robot, quat, fps)
         assert robot is not None
         assert quat is not None
         assert fps is not None
         return read_csv(path, robot, quat=quat, fps=fps)
-    arrays = read_arrays(path) if suffix == ".npz" else None
+    arrays = Npz(path, expected="the motion of a robot") if suffix == ".npz" else None
     if arrays is not None and is_native(arrays):
         return read_npz(arrays, path, robot)
     if robot is None:

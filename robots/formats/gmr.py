@@ -4,10 +4,8 @@ A dict: `fps`, `root_pos` [m], `root_rot` (xyzw), `dof_pos` [rad] in the order o
 `local_body_pos` (bodies with the root at the origin, unturned) and `link_body_list`, their names.
 """
 
-import io
 import pickle
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,17 +16,9 @@ from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from spark.errors import FileFormatError
 from spark.files import write_atomically
+from spark.plain_pickle import read_plain_pickle
 
 _PROTOCOL = 4  # the newest that stores arrays in a way that all of numpy's versions read
-_ARRAYS = {
-    (f"{package}.{module}", name)
-    for package in ("numpy.core", "numpy._core")
-    for module, name in (
-        ("multiarray", "_reconstruct"),
-        ("multiarray", "scalar"),
-        ("numeric", "_frombuffer"),
-    )
-} | {("numpy", "ndarray"), ("numpy", "dtype")}
 
 
 def write_pkl(motion: RobotMotion, path: Path) -> None:
@@ -53,7 +43,7 @@ def write_pkl(motion: RobotMotion, path: Path) -> None:
 
 def read_pkl(path: Path, robot: Morphology) -> RobotMotion:
     """The motion in `path`. Raises `FileFormatError` where the pickle holds anything but arrays."""
-    entries = _load(path)
+    entries = read_plain_pickle(path, expected="the motion of a robot")
     if not isinstance(entries, dict):
         raise FileFormatError(path, None, f"holds a {type(entries).__name__}; expected a dict")
     pos = number_array(entries, "root_pos", path, (None, 3))
@@ -61,40 +51,3 @@ def read_pkl(path: Path, robot: Morphology) -> RobotMotion:
     angles = number_array(entries, "dof_pos", path, (len(pos), None))
     frame_time = frame_time_of(scalar(entries, "fps", path), path)
     return motion_of(Columns(pos, np.roll(quat, 1, axis=1), angles, frame_time), robot, path)
-
-
-class _ArraysOnly(pickle.Unpickler):
-    """Plain values and numpy's arrays: whatever else is asked for is refused before it runs."""
-
-    def __init__(self, path: Path, data: bytes) -> None:
-        super().__init__(io.BytesIO(data))
-        self.path = path
-
-    def find_class(self, module: str, name: str) -> Any:
-        if (module, name) == ("_codecs", "encode"):  # bytes, in the older protocols
-            return _encode
-        if (module, name) not in _ARRAYS:
-            raise FileFormatError(
-                self.path,
-                None,
-                f"wants to load {module}.{name}, which no motion needs; a pickle can run any "
-                "program, so this one is not read",
-            )
-        return super().find_class(module, name)
-
-
-def _encode(text: str, encoding: str = "latin1") -> bytes:
-    return text.encode("latin1")
-
-
-def _load(path: Path) -> object:
-    try:
-        return _ArraysOnly(path, path.read_bytes()).load()
-    except FileFormatError:
-        raise
-    except OSError as error:
-        raise FileFormatError(path, None, f"can't be read ({error.strerror})") from error
-    except Exception as error:  # broken pickles fail in any way: it is a small machine's program
-        raise FileFormatError(
-            path, None, f"is no pickle of a motion ({type(error).__name__}: {error})"
-        ) from error

@@ -6,6 +6,7 @@ order. The bodies' places settle it: only one reading puts the robot's where the
 """
 
 import io
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -51,7 +52,7 @@ def write_mjlab(motion: RobotMotion, path: Path) -> None:
     write_atomically(path, out.getvalue())
 
 
-def read_mjlab(arrays: dict[str, np.ndarray], path: Path, robot: Morphology) -> RobotMotion:
+def read_mjlab(arrays: Mapping[str, Any], path: Path, robot: Morphology) -> RobotMotion:
     """The motion in the arrays of `path`. Raises `FileFormatError` where its bodies are not the
     robot's."""
     angles = number_array(arrays, "joint_pos", path, (None, len(robot.joint_names)))

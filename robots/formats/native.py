@@ -3,6 +3,7 @@
 import hashlib
 import io
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from robots.model.motion import RobotMotion
 from sim.interpolate import velocities
 from spark.errors import FileFormatError
 from spark.files import write_atomically
+from spark.opening import parse_json
 
 SCHEMA = "spark-sim qpos 1"
 
@@ -62,9 +64,7 @@ def write_npz(motion: RobotMotion, path: Path, *, source: Path | None = None) ->
     write_atomically(path, out.getvalue())
 
 
-def read_npz(
-    arrays: dict[str, np.ndarray], path: Path, robot: Morphology | None = None
-) -> RobotMotion:
+def read_npz(arrays: Mapping[str, Any], path: Path, robot: Morphology | None = None) -> RobotMotion:
     """The motion in the arrays of `path`, on `robot`, or on the one that it names.
 
     A model that has changed since is noted; where it has other joints, `FileFormatError` is raised.
@@ -72,7 +72,7 @@ def read_npz(
     about = _about(arrays, path)
     if robot is None:
         robot = known(_model(about, path))
-    names = arrays.get("joint_names", np.array([])).tolist()
+    names = np.atleast_1d(arrays.get("joint_names", np.array([]))).tolist()
     if names != list(robot.joint_names):
         other = next((n for n in names if n not in robot.joint_names), None)
         differs = f"its joint {other!r} is not there" if other else "the joints differ"
@@ -95,7 +95,7 @@ def read_npz(
     return of_qpos(qpos, robot, frame_time, path, said)
 
 
-def is_native(arrays: dict[str, np.ndarray]) -> bool:
+def is_native(arrays: Mapping[str, Any]) -> bool:
     """Whether an npz is one of ours."""
     return "about" in arrays
 
@@ -104,13 +104,8 @@ def _sha256(path: Path) -> str | None:
     return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None
 
 
-def _about(arrays: dict[str, np.ndarray], path: Path) -> dict[str, Any]:
-    try:
-        about = json.loads(str(arrays["about"]))
-    except (KeyError, ValueError) as error:
-        raise FileFormatError(
-            path, None, "has no JSON under 'about'; expected one of ours"
-        ) from error
+def _about(arrays: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    about = parse_json(path, str(arrays["about"]), "'about'")
     if not isinstance(about, dict) or about.get("schema") != SCHEMA:
         schema = about.get("schema") if isinstance(about, dict) else None
         raise FileFormatError(path, None, f"has the schema {schema!r}; expected {SCHEMA!r}")

@@ -4,7 +4,9 @@
 the seconds between frames: `frame_time` or `dt`.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,12 +19,12 @@ from spark.errors import FileFormatError
 _STEPS = ("frame_time", "dt")
 
 
-def is_plain(arrays: dict[str, np.ndarray]) -> bool:
+def is_plain(arrays: Mapping[str, Any]) -> bool:
     """Whether an npz holds MuJoCo's coordinates."""
     return "qpos" in arrays
 
 
-def read_plain(arrays: dict[str, np.ndarray], path: Path, robot: Morphology) -> RobotMotion:
+def read_plain(arrays: Mapping[str, Any], path: Path, robot: Morphology) -> RobotMotion:
     """The motion on `robot`. Raises `FileFormatError` where its columns are not the robot's, or the
     file has no rate."""
     qpos = number_array(arrays, "qpos", path, (None, None))
@@ -42,7 +44,7 @@ def read_plain(arrays: dict[str, np.ndarray], path: Path, robot: Morphology) -> 
     return of_qpos(qpos, robot, _frame_time(arrays, path), path, notes)
 
 
-def _frame_time(arrays: dict[str, np.ndarray], path: Path) -> float:
+def _frame_time(arrays: Mapping[str, Any], path: Path) -> float:
     if "fps" in arrays:
         return frame_time_of(scalar(arrays, "fps", path), path)
     step = next((name for name in _STEPS if name in arrays), None)

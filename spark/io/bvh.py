@@ -6,7 +6,6 @@ of channel values a frame. Units, axes and Euler angles stay the file's own here
 """
 
 import re
-import stat
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import chain, pairwise
@@ -20,6 +19,7 @@ from spark.files import write_atomically
 from spark.io.bvh_rows import parse_motion
 from spark.io.charset import to_utf8
 from spark.io.scanner import Scanner, shown
+from spark.opening import read_bytes
 from spark.summary import counted, time_span
 
 Vector = tuple[float, float, float]
@@ -182,20 +182,14 @@ def _hierarchy_lines(joints: tuple[BvhJoint, ...]) -> list[str]:
 
 
 def _read(path: Path) -> bytes:
-    try:
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise FileFormatError(path, None, "is not a regular file; expected a BVH file")
-        with path.open("rb") as file:
-            data = file.read(4096)
-            if re.match(rb"(\xef\xbb\xbf)?\s*HIERARCHY", data, re.IGNORECASE):
-                return data + file.read()
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise FileFormatError(path, None, f"can't be read ({reason})") from error
-    if not data.strip():
+    data = read_bytes(path, expected="a BVH file")
+    start = data[:4096]
+    if re.match(rb"(\xef\xbb\xbf)?\s*HIERARCHY", start, re.IGNORECASE):
+        return data
+    if not start.strip():
         raise FileFormatError(path, None, "is empty; expected HIERARCHY and MOTION")
     raise FileFormatError(
-        path, 1, f"starts with {shown(data.split()[0])}; a BVH file starts with HIERARCHY"
+        path, 1, f"starts with {shown(start.split()[0])}; a BVH file starts with HIERARCHY"
     )
 
 

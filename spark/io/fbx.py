@@ -26,6 +26,7 @@ from spark.io.fbx_settings import FbxSettings, read_settings
 from spark.io.recording import Recording, in_si, unique_names
 from spark.kinematics import local_rotations
 from spark.motion import Motion
+from spark.opening import read_bytes
 from spark.rotation import quat_conj, quat_continuous, quat_from_matrix, quat_rotate
 from spark.skeleton import Skeleton
 
@@ -72,10 +73,9 @@ def read_fbx(
 
 def _settings(path: Path) -> FbxSettings:
     try:
-        return read_settings(path.read_bytes())
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise FileFormatError(path, None, f"can't be read ({reason})") from error
+        return read_settings(read_bytes(path, expected="an FBX file"))
+    except (ValueError, OverflowError) as error:
+        raise FileFormatError(path, None, f"has settings that can't be read ({error})") from error
     except ConventionError as error:
         raise ConventionError(f"{path}: {error}") from error
 

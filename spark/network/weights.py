@@ -5,7 +5,6 @@ name encoder and of the training; tensors are named `model.*`, `names.*` and `op
 pickle: reading one runs no code.
 """
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from safetensors import SafetensorError, safe_open
 
 from spark.errors import FileFormatError
 from spark.network.known_bodies import Trunk
+from spark.opening import check_regular, parse_json
 
 FORMAT = "spark-sim checkpoint"
 VERSION = 3
@@ -55,8 +55,7 @@ def read_weights(path: Path) -> Weights:
     """
     if path.is_dir():
         path = path / "checkpoint.safetensors"
-    if not path.is_file():
-        raise FileFormatError(path, None, "no such file; expected a spark-sim checkpoint")
+    check_regular(path, expected="a spark-sim checkpoint")
     try:
         with safe_open(path, framework="np") as file:
             metadata = file.metadata() or {}
@@ -73,7 +72,7 @@ def read_weights(path: Path) -> Weights:
     except (SafetensorError, OSError, TypeError) as error:
         raise FileFormatError(path, None, f"is no safetensors file ({error})") from error
     try:
-        header = json.loads(metadata["config"])
+        header = parse_json(path, metadata["config"], "its header")
         network, names = dict(header["network"]), dict(header["names"])
         settings = dict(header["settings"])
         bodies: list[Trunk] = [

@@ -9,6 +9,7 @@ from safetensors.torch import save
 
 from spark.errors import FileFormatError
 from spark.files import write_atomically
+from spark.opening import check_regular, parse_json
 from spark.training.name_encoder import NameConfig, NameEncoder
 
 FORMAT = "spark-sim names"
@@ -23,8 +24,7 @@ def save_names(encoder: NameEncoder, path: Path) -> None:
 
 def load_names(path: Path) -> NameEncoder:
     """Read what `save_names` wrote, frozen. Raises `FileFormatError` for anything else."""
-    if not path.is_file():
-        raise FileFormatError(path, None, "no such file; expected a name encoder")
+    check_regular(path, expected="a name encoder")
     try:
         with safe_open(path, framework="pt") as file:
             metadata = file.metadata() or {}
@@ -33,7 +33,7 @@ def load_names(path: Path) -> NameEncoder:
                     path, None, f"is {metadata.get('format', 'something else')!r}, not {FORMAT!r}"
                 )
             weights = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
-        encoder = NameEncoder(NameConfig(**json.loads(metadata["config"])))
+        encoder = NameEncoder(NameConfig(**parse_json(path, metadata["config"], "its header")))
         encoder.load_state_dict(weights)
     except (SafetensorError, OSError, KeyError, TypeError, ValueError, RuntimeError) as error:
         reason = str(error).splitlines()[0]

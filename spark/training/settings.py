@@ -1,11 +1,11 @@
 """What a training run is: everything that `spark-sim train` can be told. No torch here."""
 
-import tomllib
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from spark.errors import ConventionError, FileFormatError
+from spark.errors import ConventionError
+from spark.opening import parse_toml, read_text
 
 PRESETS = ("default", "paper", "tiny")
 ABLATIONS = ("share", "mask", "pos", "fk", "mix")
@@ -120,10 +120,8 @@ _LOWEST = {
 
 def read_settings(path: Path) -> dict[str, Any]:
     """The settings in a TOML file. Raises `FileFormatError` where it isn't one."""
-    try:
-        return tomllib.loads(path.read_text())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise FileFormatError(path, None, f"is no TOML ({error})") from error
+    text = read_text(path, expected="settings (TOML)")
+    return parse_toml(path, text, "lines such as steps = 1000")
 
 
 def toml(config: TrainConfig) -> str:

@@ -204,7 +204,7 @@ def test_gmr_s_entries(clip: RobotClip, qpos: Float[np.ndarray, "T nq"], tmp_pat
     ).magnitude().max() < 1e-6
 
 
-@pytest.mark.parametrize("protocol", [2, 3, 4, 5])
+@pytest.mark.parametrize("protocol", range(6))
 def test_pickles_of_any_protocol_are_read(
     protocol: int, qpos: Float[np.ndarray, "T nq"], tmp_path: Path
 ) -> None:
@@ -388,7 +388,7 @@ def test_cut_off_files_are_refused(clip: RobotClip, tmp_path: Path) -> None:
 def test_npz_with_objects_is_not_unpickled(clip: RobotClip, tmp_path: Path) -> None:
     mark = tmp_path / "mark"
     np.savez(tmp_path / "evil.npz", qpos=np.array([Evil(mark, write_atomically)], dtype=object))
-    with pytest.raises(FileFormatError, match="is no npz"):
+    with pytest.raises(FileFormatError, match="'qpos' can't be read"):
         load_robot_motion(tmp_path / "evil.npz", robot="robot")
     assert not mark.exists()
 

@@ -122,7 +122,7 @@ def test_what_is_no_fbx(tmp_path: Path, data: bytes) -> None:
     (tmp_path / "x.fbx").write_bytes(data)
     with pytest.raises(FileFormatError, match=re.escape(str(tmp_path / "x.fbx"))):
         read_fbx(tmp_path / "x.fbx")
-    with pytest.raises(FileFormatError, match="No such file"):
+    with pytest.raises(FileFormatError, match="no such file"):
         read_fbx(tmp_path / "nowhere.fbx")
 
 

@@ -1,0 +1,112 @@
+"""Arrays in an npz, read without trust: no pickle, and no memory that the file only claims to need.
+
+An npz is a zip of npy files. Sizes stand in three places that need not agree (the zip's directory,
+each array's header, the data), and compressed data may be a thousandth of what it grows to. So an
+array is read when it is asked for, only where all three agree, and all together take no more than a
+multiple of the file.
+"""
+
+import io
+import re
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from math import prod
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+
+from spark.errors import FileFormatError
+from spark.opening import read_bytes
+
+_BASE, _RATIO = 128 << 20, 4  # bytes that arrays may take, and how many more for each of the file's
+_HEADER = 10_000  # bytes of an array's header, as numpy allows at most
+# A header is the text of a Python dict; what else may stand in one needs pickle.
+_FIELDS = (
+    re.compile(rb"'descr'\s*:\s*'([<>|=]?(?:b1|[iu][1248]|f[248]|[SU][1-9]\d{0,5}))'"),
+    re.compile(rb"'fortran_order'\s*:\s*(True|False)"),
+    re.compile(rb"'shape'\s*:\s*\(([\d\s,L]*)\)"),
+)
+
+
+class Npz(Mapping[str, np.ndarray]):
+    """The arrays of an npz by their names; each is read when it is asked for.
+
+    Raises `FileFormatError` where the file is none, and where an array can't be read: it is broken
+    or encrypted, holds objects (which only pickle reads), or is larger than the file can mean.
+    """
+
+    def __init__(self, path: Path, *, expected: str) -> None:
+        self.path, self._expected = path, expected
+        content = read_bytes(path, expected=expected)
+        if not content:
+            self._fail("is empty")
+        if content.startswith(b"\x93NUMPY"):
+            self._fail("is a single array, no npz of several")
+        self._limit = _BASE + _RATIO * len(content)
+        self._taken: dict[str, int] = {}
+        try:
+            self._zip = zipfile.ZipFile(io.BytesIO(content))
+        except (zipfile.BadZipFile, ValueError, OverflowError, NotImplementedError) as error:
+            self._fail(f"is no npz ({error})", error)
+        self._members = {
+            info.filename.removesuffix(".npy"): info
+            for info in self._zip.infolist()
+            if info.filename.endswith(".npy")
+        }
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        info = self._members[name]
+        if info.flag_bits & 1:
+            self._fail(f"{name!r} is encrypted")
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            self._fail(f"{name!r} is compressed in a way that npz files are not")
+        self._taken[name] = info.file_size
+        if sum(self._taken.values()) > self._limit:
+            self._fail(
+                f"{name!r} takes {info.file_size / 2**20:.0f} MB, far more than such a file holds"
+            )
+        try:
+            return _array(self._zip.read(info))
+        except (
+            *(ValueError, TypeError, EOFError, OSError, NotImplementedError, RuntimeError),
+            *(zipfile.BadZipFile, zlib.error, MemoryError),
+        ) as error:
+            self._fail(f"{name!r} can't be read ({_first_line(error)})", error)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._members)
+
+    def __len__(self) -> int:
+        return len(self._members)
+
+    def _fail(self, message: str, cause: Exception | None = None) -> NoReturn:
+        raise FileFormatError(self.path, None, f"{message}; expected {self._expected}") from cause
+
+
+def _array(data: bytes) -> np.ndarray:
+    """The array in the bytes of an npy file, which its header must describe to the byte."""
+    if data[:6] != b"\x93NUMPY" or len(data) < 12:
+        raise ValueError("it is no npy file")
+    wide = data[6] > 1  # version 1 has a header of at most 64 kB
+    start = 12 if wide else 10
+    length = int.from_bytes(data[8:start], "little")
+    if length > _HEADER:
+        raise ValueError(f"its header has {length} bytes")
+    header = data[start : start + length]
+    found = [field.search(header) for field in _FIELDS]
+    if None in found:
+        raise ValueError("its header describes no array of plain numbers or text")
+    kind, order, lengths = (field[1].decode() for field in found if field)
+    shape = tuple(int(n) for n in re.findall(r"\d+", lengths))
+    dtype = np.dtype(kind)
+    content = memoryview(data)[start + length :]
+    if len(shape) > 8 or prod(shape) * dtype.itemsize != len(content):
+        raise ValueError(f"{len(content)} bytes are no array of shape {str(shape)[:80]}")
+    array = np.frombuffer(content, dtype) if len(content) else np.zeros(0, dtype)
+    return array.reshape(shape, order="F" if order == "True" else "C")
+
+
+def _first_line(error: BaseException) -> str:
+    return str(error).splitlines()[0] if str(error) else type(error).__name__

@@ -1,0 +1,97 @@
+"""Files of strangers: read whole, where they are regular files of a size that memory can hold.
+
+A pipe may never end, a device such as `/dev/zero` never does, and a sparse file may claim more than
+the machine has.
+"""
+
+import os
+import re
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import orjson
+
+from spark.errors import FileFormatError
+
+LARGEST = 2 << 30  # bytes: a BVH of six hours at 120 fps
+LARGEST_TEXT = 16 << 20  # bytes of settings, maps and models, which people write by hand
+
+
+def read_bytes(path: Path, *, limit: int = LARGEST, expected: str = "a regular file") -> bytes:
+    """The content of a file. Raises `FileFormatError` where it is missing, a folder, a pipe or a
+    device, can't be read, or is larger than `limit` bytes."""
+    try:
+        # Opening a pipe would wait for its writer.
+        with open(path, "rb", opener=_without_waiting) as file:
+            state = os.fstat(file.fileno())
+            _check(path, state, limit, expected)
+            return file.read(state.st_size)
+    except (OSError, ValueError) as error:
+        raise unreadable(path, error, expected) from error
+    except MemoryError as error:
+        raise FileFormatError(path, None, "is larger than the memory that is left") from error
+
+
+def check_regular(path: Path, *, limit: int = LARGEST, expected: str = "a regular file") -> None:
+    """Raise what `read_bytes` raises, without reading: for libraries that open files themselves."""
+    try:
+        _check(path, os.stat(path), limit, expected)
+    except (OSError, ValueError) as error:
+        raise unreadable(path, error, expected) from error
+
+
+def read_text(path: Path, *, limit: int = LARGEST_TEXT, expected: str = "text") -> str:
+    """The content of a UTF-8 file, with or without a byte order mark; what else `read_bytes`."""
+    try:
+        return read_bytes(path, limit=limit, expected=expected).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise FileFormatError(path, None, f"is no text; expected {expected}") from error
+
+
+def parse_toml(path: Path, text: str, expected: str) -> dict[str, Any]:
+    """The table in a TOML text. Raises `FileFormatError` with the line where it is none, or nests
+    too deeply."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        found = re.search(r"\(at line (\d+)", str(error))
+        line = int(found[1]) if found else None
+        raise FileFormatError(path, line, f"{error}; expected {expected}") from error
+    except (RecursionError, ValueError) as error:  # brackets in brackets, a number of 5000 digits
+        raise FileFormatError(path, None, f"is no table that settings need ({error})") from error
+
+
+def parse_json(path: Path, text: bytes | str, what: str) -> Any:
+    """The JSON in `what` of a file. Raises `FileFormatError` where it is none, holds NaN, or is
+    nested too deeply."""
+    try:
+        return orjson.loads(text)
+    except orjson.JSONDecodeError as error:
+        raise FileFormatError(path, None, f"{what} is no JSON: {error}") from error
+
+
+def unreadable(path: Path, error: Exception, expected: str) -> FileFormatError:
+    """What is wrong with a file that the system doesn't open."""
+    if isinstance(error, FileNotFoundError):
+        return FileFormatError(path, None, f"no such file; expected {expected}")
+    if isinstance(error, IsADirectoryError):
+        return FileFormatError(path, None, f"is a folder; expected {expected}")
+    reason = error.strerror if isinstance(error, OSError) else error
+    return FileFormatError(path, None, f"can't be read ({reason}); expected {expected}")
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def _check(path: Path, state: os.stat_result, limit: int, expected: str) -> None:
+    if stat.S_ISDIR(state.st_mode):
+        raise FileFormatError(path, None, f"is a folder; expected {expected}")
+    if not stat.S_ISREG(state.st_mode):
+        raise FileFormatError(path, None, f"is not a regular file; expected {expected}")
+    if state.st_size > limit:
+        raise FileFormatError(
+            path, None, f"has {state.st_size / 2**20:.0f} MB; at most {limit >> 20} are read"
+        )
