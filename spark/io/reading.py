@@ -84,7 +84,7 @@ def holds_person(path: Path) -> bool:
         case ".pt" | ".pth":
             return says(path, (b"global_orient", b"root_orient"))
         case _:
-            return True
+            return path.suffix.lower() in SUFFIXES
 
 
 def _reader(known: Format) -> Reader:
