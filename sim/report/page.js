@@ -9,3 +9,7 @@ for (const button of document.querySelectorAll("button[data-time]")) button.oncl
   if (!button.closest("#findings")) replay.scrollIntoView({ behavior: "smooth", block: "center" });
 };
 plots.onclick = e => { const box = plots.getBoundingClientRect(); seek((e.clientX - box.left) / box.width * DURATION); };
+// On paper, what each measure means stands below it.
+const cards = document.querySelectorAll("details"), opened = new Set();
+addEventListener("beforeprint", () => { for (const card of cards) if (!card.open) { opened.add(card); card.open = true; } });
+addEventListener("afterprint", () => { for (const card of opened) card.open = false; opened.clear(); });

@@ -1,16 +1,16 @@
 """The report as one self-contained web page: headline, replay, worst moments, plots."""
 
-import base64
-import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import UInt8
 from markupsafe import Markup
 
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.clip_poses import pose_clip
+from sim.report.explanations import MEANINGS
+from sim.report.joints import joint_rows
+from sim.report.moments import worst_moments
 from sim.report.names import FLAGS, LABELS
 from sim.report.palette import CORNER_COLORS, css, grade
 from sim.report.plots import flag_strips, plots, svg
@@ -21,12 +21,9 @@ from sim.report.text import details, share_base
 from sim.template import render_page
 from sim.trajectory import Subject
 from sim.view.page import Overlay, page
-from sim.view.render import frames
-from sim.view.scene import Figure, build_scene
-from spark.errors import DependencyError
+from sim.view.scene import Figure
 from spark.files import write_atomically
 
-_MOMENTS = 6  # pictures
 _LISTED = 200  # findings
 _STANDS, _SLIDES, _SINKS = range(1, 4)  # states of a corner, in the order of `CORNER_COLORS`
 
@@ -63,7 +60,8 @@ def report_page(
     clip, frame_time = result.clip, result.clip.frame_time
     duration = (len(clip) - 1) * frame_time
     source_duration = (subject if source is None else source).motion.duration
-    moments, note = _moments(result, figures)
+    moments, note = worst_moments(result, figures)
+    columns, joints = _joints(clip)
     beside = ""
     if result.source is not None:
         beside = f"; of the source's {100 * result.source.implausible_share:.1f} %"
@@ -80,10 +78,20 @@ def report_page(
         replay=page(figures, title="", overlays=overlays),
         findings=[_line(f, f.start, clip) for f in result.findings[:_LISTED]],
         unlisted=max(len(result.findings) - _LISTED, 0),
-        moments=moments,
+        moments=[
+            {
+                "time": f"{moment.frame * frame_time:.3f}",
+                "picture": moment.picture,
+                "findings": [_line(f, f.start, clip) for f in moment.findings],
+            }
+            for moment in moments
+        ],
+        shown=" and ".join(name for _, _, name in shown),
+        columns=columns,
+        joints=joints,
         strips=flag_strips(clip),
         plots=Markup().join(svg(plot, duration, source_duration) for plot in plots(result)),
-        notes=(*result.notes, *note, clip.thresholds.version),
+        notes=(*result.notes, *([note] if note else []), clip.thresholds.version),
         duration=duration,
         record=record(result),
     )
@@ -104,23 +112,58 @@ def _overlay(clip: ClipMetrics, subject: Subject) -> Overlay:
 
 
 def _cards(result: Result) -> list[dict[str, Any]]:
-    """A card for each measure."""
+    """A card for each measure, with what it means."""
     theirs = {} if result.source is None else shares(result.source)
     cards: list[dict[str, Any]] = []
+
+    def add(measure: str, label: str, value: str, lines: list[str], grade: str = "") -> None:
+        card = {"label": label, "value": value, "lines": lines, "grade": grade}
+        cards.append({**card, "meaning": MEANINGS[measure]})
+
     for measure, percent in shares(result.clip).items():
         if percent is None:
             continue
         small = [] if (their := theirs.get(measure)) is None else [f"source {their:.1f} %"]
         if base := share_base(result.clip, measure):
             small.append(base)
-        value = f"{percent:.1f} %"
-        cards.append(
-            {"label": LABELS[measure], "value": value, "lines": small, "grade": grade(percent)}
-        )
-    for label, words in details(result):
-        value, _, rest = words.strip().partition("  ")
-        cards.append({"label": label, "value": value, "lines": [rest.strip()], "grade": ""})
+        add(measure, LABELS[measure], f"{percent:.1f} %", small, grade(percent))
+    for detail in details(result):
+        value, _, rest = detail.words.strip().partition("  ")
+        add(detail.measure, detail.label, value, [rest.strip()])
     return cards
+
+
+_COLUMNS = ("room to its limit", "at a limit", "fastest", "jerk RMS")
+_TORQUES = ("highest torque", "RMS torque", "of its motor's")
+
+
+def _joints(clip: ClipMetrics) -> tuple[tuple[str, ...], list[dict[str, Any]]]:
+    """The columns and rows of the joints' table."""
+    rows = []
+    for row in joint_rows(clip):
+        beyond = row.room is not None and row.room < 0
+        over = row.load is not None and row.load > clip.thresholds.torque
+        cells = [
+            _cell(row.room, 180 / np.pi, "°", "bad" if beyond else ""),
+            _cell(row.at_limit, 100, " %", "fair" if row.at_limit else ""),
+            _cell(row.speed, 1, " rad/s"),
+            _cell(row.jerk, 1, " rad/s³"),
+        ]
+        if clip.torques:
+            cells += [
+                _cell(row.torque, 1, " N m"),
+                _cell(row.rms, 1, " N m"),
+                _cell(row.load, 100, " %", "bad" if over else ""),
+            ]
+        rows.append({"name": row.name, "cells": cells})
+    return (*_COLUMNS, *(_TORQUES if clip.torques else ())), rows
+
+
+def _cell(value: float | None, factor: float, unit: str, grade: str = "") -> dict[str, str]:
+    if value is None:
+        return {"text": "\u2013", "grade": ""}
+    shown = factor * value
+    return {"text": f"{shown:.{0 if abs(shown) >= 100 else 1}f}{unit}", "grade": grade}
 
 
 def _line(finding: Finding, frame: int, clip: ClipMetrics) -> dict[str, Any]:
@@ -130,40 +173,3 @@ def _line(finding: Finding, frame: int, clip: ClipMetrics) -> dict[str, Any]:
         "sentence": finding.sentence,
         "place": finding.place(clip.frame_time),
     }
-
-
-def _moments(result: Result, figures: list[Figure]) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
-    """Pictures of the gravest finding of each measure, and a note where they can't be made."""
-    gravest = {finding.measure: finding for finding in reversed(result.findings)}
-    picked = list(gravest.values())[::-1][:_MOMENTS]
-    if not picked:
-        return [], ()
-    scene = build_scene(figures)
-    frame_time = result.clip.frame_time
-    at = [
-        min(round(_middle(f) * frame_time / scene.frame_time), len(scene.qpos) - 1) for f in picked
-    ]
-    try:
-        pictures = [_jpeg(p) for p in frames(scene, at, width=640, height=540)]
-    except DependencyError as error:
-        return [], (f"no pictures: {error}",)
-    return [
-        {**_line(finding, _middle(finding), result.clip), "picture": picture}
-        for finding, picture in zip(picked, pictures, strict=True)
-    ], ()
-
-
-def _middle(finding: Finding) -> int:
-    return (finding.start + finding.stop - 1) // 2
-
-
-def _jpeg(picture: UInt8[np.ndarray, "H W 3"]) -> str:
-    """Without an eighth above and below: the camera leaves room for arms overhead."""
-    try:
-        from PIL import Image
-    except ImportError as error:
-        raise DependencyError("pictures need Pillow: pip install 'spark-sim[video]'") from error
-    buffer = io.BytesIO()
-    height = len(picture)
-    Image.fromarray(picture[height // 8 : -height // 8]).save(buffer, format="JPEG", quality=85)
-    return base64.b64encode(buffer.getvalue()).decode()

@@ -127,8 +127,19 @@ def svg(plot: Plot, duration: float, source_duration: float) -> Markup:
     parts.append(_line(y(plot.values), WIDTH, plot.worst_is_low, "clip"))
     return Markup(
         "<figure><figcaption>{} <small>[{}], {:.3g} to {:.3g}</small></figcaption>"
-        '<svg viewBox="0 0 {:g} {}" preserveAspectRatio="none">{}</svg></figure>'
-    ).format(plot.name, plot.unit, bottom, top, WIDTH, _HEIGHT, Markup().join(parts))
+        '<svg role="img" aria-label="{}" viewBox="0 0 {:g} {}" preserveAspectRatio="none">{}</svg>'
+        "</figure>"
+    ).format(plot.name, plot.unit, bottom, top, _words(plot), WIDTH, _HEIGHT, Markup().join(parts))
+
+
+def _words(plot: Plot) -> str:
+    """What the plot shows, for those who don't see it."""
+    low, high = float(plot.values.min()), float(plot.values.max())
+    flagged = f"; flagged in {100 * plot.flagged.mean():.1f} % of the frames"
+    return (
+        f"{plot.name} over time: from {low:.3g} to {high:.3g} {plot.unit}"
+        f"{flagged if plot.flagged.any() else ''}"
+    )
 
 
 def _peak(values: Float[np.ndarray, "N"]) -> float:
@@ -140,10 +151,18 @@ def flag_strips(clip: ClipMetrics) -> Markup:
     """When each flag is up: one strip a flag."""
     strip = Markup(
         "<figure class=strip><figcaption>{}</figcaption>"
-        '<svg viewBox="0 0 {:g} {}" preserveAspectRatio="none">{}</svg></figure>'
+        '<svg role="img" aria-label="{}" viewBox="0 0 {:g} {}" preserveAspectRatio="none">{}</svg>'
+        "</figure>"
     )
+    words = "{}: {:.1f} % of the frames"
     return Markup().join(
-        strip.format(LABELS[name], WIDTH, _STRIP, _shades(clip.flags[name], _STRIP))
+        strip.format(
+            LABELS[name],
+            words.format(LABELS[name], 100 * clip.shares[name]),
+            WIDTH,
+            _STRIP,
+            _shades(clip.flags[name], _STRIP),
+        )
         for name in FLAGS
     )
 

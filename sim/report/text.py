@@ -1,6 +1,7 @@
 """The report as text."""
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from sim.report.table import RATES, shares, source_rate
 
 _SHOWN = 3  # findings of one measure
 _RATE_KINDS = {
-    "base_acceleration": "in 99 % of the frames",
+    "base_acceleration": "at most in 99 % of the frames",
     "joint_speed": "at most",
     "joint_jerk": "RMS",
 }
@@ -45,7 +46,7 @@ def render(result: Result, *, color: bool) -> str:
         if (their := theirs.get(measure)) is not None:
             line += f"   source {their:>6.1f} %"
         lines.append(line + (f"   {base}" if (base := share_base(clip, measure)) else ""))
-    lines += [f"  {label:<18}{words}" for label, words in details(result)]
+    lines += [f"  {detail.label:<18}{detail.words}" for detail in details(result)]
     lines += ["", *_verdict(result.findings, clip.frame_time)]
     if result.notes:
         lines += ["", *(paint(f"note: {note}", DIM) for note in result.notes)]
@@ -72,33 +73,46 @@ def share_base(clip: ClipMetrics, measure: str) -> str:
     return f"of the {at_rest:.1f} % of the frames in which the body rests"
 
 
-def details(result: Result) -> Iterator[tuple[str, str]]:
-    """The measures that are no shares of frames: label, and value in words."""
+class Detail(NamedTuple):
+    """A measure that is no share of frames: its name, its label, and its value in words."""
+
+    measure: str
+    label: str
+    words: str
+
+
+def details(result: Result) -> Iterator[Detail]:
+    """All of them that the result has."""
     clip, drift, contacts = result.clip, result.drift, result.contacts
     highest = max(clip.torques, key=lambda each: each.load.max(), default=None)
     if highest is not None:
         load = 100 * float(highest.load.max())
-        yield (
+        yield Detail(
+            "torque",
             "highest torque",
             f"{load:>6.0f} %        of what {highest.joint}'s motor gives, {highest.limit:.0f} N m",
         )
     often = sorted(clip.at_limit_shares.items(), key=lambda item: -item[1])[:_SHOWN]
     if often and often[0][1] > 0:
         others = "".join(f"; {joint} {100 * share:.1f} %" for joint, share in often[1:] if share)
-        yield "most at a limit", f"{100 * often[0][1]:>6.1f} %        {often[0][0]}{others}"
+        words = f"{100 * often[0][1]:>6.1f} %        {often[0][0]}{others}"
+        yield Detail("at_limit", "most at a limit", words)
     if contacts is not None and contacts.f1 is not None:
         parts = (("precision", contacts.precision), ("recall", contacts.recall))
         words = "".join(f"; {name} {part:.2f}" for name, part in parts if part is not None)
-        yield "foot contacts", f"{contacts.f1:>6.2f}          F1 against the source{words}"
+        words = f"{contacts.f1:>6.2f}          F1 against the source{words}"
+        yield Detail("contacts", "foot contacts", words)
     if result.swing is not None:
         swing = result.swing
-        yield (
+        yield Detail(
+            "swing_clearance",
             "swing clearance",
             f"{swing.clearance:>6.2f}          of the source's: {100 * swing.height:.1f} cm where "
             f"its feet pass {100 * swing.source_height:.1f} cm above the floor, scaled",
         )
     if drift is not None:
-        yield (
+        yield Detail(
+            "root_drift",
             LABELS["root_drift"],
             f"{drift.distance.max():>6.2f} m        at most; {drift.distance[-1]:.2f} m at the end "
             f"of a path of {drift.path_length:.1f} m; heading "
@@ -106,7 +120,8 @@ def details(result: Result) -> Iterator[tuple[str, str]]:
         )
     if result.truth is not None:
         truth = result.truth
-        yield (
+        yield Detail(
+            "ground_truth",
             "ground truth",
             f"{truth.mpjpe:>6.2f} %        of the height away in the mean; MSE {truth.mse:.2g}, "
             f"root-relative {truth.relative_mse:.2g}",
@@ -116,4 +131,5 @@ def details(result: Result) -> Iterator[tuple[str, str]]:
         theirs = source_rate(result, measure)
         scaled = ", scaled" if measure == "base_acceleration" else ""
         beside = "" if theirs is None else f"; source {theirs:.0f}{scaled}"
-        yield LABELS[measure], f"{value(clip):>6.0f} {unit:<6}   {kind}{beside}"
+        words = f"{value(clip):>6.0f} {unit:<6}   {kind}{beside}"
+        yield Detail(measure, LABELS[measure], words)
