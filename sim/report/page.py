@@ -144,16 +144,16 @@ def _joints(clip: ClipMetrics) -> tuple[tuple[str, ...], list[dict[str, Any]]]:
         beyond = row.room is not None and row.room < 0
         over = row.load is not None and row.load > clip.thresholds.torque
         cells = [
-            _cell(row.room, 180 / np.pi, "°", "bad" if beyond else ""),
-            _cell(row.at_limit, 100, " %", "fair" if row.at_limit else ""),
-            _cell(row.speed, 1, " rad/s"),
-            _cell(row.jerk, 1, " rad/s³"),
+            _cell(row.room, float(np.degrees(1.0)), "°", "bad" if beyond else ""),
+            _cell(row.at_limit, 100.0, " %", "fair" if row.at_limit else ""),
+            _cell(row.speed, 1.0, " rad/s"),
+            _cell(row.jerk, 1.0, " rad/s³"),
         ]
         if clip.torques:
             cells += [
-                _cell(row.torque, 1, " N m"),
-                _cell(row.rms, 1, " N m"),
-                _cell(row.load, 100, " %", "bad" if over else ""),
+                _cell(row.torque, 1.0, " N m"),
+                _cell(row.rms, 1.0, " N m"),
+                _cell(row.load, 100.0, " %", "bad" if over else ""),
             ]
         rows.append({"name": row.name, "cells": cells})
     return (*_COLUMNS, *(_TORQUES if clip.torques else ())), rows

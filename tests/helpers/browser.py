@@ -20,8 +20,9 @@ _QUIET = (
 )
 
 
-def opened(text: str, folder: Path) -> Any:
-    """What a page leaves in `document.body.dataset.result`, as JSON, in its first second."""
+def opened(text: str, folder: Path, *flags: str) -> Any:
+    """What a page leaves in `document.body.dataset.result`, as JSON, in its first second, in a
+    browser with these flags."""
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is None:
         assert "CI" not in os.environ, "CI installs chromium"
@@ -29,7 +30,14 @@ def opened(text: str, folder: Path) -> Any:
     path = folder / "probe.html"
     path.write_text(text, encoding="utf-8")
     ran = subprocess.run(
-        [chromium, *_QUIET.split(), f"--user-data-dir={folder}", "--dump-dom", path.as_uri()],
+        [
+            chromium,
+            *_QUIET.split(),
+            *flags,
+            f"--user-data-dir={folder}",
+            "--dump-dom",
+            path.as_uri(),
+        ],
         capture_output=True,
         text=True,
         timeout=120,
