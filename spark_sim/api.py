@@ -203,6 +203,11 @@ def play(
             files.claim(Path(path), force=force, endings=endings, what=what)
     shown = [clip_of(c) if isinstance(c, str | Path) else c for c in clips]
     figures = [figure for clip in shown for figure in clip.figures()]
+    if video is html is strip is None:
+        from sim.report.watch import watch
+
+        watch(figures, title=" - ".join(c.name for c in shown))
+        return
     scene = build_scene(figures)
     if video is not None:
         from sim.view.video import write_video
@@ -216,10 +221,6 @@ def play(
         from sim.view.video import write_strip
 
         write_strip(scene, strip)
-    if video is html is strip is None:
-        from sim.view.window import open_window
-
-        open_window(scene)
 
 
 def sample(folder: File = "samples", *, force: bool = False) -> tuple[Path, ...]:

@@ -181,6 +181,15 @@ def _beyond(
     return np.stack([ranges[:, 0] - angles, angles - ranges[:, 1]], axis=-1).reshape(-1, 6)
 
 
+def limited_joint(rig: Rig, name: str) -> int | None:
+    """The joint that a `LimitExcess` calls `name`."""
+    for limit in LIMITS:
+        for side in ("left", "right") if limit.paired else ("",):
+            if f"{side} {limit.name}".strip() == name:
+                return _joint(rig, side, limit.role)
+    return None
+
+
 def _joint(rig: Rig, side: str, role: str) -> int | None:
     """The outermost joint with the role; the trunk's roles have no side."""
     name = role if role in _UNPAIRED else f"{side}_{role}"

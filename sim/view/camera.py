@@ -24,8 +24,7 @@ def camera_distance(
     ahead = _direction(azimuth, elevation)
     right, up = _direction(azimuth - np.pi / 2, 0.0), _direction(azimuth, elevation + np.pi / 2)
     needed = [0.5 * scene.height / half_view]
-    for placement in scene.placements:
-        path = scene.path(placement)
+    for placement, path in zip(scene.placements, scene.kept_paths, strict=True):
         for end in (-0.03 * placement.height, placement.height):
             corner = path - scene.centers
             corner[:, 2] = np.maximum(end, path[:, 2] + 0.55 * end) - scene.centers[:, 2]

@@ -13,6 +13,7 @@ from sim.trajectory import ModelTrajectory
 from sim.view.simplify import Mesh, simplify_together
 
 MAX_FACES = 40_000  # of one figure's meshes
+GHOST_GROUP = 5  # of geoms: viewers hide it unless they are asked
 GHOST_RGBA = (0.35, 0.42, 0.55, 0.3)
 
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
@@ -30,33 +31,39 @@ _WIDTHS = {int(mujoco.mjtJoint.mjJNT_FREE): 7, int(mujoco.mjtJoint.mjJNT_BALL): 
 
 
 def add_display(
-    spec: mujoco.MjSpec, body: ModelTrajectory, prefix: str, *, ghost: bool = False
+    spec: mujoco.MjSpec,
+    body: ModelTrajectory,
+    prefix: str,
+    *,
+    ghost: bool = False,
+    scale: float = 1.0,
 ) -> Int[np.ndarray, "n"]:
     """Add the body's root and all below it to the spec's world; names begin with `prefix`.
 
     Yields the columns of `body.qpos` that move it, in the order of the spec's coordinates. A
-    `ghost` is seen through, in one colour.
+    `ghost` is seen through, in one colour, and in the group `GHOST_GROUP`. `scale` makes all of it
+    larger; of the coordinates, only the root's place changes with it; slides keep theirs.
     """
     model = body.model
     inside = _subtree(model, body.root)
     shown = [g for g in range(model.ngeom) if int(model.geom_bodyid[g]) in inside]
     shown = [g for g in shown if int(model.geom_type[g]) in _SHOWN_TYPES]
     visible = [g for g in shown if int(model.geom_group[g]) < _SHOWN_GROUPS]
-    meshes = _add_meshes(spec, model, visible or shown, prefix)
+    meshes = _add_meshes(spec, model, visible or shown, prefix, scale)
     columns: list[int] = []
     bodies: dict[int, mujoco.MjsBody] = {}
     for b in inside:
         parent = spec.worldbody if b == body.root else bodies[int(model.body_parentid[b])]
         bodies[b] = parent.add_body(
-            name=f"{prefix}{b}", pos=model.body_pos[b], quat=model.body_quat[b]
+            name=f"{prefix}{b}", pos=scale * model.body_pos[b], quat=model.body_quat[b]
         )
         bodies[b].explicitinertial = True  # nothing here is simulated, but must compile
         bodies[b].mass, bodies[b].inertia = 1.0, [1.0] * 3
         for j in range(model.njnt):
             if int(model.jnt_bodyid[j]) == b:
-                columns += _add_joint(bodies[b], model, j)
+                columns += _add_joint(bodies[b], model, j, scale)
     for g in visible or shown:
-        _add_geom(bodies[int(model.geom_bodyid[g])], model, g, meshes, ghost=ghost)
+        _add_geom(bodies[int(model.geom_bodyid[g])], model, g, meshes, ghost=ghost, scale=scale)
     return np.array(columns)
 
 
@@ -68,12 +75,12 @@ def _subtree(model: mujoco.MjModel, root: int) -> list[int]:
     return sorted(inside)
 
 
-def _add_joint(body: mujoco.MjsBody, model: mujoco.MjModel, joint: int) -> list[int]:
+def _add_joint(body: mujoco.MjsBody, model: mujoco.MjModel, joint: int, scale: float) -> list[int]:
     kind, address = int(model.jnt_type[joint]), int(model.jnt_qposadr[joint])
     width = _WIDTHS.get(kind, 1)
     body.add_joint(
         type=mujoco.mjtJoint(kind),
-        pos=model.jnt_pos[joint],
+        pos=scale * model.jnt_pos[joint],
         axis=model.jnt_axis[joint],
         ref=float(model.qpos0[address]) if width == 1 else 0.0,
     )
@@ -81,22 +88,29 @@ def _add_joint(body: mujoco.MjsBody, model: mujoco.MjModel, joint: int) -> list[
 
 
 def _add_geom(
-    body: mujoco.MjsBody, model: mujoco.MjModel, geom: int, meshes: dict[int, str], *, ghost: bool
+    body: mujoco.MjsBody,
+    model: mujoco.MjModel,
+    geom: int,
+    meshes: dict[int, str],
+    *,
+    ghost: bool,
+    scale: float,
 ) -> None:
     kind = int(model.geom_type[geom])
     made = body.add_geom(
         type=mujoco.mjtGeom(kind),
-        pos=model.geom_pos[geom],
+        pos=scale * model.geom_pos[geom],
         quat=model.geom_quat[geom],
         rgba=GHOST_RGBA if ghost else rgba_of(model, geom),
         contype=0,
         conaffinity=0,
         mass=0,
+        group=GHOST_GROUP if ghost else 0,
     )
     if kind == _MESH:
         made.meshname = meshes[int(model.geom_dataid[geom])]
     else:
-        made.size = model.geom_size[geom]
+        made.size = scale * model.geom_size[geom]
 
 
 def rgba_of(model: mujoco.MjModel, geom: int) -> Float[np.ndarray, "4"]:
@@ -118,7 +132,7 @@ def rgba_of(model: mujoco.MjModel, geom: int) -> Float[np.ndarray, "4"]:
 
 
 def _add_meshes(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: list[int], prefix: str
+    spec: mujoco.MjSpec, model: mujoco.MjModel, geoms: list[int], prefix: str, scale: float
 ) -> dict[int, str]:
     """The meshes of some geoms, with at most about `MAX_FACES` faces in all, and their names."""
     used = sorted({int(model.geom_dataid[g]) for g in geoms if int(model.geom_type[g]) == _MESH})
@@ -127,7 +141,7 @@ def _add_meshes(
     for mesh, (vertices, faces) in simplified.items():
         spec.add_mesh(
             name=names[mesh],
-            uservert=vertices.ravel(),
+            uservert=scale * vertices.ravel(),
             userface=faces.ravel(),
             inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
         )

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from sim.view.camera import AZIMUTH, ELEVATION, FIELD_OF_VIEW, camera_distance
+from sim.view.display import GHOST_GROUP
 from sim.view.scene import Scene
 from spark.errors import DependencyError
 
@@ -26,6 +27,7 @@ def frames(
     data = mujoco.MjData(scene.model)
     option = mujoco.MjvOption()
     option.sitegroup[:] = 0
+    option.geomgroup[GHOST_GROUP] = True
     camera = mujoco.MjvCamera()
     camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
     camera.distance = camera_distance(scene, aspect=width / height)

@@ -11,12 +11,17 @@ from jaxtyping import Float
 from sim.interpolate import at_times
 from sim.trajectory import Subject, model_trajectory
 from sim.view.display import add_display
+from sim.view.world import empty_world
 from spark.errors import SkeletonError
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig.rig import Rig
 from spark.rotation import quat_about, quat_conj, quat_mul, quat_rotate
 
+# A figure is lost to the camera once its root is faster than this [m/s], no man being so; further
+# from two standing heights over the floor than so many of them; or further [standing heights] from
+# where the figure that leads has gone.
+_LOST_SPEED, _LOST_HEIGHT, _LOST_DISTANCE = 15.0, 3.0, 5.0
 _SPACING = 0.8  # of two neighbours' mean standing height, between their roots: arms do not meet
 
 
@@ -25,13 +30,16 @@ class Figure:
     """A moving body to show, with what to call it and where its floor is [m].
 
     Where the subject has no model, one is built from its rig. A `ghost` is seen through, and stands
-    where the figure before it stands.
+    where the figure before it stands: in the same world, or, where it is `aligned`, so that both
+    begin in one place. With a `height` [m], the body and its way are scaled to stand as tall.
     """
 
     subject: Subject
     label: str
     floor_z: float = 0.0
     ghost: bool = False
+    aligned: bool = False
+    height: float | None = None
 
     @property
     def motion(self) -> Motion:
@@ -41,25 +49,37 @@ class Figure:
     def rig(self) -> Rig:
         return self.subject.rig
 
+    @property
+    def scale(self) -> float:
+        """How much larger it is shown than it is."""
+        own = self.rig.standing_height
+        return 1.0 if self.height is None else self.height / own
+
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Where a figure stands in the scene: its own world, rotated about Z by `turn`, then moved by
-    `translation` [m].
+    """Where a figure stands in the scene: its own world, scaled by `scale`, rotated about Z by
+    `turn`, then moved by `translation` [m].
 
     Of the scene's model it has the coordinates `columns` and the bodies `bodies`, its root first.
-    Its standing `height` is in metres.
+    Its standing `height` in the scene is in metres; `lane` [m] is where it stands beside the
+    others, along Y. `ahead` is where it faces, in its root body's axes.
     """
 
+    label: str
+    ghost: bool
     turn: Float[np.ndarray, "4"]
     translation: Float[np.ndarray, "3"]
+    scale: float
     columns: slice
     bodies: range
     height: float
+    lane: float
+    ahead: Float[np.ndarray, "3"]
 
     def to_scene(self, points: Float[np.ndarray, "*N 3"]) -> Float[np.ndarray, "*N 3"]:
         """Points of the figure's own world in the scene's."""
-        return quat_rotate(self.turn, points) + self.translation
+        return quat_rotate(self.turn, self.scale * points) + self.translation
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +99,7 @@ class Scene:
     @cached_property
     def centers(self) -> Float[np.ndarray, "T 3"]:
         """The path of the figures' middle, for a camera to follow."""
-        paths = np.stack([self.path(placement) for placement in self.placements])
+        paths = np.stack(self.kept_paths)
         centers = (paths.min(0) + paths.max(0)) / 2
         centers[:, 2] = 0.48 * self.height
         return centers
@@ -87,6 +107,33 @@ class Scene:
     def path(self, placement: Placement) -> Float[np.ndarray, "T 3"]:
         """Where a figure's root is."""
         return self.qpos[:, placement.columns][:, :3]
+
+    @cached_property
+    def kept_paths(self) -> tuple[Float[np.ndarray, "T 3"], ...]:
+        """Where each figure's root is, for as long as a camera can keep it in its picture: one that
+        flies off, as a simulation that diverges does, rests where it was before."""
+        return tuple(self._kept(placement) for placement in self.placements)
+
+    def _kept(self, placement: Placement) -> Float[np.ndarray, "T 3"]:
+        path, height = self.path(placement).copy(), placement.height
+        jumps = np.zeros(len(path))
+        jumps[1:] = np.linalg.norm(np.diff(path, axis=0), axis=1) / self.frame_time
+        start = np.array([0.0, placement.lane, 0.0])
+        way = self.path(self._reference) - [0.0, self._reference.lane, 0.0]
+        apart = np.linalg.norm((path - start - way)[:, :2], axis=1)
+        lost = (
+            (jumps > _LOST_SPEED)
+            | (np.abs(path[:, 2] - 2 * height) > _LOST_HEIGHT * height)
+            | (apart > _LOST_DISTANCE * max(height, self._reference.height))
+        )
+        first = int(lost.argmax()) if lost.any() else len(path)
+        path[first:] = path[max(first - 1, 0)]
+        return path
+
+    @cached_property
+    def _reference(self) -> Placement:
+        """Who is followed where the figures part: the target of a simulation, or the first."""
+        return next((p for p in self.placements if p.ghost), self.placements[0])
 
 
 def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
@@ -98,13 +145,13 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
     """
     if not figures:
         raise SkeletonError("nothing to show: expected at least one motion")
-    world = _world()
+    world = empty_world()
     first = figures[0].motion
     step = max(1, int(np.ceil(first.fps / max_fps - 1e-6)))
     frame_time = first.frame_time * step
     longest = max(figure.motion.duration for figure in figures)
     times = np.arange(int(np.floor(longest / frame_time + 1e-6)) + 1) * frame_time
-    heights = [figure.rig.standing_height for figure in figures]
+    heights = [figure.rig.standing_height * figure.scale for figure in figures]
     lanes = _lanes(figures, heights)
     turn = _turn_to_front(figures[0])
     coordinates: list[Float[np.ndarray, "T n"]] = []
@@ -113,24 +160,45 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
     for k, figure in enumerate(figures):
         body = figure.subject.body or model_trajectory(figure.rig, figure.motion)
         first_body = len(list(world.bodies))
-        columns = add_display(world, body, f"{k}_", ghost=figure.ghost)
+        columns = add_display(world, body, f"{k}_", ghost=figure.ghost, scale=figure.scale)
         qpos = at_times(body.model, body.qpos, figure.motion.frame_time, times)[:, columns]
-        if figure.ghost and placements:
+        qpos = _finite(qpos)
+        qpos[:, :3] *= figure.scale
+        if figure.ghost and placements and not figure.aligned:
             translation = placements[-1].translation
         else:
             start = quat_rotate(turn, qpos[0, :3])
-            translation = np.array([-start[0], lanes[k] - start[1], -figure.floor_z])
+            translation = np.array([-start[0], lanes[k] - start[1], -figure.scale * figure.floor_z])
         qpos[:, :3] = quat_rotate(turn, qpos[:, :3]) + translation
         qpos[:, 3:7] = quat_mul(turn, qpos[:, 3:7])
         coordinates.append(qpos)
         following = column + len(columns)
         bodies = range(first_body, len(list(world.bodies)))
+        ahead = quat_rotate(turn, _ahead(figure))
         placements.append(
-            Placement(turn, translation, slice(column, following), bodies, heights[k])
+            Placement(
+                label=figure.label,
+                ghost=figure.ghost,
+                turn=turn,
+                translation=translation,
+                scale=figure.scale,
+                columns=slice(column, following),
+                bodies=bodies,
+                height=heights[k],
+                lane=float(lanes[k]),
+                ahead=quat_rotate(quat_conj(qpos[0, 3:7]), ahead),
+            )
         )
         column = following
     qpos = np.concatenate(coordinates, axis=1)
     return Scene(world.compile(), qpos, frame_time, tuple(placements))
+
+
+def _finite(qpos: Float[np.ndarray, "T n"]) -> Float[np.ndarray, "T n"]:
+    """Frames that are no numbers show the last one that was."""
+    bad = ~np.isfinite(qpos).all(axis=1)
+    last = np.maximum.accumulate(np.where(bad, 0, np.arange(len(qpos))))
+    return np.nan_to_num(qpos[last], posinf=0.0, neginf=0.0)
 
 
 def _lanes(figures: Sequence[Figure], heights: Sequence[float]) -> Float[np.ndarray, "K"]:
@@ -144,57 +212,16 @@ def _lanes(figures: Sequence[Figure], heights: Sequence[float]) -> Float[np.ndar
 
 def _turn_to_front(figure: Figure) -> Float[np.ndarray, "4"]:
     """The turn about Z after which the figure faces +X in its first frame."""
-    rig = figure.rig
-    pelvis = forward(figure.motion.frames(0, 1))[1][0, rig.root_joint]
-    ahead = quat_rotate(
-        quat_mul(pelvis, quat_conj(rig.tpose[rig.root_joint])), np.array([1.0, 0, 0])
-    )
+    ahead = _ahead(figure)
     if np.hypot(ahead[0], ahead[1]) < 0.3:  # lies: where it looks says nothing
         return np.array([1.0, 0, 0, 0])
     return quat_about("z", np.array(-np.arctan2(ahead[1], ahead[0])))
 
 
-def _world() -> mujoco.MjSpec:
-    """A light grey floor with a grid, lit from above; shadows cost ten times the rest."""
-    spec = mujoco.MjSpec()
-    spec.compiler.degree = False
-    spec.visual.headlight.diffuse = [0.0, 0.0, 0.0]
-    spec.visual.headlight.ambient = [0.55, 0.55, 0.55]
-    spec.visual.headlight.specular = [0.0, 0.0, 0.0]
-    spec.visual.quality.offsamples = 0
-    spec.visual.quality.shadowsize = 0
-    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1080
-    spec.visual.map.znear, spec.visual.map.zfar = 0.01, 100
-    spec.add_texture(
-        name="floor",
-        type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
-        mark=mujoco.mjtMark.mjMARK_EDGE,
-        rgb1=[0.90, 0.91, 0.92],
-        rgb2=[0.90, 0.91, 0.92],
-        markrgb=[0.78, 0.80, 0.82],
-        width=300,
-        height=300,
+def _ahead(figure: Figure) -> Float[np.ndarray, "3"]:
+    """Where the figure's pelvis faces in its first frame, in its own world."""
+    rig = figure.rig
+    pelvis = forward(figure.motion.frames(0, 1))[1][0, rig.root_joint]
+    return quat_rotate(
+        quat_mul(pelvis, quat_conj(rig.tpose[rig.root_joint])), np.array([1.0, 0, 0])
     )
-    spec.add_texture(
-        name="sky",
-        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-        rgb1=[0.98, 0.98, 0.99],
-        rgb2=[0.93, 0.94, 0.96],
-        width=256,
-        height=256,
-    )
-    material = spec.add_material(name="floor", texuniform=True, texrepeat=[2, 2])
-    material.textures[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = "floor"
-    spec.worldbody.add_geom(
-        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05], material="floor"
-    )
-    for direction, strength in (([-0.5, -0.3, -1.0], 0.45), ([0.3, 0.6, -0.4], 0.2)):
-        spec.worldbody.add_light(
-            type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-            dir=direction,
-            diffuse=[strength] * 3,
-            castshadow=False,
-        )
-    return spec

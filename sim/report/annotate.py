@@ -1,0 +1,78 @@
+"""What a report knows of a motion, frame by frame, for a view to draw over the figure."""
+
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+
+from sim.report.clip_metrics import ClipMetrics
+from sim.report.clip_poses import ClipPoses, pose_clip
+from sim.report.limits import limited_joint
+from sim.report.names import FLAGS, LABELS
+from sim.report.palette import CORNER_COLORS
+from sim.report.result import Result
+from sim.trajectory import Subject
+from sim.view.annotations import Annotations
+from sim.view.timeline import Event
+
+_STANDS, _SLIDES, _SINKS = range(1, 4)  # states of a corner, in the order of `CORNER_COLORS`
+
+
+def annotate(result: Result, subject: Subject) -> Annotations:
+    """What `result`, which `assess` made of `subject`, says of each frame."""
+    clip, poses = result.clip, pose_clip(subject)
+    step = clip.frame_time
+    limits = [
+        (limit, joint) for limit in clip.limits if (joint := _joint(poses, limit.joint)) is not None
+    ]
+    at_limit = [(limit.beyond > -clip.thresholds.limit_margin).any(axis=1) for limit, _ in limits]
+    flags = {LABELS[name]: clip.flags[name] for name in FLAGS}
+    flags[LABELS["joint_limit"]] = _any([limit.excess > 0 for limit in clip.limits], len(clip))
+    flags[LABELS["self_penetration"]] = clip.self_penetration
+    return Annotations(
+        frame_time=step,
+        corners=poses.corners,
+        states=corner_states(clip, poses.corners),
+        corner_states=tuple(CORNER_COLORS.items()),
+        com=poses.mass.com,
+        support_height=clip.floor_z + clip.thresholds.contact_height,
+        joints=poses.positions[:, [joint for _, joint in limits]],
+        joint_names=tuple(limit.joint for limit, _ in limits),
+        at_limit=np.array(at_limit, dtype=bool).reshape(len(limits), len(clip)).T,
+        flags=flags,
+        events=tuple(
+            sorted(
+                (
+                    Event(f.start * step, (f.stop - 1) * step, LABELS[f.measure], f.sentence)
+                    for f in result.findings
+                ),
+                key=lambda event: event.start,
+            )
+        ),
+    )
+
+
+def corner_states(
+    clip: ClipMetrics, corners: Float[np.ndarray, "T M 3"]
+) -> UInt8[np.ndarray, "T M"]:
+    """Of each of the soles' corners: 0 in the air, else the place in `CORNER_COLORS`, from 1."""
+    heights = corners[..., 2] - clip.floor_z
+    states = np.zeros(heights.shape, dtype=np.uint8)
+    states[heights < clip.thresholds.skate_height] = _STANDS
+    states[clip.corner_skates] = _SLIDES
+    states[heights < -clip.thresholds.penetration] = _SINKS
+    return states
+
+
+def _any(masks: list[Bool[np.ndarray, "T E"]], frames: int) -> Bool[np.ndarray, "T"]:
+    return np.any([mask.any(axis=1) for mask in masks] or [np.zeros(frames, bool)], axis=0)
+
+
+def _joint(poses: ClipPoses, name: str) -> int | None:
+    """The rig's joint where a joint with limits is; of a model, the one whose part carries it."""
+    if poses.body is None:
+        return limited_joint(poses.rig, name)
+    model, names = poses.body.model, poses.rig.skeleton.names
+    known = {model.joint(j).name: int(model.jnt_bodyid[j]) for j in range(model.njnt)}
+    body = known.get(name, 0)
+    while body > 0 and model.body(body).name not in names:
+        body = int(model.body_parentid[body])
+    return names.index(model.body(body).name) if body > 0 else None

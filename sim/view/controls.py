@@ -1,0 +1,93 @@
+"""What the keys of a replay do. The help shows this table, so it is true."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from sim.view.player import Player
+
+
+@dataclass(frozen=True)
+class Control:
+    """Keys, as the help calls them, what they do in words, and what each of them does."""
+
+    label: str
+    words: str
+    keys: dict[str, Callable[[Player], object]]
+
+
+def _toggle(name: str) -> Callable[[Player], object]:
+    return lambda player: player.toggle(name)
+
+
+def _seek_digit(digit: int) -> Callable[[Player], object]:
+    return lambda player: player.timeline.seek_share(digit / 10)
+
+
+CONTROLS = (
+    Control("Space", "play, pause", {"space": lambda p: p.timeline.toggle()}),
+    Control(
+        "Left Right",
+        "back, on by a second",
+        {
+            "left": lambda p: p.timeline.seek(p.timeline.time - 1),
+            "right": lambda p: p.timeline.seek(p.timeline.time + 1),
+        },
+    ),
+    Control(
+        ", .",
+        "one frame back, on",
+        {",": lambda p: p.timeline.step(-1), ".": lambda p: p.timeline.step(1)},
+    ),
+    Control(
+        "Home End",
+        "to the start, the end",
+        {"home": lambda p: p.timeline.seek_share(0.0), "end": lambda p: p.timeline.seek_share(1.0)},
+    ),
+    Control("0 - 9", "to 0, 10 ... 90 %", {str(k): _seek_digit(k) for k in range(10)}),
+    Control(
+        "Down Up",
+        "slower, faster",
+        {
+            "down": lambda p: p.timeline.change_speed(-1),
+            "up": lambda p: p.timeline.change_speed(1),
+        },
+    ),
+    Control("L", "loop, or stop at the end", {"l": lambda p: p.toggle_loop()}),
+    Control(
+        "N P", "next, previous finding", {"n": lambda p: p.next(), "p": lambda p: p.previous()}
+    ),
+    Control("Tab", "findings of the next figure", {"tab": lambda p: p.judge_next()}),
+    Control("F", "follow all, one figure, none", {"f": lambda p: p.follow_next()}),
+    Control("O", "side by side, overlaid", {"o": _toggle("overlaid")}),
+    Control("G", "ghost of the source or target", {"g": _toggle("ghosts")}),
+    Control("C", "contacts: stands, slides, sinks", {"c": _toggle("contacts")}),
+    Control("M", "centre of mass and its support", {"m": _toggle("mass")}),
+    Control("R", "path of the root", {"r": _toggle("path")}),
+    Control("J", "joints at a limit", {"j": _toggle("limits")}),
+    Control("T", "names and where they face", {"t": _toggle("names")}),
+    Control("V", "the view from the start", {"v": lambda p: p.reset_view()}),
+    Control("H F1", "this help", {"h": _toggle("help"), "f1": _toggle("help")}),
+    Control("Q Esc", "close", {"q": lambda p: p.close(), "escape": lambda p: p.close()}),
+)
+MOUSE = (
+    ("Drag", "turn; right button: move"),
+    ("Wheel", "nearer, further"),
+    ("Click below", "to that time, or finding"),
+)
+
+_ACTIONS = {key: action for control in CONTROLS for key, action in control.keys.items()}
+
+
+def press(player: Player, key: str) -> bool:
+    """Do what a key does; whether it does anything."""
+    action = _ACTIONS.get(key.lower())
+    if action is not None:
+        action(player)
+    return action is not None
+
+
+def help_columns() -> tuple[str, str]:
+    """The help: keys, and what they do, line by line."""
+    rows = [*((c.label, c.words) for c in CONTROLS), *MOUSE]
+    keys, words = zip(*rows, strict=True)
+    return "\n".join(keys), "\n".join(words)

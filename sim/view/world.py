@@ -1,0 +1,49 @@
+"""The floor, the sky and the lights of a scene."""
+
+import mujoco
+
+
+def empty_world() -> mujoco.MjSpec:
+    """A light grey floor with a grid, lit from above; shadows cost ten times the rest."""
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    spec.visual.headlight.diffuse = [0.0, 0.0, 0.0]
+    spec.visual.headlight.ambient = [0.55, 0.55, 0.55]
+    spec.visual.headlight.specular = [0.0, 0.0, 0.0]
+    spec.visual.quality.offsamples = 0
+    spec.visual.quality.shadowsize = 0
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1080
+    spec.visual.map.znear, spec.visual.map.zfar = 0.01, 100
+    spec.add_texture(
+        name="floor",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
+        mark=mujoco.mjtMark.mjMARK_EDGE,
+        rgb1=[0.90, 0.91, 0.92],
+        rgb2=[0.90, 0.91, 0.92],
+        markrgb=[0.78, 0.80, 0.82],
+        width=300,
+        height=300,
+    )
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=[0.98, 0.98, 0.99],
+        rgb2=[0.93, 0.94, 0.96],
+        width=256,
+        height=256,
+    )
+    material = spec.add_material(name="floor", texuniform=True, texrepeat=[2, 2])
+    material.textures[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = "floor"
+    spec.worldbody.add_geom(
+        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05], material="floor"
+    )
+    for direction, strength in (([-0.5, -0.3, -1.0], 0.45), ([0.3, 0.6, -0.4], 0.2)):
+        spec.worldbody.add_light(
+            type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+            dir=direction,
+            diffuse=[strength] * 3,
+            castshadow=False,
+        )
+    return spec
