@@ -11,7 +11,8 @@ from sim.physics.tracking import TrackingResult
 from spark.constants import GRAVITY
 from spark.rotation import quat_relative, rotvec_from_quat
 
-SCHEMA = "spark-sim physics 1"
+SCHEMA = "spark-sim physics 2"
+CARRIED = 0.1  # of its weight, in the mean: a body that the assist lifts by more hangs on it
 LIMITS = (
     "This measures the servos as much as the motion: a fall shows that these servos don't keep "
     "this motion up, not that no controller could; an assist that carries weight hides feet in the "
@@ -23,7 +24,12 @@ _LISTED = 8  # joints and bodies in the text: the most loaded ones
 
 def summarize(tracked: TrackingResult) -> dict[str, Any]:
     """The measures as JSON: lengths in cm, angles in degrees, efforts as shares of body weight (and
-    height), torques in N m. Errors are those before the fall."""
+    height), torques in N m. Errors and what the assist carries are those before the fall.
+
+    `verdict` is what came of it: `stays_up`, without assist; `helped` or `carried` by an assist
+    that lifts less or more than `CARRIED` of the weight; `falls`; `diverged`. `upright_s` is the
+    time until the body falls, whatever holds it; `stays_up_s` the same, None where it is carried.
+    """
     rollout, model = tracked.rollout, tracked.model
     frames = len(rollout.fallen)
     weight = tracked.mass * GRAVITY
@@ -32,24 +38,29 @@ def summarize(tracked: TrackingResult) -> dict[str, Any]:
     upright = slice(0, max(fall, 1) if fall is not None else frames)
     apart = rollout.points[upright] - tracked.target_points[upright]
     forces, torques = np.split(rollout.wrench[1:], 2, axis=1)
-    assist = None
+    lifted = np.maximum(rollout.wrench[upright, 2][1:], 0.0)
+    assist: dict[str, Any] | None = None
     if tracked.assist is not None:
         assist = {
             "cap_force": tracked.assist.force,
             "cap_torque": tracked.assist.torque,
             "force": _mean_and_max_norm(forces / weight),
-            "carried": _reduced(rollout.wrench[1:, 2] / weight, np.mean),
+            "carried": _reduced(lifted / weight, np.mean),
             "torque": _mean_and_max_norm(torques / (weight * tracked.height)),
             "work_j": round(float(rollout.work.sum()), 3),
         }
     loads = rollout.loads / weight
+    verdict = _verdict(tracked.diverged, fall, assist)
+    upright_s = round((fall if fall is not None else frames - 1) * tracked.frame_time, 4)
     return {
         "schema": SCHEMA,
         "frames": frames,
         "frame_time": tracked.frame_time,
         "mass_kg": round(tracked.mass, 3),
         "height_m": round(tracked.height, 4),
-        "stays_up_s": round((fall if fall is not None else frames - 1) * tracked.frame_time, 4),
+        "verdict": verdict,
+        "upright_s": upright_s,
+        "stays_up_s": None if verdict == "carried" else upright_s,
         "fall_frame": fall,
         "diverged_frame": tracked.diverged,
         "error": {
@@ -86,17 +97,18 @@ def render(metrics: dict[str, Any], name: str) -> str:
     """The text of the `metrics` that `summarize` yields, of the motion `name`."""
     assist, error = metrics["assist"], metrics["error"]
     end = (metrics["frames"] - 1) * metrics["frame_time"]
-    if metrics["diverged_frame"] is not None:
-        stays = f"the simulation diverged at frame {metrics['diverged_frame']}; no numbers after it"
-    elif metrics["fall_frame"] is None:
-        stays = f"all {end:.2f} s"
-    else:
-        stays = (
-            f"{metrics['stays_up_s']:.2f} s of {end:.2f} s: falls at frame {metrics['fall_frame']}"
-        )
+    lifts = f"the assist lifts {100 * assist['carried']:.0f} % of its weight" if assist else ""
+    verdict = {
+        "stays_up": f"all {end:.2f} s",
+        "helped": f"upright for all {end:.2f} s; {lifts}",
+        "carried": f"for all {end:.2f} s it hangs on the assist, and does not stay up: {lifts}",
+        "falls": f"after {metrics['upright_s']:.2f} s of {end:.2f} s, at frame "
+        f"{metrics['fall_frame']}" + (f"; until then {lifts}" if assist else ""),
+        "diverged": f"at frame {metrics['diverged_frame']}; no numbers after it",
+    }[metrics["verdict"]]
     lines = [
         f"{name}: tracked in simulation, {'with' if assist else 'without'} assist",
-        f"  stays up  {stays}",
+        f"  {metrics['verdict'].replace('_', ' '):<8}  {verdict}",
         f"  error     {error['joints_deg']:.1f} deg RMS of the joints; joints "
         f"{error['mpjpe_cm']:.1f} cm away, {error['mpjpe_root_cm']:.1f} cm relative to the root"
         + ("" if metrics["fall_frame"] is None else " (until the fall)"),
@@ -105,8 +117,7 @@ def render(metrics: dict[str, Any], name: str) -> str:
         force, torque = assist["force"], assist["torque"]
         lines += [
             f"  assist    force {100 * force['mean']:.0f} % of body weight, at most "
-            f"{100 * force['max']:.0f} % (cap {100 * assist['cap_force']:.0f} %); it carries "
-            f"{100 * assist['carried']:.0f} %",
+            f"{100 * force['max']:.0f} % (cap {100 * assist['cap_force']:.0f} %)",
             f"            torque {100 * torque['mean']:.1f} % of body weight x height, at most "
             f"{100 * torque['max']:.1f} % (cap {100 * assist['cap_torque']:.0f} %); work "
             f"{assist['work_j']:.0f} J",
@@ -130,6 +141,16 @@ def render(metrics: dict[str, Any], name: str) -> str:
     if len(metrics["joints"]) > len(rows):
         lines.append(f"            and {len(metrics['joints']) - len(rows)} joints with less")
     return "\n".join(lines)
+
+
+def _verdict(diverged: int | None, fall: int | None, assist: dict[str, Any] | None) -> str:
+    if diverged is not None:
+        return "diverged"
+    if fall is not None:
+        return "falls"
+    if assist is None:
+        return "stays_up"
+    return "carried" if assist["carried"] > CARRIED else "helped"
 
 
 def _joint_errors(tracked: TrackingResult, frames: slice) -> Float[np.ndarray, "T N"]:

@@ -117,6 +117,30 @@ def test_held_in_the_air_the_assist_is_the_whole_weight() -> None:
     np.testing.assert_allclose(torque, np.cross(arm, [0, 0, weight]), atol=0.01 * weight)
 
 
+def test_a_body_that_hangs_does_not_stay_up() -> None:
+    """On its feet it is helped; held 5 cm above where it could stand, it hangs by half."""
+    alone = summarize(follow(still(2.0)))
+    assert (alone["verdict"], alone["stays_up_s"], alone["upright_s"]) == ("stays_up", 2.0, 2.0)
+    standing = summarize(follow(still(2.0), assist=Assist()))
+    assert (standing["verdict"], standing["stays_up_s"]) == ("helped", 2.0)
+    assert standing["assist"]["carried"] < 0.02
+    held = summarize(follow(still(2.0, up=0.05), assist=Assist()))
+    # The spring of (10 rad/s)² m x 5 cm lifts 5 m/s² of 9.81; the feet stand with the rest.
+    assert held["assist"]["carried"] == pytest.approx(0.05 * 10**2 / G, abs=0.05)
+    assert (held["verdict"], held["stays_up_s"], held["upright_s"]) == ("carried", None, 2.0)
+    text = render(held, "x")
+    assert "does not stay up" in text
+    assert "  stays up  " not in text
+    assert "  stays up  all 2.00 s" in render(alone, "x")
+
+
+def test_a_fall_is_said_with_its_time() -> None:
+    found = summarize(follow(still(0.6, up=3.0)))
+    assert found["verdict"] == "falls"
+    assert found["stays_up_s"] == found["upright_s"] < 0.6
+    assert f"falls     after {found['upright_s']:.2f} s of 0.60 s" in render(found, "x")
+
+
 def test_the_assist_reported_is_what_moves_the_body() -> None:
     """Force and gravity change the momentum: the body follows a target that accelerates."""
     body = still(1.0, up=2.0)
@@ -191,7 +215,7 @@ def test_divergence_is_said_and_nothing_is_nan(
         assert np.isfinite(values).all()
     found = summarize(tracked)
     json.dumps(found, allow_nan=False)
-    assert f"diverged at frame {tracked.diverged}" in render(found, "arm")
+    assert f"diverged  at frame {tracked.diverged}" in render(found, "arm")
     assert capfd.readouterr() == ("", "")
     assert not list(tmp_path.iterdir()), "MuJoCo keeps its warnings to itself"
 
