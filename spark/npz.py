@@ -22,9 +22,10 @@ from spark.opening import read_bytes
 
 _BASE, _RATIO = 128 << 20, 4  # bytes that arrays may take, and how many more for each of the file's
 _HEADER = 10_000  # bytes of an array's header, as numpy allows at most
+_OBJECTS = re.compile(rb"'descr'\s*:.*[<>|=]?O\d?'", re.DOTALL)
 # A header is the text of a Python dict; what else may stand in one needs pickle.
 _FIELDS = (
-    re.compile(rb"'descr'\s*:\s*'([<>|=]?(?:b1|[iu][1248]|f[248]|[SU][1-9]\d{0,5}))'"),
+    re.compile(rb"'descr'\s*:\s*'([<>|=]?(?:b1|[iu][1248]|f[248]|c(?:8|16)|[SU][1-9]\d{0,5}))'"),
     re.compile(rb"'fortran_order'\s*:\s*(True|False)"),
     re.compile(rb"'shape'\s*:\s*\(([\d\s,L]*)\)"),
 )
@@ -56,23 +57,22 @@ class Npz(Mapping[str, np.ndarray]):
             if info.filename.endswith(".npy")
         }
 
+    @property
+    def pickled(self) -> tuple[str, ...]:
+        """The arrays of Python objects, which are read by running the pickles in them: not here."""
+        return tuple(name for name in self if self._holds_objects(name))
+
     def __getitem__(self, name: str) -> np.ndarray:
         info = self._members[name]
-        if info.flag_bits & 1:
-            self._fail(f"{name!r} is encrypted")
-        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            self._fail(f"{name!r} is compressed in a way that npz files are not")
         self._taken[name] = info.file_size
         if sum(self._taken.values()) > self._limit:
             self._fail(
                 f"{name!r} takes {info.file_size / 2**20:.0f} MB, far more than such a file holds"
             )
+        data = self._content(name, info.file_size)
         try:
-            return _array(self._zip.read(info))
-        except (
-            *(ValueError, TypeError, EOFError, OSError, NotImplementedError, RuntimeError),
-            *(zipfile.BadZipFile, zlib.error, MemoryError),
-        ) as error:
+            return array_in(data)
+        except (ValueError, MemoryError) as error:
             self._fail(f"{name!r} can't be read ({_first_line(error)})", error)
 
     def __iter__(self) -> Iterator[str]:
@@ -81,31 +81,63 @@ class Npz(Mapping[str, np.ndarray]):
     def __len__(self) -> int:
         return len(self._members)
 
+    def _holds_objects(self, name: str) -> bool:
+        return holds_objects(self._content(name, _HEADER))
+
+    def _content(self, name: str, size: int) -> bytes:
+        """The first `size` bytes of a member."""
+        info = self._members[name]
+        if info.flag_bits & 1:
+            self._fail(f"{name!r} is encrypted")
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            self._fail(f"{name!r} is compressed in a way that npz files are not")
+        try:
+            with self._zip.open(info) as member:
+                return member.read(size)
+        except (
+            *(ValueError, EOFError, OSError, NotImplementedError, RuntimeError),
+            *(zipfile.BadZipFile, zlib.error, MemoryError),
+        ) as error:
+            self._fail(f"{name!r} can't be read ({_first_line(error)})", error)
+
     def _fail(self, message: str, cause: Exception | None = None) -> NoReturn:
         raise FileFormatError(self.path, None, f"{message}; expected {self._expected}") from cause
 
 
-def _array(data: bytes) -> np.ndarray:
-    """The array in the bytes of an npy file, which its header must describe to the byte."""
-    if data[:6] != b"\x93NUMPY" or len(data) < 12:
-        raise ValueError("it is no npy file")
-    wide = data[6] > 1  # version 1 has a header of at most 64 kB
-    start = 12 if wide else 10
-    length = int.from_bytes(data[8:start], "little")
-    if length > _HEADER:
-        raise ValueError(f"its header has {length} bytes")
-    header = data[start : start + length]
+def array_in(data: bytes) -> np.ndarray:
+    """The array in the bytes of an npy file, which its header must describe to the byte. Raises
+    `ValueError` where it doesn't, or where the array is not one of plain numbers or text."""
+    header, content = _split(data)
     found = [field.search(header) for field in _FIELDS]
     if None in found:
         raise ValueError("its header describes no array of plain numbers or text")
     kind, order, lengths = (field[1].decode() for field in found if field)
     shape = tuple(int(n) for n in re.findall(r"\d+", lengths))
     dtype = np.dtype(kind)
-    content = memoryview(data)[start + length :]
     if len(shape) > 8 or prod(shape) * dtype.itemsize != len(content):
         raise ValueError(f"{len(content)} bytes are no array of shape {str(shape)[:80]}")
     array = np.frombuffer(content, dtype) if len(content) else np.zeros(0, dtype)
     return array.reshape(shape, order="F" if order == "True" else "C")
+
+
+def holds_objects(data: bytes) -> bool:
+    """Whether an npy file that begins with `data` is an array of Python objects."""
+    try:
+        header, _ = _split(data)
+    except ValueError:
+        return False
+    return _OBJECTS.search(header) is not None
+
+
+def _split(data: bytes) -> tuple[bytes, memoryview]:
+    """The header and the rest of an npy file."""
+    if data[:6] != b"\x93NUMPY" or len(data) < 12:
+        raise ValueError("it is no npy file")
+    start = 12 if data[6] > 1 else 10  # version 1 has a header of at most 64 kB
+    length = int.from_bytes(data[8:start], "little")
+    if not 0 < length <= min(_HEADER, len(data) - start):
+        raise ValueError(f"its header is broken, or has {length} bytes")
+    return data[start : start + length], memoryview(data)[start + length :]
 
 
 def _first_line(error: BaseException) -> str:

@@ -42,6 +42,16 @@ def check_regular(path: Path, *, limit: int = LARGEST, expected: str = "a regula
         raise unreadable(path, error, expected) from error
 
 
+def beginning(path: Path, size: int) -> bytes:
+    """The first bytes of a regular file; nothing of anything else."""
+    try:
+        with open(path, "rb", opener=_without_waiting) as file:
+            regular = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
+            return file.read(size) if regular else b""
+    except (OSError, ValueError):
+        return b""
+
+
 def read_text(path: Path, *, limit: int = LARGEST_TEXT, expected: str = "text") -> str:
     """The content of a UTF-8 file, with or without a byte order mark; what else `read_bytes`."""
     try:

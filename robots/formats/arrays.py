@@ -21,6 +21,8 @@ def number_array(
         )
     value = arrays[name]
     try:
+        if isinstance(value, np.ndarray | complex) and np.iscomplexobj(value):
+            raise ValueError("complex numbers")
         if _count(value, depth=len(shape)) > _LARGEST:
             raise ValueError("more numbers than the file has bytes for")
         array = np.array(value, dtype=np.float64)

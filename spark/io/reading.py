@@ -11,6 +11,7 @@ from spark.io.recording import Recording
 from spark.io.smpl_layouts import KEYS as SMPL_KEYS
 from spark.io.smpl_layouts import WIDTHS as SMPL_WIDTHS
 from spark.io.tensors import says
+from spark.opening import beginning
 
 Reader = Callable[..., Recording]
 
@@ -63,11 +64,7 @@ def read_motion(
 
 def format_of(path: Path) -> Format:
     """The format of a file, by what it begins with, or else by its ending; BVH by any other."""
-    try:
-        with path.open("rb") as file:
-            head = file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n")
-    except (OSError, ValueError):
-        head = b""
+    head = beginning(path, 64).lstrip(b"\xef\xbb\xbf \t\r\n")
     by_content = (f for f in FORMATS if f.magic is not None and head.startswith(f.magic))
     by_ending = (f for f in FORMATS if path.suffix.lower() in f.endings)
     return next(by_content, None) or next(by_ending, BVH)

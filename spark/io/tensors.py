@@ -5,7 +5,6 @@ pickle's instructions are walked over one by one; those that make dicts, lists a
 followed, and whatever else they would call becomes an `Unknown`.
 """
 
-import pickletools
 import zipfile
 import zlib
 from dataclasses import dataclass
@@ -15,9 +14,11 @@ from typing import Any
 import numpy as np
 
 from spark.errors import FileFormatError
+from spark.opening import beginning, check_regular
+from spark.pickle_machine import Name, PickleMachine, RefusedError
 
 _MAX_PICKLE = 1 << 26  # bytes: it says what there is; the numbers lie beside it
-_MAX_STORAGE = 1 << 32  # bytes of one tensor
+_MAX_UNPACKED = 1 << 26  # bytes of what is packed, which torch never does
 _MAX_REPEATED = 10_000_000  # numbers of a tensor that repeats those of its storage (stride 0)
 _LEGACY = b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19."  # how torch before 1.6 begins a file
 _DTYPES = {
@@ -58,8 +59,6 @@ class Tensor:
         """The numbers. Raises `FileFormatError` where the file does not hold them."""
         with zipfile.ZipFile(self.path) as stored:
             member = _member(stored, f"data/{self.storage}", self.path)
-            if member.file_size > _MAX_STORAGE:
-                raise FileFormatError(self.path, None, "holds a tensor beyond 4 GB")
             flat = np.frombuffer(_unpacked(stored, member, self.path), self.dtype)
         last = self.offset + sum((n - 1) * s for n, s in zip(self.shape, self.strides, strict=True))
         if 0 in self.shape:
@@ -78,6 +77,7 @@ class Tensor:
 def says(path: Path, words: tuple[bytes, ...]) -> bool:
     """Whether a file of `torch.save` has one of these names in it."""
     try:
+        check_regular(path)
         with zipfile.ZipFile(path) as stored:
             member = _member(stored, "data.pkl", path)
             if member.file_size > _MAX_PICKLE:
@@ -93,22 +93,27 @@ def read_tensors(path: Path) -> Any:
 
     Raises `FileFormatError` where the file is none of torch's, or broken.
     """
+    check_regular(path, expected="a motion")
+    if beginning(path, len(_LEGACY)) == _LEGACY:
+        raise FileFormatError(
+            path, None, "was saved by torch before 1.6; load it there and save it again"
+        )
     try:
-        with path.open("rb") as file:
-            if file.read(len(_LEGACY)) == _LEGACY:
-                raise FileFormatError(
-                    path, None, "was saved by torch before 1.6; load it there and save it again"
-                )
         with zipfile.ZipFile(path) as stored:
             member = _member(stored, "data.pkl", path)
             if member.file_size > _MAX_PICKLE:
                 raise FileFormatError(path, None, "describes more than a motion")
-            return _follow(_unpacked(stored, member, path), path)
+            return _TorchMachine(path).run(_unpacked(stored, member, path))
     except OSError as error:
         raise FileFormatError(path, None, f"can't be read ({error.strerror or error})") from error
     except (zipfile.BadZipFile, NotImplementedError, ValueError) as error:
         raise FileFormatError(path, None, f"is no file of torch.save ({error})") from error
-    except (IndexError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except RefusedError as error:
+        raise FileFormatError(path, None, f"{error}; expected a motion") from error
+    except (
+        *(IndexError, KeyError, TypeError, AttributeError, RecursionError),
+        *(AssertionError, OverflowError, MemoryError),
+    ) as error:
         raise FileFormatError(
             path, None, f"holds a broken pickle ({type(error).__name__}: {error})"
         ) from error
@@ -123,123 +128,36 @@ def _member(stored: zipfile.ZipFile, ending: str, path: Path) -> zipfile.ZipInfo
 
 
 def _unpacked(stored: zipfile.ZipFile, member: zipfile.ZipInfo, path: Path) -> bytes:
+    if member.compress_type != zipfile.ZIP_STORED and member.file_size > _MAX_UNPACKED:
+        raise FileFormatError(
+            path, None, f"{member.filename} is packed, which torch never does; save it again"
+        )
     try:
         return stored.read(member)
     except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, NotImplementedError) as error:
         raise FileFormatError(path, None, f"{member.filename} is broken ({error})") from error
 
 
-_MARK = Unknown("mark")
+class _TorchMachine(PickleMachine):
+    """Follows what makes dicts, lists and tensors; other calls are not made."""
 
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.path = path
 
-def _follow(pickle: bytes, path: Path) -> Any:
-    """The value that the instructions describe; calls other than those of tensors are not made."""
-    stack: list[Any] = []
-    memo: dict[int, Any] = {}
+    def call(self, called: Any, arguments: Any) -> Any:
+        return _made(called, arguments, self.path)
 
-    def to_mark() -> list[Any]:
-        at = len(stack) - 1
-        while stack[at] is not _MARK:
-            at -= 1
-            if at < 0:
-                raise IndexError("no mark")
-        items = stack[at + 1 :]
-        del stack[at:]
-        return items
+    def build(self, made: Any, state: Any) -> None:
+        """States are of no use here."""
 
-    argument: Any
-    for opcode, argument, _ in pickletools.genops(pickle):
-        match opcode.name:
-            case "PROTO" | "FRAME":
-                pass
-            case "STOP":
-                return stack.pop()
-            case "MARK":
-                stack.append(_MARK)
-            case "NONE":
-                stack.append(None)
-            case "NEWTRUE":
-                stack.append(True)
-            case "NEWFALSE":
-                stack.append(False)
-            case "EMPTY_DICT":
-                stack.append({})
-            case "EMPTY_LIST":
-                stack.append([])
-            case "EMPTY_TUPLE":
-                stack.append(())
-            case "TUPLE":
-                stack.append(tuple(to_mark()))
-            case "LIST":
-                stack.append(to_mark())
-            case "DICT":
-                items = to_mark()
-                stack.append(dict(zip(items[::2], items[1::2], strict=True)))
-            case "TUPLE1" | "TUPLE2" | "TUPLE3":
-                count = int(opcode.name[-1])
-                items = stack[-count:]
-                del stack[-count:]
-                stack.append(tuple(items))
-            case "APPEND":
-                item = stack.pop()
-                _append(stack[-1], [item])
-            case "APPENDS":
-                items = to_mark()
-                _append(stack[-1], items)
-            case "SETITEM":
-                value, key = stack.pop(), stack.pop()
-                _update(stack[-1], [key, value])
-            case "SETITEMS":
-                items = to_mark()
-                _update(stack[-1], items)
-            case "POP":
-                stack.pop()
-            case "POP_MARK":
-                to_mark()
-            case "DUP":
-                stack.append(stack[-1])
-            case "PUT" | "BINPUT" | "LONG_BINPUT":
-                memo[int(argument)] = stack[-1]
-            case "MEMOIZE":
-                memo[len(memo)] = stack[-1]
-            case "GET" | "BINGET" | "LONG_BINGET":
-                stack.append(memo[int(argument)])
-            case "GLOBAL":
-                stack.append(Unknown(str(argument)))
-            case "STACK_GLOBAL":
-                name, module = stack.pop(), stack.pop()
-                stack.append(Unknown(f"{module} {name}"))
-            case "BINPERSID":
-                stack.append(("storage", stack.pop()))
-            case "REDUCE" | "NEWOBJ":
-                arguments, callee = stack.pop(), stack.pop()
-                stack.append(_made(callee, arguments, path))
-            case "BUILD":
-                stack.pop()
-            case name if argument is not None and name.startswith(
-                ("BIN", "INT", "LONG", "FLOAT", "SHORT", "UNICODE", "STRING")
-            ):
-                stack.append(argument)
-            case name:
-                raise FileFormatError(
-                    path, None, f"has a pickle with {name}, which no motion needs; it is not read"
-                )
-    raise ValueError("the pickle has no end")
-
-
-def _append(target: Any, items: list[Any]) -> None:
-    if isinstance(target, list):
-        target += items
-
-
-def _update(target: Any, items: list[Any]) -> None:
-    if isinstance(target, dict):
-        target.update(zip(items[::2], items[1::2], strict=True))
+    def persistent(self, key: Any) -> Any:
+        return ("storage", key)
 
 
 def _made(callee: Any, arguments: Any, path: Path) -> Any:
     """What a call gives, for the few that are known."""
-    name = callee.name if isinstance(callee, Unknown) else str(callee)
+    name = f"{callee.module} {callee.name}" if isinstance(callee, Name) else type(callee).__name__
     if name in _CONTAINERS:
         return _CONTAINERS[name]()
     if name == _PARAMETER:
@@ -247,7 +165,7 @@ def _made(callee: Any, arguments: Any, path: Path) -> Any:
     if name not in _TENSORS:
         return Unknown(name)
     (_, (_, kind, key, *_)), offset, shape, strides, *_ = arguments
-    dtype = _DTYPES.get(kind.name.rpartition(" ")[2])
+    dtype = _DTYPES.get(kind.name)
     numbers = (offset, *shape, *strides)
     if dtype is None or not all(type(n) is int and n >= 0 for n in numbers):
         return Unknown(f"tensor of {kind.name}")
