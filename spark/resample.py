@@ -4,9 +4,12 @@ A time is given as a fractional frame: 2.25 is a quarter of the way from frame 2
 first and the last frame hold beyond the ends, and a whole frame comes out as it went in.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Float, Int
 
+from spark.motion import Motion
 from spark.rotation import quat_slerp
 
 
@@ -34,6 +37,28 @@ def frames_of_keys(
 ) -> Float[np.ndarray, "N"]:
     """Times [s] as fractional frames of keys that lie at `key_times` [s], in rising order."""
     return np.interp(times, key_times, np.arange(len(key_times)))
+
+
+def frames_at_rate(count: int, frame_time: float, wanted: float) -> Float[np.ndarray, "N"]:
+    """`count` frames of `frame_time` [s] looked up every `wanted` seconds: the first frame stays,
+    and no time beyond the last is asked for."""
+    last = (count - 1) * frame_time / wanted
+    at = np.arange(int(last + 1e-6) + 1) * (wanted / frame_time)
+    near = np.round(at)
+    # A time that misses its frame by less than rounding does is that frame's.
+    return np.where(np.abs(at - near) < 1e-6, near, at)
+
+
+def motion_at(motion: Motion, at: Float[np.ndarray, "N"], frame_time: float) -> Motion:
+    """A motion at fractional frames that lie `frame_time` [s] apart."""
+    moving = motion.translations
+    return replace(
+        motion,
+        frame_time=frame_time,
+        root_pos=values_at(motion.root_pos, at),
+        rotations=rotations_at(motion.rotations, at),
+        translations=None if moving is None else values_at(moving, at),
+    )
 
 
 def _neighbours(

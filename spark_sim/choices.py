@@ -17,7 +17,19 @@ Unit = Literal["m", "dm", "cm", "mm", "inch", "cmu"]
 Quat = Literal["xyzw", "wxyz"]
 """The order of a CSV's quaternions."""
 
-Format = Literal["npz", "mjlab", "csv", "csv-wxyz", "gmr"]
+Format = Literal[
+    "npz",
+    "mjlab",
+    "beyondmimic",
+    "holomotion",
+    "locomujoco",
+    "csv",
+    "csv-wxyz",
+    "bones-seed",
+    "gmr",
+    "protomotions",
+    "sonic",
+]
 """What a robot's motion is written as; `robots.formats` says more."""
 
 RobotName = Literal[

@@ -3,15 +3,16 @@
 from abc import ABC, abstractmethod
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 
-from spark.errors import SkeletonError, name_list
+from spark.errors import ConventionError, SkeletonError, name_list
 from spark.kinematics import forward
 from spark.motion import Motion
-from spark.rig.contacts import planted_feet
+from spark.resample import frames_at_rate
+from spark.rig.contacts import feet_by_side
 from spark.rig.rig import Rig
 from spark.summary import counted, html_table, time_span
 from spark.transfer.canonical import CanonicalMotion, to_canonical
@@ -23,6 +24,9 @@ if TYPE_CHECKING:  # these load MuJoCo, which a character's clip can do without
     from sim.view.scene import Figure
 
 File: TypeAlias = str | Path
+MAX_FPS = 10_000
+AnyBase = TypeVar("AnyBase", bound="ClipBase")
+_NEAR = 0.01  # of a frame: files round their frame times, 0.016667 s
 
 
 class ClipBase(ABC):
@@ -60,6 +64,38 @@ class ClipBase(ABC):
     def save(self, path: File, *, force: bool = False) -> Path:
         """Write the motion to a file. Raises `OutputError` where it exists, unless forced."""
 
+    @abstractmethod
+    def _at(self: AnyBase, frames: Float[np.ndarray, "N"], frame_time: float) -> AnyBase:
+        """The clip at fractional frames that lie `frame_time` [s] apart."""
+
+    def part(self: AnyBase, start: float | None = None, end: float | None = None) -> AnyBase:
+        """The frames from `start` to `end` [s], both inclusive, by default to the clip's own ends.
+
+        An `end` beyond the clip's is the clip's. Raises `ConventionError` where no frame is left.
+        """
+        last = len(self) - 1
+        first = 0.0 if start is None else start / self.frame_time
+        until = float(last) if end is None else min(end / self.frame_time, last)
+        frames = np.zeros(0)
+        if 0 <= first <= until + _NEAR:  # false for what is no number
+            frames = np.arange(np.ceil(first - _NEAR), np.floor(until + _NEAR) + 1)
+        if not len(frames):
+            stop = self.duration if end is None else end
+            raise ConventionError(
+                f"{self.name}: there is nothing from {start or 0:.4g} to {stop:.4g} s; it runs "
+                f"from 0 to {self.duration:.4g} s"
+            )
+        return self._at(frames, self.frame_time)
+
+    def resampled(self: AnyBase, fps: float) -> AnyBase:
+        """The clip at another rate, positions and angles interpolated linearly, rotations on the
+        sphere; the first frame stays. Raises `ConventionError` where `fps` is no rate."""
+        if not (np.isfinite(fps) and 0 < fps <= MAX_FPS):
+            raise ConventionError(f"fps is {fps:g}; expected a number above 0, up to {MAX_FPS}")
+        if abs(self.frame_time * fps - 1) < 1e-6:
+            return self
+        return self._at(frames_at_rate(len(self), self.frame_time, 1 / fps), 1 / fps)
+
     @property
     def frame_time(self) -> float:
         """Seconds from frame to frame."""
@@ -84,10 +120,7 @@ class ClipBase(ABC):
     def contacts(self) -> dict[str, Bool[np.ndarray, "T"]]:
         """In which frames each foot stands (slow, and near its lowest height), by side: "left",
         "right"."""
-        motion, rig = self.motion, self.rig
-        standing = planted_feet(rig, forward(motion)[0], motion.frame_time)
-        roles = [rig.roles.roles[j] for j in rig.contact_joints]
-        return {role.side: standing[:, k] for k, role in enumerate(roles) if role is not None}
+        return feet_by_side(self.rig, forward(self.motion)[0], self.frame_time)
 
     @property
     def floor_z(self) -> float:

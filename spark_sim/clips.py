@@ -1,6 +1,6 @@
 """Clips: motions on the bodies that make them, of a character (`Clip`) or a robot (`RobotClip`)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
@@ -10,8 +10,10 @@ from jaxtyping import Float
 
 from spark.errors import SkeletonError
 from spark.io.bvh import write_bvh
+from spark.io.encoding import encode
 from spark.io.recording import Recording
 from spark.motion import Motion
+from spark.resample import motion_at
 from spark.rig.override import Override
 from spark.rig.rig import Rig, understand
 from spark_sim import files
@@ -85,6 +87,13 @@ class Clip(ClipBase):
         write_bvh(self.recording.bvh, path)
         return path
 
+    def _at(self, frames: Float[np.ndarray, "N"], frame_time: float) -> "Clip":
+        motion = motion_at(self.motion, frames, frame_time)
+        bvh, notes = encode(motion, self.recording)
+        bvh = replace(bvh, path=self.recording.bvh.path)
+        notes = (*self.recording.notes, *notes)
+        return replace(self, recording=replace(self.recording, bvh=bvh, motion=motion, notes=notes))
+
     def _facts(self) -> list[tuple[str, str]]:
         convention = self.recording.convention
         return [
@@ -141,16 +150,27 @@ class RobotClip(ClipBase):
             for name, start, ball in zip(self.joint_names, starts, robot.tree.balls, strict=True)
         }
 
+    def _at(self, frames: Float[np.ndarray, "N"], frame_time: float) -> "RobotClip":
+        from sim.interpolate import at_times
+
+        robot = self.on_robot.robot
+        qpos = at_times(robot.mjcf.model, self.qpos, 1.0, frames)
+        moved = replace(self.on_robot, coordinates=robot.from_qpos(qpos), frame_time=frame_time)
+        return replace(self, on_robot=moved)
+
     def save(self, path: File, *, force: bool = False, format: Format | None = None) -> Path:
         """Write the motion in one of `robots.formats.FORMATS`, by default the one of the ending.
 
-        Raises `OutputError` where `path` exists, unless forced, or has an ending of none of them.
+        What a CSV or a pickle doesn't say is written beside it, as JSON. Raises `OutputError` where
+        a file exists, unless forced, or `path` has an ending of none of the formats.
         """
-        from robots.formats import dispatch, format_of
+        from robots.formats import dispatch, written_files
 
         path = Path(path)
-        format_of(path, format)
-        files.claim(path, force=force)
+        for file in written_files(path, format):
+            files.check_free(file, force=force)
+        if not path.is_dir():
+            files.claim(path, force=force)
         dispatch.write(self.on_robot, path, format=format, source=self.path)
         return path
 

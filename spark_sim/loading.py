@@ -70,8 +70,8 @@ def load(
       x, y or z; `roles` is a map of joints in TOML, as `spark-sim inspect --save-map` writes it.
       `fps` is the rate where the file says none, or a wrong one. `body_model` is your own file of
       SMPL, SMPL-H or SMPL-X (.npz), for the exact bones of a motion of that family.
-    - A robot's motion (.npz, .csv, .pkl) is a `RobotClip`. `robot` is the robot's name or MJCF.
-      `quat` (xyzw or wxyz) and `fps` are what a CSV does not say.
+    - A robot's motion (.npz, .csv, .pkl, .motion, SONIC's folder) is a `RobotClip`. `robot` is the
+      robot's name or MJCF. `quat` (xyzw or wxyz) and `fps` are what a CSV does not say.
     - A robot's name or MJCF is a `RobotClip` of one frame, in its T-pose. `roles` is then a map by
       bodies.
 
@@ -86,6 +86,8 @@ def load(
             raise ConventionError(f"{path}: {name} does not go with such a file; leave it out")
     if registry.is_robot(path):
         return load_robot(path, roles=roles)
+    if formats.is_sonic(path):
+        return load_robot_motion(path, robot=robot)
     if path.is_dir():
         raise FileFormatError(path, None, "is a folder; expected a file, or a robot's name")
     if path.suffix.lower() in formats.SUFFIXES and not holds_person(path):
@@ -100,6 +102,8 @@ def takes(path: File) -> tuple[str, ...]:
     if registry.is_robot(path):
         return ("roles",)
     suffix = Path(path).suffix.lower()
+    if formats.is_sonic(Path(path)):
+        return ("robot",)
     if suffix in formats.SUFFIXES and not holds_person(Path(path)):
         return ("robot", "quat", "fps") if suffix == ".csv" else ("robot",)
     return (*format_of(Path(path)).options, "roles")

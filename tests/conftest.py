@@ -16,6 +16,7 @@ from tests.helpers.recordings import DATA
 # What `make quick` leaves out: files and tests that start processes, train, render in a browser or
 # solve for seconds. Whatever runs on a real recording is left out too.
 SLOW = (
+    "tests/robots/formats/test_trackers.py::test_spoilt_files_end_in_an_error_that_says_so",
     "tests/robots/solver/test_own_body.py",
     "tests/robots/solver/test_solve.py",
     "tests/robots/solver/test_target.py",
@@ -39,6 +40,7 @@ SLOW = (
     "tests/spark_sim/test_batch_command.py",
     "tests/spark_sim/test_cli.py",
     "tests/spark_sim/test_hostile_names.py",
+    "tests/spark_sim/test_rates.py",
     "tests/spark_sim/test_train_command.py",
     "tests/test_packaging.py",
     "tests/test_readme.py",

@@ -1,13 +1,22 @@
 """Arrays by their names, as files hold them, and checked."""
 
+import io
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from spark.errors import FileFormatError
+from spark.files import write_atomically
 
 _LARGEST = 300_000  # numbers in lists; arrays may have any number
+
+
+def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
+    """Write an npz, compressed. Raises `OutputError` where `path` can't be written."""
+    out = io.BytesIO()
+    np.savez_compressed(out, allow_pickle=False, **arrays)
+    write_atomically(path, out.getvalue())
 
 
 def number_array(

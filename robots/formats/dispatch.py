@@ -1,13 +1,22 @@
 """Reading and writing a robot's motion in any of the formats."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from robots.formats import QUATERNIONS, format_of
+from robots.formats import format_of, is_sonic
+from robots.formats.about import read_sidecar, robot_of, sidecar_of
 from robots.formats.gmr import read_pkl, write_pkl
-from robots.formats.mjlab import read_mjlab, write_mjlab
+from robots.formats.holomotion import is_holomotion, read_holomotion, write_holomotion
+from robots.formats.locomujoco import is_locomujoco, read_locomujoco, write_locomujoco
+from robots.formats.mjlab import read_mjlab, write_beyondmimic, write_mjlab
 from robots.formats.native import is_native, read_npz, write_npz
 from robots.formats.plain import is_plain, read_plain
+from robots.formats.protomotions import read_protomotions, write_protomotions
+from robots.formats.seed import is_seed, read_seed, write_seed
+from robots.formats.sonic import info_of, read_sonic, write_sonic
 from robots.formats.unitree import ORDERS, likely_order, read_csv, write_csv
+from robots.model.known import known
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from spark.errors import ConventionError, FileFormatError
@@ -27,10 +36,22 @@ def write(
             write_npz(motion, path, source=source)
         case "mjlab":
             write_mjlab(motion, path)
+        case "beyondmimic":
+            write_beyondmimic(motion, path)
+        case "holomotion":
+            write_holomotion(motion, path)
+        case "locomujoco":
+            write_locomujoco(motion, path)
         case "gmr":
-            write_pkl(motion, path)
+            write_pkl(motion, path, source)
+        case "protomotions":
+            write_protomotions(motion, path)
+        case "sonic":
+            write_sonic(motion, path, source)
+        case "bones-seed":
+            write_seed(motion, path, source)
         case name:
-            write_csv(motion, path, quat=QUATERNIONS[name])
+            write_csv(motion, path, quat="wxyz" if name == "csv-wxyz" else "xyzw", source=source)
 
 
 def read(
@@ -40,44 +61,111 @@ def read(
     quat: str | None = None,
     fps: float | None = None,
 ) -> RobotMotion:
-    """The motion of a robot in a file of any of the formats; the content says which npz it is.
+    """The motion of a robot in a file of any of the formats; the content says which npz or CSV it
+    is.
 
-    Our npz knows its robot; `quat` and `fps` are for CSVs. Raises `ConventionError` where what the
-    file doesn't say is not given, and `FileFormatError` where it is broken.
+    What is given here wins over what the file, or the JSON beside it, says; `quat` and `fps` are
+    for CSVs. Raises `ConventionError` where what nothing says is not given, and `FileFormatError`
+    where the file is broken.
     """
     suffix = path.suffix.lower()
-    check_regular(path, expected="the motion of a robot")
+    folder = is_sonic(path)
+    if not folder:
+        check_regular(path, expected="the motion of a robot")
+    facts = (info_of(path) if folder else read_sidecar(path)) or {}
     if suffix == ".csv":
-        _need(path, robot, quat, fps)
-        assert robot is not None
-        assert quat is not None
-        assert fps is not None
-        return read_csv(path, robot, quat=quat, fps=fps)
-    arrays = Npz(path, expected="the motion of a robot") if suffix == ".npz" else None
-    if arrays is not None and is_native(arrays):
+        return _read_csv(path, robot, quat, fps, facts)
+    arrays = Npz(path, expected="the motion of a robot") if suffix == ".npz" else {}
+    if is_native(arrays):
         return read_npz(arrays, path, robot)
-    if robot is None:
-        raise ConventionError(f"{path}: doesn't say which robot moves; name it with --robot")
-    if arrays is None:
+    robot = _robot(path, robot, facts)
+    if folder:
+        return read_sonic(path, robot)
+    if suffix == ".pkl":
         return read_pkl(path, robot)
-    if not is_plain(arrays) and "joint_pos" not in arrays:
-        held = ", ".join(map(repr, arrays)) or "nothing"
-        raise FileFormatError(
-            path, None, f"has neither MuJoCo's 'qpos' nor mjlab's 'joint_pos'; it holds {held}"
-        )
-    return read_plain(arrays, path, robot) if is_plain(arrays) else read_mjlab(arrays, path, robot)
+    if suffix == ".motion":
+        return read_protomotions(path, robot)
+    for recognises, reads in (
+        (is_locomujoco, read_locomujoco),
+        (is_plain, read_plain),
+        (is_holomotion, read_holomotion),
+        (lambda arrays: "joint_pos" in arrays, read_mjlab),
+    ):
+        if recognises(arrays):
+            return reads(arrays, path, robot)
+    held = ", ".join(map(repr, arrays)) or "nothing"
+    raise FileFormatError(
+        path, None, f"has neither MuJoCo's 'qpos' nor mjlab's 'joint_pos'; it holds {held}"
+    )
 
 
-def _need(path: Path, robot: Morphology | None, quat: str | None, fps: float | None) -> None:
-    """A CSV says nothing of itself: all that is missing, in one message."""
+def _robot(path: Path, robot: Morphology | None, facts: dict[str, Any]) -> Morphology:
+    """The robot that is given, or the one that the motion was made for."""
+    if robot is not None:
+        return robot
+    if "model" not in facts:
+        raise ConventionError(f"{path}: doesn't say which robot moves; name it with --robot")
+    return known(robot_of(facts, path))
+
+
+def _read_csv(
+    path: Path,
+    robot: Morphology | None,
+    quat: str | None,
+    fps: float | None,
+    facts: dict[str, Any],
+) -> RobotMotion:
+    """A CSV says nothing of itself, but for the joints' names in a header: what neither the user
+    nor the file beside it says is asked for in one message."""
+    seed = is_seed(path)
+    said = _contradictions(path, fps, quat, facts)
+    own = facts.get("fps"), facts.get("quaternion")
+    rate = fps if fps is not None else own[0] if isinstance(own[0], float | int) else None
+    order = quat if quat is not None else own[1] if own[1] in ORDERS else None
     missing = []
-    if robot is None:
+    if robot is None and "model" not in facts:
         missing.append("the robot: --robot NAME")
-    if quat is None:
+    if order is None and not seed:
         likely = likely_order(path)
         hint = f" (upright only as {likely})" if likely else ""
         missing.append(f"its quaternions' order: --quat {' or --quat '.join(ORDERS)}{hint}")
-    if fps is None:
-        missing.append("its frame rate: --fps N")
+    if rate is None:
+        hint = " (BONES-SEED's own files have 120)" if seed else ""
+        missing.append(f"its frame rate: --fps N (retarget: --source-fps){hint}")
     if missing:
         raise ConventionError(f"{path}: a CSV doesn't say {'; '.join(missing)}")
+    assert rate is not None
+    robot = _robot(path, robot, facts)
+    if seed:
+        read = read_seed(path, robot, fps=rate)
+    else:
+        assert order is not None
+        read = read_csv(path, robot, quat=order, fps=rate)
+    if facts.get("frames", len(read)) != len(read):
+        said += (
+            f"has {len(read)} frames, {sidecar_of(path).name} says {facts['frames']}: it may be of "
+            "an older file",
+        )
+    return replace(read, notes=(*read.notes, *said))
+
+
+def _contradictions(
+    path: Path, fps: float | None, quat: str | None, facts: dict[str, Any]
+) -> tuple[str, ...]:
+    """What is given otherwise than the file beside the CSV says it."""
+    beside = sidecar_of(path).name
+    notes: tuple[str, ...] = ()
+    rate = facts.get("fps")
+    if (
+        fps is not None
+        and isinstance(rate, float | int)
+        and rate > 0
+        and abs(fps / rate - 1) > 1e-3
+    ):
+        notes += (
+            f"read at {fps:g} fps, {fps / rate:.3g} times as fast as {beside} says ({rate:g} fps); "
+            "is --fps right?",
+        )
+    if quat is not None and facts.get("quaternion") not in (None, quat):
+        notes += (f"read as {quat}, {beside} says {facts['quaternion']}; is --quat right?",)
+    return notes

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from robots.formats.about import write_sidecar
 from robots.formats.arrays import number_array, scalar
-from robots.formats.mjlab import body_poses
+from robots.formats.bodies import body_poses
 from robots.formats.qpos import Columns, columns_of, frame_time_of, motion_of
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
@@ -21,8 +22,8 @@ from spark.plain_pickle import read_plain_pickle
 _PROTOCOL = 4  # the newest that stores arrays in a way that all of numpy's versions read
 
 
-def write_pkl(motion: RobotMotion, path: Path) -> None:
-    """Write the six entries that GMR writes, bodies included."""
+def write_pkl(motion: RobotMotion, path: Path, source: Path | None = None) -> None:
+    """Write the six entries that GMR writes, bodies included, and beside it what they don't say."""
     columns = columns_of(motion, path)
     mjcf = motion.robot.mjcf
     still = motion.qpos.copy()
@@ -39,6 +40,10 @@ def write_pkl(motion: RobotMotion, path: Path) -> None:
         "link_body_list": [mjcf.body_name(body) for body in mjcf.bodies()],
     }
     write_atomically(path, pickle.dumps(entries, protocol=_PROTOCOL))
+    conventions = {"quaternion": "xyzw", "length_unit": "m", "angle_unit": "rad"}
+    write_sidecar(
+        motion, path, format="gmr", columns=[*entries], conventions=conventions, source=source
+    )
 
 
 def read_pkl(path: Path, robot: Morphology) -> RobotMotion:

@@ -1,28 +1,32 @@
-"""The npz that BeyondMimic and mjlab train on: joints, and the poses of all bodies in the world.
+"""The npz that mjlab and BeyondMimic train on: joints, and the poses of all bodies in the world.
 
-Joints and bodies come in the model's order, which is depth first in MuJoCo (mjlab) and breadth
-first in Isaac Lab (BeyondMimic), and files don't say which, nor do all agree on the quaternions'
+Joints and bodies come in MuJoCo's order, depth first (mjlab), or level by level, as Isaac Lab
+numbers them (BeyondMimic). Other tools' files don't say which, nor do all agree on the quaternions'
 order. The bodies' places settle it: only one reading puts the robot's where the file has them.
 """
 
-import io
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
-from robots.formats.arrays import number_array, scalar
+from robots.formats.arrays import number_array, scalar, write_arrays
+from robots.formats.bodies import (
+    body_names,
+    body_poses,
+    body_states,
+    breadth_first,
+    contact_array,
+    gradient,
+    isaac_bodies,
+)
 from robots.formats.qpos import Columns, check_finite, columns_of, frame_time_of, motion_of
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
-from robots.tree import Tree
 from spark.errors import FileFormatError
-from spark.files import write_atomically
-from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 
 _SAME_PLACE = 0.02  # [m] within which a body of the file is the robot's
 _TELLING = 1e-3  # [m] by which the right order has to be nearer
@@ -31,25 +35,52 @@ _LOOKS = 25  # frames in which that is looked at
 
 def write_mjlab(motion: RobotMotion, path: Path) -> None:
     """Write `fps`, `joint_pos`, `joint_vel` and the bodies' `body_pos_w`, `body_quat_w` (wxyz),
-    `body_lin_vel_w` (of the body's own origin) and `body_ang_vel_w`, in world axes, as float32.
+    `body_lin_vel_w` (of the body's own origin) and `body_ang_vel_w`, in world axes, as float32; and
+    beside them the names, which mjlab doesn't ask for, and the feet's contacts.
 
-    Bodies are those of the robot, without the world. Velocities are central differences.
+    Joints and bodies are in MuJoCo's order, all bodies of the robot, without the world.
     """
-    columns = columns_of(motion, path)
-    pos, quat = body_poses(motion.robot, motion.qpos)
-    dt = motion.frame_time
-    arrays: dict[str, Any] = {
-        "joint_pos": columns.angles,
-        "joint_vel": _gradient(columns.angles, dt),
-        "body_pos_w": pos,
-        "body_quat_w": quat,
-        "body_lin_vel_w": _gradient(pos, dt),
-        "body_ang_vel_w": _turning(quat, dt),
+    order = np.arange(len(motion.robot.joint_names))
+    _write(motion, path, "MuJoCo", order, motion.robot.mjcf.bodies(), of_mass=False)
+
+
+def write_beyondmimic(motion: RobotMotion, path: Path) -> None:
+    """Write the same for BeyondMimic, as Isaac Lab has it: joints and bodies level by level, bodies
+    without those that are welded on, and as `body_lin_vel_w` the velocities of the centres of mass.
+    """
+    robot = motion.robot
+    _write(motion, path, "Isaac Lab", breadth_first(robot.tree), isaac_bodies(robot), of_mass=True)
+
+
+def _write(
+    motion: RobotMotion,
+    path: Path,
+    order: str,
+    joints: Int[np.ndarray, "N"],
+    bodies: list[int],
+    *,
+    of_mass: bool,
+) -> None:
+    angles = columns_of(motion, path).angles[:, joints]
+    states = body_states(motion, bodies, of_mass=of_mass)
+    arrays = {
+        "joint_pos": angles,
+        "joint_vel": gradient(angles, motion.frame_time),
+        "body_pos_w": states.pos,
+        "body_quat_w": states.quat,
+        "body_lin_vel_w": states.lin_vel,
+        "body_ang_vel_w": states.ang_vel,
     }
-    out = io.BytesIO()
-    arrays = {name: values.astype(np.float32) for name, values in arrays.items()}
-    np.savez(out, fps=np.array([1 / dt]), **arrays)
-    write_atomically(path, out.getvalue())
+    about = {
+        "joint_names": np.array([motion.robot.joint_names[j] for j in joints]),
+        "body_names": np.array(body_names(motion.robot, bodies)),
+        "order": np.array(order),
+        "quaternion": np.array("wxyz"),
+        "body_lin_vel_of": np.array("centres of mass" if of_mass else "origins"),
+    }
+    floats = {name: values.astype(np.float32) for name, values in arrays.items()}
+    fps = {"fps": np.array([1 / motion.frame_time])}
+    write_arrays(path, fps | floats | contact_array(motion) | about)
 
 
 def read_mjlab(arrays: Mapping[str, Any], path: Path, robot: Morphology) -> RobotMotion:
@@ -66,7 +97,7 @@ def read_mjlab(arrays: Mapping[str, Any], path: Path, robot: Morphology) -> Robo
     columns = Columns(pos[:, 0], quat[:, 0], angles, frame_time)
     readings = {
         (order, convention): replace(columns, quat=np.roll(quat[:, 0], shift, 1), angles=read)
-        for order, read in _orders(angles, robot.tree).items()
+        for order, read in _orders(angles, arrays.get("joint_names"), robot).items()
         for convention, shift in (("wxyz", 0), ("xyzw", 1))
     }
     off = {how: _distance(reading, pos, robot, path) for how, reading in readings.items()}
@@ -79,40 +110,26 @@ def read_mjlab(arrays: Mapping[str, Any], path: Path, robot: Morphology) -> Robo
             f"{robot.mjcf.path.stem!r} has them, in any order of joints; is it of another robot?",
         )
     order, convention = best
-    rival = next(how for how in off if how[0] != order and how[1] == convention)
-    unclear = off[rival] < off[best] + _TELLING and not np.allclose(
-        readings[rival].angles, readings[best].angles
+    unclear = any(
+        off[rival] < off[best] + _TELLING
+        and not np.allclose(readings[rival].angles, readings[best].angles)
+        for rival in off
+        if rival[0] != order and rival[1] == convention
     )
     why = "though the bodies' places don't show it" if unclear else "as the bodies' places show"
-    said = f"joints are read in {order}-first order, quaternions as {convention}, {why}"
+    said = f"joints are read {order}, quaternions as {convention}, {why}"
     return motion_of(readings[best], robot, path, (said,))
 
 
-def body_poses(
-    robot: Morphology, qpos: Float[np.ndarray, "T nq"]
-) -> tuple[Float[np.ndarray, "T B 3"], Float[np.ndarray, "T B 4"]]:
-    """Where the robot's bodies are [m], and how they are turned (wxyz), the root first."""
-    model, bodies = robot.mjcf.model, robot.mjcf.bodies()
-    data = mujoco.MjData(model)
-    pos, quat = np.zeros((len(qpos), len(bodies), 3)), np.zeros((len(qpos), len(bodies), 4))
-    for t, frame in enumerate(qpos):
-        data.qpos[:] = frame
-        mujoco.mj_kinematics(model, data)
-        pos[t], quat[t] = data.xpos[bodies], data.xquat[bodies]
-    return pos, quat
-
-
-def breadth_first(tree: Tree) -> Int[np.ndarray, "N"]:
-    """The joints level by level: entry k is the joint that comes k-th."""
-    depth = [len(tree.chain(j)) for j in range(len(tree))]
-    return np.argsort(depth, kind="stable")
-
-
-def _orders(angles: Float[np.ndarray, "T N"], tree: Tree) -> dict[str, Float[np.ndarray, "T N"]]:
-    """The angles by hinge, where the file has them in either order."""
+def _orders(
+    angles: Float[np.ndarray, "T N"], names: np.ndarray | None, robot: Morphology
+) -> dict[str, Float[np.ndarray, "T N"]]:
+    """The angles by hinge, in each order that the file may have them in."""
+    if names is not None and sorted(names.tolist()) == sorted(robot.joint_names):
+        return {"by their names": angles[:, [names.tolist().index(n) for n in robot.joint_names]]}
     breadth = np.zeros_like(angles)
-    breadth[:, breadth_first(tree)] = angles
-    return {"depth": angles, "breadth": breadth}
+    breadth[:, breadth_first(robot.tree)] = angles
+    return {"in depth-first order": angles, "in breadth-first order": breadth}
 
 
 def _distance(
@@ -125,18 +142,3 @@ def _distance(
     own, _ = body_poses(robot, motion_of(few, robot, path).qpos)
     apart = np.linalg.norm(own[:, :, None] - pos[at][:, None], axis=-1)
     return float(apart.min(2 if own.shape[1] <= pos.shape[1] else 1).max())
-
-
-def _gradient(values: Float[np.ndarray, "T ..."], dt: float) -> Float[np.ndarray, "T ..."]:
-    return np.gradient(values, dt, axis=0) if len(values) > 1 else np.zeros_like(values)
-
-
-def _turning(quat: Float[np.ndarray, "T B 4"], dt: float) -> Float[np.ndarray, "T B 3"]:
-    """Angular velocities in world axes [rad/s]."""
-    out = np.zeros((*quat.shape[:2], 3))
-    if len(quat) > 1:
-        after = np.minimum(np.arange(len(quat)) + 1, len(quat) - 1)
-        before = np.maximum(np.arange(len(quat)) - 1, 0)
-        turn = rotvec_from_quat(quat_mul(quat[after], quat_conj(quat[before])))
-        out = turn / (dt * (after - before))[:, None, None]
-    return out

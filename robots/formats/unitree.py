@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from robots.formats.about import write_sidecar
 from robots.formats.qpos import Columns, columns_of, frame_time_of, motion_of
+from robots.formats.table import read_table
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from spark.errors import ConventionError, FileFormatError
@@ -21,14 +23,22 @@ _UPRIGHT = 0.5  # cosine of the mean tilt of a trunk that mostly stands
 _CLEARLY = 0.3  # how much less it is where quaternions are read in the wrong order
 
 
-def write_csv(motion: RobotMotion, path: Path, *, quat: str = "xyzw") -> None:
-    """Write a row a frame, with 9 decimals."""
+def write_csv(
+    motion: RobotMotion, path: Path, *, quat: str = "xyzw", source: Path | None = None
+) -> None:
+    """Write a row a frame, with 9 decimals, and beside it what the rows don't say."""
     columns = columns_of(motion, path)
     turned = columns.quat if quat == "wxyz" else np.roll(columns.quat, -1, axis=1)
     out = io.StringIO()
     table = np.concatenate([columns.pos, turned, columns.angles], axis=1)
     np.savetxt(out, table, fmt="%.9f", delimiter=",")
     write_atomically(path, out.getvalue().encode())
+    named = [*"xyz", *(f"q{axis}" for axis in quat), *motion.robot.joint_names]
+    conventions = {"quaternion": quat, "length_unit": "m", "angle_unit": "rad"}
+    format = "csv" if quat == "xyzw" else "csv-wxyz"
+    write_sidecar(
+        motion, path, format=format, columns=named, conventions=conventions, source=source
+    )
 
 
 def read_csv(path: Path, robot: Morphology, *, quat: str, fps: float) -> RobotMotion:
@@ -70,46 +80,9 @@ def _wxyz(table: Float[np.ndarray, "T C"], quat: str) -> Float[np.ndarray, "T 4"
 
 
 def _table(path: Path) -> Float[np.ndarray, "T C"]:
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise FileFormatError(path, None, "is no text; expected rows of numbers") from error
-    except OSError as error:
-        raise FileFormatError(path, None, f"can't be read ({error.strerror})") from error
-    if not text.strip():
-        raise FileFormatError(path, None, "is empty; expected a row of numbers for each frame")
-    try:
-        table = np.loadtxt(io.StringIO(text), delimiter=",", comments=None, ndmin=2)
-    except ValueError as error:
-        raise _fault(path, text) from error
+    _, table = read_table(path)
     if table.shape[1] <= _BASE:
         raise FileFormatError(
             path, 1, f"has {table.shape[1]} columns; expected 7 of the base and one for each joint"
         )
-    bad = np.argwhere(~np.isfinite(table))
-    if len(bad):
-        row, column = bad[0].tolist()
-        lines = [n for n, line in enumerate(text.splitlines(), start=1) if line.strip()]
-        raise FileFormatError(path, lines[row], f"column {column + 1} is {table[row, column]}")
     return table
-
-
-def _fault(path: Path, text: str) -> FileFormatError:
-    """The first row that is not as the others are."""
-    width = 0
-    for number, line in enumerate(text.splitlines(), start=1):
-        if not line.strip():
-            continue
-        cells = line.split(",")
-        for column, cell in enumerate(cells, start=1):
-            try:
-                float(cell)
-            except ValueError:
-                what = "expected numbers, and no header" if number == 1 else "expected a number"
-                return FileFormatError(path, number, f"column {column} is {cell[:40]!r}; {what}")
-        width = width or len(cells)
-        if len(cells) != width:
-            return FileFormatError(
-                path, number, f"has {len(cells)} columns, the rows above have {width}"
-            )
-    return FileFormatError(path, None, "can't be read as rows of numbers")

@@ -72,12 +72,26 @@ def assess(
     swing = swing_of(clip, source_clip, times, scale)
     contacts = _contacts(clip, source_clip, times)
     notes += _slope(source_poses, "the source's")
-    difference = abs(source_poses.motion.duration - motion.duration)
-    if difference > max(0.1, 2 * motion.frame_time):
-        notes += (f"the source's duration differs by {difference:.1f} s: frames may not match",)
+    notes += _pace(motion, source_poses.motion)
     thrown = scale * source_clip.base_acceleration_p99
     findings = findings_of(clip, drift, swing, thrown)
     return Report(clip, source_clip, drift, contacts, findings, notes, known, swing, scale)
+
+
+def _pace(motion: Motion, source: Motion) -> tuple[str, ...]:
+    """A note where the motion does not last as long as its source: a CSV that is read at another
+    rate than its own runs too fast or too slowly, and nothing else shows it."""
+    difference = abs(source.duration - motion.duration)
+    if difference <= max(0.1, 2 * motion.frame_time):
+        return ()
+    note = (
+        f"the source's duration differs by {difference:.1f} s: it lasts {source.duration:.4g} s, "
+        f"the motion {motion.duration:.4g} s, and frames may not match"
+    )
+    if len(motion) > 1 and source.duration > 0:
+        rate = (len(motion) - 1) / source.duration
+        note += f". Is its rate {rate:.4g} fps, and not {motion.fps:.4g}?"
+    return (note,)
 
 
 def _pose(name: str, subject: Subject) -> ClipPoses:

@@ -66,7 +66,10 @@ def read_smpl(
     count = said.rotvecs.shape[1]
     notes = [f"{said.origin}, {_hands(said)}", *said.notes]
     if fps is None and said.fps is None:
-        notes.append(f"{said.usual_fps:g} fps, as is usual: the file says none; else give --fps")
+        notes.append(
+            f"{said.usual_fps:g} fps, as is usual: the file says none; else give --fps (of "
+            "retarget: --source-fps)"
+        )
     if body_model is not None:
         body, what = read_body_model(Path(body_model), count, said.betas)
         notes.append(f"bones of {what}")

@@ -60,3 +60,12 @@ def planted_feet(
 ) -> Bool[np.ndarray, "T F"]:
     """For each of the rig's feet, whether its toe stands (the ankle where there is no toe)."""
     return planted_points(positions[:, rig.contact_joints], frame_time, rig.standing_height)
+
+
+def feet_by_side(
+    rig: Rig, positions: Float[np.ndarray, "T J 3"], frame_time: float
+) -> dict[str, Bool[np.ndarray, "T"]]:
+    """In which frames each foot stands, by side: "left", "right"; empty for a body without feet."""
+    standing = planted_feet(rig, positions, frame_time)
+    roles = [rig.roles.roles[j] for j in rig.contact_joints]
+    return {role.side: standing[:, k] for k, role in enumerate(roles) if role is not None}

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from spark.kinematics import forward, local_rotations, world_positions
 from spark.motion import Motion
-from spark.resample import rotations_at, values_at
+from spark.resample import frames_at_rate, rotations_at, values_at
 from spark.rig.contacts import floor_height
 from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_rotate
@@ -89,9 +89,7 @@ def at_frame_time(canonical: CanonicalMotion, frame_time: float) -> CanonicalMot
     stays. A motion that has this frame time already is returned as it is."""
     if abs(canonical.frame_time - frame_time) < 1e-3 * frame_time:
         return canonical
-    last = len(canonical) - 1
-    times = np.arange(int(last * canonical.frame_time / frame_time + 1e-6) + 1) * frame_time
-    at = times / canonical.frame_time
+    at = frames_at_rate(len(canonical), canonical.frame_time, frame_time)
     return CanonicalMotion(
         canonical.rig,
         frame_time,

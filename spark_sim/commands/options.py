@@ -41,13 +41,17 @@ def add_corrections(parser: ArgumentParser, file: str, prefix: str = "") -> None
         )
 
 
-def add_robot_motion(parser: ArgumentParser, file: str, prefix: str = "") -> None:
+def add_robot_motion(
+    parser: ArgumentParser, file: str, prefix: str = "", *, fps: str | None = None
+) -> None:
     """`--robot`, `--quat` and `--fps`: what `file` doesn't say where it is a robot's own motion.
 
-    A file that comes with the option `--NAME` has `--NAME-robot`, `--NAME-quat`, `--NAME-fps`.
+    A file that comes with the option `--NAME` has `--NAME-robot`, `--NAME-quat`, `--NAME-fps`;
+    `fps` is another name for the last one.
     """
+    rate = fps or f"{prefix}fps"
     dest = prefix.replace("-", "_")
-    group = parser.add_argument_group(f"for {file} of a robot (.npz, .csv, .pkl)")
+    group = parser.add_argument_group(f"for {file} of a robot (.npz, .csv, .pkl, ...)")
     group.add_argument(
         f"--{prefix}robot",
         dest=f"{dest}robot",
@@ -62,8 +66,8 @@ def add_robot_motion(parser: ArgumentParser, file: str, prefix: str = "") -> Non
         help="order of the quaternions in a CSV; Unitree writes xyzw",
     )
     group.add_argument(
-        f"--{prefix}fps",
-        dest=f"{dest}fps",
+        f"--{rate}",
+        dest=rate.replace("-", "_"),
         metavar="N",
         type=float,
         help="frame rate of a CSV, or of any motion whose file says none",

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from robots.formats import FORMATS
+from robots.formats import FORMATS, SONIC_FPS, is_sonic
 from spark_sim.choices import Method
 from spark_sim.commands.options import (
     add_corrections,
@@ -24,7 +24,8 @@ DESCRIPTION = """\
 Put the motion of each SRC on the body of TARGET. Both may be any humanoid rig
 or robot. Rest poses, axes, units, proportions and joint names may differ. On a
 character the result is a BVH file with TARGET's own hierarchy, channels, unit
-and axes. On a robot it is the coordinates of its joints (.npz, .csv, .pkl)."""
+and axes. On a robot it is the coordinates of its joints, as your trainer reads
+them (.npz, .csv, .pkl, .motion, or a folder)."""
 EXAMPLES = """\
 examples:
   spark-sim retarget walk.bvh --to mutant.bvh       # writes walk_on_mutant.bvh
@@ -32,7 +33,8 @@ examples:
   spark-sim retarget takes/ --to mutant.bvh -o out/ # every file below takes/
   spark-sim retarget walk.bvh --to robot            # writes walk_on_robot.npz
   spark-sim retarget walk.bvh --to unitree_g1 -o walk.csv
-  spark-sim retarget g1.csv --robot unitree_g1 --quat xyzw --fps 60 --to t1.xml
+  spark-sim retarget walk.bvh --to g1 --format sonic --fps 50 --start 1 --end 4
+  spark-sim retarget g1.csv --robot g1 --quat xyzw --source-fps 60 --to t1.xml
 """
 
 
@@ -61,9 +63,22 @@ def configure(parser: ArgumentParser) -> None:
         "--format",
         choices=tuple(FORMATS),
         metavar="NAME",
-        help="of a robot's motion, where the ending leaves it open. For .npz: npz (default) or "
-        "mjlab (of mjlab and BeyondMimic). For .csv: csv (Unitree's, quaternions xyzw; default) "
-        "or csv-wxyz. For .pkl: gmr",
+        help="of a robot's motion, where the ending leaves it open. For .npz: npz (default), "
+        "mjlab, beyondmimic (Isaac Lab's order), holomotion or locomujoco. For .csv: csv "
+        "(Unitree's, quaternions xyzw; default), csv-wxyz or bones-seed. For .pkl: gmr. For "
+        ".motion: protomotions. A folder: sonic",
+    )
+    parser.add_argument(
+        "--fps",
+        metavar="N",
+        type=float,
+        help="frames a second of the result (default: those of SRC)",
+    )
+    parser.add_argument(
+        "--start", metavar="S", type=float, help="begin at this second of SRC (default: 0)"
+    )
+    parser.add_argument(
+        "--end", metavar="S", type=float, help="stop at this second of SRC (default: its end)"
     )
     parser.add_argument(
         "--method",
@@ -89,29 +104,30 @@ def configure(parser: ArgumentParser) -> None:
     add_force(parser)
     add_json(parser, "one line for each result")
     add_corrections(parser, "SRC")
-    add_robot_motion(parser, "SRC")
+    add_robot_motion(parser, "SRC", fps="source-fps")
     add_corrections(parser, "TARGET", "to-")
 
 
 def run(args: Namespace) -> int:
-    from robots.formats import SUFFIXES, format_of
+    from robots.formats import SUFFIXES, written_files
     from robots.registry import is_robot
     from spark.errors import OutputError, SparkSimError
     from spark.io.reading import SUFFIXES as CHARACTERS
     from spark_sim import console, files
     from spark_sim.clips import CHARACTER_ENDINGS
 
-    robot = is_robot(args.to) or Path(args.to).suffix.lower() in SUFFIXES
+    robot = is_robot(args.to) or Path(args.to).suffix.lower() in SUFFIXES or is_sonic(Path(args.to))
     if args.format is not None and not robot:
         raise OutputError(f"--format is for robots; {args.to} is a character")
     suffixes = CHARACTERS if args.robot is None else (*CHARACTERS, *SUFFIXES)
     ending = FORMATS[args.format or "npz"] if robot else ".bvh"
     jobs = _jobs(args.sources, Path(args.to), args.output, ending, suffixes)
     for _, out in jobs:
-        files.check_free(out, force=args.force)
         if robot:
-            format_of(out, args.format)
+            for file in written_files(out, args.format):
+                files.check_free(file, force=args.force)
         else:
+            files.check_free(out, force=args.force)
             files.check_ending(out, CHARACTER_ENDINGS, "a character's motion")
     target = load(args, args.to, "to-")
     failures = 0
@@ -142,7 +158,7 @@ def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> di
     from spark_sim.api import retarget
     from spark_sim.clips import Clip
 
-    clip = load(args, str(source))
+    clip = _source(args, source)
     result = retarget(
         clip, target, method=args.method, checkpoint=args.checkpoint, refine=args.refine
     )
@@ -151,7 +167,7 @@ def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> di
         result.save(out, force=args.force)
     else:
         new = [note for note in result.notes if note not in target.notes]
-        console.notes(out, [*new, *unsaid(format_of(out, args.format), result.motion.fps)])
+        console.notes(out, [*new, *unsaid(out, format_of(out, args.format), result.motion.fps)])
         result.save(out, force=args.force, format=args.format)
     method = args.method
     if not isinstance(result, Clip):
@@ -168,6 +184,31 @@ def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> di
         "scale": result.rig.hip_height / clip.rig.hip_height,
         "notes": [*clip.notes, *result.notes],
     }
+
+
+def _source(args: Namespace, path: Path) -> "AnyClip":
+    """The motion to retarget: of a file, the part of it that is wanted, at the rate that is wanted.
+
+    Of a CSV whose rate nothing else says, `--fps` is the rate, and the result's too.
+    """
+    from robots.formats.about import read_sidecar
+    from spark_sim import console
+
+    rate, is_csv = args.source_fps, path.suffix.lower() == ".csv"
+    if is_csv and rate is None and args.fps is not None and "fps" not in (read_sidecar(path) or {}):
+        rate = args.fps
+        console.note(
+            f"{path.name}: read at {rate:g} fps, as --fps says; --source-fps where it has another "
+            "rate than the result"
+        )
+    clip = load(Namespace(**vars(args) | {"fps": rate}), str(path))
+    if args.start is not None or args.end is not None:
+        clip = clip.part(args.start, args.end)
+    wanted = args.fps
+    if wanted is None and args.format == "sonic":
+        wanted = SONIC_FPS
+        console.note(f"{path.name}: resampled to {wanted:g} fps, which SONIC plays")
+    return clip if wanted is None else clip.resampled(wanted)
 
 
 def _joints(clip: "AnyClip") -> int:
@@ -195,13 +236,14 @@ def _jobs(
 
     found: list[tuple[Path, Path]] = []
     for source in map(Path, sources):
-        if source.is_dir():
+        if source.is_dir() and not is_sonic(source):
             found += [
                 (path, path.parent.relative_to(source)) for path in motion_files(source, suffixes)
             ]
         else:
             found.append((source, Path()))
-    several = len(found) > 1 or any(Path(source).is_dir() for source in sources)
+    folders = any(Path(source).is_dir() and not is_sonic(Path(source)) for source in sources)
+    several = len(found) > 1 or folders
     if output is not None and not several and not _names_folder(output):
         return [(found[0][0], Path(output))]
     folder = Path(output or ".")

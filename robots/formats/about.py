@@ -1,0 +1,119 @@
+"""What a file of a robot's motion says of itself as JSON: inside our npz, and beside files of
+formats that have no room for it."""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from robots import registry
+from robots.formats.bodies import foot_spans
+from robots.model.known import model_sha256
+from robots.model.motion import RobotMotion
+from spark.errors import FileFormatError
+from spark.files import write_atomically
+from spark.opening import LARGEST_TEXT, parse_json, read_bytes
+
+SIDECAR = "spark-sim sidecar 1"
+
+
+def about(motion: RobotMotion, path: Path, source: Path | None = None) -> dict[str, Any]:
+    """The robot's name, the names of its model and of `source` with their SHA-256, the conventions
+    that all formats share, and what was assumed. No folder of this machine: the model's is its path
+    from `path`'s folder where it lies in that, and its bare name where not."""
+    model = motion.robot.mjcf.path
+    return {
+        "robot": registry.name_of(model),
+        "model": _portable(model, path),
+        "model_sha256": model_sha256(model),
+        "source": None if source is None else source.name,
+        "source_sha256": None if source is None else _sha256(source),
+        "up_axis": "z",
+        "notes": [_without_folder(note, model) for note in motion.notes],
+    }
+
+
+def write_sidecar(
+    motion: RobotMotion,
+    path: Path,
+    *,
+    format: str,
+    columns: Sequence[str],
+    conventions: dict[str, str],
+    source: Path | None = None,
+) -> None:
+    """Write `sidecar_of(path)`: rate, frames, order of the joints, what the `columns` are, and in
+    which frames each foot stands, as [first, last] of each contact."""
+    facts = {
+        "schema": SIDECAR,
+        "file": path.name,
+        "format": format,
+        "fps": _rate(motion),
+        "frames": len(motion),
+        **conventions,
+        "joint_names": list(motion.robot.joint_names),
+        "columns": list(columns),
+        **about(motion, path, source),
+        "foot_contacts": foot_spans(motion),
+    }
+    write_atomically(sidecar_of(path), (json.dumps(facts, indent=1) + "\n").encode())
+
+
+def read_sidecar(path: Path) -> dict[str, Any] | None:
+    """What the file beside `path` says; None where there is none. Raises `FileFormatError` where it
+    is broken."""
+    beside = sidecar_of(path)
+    if not beside.is_file():
+        return None
+    facts = parse_json(beside, read_bytes(beside, limit=LARGEST_TEXT), "all of it")
+    if not isinstance(facts, dict) or facts.get("schema") != SIDECAR:
+        return None  # another tool's
+    return facts
+
+
+def sidecar_of(path: Path) -> Path:
+    """Where what `path` doesn't say stands: `walk.csv.json` beside `walk.csv`."""
+    return path.with_name(f"{path.name}.json")
+
+
+def robot_of(facts: dict[str, Any], path: Path) -> str | Path:
+    """The robot that a motion was made for: its name, or its model, looked for from the folder of
+    `path`, then from the working directory. Older files hold an absolute path."""
+    name, model = facts.get("robot"), facts.get("model")
+    if isinstance(name, str):
+        return name
+    tried = [] if not isinstance(model, str) else [path.parent / model, Path(model)]
+    for candidate in tried:
+        if candidate.is_file():
+            return candidate
+    raise FileFormatError(
+        path,
+        None,
+        f"was made for the robot {model!r}, which is neither beside it nor here; name it with "
+        "--robot",
+    )
+
+
+def _rate(motion: RobotMotion) -> float:
+    """fps, as a whole number where it is one but for rounding."""
+    fps = 1 / motion.frame_time
+    return float(round(fps)) if abs(fps - round(fps)) < 1e-6 else fps
+
+
+def _sha256(path: Path) -> str | None:
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None
+
+
+def _portable(model: Path, path: Path) -> str:
+    """How `model` is called in a file at `path`, without a folder above it."""
+    folder = path.resolve().parent
+    found = model.resolve()
+    return found.relative_to(folder).as_posix() if found.is_relative_to(folder) else model.name
+
+
+def _without_folder(note: str, model: Path) -> str:
+    """A note in which MuJoCo may have named files beside the model by their whole path."""
+    for folder in {model.parent.resolve(), model.parent.absolute()}:
+        note = note.replace(f"{folder}/", "")
+    return note
