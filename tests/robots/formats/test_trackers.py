@@ -373,7 +373,7 @@ def test_spoilt_files_end_in_an_error_that_says_so(
     files = written_files(path, format)
     whole = {file: file.read_bytes() for file in files}
 
-    @settings(max_examples=40, deadline=None)
+    @settings(max_examples=30, deadline=None)
     @given(st.sampled_from(files), st.randoms(use_true_random=False))
     def spoil(file: Path, random: object) -> None:
         data = bytearray(whole[file])
