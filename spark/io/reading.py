@@ -102,8 +102,8 @@ def _reader(known: Format) -> Reader:
 def motion_files(path: Path, suffixes: tuple[str, ...] = SUFFIXES) -> list[Path]:
     """The files of some endings below a folder, in order of their names; a file itself.
 
-    Links are followed, and files of arrays that are no motion of a person left out. Raises
-    `FileFormatError` where there is none.
+    Links are followed. Of the endings of `FORMATS`, files of arrays that are no motion of a person
+    are left out. Raises `FileFormatError` where there is none.
     """
     if path.is_file():
         return [path]
@@ -112,7 +112,7 @@ def motion_files(path: Path, suffixes: tuple[str, ...] = SUFFIXES) -> list[Path]
     found = sorted(
         p
         for p in _files(path, set())
-        if p.suffix.lower() in suffixes and (p.suffix.lower() not in SUFFIXES or holds_person(p))
+        if p.suffix.lower() in suffixes and (suffixes != SUFFIXES or holds_person(p))
     )
     if not found:
         raise FileFormatError(
