@@ -5,12 +5,20 @@ Usage: python scripts/copy_table.py FOLDER TARGET... (a folder of BVH sources, B
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 import spark_sim
 from sim.report import ClipMetrics
 from sim.report.names import FLAGS, LABELS
+
+WAYS: dict[str, dict[str, Any]] = {
+    "`copy` alone": {"method": "copy", "refine": False},
+    "`copy`, feet held": {"method": "copy"},
+    "`spark`, feet not held": {"refine": False},
+    "`spark`": {},
+}
 
 
 def row(name: str, clips: list[ClipMetrics]) -> str:
@@ -28,10 +36,10 @@ def main(folder: str, *targets: str) -> None:
     print(f"| | implausible | {heads} |\n|---|{'---|' * (len(FLAGS) + 1)}")
     print(row("the source itself", [spark_sim.report(s).clip for s in sources]))
     for target in map(spark_sim.load, targets):
-        for name, refine in (("`copy` alone", False), ("`copy`, feet held", True)):
+        for name, how in WAYS.items():
             results = []
             for source in sources:
-                moved = spark_sim.retarget(source, target, method="copy", refine=refine)
+                moved = spark_sim.retarget(source, target, **how)
                 results.append(spark_sim.report(moved, source=source).clip)
             print(row(f"{name}, onto {target.name}", results))
 

@@ -12,6 +12,7 @@ from spark.io.encoding import encode, encode_new
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, from_canonical
 from spark.transfer.foot_lock import lock_feet
+from spark.transfer.leg_fit import fit_legs
 from spark_sim import files
 from spark_sim.choices import Method, RobotName
 from spark_sim.clips import AnyClip, Clip, File, RobotClip
@@ -65,11 +66,13 @@ def retarget(
 
     Both are clips, or what `load` takes: `target` may be a robot's name or MJCF.
 
-    On a character each joint turns as its counterpart does, in world axes. A joint of spine, neck
-    or shoulders that the source has no counterpart of is filled in: with method "copy" by
-    interpolation between its neighbours; with "spark" by a trained network (`checkpoint`, or the
-    one that ships) on rigs like those that it was trained on, and by the target's own motion, where
-    its file has one. With `refine`, each foot is then held where the source's foot stands.
+    On a character each joint turns as its counterpart does, in world axes. With method "copy" that
+    is all, as a baseline: joints that the source has no counterpart of are interpolated between
+    their neighbours. With "spark" the legs are fitted, so that the feet take the source's steps
+    (`spark.transfer.leg_fit`), and joints of spine, neck or shoulders without a counterpart are
+    filled in: by a trained network (`checkpoint`, or the one that ships) on rigs like those that it
+    was trained on, and by the target's own motion, where its file has one. With `refine`, each foot
+    is then held where the source's foot stands.
 
     On a robot the whole trajectory is solved for, within the joints' limits, feet held. With method
     "copy" or without `refine`, each pose is only copied to the robot's hinges, as a baseline.
@@ -121,12 +124,13 @@ def _onto_robot(source: AnyClip, target: RobotClip, *, solved: bool) -> RobotCli
 def _filled_in(
     source: CanonicalMotion, target: Clip, network: "NetworkRetargeter"
 ) -> CanonicalMotion:
-    """The joints without a counterpart as a network fills them in, and the target's own motion."""
+    """The joints without a counterpart as a network fills them in, and the target's own motion; the
+    legs fitted to it. A network that says where every joint is has said all of that."""
     from spark.transfer.target_prior import with_target_prior
 
     if not network.network.config.residual:
         return network(source, target.rig)
-    return with_target_prior(network, source, target.canonical)
+    return fit_legs(source, with_target_prior(network, source, target.canonical))
 
 
 def _learned(checkpoint: File | None) -> "NetworkRetargeter":

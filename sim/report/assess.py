@@ -26,6 +26,7 @@ from spark.motion import Motion
 from spark.resample import values_at
 from spark.rig.contacts import planted_feet
 from spark.rig.rig import Rig
+from spark.transfer.leg_fit import travel_scale
 
 # Hip heights: a source whose floor is further from z = 0 than this does not stand on z = 0, and
 # what was made of it may have been put there.
@@ -68,7 +69,8 @@ def assess(
     times = np.arange(len(clip_poses)) * motion.frame_time
     scale = rig.hip_height / source_poses.rig.hip_height
     clip = _beyond_source(measure(clip_poses, floor), source_clip, times, scale)
-    drift = _drift(clip_poses, source_poses, times, scale)
+    travel = scale if subject.body is not None else travel_scale(source_poses.rig, rig)
+    drift = _drift(clip_poses, source_poses, times, travel)
     swing = swing_of(clip, source_clip, times, scale)
     contacts = _contacts(clip, source_clip, times)
     notes += _slope(source_poses, "the source's")

@@ -62,7 +62,7 @@ def horizontal_speed(
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """How far the root strays from the source's path, which is scaled by the hip heights' ratio.
+    """How far the root strays from the source's path, which is scaled to the body.
 
     `distance` [m] is horizontal, frame by frame, with both paths starting at the same point;
     `path_length` [m] is that of the scaled source; `heading` [rad] is the difference of headings.
@@ -82,7 +82,7 @@ def root_drift(
     source_heading: Float[np.ndarray, "T"],
     scale: float,
 ) -> Drift:
-    """Both motions at the same times; `scale` is the hip height over the source's."""
+    """Both motions at the same times; `scale` is how far the body goes for each metre of it."""
     path = (hips - hips[0])[:, :2]
     source_path = scale * (source_hips - source_hips[0])[:, :2]
     turned = heading - source_heading

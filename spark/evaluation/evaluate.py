@@ -20,6 +20,7 @@ from spark.io.reading import SUFFIXES, read_motion
 from spark.rig.rig import understand
 from spark.transfer.canonical import FRAME_TIME, at_frame_time, canonical_positions, to_canonical
 from spark.transfer.foot_lock import lock_feet
+from spark.transfer.leg_fit import fit_legs
 from spark.transfer.target_prior import RetargetMethod, with_target_prior
 
 Positions = Float[np.ndarray, "_ _ 3"]  # frames, joints
@@ -92,19 +93,26 @@ def evaluate(
 
 
 def as_method(
-    method: RetargetMethod, *, target_prior: bool = False, feet_held: bool = False
+    method: RetargetMethod,
+    *,
+    target_prior: bool = False,
+    legs_fitted: bool = False,
+    feet_held: bool = False,
 ) -> Method:
     """A retarget method as `evaluate` takes one.
 
     With `target_prior` it is corrected by another recording of the target
-    (`spark.transfer.target_prior`), with `feet_held` its feet are then locked where the source's
-    stand (`spark.transfer.foot_lock`). Both together are what `retarget` does."""
+    (`spark.transfer.target_prior`), with `legs_fitted` its feet are led where the source's go
+    (`spark.transfer.leg_fit`), with `feet_held` locked where the source's stand
+    (`spark.transfer.foot_lock`). All three are what `retarget` does."""
 
     def run(case: Case) -> Positions:
         if target_prior and case.target_recording is not None:
             moved = with_target_prior(method, case.source, case.target_recording)
         else:
             moved = method(case.source, case.truth.rig)
+        if legs_fitted:
+            moved = fit_legs(case.source, moved)
         return canonical_positions(lock_feet(case.source, moved) if feet_held else moved)
 
     return run

@@ -19,9 +19,9 @@ Put motions on other bodies and measure how far the results are from the right
 answers. DATA is a dataset that `spark-sim prepare` made, or a folder with one
 folder a character. A motion that two characters share has a known answer.
 
-The table has a row for copy (the analytic transfer), for each --checkpoint and
-for each --result. The first two also appear with feet held, and with another
-recording of the target as a guide, as `retarget` uses it. The columns are
+The table has a row for copy (copied rotations), for each --checkpoint and for
+each --result. The first two also come with what `retarget` adds: another
+recording of the target as a guide, legs fitted, feet held. The columns are
 those of tables 1 and 2 of the paper; docs/evaluation.md defines the metrics."""
 EXAMPLES = """\
 examples:
@@ -31,12 +31,17 @@ examples:
                                                       # MOTION.bvh
   spark-sim evaluate dataset --made --checkpoint run
 """
-_WAYS: dict[str, dict[str, bool]] = {  # rows of one method, as they are named
-    "": {},
-    ", feet held": {"feet_held": True},
-    ", target prior": {"target_prior": True},
-    ", target prior, feet held": {"target_prior": True, "feet_held": True},
+Ways = dict[str, dict[str, bool]]
+"""What a row adds to its method, by the end of its name."""
+_PLAIN: Ways = {"": {}}
+_HELD: Ways = {", feet held": {"feet_held": True}}
+_PRIOR: Ways = {", target prior": {"target_prior": True}}
+_FITTED: Ways = {", legs fitted": {"legs_fitted": True}}
+_BOTH: Ways = {", legs fitted, feet held": {"legs_fitted": True, "feet_held": True}}
+_ALL: Ways = {
+    ", as retarget": {"target_prior": True, "legs_fitted": True, "feet_held": True},
 }
+_ALL_MADE: Ways = {", target prior, feet held": {"target_prior": True, "feet_held": True}}
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -118,18 +123,22 @@ def run(args: Namespace) -> int:
 
     rows: list[MethodScores] = []
 
-    def add(name: str, method: "RetargetMethod", ways: "Sequence[str]", **about: Any) -> None:
+    def add(name: str, method: "RetargetMethod", ways: Ways, **about: Any) -> None:
         rows.extend(
-            row(name + way, as_method(method, **_WAYS[way]), cases, **about) for way in ways
+            row(name + way, as_method(method, **added), cases, **about)
+            for way, added in ways.items()
         )
 
-    plain, held, own, both = _WAYS
-    add("copy", transfer, (plain, held, own))
+    # Made answers keep the legs' rotations and the path in hip heights: they can't judge fitted
+    # legs.
+    add("copy", transfer, _PLAIN | _HELD | _PRIOR | ({} if args.made else _FITTED | _BOTH))
     for name, weights in checkpoints.items():
         from spark.network.retarget import NetworkRetargeter
 
         network = NetworkRetargeter(weights)
-        ways = (plain, own, both) if network.network.config.residual else (plain,)
+        ways = _PLAIN
+        if network.network.config.residual:
+            ways = _PLAIN | _PRIOR | (_ALL_MADE if args.made else _ALL)
         add(name, network, ways, settings=weights.settings)
     for name, folder in results.items():
         answered = [case for case in cases if case.answer is not None]

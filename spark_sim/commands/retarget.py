@@ -85,9 +85,10 @@ def configure(parser: ArgumentParser) -> None:
         choices=get_args(Method),
         default="spark",
         help="spark (default) or copy. On a character both turn each joint as its counterpart "
-        "turns; where SRC has no counterpart, copy interpolates between the neighbours, and spark "
-        "asks a trained network and TARGET's own motion. On a robot, spark solves for the whole "
-        "trajectory; copy only copies each pose to the hinges, as a baseline",
+        "turns. spark then fits the legs, so that the feet take SRC's steps, and where SRC has no "
+        "counterpart asks a trained network and TARGET's own motion; copy interpolates there, as a "
+        "baseline. On a robot, spark solves for the whole trajectory; copy only copies each pose "
+        "to the hinges",
     )
     parser.add_argument(
         "--checkpoint",

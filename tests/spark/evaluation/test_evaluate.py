@@ -283,9 +283,10 @@ def test_command(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     command = [sys.executable, "-m", "spark_sim", "evaluate", tree, "--checkpoint", "run", *outputs]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    rows = [line.split("|")[1].strip() for line in done.stdout.splitlines()[2:8]]
-    both = "run", "run, target prior", "run, target prior, feet held"
-    assert rows == ["copy", "copy, feet held", "copy, target prior", *both]
+    rows = [line.split("|")[1].strip() for line in done.stdout.splitlines()[2:10]]
+    of_run = ["run", "run, target prior", "run, as retarget"]
+    fitted = ["copy, legs fitted", "copy, legs fitted, feet held"]
+    assert rows == ["copy", "copy, feet held", "copy, target prior", *fitted, *of_run]
     assert (tmp_path / "t.md").read_text() == done.stdout
     assert json.loads((tmp_path / "t.json").read_text())["data"] == str(tree)
     assert (tmp_path / "t.csv").read_text().startswith("method,")

@@ -1,0 +1,86 @@
+"""Legs fitted to the target: its feet take the source's steps, and its hips the path between them.
+
+Rotations copied onto legs of other proportions take the feet elsewhere. A wide body steps on its
+own toes, and a body with longer shanks squats. Animators keep the steps and let the knees follow,
+and so does this:
+
+- over the ground, the hips' path and the ankles about it are scaled alike (`travel_scale`), and
+  each ankle is moved out by as much as its hip joint is farther out than the source's, scaled;
+- in height, the ankles' way above where they stand in the T-pose is scaled as the hips' is;
+- the feet keep their rotations, and the knees bend by two-bone inverse kinematics.
+
+A body's own motion comes back as it was.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from spark.rig.rig import Rig
+from spark.rig.roles import LIMBS, Group, Role
+from spark.rotation import quat_rotate
+from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.leg_ik import bend_leg, leg_of
+
+# Of the shoulders' height in `travel_scale`, against the hips'. On retargeted characters of an
+# animation library the scale over the ground lay between the two (docs/evaluation.md).
+_SHOULDER_WEIGHT = 0.5
+_SHOULDERS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
+
+
+def travel_scale(source: Rig, target: Rig) -> float:
+    """How far `target` goes for each metre that `source` goes.
+
+    The geometric mean of the ratios of their hips' and their shoulders' heights: a big body on
+    short legs takes longer steps than its legs alone would. That of the hips alone where one of the
+    two has no arms.
+    """
+    hips = target.hip_height / source.hip_height
+    heights = [_shoulder_height(rig) for rig in (source, target)]
+    if min(heights) < 1:
+        return hips
+    return hips * float(heights[1] / heights[0]) ** _SHOULDER_WEIGHT
+
+
+def fit_legs(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
+    """`moved`, the transfer of `source`, with its path over the ground scaled by `travel_scale` and
+    its ankles where the source's are. A leg stays as it is where one of the two rigs has no foot.
+    """
+    start, target = source.rig, moved.rig
+    scale, rise = travel_scale(start, target), target.hip_height / start.hip_height
+    moved = replace(moved, hips=np.column_stack([source.hips[:, :2] * scale, moved.hips[:, 2]]))
+    theirs, positions = canonical_positions(source), canonical_positions(moved)
+    outwards = quat_rotate(source.rotations[:, start.pelvis], np.array([0.0, 1.0, 0.0]))[:, :2]
+    rotations = moved.rotations
+    for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
+        leg = leg_of(target.skeleton, target.roles.roles, group)
+        ankle = start.roles.joint(_foot(group))
+        if leg is None or ankle is None:
+            continue
+        rest, own_rest = _from_sole(start, ankle), _from_sole(target, leg.foot)
+        wanted = np.empty_like(moved.hips)
+        away = theirs[:, ankle, :2] - source.hips[:, :2]
+        wanted[:, :2] = moved.hips[:, :2] + scale * away
+        wanted[:, :2] += (own_rest[1] - scale * rest[1]) * outwards
+        above = theirs[:, ankle, 2] - source.floor_z - rest[2]
+        wanted[:, 2] = moved.floor_z + own_rest[2] + rise * above
+        rotations = bend_leg(rotations, positions, leg, wanted - positions[:, leg.foot])
+    return replace(moved, rotations=rotations)
+
+
+def _foot(leg: Group) -> Role:
+    return LIMBS[leg][2]
+
+
+def _from_sole(rig: Rig, joint: int) -> Float[np.ndarray, "3"]:
+    """Where a joint is in the T-pose [m], from the point of the floor below the hips' middle."""
+    at = rig.tpose_positions[joint] - rig.tpose_positions[rig.hips].mean(0)
+    return at + np.array([0.0, 0.0, rig.hip_height])
+
+
+def _shoulder_height(rig: Rig) -> float:
+    """Of the upper arms' joints over the floor in the T-pose [hip heights]; 0 without arms."""
+    joints = [j for role in _SHOULDERS for j in rig.roles.joints(role)[:1]]
+    heights = [_from_sole(rig, j)[2] / rig.hip_height for j in joints]
+    return float(np.mean(heights)) if heights else 0.0
