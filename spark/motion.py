@@ -5,9 +5,31 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from spark.errors import SkeletonError
+from spark.errors import ConventionError, SkeletonError
 from spark.skeleton import Skeleton
 from spark.summary import counted, time_span
+
+FRAME_TIMES = (1e-4, 1.0)
+"""[s] The shortest and the longest step of a motion. What lies beyond is a mistake, such as
+milliseconds for seconds; resampled, a small file of it would last for days."""
+_USUAL = (1 / 250, 1 / 5)  # [s] the steps of recordings, for a guess at what was meant
+
+
+def check_frame_time(frame_time: float, name: str = "the frame time") -> None:
+    """Raise `ConventionError` for what can't be the step of a motion [s]; it is called `name`."""
+    shortest, longest = FRAME_TIMES
+    if shortest <= frame_time <= longest:
+        return
+    meant = {"milliseconds": frame_time / 1000, "frames a second": 1 / (frame_time or np.nan)}
+    guesses = [
+        f"; if {frame_time:g} are {unit}, write {seconds:.6g}"
+        for unit, seconds in meant.items()
+        if _USUAL[0] <= seconds <= _USUAL[1]
+    ]
+    raise ConventionError(
+        f"{name} is {frame_time:g} s; expected {shortest:g} to {longest:g} s from frame to frame, "
+        f"such as 0.0333333{''.join(guesses)}"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +52,7 @@ class Motion:
         return f"Motion({span}, {counted(len(self.skeleton), 'joint')})"
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.frame_time) and self.frame_time > 0):
-            raise SkeletonError(f"frame time is {self.frame_time} s; expected a positive number")
+        check_frame_time(self.frame_time)
         if self.rotations.shape[1] != len(self.skeleton):
             raise SkeletonError(
                 f"the motion turns {self.rotations.shape[1]} joints, the skeleton has "

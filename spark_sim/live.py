@@ -6,6 +6,7 @@ from jaxtyping import Float
 from robots.stream.frame_targets import LATENCY, Frame, ground_of
 from robots.stream.stream import Stream
 from spark.errors import ConventionError
+from spark.motion import check_frame_time
 from spark_sim.clips import AnyClip, File, RobotClip
 from spark_sim.loading import clip_of
 
@@ -28,8 +29,8 @@ class Retargeter:
         source, target = clip_of(source), clip_of(target)
         if not isinstance(target, RobotClip):
             raise ConventionError(f"{target.name} is no robot; only robots follow frame by frame")
-        if fps is not None and not (np.isfinite(fps) and fps > 0):
-            raise ConventionError(f"fps is {fps}; expected a positive number")
+        if fps is not None:
+            check_frame_time(1.0 / fps if fps else np.inf)
         self.robot = target.on_robot.robot
         self._source = source.name
         frame_time = source.motion.frame_time if fps is None else 1.0 / fps

@@ -15,7 +15,8 @@ from robots.model.known import known, model_sha256
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from sim.interpolate import velocities
-from spark.errors import FileFormatError
+from spark.errors import ConventionError, FileFormatError
+from spark.motion import check_frame_time
 from spark.opening import parse_json
 
 SCHEMA = "spark-sim qpos 1"
@@ -78,8 +79,10 @@ def read_npz(arrays: Mapping[str, Any], path: Path, robot: Morphology | None = N
     if facts.get("model_sha256") != model_sha256(robot.mjcf.path):
         said += (f"the model {robot.mjcf.path.name} has changed since this was written",)
     frame_time = scalar(arrays, "frame_time", path)
-    if not (np.isfinite(frame_time) and frame_time > 0):
-        raise FileFormatError(path, None, f"frame_time is {frame_time:g} s, no time")
+    try:
+        check_frame_time(frame_time, "frame_time")
+    except ConventionError as error:
+        raise FileFormatError(path, None, str(error)) from error
     return of_qpos(qpos, robot, frame_time, path, said)
 
 

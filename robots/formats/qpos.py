@@ -9,7 +9,8 @@ from jaxtyping import Float
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.registry import ENTRIES
-from spark.errors import FileFormatError, OutputError
+from spark.errors import ConventionError, FileFormatError, OutputError
+from spark.motion import check_frame_time
 
 _HIGH = 10  # hip heights at which a robot hardly walks
 _NOTED, _REFUSED = 1e-3, 0.05  # how far the norm of a quaternion may be from 1
@@ -92,9 +93,12 @@ def of_qpos(
 
 def frame_time_of(fps: float, path: Path) -> float:
     """Seconds a frame. Raises `FileFormatError` where `fps` is no rate."""
-    if not (np.isfinite(fps) and 0 < fps < 1e6):
-        raise FileFormatError(path, None, f"fps is {fps:g}; expected a positive number")
-    return 1.0 / fps
+    frame_time = 1.0 / fps if fps else np.inf
+    try:
+        check_frame_time(frame_time)
+    except ConventionError as error:
+        raise FileFormatError(path, None, f"fps is {fps:g}, {error}") from error
+    return frame_time
 
 
 def check_finite(path: Path, **arrays: Float[np.ndarray, "T ..."]) -> None:

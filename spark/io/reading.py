@@ -57,8 +57,8 @@ def read_motion(
     for name in given:
         if name not in known.options:
             raise ConventionError(f"{path}: {name} does not go with {known.name}; leave it out")
-    if fps is not None and not 0.1 <= fps <= 10000:
-        raise ConventionError(f"{fps:g} fps is no frame rate; expected 0.1 to 10000")
+    if fps is not None and not 1 <= fps <= 10000:
+        raise ConventionError(f"{fps:g} fps is no frame rate; expected 1 to 10000")
     return _reader(known)(path, **given)
 
 

@@ -11,16 +11,16 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from spark.errors import ConventionError, name_list
+from spark.errors import ConventionError, FileFormatError, name_list
 from spark.io.bvh import Bvh, read_bvh
 from spark.io.convention import Convention, given_unit, given_up, infer_unit, infer_up
 from spark.io.euler import quat_from_angles
-from spark.motion import Motion
+from spark.motion import Motion, check_frame_time
 from spark.rotation import quat_identity
 from spark.skeleton import Skeleton
 
 _SAMPLES = 32  # frames that unit and up axis are inferred from
-_USUAL_FRAME_TIME = (0.001, 1.0)  # [s] 1000 to 1 frames a second
+_USUAL_FRAME_TIME = (0.001, 0.5)  # [s] 1000 to 2 frames a second
 
 _ENCODINGS = {"cp932": "Shift-JIS", "latin-1": "Latin-1"}
 
@@ -65,6 +65,10 @@ def read_recording(
     bvh = read_bvh(path)
     if fps is not None:
         bvh = replace(bvh, frame_time=1 / fps)
+    try:
+        check_frame_time(bvh.frame_time, "Frame Time")
+    except ConventionError as error:
+        raise FileFormatError(path, None, f"{error}; or give --fps") from error
     motion, adds_offset, notes = _decode(bvh)
     picked = np.unique(np.linspace(0, len(motion) - 1, _SAMPLES).astype(int))
     sample = replace(

@@ -266,7 +266,7 @@ def _rate(arrays: Mapping[str, np.ndarray], path: Path) -> float | None:
     if name is None or arrays[name].size != 1:
         return None
     fps = float(numbers(arrays, name, path).ravel()[0])
-    if not 0.1 <= fps <= 10000:
+    if not 1 <= fps <= 10000:
         raise FileFormatError(path, None, f"{name!r} is {fps:g}; expected frames a second")
     return fps
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from spark.errors import FileFormatError
 from spark.io.bvh import CHANNELS, Bvh, BvhJoint
 from spark.io.convention import UNITS
 from spark.io.encoding import encode
@@ -151,8 +152,23 @@ def test_a_file_without_frames_is_its_rest_pose(tmp_path: Path) -> None:
     np.testing.assert_allclose(forward(found.motion)[0][0], found.motion.skeleton.rest_positions)
 
 
-@pytest.mark.parametrize("frame_time", [30.0, 33e-6])
-def test_a_frame_time_in_another_unit_is_pointed_out(tmp_path: Path, frame_time: float) -> None:
+def test_an_odd_frame_time_is_pointed_out(tmp_path: Path) -> None:
     bvh = human()
-    found = read_recording(save(Bvh(bvh.joints, frame_time, bvh.values), tmp_path))
-    assert f"a frame lasts {frame_time:g} s" in found.notes[0]
+    found = read_recording(save(Bvh(bvh.joints, 0.9, bvh.values), tmp_path))
+    assert "a frame lasts 0.9 s" in found.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("frame_time", "meant"), [(33.333, "0.033333"), (30.0, "0.0333333"), (3600.0, ""), (33e-6, "")]
+)
+def test_a_frame_time_in_another_unit_is_refused(
+    tmp_path: Path, frame_time: float, meant: str
+) -> None:
+    """In milliseconds, a minute would be read as sixteen hours."""
+    bvh = human()
+    path = save(Bvh(bvh.joints, frame_time, bvh.values), tmp_path)
+    with pytest.raises(
+        FileFormatError, match=r"bvh: Frame Time is .* s; expected 0.0001 to 1 s"
+    ) as e:
+        read_recording(path)
+    assert (f"write {meant}" in str(e.value)) == bool(meant)
