@@ -3,6 +3,7 @@
 Only the kinematics matter here, so a file whose meshes are missing is read without them.
 """
 
+import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from robots.model.mjcf_source import read_source
 from spark.errors import FileFormatError, SkeletonError
 from spark.summary import brief
 
@@ -27,6 +29,11 @@ FREE, BALL, SLIDE, HINGE = (
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
 _MIN_MASS, _MIN_INERTIA = 1e-4, 1e-8  # [kg], [kg m²] of bodies whose mass went with their meshes
 _MAX_OFFSET = 1e4  # [m] of a body from its parent: beyond, floats lose millimetres; it is a mistake
+_NUMBERS = (
+    *("qpos0", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat"),
+    *("jnt_pos", "jnt_axis", "jnt_range", "geom_pos", "geom_quat", "geom_size"),
+    *("site_pos", "site_quat", "mesh_vert"),
+)
 _RIVAL_SHARE = 0.5  # a second tree with this share of the first one's joints is another robot
 
 
@@ -91,26 +98,37 @@ def read_mjcf(path: str | Path, *, visuals: bool = True) -> Mjcf:
     SkeletonError where it holds no robot or several.
     """
     path = Path(path)
-    if not path.is_file():
-        what = "is a folder" if path.is_dir() else "no such file"
-        raise FileFormatError(path, None, f"{what}; expected an MJCF (.xml)")
+    source = read_source(path)
     notes: list[str] = []
     with _warnings_as_notes(notes):
         try:
-            spec = mujoco.MjSpec.from_file(str(path))
-        except (ValueError, RuntimeError) as error:
-            raise FileFormatError(path, None, f"MuJoCo can't read it: {_line(error)}") from error
+            spec = mujoco.MjSpec.from_string(source.text, include=source.models)
+        except Exception as error:  # of MuJoCo or its binding, which has several kinds
+            message = _line(error) if source.whole else re.sub(r",? line \d+", "", _line(error))
+            raise FileFormatError(path, None, f"MuJoCo can't read it: {message}") from error
+        if any("'NaN'" in note for note in notes):
+            raise FileFormatError(path, None, "holds NaN where MuJoCo expects a number")
+        spec.modelfiledir = str(path.parent)
         if not visuals:
             _drop_visuals(spec)
         root = _find_root(spec, path, notes)
         _free_root(spec, root, path, notes)
         model = _compile(spec, path, notes)
     _note_ignored(model, notes)
-    if not (np.abs(model.body_pos) < _MAX_OFFSET).all() or not np.isfinite(model.jnt_axis).all():
+    _check_numbers(model, path)
+    return Mjcf(model, spec, int(model.body(root).id), path, tuple(notes))
+
+
+def _check_numbers(model: mujoco.MjModel, path: Path) -> None:
+    """Raise FileFormatError where a number of the model is none, or no length or mass that is."""
+    if not (np.abs(model.body_pos) < _MAX_OFFSET).all():
         raise FileFormatError(
             path, None, f"a body's place is no number of metres below {_MAX_OFFSET:g}"
         )
-    return Mjcf(model, spec, int(model.body(root).id), path, tuple(notes))
+    for name in _NUMBERS:
+        values = getattr(model, name)
+        if not np.isfinite(values).all():
+            raise FileFormatError(path, None, f"has numbers that are not finite ({name})")
 
 
 @contextmanager
@@ -214,7 +232,7 @@ def _free_root(spec: mujoco.MjSpec, root: str, path: Path, notes: list[str]) -> 
 def _compile(spec: mujoco.MjSpec, path: Path, notes: list[str]) -> mujoco.MjModel:
     try:
         return spec.compile()
-    except (ValueError, RuntimeError) as error:
+    except Exception as error:  # of MuJoCo or its binding, which has several kinds
         message = _line(error)
     assets = [mesh.file for mesh in spec.meshes if mesh.file]
     if not (assets or list(spec.textures) or list(spec.hfields)):
@@ -222,7 +240,7 @@ def _compile(spec: mujoco.MjSpec, path: Path, notes: list[str]) -> mujoco.MjMode
     _drop_assets(spec)
     try:
         model = spec.compile()
-    except (ValueError, RuntimeError) as again:
+    except Exception as again:
         raise FileFormatError(
             path,
             None,

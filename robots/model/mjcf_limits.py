@@ -1,0 +1,212 @@
+"""Sizes that a robot's model may ask for, checked before MuJoCo makes them.
+
+A line of MJCF can stand for a hundred thousand shapes (`replicate`), for a texture of gigabytes or
+for numbers without end beside each body. The limits lie far beyond the largest robots and scenes of
+MuJoCo Menagerie (1,300 elements, 40 MB of textures).
+"""
+
+import os
+import stat
+import struct
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping
+from math import prod
+from pathlib import Path
+
+from spark.errors import FileFormatError
+
+_ELEMENTS = 20_000  # after copying; compiled in seconds
+_DEPTH = 200  # bodies in bodies
+_JOINTS = 2_000  # MuJoCo's matrices grow with their square
+_KEYED = 5_000_000  # keyframes times elements: numbers of all of them together
+_PIXELS = 64 << 20  # of textures and height fields together
+_FILE = 256 << 20  # bytes of a mesh, or what else a model loads
+_MEMORY = 4 << 30  # bytes that `size memory` sets aside
+
+# How large a number may be, by the attribute that says it.
+_NUMBERS = {
+    **dict.fromkeys(
+        ("nuser_actuator", "nuser_body", "nuser_cam", "nuser_geom", "nuser_jnt"), 1_000
+    ),
+    **dict.fromkeys(("nuser_sensor", "nuser_site", "nuser_tendon", "nsample", "actdim"), 1_000),
+    **dict.fromkeys(("nuserdata", "nstack", "nconmax", "njmax"), 10_000_000),
+    **dict.fromkeys(("nkey", "offwidth", "offheight", "shadowsize", "resolution"), 20_000),
+    **dict.fromkeys(("numslices", "numstacks", "numquads", "offsamples", "maxhullvert"), 10_000),
+    **dict.fromkeys(("ccd_iterations", "sdf_iterations", "sdf_initpoints"), 10_000),
+    **dict.fromkeys(("iterations", "ls_iterations", "noslip_iterations"), 10_000),
+    "dim": 1_000,
+}
+_GRIDS = ("count", "cellcount")  # copies along one to three axes
+_LOADED = ("mesh", "hfield", "skin", "texture", "flexcomp")
+_FOLDERS = ("meshdir", "texturedir", "assetdir")
+
+
+def check_limits(path: Path, root: ET.Element, attached: Mapping[str, ET.Element]) -> None:
+    """Raise `FileFormatError` where the model, or one that it attaches, asks for more than a robot
+    needs, or loads what is not a regular file."""
+    trees = [root, *attached.values()]
+    elements, joints = _Counter(path, attached).counts(root)
+    if elements > _ELEMENTS:
+        raise FileFormatError(path, None, f"stands for {_many(elements, 'elements', _ELEMENTS)}")
+    if joints > _JOINTS:
+        raise FileFormatError(path, None, f"stands for {_many(joints, 'joints', _JOINTS)}")
+    keys = sum(len(tree.findall("./keyframe/key")) for tree in trees)
+    if keys * elements > _KEYED:
+        raise FileFormatError(path, None, f"has {keys} keyframes, more than such a model needs")
+    for tree in trees:
+        for element in tree.iter():
+            _check_numbers(path, element)
+    _check_pixels(path, trees)
+    _check_files(path, trees)
+
+
+def _many(count: float, noun: str, limit: int) -> str:
+    return f"{count:,.0f} {noun}; a robot has fewer than {limit:,}"
+
+
+class _Counter:
+    """How many elements and joints a tree comes to, after replicas, grids and attached models."""
+
+    def __init__(self, path: Path, attached: Mapping[str, ET.Element]) -> None:
+        self.path, self.attached = path, attached
+        self._known: dict[str, tuple[float, float]] = {}
+
+    def counts(self, root: ET.Element) -> tuple[float, float]:
+        files = {m.get("name", ""): m.get("file", "") for m in root.findall("./asset/model")}
+        elements = joints = 0.0
+        waiting = [(root, 1.0, 0)]
+        while waiting:
+            element, copies, depth = waiting.pop()
+            if depth > _DEPTH:
+                raise FileFormatError(self.path, None, f"nests elements deeper than {_DEPTH}")
+            if element.tag == "attach":
+                more, moving = self._of_attached(files, element.get("model", ""))
+                elements, joints = elements + copies * more, joints + copies * moving
+            own = prod(max(1.0, n) for name in _GRIDS for n in _numbers(element, name))
+            elements += copies * (own if element.tag != "replicate" else 1)
+            if element.tag in ("joint", "freejoint"):
+                joints += copies
+            if element.tag in ("composite", "flexcomp"):
+                joints += 3 * copies * own
+            below = copies * own if element.tag == "replicate" else copies
+            waiting += [(child, below, depth + 1) for child in element]
+        return elements, joints
+
+    def _of_attached(self, files: dict[str, str], model: str) -> tuple[float, float]:
+        file = files.get(model) or next(iter(files.values()), "")
+        if file not in self._known and file in self.attached:
+            self._known[file] = self.counts(self.attached[file])
+        return self._known.get(file, (0.0, 0.0))
+
+
+def _check_numbers(path: Path, element: ET.Element) -> None:
+    for name, limit in _NUMBERS.items():
+        for value in _numbers(element, name):
+            if value > limit:
+                _refuse(path, element, name, f"at most {limit}")
+    if element.tag == "numeric" and any(n > 1_000_000 for n in _numbers(element, "size")):
+        _refuse(path, element, "size", "at most 1000000")
+    if element.tag == "mesh" and any(n > 1_000 for n in _numbers(element, "params")):
+        _refuse(path, element, "params", "at most 1000")
+    if element.tag == "size" and _bytes(element.get("memory", "")) > _MEMORY:
+        _refuse(path, element, "memory", "at most 4G")
+
+
+def _check_pixels(path: Path, trees: list[ET.Element]) -> None:
+    pixels = 0.0
+    of_classes = [e for tree in trees for d in tree.iter("default") for e in d.findall("texture")]
+    for element in (e for tree in trees for e in tree.iter()):
+        if element.tag == "texture":
+            width, height = (
+                max((n for e in (element, *of_classes) for n in _numbers(e, name)), default=0.0)
+                for name in ("width", "height")
+            )
+            # The six sides of a cube lie above each other, as high as they are wide.
+            pixels += max(width * height, 6 * width * width if element.get("type") != "2d" else 0)
+        elif element.tag == "hfield":
+            pixels += prod(max(_numbers(element, name), default=0.0) for name in ("nrow", "ncol"))
+        if element.tag in ("texture", "hfield"):
+            pixels += sum(_png_pixels(file) for file in _files(path, trees, element))
+    if not pixels <= _PIXELS:  # nor NaN
+        raise FileFormatError(
+            path,
+            None,
+            f"has textures and height fields of {pixels / 1e6:,.0f} million points; at most "
+            f"{_PIXELS / 1e6:.0f} are read",
+        )
+
+
+def _check_files(path: Path, trees: list[ET.Element]) -> None:
+    for element in (e for tree in trees for e in tree.iter()):
+        if element.tag not in _LOADED:
+            continue
+        for file in _files(path, trees, element):
+            state = os.stat(file)
+            if not stat.S_ISREG(state.st_mode):
+                what = "is a folder" if stat.S_ISDIR(state.st_mode) else "is not a regular file"
+                raise FileFormatError(path, None, f"loads {str(file)!r}, which {what}")
+            if state.st_size > _FILE:
+                size = f"{state.st_size >> 20} MB; at most {_FILE >> 20} are read"
+                raise FileFormatError(path, None, f"loads {str(file)!r}, which has {size}")
+
+
+def _files(path: Path, trees: list[ET.Element], element: ET.Element) -> Iterator[Path]:
+    """The files that an element may mean, of those that are there."""
+    names = [value for name, value in element.attrib.items() if name.startswith("file")]
+    names = [name for name in names if name]
+    if not names:
+        return
+    compilers = [c for tree in trees for c in tree.iter("compiler")]
+    folders = {c.get(name, "") for c in compilers for name in _FOLDERS} | {""}
+    seen = set()
+    for name in names:
+        for folder in folders:
+            for own in (name, name.replace("\\", "/").rpartition("/")[2]):
+                file = path.parent / folder / own
+                try:
+                    there = file.exists()
+                except (OSError, ValueError):
+                    there = False
+                if there and file not in seen:
+                    seen.add(file)
+                    yield file
+
+
+def _png_pixels(file: Path) -> float:
+    """Width times height, as a PNG begins; 0 for other files, whose points are their bytes."""
+    if not file.is_file():
+        return 0.0
+    with file.open("rb") as opened:
+        head = opened.read(24)
+    if head[:8] != b"\x89PNG\r\n\x1a\n" or len(head) < 24:
+        return 0.0
+    width, height = struct.unpack(">II", head[16:24])
+    return float(width) * float(height)
+
+
+def _numbers(element: ET.Element, name: str) -> list[float]:
+    """The numbers of an attribute; words that are none are MuJoCo's to refuse."""
+    found = []
+    for word in element.get(name, "").split():
+        try:
+            found.append(float(word))
+        except ValueError:
+            continue
+    return [n for n in found if n == n]  # not NaN
+
+
+def _bytes(text: str) -> float:
+    """What `memory` says, such as 15M."""
+    text = text.strip()
+    powers = {"K": 10, "M": 20, "G": 30, "T": 40, "P": 50, "E": 60}
+    try:
+        return float(text.rstrip("KMGTPEkmgtpe") or 0) * 2 ** powers.get(text[-1:].upper(), 0)
+    except ValueError:
+        return 0.0
+
+
+def _refuse(path: Path, element: ET.Element, name: str, expected: str) -> None:
+    value = element.get(name, "")[:40]
+    raise FileFormatError(
+        path, None, f"asks for {name}={value!r} in <{element.tag}>; expected {expected}"
+    )
