@@ -336,7 +336,7 @@ ARM = '<body name="arm"><joint axis="0 1 0"/><geom size=".1"/></body>'
 @pytest.mark.parametrize(
     ("text", "error", "says"),
     [
-        ("<mujoco><worldbody>", FileFormatError, "can't read"),
+        ("<mujoco><worldbody>", FileFormatError, "is no XML"),
         (
             '<mujoco><worldbody><body><freejoint/><geom type="mesh" mesh="no"/></body></worldbody>'
             "</mujoco>",
@@ -345,7 +345,7 @@ ARM = '<body name="arm"><joint axis="0 1 0"/><geom size=".1"/></body>'
         ),
         (f"<mujoco><worldbody>{ARM}</worldbody></mujoco>", SkeletonError, "can't move"),
         ("<mujoco/>", SkeletonError, "no joints"),
-        ("not xml", FileFormatError, "can't read"),
+        ("not xml", FileFormatError, "is no XML"),
     ],
 )
 def test_what_is_no_robot_is_refused(
