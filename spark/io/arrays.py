@@ -43,7 +43,7 @@ def npz_names(path: Path) -> frozenset[str]:
             return frozenset(name.removesuffix(".npy") for name in stored.namelist())
     except (
         *(FileFormatError, OSError, ValueError, struct.error),
-        *(zipfile.BadZipFile, NotImplementedError),
+        *(zipfile.BadZipFile, NotImplementedError, IndexError),
     ):
         return frozenset()
 

@@ -33,6 +33,11 @@ HUMAN_HEIGHTS = (0.5, 3.0)  # [m] beyond them a note says so
 # Units or axes this close in log-probability are named in a note.
 _CLOSE = 0.6  # the second is more than half as likely
 
+# The mean direction from feet to body this near to an axis tells that axis.
+_CLEARLY = 0.75
+_STEADIER = 1.5  # a floor along an axis moves no more than this many times that of another
+_STEADY = 0.01  # of the body's height: a floor that moves less is steady
+
 # [heights] From a fingertip or toe to the farthest other one, along the bones.
 _LONGEST_PATH = 1.5
 
@@ -153,6 +158,26 @@ def infer_up(motion: Motion) -> tuple[Up, tuple[str, ...]]:
     elif standing[best] < -0.5:
         notes.append(f"the body is upside down along {up}; check, and give --up")
     return up, tuple(notes)
+
+
+def standing_axis(motion: Motion, usual: Up) -> tuple[Up, bool, str]:
+    """The axis along which the body stands, whether it points down, and why.
+
+    For a kind of file that has `usual` up as a rule: that axis, unless the body clearly stands
+    along another one, on a floor as steady. A body that crawls along x makes no file with x up.
+    """
+    positions, _ = forward(motion)
+    standing = above_feet(motion, positions)
+    best = int(np.argmax(np.abs(standing)))
+    own = UPS.index(usual)
+    if best == own or abs(standing[best]) < _CLEARLY:
+        down = bool(standing[own] < -_CLEARLY and own)  # a body is turned over about x
+        return usual, down, "as is usual in such files"
+    low = positions.min(axis=1) if standing[best] > 0 else -positions.max(axis=1)
+    size = float(np.median(np.ptp(positions, axis=1).max(axis=-1)))
+    if np.std(low[:, best]) > _STEADIER * np.std(low[:, own]) + _STEADY * size:
+        return usual, False, "as is usual in such files"
+    return UPS[best], bool(standing[best] < 0 and best), "along which the body stands"
 
 
 def above_feet(motion: Motion, positions: Float[np.ndarray, "T J 3"]) -> Float[np.ndarray, "3"]:

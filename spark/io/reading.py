@@ -7,6 +7,7 @@ from typing import Any
 
 from spark.errors import ConventionError, FileFormatError
 from spark.io.arrays import npy_shape, npz_names
+from spark.io.position_layouts import POSITION_KEYS, layouts
 from spark.io.recording import Recording
 from spark.io.smpl_layouts import KEYS as SMPL_KEYS
 from spark.io.smpl_layouts import WIDTHS as SMPL_WIDTHS
@@ -32,8 +33,12 @@ class Format:
 BVH = Format("BVH", (".bvh",), (*UNIT_AND_UP, "fps"), b"HIERARCHY")
 FBX = Format("FBX", (".fbx",), UNIT_AND_UP, b"Kaydara FBX Binary")
 SMPL = Format("SMPL", (".npz", ".npy", ".pt", ".pth"), (*UNIT_AND_UP, "fps", "body_model"))
+POSITIONS = Format("positions", (".npz", ".npy"), (*UNIT_AND_UP, "fps"))
 
-FORMATS = (BVH, FBX, SMPL)
+FORMATS = (BVH, FBX, SMPL, POSITIONS)
+_ROBOTS = frozenset({"qpos", "joint_pos", "dof_pos"})
+"""An npz with one of these arrays is a robot's motion."""
+
 SUFFIXES = tuple(dict.fromkeys(ending for known in FORMATS for ending in known.endings))
 
 
@@ -65,6 +70,8 @@ def read_motion(
 def format_of(path: Path) -> Format:
     """The format of a file, by what it begins with, or else by its ending; BVH by any other."""
     head = beginning(path, 64).lstrip(b"\xef\xbb\xbf \t\r\n")
+    if path.suffix.lower() in (".npy", ".npz") and head.startswith((b"\x93NUMPY", b"PK")):
+        return SMPL if _is_smpl(path) else POSITIONS
     by_content = (f for f in FORMATS if f.magic is not None and head.startswith(f.magic))
     by_ending = (f for f in FORMATS if path.suffix.lower() in f.endings)
     return next(by_content, None) or next(by_ending, BVH)
@@ -74,14 +81,20 @@ def holds_person(path: Path) -> bool:
     """Whether a file of arrays is the motion of a person, not of a robot or any other numbers."""
     match path.suffix.lower():
         case ".npz":
-            return bool(npz_names(path) & SMPL_KEYS)
+            names = npz_names(path)
+            return bool(names & {*SMPL_KEYS, *POSITION_KEYS}) and not names & _ROBOTS
         case ".npy":
             shape = npy_shape(path)
-            return len(shape) == 2 and shape[1] in SMPL_WIDTHS
+            return _is_smpl(path) or (len(shape) == 3 and bool(layouts(shape[1])))
         case ".pt" | ".pth":
             return says(path, (b"global_orient", b"root_orient"))
         case _:
             return path.suffix.lower() in SUFFIXES
+
+
+def _is_smpl(path: Path) -> bool:
+    shape = npy_shape(path)
+    return bool(npz_names(path) & SMPL_KEYS) or (len(shape) == 2 and shape[1] in SMPL_WIDTHS)
 
 
 def _reader(known: Format) -> Reader:
@@ -94,6 +107,10 @@ def _reader(known: Format) -> Reader:
         from spark.io.smpl import read_smpl
 
         return read_smpl
+    if known is POSITIONS:
+        from spark.io.positions import read_positions
+
+        return read_positions
     from spark.io.recording import read_recording
 
     return read_recording

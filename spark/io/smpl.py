@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from spark.io.arrays import read_npy, read_npz
-from spark.io.convention import UPS, Up, above_feet, given_up
+from spark.io.convention import UPS, Up, given_up, standing_axis
 from spark.io.foreign import foreign_recording
 from spark.io.recording import Recording
 from spark.io.smpl_body import Body, mean_body, read_body_model
@@ -29,10 +29,6 @@ _NEUTRAL = 1.70
 _PER_BETA = 0.1
 _BETA_ZERO = 1.66
 _HEIGHT_RANGE = (1.3, 2.2)  # [m] of adults
-
-# The mean direction from feet to body this near to an axis tells that axis.
-_CLEARLY = 0.75
-_STEADIER = 1.5  # a floor along an axis moves no more than this many times that of another
 
 _LOWEST = 5  # [%] of the frames' lowest points: the floor
 
@@ -78,8 +74,9 @@ def read_smpl(
         body = mean_body(count, height, smplx=said.smplx)
     frame_time = 1 / (fps or said.fps or said.usual_fps)
     motion = _motion(said, body, frame_time)
-    axis, downward, why_up = _up(motion, said.usual_up)
-    if up is not None:
+    if up is None:
+        axis, downward, why_up = standing_axis(motion, said.usual_up)
+    else:
         axis, downward, why_up = given_up(up), False, "as given"
     if body_model is None:
         scale = _scale(motion, UPS.index(axis))
@@ -167,25 +164,6 @@ def _height(said: SmplMotion) -> tuple[float, str]:
         tall = _BETA_ZERO + _PER_BETA * float(said.betas[0])
         return float(np.clip(tall, *_HEIGHT_RANGE)), f"by its first beta{known}"
     return _NEUTRAL, f"for want of a shape{known}"
-
-
-def _up(motion: Motion, usual: Up) -> tuple[Up, bool, str]:
-    """The axis along which the body stands, whether it points down, and why.
-
-    The format's own, unless the body clearly stands along another one, on a floor as steady:
-    a body that crawls along x is no file with x up.
-    """
-    positions, _ = forward(motion)
-    standing = above_feet(motion, positions)
-    best = int(np.argmax(np.abs(standing)))
-    own = UPS.index(usual)
-    if best == own or abs(standing[best]) < _CLEARLY:
-        down = bool(standing[own] < -_CLEARLY and own)  # turned over about x
-        return usual, down, "as is usual in such files"
-    low = positions.min(axis=1) if standing[best] > 0 else -positions.max(axis=1)
-    if np.std(low[:, best]) > _STEADIER * np.std(low[:, own]):
-        return usual, False, "as is usual in such files"
-    return UPS[best], bool(standing[best] < 0 and best), "along which the body stands"
 
 
 def _scale(motion: Motion, up: int) -> float | None:

@@ -104,14 +104,14 @@ def mean_body(count: int, height: float, *, smplx: bool = False) -> Body:
     origin lies higher."""
     names, parents = joints_of(count)
     scale = height / MEAN_HEIGHT
-    at = np.array([_position(name) for name in names]) * scale
+    at = np.array([rest_position(name) for name in names]) * scale
     ends = {
         "head": (0.0, _CROWN, 0.0),
         "left_foot": (_POSITIONS["foot"][0], _SOLE, _TOES),
         "right_foot": (-_POSITIONS["foot"][0], _SOLE, _TOES),
     }
     ends |= {
-        f"{side}_{finger}3": _position(f"{side}_{finger}3") + np.array([sign * _TIP, 0, 0])
+        f"{side}_{finger}3": rest_position(f"{side}_{finger}3") + np.array([sign * _TIP, 0, 0])
         for side, sign in (("left", 1), ("right", -1))
         for finger in _FINGERS
     }
@@ -178,7 +178,8 @@ def read_body_model(
     return Body(_skeleton(wanted, wanted_parents, places, tips), places[0]), what
 
 
-def _position(name: str) -> Float[np.ndarray, "3"]:
+def rest_position(name: str) -> Float[np.ndarray, "3"]:
+    """Where a joint of the mean skeleton is [m] in the rest pose: x left, y up, z forward."""
     side, _, part = name.rpartition("_")
     mirrored = np.array([-1.0 if side == "right" else 1.0, 1.0, 1.0])
     return np.array(_POSITIONS[part]) * mirrored

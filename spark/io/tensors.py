@@ -5,6 +5,7 @@ pickle's instructions are walked over one by one; those that make dicts, lists a
 followed, and whatever else they would call becomes an `Unknown`.
 """
 
+import struct
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,7 +83,10 @@ def says(path: Path, words: tuple[bytes, ...]) -> bool:
             if member.file_size > _MAX_PICKLE:
                 return False
             pickle = _unpacked(stored, member, path)
-    except (OSError, zipfile.BadZipFile, NotImplementedError, ValueError, FileFormatError):
+    except (
+        *(FileFormatError, OSError, ValueError, struct.error),
+        *(zipfile.BadZipFile, NotImplementedError, IndexError),
+    ):
         return False
     return any(word in pickle for word in words)
 
