@@ -1,6 +1,5 @@
 """`spark-sim batch`: a shelf of motions onto several bodies."""
 
-import os
 import re
 import sys
 import time
@@ -10,7 +9,15 @@ from typing import TYPE_CHECKING, get_args
 
 from robots.formats import FORMATS
 from spark_sim.choices import Method
-from spark_sim.commands.options import add_corrections, add_force, add_json, add_robot_motion
+from spark_sim.commands.options import (
+    add_corrections,
+    add_force,
+    add_json,
+    add_robot_motion,
+    add_workers,
+    given,
+    workers,
+)
 
 if TYPE_CHECKING:
     from spark_sim.shelf.batch import Backend
@@ -64,9 +71,7 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--mirror", action="store_true", help="make each motion with left and right exchanged, too"
     )
-    parser.add_argument(
-        "--workers", metavar="N", type=int, help="number of processes (default: one a core)"
-    )
+    add_workers(parser)
     parser.add_argument(
         "--shard",
         metavar="I/N",
@@ -87,15 +92,7 @@ def run(args: Namespace) -> int:
     from spark_sim.shelf.work import target_clip
 
     out = Path(args.output)
-    given = {
-        "unit": args.unit,
-        "up": args.up,
-        "roles": args.map,
-        "robot": args.source_robot,
-        "quat": args.source_quat,
-        "fps": args.source_fps,
-    }
-    reading = {name: value for name, value in given.items() if value is not None}
+    reading = given(args) | given(args, "source-")
     options = Options(args.method, args.format, reading=reading)
     keep = None if args.keep is None else parse(args.keep)
     jobs = plan(args.sources, args.to, out, options, mirror=args.mirror)
@@ -145,13 +142,9 @@ def _backend(args: Namespace) -> "Backend":
     """Who does the jobs: processes of this machine."""
     from functools import partial
 
-    from spark.errors import ConventionError
     from spark_sim.shelf.processes import in_processes
 
-    workers = len(os.sched_getaffinity(0)) if args.workers is None else args.workers
-    if workers < 1:
-        raise ConventionError(f"--workers {workers}: expected 1 or more")
-    return partial(in_processes, workers=workers)
+    return partial(in_processes, workers=workers(args))
 
 
 def _shard(text: str) -> tuple[int, int]:

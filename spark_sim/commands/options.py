@@ -1,5 +1,6 @@
 """Options that several commands share."""
 
+import os
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -74,6 +75,17 @@ def add_robot_motion(
     )
 
 
+_READING = ("unit", "up", "roles", "body_model", "robot", "quat", "fps")
+
+
+def given(args: Namespace, prefix: str = "") -> dict[str, Any]:
+    """What the user says of the files that options with this prefix are for, as `load` of
+    `spark_sim` takes it."""
+    start = prefix.replace("-", "_")
+    values = {name: vars(args).get(start + name.replace("roles", "map")) for name in _READING}
+    return {name: value for name, value in values.items() if value is not None}
+
+
 def load(args: Namespace, path: str, prefix: str = "", *, humanoid: bool = True) -> "AnyClip":
     """The clip of `path`, read with the corrections given; its notes go to stderr.
 
@@ -83,15 +95,11 @@ def load(args: Namespace, path: str, prefix: str = "", *, humanoid: bool = True)
     from spark_sim import console, loading
     from spark_sim.clips import Clip
 
-    given: dict[str, Any] = vars(args)
-    wanted: dict[str, Any] = {}
-    for name in ("unit", "up", "roles", "body_model", "robot", "quat", "fps"):
+    wanted = given(args, prefix)
+    for name in wanted.keys() - set(loading.takes(path)):
+        del wanted[name]
         option = f"{prefix}{'map' if name == 'roles' else name.replace('_', '-')}"
-        value = given.get(option.replace("-", "_"))
-        if value is not None and name in loading.takes(path):
-            wanted[name] = value
-        elif value is not None:
-            console.note(f"{path}: --{option} is left out, it does not apply to such a file")
+        console.note(f"{path}: --{option} is left out, it does not apply to such a file")
     loaded = loading.load(path, **wanted)
     if isinstance(loaded, Clip) and not humanoid:
         console.notes(path, loaded.recording.notes)
@@ -108,3 +116,23 @@ def add_force(parser: ArgumentParser) -> None:
 def add_json(parser: ArgumentParser, what: str) -> None:
     """`--json`: the result for scripts."""
     parser.add_argument("--json", action="store_true", help=f"print {what} as JSON")
+
+
+def add_workers(parser: ArgumentParser) -> None:
+    """`--workers`: how many processes share the work."""
+    parser.add_argument(
+        "--workers",
+        metavar="N",
+        type=int,
+        help="number of processes for many files (default: one a core)",
+    )
+
+
+def workers(args: Namespace) -> int:
+    """How many processes to start."""
+    from spark.errors import ConventionError
+
+    count = len(os.sched_getaffinity(0)) if args.workers is None else int(args.workers)
+    if count < 1:
+        raise ConventionError(f"--workers {count}: expected 1 or more")
+    return count

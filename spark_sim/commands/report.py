@@ -9,11 +9,12 @@ from spark_sim.commands.options import (
     add_force,
     add_json,
     add_robot_motion,
+    add_workers,
     load,
 )
 
 SUMMARY = "measure how believable a motion is"
-USAGE = "FILE [--source SRC] [--html OUT] [options]"
+USAGE = "FILE | FOLDER [--source SRC] [--html OUT] [options]"
 DESCRIPTION = """\
 Measure how plausible the motion in FILE is: penetration of the floor,
 floating, skating, forces that the floor can't give, joint limits,
@@ -22,7 +23,12 @@ how well the foot contacts agree, and how far the root drifts. With --truth,
 also measure how far it is from the right answer.
 
 A robot's motion, from any tool, is measured on the robot's own model: its
-masses, shapes, soles and joint limits."""
+masses, shapes, soles and joint limits.
+
+Of a FOLDER, every motion is measured, against the source that the batch's
+manifest names or that --source has under the same name. One page has them all
+in a table, the worst first, and leads to a page for each; the table is beside
+it as JSON, CSV and Parquet."""
 EXAMPLES = """\
 examples:
   spark-sim report walk_on_mutant.bvh --source walk.bvh
@@ -32,11 +38,15 @@ examples:
   spark-sim report theirs.csv --robot unitree_g1 --quat xyzw --fps 60
   spark-sim report walk_on_mutant.bvh --truth mutant_walk.bvh --json
   spark-sim report walk_on_mutant.bvh --fail-over 5%
+  spark-sim report out/                          # out/report.html, .csv, .json
+  spark-sim report theirs/ --robot g1 --source mocap/ --html theirs.html
 """
 
 
 def configure(parser: ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE", help="a BVH or FBX file, or a robot's motion")
+    parser.add_argument(
+        "file", metavar="FILE", help="a BVH or FBX file, a robot's motion, or a folder of them"
+    )
     parser.add_argument("--source", metavar="SRC", help="the motion that FILE was made from")
     parser.add_argument(
         "--truth",
@@ -59,6 +69,7 @@ def configure(parser: ArgumentParser) -> None:
         type=_percentage,
         help="exit with code 1 if more than this share of the frames is implausible",
     )
+    add_workers(parser)
     add_json(parser, "the report")
     add_force(parser)
     add_corrections(parser, "FILE")
@@ -70,6 +81,10 @@ def configure(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     from spark_sim import api, console
 
+    if Path(args.file).is_dir():
+        from spark_sim.commands.report_folder import report_folder
+
+        return _verdict(args, report_folder(args))
     judged = load(args, args.file)
     others = {path: load(args, path) for path in args.compare}
     source = None if args.source is None else load(args, args.source, "source-")
@@ -91,7 +106,15 @@ def run(args: Namespace) -> int:
         console.say(compare(table, color=console.uses_color()))
     else:
         console.say(report.text(color=console.uses_color()))
-    worst = max(each.implausible for each in reports.values())
+    return _verdict(args, max(each.implausible for each in reports.values()))
+
+
+def _verdict(args: Namespace, worst: float | None) -> int:
+    """The exit code, by the largest share of implausible frames; None where there is none."""
+    from spark_sim import console
+
+    if worst is None:
+        return 2
     if args.fail_over is not None and 100 * worst > args.fail_over:
         console.error(
             f"{100 * worst:.3g} % of the frames are implausible, "

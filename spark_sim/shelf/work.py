@@ -72,7 +72,7 @@ def _pieces(job: Job, folder: Path) -> Iterator[Piece]:
             replace(piece, path=job.source).save(path, force=True, format=options.format)
         else:
             piece.save(path, force=True)
-        measured = assess(piece.subject, source=_span(source.subject, first, stop))
+        measured = assess(piece.subject, source=span(source.subject, first, stop))
         facts = {
             **{f"output_{name}": value for name, value in file_facts(path).items()},
             "frames": len(piece),
@@ -90,7 +90,7 @@ def _name(job: Job, number: int | None) -> str:
     return f"{job.output.stem}{cut}{job.output.suffix}"
 
 
-def _span(subject: Subject, first: int, stop: int) -> Subject:
+def span(subject: Subject, first: int, stop: int) -> Subject:
     """Frames [first, stop), on the body as the whole motion shows it."""
     body = subject.body
     if body is not None:

@@ -1,0 +1,61 @@
+"""`spark-sim report FOLDER`: every motion of a folder."""
+
+from argparse import Namespace
+from functools import partial
+from pathlib import Path
+
+from spark_sim.commands.options import given, workers
+
+_WORST = 10  # lines that are printed
+
+
+def report_folder(args: Namespace) -> float | None:
+    """Measure the motions of a folder, write page and tables. Returns the share of implausible
+    frames of the worst; None where a motion could not be measured."""
+    from spark.errors import ConventionError
+    from spark_sim import console, files
+    from spark_sim.shelf.headline import key
+    from spark_sim.shelf.items import items
+    from spark_sim.shelf.processes import in_processes
+    from spark_sim.shelf.report import measure_all, outputs, write_folder_report
+
+    if args.compare or args.truth is not None:
+        raise ConventionError("--compare and --truth go with a file, and not with a folder")
+    folder = Path(args.file)
+    page = folder / "report.html" if args.html is None else Path(args.html)
+    files.claim(page, force=args.force, endings=(".html", ".htm"), what="a page")
+    *tables, clips = outputs(page)
+    for path in tables:
+        files.claim(path, force=args.force)
+    if clips.exists() and not args.force:
+        files.check_free(clips, force=False)
+    sources = None if args.source is None else Path(args.source)
+    found = items(folder, given(args), sources, given(args, "source-"))
+    done = []
+    backend = partial(in_processes, workers=min(workers(args), len(found)))
+    with console.meter(len(found), 0, "report") as tell:
+        for count, (_, each) in enumerate(measure_all(found, page, backend), 1):
+            done.append(each)
+            if each.error is not None:
+                console.error(f"{each.name}: {each.error}")
+            tell(count, {})
+    rows, groups, notes = write_folder_report(done, page, folder.resolve().name)
+    for note in notes:
+        console.note(note)
+    for group in groups:
+        console.note(f"nearly the same motion: {', '.join(group)}")
+    good = [row for row in rows if row["error"] is None]
+    if args.json:
+        console.emit_json({"page": str(page), "clips": rows, "near_duplicates": groups})
+    else:
+        lines = [("implausible", "motion", "to mend first")]
+        lines += [
+            (f"{100 * row[key('implausible')]:.1f} %", row["file"], row["worst"] or "nothing")
+            for row in good[:_WORST]
+        ]
+        console.say("\n".join(console.columns(lines)))
+        failed = f", {len(rows) - len(good)} could not be measured" if len(rows) > len(good) else ""
+        console.say(f"{page}: {len(good)} motions{failed}")
+    if len(good) < len(rows):
+        return None
+    return max(float(row[key("implausible")]) for row in good)

@@ -1,0 +1,118 @@
+"""The motions of a folder, and what has to be known to read and judge each."""
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from robots.formats import QUATERNIONS, SUFFIXES
+from robots.registry import is_robot
+from spark.errors import FileFormatError
+from spark.io.arrays import npz_names
+from spark.io.reading import SUFFIXES as CHARACTERS
+from spark.io.reading import motion_files
+from spark_sim.shelf.manifest import Entry, Manifest
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a motion was made from: a file, from `start` [s] on, left and right exchanged or not."""
+
+    path: Path
+    reading: Mapping[str, Any] = field(default_factory=dict)
+    start: float = 0.0
+    mirrored: bool = False
+
+
+@dataclass(frozen=True)
+class Item:
+    """A motion by its `name` in the folder, with its `origin` where that is known. `reading` is
+    what `spark_sim.load` must be given."""
+
+    path: Path
+    name: str
+    reading: Mapping[str, Any]
+    origin: Origin | None = None
+
+
+def items(
+    folder: Path,
+    reading: Mapping[str, Any],
+    sources: Path | None,
+    source_reading: Mapping[str, Any],
+) -> list[Item]:
+    """The motions below a folder, in the order of their names.
+
+    What a batch wrote is known from its manifest: robot, source, piece. Of other motions the source
+    is the file of `sources` with the same name, before `_on_TARGET`; or `sources` itself, where
+    that is a file. Raises `FileFormatError` where there is no motion.
+    """
+    found: dict[Path, Item] = {}
+    for manifest in sorted({path.parent for path in folder.rglob("manifest*.jsonl")}):
+        for entry in Manifest(manifest):
+            path = manifest / str(entry["output"])
+            if entry["status"] == "written" and path.is_file():
+                name = path.relative_to(folder).as_posix()
+                known = {**_reading_of(entry, path), **reading}
+                found[path] = Item(path, name, known, _origin_of(entry, manifest))
+    by_name = _by_name(sources)
+    for path in _motions(folder, "robot" in reading):
+        if path in found:
+            continue
+        below = path.relative_to(folder)
+        origin = sources if sources is not None and sources.is_file() else None
+        for stem in (below.stem, below.stem.partition("_on_")[0]):
+            origin = origin or by_name.get(below.with_name(stem))
+        known_origin = None if origin is None else Origin(origin, source_reading)
+        found[path] = Item(path, below.as_posix(), reading, known_origin)
+    if not found:
+        raise FileFormatError(
+            folder, None, "holds no motion; expected one or more (a robot's needs --robot)"
+        )
+    return sorted(found.values(), key=lambda item: item.name)
+
+
+def _motions(folder: Path, robot: bool) -> Iterator[Path]:
+    """Motions of characters and, where their files or the user say which, of robots."""
+    try:
+        paths = motion_files(folder, tuple(dict.fromkeys((*CHARACTERS, *SUFFIXES))))
+    except FileFormatError:
+        return
+    for path in paths:
+        ending = path.suffix.lower()
+        if ending not in SUFFIXES or robot or (ending == ".npz" and _says_robot(path)):
+            yield path
+
+
+def _says_robot(path: Path) -> bool:
+    try:
+        return "about" in npz_names(path)
+    except (FileFormatError, OSError):
+        return False
+
+
+def _reading_of(entry: Entry, path: Path) -> dict[str, Any]:
+    target, options = entry["target"], entry["options"]
+    if not is_robot(target):
+        return {}
+    if path.suffix.lower() != ".csv":
+        return {"robot": target}
+    quat = QUATERNIONS[options["format"] or "csv"]
+    return {"robot": target, "quat": quat, "fps": entry["fps"]}
+
+
+def _origin_of(entry: Entry, folder: Path) -> Origin | None:
+    options = entry["options"]
+    from_here = os.path.normpath(folder / entry["source_from_here"])
+    places = (Path(from_here), Path(entry["source"]))
+    path = next((place for place in places if place.is_file()), None)
+    if path is None:
+        return None
+    return Origin(path, options["reading"], entry["start_s"], options["mirrored"])
+
+
+def _by_name(sources: Path | None) -> dict[Path, Path]:
+    if sources is None or not sources.is_dir():
+        return {}
+    return {path.relative_to(sources).with_suffix(""): path for path in motion_files(sources)}

@@ -1,0 +1,80 @@
+"""One motion of a folder: read, measured, drawn small, and with a page of its own."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sim.report import assess
+from sim.report.page import write_report_page
+from sim.trajectory import Subject
+from spark.errors import SparkSimError
+from spark_sim.clips import AnyClip
+from spark_sim.loading import load, takes
+from spark_sim.shelf.duplicates import fingerprint
+from spark_sim.shelf.headline import headline
+from spark_sim.shelf.items import Item, Origin
+from spark_sim.shelf.thumbnail import thumbnail
+from spark_sim.shelf.work import mirror_clip, span
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A line of the table: the `facts` of a motion, or else the error; its picture as SVG and its
+    fingerprint."""
+
+    name: str
+    facts: dict[str, Any]
+    picture: str = ""
+    fingerprint: str = ""
+    error: str | None = None
+
+
+def measure(item: Item, page: Path) -> Measured:
+    """Measure a motion and write its page. Whatever fails becomes an error in words."""
+    try:
+        return _measure(item, page)
+    except (SparkSimError, OSError) as error:
+        reason = str(error)
+    except Exception as error:  # a fault of ours in one file must not end the others
+        reason = f"{type(error).__name__}: {error}; this is a fault of spark-sim, please report it"
+    return Measured(item.name, {"file": item.name}, error=reason)
+
+
+def _measure(item: Item, page: Path) -> Measured:
+    clip = _load(item.path, item.reading)
+    source = None if item.origin is None else _source(item.origin, clip.duration)
+    report = assess(clip.subject, source=source)
+    page.parent.mkdir(parents=True, exist_ok=True)
+    origin = None if item.origin is None else item.origin.path
+    names = (clip.name, "source" if origin is None else origin.stem)
+    write_report_page(report, page, clip.subject, source, title=item.name, names=names)
+    worst = report.findings[0] if report.findings else None
+    facts = {
+        "file": item.name,
+        "source": None if origin is None else str(origin),
+        "frames": len(clip),
+        "fps": clip.fps,
+        "duration_s": clip.duration,
+        **headline(report),
+        "worst": None if worst is None else f"{worst.sentence} {worst.place(clip.frame_time)}",
+        "notes": list(report.notes),
+    }
+    at = len(clip) // 2 if worst is None else (worst.start + worst.stop - 1) // 2
+    picture = thumbnail(clip.motion, clip.rig, clip.floor_z, at, marked=worst is not None)
+    return Measured(item.name, facts, picture, fingerprint(clip.motion, clip.rig))
+
+
+def _load(path: Path, reading: Any) -> AnyClip:
+    return load(path, **{name: value for name, value in reading.items() if name in takes(path)})
+
+
+def _source(origin: Origin, duration: float) -> Subject:
+    """The stretch of the source that a motion of this duration [s] was made from."""
+    clip = _load(origin.path, origin.reading)
+    if origin.mirrored:
+        clip = mirror_clip(clip)
+    first = round(origin.start / clip.frame_time)
+    stop = len(clip)
+    if origin.start > 0 or duration < clip.duration - 2 * clip.frame_time:
+        stop = min(first + round(duration / clip.frame_time) + 1, len(clip))
+    return span(clip.subject, first, stop)

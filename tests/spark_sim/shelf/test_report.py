@@ -1,0 +1,154 @@
+"""The report of a folder: what is measured, the tables, and the page in a browser."""
+
+import csv
+import json
+import re
+import shutil
+from pathlib import Path
+from urllib.parse import unquote
+
+import numpy as np
+import pytest
+from pyarrow import parquet
+
+import spark_sim
+from spark_sim.shelf.histogram import HEIGHT, histogram
+from spark_sim.shelf.items import items
+from spark_sim.shelf.tables import COLUMNS
+from tests.helpers.browser import Elements, opened, with_probe
+from tests.helpers.program import Program
+
+EVIL = "<img src=x onerror=alert(1)>"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """`out/` of a batch onto a character, with a motion that sinks and a broken one beside it, and
+    the report of it."""
+    folder = tmp_path_factory.mktemp("folder")
+    spark_sim.sample(folder / "samples")
+    (folder / "in").mkdir()
+    for name in ("walk", "squat"):
+        shutil.copy(folder / "samples" / f"walker_{name}.bvh", folder / "in" / f"{name}.bvh")
+    sunk = spark_sim.load(folder / "in" / "squat.bvh").recording.bvh
+    text = (folder / "in" / "squat.bvh").read_text()
+    head, _, rows = text.partition("Frame Time:")
+    first, *lines = rows.strip().splitlines()
+    lower = [re.sub(r"^(\S+) (\S+)", lambda m: f"{m[1]} {float(m[2]) - 20}", row) for row in lines]
+    assert sunk.values[0, 1] > 50  # the second number is the height in cm
+    with Program(folder) as program:
+        done = program(
+            *("batch", "in", "--to", "samples/dancer_walk.bvh", "-o", "out", "--workers", "1")
+        )
+        assert done.code == 0, done.stderr
+        (folder / "out" / f"{EVIL}.bvh").write_text(
+            "\n".join([f"{head}Frame Time: {first}", *lower]) + "\n"
+        )
+        (folder / "out" / "broken.bvh").write_text("no BVH")
+        done = program("report", "out", "--workers", "1")
+        assert done.code == 2
+        assert "broken.bvh: " in done.stderr
+        assert done.stdout.splitlines()[-1] == (
+            "out/report.html: 3 motions, 1 could not be measured"
+        )
+    return folder
+
+
+def test_the_tables_say_what_the_report_of_each_says(folder: Path) -> None:
+    table = json.loads((folder / "out" / "report.json").read_text())
+    rows = {row["file"]: row for row in table["clips"]}
+    assert set(rows) == {
+        "dancer_walk/walk.bvh",
+        "dancer_walk/squat.bvh",
+        f"{EVIL}.bvh",
+        "broken.bvh",
+    }
+    alone = spark_sim.report(
+        folder / "out" / "dancer_walk" / "walk.bvh", source=folder / "in" / "walk.bvh"
+    ).json()
+    row = rows["dancer_walk/walk.bvh"]
+    assert row["implausible_share"] == alone["implausible_share"]
+    assert row["skating_share"] == alone["clip"]["flags"]["skating"]["share"]
+    assert row["root_drift_m"] == pytest.approx(alone["root_drift"]["largest_m"])
+    assert rows["broken.bvh"]["error"]
+
+    with (folder / "out" / "report.csv").open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    assert tuple(lines[0]) == COLUMNS
+    typed = parquet.read_table(folder / "out" / "report.parquet").to_pylist()
+    for name in ("frames", "fps", "implausible_share", "root_drift_m", "balance_share"):
+        for line, row_typed in zip(lines, typed, strict=True):
+            value = rows[line["file"]].get(name)
+            assert row_typed[name] == value
+            assert (float(line[name]) if line[name] else None) == value
+
+
+def test_each_motion_has_its_own_page(folder: Path) -> None:
+    text = (folder / "out" / "report.html").read_text()
+    links = set(re.findall(r'href="(report_clips/[^"]+)"', text))
+    assert len(links) == 3
+    for link in links:
+        assert "of the frames are implausible" in (folder / "out" / unquote(link)).read_text()
+
+
+def test_the_page_sorts_in_a_browser(folder: Path, tmp_path: Path) -> None:
+    """The worst first; then by name; a strange name is text."""
+    text = (folder / "out" / "report.html").read_text()
+    tags = Elements(text).tags
+    assert not any("onerror" in attributes for _, attributes in tags)
+    script = """
+      const column = k => [...document.querySelectorAll("#clips tbody tr")].map(
+        row => row.cells[k].dataset.value);
+      const names = () => column(1), values = () => column(3).map(Number);
+      const out = { first: names(), worst: values() };
+      document.querySelector("th button[data-column='1']").click(); out.byName = names();
+      const head = document.querySelector("th button[data-column='3']");
+      head.click(); out.worstAgain = values(); head.click(); out.best = values();
+      out.pictures = document.querySelectorAll("#clips tbody svg path.pose").length;
+      out.bars = document.querySelectorAll("figure rect").length;
+      document.body.dataset.result = JSON.stringify(out);"""
+    seen = opened(with_probe(text, script), tmp_path)
+    assert seen["worst"] == sorted(seen["worst"], reverse=True)
+    assert seen["first"][0] == f"{EVIL}.bvh"
+    assert seen["byName"] == sorted(seen["first"])
+    assert seen["worstAgain"] == seen["worst"]
+    assert seen["best"] == seen["worst"][::-1]
+    assert seen["pictures"] >= 3 * 4
+    assert seen["bars"] > 10
+
+
+def test_nothing_is_overwritten_unasked(folder: Path) -> None:
+    with Program(folder) as program:
+        done = program("report", "out")
+        assert done.code == 2
+        assert "report.html: exists" in done.stderr
+        done = program("report", "in/walk.bvh", "--html", "out/report.html")
+        assert done.code == 2
+        done = program("report", "samples", "--html", "out.txt")
+        assert "is written as" in done.stderr
+
+
+def test_sources_are_found_by_name(tmp_path: Path) -> None:
+    for name in ("out/sub/walk_on_g1.bvh", "out/jump.bvh", "mocap/sub/walk.bvh", "mocap/jump.bvh"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    found = items(tmp_path / "out", {}, tmp_path / "mocap", {})
+    origins = {item.name: item.origin and item.origin.path for item in found}
+    assert origins == {
+        "jump.bvh": tmp_path / "mocap" / "jump.bvh",
+        "sub/walk_on_g1.bvh": tmp_path / "mocap" / "sub" / "walk.bvh",
+    }
+    one = items(tmp_path / "out", {}, tmp_path / "mocap" / "jump.bvh", {})
+    assert {item.origin.path.name for item in one if item.origin} == {"jump.bvh"}
+    assert all(item.origin is None for item in items(tmp_path / "out", {}, None, {}))
+
+
+def test_bars_stand_for_every_value() -> None:
+    values = [0.0] * 90 + [5.0] * 9 + [50.0]
+    made = histogram(values)
+    counts = [int(bar["words"].rpartition(": ")[2]) for bar in made["bars"]]
+    assert sum(counts) == len(values)
+    assert made["bars"][0]["height"] == HEIGHT
+    assert made["bars"][-1]["height"] == pytest.approx(HEIGHT / np.sqrt(90), abs=0.01)
+    assert made["median"] == "0"
+    assert histogram([])["bars"] == []
