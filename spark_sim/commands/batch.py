@@ -7,7 +7,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from robots.formats import FORMATS
+from robots.formats import FORMATS, SONIC_FPS
 from spark_sim.choices import Method
 from spark_sim.commands.options import (
     add_corrections,
@@ -35,8 +35,8 @@ be killed at any moment. A file that fails does not stop the others."""
 EXAMPLES = """\
 examples:
   spark-sim batch mocap/ --to g1 --to t1 -o out/
-  spark-sim batch mocap/ --to g1 -o out/ --format mjlab
-  spark-sim batch mocap/ --to g1 -o out/ --mirror
+  spark-sim batch mocap/ --to g1 -o out/ --format mjlab --fps 50
+  spark-sim batch mocap/ --to g1 -o out/ --mirror --cut 10s
   spark-sim batch mocap/ --to g1 -o out/ --keep "implausible < 5%"
   spark-sim batch mocap/ --to g1 -o out/ --shard 3/8  # the third of 8 machines
 """
@@ -61,6 +61,7 @@ def configure(parser: ArgumentParser) -> None:
         metavar="NAME",
         help=f"of robots' motions: {', '.join(FORMATS)} (default npz)",
     )
+    parser.add_argument("--fps", metavar="N", type=float, help="frame rate of the results")
     parser.add_argument("--method", choices=get_args(Method), default="spark", help="see retarget")
     parser.add_argument(
         "--keep",
@@ -70,6 +71,12 @@ def configure(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--mirror", action="store_true", help="make each motion with left and right exchanged, too"
+    )
+    parser.add_argument(
+        "--cut",
+        metavar="SECONDS",
+        type=_seconds,
+        help="cut each motion at moments of rest, into pieces that are no longer (10s)",
     )
     add_workers(parser)
     parser.add_argument(
@@ -81,19 +88,26 @@ def configure(parser: ArgumentParser) -> None:
     add_force(parser)
     add_json(parser, "what the run came to")
     add_corrections(parser, "every IN")
-    add_robot_motion(parser, "every IN", "source-")
+    add_robot_motion(parser, "every IN", fps="source-fps")
 
 
 def run(args: Namespace) -> int:
+    from spark.errors import ConventionError
     from spark_sim import console
+    from spark_sim.clip_base import MAX_FPS
     from spark_sim.shelf.batch import Batch, locked
     from spark_sim.shelf.keep import parse
     from spark_sim.shelf.plan import Options, plan
     from spark_sim.shelf.work import target_clip
 
     out = Path(args.output)
-    reading = given(args) | given(args, "source-")
-    options = Options(args.method, args.format, reading=reading)
+    reading = {name: value for name, value in given(args).items() if name != "fps"}
+    if args.source_fps is not None:
+        reading["fps"] = args.source_fps
+    if args.fps is not None and not 0 < args.fps <= MAX_FPS:
+        raise ConventionError(f"--fps {args.fps:g}: expected a rate above 0, up to {MAX_FPS}")
+    fps = SONIC_FPS if args.fps is None and args.format == "sonic" else args.fps
+    options = Options(args.method, args.format, fps, args.cut, reading)
     keep = None if args.keep is None else parse(args.keep)
     jobs = plan(args.sources, args.to, out, options, mirror=args.mirror)
     for target in args.to:
@@ -119,7 +133,9 @@ def run(args: Namespace) -> int:
                     f"{left / 60:.0f} min left"
                 )
                 told = now
-    tally = batch.tally
+    tally, duplicates = batch.tally, batch.near_duplicates(jobs)
+    for group in duplicates:
+        console.note(f"nearly the same motion: {', '.join(group)}")
     if args.json:
         console.emit_json(
             {
@@ -130,6 +146,7 @@ def run(args: Namespace) -> int:
                 "left_out": tally.left_out,
                 "failed": tally.failed,
                 "reasons": [{"source": s, "error": error} for s, error in tally.reasons],
+                "near_duplicates": duplicates,
                 "seconds": time.perf_counter() - start,
             }
         )
@@ -145,6 +162,14 @@ def _backend(args: Namespace) -> "Backend":
     from spark_sim.shelf.processes import in_processes
 
     return partial(in_processes, workers=workers(args))
+
+
+def _seconds(text: str) -> float:
+    """`10s` and `10` are both 10."""
+    match = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+)\s*s?", text.strip())
+    if match is None or not 0.5 <= float(match[1]) <= 1e5:
+        raise ArgumentTypeError(f"{text!r} is no time; expected 0.5s or more, such as 10s")
+    return float(match[1])
 
 
 def _shard(text: str) -> tuple[int, int]:

@@ -16,6 +16,7 @@ from typing import TypeAlias
 from robots.model.known import model_sha256
 from robots.registry import find, is_robot
 from spark.errors import OutputError
+from spark_sim.shelf.duplicates import near_duplicates
 from spark_sim.shelf.keep import Keep
 from spark_sim.shelf.manifest import SCHEMA, Entry, Manifest, is_still, sha256
 from spark_sim.shelf.plan import Job
@@ -72,21 +73,21 @@ class Batch:
         self, folder: Path, *, keep: Keep | None = None, shard: str = "", force: bool = False
     ) -> None:
         self.folder, self.keep, self.force = folder, keep, force
-        self.manifest = Manifest(folder, shard)
-        self.manifest.tidy()
         self.parts = folder / (f".part-{shard}" if shard else ".part")
+        shutil.rmtree(self.parts, ignore_errors=True)
+        self.manifest = Manifest(folder, shard)
+        self.manifest.tidy(self.parts)
         self.tally = Tally()
         self._version = version("spark-sim")
         self._written_by = {
             output: entry["job"]
             for entry in self.manifest
-            for output in ([entry["output"]] if entry["status"] == "written" else entry["stale"])
+            for output in (entry["files"] if entry["status"] == "written" else entry["stale"])
         }
 
     def run(self, jobs: Sequence[Job], backend: Backend) -> Iterator[tuple[Job, list[Entry]]]:
         """Do what is missing or changed, the largest files first; yields each job as it is done,
         with its lines of the manifest. What is unchanged comes first."""
-        shutil.rmtree(self.parts, ignore_errors=True)
         targets = {job.target: target_sha256(job.target) for job in jobs}
         missing = []
         for job in jobs:
@@ -103,8 +104,18 @@ class Batch:
                     done = Done((), {}, 0.0, str(done))
                 yield job, self._commit(job, targets[job.target], done)
         finally:
+            self.manifest.tidy(self.parts)
             shutil.rmtree(self.parts, ignore_errors=True)
-            self.manifest.tidy()
+
+    def near_duplicates(self, jobs: Sequence[Job]) -> list[list[str]]:
+        """Groups of sources, or pieces of them, that hold nearly the same motion."""
+        prints: dict[str, str] = {}
+        for job in jobs:
+            for entry in self.manifest.of(job.output.as_posix()) if not job.mirrored else ():
+                if entry["status"] != "failed":
+                    span = f" from {entry['start_s']:.4g} s" if entry["pieces"] > 1 else ""
+                    prints[f"{entry['source']}{span}"] = entry["fingerprint"]
+        return near_duplicates(prints)
 
     def _is_done(self, job: Job, target: str) -> bool:
         """Whether the manifest's lines of a job, and its files, are what it would make again."""
@@ -119,12 +130,12 @@ class Batch:
                 and self._is_there(entry)
                 for entry in entries
             )
-            and is_still(job.source, entries[0], "source")
+            and is_still([job.source], entries[0], "source")
         )
 
     def _is_there(self, entry: Entry) -> bool:
         if entry["status"] == "written":
-            return is_still(self.folder / entry["output"], entry, "output")
+            return is_still([self.folder / file for file in entry["files"]], entry, "output")
         return entry["status"] == "left out" and not self._keeps(entry)
 
     def _keeps(self, entry: Entry) -> bool:
@@ -136,8 +147,8 @@ class Batch:
         entries = self.manifest.of(job.output.as_posix())
         fallen = [e for e in entries if e["status"] == "written" and not self._keeps(e)]
         if fallen:
-            for entry in fallen:
-                (self.folder / entry["output"]).unlink(missing_ok=True)
+            for file in (file for entry in fallen for file in entry["files"]):
+                (self.folder / file).unlink(missing_ok=True)
             entries = [{**e, "status": "left out"} if e in fallen else e for e in entries]
             now = _now()
             self.manifest.add([{**entry, "finished": now} for entry in entries])
@@ -148,26 +159,31 @@ class Batch:
 
     def _taken(self, job: Job) -> str | None:
         """What is wrong where a file that the batch did not write has the name of a result."""
-        return None if self._is_free(job.output, job) else _exists(self.folder / job.output)
+        free = self._is_free(job.output.as_posix(), job)
+        return None if free else _exists(self.folder / job.output)
 
-    def _is_free(self, output: Path, job: Job) -> bool:
-        owner = self._written_by.get(output.as_posix())
+    def _is_free(self, file: str, job: Job) -> bool:
+        owner = self._written_by.get(file)
         if owner is not None:
             return owner == job.output.as_posix()
-        return self.force or not os.path.lexists(self.folder / output)
+        path = self.folder / file
+        # A result that is a folder fills it file by file.
+        return self.force or not os.path.lexists(path) or (not path.suffix and path.is_dir())
 
     def _commit(self, job: Job, target: str, done: Done) -> list[Entry]:
         """Give the results of a job their names, and the manifest its lines."""
         ours = {o for o, job_of in self._written_by.items() if job_of == job.output.as_posix()}
-        outputs = [job.output.with_name(piece.part.name) for piece in done.pieces]
+        beside = job.output.parent
+        files = [[(beside / file).as_posix() for file in piece.files] for piece in done.pieces]
         error = done.error
-        if taken := [output for output in outputs if not self._is_free(output, job)]:
+        if taken := [f for group in files for f in group if not self._is_free(f, job)]:
             error = _exists(self.folder / taken[0])
         entry: Entry = {
             "schema": SCHEMA,
             "status": "failed",
             "job": job.output.as_posix(),
             "output": None,
+            "files": [],
             "source": str(job.source),
             "source_from_here": os.path.relpath(job.source, self.folder),
             "target": job.target,
@@ -188,23 +204,23 @@ class Batch:
             return entries
         entries = [
             entry
-            | {"output": output.as_posix(), "stale": [], "pieces": len(outputs)}
-            | dict(piece.facts)
-            for output, piece in zip(outputs, done.pieces, strict=True)
+            | {"output": (beside / piece.name).as_posix(), "files": group, "stale": []}
+            | {"pieces": len(files), **piece.facts}
+            for group, piece in zip(files, done.pieces, strict=True)
         ]
         for each in entries:
             each["status"] = "written" if self._keeps(each) else "left out"
-        kept = {each["output"] for each in entries if each["status"] == "written"}
+        kept = [each for each in entries if each["status"] == "written"]
         # The order matters where a kill comes between: a line without its file is made again.
-        for old in ours - kept:
+        for old in ours - {file for each in kept for file in each["files"]}:
             (self.folder / old).unlink(missing_ok=True)
             del self._written_by[old]
         self.manifest.add(entries)
-        for output, piece in zip(outputs, done.pieces, strict=True):
-            if output.as_posix() in kept:
-                (self.folder / output).parent.mkdir(parents=True, exist_ok=True)
-                piece.part.replace(self.folder / output)
-                self._written_by[output.as_posix()] = job.output.as_posix()
+        for file in (file for each in kept for file in each["files"]):
+            (self.folder / file).parent.mkdir(parents=True, exist_ok=True)
+            made = self.parts / job.output / Path(file).relative_to(beside)
+            made.replace(self.folder / file)
+            self._written_by[file] = job.output.as_posix()
         shutil.rmtree(self.parts / job.output, ignore_errors=True)
         self.tally.written += len(kept)
         self.tally.left_out += len(entries) - len(kept)

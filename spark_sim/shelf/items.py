@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from robots.formats import QUATERNIONS, SUFFIXES
+from robots.formats import SUFFIXES
 from robots.registry import is_robot
 from spark.errors import FileFormatError
 from spark.io.arrays import npz_names
@@ -52,9 +52,10 @@ def items(
     for manifest in sorted({path.parent for path in folder.rglob("manifest*.jsonl")}):
         for entry in Manifest(manifest):
             path = manifest / str(entry["output"])
-            if entry["status"] == "written" and path.is_file():
+            if entry["status"] == "written" and path.exists():
                 name = path.relative_to(folder).as_posix()
-                known = {**_reading_of(entry, path), **reading}
+                robot = {"robot": entry["target"]} if is_robot(entry["target"]) else {}
+                known = {**robot, **reading}
                 found[path] = Item(path, name, known, _origin_of(entry, manifest))
     by_name = _by_name(sources)
     for path in _motions(folder, "robot" in reading):
@@ -90,16 +91,6 @@ def _says_robot(path: Path) -> bool:
         return "about" in npz_names(path)
     except (FileFormatError, OSError):
         return False
-
-
-def _reading_of(entry: Entry, path: Path) -> dict[str, Any]:
-    target, options = entry["target"], entry["options"]
-    if not is_robot(target):
-        return {}
-    if path.suffix.lower() != ".csv":
-        return {"robot": target}
-    quat = QUATERNIONS[options["format"] or "csv"]
-    return {"robot": target, "quat": quat, "fps": entry["fps"]}
 
 
 def _origin_of(entry: Entry, folder: Path) -> Origin | None:

@@ -8,7 +8,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from spark.errors import FileFormatError
 from spark.files import write_atomically
@@ -49,11 +49,14 @@ class Manifest:
         for entry in entries:
             self._take(entry, self.path)
 
-    def tidy(self) -> None:
+    def tidy(self, parts: Path) -> None:
         """The file anew, whole or not at all: the lines that count in the order of their names,
-        and none that was torn."""
+        and none that was torn. It is written in the folder `parts` before it takes its name."""
         own = (entry for entry in self if self._file_of[entry["job"]] == self.path)
-        write_atomically(self.path, _text(own))
+        parts.mkdir(exist_ok=True)
+        made = parts / self.path.name
+        write_atomically(made, _text(own))
+        made.replace(self.path)
 
     def _take(self, entry: Entry, path: Path) -> None:
         job = entry["job"]
@@ -84,25 +87,32 @@ def read(path: Path) -> list[Entry]:
     return entries
 
 
-def is_still(path: Path, entry: Mapping[str, Any], which: Literal["source", "output"]) -> bool:
-    """Whether a file is what the line says: by size and time, or else by its bytes."""
+def is_still(paths: Sequence[Path], entry: Mapping[str, Any], which: str) -> bool:
+    """Whether files are what the line says of its "source" or "output": by size and time, or else
+    by their bytes."""
     try:
-        now = file_facts(path, entry[f"{which}_sha256"])
+        now = file_facts(paths, entry[f"{which}_sha256"])
+        same_time = now["mtime_ns"] == entry[f"{which}_mtime_ns"]
+        return now["bytes"] == entry[f"{which}_bytes"] and (
+            same_time or file_facts(paths)["sha256"] == now["sha256"]
+        )
     except OSError:
         return False
-    if now["bytes"] != entry[f"{which}_bytes"]:
-        return False
-    return now["mtime_ns"] == entry[f"{which}_mtime_ns"] or sha256(path) == now["sha256"]
 
 
-def file_facts(path: Path, known_sha256: str | None = None) -> dict[str, Any]:
-    """Size, time and hash of a file."""
-    stat = path.stat()
+def file_facts(paths: Sequence[Path], known_sha256: str | None = None) -> dict[str, Any]:
+    """Size, time and hash of a file; of several the sum, the latest, and the hash of the hashes."""
+    stats = [path.stat() for path in paths]
     return {
-        "sha256": known_sha256 or sha256(path),
-        "bytes": stat.st_size,
-        "mtime_ns": stat.st_mtime_ns,
+        "sha256": known_sha256 or _sha256(paths),
+        "bytes": sum(stat.st_size for stat in stats),
+        "mtime_ns": max(stat.st_mtime_ns for stat in stats),
     }
+
+
+def _sha256(paths: Sequence[Path]) -> str:
+    hashes = [sha256(path) for path in paths]
+    return hashes[0] if len(hashes) == 1 else hashlib.sha256("".join(hashes).encode()).hexdigest()
 
 
 def sha256(path: Path) -> str:

@@ -14,7 +14,7 @@ from spark_sim.shelf.duplicates import fingerprint
 from spark_sim.shelf.headline import headline
 from spark_sim.shelf.items import Item, Origin
 from spark_sim.shelf.thumbnail import thumbnail
-from spark_sim.shelf.work import mirror_clip, span
+from spark_sim.shelf.work import mirror_clip, stretch
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,4 @@ def _source(origin: Origin, duration: float) -> Subject:
     clip = _load(origin.path, origin.reading)
     if origin.mirrored:
         clip = mirror_clip(clip)
-    first = round(origin.start / clip.frame_time)
-    stop = len(clip)
-    if origin.start > 0 or duration < clip.duration - 2 * clip.frame_time:
-        stop = min(first + round(duration / clip.frame_time) + 1, len(clip))
-    return span(clip.subject, first, stop)
+    return stretch(clip, origin.start, duration)

@@ -8,6 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from robots.formats import written_files
 from sim.report import assess
 from sim.trajectory import Subject
 from spark.errors import SparkSimError
@@ -18,6 +19,8 @@ from spark.rig.mirror import mirrored
 from spark_sim.api import retarget
 from spark_sim.clips import AnyClip, Clip, RobotClip
 from spark_sim.loading import load, takes
+from spark_sim.shelf.cut import pieces
+from spark_sim.shelf.duplicates import fingerprint
 from spark_sim.shelf.headline import headline
 from spark_sim.shelf.manifest import file_facts
 from spark_sim.shelf.plan import Job
@@ -25,10 +28,11 @@ from spark_sim.shelf.plan import Job
 
 @dataclass(frozen=True)
 class Piece:
-    """A result: the file `part`, which has the name that it will have beside the job's output, and
+    """A result: its `name` and its files, relative to the folder that they were written to, and
     what the manifest says of it."""
 
-    part: Path
+    name: Path
+    files: tuple[Path, ...]
     facts: Mapping[str, Any]
 
 
@@ -46,7 +50,7 @@ def work(job: Job, folder: Path) -> Done:
     """Do a job; what it writes lies in `folder`. Whatever fails becomes an error in words."""
     start, facts = time.perf_counter(), {}
     try:
-        facts = {f"source_{name}": value for name, value in file_facts(job.source).items()}
+        facts = {f"source_{name}": value for name, value in file_facts([job.source]).items()}
         made = tuple(_pieces(job, folder))
         return Done(made, facts, time.perf_counter() - start)
     except (SparkSimError, OSError) as error:
@@ -58,30 +62,39 @@ def work(job: Job, folder: Path) -> Done:
 
 def _pieces(job: Job, folder: Path) -> Iterator[Piece]:
     options = job.options
-    source = _source(job.source, job.source.stat().st_mtime_ns, tuple(options.reading.items()))
+    original = _source(job.source, job.source.stat().st_mtime_ns, tuple(options.reading.items()))
+    source = original if options.fps is None else original.resampled(options.fps)
     if job.mirrored:
-        source = mirror_clip(source)
+        original, source = mirror_clip(original), mirror_clip(source)
     result = retarget(source, target_clip(job.target), method=options.method)
     spans = [(0, len(source))]
+    if options.cut is not None:
+        spans = pieces(source.motion, source.rig, options.cut)
     several = len(spans) > 1
     for number, (first, stop) in enumerate(spans, 1):
         piece, begin = result, first * source.frame_time
+        if several:
+            piece = result.part(begin, (stop - 1) * source.frame_time)
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / _name(job, number if several else None)
+        files: tuple[Path, ...] = (path,)
         if isinstance(piece, RobotClip):
             replace(piece, path=job.source).save(path, force=True, format=options.format)
+            files = written_files(path, options.format)
         else:
             piece.save(path, force=True)
-        measured = assess(piece.subject, source=span(source.subject, first, stop))
+        measured = assess(piece.subject, source=stretch(original, begin, piece.duration))
         facts = {
-            **{f"output_{name}": value for name, value in file_facts(path).items()},
+            **{f"output_{name}": value for name, value in file_facts(files).items()},
             "frames": len(piece),
             "fps": piece.fps,
+            "duration_s": piece.duration,
             "start_s": begin,
             "report": headline(measured),
             "notes": list(dict.fromkeys((*source.notes, *piece.notes))),
+            "fingerprint": fingerprint(source.motion.frames(first, stop), source.rig),
         }
-        yield Piece(path, facts)
+        yield Piece(Path(path.name), tuple(file.relative_to(folder) for file in files), facts)
 
 
 def _name(job: Job, number: int | None) -> str:
@@ -90,12 +103,17 @@ def _name(job: Job, number: int | None) -> str:
     return f"{job.output.stem}{cut}{job.output.suffix}"
 
 
-def span(subject: Subject, first: int, stop: int) -> Subject:
-    """Frames [first, stop), on the body as the whole motion shows it."""
-    body = subject.body
+def stretch(clip: AnyClip, start: float, duration: float) -> Subject:
+    """What a clip shows for some seconds from `start` [s] on, on the body as the whole clip shows
+    it; all of it where that is as long."""
+    motion, body = clip.motion, clip.subject.body
+    first = round(start / motion.frame_time)
+    stop = first + round(duration / motion.frame_time) + 1
+    if start == 0 and duration > motion.duration - 2 * motion.frame_time:
+        stop = len(motion)
     if body is not None:
         body = replace(body, qpos=body.qpos[first:stop])
-    return Subject(subject.motion.frames(first, stop), subject.rig, body)
+    return Subject(motion.frames(first, stop), clip.rig, body)
 
 
 def mirror_clip(clip: AnyClip) -> Clip:

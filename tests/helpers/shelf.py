@@ -31,7 +31,7 @@ def contents(text: str, number: int) -> bytes:
 def made(job: Job, folder: Path) -> Done:
     """A source says how many pieces it has. They are written slowly, and not atomically."""
     text = job.source.read_text()
-    source = {f"source_{name}": value for name, value in file_facts(job.source).items()}
+    source = {f"source_{name}": value for name, value in file_facts([job.source]).items()}
     if text == "broken":
         return Done((), source, 0.0, f"{job.source}: is broken")
     pieces = []
@@ -45,9 +45,15 @@ def made(job: Job, folder: Path) -> Done:
             for k in range(BLOCKS):
                 file.write(whole[k * len(whole) // BLOCKS : (k + 1) * len(whole) // BLOCKS])
                 time.sleep(1e-4)
-        facts = {f"output_{name}": value for name, value in file_facts(path).items()}
+        facts = {f"output_{name}": value for name, value in file_facts([path]).items()}
         report = {"implausible_share": 0.1 * number}
-        pieces.append(Piece(path, facts | {"frames": 1, "report": report, "notes": []}))
+        pieces.append(
+            Piece(
+                Path(path.name),
+                (Path(path.name),),
+                facts | {"frames": 1, "report": report, "notes": []},
+            )
+        )
     return Done(tuple(pieces), source, 0.0)
 
 

@@ -8,7 +8,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +43,7 @@ def program(shelf: Path) -> Iterator[Program]:
         yield program
 
 
-def lines(out: Path) -> list[dict[str, object]]:
+def lines(out: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in (out / "manifest.jsonl").read_text().splitlines()]
 
 
@@ -150,3 +152,53 @@ def children_of(pid: int) -> set[int]:
     except OSError:
         return set()
     return set(map(int, text.split()))
+
+
+@pytest.mark.parametrize("format", ["mjlab", "csv", "sonic"])
+def test_pieces_at_another_rate_in_any_format(shelf: Path, program: Program, format: str) -> None:
+    """Together the pieces are as long as the motion; each is read again on its robot, and the
+    report of the folder finds robot and source of each in the manifest."""
+    arguments = (
+        *("batch", "mutant.bvh", "--to", "robot", "-o", "out", "--method", "copy"),
+        *("--format", format, "--fps", "50", "--cut", "2s", "--workers", "1"),
+        *(("--mirror",) if format == "csv" else ()),
+    )
+    done = program(*arguments)
+    assert done.code == 0, done.stderr
+    assert program(*arguments).stdout == f"out: {done.stdout.split()[1]} unchanged\n"
+    source = spark_sim.load(shelf / "mutant.bvh")
+    pieces = [e for e in lines(shelf / "out") if not e["options"]["mirrored"]]
+    assert len(pieces) == 2
+    for piece, following in pairwise(pieces):
+        assert piece["duration_s"] <= 2.0
+        assert piece["start_s"] + piece["duration_s"] == pytest.approx(
+            following["start_s"], abs=1.5 * (source.frame_time + 0.02)
+        )
+    last = pieces[-1]
+    assert last["start_s"] + last["duration_s"] == pytest.approx(source.duration, abs=0.03)
+    clip = spark_sim.load(shelf / "out" / last["output"], robot="robot")
+    assert clip.fps == pytest.approx(50)
+    assert len(clip) == last["frames"]
+
+    if format != "csv":
+        return
+    done = program("report", "out", "--workers", "1")
+    assert done.code == 0, done.stderr
+    rows = {
+        row["file"]: row for row in json.loads((shelf / "out/report.json").read_text())["clips"]
+    }
+    assert len(rows) == len(lines(shelf / "out"))
+    for entry in lines(shelf / "out"):
+        row = rows[entry["output"]]
+        assert Path(row["source"]).name == "mutant.bvh"
+        for name in ("implausible_share", "root_drift_m", "invented_contact_share"):
+            assert row[name] == pytest.approx(entry["report"][name], abs=1e-4), name
+
+
+def test_near_duplicates_are_named(shelf: Path, program: Program) -> None:
+    shutil.copy(shelf / "in" / "walker_squat.bvh", shelf / "in" / "again.bvh")
+    (shelf / "in" / "broken.bvh").unlink()
+    done = program("batch", "in", "--to", "robot", "-o", "out", "--method", "copy")
+    assert done.code == 0
+    assert "nearly the same motion: in/again.bvh, in/walker_squat.bvh" in done.stderr
+    assert done.stderr.count("nearly the same") == 1
