@@ -19,12 +19,17 @@ from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, plan
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_mul
+from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion
 
 MIN_DURATION = 0.08  # contacts and breaks shorter than this [s] are noise
 MAX_CREEP = 0.6  # [m/s, of an adult] of a foot that stands because nothing else does
 FLIGHT_PUSH = 0.35  # [body weights] of push below which nothing holds the body up
-TOUCH_HEIGHT = 0.03  # [m, of an adult] between the floor and the flesh of a part that touches
+TOUCH_HEIGHT = 0.03  # [m, of an adult] between the floor and the flesh of a part that touches,
+REST_HEIGHT = 0.05  # and of one that rests: recorded floors are off, and flesh is thick;
+WRIST_HEIGHT = 0.04  # more above a palm or a fist
+REST_SPEED = 0.2  # [m/s, of an adult] below which a part comes to rest,
+ROLL_SPEED = 0.8  # and up to which it then stays in place, though its joint rolls over it
 _WINDOW = 0.05  # [s] before and after a frame over which accelerations are measured
 _MAY_TOUCH = ("hand", "forearm", "upper_arm", "head", "spine", "pelvis", "lower_leg")
 _PARTS = tuple(role for role in Role if role.part in _MAY_TOUCH)  # and the feet
@@ -33,10 +38,11 @@ _PARTS = tuple(role for role in Role if role.part in _MAY_TOUCH)  # and the feet
 @dataclass(frozen=True, eq=False)
 class Schedule:
     """`feet`: whether heel and toe of each of S feet stand. `parts`: whether those of
-    `part_roles` touch. `flight`: whether the body falls freely. `com_acceleration` [m/s²]."""
+    `part_roles` touch, `rests` whether they also stay in place. `flight`: whether the body falls freely. `com_acceleration` [m/s²]."""
 
     feet: Bool[np.ndarray, "T S 2"]
     parts: Bool[np.ndarray, "T B"]
+    rests: Bool[np.ndarray, "T B"]
     part_roles: tuple[Role, ...]
     flight: Bool[np.ndarray, "T"]
     com_acceleration: Float[np.ndarray, "T 3"]
@@ -53,7 +59,7 @@ def schedule(
     mass = human_mass(rig, positions, quat_mul(source.rotations, rig.tpose))
     acceleration = derivative(mass.com, frame_time, 2, _WINDOW)
     flight = np.less(acceleration[:, 2], (FLIGHT_PUSH - 1) * GRAVITY)
-    roles, parts = _touching_parts(rig, positions, source.floor_z)
+    roles, parts, rests = _touching_parts(source, positions)
     stands = np.zeros(paths.shape[:-1], dtype=bool)
     exist = np.abs(paths).sum(axis=(0, 2, 3)) > 0
     for s in np.flatnonzero(exist).tolist():
@@ -63,7 +69,7 @@ def schedule(
     floating = _nothing_holds(feet, parts)
     floating[flight] = False
     feet[floating] |= _creeping(source, paths, exist)[floating]
-    return Schedule(_majority(feet, frames), parts, roles, flight, acceleration)
+    return Schedule(_majority(feet, frames), parts, rests, roles, flight, acceleration)
 
 
 def _nothing_holds(
@@ -74,12 +80,34 @@ def _nothing_holds(
 
 
 def _touching_parts(
-    rig: Rig, positions: Float[np.ndarray, "T J 3"], floor_z: float
-) -> tuple[tuple[Role, ...], Bool[np.ndarray, "T B"]]:
-    joints = {role: j for role in _PARTS if (j := rig.roles.joint(role)) is not None}
+    source: CanonicalMotion, positions: Float[np.ndarray, "T J 3"]
+) -> tuple[tuple[Role, ...], Bool[np.ndarray, "T B"], Bool[np.ndarray, "T B"]]:
+    """Whether parts touch the ground: their flesh is near it, or not far and they are slow; and
+    whether they rest there."""
+    rig, frame_time = source.rig, source.frame_time
+    joints = {role: j for role in _PARTS if (j := touching_joint(rig, role)) is not None}
+    scale = rig.standing_height / ADULT_HEIGHT
     flesh = np.array([RADII[role.part] for role in joints]) * rig.standing_height
-    height = positions[:, list(joints.values()), 2] - floor_z - flesh
-    return tuple(joints), height < TOUCH_HEIGHT * rig.standing_height / ADULT_HEIGHT
+    paths = positions[:, list(joints.values())]
+    height = (paths[..., 2] - source.floor_z - flesh) / scale
+    speed = np.linalg.norm(derivative(paths, frame_time, 1, _WINDOW), axis=-1) / scale
+    height -= WRIST_HEIGHT * np.array([role.part == "hand" for role in joints])
+    slow = speed < REST_SPEED
+    frames = max(1, round(MIN_DURATION / frame_time))
+    touches = _majority((height < TOUCH_HEIGHT) | ((height < REST_HEIGHT) & slow), frames)
+    stays = _majority(touches & (speed < ROLL_SPEED), frames) & touches
+    return tuple(joints), touches, _runs_with(stays, slow)
+
+
+def _runs_with(
+    mask: Bool[np.ndarray, "T B"], seed: Bool[np.ndarray, "T B"]
+) -> Bool[np.ndarray, "T B"]:
+    """Those runs of each column of a mask in which a seed lies."""
+    out = np.zeros_like(mask)
+    for b in range(mask.shape[1]):
+        for start, stop in true_runs(mask[:, b]):
+            out[start:stop, b] = seed[start:stop, b].any()
+    return out
 
 
 def _creeping(
@@ -100,6 +128,11 @@ def _creeping(
     return out
 
 
-def _majority(mask: Bool[np.ndarray, "T S 2"], frames: int) -> Bool[np.ndarray, "T S 2"]:
+def touching_joint(rig: Rig, role: Role) -> int | None:
+    """The joint whose part touches the ground as that role's: of the spine, the topmost."""
+    return rig.chest if role is Role.SPINE else rig.roles.joint(role)
+
+
+def _majority(mask: Bool[np.ndarray, "T *n"], frames: int) -> Bool[np.ndarray, "T *n"]:
     """Over a short window: without flicker."""
     return uniform_filter1d(mask.astype(np.float64), frames, axis=0, mode="nearest") > 0.5

@@ -10,7 +10,7 @@ from robots.least_squares import NormalEquations, Smoothness
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.collision import Candidate, collisions_of
-from robots.solver.foot_path import Footing
+from robots.solver.holds import Holds
 from robots.solver.objective import linearize
 from robots.solver.smoothness import com_acceleration, jerk_stiffening, smoothness_of
 from robots.solver.targets import Targets
@@ -47,7 +47,7 @@ def collision_stride(targets: Targets) -> int:
 def solve_block(
     robot: Morphology,
     targets: Targets,
-    footing: list[Footing],
+    holds: Holds,
     q: Coordinates,
     block: Block,
     max_iter: int,
@@ -90,7 +90,7 @@ def solve_block(
     stiffening = np.ones((max(len(q) - 2, 0), len(block.dofs)))
 
     def linearize_at(q: Coordinates, with_jacobian: bool = True) -> NormalEquations:
-        terms = robot, targets, footing, q, block, candidates, penalty_scale
+        terms = robot, targets, holds, q, block, candidates, penalty_scale
         return linearize(*terms, with_jacobian=with_jacobian, exact=repair is not None)
 
     def smoothness_at(q: Coordinates) -> Smoothness:

@@ -6,18 +6,17 @@ the source's feet stood: a floor that slopes by a few centimetres is level under
 foot is fast it is lifted, so that it steps and does not drag.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Int
+from jaxtyping import Bool, Complex, Float
 
+from robots.model.morphology import Morphology
 from robots.solver.footprints import FootPlan, on_points
+from robots.solver.holds import Holds
 from spark.runs import true_runs
 
 # How firmly the points of a sole are held, in x, y and z, as a share of those that stand:
 SWING_HOLD = np.array([0.35, 0.35, 0.6])  # its height in swing is what keeps it off the floor,
-RAISED_HOLD = np.array([0.2, 0.2, 0.3])  # the raised end of a standing foot follows its copy,
-SLIDING_HOLD = 0.03  # and over the floor nearly nothing, while feet find where they can stand
+RAISED_HOLD = np.array([0.2, 0.2, 0.3])  # the raised end of a standing foot follows its copy
 # Hip heights that a fast foot is above the floor: the report sees feet skate below 0.028.
 STEP_HEIGHT = 0.03
 # Hip heights/s below which a foot may be on the floor, and above which it is lifted: the report
@@ -28,29 +27,12 @@ LET_DOWN = 0.1  # [s] within which a foot comes down that is in the air where it
 _ON_FLOOR = 1e-3  # [m]
 
 
-@dataclass(frozen=True, eq=False)
-class Footing:
-    """For each point of a sole: where it should be [m, world], and how firmly (0 to 1)."""
-
-    positions: Float[np.ndarray, "P 3 T"]
-    holds: Float[np.ndarray, "P 3 T"]
-
-    def at(self, frames: Int[np.ndarray, "S"]) -> "Footing":
-        """That of some frames."""
-        return Footing(self.positions[..., frames], self.holds[..., frames])
-
-    def sliding(self) -> "Footing":
-        """The same over the floor, but hardly held there."""
-        along = np.array([[SLIDING_HOLD], [SLIDING_HOLD], [1.0]])
-        return Footing(self.positions, self.holds * along)
-
-
-def footing_of(plan: FootPlan) -> Footing:
-    """Where the points of a planned foot are."""
+def footing_of(robot: Morphology, plan: FootPlan) -> Holds:
+    """Where the points of a planned foot's sole are held."""
     stands = plan.stands
     offset = plan.prints - np.column_stack([plan.toe, plan.heading])
     offset[:, 2] = np.remainder(offset[:, 2] + np.pi, 2 * np.pi) - np.pi
-    offset = _between_contacts(offset, stands, plan.toe)
+    offset = between_contacts(offset, stands, plan.toe)
     turn = np.exp(1j * offset[:, 2])
     pivot = (plan.toe[:, 0] + offset[:, 0]) + 1j * (plan.toe[:, 1] + offset[:, 1])
     copied = plan.points[..., 0] + 1j * plan.points[..., 1]
@@ -71,7 +53,8 @@ def footing_of(plan: FootPlan) -> Footing:
     holds = np.where(stands[:, None, None], RAISED_HOLD, SWING_HOLD)
     holds = np.where(on[..., None], 1.0, holds)
     positions = np.stack([place.real, place.imag, z], axis=-1)
-    return Footing(*(np.ascontiguousarray(x.transpose(1, 2, 0)) for x in (positions, holds)))
+    over_time = (np.ascontiguousarray(x.transpose(1, 2, 0)) for x in (positions, holds))
+    return Holds(*robot.sole_points(plan.sole), *over_time)
 
 
 def _height(
@@ -82,7 +65,7 @@ def _height(
     ground = np.zeros(len(stands))
     for start, stop in true_runs(stands):
         ground[start:stop] = plan.clearance[start:stop].min()
-    clearance = plan.clearance - _between_contacts(ground[:, None], stands, plan.toe)[:, 0]
+    clearance = plan.clearance - between_contacts(ground[:, None], stands, plan.toe)[:, 0]
     drop = np.where(stands, clearance, 0.0)
     clearance = clearance - _fading(drop, stands, max(1, round(LET_DOWN / plan.frame_time)))
     height = np.where(stands, 0.0, clearance + plan.lift)
@@ -106,7 +89,7 @@ def _speed(
     return speed
 
 
-def _between_contacts(
+def between_contacts(
     values: Float[np.ndarray, "T D"], stands: Bool[np.ndarray, "T"], path: Float[np.ndarray, "T 2"]
 ) -> Float[np.ndarray, "T D"]:
     """The values of standing frames, and between these from one to the next by as much of its way

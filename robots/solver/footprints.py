@@ -114,8 +114,8 @@ def _plan(
         on_toe = np.flatnonzero(contacts[start:stop, 1]) + start
         frames = on_toe if len(on_toe) else np.arange(start, stop)
         own = toe[frames] if len(on_toe) else (heel + length * ahead)[frames]
-        place = own.mean(0) + _beyond(targets.feet[frames, s, int(len(on_toe) > 0)], radius)
-        turned = heading[frames].mean() + _beyond(heading[frames, None], MAX_TWIST)[:, 0]
+        place = own.mean(0) + beyond(targets.feet[frames, s, int(len(on_toe) > 0)], radius)
+        turned = heading[frames].mean() + beyond(heading[frames, None], MAX_TWIST)[:, 0]
         time = np.arange(start, stop)
         for column, values in enumerate((*place.T, turned)):
             prints[start:stop, column] = np.interp(time, frames, values)
@@ -154,7 +154,7 @@ def _moved(plan: FootPlan, points: Float[np.ndarray, "P 3 T"]) -> FootPlan:
     return replace(plan, prints=prints)
 
 
-def _beyond(path: Float[np.ndarray, "P D"], radius: float) -> Float[np.ndarray, "P D"]:
+def beyond(path: Float[np.ndarray, "P D"], radius: float) -> Float[np.ndarray, "P D"]:
     """How far a path is from its mean, but for what of that lies within a radius."""
     away = path - path.mean(0)
     far = np.linalg.norm(away, axis=1, keepdims=True)

@@ -13,6 +13,7 @@ from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from robots.model.morphology import Morphology
 from robots.solver.com_plan import Support, plan_com
+from robots.solver.contacts import touching_joint
 from robots.solver.dynamics import angular_momentum, center_of_mass
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import FootPlan
@@ -55,12 +56,12 @@ def _support(
     robot: Morphology, targets: Targets, feet: Sequence[FootPlan], poses: LinkPoses
 ) -> Support:
     """Sole points that are low, and other parts where the source's touch the floor."""
-    planned = [footing_of(foot).positions for foot in feet]
+    planned = [footing_of(robot, foot).positions for foot in feet]
     points = np.concatenate([p.transpose(2, 0, 1) for p in planned], axis=1)
     reach = max(1, round(TOUCH_SPAN / targets.frame_time))
     low = minimum_filter1d(points[..., 2], 2 * reach + 1, axis=0, mode="nearest")
     touching: Bool[np.ndarray, "T K"] = low < TOUCH_HEIGHT * robot.rig.hip_height
-    joints = [robot.rig.roles.joint(role) for role in targets.part_roles]
+    joints = [touching_joint(robot.rig, role) for role in targets.part_roles]
     known = [k for k, joint in enumerate(joints) if joint is not None]
     parts = [
         poses.point(int(robot.links[joint]), robot.centers[joint])[:2].T

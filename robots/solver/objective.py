@@ -22,7 +22,7 @@ from robots.solver.block import Block
 from robots.solver.collision import Candidate, collisions_of
 from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.floor import add_floor
-from robots.solver.foot_path import Footing
+from robots.solver.holds import Holds
 from robots.solver.targets import Targets
 from robots.solver.weights import (
     FLOOR_ROUNDING,
@@ -30,9 +30,9 @@ from robots.solver.weights import (
     LIMIT_MARGIN,
     W_COLLISION,
     W_FLOOR,
-    W_FOOT_HOLD,
     W_HANDS,
     W_HIPS_POSITION,
+    W_HOLD,
     W_LEG_COLLISION,
     W_LIMB_DIRECTION,
     W_LIMIT,
@@ -105,7 +105,7 @@ class ChainTerms:
 def linearize(
     robot: Morphology,
     targets: Targets,
-    footing: Sequence[Footing],
+    holds: Holds,
     q: Coordinates,
     block: Block,
     candidates: Sequence[Candidate],
@@ -118,7 +118,8 @@ def linearize(
     `with_jacobian` is False.
 
     Per frame: the rotation of each part with a role and the direction of each limb (`_add_pose`);
-    hips, footholds and the floor, where the base is free; hands that touch, where it is not;
+    points that are held; hips and the floor under soles, where the base is free; hands that touch,
+    where it is not;
     the depth of all other parts in the floor, and of the colliding `candidates` in each other,
     approximate or `exact`; limits; a pull to the T-pose.
     `penalty_scale` multiplies the weights of collisions and the floor, frame by frame.
@@ -144,8 +145,9 @@ def linearize(
                     poses.rotations[link], wanted, terms.axes_of(link), W_ROTATION["chest"]
                 )
             )
+    _add_holds(robot, holds, poses, chains, block)
     if block.base:
-        _add_hips_feet_and_floor(robot, targets, footing, poses, chains, penalty_scale)
+        _add_hips_and_soles(robot, targets, poses, chains, penalty_scale)
     elif targets.hands is not None:
         _add_hands(robot, targets, poses, block, normal, with_jacobian)
     for terms in chains.values():
@@ -206,17 +208,29 @@ def _add_pose(
         terms.add_rotational(direction_residual(now, targets.bones[role].T, axes, W_LIMB_DIRECTION))
 
 
-def _add_hips_feet_and_floor(
+def _add_holds(
+    robot: Morphology, holds: Holds, poses: LinkPoses, chains: dict[int, ChainTerms], block: Block
+) -> None:
+    """Each point that is held, where the block alone moves it: r = `W_HOLD` share (p - p*)."""
+    for p, link in enumerate(holds.links.tolist()):
+        own = block.frees(link) if block.base else bool(block.free_joints(link))
+        terms = _chain_of(chains, robot, link) if own else None
+        if terms is not None:
+            point = poses.point(link, holds.points[p])
+            weight = W_HOLD[:, None] * holds.shares[p]
+            terms.add_point(link, point, holds.positions[p], weight)
+
+
+def _add_hips_and_soles(
     robot: Morphology,
     targets: Targets,
-    footing: Sequence[Footing],
     poses: LinkPoses,
     chains: dict[int, ChainTerms],
     penalty_scale: Float[np.ndarray, "T"],
 ) -> None:
-    """The middle of the hips on its path; for each corner of a sole its foothold, and the floor.
+    """The middle of the hips on its path; the corners of the soles above the floor.
 
-    With z the corner's height, the floor's r = w one_sided(-z), w = `W_FLOOR` x `penalty_scale`.
+    With z a corner's height, r = w one_sided(-z), w = `W_FLOOR` x `penalty_scale`.
     """
     count = len(targets)
     pelvis = int(robot.links[robot.rig.pelvis])
@@ -225,13 +239,11 @@ def _add_hips_feet_and_floor(
     middle = robot.centers[robot.rig.hips].mean(0)
     path = np.repeat(W_HIPS_POSITION[:, None], count, axis=1)
     terms.add_point(pelvis, poses.point(pelvis, middle), targets.hips.T, path)
-    for sole, foot in zip(robot.soles, footing, strict=True):
-        for c, (link, rest) in enumerate(zip(*robot.sole_points(sole), strict=True)):
+    for sole in robot.soles:
+        for link, rest in zip(*robot.sole_points(sole), strict=True):
             foot_terms = _chain_of(chains, robot, int(link))
             assert foot_terms is not None
             point = poses.point(int(link), rest)
-            weight = W_FOOT_HOLD[:, None] * foot.holds[c]
-            foot_terms.add_point(int(link), point, foot.positions[c], weight)
             # As a point's residual: its weight is dr/dz, its distance what makes the product r.
             depth, slope = one_sided(-point[2], FLOOR_ROUNDING / penalty_scale)
             up = np.stack([np.zeros(count), np.zeros(count), -W_FLOOR * penalty_scale * slope])

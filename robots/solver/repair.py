@@ -6,8 +6,6 @@ round (a penalty method: Nocedal and Wright, "Numerical Optimization", 17.1). Ar
 something are first led out of it.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from jaxtyping import Bool
 from scipy.ndimage import binary_dilation, maximum_filter1d
@@ -23,7 +21,7 @@ from robots.solver.descent import (
     solve_block,
 )
 from robots.solver.exact_contact import exact_contacts_of
-from robots.solver.foot_path import Footing
+from robots.solver.holds import Holds
 from robots.solver.footprints import points_of
 from robots.solver.smoothness import jerk_stiffening, overspeed
 from robots.solver.targets import Targets
@@ -45,7 +43,7 @@ _MAX_OVERSPEED = 0.5  # [rad/s] of a hinge beyond the speed at which it is held 
 def repair(
     robot: Morphology,
     targets: Targets,
-    footing: Sequence[Footing],
+    holds: Holds,
     q: Coordinates,
     block: Block,
 ) -> Coordinates:
@@ -60,8 +58,8 @@ def repair(
         fixed = np.zeros(len(frames), dtype=bool)
         fixed[:2] = frames[0] > 0
         fixed[-2:] |= frames[-1] < len(q) - 1
-        feet = [foot.at(frames) for foot in footing]
-        part = _repair_stretch(robot, targets.at(frames), feet, q.at(frames), block, fixed)
+        held, part = holds.at(frames), q.at(frames)
+        part = _repair_stretch(robot, targets.at(frames), held, part, block, fixed)
         q = q.replaced(frames, part)
     return q
 
@@ -69,7 +67,7 @@ def repair(
 def _repair_stretch(
     robot: Morphology,
     targets: Targets,
-    footing: list[Footing],
+    holds: Holds,
     q: Coordinates,
     block: Block,
     fixed: Bool[np.ndarray, "T"],
@@ -89,7 +87,7 @@ def _repair_stretch(
         q = solve_block(
             robot,
             targets,
-            footing,
+            holds,
             q,
             block,
             max_iter=_MAX_ITER,

@@ -7,6 +7,8 @@ after the other: base, trunk and legs, which the feet couple, then arms and head
 trunk and don't move it.
 """
 
+from collections.abc import Sequence
+
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.solver.block import Block
@@ -14,9 +16,11 @@ from robots.solver.collision import collisions_of
 from robots.solver.descent import collision_stride, solve_block
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import FootPlan, plan_feet, reachable
+from robots.solver.holds import Holds, joined
 from robots.solver.motion_plan import with_dynamics
 from robots.solver.projection import project
 from robots.solver.repair import repair
+from robots.solver.resting import resting
 from robots.solver.smoothness import limit_speed
 from robots.solver.targets import Targets, targets_of
 from robots.tree import Coordinates, forward_kinematics
@@ -73,20 +77,27 @@ def solve(
     collisions, and feet held where they came to rest; then repaired. To `polish` what is nearly
     solved, without the first.
     """
-    footing = [footing_of(foot) for foot in feet]
     for block, max_iter, rel_tol in zip(blocks_of(robot), _MAX_ITER, _REL_TOL, strict=True):
         if not block.dofs:
             continue
         ends = _POLISH if polish else (max_iter, rel_tol, _MAX_REJECTED)
         if not polish:
-            sliding = [foot.sliding() for foot in footing]
+            sliding = _holds_of(robot, targets, feet, q).sliding()
             q = solve_block(robot, targets, sliding, q, block, *ends, avoid_collisions=False)
         if block.base and not polish:
-            footing = [footing_of(foot) for foot in reachable(robot, feet, q)]
+            feet = reachable(robot, feet, q)
+        holds = _holds_of(robot, targets, feet, q)
         if polish or _may_collide(robot, targets, q, block):
-            q = solve_block(robot, targets, footing, q, block, *ends, avoid_collisions=True)
-        q = repair(robot, targets, footing, q, block)
+            q = solve_block(robot, targets, holds, q, block, *ends, avoid_collisions=True)
+        q = repair(robot, targets, holds, q, block)
     return q
+
+
+def _holds_of(
+    robot: Morphology, targets: Targets, feet: Sequence[FootPlan], q: Coordinates
+) -> Holds:
+    """Of the feet, and of what else of `q` touches the ground."""
+    return joined([*(footing_of(robot, foot) for foot in feet), resting(robot, targets, q)])
 
 
 def _may_collide(robot: Morphology, targets: Targets, q: Coordinates, block: Block) -> bool:

@@ -40,8 +40,8 @@ class Targets:
     """Over frames, floor at z = 0: `world`, the rig's joints' rotations (`q_world_joint`); `chest`,
     that of the topmost part of the trunk; `hips`, the path of the hips' middle [m]; `bones`, unit
     directions by the role at a segment's upper end; `contacts`, whether heel and toe of each of the
-    robot's soles stand, `parts`, whether the joints of `part_roles` lie on the floor, `flight`,
-    whether nothing does; `com_acceleration`, the source's, scaled [m/s²]; `feet`, the paths of the
+    robot's soles stand, `parts`, whether the joints of `part_roles` lie on the floor, `rests`, whether they
+    also stay in place, `flight`, whether nothing touches it; `com_acceleration`, the source's, scaled [m/s²]; `feet`, the paths of the
     source's heels and toes over the floor [m], and `clearance`, how high its soles are, scaled;
     `hands`, from the right hand to the left [m]. `com` [m] is planned where it is known.
     """
@@ -53,6 +53,7 @@ class Targets:
     bones: dict[Role, Float[np.ndarray, "T 3"]]
     contacts: Bool[np.ndarray, "T S 2"]
     parts: Bool[np.ndarray, "T B"]
+    rests: Bool[np.ndarray, "T B"]
     part_roles: tuple[Role, ...]
     flight: Bool[np.ndarray, "T"]
     com_acceleration: Float[np.ndarray, "T 3"]
@@ -80,6 +81,7 @@ class Targets:
             bones={role: bone[frames] for role, bone in self.bones.items()},
             contacts=self.contacts[frames],
             parts=self.parts[frames],
+            rests=self.rests[frames],
             flight=self.flight[frames],
             com_acceleration=self.com_acceleration[frames],
             feet=self.feet[frames],
@@ -106,6 +108,7 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
         bones=bone_directions(rig, positions, source.rotations),
         contacts=touches.feet,
         parts=touches.parts,
+        rests=touches.rests,
         part_roles=touches.part_roles,
         flight=touches.flight,
         com_acceleration=scale * touches.com_acceleration,

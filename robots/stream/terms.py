@@ -22,7 +22,7 @@ from robots.solver.weights import (
     HANDS_RANGE,
     LIMIT_MARGIN,
     W_FLOOR,
-    W_FOOT_HOLD,
+    W_HOLD,
     W_HANDS,
     W_HIPS_POSITION,
     W_LIMB_DIRECTION,
@@ -221,7 +221,7 @@ class Terms:
     ) -> None:
         """The footholds of the soles' points, and the floor; weights squared."""
         count = self._sole_count
-        hold_weights = (W_FOOT_HOLD * foot_targets.holds) ** 2
+        hold_weights = (W_HOLD * foot_targets.holds) ** 2
         weights[:, :count] = hold_weights
         forces[:, :count] = hold_weights * (points[:, :count] - foot_targets.positions)
         depth, slope = one_sided(-points[:, :count, 2], FLOOR_ROUNDING)

@@ -1,0 +1,129 @@
+"""Hands, knees, back and other parts that lie on the ground: held where they come to rest.
+
+A part is held by its joint's centre, at the height at which its lowest shape touches the ground
+there. Of arms, which give way to the trunk, the shoulder is held as well, so that the trunk comes
+to where its arms can reach the ground.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.ndimage import distance_transform_edt
+
+from robots.model.morphology import Morphology
+from robots.solver.contacts import touching_joint
+from robots.solver.foot_path import between_contacts
+from robots.solver.footprints import MAX_WOBBLE, beyond
+from robots.solver.holds import Holds, joined
+from robots.solver.hulls import shapes_of
+from robots.solver.targets import Targets
+from robots.tree import Coordinates, LinkPoses, forward_kinematics
+from spark.rig.roles import Role
+from spark.runs import true_runs
+
+# How firmly a part that touches the ground is held over it and at its height, as a share of a
+# standing sole: it is softer, and where it touches is less certain,
+REST_HOLD, TOUCH_HOLD = 0.6, 0.6
+CARRIED_HOLD = 0.3  # and the shoulder over an arm that touches.
+APPROACH = 0.15  # [s] before and after a touch in which a part is led to the ground and away
+_NEAR = 0.1  # hip heights from a joint within which the shapes of its part may touch for it
+
+
+def resting(robot: Morphology, targets: Targets, q: Coordinates) -> Holds:
+    """The holds of the parts that touch the ground, where those of `q` rest on average."""
+    poses, frames = forward_kinematics(robot.tree, q), len(q)
+    parts = [Holds.none(frames)]
+    for k, role in enumerate(targets.part_roles):
+        joint = touching_joint(robot.rig, role)
+        touches = targets.parts[:, k]
+        if joint is None or not touches.any():
+            continue
+        parts.append(_held(robot, targets, poses, joint, touches, targets.rests[:, k]))
+        if role.part in ("hand", "forearm"):
+            shoulder = robot.rig.roles.joint(Role(f"{role.side}_upper_arm"))
+            if shoulder is not None:
+                parts.append(_carried(robot, poses, shoulder, joint, parts[-1]))
+    return joined(parts)
+
+
+def _held(
+    robot: Morphology,
+    targets: Targets,
+    poses: LinkPoses,
+    joint: int,
+    touches: Bool[np.ndarray, "T"],
+    rests: Bool[np.ndarray, "T"],
+) -> Holds:
+    link = int(robot.links[joint])
+    now = poses.point(link, robot.centers[joint])
+    offset = np.zeros((len(targets), 3))
+    for start, stop in true_runs(rests):
+        path = now[:2, start:stop].T
+        place = path.mean(axis=0) + beyond(path, MAX_WOBBLE * robot.rig.hip_height)
+        offset[start:stop, :2] = place - path
+    offset[:, :2] = between_contacts(offset[:, :2], rests, now[:2].T)
+    lift = -_lowest(robot, poses, joint)
+    offset[:, 2] = between_contacts(lift[:, None], touches, now[:2].T)[:, 0]
+    along = REST_HOLD * _around(rests, targets.frame_time)
+    shares = np.stack([along, along, TOUCH_HOLD * _around(touches, targets.frame_time)])
+    positions = (now + offset.T)[None]
+    return Holds(np.array([link]), robot.centers[[joint]], positions, shares[None])
+
+
+def _carried(robot: Morphology, poses: LinkPoses, shoulder: int, joint: int, held: Holds) -> Holds:
+    """The shoulder shifted as the part of its arm is."""
+    link = int(robot.tree.parents[_first_above(robot, shoulder)])
+    center = robot.centers[shoulder]
+    shift = held.positions[0] - poses.point(int(robot.links[joint]), robot.centers[joint])
+    positions = (poses.point(link, center) + shift)[None]
+    return Holds(
+        np.array([link]), center[None], positions, held.shares * (CARRIED_HOLD / REST_HOLD)
+    )
+
+
+def _first_above(robot: Morphology, joint: int) -> int:
+    """The first of the tree's joints that turn a part, but not the part that it hangs on."""
+    above = int(robot.links[int(robot.rig.skeleton.parents[joint])])
+    trunk = robot.tree.chain(above)
+    return next(k for k in robot.tree.chain(int(robot.links[joint])) if k not in trunk)
+
+
+def _lowest(robot: Morphology, poses: LinkPoses, joint: int) -> Float[np.ndarray, "T"]:
+    """How high [m] the lowest shape near a joint is; the joint itself where none is near."""
+    link, spheres = touching_spheres(robot)[joint]
+    heights = [poses.point(link, center)[2] - radius for center, radius in spheres]
+    lowest: Float[np.ndarray, T] = np.min(heights, axis=0)
+    return lowest
+
+
+@lru_cache(maxsize=16)
+def touching_spheres(
+    robot: Morphology,
+) -> list[tuple[int, list[tuple[Float[np.ndarray, "3"], float]]]]:
+    """For each joint of the rig its link, and the spheres, in the rest pose [m], of the shapes that
+    this moves: those that are nearly as near to the joint as the nearest."""
+    shapes = shapes_of(robot.mjcf, robot.mj_joints)
+    out = []
+    for link, center in zip(robot.links.tolist(), robot.centers, strict=True):
+        own = [
+            (sphere, float(radius))
+            for shape in shapes
+            if shape.link == link
+            for sphere, radius in zip(shape.spheres, shape.radii, strict=True)
+        ]
+        away = [np.linalg.norm(sphere - center) - radius for sphere, radius in own]
+        reach = min(away, default=0.0) + _NEAR * robot.rig.hip_height
+        near = [x for x, distance in zip(own, away, strict=True) if distance <= reach]
+        out.append((link, near or [(center, 0.0)]))
+    return out
+
+
+def _around(mask: Bool[np.ndarray, "T"], frame_time: float) -> Float[np.ndarray, "T"]:
+    """1 where the mask holds, fading (a smoothstep) before and after."""
+    if not mask.any():
+        return np.zeros(len(mask))
+    away = distance_transform_edt(~mask) * frame_time / APPROACH
+    share = np.clip(1.0 - away, 0.0, 1.0)
+    faded: Float[np.ndarray, T] = share**2 * (3 - 2 * share)
+    return faded
