@@ -10,7 +10,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from robots.model.motion import RobotMotion
-from robots.solver.targets import bone_directions
+from robots.solver.contacts import touching_joint
+from robots.solver.resting import lowest_near
+from robots.solver.targets import bone_directions, targets_of
 from robots.tree import forward_kinematics
 from sim.report.assess import assess
 from sim.report.clip_poses import pose_clip
@@ -22,6 +24,7 @@ from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_mul
+from spark.transfer.canonical import CanonicalMotion, to_canonical
 
 DRAG_SPEED, DRAG_HEIGHT = 0.5, 0.01  # [m/s], [m] of a sole that is fast, and low: it drags
 # [m/s], [m] of a standing toe of the source, whatever its size: the figures that other tools are
@@ -42,7 +45,8 @@ _LOWER = {
 class RobotMetrics:
     """Shares are of frames [0, 1]; those of `source` beside them. `swing_clearance` and the
     accelerations (99th percentiles, of the middle of the hips and the centre of mass) are over the
-    source's, scaled by the hips' heights; None where there is nothing to compare."""
+    source's, scaled by the hips' heights; `rests` is of hands, knees and other parts that lie on
+    the ground in the source. None where there is nothing to compare."""
 
     implausible: float
     implausible_source: float
@@ -66,6 +70,8 @@ class RobotMetrics:
     in_air: float
     skate_m_s: float
     skate_source_m_s: float
+    rests_in_air: float | None
+    rests_slide_m_s: float | None
     limb_error_rad: float
     at_limit: float
     fastest_rad_s: float
@@ -118,6 +124,7 @@ def measure(motion: Motion, rig: Rig, result: RobotMotion) -> RobotMetrics:
         in_air=float((planted & (ours.lowest > IN_AIR)).sum() / count),
         skate_m_s=float(ours.lowest_speed[planted].sum() / count),
         skate_source_m_s=float(_speed(toes, frame_time)[planted].sum() / count),
+        **_resting(to_canonical(motion, rig), result),
         limb_error_rad=limb_error(motion, rig, result),
         at_limit=float(near.any(axis=1).mean()),
         fastest_rad_s=float(np.abs(np.diff(angles, axis=0)).max(initial=0.0) / frame_time),
@@ -162,6 +169,27 @@ def _robot_soles(result: RobotMotion) -> list[Float[np.ndarray, "T _ 3"]]:
         pairs = zip(*result.robot.sole_points(sole), strict=True)
         out.append(np.stack([poses.point(int(link), point).T for link, point in pairs], axis=1))
     return out
+
+
+def _resting(source: CanonicalMotion, result: RobotMotion) -> dict[str, float | None]:
+    """Of the parts that rest in the source: the share of times at which the robot's is in the air,
+    and how fast its joint then slides."""
+    robot, targets = result.robot, targets_of(source, result.robot)
+    poses = forward_kinematics(robot.tree, result.coordinates)
+    in_air, speeds = [], []
+    for k, role in enumerate(targets.part_roles):
+        joint = touching_joint(robot.rig, role)
+        if joint is not None:
+            rests = targets.rests[:, k]
+            path = poses.point(int(robot.links[joint]), robot.centers[joint]).T
+            in_air.append(lowest_near(robot, poses, joint)[rests] > IN_AIR)
+            speeds.append(_speed(path, source.frame_time)[rests])
+    if not sum(map(len, in_air)):
+        return {"rests_in_air": None, "rests_slide_m_s": None}
+    return {
+        "rests_in_air": float(np.concatenate(in_air).mean()),
+        "rests_slide_m_s": float(np.concatenate(speeds).mean()),
+    }
 
 
 def _over(

@@ -29,7 +29,7 @@ TOUCH_HEIGHT = 0.03  # [m, of an adult] between the floor and the flesh of a par
 REST_HEIGHT = 0.05  # and of one that rests: recorded floors are off, and flesh is thick;
 WRIST_HEIGHT = 0.04  # more above a palm or a fist
 REST_SPEED = 0.2  # [m/s, of an adult] below which a part comes to rest,
-ROLL_SPEED = 0.8  # and up to which it then stays in place, though its joint rolls over it
+ROLL_SPEED = 0.4  # and up to which it then stays in place, though its joint rolls over it
 _WINDOW = 0.05  # [s] before and after a frame over which accelerations are measured
 _MAY_TOUCH = ("hand", "forearm", "upper_arm", "head", "spine", "pelvis", "lower_leg")
 _PARTS = tuple(role for role in Role if role.part in _MAY_TOUCH)  # and the feet
@@ -37,8 +37,9 @@ _PARTS = tuple(role for role in Role if role.part in _MAY_TOUCH)  # and the feet
 
 @dataclass(frozen=True, eq=False)
 class Schedule:
-    """`feet`: whether heel and toe of each of S feet stand. `parts`: whether those of
-    `part_roles` touch, `rests` whether they also stay in place. `flight`: whether the body falls freely. `com_acceleration` [m/s²]."""
+    """`feet`: whether heel and toe of each of S feet stand. `parts`: whether those of `part_roles`
+    touch the ground, `rests`: whether they also stay in place. `flight`: whether the body falls
+    freely. `com_acceleration` [m/s²]."""
 
     feet: Bool[np.ndarray, "T S 2"]
     parts: Bool[np.ndarray, "T B"]

@@ -51,10 +51,8 @@ def add_floor(
 ) -> None:
     """r = w one_sided(radius - z) of the spheres of each shape that the block alone moves: w [1/m]
     is `weight`; it sets in over `rounding` [m]."""
-    for shape in shapes_over_floor(robot):
+    for shape in _moved_shapes(robot, block):
         joints = block.free_joints(shape.link)
-        if not (block.frees(shape.link) if block.base else joints):
-            continue
         frames = np.flatnonzero(poses.point(shape.link, shape.center)[2] < shape.bound + _REACH)
         if not len(frames):
             continue
@@ -77,3 +75,25 @@ def add_floor(
                 continue
             J = point_jacobian(near, joints, axes, point, base=block.base)[:, 2, felt]
             normal.add_at(here, dofs, -J * slope * weight[here], residual * weight[here])
+
+
+def depth_in_floor(robot: Morphology, poses: LinkPoses, block: Block) -> Float[np.ndarray, "T"]:
+    """How deep [m] the deepest of those shapes is in the floor; 0 where none is."""
+    out = np.zeros(poses.positions.shape[2])
+    for shape in _moved_shapes(robot, block):
+        frames = np.flatnonzero(poses.point(shape.link, shape.center)[2] < shape.bound)
+        if len(frames):
+            near = poses.at(frames, [shape.link])
+            for center, radius in zip(shape.spheres, shape.radii, strict=True):
+                depth = radius - near.point(shape.link, center)[2]
+                out[frames] = np.maximum(out[frames], depth)
+    return out
+
+
+def _moved_shapes(robot: Morphology, block: Block) -> list[Shape]:
+    """Those that the block moves, and no later one."""
+    return [
+        shape
+        for shape in shapes_over_floor(robot)
+        if (block.frees(shape.link) if block.base else block.free_joints(shape.link))
+    ]

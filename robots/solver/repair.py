@@ -21,8 +21,9 @@ from robots.solver.descent import (
     solve_block,
 )
 from robots.solver.exact_contact import exact_contacts_of
-from robots.solver.holds import Holds
+from robots.solver.floor import depth_in_floor
 from robots.solver.footprints import points_of
+from robots.solver.holds import Holds
 from robots.solver.smoothness import jerk_stiffening, overspeed
 from robots.solver.targets import Targets
 from robots.tree import Coordinates, forward_kinematics
@@ -36,7 +37,7 @@ _AROUND = 0.4  # [s] before and after a violation that are solved again
 _MAX_JERK_RATIO = 5.0  # jerk, over the one from which hinges are smoothed, that is a violation
 _SEARCH_DISTANCE = 0.01  # [m] between approximate shapes within which the exact ones are measured
 _MAX_DEPTH = 0.006  # [m] of parts in each other, beyond their clearance
-_MAX_SINKING = 0.006  # [m] of a sole's corner below the floor
+_MAX_SINKING = 0.006  # [m] of a sole's corner, or another part, below the floor
 _MAX_OVERSPEED = 0.5  # [rad/s] of a hinge beyond the speed at which it is held back
 
 
@@ -146,4 +147,4 @@ def violations(
     if block.base:
         for sole in robot.soles:
             violated |= points_of(robot, poses, sole)[:, 2].min(0) < -_MAX_SINKING
-    return violated
+    return violated | (depth_in_floor(robot, poses, block) > _MAX_SINKING)

@@ -14,7 +14,7 @@ from scipy.ndimage import distance_transform_edt
 from robots.model.morphology import Morphology
 from robots.solver.contacts import touching_joint
 from robots.solver.foot_path import between_contacts
-from robots.solver.footprints import MAX_WOBBLE, beyond
+from robots.solver.footprints import beyond
 from robots.solver.holds import Holds, joined
 from robots.solver.hulls import shapes_of
 from robots.solver.targets import Targets
@@ -22,11 +22,10 @@ from robots.tree import Coordinates, LinkPoses, forward_kinematics
 from spark.rig.roles import Role
 from spark.runs import true_runs
 
-# How firmly a part that touches the ground is held over it and at its height, as a share of a
-# standing sole: it is softer, and where it touches is less certain,
-REST_HOLD, TOUCH_HOLD = 0.6, 0.6
-CARRIED_HOLD = 0.3  # and the shoulder over an arm that touches.
-APPROACH = 0.15  # [s] before and after a touch in which a part is led to the ground and away
+HOLD = 1.0  # how firmly a part is held where it touches the ground, as a share of a standing sole,
+CARRIED_HOLD = 0.8  # and the shoulder over an arm that touches
+MAX_ROLL = 0.1  # hip heights that the joint of a part that rests may roll over it
+APPROACH = 0.2  # [s] before and after a touch in which a part is led to the ground and away
 _NEAR = 0.1  # hip heights from a joint within which the shapes of its part may touch for it
 
 
@@ -60,13 +59,13 @@ def _held(
     offset = np.zeros((len(targets), 3))
     for start, stop in true_runs(rests):
         path = now[:2, start:stop].T
-        place = path.mean(axis=0) + beyond(path, MAX_WOBBLE * robot.rig.hip_height)
+        place = path.mean(axis=0) + beyond(path, MAX_ROLL * robot.rig.hip_height)
         offset[start:stop, :2] = place - path
     offset[:, :2] = between_contacts(offset[:, :2], rests, now[:2].T)
-    lift = -_lowest(robot, poses, joint)
+    lift = -lowest_near(robot, poses, joint)
     offset[:, 2] = between_contacts(lift[:, None], touches, now[:2].T)[:, 0]
-    along = REST_HOLD * _around(rests, targets.frame_time)
-    shares = np.stack([along, along, TOUCH_HOLD * _around(touches, targets.frame_time)])
+    along, up = (HOLD * _around(mask, targets.frame_time) for mask in (rests, touches))
+    shares = np.stack([along, along, up])
     positions = (now + offset.T)[None]
     return Holds(np.array([link]), robot.centers[[joint]], positions, shares[None])
 
@@ -77,9 +76,7 @@ def _carried(robot: Morphology, poses: LinkPoses, shoulder: int, joint: int, hel
     center = robot.centers[shoulder]
     shift = held.positions[0] - poses.point(int(robot.links[joint]), robot.centers[joint])
     positions = (poses.point(link, center) + shift)[None]
-    return Holds(
-        np.array([link]), center[None], positions, held.shares * (CARRIED_HOLD / REST_HOLD)
-    )
+    return Holds(np.array([link]), center[None], positions, CARRIED_HOLD * held.shares)
 
 
 def _first_above(robot: Morphology, joint: int) -> int:
@@ -89,8 +86,9 @@ def _first_above(robot: Morphology, joint: int) -> int:
     return next(k for k in robot.tree.chain(int(robot.links[joint])) if k not in trunk)
 
 
-def _lowest(robot: Morphology, poses: LinkPoses, joint: int) -> Float[np.ndarray, "T"]:
-    """How high [m] the lowest shape near a joint is; the joint itself where none is near."""
+def lowest_near(robot: Morphology, poses: LinkPoses, joint: int) -> Float[np.ndarray, "T"]:
+    """How high [m] the shapes of a joint's part reach down near it; the joint itself where it has
+    none."""
     link, spheres = touching_spheres(robot)[joint]
     heights = [poses.point(link, center)[2] - radius for center, radius in spheres]
     lowest: Float[np.ndarray, T] = np.min(heights, axis=0)

@@ -40,10 +40,11 @@ class Targets:
     """Over frames, floor at z = 0: `world`, the rig's joints' rotations (`q_world_joint`); `chest`,
     that of the topmost part of the trunk; `hips`, the path of the hips' middle [m]; `bones`, unit
     directions by the role at a segment's upper end; `contacts`, whether heel and toe of each of the
-    robot's soles stand, `parts`, whether the joints of `part_roles` lie on the floor, `rests`, whether they
-    also stay in place, `flight`, whether nothing touches it; `com_acceleration`, the source's, scaled [m/s²]; `feet`, the paths of the
-    source's heels and toes over the floor [m], and `clearance`, how high its soles are, scaled;
-    `hands`, from the right hand to the left [m]. `com` [m] is planned where it is known.
+    robot's soles stand, `parts`, whether those of `part_roles` touch the floor, `rests`, whether
+    they also stay in place, `flight`, whether nothing holds the body; `com_acceleration`, the
+    source's, scaled [m/s²]; `feet`, the paths of the source's heels and toes over the floor [m],
+    and `clearance`, how high its soles are, scaled; `hands`, from the right hand to the left [m].
+    `com` [m] is planned where it is known.
     """
 
     frame_time: float

@@ -8,7 +8,7 @@ import numpy as np
 
 W_LIMB_DIRECTION = 2.0  # [1/rad] of upper and lower arms and legs: what a pose looks like
 W_ROTATION = {  # [1/rad] of a part by its role; low where the directions of limbs say enough,
-    "pelvis": 6.0,  # higher where they say nothing: the trunk, above all where it heads,
+    "pelvis": 5.0,  # higher where they say nothing: the trunk, above all where it heads,
     "chest": 0.8,
     "head": 0.5,  # what looks somewhere,
     "neck": 0.1,
@@ -19,7 +19,7 @@ W_ROTATION = {  # [1/rad] of a part by its role; low where the directions of lim
 }
 W_OTHER_ROTATION = 0.08  # [1/rad] of the rest: the twist of limbs
 W_HIPS_POSITION = np.array([6.0, 6.0, 6.0])  # [1/m] of their path: 1 cm is 2 degrees of a limb
-W_COM_ACCELERATION = 0.2  # [s²/m] of the planned centre of mass: 1 m/s² is 6 degrees of a limb
+W_COM_ACCELERATION = 0.25  # [s²/m] of the planned centre of mass: 1 m/s² is 7 degrees of a limb
 W_HOLD = np.array(
     [25.0, 25.0, 20.0]
 )  # [1/m] of a point held, as a standing sole's: 1 cm is 7 degrees

@@ -13,6 +13,7 @@ from robots.solver.block import Block
 from robots.solver.collision import Candidate, collisions_of
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import plan_feet, points_of
+from robots.solver.holds import joined
 from robots.solver.objective import linearize
 from robots.solver.projection import project
 from robots.solver.solve import blocks_of
@@ -85,7 +86,7 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     """The same normal equations, made in another way."""
     source = to_canonical(WALK.frames(20, 24), RIG)
     targets = targets_of(source, EMBER)
-    footing = [footing_of(foot) for foot in plan_feet(EMBER, targets)]
+    holds = joined([footing_of(EMBER, foot) for foot in plan_feet(EMBER, targets)])
     tree = EMBER.tree
     rng = np.random.default_rng(0)
     q = project(EMBER, targets.world, targets.hips)
@@ -111,10 +112,7 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     body_axes = matrix_from_quat(EMBER.to_qpos(q)[:, 3:7])
     for t in range(4):
         one = slice(t, t + 1)
-        foot_targets = FootTargets(
-            np.concatenate([foot.positions[..., t] for foot in footing]),
-            np.concatenate([foot.holds[..., t] for foot in footing]),
-        )
+        foot_targets = FootTargets(holds.positions[..., t], holds.shares[..., t])
         here = FrameTargets(*(getattr(seen, name)[one] for name in FrameTargets.__annotations__))
         qpos = EMBER.to_qpos(q.at(one))
         H, g = terms.linearize(qpos, here, foot_targets, terms.at_tpose, terms.candidates(qpos))
@@ -122,7 +120,7 @@ def test_the_objective_is_that_of_whole_clips() -> None:
         turn[3:6, 3:6] = body_axes[t]
         H, g = turn @ H[0] @ turn.T, turn @ g[0]
         for block in blocks_of(EMBER):
-            wanted = linearize(EMBER, targets, footing, q, block, near(block))
+            wanted = linearize(EMBER, targets, holds, q, block, near(block))
             at = np.ix_(block.dofs, block.dofs)
             np.testing.assert_allclose(g[block.dofs], wanted.g[t], atol=1e-8)
             np.testing.assert_allclose(H[at], wanted.H[t], atol=1e-7)

@@ -1,0 +1,112 @@
+"""Hands, knees and the back: where they touch the ground, they lie on it and stay."""
+
+import numpy as np
+import pytest
+
+from robots.metrics import measure
+from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
+from robots.registry import find
+from robots.solver.resting import lowest_near
+from robots.solver.solve import copy, retarget
+from robots.solver.targets import targets_of
+from robots.tree import forward_kinematics
+from spark.demo.sample import sample_rig
+from spark.rig.roles import Role
+from spark.rotation import quat_from_rotvec, quat_mul
+from spark.transfer.canonical import CanonicalMotion, canonical_positions, from_canonical
+from spark_sim.loading import load_robot
+
+KNEES = (Role.LEFT_LOWER_LEG, Role.RIGHT_LOWER_LEG)
+HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
+COUNT = 90
+
+
+@pytest.fixture(scope="module")
+def ember() -> Morphology:
+    return load_robot(find("robot")).on_robot.robot
+
+
+def turn(x: float = 0.0, y: float = 0.0) -> np.ndarray:
+    """About the axes, in quarters of a turn; about Y first."""
+    quarters = np.pi / 2 * np.eye(3) * [x, y, 0]
+    return quat_mul(quat_from_rotvec(quarters[0]), quat_from_rotvec(quarters[1]))
+
+
+def posed(turns: dict[Role, np.ndarray], ground: float, sway: float = 0.0) -> CanonicalMotion:
+    """A walker whose joints have turned since the T-pose, each role with all below it, in roles'
+    order; its lowest joint is at `ground` [m]. Its hips sway forward and back [m]."""
+    rig = sample_rig("walker")
+    rotations = np.tile([1.0, 0, 0, 0], (COUNT, len(rig.skeleton), 1))
+    for role, q in turns.items():
+        rotations[:, list(rig.skeleton.subtree(rig.roles.require(role)))] = q
+    hips = np.zeros((COUNT, 3))
+    hips[:, 0] = sway * np.sin(2 * np.pi * np.arange(COUNT) / COUNT)
+    source = CanonicalMotion(rig, 1 / 60, rotations, hips, 0.0)
+    lowest = canonical_positions(source)[..., 2].min()
+    return CanonicalMotion(rig, 1 / 60, rotations, hips + np.array([0, 0, ground - lowest]), 0.0)
+
+
+def on_all_fours(sway: float = 0.0) -> CanonicalMotion:
+    limbs = {}
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        limbs[Role(f"{side}_upper_leg")] = turn()
+        limbs[Role(f"{side}_lower_leg")] = turn(y=1)
+        limbs[Role(f"{side}_foot")] = turn(y=2)
+        limbs[Role(f"{side}_upper_arm")] = turn(x=sign)
+    level = canonical_positions(posed({Role.PELVIS: turn(y=1), **limbs}, 0.05))[0]
+    rig = sample_rig("walker")
+    hip, knee, shoulder, hand = (
+        level[rig.roles.require(Role(f"left_{part}"))]
+        for part in ("upper_leg", "lower_leg", "upper_arm", "hand")
+    )
+    rise = np.arcsin((knee - hand)[2] / (shoulder - hip)[0])  # that longer arms ask of the trunk
+    return posed({Role.PELVIS: turn(y=1 - rise / (np.pi / 2)), **limbs}, 0.05, sway)
+
+
+def heights(result: RobotMotion, roles: tuple[Role, ...]) -> np.ndarray:
+    """How low the robot's parts reach [m], a row each."""
+    poses = forward_kinematics(result.robot.tree, result.coordinates)
+    rig = result.robot.rig
+    return np.stack([lowest_near(result.robot, poses, rig.roles.require(role)) for role in roles])
+
+
+def test_hands_and_knees_of_the_source_are_seen_to_rest(ember: Morphology) -> None:
+    targets = targets_of(on_all_fours(), ember)
+    resting = {r for k, r in enumerate(targets.part_roles) if targets.rests[:, k].all()}
+    assert set(KNEES) <= resting
+    assert set(HANDS) <= resting
+    assert not {Role.HEAD, Role.PELVIS, Role.SPINE} & resting
+
+
+def test_all_fours_of_a_robot_with_other_limbs_lie_on_the_ground(ember: Morphology) -> None:
+    source = on_all_fours()
+    copied = heights(copy(source, ember), (*KNEES, *HANDS))
+    assert np.ptp(copied, axis=0).max() > 0.04  # its arms are longer than its thighs, or shorter
+    lying = heights(retarget(source, ember), (*KNEES, *HANDS))
+    assert np.abs(lying).max() < 0.02
+
+
+def test_hands_and_knees_stay_where_they_are_while_the_body_sways(ember: Morphology) -> None:
+    """The source's are dragged along by 2 cm."""
+    source = on_all_fours(sway=0.02)
+    found = measure(from_canonical(source), source.rig, retarget(source, ember))
+    assert found.rests_in_air == 0
+    assert found.rests_slide_m_s is not None
+    assert found.rests_slide_m_s < 0.02
+
+
+def test_a_back_lies_on_the_ground(ember: Morphology) -> None:
+    source = posed({Role.PELVIS: turn(y=-1)}, 0.06)
+    result = retarget(source, ember)
+    body = (Role.PELVIS, Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
+    assert heights(result, body).min(axis=1).max() < 0.06
+    assert heights(result, body).min() > -0.01
+
+
+def test_who_stands_rests_on_nothing_but_feet(ember: Morphology) -> None:
+    source = posed({}, 0.0)
+    assert not targets_of(source, ember).parts.any()
+    found = measure(from_canonical(source), source.rig, retarget(source, ember))
+    assert found.rests_in_air is None
+    assert found.rests_slide_m_s is None
