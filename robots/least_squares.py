@@ -99,10 +99,13 @@ class NormalEquations:
         smoothness: "Smoothness",
         damping: Float[np.ndarray, "T"],
         at_limits: Float[np.ndarray, "T D"],
+        *,
+        solves: int = 1,
     ) -> Float[np.ndarray, "T D"]:
         """The Gauss-Newton step of all frames together, `smoothness` included; `damping` is added
         to H's diagonal. Dofs that stand at their upper (`at_limits` +1) or lower limit (-1) do not
-        move where the gradient would take them beyond it."""
+        move where the gradient would take them beyond it; nor, in more than one of the `solves`,
+        where the step before would."""
         T, D = self.g.shape
         point = smoothness.point
         band = np.zeros(((COUPLED + 1) * D if point else COUPLED * D + 1, T, D))
@@ -126,15 +129,21 @@ class NormalEquations:
         if point:
             g += point.add_to(band)
         held = at_limits * g < 0
-        band[0] += np.where(held, _HELD, damping[:, None])
-        step = solveh_banded(
-            band.reshape(len(band), T * D),
-            np.where(held, 0.0, g).ravel(),
-            lower=True,
-            overwrite_ab=True,
-            check_finite=False,
-        )
-        return -step.reshape(T, D)
+        diagonal = band[0].copy()
+        for k in range(solves):
+            band[0] = diagonal + np.where(held, _HELD, damping[:, None])
+            step = -solveh_banded(
+                band.reshape(len(band), T * D),
+                np.where(held, 0.0, g).ravel(),
+                lower=True,
+                overwrite_ab=k == solves - 1,
+                check_finite=False,
+            ).reshape(T, D)
+            beyond = (at_limits * step > 0) & ~held
+            if not beyond.any():
+                break
+            held |= beyond
+        return step
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ _WINDOW = 0.15  # [s] before and after a frame over which its cost is averaged t
 _WIDE_WINDOW = 0.5  # [s] the same for what is gained nearby,
 _ALLOWED_LOSS = 0.5  # and the share of that by which a frame's cost may rise
 _MAX_HALVINGS = 6  # of a step in a repair
+_MAX_SOLVES = 4  # for which hinges stay at their limits, of a step in a repair
 _PATIENCE = 2  # steps without progress that are allowed while many frames reject them
 _COLLISION_PERIOD = 5  # steps from one search for collision candidates to the next
 _COLLISION_INTERVAL = 0.06  # [s] between the frames that are searched
@@ -79,7 +80,7 @@ def solve_block(
         min_damping = np.where(repair.fixed, _FIXED_DAMPING, _MIN_DAMPING)
     damping = min_damping
     start = q if avoid_collisions else None
-    stride = 1 if repair else collision_stride(targets)
+    stride, solves = (1, _MAX_SOLVES) if repair else (collision_stride(targets), 1)
     candidates: list[Candidate] = []
 
     def find_candidates(q: Coordinates) -> list[Candidate]:
@@ -108,7 +109,7 @@ def solve_block(
         cost = uniform_filter1d(normal.cost + coupling.cost(len(q)), window)
         limits = q.at_limits(tree, LIMIT_CLEARANCE)[:, block.dofs]
         step = np.zeros((len(q), tree.nv))
-        step[:, block.dofs] = normal.solve_coupled(coupling, damping, limits)
+        step[:, block.dofs] = normal.solve_coupled(coupling, damping, limits, solves=solves)
         shortening = np.minimum(1.0, _MAX_STEP / np.maximum(np.abs(step).max(1), 1e-9))
         step *= smooth_lower_envelope(shortening, window)[:, None]
         share = np.ones(len(q))
