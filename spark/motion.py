@@ -1,6 +1,8 @@
 """A motion: a skeleton moving in time, in SI units and Z-up axes."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
@@ -74,9 +76,61 @@ class Motion:
 
     def frames(self, start: int, stop: int) -> "Motion":
         """The clip of frames `start` to `stop`, exclusive."""
+        return self.picked(slice(start, stop))
+
+    def thinned(self, count: int) -> "Motion":
+        """Every frame of a motion of at most `count` frames; else every second, third, ..."""
+        step = -(-len(self) // count)
+        return self if step == 1 else self.picked(slice(None, None, step))
+
+    def picked(self, span: slice) -> "Motion":
+        """The frames of a slice. The time between them is that of neighbours: it is not meant for
+        steps where time matters."""
         return replace(
             self,
-            root_pos=self.root_pos[start:stop],
-            rotations=self.rotations[start:stop],
-            translations=None if self.translations is None else self.translations[start:stop],
+            root_pos=self.root_pos[span],
+            rotations=self.rotations[span],
+            translations=None if self.translations is None else self.translations[span],
         )
+
+
+class LazyMotion(Motion):
+    """A motion whose rotations are made when they are asked for: all at the first use of
+    `rotations` or `translations`, and only some by `frames`, `thinned` and `picked`.
+
+    `rotations` is what makes the frames of a slice; or, as `replace` calls it, a motion's own.
+    """
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        frame_time: float,
+        root_pos: Float[np.ndarray, "T 3"],
+        rotations: "Callable[[slice], Motion] | Float[np.ndarray, 'T J 4']",
+        translations: Float[np.ndarray, "T J 3"] | None = None,
+    ) -> None:
+        check_frame_time(frame_time)
+        if isinstance(rotations, np.ndarray):
+            rotations = Motion(skeleton, frame_time, root_pos, rotations, translations).picked
+        vars(self).update(
+            skeleton=skeleton, frame_time=frame_time, root_pos=root_pos, _make=rotations
+        )
+
+    @cached_property
+    def _whole(self) -> Motion:
+        return self.picked(slice(None))
+
+    @property
+    def rotations(self) -> Float[np.ndarray, "T J 4"]:
+        """All rotations."""
+        return self._whole.rotations
+
+    @property
+    def translations(self) -> Float[np.ndarray, "T J 3"] | None:
+        """All local positions, where child joints move."""
+        return self._whole.translations
+
+    def picked(self, span: slice) -> Motion:
+        """The frames of a slice, made now."""
+        make: Callable[[slice], Motion] = vars(self)["_make"]
+        return make(span)

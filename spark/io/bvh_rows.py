@@ -2,11 +2,12 @@
 and with the line of the fault where they are wrong.
 """
 
+from collections.abc import Iterator
 from typing import NoReturn
 
 import numpy as np
 import orjson
-from jaxtyping import Float
+from jaxtyping import Float, Int, UInt8
 
 from spark.errors import FileFormatError
 from spark.io.scanner import LARGEST, Scanner, number, shown
@@ -45,61 +46,99 @@ def parse_motion(
     frame_time = scanner.number("Frame Time")
     if frame_time < _MIN_FRAME_TIME:
         scanner.fail(f"Frame Time is {frame_time:g}; expected seconds a frame, such as 0.0333333")
-    rows = scanner.data[scanner.end :]
-    values = _parse_rows(rows, frames, channels)
+    text, start = scanner.data, scanner.end
+    values = _parse_rows(text, start, frames, channels)
     if values is not None:
         return frame_time, values, ()
-    lines = sum(not line.isspace() for line in rows.splitlines() if line)
+    lines = sum(
+        not line.isspace()
+        for at, stop in _blocks(text, start)
+        for line in text[at:stop].splitlines()
+        if line
+    )
     if lines >= max(1, _LEAST_SHARE * frames):
-        values = _parse_rows(rows, lines, channels)
+        values = _parse_rows(text, start, lines, channels)
     if values is None:
         _diagnose(scanner, frames, channels)
     note = f"Frames: says {frames}, but {counted(lines, 'row')} of values follow: those are read"
     return frame_time, values, (note,)
 
 
-# Bytes that a table of numbers may hold.
-_NUMERIC = np.isin(np.arange(256), np.frombuffer(b"0123456789+-.eE \t\r\n\v\f", dtype=np.uint8))
+# Bytes that a table of numbers may hold, and what stands between them.
+_NUMERIC = b"0123456789+-.eE \t\r\n\v\f"
+_BLANK = np.isin(np.arange(256), [32, *range(9, 14)])
+
+_BLOCK = 4 << 20  # bytes of text that are read at a time: what is in between takes six times that
 
 
-def _parse_rows(rows: bytes, frames: int, channels: int) -> Float[np.ndarray, "T C"] | None:
-    """The values, or None where they are not `frames` rows of finite numbers."""
-    letters = np.frombuffer(rows, dtype=np.uint8)
-    blank = (letters == 32) | ((letters >= 9) & (letters <= 13))
-    first = ~blank
-    first[1:] &= blank[:-1]
-    starts = np.flatnonzero(first)
-    if len(starts) != frames * channels:
-        return None
-    breaks = np.flatnonzero((letters == 10) | (letters == 13))
-    per_line = np.diff(np.searchsorted(starts, breaks), prepend=0, append=len(starts))
+def _parse_rows(
+    text: bytes, start: int, frames: int, channels: int
+) -> Float[np.ndarray, "T C"] | None:
+    """The values from `start` on, or None where they are not `frames` rows of finite numbers."""
+    count = frames * channels
+    if 2 * count > len(text) - start + 1:
+        return None  # so many do not fit in the text
+    values = np.empty(count)
+    widths: list[Int[np.ndarray, L]] = []
+    done = 0
+    for at, stop in _blocks(text, start):
+        block = text[at:stop]
+        if block.translate(None, _NUMERIC):
+            return None
+        letters = np.frombuffer(block, dtype=np.uint8)
+        blank = _BLANK[letters]
+        first = ~blank
+        first[1:] &= blank[:-1]
+        starts = np.flatnonzero(first)
+        ends = np.flatnonzero((letters == 10) | (letters == 13))
+        widths.append(np.diff(np.searchsorted(starts, ends), prepend=0, append=len(starts)))
+        numbers = _numbers(block, letters, starts)
+        if numbers is None or done + len(numbers) > count:
+            return None
+        values[done : done + len(numbers)] = numbers
+        done += len(numbers)
+    per_line = np.concatenate([np.zeros(0, int), *widths])
     per_line = per_line[per_line > 0]
-    if len(per_line) == frames and np.any(per_line != channels):
-        return None  # one value too many here and one too few there, not wrapped rows
-    if frames == 0:
-        return np.zeros((0, channels))
-    if not _NUMERIC[letters].all():
-        return None
+    if done != count or (len(per_line) == frames and np.any(per_line != channels)):
+        return None  # also one value too many here and one too few there: not wrapped rows
+    return values.reshape(frames, channels)
+
+
+def _blocks(text: bytes, start: int) -> Iterator[tuple[int, int]]:
+    """Where the parts of a text begin and end, each of whole lines."""
+    while start < len(text):
+        end = text.find(b"\n", start + _BLOCK) + 1 or len(text)
+        yield start, end
+        start = end
+
+
+def _numbers(
+    block: bytes, letters: UInt8[np.ndarray, "B"], starts: Int[np.ndarray, "W"]
+) -> Float[np.ndarray, "W"] | None:
+    """The numbers of a text whose words begin at `starts`; None where a word is no finite one."""
+    if not len(starts):
+        return np.zeros(0)
     try:
         # A JSON reader is three times as fast as numpy's, but takes no "+1", ".5" or "01".
         listed = letters.copy()
         listed[starts[1:] - 1] = ord(",")
-        values = np.array(orjson.loads(b"[" + listed.tobytes() + b"]"), dtype=np.float64)
-    except orjson.JSONDecodeError:
+        values = np.fromiter(orjson.loads(b"[" + listed.tobytes() + b"]"), np.float64, len(starts))
+    except (orjson.JSONDecodeError, OverflowError):
         try:
-            values = np.fromstring(rows, sep=" ")
+            values = np.fromstring(block, sep=" ")
         except (ValueError, DeprecationWarning):
             return None
     # Older numpy stops at a word that is no number, with a warning alone.
     if len(values) != len(starts) or not np.all(np.abs(values) <= LARGEST):
         return None
-    return values.reshape(frames, channels)
+    return values
 
 
 def _diagnose(scanner: Scanner, frames: int, channels: int) -> NoReturn:
     """Say why `_parse_rows` gave up: a slow second pass over the text."""
-    rows = [(at, words) for at, words in scanner.lines() if words]
-    for line, words in rows:
+    found, lines, end = 0, 0, None
+    odd: list[tuple[int, int]] = []
+    for line, words in scanner.lines():
         for word in words:
             if number(word) is None:
                 raise FileFormatError(
@@ -107,8 +146,11 @@ def _diagnose(scanner: Scanner, frames: int, channels: int) -> NoReturn:
                     line,
                     f"expected a finite number, at most 1e12, found {shown(word)}",
                 )
-    found, needed = sum(len(words) for _, words in rows), frames * channels
-    odd = [(at, len(words)) for at, words in rows if len(words) != channels]
+        if words:
+            found, lines, end = found + len(words), lines + 1, line
+        if words and len(words) != channels:
+            odd.append((line, len(words)))
+    needed = frames * channels
     if found == needed:
         at, width = odd[0]
         raise FileFormatError(
@@ -121,10 +163,9 @@ def _diagnose(scanner: Scanner, frames: int, channels: int) -> NoReturn:
         else f" ({found // channels} whole frames); fetch or export the file again"
     )
     # A few odd rows are the fault; many are rows wrapped over lines.
-    end = rows[-1][0] if rows else None
     raise FileFormatError(
         scanner.path,
-        odd[0][0] if 0 < len(odd) < max(2, len(rows) // 2) else end,
+        odd[0][0] if 0 < len(odd) < max(2, lines // 2) else end,
         f"the motion is {fault}: Frames: {frames} with {channels} channels each need {needed} "
         f"values, not {found}{remedy}",
     )

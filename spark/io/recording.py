@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
+from spark.blocks import BLOCK, blocks
 from spark.errors import ConventionError, FileFormatError, name_list
 from spark.io.bvh import Bvh, read_bvh
 from spark.io.convention import Convention, given_unit, given_up, infer_unit, infer_up
 from spark.io.euler import quat_from_angles
-from spark.motion import Motion, check_frame_time
+from spark.motion import LazyMotion, Motion, check_frame_time
 from spark.rotation import quat_identity
 from spark.skeleton import Skeleton
 
@@ -69,14 +70,9 @@ def read_recording(
         check_frame_time(bvh.frame_time, "Frame Time")
     except ConventionError as error:
         raise FileFormatError(path, None, f"{error}; or give --fps") from error
-    motion, adds_offset, notes = _decode(bvh)
-    picked = np.unique(np.linspace(0, len(motion) - 1, _SAMPLES).astype(int))
-    sample = replace(
-        motion,
-        root_pos=motion.root_pos[picked],
-        rotations=motion.rotations[picked],
-        translations=None if motion.translations is None else motion.translations[picked],
-    )
+    decoder = _Decoder(bvh)
+    notes = decoder.notes
+    sample = decoder.motion(np.unique(np.linspace(0, len(decoder) - 1, _SAMPLES).astype(int)))
     found: tuple[str, ...]
     if unit_m is None:
         try:
@@ -88,61 +84,96 @@ def read_recording(
         up_axis, found = infer_up(sample)
         notes += found
     convention = Convention(unit_m, up_axis)
-    return Recording(bvh, in_si(motion, convention), convention, notes, adds_offset)
+    motion = decoder.in_si(convention)
+    return Recording(bvh, motion, convention, notes, decoder.adds_offset)
 
 
-def _decode(bvh: Bvh) -> tuple[Motion, bool, tuple[str, ...]]:
-    """The motion in file units and axes, whether positions add to the offsets, and notes."""
-    notes = list(bvh.repairs)
-    if bvh.encoding != "utf-8":
-        notes.append(f"joint names are not UTF-8: read as {_ENCODINGS[bvh.encoding]}")
-    if not _USUAL_FRAME_TIME[0] <= bvh.frame_time <= _USUAL_FRAME_TIME[1]:
-        notes.append(
-            f"a frame lasts {bvh.frame_time:g} s, which is unusual; Frame Time is in seconds"
+class _Decoder:
+    """What the rows of a file mean. Of a long file, frames are decoded as they are asked for.
+
+    `adds_offset` is whether positions add to the offsets; `notes` tell what was assumed.
+    """
+
+    def __init__(self, bvh: Bvh) -> None:
+        notes = list(bvh.repairs)
+        if bvh.encoding != "utf-8":
+            notes.append(f"joint names are not UTF-8: read as {_ENCODINGS[bvh.encoding]}")
+        if not _USUAL_FRAME_TIME[0] <= bvh.frame_time <= _USUAL_FRAME_TIME[1]:
+            notes.append(
+                f"a frame lasts {bvh.frame_time:g} s, which is unusual; Frame Time is in seconds"
+            )
+        joints, values = bvh.joints, bvh.values
+        offsets = np.array([joint.offset for joint in joints])
+        placed, axes, columns = bvh.position_channels.T
+        if not len(values):
+            notes.append("no frames in the file: its rest pose stands in as the only one")
+            values = np.zeros((1, values.shape[1]))
+            values[0, columns] = offsets[placed, axes]
+
+        child = placed > 0
+        middle = np.array([np.median(values[:, column]) for column in columns])
+        spread = np.array([np.ptp(values[:, column]) for column in columns])
+        self.adds_offset = _adds_offset(middle, offsets[placed, axes], placed)
+        self._start = np.where(child & self.adds_offset, offsets[placed, axes], 0.0)
+        if self.adds_offset:
+            notes.append(
+                "position channels of child joints are small: read as additions to the OFFSET"
+            )
+        rest = offsets.copy()
+        rest[placed[child], axes[child]] = (middle + self._start)[child]
+        still = _CONSTANT * np.linalg.norm(rest[1:], axis=-1).max(initial=0.0)
+        self._stretches = bool(np.any(spread[child] > still))
+
+        names, renamed = unique_names([joint.name for joint in joints])
+        ends = [(j, end) for j, joint in enumerate(joints) for end in joint.ends]
+        self._skeleton = Skeleton(
+            names,
+            np.array([joint.parent for joint in joints]),
+            rest,
+            np.isin(np.arange(len(joints)), [0, *placed]),
+            np.array([j for j, _ in ends], dtype=np.int64),
+            np.array([end for _, end in ends], dtype=np.float64).reshape(-1, 3),
         )
-    joints, values = bvh.joints, bvh.values
-    offsets = np.array([joint.offset for joint in joints])
-    placed, axes, columns = bvh.position_channels.T
-    if not len(values):
-        notes.append("no frames in the file: its rest pose stands in as the only one")
-        values = np.zeros((1, values.shape[1]))
-        values[0, columns] = offsets[placed, axes]
+        self._bvh, self._values, self._offsets = bvh, values, offsets
+        self.notes = (*notes, *renamed)
 
-    positions = values[:, columns]
-    child = placed > 0
-    middle = np.median(positions, axis=0)
-    adds_offset = _adds_offset(middle, offsets[placed, axes], placed)
-    if adds_offset:
-        notes.append("position channels of child joints are small: read as additions to the OFFSET")
-        start = np.where(child, offsets[placed, axes], 0.0)
-        positions, middle = positions + start, middle + start
-    root_pos = np.repeat(offsets[:1], len(values), axis=0)
-    root_pos[:, axes[~child]] = positions[:, ~child]
-    rest = offsets.copy()
-    rest[placed[child], axes[child]] = middle[child]
-    still = _CONSTANT * np.linalg.norm(rest[1:], axis=-1).max(initial=0.0)
-    translations = None
-    if np.any(np.ptp(positions[:, child], axis=0) > still):
-        translations = np.repeat(offsets[None], len(values), axis=0)
-        translations[:, placed, axes] = positions
+    def __len__(self) -> int:
+        return len(self._values)
 
-    rotations = np.repeat(quat_identity(offsets)[None], len(values), axis=0)
-    for order, (members, angle_columns) in bvh.rotation_channels.items():
-        rotations[:, members] = quat_from_angles(np.radians(values[:, angle_columns]), order)
+    def motion(self, picked: Int[np.ndarray, "N"] | slice) -> Motion:
+        """These frames in file units and axes."""
+        bvh, values, offsets = self._bvh, self._values[picked], self._offsets
+        placed, axes, columns = bvh.position_channels.T
+        positions = values[:, columns] + self._start
+        root = placed == 0
+        root_pos = np.repeat(offsets[:1], len(values), axis=0)
+        root_pos[:, axes[root]] = positions[:, root]
+        translations = None
+        if self._stretches:
+            translations = np.repeat(offsets[None], len(values), axis=0)
+            translations[:, placed, axes] = positions
+        rotations = np.empty((len(values), len(offsets), 4))
+        rotations[:] = quat_identity(offsets)
+        for order, (members, angle_columns) in bvh.rotation_channels.items():
+            for block in blocks(len(values)):
+                angles = np.radians(values[block][:, angle_columns])
+                rotations[block, members] = quat_from_angles(angles, order)
+        return Motion(self._skeleton, bvh.frame_time, root_pos, rotations, translations)
 
-    names, renamed = unique_names([joint.name for joint in joints])
-    notes += renamed
-    ends = [(j, end) for j, joint in enumerate(joints) for end in joint.ends]
-    skeleton = Skeleton(
-        names,
-        np.array([joint.parent for joint in joints]),
-        rest,
-        np.isin(np.arange(len(joints)), [0, *placed]),
-        np.array([j for j, _ in ends], dtype=np.int64),
-        np.array([end for _, end in ends], dtype=np.float64).reshape(-1, 3),
-    )
-    motion = Motion(skeleton, bvh.frame_time, root_pos, rotations, translations)
-    return motion, adds_offset, tuple(notes)
+    def in_si(self, convention: Convention) -> Motion:
+        """All frames in metres and internal axes, as far as they will be asked for."""
+
+        def make(span: slice) -> Motion:
+            return in_si(self.motion(span), convention)
+
+        if len(self) <= BLOCK:
+            return make(slice(None))
+        placed, axes, columns = self._bvh.position_channels.T
+        root = placed == 0
+        root_pos = np.repeat(self._offsets[:1], len(self), axis=0)
+        root_pos[:, axes[root]] = self._values[:, columns[root]]
+        first = make(slice(0, 1))
+        return LazyMotion(first.skeleton, first.frame_time, convention.from_file(root_pos), make)
 
 
 def _adds_offset(
@@ -168,9 +199,16 @@ def in_si(motion: Motion, convention: Convention) -> Motion:
             end_offsets=convention.from_file(skeleton.end_offsets),
         ),
         root_pos=convention.from_file(motion.root_pos),
-        rotations=motion.rotations[..., [0, *(1 + axis for axis in convention.axes)]],
+        rotations=_turned(motion.rotations, [0, *(1 + axis for axis in convention.axes)]),
         translations=None if translations is None else convention.from_file(translations),
     )
+
+
+def _turned(rotations: Float[np.ndarray, "T J 4"], order: list[int]) -> Float[np.ndarray, "T J 4"]:
+    out = np.empty_like(rotations)
+    for block in blocks(len(rotations)):
+        out[block] = rotations[block][..., order]
+    return out
 
 
 def unique_names(names: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:

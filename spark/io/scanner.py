@@ -80,8 +80,11 @@ class Scanner:
 
     def lines(self) -> Iterator[tuple[int, list[bytes]]]:
         """What follows, line by line: the line's number and its words."""
-        lines = _LINE_END.split(self.data[self.end :])
-        return ((i, line.split()) for i, line in enumerate(lines, start=self._line(self.end)))
+        at, number = self.end, self._line(self.end)
+        for found in _LINE_END.finditer(self.data, self.end):
+            yield number, self.data[at : found.start()].split()
+            at, number = found.end(), number + 1
+        yield number, self.data[at:].split()
 
     def fail(self, message: str) -> NoReturn:
         """Raise `FileFormatError` at the word that was taken last."""

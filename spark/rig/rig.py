@@ -18,6 +18,9 @@ from spark.rig.tpose import find_tpose, root_joint_of
 from spark.skeleton import Skeleton
 from spark.summary import counted
 
+# Frames that are looked at for the T-pose: three minutes at 120 fps, or as much of a longer motion.
+_FRAMES = 20_000
+
 # Roles that several joints hold, and those between which they lie.
 _CHAINS: dict[Role, tuple[Role, Role | None]] = {
     Role.SPINE: (Role.PELVIS, None),
@@ -124,7 +127,7 @@ def understand(motion: Motion, override: Override | None = None) -> Rig:
     Raises SkeletonError with the reason where the body is not a humanoid. `override` is a role map
     as `spark.rig.role_assignment.assign_roles` takes it.
     """
-    skeleton = motion.skeleton
+    skeleton, motion = motion.skeleton, motion.thinned(_FRAMES)
     roles = assign_roles(skeleton, motion, override)
     tpose, notes = find_tpose(motion, roles)
     pelvis = roles.require(Role.PELVIS)

@@ -1,5 +1,6 @@
 """From file numbers to SI motion: against an evaluation of BVH written out by hand."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,11 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spark.errors import FileFormatError
-from spark.io.bvh import CHANNELS, Bvh, BvhJoint
+from spark.io.bvh import CHANNELS, Bvh, BvhJoint, read_bvh
 from spark.io.convention import UNITS
 from spark.io.encoding import encode
 from spark.io.recording import Recording, read_recording
 from spark.kinematics import end_positions, forward
+from spark.motion import LazyMotion
 from tests.helpers.bvh_by_hand import XYZ, ZXY, assert_as_by_hand, human, save
 from tests.helpers.recordings import recording, recordings
 
@@ -172,3 +174,54 @@ def test_a_frame_time_in_another_unit_is_refused(
     ) as e:
         read_recording(path)
     assert (f"write {meant}" in str(e.value)) == bool(meant)
+
+
+def test_long_recordings_are_decoded_as_they_are_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In blocks, in part or as a whole: the same numbers."""
+    bvh, rng = human(), np.random.default_rng(0)
+    values = np.repeat(bvh.values[:1], 100, axis=0)
+    values += rng.normal(0, 3, values.shape)
+    path = save(Bvh(bvh.joints, 0.04, values), tmp_path)
+    whole = read_recording(path).motion
+    monkeypatch.setattr("spark.io.recording.BLOCK", 16)
+    monkeypatch.setattr("spark.io.bvh_rows._BLOCK", 1000)
+    found = read_recording(path)
+    lazy = found.motion
+    assert isinstance(lazy, LazyMotion)
+    assert not isinstance(whole, LazyMotion)
+    np.testing.assert_array_equal(found.bvh.values, values)
+    assert (len(lazy), lazy.fps, lazy.skeleton.names) == (100, 25, whole.skeleton.names)
+    np.testing.assert_array_equal(lazy.root_pos, whole.root_pos)
+    some, same = lazy.frames(30, 60), whole.frames(30, 60)
+    np.testing.assert_array_equal(some.rotations, same.rotations)
+    np.testing.assert_array_equal(lazy.thinned(30).rotations, whole.rotations[::4])
+    np.testing.assert_array_equal(replace(lazy, frame_time=0.5).rotations, whole.rotations)
+    np.testing.assert_array_equal(lazy.rotations, whole.rotations)
+    if whole.translations is not None:
+        np.testing.assert_array_equal(lazy.translations, whole.translations)
+
+
+@pytest.mark.parametrize("line_end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("block", [1, 100, 1 << 20])
+def test_rows_are_read_in_blocks_as_in_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line_end: str, block: int
+) -> None:
+    bvh, rng = human(), np.random.default_rng(1)
+    values = rng.normal(0, 100, (20, bvh.values.shape[1]))
+    path = save(Bvh(bvh.joints, 0.04, values), tmp_path)
+    monkeypatch.setattr("spark.io.bvh_rows._BLOCK", block)
+    path.write_bytes(path.read_bytes().replace(b"\n", line_end.encode()))
+    np.testing.assert_array_equal(read_bvh(path).values, values)
+    text = path.read_bytes()
+    path.write_bytes(text[:-200] + text[-200:].replace(b".", b"x", 1))
+    with pytest.raises(FileFormatError, match="expected a finite number"):
+        read_bvh(path)
+    # A value moved from one row to another is no wrapped row.
+    lines = text.decode().split(line_end)
+    first, rest = lines[-3].rsplit(" ", 1)
+    lines[-3], lines[-2] = first, f"{rest} {lines[-2]}"
+    path.write_bytes(line_end.join(lines).encode())
+    with pytest.raises(FileFormatError, match="values in this row"):
+        read_bvh(path)
