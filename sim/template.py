@@ -17,15 +17,19 @@ _ENVIRONMENT = Environment(autoescape=True, undefined=StrictUndefined)
 _ENVIRONMENT.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
 
 
-def render_page(package: str, *, framed: tuple[str, ...] = (), **fields: object) -> str:
-    """The page of a package, its `page.html` filled with `fields`, its `page.js` and its policy.
+def render_page(
+    package: str, *, name: str = "page", framed: tuple[str, ...] = (), **fields: object
+) -> str:
+    """The page of a package, its `page.html` filled with `fields`, its `page.js` and its policy;
+    or another of its pages, by `name`.
 
     A field is text and shown as it is; what is HTML already is `Markup`. A page inside a frame of
     this one is under this one's policy too: `framed` names the packages whose scripts it runs.
     """
-    scripts = {name: _text(name, "page.js") for name in (package, *framed)}
-    text = _ENVIRONMENT.from_string(_text(package, "page.html")).render(
-        **fields, script=Markup(scripts[package]), policy=_policy(*scripts.values())
+    own = _text(package, f"{name}.js")
+    scripts = (own, *(_text(other, "page.js") for other in framed))
+    text = _ENVIRONMENT.from_string(_text(package, f"{name}.html")).render(
+        **fields, script=Markup(own), policy=_policy(*scripts)
     )
     # A file's name need not be UTF-8, what is left of it is shown.
     return text.encode("utf-8", "replace").decode()

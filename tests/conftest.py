@@ -24,6 +24,7 @@ SLOW = (
     "tests/robots/stream/test_stream.py::test_the_bars_hold_on_real_clips",
     "tests/scripts/",
     "tests/sim/physics/",
+    "tests/sim/report/test_compare_page.py::test_a_finding_goes_to_its_moment",
     "tests/sim/report/test_page.py",
     "tests/sim/test_template.py::test_the_policy_stops_what_would_slip_through",
     "tests/sim/view/test_view.py::test_page_moves_in_a_browser",

@@ -56,7 +56,7 @@ def report_page(
     if source is not None and result.source is not None:
         shown.append((source, result.source, names[1]))
     figures = [Figure(each, name, metrics.floor_z) for each, metrics, name in shown]
-    overlays = [_overlay(metrics, each) for each, metrics, _ in shown]
+    overlays = [overlay(metrics, each) for each, metrics, _ in shown]
     clip, frame_time = result.clip, result.clip.frame_time
     duration = (len(clip) - 1) * frame_time
     source_duration = (subject if source is None else source).motion.duration
@@ -76,13 +76,13 @@ def report_page(
         cards=_cards(result),
         key=CORNER_COLORS,
         replay=page(figures, title="", overlays=overlays),
-        findings=[_line(f, f.start, clip) for f in result.findings[:_LISTED]],
+        findings=[finding_line(f, f.start, clip) for f in result.findings[:_LISTED]],
         unlisted=max(len(result.findings) - _LISTED, 0),
         moments=[
             {
                 "time": f"{moment.frame * frame_time:.3f}",
                 "picture": moment.picture,
-                "findings": [_line(f, f.start, clip) for f in moment.findings],
+                "findings": [finding_line(f, f.start, clip) for f in moment.findings],
             }
             for moment in moments
         ],
@@ -97,7 +97,7 @@ def report_page(
     )
 
 
-def _overlay(clip: ClipMetrics, subject: Subject) -> Overlay:
+def overlay(clip: ClipMetrics, subject: Subject) -> Overlay:
     """The soles' corners as dots, and the labels of each frame's flags."""
     poses = pose_clip(subject)
     heights = poses.corners[..., 2] - clip.floor_z
@@ -166,7 +166,7 @@ def _cell(value: float | None, factor: float, unit: str, grade: str = "") -> dic
     return {"text": f"{shown:.{0 if abs(shown) >= 100 else 1}f}{unit}", "grade": grade}
 
 
-def _line(finding: Finding, frame: int, clip: ClipMetrics) -> dict[str, Any]:
+def finding_line(finding: Finding, frame: int, clip: ClipMetrics) -> dict[str, Any]:
     """A finding in words, and the time [s] that a click on it goes to."""
     return {
         "time": f"{frame * clip.frame_time:.3f}",

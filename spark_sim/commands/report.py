@@ -3,6 +3,7 @@
 import re
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from spark_sim.commands.options import (
     add_corrections,
@@ -12,6 +13,9 @@ from spark_sim.commands.options import (
     add_workers,
     load,
 )
+
+if TYPE_CHECKING:
+    from spark_sim.clips import AnyClip
 
 SUMMARY = "measure how believable a motion is"
 USAGE = "FILE | FOLDER [--source SRC] [--html OUT] [options]"
@@ -34,6 +38,7 @@ examples:
   spark-sim report walk_on_mutant.bvh --source walk.bvh
   spark-sim report walk_on_mutant.bvh --source walk.bvh --html report.html
   spark-sim report ours.bvh --compare theirs.bvh --source walk.bvh
+  spark-sim report --compare a.npz b.npz --source walk.bvh --html both.html
   spark-sim report walk_on_g1.npz --source walk.bvh
   spark-sim report theirs.csv --robot unitree_g1 --quat xyzw --fps 60
   spark-sim report walk_on_mutant.bvh --truth mutant_walk.bvh --json
@@ -45,7 +50,10 @@ examples:
 
 def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
-        "file", metavar="FILE", help="a BVH or FBX file, a robot's motion, or a folder of them"
+        "file",
+        metavar="FILE",
+        nargs="?",
+        help="a BVH or FBX file, a robot's motion, or a folder of them",
     )
     parser.add_argument("--source", metavar="SRC", help="the motion that FILE was made from")
     parser.add_argument(
@@ -61,7 +69,8 @@ def configure(parser: ArgumentParser) -> None:
         metavar="OTHER",
         nargs="+",
         default=[],
-        help="measure these files too, with the same options, and print one table",
+        help="measure these files too, with the same options, and print one table; with --html "
+        "they stand side by side on one page, with a replay",
     )
     parser.add_argument(
         "--fail-over",
@@ -79,34 +88,56 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
+    from robots.formats import is_sonic
+    from spark.errors import ConventionError
     from spark_sim import api, console
 
-    if Path(args.file).is_dir():
+    if args.file is not None and Path(args.file).is_dir() and not is_sonic(Path(args.file)):
         from spark_sim.commands.report_folder import report_folder
 
         return _verdict(args, report_folder(args))
-    judged = load(args, args.file)
-    others = {path: load(args, path) for path in args.compare}
+    paths = [path for path in (args.file, *args.compare) if path is not None]
+    if len({*paths}) < len(paths) or not paths or (args.compare and len(paths) < 2):
+        raise ConventionError("a report needs a FILE, and --compare at least two that differ")
     source = None if args.source is None else load(args, args.source, "source-")
+    if len(paths) > 1:
+        return _verdict(args, _compared(args, paths, source))
+    judged = load(args, paths[0])
     truth = None if args.truth is None else load(args, args.truth)
     report = api.report(judged, source=source, truth=truth, html=args.html, force=args.force)
-    reports = {args.file: report}
-    reports |= {
-        path: api.report(other, source=source, truth=truth) for path, other in others.items()
-    }
     if args.json:
-        records = {path: each.json() for path, each in reports.items()}
-        console.emit_json(records if others else records[args.file])
-    elif others:
-        from sim.report import compare
-
-        stems = [Path(path).stem for path in reports]
-        names = stems if len({*stems}) == len(stems) else list(reports)
-        table = dict(zip(names, reports.values(), strict=True))
-        console.say(compare(table, color=console.uses_color()))
+        console.emit_json(report.json())
     else:
         console.say(report.text(color=console.uses_color()))
-    return _verdict(args, max(each.implausible for each in reports.values()))
+    return _verdict(args, report.implausible)
+
+
+def _compared(args: Namespace, paths: list[str], source: "AnyClip | None") -> float:
+    """Several files in one table, and on one page. Returns the worst share of implausible
+    frames."""
+    from sim.report import compare
+    from spark_sim import api, console, files
+
+    if args.html is not None:
+        files.claim(Path(args.html), force=args.force, endings=(".html", ".htm"), what="a page")
+    truth = None if args.truth is None else load(args, args.truth)
+    stems = [Path(path).stem for path in paths]
+    names = stems if len({*stems}) == len(stems) else paths
+    clips = {name: load(args, path) for name, path in zip(names, paths, strict=True)}
+    reports = {name: api.report(clip, source=source, truth=truth) for name, clip in clips.items()}
+    if args.html is not None:
+        from sim.report.compare_page import write_compare_page
+
+        origin = None if source is None else (source.name, source.subject)
+        subjects = {name: clip.subject for name, clip in clips.items()}
+        title = " and ".join(names) + ("" if source is None else f", of {source.name}")
+        write_compare_page(reports, args.html, subjects, origin, title=title)
+    if args.json:
+        records = zip(paths, reports.values(), strict=True)
+        console.emit_json({path: each.json() for path, each in records})
+    else:
+        console.say(compare(reports, color=console.uses_color()))
+    return max(each.implausible for each in reports.values())
 
 
 def _verdict(args: Namespace, worst: float | None) -> int:

@@ -1,0 +1,85 @@
+"""Several reports of one source beside each other, as one self-contained web page: of tools,
+settings, versions."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from markupsafe import Markup
+
+from sim.report.compare import lines
+from sim.report.explanations import MEANINGS
+from sim.report.names import LABELS
+from sim.report.page import finding_line, overlay
+from sim.report.palette import CORNER_COLORS, css, grade
+from sim.report.result import Result
+from sim.template import render_page
+from sim.trajectory import Subject
+from sim.view.page import page
+from sim.view.scene import Figure
+from spark.files import write_atomically
+
+_LISTED = 12  # findings of each
+
+
+def write_compare_page(
+    reports: Mapping[str, Result],
+    path: str | Path,
+    subjects: Mapping[str, Subject],
+    source: tuple[str, Subject] | None = None,
+    *,
+    title: str,
+) -> None:
+    """Write the page of reports that `assess` made of `subjects`, by the same names, and of their
+    common `source`, which is named too."""
+    text = compare_page(reports, subjects, source, title=title)
+    write_atomically(Path(path), text.encode())
+
+
+def compare_page(
+    reports: Mapping[str, Result],
+    subjects: Mapping[str, Subject],
+    source: tuple[str, Subject] | None = None,
+    *,
+    title: str,
+) -> str:
+    """The page as text: a table, one replay of all side by side, and what to mend in each."""
+    shown = [(name, subjects[name], report.clip) for name, report in reports.items()]
+    theirs = next((r.source for r in reports.values() if r.source is not None), None)
+    if source is not None and theirs is not None:
+        shown.append((*source, theirs))
+    figures = [Figure(subject, name, clip.floor_z) for name, subject, clip in shown]
+    overlays = [overlay(clip, subject) for _, subject, clip in shown]
+    return render_page(
+        "sim.report",
+        name="compare",
+        framed=("sim.view",),
+        title=title,
+        palette=Markup(css()),
+        key=CORNER_COLORS,
+        tools=[
+            {
+                "name": name,
+                "share": f"{100 * report.implausible:.1f} %",
+                "grade": grade(100 * report.implausible),
+                "findings": [
+                    finding_line(f, f.start, report.clip) for f in report.findings[:_LISTED]
+                ],
+                "unlisted": max(len(report.findings) - _LISTED, 0),
+            }
+            for name, report in reports.items()
+        ],
+        source=None
+        if source is None or theirs is None
+        else {"name": source[0], "share": f"{100 * theirs.implausible_share:.1f} %"},
+        lines=[
+            {
+                "label": LABELS[line.measure],
+                "unit": line.unit,
+                "meaning": MEANINGS.get(line.measure, ""),
+                "cells": [{"text": cell, "best": cell == line.best} for cell in line.cells],
+            }
+            for line in lines(reports)
+        ],
+        replay=page(figures, title="", overlays=overlays),
+        notes=list(dict.fromkeys(note for report in reports.values() for note in report.notes)),
+    )
