@@ -24,16 +24,18 @@ if TYPE_CHECKING:
     from spark_sim.clips import AnyClip, Clip, RobotClip
     from spark_sim.live import Retargeter
     from spark_sim.loading import load
-    from spark_sim.simulation import Simulated, simulate
+    from spark_sim.simulation import Followed, Simulated, follow, simulate
 
 _MODULE_OF = {
     "AnyClip": "spark_sim.clips",
     "Clip": "spark_sim.clips",
+    "Followed": "spark_sim.simulation",
     "Report": "sim.report",
     "Retargeter": "spark_sim.live",
     "RobotClip": "spark_sim.clips",
     "Simulated": "spark_sim.simulation",
     "SparkSimError": "spark.errors",
+    "follow": "spark_sim.simulation",
     "load": "spark_sim.loading",
     "play": "spark_sim.api",
     "report": "spark_sim.api",
@@ -44,11 +46,13 @@ _MODULE_OF = {
 __all__ = [
     "AnyClip",
     "Clip",
+    "Followed",
     "Report",
     "Retargeter",
     "RobotClip",
     "Simulated",
     "SparkSimError",
+    "follow",
     "load",
     "play",
     "report",

@@ -1,16 +1,22 @@
-"""Clips tracked in simulation."""
+"""Clips tracked in simulation, by servos or by a policy."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
+from sim.physics import policy_summary
+from sim.physics.policy_network import PolicyNetwork
+from sim.physics.policy_spec import read_spec
+from sim.physics.policy_tracking import PolicyRun, PolicyTracker
 from sim.physics.summary import LIMITS, render, summarize
 from sim.physics.tracking import Assist, TrackingResult, track
 from sim.trajectory import Subject, model_trajectory
 from sim.view.scene import Figure
-from spark_sim.clips import AnyClip, File
+from spark.errors import SkeletonError
+from spark_sim.clips import AnyClip, File, RobotClip
 from spark_sim.loading import clip_of
 
-__all__ = ["LIMITS", "Simulated", "simulate"]
+__all__ = ["LIMITS", "Followed", "Simulated", "follow", "simulate"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,3 +73,71 @@ def simulate(clip: AnyClip | File, *, assist: bool = False) -> Simulated:
         assist=Assist() if assist else None,
     )
     return Simulated(clip, tracked)
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """A robot's clip, and the runs in which a policy followed it."""
+
+    clip: RobotClip
+    policy: str
+    tracker: PolicyTracker
+    runs: tuple[PolicyRun, ...]
+
+    def __repr__(self) -> str:
+        falls = ", ".join(str(len(run.falls)) for run in self.runs)
+        return f"Followed({self.clip!r}, by {self.policy!r}, falls {falls})"
+
+    @property
+    def name(self) -> str:
+        """What pictures and messages call it."""
+        return f"{self.clip.name}, by {self.policy}"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was assumed of the model."""
+        return self.tracker.notes
+
+    def json(self) -> dict[str, Any]:
+        """The measures (docs/policies.md), with a schema version."""
+        return policy_summary.summarize(self.tracker, self.runs)
+
+    def text(self) -> str:
+        """The measures in words."""
+        return policy_summary.render(self.json(), self.clip.name, self.policy)
+
+    def figures(self) -> list[Figure]:
+        """What is shown: the first run, and its target as a ghost."""
+        clip, target = self.clip, self.tracker.body
+        robot, dt = clip.on_robot.robot, self.tracker.frame_time
+        motion = robot.motion(robot.from_qpos(target.qpos), dt)
+        made = replace(target, qpos=self.runs[0].qpos)
+        return [
+            Figure(Subject(motion, clip.rig, made), self.name, clip.floor_z),
+            Figure(Subject(motion, clip.rig, target), "target", clip.floor_z, ghost=True),
+        ]
+
+
+def follow(clip: RobotClip | File, policy: File, spec: File, *, seeds: int = 3) -> Followed:
+    """Follow a robot's motion with a policy of yours (ONNX), in simulation, once for each seed.
+
+    `spec` is the TOML that says what the policy sees and how its actions move the robot
+    (docs/policies.md). Raises `SkeletonError` for a character's clip and where the spec's joints
+    are not the robot's, `FileFormatError` for a spec or a policy that don't fit, and
+    `DependencyError` without onnxruntime.
+    """
+    loaded = clip_of(clip)
+    if not isinstance(loaded, RobotClip):
+        raise SkeletonError(
+            f"{loaded.name}: is no robot's motion; a policy moves a robot: retarget it onto one"
+        )
+    settings = read_spec(Path(spec))
+    tracker = PolicyTracker(
+        loaded.body,
+        loaded.motion.frame_time,
+        settings,
+        PolicyNetwork(Path(policy), settings),
+        height=loaded.rig.standing_height,
+    )
+    runs = tuple(tracker.run(seed) for seed in range(1, seeds + 1))
+    return Followed(loaded, Path(policy).stem, tracker, runs)

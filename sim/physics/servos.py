@@ -24,17 +24,8 @@ def with_servos(
     A model's own position servos stay as they are. Motors are replaced by servos with the torque
     limits of the motors, and a model without actuators gets servos on all its joints.
     """
-    spec = body.spec.copy()
     notes: list[str] = []
-    _let_something_collide(spec, notes)
-    if not any(g.type == mujoco.mjtGeom.mjGEOM_PLANE for g in spec.worldbody.geoms):
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_PLANE,
-            size=[0, 0, 1],
-            pos=[0, 0, floor_z],
-            contype=1 | _bits(body.model, "conaffinity"),
-            conaffinity=1 | _bits(body.model, "contype"),
-        )
+    spec = on_floor(body, floor_z, notes)
     timestep = min(float(body.model.opt.timestep), _MAX_TIMESTEP)
     _replace_motors(spec, body.model, height, timestep, notes)
     spec.option.timestep, spec.option.gravity = timestep, [0.0, 0.0, -GRAVITY]
@@ -44,6 +35,22 @@ def with_servos(
     model.actuator_ctrllimited[:] = 0
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return model, tuple(notes)
+
+
+def on_floor(body: ModelTrajectory, floor_z: float, notes: list[str]) -> mujoco.MjSpec:
+    """A copy of the body's spec with something that collides, and a floor; what was assumed is
+    added to `notes`."""
+    spec = body.spec.copy()
+    _let_something_collide(spec, notes)
+    if not any(g.type == mujoco.mjtGeom.mjGEOM_PLANE for g in spec.worldbody.geoms):
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            size=[0, 0, 1],
+            pos=[0, 0, floor_z],
+            contype=1 | _bits(body.model, "conaffinity"),
+            conaffinity=1 | _bits(body.model, "contype"),
+        )
+    return spec
 
 
 def _let_something_collide(spec: mujoco.MjSpec, notes: list[str]) -> None:

@@ -187,7 +187,7 @@ class _Simulation:
         mujoco.mj_resetData(model, data)
         data.qpos[:], data.qvel[:] = target[0], start
         diverged = None
-        with _without_warnings():
+        with without_warnings():
             self._log(rollout, 0, target_points, ups)
             for t, qpos, qvel in _interpolated_targets(model, target, speeds, frame_time, steps):
                 self._step_to(rollout, t, qpos, qvel)
@@ -334,7 +334,7 @@ def _interpolated_targets(
 
 
 @contextmanager
-def _without_warnings() -> Iterator[None]:
+def without_warnings() -> Iterator[None]:
     """MuJoCo writes warnings to the terminal and a file; here they are results."""
     mujoco.set_mju_user_warning(lambda message: None)
     try:

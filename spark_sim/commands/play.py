@@ -1,6 +1,6 @@
 """`spark-sim play`: watch motions, in a window, a video, a web page or a picture."""
 
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from functools import partial
 from pathlib import Path
 from textwrap import fill
@@ -16,7 +16,9 @@ from their skeletons, robots on their own models. This opens a window. With
 --video, --html or --strip it writes files instead and needs no display.
 
 With --physics, position servos track each motion in simulation. A summary says
-how long the body stays up, how far it is from the motion, and the torques."""
+whether the body stays up, hangs on the assist or falls, how far it is from the
+motion, and the torques. With --policy and --spec a policy of yours follows a
+robot's motion instead."""
 EXAMPLES = """\
 examples:
   spark-sim play walk.bvh              # a window
@@ -24,6 +26,7 @@ examples:
   spark-sim play walk.bvh walk_on_g1.npz --video walk.mp4 --strip walk.png
   spark-sim play theirs.csv --robot unitree_g1 --quat xyzw --fps 60
   spark-sim play walk_on_g1.npz --physics --assist --html physics.html
+  spark-sim play walk_on_g1.npz --physics --policy my.onnx --spec my.toml
 """
 
 
@@ -44,6 +47,17 @@ def configure(parser: ArgumentParser) -> None:
         action="store_true",
         help="with --physics: a force and a torque on the root help",
     )
+    parser.add_argument(
+        "--policy", metavar="ONNX", help="with --physics: follow a robot's motion with this policy"
+    )
+    parser.add_argument(
+        "--spec",
+        metavar="TOML",
+        help="what the policy sees, its joints, gains and rate: docs/policies.md",
+    )
+    parser.add_argument(
+        "--seeds", metavar="N", type=_count, help="runs of the policy (3), each begun a little off"
+    )
     add_json(parser, "the summary of --physics")
     add_force(parser)
     add_corrections(parser, "every FILE")
@@ -56,6 +70,12 @@ def run(args: Namespace) -> int:
 
     if not args.physics and (args.assist or args.json):
         raise ConventionError("--assist and --json go with --physics")
+    if (args.policy is None) != (args.spec is None) or (args.policy and not args.physics):
+        raise ConventionError("--policy FILE.onnx goes with --physics and --spec FILE.toml")
+    if args.policy and args.assist:
+        raise ConventionError("--assist helps servos; a policy goes without")
+    if args.seeds and not args.policy:
+        raise ConventionError("--seeds goes with --policy")
     outputs = {name: getattr(args, name) for name in ("video", "html", "strip")}
     wanted = {name: Path(path) for name, path in outputs.items() if path is not None}
     shown: list[Any] = [load(args, path) for path in args.files]
@@ -73,14 +93,26 @@ def run(args: Namespace) -> int:
 def _simulated(args: Namespace, clips: list[Any]) -> list[Any]:
     """The clips as they come out of the simulation; the report is printed."""
     from spark_sim import console
-    from spark_sim.simulation import LIMITS, simulate
+    from spark_sim.simulation import LIMITS, follow, simulate
 
-    made = [simulate(each, assist=args.assist) for each in clips]
+    made: list[Any]
+    if args.policy is None:
+        made = [simulate(each, assist=args.assist) for each in clips]
+    else:
+        seeds = args.seeds or 3
+        made = [follow(each, args.policy, args.spec, seeds=seeds) for each in clips]
     for path, each in zip(args.files, made, strict=True):
         console.notes(path, each.notes)
     if args.json:
         for each in made:
             console.emit_json(each.json())
     else:
-        console.say("\n\n".join([*(each.text() for each in made), fill(LIMITS, 79)]))
-    return list(made)
+        caution = [fill(LIMITS, 79)] if args.policy is None else []
+        console.say("\n\n".join([*(each.text() for each in made), *caution]))
+    return made
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 1000:
+        raise ArgumentTypeError(f"{text!r} is no number of runs; expected 1 to 1000")
+    return int(text)
