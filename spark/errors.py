@@ -29,6 +29,10 @@ class OutputError(SparkSimError):
     """A result can't be written where it was asked for."""
 
 
+class DivergedError(SparkSimError):
+    """A training came to numbers that are none; what it saved before is good."""
+
+
 class DependencyError(SparkSimError):
     """An optional package or system library is missing; the message says how to install it."""
 

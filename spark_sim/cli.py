@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from itertools import takewhile
 from typing import Any, NoReturn
 
-from spark.errors import SparkSimError
+from spark.errors import DivergedError, SparkSimError
 from spark_sim import console
 from spark_sim.commands import (
     batch,
@@ -47,6 +47,7 @@ FBX files, videos and most robots need extras:
 spark-sim COMMAND --help tells more of each command.
 """
 
+DIVERGED = 1
 FAILED, INTERNAL_ERROR, INTERRUPTED, BROKEN_PIPE = 2, 70, 130, 141
 
 
@@ -162,8 +163,8 @@ def run(argv: Sequence[str], ready: Callable[[], None] = lambda: None) -> int:
     """Parse and carry out one command line; every failure ends as one line on stderr. `ready` is
     called in between.
 
-    Exit codes: 0 done; 1 `report --fail-over` found too much; 2 wrong input or usage; 70 a fault of
-    spark-sim itself; 130 interrupted; 141 the reader of stdout went away.
+    Exit codes: 0 done; 1 `report --fail-over` found too much, or `train` diverged; 2 wrong input or
+    usage; 70 a fault of spark-sim itself; 130 interrupted; 141 the reader of stdout went away.
     """
     args = parse(argv)
     if args.command is None:
@@ -187,6 +188,8 @@ def _run(args: Namespace) -> int:
         code: int = args.run(args)
     except BrokenPipeError:
         raise
+    except DivergedError as error:
+        return _fail(str(error), DIVERGED)
     except SparkSimError as error:
         return _fail(str(error), FAILED)
     except OSError as error:

@@ -4,6 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from robots.formats import format_of, is_sonic
 from robots.formats.about import read_sidecar, robot_of, sidecar_of
 from robots.formats.gmr import read_pkl, write_pkl
@@ -20,6 +22,7 @@ from robots.model.known import known
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from spark.errors import ConventionError, FileFormatError
+from spark.finite import check_output
 from spark.npz import Npz
 from spark.opening import check_regular
 
@@ -29,8 +32,9 @@ def write(
 ) -> None:
     """Write a motion in `format`, or in the one that the ending says.
 
-    Raises `OutputError` where the ending is not the format's.
+    Raises `OutputError` where the ending is not the format's, or where a number is none.
     """
+    check_output(path, qpos=motion.qpos, frame_time=np.array([motion.frame_time]))
     match format_of(path, format):
         case "npz":
             write_npz(motion, path, source=source)

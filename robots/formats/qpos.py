@@ -13,6 +13,7 @@ from spark.errors import ConventionError, FileFormatError, OutputError
 from spark.motion import check_frame_time
 
 _HIGH = 10  # hip heights at which a robot hardly walks
+_LARGEST = 1e8  # [m, rad] beyond, no difference between frames is left
 _NOTED, _REFUSED = 1e-3, 0.05  # how far the norm of a quaternion may be from 1
 
 
@@ -102,13 +103,17 @@ def frame_time_of(fps: float, path: Path) -> float:
 
 
 def check_finite(path: Path, **arrays: Float[np.ndarray, "T ..."]) -> None:
-    """Raise `FileFormatError` at the first value that is no finite number."""
+    """Raise `FileFormatError` at the first value that is no finite number, or too large to be a
+    place or an angle."""
     for name, array in arrays.items():
-        bad = np.argwhere(~np.isfinite(array))
+        bad = np.argwhere(~(np.abs(array) < _LARGEST))
         if len(bad):
             frame, *place = bad[0].tolist()
             raise FileFormatError(
-                path, None, f"{name}{place} is {array[tuple(bad[0])]} in frame {frame}"
+                path,
+                None,
+                f"{name}{place} is {array[tuple(bad[0])]} in frame {frame}; expected a number "
+                f"below {_LARGEST:g}",
             )
 
 

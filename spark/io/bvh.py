@@ -16,6 +16,7 @@ from jaxtyping import Float, Int
 
 from spark.errors import FileFormatError, SkeletonError
 from spark.files import write_atomically
+from spark.finite import check_output
 from spark.io.bvh_rows import parse_motion
 from spark.io.charset import to_utf8
 from spark.io.scanner import Scanner, shown
@@ -143,8 +144,15 @@ def read_bvh(path: str | Path) -> Bvh:
 def write_bvh(bvh: Bvh, path: str | Path) -> None:
     """Write the file, replacing what is there; every number in its shortest exact form.
 
-    Raises `OutputError` where `path` can't be written.
+    Raises `OutputError` where `path` can't be written, or where a number is none.
     """
+    rest = [(joint.offset, *joint.ends) for joint in bvh.joints]
+    check_output(
+        Path(path),
+        channel=bvh.values,
+        OFFSET=np.array([v for each in rest for v in each]),
+        frame_time=np.array([bvh.frame_time]),
+    )
     lines = ["HIERARCHY", *_hierarchy_lines(bvh.joints)]
     lines += ["MOTION", f"Frames: {len(bvh)}", f"Frame Time: {_text([bvh.frame_time])}"]
     text = "\n".join(chain(lines, map(_text, bvh.values.tolist()), [""]))

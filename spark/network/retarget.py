@@ -165,7 +165,7 @@ def _name_encoder(weights: Weights) -> Callable[[Sequence[str]], Float[np.ndarra
             raise DependencyError(
                 f"a network with T5's names needs {error.name}: pip install 'spark-sim[t5]'"
             ) from error
-        t5 = T5Names(str(weights.names["t5"]), NAME_CACHE)
+        t5 = T5Names(str(weights.names["t5"]), NAME_CACHE, own=False)
         encode = cache(lambda names: t5.encode(names).numpy())
     else:
         encode = cache(NameNetwork(weights).encode)

@@ -2,6 +2,7 @@
 needs torch, and `transformers`.
 """
 
+import os
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
@@ -14,6 +15,12 @@ from torch import Tensor
 from spark.errors import DependencyError, FileFormatError
 from spark.files import write_atomically
 
+TRUST = "SPARK_SIM_T5"  # names the one other model that a checkpoint may have loaded
+KNOWN = frozenset(
+    f"{owner}{family}-{size}"
+    for owner, family in (("", "t5"), ("google-t5/", "t5"), ("google/", "t5-v1_1"))
+    for size in ("small", "base", "large")
+) | {f"google/{name}" for name in ("byt5-small", "byt5-base", "flan-t5-small", "flan-t5-base")}
 NAME_CACHE = Path.home() / ".cache" / "spark-sim" / "names.pt"
 
 
@@ -21,11 +28,15 @@ class T5Names:
     """A T5 encoder from a local directory or a hub name, frozen, its vectors kept on disk.
 
     `transformers` is imported when a name is met that the cache does not hold, and not before. A
-    directory whose files have changed is another model.
+    directory whose files have changed is another model. Where the user did not name it (`own`), as
+    where a checkpoint does, only T5's and ByT5's published models are loaded, and the one that the
+    environment variable `SPARK_SIM_T5` names.
     """
 
-    def __init__(self, model: str, cache: Path) -> None:
+    def __init__(self, model: str, cache: Path, *, own: bool = True) -> None:
         self.model, self.cache = model, cache
+        published = model in KNOWN and not Path(model).exists()  # a folder of that name wins
+        self._trusted = own or published or model == os.environ.get(TRUST)
         self._key = _identity(model)
         self._vectors = _cached(cache).get(self._key, {})
 
@@ -42,6 +53,11 @@ class T5Names:
 
     @torch.no_grad()
     def _run(self, names: list[str]) -> list[Tensor]:
+        if not self._trusted:
+            raise DependencyError(
+                f"the checkpoint encodes joint names with {self.model!r}, which is not loaded on a "
+                f"checkpoint's word; if you trust that model, set {TRUST} to its name"
+            )
         try:
             from transformers import AutoTokenizer, T5EncoderModel
         except ImportError as error:

@@ -14,6 +14,7 @@ from jaxtyping import Shaped
 from safetensors import SafetensorError, safe_open
 
 from spark.errors import FileFormatError
+from spark.finite import first_not_finite
 from spark.network.known_bodies import Trunk
 from spark.opening import check_regular, parse_json
 
@@ -69,6 +70,11 @@ def read_weights(path: Path) -> Weights:
                     f"version {VERSION}",
                 )
             tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
+        for name, tensor in tensors.items():
+            if first_not_finite(tensor) is not None:
+                raise FileFormatError(
+                    path, None, f"its {name!r} holds NaN or infinity: the training went wrong"
+                )
     except (SafetensorError, OSError, TypeError) as error:
         raise FileFormatError(path, None, f"is no safetensors file ({error})") from error
     try:

@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Shaped
 
 from spark.errors import (
     FileFormatError,
@@ -36,8 +36,10 @@ from spark.errors import (
     name_list,
 )
 from spark.files import alone, write_atomically
+from spark.finite import first_not_finite
 from spark.io.reading import motion_files
 from spark.network.features import BodyFeatures, body_features
+from spark.opening import check_regular, parse_json, read_bytes
 from spark.rig.rig import Rig
 from spark.rig.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_conj, quat_mul
@@ -110,6 +112,9 @@ def _prepared(
     return index
 
 
+_DATASET = "a dataset; `spark-sim prepare` makes one"
+
+
 def training_clips(
     paths: Sequence[Path], progress: Callable[[Iterable[Path]], Iterable[Path]] = iter
 ) -> tuple[list[TrainingClip], tuple[str, ...]]:
@@ -140,11 +145,11 @@ def read_performances(path: Path) -> "list[Performance]":
     Raises `FileFormatError` where `path` is no dataset of this version, or a damaged one.
     """
     try:
-        index = json.loads((path / "index.json").read_bytes())
+        index = parse_json(path, read_bytes(path / "index.json", expected=_DATASET), "its index")
         if (index["format"], index["version"]) != (FORMAT, VERSION):
             raise ValueError(f"it says {index['format']!r}, version {index['version']!r}")
         arrays = index.get("arrays", _ARRAYS)
-        numbers, planted = (np.load(path / arrays[name], mmap_mode="r") for name in _ARRAYS)
+        numbers, planted = (_array(path, arrays[name]) for name in _ARRAYS)
         bodies = [body_features(rig_from_json(body["rig"])) for body in index["bodies"]]
         return [
             Performance(
@@ -155,12 +160,27 @@ def read_performances(path: Path) -> "list[Performance]":
             )
             for clip in index["clips"]
         ]
-    except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
+    except (
+        *(OSError, ValueError, KeyError, TypeError, IndexError),
+        *(AttributeError, RecursionError, MemoryError, OverflowError),
+    ) as error:
         raise FileFormatError(
             path,
             None,
             f"is no dataset of version {VERSION} ({error}); `spark-sim prepare` makes one",
         ) from error
+
+
+def _array(folder: Path, name: str) -> Shaped[np.ndarray, "..."]:
+    """An array of a dataset, mapped into memory. Raises `FileFormatError` where it is not beside
+    its index, or holds a number that is none."""
+    path = folder / Path(name).name
+    check_regular(path, limit=1 << 50, expected="an array of the dataset")
+    array = np.load(path, mmap_mode="r")
+    at = first_not_finite(array)
+    if at is not None:
+        raise FileFormatError(path, None, f"holds {array[at]} at {at[0]}; prepare it again")
+    return array
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """What a training run is: everything that `spark-sim train` can be told. No torch here."""
 
+import sys
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -54,9 +55,15 @@ class TrainConfig:
         for switch in self.ablate:
             _one_of("ablate", switch, ABLATIONS)
         for name, lowest in _LOWEST.items():
-            if getattr(self, name) < lowest:
+            if not getattr(self, name) >= lowest:
                 raise ConventionError(
                     f"{name} = {getattr(self, name)}: expected {lowest} or more in a training run"
+                )
+        for name, highest in _HIGHEST.items():
+            if not getattr(self, name) <= highest:
+                raise ConventionError(
+                    f"{name} = {getattr(self, name)}: expected {highest:g} at most in a training "
+                    "run"
                 )
         if self.width % (2 * self.heads):
             raise ConventionError(
@@ -115,6 +122,14 @@ _LOWEST = {
     **dict.fromkeys(("save_every", "log_every"), 1),
     **dict.fromkeys(("seed", "workers", "warmup", "weight_decay", "rate", "name_steps"), 0),
     "window": 2,
+}
+_HIGHEST = {
+    **dict.fromkeys(("width", "window"), 8192),
+    **dict.fromkeys(("heads", "blocks", "workers"), 512),
+    **dict.fromkeys(("batch", "per_body", "variants"), 65536),
+    **dict.fromkeys(("steps", "save_every", "log_every", "warmup", "name_steps"), 10**9),
+    "seed": 2**63 - 1,
+    **dict.fromkeys(("rate", "weight_decay"), sys.float_info.max),  # finite
 }
 
 

@@ -9,7 +9,7 @@ draws; losses are means over windows, so the processes' mean gradient is that of
 import json
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
@@ -22,6 +22,7 @@ from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 from torch.utils.data import DataLoader, Dataset
 
+from spark.errors import DivergedError
 from spark.files import write_atomically
 from spark.network.config import Config
 from spark.network.known_bodies import distinct_trunks
@@ -191,6 +192,7 @@ def train(
 ) -> Checkpoint:
     """Train from `start` to `config.steps`; `out/checkpoint.safetensors` and `out/log.jsonl` grow.
 
+    Raises `DivergedError` where a loss is no finite number; the last good checkpoint stays.
     `watch` is told the loss terms after each step that is logged. On a GPU the network is compiled
     and computes in bf16. Under `torchrun` the first process writes.
     """
@@ -202,7 +204,8 @@ def train(
     runner = distributed(objective) if world > 1 else objective
     if device.type == "cuda":
         runner = torch.compile(runner, dynamic=True)  # type: ignore[assignment]
-    steps = Steps(clips, name_vectors(start.names), config, rank, world)
+    own = start.names == config.t5  # else it is the checkpoint's word alone
+    steps = Steps(clips, name_vectors(start.names, own=own), config, rank, world)
     bodies = distinct_trunks(clip.body for clip in clips)
     checkpoint = start
     model.train()
@@ -215,17 +218,37 @@ def train(
             if rank:
                 continue
             done = n + 1
-            if done % config.log_every == 0 or done == config.steps:
+            logs, saves = (
+                done % every == 0 or done == config.steps
+                for every in (config.log_every, config.save_every)
+            )
+            if logs or saves:
                 values = {k: float(v) for k, v in terms.items()}
+                _check_finite(done, values.items(), checkpoint.step)
+            if logs:
                 entry = {"step": done, "seconds": round(perf_counter() - began, 3), **values}
                 log.write(json.dumps(entry) + "\n")
                 log.flush()
                 watch(done, values)
-            if done % config.save_every == 0 or done == config.steps:
+            if saves:
+                parameters = ((k, float(p.detach().sum())) for k, p in model.named_parameters())
+                _check_finite(done, parameters, checkpoint.step)
                 state = optimizer_tensors(optimiser, model)
                 checkpoint = Checkpoint(model, start.names, done, asdict(config), bodies, state)
                 save_checkpoint(checkpoint, out / "checkpoint.safetensors")
     return checkpoint
+
+
+def _check_finite(done: int, numbers: Iterable[tuple[str, float]], saved: int) -> None:
+    """Raise `DivergedError` where a loss term, or the sum of a parameter, is no number."""
+    bad = next((name for name, value in numbers if not math.isfinite(value)), None)
+    if bad is None:
+        return
+    kept = f"the checkpoint of step {saved} is kept" if saved else "no checkpoint was written"
+    raise DivergedError(
+        f"training diverged at step {done}: {bad} is no finite number; {kept}. A lower rate, or a "
+        "longer warmup, helps"
+    )
 
 
 def distributed(objective: Objective) -> nn.Module:
@@ -268,11 +291,12 @@ def _join_processes() -> tuple[int, int, torch.device]:
     return rank, world, torch.device("cuda", local) if cuda else torch.device("cpu")
 
 
-def name_vectors(names: NameEncoder | str) -> Names:
-    """What turns joint names into vectors: our own encoder, or the T5 of that name."""
+def name_vectors(names: NameEncoder | str, *, own: bool = True) -> Names:
+    """What turns joint names into vectors: our own encoder, or the T5 of that name, which the user
+    gave or (not `own`) a checkpoint did."""
     if isinstance(names, NameEncoder):
         return names.cpu().remembering()
-    return T5Names(names, NAME_CACHE).encode
+    return T5Names(names, NAME_CACHE, own=own).encode
 
 
 def _batches(steps: Steps, start: int) -> Iterator[Packed]:

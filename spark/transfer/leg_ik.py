@@ -126,8 +126,8 @@ def leg_rotations(
     lateral = quat_rotate(upper_leg, np.array([0, 1, 0], upper_leg.dtype))
     axis = np.cross(thigh, shank)
     sine = _length(axis)
-    # A straight leg bends about the body's lateral axis, backwards.
-    straight = (sine < _STRAIGHT * a * b)[..., None]
+    # A straight leg bends about the body's lateral axis, backwards; so does one without a bone.
+    straight = (sine <= _STRAIGHT * a * b)[..., None]
     axis = np.where(straight, lateral, axis)
     axis = axis / _length(axis)[..., None]
     now = np.arctan2(sine, np.einsum("...i,...i", thigh, shank))
@@ -144,5 +144,6 @@ def _flexion(
     reach: Float[np.ndarray, "*n"], a: Float[np.ndarray, "*n"], b: Float[np.ndarray, "*n"]
 ) -> Float[np.ndarray, "*n"]:
     """The knee's angle from straight, by the law of cosines."""
-    cos = (reach**2 - a**2 - b**2) / (2 * a * b)
+    both = 2 * a * b
+    cos = np.divide(reach**2 - a**2 - b**2, both, out=np.ones_like(both), where=both > 0)
     return np.arccos(np.clip(cos, -1.0, 1.0))

@@ -59,3 +59,14 @@ def test_what_is_no_checkpoint_is_refused(tmp_path: Path) -> None:
     path.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(FileFormatError, match="no safetensors"):
         load_checkpoint(path)
+
+
+@pytest.mark.parametrize("value", [torch.nan, torch.inf])
+def test_weights_that_are_no_numbers_are_refused(tmp_path: Path, value: float) -> None:
+    path = tmp_path / "x.safetensors"
+    spoilt = fresh(TINY)
+    with torch.no_grad():
+        next(spoilt.model.parameters()).view(-1)[-1] = value
+    save_checkpoint(spoilt, path)
+    with pytest.raises(FileFormatError, match="holds NaN or infinity"):
+        read_weights(path)

@@ -372,3 +372,29 @@ def test_linked_folders_are_read_once(tree: Path, tmp_path: Path) -> None:
     assert names == [f"a/{name}.bvh" for name in ("squat", "walk", "wave")]
     with pytest.raises(FileFormatError, match="nowhere: no such file or folder"):
         motion_files(tmp_path / "nowhere")
+
+
+def test_a_dataset_with_numbers_that_are_none_is_refused(made: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(made, out)
+    (path,) = out.glob("numbers*.npy")
+    numbers = np.load(path)
+    numbers[len(numbers) // 2] = np.nan
+    np.save(path, numbers)
+    with pytest.raises(FileFormatError, match=r"numbers.*\.npy: holds nan"):
+        read_dataset(out)
+
+
+def test_an_index_cannot_name_files_elsewhere(made: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(made, out)
+    index = json.loads((out / "index.json").read_text())
+    (path,) = out.glob("numbers*.npy")
+    path.rename(tmp_path / "elsewhere.npy")
+    index["arrays"]["numbers"] = "../elsewhere.npy"
+    (out / "index.json").write_text(json.dumps(index))
+    with pytest.raises(FileFormatError, match=r"elsewhere\.npy: no such file"):
+        read_dataset(out)
+    (out / "index.json").write_text("[" * 100_000)
+    with pytest.raises(FileFormatError, match="its index is no JSON"):
+        read_dataset(out)

@@ -1,5 +1,6 @@
 """Names as vectors: what must not change them, what the encoder learns from, T5 from a folder."""
 
+import json
 import shutil
 import subprocess
 import sys
@@ -10,11 +11,15 @@ import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
+from safetensors import safe_open
+from safetensors.numpy import save_file as save_arrays
 from safetensors.torch import save_file
 
 from spark.errors import ConventionError, DependencyError, FileFormatError
 from spark.network.name_words import PAD, rig_words
+from spark.network.retarget import NetworkRetargeter
 from spark.network.t5 import T5Names
+from spark.network.weights import SHIPPED, read_weights
 from spark.rig.name_conventions import CONVENTIONS, HELD_OUT, name_joints
 from spark.rig.roles import Role
 from spark.training.checkpoint import load_checkpoint, save_checkpoint
@@ -240,6 +245,29 @@ def test_what_is_no_t5_and_what_is_no_cache_is_refused(t5: Path, tmp_path: Path)
         cache.write_bytes(content)
         with pytest.raises(FileFormatError, match=r"names\.pt.*delete it"):
             T5Names(str(t5), cache)
+
+
+def test_no_model_is_loaded_on_a_checkpoints_word(
+    t5: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither a folder nor a name on the hub, not even a folder that is called as T5 is."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(t5, tmp_path / "t5-small")
+    cache = tmp_path / "names.pt"
+    for model in (str(t5), "stranger/model", "t5-small"):
+        with pytest.raises(DependencyError, match="not loaded on a checkpoint's word"):
+            T5Names(model, cache, own=False).encode(["Hips"])
+    spoilt = tmp_path / "x.safetensors"
+    with safe_open(SHIPPED, "np") as file:
+        header = json.loads(file.metadata()["config"]) | {"names": {"t5": str(t5)}}
+        metadata = {**file.metadata(), "config": json.dumps(header)}
+        tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
+    save_arrays({k: v for k, v in tensors.items() if not k.startswith("names.")}, spoilt, metadata)
+    encode = NetworkRetargeter(read_weights(spoilt))._encode
+    with pytest.raises(DependencyError, match="not loaded on a checkpoint's word"):
+        encode(("a joint of no cache",))
+    monkeypatch.setenv("SPARK_SIM_T5", str(t5))  # the user's word
+    assert T5Names(str(t5), cache, own=False).encode(["Hips"]).shape[0] == 1
 
 
 # Files

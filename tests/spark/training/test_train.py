@@ -1,6 +1,7 @@
 """Training: resuming, processes, and that a network learns what it is shown."""
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 import torch
 
+from spark.errors import DivergedError
 from spark.training.checkpoint import Checkpoint, load_checkpoint
 from spark.training.model import _corrected
 from spark.training.name_encoder import NameEncoder
@@ -139,3 +141,31 @@ def test_a_handful_of_pairs_is_learned_by_heart(clips: list[TrainingClip]) -> No
     terms = [take_step(objective, optimiser, batch, n, config) for n in range(config.steps)]
     assert terms[-1]["fk"] < 0.1 * terms[0]["fk"]
     assert terms[-1]["rec"] < 0.1 * terms[0]["rec"]
+
+
+@pytest.mark.parametrize(("rate", "kept"), [(1e30, 0), (0.0, 1)])
+def test_a_run_that_diverges_keeps_its_last_good_state(
+    clips: list[TrainingClip], tmp_path: Path, rate: float, kept: int
+) -> None:
+    """At a rate beyond reason from the first step on; by weights that break in the second."""
+    config = replace(TINY, steps=4, warmup=0, save_every=1, log_every=1)
+    object.__setattr__(config, "rate", rate or config.rate)
+    start = fresh(config)
+
+    def spoil(step: int, terms: dict[str, float]) -> None:
+        if step == kept + 1 and not rate:
+            with torch.no_grad():
+                next(start.model.parameters()).fill_(torch.nan)
+
+    path = tmp_path / "checkpoint.safetensors"
+    says = f"the checkpoint of step {kept} is kept" if kept else "diverged at step"
+    with pytest.raises(DivergedError, match=says):
+        train(clips, config, tmp_path, start=start, watch=spoil)
+    for line in (tmp_path / "log.jsonl").read_text().splitlines():
+        assert all(map(math.isfinite, json.loads(line).values()))
+    if path.exists():
+        good = load_checkpoint(path)
+        assert good.step == 1
+        assert all(bool(torch.isfinite(p).all()) for p in good.model.parameters())
+    else:
+        assert not kept
