@@ -186,15 +186,20 @@ def play(
     video: File | None = None,
     html: File | None = None,
     strip: File | None = None,
+    gif: File | None = None,
+    webp: File | None = None,
+    same_height: bool = False,
     force: bool = False,
     progress: Callable[[Iterable[int]], Iterable[int]] = iter,
 ) -> None:
     """Show motions side by side: in a window, or as the files that are named, a video (MP4), a web
-    page (HTML) and a strip of moments (PNG). What `simulate` returns is shown with its target as a
-    ghost.
+    page (HTML), a strip of moments (PNG) and an animated picture (GIF, WebP). What `simulate`
+    returns is shown with its target as a ghost. With `same_height`, all stand as tall as the
+    tallest.
 
-    `progress` wraps the frames of the video. Raises `DependencyError` where there is no display, or
-    nothing to draw or encode with, and `OutputError` where a file exists, unless forced.
+    `progress` wraps the frames of the video and of animated pictures. Raises `DependencyError`
+    where there is no display, or nothing to draw or encode with, and `OutputError` where a file
+    exists, unless forced.
     """
     from sim.view.scene import build_scene
 
@@ -202,12 +207,17 @@ def play(
         (video, (".mp4",), "a video"),
         (html, _PAGE, "a page"),
         (strip, (".png",), "a strip"),
+        (gif, (".gif",), "a GIF"),
+        (webp, (".webp",), "a WebP"),
     ):
         if path is not None:
             files.claim(Path(path), force=force, endings=endings, what=what)
     shown = [clip_of(c) if isinstance(c, str | Path) else c for c in clips]
     figures = [figure for clip in shown for figure in clip.figures()]
-    if video is html is strip is None:
+    if same_height:
+        tallest = max(figure.own_height for figure in figures)
+        figures = [replace(figure, height=tallest) for figure in figures]
+    if video is html is strip is gif is webp is None:
         from sim.report.watch import watch
 
         watch(figures, title=" - ".join(c.name for c in shown))
@@ -217,6 +227,11 @@ def play(
         from sim.view.video import write_video
 
         write_video(scene, video, progress=progress)
+    for path in (gif, webp):
+        if path is not None:
+            from sim.view.video import write_animation
+
+            write_animation(scene, path, progress=progress)
     if html is not None:
         from sim.view.page import write_page
 

@@ -20,6 +20,7 @@ from spark.rig.rig import Rig
 _DETAIL_RADIUS = 0.006  # of fingers, face and helpers
 _HEAD_SIZE = np.array([0.055, 0.045, 0.068])  # half axes of the ellipsoid
 _HEAD_CENTER = np.array([0.015, 0.0, 0.055])  # from the head's joint
+_HIDDEN = 3  # the group of geoms that viewers don't show
 _FOOT_HEIGHT = 0.022  # of a foot's box
 
 # Warm on the left, cool on the right: a swapped side is seen at once.
@@ -138,7 +139,13 @@ class _GeomBuilder:
             fromto=[0, 0, 0, *tip],
             size=[min(radius, 0.5 * float(np.linalg.norm(tip)) + 0.004), 0, 0],
             material=material_of(self.rig, joint),
+            group=_HIDDEN if self._loose(joint) else self.spec.find_default(default).geom.group,
         )
+
+    def _loose(self, joint: int) -> bool:
+        """Hair, cloth, props, face: beside the flesh, so that they would float in pictures."""
+        parts = {part_of(self.rig, k) for k in self.rig.skeleton.ancestors(joint)}
+        return part_of(self.rig, joint) == DETAIL and not parts & {"hand", "foot"}
 
     def _class(self, joint: int) -> str:
         above = self.rig.skeleton.ancestors(joint)
@@ -158,4 +165,4 @@ class _GeomBuilder:
             material=material_of(self.rig, joint),
         )
         if hidden:
-            box.group = 3
+            box.group = _HIDDEN

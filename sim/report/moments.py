@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from sim.report.result import Finding, Result
-from sim.view.render import frames
+from sim.view.render import stills
 from sim.view.scene import Figure, build_scene
 from spark.errors import DependencyError
 
@@ -58,7 +58,7 @@ def _pictures(figures: list[Figure], times: list[float]) -> list[str]:
         scene = build_scene([figure])
         last = len(scene.qpos) - 1
         at = [min(round(time / scene.frame_time), last) for time in times]
-        columns.append(list(frames(scene, at, width=width, height=height)))
+        columns.append(stills(scene, at, width=width, height=height))
     gap = np.full((height, _GAP, 3), 255, dtype=np.uint8)
     return [
         _jpeg(np.concatenate([part for column in row for part in (gap, column)][1:], axis=1))

@@ -34,7 +34,7 @@ def with_ghosts(figures: Sequence[Figure]) -> list[Figure]:
         return list(figures)
     source, out = figures[0], [figures[0]]
     for figure in figures[1:]:
-        height = figure.rig.standing_height * figure.scale
+        height = figure.own_height * figure.scale
         out += [figure, replace(source, ghost=True, aligned=True, height=height)]
     return out
 

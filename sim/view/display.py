@@ -16,6 +16,8 @@ MAX_FACES = 40_000  # of one figure's meshes
 GHOST_GROUP = 5  # of geoms: viewers hide it unless they are asked
 GHOST_RGBA = (0.35, 0.42, 0.55, 0.3)
 
+_LEAST_LIGHT = 0.55  # of the brightest channel; darker colours are lifted, black to 2/3 of it
+
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 _SHOWN_TYPES = (
     int(mujoco.mjtGeom.mjGEOM_SPHERE),
@@ -101,7 +103,7 @@ def _add_geom(
         type=mujoco.mjtGeom(kind),
         pos=scale * model.geom_pos[geom],
         quat=model.geom_quat[geom],
-        rgba=GHOST_RGBA if ghost else rgba_of(model, geom),
+        rgba=GHOST_RGBA if ghost else lit(rgba_of(model, geom)),
         contype=0,
         conaffinity=0,
         mass=0,
@@ -111,6 +113,13 @@ def _add_geom(
         made.meshname = meshes[int(model.geom_dataid[geom])]
     else:
         made.size = scale * model.geom_size[geom]
+
+
+def lit(rgba: Float[np.ndarray, "4"]) -> Float[np.ndarray, "4"]:
+    """The colour, lighter where it is so dark that no light shows its shape."""
+    light = float(rgba[:3].max())
+    more = max(0.0, (_LEAST_LIGHT - light) * 2 / 3)
+    return np.append(np.minimum(rgba[:3] + more, 1.0), rgba[3])
 
 
 def rgba_of(model: mujoco.MjModel, geom: int) -> Float[np.ndarray, "4"]:

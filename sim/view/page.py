@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from sim.template import render_page
-from sim.view.camera import camera_distance
+from sim.view.camera import shot
 from sim.view.scene import Figure, Placement, Scene, build_scene
 from spark.files import write_atomically
 
@@ -65,7 +65,7 @@ def page(
         "frames": len(scene.qpos),
         "frame_time": scene.frame_time,
         "file_frame_time": figures[0].motion.frame_time,
-        "distance": camera_distance(scene, half_view=_HALF_VIEW, aspect=1.6),
+        "distance": shot(scene, aspect=1.6, half_view=_HALF_VIEW, centered=True).distance,
         "height": scene.height,
         "figures": [
             _figure(scene, placement, figure, overlay, meshes)

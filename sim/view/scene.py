@@ -15,6 +15,7 @@ from sim.view.world import empty_world
 from spark.errors import SkeletonError
 from spark.kinematics import forward
 from spark.motion import Motion
+from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
 from spark.rotation import quat_about, quat_conj, quat_mul, quat_rotate
 
@@ -22,6 +23,7 @@ from spark.rotation import quat_about, quat_conj, quat_mul, quat_rotate
 # from two standing heights over the floor than so many of them; or further [standing heights] from
 # where the figure that leads has gone.
 _LOST_SPEED, _LOST_HEIGHT, _LOST_DISTANCE = 15.0, 3.0, 5.0
+_HEAD = 0.12  # of the standing height: from the head's joint to the crown
 _SPACING = 0.8  # of two neighbours' mean standing height, between their roots: arms do not meet
 
 
@@ -52,8 +54,19 @@ class Figure:
     @property
     def scale(self) -> float:
         """How much larger it is shown than it is."""
-        own = self.rig.standing_height
-        return 1.0 if self.height is None else self.height / own
+        return 1.0 if self.height is None else self.height / self.own_height
+
+    @property
+    def own_height(self) -> float:
+        """The height [m] of its crown over its soles in the T-pose; where it has no head, that of a
+        human with its legs."""
+        rig = self.rig
+        heads = [j for j, role in enumerate(rig.roles.roles) if role is not None and role == "head"]
+        if not heads or not rig.soles:
+            return rig.standing_height
+        heights = rig.tpose_positions[:, 2]
+        feet = [sole_positions(s, rig.tpose_positions, rig.tpose)[:, 2].min() for s in rig.soles]
+        return float(heights[heads].max() - min(feet)) + _HEAD * rig.standing_height
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,19 +1,21 @@
-"""Scenes as video files and as strips of pictures."""
+"""Scenes as video files, animated pictures and strips of pictures."""
 
 import subprocess
 from collections.abc import Callable, Iterable
 from io import BytesIO
 from pathlib import Path
 from shutil import which
+from typing import Any
 
 import numpy as np
 
 from sim.view.camera import fitting_aspect
-from sim.view.render import frames
+from sim.view.render import frames, stills
 from sim.view.scene import Scene
 from spark.errors import DependencyError, OutputError
 from spark.files import replacing, write_atomically
 
+_VIDEO_FPS, _ANIMATED_FPS = 30.0, 15.0
 Progress = Callable[[Iterable[int]], Iterable[int]]
 
 
@@ -25,7 +27,8 @@ def write_video(
     height: int = 540,
     progress: Progress = iter,
 ) -> None:
-    """An H.264 video of the whole scene at its own frame rate. `progress` wraps the frames."""
+    """An H.264 video of the whole scene, of at most `_VIDEO_FPS` frames a second. `progress` wraps
+    the frames."""
     path = Path(path)
     if not path.parent.is_dir():
         raise OutputError(f"{path}: there is no folder {path.parent}; make it first")
@@ -37,9 +40,10 @@ def _encode(
     scene: Scene, unfinished: Path, path: Path, width: int, height: int, progress: Progress
 ) -> None:
     """Write the video to `unfinished`; errors call it `path`."""
+    step = max(1, int(np.ceil(1 / (_VIDEO_FPS * scene.frame_time) - 1e-6)))
     encoder = [
         *(_ffmpeg(), "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24"),
-        *("-s", f"{width}x{height}", "-r", f"{1 / scene.frame_time:.6f}", "-i", "-"),
+        *("-s", f"{width}x{height}", "-r", f"{1 / (step * scene.frame_time):.6f}", "-i", "-"),
         *("-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p"),
         *("-movflags", "+faststart", "-f", "mp4", str(unfinished)),
     ]
@@ -47,7 +51,7 @@ def _encode(
         assert process.stdin is not None
         assert process.stderr is not None
         try:
-            indices = progress(range(len(scene.qpos)))
+            indices = progress(range(0, len(scene.qpos), step))
             for picture in frames(scene, indices, width=width, height=height):
                 process.stdin.write(picture.tobytes())
             process.stdin.close()
@@ -75,19 +79,57 @@ def write_strip(
 
     Each is `width` x `height` pixels; without a width, just wide enough for the figures.
     """
+    image = _pillow()
+    path = Path(path)
+    count = count or (5 if len(scene.placements) < 4 else 3)
+    indices = np.linspace(0, len(scene.qpos) - 1, count).round().astype(int).tolist()
+    pictures = stills(scene, indices, width=width, height=height)
+    buffer = BytesIO()
+    image.fromarray(np.concatenate(pictures, axis=1)).save(buffer, format="PNG", optimize=True)
+    write_atomically(path, buffer.getvalue())
+
+
+def write_animation(
+    scene: Scene,
+    path: str | Path,
+    *,
+    height: int = 240,
+    progress: Progress = iter,
+) -> None:
+    """A GIF or a WebP, by the ending, that loops for ever: for a README. At most `_ANIMATED_FPS`
+    frames a second; just wide enough for the figures."""
+    image = _pillow()
+    path = Path(path)
+    step = max(1, round(1 / (_ANIMATED_FPS * scene.frame_time)))
+    indices = progress(range(0, len(scene.qpos), step))
+    width = round(height * fitting_aspect(scene))
+    pictures = [
+        image.fromarray(picture.copy())
+        for picture in frames(scene, indices, width=width, height=height)
+    ]
+    # Hundredths of a second in a GIF: the rounding is spread, so that the whole lasts as long.
+    ends = np.round(100 * step * scene.frame_time * np.arange(len(pictures) + 1)) * 10
+    more: dict[str, object] = {"save_all": True, "append_images": pictures[1:], "loop": 0}
+    if path.suffix.lower() == ".gif":
+        palette = pictures[len(pictures) // 2].quantize(128)
+        pictures = [picture.quantize(palette=palette, dither=0) for picture in pictures]
+        more |= {"append_images": pictures[1:], "optimize": True, "disposal": 1}
+    else:
+        more |= {"quality": 80, "method": 4}
+    durations = np.diff(ends).astype(int).tolist()
+    try:
+        pictures[0].save(path, duration=durations, **more)
+    except OSError as error:
+        raise OutputError(f"{path}: can't be written ({error.strerror or error})") from error
+
+
+def _pillow() -> Any:
+    """Pillow's Image."""
     try:
         from PIL import Image
     except ImportError as error:
         raise DependencyError("pictures need Pillow: pip install 'spark-sim[video]'") from error
-    path = Path(path)
-    if width is None:
-        width = round(height * fitting_aspect(scene))
-    count = count or (5 if width < 2 * height else 3)
-    indices = np.linspace(0, len(scene.qpos) - 1, count).round().astype(int).tolist()
-    pictures = list(frames(scene, indices, width=width, height=height))
-    buffer = BytesIO()
-    Image.fromarray(np.concatenate(pictures, axis=1)).save(buffer, format="PNG", optimize=True)
-    write_atomically(path, buffer.getvalue())
+    return Image
 
 
 def _ffmpeg() -> str:

@@ -16,7 +16,7 @@ import numpy as np
 
 from sim import has_display
 from sim.view.annotations import Annotations
-from sim.view.camera import AZIMUTH, ELEVATION, FIELD_OF_VIEW, camera_distance
+from sim.view.camera import AZIMUTH, ELEVATION, FIELD_OF_VIEW, shot
 from sim.view.controls import press
 from sim.view.display import GHOST_GROUP
 from sim.view.hud import Hud
@@ -179,8 +179,8 @@ class Window:
         target = player.target()
         if player.view_is_new:
             camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
-            camera.distance = camera_distance(player.scene, aspect=aspect)
-            self._offset = np.zeros(3)
+            seen = shot(player.scene, aspect=aspect)
+            camera.distance, self._offset = seen.distance, seen.offset[0]
             player.view_is_new = False
         if target is not None:
             camera.lookat[:] = target + self._offset

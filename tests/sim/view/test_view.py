@@ -13,11 +13,13 @@ import pytest
 import spark_sim
 from sim.interpolate import at_times
 from sim.trajectory import ModelTrajectory, Subject
+from sim.view.camera import extents
+from sim.view.display import lit
 from sim.view.page import page, write_page
-from sim.view.render import frames
+from sim.view.render import frames, stills
 from sim.view.scene import Figure, Scene, build_scene
 from sim.view.simplify import area, simplify_together
-from sim.view.video import write_strip, write_video
+from sim.view.video import write_animation, write_strip, write_video
 from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import DependencyError, OutputError
 from spark.motion import Motion
@@ -305,3 +307,66 @@ def test_a_motion_is_not_overwritten_by_what_shows_it(option: str, tmp_path: Pat
     with pytest.raises(OutputError, match=r"a MuJoCo model is written as \.xml"):
         spark_sim.load(walk).save_mjcf(walk, force=True)  # type: ignore[union-attr]
     assert walk.read_bytes() == before
+
+
+def test_stills_are_framed_on_the_figures() -> None:
+    """The figures reach over most of each still, and no part of them is cut off."""
+    scene = build_scene(figures())
+    frames = [0, len(scene.qpos) // 2, len(scene.qpos) - 1]
+    pictures, heights = stills(scene, frames, height=240), []
+    for picture in pictures:
+        limbs = np.ptp(picture.astype(int), axis=-1) > 60
+        rows, columns = (np.flatnonzero(limbs.any(axis=axis)) for axis in (1, 0))
+        assert 0 < rows[0] < rows[-1] < 239
+        heights.append(rows[-1] - rows[0])
+        assert 0 < columns[0] < columns[-1] < picture.shape[1] - 1
+    assert max(heights) > 0.6 * 240
+
+
+def test_a_line_parts_figures_that_overlap() -> None:
+    first, _ = figures()
+    behind = replace(first, floor_z=first.floor_z + 0.1, ghost=False)
+    scene = build_scene([first, behind])
+    scene.qpos[:, scene.placements[1].columns][:, 1] = scene.qpos[:, 1] + 0.05
+    white = [(p == 255).all(-1).sum() for p in stills(scene, [0], height=240)]
+    alone = [(p == 255).all(-1).sum() for p in stills(build_scene([first]), [0], height=240)]
+    assert white[0] > alone[0] + 40
+
+
+def test_at_the_same_height_they_stand_as_tall() -> None:
+    small = replace(figures()[0], height=1.0)
+    tall = replace(figures()[1], height=2.0)
+    scene = build_scene([small, tall])
+    bounds = extents(scene, [0])[0]
+    owners = scene.model.geom_bodyid
+    up = []
+    for placement in scene.placements:
+        own = np.flatnonzero(np.isin(owners[owners > 0], placement.bodies))
+        up.append(np.ptp(bounds[own, 1]))
+    assert up[1] / up[0] == pytest.approx(2.0, rel=0.1)
+
+
+@pytest.mark.parametrize("ending", ["gif", "webp"])
+def test_animated_pictures_last_as_long_as_the_motion(tmp_path: Path, ending: str) -> None:
+    image = pytest.importorskip("PIL.Image")
+    scene = build_scene(figures())
+    out = tmp_path / f"a.{ending}"
+    write_animation(scene, out, height=80)
+    with image.open(out) as opened:
+        total = 0
+        for frame in range(opened.n_frames):
+            opened.seek(frame)
+            opened.load()
+            total += opened.info["duration"]
+        assert opened.n_frames > 10
+        assert opened.info.get("loop") == 0
+    duration = (len(scene.qpos) - 1) * scene.frame_time
+    assert abs(total / 1000 - duration) < 0.15
+
+
+def test_dark_colours_are_lifted_and_others_stay() -> None:
+    black, blue = lit(np.array([0.0, 0, 0, 1])), np.array([0.6, 0.7, 0.9, 0.5])
+    assert 0.3 < black[:3].min() < 0.5
+    np.testing.assert_allclose(lit(blue), blue)
+    grey = [float(lit(np.array([v, v, v, 1.0]))[0]) for v in np.linspace(0, 1, 20)]
+    assert grey == sorted(grey)
