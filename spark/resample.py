@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
+from spark.blocks import in_blocks
 from spark.motion import Motion
 from spark.rotation import quat_slerp
 
@@ -26,10 +27,14 @@ def rotations_at(
     rotations: Float[np.ndarray, "T *n 4"], at: Float[np.ndarray, "N"]
 ) -> Float[np.ndarray, "N *n 4"]:
     """Rotations at fractional frames, by slerp along the shorter arc."""
-    before, after, fraction = _neighbours(at, len(rotations))
-    fraction = fraction.reshape(-1, *(1,) * (rotations.ndim - 2))
-    fraction = np.broadcast_to(fraction, (len(at), *rotations.shape[1:-1]))
-    return quat_slerp(rotations[before], rotations[after], fraction)
+
+    def some(block: slice) -> Float[np.ndarray, "N *n 4"]:
+        before, after, fraction = _neighbours(at[block], len(rotations))
+        fraction = fraction.reshape(-1, *(1,) * (rotations.ndim - 2))
+        fraction = np.broadcast_to(fraction, (len(fraction), *rotations.shape[1:-1]))
+        return quat_slerp(rotations[before], rotations[after], fraction)
+
+    return in_blocks(some, len(at))
 
 
 def frames_of_keys(

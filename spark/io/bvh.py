@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
+from spark.blocks import blocks
 from spark.errors import FileFormatError, SkeletonError
 from spark.files import write_atomically
 from spark.finite import check_output
@@ -155,8 +156,9 @@ def write_bvh(bvh: Bvh, path: str | Path) -> None:
     )
     lines = ["HIERARCHY", *_hierarchy_lines(bvh.joints)]
     lines += ["MOTION", f"Frames: {len(bvh)}", f"Frame Time: {_text([bvh.frame_time])}"]
-    text = "\n".join(chain(lines, map(_text, bvh.values.tolist()), [""]))
-    write_atomically(Path(path), text.encode(bvh.encoding))
+    rows = ("".join(f"{_text(row)}\n" for row in bvh.values[b].tolist()) for b in blocks(len(bvh)))
+    text = chain(["\n".join([*lines, ""])], rows)
+    write_atomically(Path(path), (piece.encode(bvh.encoding) for piece in text))
 
 
 def _text(numbers: Iterable[float]) -> str:

@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from spark.blocks import blocks
 from spark.errors import SkeletonError, name_list
 from spark.io.bvh import Bvh, BvhJoint, Vector
 from spark.io.convention import Convention, given_unit, given_up
-from spark.io.euler import euler_over_time, quat_from_angles
+from spark.io.euler import angles_of, angles_over_time, quat_from_angles
 from spark.io.recording import Recording
 from spark.motion import Motion
 from spark.rotation import quat_angle, quat_identity
@@ -79,14 +80,21 @@ def _encode_rotations(
     motion: Motion, bvh: Bvh, convention: Convention, values: Float[np.ndarray, "T C"]
 ) -> tuple[str, ...]:
     """Fill the rotation channels; notes on rotations that the channels don't reach."""
-    in_file = np.empty_like(motion.rotations)
-    in_file[..., [0, *(1 + axis for axis in convention.axes)]] = motion.rotations
-    lost = quat_angle(quat_identity(in_file), in_file)
-    for order, (members, columns) in bvh.rotation_channels.items():
-        angles = euler_over_time(in_file[:, members], order)
-        values[:, columns] = np.round(np.degrees(angles), 6) + 0.0  # no "-0.0"
-        lost[:, members] = quat_angle(quat_from_angles(angles, order), in_file[:, members])
-    worst = lost.max(axis=0)
+    worst = np.zeros(len(bvh.joints))
+    for block in blocks(len(motion)):
+        rotations = motion.picked(block).rotations
+        in_file = np.empty_like(rotations)
+        in_file[..., [0, *(1 + axis for axis in convention.axes)]] = rotations
+        lost = quat_angle(quat_identity(in_file), in_file)
+        for order, (members, columns) in bvh.rotation_channels.items():
+            angles = angles_of(in_file[:, members], order)
+            values[block, columns] = angles
+            lost[:, members] = quat_angle(quat_from_angles(angles, order), in_file[:, members])
+        worst = np.maximum(worst, lost.max(axis=0))
+    for order, (_, columns) in bvh.rotation_channels.items():
+        for joint in columns:  # one at a time: what is in between is several times as large
+            angles = angles_over_time(values[:, joint], order)
+            values[:, joint] = np.round(np.degrees(angles), 6) + 0.0  # no "-0.0"
     names = [bvh.joints[j].name for j in np.flatnonzero(worst > _MAX_LOST_ANGLE)]
     if not names:
         return ()
@@ -103,18 +111,20 @@ def _encode_positions(
     bvh, convention = template.bvh, template.convention
     joints, axes, columns = bvh.position_channels.T
     offsets = np.array([joint.offset for joint in bvh.joints])
-    local = np.repeat(motion.skeleton.offsets[None], len(motion), axis=0)
-    if motion.translations is not None:
-        local[:] = motion.translations
-    local[:, 0] = motion.root_pos
-    in_file = convention.to_file(local)
-    values[:, columns] = in_file[:, joints, axes]
+    worst = np.zeros(len(bvh.joints))
+    for block in blocks(len(motion)):
+        part = motion.picked(block)
+        local = np.repeat(part.skeleton.offsets[None], len(part), axis=0)
+        if part.translations is not None:
+            local[:] = part.translations
+        local[:, 0] = part.root_pos
+        in_file = convention.to_file(local)
+        values[block, columns] = in_file[:, joints, axes]
+        lost = np.abs(in_file - offsets) * convention.unit_m
+        lost[:, joints, axes] = 0.0
+        worst = np.maximum(worst, lost.max(axis=(0, 2)))
     if template.adds_offset:
         values[:, columns] -= np.where(joints > 0, offsets[joints, axes], 0.0)
-
-    lost = np.abs(in_file - offsets) * convention.unit_m
-    lost[:, joints, axes] = 0.0
-    worst = lost.max(axis=(0, 2))
     longest = np.linalg.norm(motion.skeleton.offsets, axis=-1).max()
     names = [bvh.joints[j].name for j in np.flatnonzero(worst > _MAX_LOST_LENGTH * longest)]
     if not names:

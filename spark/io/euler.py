@@ -30,17 +30,33 @@ def euler_over_time(q: Float[np.ndarray, "T *n 4"], order: str) -> Float[np.ndar
     second solution, (a + pi, pi - b, c + pi): the first frame takes the one with b in
     [-pi/2, pi/2], the others the one that is nearer to the frame before.
     """
+    return angles_over_time(angles_of(q, order), order)
+
+
+def angles_of(q: Float[np.ndarray, "*n 4"], order: str) -> Float[np.ndarray, "*n k"]:
+    """Euler angles [rad] of each rotation by itself, as `euler_over_time` takes them for a first
+    frame."""
     if len(order) == 1:
         along = q[..., 1 + "xyz".index(order)]
-        return np.unwrap(2 * np.arctan2(along, q[..., 0]), axis=0)[..., None]
+        return 2 * np.arctan2(along, q[..., 0])[..., None]
     all_axes = order + "".join(axis for axis in AXES if axis not in order)
     angles = euler_from_quat(q, all_axes)
     if len(order) == 2:
         # The solution without a third angle is the one that two axes can express.
         other = _other(angles)
         exact = np.abs(_wrapped(other[..., 2])) < np.abs(angles[..., 2])
-        return np.unwrap(np.where(exact[..., None], other, angles), axis=0)[..., :2]
-    _hold_third(angles, all_axes)
+        return np.where(exact[..., None], other, angles)[..., :2]
+    return angles
+
+
+def angles_over_time(
+    angles: Float[np.ndarray, "T *n k"], order: str
+) -> Float[np.ndarray, "T *n k"]:
+    """The angles of `angles_of` in successive frames, chosen as `euler_over_time` says."""
+    if len(order) < 3:
+        return np.unwrap(angles, axis=0)
+    angles = angles.copy()
+    _hold_third(angles, order)
     other = _other(angles)
     # Changing over saves the same whichever solution the frame before took, so that whether a frame
     # takes the other one is a parity of the changes up to it.

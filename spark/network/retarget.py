@@ -14,6 +14,7 @@ from functools import cache
 import numpy as np
 from jaxtyping import Float, Int
 
+from spark.blocks import in_blocks
 from spark.errors import DependencyError, name_list
 from spark.network.features import (
     BodyFeatures,
@@ -80,11 +81,19 @@ class NetworkRetargeter:
         )
         if start_30fps is start:
             return blended
-        correction = quat_mul(blended.rotations, quat_conj(start_30fps.rotations))
+        correction = in_blocks(
+            lambda block: quat_mul(
+                blended.rotations[block], quat_conj(start_30fps.rotations[block])
+            ),
+            len(blended),
+        )
         at = np.arange(len(start)) * start.frame_time / FRAME_TIME
         return replace(
             start,
-            rotations=quat_mul(rotations_at(correction, at), start.rotations),
+            rotations=in_blocks(
+                lambda block: quat_mul(rotations_at(correction, at[block]), start.rotations[block]),
+                len(start),
+            ),
             hips=start.hips + values_at(blended.hips - start_30fps.hips, at),
         )
 

@@ -22,11 +22,20 @@ def floor_height(
 
     A body without feet has its floor at 0.
     """
-    soles = rig.soles
-    if not soles:
-        return 0.0
-    points = [sole_positions(sole, positions, world)[..., 2] for sole in soles]
-    return float(np.percentile(np.concatenate(points, axis=1).min(1), 5))
+    return floor_under(lowest_sole(rig, positions, world))
+
+
+def lowest_sole(
+    rig: Rig, positions: Float[np.ndarray, "T J 3"], world: Float[np.ndarray, "T J 4"]
+) -> Float[np.ndarray, "T"]:
+    """The height [m] of the lowest sole point in each frame; 0 without feet."""
+    points = [sole_positions(sole, positions, world)[..., 2] for sole in rig.soles]
+    return np.concatenate(points, axis=1).min(1) if points else np.zeros(len(positions))
+
+
+def floor_under(lowest: Float[np.ndarray, "T"]) -> float:
+    """The floor's height [m] from that of the lowest sole point in each frame."""
+    return float(np.percentile(lowest, 5))
 
 
 def speeds(positions: Float[np.ndarray, "T *n 3"], frame_time: float) -> Float[np.ndarray, "T *n"]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from spark.blocks import in_blocks
 from spark.errors import name_list
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
@@ -135,7 +136,10 @@ def transfer(source: CanonicalMotion, target: Rig) -> CanonicalMotion:
     The hips' path is scaled by the hip heights' ratio about the floor. The floor is z = 0, unless
     the source's feet say that it is elsewhere: then it is moved to 0 and a note says so.
     """
-    rotations = correspond(source.rig, target).rotations(source.rotations, target)
+    link = correspond(source.rig, target)
+    rotations = in_blocks(
+        lambda block: link.rotations(source.rotations[block], target), len(source)
+    )
     scale = target.hip_height / source.rig.hip_height
     notes = (*source.notes, *_without_arms(source.rig, target), *_without_fingers(source, target))
     lift = 0.0

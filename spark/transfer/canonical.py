@@ -1,14 +1,16 @@
 """Canonical form: a motion as rotations since the T-pose, one language for every rig."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
+from spark.blocks import BLOCK, in_blocks
 from spark.kinematics import forward, local_rotations, world_positions
-from spark.motion import Motion
+from spark.motion import LazyMotion, Motion
 from spark.resample import frames_at_rate, rotations_at, values_at
-from spark.rig.contacts import floor_height
+from spark.rig.contacts import floor_under, lowest_sole
 from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_rotate
 from spark.summary import counted, time_span
@@ -41,35 +43,68 @@ class CanonicalMotion:
 
     def frames(self, start: int, stop: int) -> "CanonicalMotion":
         """The motion of frames `start` to `stop`, exclusive."""
-        return replace(self, rotations=self.rotations[start:stop], hips=self.hips[start:stop])
+        return self.picked(slice(start, stop))
+
+    def picked(self, span: slice) -> "CanonicalMotion":
+        """The frames of a slice, as `Motion.picked` takes them."""
+        return replace(self, rotations=self.rotations[span], hips=self.hips[span])
 
 
 def to_canonical(motion: Motion, rig: Rig) -> CanonicalMotion:
     """The canonical form of a motion on its own rig. Bones that the file stretches keep the
     skeleton's length: only the hips' path and the rotations are taken over."""
-    positions, world = forward(motion)
-    return CanonicalMotion(
-        rig,
-        motion.frame_time,
-        quat_mul(world, quat_conj(rig.tpose)),
-        positions[:, rig.hips].mean(1),
-        floor_height(rig, positions, world),
-    )
+    count = len(motion)
+    hips, lowest = np.empty((count, 3)), np.empty(count)
+
+    def turned(block: slice) -> Float[np.ndarray, "T J 4"]:
+        positions, world = forward(motion.picked(block))
+        hips[block] = positions[:, rig.hips].mean(1)
+        lowest[block] = lowest_sole(rig, positions, world)
+        return quat_mul(world, quat_conj(rig.tpose))
+
+    rotations = in_blocks(turned, count)
+    return CanonicalMotion(rig, motion.frame_time, rotations, hips, floor_under(lowest))
 
 
-def canonical_positions(canonical: CanonicalMotion) -> Float[np.ndarray, "T J 3"]:
-    """Where the joints are [m, world]; those above the root joint as if rigid with it."""
+def canonical_positions(
+    canonical: CanonicalMotion, joints: Sequence[int] | None = None
+) -> Float[np.ndarray, "T J 3"]:
+    """Where the joints are [m, world], or some of them; those above the root joint as if rigid with
+    it."""
     rig = canonical.rig
-    world = quat_mul(canonical.rotations, rig.tpose)
-    positions = world_positions(rig.skeleton, world, np.zeros((len(canonical), 3)))
-    return positions + (canonical.hips - positions[:, rig.hips].mean(1))[:, None]
+
+    def some(block: slice) -> Float[np.ndarray, "T J 3"]:
+        hips = canonical.hips[block]
+        world = quat_mul(canonical.rotations[block], rig.tpose)
+        positions = world_positions(rig.skeleton, world, np.zeros_like(hips))
+        positions += (hips - positions[:, rig.hips].mean(1))[:, None]
+        return positions if joints is None else positions[:, joints]
+
+    return in_blocks(some, len(canonical))
 
 
 def from_canonical(canonical: CanonicalMotion) -> Motion:
     """The motion on the rig's own skeleton: the inverse of `to_canonical`.
 
-    The rig's root joint takes the path through the world; joints above it stay where they rest.
+    The rig's root joint takes the path through the world; joints above it stay where they rest. Of
+    a long motion, frames are made as they are asked for.
     """
+    count = len(canonical)
+    if count <= BLOCK:
+        return _on_skeleton(canonical)
+    root_pos = in_blocks(
+        lambda block: _on_skeleton(canonical.frames(block.start, block.stop)).root_pos, count
+    )
+
+    return LazyMotion(
+        canonical.rig.skeleton,
+        canonical.frame_time,
+        root_pos,
+        lambda span: _on_skeleton(canonical.picked(span)),
+    )
+
+
+def _on_skeleton(canonical: CanonicalMotion) -> Motion:
     rig, skeleton = canonical.rig, canonical.rig.skeleton
     world = quat_mul(canonical.rotations, rig.tpose)
     rotations = local_rotations(skeleton, world)

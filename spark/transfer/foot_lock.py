@@ -13,12 +13,13 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from spark.blocks import in_blocks
 from spark.rig.contacts import planted_points
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
 from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
-from spark.transfer.leg_ik import bend_leg, blend_between, leg_of
+from spark.transfer.leg_ik import Leg, bend_leg, blend_between, leg_of
 
 _MIN_STANCE = 0.1  # [s] a shorter one is a swinging foot that is slow and low for a moment
 _CAPTURE_NOISE = 0.03  # [hip heights] 3 cm of an adult
@@ -27,15 +28,14 @@ _CAPTURE_NOISE = 0.03  # [hip heights] 3 cm of an adult
 def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
     """`moved`, the transfer of `source`, with its feet held while the source's stand."""
     scale = moved.rig.hip_height / source.rig.hip_height
-    source_positions, positions = canonical_positions(source), canonical_positions(moved)
-    rotations = moved.rotations
+    moves: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
     for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
         leg = leg_of(moved.rig.skeleton, moved.rig.roles.roles, group)
         contact = _contact(source.rig, moved.rig, group)
         if leg is None or contact is None:
             continue
         from_joint, to_joint = contact
-        path = source_positions[:, from_joint] - [0, 0, source.floor_z]
+        path = canonical_positions(source, [from_joint])[:, 0] - [0, 0, source.floor_z]
         stance = _stances(
             planted_points(path, source.frame_time, source.rig.standing_height),
             source.frame_time,
@@ -47,15 +47,19 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
         desired = path[frames] * scale
         desired[:, 2] -= scale * _rest_height(source.rig, from_joint)
         rest_z = moved.floor_z + _rest_height(moved.rig, to_joint)
-        current = positions[frames, to_joint] - [0, 0, rest_z]
+        current = canonical_positions(moved, [to_joint])[frames, 0] - [0, 0, rest_z]
         desired[:, :2] = _without_mean(desired[:, :2], counts)
         desired[:, :2] -= _clamped(desired[:, :2], _CAPTURE_NOISE * moved.rig.hip_height)
         current[:, :2] = _without_mean(current[:, :2], counts)
-        error = desired - current
-        rotations = bend_leg(
-            rotations, positions, leg, blend_between(error, frames, len(positions))
-        )
-    return replace(moved, rotations=rotations)
+        moves.append((leg, blend_between(desired - current, frames, len(moved))))
+
+    def bent(block: slice) -> Float[np.ndarray, "T J 4"]:
+        rotations, positions = moved.rotations[block], canonical_positions(moved.picked(block))
+        for leg, move in moves:
+            rotations = bend_leg(rotations, positions, leg, move[block])
+        return rotations
+
+    return replace(moved, rotations=in_blocks(bent, len(moved)))
 
 
 def _without_mean(

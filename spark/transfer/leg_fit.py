@@ -17,6 +17,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from spark.blocks import blocks
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_rotate
@@ -47,6 +48,14 @@ def fit_legs(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion
     """`moved`, the transfer of `source`, with its path over the ground scaled by `travel_scale` and
     its ankles where the source's are. A leg stays as it is where one of the two rigs has no foot.
     """
+    out = replace(moved, rotations=np.empty_like(moved.rotations), hips=np.empty_like(moved.hips))
+    for block in blocks(len(moved)):
+        fitted = _fitted(source.picked(block), moved.picked(block))
+        out.rotations[block], out.hips[block] = fitted.rotations, fitted.hips
+    return out
+
+
+def _fitted(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
     start, target = source.rig, moved.rig
     scale, rise = travel_scale(start, target), target.hip_height / start.hip_height
     moved = replace(moved, hips=np.column_stack([source.hips[:, :2] * scale, moved.hips[:, 2]]))

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
+from spark.blocks import in_blocks
 from spark.errors import name_list
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
@@ -71,11 +72,16 @@ def with_target_prior(
     prior = _fit(features, np.concatenate(lost))
     if not prior.trust.any():
         return moved
-    corrections = quat_from_rotvec(prior.predict(_features(moved)))
+
+    def corrected(block: slice) -> Float[np.ndarray, "T J 4"]:
+        part = moved.picked(block)
+        corrections = quat_from_rotvec(prior.predict(_features(part)))
+        return _corrected(part.rotations, joints, link.unmatched, corrections)
+
     names = name_list([rig.skeleton.names[j] for j in joints])
     return replace(
         moved,
-        rotations=_corrected(moved.rotations, joints, link.unmatched, corrections),
+        rotations=in_blocks(corrected, len(moved)),
         notes=(*moved.notes, f"{names}: corrected by the target's own motion"),
     )
 
