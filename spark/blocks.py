@@ -8,9 +8,9 @@ import numpy as np
 BLOCK = 4096  # frames: 4 MB of quaternions of 31 joints, which the processor's cache nearly holds
 
 
-def blocks(count: int, size: int = BLOCK) -> Iterator[slice]:
-    """`count` frames in order, `size` at a time."""
-    return (slice(start, min(start + size, count)) for start in range(0, count, size))
+def blocks(count: int) -> Iterator[slice]:
+    """`count` frames in order, at most `BLOCK` at a time."""
+    return (slice(start, min(start + BLOCK, count)) for start in range(0, count, BLOCK))
 
 
 def in_blocks(work: Callable[[slice], np.ndarray], count: int) -> np.ndarray:
