@@ -29,6 +29,7 @@ def load(
     roles: File | None = None,
     fps: float | None = None,
     body_model: File | None = None,
+    clip: str | None = None,
 ) -> Clip: ...
 @overload
 def load(
@@ -38,6 +39,7 @@ def load(
     roles: File | None = None,
     fps: float | None = None,
     body_model: File | None = None,
+    clip: str | None = None,
 ) -> Clip: ...
 @overload
 def load(
@@ -50,6 +52,7 @@ def load(
     quat: Quat | None = None,
     fps: float | None = None,
     body_model: File | None = None,
+    clip: str | None = None,
 ) -> AnyClip: ...
 def load(
     path: File,
@@ -61,6 +64,7 @@ def load(
     quat: str | None = None,
     fps: float | None = None,
     body_model: File | None = None,
+    clip: str | None = None,
 ) -> AnyClip:
     """Read a motion from a file, or a robot by its name. What is not given is inferred, and the
     clip's `notes` say so.
@@ -70,6 +74,7 @@ def load(
       x, y or z; `roles` is a map of joints in TOML, as `spark-sim inspect --save-map` writes it.
       `fps` is the rate where the file says none, or a wrong one. `body_model` is your own file of
       SMPL, SMPL-H or SMPL-X (.npz), for the exact bones of a motion of that family.
+      `clip` names one of several animations in a glTF or FBX file.
     - A robot's motion (.npz, .csv, .pkl, .motion, SONIC's folder) is a `RobotClip`. `robot` is the
       robot's name or MJCF. `quat` (xyzw or wxyz) and `fps` are what a CSV does not say.
     - A robot's name or MJCF is a `RobotClip` of one frame, in its T-pose. `roles` is then a map by
@@ -80,7 +85,7 @@ def load(
     """
     path = Path(path)
     given = {"unit": unit, "up": up, "roles": roles, "robot": robot, "quat": quat, "fps": fps}
-    given["body_model"] = body_model
+    given |= {"body_model": body_model, "clip": clip}
     for name, value in given.items():
         if value is not None and name not in takes(path):
             raise ConventionError(f"{path}: {name} does not go with such a file; leave it out")
@@ -92,7 +97,7 @@ def load(
         raise FileFormatError(path, None, "is a folder; expected a file, or a robot's name")
     if path.suffix.lower() in formats.SUFFIXES and not holds_person(path):
         return load_robot_motion(path, robot=robot, quat=quat, fps=fps)
-    recording = read_motion(path, unit=unit, up=up, fps=fps, body_model=body_model)
+    recording = read_motion(path, unit=unit, up=up, fps=fps, body_model=body_model, clip=clip)
     names = None if roles is None else rolemap.read(roles, recording.motion.skeleton)
     return Clip(recording, path.stem, names)
 

@@ -4,24 +4,15 @@ Read here because the general readers drop skins. Khronos, "glTF 2.0 Specificati
 in the file's pose is `world(joint) · inverse bind matrix · vertex`; metres, Y up.
 """
 
-import base64
-import binascii
-import json
-import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from spark.errors import FileFormatError
+from spark.io.gltf_file import GltfFile
 
-_GLB, _JSON_CHUNK, _BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
-_COMPONENTS = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-_COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
 _TO_Z_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
@@ -41,40 +32,17 @@ class SkinnedMesh:
 
 def read_skinned_mesh(path: str | Path) -> SkinnedMesh:
     """All skinned meshes of a file. Raises FileFormatError where it has none or can't be read."""
-    path = Path(path)
-    try:
-        return _Reader(path).read()
-    except OSError as error:
-        raise FileFormatError(path, None, f"can't be read ({error.strerror})") from error
-    except (
-        AttributeError,
-        IndexError,
-        KeyError,
-        OverflowError,
-        RecursionError,
-        TypeError,
-        ValueError,
-        binascii.Error,
-        struct.error,
-    ) as error:
-        reason = f"{type(error).__name__}: {error}"
-        raise FileFormatError(path, None, f"is no valid glTF 2.0 file ({reason})") from error
+    file = GltfFile(Path(path))
+    with file.checked():
+        return _Reader(file).read()
 
 
 class _Reader:
     """The parts of one file."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        content = path.read_bytes()
-        self.binary = b""
-        if content[:4] == struct.pack("<I", _GLB):
-            content, self.binary = self._chunks(content)
-        self.json: dict[str, Any] = self._parsed(content)
-        compressed = [x for x in _COMPRESSED if x in self.json.get("extensionsRequired", ())]
-        if compressed:
-            raise self._error(f"is compressed ({compressed[0]}); expected one exported without")
-        self.nodes = self.json.get("nodes", [])
+    def __init__(self, file: GltfFile) -> None:
+        self.json, self.nodes = file.json, file.nodes
+        self._accessor, self._error = file.accessor, file.error
 
     def read(self) -> SkinnedMesh:
         skinned = [node for node in self.nodes if "skin" in node and "mesh" in node]
@@ -132,36 +100,6 @@ class _Reader:
             owners.append(joints[owner])
         return np.concatenate(points), np.concatenate(owners)
 
-    def _accessor(self, index: int) -> Float[np.ndarray, "n w"]:
-        """Numbers of the file, one row an element; normalised integers as fractions."""
-        accessor = self.json["accessors"][index]
-        if "sparse" in accessor or "bufferView" not in accessor:
-            raise self._error("has a sparse accessor in its skin; expected plain ones")
-        view = self.json["bufferViews"][accessor["bufferView"]]
-        dtype = np.dtype("<" + _COMPONENTS[accessor["componentType"]])
-        width, count = _WIDTHS[accessor["type"]], int(accessor["count"])
-        data = self._buffer(view["buffer"])
-        start = int(view.get("byteOffset", 0)) + int(accessor.get("byteOffset", 0))
-        stride = int(view.get("byteStride", dtype.itemsize * width))
-        end = start + (count - 1) * stride + dtype.itemsize * width
-        if count < 1 or start < 0 or stride < dtype.itemsize or end > len(data):
-            raise self._error(f"accessor {index} lies outside its buffer of {len(data)} bytes")
-        rows = np.ndarray((count, width), dtype, data, start, (stride, dtype.itemsize))
-        values = rows.astype(float)
-        if accessor.get("normalized"):
-            values = np.maximum(values / np.iinfo(dtype).max, -1.0)
-        if not np.isfinite(values).all():
-            raise self._error(f"accessor {index} has a value that is no number")
-        return values
-
-    def _buffer(self, index: int) -> bytes:
-        uri = self.json["buffers"][index].get("uri")
-        if uri is None:
-            return self.binary
-        if uri.startswith("data:"):
-            return base64.b64decode(uri.split(",", 1)[1])
-        return (self.path.parent / unquote(uri)).read_bytes()
-
     def _world(self, above: dict[int, int], node: int) -> Float[np.ndarray, "4 4"]:
         """Where a node is in the pose that the file has."""
         matrix = _local(self.nodes[node])
@@ -196,27 +134,6 @@ class _Reader:
                 tree += children.get(joint, [])
             trees.append(tree)
         return max(trees, key=len)
-
-    def _parsed(self, content: bytes) -> dict[str, Any]:
-        try:
-            found: dict[str, Any] = json.loads(content)
-        except ValueError as error:
-            raise self._error("is no valid glTF 2.0 file: neither a GLB nor JSON") from error
-        return found
-
-    @staticmethod
-    def _chunks(content: bytes) -> tuple[bytes, bytes]:
-        """The JSON and the binary chunk of a GLB."""
-        found: dict[int, bytes] = {}
-        at = 12
-        while at + 8 <= len(content):
-            length, kind = struct.unpack_from("<II", content, at)
-            found.setdefault(kind, content[at + 8 : at + 8 + length])
-            at += 8 + length
-        return found[_JSON_CHUNK], found.get(_BINARY_CHUNK, b"")
-
-    def _error(self, message: str) -> FileFormatError:
-        return FileFormatError(self.path, None, message)
 
 
 def _local(node: dict[str, Any]) -> Float[np.ndarray, "4 4"]:

@@ -1,6 +1,5 @@
 """The nodes of an FBX file and how they move, evaluated by ufbx (the package pufbx)."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -8,20 +7,12 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import DependencyError, FileFormatError, name_list
+from spark.io.nodes import NodeJoint, chosen_clip, joints_of
 from spark.resample import frames_of_keys, rotations_at, values_at
 from spark.rotation import matrix_from_quat
 
 # Frames times nodes of a file: 12 hours of a body with fingers at 30 fps. More is a broken file.
 _MAX_VALUES = 100_000_000
-
-
-@dataclass(frozen=True)
-class FbxJoint:
-    """A node that is read as a joint: its name, and the joint that it hangs on (-1: none)."""
-
-    node: int
-    name: str
-    parent: int
 
 
 class FbxScene:
@@ -51,7 +42,7 @@ class FbxScene:
         self._nodes: list[Any] = list(self._scene.nodes)
         self._parents = [-1 if n.parent is None else n.parent.typed_id for n in self._nodes]
 
-    def joints(self) -> tuple[list[FbxJoint], tuple[str, ...]]:
+    def joints(self) -> tuple[list[NodeJoint], tuple[str, ...]]:
         """Bones, and other nodes that lie between them, depth-first below one root; and notes.
 
         In a file without bones its empty nodes. Of several skeletons the largest.
@@ -63,34 +54,17 @@ class FbxScene:
             notes += ("no node is a bone: its empty nodes are read as joints",)
         if not bones:
             raise FileFormatError(self.path, None, "holds no skeleton; expected bones")
-        lines = [self._line(i) for i in bones]
-        tops = [line[0] for line in lines]
-        top = max(tops, key=tops.count)
-        others = sorted({self._nodes[i].name for i in tops if i != top})
-        if others:
-            notes += (f"of several skeletons the largest is read, not {name_list(others)}",)
-        lines = [line for line in lines if line[0] == top]
-        shared = 0
-        while all(len(line) > shared + 1 for line in lines) and (
-            len({line[shared + 1] for line in lines}) == 1
-        ):
-            shared += 1
-        children: dict[int, list[int]] = {}
-        for i in sorted({i for line in lines for i in line[shared + 1 :]}):
-            children.setdefault(self._parents[i], []).append(i)
-        joints: list[FbxJoint] = []
-        stack = [(lines[0][shared], -1)]
-        while stack:
-            node, parent = stack.pop()
-            stack += [(child, len(joints)) for child in reversed(children.get(node, []))]
-            joints.append(FbxJoint(node, self._nodes[node].name or f"node{node}", parent))
-        return joints, notes
+        parents = [parent if parent > 0 else -1 for parent in self._parents]
+        joints, found = joints_of(bones, parents, [node.name for node in self._nodes])
+        return joints, notes + found
 
-    def animation(self, frame_time: float) -> tuple[Any, Float[np.ndarray, "T"], tuple[str, ...]]:
+    def animation(
+        self, frame_time: float, clip: str | None = None
+    ) -> tuple[Any, Float[np.ndarray, "T"], tuple[str, ...]]:
         """The animation to read, the times [s] of its frames, and notes.
 
-        Of several the one that moves the most nodes, the longest of those: exporters leave empty
-        ones beside it. None and one frame where nothing moves.
+        The one called `clip`; of several the one that moves the most nodes, the longest of those:
+        exporters leave empty ones beside it. None and one frame where nothing moves.
         """
         stacks = list(self._scene.anim_stacks)
         baked = [
@@ -104,6 +78,8 @@ class FbxScene:
             key=lambda i: (len(baked[i].modified_nodes), baked[i].key_time_max),
             default=None,
         )
+        if clip is not None:
+            best = chosen_clip(clip, [stack.name for stack in stacks], self.path)
         if best is None or not len(baked[best].modified_nodes):
             return (
                 None,
@@ -123,7 +99,7 @@ class FbxScene:
         return baked[best], begin + frame_time * np.arange(count), notes
 
     def world(
-        self, joints: list[FbxJoint], baked: Any, times: Float[np.ndarray, "T"]
+        self, joints: list[NodeJoint], baked: Any, times: Float[np.ndarray, "T"]
     ) -> tuple[Float[np.ndarray, "T J 3"], Float[np.ndarray, "T J 3 3"]]:
         """Where the joints are and how their axes lie (with scale) at `times`, in file units and
         axes. Without `baked` that of the nodes' own transforms."""

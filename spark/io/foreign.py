@@ -64,7 +64,7 @@ def foreign_recording(
         raise ConventionError(f"{path}: {error}") from error
     convention = Convention(unit_m, up_axis)
     motion = in_si(motion, convention)
-    tall = float(np.ptp(motion.skeleton.rest_positions, axis=0).max())
+    tall = float(np.ptp(motion.skeleton.rest_positions[:, 2]))
     if unit is None and not HUMAN_HEIGHTS[0] < tall < HUMAN_HEIGHTS[1]:
         found.append(f"{tall:.3g} m is no human's height; check, and give --unit")
     bvh = replace(encode_new(motion, unit=unit_m, up=up_axis), path=path)

@@ -31,11 +31,12 @@ class Format:
 
 
 BVH = Format("BVH", (".bvh",), (*UNIT_AND_UP, "fps"), b"HIERARCHY")
-FBX = Format("FBX", (".fbx",), UNIT_AND_UP, b"Kaydara FBX Binary")
+FBX = Format("FBX", (".fbx",), (*UNIT_AND_UP, "clip"), b"Kaydara FBX Binary")
+GLTF = Format("glTF", (".glb", ".gltf", ".vrm", ".vrma"), (*UNIT_AND_UP, "fps", "clip"), b"glTF")
 SMPL = Format("SMPL", (".npz", ".npy", ".pt", ".pth"), (*UNIT_AND_UP, "fps", "body_model"))
 POSITIONS = Format("positions", (".npz", ".npy"), (*UNIT_AND_UP, "fps"))
 
-FORMATS = (BVH, FBX, SMPL, POSITIONS)
+FORMATS = (BVH, FBX, GLTF, SMPL, POSITIONS)
 _ROBOTS = frozenset({"qpos", "joint_pos", "dof_pos"})
 """An npz with one of these arrays is a robot's motion."""
 
@@ -49,6 +50,7 @@ def read_motion(
     up: str | None = None,
     fps: float | None = None,
     body_model: str | Path | None = None,
+    clip: str | None = None,
 ) -> Recording:
     """The recording in a file of any of the formats, told apart by content and ending.
 
@@ -58,6 +60,7 @@ def read_motion(
     path = Path(path)
     known = format_of(path)
     given: dict[str, Any] = {"unit": unit, "up": up, "fps": fps, "body_model": body_model}
+    given["clip"] = clip
     given = {name: value for name, value in given.items() if value is not None}
     for name in given:
         if name not in known.options:
@@ -103,6 +106,10 @@ def _reader(known: Format) -> Reader:
         from spark.io.fbx import read_fbx
 
         return read_fbx
+    if known is GLTF:
+        from spark.io.gltf import read_gltf
+
+        return read_gltf
     if known is SMPL:
         from spark.io.smpl import read_smpl
 

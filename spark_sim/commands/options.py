@@ -32,6 +32,12 @@ def add_corrections(parser: ArgumentParser, file: str, prefix: str = "") -> None
         metavar="TOML",
         help="which joint is what, as `spark-sim inspect --save-map` writes it",
     )
+    group.add_argument(
+        f"--{prefix}clip",
+        dest=f"{dest}clip",
+        metavar="NAME",
+        help="which of several animations in a glTF or FBX file",
+    )
     if prefix != "to-":  # a target is a character's file
         group.add_argument(
             f"--{prefix}body-model",
@@ -75,7 +81,7 @@ def add_robot_motion(
     )
 
 
-_READING = ("unit", "up", "roles", "body_model", "robot", "quat", "fps")
+_READING = ("unit", "up", "roles", "body_model", "clip", "robot", "quat", "fps")
 
 
 def given(args: Namespace, prefix: str = "") -> dict[str, Any]:
