@@ -78,7 +78,9 @@ def read_positions(
     rate = fps or points.fps
     if rate is None:
         rate = layout.usual_fps if layout is not None else 30.0
-        notes.append(f"{rate:g} fps, as is usual: the file says none; else give --fps")
+        notes.append(
+            f"{rate:g} fps, as is usual: the file says none (--fps, or retarget's --source-fps)"
+        )
     try:
         seen, convention = _in_si(seen, layout, 1 / rate, unit, up, notes)
     except ConventionError as error:
