@@ -38,6 +38,7 @@ SLOW = (
     "tests/spark/transfer/test_analytic.py::test_every_pair_of_humanoids_keeps_limb_directions",
     "tests/spark_sim/shelf/test_batch.py::test_killed_at_random_moments",
     "tests/spark_sim/shelf/test_processes.py",
+    "tests/spark_sim/shelf/test_ray.py",
     "tests/spark_sim/shelf/test_report.py",
     "tests/spark_sim/test_batch_command.py",
     "tests/spark_sim/test_cli.py",

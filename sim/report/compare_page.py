@@ -46,7 +46,7 @@ def compare_page(
     shown = [(name, subjects[name], report.clip) for name, report in reports.items()]
     theirs = next((r.source for r in reports.values() if r.source is not None), None)
     if source is not None and theirs is not None:
-        shown.append((*source, theirs))
+        shown.append((f"{source[0]} (source)", source[1], theirs))
     figures = [Figure(subject, name, clip.floor_z) for name, subject, clip in shown]
     overlays = [overlay(clip, subject) for _, subject, clip in shown]
     return render_page(

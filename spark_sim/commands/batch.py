@@ -80,6 +80,14 @@ def configure(parser: ArgumentParser) -> None:
     )
     add_workers(parser)
     parser.add_argument(
+        "--backend",
+        choices=("local", "ray"),
+        default="local",
+        help="processes of this machine (default), or all cores of the Ray cluster that "
+        "RAY_ADDRESS names or this machine belongs to; IN, OUT and TARGET then lie on storage "
+        "that all its machines see",
+    )
+    parser.add_argument(
         "--shard",
         metavar="I/N",
         type=_shard,
@@ -156,8 +164,13 @@ def run(args: Namespace) -> int:
 
 
 def _backend(args: Namespace) -> "Backend":
-    """Who does the jobs: processes of this machine."""
+    """Who does the jobs: processes of this machine, or a cluster's."""
     from functools import partial
+
+    if args.backend == "ray":
+        from spark_sim.shelf.ray_cluster import on_ray
+
+        return on_ray
 
     from spark_sim.shelf.processes import in_processes
 

@@ -13,7 +13,7 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 ATTEMPTS = 2  # a process may be killed for what another needed; twice is the job's own fault
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+THREADS = ("OMP_NUMTHREADS", "OPENBLAS_NUMTHREADS", "MKL_NUMTHREADS")
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,11 @@ class Died:
     the signal that killed it as a negative number."""
 
     code: int
+    why: str = ""
 
     def __str__(self) -> str:
+        if self.why:
+            return self.why
         if self.code >= 0:
             return f"its process ended with code {self.code}"
         name = signal.Signals(-self.code).name
@@ -137,8 +140,8 @@ def _serve(pipe: Connection, work: Callable[[Any], Any]) -> None:
 @contextmanager
 def _one_thread() -> Iterator[None]:
     """What starts meanwhile computes on one thread: libraries read this when they are loaded."""
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
     try:
         yield
     finally:
