@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -11,6 +12,8 @@ from typing import Any, TextIO, TypeVar
 T = TypeVar("T")
 
 PROGRAM = "spark-sim"
+# All but tab and line feed, and the colours (SGR) that the report's text has.
+_CONTROL = re.compile(r"(?!\x1b\[[0-9;]{0,9}m)[\x00-\x08\x0b-\x1f\x7f-\x9f]")
 
 
 def say(text: str) -> None:
@@ -40,7 +43,9 @@ def error(text: str) -> None:
 
 
 def _line(text: str, stream: TextIO) -> None:
-    """One flushed line, so that stdout and stderr keep their order; above a bar where one is up."""
+    """One flushed line, so that stdout and stderr keep their order; above a bar where one is up.
+    Control characters are written out: names of files and joints must not steer a terminal."""
+    text = _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
     if "tqdm" in sys.modules:
         sys.modules["tqdm"].tqdm.write(text, file=stream)
         stream.flush()

@@ -23,6 +23,7 @@ SLOW = (
     "tests/robots/stream/test_stream.py::test_the_bars_hold_on_the_walk",
     "tests/robots/stream/test_stream.py::test_the_bars_hold_on_real_clips",
     "tests/scripts/",
+    "tests/sim/body/test_names.py",
     "tests/sim/physics/",
     "tests/sim/report/test_compare_page.py::test_a_finding_goes_to_its_moment",
     "tests/sim/report/test_page.py",

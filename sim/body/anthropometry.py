@@ -213,7 +213,7 @@ class _Builder:
             heel, toe = points[:2].mean(axis=0), points[-2:].mean(axis=0)
             com = heel + 0.42 * (toe - heel)
             com[2] = 0.5 * (com[2] + self.pos[foot, 2])
-            forward = (toe - heel) / np.linalg.norm(toe - heel)
+            forward = (toe - heel) / max(float(np.linalg.norm(toe - heel)), 1e-9)
             long, across = 0.035 * self.height, 0.013 * self.height
             spread = across + (long - across) * np.abs(forward)
             self._add(foot, FOOT_MASS, com, _inertia_of_spread(spread))

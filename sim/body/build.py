@@ -48,6 +48,16 @@ def build_body(
     """
     if mass is not None and not (np.isfinite(mass) and mass > 0):
         raise SkeletonError(f"mass is {mass} kg; expected a positive number")
+    try:
+        return _built(rig, mass, joints, mesh)
+    except ValueError as error:  # of MuJoCo: two joints, say, whose names come out as the same
+        message = " ".join(str(error).split())
+        raise SkeletonError(f"MuJoCo can't build this body: {message}") from error
+
+
+def _built(
+    rig: Rig, mass: float | None, joints: JointType, mesh: str | Path | None
+) -> mujoco.MjSpec:
     height = rig.standing_height
     masses = inertias(rig, BODY_MASS_INDEX * height**2 if mass is None else mass)
     hulls, mesh_notes = ({}, ()) if mesh is None else hulls_of(mesh, rig)

@@ -19,6 +19,7 @@ from spark.rig.rig import Rig
 # Fractions of the standing height.
 _DETAIL_RADIUS = 0.006  # of fingers, face and helpers
 _HEAD_SIZE = np.array([0.055, 0.045, 0.068])  # half axes of the ellipsoid
+_NO_BONE = 1e-4  # [m] shorter ones have no shape: a toe may lie in its ankle
 _HEAD_CENTER = np.array([0.015, 0.0, 0.055])  # from the head's joint
 _HIDDEN = 3  # the group of geoms that viewers don't show
 _FOOT_HEIGHT = 0.022  # of a foot's box
@@ -126,13 +127,14 @@ class _GeomBuilder:
         tips = [self.pos[c] for c in kept or children]
         if not kept:
             tips += list(self.ends[skeleton.end_parents == joint])
-        return [
-            tip - self.pos[joint] for tip in tips if np.linalg.norm(tip - self.pos[joint]) > 1e-4
-        ]
+        bones = [tip - self.pos[joint] for tip in tips]
+        return [bone for bone in bones if np.linalg.norm(bone) > _NO_BONE]
 
     def _capsule(
         self, joint: int, tip: Float[np.ndarray, "3"], radius: float, default: str
     ) -> None:
+        if float(np.linalg.norm(tip)) < _NO_BONE:
+            return
         self.bodies[joint].add_geom(
             self.spec.find_default(default),
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,
@@ -155,7 +157,7 @@ class _GeomBuilder:
     def _box(self, joint: int, points: Float[np.ndarray, "P 3"], *, hidden: bool) -> None:
         """A flat box between points of the sole; thinner than the joint is high."""
         low, high = points.min(0) - self.pos[joint], points.max(0) - self.pos[joint]
-        half = (high - low) / 2
+        half = np.maximum((high - low) / 2, _NO_BONE)
         half[2] = min(_FOOT_HEIGHT * self.height, max(-low[2], 0.01)) / 2
         box = self.bodies[joint].add_geom(
             self.spec.find_default("foot"),

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.sax.saxutils import escape
 
 import mujoco
 
@@ -10,6 +11,11 @@ from spark.files import write_atomically
 
 _DIGITS = 9  # of every number: nanometres on a body
 _ZERO = 1e-12
+# What holds names, which may look like numbers.
+_NAMES = {
+    *("name", "model", "class", "childclass", "body", "body1", "body2", "joint", "site", "geom"),
+    *("objname", "refname", "mesh", "material", "texture", "file", "actuator", "tendon"),
+}
 
 _SCENE = """<mujoco model="{name} scene">
   <include file="{file}"/>
@@ -41,16 +47,40 @@ def paths_of(spec: mujoco.MjSpec, path: str | Path) -> tuple[Path, ...]:
 
 def write_mjcf(spec: mujoco.MjSpec, path: str | Path) -> tuple[Path, Path]:
     """Write a body, and beside it `NAME_scene.xml` with floor and light, as Menagerie does, and
-    the meshes it has in a folder `NAME_meshes`. Gives the paths of body and scene."""
+    the meshes it has in a folder `NAME_meshes`. Gives the paths of body and scene. Raises
+    `OutputError` where MuJoCo could not load it: of a name, say, that it has for itself."""
     path = Path(path)
-    spec.modelname = path.stem
+    spec.modelname = path.stem.encode("utf-8", "replace").decode()
     root = _tree(spec)
     body, scene, *_ = paths_of(spec, path)
     for mesh in root.iter("mesh"):
         _move_to_file(mesh, path)
-    write_atomically(body, _text(root).encode())
-    write_atomically(scene, _SCENE.format(name=path.stem, file=path.name).encode())
+    text = _text(root)
+    _check_loads(text, path)
+    write_atomically(body, text.encode())
+    write_atomically(scene, _scene(path).encode())
     return body, scene
+
+
+def _check_loads(text: str, path: Path) -> None:
+    """Raise `OutputError` where MuJoCo would not read what is to be written."""
+    try:
+        path.name.encode()  # the scene names it
+        spec = mujoco.MjSpec.from_string(text)
+        if not list(spec.meshes):  # whose files are still to come
+            spec.compile()
+    except ValueError as error:
+        message = " ".join(str(error).split())
+        raise OutputError(f"{path}: not written: MuJoCo could not load it ({message})") from error
+
+
+def _scene(path: Path) -> str:
+    """The scene of a body, its names as attributes hold them."""
+    return _SCENE.format(name=_quoted(path.stem), file=_quoted(path.name))
+
+
+def _quoted(name: str) -> str:
+    return escape(name, {'"': "&quot;", "\n": "&#10;", "\t": "&#9;"})
 
 
 def to_xml(spec: mujoco.MjSpec) -> str:
@@ -77,7 +107,8 @@ def _tree(spec: mujoco.MjSpec) -> ElementTree.Element:
             attributes.pop(implied, None)
     for element in root.iter():
         for key, value in element.items():
-            element.set(key, _tidy(value))
+            if key not in _NAMES:
+                element.set(key, _tidy(value))
     return root
 
 

@@ -4,6 +4,7 @@ This is the border where file units, file axes, Euler angles and degrees end; `s
 the way back.
 """
 
+import unicodedata
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,6 +24,8 @@ from spark.skeleton import Skeleton
 _SAMPLES = 32  # frames that unit and up axis are inferred from
 _USUAL_FRAME_TIME = (0.001, 0.5)  # [s] 1000 to 2 frames a second
 
+_NO_XML = "\ufffe\uffff"
+_MUJOCOS = "world"  # MuJoCo's own body, so none of ours
 _ENCODINGS = {"cp932": "Shift-JIS", "latin-1": "Latin-1"}
 
 # Of the body's height: positions that vary less are constant.
@@ -212,11 +215,17 @@ def _turned(rotations: Float[np.ndarray, "T J 4"], order: list[int]) -> Float[np
 
 
 def unique_names(names: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Repeated names with a number (Toe, Toe.2, Toe.3), and a note on them."""
-    taken = set(names)
-    repeats = Counter[str]()
+    """Repeated names with a number (Toe, Toe.2, Toe.3), names that can be shown and given to
+    MuJoCo, and notes on what was changed."""
+    plain = [_plain(name) for name in names]
+    odd = [a for a, b in zip(plain, names, strict=True) if a != b]
+    notes: tuple[str, ...] = ()
+    if odd:
+        notes = (f"control characters in names are read as _: {name_list(odd)}",)
+    taken = {*plain, _MUJOCOS}
+    repeats = Counter[str]((_MUJOCOS,))
     unique: list[str] = []
-    for name in names:
+    for name in plain:
         repeats[name] += 1
         candidate = name
         while repeats[name] > 1 and candidate in taken:
@@ -224,6 +233,17 @@ def unique_names(names: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
             repeats[name] += candidate in taken
         taken.add(candidate)
         unique.append(candidate)
-    renamed = [name for name, before in zip(unique, names, strict=True) if name != before]
-    notes = (f"repeated joint names got numbers: {name_list(renamed)}",) if renamed else ()
+    renamed = [name for name, before in zip(unique, plain, strict=True) if name != before]
+    if renamed:
+        which = f", and MuJoCo's own {_MUJOCOS!r}," if _MUJOCOS in plain else ""
+        notes += (f"repeated joint names{which} got numbers: {name_list(renamed)}",)
     return tuple(unique), notes
+
+
+def _plain(name: str) -> str:
+    """A name without control characters, which would steer a terminal and are no XML."""
+    return "".join("_" if _is_control(character) else character for character in name)
+
+
+def _is_control(character: str) -> bool:
+    return unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp") or character in _NO_XML

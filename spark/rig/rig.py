@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from spark.errors import SkeletonError
 from spark.kinematics import world_positions
 from spark.motion import Motion
 from spark.rig.feet import FEET, HIP_HEIGHT, UPPER_LEGS, Sole, hip_height, human_soles
@@ -20,6 +21,7 @@ from spark.summary import counted
 
 # Frames that are looked at for the T-pose: three minutes at 120 fps, or as much of a longer motion.
 _FRAMES = 20_000
+_LOWEST_HIPS = 1e-3  # [m] lower ones are those of no body, or of a unit that is wrong
 
 # Roles that several joints hold, and those between which they lie.
 _CHAINS: dict[Role, tuple[Role, Role | None]] = {
@@ -133,4 +135,8 @@ def understand(motion: Motion, override: Override | None = None) -> Rig:
     pelvis = roles.require(Role.PELVIS)
     root_joint = root_joint_of(skeleton, pelvis)
     height = hip_height(skeleton, roles, tpose)
+    if height < _LOWEST_HIPS:
+        raise SkeletonError(
+            f"the hips are {height:.2g} m above the soles; expected legs with a length"
+        )
     return Rig(skeleton, roles, groups_of(skeleton, roles), tpose, root_joint, height, notes)

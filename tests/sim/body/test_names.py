@@ -1,0 +1,91 @@
+"""Bodies of joints with any names, and of bones without length: loadable, or refused."""
+
+import re
+from pathlib import Path
+
+import mujoco
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+import spark_sim
+from spark.errors import SparkSimError
+
+
+def walker(folder: Path, names: dict[str, str]) -> Path:
+    """The sample walk, some of its joints called otherwise."""
+    path = folder / "walker_walk.bvh"
+    if not path.exists():
+        spark_sim.sample(folder)
+    text = re.sub(
+        r"(ROOT|JOINT) (\S+)", lambda m: f"{m[1]} {names.get(m[2], m[2])}", path.read_text()
+    )
+    (folder / "renamed.bvh").write_text(text)
+    return folder / "renamed.bvh"
+
+
+@settings(deadline=None, max_examples=25)
+@given(name=st.text(st.characters(exclude_characters="\r\n{}", codec="utf-8"), min_size=1))
+@example(name="world")
+@example(name="007")
+@example(name="nan")
+@example(name="1e5")
+@example(name='"><!--')
+@example(name="a\0b")
+@example(name="\x1b[2J")
+@example(name="a\u2028b\ufffe")
+@example(name="x" * 10_000)
+def test_a_joint_of_any_name_is_one_of_mujocos(
+    name: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Written, read back by MuJoCo with as many bodies; or refused as a joint without a name."""
+    folder = tmp_path_factory.getbasetemp() / "names"
+    folder.mkdir(exist_ok=True)
+    path = walker(folder, {"Neck": name, "Head": f"{name}7"})
+    if not name.strip():
+        with pytest.raises(SparkSimError, match=r"name of a joint|expected"):
+            spark_sim.load(path)
+        return
+    clip = spark_sim.load(path)
+    (_, scene), _ = clip.save_mjcf(folder / 'a "&< b.xml', force=True)
+    model = mujoco.MjModel.from_xml_path(str(scene))
+    assert model.nbody == len(clip.joint_names) + 1
+    assert {model.body(b).name for b in range(1, model.nbody)} == set(clip.joint_names)
+
+
+def flattened(folder: Path, joints: str) -> Path:
+    """The sample walk with the OFFSETs of some joints at zero."""
+    path = folder / "walker_walk.bvh"
+    if not path.exists():
+        spark_sim.sample(folder)
+    lines, zero = [], False
+    for line in path.read_text().splitlines():
+        if found := re.match(r"\s*(?:ROOT|JOINT) (\S+)", line):
+            zero = re.search(joints, found[1]) is not None
+        lines.append(re.sub(r"OFFSET .*", "OFFSET 0 0 0", line) if zero else line)
+    (folder / "flat.bvh").write_text("\n".join(lines) + "\n")
+    return folder / "flat.bvh"
+
+
+@pytest.mark.parametrize(
+    "joints", ["Toe", "Foot|Toe", "Leg$", "Arm", "Hand", "Spine", "Neck|Head", "Leg|Foot|Toe", "."]
+)
+def test_bones_without_length(joints: str, tmp_path: Path) -> None:
+    """A result or a typed error in every way that a clip goes."""
+    path = flattened(tmp_path, joints)
+    walk = tmp_path / "dancer_walk.bvh"
+    done = 0
+    for go in (
+        lambda: spark_sim.load(path).save_mjcf(tmp_path / "o.xml", force=True),
+        lambda: spark_sim.play(path, html=tmp_path / "o.html", force=True),
+        lambda: spark_sim.report(path, html=tmp_path / "r.html", force=True),
+        lambda: spark_sim.retarget(walk, path).save(tmp_path / "o.bvh", force=True),
+        lambda: spark_sim.retarget(path, walk).save(tmp_path / "o.bvh", force=True),
+        lambda: spark_sim.retarget(path, "robot").save(tmp_path / "o.npz", force=True),
+    ):
+        try:
+            go()
+            done += 1
+        except SparkSimError as error:
+            assert str(error)  # noqa: PT017
+    assert done or joints in ("Leg|Foot|Toe", ".")  # no body is left
