@@ -33,10 +33,11 @@ class Format:
 BVH = Format("BVH", (".bvh",), (*UNIT_AND_UP, "fps"), b"HIERARCHY")
 FBX = Format("FBX", (".fbx",), (*UNIT_AND_UP, "clip"), b"Kaydara FBX Binary")
 GLTF = Format("glTF", (".glb", ".gltf", ".vrm", ".vrma"), (*UNIT_AND_UP, "fps", "clip"), b"glTF")
+ACCLAIM = Format("ASF/AMC", (".amc", ".asf"), (*UNIT_AND_UP, "fps"))
 SMPL = Format("SMPL", (".npz", ".npy", ".pt", ".pth"), (*UNIT_AND_UP, "fps", "body_model"))
 POSITIONS = Format("positions", (".npz", ".npy"), (*UNIT_AND_UP, "fps"))
 
-FORMATS = (BVH, FBX, GLTF, SMPL, POSITIONS)
+FORMATS = (BVH, FBX, GLTF, ACCLAIM, SMPL, POSITIONS)
 _ROBOTS = frozenset({"qpos", "joint_pos", "dof_pos"})
 """An npz with one of these arrays is a robot's motion."""
 
@@ -91,6 +92,8 @@ def holds_person(path: Path) -> bool:
             return _is_smpl(path) or (len(shape) == 3 and bool(layouts(shape[1])))
         case ".pt" | ".pth":
             return says(path, (b"global_orient", b"root_orient"))
+        case ".asf":  # a skeleton, which its AMCs move
+            return False
         case _:
             return path.suffix.lower() in SUFFIXES
 
@@ -110,6 +113,10 @@ def _reader(known: Format) -> Reader:
         from spark.io.gltf import read_gltf
 
         return read_gltf
+    if known is ACCLAIM:
+        from spark.io.acclaim import read_acclaim
+
+        return read_acclaim
     if known is SMPL:
         from spark.io.smpl import read_smpl
 
