@@ -196,7 +196,7 @@ CORRUPTIONS: dict[str, Corruption] = {
 }
 """What the test-bench does to clips; the frame rates and the mirror change nothing that matters."""
 
-HARMLESS = ("15 fps", "60 fps", "120 fps", "mirrored")
+HARMLESS = ("15 fps", "30 fps", "60 fps", "120 fps", "mirrored")
 
 
 def _displaced(motion: Motion, path: Float[np.ndarray, "T 3"]) -> Motion:

@@ -7,7 +7,7 @@ the table of docs/report.md.
 
 import argparse
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -130,10 +130,19 @@ def bench(data: Path) -> tuple[int, dict[str, dict[str, float]]]:
             subject = Subject(changed, rig)
             origin = subject if kind == "mirrored" else source
             spoilt[kind][name] = scores(assess(subject, source=origin))
-    return len(clean), {
+    return len(clean), separation(clean, spoilt)
+
+
+def separation(
+    clean: dict[str, dict[str, float]],
+    spoilt: dict[str, dict[str, dict[str, float]]],
+    measures: Sequence[str] = MEASURES,
+) -> dict[str, dict[str, float]]:
+    """For each corruption the AUC of each measure, over the clips that have what it measures."""
+    return {
         kind: {
             measure: auc([clean[n][measure] for n in asked], [rows[n][measure] for n in asked])
-            for measure in MEASURES
+            for measure in measures
             if (asked := [n for n in rows if np.isfinite(clean[n][measure] + rows[n][measure])])
         }
         for kind, rows in spoilt.items()
@@ -141,11 +150,11 @@ def bench(data: Path) -> tuple[int, dict[str, dict[str, float]]]:
     }
 
 
-def table(result: dict[str, dict[str, float]]) -> str:
+def table(result: dict[str, dict[str, float]], measures: Sequence[str] = MEASURES) -> str:
     """Markdown; bold where a measure tells a harm in 95 % of the pairs."""
     lines = [
-        "| corruption | " + " | ".join(MEASURES) + " |",
-        "|---|" + "---:|" * len(MEASURES),
+        "| corruption | " + " | ".join(measures) + " |",
+        "|---|" + "---:|" * len(measures),
     ]
     for kind, row in result.items():
         cells = (

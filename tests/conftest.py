@@ -27,6 +27,8 @@ SLOW = (
     "tests/sim/physics/",
     "tests/sim/report/test_compare_page.py::test_a_finding_goes_to_its_moment",
     "tests/sim/report/test_page.py",
+    "tests/sim/report/test_page_reading.py",
+    "tests/spark_sim/test_policy_command.py",
     "tests/sim/test_template.py::test_the_policy_stops_what_would_slip_through",
     "tests/sim/view/test_view.py::test_page_moves_in_a_browser",
     "tests/spark/evaluation/test_evaluate.py",

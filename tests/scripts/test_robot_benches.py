@@ -1,0 +1,68 @@
+"""The benches of robots: their corruptions do what they say, and a standing robot is balanced."""
+
+import numpy as np
+import pytest
+
+from robots import registry
+from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
+from robots.model.understand import understand_robot
+from scripts.balance_qp import Balance
+from scripts.robot_report_bench import CORRUPTIONS
+from spark.rig.feet import sole_positions
+
+
+@pytest.fixture(scope="module")
+def standing() -> RobotMotion:
+    """Ember in its T-pose, its soles on the floor, for a second."""
+    robot: Morphology = understand_robot(registry.find("robot"))
+    qpos = np.tile(robot.to_qpos(robot.tpose)[0], (61, 1))
+    soles = [sole_positions(s, robot.rig.tpose_positions, robot.rig.tpose) for s in robot.rig.soles]
+    lowest = np.concatenate(soles)[:, 2].min()
+    qpos[:, 2] += -lowest - robot.motion(robot.from_qpos(qpos[:1]), 1.0).root_pos[0, 2]
+    return RobotMotion(robot, robot.from_qpos(qpos), 1 / 60)
+
+
+def spoilt(kind: str, motion: RobotMotion) -> RobotMotion:
+    return CORRUPTIONS[kind](motion, np.random.default_rng(0))
+
+
+def test_the_base_moves_as_told(standing: RobotMotion) -> None:
+    scale = standing.robot.rig.hip_height / 0.9
+    for kind, height in (("float 5 cm", 0.05), ("sink 3 cm", -0.03)):
+        moved = spoilt(kind, standing).qpos - standing.qpos
+        np.testing.assert_allclose(moved[:, :3], [[0, 0, height * scale]] * 61, atol=1e-9)
+        np.testing.assert_allclose(moved[:, 3:], 0, atol=1e-9)
+    moved = spoilt("slide 0.3 m/s", standing).qpos - standing.qpos
+    way = np.linalg.norm(moved[:, :2], axis=1)
+    np.testing.assert_allclose(way, 0.3 * np.arange(61) / 60, atol=1e-9)
+
+
+def test_hinges_move_within_their_ranges(standing: RobotMotion) -> None:
+    tree, still = standing.robot.tree, standing.coordinates.angles
+    for kind, size in (("jitter 2°", 2.0), ("flail 10°", 10 / np.sqrt(2))):
+        angles = spoilt(kind, standing).coordinates.angles
+        assert (angles >= tree.lower - 1e-9).all()
+        assert (angles <= tree.upper + 1e-9).all()
+        free = (still > tree.lower + 0.4) & (still < tree.upper - 0.4)
+        rms = np.degrees(np.sqrt(((angles - still)[free] ** 2).mean()))
+        assert rms == pytest.approx(size, rel=0.05)
+
+
+def test_other_frame_rates_are_the_same_motion(standing: RobotMotion) -> None:
+    for kind, count in (("30 fps", 31), ("120 fps", 121)):
+        other = spoilt(kind, standing)
+        assert len(other) == count
+        np.testing.assert_allclose(other.qpos, standing.qpos[:1].repeat(count, 0), atol=1e-9)
+    assert spoilt("twice as fast", standing).frame_time == standing.frame_time / 2
+
+
+def test_a_standing_robot_is_balanced_by_its_own_forces(standing: RobotMotion) -> None:
+    balance = Balance(standing)
+    assert balance.run() == balance.times[-1]
+    # It stands where it stood, and not by luck: without its torques it gives way.
+    assert np.abs(balance.data.qpos - balance.q[-1]).max() < 0.02
+    limp = Balance(standing)
+    limp.limits[:] = 0.0
+    limp.run()
+    assert np.abs(limp.data.qpos - limp.q[-1]).max() > 0.2
