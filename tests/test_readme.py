@@ -1,5 +1,6 @@
 """The commands and the Python of README and of the guides run as they stand, in their order."""
 
+import json
 import os
 import re
 import shlex
@@ -73,6 +74,22 @@ def test_the_robotics_engineers_page(tmp_path: Path) -> None:
     made = [np.load(path)["joint_pos"].shape[1] for path in (tmp_path / "g1").iterdir()]
     assert made == [29] * 6
     assert (tmp_path / "walker_walk_g1.npz").exists()
+
+
+def test_from_bvh_to_mjlab(tmp_path: Path) -> None:
+    """What the page leads to is on disk: believable pieces, and the report of the folder."""
+    run_page(CHECKOUT / "docs" / "hand-over.md", tmp_path)
+    shelf = tmp_path / "shelf"
+    lines = [json.loads(line) for line in (shelf / "manifest.jsonl").read_text().splitlines()]
+    kept = {line["output"] for line in lines if line["status"] == "written"}
+    assert {f"g1/{path.name}" for path in (shelf / "g1").iterdir()} == kept
+    assert len(lines) == 12  # six sample motions, and their mirror images
+    for line in lines:
+        believable = line["report"]["implausible_share"] < 0.1
+        believable &= line["report"]["self_penetration_share"] < 0.01
+        assert (line["output"] in kept) == believable
+    for ending in (".html", ".csv", ".json", ".parquet"):
+        assert (shelf / f"report{ending}").stat().st_size > 500
 
 
 def test_the_animators_page(tmp_path: Path) -> None:
