@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from sim.physics.policy_tracking import PolicyRun, PolicyTracker
+from spark.summary import counted
 
 SCHEMA = "spark-sim policy 1"
 _LISTED = 8  # joints in the text: the most loaded ones
@@ -64,11 +65,12 @@ def render(metrics: dict[str, Any], name: str, policy: str) -> str:
     seeds, duration = metrics["seeds"], metrics["duration_s"]
     falls = [each["falls"] for each in seeds]
     if not any(falls):
-        verdict = f"stays up for all {duration:.2f} s in all {len(seeds)} runs"
+        verdict = f"stays up for all {duration:.2f} s in {counted(len(seeds), 'run')}"
     else:
         first = min(t for each in seeds for t in each["fell_at_s"])
         verdict = (
-            f"falls {sum(falls)} times in {len(seeds)} runs of {duration:.2f} s (by seed: "
+            f"falls {counted(sum(falls), 'time')} in {counted(len(seeds), 'run')} of "
+            f"{duration:.2f} s (by seed: "
             f"{', '.join(map(str, falls))}); first after {first:.2f} s"
         )
     lines = [
