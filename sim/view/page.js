@@ -314,7 +314,14 @@ el("play").onclick = () => play(!view.playing);
 el("scrub").oninput = e => { play(false); view.time = e.target.value * dt; };
 addEventListener("keydown", e => {
   if (e.key === " ") { play(!view.playing); e.preventDefault(); }
-  const step = { ArrowRight: 1, ArrowLeft: -1 }[e.key];
+  if (e.ctrlKey || e.altKey || e.metaKey) return;
+  const end = (T - 1) * dt, digit = e.key >= "0" && e.key <= "9" && e.key.length === 1;
+  const to = { Home: 0, End: end, ArrowRight: view.time + 1, ArrowLeft: view.time - 1 }[e.key] ?? (digit ? e.key / 10 * end : null);
+  if (to !== null) { view.time = Math.max(0, Math.min(end, to)); e.preventDefault(); }
+  const faster = { ArrowUp: 1, ArrowDown: -1 }[e.key], speed = el("speed");
+  if (faster) { speed.selectedIndex = Math.max(0, Math.min(speed.length - 1, speed.selectedIndex + faster)); e.preventDefault(); }
+  if (e.key === "f") el("follow").click();
+  const step = { ".": 1, ",": -1 }[e.key];
   if (step) { play(false); view.time = Math.max(0, Math.min(T - 1, Math.round(view.time / dt) + step)) * dt; e.preventDefault(); }
 });
 const fingers = new Map();

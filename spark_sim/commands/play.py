@@ -33,13 +33,21 @@ examples:
 
 def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
-        "files", metavar="FILE", nargs="+", help="a BVH or FBX file, or a robot's motion"
+        "files", metavar="FILE", nargs="*", help="a BVH or FBX file, or a robot's motion"
     )
     parser.add_argument("--video", metavar="MP4", help="write a video")
     parser.add_argument("--html", metavar="HTML", help="write one web page with a 3D replay")
     parser.add_argument("--strip", metavar="PNG", help="write a strip of moments as one picture")
     parser.add_argument("--gif", metavar="GIF", help="write an animated picture, for a README")
     parser.add_argument("--webp", metavar="WEBP", help="write one that is smaller and finer")
+    parser.add_argument(
+        "--serve", action="store_true", help="serve a page in a browser, to drop files on"
+    )
+    parser.add_argument(
+        "--address",
+        metavar="HOST:PORT",
+        help="with --serve: where (localhost:8765; other machines reach 0.0.0.0:8765)",
+    )
     parser.add_argument(
         "--same-height", action="store_true", help="show all figures as tall as the tallest"
     )
@@ -74,6 +82,12 @@ def run(args: Namespace) -> int:
     from spark.errors import ConventionError
     from spark_sim import api, console
 
+    if args.address and not args.serve:
+        raise ConventionError("--address goes with --serve")
+    if args.serve:
+        return _serve(args)
+    if not args.files:
+        raise ConventionError("no FILE is given; only --serve needs none")
     if not args.physics and (args.assist or args.json):
         raise ConventionError("--assist and --json go with --physics")
     if (args.policy is None) != (args.spec is None) or (args.policy and not args.physics):
@@ -124,3 +138,13 @@ def _count(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 1000:
         raise ArgumentTypeError(f"{text!r} is no number of runs; expected 1 to 1000")
     return int(text)
+
+
+def _serve(args: Namespace) -> int:
+    from spark_sim import console
+    from spark_sim.commands.studio import address, serve
+
+    host, port = address(args.address or "localhost:8765")
+    clips = [load(args, path) for path in args.files]
+    serve(host, port, clips, lambda url: console.say(f"{url}  (Ctrl-C ends it)"))
+    return 0
