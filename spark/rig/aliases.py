@@ -73,8 +73,8 @@ MEANINGS: dict[str, dict[str, float]] = {
     "ankle": {"foot": 1.0},
     "foot": {"foot": 0.9, "toe": 0.5},
     "feet": {"foot": 0.8, "toe": 0.5},
-    "toe": {"toe": 1.0},
     "ball": {"toe": 1.0},
+    "toe": {"toe": 0.97},  # below a ball it is the tip
     "wing": {"wing": 1.0},
 }
 
@@ -110,6 +110,57 @@ SPELLINGS = {
     "kfe": "knee",
     "afe": "ankle",
     "fingers": "finger",
+    "girdle": "clavicle",
+    "uparm": "upper arm",
+    # of anatomy
+    "sacrum": "pelvis",
+    "vertebra": "spine",
+    "vertebrae": "spine",
+    "cervical": "neck",
+    "fibula": "tibia",
+    "carpus": "wrist",
+    "talus": "ankle",
+    "calcn": "foot",
+    "phalanges": "toe",
+    # German, Spanish, French (whose "main" is left out: English names end with it)
+    "becken": "pelvis",
+    "huefte": "hip",
+    "hüfte": "hip",
+    "wirbel": "spine",
+    "hals": "neck",
+    "kopf": "head",
+    "schluesselbein": "clavicle",
+    "schlüsselbein": "clavicle",
+    "oberarm": "upper arm",
+    "unterarm": "forearm",
+    "oberschenkel": "thigh",
+    "unterschenkel": "shin",
+    "fuss": "foot",
+    "fuß": "foot",
+    "zehen": "toe",
+    "cadera": "pelvis",
+    "columna": "spine",
+    "cuello": "neck",
+    "cabeza": "head",
+    "clavicula": "clavicle",
+    "brazo": "arm",
+    "antebrazo": "forearm",
+    "mano": "hand",
+    "muslo": "thigh",
+    "pierna": "leg",
+    "pie": "foot",
+    "dedos": "toe",
+    "bassin": "pelvis",
+    "colonne": "spine",
+    "cou": "neck",
+    "tete": "head",
+    "clavicule": "clavicle",
+    "bras": "arm",
+    "avantbras": "forearm",
+    "cuisse": "thigh",
+    "jambe": "leg",
+    "pied": "foot",
+    "orteils": "toe",
     # MikuMikuDance, in Japanese and in Latin letters
     "下半身": "pelvis",
     "上半身": "spine",
@@ -137,6 +188,8 @@ SPELLINGS = {
     "ude": "upper arm",
     "hiji": "elbow",
     "tekubi": "wrist",
+    "sebone": "spine",
+    "tsumasaki": "toe",
     "ashi": "thigh",
     "hiza": "knee",
     "ashikubi": "ankle",
@@ -149,7 +202,7 @@ ASIDE: dict[str, str] = {
         "人指 中指 薬指 小指",
         "a twist bone": "twist roll share",
         "a helper": "ik fk pole ctrl control target helper nub end tip leaf null dummy socket "
-        "attach attachment marker imu camera sec adj mch spring physics jiggle offset effector "
+        "attach attachment marker imu camera sec sub adj mch spring physics jiggle offset effector "
         "site corrective muscle headtop sensor",
         "part of the face": "eye jaw ear teeth tooth tongue brow eyebrow eyelid lid cheek lip lips "
         "nose nostril mouth chin beard oculi oris orbicularis risorius levator temporalis special",
@@ -180,7 +233,7 @@ FINGER_TIP = _set("end nub tip leaf site")
 METACARPAL = _set("metacarpal metacarpals carpal palm in cup")
 
 MODIFIERS = _set("upper lower front hind rear base bend bone center c m x stretch")
-NOISE = _set("jnt joint bn jt link def org bind skin sk rig j b bip biped valve mixamorig")
+NOISE = _set("fe aa ie jnt joint bn jt link def org bind skin sk rig j b bip biped valve mixamorig")
 # A robot's hinge axes: "roll" is a twist bone elsewhere.
 AXES = _set("pitch roll yaw")
 

@@ -33,6 +33,10 @@ UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
 HIP_HEIGHT = 0.530
 FOOT_LENGTH = 0.152
 FOOT_WIDTH = 0.055
+# [legs] from the ankle to the farthest point of a foot: 0.25 on a human, up to 0.6 in big shoes.
+_MAX_FOOT = 0.65
+_HUMAN_FOOT = 0.24
+_ODD_TIP = 0.05, 0.5  # shorter or longer, an ankle's own End Site is in other units
 _HEEL, _BALL, _TIP = -0.25 * FOOT_LENGTH, 0.5 * FOOT_LENGTH, 0.75 * FOOT_LENGTH
 
 
@@ -103,9 +107,11 @@ def human_soles(
         if toe is None:
             rows.append((foot, max(tip_at, _TIP * height)))
         else:
-            ball_at = max(float(pose.positions[toe, 0] - ankle[0]), 0.3 * _BALL * height)
-            rows.append((foot, ball_at))
-            rows.append((toe, max(tip_at, ball_at + 0.5 * (_TIP - _BALL) * height)))
+            farthest = _MAX_FOOT * float(np.linalg.norm(pose.positions[pose.hips].mean(0) - ankle))
+            toe_at = float(pose.positions[toe, 0] - ankle[0])
+            ball_at = min(max(toe_at, 0.3 * _BALL * height), farthest)
+            tip_at = max(tip_at, ball_at + 0.5 * (_TIP - _BALL) * height)
+            rows += [(foot, ball_at), (toe, min(tip_at, farthest))]
         half_width = 0.5 * FOOT_WIDTH * height
         joints = np.repeat([joint for joint, _ in rows], 2)
         world = np.array(
@@ -136,8 +142,24 @@ class _TPose:
         return np.concatenate([self.positions[joints], ends])
 
     def foot(self, joint: int) -> Float[np.ndarray, "K 3"]:
-        """The points of a foot. No foot is longer than its leg: an End Site that is farther away is
-        in other units than the rest."""
-        points, ankle = self.below(joint), self.positions[joint]
-        leg = np.linalg.norm(self.positions[self.hips].mean(axis=0) - ankle)
-        return points[np.linalg.norm(points - ankle, axis=1) <= leg]
+        """The points of a foot, as far as they may be its own.
+
+        None is further from the ankle than `_MAX_FOOT` legs. End Sites may be in other units than
+        the rest: one beyond the ankle counts where it is no further from its joint than the ball of
+        the foot is from the ankle; the ankle's own keeps its direction, with a human foot's length
+        if it is much shorter or longer.
+        """
+        joints = list(self.skeleton.subtree(joint))
+        ankle = self.positions[joint]
+        leg = float(np.linalg.norm(self.positions[self.hips].mean(axis=0) - ankle))
+        held = np.isin(self.skeleton.end_parents, joints)
+        own = self.skeleton.end_parents[held] == joint
+        lengths = np.linalg.norm(self.skeleton.end_offsets[held], axis=1)
+        balls = self.positions[list(self.skeleton.children[joint])]
+        ball = np.linalg.norm(balls - ankle, axis=1).max(initial=0.0)
+        tips, beyond = self.ends[held][own], self.ends[held][~own & (lengths <= ball)]
+        size = lengths[own] / leg
+        odd = (size > _ODD_TIP[1]) | ((size < _ODD_TIP[0]) & (size > 0))
+        tips[odd] = ankle + (tips - ankle)[odd] * (_HUMAN_FOOT / size[odd])[:, None]
+        points = np.concatenate([self.positions[joints], tips, beyond])
+        return points[np.linalg.norm(points - ankle, axis=1) <= _MAX_FOOT * leg]

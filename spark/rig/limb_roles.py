@@ -15,6 +15,9 @@ LEG = ("upper_leg", "lower_leg", "foot", "toe")
 ARM = ("clavicle", "upper_arm", "forearm", "hand")
 
 _NAME_WEIGHT = 3.0  # of a sure name, in units of the log-likelihoods of lengths below
+# Of a joint and its numbered companions further down (shin, shin.001) the first is meant; in the
+# same units.
+_NOT_THE_FIRST = 6.0
 _MIN_BEND = 0.2  # [rad] in a motion; of a chain that bends less, no joint is called stiff
 _MAX_CHAIN = 10  # joints of a chain that are tried as a limb's: more would be a hand's fingers
 
@@ -57,8 +60,16 @@ def _best_labels(
     stiff = np.mean([_stiffness(measured, chain) for chain in chains], axis=0)
     shape = _leg_shape if parts is LEG else _arm_shape
     best = Labels({}, float("-inf"))
+    # What is lost by leaving a joint out whose name speaks of this limb.
+    spoken = {i: max(0.0, *(names[part, i] for part in parts)) for i in free}
     for index in _placements(free, parts):
         score = _NAME_WEIGHT * sum(names[part, i] for part, i in index.items())
+        left_out = [i for i in free if i not in index.values()]
+        score -= _NAME_WEIGHT * sum(spoken[i] for i in left_out)
+        score -= _NOT_THE_FIRST * sum(
+            any(k < i and names[part, k] > names[part, i] > 0 for k in left_out)
+            for part, i in index.items()
+        )
         score += sum(shape(index, at) for at in along) / len(chains)
         score -= stiff[index["lower_leg" if parts is LEG else "forearm"]]
         if score > best.score + 1e-9:

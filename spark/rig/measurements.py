@@ -36,12 +36,13 @@ class Measurements:
 
     @cached_property
     def end_reach(self) -> Float[np.ndarray, "J"]:
-        """Distance of each joint's farthest End Site [m]; 0 without one."""
+        """Distance of each joint's farthest End Site [m]; 0 without one. None is longer than the
+        longest bone: some files have theirs in other units."""
         reach = np.zeros(len(self.skeleton))
         np.maximum.at(
             reach, self.skeleton.end_parents, np.linalg.norm(self.skeleton.end_offsets, axis=-1)
         )
-        return reach
+        return np.minimum(reach, self.bones.max())
 
     @cached_property
     def reach(self) -> Float[np.ndarray, "J"]:

@@ -166,7 +166,8 @@ def _parts(words: set[str], sided: bool) -> tuple[dict[str, float], bool]:
     general = [word for word in sorted(words & MEANINGS.keys()) if word not in SPECIFIC]
     if specific and "leg" in general:
         # "AnkleLeg" is a leg's segment above the foot, and still the ankle where nothing else is.
-        return {part: 0.6 * s for part, s in MEANINGS[specific[0]].items()}, False
+        doubt = 0.3 if "ankle" in specific else 0.6
+        return {part: doubt * s for part, s in MEANINGS[specific[0]].items()}, False
     for word in (*specific, *general):
         return MEANINGS[word], False
     return {}, False

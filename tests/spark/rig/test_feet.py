@@ -11,7 +11,8 @@ from spark.rig.feet import FOOT_LENGTH, FOOT_WIDTH, hip_height, sole_positions
 from spark.rig.rig import Rig
 from spark.rig.roles import Role, RoleMap
 from spark.rotation import quat_about, quat_rotate
-from tests.helpers.stick import joint, standing, stick_rig
+from spark.skeleton import Skeleton
+from tests.helpers.stick import JOINTS, joint, standing, stick_rig
 
 
 def soles_of(rig: Rig, motion: Motion) -> np.ndarray:
@@ -101,7 +102,7 @@ def test_a_rigid_foot_has_no_ball() -> None:
     np.testing.assert_allclose(rigid.offsets[:2], bent.offsets[:2], atol=1e-12)
 
 
-@pytest.mark.parametrize("scale", [100.0, 0.01])
+@pytest.mark.parametrize("scale", [100.0, 10.0, 0.01])
 def test_a_toe_tip_in_other_units_moves_no_floor(scale: float) -> None:
     """It is no part of the foot: as if there were none."""
     rig = stick_rig()
@@ -112,3 +113,37 @@ def test_a_toe_tip_in_other_units_moves_no_floor(scale: float) -> None:
     assert odd == pytest.approx(hip_height(none, rig.roles, rig.tpose), abs=1e-3)
     soles = [replace(rig, skeleton=each).soles[0] for each in (skeleton, none)]
     np.testing.assert_allclose(soles[0].offsets, soles[1].offsets, atol=1e-3)
+
+
+@pytest.mark.parametrize("scale", [100.0, 39.37, 10.0, 2.54, 0.1, 0.01])
+def test_the_tip_of_a_foot_without_toes_in_other_units_moves_no_floor(scale: float) -> None:
+    """It shows where the foot points; how long feet are, people tell: within 1 cm of the height."""
+    rig = stick_rig()
+    keep = [j for j, (role, _, _) in enumerate(JOINTS) if role.part != "toe"]
+    index = {old: new for new, old in enumerate(keep)}
+    feet = [index[joint(Role.LEFT_FOOT)], index[joint(Role.RIGHT_FOOT)]]
+    skeleton = Skeleton(
+        names=tuple(rig.skeleton.names[j] for j in keep),
+        parents=np.array([index.get(int(rig.skeleton.parents[j]), -1) for j in keep]),
+        offsets=rig.skeleton.offsets[keep],
+        translating=rig.skeleton.translating[keep],
+        end_parents=np.array(feet),
+        end_offsets=np.array([[0.18, 0.0, -0.09]] * 2),
+    )
+    part = RoleMap(*(tuple(x[j] for j in keep) for x in (rig.roles.roles, (1.0,) * 99, ("",) * 99)))
+    tpose = rig.tpose[keep]
+    right = hip_height(skeleton, part, tpose)
+    odd = replace(skeleton, end_offsets=skeleton.end_offsets * scale)
+    assert right == pytest.approx(0.89)
+    assert hip_height(odd, part, tpose) == pytest.approx(right, abs=0.01)
+
+
+def test_a_foot_has_an_upper_bound() -> None:
+    """Whatever hangs below an ankle, a sole ends two thirds of the leg ahead of it."""
+    rig = stick_rig()
+    offsets = rig.skeleton.offsets.copy()
+    offsets[joint(Role.LEFT_TOE), 0] = 2.0
+    odd = replace(rig, skeleton=replace(rig.skeleton, offsets=offsets))
+    left, right = soles_of(odd, standing(odd, 1))[0]
+    assert left[:, 0].max() < 2 / 3 * 0.8
+    np.testing.assert_allclose(left[:2, 0], right[:2, 0], atol=1e-12)

@@ -6,11 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from spark.demo.sample import sample_rig
 from spark.io.recording import read_recording
+from spark.network.features import body_features
+from spark.rig.name_conventions import CONVENTIONS
 from spark.rig.role_assignment import assign_roles
+from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_mul
 from spark.skeleton import Skeleton
-from tests.helpers.recordings import recordings
+from spark.training.variants import random_variant, same_body
+from tests.helpers.recordings import recording, recordings
 from tests.helpers.rigs import RIGS, build, walk
 from tests.helpers.role_tables import (
     CMU_ASF,
@@ -181,3 +186,40 @@ def test_reasons_say_where_a_role_comes_from() -> None:
     assert reason["thumb_01_l"] == "a finger, by its name"
     assert reason["calf_twist_01_l"] == "a twist bone, by its name"
     assert reason["ik_foot_l"] == "a helper, by its name"
+
+
+@pytest.mark.parametrize("convention", RIGS)
+def test_sure_names_do_not_lose_to_lengths(convention: str) -> None:
+    """Bones of each part of the body 0.4 to 2.5 times as long (log-normal, 0.45): caricatures."""
+    skeleton, right = build(RIGS[convention])
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        factors = {part: np.exp(rng.normal(0, 0.45)) for part in sorted(set(map(_part, right)))}
+        offsets = skeleton.offsets * np.array([factors[_part(role)] for role in right])[:, None]
+        odd = replace(skeleton, offsets=np.where(np.arange(len(right))[:, None], offsets, 0.0))
+        assert wrong(odd, assign_roles(odd), right) == {}, seed
+
+
+def _part(role: Role | None) -> str:
+    return "" if role is None else role.part
+
+
+@pytest.mark.parametrize("convention", CONVENTIONS)
+def test_roles_of_made_rigs_are_those_they_were_made_with(convention: str) -> None:
+    """Joints dropped, split and scaled, as in training, and named by one convention each."""
+    base = same_body(body_features(sample_rig("walker"))).body
+    for seed in range(6):
+        rig = random_variant(base, np.random.default_rng(seed), convention).body.rig
+        assert wrong(rig.skeleton, assign_roles(rig.skeleton), rig.roles.roles) == {}, seed
+
+
+def test_a_mouse_with_short_upper_arms_has_shoulders() -> None:
+    """Mixamo's Mousey: its upper arm is half as long as its forearm, no longer than the clavicle,
+    and "LeftShoulder" alone could be either."""
+    motion = read_recording(recording("mixamo_pairs/_tposes/Mousey.bvh")).motion
+    roles = assign_roles(motion.skeleton, motion)
+    table = dict(zip(motion.skeleton.names, roles.roles, strict=True))
+    assert table["mixamorig:LeftShoulder"] is Role.LEFT_CLAVICLE
+    assert table["mixamorig:LeftArm"] is Role.LEFT_UPPER_ARM
+    assert table["mixamorig:RightForeArm"] is Role.RIGHT_FOREARM
+    assert table["mixamorig:RightHand"] is Role.RIGHT_HAND
