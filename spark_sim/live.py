@@ -32,6 +32,8 @@ class Retargeter:
         if fps is not None:
             check_frame_time(1.0 / fps if fps else np.inf)
         self.robot = target.on_robot.robot
+        if self.robot.mount is not None:
+            raise ConventionError(f"{target.name} has no legs; only walking robots follow live")
         self._source = source.name
         frame_time = source.motion.frame_time if fps is None else 1.0 / fps
         ground = ground_of(source.canonical, self.robot)

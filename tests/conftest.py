@@ -17,6 +17,7 @@ from tests.helpers.recordings import DATA
 # solve for seconds. Whatever runs on a real recording is left out too.
 SLOW = (
     "tests/robots/formats/test_trackers.py::test_spoilt_files_end_in_an_error_that_says_so",
+    "tests/robots/model/test_urdf.py",
     "tests/robots/solver/test_own_body.py",
     "tests/robots/solver/test_solve.py",
     "tests/robots/solver/test_target.py",

@@ -1,4 +1,5 @@
-"""MJCF files of humanoids: any that MuJoCo can compile, with a free joint where it has none.
+"""Models of humanoids, MJCF or URDF: any that MuJoCo can compile, with a free joint where there is
+none.
 
 Only the kinematics matter here, so a file whose meshes are missing is read without them.
 """
@@ -12,10 +13,12 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
 from robots.model.mjcf_source import read_source
+from robots.model.urdf import is_urdf, read_urdf
 from spark.errors import FileFormatError, SkeletonError
-from spark.summary import brief
+from spark.summary import brief, counted
 
 FREE, BALL, SLIDE, HINGE = (
     int(kind)
@@ -26,6 +29,7 @@ FREE, BALL, SLIDE, HINGE = (
         mujoco.mjtJoint.mjJNT_HINGE,
     )
 )
+_EQ_JOINT = int(mujoco.mjtEq.mjEQ_JOINT)
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
 _MIN_MASS, _MIN_INERTIA = 1e-4, 1e-8  # [kg], [kg m²] of bodies whose mass went with their meshes
 _MAX_OFFSET = 1e4  # [m] of a body from its parent: beyond, floats lose millimetres; it is a mistake
@@ -75,6 +79,17 @@ class Mjcf:
             if int(model.jnt_type[joint]) in (HINGE, BALL)
         ]
 
+    def followers(self) -> list[tuple[int, int, Float[np.ndarray, "5"]]]:
+        """The joints that follow others (mimic joints), those others, and the polynomial that takes
+        their turn since the rest pose to the followers'."""
+        model, own = self.model, set(self.joints())
+        pairs = [
+            (int(model.eq_obj1id[k]), int(model.eq_obj2id[k]), model.eq_data[k, :5].copy())
+            for k in range(model.neq)
+            if int(model.eq_type[k]) == _EQ_JOINT and model.eq_active0[k]
+        ]
+        return [pair for pair in pairs if pair[0] in own and pair[1] in own]
+
     def joint_name(self, joint: int) -> str:
         """The joint's name, or where it sits if it has none."""
         return (
@@ -91,29 +106,23 @@ class Mjcf:
 
 
 def read_mjcf(path: str | Path, *, visuals: bool = True) -> Mjcf:
-    """Read and compile an MJCF (or a scene that includes one).
+    """Read and compile an MJCF (or a scene that includes one), or a URDF.
 
     Without `visuals`, meshes that do not collide are left out: coordinates are the same, and
     reading is several times faster. Raises FileFormatError where MuJoCo can't compile the file, and
     SkeletonError where it holds no robot or several.
     """
     path = Path(path)
-    source = read_source(path)
     notes: list[str] = []
     with _warnings_as_notes(notes):
-        try:
-            spec = mujoco.MjSpec.from_string(source.text, include=source.models)
-        except Exception as error:  # of MuJoCo or its binding, which has several kinds
-            message = _line(error) if source.whole else re.sub(r",? line \d+", "", _line(error))
-            raise FileFormatError(path, None, f"MuJoCo can't read it: {message}") from error
-        if any("'NaN'" in note for note in notes):
-            raise FileFormatError(path, None, "holds NaN where MuJoCo expects a number")
-        spec.modelfiledir = str(path.parent)
+        spec = _parse(path, notes, visuals=visuals)
         if not visuals:
             _drop_visuals(spec)
         root = _find_root(spec, path, notes)
         _free_root(spec, root, path, notes)
         model = _compile(spec, path, notes)
+    if is_urdf(path):
+        _stand(spec, model, root)
     _note_ignored(model, notes)
     _check_numbers(model, path)
     return Mjcf(model, spec, int(model.body(root).id), path, tuple(notes))
@@ -129,6 +138,21 @@ def _check_numbers(model: mujoco.MjModel, path: Path) -> None:
         values = getattr(model, name)
         if not np.isfinite(values).all():
             raise FileFormatError(path, None, f"has numbers that are not finite ({name})")
+
+
+def _parse(path: Path, notes: list[str], *, visuals: bool) -> mujoco.MjSpec:
+    if is_urdf(path):
+        return read_urdf(path, notes, visuals=visuals)
+    source = read_source(path)
+    try:
+        spec = mujoco.MjSpec.from_string(source.text, include=source.models)
+    except Exception as error:  # of MuJoCo or its binding, which has several kinds
+        message = _line(error) if source.whole else re.sub(r",? line \d+", "", _line(error))
+        raise FileFormatError(path, None, f"MuJoCo can't read it: {message}") from error
+    if any("'NaN'" in note for note in notes):
+        raise FileFormatError(path, None, "holds NaN where MuJoCo expects a number")
+    spec.modelfiledir = str(path.parent)
+    return spec
 
 
 @contextmanager
@@ -234,6 +258,10 @@ def _compile(spec: mujoco.MjSpec, path: Path, notes: list[str]) -> mujoco.MjMode
         return spec.compile()
     except Exception as error:  # of MuJoCo or its binding, which has several kinds
         message = _line(error)
+    if "mjMINVAL" in message and not spec.compiler.boundmass:
+        spec.compiler.boundmass, spec.compiler.boundinertia = _MIN_MASS, _MIN_INERTIA
+        notes.append("some moving bodies have no mass: they get next to none")
+        return _compile(spec, path, notes)
     assets = [mesh.file for mesh in spec.meshes if mesh.file]
     if not (assets or list(spec.textures) or list(spec.hfields)):
         raise FileFormatError(path, None, f"MuJoCo can't compile it: {message}")
@@ -248,6 +276,22 @@ def _compile(spec: mujoco.MjSpec, path: Path, notes: list[str]) -> mujoco.MjMode
         ) from again
     notes.append(f"read without meshes and textures ({message}): shapes and masses are incomplete")
     return model
+
+
+def _stand(spec: mujoco.MjSpec, model: mujoco.MjModel, root: str) -> None:
+    """Lift the root, which a URDF leaves at the origin, so that the lowest of the shapes is on the
+    floor."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    if not model.ngeom:
+        return
+    up = data.geom_xmat[:, 6:]
+    middle = data.geom_xpos[:, 2] + (up * model.geom_aabb[:, :3]).sum(1)
+    low = float((middle - (np.abs(up) * model.geom_aabb[:, 3:]).sum(1)).min())
+    body = int(model.body(root).id)
+    model.body_pos[body, 2] -= low
+    model.qpos0[int(model.jnt_qposadr[model.body_jntadr[body]]) + 2] -= low
+    spec.body(root).pos = model.body_pos[body]
 
 
 def _drop_assets(spec: mujoco.MjSpec) -> None:
@@ -270,8 +314,11 @@ def _note_ignored(model: mujoco.MjModel, notes: list[str]) -> None:
     slides = [model.joint(j).name for j in range(model.njnt) if int(model.jnt_type[j]) == SLIDE]
     if slides:
         notes.append(f"{len(slides)} sliding joints stay at 0 ({slides[0]!r}, ...)")
-    if model.neq:
-        notes.append(f"{model.neq} equality constraints between joints or bodies are ignored")
+    following = sum(int(kind) == _EQ_JOINT for kind in model.eq_type)
+    if following:
+        notes.append(f"{counted(following, 'joint')} follow others, as the model's constraints say")
+    if model.neq > following:
+        notes.append(f"{model.neq - following} equality constraints between bodies are ignored")
 
 
 def _line(error: Exception) -> str:

@@ -29,7 +29,8 @@ from spark.summary import counted
 @dataclass(frozen=True, eq=False)
 class Morphology:
     """What a robot is. Joint j of `rig.skeleton` is the part that tree link `links[j]` moves (-1:
-    the base), and `centers[j]` [m] is where it turns, in the rest pose."""
+    the base), and `centers[j]` [m] is where it turns, in the rest pose. `mount` is where a robot
+    without legs stays."""
 
     mjcf: Mjcf
     tree: Tree
@@ -39,6 +40,7 @@ class Morphology:
     centers: Float[np.ndarray, "J 3"]
     tpose: Coordinates
     notes: tuple[str, ...] = ()
+    mount: Coordinates | None = None
 
     def __repr__(self) -> str:
         return f"Morphology({self.mjcf.path.name!r}, {counted(len(self.mj_joints), 'joint')})"
@@ -109,6 +111,17 @@ class Morphology:
         return Coordinates(
             qpos[:, base : base + 3].copy(), quat_mul(quat, quat_conj(root_quat)), angles, balls
         )
+
+    def following(self, q: Coordinates) -> Coordinates:
+        """The same with joints that follow others where those take them."""
+        pairs = self.mjcf.followers()
+        if not pairs:
+            return q
+        angles = q.angles.copy()
+        for follower, leader, polynomial in pairs:
+            turned = angles[:, self.mj_joints.index(leader)]
+            angles[:, self.mj_joints.index(follower)] = np.polyval(polynomial[::-1], turned)
+        return Coordinates(q.pos, q.quat, angles, q.ball_quats)
 
     @property
     def soles(self) -> tuple[Sole, ...]:

@@ -13,19 +13,21 @@ from jaxtyping import Float
 
 from robots.model.mjcf import Mjcf, read_mjcf
 from robots.model.morphology import Morphology
-from robots.model.parts import skeleton_of, surface_points, telling_names
+from robots.model.mount import roles_and_parts, standing_height
+from robots.model.parts import skeleton_of, surface_points
 from robots.model.segments import Segment, segments_of, tree_of
 from robots.model.soles import place_feet, soles_of, with_soles
 from robots.model.tpose import TPose, search_tpose
-from robots.tree import Tree
+from robots.tree import Coordinates, Tree
 from spark.errors import SkeletonError
 from spark.motion import Motion
 from spark.rig.feet import hip_height
 from spark.rig.groups import groups_of
 from spark.rig.rig import Rig
-from spark.rig.role_assignment import Override, assign_roles
+from spark.rig.role_assignment import Override
 from spark.rig.roles import Role, RoleMap
 from spark.rig.tpose import find_tpose
+from spark.rotation import quat_normalize
 from spark.skeleton import Skeleton
 
 _NOTED = np.radians(5)  # a limb farther from the T-pose is noted: its motions lean by as much
@@ -33,9 +35,10 @@ _REFUSED = np.radians(40)  # farther is nearly an A-pose (45): no rotation copie
 
 
 def understand_robot(source: Mjcf | str | Path, override: Override | None = None) -> Morphology:
-    """The morphology of any humanoid MJCF. `override` gives roles to joints of `parts_of` it.
+    """The morphology of any humanoid MJCF or URDF. `override` gives roles to joints of `parts_of`
+    it.
 
-    Raises SkeletonError where it has no legs, or limits that forbid a T-pose.
+    Raises SkeletonError where it has neither legs nor arms, or limits that forbid a T-pose.
     """
     mjcf = source if isinstance(source, Mjcf) else read_mjcf(source, visuals=False)
     tree, joints = tree_of(mjcf)
@@ -58,7 +61,8 @@ def parts_of(mjcf: Mjcf) -> Skeleton:
 def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | None) -> Morphology:
     segments = segments_of(mjcf, tree, joints)
     points = surface_points(mjcf, segments)
-    found = assign_roles(skeleton_of(segments, points, telling_names(segments)), None, override)
+    standing = standing_height(points, tree.base)
+    found, segments, points, mounted = roles_and_parts(segments, points, override)
     segments, order = _rerooted(segments, found)
     points = [points[k] for k in order]
     roles = RoleMap(
@@ -77,6 +81,8 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
     tree, assumed = _assume_limits(tree, segments, roles)
     tpose = search_tpose(tree, skeleton, roles, links, ideal)
     notes = (*mjcf.notes, *assumed, *_check_tpose(tpose, skeleton))
+    if mounted:
+        notes = (*notes, "no legs: it stays on its base; arms, waist and head follow")
     rig = Rig(
         skeleton=skeleton,
         roles=roles,
@@ -96,7 +102,15 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
         centers=np.array([segment.center for segment in segments]),
         tpose=tpose.coordinates,
         notes=notes,
+        mount=_mount(tpose.coordinates, standing) if mounted else None,
     )
+
+
+def _mount(tpose: Coordinates, height: float) -> Coordinates:
+    """Where the base of a robot without legs stays: on the floor, upright, heading as in the
+    T-pose, its joints too."""
+    quat = quat_normalize(tpose.quat * np.array([1.0, 0, 0, 1]))
+    return Coordinates(np.array([[0.0, 0, height]]), quat, tpose.angles, tpose.ball_quats)
 
 
 def _rerooted(segments: list[Segment], roles: RoleMap) -> tuple[list[Segment], list[int]]:

@@ -138,7 +138,7 @@ def linearize(
         own = j == 0 or link != robot.links[int(rig.skeleton.parents[j])]
         if own and (link in block.joints or (block.base and (link < 0 or j == rig.pelvis))):
             _add_pose(robot, targets, poses, terms, j, role)
-        if j == chest and block.base:
+        if j == chest and (block.base or link in block.joints):
             wanted = np.moveaxis(matrix_from_quat(targets.chest), 0, -1)
             terms.add_rotational(
                 rotation_residual(

@@ -18,6 +18,7 @@ from robots.solver.foot_path import footing_of
 from robots.solver.footprints import FootPlan, plan_feet, reachable
 from robots.solver.holds import Holds, joined
 from robots.solver.motion_plan import with_dynamics
+from robots.solver.mounted import facing_ahead, on_mount
 from robots.solver.projection import project
 from robots.solver.repair import repair
 from robots.solver.resting import resting
@@ -36,27 +37,33 @@ _COARSE_INTERVAL = 1 / 20  # [s] between the frames that are solved first
 def copy(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     """Each joint turned as its counterpart is, as far as its hinges can, and nothing more: the
     baseline."""
+    if robot.mount is not None:
+        source = facing_ahead(source)
     targets = targets_of(source, robot)
-    q = project(robot, targets.world, targets.hips)
-    return RobotMotion(robot, q, source.frame_time, targets.notes)
+    q = on_mount(robot, project(robot, targets.world, targets.hips))
+    return RobotMotion(robot, robot.following(q), source.frame_time, targets.notes)
 
 
 def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     """The motion of `source` on a robot, its feet planted where the source's are, within limits.
 
     Recordings of more than 20 fps are solved at about 20 fps first; splines through that are then
-    polished in all frames.
+    polished in all frames. A robot without legs stays where it is mounted.
     """
+    if robot.mount is not None:
+        source = facing_ahead(source)
     targets = targets_of(source, robot)
     feet = plan_feet(robot, targets)
     stride = coarse_stride(targets)
     coarse = targets.every(stride)
-    q = limit_speed(robot, project(robot, coarse.world, coarse.hips), coarse.frame_time)
+    q = on_mount(robot, project(robot, coarse.world, coarse.hips))
+    q = limit_speed(robot, q, coarse.frame_time)
     q = solve(robot, coarse, [foot.every(stride) for foot in feet], q)
     if stride > 1:
         q = q.upsampled(stride, len(targets))
     targets, feet = with_dynamics(robot, targets, reachable(robot, feet, q), q)
     q = solve(robot, targets, feet, q, polish=True)
+    q = robot.following(q)
     return RobotMotion(robot, q, source.frame_time, (*robot.notes, *targets.notes))
 
 
@@ -106,8 +113,12 @@ def _may_collide(robot: Morphology, targets: Targets, q: Coordinates, block: Blo
 
 
 def blocks_of(robot: Morphology) -> tuple[Block, Block]:
-    """Base, trunk and legs; then the rest: arms and head."""
+    """Base, trunk and legs; then the rest: arms and head. Of a robot without legs all at once."""
     tree = robot.tree
+    if robot.mount is not None:
+        named = zip(robot.links, robot.rig.roles.roles, strict=True)
+        moved = sorted({j for link, role in named if role for j in tree.chain(int(link))})
+        return Block(tree, (), False), Block(tree, tuple(moved), False)
     links = {int(robot.links[robot.rig.chest])}
     links |= {int(link) for sole in robot.soles for link in robot.sole_points(sole)[0]}
     links |= {int(robot.links[j]) for j in robot.rig.contact_joints}

@@ -20,6 +20,10 @@ _CLEAR_NAMES = 1.5
 _REMEDY = "a map file can say which joint is what (spark-sim inspect --help)"
 
 
+class NoLegsError(SkeletonError):
+    """No pair of limbs can be legs; there may be arms."""
+
+
 @dataclass(frozen=True)
 class Anatomy:
     """The joints of each part of the body; `sides` is the evidence that the `first` limbs are the
@@ -47,7 +51,7 @@ def find_anatomy(measured: Measurements, hints: Sequence[NameHint]) -> Anatomy:
     if legs is None:
         legs = _legs_by_shape(measured, hints, pairs, arms)
     if legs is None:
-        raise SkeletonError(_no_legs(skeleton, hints, arms))
+        raise NoLegsError(_no_legs(skeleton, hints, arms))
     others = _others(measured, skeleton, pairs, legs)
     if arms is None and others:
         arms = max(others, key=lambda pair: measured.reach[pair.first[0]])

@@ -50,7 +50,7 @@ def configure(parser: ArgumentParser) -> None:
         metavar="TARGET",
         required=True,
         help="the body to put the motion on: a BVH or FBX file, a robot's name "
-        "(`spark-sim robots`), or any humanoid robot's MJCF (.xml)",
+        "(`spark-sim robots`), or any humanoid robot's MJCF (.xml) or URDF (.urdf)",
     )
     parser.add_argument(
         "-o",

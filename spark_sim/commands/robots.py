@@ -9,7 +9,7 @@ USAGE = "[--json]"
 DESCRIPTION = """\
 List the robots that `--to` and `--robot` know by name: number of joints,
 height, origin and licence of the model, and how to install it. Any other
-humanoid robot is given by the path of its MJCF file."""
+humanoid robot is given by the path of its MJCF or URDF file."""
 EXAMPLES = """\
 examples:
   spark-sim robots

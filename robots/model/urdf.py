@@ -1,0 +1,220 @@
+"""URDF files of humanoids, as MuJoCo reads them: with their meshes found, or left out.
+
+MuJoCo parses URDF itself. What it does not know is where meshes are (`package://`), what is in a
+COLLADA file, and which of a link's faults matter to nobody here.
+"""
+
+import os
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from robots.model.meshes import as_obj
+from spark.errors import FileFormatError, SkeletonError, name_list
+from spark.opening import LARGEST_TEXT, read_bytes
+from spark.summary import counted
+
+SUFFIX = ".urdf"
+_COMPILER = {
+    "fusestatic": "false",  # hands and feet are often welded on
+    "strippath": "false",
+    "discardvisual": "false",
+    "balanceinertia": "true",
+}
+_TYPICAL_RADIUS = 0.05  # [m]
+_BEGINNING = 4096  # bytes that tell an MJCF from a URDF
+_MOVING = ("revolute", "continuous", "prismatic")
+_LEAST = 1e-10  # [kg m²] of a principal moment
+_LOCKED = 1e-6  # [rad] MuJoCo ignores limits without a range, and the joint would turn freely
+
+
+def is_urdf(path: Path) -> bool:
+    """Whether a model is URDF: by its ending, or by what it begins with."""
+    if path.suffix.lower() == SUFFIX:
+        return True
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return bool(re.search(rb"<robot[\s>]", file.read(_BEGINNING)))
+
+
+def read_urdf(path: Path, notes: list[str], *, visuals: bool = True) -> mujoco.MjSpec:
+    """The robot in a URDF. Meshes that are missing or can't be read are left out, with a note;
+    without `visuals` also those of links that have other shapes and a mass.
+
+    Raises `FileFormatError` where it is none, or its links are no trees.
+    """
+    data = read_bytes(path, limit=LARGEST_TEXT, expected="a URDF")
+    try:
+        robot = ET.fromstring(data)
+    except (ET.ParseError, ValueError, LookupError) as error:
+        line = getattr(error, "position", (None,))[0]
+        raise FileFormatError(path, line, f"is no XML ({error}); expected a URDF") from error
+    if robot.tag != "robot":
+        raise FileFormatError(path, 1, f"begins with <{robot.tag}>; a URDF begins with <robot>")
+    if any("xacro" in element.tag for element in robot.iter()):
+        raise FileFormatError(
+            path, None, "holds xacro macros; expand them first: xacro FILE > robot.urdf"
+        )
+    _check_tree(robot, path)
+    for element in [e for e in robot if e.tag not in ("link", "joint", "material")]:
+        robot.remove(element)  # transmissions, sensors of simulators, other settings of MuJoCo's
+    moving = {j.get("name") for j in robot.findall("joint") if j.get("type") in _MOVING}
+    for joint in robot.findall("joint"):
+        _keep_locked(joint)
+        for mimic in joint.findall("mimic"):
+            if not {joint.get("name"), mimic.get("joint")} <= moving:
+                joint.remove(mimic)
+    for shape in [*robot.iter("visual"), *robot.iter("collision")]:
+        shape.attrib.pop("name", None)  # they need not be unique
+    mended = [link.get("name", "") for link in robot.findall("link") if _mend_inertia(link)]
+    if mended:
+        notes.append(
+            f"{counted(len(mended), 'link')} have an inertia that no body has: {name_list(mended)}"
+        )
+    assets = _find_meshes(robot, path, notes, visuals=visuals)
+    ET.SubElement(ET.SubElement(robot, "mujoco"), "compiler", _COMPILER)
+    try:
+        spec = mujoco.MjSpec.from_string(ET.tostring(robot, encoding="unicode"), assets=assets)
+    except (ValueError, RuntimeError) as error:
+        message = " ".join(str(error).split())
+        raise FileFormatError(path, None, f"MuJoCo can't read it: {message}") from error
+    for mesh in spec.meshes:
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # any mesh has one
+    return spec
+
+
+def _check_tree(robot: ET.Element, path: Path) -> None:
+    """Raise where joints name links that are not there, or go round in a circle."""
+    links = [link.get("name", "") for link in robot.findall("link")]
+    parents: dict[str, str] = {}
+    for joint in robot.findall("joint"):
+        name = joint.get("name")
+        ends = [joint.find(end) for end in ("parent", "child")]
+        parent, child = ("" if end is None else end.get("link", "") for end in ends)
+        for link in (parent, child):
+            if link not in links:
+                raise FileFormatError(
+                    path, None, f"joint {name!r} joins {link!r}, which is no link of the file"
+                )
+        if child in parents:
+            raise FileFormatError(path, None, f"the link {child!r} hangs on two joints, not one")
+        parents[child] = parent
+    for link in links:
+        above, seen = link, {link}
+        while above in parents:
+            above = parents[above]
+            if above in seen:
+                raise SkeletonError(f"{path}: the links {name_list(sorted(seen))} hang in a circle")
+            seen.add(above)
+
+
+def _mend_inertia(link: ET.Element) -> bool:
+    """Whether the link's inertia was none, and is mended: without mass it goes; without positive
+    principal moments it gets those of a ball of this mass and a typical size."""
+    inertial = link.find("inertial")
+    if inertial is None:
+        return False
+    try:
+        mass = float(inertial.find("mass").get("value", "0"))  # type: ignore[union-attr]
+        moments = inertial.find("inertia").attrib  # type: ignore[union-attr]
+        x, y, z, xy, xz, yz = (
+            float(moments.get(f"i{ij}", "0")) for ij in ("xx", "yy", "zz", "xy", "xz", "yz")
+        )
+    except (AttributeError, ValueError):
+        link.remove(inertial)
+        return True
+    if mass <= 0:
+        link.remove(inertial)
+        return mass < 0
+    least = np.linalg.eigvalsh([[x, xy, xz], [xy, y, yz], [xz, yz, z]])[0]
+    if np.isfinite(least) and least > _LEAST:
+        return False
+    inertia = inertial.find("inertia")
+    assert inertia is not None
+    for ij in ("xx", "yy", "zz", "xy", "xz", "yz"):
+        inertia.set(f"i{ij}", repr(0.4 * mass * _TYPICAL_RADIUS**2) if ij[0] == ij[1] else "0")
+    return True
+
+
+def _keep_locked(joint: ET.Element) -> None:
+    """A hinge that may not turn keeps a tiny range."""
+    limit = joint.find("limit")
+    if joint.get("type") != "revolute" or limit is None:
+        return
+    try:
+        lower, upper = (float(limit.get(end, "0")) for end in ("lower", "upper"))
+    except ValueError:
+        return  # MuJoCo says what is wrong
+    if lower == upper:
+        limit.set("lower", repr(lower - _LOCKED / 2))
+        limit.set("upper", repr(upper + _LOCKED / 2))
+
+
+def _find_meshes(
+    robot: ET.Element, path: Path, notes: list[str], *, visuals: bool
+) -> dict[str, bytes]:
+    """Point each mesh to its file, and drop those that have none; the files that MuJoCo can't read
+    itself come back as ones that it can, by name."""
+    converted: dict[str, bytes] = {}
+    names: dict[str, str] = {}  # what each mesh becomes
+    faults: dict[str, str] = {}
+    for link in robot.findall("link"):
+        judged = link.find("collision") is not None and link.find("inertial") is not None
+        for shape in [*link.findall("visual"), *link.findall("collision")]:
+            mesh = shape.find("geometry/mesh")
+            if mesh is None:
+                continue
+            uri = mesh.get("filename", "")
+            if uri not in names and uri not in faults:
+                if shape.tag == "visual" and judged and not visuals:
+                    link.remove(shape)
+                    continue
+                try:
+                    names[uri] = _usable(uri, path, converted)
+                except FileFormatError as error:
+                    faults[uri] = str(error)
+            if uri in names:
+                mesh.set("filename", names[uri])
+            else:
+                link.remove(shape)
+    if faults:
+        first = next(iter(faults.values()))
+        notes.append(f"{counted(len(faults), 'mesh file')} left out: {first}")
+    return converted
+
+
+def _usable(uri: str, path: Path, converted: dict[str, bytes]) -> str:
+    """The name of a mesh's file that MuJoCo reads; a converted one is added."""
+    file = _mesh_file(uri, path)
+    if file is None:
+        raise FileFormatError(uri, None, "no such file in the folders around the model")
+    content = as_obj(file)
+    if content is None:
+        return str(file)
+    name = f"{file.stem}_{len(converted)}.obj"
+    converted[name] = content
+    return name
+
+
+def _mesh_file(uri: str, path: Path) -> Path | None:
+    """Where a mesh is: below the URDF's folder, or a folder above it that is the package, or holds
+    it, or is named in ROS_PACKAGE_PATH."""
+    scheme, _, rest = uri.rpartition("://")
+    rest = rest.lstrip("/") if scheme not in ("", "file") else rest
+    folder = path.parent.absolute()
+    if scheme in ("", "file"):
+        candidates = [folder / rest]
+    else:
+        package, _, inside = rest.partition("/")
+        roots = [Path(root) for root in os.environ.get("ROS_PACKAGE_PATH", "").split(":") if root]
+        candidates = [root / rest for root in roots]
+        for above in [folder, *folder.parents]:
+            candidates += [above / rest, above / inside] if above != Path("/") else []
+        candidates.append(folder / package / inside)
+    name = rest.rpartition("/")[2]
+    candidates += [folder / name, folder / "meshes" / name, folder.parent / "meshes" / name]
+    return next((file for file in candidates if file.is_file()), None)
