@@ -108,7 +108,8 @@ def test_what_is_not_installed_says_how_to_get_it(monkeypatch: pytest.MonkeyPatc
 
 def test_paths_are_models() -> None:
     assert registry.find("some/where/g1.xml") == Path("some/where/g1.xml")
-    for path in ("g1.urdf", "walk.bvh", "folder/g1", "."):
+    assert registry.find("some/where/g1.urdf") == Path("some/where/g1.urdf")
+    for path in ("g1.usd", "walk.bvh", "folder/g1", "."):
         with pytest.raises(FileFormatError, match="expected an MJCF"):
             registry.find(path)
 

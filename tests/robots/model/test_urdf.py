@@ -55,7 +55,6 @@ def test_a_urdf_stands_on_the_floor(folder: Path) -> None:
     np.testing.assert_allclose(data.xpos, other.xpos, atol=5e-3)
 
 
-XACRO = '<xacro:if xmlns:xacro="http://www.ros.org/wiki/xacro"/>'
 SHAPELESS = '<collision><geometry><mesh filename="{}"/></geometry></collision>'
 
 
