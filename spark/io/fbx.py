@@ -15,6 +15,7 @@ from spark.io.fbx_settings import FbxSettings, read_settings
 from spark.io.foreign import foreign_recording
 from spark.io.nodes import motion_of_axes
 from spark.io.recording import Recording
+from spark.io.scanner import LARGEST
 from spark.motion import Motion
 from spark.opening import read_bytes
 
@@ -57,7 +58,8 @@ def _read_motion(path: Path, frame_time: float, clip: str | None) -> tuple[Motio
     baked, times, found = scene.animation(frame_time, clip)
     rest, rest_axes = scene.world(joints, None, np.zeros(1))
     positions, axes = scene.world(joints, baked, times)
-    if not (np.isfinite(positions).all() and np.isfinite(axes).all()):
-        raise FileFormatError(path, None, "holds numbers that are not finite")
+    for numbers in (rest, positions, rest_axes, axes):
+        if not (np.abs(numbers) < LARGEST).all():
+            raise FileFormatError(path, None, f"holds numbers beyond {LARGEST:g}, or none at all")
     motion, renamed = motion_of_axes(joints, (rest[0], rest_axes[0]), (positions, axes), frame_time)
     return motion, notes + found + renamed

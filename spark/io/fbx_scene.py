@@ -11,8 +11,9 @@ from spark.io.nodes import NodeJoint, chosen_clip, joints_of
 from spark.resample import frames_of_keys, rotations_at, values_at
 from spark.rotation import matrix_from_quat
 
-# Frames times nodes of a file: 12 hours of a body with fingers at 30 fps. More is a broken file.
-_MAX_VALUES = 100_000_000
+# Frames times nodes: what any file may hold, and how many more for each of its bytes. Mixamo's have
+# a hundredth for each; an hour of two keys at its ends is no recording.
+_FREE_VALUES, _VALUES_A_BYTE = 1_000_000, 0.2
 
 
 class FbxScene:
@@ -67,6 +68,7 @@ class FbxScene:
         exporters leave empty ones beside it. None and one frame where nothing moves.
         """
         stacks = list(self._scene.anim_stacks)
+        self._check_span(frame_time)
         baked = [
             self._library.bake_anim(
                 self._scene, s.anim, resample_rate=1 / frame_time, max_keyframe_segments=100_000
@@ -91,12 +93,27 @@ class FbxScene:
             others = [stack.name for i, stack in enumerate(stacks) if i != best]
             notes += (f"animation {stacks[best].name!r} is read, not {name_list(others)}",)
         begin, end = baked[best].key_time_min, baked[best].key_time_max
+        self._check_count((end - begin) / frame_time, f"from {begin:g} s to {end:g} s")
         count = int((end - begin) / frame_time + 1e-3) + 1
-        if not 0 < count * len(self._nodes) < _MAX_VALUES:
-            raise FileFormatError(
-                self.path, None, f"has keys from {begin:g} s to {end:g} s; expected hours at most"
-            )
         return baked[best], begin + frame_time * np.arange(count), notes
+
+    def _check_span(self, frame_time: float) -> None:
+        """Raise where the keys span more than the file can mean: baking makes every frame."""
+        spans = [(c.min_time, c.max_time) for c in self._scene.anim_curves if len(c.keyframes)]
+        spans += [(s.time_begin, s.time_end) for s in self._scene.anim_stacks]
+        if spans:
+            begin, end = min(s[0] for s in spans), max(s[1] for s in spans)
+            self._check_count((end - begin) / frame_time, f"from {begin:g} s to {end:g} s")
+
+    def _check_count(self, frames: float, span: str) -> None:
+        most = _FREE_VALUES + _VALUES_A_BYTE * self.path.stat().st_size
+        if not -1 < frames * len(self._nodes) < most:  # nor NaN
+            raise FileFormatError(
+                self.path,
+                None,
+                f"has keys {span}, {frames:,.0f} frames of {len(self._nodes)} nodes; a file of "
+                "its size holds no such recording",
+            )
 
     def world(
         self, joints: list[NodeJoint], baked: Any, times: Float[np.ndarray, "T"]

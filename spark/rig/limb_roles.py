@@ -141,4 +141,4 @@ def _log_likelihood(length: float, other: float, ratio: float, spread: float) ->
     """
     if min(length, other) < 1e-6:
         return -0.9 if other > 1e-6 else -4.0
-    return max(-4.0, -0.5 * (log(length / (ratio * other)) / spread) ** 2)
+    return max(-4.0, -0.5 * ((log(length) - log(ratio * other)) / spread) ** 2)

@@ -229,3 +229,17 @@ def test_retarget_from_and_to_fbx(tmp_path: Path) -> None:
     again = spark_sim.load(result.save(tmp_path / "out.bvh"))
     assert again.motion.skeleton.names == result.motion.skeleton.names
     np.testing.assert_allclose(forward(again.motion)[0], forward(result.motion)[0], atol=1e-5)
+
+
+@pytest.mark.parametrize(("times", "rate"), [((0, 86400.0), 30.0), ((0, 1.1), 90_000.0)])
+def test_keys_far_apart_are_no_recording(
+    times: tuple[float, float], rate: float, tmp_path: Path
+) -> None:
+    """A day of two keys, and a second at 90 kHz: refused before their frames are made."""
+    nodes = [Node(f"n{k}", k - 1, (0, 10, 0)) for k in range(30)]
+    takes = [Take("Take 001", 1, "X", times, (0, 90))]
+    path = Fbx(nodes, takes, time_mode=14, rate=rate).write(tmp_path / "long.fbx")
+    with pytest.raises(FileFormatError, match=r"frames of 31 nodes; a file of its size holds no"):
+        read_fbx(path)
+    near = [Take("Take 001", 1, "X", (0, 1), (0, 90))]
+    assert len(read_fbx(Fbx(nodes, near, time_mode=14, rate=30.0).write(path)).motion) == 31
