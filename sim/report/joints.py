@@ -1,5 +1,6 @@
 """Joint by joint: limits, speed, jerk and torque in one row each."""
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,17 +29,21 @@ class JointRow:
 
 
 def joint_rows(clip: ClipMetrics) -> list[JointRow]:
-    """A row for each joint whose rates are measured, in the body's order."""
+    """A row for each joint whose rates are measured, in the body's order; those of one name are
+    numbered."""
     limits = {_BONES.get(each.joint, each.joint): each for each in clip.limits}
+    counts = Counter(clip.joint_names)
+    seen: Counter[str] = Counter()
     torques = {each.joint: each for each in clip.torques}
     rows = []
     for k, name in enumerate(clip.joint_names):
         # A rig's spine may have several joints of one name; its limit is that of the outermost.
         limit = limits.get(name) if name not in clip.joint_names[k + 1 :] else None
         torque = torques.get(name)
+        seen[name] += 1
         rows.append(
             JointRow(
-                name=name,
+                name=name if counts[name] == 1 else f"{name} {seen[name]}",
                 room=None if limit is None else -float(limit.beyond.max()),
                 at_limit=None if limit is None else limit.share(-clip.thresholds.limit_margin),
                 speed=float(clip.joint_speed[:, k].max()),

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from sim.report.clip_metrics import ClipMetrics
+from sim.report.joints import joint_rows
 from sim.report.measures import Drift
 from sim.report.result import Finding, Result
 from sim.report.swing import Swing
@@ -104,11 +105,8 @@ def _clip(clip: ClipMetrics) -> dict[str, Any]:
             for limit in clip.limits
         },
         "joint_rates": {
-            name: {
-                "largest_speed_rad_s": float(clip.joint_speed[:, k].max()),
-                "jerk_rms_rad_s3": float(np.sqrt(np.mean(clip.joint_jerk[:, k] ** 2))),
-            }
-            for k, name in enumerate(clip.joint_names)
+            row.name: {"largest_speed_rad_s": row.speed, "jerk_rms_rad_s3": row.jerk}
+            for row in joint_rows(clip)
         },
         "joint_torques": {
             each.joint: {

@@ -18,6 +18,7 @@ from sim.report.explanations import MEANINGS
 from sim.report.joints import joint_rows
 from sim.report.page import report_page
 from sim.report.palette import css
+from spark.demo.sample import sample_motion, sample_rig
 from spark.rig.roles import Role
 from spark.rotation import quat_about
 from tests.helpers.browser import opened, with_probe
@@ -169,6 +170,21 @@ def test_joints_of_a_rig_have_their_anatomical_limits(text: str) -> None:
     assert knee.speed > 0 == rows["right lower leg"].speed
     assert '<th scope="row">left lower leg</th>' in text
     assert "of its motor" not in text
+
+
+def test_joints_of_one_name_are_numbered() -> None:
+    """A spine of three: two turn against the next below."""
+    rig = sample_rig("walker")
+    motion = sample_motion("walk", rig, 60.0)
+    report = assess(Subject(motion, rig))
+    rows = joint_rows(report.clip)
+    names = [row.name for row in rows]
+    assert len({*names}) == len(names) == len(report.clip.joint_names)
+    spines = [row for row in rows if row.name.startswith("spine ")]
+    assert [row.name for row in spines] == [f"spine {k + 1}" for k in range(len(spines))]
+    assert len(spines) > 1
+    assert [row.room is not None for row in spines] == [False] * (len(spines) - 1) + [True]
+    assert {*report.json()["clip"]["joint_rates"]} == {*names}
 
 
 def test_joints_of_a_robot_have_torques() -> None:
