@@ -2,13 +2,14 @@
 
 from abc import ABC, abstractmethod
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from spark.errors import ConventionError, SkeletonError, name_list
+from spark.errors import ConventionError, SkeletonError, SparkSimError, name_list
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark.resample import frames_at_rate
@@ -181,7 +182,20 @@ class ClipBase(ABC):
             ("joints", f"{len(self.joint_names)}: {name_list([*self.joint_names])}"),
             *self._facts(),
         ]
-        return html_table(self.name, rows)
+        return html_table(self.name, rows) + self._replay()
+
+    def _replay(self) -> str:
+        """The page with the replay, in a frame; nothing for a body that is no humanoid."""
+        from sim.view.page import page
+
+        try:
+            text = page(self.figures(), title=self.name)
+        except SparkSimError:
+            return ""
+        return (
+            f'<iframe srcdoc="{escape(text)}" title="replay of {escape(self.name)}" '
+            'sandbox="allow-scripts" style="width:100%;height:420px;border:0"></iframe>'
+        )
 
     def _facts(self) -> list[tuple[str, str]]:
         """What a notebook shows besides frames and joints."""

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from sim.report.annotate import corner_states
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.clip_poses import pose_clip
 from sim.report.explanations import MEANINGS
@@ -25,7 +26,6 @@ from sim.view.scene import Figure
 from spark.files import write_atomically
 
 _LISTED = 200  # findings
-_STANDS, _SLIDES, _SINKS = range(1, 4)  # states of a corner, in the order of `CORNER_COLORS`
 
 
 def write_report_page(
@@ -100,11 +100,7 @@ def report_page(
 def overlay(clip: ClipMetrics, subject: Subject) -> Overlay:
     """The soles' corners as dots, and the labels of each frame's flags."""
     poses = pose_clip(subject)
-    heights = poses.corners[..., 2] - clip.floor_z
-    states = np.zeros(heights.shape, dtype=np.uint8)
-    states[heights < clip.thresholds.skate_height] = _STANDS
-    states[clip.corner_skates] = _SLIDES
-    states[heights < -clip.thresholds.penetration] = _SINKS
+    states = corner_states(clip, poses.corners)
     labels = tuple(
         tuple(LABELS[name] for name in FLAGS if clip.flags[name][t]) for t in range(len(clip))
     )

@@ -36,6 +36,9 @@ _DARK = {
 # The dots of the soles' corners in the replay, which is light and dark too.
 CORNER_COLORS = {"stands": "#1f9d55", "slides": "#f08c00", "sinks": "#e03131"}
 
+# Of the tiles of a notebook, which is light or dark without our knowing: readable on both.
+TILE_COLORS: dict[Grade, str] = {"good": "#2e9e5f", "fair": "#c07a10", "bad": "#e5484d"}
+
 # ANSI codes of a terminal (ECMA-48, "select graphic rendition").
 TERMINAL: dict[Grade, int] = {"good": 32, "fair": 33, "bad": 31}
 BOLD, DIM = 1, 2
