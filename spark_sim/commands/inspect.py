@@ -32,7 +32,7 @@ def configure(parser: ArgumentParser) -> None:
         "files",
         metavar="FILE",
         nargs="+",
-        help="a BVH or FBX file, a robot's motion, or a robot's name",
+        help="a character's file, a robot's motion, or a robot's name",
     )
     parser.add_argument(
         "--save-map", metavar="TOML", help="write the map of joints of FILE, to edit"

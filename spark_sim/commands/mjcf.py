@@ -21,7 +21,7 @@ examples:
 
 
 def configure(parser: ArgumentParser) -> None:
-    parser.add_argument("rig", metavar="RIG", help="a BVH or FBX file; its motion is not needed")
+    parser.add_argument("rig", metavar="RIG", help="a character's file; its motion is not needed")
     parser.add_argument(
         "-o",
         "--output",

@@ -33,7 +33,7 @@ examples:
 
 def configure(parser: ArgumentParser) -> None:
     parser.add_argument(
-        "files", metavar="FILE", nargs="*", help="a BVH or FBX file, or a robot's motion"
+        "files", metavar="FILE", nargs="*", help="a character's file, or a robot's motion"
     )
     parser.add_argument("--video", metavar="MP4", help="write a video")
     parser.add_argument("--html", metavar="HTML", help="write one web page with a 3D replay")

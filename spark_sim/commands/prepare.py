@@ -9,7 +9,7 @@ from spark_sim.commands.options import add_force
 SUMMARY = "make a dataset to train on"
 USAGE = "SRC... -o DATASET [options]"
 DESCRIPTION = """\
-Read every BVH and FBX file below each SRC and write one dataset: canonical
+Read every motion below each SRC and write one dataset: canonical
 rotations at 30 frames a second, without fingers, hair and clothes. It is made
 for Mixamo downloads, one folder a character, and takes any tree of files.
 
@@ -25,7 +25,7 @@ examples:
 
 
 def configure(parser: ArgumentParser) -> None:
-    parser.add_argument("sources", metavar="SRC", nargs="+", help="folders, or BVH and FBX files")
+    parser.add_argument("sources", metavar="SRC", nargs="+", help="folders of motions, or motions")
     parser.add_argument(
         "-o", "--output", metavar="DATASET", required=True, help="the folder to write"
     )

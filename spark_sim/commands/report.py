@@ -53,7 +53,7 @@ def configure(parser: ArgumentParser) -> None:
         "file",
         metavar="FILE",
         nargs="?",
-        help="a BVH or FBX file, a robot's motion, or a folder of them",
+        help="a character's file, a robot's motion, or a folder of them",
     )
     parser.add_argument("--source", metavar="SRC", help="the motion that FILE was made from")
     parser.add_argument(

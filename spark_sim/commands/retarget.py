@@ -43,13 +43,13 @@ def configure(parser: ArgumentParser) -> None:
         "sources",
         metavar="SRC",
         nargs="+",
-        help="motions, or folders of them (BVH and FBX; with --robot, a robot's own too)",
+        help="motions, or folders of them (with --robot, a robot's own too)",
     )
     parser.add_argument(
         "--to",
         metavar="TARGET",
         required=True,
-        help="the body to put the motion on: a BVH or FBX file, a robot's name "
+        help="the body to put the motion on: a character's file, a robot's name "
         "(`spark-sim robots`), or any humanoid robot's MJCF (.xml) or URDF (.urdf)",
     )
     parser.add_argument(

@@ -15,7 +15,7 @@ SUMMARY = "train the network that retargets"
 USAGE = "DATA... -o DIR [--config TOML] [--resume] [options]"
 DESCRIPTION = """\
 Train a network on each DATA: a dataset that `spark-sim prepare` made, or a
-folder of BVH and FBX files. Writes DIR/checkpoint.safetensors, the settings to
+folder of motions. Writes DIR/checkpoint.safetensors, the settings to
 DIR/config.toml, and the losses of each step to DIR/log.jsonl."""
 EXAMPLES = """\
 examples:
