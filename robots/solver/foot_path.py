@@ -13,6 +13,7 @@ from robots.model.morphology import Morphology
 from robots.solver.footprints import FootPlan, on_points
 from robots.solver.holds import Holds
 from spark.runs import true_runs
+from spark.transfer.footfalls import between_contacts
 
 # How firmly the points of a sole are held, in x, y and z, as a share of those that stand:
 SWING_HOLD = np.array([0.35, 0.35, 0.6])  # its height in swing is what keeps it off the floor,
@@ -87,19 +88,6 @@ def _speed(
     way = np.where(low, np.abs(points[after] - points[before]), 0.0).max(axis=1)
     speed: Float[np.ndarray, T] = way / np.maximum((after - before) * frame_time, 1e-9)
     return speed
-
-
-def between_contacts(
-    values: Float[np.ndarray, "T D"], stands: Bool[np.ndarray, "T"], path: Float[np.ndarray, "T 2"]
-) -> Float[np.ndarray, "T D"]:
-    """The values of standing frames, and between these from one to the next by as much of its way
-    as the foot has gone. 0 where it never stands."""
-    at = np.flatnonzero(stands)
-    if not len(at):
-        return np.zeros_like(values)
-    step = np.linalg.norm(np.diff(path, axis=0, prepend=path[:1]), axis=1)
-    way = np.cumsum(step + 1e-4)  # a tenth of a millimetre a frame, for feet that stay in place
-    return np.stack([np.interp(way, way[at], column[at]) for column in values.T], axis=1)
 
 
 def _fading(

@@ -17,6 +17,7 @@ from robots.tree import Coordinates, LinkPoses, forward_kinematics
 from spark.kinematics import world_positions
 from spark.rig.feet import Sole, sole_positions
 from spark.runs import true_runs
+from spark.transfer.footfalls import beyond
 
 # Hip heights that a standing foot may stray from its mean place without having moved,
 MAX_WOBBLE = 0.05
@@ -152,10 +153,3 @@ def _moved(plan: FootPlan, points: Float[np.ndarray, "P 3 T"]) -> FootPlan:
         at = center + shift + turn * (pivot[here] - center)
         prints[here] = np.column_stack([at.real, at.imag, heading[here] + np.angle(turn)])
     return replace(plan, prints=prints)
-
-
-def beyond(path: Float[np.ndarray, "P D"], radius: float) -> Float[np.ndarray, "P D"]:
-    """How far a path is from its mean, but for what of that lies within a radius."""
-    away = path - path.mean(0)
-    far = np.linalg.norm(away, axis=1, keepdims=True)
-    return away * np.maximum(1.0 - radius / np.maximum(far, 1e-12), 0.0)

@@ -13,14 +13,13 @@ from scipy.ndimage import distance_transform_edt
 
 from robots.model.morphology import Morphology
 from robots.solver.contacts import touching_joint
-from robots.solver.foot_path import between_contacts
-from robots.solver.footprints import beyond
 from robots.solver.holds import Holds, joined
 from robots.solver.hulls import shapes_of
 from robots.solver.targets import Targets
 from robots.tree import Coordinates, LinkPoses, forward_kinematics
 from spark.rig.roles import Role
 from spark.runs import true_runs
+from spark.transfer.footfalls import between_contacts, beyond
 
 HOLD = 1.0  # how firmly a part is held where it touches the ground, as a share of a standing sole,
 CARRIED_HOLD = 0.8  # and the shoulder over an arm that touches

@@ -42,7 +42,8 @@ class Measurements:
         np.maximum.at(
             reach, self.skeleton.end_parents, np.linalg.norm(self.skeleton.end_offsets, axis=-1)
         )
-        return np.minimum(reach, self.bones.max())
+        longest = self.bones.max()
+        return np.minimum(reach, longest) if longest > 0 else reach
 
     @cached_property
     def reach(self) -> Float[np.ndarray, "J"]:

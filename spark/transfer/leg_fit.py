@@ -22,7 +22,7 @@ from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_rotate
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
-from spark.transfer.leg_ik import bend_leg, leg_of
+from spark.transfer.leg_ik import Leg, leg_of, move_ankles
 
 # Of the shoulders' height in `travel_scale`, against the hips'. On retargeted characters of an
 # animation library the scale over the ground lay between the two (docs/evaluation.md).
@@ -59,23 +59,21 @@ def _fitted(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
     start, target = source.rig, moved.rig
     scale, rise = travel_scale(start, target), target.hip_height / start.hip_height
     moved = replace(moved, hips=np.column_stack([source.hips[:, :2] * scale, moved.hips[:, 2]]))
-    theirs, positions = canonical_positions(source), canonical_positions(moved)
     outwards = quat_rotate(source.rotations[:, start.pelvis], np.array([0.0, 1.0, 0.0]))[:, :2]
-    rotations = moved.rotations
+    moves: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
     for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
         leg = leg_of(target.skeleton, target.roles.roles, group)
         ankle = start.roles.joint(_foot(group))
         if leg is None or ankle is None:
             continue
         rest, own_rest = _from_sole(start, ankle), _from_sole(target, leg.foot)
-        wanted = np.empty_like(moved.hips)
-        away = theirs[:, ankle, :2] - source.hips[:, :2]
-        wanted[:, :2] = moved.hips[:, :2] + scale * away
-        wanted[:, :2] += (own_rest[1] - scale * rest[1]) * outwards
-        above = theirs[:, ankle, 2] - source.floor_z - rest[2]
-        wanted[:, 2] = moved.floor_z + own_rest[2] + rise * above
-        rotations = bend_leg(rotations, positions, leg, wanted - positions[:, leg.foot])
-    return replace(moved, rotations=rotations)
+        theirs = canonical_positions(source, [ankle])[:, 0]
+        own = canonical_positions(moved, [leg.foot])[:, 0]
+        along = moved.hips[:, :2] + scale * (theirs[:, :2] - source.hips[:, :2])
+        along += (own_rest[1] - scale * rest[1]) * outwards
+        above = moved.floor_z + own_rest[2] + rise * (theirs[:, 2] - source.floor_z - rest[2])
+        moves.append((leg, np.column_stack([along, above]) - own))
+    return move_ankles(moved, moves)
 
 
 def _foot(leg: Group) -> Role:

@@ -7,14 +7,17 @@ foot keeps its rotation in the world.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
+from spark.blocks import in_blocks
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_between, quat_from_rotvec, quat_mul, quat_rotate
 from spark.skeleton import Skeleton
+from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
 # Of the leg's length: at full stretch the knee would lock, and the direction it bends in flip.
 _MAX_REACH = 0.999
@@ -57,7 +60,7 @@ def stance_correction(
     planted: Bool[np.ndarray, "*n T"],
 ) -> Float[np.ndarray, "*n T 3"]:
     """What must be added to contact points' paths so that over each stance they rest at the mean of
-    the wanted path [same unit]; in between as `blend_between` does it."""
+    the wanted path [same unit]; eased from one to the next in between, held at both ends."""
     starts = planted & ~np.concatenate([np.zeros_like(planted[..., :1]), planted[..., :-1]], -1)
     stance = starts.cumsum().reshape(planted.shape)  # a number for each stance of each path
     frames = planted.nonzero()
@@ -68,15 +71,6 @@ def stance_correction(
         means = np.bincount(stance[frames], wanted) / counts if len(wanted) else counts
         held[..., axis][frames] = means[stance[frames]] - contact_pos[..., axis][frames]
     return _eased(held, planted)
-
-
-def blend_between(
-    values: Float[np.ndarray, "P 3"], frames: Int[np.ndarray, "P"], count: int
-) -> Float[np.ndarray, "T 3"]:
-    """Values at some frames carried over to all: eased from one to the next, held at both ends."""
-    spread, known = np.zeros((count, 3)), np.zeros(count, dtype=bool)
-    spread[frames], known[frames] = values, True
-    return _eased(spread, known)
 
 
 def _eased(
@@ -108,6 +102,20 @@ def bend_leg(
     for joints, turned in zip((leg.with_thigh, leg.with_shank), both, strict=True):
         out[..., list(joints), :] = quat_mul(turned[..., None, :], rotations[..., list(joints), :])
     return out
+
+
+def move_ankles(
+    motion: CanonicalMotion, moves: Sequence[tuple[Leg, Float[np.ndarray, "T 3"]]]
+) -> CanonicalMotion:
+    """`motion` with the ankles of some legs moved by so much [m], as `bend_leg` does it."""
+
+    def bent(block: slice) -> Float[np.ndarray, "T J 4"]:
+        rotations, positions = motion.rotations[block], canonical_positions(motion.picked(block))
+        for leg, move in moves:
+            rotations = bend_leg(rotations, positions, leg, move[block])
+        return rotations
+
+    return replace(motion, rotations=in_blocks(bent, len(motion)))
 
 
 def leg_rotations(

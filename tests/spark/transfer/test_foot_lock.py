@@ -1,5 +1,7 @@
 """Refined feet stand still where the source's stand, and the rest of the body hardly notices."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,12 +9,17 @@ from spark.demo.sample import MOTIONS, sample_motion, sample_rig
 from spark.io.recording import read_recording
 from spark.kinematics import forward
 from spark.rig.contacts import planted_feet, speeds
+from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig, understand
+from spark.rig.roles import Role
+from spark.rotation import quat_from_rotvec
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import canonical_positions, from_canonical, to_canonical
 from spark.transfer.foot_lock import lock_feet
-from spark.transfer.leg_ik import blend_between, stance_correction
+from spark.transfer.footfalls import between_contacts, beyond
+from spark.transfer.leg_ik import stance_correction
 from tests.helpers.recordings import recording
+from tests.helpers.stick import joint, standing, stick_rig
 
 PAIRS = [
     ("cmu_asf/cmu_02_01.bvh", "zoo/m2m_human.bvh"),
@@ -82,10 +89,44 @@ def test_a_slid_foot_is_held_at_the_middle_of_its_stance() -> None:
     np.testing.assert_allclose(stance_correction(path, wanted, np.zeros(8, dtype=bool)), 0)
 
 
-def test_corrections_blend_without_a_jump() -> None:
-    values = np.array([[0.0, 0, 0], [1.0, 0, 0]])
-    out = blend_between(values, np.array([2, 6]), 9)[:, 0]
-    np.testing.assert_allclose(out, [0, 0, 0, 5 / 32, 0.5, 27 / 32, 1, 1, 1])
+def test_corrections_go_over_by_as_much_of_its_way_as_the_foot_has_gone() -> None:
+    """By hand: 0 at the first footprint, 1 at the second; a tenth of the way is a tenth of it, and
+    a foot that waits is not pushed. Before the first and after the last they stay."""
+    path = np.array([[0.0, 0], [0, 0], [0.1, 0], [0.1, 0], [0.5, 0], [1, 0], [1, 0]])
+    values = np.array([[9.0], [0], [9], [9], [9], [1], [9]])
+    stands = np.array([0, 1, 0, 0, 0, 1, 0], dtype=bool)
+    out = between_contacts(values, stands, path)[:, 0]
+    np.testing.assert_allclose(out, [0, 0, 0.1, 0.1, 0.5, 1, 1], atol=1e-3)
+    assert not between_contacts(values, np.zeros(7, dtype=bool), path).any()
+
+
+def test_only_what_goes_beyond_a_radius_moves_a_standing_foot() -> None:
+    path = np.array([[0.0, 0], [0.04, 0], [0, 0], [-0.04, 0]])
+    np.testing.assert_allclose(beyond(path, 0.03)[:, 0], [0, 0.01, 0, -0.01], atol=1e-12)
+
+
+def test_a_longer_foot_on_its_toes_stays_on_the_floor() -> None:
+    """The lowest point of the sole is as high as the source's, scaled, however long the foot is:
+    raised heels and raised toes alike."""
+    rig = stick_rig()
+    offsets = rig.skeleton.offsets.copy()
+    ends = rig.skeleton.end_offsets.copy()
+    for role in (Role.LEFT_TOE, Role.RIGHT_TOE):
+        offsets[joint(role), 0] *= 2
+    ends[:2] *= 2
+    long_feet = replace(rig, skeleton=replace(rig.skeleton, offsets=offsets, end_offsets=ends))
+    motion = standing(rig, 60)
+    for side in ("left", "right"):
+        pitch = np.zeros((60, 3))
+        pitch[:, 1] = 0.4 * np.sin(np.linspace(0, 6, 60))
+        motion.rotations[:, joint(Role(f"{side}_foot"))] = quat_from_rotvec(pitch)
+    source = to_canonical(motion, rig)
+    heights = []
+    for one in (source, lock_feet(source, transfer(source, long_feet))):
+        positions, world = forward(from_canonical(one))
+        soles = [sole_positions(sole, positions, world) for sole in one.rig.soles]
+        heights.append(np.stack([points[..., 2].min(1) for points in soles]) - one.floor_z)
+    np.testing.assert_allclose(heights[1], np.maximum(heights[0], -0.0045), atol=2e-3)
 
 
 def test_many_paths_at_once_are_each_by_itself() -> None:
@@ -97,6 +138,16 @@ def test_many_paths_at_once_are_each_by_itself() -> None:
     for path, goal, flags, made in zip(paths, goals, planted, together, strict=True):
         frames = np.flatnonzero(flags)
         stances = np.split(frames, np.flatnonzero(np.diff(frames) > 1) + 1)
-        held = [goal[stance].mean(0) - path[stance] for stance in stances if len(stance)]
-        wanted = blend_between(np.concatenate(held), frames, 30) if held else np.zeros((30, 3))
+        if not len(frames):
+            np.testing.assert_allclose(made, 0)
+            continue
+        held = np.concatenate([goal[stance].mean(0) - path[stance] for stance in stances])
+        np.testing.assert_allclose(made[frames], held, atol=1e-12)
+        if len(frames) < 2:
+            continue
+        k = np.searchsorted(frames, np.arange(30)).clip(1, len(frames) - 1)
+        before, after = frames[k - 1], frames[k]
+        u = np.clip((np.arange(30) - before) / (after - before), 0, 1)[:, None]
+        ease = u * u * (3 - 2 * u)
+        wanted = held[k - 1] + ease * (held[k] - held[k - 1])
         np.testing.assert_allclose(made, wanted, atol=1e-12)
