@@ -59,6 +59,7 @@ bench: $(VENV)/.dev
 	$(BIN)/pytest tests/bench -m bench -o addopts= -q --benchmark-json=out/bench.json \
 	  --benchmark-columns=min,median,stddev,rounds
 	$(BIN)/python scripts/bench_table.py out/bench.json
+	$(BIN)/python -m scripts.batch_bench --plot out/shelf.svg
 
 wheel: $(VENV)/.dev
 	bash scripts/wheel_test.sh $(BIN)/python

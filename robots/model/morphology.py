@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
-from robots.model.mjcf import Mjcf
+from robots.model.mjcf import Mjcf, read_mjcf
 from robots.model.tpose import rest_pose
 from robots.tree import Coordinates, Tree, forward_kinematics
 from spark.motion import Motion
@@ -49,6 +49,12 @@ class Morphology:
     def joint_names(self) -> tuple[str, ...]:
         """The names of the hinges and balls, in the order of qpos."""
         return tuple(self.mjcf.joint_name(joint) for joint in self.mj_joints)
+
+    @cached_property
+    def whole(self) -> Mjcf:
+        """The model with all its shapes, read and compiled once for all motions; not to be
+        changed."""
+        return read_mjcf(self.mjcf.path)
 
     @cached_property
     def bones(self) -> dict[Role, Float[np.ndarray, "3"]]:

@@ -6,7 +6,6 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from robots.model.mjcf import read_mjcf
 from robots.model.morphology import Morphology
 from robots.tree import Coordinates
 from sim.trajectory import ModelTrajectory
@@ -42,7 +41,7 @@ class RobotMotion:
     @cached_property
     def body(self) -> ModelTrajectory:
         """The model with all its shapes, and the coordinates: what is shown and judged."""
-        mjcf, robot = read_mjcf(self.robot.mjcf.path), self.robot
+        mjcf, robot = self.robot.whole, self.robot
         return ModelTrajectory(
             spec=mjcf.spec,
             model=mjcf.model,
