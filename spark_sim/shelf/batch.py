@@ -162,6 +162,12 @@ class Batch:
         free = self._is_free(job.output.as_posix(), job)
         return None if free else _exists(self.folder / job.output)
 
+    def _files_of(self, job: Job) -> set[str]:
+        """The files that the job wrote when it was done last."""
+        name = job.output.as_posix()
+        listed = (e["files"] or e["stale"] for e in self.manifest.of(name))
+        return {file for files in listed for file in files if self._written_by.get(file) == name}
+
     def _is_free(self, file: str, job: Job) -> bool:
         owner = self._written_by.get(file)
         if owner is not None:
@@ -172,7 +178,7 @@ class Batch:
 
     def _commit(self, job: Job, target: str, done: Done) -> list[Entry]:
         """Give the results of a job their names, and the manifest its lines."""
-        ours = {o for o, job_of in self._written_by.items() if job_of == job.output.as_posix()}
+        ours = self._files_of(job)
         beside = job.output.parent
         files = [[(beside / file).as_posix() for file in piece.files] for piece in done.pieces]
         error = done.error
