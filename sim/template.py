@@ -13,6 +13,8 @@ from importlib.resources import files
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
+from spark.errors import OutputError
+
 _ENVIRONMENT = Environment(autoescape=True, undefined=StrictUndefined)
 _ENVIRONMENT.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
 
@@ -25,12 +27,15 @@ def render_page(
 
     A field is text and shown as it is; what is HTML already is `Markup`. A page inside a frame of
     this one is under this one's policy too: `framed` names the packages whose scripts it runs.
+    Raises `OutputError` where a number is none.
     """
     own = _text(package, f"{name}.js")
     scripts = (own, *(_text(other, "page.js") for other in framed))
-    text = _ENVIRONMENT.from_string(_text(package, f"{name}.html")).render(
-        **fields, script=Markup(own), policy=_policy(*scripts)
-    )
+    template = _ENVIRONMENT.from_string(_text(package, f"{name}.html"))
+    try:
+        text = template.render(**fields, script=Markup(own), policy=_policy(*scripts))
+    except ValueError as error:  # of JSON
+        raise OutputError(f"no page: it would hold a number that is none ({error})") from error
     # A file's name need not be UTF-8, what is left of it is shown.
     return text.encode("utf-8", "replace").decode()
 

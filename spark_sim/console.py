@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO, TypeVar
 
+from spark.errors import OutputError
+
 T = TypeVar("T")
 
 PROGRAM = "spark-sim"
@@ -23,7 +25,11 @@ def say(text: str) -> None:
 
 def emit_json(value: Mapping[str, Any]) -> None:
     """A result, for scripts: one object on one line, so that several make JSON lines."""
-    _line(json.dumps(value, ensure_ascii=False, allow_nan=False), sys.stdout)
+    try:
+        text = json.dumps(value, ensure_ascii=False, allow_nan=False)
+    except ValueError as error:
+        raise OutputError(f"not told: the result holds a number that is none ({error})") from error
+    _line(text, sys.stdout)
 
 
 def notes(path: str | Path, notes: Sequence[str]) -> None:
