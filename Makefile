@@ -2,6 +2,7 @@
 # make test    the test suite                make quick   its quick part, in two minutes
 # make check   lint, format, types, rooms    make bench   benchmarks
 # make docs    the site, in site/            make wheel   build, install elsewhere, run
+# make fuzz    spoilt files against every reader, a minute each (SECURITY.md)
 # make clean   remove what these made
 
 PYTHON ?= python3
@@ -10,7 +11,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test quick check docs bench wheel clean
+.PHONY: demo test quick check docs bench fuzz wheel clean
 .DELETE_ON_ERROR:
 
 $(BIN)/python:
@@ -60,6 +61,11 @@ bench: $(VENV)/.dev
 	  --benchmark-columns=min,median,stddev,rounds
 	$(BIN)/python scripts/bench_table.py out/bench.json
 	$(BIN)/python -m scripts.batch_bench --plot out/shelf.svg
+
+# Led by coverage where atheris has a wheel for this Python, else by hypothesis.
+fuzz: $(VENV)/.dev
+	@$(PIP) install --quiet --only-binary :all: atheris==3.0.0 || true
+	$(BIN)/python -m tests.fuzz
 
 wheel: $(VENV)/.dev
 	bash scripts/wheel_test.sh $(BIN)/python

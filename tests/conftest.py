@@ -16,6 +16,7 @@ from tests.helpers.recordings import DATA
 # What `make quick` leaves out: files and tests that start processes, train, render in a browser or
 # solve for seconds. Whatever runs on a real recording is left out too.
 SLOW = (
+    "tests/fuzz/",
     "tests/robots/formats/test_trackers.py::test_spoilt_files_end_in_an_error_that_says_so",
     "tests/robots/model/test_urdf.py",
     "tests/robots/solver/test_own_body.py",

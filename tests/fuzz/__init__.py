@@ -1,0 +1,1 @@
+"""Spoilt files against every reader: `make fuzz`."""

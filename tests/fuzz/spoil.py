@@ -1,0 +1,34 @@
+"""Good files spoilt: bytes changed at random, and numbers that no one meant."""
+
+import re
+
+from hypothesis import strategies as st
+
+from tests.helpers.hostile import damaged, edits
+
+_NUMBER = re.compile(rb"-?\d+\.?\d*(?:e[+-]?\d+)?")
+_ODD = (
+    *("0", "-1", "1", "2", "nan", "inf", "-inf", "1e-300", "1e30", "1e308", "-1e12", "1e12"),
+    *("99999999999", "65536", "3600", "0.0000001"),
+)
+
+numbers = st.lists(
+    st.tuples(st.integers(0, 1 << 20), st.sampled_from(_ODD)), min_size=0, max_size=4
+)
+"""Which of a file's numbers become which."""
+
+
+def spoilt(
+    data: bytes, values: list[tuple[int, str]], changes: list[tuple[str, int, int]]
+) -> bytes:
+    """The file with numbers replaced, then bytes as `damaged` changes them."""
+    for place, value in values:
+        found = list(_NUMBER.finditer(data))
+        if found:
+            number = found[place % len(found)]
+            data = data[: number.start()] + value.encode() + data[number.end() :]
+    return damaged(data, changes)
+
+
+changes = st.one_of(st.just([]), edits)
+"""None where numbers alone are spoilt: the file is still one of its format."""
