@@ -22,7 +22,6 @@ from spark.transfer.footfalls import beyond
 # Hip heights that a standing foot may stray from its mean place without having moved,
 MAX_WOBBLE = 0.05
 MAX_TWIST = np.radians(12)  # and how far it may turn
-RAMP = 0.05  # [s] over which a foot of a stream is taken hold of and let go
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 A foot is held where it comes down. What the source's foot wobbles while it stands is lost, what it
 drifts beyond that is motion and stays; as in `robots.solver.footprints`, which sees the whole clip.
+A foot in swing is as high as the source's, scaled, and as it is pitched.
 """
 
 from collections import deque
@@ -9,11 +10,14 @@ from collections import deque
 import numpy as np
 from jaxtyping import Float
 
-from robots.solver.footprints import MAX_TWIST, MAX_WOBBLE, RAMP, flat_sole, on_points
+from robots.solver.foot_path import FAST, SLOW, STEP_HEIGHT, SWING_HOLD
+from robots.solver.footprints import MAX_TWIST, MAX_WOBBLE, flat_sole, on_points
 from robots.stream.frame_targets import FrameReader, FrameTargets
 from robots.stream.terms import FootTargets
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
 
+RAMP = 0.05  # [s] over which a foot is taken hold of and let go
+_SWING = np.array([0.0, 0.0, SWING_HOLD[2]])  # where it will come down is not known
 _RELEASE_FACTOR = (
     1.5  # times the speed and height at which a foot comes to stand: there it is let go
 )
@@ -52,6 +56,7 @@ class ContactTracker:
             (self._reach + after) * self._frame_time
         )
         height = now.feet[..., 2] - self._low
+        swing = np.maximum(now.clearance, self._lift(speed.min(axis=1)))
         factor = np.where(self._planted, _RELEASE_FACTOR, 1.0)
         self._planted = (
             self._has_foot
@@ -75,8 +80,19 @@ class ContactTracker:
                 footprint.follow(moved, turn, float(self._holds[s].max()), wobble)
             places[own, :2] = footprint.positions(self._flat[s])
             self._holds[s] += step[s]
-            holds[own] = on_points(sole, self._holds[s])[:, None]
+            held = on_points(sole, self._holds[s])[:, None]
+            raised = (1 - held[:, 0]) * now.pitched[own]
+            places[own, 2] = raised + (1 - held.max()) * swing[s]
+            holds[own] = held + (1 - held) * _SWING
         return FootTargets(places, holds)
+
+    def _lift(self, speed: Float[np.ndarray, "S"]) -> Float[np.ndarray, "S"]:
+        """How high [m] feet step that are as fast in the source [m/s]: as in
+        `robots.solver.foot_path`."""
+        hip_height = self._robot.rig.hip_height
+        share = np.clip((self._scale * speed / hip_height - SLOW) / (FAST - SLOW), 0.0, 1.0)
+        lift: Float[np.ndarray, S] = share * STEP_HEIGHT * hip_height
+        return lift
 
 
 class Footprint:

@@ -53,7 +53,8 @@ class FrameTargets:
     matrices (`R_world_joint`).
 
     `bones` are in the order of `FrameReader.bones`. `feet` are the source's heel and toe of each of
-    the robot's soles [m, the source's own world].
+    the robot's soles [m, the source's own world], `clearance` is how high its soles are, scaled,
+    and `pitched` how high the points of the robot's would be above the lowest of each [m].
     """
 
     world: Float[np.ndarray, "*T J 3 3"]
@@ -62,6 +63,12 @@ class FrameTargets:
     bones: Float[np.ndarray, "*T B 3"]
     hands: Float[np.ndarray, "*T 3"]
     feet: Float[np.ndarray, "*T S 2 3"]
+    clearance: Float[np.ndarray, "*T S"]
+    pitched: Float[np.ndarray, "*T P"]
+
+    def last(self, frames: int) -> "FrameTargets":
+        """Those of the last frames."""
+        return FrameTargets(*(getattr(self, f.name)[-frames:] for f in fields(self)))
 
 
 def stack_targets(targets: Sequence[FrameTargets]) -> FrameTargets:
@@ -108,14 +115,16 @@ class FrameReader:
             bones[row] = turns[joint] @ out
         hips = joints[self.source.hips].mean(0)
         hips[2] -= self.ground.z
-        own = self._own(turns)
+        own_world = self._own(turns) @ self._tpose
         return FrameTargets(
-            world=own @ self._tpose,
+            world=own_world,
             chest=turns[self._chest] @ self._tpose[self.robot.rig.chest],
             hips=self.scale * hips,
             bones=bones,
             hands=self._between_hands(joints),
             feet=self._feet(world, joints),
+            clearance=self._clearance(world, joints),
+            pitched=self._pitched(own_world),
         )
 
     def _world(self, frame: Frame) -> tuple[Float[np.ndarray, "N 3 3"], Float[np.ndarray, "N 3"]]:
@@ -179,6 +188,22 @@ class FrameReader:
         feet[self.has_feet, 1] = joints[self._toes]
         return feet
 
+    def _clearance(
+        self, world: Float[np.ndarray, "N 3 3"], joints: Float[np.ndarray, "N 3"]
+    ) -> Float[np.ndarray, "S"]:
+        out = np.zeros(len(self.has_feet))
+        for s, (own, offsets) in zip(np.flatnonzero(self.has_feet), self._soles, strict=True):
+            heights = joints[own, 2] + (world[own, 2] * offsets).sum(1)
+            out[s] = self.scale * (heights.min() - self.ground.z)
+        return out
+
+    def _pitched(self, world: Float[np.ndarray, "J 3 3"]) -> Float[np.ndarray, "P"]:
+        out = []
+        for sole, from_foot in zip(self.robot.soles, self._from_foot, strict=True):
+            height = from_foot @ world[sole.foot, 2] + (world[sole.joints, 2] * sole.offsets).sum(1)
+            out.append(height - height.min())
+        return np.concatenate(out) if out else np.zeros(0)
+
     def _between_hands(self, joints: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "3"]:
         if self.hands is None:
             return np.zeros(3)
@@ -192,6 +217,12 @@ class FrameReader:
         source, robot = self.source, self.robot
         source_soles = {sole.side: sole for sole in source.soles}
         sides = [sole.side for sole in robot.soles]
+        rest = robot.rig.skeleton.rest_positions
+        self._from_foot = [rest[sole.joints] - rest[sole.foot] for sole in robot.soles]
+        self._soles = [
+            (own.joints, own.offsets)
+            for own in (source_soles[side] for side in sides if side in source_soles)
+        ]
         self.has_feet = np.array([side in source_soles for side in sides], dtype=bool)
         heels, offsets, toes = [], [], []
         for side in (side for side in sides if side in source_soles):

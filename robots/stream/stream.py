@@ -26,7 +26,7 @@ from spark.errors import FrameError
 from spark.rig.rig import Rig
 from spark.rotation import quat_from_matrix
 
-_FIXED = 2  # frames before the free ones
+_FIXED = 3  # frames before the free ones
 _FRAMES = _FIXED + LATENCY + 1
 _SHIFTED = np.array([*range(1, _FRAMES), _FRAMES - 1])
 _FIRST_ITERATIONS = 20
@@ -69,10 +69,10 @@ class Stream:
             poses = self._terms.poses(q[_FIXED : _FIXED + 1])  # what is next to be said
             foot_targets = self._contacts.update(targets, self._terms.sole_points(poses)[0])
             bones, angles = self._terms.bones(poses)[0], self._terms.angles(q)[_FIXED]
-            posture = self._detours.update(self._targets[0], bones, angles)
+            posture = self._detours.update(self._targets[_FIXED], bones, angles)
             self._q = self._window.solve(q, stack_targets(self._targets), foot_targets, posture)
         else:
-            self._targets = [targets] * (LATENCY + 1)
+            self._targets = [targets] * _FRAMES
             self._q = self._first(targets)
         self._count += 1
         return self._q[_FIXED].copy()

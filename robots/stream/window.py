@@ -7,13 +7,10 @@ from scipy.linalg.lapack import dposv
 
 from robots.model.morphology import Morphology
 from robots.solver.descent import LIMIT_CLEARANCE
-from robots.solver.smoothness import acceleration_weights
-from robots.solver.weights import MAX_HINGE_SPEED, W_OVERSPEED
-from robots.solver.weights import SMOOTH_CUTOFF as WHOLE_CLIP_CUTOFF
+from robots.stream.coupling import Coupling
 from robots.stream.frame_targets import FrameTargets
 from robots.stream.terms import FootTargets, Posture, Terms
 
-SMOOTH_CUTOFF = 5.5  # [Hz] above which motion fades: below, without later frames, it would lag
 _DAMPING = 1e-3  # [1] on the diagonal of the normal equations,
 _LONE_DAMPING = 0.02  # where frames are not coupled,
 _HELD = 1e8  # and at a limit
@@ -43,21 +40,7 @@ class Window:
         lower, upper = tree.limits_within(LIMIT_CLEARANCE)
         rest = self._model.qpos0[self._angles]
         self._lower, self._upper = lower[hinges] + rest, upper[hinges] + rest
-        # As `robots.least_squares.Smoothness`, for the free frames alone; weights squared.
-        weights = (
-            acceleration_weights(robot) * (WHOLE_CLIP_CUTOFF / SMOOTH_CUTOFF / frame_time) ** 2
-        )
-        self._acceleration_weights = weights**2
-        second_difference, self._first_difference = (
-            np.diff(np.eye(fixed + free), k, axis=0)[:, fixed:] for k in (2, 1)
-        )
-        self._second_difference = second_difference
-        self._coupling = np.kron(
-            second_difference.T @ second_difference, np.diag(self._acceleration_weights)
-        )
-        self._overspeed_weight = (W_OVERSPEED / frame_time) ** 2
-        self._max_steps = np.full(tree.nv, np.inf)
-        self._max_steps[self._hinge_dofs] = MAX_HINGE_SPEED * frame_time
+        self._coupling = Coupling(robot, frame_time, fixed=fixed, free=free)
 
     def solve(
         self,
@@ -66,7 +49,7 @@ class Window:
         foot_targets: FootTargets,
         posture: Posture,
     ) -> Float[np.ndarray, "T nq"]:
-        """`q` with its free frames, which `targets` are for, after at most `_MAX_ITER` steps."""
+        """`q` after at most `_MAX_ITER` steps of its free frames; `targets` are for all."""
         candidates = self._terms.candidates(q[-1:])
         for _ in range(_MAX_ITER):
             q, length = self._step(q, targets, foot_targets, posture, candidates)
@@ -107,14 +90,15 @@ class Window:
         """One Gauss-Newton step, and its largest entry [rad, m]; with `lone_damping`, frames are
         not coupled, and damped by so much."""
         model, free = self._model, self._free
-        H, g = self._terms.linearize(q[-free:], targets, foot_targets, posture, candidates)
+        wanted = targets.last(free)
+        H, g = self._terms.linearize(q[-free:], wanted, foot_targets, posture, candidates)
         D = g.shape[1]
-        whole = self._coupling * (lone_damping is None)
+        whole = np.zeros((free * D, free * D))
         blocks = whole.reshape(free, D, free, D)
         for t in range(free):
-            blocks[t, :, t] += H[t]
+            blocks[t, :, t] = H[t]
         if lone_damping is None:
-            self._couple(q, blocks, g)
+            self._coupling.add_to(self._steps(q), targets.hips, blocks, g)
         held = self._at_limits(q[-free:], g)
         g[held] = 0.0
         whole.reshape(-1)[:: free * D + 1] += np.where(
@@ -130,27 +114,12 @@ class Window:
         q[:, self._angles] = np.clip(q[:, self._angles], self._lower, self._upper)
         return q, length
 
-    def _couple(
-        self,
-        q: Float[np.ndarray, "T nq"],
-        blocks: Float[np.ndarray, "F D F D"],
-        g: Float[np.ndarray, "F D"],
-    ) -> None:
-        """Add the residuals of accelerations and overspeed to the normal equations."""
+    def _steps(self, q: Float[np.ndarray, "T nq"]) -> Float[np.ndarray, "V D"]:
+        """The dofs' steps from frame to frame."""
         steps = np.empty((len(q) - 1, self._model.nv))
         for t in range(len(q) - 1):
             mujoco.mj_differentiatePos(self._model, steps[t], 1.0, q[t], q[t + 1])
-        steps = steps[:, self._dofs]
-        g += self._acceleration_weights * (self._second_difference.T @ (steps[1:] - steps[:-1]))
-        overspeed = steps - np.clip(steps, -self._max_steps, self._max_steps)
-        if overspeed.any():
-            first, at = self._first_difference, np.arange(g.shape[1])
-            g += self._overspeed_weight * (first.T @ overspeed)
-            pulls = np.einsum(
-                "vs,vt,vd->std", first, first, self._overspeed_weight * (overspeed != 0)
-            )
-            for s, t in np.ndindex(pulls.shape[:2]):
-                blocks[s, at, t, at] += pulls[s, t]
+        return steps[:, self._dofs]
 
     def _at_limits(
         self, q: Float[np.ndarray, "F nq"], g: Float[np.ndarray, "F D"]
