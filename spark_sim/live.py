@@ -30,7 +30,9 @@ class Retargeter:
         if not isinstance(target, RobotClip):
             raise ConventionError(f"{target.name} is no robot; only robots follow frame by frame")
         if fps is not None:
-            check_frame_time(1.0 / fps if fps else np.inf)
+            if not fps > 0:
+                raise ConventionError(f"fps is {fps}; expected a positive number")
+            check_frame_time(1.0 / fps)
         self.robot = target.on_robot.robot
         if self.robot.mount is not None:
             raise ConventionError(f"{target.name} has no legs; only walking robots follow live")

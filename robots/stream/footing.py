@@ -56,7 +56,7 @@ class ContactTracker:
             (self._reach + after) * self._frame_time
         )
         height = now.feet[..., 2] - self._low
-        swing = np.maximum(now.clearance, self._lift(speed.min(axis=1)))
+        swing = np.maximum(now.clearance, self._lift(speed.max(axis=1)))
         factor = np.where(self._planted, _RELEASE_FACTOR, 1.0)
         self._planted = (
             self._has_foot

@@ -195,7 +195,7 @@ def test_the_bars_hold_on_real_clips(clip: str) -> None:
     found = measure(from_canonical(source), source.rig, follow(source, EMBER))
     assert found.sunk <= 0.01
     assert found.in_air <= 0.03  # what comes down is seen when it has
-    assert found.skate_m_s <= 0.04
+    assert found.skate_m_s <= max(0.04, 1.25 * found.skate_source_m_s)
     assert found.limb_error_rad <= np.radians(6)
     assert found.at_limit == 0
     assert found.fastest_rad_s <= 20
