@@ -326,7 +326,7 @@ def test_qpos_of_any_script_is_read(robot: Morphology, tmp_path: Path) -> None:
     ("wrong", "message"),
     [
         ({"fps": 0}, "fps is 0"),
-        ({"dt": 0}, "expected a positive number"),
+        ({"dt": 0}, "the frame time is 0 s"),
         ({}, "doesn't say its rate; expected 'fps'"),
         ({"fps": 50, "qpos": np.zeros((3, 40))}, "40 columns; the robot 'ember' has 36"),
         ({"fps": 50, "qpos": np.zeros((3, 36))}, "length 0; expected 1"),
