@@ -16,6 +16,7 @@ from spark_sim.commands import (
     evaluate,
     export,
     inspect,
+    live,
     mjcf,
     play,
     prepare,
@@ -27,7 +28,7 @@ from spark_sim.commands import (
 )
 
 COMMANDS = (
-    *(retarget, batch, robots, inspect, report, play, mjcf, sample),
+    *(retarget, batch, robots, inspect, report, play, live, mjcf, sample),
     *(prepare, train, evaluate, export),
 )
 
