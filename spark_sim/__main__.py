@@ -40,6 +40,9 @@ def main() -> int:
         return 2
     from spark_sim.cli import run
 
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):  # a terminal without our letters shows their numbers
+            stream.reconfigure(errors="backslashreplace")
     return run(sys.argv[1:], ready=_listen)
 
 

@@ -21,7 +21,7 @@ KNOWN = frozenset(
     for owner, family in (("", "t5"), ("google-t5/", "t5"), ("google/", "t5-v1_1"))
     for size in ("small", "base", "large")
 ) | {f"google/{name}" for name in ("byt5-small", "byt5-base", "flan-t5-small", "flan-t5-base")}
-NAME_CACHE = Path.home() / ".cache" / "spark-sim" / "names.pt"
+NAME_CACHE = Path(os.path.expanduser("~")) / ".cache" / "spark-sim" / "names.pt"
 
 
 class T5Names:
