@@ -68,7 +68,7 @@ def read_positions(
 ) -> Recording:
     """The recording in a file of joint positions.
 
-    An npy holds frames x joints x 3 (or 4: a confidence is left out); an npz such an array, and
+    An npy holds frames x joints x 3 (or more: confidences are left out); an npz such an array, and
     maybe `names`, `parents` and `fps`. Unit and up axis are inferred where not given. Raises
     `FileFormatError` where the layout is not known, or the file broken.
     """
@@ -113,10 +113,14 @@ def _points(array: np.ndarray, arrays: Arrays, path: Path, what: str) -> _Points
     values = numbers({what: array}, what, path, finite=False)
     if values.ndim == 4 and 1 in values.shape[:2]:
         values = values[0] if len(values) == 1 else values[:, 0]
-    if values.ndim == 3 and values.shape[1] == 3 and values.shape[2] not in (3, 4):
+    if values.ndim == 3 and values.shape[1] == 3 and values.shape[2] not in (3, 4, 5):
         values = np.moveaxis(values, 2, 0)
         notes.append("joints x 3 x frames, turned round")
-    if values.ndim != 3 or values.shape[2] not in (3, 4) or not 2 < values.shape[1] < _MAX_JOINTS:
+    if (
+        values.ndim != 3
+        or values.shape[2] not in (3, 4, 5)
+        or not 2 < values.shape[1] < _MAX_JOINTS
+    ):
         raise FileFormatError(
             path,
             None,
@@ -125,8 +129,8 @@ def _points(array: np.ndarray, arrays: Arrays, path: Path, what: str) -> _Points
         )
     if not len(values):
         raise FileFormatError(path, None, "has no frames")
-    if values.shape[2] == 4:
-        notes.append("the fourth number of each joint, a confidence, is not read")
+    if values.shape[2] > 3:
+        notes.append("numbers beyond three of each joint, its confidence, are not read")
     values, gaps = _filled(values[..., :3], path)
     if gaps:
         notes.append(f"{gaps} positions are missing: filled in from the frames around")

@@ -9,7 +9,7 @@ from spark.errors import ConventionError, FileFormatError
 from spark.io.arrays import npy_shape, npz_names
 from spark.io.position_layouts import POSITION_KEYS, layouts
 from spark.io.recording import Recording
-from spark.io.smpl_layouts import KEYS as SMPL_KEYS
+from spark.io.smpl_layouts import KEYS, SIGNS
 from spark.io.smpl_layouts import WIDTHS as SMPL_WIDTHS
 from spark.io.tensors import says
 from spark.opening import beginning
@@ -38,6 +38,19 @@ SMPL = Format("SMPL", (".npz", ".npy", ".pt", ".pth"), (*UNIT_AND_UP, "fps", "bo
 POSITIONS = Format("positions", (".npz", ".npy"), (*UNIT_AND_UP, "fps"))
 
 FORMATS = (BVH, FBX, GLTF, ACCLAIM, SMPL, POSITIONS)
+SMPL_KEYS = KEYS | SIGNS
+_NOT_READ = {
+    ".c3d": "C3D holds markers; expected joints: export BVH or FBX from the program that solved "
+    "them, or joint centres as an npz with 'positions' and 'names'",
+    ".trc": "TRC holds markers; expected joints: export BVH or FBX, or joint centres as an npz "
+    "with 'positions' and 'names'",
+    ".mvnx": "MVNX is not read; export BVH or FBX from Xsens MVN",
+    **dict.fromkeys(
+        (".blend", ".dae", ".usd", ".usda", ".usdc", ".usdz", ".vmd", ".ma", ".mb", ".max"),
+        "is not read; export it as GLB, FBX or BVH from the program that made it",
+    ),
+}
+"""What to do with files that people have and that are not read."""
 _ROBOTS = frozenset({"qpos", "joint_pos", "dof_pos"})
 """An npz with one of these arrays is a robot's motion."""
 
@@ -60,6 +73,8 @@ def read_motion(
     """
     path = Path(path)
     known = format_of(path)
+    if known is BVH and (why := _NOT_READ.get(path.suffix.lower())) and path.is_file():
+        raise FileFormatError(path, None, why)
     given: dict[str, Any] = {"unit": unit, "up": up, "fps": fps, "body_model": body_model}
     given["clip"] = clip
     given = {name: value for name, value in given.items() if value is not None}

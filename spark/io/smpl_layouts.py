@@ -31,6 +31,9 @@ _FACE = (("pose_jaw", "jaw_pose"), ("leye_pose",), ("reye_pose",))
 KEYS = frozenset({*_POSES, *_ROOT, *_BODY} - {"pose"})
 """An npz with one of these holds a body of the family."""
 
+SIGNS = frozenset({"betas", "v_template", "surface_model_type"})
+"""An npz with one of these has to do with the family, though it may be no motion."""
+
 _JOINTS = {66: 22, 72: 24, 156: 52, 165: 55}  # by the numbers in a pose
 
 # Of the vectors in a dict of a video method, those in the world come first.
@@ -63,6 +66,10 @@ class SmplMotion:
 
 def from_npz(arrays: Arrays, path: Path) -> SmplMotion:
     """The motion in the named arrays of an npz. Raises `FileFormatError` where it has none."""
+    if "v_template" in arrays:
+        raise FileFormatError(
+            path, None, "is a body model and no motion; give it with --body-model beside a motion"
+        )
     if not KEYS & arrays.keys():
         raise FileFormatError(
             path,

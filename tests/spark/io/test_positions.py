@@ -161,7 +161,7 @@ def test_a_camera_s_landmarks(walking: Motion, tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", seen)
     read = read_motion(tmp_path / "a.npy")
     said = " ".join(read.notes)
-    for words in ("y axis points down", "a confidence", "1 positions are missing", "never move"):
+    for words in ("y axis points down", "its confidence", "1 positions are missing", "never move"):
         assert words in said
     found, _ = forward(read.motion)
     way = np.linalg.norm(hips[-1] - hips[0])

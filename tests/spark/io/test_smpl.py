@@ -316,6 +316,28 @@ def test_broken_motions_are_refused(
         spark_sim.load(tmp_path / "a.npz")
 
 
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ({"betas": np.zeros(16), "gender": "male"}, "no motion of a body: expected 'poses'"),
+        ({"v_template": np.zeros((4, 3))}, "is a body model and no motion; .*--body-model"),
+    ],
+)
+def test_files_beside_the_motions(
+    tmp_path: Path, content: dict[str, np.ndarray], message: str
+) -> None:
+    np.savez(tmp_path / "a.npz", **content)
+    with pytest.raises(FileFormatError, match=rf"a\.npz: .*{message}"):
+        spark_sim.load(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize("name", ["a.c3d", "a.TRC", "a.mvnx", "a.blend"])
+def test_files_that_are_not_read_say_what_to_do(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(b"\2P" + bytes(600))
+    with pytest.raises(FileFormatError, match=rf"{name}: .*export"):
+        spark_sim.load(tmp_path / name)
+
+
 def test_options_of_other_formats_are_refused(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", poses=np.zeros((2, 156)))
     with pytest.raises(ConventionError, match="quat does not go with such a file"):
