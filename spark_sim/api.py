@@ -104,7 +104,7 @@ def retarget(
         notes += (f"written as a BVH of its own; {kind.name} files are read only",)
     recording = replace(target.recording, bvh=bvh, motion=motion, notes=(*moved.notes, *notes))
     # The rig is given: what is known of a body does not depend on the motion that it makes.
-    return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig)
+    return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig, target.path)
 
 
 def _onto_robot(source: AnyClip, target: RobotClip, *, solved: bool) -> RobotClip:

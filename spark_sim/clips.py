@@ -11,6 +11,8 @@ from jaxtyping import Float
 from spark.errors import SkeletonError
 from spark.io.bvh import write_bvh
 from spark.io.encoding import encode
+from spark.io.glb import write_glb
+from spark.io.glb_skin import write_on_skin
 from spark.io.recording import Recording
 from spark.motion import Motion
 from spark.resample import motion_at
@@ -26,8 +28,9 @@ if TYPE_CHECKING:  # these load MuJoCo, which a character's clip can do without
 
 __all__ = ["CHARACTER_ENDINGS", "AnyClip", "Clip", "File", "RobotClip"]
 
-CHARACTER_ENDINGS = (".bvh",)
+CHARACTER_ENDINGS = (".bvh", ".glb")
 """What the motion of a character is written as."""
+_SKINNED = (".glb", ".gltf", ".vrm")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,13 +38,20 @@ class Clip(ClipBase):
     """A motion on a character: a recording and, found when first asked for, its rig.
 
     `roles` is the user's own map of joints (`spark_sim.rolemap`), where one was given. `given_rig`
-    is the rig, where it is known already.
+    is the rig, where it is known already, and `target` the file of the body of a result.
     """
 
     recording: Recording
     name: str
     roles: Override | None = None
     given_rig: Rig | None = None
+    target: Path | None = None
+
+    @property
+    def skin(self) -> Path | None:
+        """The glTF or VRM file whose skin the motion wears: its own, or that of the target."""
+        file = self.path if self.target is None else self.target
+        return file if file is not None and file.suffix.lower() in _SKINNED else None
 
     @property
     def motion(self) -> Motion:
@@ -78,13 +88,20 @@ class Clip(ClipBase):
         return self.motion.skeleton.names
 
     def save(self, path: File, *, force: bool = False) -> Path:
-        """Write the motion as BVH.
+        """Write the motion as BVH, or as GLB: on the skin of the body's own file where that is a
+        glTF or VRM, else with bones to see.
 
-        Raises `OutputError` where `path` exists, unless forced, or does not end in .bvh.
+        Raises `OutputError` where `path` exists, unless forced, or ends in neither .bvh nor .glb.
         """
         path = Path(path)
         files.claim(path, force=force, endings=CHARACTER_ENDINGS, what="a character's motion")
-        write_bvh(self.recording.bvh, path)
+        if path.suffix.lower() == ".glb" and self.skin is not None:
+            unit_m = self.recording.convention.unit_m
+            write_on_skin(self.motion, self.skin, path, unit_m=unit_m, name=self.name)
+        elif path.suffix.lower() == ".glb":
+            write_glb(self.motion, path, name=self.name)
+        else:
+            write_bvh(self.recording.bvh, path)
         return path
 
     def _at(self, frames: Float[np.ndarray, "N"], frame_time: float) -> "Clip":

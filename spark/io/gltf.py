@@ -17,7 +17,7 @@ from spark.io.convention import infer_unit
 from spark.io.foreign import foreign_recording
 from spark.io.gltf_file import GltfFile
 from spark.io.nodes import NodeJoint, chosen_clip, joints_of, line_to, motion_of_axes
-from spark.io.recording import Recording
+from spark.io.recording import Recording, unique_names
 from spark.motion import Motion
 from spark.resample import frames_of_keys, rotations_at, values_at
 from spark.rotation import matrix_from_quat, quat_normalize
@@ -86,6 +86,15 @@ def _motion(file: GltfFile, clip: str | None, fps: float | None) -> tuple[Motion
     seen = _world(file, joints, parents, tracks, times)
     motion, renamed = motion_of_axes(joints, (rest[0][0], rest[1][0]), seen, frame_time)
     return motion, [*notes, *renamed]
+
+
+def skeleton_nodes(file: GltfFile) -> list[tuple[str, int]]:
+    """The joints' names as a recording has them, and their nodes, in the order of its skeleton."""
+    parents = file.parents()
+    names = [file.name_of(i) for i in range(len(file.nodes))]
+    joints, _ = joints_of(_bones(file, _animation(file, None)[0]), parents, names)
+    unique, _ = unique_names([joint.name for joint in joints])
+    return list(zip(unique, (joint.node for joint in joints), strict=True))
 
 
 def _times(

@@ -122,7 +122,7 @@ class GltfFile:
         view = self.json["bufferViews"][where["bufferView"]]
         if "EXT_meshopt_compression" in view.get("extensions", {}):
             raise self.error("is compressed (EXT_meshopt_compression); expected one without")
-        data = self._buffer(view["buffer"])
+        data = self.buffer(view["buffer"])
         start = int(view.get("byteOffset", 0)) + int(where.get("byteOffset", 0))
         stride = int(view.get("byteStride", dtype.itemsize * width))
         end = start + (count - 1) * stride + dtype.itemsize * width
@@ -130,7 +130,8 @@ class GltfFile:
             raise self.error(f"accessor {index} lies outside its buffer of {len(data)} bytes")
         return np.ndarray((count, width), dtype, data, start, (stride, dtype.itemsize))
 
-    def _buffer(self, index: int) -> bytes:
+    def buffer(self, index: int) -> bytes:
+        """The bytes of a buffer, of the file, in its text, or beside it."""
         if index not in self._buffers:
             uri = self.json["buffers"][index].get("uri")
             if uri is None:

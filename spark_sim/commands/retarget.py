@@ -24,12 +24,14 @@ DESCRIPTION = """\
 Put the motion of each SRC on the body of TARGET. Both may be any humanoid rig
 or robot. Rest poses, axes, units, proportions and joint names may differ. On a
 character the result is a BVH file with TARGET's own hierarchy, channels, unit
-and axes. On a robot it is the coordinates of its joints, as your trainer reads
-them (.npz, .csv, .pkl, .motion, or a folder)."""
+and axes, or a GLB (-o OUT.glb), with TARGET's skin where it is a glTF or VRM.
+On a robot it is the coordinates of its joints, as your trainer reads them
+(.npz, .csv, .pkl, .motion, or a folder)."""
 EXAMPLES = """\
 examples:
   spark-sim retarget walk.bvh --to mutant.bvh       # writes walk_on_mutant.bvh
   spark-sim retarget walk.bvh --to mutant.bvh -o out.bvh
+  spark-sim retarget walk.bvh --to hero.vrm -o out.glb
   spark-sim retarget takes/ --to mutant.bvh -o out/ # every file below takes/
   spark-sim retarget walk.bvh --to robot            # writes walk_on_robot.npz
   spark-sim retarget walk.bvh --to unitree_g1 -o walk.csv
