@@ -23,6 +23,7 @@ from robots.solver.projection import project
 from robots.solver.repair import repair
 from robots.solver.resting import resting
 from robots.solver.smoothness import limit_speed
+from robots.solver.stretches import by_stretches
 from robots.solver.targets import Targets, targets_of
 from robots.tree import Coordinates, forward_kinematics
 from spark.transfer.canonical import CanonicalMotion
@@ -48,11 +49,24 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     """The motion of `source` on a robot, its feet planted where the source's are, within limits.
 
     Recordings of more than 20 fps are solved at about 20 fps first; splines through that are then
-    polished in all frames. A robot without legs stays where it is mounted.
+    polished in all frames. Long ones are solved a stretch at a time. A robot without legs stays
+    where it is mounted.
     """
     if robot.mount is not None:
         source = facing_ahead(source)
-    targets = targets_of(source, robot)
+    notes = dict.fromkeys(robot.notes)
+
+    def solved(start: int, stop: int) -> Coordinates:
+        targets = targets_of(source.frames(start, stop), robot)
+        notes.update(dict.fromkeys(targets.notes))
+        return _trajectory(robot, targets)
+
+    q = robot.following(by_stretches(solved, len(source), source.frame_time))
+    return RobotMotion(robot, q, source.frame_time, tuple(notes))
+
+
+def _trajectory(robot: Morphology, targets: Targets) -> Coordinates:
+    """That follows the targets."""
     feet = plan_feet(robot, targets)
     stride = coarse_stride(targets)
     coarse = targets.every(stride)
@@ -62,9 +76,7 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     if stride > 1:
         q = q.upsampled(stride, len(targets))
     targets, feet = with_dynamics(robot, targets, reachable(robot, feet, q), q)
-    q = solve(robot, targets, feet, q, polish=True)
-    q = robot.following(q)
-    return RobotMotion(robot, q, source.frame_time, (*robot.notes, *targets.notes))
+    return solve(robot, targets, feet, q, polish=True)
 
 
 def coarse_stride(targets: Targets) -> int:
