@@ -18,9 +18,13 @@ def values_at(
     values: Float[np.ndarray, "T *n"], at: Float[np.ndarray, "N"]
 ) -> Float[np.ndarray, "N *n"]:
     """Positions, angles or other numbers at fractional frames, linearly."""
-    before, after, fraction = _neighbours(at, len(values))
-    fraction = fraction.reshape(-1, *(1,) * (values.ndim - 1))
-    return (1 - fraction) * values[before] + fraction * values[after]
+
+    def some(block: slice) -> Float[np.ndarray, "N *n"]:
+        before, after, fraction = _neighbours(at[block], len(values))
+        fraction = fraction.reshape(-1, *(1,) * (values.ndim - 1))
+        return (1 - fraction) * values[before] + fraction * values[after]
+
+    return in_blocks(some, len(at))
 
 
 def rotations_at(

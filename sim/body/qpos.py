@@ -8,6 +8,7 @@ from sim.body.hinges import angles_within
 from sim.body.joints import mirrored
 from sim.body.keyframes import standing_position
 from sim.body.parts import hinges_of, kept_joints, side_of
+from spark.blocks import in_blocks
 from spark.kinematics import forward, local_rotations
 from spark.motion import Motion
 from spark.rig.rig import Rig
@@ -20,6 +21,10 @@ def qpos_from_motion(model: mujoco.MjModel, motion: Motion, rig: Rig) -> Float[n
 
     Bones that the file stretches keep the skeleton's length.
     """
+    return in_blocks(lambda block: _coordinates(model, motion.picked(block), rig), len(motion))
+
+
+def _coordinates(model: mujoco.MjModel, motion: Motion, rig: Rig) -> Float[np.ndarray, "T nq"]:
     positions, world = forward(motion)
     since_tpose = quat_mul(world, quat_conj(rig.tpose))
     local = local_rotations(rig.skeleton, since_tpose)
