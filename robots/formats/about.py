@@ -9,13 +9,11 @@ from typing import Any
 
 from robots import registry
 from robots.formats.bodies import foot_spans
+from robots.formats.sidecar import SIDECAR, sidecar_of
 from robots.model.known import model_sha256
 from robots.model.motion import RobotMotion
 from spark.errors import FileFormatError
 from spark.files import write_atomically
-from spark.opening import LARGEST_TEXT, parse_json, read_bytes
-
-SIDECAR = "spark-sim sidecar 1"
 
 
 def about(motion: RobotMotion, path: Path, source: Path | None = None) -> dict[str, Any]:
@@ -58,23 +56,6 @@ def write_sidecar(
         "foot_contacts": foot_spans(motion),
     }
     write_atomically(sidecar_of(path), (json.dumps(facts, indent=1) + "\n").encode())
-
-
-def read_sidecar(path: Path) -> dict[str, Any] | None:
-    """What the file beside `path` says; None where there is none. Raises `FileFormatError` where it
-    is broken."""
-    beside = sidecar_of(path)
-    if not beside.is_file():
-        return None
-    facts = parse_json(beside, read_bytes(beside, limit=LARGEST_TEXT), "all of it")
-    if not isinstance(facts, dict) or facts.get("schema") != SIDECAR:
-        return None  # another tool's
-    return facts
-
-
-def sidecar_of(path: Path) -> Path:
-    """Where what `path` doesn't say stands: `walk.csv.json` beside `walk.csv`."""
-    return path.with_name(f"{path.name}.json")
 
 
 def robot_of(facts: dict[str, Any], path: Path) -> str | Path:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from robots.formats import format_of, is_sonic
-from robots.formats.about import read_sidecar, robot_of, sidecar_of
+from robots.formats.about import robot_of
 from robots.formats.gmr import read_pkl, write_pkl
 from robots.formats.holomotion import is_holomotion, read_holomotion, write_holomotion
 from robots.formats.locomujoco import is_locomujoco, read_locomujoco, write_locomujoco
@@ -16,6 +16,7 @@ from robots.formats.native import is_native, read_npz, write_npz
 from robots.formats.plain import is_plain, read_plain
 from robots.formats.protomotions import read_protomotions, write_protomotions
 from robots.formats.seed import is_seed, read_seed, write_seed
+from robots.formats.sidecar import read_sidecar, sidecar_of
 from robots.formats.sonic import info_of, read_sonic, write_sonic
 from robots.formats.unitree import ORDERS, likely_order, read_csv, write_csv
 from robots.model.known import known

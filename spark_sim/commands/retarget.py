@@ -194,7 +194,7 @@ def _source(args: Namespace, path: Path) -> "AnyClip":
 
     Of a CSV whose rate nothing else says, `--fps` is the rate, and the result's too.
     """
-    from robots.formats.about import read_sidecar
+    from robots.formats.sidecar import read_sidecar
     from spark_sim import console
 
     rate, is_csv = args.source_fps, path.suffix.lower() == ".csv"
