@@ -27,7 +27,7 @@ SLOW = (
     "tests/scripts/",
     "tests/sim/body/test_names.py",
     "tests/sim/physics/",
-    "tests/sim/report/test_compare_page.py::test_a_finding_goes_to_its_moment",
+    "tests/sim/report/test_compare_page.py::test_a_finding_goes_to_its_moment_in_the_replay",
     "tests/sim/report/test_page.py",
     "tests/sim/report/test_page_reading.py",
     "tests/spark_sim/test_policy_command.py",
