@@ -156,12 +156,12 @@ SNAKE = (
 )
 BODY = ROBOT[ROBOT.index("<body") : ROBOT.rindex("</body>") + len("</body>")]
 BAD = {
-    "no XML": ("not xml", "MuJoCo can't read it"),
-    "empty": ("", "MuJoCo can't read it"),
-    "cut off": (ROBOT[:900], "MuJoCo can't read it"),
+    "no XML": ("not xml", "is no XML"),
+    "empty": ("", "is no XML"),
+    "cut off": (ROBOT[:900], "is no XML"),
     "a web page": ("<html><body>404</body></html>", "MuJoCo can't read it"),
     "does not compile": (ROBOT.replace('"0.7"', '"x"').replace("capsule", "bag"), "MuJoCo can't"),
-    "includes itself": ('<mujoco><include file="bad.xml"/></mujoco>', "already included"),
+    "includes itself": ('<mujoco><include file="bad.xml"/></mujoco>', "includes 'bad.xml' again"),
     "no robot": ("<mujoco><worldbody/></mujoco>", "the model has no joints; expected a humanoid"),
     "no legs": (SNAKE, "not a humanoid"),
     "two robots": (
@@ -173,7 +173,14 @@ BAD = {
         ROBOT.replace('range="-2.2 1.6"', 'range="1.2 1.6"'),
         "the joint limits forbid a T-pose (legs down, arms out)",
     ),
-    "no number": (ROBOT.replace('pos="0 0 0.7"', 'pos="0 0 nan"'), "a body's place is no number"),
+    "no number": (
+        ROBOT.replace('pos="0 0 0.7"', 'pos="0 0 nan"'),
+        "holds NaN where MuJoCo expects a number",
+    ),
+    "no number beside": (
+        ROBOT.replace('name="waist_yaw" axis', 'name="waist_yaw" damping="nan" axis'),
+        "holds NaN where MuJoCo expects a number",
+    ),
     "too far": (ROBOT.replace('pos="0 0 0.7"', 'pos="0 0 1e30"'), "a body's place is no number"),
 }
 
@@ -186,7 +193,7 @@ def test_what_is_no_robot_is_refused(what: str, walk_path: Path, tmp_path: Path)
     out = tmp_path / "out.npz"
     code, stdout, stderr = on_command_line("retarget", walk_path, "--to", bad, "-o", out)
     assert (code, stdout) == (2, [])
-    assert stderr[-1].startswith(f"spark-sim: error: {bad}: ")
+    assert re.match(rf"spark-sim: error: {re.escape(str(bad))}:(\d+:)? ", stderr[-1])
     assert says in stderr[-1]
     assert [path.name for path in tmp_path.iterdir()] == ["bad.xml"]
 
@@ -216,7 +223,7 @@ def test_a_model_changed_at_random_is_understood_or_refused(seed: int, tmp_path:
     except SparkSimError as error:
         found = str(error)
     if isinstance(found, str):
-        assert found.startswith(f"{path}: ")
+        assert re.match(rf"{re.escape(str(path))}:(\d+:)? ", found)
     else:
         assert isinstance(found, RobotClip)
         assert np.isfinite(found.on_robot.qpos).all()
@@ -234,12 +241,6 @@ def test_a_folder_is_no_robot(walk_path: Path, tmp_path: Path) -> None:
     [
         (lambda text: re.sub(' range="[^"]*"', "", text), "22 hinges have no limits: taken as 180"),
         (lambda text: text.replace("<freejoint/>", ""), "no free joint: one was given to 'pelvis'"),
-        (
-            lambda text: text.replace(
-                'name="waist_yaw" axis', 'name="waist_yaw" damping="nan" axis'
-            ),
-            "MuJoCo warns: XML contains a 'NaN'",
-        ),
     ],
 )
 def test_what_is_assumed_of_a_robot_is_said(
