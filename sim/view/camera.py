@@ -105,7 +105,7 @@ def _picked(scene: Scene, frames: Sequence[int] | None) -> Sequence[int]:
 
 
 def _fit(
-    found: list[Float[np.ndarray, "N 3 2"]],
+    found: list[Float[np.ndarray, "_ 3 2"]],
     scene: Scene,
     aspect: float,
     half_view: float,

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from spark.errors import SkeletonError
+from spark.errors import ConventionError, SkeletonError
 from spark.kinematics import end_positions, forward, local_rotations
 from spark.motion import Motion
 from spark.skeleton import Skeleton
@@ -126,5 +126,5 @@ def test_tree_queries() -> None:
 @pytest.mark.parametrize("frame_time", [0.0, -1.0, float("nan"), float("inf")])
 def test_impossible_frame_times_are_refused(frame_time: float) -> None:
     made = random_motion(2, 2)
-    with pytest.raises(SkeletonError, match="frame time"):
+    with pytest.raises(ConventionError, match="frame time"):
         Motion(made.skeleton, frame_time, made.root_pos, made.rotations)

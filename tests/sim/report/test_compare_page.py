@@ -66,7 +66,7 @@ def test_a_finding_goes_to_its_moment_in_the_replay(text: str, tmp_path: Path) -
           time: document.querySelector("button[data-time]").dataset.time,
           shown: frame.contentDocument.getElementById("time").textContent,
           figures: frame.contentDocument.body.textContent.includes("good"),
-        }); }, 400);
+        }); }, 900);
       });"""
     seen = opened(with_probe(text, script), tmp_path)
     assert float(seen["time"]) >= 0.5
