@@ -70,19 +70,12 @@ def _held(
 
 
 def _carried(robot: Morphology, poses: LinkPoses, shoulder: int, joint: int, held: Holds) -> Holds:
-    """The shoulder shifted as the part of its arm is."""
-    link = int(robot.tree.parents[_first_above(robot, shoulder)])
+    """The shoulder, as a point of what the arm hangs on, shifted as the part of the arm is."""
+    link = int(robot.links[int(robot.rig.skeleton.parents[shoulder])])
     center = robot.centers[shoulder]
     shift = held.positions[0] - poses.point(int(robot.links[joint]), robot.centers[joint])
     positions = (poses.point(link, center) + shift)[None]
     return Holds(np.array([link]), center[None], positions, CARRIED_HOLD * held.shares)
-
-
-def _first_above(robot: Morphology, joint: int) -> int:
-    """The first of the tree's joints that turn a part, but not the part that it hangs on."""
-    above = int(robot.links[int(robot.rig.skeleton.parents[joint])])
-    trunk = robot.tree.chain(above)
-    return next(k for k in robot.tree.chain(int(robot.links[joint])) if k not in trunk)
 
 
 def lowest_near(robot: Morphology, poses: LinkPoses, joint: int) -> Float[np.ndarray, "T"]:

@@ -26,7 +26,7 @@ class Window:
     def __init__(
         self, robot: Morphology, terms: Terms, frame_time: float, *, fixed: int, free: int
     ) -> None:
-        self._terms, self._frame_time, self._free = terms, frame_time, free
+        self._terms, self._free = terms, free
         self._model, tree = robot.mjcf.model, robot.tree
         starts = self._model.jnt_dofadr[list(robot.mj_joints)]
         base = int(self._model.jnt_dofadr[robot.mjcf.free_joint])
