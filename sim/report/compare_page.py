@@ -12,12 +12,13 @@ from sim.report.names import LABELS
 from sim.report.page import finding_line, overlay
 from sim.report.palette import CORNER_COLORS, css, grade
 from sim.report.result import Result
-from sim.template import render_page
+from sim.template import Template
 from sim.trajectory import Subject
-from sim.view.page import page
+from sim.view.page import REPLAY, page
 from sim.view.scene import Figure
 from spark.files import write_atomically
 
+_PAGE = Template("sim.report", "compare.html", ("compare.js",), frames=(REPLAY,))
 _LISTED = 12  # findings of each
 
 
@@ -49,10 +50,7 @@ def compare_page(
         shown.append((f"{source[0]} (source)", source[1], theirs))
     figures = [Figure(subject, name, clip.floor_z) for name, subject, clip in shown]
     overlays = [overlay(clip, subject) for _, subject, clip in shown]
-    return render_page(
-        "sim.report",
-        name="compare",
-        framed=("sim.view",),
+    return _PAGE.render(
         title=title,
         palette=Markup(css()),
         key=CORNER_COLORS,

@@ -19,12 +19,13 @@ from sim.report.record import record
 from sim.report.result import Finding, Result
 from sim.report.table import shares
 from sim.report.text import details, share_base
-from sim.template import render_page
+from sim.template import Template
 from sim.trajectory import Subject
-from sim.view.page import Overlay, page
+from sim.view.page import REPLAY, Overlay, page
 from sim.view.scene import Figure
 from spark.files import write_atomically
 
+_PAGE = Template("sim.report", "page.html", ("page.js",), frames=(REPLAY,))
 _LISTED = 200  # findings
 
 
@@ -65,9 +66,7 @@ def report_page(
     beside = ""
     if result.source is not None:
         beside = f"; of the source's {100 * result.source.implausible_share:.1f} %"
-    return render_page(
-        "sim.report",
-        framed=("sim.view",),
+    return _PAGE.render(
         title=title,
         palette=Markup(css()),
         grade=grade(100 * result.implausible),

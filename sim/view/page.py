@@ -13,11 +13,12 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from sim.template import render_page
+from sim.template import Template
 from sim.view.camera import shot
 from sim.view.scene import Figure, Placement, Scene, build_scene
 from spark.files import write_atomically
 
+REPLAY = Template("sim.view", "page.html", ("kinematics.js", "shapes.js", "drawing.js", "page.js"))
 _HALF_VIEW = 0.26  # tan of half the page's angle, less what its bar and labels take
 _STEPS = 32000  # coordinates are kept as 16-bit integers
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
@@ -75,7 +76,7 @@ def page(
         ],
         "meshes": list(meshes.values()),
     }
-    return render_page("sim.view", title=title, data=data)
+    return REPLAY.render(title=title, data=data)
 
 
 def _figure(

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from sim.report.names import FLAGS, LABELS, UNITS
 from sim.report.palette import css, grade
-from sim.template import render_page
+from sim.template import Template
 from spark.errors import DependencyError
 from spark.files import write_atomically
 from spark_sim.shelf.duplicates import near_duplicates
@@ -25,6 +25,7 @@ from spark_sim.shelf.tables import write_csv, write_json, write_parquet
 Measurer: TypeAlias = Callable[
     [Callable[[Item], Measured], Sequence[Item]], Iterator[tuple[Item, Measured | Died]]
 ]
+_PAGE = Template("spark_sim.shelf", "page.html", ("page.js",))
 _SI = {"%": 100.0, "cm": 100.0}  # of a unit, in its SI unit
 
 
@@ -72,8 +73,7 @@ def write_folder_report(
     except DependencyError as error:
         notes = (f"no {as_parquet.name}: {error}",)
     shown = [m for m in MEASURES if any(each.facts.get(key(m)) is not None for each in good)]
-    text = render_page(
-        "spark_sim.shelf",
+    text = _PAGE.render(
         title=title,
         palette=Markup(css()),
         about=_about(good, failed),

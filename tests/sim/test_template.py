@@ -2,21 +2,20 @@
 
 import json
 import re
-from importlib.resources import files
 from pathlib import Path
 
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from sim.template import render_page
-from sim.view.page import page
+from sim.view.page import REPLAY, page
 from sim.view.scene import Figure
 from spark.errors import OutputError
 from spark_sim import sample
 from spark_sim.loading import load
 from tests.helpers.browser import Elements, opened, watched
 
+CHECKOUT = Path(__file__).parents[2]
 HOSTILE = (
     "__DATA__<img src=x onerror=document.title=1337>",
     "</script><script>document.title=1337</script>",
@@ -37,9 +36,9 @@ HOSTILE = (
 @example(HOSTILE[5])
 def test_a_name_is_text_and_nothing_else(name: str) -> None:
     """As title and in the data: the same elements as with any other name, and the name whole."""
-    text = render_page("sim.view", title=name, data={"label": name})
+    text = REPLAY.render(title=name, data={"label": name})
     shown = Elements(text)
-    assert shown.tags == Elements(render_page("sim.view", title="x", data={"label": "x"})).tags
+    assert shown.tags == Elements(REPLAY.render(title="x", data={"label": "x"})).tags
     assert name in shown.texts or not name
     block = re.search(r'<script id="data" type="application/json">(.*?)</script>', text, re.S)
     assert block
@@ -49,17 +48,22 @@ def test_a_name_is_text_and_nothing_else(name: str) -> None:
 
 def test_numbers_that_are_none_are_no_page() -> None:
     with pytest.raises(OutputError, match="a number that is none"):
-        render_page("sim.view", title="x", data={"height": float("nan")})
+        REPLAY.render(title="x", data={"height": float("nan")})
 
 
 def test_a_name_that_is_not_utf8() -> None:
     name = b"walk_\xff.bvh".decode("utf-8", "surrogateescape")
-    assert "<title>walk_?.bvh</title>" in render_page("sim.view", title=name, data={"a": name})
+    assert "<title>walk_?.bvh</title>" in REPLAY.render(title=name, data={"a": name})
 
 
-@pytest.mark.parametrize("package", ["sim.view", "sim.report"])
-def test_templates_mark_nothing_as_safe(package: str) -> None:
-    template = (files(package) / "page.html").read_text()
+TEMPLATES = sorted(
+    path for package in ("sim", "spark_sim") for path in (CHECKOUT / package).rglob("*.html")
+)
+
+
+@pytest.mark.parametrize("path", TEMPLATES, ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_templates_mark_nothing_as_safe(path: Path) -> None:
+    template = path.read_text()
     assert "safe" not in template
     assert "autoescape" not in template
 

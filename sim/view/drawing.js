@@ -1,0 +1,119 @@
+"use strict";
+const gl = document.createElement("canvas").getContext("webgl2", { antialias: true });
+const VERTEX = `#version 300 es
+in vec3 place; in vec3 normal; in vec3 color;
+uniform vec4 q; uniform vec3 p; uniform mat4 camera; uniform bool flatten; uniform vec3 light;
+out vec3 at; out vec3 n; out vec3 rgb;
+vec3 rot(vec3 v) { return v + 2.0 * cross(q.yzw, cross(q.yzw, v) + q.x * v); }
+void main() {
+  at = rot(place) + p; n = rot(normal); rgb = color;
+  if (flatten) at = vec3(at.xy - light.xy / light.z * max(at.z, 0.0), 0.0);
+  gl_Position = camera * vec4(at, 1.0);
+}`;
+const FRAGMENT = `#version 300 es
+precision highp float;
+in vec3 at; in vec3 n; in vec3 rgb; out vec4 pixel;
+uniform vec4 paint; uniform vec3 light; uniform vec3 eye; uniform vec3 middle; uniform float alpha;
+void main() {
+  if (paint.a > 0.0) { // floor lines and shadows: one colour that fades with the distance
+    float fade = paint.a * clamp(1.4 - length(at.xy - middle.xy) / 8.0, 0.0, 1.0);
+    pixel = vec4(paint.rgb * fade, fade); return;
+  }
+  vec3 out_of = normalize(eye - at), m = normalize(n);
+  if (dot(m, out_of) < 0.0) m = -m;
+  float lit = 0.5 + 0.18 * m.z + 0.45 * max(dot(m, light), 0.0);
+  float gloss = 0.14 * pow(max(dot(m, normalize(light + out_of)), 0.0), 18.0) + 0.10 * pow(1.0 - dot(m, out_of), 3.0);
+  pixel = vec4((rgb * lit + gloss) * alpha, alpha);
+}`;
+const uniform = {};
+let lines;
+if (gl) {
+  const program = gl.createProgram();
+  for (const [kind, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
+    const shader = gl.createShader(kind);
+    gl.shaderSource(shader, text); gl.compileShader(shader); gl.attachShader(program, shader);
+  }
+  gl.linkProgram(program); gl.useProgram(program);
+  for (const name of ["q", "p", "camera", "flatten", "light", "paint", "eye", "middle", "alpha"]) uniform[name] = gl.getUniformLocation(program, name);
+  const upload = numbers => {
+    const array = gl.createVertexArray();
+    gl.bindVertexArray(array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(numbers), gl.STATIC_DRAW);
+    ["place", "normal", "color"].forEach((name, k) => {
+      const slot = gl.getAttribLocation(program, name);
+      gl.enableVertexAttribArray(slot); gl.vertexAttribPointer(slot, 3, gl.FLOAT, false, 36, 12 * k);
+    });
+    return { array, count: numbers.length / 9 };
+  };
+  for (const f of DATA.figures) for (const [k, body] of f.bodies.entries()) {
+    const numbers = [];
+    for (const geom of f.geoms) if (geom.body === k) corners(geom, numbers);
+    body.drawn = numbers.length ? upload(numbers) : null;
+  }
+  const grid = [], n = 12, rest = [0, 0, 1, 0, 0, 0];
+  for (let i = -n; i <= n; i++) grid.push(i, -n, 0, ...rest, i, n, 0, ...rest, -n, i, 0, ...rest, n, i, 0, ...rest);
+  lines = upload(grid);
+  gl.uniform3fv(uniform.light, LIGHT);
+  gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+  gl.enable(gl.BLEND);
+}
+
+let basis, eye, focal, W, H;
+function setCamera(target) {
+  const cy = Math.cos(view.yaw), sy = Math.sin(view.yaw), cp = Math.cos(view.pitch), sp = Math.sin(view.pitch);
+  const back = [cp * cy, cp * sy, sp], right = [-sy, cy, 0], up = [-sp * cy, -sp * sy, cp];
+  target = target.map((v, i) => v + right[i] * view.pan[0] + up[i] * view.pan[1]);
+  eye = target.map((v, i) => v + back[i] * view.distance);
+  basis = [right, up, back];
+  W = canvas.width; H = canvas.height; focal = 1.6 * H;
+}
+function project(p) {
+  const d = sub(p, eye), depth = -dot(d, basis[2]), s = focal / Math.max(depth, 0.05);
+  return [W / 2 + dot(d, basis[0]) * s, 0.46 * H - dot(d, basis[1]) * s, depth];
+}
+// The same projection as a matrix, by columns.
+function cameraMatrix() {
+  const near = 0.05, far = 200, a = (far + near) / (far - near), b = -2 * far * near / (far - near);
+  const ahead = basis[2].map(v => -v), [right, up] = basis;
+  const rows = [right.map(v => 2 * focal / W * v), up.map((v, i) => 2 * focal / H * v + 0.08 * ahead[i]), ahead.map(v => a * v), ahead];
+  return [0, 1, 2].flatMap(i => rows.map(row => row[i])).concat(rows.map((row, k) => -dot(row, eye) + (k === 2 ? b : 0)));
+}
+function rgb(css, alpha) { // "#rrggbb" or "#rgb"
+  const text = css.trim().slice(1), n = text.length / 3;
+  return [0, 1, 2].map(k => parseInt(text.substr(k * n, n).repeat(3 - n), 16) / 255).concat(alpha);
+}
+function render(all, target, css) {
+  gl.canvas.width = W; gl.canvas.height = H;
+  gl.viewport(0, 0, W, H);
+  gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+  gl.uniformMatrix4fv(uniform.camera, false, cameraMatrix());
+  gl.uniform3fv(uniform.eye, eye);
+  gl.uniform3fv(uniform.middle, target);
+  const bodies = (f, at) => f.bodies.forEach((body, k) => {
+    if (!body.drawn) return;
+    gl.uniform4fv(uniform.q, at[k].q); gl.uniform3fv(uniform.p, at[k].p);
+    gl.bindVertexArray(body.drawn.array); gl.drawArrays(gl.TRIANGLES, 0, body.drawn.count);
+  });
+  gl.disable(gl.DEPTH_TEST);
+  gl.uniform1i(uniform.flatten, 0);
+  gl.uniform4fv(uniform.paint, rgb(css.line, 1));
+  gl.uniform4fv(uniform.q, [1, 0, 0, 0]); gl.uniform3fv(uniform.p, [Math.round(target[0]), Math.round(target[1]), 0]);
+  gl.bindVertexArray(lines.array); gl.drawArrays(gl.LINES, 0, lines.count);
+  gl.uniform1i(uniform.flatten, 1);
+  gl.uniform4fv(uniform.paint, rgb(css.shadow, 1));
+  DATA.figures.forEach((f, i) => { if (f.alpha === 1) bodies(f, all[i]); });
+  gl.enable(gl.DEPTH_TEST);
+  gl.uniform1i(uniform.flatten, 0);
+  gl.uniform4fv(uniform.paint, [0, 0, 0, 0]);
+  gl.depthFunc(gl.LEQUAL);
+  for (const clear of [false, true]) DATA.figures.forEach((f, i) => {
+    if (clear !== f.alpha < 1) return;
+    gl.uniform1f(uniform.alpha, f.alpha);
+    if (clear) { // depth first: only its nearest faces are seen
+      gl.colorMask(false, false, false, false); bodies(f, all[i]); gl.colorMask(true, true, true, true);
+    }
+    bodies(f, all[i]);
+  });
+  ctx.drawImage(gl.canvas, 0, 0);
+}
