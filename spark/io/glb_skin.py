@@ -59,7 +59,7 @@ def _local_maps(
     file: GltfFile, nodes: list[int], motion: Motion, unit_m: float
 ) -> dict[int, tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3 3"]]]:
     """Each joint's node in its parent over time: its place, and its linear map with scale."""
-    parents, rest = file.parents(), _rest(file)
+    parents, rest = file.parents(), rest_maps(file)
     positions, world = forward(motion)
     where = places(positions) / unit_m
     since = matrix_from_quat(turns(world)[..., [3, 0, 1, 2]])
@@ -86,7 +86,7 @@ def _local_maps(
     return out
 
 
-def _rest(file: GltfFile) -> dict[int, tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]]:
+def rest_maps(file: GltfFile) -> dict[int, tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]]:
     """Every node's place and linear map in the world, as the file has them at rest."""
     parents = file.parents()
     known: dict[int, tuple[Float[np.ndarray, 3], Float[np.ndarray, "3 3"]]] = {}

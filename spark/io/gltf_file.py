@@ -108,7 +108,8 @@ class GltfFile:
                 raise self.error(f"accessor {index} replaces rows that it does not have")
             rows = rows.copy()
             rows[at] = self._rows(sparse["values"], index, dtype, width, changed)
-        values = rows.astype(float)
+        with np.errstate(invalid="ignore"):  # numbers that are none, which are refused below
+            values = rows.astype(float)
         if accessor.get("normalized"):
             values = np.maximum(values / np.iinfo(dtype).max, -1.0)
         if not np.isfinite(values).all():

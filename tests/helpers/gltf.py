@@ -173,7 +173,7 @@ def animated(
     gltf.json["scenes"][0]["nodes"] = [0]
     if skin:
         bind = np.zeros((count, 4, 4))
-        bind[:, :3, :3] = np.swapaxes(matrix_from_quat(own), 1, 2)
+        bind[:, :3, :3] = scale * np.swapaxes(matrix_from_quat(own), 1, 2)
         bind[:, :3, 3] = -np.einsum("jik,jk->ji", bind[:, :3, :3], rest_positions)
         bind[:, 3, 3] = 1
         columns = np.swapaxes(bind, 1, 2).reshape(count, 16)
