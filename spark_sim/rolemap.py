@@ -16,13 +16,11 @@ from pathlib import Path
 from spark.errors import FileFormatError, SkeletonError
 from spark.files import write_atomically
 from spark.opening import parse_toml, read_text
-from spark.rig.override import Override, check_override
+from spark.rig.override import SEVERAL, Override, check_override
 from spark.rig.roles import Role, RoleMap
 from spark.skeleton import Skeleton
 
-_SEVERAL = (Role.SPINE, Role.NECK)
-
-_HEADER = """\
+HEADER = """\
 # Which joint is what. Correct what is wrong; roles that are left out are inferred.
 # spine and neck may be several joints, from the pelvis outwards; [] where the body has none.
 """
@@ -30,10 +28,10 @@ _HEADER = """\
 
 def write(skeleton: Skeleton, roles: RoleMap | None, path: str | Path) -> None:
     """Write the roles, and as comments the joints that hold none; without roles, a form."""
-    lines = [_HEADER]
+    lines = [HEADER]
     for role in Role:
         held = [skeleton.names[j] for j in roles.joints(role)] if roles else []
-        value = held[0] if len(held) == 1 and role not in _SEVERAL else held
+        value = held[0] if len(held) == 1 and role not in SEVERAL else held
         lines.append(f"{'' if roles else '# '}{role} = {_quoted(value)}")
     free = [name for j, name in enumerate(skeleton.names) if not roles or roles.roles[j] is None]
     if free:
@@ -43,7 +41,7 @@ def write(skeleton: Skeleton, roles: RoleMap | None, path: str | Path) -> None:
 
 
 def _quoted(value: str | list[str]) -> str:
-    return json.dumps(value, ensure_ascii=False)
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # TOML takes no DEL
 
 
 def read(path: str | Path, skeleton: Skeleton) -> Override:

@@ -49,6 +49,7 @@ SLOW = (
     "tests/spark_sim/test_cli.py",
     "tests/spark_sim/test_hostile_names.py",
     "tests/spark_sim/test_rates.py",
+    "tests/spark_sim/test_rig_page.py",
     "tests/spark_sim/test_train_command.py",
     "tests/test_packaging.py",
     "tests/test_readme.py",

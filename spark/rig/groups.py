@@ -3,7 +3,7 @@
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.skeleton import Skeleton
 
-_OF_ROLE: dict[Role, Group] = {
+GROUP_OF_ROLE: dict[Role, Group] = {
     **{role: group for group, roles in LIMBS.items() for role in roles},
     Role.PELVIS: Group.TORSO,
     Role.SPINE: Group.TORSO,
@@ -26,7 +26,7 @@ def groups_of(skeleton: Skeleton, roles: RoleMap) -> tuple[frozenset[Group], ...
     top = roles.joints(Role.SPINE)[-1:] or roles.joints(Role.PELVIS)
     for j, role in enumerate(roles.roles):
         if role is not None:
-            own = frozenset({_OF_ROLE[role]})
+            own = frozenset({GROUP_OF_ROLE[role]})
             if role is Role.PELVIS:
                 own |= _ON_LEGS
             if j in top:
@@ -44,5 +44,5 @@ def _inherited(
     if parent < 0 or len(groups[parent]) == 1:
         return groups[parent] if parent >= 0 else frozenset({Group.TORSO})
     # Below a shared joint: the part that the joint leads to, or the torso.
-    below = {_OF_ROLE[r] for j in skeleton.subtree(joint) if (r := roles.roles[j]) is not None}
+    below = {GROUP_OF_ROLE[r] for j in skeleton.subtree(joint) if (r := roles.roles[j]) is not None}
     return frozenset(below) if len(below) == 1 else frozenset({Group.TORSO})

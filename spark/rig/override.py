@@ -10,14 +10,15 @@ from spark.skeleton import Skeleton
 Override = Mapping[Role, Sequence[int]]
 """Roles given by the user: their joints from the pelvis outwards; none where nobody holds one."""
 
-_SEVERAL = (Role.SPINE, Role.NECK)
+SEVERAL = (Role.SPINE, Role.NECK)
+"""The roles that several joints may hold."""
 
 
 def check_override(skeleton: Skeleton, override: Override) -> None:
     """Raise SkeletonError where a joint is given twice, does not exist, or is one too many."""
     given: dict[int, Role] = {}
     for role, joints in override.items():
-        if len(joints) > 1 and role not in _SEVERAL:
+        if len(joints) > 1 and role not in SEVERAL:
             names = ", ".join(repr(skeleton.names[j]) for j in joints)
             raise SkeletonError(f"{role} is given {len(joints)} joints ({names}); expected one")
         for j in joints:

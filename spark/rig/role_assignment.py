@@ -34,7 +34,7 @@ def assign_roles(
     try:
         found = _infer(skeleton, motion, hints)
     except SkeletonError as error:
-        missing = [role.value for role in _REQUIRED if not override.get(role)]
+        missing = [role.value for role in REQUIRED if not override.get(role)]
         if override and missing:
             raise SkeletonError(f"{error}; the one given lacks {', '.join(missing)}") from error
         if missing:
@@ -46,13 +46,14 @@ def assign_roles(
     return roles
 
 
-_REQUIRED = (
+REQUIRED = (
     Role.PELVIS,
     Role.LEFT_UPPER_LEG,
     Role.LEFT_LOWER_LEG,
     Role.RIGHT_UPPER_LEG,
     Role.RIGHT_LOWER_LEG,
 )
+"""What a map has to give where nothing can be inferred."""
 
 Found = dict[int, tuple[Role, float, str]]
 
