@@ -21,7 +21,7 @@ from spark.training.dataset import training_clips
 from spark.training.name_encoder import NameEncoder
 from spark.training.packed import AHEAD, Packed, Packer
 from spark.training.settings import TrainConfig
-from spark.training.train import Steps
+from spark.training.steps import Steps
 
 FIRST, BEGUN, STEPS = 800, 400, 700
 

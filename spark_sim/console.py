@@ -1,12 +1,14 @@
 """What the program says: results on stdout; notes, errors and progress on stderr."""
 
 import json
+import math
 import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from time import monotonic
 from typing import Any, TextIO, TypeVar
 
 from spark.errors import OutputError
@@ -86,20 +88,55 @@ def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterat
     yield from tqdm(items, label, total, leave=False, dynamic_ncols=True, delay=0.5)
 
 
+_LINE_EVERY = 10.0  # seconds between the lines of a meter that is no bar
+
+
 @contextmanager
 def meter(
-    total: int, done: int, label: str
+    total: int, done: int, label: str, *, lines: bool = False
 ) -> Iterator[Callable[[int, Mapping[str, float]], None]]:
-    """A bar for long work, with figures beside it and the time that is left; on terminals alone."""
+    """A bar for long work, with figures beside it and the time that is left; on other streams than
+    terminals nothing, or a line at the first step and then every ten seconds."""
     if not sys.stderr.isatty():
-        yield lambda step, figures: None
+        yield _lines(total, done, label) if lines else lambda step, figures: None
         return
     from tqdm import tqdm
 
     with tqdm(total=total, initial=done, desc=label, dynamic_ncols=True) as bar:
 
         def tell(step: int, figures: Mapping[str, float]) -> None:
-            bar.set_postfix({name: f"{value:.3g}" for name, value in figures.items()})
+            if figures:
+                bar.set_postfix(
+                    {name: f"{value:.3g}" for name, value in figures.items()}, refresh=False
+                )
             bar.update(step - bar.n)
 
         yield tell
+
+
+def _lines(total: int, done: int, label: str) -> Callable[[int, Mapping[str, float]], None]:
+    """A meter that writes lines."""
+    began, told = monotonic(), -math.inf
+    known: dict[str, float] = {}
+
+    def tell(step: int, figures: Mapping[str, float]) -> None:
+        nonlocal told
+        known.update(figures)
+        now = monotonic()
+        if now - told < _LINE_EVERY and step < total:
+            return
+        told = now
+        shown = "".join(f", {name} {value:.3g}" for name, value in known.items())
+        if done + 1 < step < total:  # the first step tells nothing of the others
+            left = (total - step) * (now - began) / (step - done)
+            shown += f", {duration(left)} left"
+        note(f"{label}: {step} of {total}{shown}")
+
+    return tell
+
+
+def duration(seconds: float) -> str:
+    """A time as people say it."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

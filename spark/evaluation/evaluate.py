@@ -43,13 +43,15 @@ class MethodScores:
     """One method: its scores by structure and cell, and over all cases of a structure together.
 
     `settings` are those of the training of a checkpoint. `sensitivity`: `source_sensitivity`, the
-    mean over targets that receive several motions; NaN where there is none.
+    mean over targets that receive several motions; NaN where there is none. `each` has every case's
+    score, in their order.
     """
 
     name: str
     cells: Mapping[tuple[Structure, str], CellScore]
     sensitivity: Mapping[Structure, float]
     settings: Mapping[str, object] = field(default_factory=dict)
+    each: tuple[Score, ...] = ()
 
     def mean(self, structure: Structure) -> Score:
         """The mean over the cells of a structure; NaN where there is none."""
@@ -72,12 +74,14 @@ def evaluate(
     positions_by_pair: dict[tuple[Structure, str, str], list[tuple[Positions, Positions]]] = (
         defaultdict(list)
     )
+    each: list[Score] = []
     for case in progress(cases):
         truth = canonical_positions(case.truth)
         own = method(case)
         rig = case.truth.rig
         scored = score_positions(own, truth, rig, case.truth.frame_time, case.height)
         scores[case.structure, case.cell][case.target].append(scored)
+        each.append(scored)
         positions_by_pair[case.structure, case.target, case.performer].append(
             (_relative(own), _relative(truth))
         )
@@ -89,6 +93,7 @@ def evaluate(
         },
         {structure: _sensitivity(structure, positions_by_pair) for structure in STRUCTURES},
         settings or {},
+        tuple(each),
     )
 
 

@@ -157,6 +157,19 @@ class NetworkRetargeter:
         ]
 
 
+def silence(network: NetworkRetargeter, source: Rig, target: Rig) -> str:
+    """Why `network` leaves the analytic transfer between these rigs as it is; empty where it
+    doesn't."""
+    if not network.network.config.residual:
+        return ""
+    body = body_features(target)
+    if not (unmatched_joints(source, body) >= 0).any():
+        return "every joint of the target has a counterpart in the source"
+    if not similarity(body, network.bodies):
+        return "the target is unlike all bodies of the training"
+    return ""
+
+
 def unmatched_joints(source: Rig, target: BodyFeatures) -> Int[np.ndarray, "J"]:
     """`Correspondence.unmatched` in the network's numbering of the target's joints."""
     index = {int(j): k for k, j in enumerate(target.joints)}

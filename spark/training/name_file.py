@@ -1,4 +1,4 @@
-"""A trained name encoder as a file of its own: learned once, taken by many training runs."""
+"""Name encoders that are trained already: files of their own, and those within checkpoints."""
 
 import json
 from dataclasses import asdict
@@ -9,10 +9,22 @@ from safetensors.torch import save
 
 from spark.errors import FileFormatError
 from spark.files import write_atomically
+from spark.network.weights import FORMAT as CHECKPOINT
 from spark.opening import check_regular, parse_json
+from spark.training.checkpoint import load_checkpoint
 from spark.training.name_encoder import NameConfig, NameEncoder
 
 FORMAT = "spark-sim names"
+
+
+def _format(path: Path) -> str | None:
+    """What a safetensors file says it is. Raises `FileFormatError` where it is none."""
+    check_regular(path, expected="a name encoder, or a checkpoint")
+    try:
+        with safe_open(path, framework="np") as file:
+            return (file.metadata() or {}).get("format")
+    except (SafetensorError, OSError) as error:
+        raise FileFormatError(path, None, f"is no name encoder ({error})") from error
 
 
 def save_names(encoder: NameEncoder, path: Path) -> None:
@@ -23,8 +35,15 @@ def save_names(encoder: NameEncoder, path: Path) -> None:
 
 
 def load_names(path: Path) -> NameEncoder:
-    """Read what `save_names` wrote, frozen. Raises `FileFormatError` for anything else."""
-    check_regular(path, expected="a name encoder")
+    """Read what `save_names` wrote, or the encoder within a checkpoint or a run's folder; frozen.
+
+    Raises `FileFormatError` for anything else.
+    """
+    if path.is_dir() or _format(path) == CHECKPOINT:
+        names = load_checkpoint(path).names
+        if isinstance(names, NameEncoder):
+            return names
+        raise FileFormatError(path, None, f"was trained on the names of {names!r}; give --t5 that")
     try:
         with safe_open(path, framework="pt") as file:
             metadata = file.metadata() or {}

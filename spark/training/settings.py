@@ -23,8 +23,9 @@ class TrainConfig:
     step are drawn `per_body` at a time from one pair of bodies, of which each recorded body has
     `variants`. The rate rises over `warmup` steps and then falls along a cosine to a tenth at
     `steps`. With `bf16`, matrix products are in bfloat16 where the processor has them. The encoder
-    of joint names is learned first, in `name_steps`; `names` is a file with one that has been, and
-    `t5` a T5 instead.
+    of joint names is the one that ships ("shipped"); `names` is a file with another, or one is
+    learned first in `name_steps`, or `t5` is a T5. A checkpoint is written every `save_every` steps
+    and every `save_minutes`.
     """
 
     preset: str = "default"
@@ -45,8 +46,9 @@ class TrainConfig:
     workers: int = 0
     bf16: bool = True
     save_every: int = 1000
+    save_minutes: float = 5.0
     log_every: int = 20
-    name_steps: int = 200
+    name_steps: int = 0
     names: str = ""
     t5: str = ""
 
@@ -121,6 +123,7 @@ _LOWEST = {
     **dict.fromkeys(("width", "heads", "blocks", "steps", "batch", "per_body", "variants"), 1),
     **dict.fromkeys(("save_every", "log_every"), 1),
     **dict.fromkeys(("seed", "workers", "warmup", "weight_decay", "rate", "name_steps"), 0),
+    "save_minutes": 0,
     "window": 2,
 }
 _HIGHEST = {
@@ -129,7 +132,7 @@ _HIGHEST = {
     **dict.fromkeys(("batch", "per_body", "variants"), 65536),
     **dict.fromkeys(("steps", "save_every", "log_every", "warmup", "name_steps"), 10**9),
     "seed": 2**63 - 1,
-    **dict.fromkeys(("rate", "weight_decay"), sys.float_info.max),  # finite
+    **dict.fromkeys(("rate", "weight_decay", "save_minutes"), sys.float_info.max),  # finite
 }
 
 

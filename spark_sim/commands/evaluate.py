@@ -90,6 +90,7 @@ def configure(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     from spark.errors import ConventionError
     from spark.evaluation.cases import made_cases, performances, recorded_cases
+    from spark.evaluation.equal import Why, equal_rows, why_no_prior, why_silent
     from spark.evaluation.evaluate import as_method, evaluate, results_in
     from spark.evaluation.tables import markdown
     from spark.files import write_atomically
@@ -122,6 +123,7 @@ def run(args: Namespace) -> int:
         )
 
     rows: list[MethodScores] = []
+    why: dict[str, Why] = {"copy, target prior": why_no_prior}
 
     def add(name: str, method: "RetargetMethod", ways: Ways, **about: Any) -> None:
         rows.extend(
@@ -136,6 +138,7 @@ def run(args: Namespace) -> int:
         from spark.network.retarget import NetworkRetargeter
 
         network = NetworkRetargeter(weights)
+        why[name] = why_silent(network)
         ways = _PLAIN
         if network.network.config.residual:
             ways = _PLAIN | _PRIOR | (_ALL_MADE if args.made else _ALL)
@@ -143,7 +146,10 @@ def run(args: Namespace) -> int:
     for name, folder in results.items():
         answered = [case for case in cases if case.answer is not None]
         rows.append(row(name, results_in(Path(folder)), answered))
+    equal = equal_rows(rows, cases, why)
     console.say(markdown(rows).rstrip("\n"))
+    for sentence in equal:
+        console.note(sentence)
     about = {"data": args.data, "made": args.made, "seed": args.seed, "limit": args.limit}
     for path in outputs:
         write_atomically(path, _text(path, rows, about).encode())

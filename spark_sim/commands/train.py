@@ -1,22 +1,24 @@
 """`spark-sim train`: a network of your own."""
 
-import os
+import shlex
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from spark.training.settings import TrainConfig
-    from spark.training.train import Watch
 
 SUMMARY = "train the network that retargets"
 USAGE = "DATA... -o DIR [--config TOML] [--resume] [options]"
 DESCRIPTION = """\
 Train a network on each DATA: a dataset that `spark-sim prepare` made, or a
 folder of motions. Writes DIR/checkpoint.safetensors, the settings to
-DIR/config.toml, and the losses of each step to DIR/log.jsonl."""
+DIR/config.toml, the losses to DIR/log.jsonl, and a plot of them to
+DIR/losses.png.
+
+Ctrl-C ends the run after the step at work, which is saved; --resume goes on
+as if the run had never stopped. A second Ctrl-C ends it at once."""
 EXAMPLES = """\
 examples:
   spark-sim train motions/ -o run --preset tiny
@@ -56,7 +58,10 @@ def configure(parser: ArgumentParser) -> None:
         number = float if name == "rate" else int
         parser.add_argument(f"--{name}", metavar="N", type=number, help=what)
     parser.add_argument(
-        "--names", metavar="FILE", help="an encoder of joint names that was trained before"
+        "--names",
+        metavar="FILE",
+        help="another encoder of joint names than the one that ships: a file of "
+        "scripts/train_names.py, a checkpoint, or the folder of a run",
     )
     parser.add_argument(
         "--t5", metavar="MODEL", help="encode joint names with a T5: a folder, or a name on the hub"
@@ -72,6 +77,8 @@ def run(args: Namespace) -> int:
     from spark.files import write_atomically
     from spark.training.settings import TrainConfig, read_settings, toml
     from spark_sim import console
+    from spark_sim.stopping import asked_to_stop
+    from spark_sim.watching import is_first, watching, watching_names
 
     out = Path(args.output)
     path = out / "checkpoint.safetensors"
@@ -91,9 +98,17 @@ def run(args: Namespace) -> int:
         raise ConventionError("no DATA to train on; expected datasets or folders of motion files")
     if path.exists() and not (args.resume or args.force):
         raise OutputError(f"{path}: exists; go on with --resume, or overwrite it with --force")
+    if is_first():
+        console.note(
+            f"{out}: preset {config.preset}, {config.steps} steps of {config.batch} windows, on "
+            f"{', '.join(config.data)}"
+        )
     try:
+        import torch
+
         from spark.training.checkpoint import load_checkpoint
         from spark.training.dataset import training_clips
+        from spark.training.threads import choose_threads
         from spark.training.train import fresh_checkpoint, train
     except ImportError as error:
         raise DependencyError(
@@ -101,40 +116,64 @@ def run(args: Namespace) -> int:
         ) from error
     if args.tensorboard:
         try:
-            import torch.utils.tensorboard  # noqa: F401  # before minutes of work, not after
+            import torch.utils.tensorboard  # before minutes of work, not after
         except ImportError as error:
             raise DependencyError(
                 f"--tensorboard needs {error.name}: pip install 'spark-sim[tensorboard]'"
             ) from error
+    threads = choose_threads(config.width)
+    if threads:
+        torch.set_num_threads(threads)
     start = load_checkpoint(path) if args.resume else None
     if start:
         _check_same_network(path, start.settings, config)
     clips, notes = training_clips(
         [Path(p) for p in config.data], lambda files: console.progress(files, "reading")
     )
-    for note in notes:
-        console.note(note)
-    start = start or fresh_checkpoint(config)
+    if is_first():
+        for note in notes:
+            console.note(note)
+        console.note(
+            f"{len(clips)} clips of {len({id(clip.body) for clip in clips})} bodies, "
+            f"{sum(len(clip.hips) * clip.frame_time for clip in clips) / 60:.3g} minutes; "
+            f"on {_device(threads)}"
+        )
+    if start is None:
+        with watching_names(0 if config.names or config.t5 else config.name_steps) as watch_names:
+            start = fresh_checkpoint(config, watch_names)
     out.mkdir(parents=True, exist_ok=True)
     write_atomically(out / "config.toml", toml(config).encode())
     with (
-        _board(out, start.step, args.tensorboard) as board,
-        console.meter(config.steps, start.step, "training") as tell,
+        asked_to_stop(_say_stopping) as asked,
+        watching(out, start.step, config.steps, board=args.tensorboard) as watch,
     ):
-
-        def watch(step: int, terms: dict[str, float]) -> None:
-            board(step, terms)
-            tell(step, terms)
-
-        done = train(clips, config, out, start=start, watch=watch)
-    if _is_first():
+        done = train(clips, config, out, start=start, watch=watch, stop=lambda: asked() > 0)
+        by_signal = asked()
+    if is_first():
         console.say(f"{path}: {done.step} steps on {len(clips)} clips")
-    return 0
+        if done.step < config.steps:
+            console.note(
+                f"stopped at step {done.step} of {config.steps}, which is saved; go on with: "
+                f"spark-sim train -o {shlex.quote(str(out))} --resume"
+            )
+    return 128 + by_signal if done.step < config.steps else 0
 
 
-def _is_first() -> bool:
-    """Whether this process is the only one, or the one of `torchrun`'s that writes."""
-    return os.environ.get("RANK", "0") == "0"
+def _device(threads: int | None) -> str:
+    """Where this process computes."""
+    import torch
+
+    if torch.cuda.is_available():
+        return torch.cuda.get_device_name()
+    count = torch.get_num_threads()
+    chosen = "OMP_NUM_THREADS would set another number" if threads else "as the environment says"
+    return f"the CPU with {count} thread{'s' * (count > 1)} ({chosen})"
+
+
+def _say_stopping() -> None:
+    from spark_sim import console
+
+    console.note("stopping after this step, which is saved; once more ends at once, unsaved")
 
 
 def _check_same_network(path: Path, trained: Mapping[str, object], config: "TrainConfig") -> None:
@@ -149,20 +188,3 @@ def _check_same_network(path: Path, trained: Mapping[str, object], config: "Trai
                 f"{path}: was trained with {name} = {before!r}, not {now!r}; --resume goes on with "
                 "the network that is there"
             )
-
-
-@contextmanager
-def _board(out: Path, step: int, wanted: bool) -> "Iterator[Watch]":
-    """What writes loss terms for TensorBoard, from `step` on; under `torchrun` one process does."""
-    if not (wanted and _is_first()):
-        yield lambda step, terms: None
-        return
-    from torch.utils.tensorboard import SummaryWriter
-
-    with SummaryWriter(str(out), purge_step=step + 1) as writer:
-
-        def tell(step: int, terms: dict[str, float]) -> None:
-            for name, value in terms.items():
-                writer.add_scalar(name, value, step)
-
-        yield tell

@@ -12,10 +12,10 @@ from spark.training.batch import Batch
 from spark.training.checkpoint import Checkpoint
 from spark.training.model import Spark
 from spark.training.name_encoder import NameConfig, NameEncoder
+from spark.training.objective import network
 from spark.training.pairs import TrainingClip
 from spark.training.settings import TrainConfig
 from spark.training.tensors import Start
-from spark.training.train import network
 from spark.transfer.canonical import to_canonical
 
 SMALL = {"width": 32, "heads": 2, "encoder_blocks": 1, "decoder_blocks": 2}

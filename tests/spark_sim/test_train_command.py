@@ -3,16 +3,64 @@
 import importlib
 import importlib.util
 import json
+import os
+import signal
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import torch
 
 from spark.training.checkpoint import load_checkpoint
 from spark.training.settings import read_settings, toml
 from spark_sim import sample
 from tests.helpers.program import Program
 from tests.helpers.training import TINY
+
+CHECKOUT = Path(__file__).parents[2]
+
+
+def test_ctrl_c_saves_and_the_rest_is_as_if_it_had_not_been(tmp_path: Path) -> None:
+    """The first line comes first, Ctrl-C ends after a step, and what resumes ends the same."""
+    sample(tmp_path / "samples")
+    # The rate of a step that is warming up does not depend on how many are to come.
+    settings = replace(TINY, steps=400, save_every=1000, warmup=1000)
+    (tmp_path / "tiny.toml").write_text(toml(settings))
+    train = (sys.executable, "-m", "spark_sim", "train")
+    process = subprocess.Popen(
+        [*train, "samples", "-o", "run", "--config", "tiny.toml", "--workers", "1"],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(CHECKOUT)},
+        start_new_session=True,
+    )
+    assert process.stderr is not None
+    said = [process.stderr.readline()]
+    assert "run: preset tiny, 400 steps of 4 windows, on samples" in said[0]
+    while "training: 1 of 400" not in said[-1] and process.poll() is None:
+        said.append(process.stderr.readline())
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does it: workers get it too
+    rest = process.communicate(timeout=60)[1]
+    assert process.returncode == 130, [*said, rest]
+    step = load_checkpoint(tmp_path / "run" / "checkpoint.safetensors").step
+    assert f"stopped at step {step} of 400, which is saved; go on with: " in rest
+    assert rest.rstrip().endswith("spark-sim train -o run --resume")
+    assert "Traceback" not in rest
+    with Program(tmp_path) as command:
+        end = ("--steps", str(step + 2))
+        assert command("train", "-o", "run", "--resume", *end).code == 0
+        whole = command("train", "samples", "-o", "whole", "--config", "tiny.toml", *end)
+        assert whole.code == 0, whole.stderr
+    one, two = (
+        load_checkpoint(tmp_path / run / "checkpoint.safetensors") for run in ("run", "whole")
+    )
+    assert one.step == two.step == step + 2
+    for name, weight in two.model.state_dict().items():
+        assert torch.equal(weight, one.model.state_dict()[name]), name
+    assert (tmp_path / "run" / "losses.png").exists()
 
 
 def test_the_command_line_trains_resumes_and_retargets(tmp_path: Path) -> None:

@@ -35,9 +35,9 @@ from spark.training.checkpoint import Checkpoint, save_checkpoint
 from spark.training.dataset import Performance
 from spark.training.model import Spark
 from spark.training.name_encoder import NameConfig, NameEncoder
+from spark.training.objective import network
 from spark.training.pairs import TrainingClip
 from spark.training.settings import TrainConfig
-from spark.training.train import network
 from spark.training.variants import same_body, split_body, split_joints
 from spark.transfer.analytic import correspond, transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions

@@ -4,6 +4,7 @@ import json
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -299,6 +300,28 @@ def test_what_is_no_name_encoder_is_refused(encoder: NameEncoder, tmp_path: Path
         load_names(path)
     with pytest.raises(FileFormatError, match="no such file"):
         load_names(tmp_path / "none.safetensors")
+
+
+def test_training_begins_with_the_names_that_ship(tmp_path: Path) -> None:
+    """By default, by name, by the file itself, and by the folder of a run that has them."""
+    shipped = load_checkpoint(SHIPPED).names
+    assert isinstance(shipped, NameEncoder)
+    names = name_joints(ROLES, "xsens")
+    tiny = TrainConfig.of("tiny")
+    save_checkpoint(fresh_checkpoint(tiny), tmp_path / "checkpoint.safetensors")
+    for file in ("shipped", str(SHIPPED), str(tmp_path)):
+        own = fresh_checkpoint(tiny.changed("test", names=file, name_steps=5)).names
+        assert isinstance(own, NameEncoder)
+        torch.testing.assert_close(own.encode(names), shipped.encode(names))
+    told: list[int] = []
+    learned = fresh_checkpoint(tiny.changed("test", name_steps=2), lambda n, loss: told.append(n))
+    assert told == [1, 2]
+    assert isinstance(learned.names, NameEncoder)
+    assert not torch.allclose(learned.names.encode(names), shipped.encode(names))
+    t5 = replace(fresh_checkpoint(tiny), names="t5-small")
+    save_checkpoint(t5, tmp_path / "checkpoint.safetensors")
+    with pytest.raises(FileFormatError, match="names of 't5-small'; give --t5 that"):
+        load_names(tmp_path)
 
 
 def test_training_begins_with_the_names_of_a_file(encoder: NameEncoder, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import torch
 from spark.training.name_encoder import NameEncoder
 from spark.training.packed import Packer
 from spark.training.pairs import TrainingClip
-from spark.training.train import Steps, _batches
+from spark.training.steps import Steps, batches_from
 from tests.helpers.training import SMALL_NAMES, TINY
 
 
@@ -28,7 +28,7 @@ def test_a_packed_batch_is_the_batch(clips: list[TrainingClip]) -> None:
 def test_batches_of_a_worker_hold_while_they_are_used(clips: list[TrainingClip]) -> None:
     """Their memory is used again, but not before the trainer is done with them."""
     steps = Steps(clips, NameEncoder(SMALL_NAMES).encode, replace(TINY, workers=1, steps=14), 0, 1)
-    for n, packed in enumerate(_batches(steps, 0)):
+    for n, packed in enumerate(batches_from(steps, 0)):
         time.sleep(0.02)  # so that the worker is as far ahead as it may be
         batch, again = steps[n], packed.on(torch.device("cpu"))
         assert torch.equal(batch.truth.rotations, again.truth.rotations), n

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from spark.errors import ConventionError
+from spark.training.objective import Objective, network
 from spark.training.settings import TrainConfig, read_settings, toml
-from spark.training.train import Objective, network
 from tests.helpers.training import TINY, fresh
 
 

@@ -15,8 +15,11 @@ from spark.errors import DivergedError
 from spark.training.checkpoint import Checkpoint, load_checkpoint
 from spark.training.model import _corrected
 from spark.training.name_encoder import NameEncoder
+from spark.training.objective import Objective
+from spark.training.optimiser import make_optimiser
 from spark.training.pairs import TrainingClip
-from spark.training.train import Objective, Steps, make_optimiser, take_step, train
+from spark.training.steps import Steps
+from spark.training.train import take_step, train
 from spark_sim import sample
 from tests.helpers.training import TINY, fresh
 
@@ -87,9 +90,11 @@ import torch
 from dataclasses import replace
 from spark.training.clips import read_clips
 from tests.helpers.training import TINY, fresh
-from spark.training.train import Objective, Steps, _join_processes, distributed
+from spark.training.objective import Objective
+from spark.training.processes import distributed, join_processes
+from spark.training.steps import Steps
 folder, out = Path(sys.argv[1]), Path(sys.argv[2])
-rank, world, _ = _join_processes()
+rank, world, _ = join_processes()
 checkpoint = fresh(TINY).__class__(fresh(TINY).model.eval(), fresh(TINY).names)
 torch.manual_seed(1)
 torch.nn.init.normal_(checkpoint.model.decoder.rotation.weight, std=0.1)

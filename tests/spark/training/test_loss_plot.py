@@ -1,0 +1,34 @@
+"""The picture of a run's losses."""
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spark.training.loss_plot import LossPlot, read_terms
+
+pytest.importorskip("matplotlib")
+
+
+def test_the_plot_has_the_terms_of_the_log_and_grows(tmp_path: Path) -> None:
+    from PIL import Image
+
+    log = tmp_path / "log.jsonl"
+    plot = LossPlot(tmp_path)
+    plot.update(now=True)
+    assert not (tmp_path / "losses.png").exists()  # nothing to show yet
+    lines = [{"step": n, "seconds": n, "loss": 1 / n, "fk": 0.1 / n} for n in range(1, 60)]
+    log.write_text("".join(json.dumps(line) + "\n" for line in lines) + '{"step": 60, "lo')
+    assert {k: len(v) for k, v in read_terms(log).items()} == {"loss": 59, "fk": 59}
+    plot.update()
+    assert not (tmp_path / "losses.png").exists()  # too soon after the last
+    plot.update(now=True)
+    first = (tmp_path / "losses.png").read_bytes()
+    pixels = np.asarray(Image.open(io.BytesIO(first)).convert("RGB"), int)
+    assert (pixels.max(-1) < 40).mean() > 0.005  # black: text and the loss
+    assert (pixels.max(-1) - pixels.min(-1) > 80).mean() > 0.001  # a colour: the term
+    log.write_text(log.read_text() + 'ss": 1}\n{"step": 61, "loss": 0.001}\n')
+    plot.update(now=True)
+    assert (tmp_path / "losses.png").read_bytes() != first
