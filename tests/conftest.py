@@ -1,11 +1,17 @@
 """Fixtures that tests of several packages share."""
 
 import os
+import tempfile
 from pathlib import Path
 
 # One thread a process, here and in what tests start: two workers on two cores, each with threads
 # for both, take several times as long. Before anything that reads it is imported.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+# Compiled models are kept for the time of the tests, and not in the user's own cache.
+if "PYTEST_XDIST_WORKER" not in os.environ:
+    _CACHE = tempfile.TemporaryDirectory(prefix="spark-sim-tests-")
+    os.environ["XDG_CACHE_HOME"] = _CACHE.name
 
 import pytest
 

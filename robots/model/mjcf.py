@@ -9,12 +9,15 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from robots.model import model_cache
+from robots.model.compiling import compiled, one_line
 from robots.model.mjcf_source import read_source
 from robots.model.urdf import is_urdf, read_urdf
 from spark.errors import FileFormatError, SkeletonError
@@ -31,7 +34,6 @@ FREE, BALL, SLIDE, HINGE = (
 )
 _EQ_JOINT = int(mujoco.mjtEq.mjEQ_JOINT)
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
-_MIN_MASS, _MIN_INERTIA = 1e-4, 1e-8  # [kg], [kg m²] of bodies whose mass went with their meshes
 _MAX_OFFSET = 1e4  # [m] of a body from its parent: beyond, floats lose millimetres; it is a mistake
 _NUMBERS = (
     *("qpos0", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat"),
@@ -115,12 +117,12 @@ def read_mjcf(path: str | Path, *, visuals: bool = True) -> Mjcf:
     path = Path(path)
     notes: list[str] = []
     with _warnings_as_notes(notes):
-        spec = _parse(path, notes, visuals=visuals)
+        spec, text = _parse(path, notes, visuals=visuals)
         if not visuals:
             _drop_visuals(spec)
         root = _find_root(spec, path, notes)
         _free_root(spec, root, path, notes)
-        model = _compile(spec, path, notes)
+        model = compiled(spec, path, notes, partial(model_cache.key, spec, text, visuals))
     if is_urdf(path):
         _stand(spec, model, root)
     _note_ignored(model, notes)
@@ -140,19 +142,20 @@ def _check_numbers(model: mujoco.MjModel, path: Path) -> None:
             raise FileFormatError(path, None, f"has numbers that are not finite ({name})")
 
 
-def _parse(path: Path, notes: list[str], *, visuals: bool) -> mujoco.MjSpec:
+def _parse(path: Path, notes: list[str], *, visuals: bool) -> tuple[mujoco.MjSpec, str]:
+    """The spec of a file, and the text that MuJoCo was given."""
     if is_urdf(path):
         return read_urdf(path, notes, visuals=visuals)
     source = read_source(path)
     try:
         spec = mujoco.MjSpec.from_string(source.text, include=source.models)
     except Exception as error:  # of MuJoCo or its binding, which has several kinds
-        message = _line(error) if source.whole else re.sub(r",? line \d+", "", _line(error))
+        message = one_line(error) if source.whole else re.sub(r",? line \d+", "", one_line(error))
         raise FileFormatError(path, None, f"MuJoCo can't read it: {message}") from error
     if any("'NaN'" in note for note in notes):
         raise FileFormatError(path, None, "holds NaN where MuJoCo expects a number")
     spec.modelfiledir = str(path.parent)
-    return spec
+    return spec, source.text
 
 
 @contextmanager
@@ -253,31 +256,6 @@ def _free_root(spec: mujoco.MjSpec, root: str, path: Path, notes: list[str]) -> 
     body.add_freejoint(name=f"{root}_free")
 
 
-def _compile(spec: mujoco.MjSpec, path: Path, notes: list[str]) -> mujoco.MjModel:
-    try:
-        return spec.compile()
-    except Exception as error:  # of MuJoCo or its binding, which has several kinds
-        message = _line(error)
-    if "mjMINVAL" in message and not spec.compiler.boundmass:
-        spec.compiler.boundmass, spec.compiler.boundinertia = _MIN_MASS, _MIN_INERTIA
-        notes.append("some moving bodies have no mass: they get next to none")
-        return _compile(spec, path, notes)
-    assets = [mesh.file for mesh in spec.meshes if mesh.file]
-    if not (assets or list(spec.textures) or list(spec.hfields)):
-        raise FileFormatError(path, None, f"MuJoCo can't compile it: {message}")
-    _drop_assets(spec)
-    try:
-        model = spec.compile()
-    except Exception as again:
-        raise FileFormatError(
-            path,
-            None,
-            f"MuJoCo can't compile it: {message}; nor without meshes: {_line(again)}",
-        ) from again
-    notes.append(f"read without meshes and textures ({message}): shapes and masses are incomplete")
-    return model
-
-
 def _stand(spec: mujoco.MjSpec, model: mujoco.MjModel, root: str) -> None:
     """Lift the root, which a URDF leaves at the origin, so that the lowest of the shapes is on the
     floor."""
@@ -294,22 +272,6 @@ def _stand(spec: mujoco.MjSpec, model: mujoco.MjModel, root: str) -> None:
     spec.body(root).pos = model.body_pos[body]
 
 
-def _drop_assets(spec: mujoco.MjSpec) -> None:
-    """Delete whatever needs a file, and give massless bodies a little mass."""
-    for geom in list(spec.geoms):
-        if geom.meshname or geom.hfieldname:
-            spec.delete(geom)
-        else:
-            geom.material = ""
-    for site in spec.sites:
-        site.material = ""
-    for kind in ("skins", "materials", "textures", "hfields", "meshes"):
-        for element in list(getattr(spec, kind)):
-            spec.delete(element)
-    spec.compiler.boundmass = _MIN_MASS
-    spec.compiler.boundinertia = _MIN_INERTIA
-
-
 def _note_ignored(model: mujoco.MjModel, notes: list[str]) -> None:
     slides = [model.joint(j).name for j in range(model.njnt) if int(model.jnt_type[j]) == SLIDE]
     if slides:
@@ -319,8 +281,3 @@ def _note_ignored(model: mujoco.MjModel, notes: list[str]) -> None:
         notes.append(f"{counted(following, 'joint')} follow others, as the model's constraints say")
     if model.neq > following:
         notes.append(f"{model.neq - following} equality constraints between bodies are ignored")
-
-
-def _line(error: Exception) -> str:
-    """MuJoCo's message on one line."""
-    return " ".join(str(error).split())

@@ -41,11 +41,12 @@ def is_urdf(path: Path) -> bool:
         return bool(re.search(rb"<robot[\s>]", file.read(_BEGINNING)))
 
 
-def read_urdf(path: Path, notes: list[str], *, visuals: bool = True) -> mujoco.MjSpec:
-    """The robot in a URDF. Meshes that are missing or can't be read are left out, with a note;
-    without `visuals` also those of links that have other shapes and a mass.
+def read_urdf(path: Path, notes: list[str], *, visuals: bool = True) -> tuple[mujoco.MjSpec, str]:
+    """The robot in a URDF, and the text that MuJoCo was given of it.
 
-    Raises `FileFormatError` where it is none, or its links are no trees.
+    Meshes that are missing or can't be read are left out, with a note; without `visuals` also those
+    of links that have other shapes and a mass. Raises `FileFormatError` where it is none, or its
+    links are no trees.
     """
     data = read_bytes(path, limit=LARGEST_TEXT, expected="a URDF")
     try:
@@ -77,14 +78,15 @@ def read_urdf(path: Path, notes: list[str], *, visuals: bool = True) -> mujoco.M
         )
     assets = _find_meshes(robot, path, notes, visuals=visuals)
     ET.SubElement(ET.SubElement(robot, "mujoco"), "compiler", _COMPILER)
+    text = ET.tostring(robot, encoding="unicode")
     try:
-        spec = mujoco.MjSpec.from_string(ET.tostring(robot, encoding="unicode"), assets=assets)
+        spec = mujoco.MjSpec.from_string(text, assets=assets)
     except (ValueError, RuntimeError) as error:
         message = " ".join(str(error).split())
         raise FileFormatError(path, None, f"MuJoCo can't read it: {message}") from error
     for mesh in spec.meshes:
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # any mesh has one
-    return spec
+    return spec, text
 
 
 def _check_tree(robot: ET.Element, path: Path) -> None:

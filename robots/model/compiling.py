@@ -1,0 +1,79 @@
+"""A spec compiled: as it is, or else with what MuJoCo misses, or without what it can't read."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+
+from robots.model import model_cache
+from spark.errors import FileFormatError
+
+_MIN_MASS, _MIN_INERTIA = 1e-4, 1e-8  # [kg], [kg m²] of bodies whose mass went with their meshes
+
+
+def compiled(
+    spec: mujoco.MjSpec, path: Path, notes: list[str], key: Callable[[], str | None]
+) -> mujoco.MjModel:
+    """The model of a spec; from the disk where it was stored under this `key`, which is worked out
+    from files that may change.
+
+    What had to be changed in the spec is added to `notes`; such a model is not stored. Raises
+    FileFormatError where MuJoCo can't compile it.
+    """
+    name = key()
+    stored = None if name is None else model_cache.load(name)
+    if stored is not None:
+        return stored
+    before = len(notes)
+    # MuJoCo's own cache takes a mesh for the one it had, if both were written in one second.
+    mujoco.mj_clearCache(mujoco.mj_getCache())
+    model = _compile(spec, path, notes)
+    if name is not None and len(notes) == before and key() == name:
+        model_cache.store(name, model)
+    return model
+
+
+def _compile(spec: mujoco.MjSpec, path: Path, notes: list[str]) -> mujoco.MjModel:
+    try:
+        return spec.compile()
+    except Exception as error:  # of MuJoCo or its binding, which has several kinds
+        message = one_line(error)
+    if "mjMINVAL" in message and not spec.compiler.boundmass:
+        spec.compiler.boundmass, spec.compiler.boundinertia = _MIN_MASS, _MIN_INERTIA
+        notes.append("some moving bodies have no mass: they get next to none")
+        return _compile(spec, path, notes)
+    assets = [mesh.file for mesh in spec.meshes if mesh.file]
+    if not (assets or list(spec.textures) or list(spec.hfields)):
+        raise FileFormatError(path, None, f"MuJoCo can't compile it: {message}")
+    _drop_assets(spec)
+    try:
+        model = spec.compile()
+    except Exception as again:
+        raise FileFormatError(
+            path,
+            None,
+            f"MuJoCo can't compile it: {message}; nor without meshes: {one_line(again)}",
+        ) from again
+    notes.append(f"read without meshes and textures ({message}): shapes and masses are incomplete")
+    return model
+
+
+def _drop_assets(spec: mujoco.MjSpec) -> None:
+    """Delete whatever needs a file, and give massless bodies a little mass."""
+    for geom in list(spec.geoms):
+        if geom.meshname or geom.hfieldname:
+            spec.delete(geom)
+        else:
+            geom.material = ""
+    for site in spec.sites:
+        site.material = ""
+    for kind in ("skins", "materials", "textures", "hfields", "meshes"):
+        for element in list(getattr(spec, kind)):
+            spec.delete(element)
+    spec.compiler.boundmass = _MIN_MASS
+    spec.compiler.boundinertia = _MIN_INERTIA
+
+
+def one_line(error: Exception) -> str:
+    """MuJoCo's message on one line."""
+    return " ".join(str(error).split())
