@@ -10,6 +10,7 @@ import resource
 import tempfile
 import time
 from functools import partial
+from multiprocessing import forkserver
 from pathlib import Path
 from typing import NamedTuple
 
@@ -51,6 +52,7 @@ def cost(source: Path, workers: int) -> Cost:
         jobs = plan([str(source)], [TARGET], out, Options())
         list(batch.run(jobs, partial(in_processes, workers=workers)))
     assert batch.tally.failed == 0, batch.tally.sentence()
+    forkserver._forkserver._stop()  # type: ignore[attr-defined]  # it has its workers' CPU time
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return Cost(time.perf_counter() - start, used)

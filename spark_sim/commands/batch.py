@@ -118,6 +118,7 @@ def run(args: Namespace) -> int:
     options = Options(args.method, args.format, fps, args.cut, reading)
     keep = None if args.keep is None else parse(args.keep)
     jobs = plan(args.sources, args.to, out, options, mirror=args.mirror)
+    backend = _backend(args)
     for target in args.to:
         console.notes(target, target_clip(target).notes)
     shard = ""
@@ -128,7 +129,7 @@ def run(args: Namespace) -> int:
     with locked(out, shard), console.meter(len(jobs), 0, "batch") as tell:
         batch = Batch(out, keep=keep, shard=shard, force=args.force)
         frames, told = 0, start
-        for count, (job, entries) in enumerate(batch.run(jobs, _backend(args)), 1):
+        for count, (job, entries) in enumerate(batch.run(jobs, backend), 1):
             if error := entries[0]["error"]:
                 console.error(error if str(job.source) in error else f"{job.source}: {error}")
             now = time.perf_counter()
@@ -164,7 +165,7 @@ def run(args: Namespace) -> int:
 
 
 def _backend(args: Namespace) -> "Backend":
-    """Who does the jobs: processes of this machine, or a cluster's."""
+    """Who does the jobs: processes of this machine, which begin to start, or a cluster's."""
     from functools import partial
 
     if args.backend == "ray":
@@ -172,8 +173,9 @@ def _backend(args: Namespace) -> "Backend":
 
         return on_ray
 
-    from spark_sim.shelf.processes import in_processes
+    from spark_sim.shelf.processes import begin, in_processes
 
+    begin()
     return partial(in_processes, workers=workers(args))
 
 

@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
+from secrets import token_hex
 from typing import TypeAlias
 
 from robots.model.known import model_sha256
@@ -73,8 +74,10 @@ class Batch:
         self, folder: Path, *, keep: Keep | None = None, shard: str = "", force: bool = False
     ) -> None:
         self.folder, self.keep, self.force = folder, keep, force
-        self.parts = folder / (f".part-{shard}" if shard else ".part")
-        shutil.rmtree(self.parts, ignore_errors=True)
+        self._all_parts = folder / (f".part-{shard}" if shard else ".part")
+        shutil.rmtree(self._all_parts, ignore_errors=True)
+        # Of this run alone: the workers of one that was killed may still write.
+        self.parts = self._all_parts / token_hex(4)
         self.manifest = Manifest(folder, shard)
         self.manifest.tidy(self.parts)
         self.tally = Tally()
@@ -105,7 +108,7 @@ class Batch:
                 yield job, self._commit(job, targets[job.target], done)
         finally:
             self.manifest.tidy(self.parts)
-            shutil.rmtree(self.parts, ignore_errors=True)
+            shutil.rmtree(self._all_parts, ignore_errors=True)
 
     def near_duplicates(self, jobs: Sequence[Job]) -> list[list[str]]:
         """Groups of sources, or pieces of them, that hold nearly the same motion."""

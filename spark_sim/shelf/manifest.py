@@ -53,7 +53,7 @@ class Manifest:
         """The file anew, whole or not at all: the lines that count in the order of their names,
         and none that was torn. It is written in the folder `parts` before it takes its name."""
         own = (entry for entry in self if self._file_of[entry["job"]] == self.path)
-        parts.mkdir(exist_ok=True)
+        parts.mkdir(parents=True, exist_ok=True)
         made = parts / self.path.name
         write_atomically(made, _text(own))
         made.replace(self.path)

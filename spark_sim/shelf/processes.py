@@ -2,18 +2,29 @@
 
 import os
 import signal
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import forkserver, get_context
 from multiprocessing.connection import Connection, wait
-from typing import Any, Generic, TypeVar
+from multiprocessing.context import ForkServerContext, SpawnContext
+from typing import Generic, TypeVar
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 ATTEMPTS = 2  # a process may be killed for what another needed; twice is the job's own fault
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+# A fork of this process would copy locks that other threads hold. A server of forks has no other
+# thread, and imports once what all jobs need; elsewhere each process imports it anew.
+_FORKS = sys.platform == "linux"
+_IMPORTED_ONCE = [
+    "spark_sim.shelf.measure",
+    "spark_sim.shelf.work",
+    "robots.formats.dispatch",
+    "robots.solver.solve",
+]
 
 
 @dataclass(frozen=True)
@@ -47,6 +58,7 @@ def in_processes(
     pool: list[_Worker[Job, Result]] = []
     waiting = iter(jobs)
     try:
+        begin()
         with _one_thread():
             for job in waiting:
                 pool.append(_Worker(work))
@@ -75,6 +87,14 @@ def in_processes(
             worker.end()
 
 
+def begin() -> None:
+    """Start to import what jobs need, while this process does something else."""
+    if _FORKS:
+        forkserver.set_forkserver_preload(_IMPORTED_ONCE)
+        with _one_thread():
+            forkserver.ensure_running()
+
+
 class _Worker(Generic[Job, Result]):
     """A process, and the job that it does."""
 
@@ -84,11 +104,14 @@ class _Worker(Generic[Job, Result]):
         self._open()
 
     def _open(self) -> None:
-        context = get_context("spawn")  # a fork would copy locks that other threads hold
+        context: ForkServerContext | SpawnContext = (
+            get_context("forkserver") if _FORKS else get_context("spawn")
+        )
         self.pipe, other = context.Pipe()
-        self._process = context.Process(target=_serve, args=(other, self._work), daemon=True)
+        self._process = context.Process(target=_serve, args=(other,), daemon=True)
         self._process.start()
         other.close()
+        self._send(self._work)
 
     def start(self, job: Job) -> None:
         """Do a job, in a new process where the last one died."""
@@ -96,7 +119,7 @@ class _Worker(Generic[Job, Result]):
             self.end()
             self._open()
         self._job, self._attempt = job, 1
-        self._send()
+        self._send(self._job)
 
     def finish(self) -> tuple[Job, Result | Died] | None:
         """The job with its result; None where the process died and the job may be tried again."""
@@ -113,7 +136,7 @@ class _Worker(Generic[Job, Result]):
         self.end()
         self._attempt += 1
         self._open()
-        self._send()
+        self._send(self._job)
 
     def end(self) -> None:
         """End the process, whatever it does."""
@@ -121,20 +144,20 @@ class _Worker(Generic[Job, Result]):
         self._process.terminate()
         self._process.join()
 
-    def _send(self) -> None:
+    def _send(self, what: Callable[[Job], Result] | Job) -> None:
         with suppress(BrokenPipeError, ConnectionResetError):  # `finish` finds the process dead
-            self.pipe.send(self._job)
+            self.pipe.send(what)
 
 
-def _serve(pipe: Connection, work: Callable[[Any], Any]) -> None:
-    """Do what comes through the pipe until it is closed, as it is when the other process ends."""
+def _serve(pipe: Connection) -> None:
+    """Receive the work and do it to what comes through the pipe, until it is closed, as it is when
+    the other process ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that gives the jobs
-    while True:
-        try:
-            job = pipe.recv()
-            pipe.send(work(job))
-        except (EOFError, BrokenPipeError, ConnectionResetError):
-            return
+    os.environ.update(dict.fromkeys(THREADS, "1"))  # the server of forks may be someone else's
+    with suppress(EOFError, BrokenPipeError, ConnectionResetError):
+        work = pipe.recv()  # it is imported now, with the threads that were set
+        while True:
+            pipe.send(work(pipe.recv()))
 
 
 @contextmanager
