@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, get_args, overload
 from spark.errors import ConventionError
 from spark.io.bvh import write_bvh
 from spark.io.encoding import encode, encode_new
-from spark.io.reading import BVH, format_of
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, from_canonical
 from spark.transfer.foot_lock import lock_feet
@@ -99,9 +98,6 @@ def retarget(
         moved = lock_feet(canonical, moved)
     motion = from_canonical(moved)
     bvh, notes = encode(motion, target.recording)
-    file = target.recording.bvh.path
-    if file is not None and (kind := format_of(file)) is not BVH:
-        notes += (f"written as a BVH of its own; {kind.name} files are read only",)
     recording = replace(target.recording, bvh=bvh, motion=motion, notes=(*moved.notes, *notes))
     # The rig is given: what is known of a body does not depend on the motion that it makes.
     return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig, target.path)

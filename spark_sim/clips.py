@@ -9,16 +9,13 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import SkeletonError
-from spark.io.bvh import write_bvh
 from spark.io.encoding import encode
-from spark.io.glb import write_glb
-from spark.io.glb_skin import write_on_skin
 from spark.io.recording import Recording
 from spark.motion import Motion
 from spark.resample import motion_at
 from spark.rig.override import Override
 from spark.rig.rig import Rig, understand
-from spark_sim import files
+from spark_sim import character_files, files
 from spark_sim.choices import Format
 from spark_sim.clip_base import ClipBase, File
 
@@ -26,11 +23,10 @@ if TYPE_CHECKING:  # these load MuJoCo, which a character's clip can do without
     from robots.model.motion import RobotMotion
     from sim.trajectory import ModelTrajectory
 
-__all__ = ["CHARACTER_ENDINGS", "AnyClip", "Clip", "File", "RobotClip"]
+__all__ = ["AnyClip", "Clip", "File", "RobotClip"]
 
-CHARACTER_ENDINGS = (".bvh", ".glb")
-"""What the motion of a character is written as."""
-_SKINNED = (".glb", ".gltf", ".vrm")
+
+_WHAT = "a character's motion"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,10 +44,9 @@ class Clip(ClipBase):
     target: Path | None = None
 
     @property
-    def skin(self) -> Path | None:
-        """The glTF or VRM file whose skin the motion wears: its own, or that of the target."""
-        file = self.path if self.target is None else self.target
-        return file if file is not None and file.suffix.lower() in _SKINNED else None
+    def body_file(self) -> Path | None:
+        """The file whose body moves: its own, or that of the target."""
+        return self.path if self.target is None else self.target
 
     @property
     def motion(self) -> Motion:
@@ -88,20 +83,14 @@ class Clip(ClipBase):
         return self.motion.skeleton.names
 
     def save(self, path: File, *, force: bool = False) -> Path:
-        """Write the motion as BVH, or as GLB: on the skin of the body's own file where that is a
-        glTF or VRM, else with bones to see.
+        """Write the motion as BVH, or as GLB: on the skin of the body's own file where that is an
+        FBX, glTF or VRM with one, else with bones to see.
 
-        Raises `OutputError` where `path` exists, unless forced, or ends in neither .bvh nor .glb.
+        Raises `OutputError` where `path` exists, unless forced, or has another ending.
         """
         path = Path(path)
-        files.claim(path, force=force, endings=CHARACTER_ENDINGS, what="a character's motion")
-        if path.suffix.lower() == ".glb" and self.skin is not None:
-            unit_m = self.recording.convention.unit_m
-            write_on_skin(self.motion, self.skin, path, unit_m=unit_m, name=self.name)
-        elif path.suffix.lower() == ".glb":
-            write_glb(self.motion, path, name=self.name)
-        else:
-            write_bvh(self.recording.bvh, path)
+        files.claim(path, force=force, endings=character_files.ENDINGS, what=_WHAT)
+        character_files.write(self, path)
         return path
 
     def _at(self, frames: Float[np.ndarray, "N"], frame_time: float) -> "Clip":

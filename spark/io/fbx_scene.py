@@ -125,7 +125,7 @@ class FbxScene:
         linear: dict[int, Any] = {}
         turn: dict[int, Any] = {}
         for joint in joints:
-            for i in self._line(joint.node):
+            for i in self.line(joint.node):
                 if i in position:
                     continue
                 at, rotation, scale = self._local(i, moved.get(i), times)
@@ -158,7 +158,12 @@ class FbxScene:
         # A scale of zero hides things; as a map it would have no inverse.
         return at, quat, np.where(np.abs(scale) < 1e-9, 1.0, scale)
 
-    def _line(self, node: int) -> list[int]:
+    def paths(self) -> dict[int, tuple[str, ...]]:
+        """The names of each node and of those above it, from the top down."""
+        nodes = range(1, len(self._nodes))
+        return {i: tuple(self._nodes[k].name for k in self.line(i)) for i in nodes}
+
+    def line(self, node: int) -> list[int]:
         """The nodes from below the scene's own root to `node`."""
         line = [node]
         while self._parents[line[-1]] > 0:

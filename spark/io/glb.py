@@ -1,32 +1,35 @@
 """A character's motion as GLB (binary glTF 2.0), for browsers, engines and Blender: the joints as
-nodes, an animation, and a bone to see between each joint and the next.
-
-glTF has Y up, Z ahead, metres, and quaternions xyzw.
+nodes, an animation, and a skin; or without one, a bone to see between each joint and the next.
 """
 
-import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import orjson
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-from spark.files import write_atomically
+from spark.io.convention import Convention
+from spark.io.fbx_skin import FbxSkin
+from spark.io.glb_file import VERTICES, FileNumbers, container, places, turns
+from spark.io.glb_mesh import add_skin
 from spark.motion import Motion
 from spark.rotation import quat_between
 
-_AXES = [1, 2, 0]  # ours that are glTF's X, Y, Z: left, up, ahead
-_FLOAT, _USHORT = 5126, 5123
-_ARRAY, _ELEMENTS = 34962, 34963  # what a buffer's view is for
-_KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 _WIDTH = 0.1  # of a bone, of its length
 _SHORT = 1e-4  # [m] bones that are not drawn
 
 
-def write_glb(motion: Motion, path: Path, *, name: str = "motion") -> None:
-    """Write the motion; its rotations are exact, single precision. Raises `OutputError` where
-    `path` can't be written."""
+def write_glb(
+    motion: Motion,
+    path: Path,
+    *,
+    name: str = "motion",
+    skin: FbxSkin | None = None,
+    convention: Convention | None = None,
+) -> None:
+    """Write the motion; its rotations are exact, single precision. `skin` is that of a file in
+    `convention`, of whose joints the motion is. Raises `OutputError` where `path` can't be
+    written."""
     file = FileNumbers()
     skeleton = motion.skeleton
     first = motion.rotations[0]
@@ -43,7 +46,6 @@ def write_glb(motion: Motion, path: Path, *, name: str = "motion") -> None:
     for j, children in enumerate(skeleton.children):
         if children:
             nodes[j]["children"] = list(children)
-    _draw_bones(motion, nodes)
     times = file.add(np.arange(len(motion)) * motion.frame_time, bounds=True)
     samplers: list[dict[str, Any]] = []
     channels: list[dict[str, Any]] = []
@@ -55,22 +57,16 @@ def write_glb(motion: Motion, path: Path, *, name: str = "motion") -> None:
         for what, values in moving.items():
             channels.append({"sampler": len(samplers), "target": {"node": j, "path": what}})
             samplers.append({"input": times, "output": file.add(values)})
-    corners, faces = _octahedron()
-    mesh = {
-        "attributes": {"POSITION": file.add(corners, target=_ARRAY, bounds=True)},
-        "indices": file.add_indices(faces),
-        "material": 0,
-    }
+    if skin is None or convention is None:
+        shown = _draw_bones(motion, file, nodes)
+    else:
+        shown = add_skin(skin, skeleton, convention, file, nodes)
     gltf = {
         "asset": {"version": "2.0", "generator": "spark-sim"},
         "scene": 0,
-        "scenes": [{"nodes": [0]}],
         "nodes": nodes,
-        "meshes": [{"name": "bone", "primitives": [mesh]}],
-        "materials": [
-            {"name": "bone", "pbrMetallicRoughness": {"baseColorFactor": [0.7, 0.72, 0.75, 1]}}
-        ],
         "animations": [{"name": name, "samplers": samplers, "channels": channels}],
+        **shown,
         **file.entries(),
     }
     container(gltf, file, path)
@@ -86,18 +82,9 @@ def _local(motion: Motion) -> Float[np.ndarray, "T J 3"]:
     return local
 
 
-def places(values: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
-    return values[..., _AXES]
-
-
-def turns(q: Float[np.ndarray, "*n 4"]) -> Float[np.ndarray, "*n 4"]:
-    """Quaternions wxyz in our axes as glTF's, of unit length in single precision."""
-    turned = q[..., [1 + axis for axis in _AXES] + [0]]
-    return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
-
-
-def _draw_bones(motion: Motion, nodes: list[dict[str, Any]]) -> None:
-    """A stretched octahedron from each joint to each child and end."""
+def _draw_bones(motion: Motion, file: FileNumbers, nodes: list[dict[str, Any]]) -> dict[str, Any]:
+    """A stretched octahedron from each joint to each child and end: nodes that are added, and the
+    rest of the JSON."""
     skeleton = motion.skeleton
     ends = [
         *((int(parent), skeleton.offsets[j]) for j, parent in enumerate(skeleton.parents) if j),
@@ -118,65 +105,24 @@ def _draw_bones(motion: Motion, nodes: list[dict[str, Any]]) -> None:
                 "scale": [_WIDTH * length, length, _WIDTH * length],
             }
         )
+    corners, faces = _octahedron()
+    drawn = {
+        "attributes": {"POSITION": file.add(corners, target=VERTICES, bounds=True)},
+        "indices": file.add_faces(faces),
+        "material": 0,
+    }
+    grey = {"baseColorFactor": [0.7, 0.72, 0.75, 1]}
+    return {
+        "scenes": [{"nodes": [0]}],
+        "meshes": [{"name": "bone", "primitives": [drawn]}],
+        "materials": [{"name": "bone", "pbrMetallicRoughness": grey}],
+    }
 
 
-def _octahedron() -> tuple[Float[np.ndarray, "V 3"], list[tuple[int, int, int]]]:
+def _octahedron() -> tuple[Float[np.ndarray, "V 3"], Int[np.ndarray, "F 3"]]:
     """From the origin to (0, 1, 0), widest a tenth up."""
     ring = [(1.0, 0.1, 0.0), (0.0, 0.1, -1.0), (-1.0, 0.1, 0.0), (0.0, 0.1, 1.0)]
     corners = np.array([(0.0, 0.0, 0.0), *ring, (0.0, 1.0, 0.0)])
     faces = [(0, 1 + (k + 1) % 4, 1 + k) for k in range(4)]
     faces += [(5, 1 + k, 1 + (k + 1) % 4) for k in range(4)]
-    return corners, faces
-
-
-class FileNumbers:
-    """The numbers of a glTF: one buffer, its views and accessors."""
-
-    def __init__(self) -> None:
-        self.data = bytearray()
-        self.views: list[dict[str, Any]] = []
-        self.accessors: list[dict[str, Any]] = []
-
-    def add(self, values: np.ndarray, *, target: int | None = None, bounds: bool = False) -> int:
-        """The number of an accessor of floats, with its bounds where glTF wants them."""
-        floats = np.ascontiguousarray(values, dtype="<f4")
-        wide = floats.reshape(len(floats), -1)
-        accessor = {"componentType": _FLOAT, "count": len(wide), "type": _KINDS[wide.shape[1]]}
-        if bounds:
-            accessor |= {"min": wide.min(0).tolist(), "max": wide.max(0).tolist()}
-        return self._accessor(floats.tobytes(), accessor, target)
-
-    def add_indices(self, faces: list[tuple[int, int, int]]) -> int:
-        """The number of an accessor of triangles."""
-        indices = np.array(faces, dtype="<u2").ravel()
-        accessor = {"componentType": _USHORT, "count": len(indices), "type": "SCALAR"}
-        return self._accessor(indices.tobytes(), accessor, _ELEMENTS)
-
-    def view(self, content: bytes, target: int | None) -> int:
-        """The number of a view of some bytes that are added."""
-        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(content)}
-        self.views.append(view if target is None else view | {"target": target})
-        self.data += content + bytes(-len(content) % 4)
-        return len(self.views) - 1
-
-    def entries(self) -> dict[str, Any]:
-        """What stands for them in the JSON."""
-        return {
-            "accessors": self.accessors,
-            "bufferViews": self.views,
-            "buffers": [{"byteLength": len(self.data)}],
-        }
-
-    def _accessor(self, content: bytes, accessor: dict[str, Any], target: int | None) -> int:
-        self.accessors.append({"bufferView": self.view(content, target), **accessor})
-        return len(self.accessors) - 1
-
-
-def container(gltf: dict[str, Any], numbers: FileNumbers, path: Path) -> None:
-    """Write the JSON and the numbers as chunks of a GLB, each padded to four bytes."""
-    data = bytes(numbers.data)
-    text = orjson.dumps(gltf)
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
-    chunks += struct.pack("<II", len(data), 0x004E4942) + data
-    write_atomically(path, struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
+    return corners, np.array(faces)

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import FileFormatError
-from spark.io.glb import FileNumbers, container, places, turns
+from spark.io.glb_file import FileNumbers, container, places, turns
 from spark.io.gltf import skeleton_nodes
 from spark.io.gltf_file import GltfFile
 from spark.kinematics import forward

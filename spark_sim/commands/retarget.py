@@ -116,8 +116,7 @@ def run(args: Namespace) -> int:
     from robots.registry import is_robot
     from spark.errors import OutputError, SparkSimError
     from spark.io.reading import SUFFIXES as CHARACTERS
-    from spark_sim import console, files
-    from spark_sim.clips import CHARACTER_ENDINGS
+    from spark_sim import character_files, console, files
 
     robot = is_robot(args.to) or Path(args.to).suffix.lower() in SUFFIXES or is_sonic(Path(args.to))
     if args.format is not None and not robot:
@@ -131,7 +130,7 @@ def run(args: Namespace) -> int:
                 files.check_free(file, force=args.force)
         else:
             files.check_free(out, force=args.force)
-            files.check_ending(out, CHARACTER_ENDINGS, "a character's motion")
+            files.check_ending(out, character_files.ENDINGS, "a character's motion")
     target = load(args, args.to, "to-")
     failures = 0
     for source, out in console.progress(jobs, "retarget"):
@@ -157,7 +156,7 @@ def run(args: Namespace) -> int:
 
 def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> dict[str, Any]:
     from robots.formats import format_of, unsaid
-    from spark_sim import console
+    from spark_sim import character_files, console
     from spark_sim.api import retarget
     from spark_sim.clips import Clip
 
@@ -166,7 +165,7 @@ def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> di
         clip, target, method=args.method, checkpoint=args.checkpoint, refine=args.refine
     )
     if isinstance(result, Clip):
-        console.notes(out, result.recording.notes)
+        console.notes(out, [*result.recording.notes, *character_files.lacking(result, out)])
         result.save(out, force=args.force)
     else:
         new = [note for note in result.notes if note not in target.notes]

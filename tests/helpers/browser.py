@@ -20,18 +20,23 @@ _QUIET = (
 )
 
 
+def chromium() -> str:
+    """The browser; skips the test without one."""
+    found = shutil.which("chromium") or shutil.which("chromium-browser")
+    if found is None:
+        assert "CI" not in os.environ, "CI installs chromium"
+        pytest.skip("chromium is not installed")
+    return found
+
+
 def opened(text: str, folder: Path, *flags: str) -> Any:
     """What a page leaves in `document.body.dataset.result`, as JSON, in its first second, in a
     browser with these flags."""
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-    if chromium is None:
-        assert "CI" not in os.environ, "CI installs chromium"
-        pytest.skip("chromium is not installed")
     path = folder / "probe.html"
     path.write_text(text, encoding="utf-8")
     ran = subprocess.run(
         [
-            chromium,
+            chromium(),
             *_QUIET.split(),
             *flags,
             f"--user-data-dir={folder}",

@@ -79,6 +79,7 @@ def write_glb(
     joints[:, 0] = np.repeat(np.arange(count), 8)
     joints[:, 1] = 0
     weights = np.tile(np.array([0.7, 0.3, 0, 0], "<f4"), (len(vertices), 1))
+    weights[joints[:, 0] == 0] = [1, 0, 0, 0]  # a vertex names each joint once
     inverse = np.linalg.inv(bound).swapaxes(1, 2).astype("<f4")
 
     nodes: list[dict[str, Any]] = []
@@ -113,6 +114,7 @@ def write_glb(
                 "type": shape,
                 "count": count if k == 3 else len(vertices),
             }
+            | ({} if k else {"min": vertices.min(0).tolist(), "max": vertices.max(0).tolist()})
             for k, (kind, shape) in enumerate(kinds)
         ],
         "bufferViews": [

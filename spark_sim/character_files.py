@@ -1,0 +1,59 @@
+"""The motion of a character as a file: its ending says which, and what it lacks is told."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from spark.errors import name_list
+from spark.io.bvh import write_bvh
+from spark.io.glb import write_glb
+from spark.io.glb_skin import write_on_skin
+from spark.io.reading import BVH, FBX, GLTF, format_of
+
+if TYPE_CHECKING:
+    from spark.io.fbx_skin import FbxSkin
+    from spark_sim.clips import Clip
+
+ENDINGS = (".bvh", ".glb")
+"""What the motion of a character is written as."""
+_SKINNED = (".glb", ".gltf", ".vrm")  # glTF files that have meshes: a .vrma has none
+
+
+def write(clip: "Clip", path: Path) -> None:
+    """Write a clip as BVH, or as GLB: with the skin of its body's own file where that is an FBX,
+    glTF or VRM, else with bones to see."""
+    body, unit_m = clip.body_file, clip.recording.convention.unit_m
+    if path.suffix.lower() != ".glb":
+        write_bvh(clip.recording.bvh, path)
+    elif body is not None and body.suffix.lower() in _SKINNED and format_of(body) is GLTF:
+        write_on_skin(clip.motion, body, path, unit_m=unit_m, name=clip.name)
+    else:
+        convention = clip.recording.convention
+        write_glb(clip.motion, path, name=clip.name, skin=_skin(body), convention=convention)
+
+
+def lacking(clip: "Clip", path: Path) -> tuple[str, ...]:
+    """What the file at `path` will lack of the clip's body, as notes."""
+    body = clip.body_file
+    kind = BVH if body is None else format_of(body)
+    if path.suffix.lower() != ".glb":
+        named = f"written as a BVH of its own; {kind.name} files are read only"
+        shown = ": .glb has the skin too" if kind in (FBX, GLTF) else ""
+        return () if kind is BVH else (named + shown,)
+    if body is None or kind is not FBX:
+        return ()
+    if (skin := _skin(body)) is None:
+        return (f"{body.name} has no skin (Mixamo: download it with skin): bones are drawn",)
+    missing = [m.missing for mesh in skin.meshes for m in mesh.materials if m.missing is not None]
+    if not missing:
+        return ()
+    names = name_list(list(dict.fromkeys(missing)))
+    return (f"pictures that are not in {body.name}, nor beside it as PNG or JPEG: {names}",)
+
+
+def _skin(body: Path | None) -> "FbxSkin | None":
+    """The skin of an FBX file; None where there is none."""
+    if body is None or format_of(body) is not FBX:
+        return None
+    from spark.io.fbx_skin import read_fbx_skin
+
+    return read_fbx_skin(body)
