@@ -8,32 +8,30 @@ from spark.io.bvh import write_bvh
 from spark.io.glb import write_glb
 from spark.io.glb_skin import write_on_skin
 from spark.io.reading import BVH, FBX, GLTF, format_of
+from spark.io.recording import Recording
 
 if TYPE_CHECKING:
     from spark.io.fbx_skin import FbxSkin
-    from spark_sim.clips import Clip
 
 ENDINGS = (".bvh", ".glb")
 """What the motion of a character is written as."""
 _SKINNED = (".glb", ".gltf", ".vrm")  # glTF files that have meshes: a .vrma has none
 
 
-def write(clip: "Clip", path: Path) -> None:
-    """Write a clip as BVH, or as GLB: with the skin of its body's own file where that is an FBX,
-    glTF or VRM, else with bones to see."""
-    body, unit_m = clip.body_file, clip.recording.convention.unit_m
+def write(recording: Recording, body: Path | None, path: Path, name: str) -> None:
+    """Write a motion as BVH, or as GLB: with the skin of its `body` where that is an FBX, glTF or
+    VRM file, else with bones to see."""
+    motion, convention = recording.motion, recording.convention
     if path.suffix.lower() != ".glb":
-        write_bvh(clip.recording.bvh, path)
+        write_bvh(recording.bvh, path)
     elif body is not None and body.suffix.lower() in _SKINNED and format_of(body) is GLTF:
-        write_on_skin(clip.motion, body, path, unit_m=unit_m, name=clip.name)
+        write_on_skin(motion, body, path, unit_m=convention.unit_m, name=name)
     else:
-        convention = clip.recording.convention
-        write_glb(clip.motion, path, name=clip.name, skin=_skin(body), convention=convention)
+        write_glb(motion, path, name=name, skin=_skin(body), convention=convention)
 
 
-def lacking(clip: "Clip", path: Path) -> tuple[str, ...]:
-    """What the file at `path` will lack of the clip's body, as notes."""
-    body = clip.body_file
+def lacking(body: Path | None, path: Path) -> tuple[str, ...]:
+    """What the file at `path` will lack of the body in the file `body`, as notes."""
     kind = BVH if body is None else format_of(body)
     if path.suffix.lower() != ".glb":
         named = f"written as a BVH of its own; {kind.name} files are read only"

@@ -90,7 +90,7 @@ class Clip(ClipBase):
         """
         path = Path(path)
         files.claim(path, force=force, endings=character_files.ENDINGS, what=_WHAT)
-        character_files.write(self, path)
+        character_files.write(self.recording, self.body_file, path, self.name)
         return path
 
     def _at(self, frames: Float[np.ndarray, "N"], frame_time: float) -> "Clip":

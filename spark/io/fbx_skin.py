@@ -22,8 +22,8 @@ from spark.io.fbx_scene import FbxScene
 from spark.io.nodes import NodeJoint
 from spark.io.recording import unique_names
 from spark.rotation import matrix_from_quat, quat_from_euler
+from spark.skin import strongest
 
-INFLUENCES = 4  # bones that a vertex hangs on at most
 _ROOT = 0  # the id of the scene itself
 _FLAT = 1e-30  # the determinant of a map that has no inverse
 _Cluster = tuple[Any, Any]  # the points that hang on a bone, and their weights
@@ -212,10 +212,7 @@ def _influences(
     bones[at, nth], weights[at, nth] = bone, weight
     free = weights.sum(axis=1) <= 0
     bones[free, 0], weights[free, 0] = np.argmax(np.bincount(bone, weight)), 1.0
-    first = np.argsort(-weights, axis=1, kind="stable")[:, :INFLUENCES]
-    kept = np.take_along_axis(weights, first, axis=1)
-    bones = np.where(kept > 0, np.take_along_axis(bones, first, axis=1), 0)
-    return bones.astype(np.int64), kept / kept.sum(axis=1, keepdims=True)
+    return strongest(bones.astype(np.int64), weights)
 
 
 def _around(mesh: FbxMesh) -> Float[np.ndarray, "V 3"]:

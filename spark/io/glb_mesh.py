@@ -11,9 +11,10 @@ from jaxtyping import Float, Int
 
 from spark.io.convention import Convention
 from spark.io.fbx_materials import PICTURES, FbxMaterial
-from spark.io.fbx_skin import INFLUENCES, FbxSkin
+from spark.io.fbx_skin import FbxSkin
 from spark.io.glb_file import VERTICES, FileNumbers, places
 from spark.skeleton import Skeleton
+from spark.skin import INFLUENCES
 
 _ALIKE = 5  # decimals [m] of maps of bones that are one
 _ROUGH = 0.8  # a surface's roughness: FBX's shininess has no counterpart

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from spark.io.convention import Convention
-from spark.io.reading import GLTF, format_of
+from spark.io.reading import FBX, GLTF, format_of
 from spark.skin import Skin
 
 
@@ -18,4 +18,8 @@ def read_skin(path: str | Path, convention: Convention) -> tuple[Skin | None, tu
         from spark.io.gltf_skin import read_gltf_skin
 
         return read_gltf_skin(path, convention)
+    if format_of(path) is FBX:
+        from spark.io.fbx_surface import read_fbx_surface
+
+        return read_fbx_surface(path, convention)
     return None, ()

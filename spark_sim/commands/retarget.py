@@ -165,7 +165,8 @@ def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> di
         clip, target, method=args.method, checkpoint=args.checkpoint, refine=args.refine
     )
     if isinstance(result, Clip):
-        console.notes(out, [*result.recording.notes, *character_files.lacking(result, out)])
+        lacking = character_files.lacking(result.body_file, out)
+        console.notes(out, [*result.recording.notes, *lacking])
         result.save(out, force=args.force)
     else:
         new = [note for note in result.notes if note not in target.notes]

@@ -18,8 +18,10 @@ from spark.io.fbx import read_fbx
 from spark.io.fbx_scene import FbxScene
 from spark.io.fbx_skin import FbxSkin, HungMesh, read_fbx_skin
 from spark.io.gltf_file import GltfFile
+from spark.io.skins import read_skin
 from spark.kinematics import forward
 from spark.rotation import matrix_from_quat, quat_rotate
+from spark.skin import skinned
 from spark_sim import Clip
 from tests.helpers.fbx_text import Fbx, Mesh, Node, Surface, Take, as_binary
 from tests.helpers.recordings import recording
@@ -334,3 +336,26 @@ def test_a_mixamo_character_has_its_skin_with_fingers() -> None:
         same = np.broadcast_to(mesh.to_rest[0], mesh.to_rest.shape)
         np.testing.assert_allclose(mesh.to_rest, same, atol=1e-3)
     assert read_fbx_skin(recording("mixamo/Amy/hip_hop_dancing_101f.fbx")) is None
+
+
+def test_what_pictures_show_is_what_the_file_has(tmp_path: Path) -> None:
+    """The skin as one surface in metres, moved by its joints, with its picture."""
+    path = arm(surfaces=[Surface(picture=png((200, 30, 30)))]).write(tmp_path / "arm.fbx")
+    clip = spark_sim.load(path)
+    assert isinstance(clip, Clip)
+    skin, notes = read_skin(path, clip.recording.convention)
+    assert skin is not None
+    assert notes == ()
+    moved = skinned(skin, clip.motion.skeleton, *forward(clip.motion))
+    source = skin_of(path)
+    expected = placed(source, source.meshes[0], clip)
+    # The faces are the same, in the same order; vertices may be numbered anew.
+    corners = source.meshes[0].faces
+    np.testing.assert_allclose(moved[:, skin.faces], expected[:, corners], atol=1e-6)
+    (material,) = skin.materials
+    assert material.image is not None
+    assert material.image[0, 0].tolist() == [200, 30, 30]
+    # The front's corner at the box's top left shows the picture's top left.
+    top = np.argmin(np.abs(source.meshes[0].vertices - [-5, 40, 5]).sum(axis=1))
+    at = corners.ravel().tolist().index(int(top))
+    np.testing.assert_allclose(skin.uv[skin.faces.ravel()[at]], [0, 0], atol=1e-6)
