@@ -83,14 +83,18 @@ class Clip(ClipBase):
         return self.motion.skeleton.names
 
     def save(self, path: File, *, force: bool = False) -> Path:
-        """Write the motion as BVH, or as GLB: on the skin of the body's own file where that is an
-        FBX, glTF or VRM with one, else with bones to see.
+        """Write the motion as BVH; as GLB, on the skin of the body's own file where that is an FBX,
+        glTF or VRM with one, else with bones to see; or as VRMA, for avatars.
 
-        Raises `OutputError` where `path` exists, unless forced, or has another ending.
+        Raises `OutputError` where `path` exists, unless forced, or has another ending, and
+        `SkeletonError` for a VRMA of what has no arms.
         """
         path = Path(path)
         files.claim(path, force=force, endings=character_files.ENDINGS, what=_WHAT)
-        character_files.write(self.recording, self.body_file, path, self.name)
+        if path.suffix.lower() == ".vrma":
+            character_files.write_for_avatars(self.canonical, path, self.name)
+        else:
+            character_files.write(self.recording, self.body_file, path, self.name)
         return path
 
     def _at(self, frames: Float[np.ndarray, "N"], frame_time: float) -> "Clip":

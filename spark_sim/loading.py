@@ -5,7 +5,9 @@ from typing import TYPE_CHECKING, overload
 
 from robots import formats, registry
 from spark.errors import ConventionError, FileFormatError
-from spark.io.reading import format_of, holds_person, read_motion
+from spark.io.reading import GLTF, format_of, holds_person, read_motion
+from spark.rig.override import Override
+from spark.skeleton import Skeleton
 from spark_sim import rolemap
 from spark_sim.choices import Quat, RobotName, Unit
 from spark_sim.clips import AnyClip, Clip, File, RobotClip
@@ -98,8 +100,19 @@ def load(
     if path.suffix.lower() in formats.SUFFIXES and not holds_person(path):
         return load_robot_motion(path, robot=robot, quat=quat, fps=fps)
     recording = read_motion(path, unit=unit, up=up, fps=fps, body_model=body_model, clip=clip)
-    names = None if roles is None else rolemap.read(roles, recording.motion.skeleton)
-    return Clip(recording, path.stem, names)
+    if roles is not None:
+        return Clip(recording, path.stem, rolemap.read(roles, recording.motion.skeleton))
+    return Clip(recording, path.stem, _own_roles(path, recording.motion.skeleton))
+
+
+def _own_roles(path: Path, skeleton: Skeleton) -> Override | None:
+    """The roles that a file itself gives its joints: a VRM does."""
+    if format_of(path) is not GLTF:
+        return None
+    from spark.io.gltf_joints import humanoid_joints
+    from spark.rig.vrm_bones import roles_of_bones
+
+    return roles_of_bones(humanoid_joints(path, skeleton)) or None
 
 
 def takes(path: File) -> tuple[str, ...]:

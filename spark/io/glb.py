@@ -15,6 +15,7 @@ from spark.io.glb_mesh import add_skin
 from spark.motion import Motion
 from spark.rotation import quat_between
 
+HEAD = {"asset": {"version": "2.0", "generator": "spark-sim"}, "scene": 0}
 _WIDTH = 0.1  # of a bone, of its length
 _SHORT = 1e-4  # [m] bones that are not drawn
 
@@ -31,17 +32,24 @@ def write_glb(
     `convention`, of whose joints the motion is. Raises `OutputError` where `path` can't be
     written."""
     file = FileNumbers()
+    nodes, animation = animated(motion, file, name)
+    if skin is None or convention is None:
+        shown = _draw_bones(motion, file, nodes)
+    else:
+        shown = add_skin(skin, motion.skeleton, convention, file, nodes)
+    gltf = {**HEAD, "nodes": nodes, "animations": [animation], **shown, **file.entries()}
+    container(gltf, file, path)
+
+
+def animated(
+    motion: Motion, file: FileNumbers, name: str
+) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+    """A node for each joint, in its order and in the rest pose, and an animation of that name."""
     skeleton = motion.skeleton
-    first = motion.rotations[0]
+    rest = places(skeleton.offsets)
     nodes: list[dict[str, Any]] = [
-        {
-            "name": joint,
-            "translation": offset.tolist(),
-            "rotation": turned.tolist(),
-        }
-        for joint, offset, turned in zip(
-            skeleton.names, places(_local(motion)[0]), turns(first), strict=True
-        )
+        {"name": joint, "translation": offset.tolist()}
+        for joint, offset in zip(skeleton.names, rest, strict=True)
     ]
     for j, children in enumerate(skeleton.children):
         if children:
@@ -52,24 +60,12 @@ def write_glb(
     local = places(_local(motion))
     for j in range(len(skeleton)):
         moving = {"rotation": turns(motion.rotations[:, j])}
-        if np.ptp(local[:, j], axis=0).max() > 0:
+        if (local[:, j] != rest[j]).any():
             moving["translation"] = local[:, j]
         for what, values in moving.items():
             channels.append({"sampler": len(samplers), "target": {"node": j, "path": what}})
             samplers.append({"input": times, "output": file.add(values)})
-    if skin is None or convention is None:
-        shown = _draw_bones(motion, file, nodes)
-    else:
-        shown = add_skin(skin, skeleton, convention, file, nodes)
-    gltf = {
-        "asset": {"version": "2.0", "generator": "spark-sim"},
-        "scene": 0,
-        "nodes": nodes,
-        "animations": [{"name": name, "samplers": samplers, "channels": channels}],
-        **shown,
-        **file.entries(),
-    }
-    container(gltf, file, path)
+    return nodes, {"name": name, "samplers": samplers, "channels": channels}
 
 
 def _local(motion: Motion) -> Float[np.ndarray, "T J 3"]:

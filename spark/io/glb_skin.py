@@ -13,8 +13,8 @@ from jaxtyping import Float
 
 from spark.errors import FileFormatError
 from spark.io.glb_file import FileNumbers, container, places, turns
-from spark.io.gltf import skeleton_nodes
 from spark.io.gltf_file import GltfFile
+from spark.io.gltf_joints import skeleton_nodes
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark.opening import read_bytes

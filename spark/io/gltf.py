@@ -1,8 +1,8 @@
 """glTF files (.glb, .gltf, and .vrm, .vrma, which are GLBs) as recordings.
 
-Joints are those of a skin; in a file without one, the nodes that an animation turns. The rest pose
-is that of the nodes' own transforms. Khronos, "glTF 2.0 Specification", 3.5.2, 3.11 and appendix C:
-metres, Y up; keys at any times, with linear, stepped or cubic interpolation between them.
+The rest pose is that of the nodes' own transforms. Khronos, "glTF 2.0 Specification", 3.5.2, 3.11
+and appendix C: metres, Y up; keys at any times, with linear, stepped or cubic interpolation between
+them.
 """
 
 from collections.abc import Callable
@@ -16,8 +16,9 @@ from jaxtyping import Float
 from spark.io.convention import infer_unit
 from spark.io.foreign import foreign_recording
 from spark.io.gltf_file import GltfFile
+from spark.io.gltf_joints import joint_nodes
 from spark.io.nodes import NodeJoint, chosen_clip, joints_of, line_to, motion_of_axes
-from spark.io.recording import Recording, unique_names
+from spark.io.recording import Recording
 from spark.motion import Motion
 from spark.resample import frames_of_keys, rotations_at, values_at
 from spark.rotation import matrix_from_quat, quat_normalize
@@ -76,7 +77,7 @@ def _motion(file: GltfFile, clip: str | None, fps: float | None) -> tuple[Motion
     parents = file.parents()
     names = [file.name_of(i) for i in range(len(file.nodes))]
     tracks, notes = _animation(file, clip)
-    bones = _bones(file, tracks)
+    bones = joint_nodes(file)
     joints, found = joints_of(bones, parents, names)
     notes += found
     inside = {node for joint in joints for node in line_to(joint.node, parents)}
@@ -86,15 +87,6 @@ def _motion(file: GltfFile, clip: str | None, fps: float | None) -> tuple[Motion
     seen = _world(file, joints, parents, tracks, times)
     motion, renamed = motion_of_axes(joints, (rest[0][0], rest[1][0]), seen, frame_time)
     return motion, [*notes, *renamed]
-
-
-def skeleton_nodes(file: GltfFile) -> list[tuple[str, int]]:
-    """The joints' names as a recording has them, and their nodes, in the order of its skeleton."""
-    parents = file.parents()
-    names = [file.name_of(i) for i in range(len(file.nodes))]
-    joints, _ = joints_of(_bones(file, _animation(file, None)[0]), parents, names)
-    unique, _ = unique_names([joint.name for joint in joints])
-    return list(zip(unique, (joint.node for joint in joints), strict=True))
 
 
 def _times(
@@ -115,34 +107,6 @@ def _times(
     if not 0 < count * nodes < _MAX_VALUES:
         raise file.error(f"has keys from {begin:g} s to {end:g} s; expected hours at most")
     return begin + frame_time * np.arange(count), frame_time
-
-
-def _bones(file: GltfFile, tracks: _Tracks) -> list[int]:
-    """The nodes that are joints: of the largest skin and those that share joints with it; without
-    skins, of a humanoid's description (VRM); without that, the nodes that turn."""
-    skins = [set(skin["joints"]) for skin in file.json.get("skins", [])]
-    if skins:
-        bones = set(sorted(skins, key=len)[-1])
-        for _ in skins:
-            bones = bones.union(*(skin for skin in skins if skin & bones))
-    else:
-        bones = _humanoid(file) or {node for node, what in tracks if what == "rotation"}
-    if not bones:
-        raise file.error("holds no skeleton; expected a skin, or nodes that an animation turns")
-    if not all(type(i) is int and 0 <= i < len(file.nodes) for i in bones):
-        raise file.error(f"has a skin on joints that are none of its {len(file.nodes)} nodes")
-    return sorted(bones)
-
-
-def _humanoid(file: GltfFile) -> set[int]:
-    """The nodes that VRM 1.0, VRM animations or VRM 0 call a human's bones."""
-    found = file.json.get("extensions", {})
-    for name in ("VRMC_vrm", "VRMC_vrm_animation", "VRM"):
-        bones = found.get(name, {}).get("humanoid", {}).get("humanBones", {})
-        bones = bones.values() if isinstance(bones, dict) else bones
-        if bones:
-            return {bone["node"] for bone in bones}
-    return set()
 
 
 def _animation(file: GltfFile, clip: str | None) -> tuple[_Tracks, list[str]]:

@@ -13,8 +13,8 @@ from jaxtyping import Float, Int
 
 from spark.io.convention import Convention
 from spark.io.glb_skin import rest_maps
-from spark.io.gltf import skeleton_nodes
 from spark.io.gltf_file import GltfFile
+from spark.io.gltf_joints import skeleton_nodes
 from spark.io.gltf_materials import Surfaces
 from spark.io.nodes import line_to
 from spark.io.skin_parts import MAX_FACES, MAX_VERTICES, SkinPart, skin_of

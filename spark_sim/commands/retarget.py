@@ -24,7 +24,8 @@ DESCRIPTION = """\
 Put the motion of each SRC on the body of TARGET. Both may be any humanoid rig
 or robot. Rest poses, axes, units, proportions and joint names may differ. On a
 character the result is a BVH file with TARGET's own hierarchy, channels, unit
-and axes, or a GLB (-o OUT.glb), with TARGET's skin where it is a glTF or VRM.
+and axes; or a GLB (-o OUT.glb), with TARGET's skin where it is an FBX, glTF
+or VRM that has one; or a VRM animation (-o OUT.vrma).
 On a robot it is the coordinates of its joints, as your trainer reads them
 (.npz, .csv, .pkl, .motion, or a folder)."""
 EXAMPLES = """\

@@ -117,5 +117,5 @@ def test_meshes_stay_as_they_are(embed: bool, walk: Clip, tmp_path: Path) -> Non
 
 
 def test_other_endings_are_refused(walk: Clip, tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match=r"written as \.bvh or \.glb, not as \.fbx"):
+    with pytest.raises(OutputError, match=r"written as \.bvh, \.glb or \.vrma, not as"):
         walk.save(tmp_path / "walk.fbx")
