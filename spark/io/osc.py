@@ -5,12 +5,13 @@ The format is at https://opensoundcontrol.stanford.edu/spec-1_0.html.
 
 import struct
 from collections.abc import Iterator
+from itertools import groupby
 
 from spark.errors import ConventionError
 
 Argument = int | float | str | bytes | bool | None
 
-_FIXED = {"i": ">i", "f": ">f", "h": ">q", "d": ">d", "t": ">Q"}
+_FIXED = {"i": "i", "f": "f", "h": "q", "d": "d", "t": "Q"}
 _CONSTANTS: dict[str, Argument] = {"T": True, "F": False, "N": None, "I": None}
 _MOST_NESTED = 8
 
@@ -25,7 +26,7 @@ def messages(packet: bytes, depth: int = 0) -> Iterator[tuple[str, list[Argument
             raise ConventionError("an OSC bundle in bundles in bundles; expected one or two")
         at = 16  # the name and a time, which no one fills in
         while at < len(packet):
-            size = int(_number(packet, at, ">i"))
+            size = _size(packet, at)
             if size < 0 or at + 4 + size > len(packet):
                 raise ConventionError("an OSC bundle ends in the middle of a message")
             yield from messages(packet[at + 4 : at + 4 + size], depth + 1)
@@ -36,21 +37,20 @@ def messages(packet: bytes, depth: int = 0) -> Iterator[tuple[str, list[Argument
         raise ConventionError("the packet is no OSC message: its address does not begin with /")
     kinds, at = _text(packet, at) if at < len(packet) else (",", at)
     arguments: list[Argument] = []
-    for kind in kinds[1:]:
+    for kind, several in groupby(kinds[1:]):
+        count = sum(1 for _ in several)
         if kind in _FIXED:
-            arguments.append(_number(packet, at, _FIXED[kind]))
-            at += struct.calcsize(_FIXED[kind])
-        elif kind in "sS":
-            text, at = _text(packet, at)
-            arguments.append(text)
-        elif kind == "b":
-            size = int(_number(packet, at, ">i"))
-            if size < 0 or at + 4 + size > len(packet):
-                raise ConventionError(f"{address}: ends in the middle of a blob")
-            arguments.append(packet[at + 4 : at + 4 + size])
-            at += 4 + size + -size % 4
+            form = struct.Struct(f">{count}{_FIXED[kind]}")
+            if at + form.size > len(packet):
+                raise ConventionError("an OSC message ends in the middle of a number")
+            arguments += form.unpack_from(packet, at)
+            at += form.size
         elif kind in _CONSTANTS:
-            arguments.append(_CONSTANTS[kind])
+            arguments += [_CONSTANTS[kind]] * count
+        elif kind in "sSb":
+            for _ in range(count):
+                argument, at = (_blob if kind == "b" else _text)(packet, at)
+                arguments.append(argument)
         else:
             raise ConventionError(f"{address}: an OSC argument of type {kind!r} is not known")
     yield address, arguments
@@ -87,8 +87,14 @@ def _text(packet: bytes, at: int) -> tuple[str, int]:
     return packet[at:end].decode("utf-8", "replace"), end + 4 - end % 4
 
 
-def _number(packet: bytes, at: int, form: str) -> int | float:
-    if at + struct.calcsize(form) > len(packet):
+def _blob(packet: bytes, at: int) -> tuple[bytes, int]:
+    size = _size(packet, at)
+    if size < 0 or at + 4 + size > len(packet):
+        raise ConventionError("an OSC message ends in the middle of a blob")
+    return packet[at + 4 : at + 4 + size], at + 4 + size + -size % 4
+
+
+def _size(packet: bytes, at: int) -> int:
+    if at + 4 > len(packet):
         raise ConventionError("an OSC message ends in the middle of a number")
-    value: int | float = struct.unpack_from(form, packet, at)[0]
-    return value
+    return int(struct.unpack_from(">i", packet, at)[0])

@@ -6,18 +6,21 @@ places and turns in their parents, in metres, X to the right, Y up, Z ahead, lef
 VRM 0 is in its T-pose where no bone is turned.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import hypot, isfinite
 
 import numpy as np
 from jaxtyping import Float
 
 from spark.errors import ConventionError
 from spark.io import osc
+from spark.io.live_pose import LivePose, Order, Places, Pose, tpose_of
 from spark.motion import Motion
 from spark.rotation import quat_mul, quat_rotate
 from spark.skeleton import Skeleton
 
-_PARENTS: dict[str, tuple[str, ...]] = {
+PARENTS: dict[str, tuple[str, ...]] = {
     "Hips": (),
     "Spine": ("Hips",),
     "Chest": ("Spine",),
@@ -27,7 +30,7 @@ _PARENTS: dict[str, tuple[str, ...]] = {
 }
 """The bones that a bone may hang on, the nearest first; a rig may lack some."""
 for _side in ("Left", "Right"):
-    _PARENTS |= {
+    PARENTS |= {
         f"{_side}UpperLeg": ("Hips",),
         f"{_side}LowerLeg": (f"{_side}UpperLeg",),
         f"{_side}Foot": (f"{_side}LowerLeg",),
@@ -39,27 +42,17 @@ for _side in ("Left", "Right"):
     }
 _LIMBS = ("UpperLeg", "LowerLeg", "Foot", "UpperArm", "LowerArm", "Hand")
 NEEDED = ("Hips", "Spine", "Head", *(f"{s}{bone}" for s in ("Left", "Right") for bone in _LIMBS))
-_RESTART = 1.0  # [s]: a sender whose clock goes back by more has been started anew
 
 
 @dataclass
-class VmcPose:
-    """The newest pose of a sender, put together from its packets.
+class VmcPose(LivePose):
+    """The newest pose of a VMC sender."""
 
-    `dropped` counts packets that are no OSC or hold broken numbers, `reordered` those that are
-    older than one that was taken before. `heard` says when each bone was last heard of [s].
-    """
-
-    dropped: int = 0
-    reordered: int = 0
-    frames: int = 0
-    heard: dict[str, float] = field(default_factory=dict)
-    _time: float = -np.inf
+    _order: Order = field(default_factory=Order)
     _root: Float[np.ndarray, "7"] = field(default_factory=lambda: np.array([0.0, 0, 0, 1, 0, 0, 0]))
     _bones: dict[str, Float[np.ndarray, "7"]] = field(default_factory=dict)
 
     def take(self, packet: bytes, now: float) -> bool:
-        """Take a packet that came at `now` [s]; whether it told of the pose."""
         try:
             parts = list(osc.messages(packet))
         except ConventionError:
@@ -70,11 +63,9 @@ class VmcPose:
             for name, a in parts
             if name == "/VMC/Ext/T" and a and isinstance(a[0], float | int) and np.isfinite(a[0])
         ]
-        if times:
-            if self._time - _RESTART < times[-1] < self._time:
-                self.reordered += 1
-                return False
-            self._time = times[-1]
+        if times and self._order.is_late(times[-1], now):
+            self.reordered += 1
+            return False
         told = False
         for name, arguments in parts:
             if name not in ("/VMC/Ext/Bone/Pos", "/VMC/Ext/Root/Pos"):
@@ -84,7 +75,7 @@ class VmcPose:
                 self.dropped += 1
             elif name.endswith("Root/Pos"):
                 self._root = pose
-            elif arguments[0] in _PARENTS:
+            elif arguments[0] in PARENTS:
                 bone = str(arguments[0])
                 self._bones[bone], self.heard[bone], told = pose, now, True
         self.frames += told
@@ -92,42 +83,40 @@ class VmcPose:
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """The bones that are needed and were not heard of yet."""
         return tuple(bone for bone in NEEDED if bone not in self._bones)
 
-    def tpose(self, frame_time: float) -> Motion:
-        """One frame of the sender's rig in its T-pose, its lowest joint on the floor."""
-        names = tuple(bone for bone in _PARENTS if bone in self._bones)
-        parents = np.array([_parent(bone, names) for bone in names])
-        offsets = np.array([self._bones[bone][:3] for bone in names])
-        offsets[0] = 0.0
-        places = offsets.copy()
-        for j, parent in enumerate(parents.tolist()):
-            if parent >= 0:
-                places[j] += places[parent]
-        turns = np.zeros((1, len(names), 4))
-        turns[..., 0] = 1.0
-        skeleton = Skeleton(names, parents, offsets, np.arange(len(names)) == 0)
-        root = np.array([[0.0, 0.0, -places[:, 2].min()]])
-        return Motion(skeleton, frame_time, root, turns)
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return ("VMC: metres, Y up, left-handed; in its T-pose where no bone is turned",)
 
-    def frame(self, skeleton: Skeleton) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "J 4"]]:
-        """The newest pose on the skeleton of `tpose`: the root's place and all local turns. A bone
-        that is heard of no more stays as it was."""
+    def bones(self) -> Places:
+        return {bone: self._bones[bone][:3] for bone in PARENTS if bone in self._bones}
+
+    def tpose(self, frame_time: float) -> Motion:
+        return tpose_of(self.bones(), PARENTS, frame_time)
+
+    def frame(self, skeleton: Skeleton) -> Pose:
         hips = self._bones["Hips"]
         place = self._root[:3] + quat_rotate(self._root[3:], hips[:3])
         turns = np.array([self._bones[bone][3:] for bone in skeleton.names])
         turns[0] = quat_mul(self._root[3:], hips[3:])
-        return place, turns
+        return place, turns, None
 
 
-def _parent(bone: str, names: tuple[str, ...]) -> int:
-    found = [names.index(parent) for parent in _PARENTS[bone] if parent in names]
-    return found[0] if found else -1
+def packet(
+    bones: Mapping[str, tuple[Float[np.ndarray, "3"], Float[np.ndarray, "4"]]], clock: float
+) -> bytes:
+    """A pose as a sender sends it at `clock` [s]: for each bone its place in its parent [m] and its
+    turn (wxyz), in our axes."""
+    parts = [osc.message("/VMC/Ext/OK", 1), osc.message("/VMC/Ext/T", float(clock))]
+    for bone, ((x, y, z), (w, i, j, k)) in bones.items():
+        values = (-y, z, x, j, -k, -i, w)
+        parts.append(osc.message("/VMC/Ext/Bone/Pos", bone, *map(float, values)))
+    return osc.bundle(parts)
 
 
 def _numbers(arguments: list[osc.Argument]) -> bool:
-    return all(isinstance(a, float | int) and np.isfinite(a) for a in arguments)
+    return all(isinstance(a, float | int) and isfinite(a) for a in arguments)
 
 
 def _pose(arguments: list[osc.Argument]) -> Float[np.ndarray, "7"] | None:
@@ -135,7 +124,7 @@ def _pose(arguments: list[osc.Argument]) -> Float[np.ndarray, "7"] | None:
     if len(arguments) < 8 or not isinstance(arguments[0], str) or not _numbers(arguments[1:8]):
         return None
     x, y, z, i, j, k, w = (float(a) for a in arguments[1:8] if isinstance(a, float | int))
-    size = float(np.linalg.norm([i, j, k, w]))
+    size = hypot(i, j, k, w)
     if not 0.5 < size < 2.0 or max(abs(x), abs(y), abs(z)) > 1e3:
         return None
     # A mirror takes left-handed axes to ours, so axes of turns change their sign as well.
