@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from spark.errors import SparkSimError
     from spark_sim.api import play, report, retarget, sample
     from spark_sim.clips import AnyClip, Clip, RobotClip
-    from spark_sim.live import Retargeter
+    from spark_sim.live.listener import Listener
+    from spark_sim.live.retargeter import Retargeter
     from spark_sim.loading import load
     from spark_sim.simulation import Followed, Simulated, follow, simulate
 
@@ -30,8 +31,9 @@ _MODULE_OF = {
     "AnyClip": "spark_sim.clips",
     "Clip": "spark_sim.clips",
     "Followed": "spark_sim.simulation",
+    "Listener": "spark_sim.live.listener",
     "Report": "sim.report",
-    "Retargeter": "spark_sim.live",
+    "Retargeter": "spark_sim.live.retargeter",
     "RobotClip": "spark_sim.clips",
     "Simulated": "spark_sim.simulation",
     "SparkSimError": "spark.errors",
@@ -47,6 +49,7 @@ __all__ = [
     "AnyClip",
     "Clip",
     "Followed",
+    "Listener",
     "Report",
     "Retargeter",
     "RobotClip",

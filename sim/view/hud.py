@@ -65,7 +65,7 @@ class Hud:
         state = "" if timeline.playing else "   paused"
         speed = "" if timeline.speed == 1 else f"   speed {timeline.speed:g}"
         once = "" if timeline.loop else "   once"
-        words = (
+        words = player.status or (
             f"{timeline.time:.2f} / {timeline.duration:.2f} s   frame {timeline.frame} of "
             f"{timeline.frames}{speed}{once}{state}"
         )

@@ -35,6 +35,8 @@ class Player:
         self.closing = False
         self.view_is_new = True
         self.message = ""
+        self.status = ""
+        """What is said below the picture instead of the time, where nothing is replayed."""
         self.annotations: tuple[Annotations | None, ...] = (None,) * len(self.figures)
         self.judged = len(self.figures) - 1
         """The place of the figure whose findings are shown."""

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from sim.interpolate import at_times
 from sim.trajectory import Subject, model_trajectory
@@ -74,7 +74,8 @@ class Placement:
     """Where a figure stands in the scene: its own world, scaled by `scale`, rotated about Z by
     `turn`, then moved by `translation` [m].
 
-    Of the scene's model it has the coordinates `columns` and the bodies `bodies`, its root first.
+    Of the scene's model it has the coordinates `columns` and the bodies `bodies`, its root first;
+    `own` are the coordinates of its subject's model that these are.
     Its standing `height` in the scene is in metres; `lane` [m] is where it stands beside the
     others, along Y. `ahead` is where it faces, in its root body's axes.
     """
@@ -85,6 +86,7 @@ class Placement:
     translation: Float[np.ndarray, "3"]
     scale: float
     columns: slice
+    own: Int[np.ndarray, "n"]
     bodies: range
     height: float
     lane: float
@@ -196,6 +198,7 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
                 translation=translation,
                 scale=figure.scale,
                 columns=slice(column, following),
+                own=columns,
                 bodies=bodies,
                 height=heights[k],
                 lane=float(lanes[k]),

@@ -1,0 +1,188 @@
+"""A person's pose from the network, as it comes."""
+
+import socket
+import struct
+import sys
+import time
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+
+from robots.stream.frame_targets import Frame
+from spark.errors import ConventionError
+from spark.io.convention import Convention, given_unit, given_up
+from spark.io.encoding import encode_new
+from spark.io.live_pose import LivePose
+from spark.io.mvn_pose import MvnPose
+from spark.io.recording import Recording
+from spark.io.vmc import VmcPose
+from spark.motion import Motion, check_frame_time
+from spark.rig.feet import sole_positions
+from spark.rig.rig import understand
+from spark_sim.clips import Clip
+from spark_sim.live.address import SOURCES, parse
+
+_POSES: dict[str, type[LivePose]] = {"vmc": VmcPose, "xsens": MvnPose}
+_PACKET = 65535  # bytes, the most of UDP
+_MOST_WAITING = 256  # packets that are read at once: of a flood, the newest
+_MOST_LATE = 32  # packets that are read though it is late
+_SETTLE = 0.2  # [s] from the first whole pose on: optional bones may come in packets of their own
+_STAMP = 35  # SO_TIMESTAMPNS of Linux: when a packet came to the machine, not to this program
+_STAMP_FORM = struct.Struct("@ll")  # [s, ns]
+
+
+class Listener:
+    """Listens on a UDP port for a person's pose: `vmc://[HOST]:PORT` (the VMC protocol, OSC) or
+    `xsens://[HOST]:PORT` (MVN's network streamer). A context manager.
+
+        with spark_sim.Listener("xsens://:9763") as person:
+            live = spark_sim.Retargeter(person.wait(fps=60), "unitree_g1")
+            while True:
+                person.listen(1 / 60)
+                qpos = live.step(person.frame())
+
+    Of several poses that come between two steps, the newest counts. A bone that is not heard of
+    any more stays as it was. Raises `ConventionError` where the address can't be listened on.
+    """
+
+    def __init__(self, address: str) -> None:
+        where = parse(address, SOURCES)
+        self.pose = _POSES[where.scheme]()
+        self.arrived = 0.0
+        """When the newest pose came to this machine [s, Unix]."""
+        self.fresh = False
+        """Whether a pose came since `frame` was called last."""
+        self.skipped = 0
+        """Poses that a newer one followed before `frame` was called."""
+        self.flooded = 0
+        """Packets that were thrown away, because too many came at once."""
+        self._whole = np.inf
+        self._skeleton: Motion | None = None
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        if sys.platform == "linux":
+            self._socket.setsockopt(socket.SOL_SOCKET, _STAMP, 1)
+        try:
+            self._socket.bind((where.host, where.port))
+        except (OSError, UnicodeError) as error:
+            self._socket.close()
+            why = error.strerror if isinstance(error, OSError) and error.strerror else error
+            raise ConventionError(f"{where}: can't be listened on ({why})") from error
+        self.port = int(self._socket.getsockname()[1])
+        """The port, where 0 was asked for: one that was free."""
+
+    def __enter__(self) -> "Listener":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the port."""
+        self._socket.close()
+
+    @property
+    def ready(self) -> bool:
+        """Whether the whole person was heard of."""
+        return time.monotonic() - self._whole >= _SETTLE
+
+    def listen(self, seconds: float) -> None:
+        """Take what has come, and what comes within so many seconds."""
+        until = time.monotonic() + seconds
+        waiting: deque[tuple[bytes, float]] = deque(maxlen=_MOST_WAITING)
+        while True:
+            count = self._drain(waiting)
+            self.flooded += max(count - _MOST_WAITING, 0)
+            while waiting:
+                self._take(*waiting.popleft())
+                if len(waiting) > _MOST_LATE and time.monotonic() > until:
+                    waiting.popleft()  # what comes is more than can be read
+                    self.flooded += 1
+            left = until - time.monotonic()
+            if left <= 0:
+                return
+            self._socket.settimeout(left)
+            self._receive(waiting)
+
+    def _drain(self, into: "deque[tuple[bytes, float]]") -> int:
+        """All that has come; as many as have room, the newest; how many came."""
+        self._socket.settimeout(0)
+        count = 0
+        while count < 100 * _MOST_WAITING and self._receive(into):
+            count += 1
+        return count
+
+    def _receive(self, into: "deque[tuple[bytes, float]]") -> bool:
+        """The next packet, and when it came."""
+        try:
+            packet, said, _, _ = self._socket.recvmsg(_PACKET, socket.CMSG_SPACE(_STAMP_FORM.size))
+        except (TimeoutError, BlockingIOError):
+            return False
+        except ConnectionError:  # of what was sent before; no one was there
+            return True
+        came = time.time()
+        for _, kind, data in said:
+            if kind == _STAMP and len(data) >= _STAMP_FORM.size:
+                seconds, nanoseconds = _STAMP_FORM.unpack(data[: _STAMP_FORM.size])
+                came = min(seconds + 1e-9 * nanoseconds, came)
+        into.append((packet, came))
+        return True
+
+    def _take(self, packet: bytes, came: float) -> None:
+        now = time.monotonic()
+        if self.pose.take(packet, now):
+            self.skipped += self.fresh
+            self.arrived, self.fresh = came, True
+        if self._whole == np.inf and self.pose.frames and not self.pose.missing:
+            self._whole = now
+
+    def wait(self, fps: float = 60.0, timeout: float | None = None) -> Clip:
+        """Wait until the whole person was heard of; one frame of them in their T-pose, which a
+        `Retargeter` takes for its source. `fps` is how often it will be stepped.
+
+        Raises `ConventionError` after `timeout` seconds.
+        """
+        began = time.monotonic()
+        while not self.ready:
+            self.listen(0.05)
+            if timeout is not None and time.monotonic() - began > timeout:
+                raise ConventionError(f"no person was heard of in {timeout:g} s{self.lacking}")
+        return self.person(fps)
+
+    def person(self, fps: float) -> Clip:
+        """The person as they are now, in their T-pose on the floor: the source of the frames that
+        follow."""
+        check_frame_time(1.0 / fps if fps > 0 else np.inf)
+        motion = self.pose.tpose(1.0 / fps)
+        rig = understand(motion)
+        lowest = min(
+            float(sole_positions(sole, rig.tpose_positions, rig.tpose)[:, 2].min())
+            for sole in rig.soles
+        )
+        motion = replace(motion, root_pos=np.array([[0.0, 0.0, -lowest]]))
+        self._skeleton = motion
+        convention = Convention(given_unit("cm"), given_up("y"))
+        recording = Recording(encode_new(motion), motion, convention)
+        return Clip(recording, "the sender", given_rig=rig)
+
+    def frame(self) -> Frame:
+        """The newest pose of the person that `wait` or `person` gave."""
+        if self._skeleton is None:
+            raise ConventionError("no person is known yet; call wait() first")
+        self.fresh = False
+        return Frame(*self.pose.frame(self._skeleton.skeleton))
+
+    @property
+    def changed(self) -> bool:
+        """Whether the sender's body is another one by now: ask for `person` again."""
+        return self._skeleton is not None and self.pose.changed(self._skeleton.skeleton)
+
+    @property
+    def lacking(self) -> str:
+        """What has not been heard of, in words."""
+        missing = self.pose.missing
+        if self.pose.frames and missing:
+            return f"; not heard of: {', '.join(missing)}"
+        if self.pose.dropped:
+            return f"; {self.pose.dropped} packets were none of this protocol"
+        return "".join(f"; {note}" for note in self.pose.notes if "no pose" in note)

@@ -1,0 +1,49 @@
+"""When the robot takes its steps."""
+
+import time
+
+_LATE = 1.0  # [s]: after a pause this long the machine slept, and steps are not made up for
+_LEAD = 0.002  # [s] from a pose to the step that takes it
+_PULL = 0.01  # of a step, the most by which it is shifted
+
+
+class Pace:
+    """Steps every `frame_time` [s]. One that is over before it could be taken is left out.
+
+    `step` counts the steps, also those that were left out: `missed` in all, `just_missed` before
+    this one.
+    """
+
+    def __init__(self, frame_time: float) -> None:
+        self.frame_time = frame_time
+        self.step, self.missed, self.just_missed = 0, 0, 0
+        self.restart()
+
+    def restart(self) -> None:
+        """Take the next step now."""
+        self._due = time.monotonic()
+
+    @property
+    def left(self) -> float:
+        """How long it is until the next step [s]."""
+        return max(self._due - time.monotonic(), 0.0)
+
+    def advance(self) -> None:
+        """A step was taken: wait for the next one."""
+        self.step += 1
+        self.just_missed = 0
+        self._due += self.frame_time
+        behind = time.monotonic() - self._due
+        if behind > _LATE:
+            self.restart()
+        elif behind > self.frame_time:
+            self.just_missed = over = int(behind / self.frame_time)
+            self.step += over
+            self.missed += over
+            self._due += over * self.frame_time
+
+    def follow(self, age: float) -> None:
+        """Move the steps towards the moments when poses come, so that a pose of `age` [s] would be
+        `_LEAD` old: no faster than a clock may be off."""
+        most = _PULL * self.frame_time
+        self._due -= min(max(0.1 * (age - _LEAD), -most), most)

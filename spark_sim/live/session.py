@@ -1,0 +1,230 @@
+"""A person's pose from the network on a robot, step by step: what `spark-sim live` runs."""
+
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from robots.stream.frame_targets import Frame
+from spark.errors import FrameError, SparkSimError
+from spark_sim.live.handover import Handover
+from spark_sim.live.journal import Journal
+from spark_sim.live.listener import Listener
+from spark_sim.live.pace import Pace
+from spark_sim.live.retargeter import Retargeter
+from spark_sim.live.sinks import Sink
+from spark_sim.live.viewer import Viewer
+from spark_sim.loading import load_robot
+
+Note = Callable[[str], None]
+
+_SILENT = 0.5  # [s] without news: a tracker has vanished
+_LOOK_EVERY = 0.1  # [s] at silent bones, and at the sender's body
+_CHANGED_FOR = 0.3  # [s] that another body is sent for until it is believed
+_FASTEST = 12.0  # [m/s]: a person who is faster was put somewhere else
+_COUNTED = 100_000  # latencies, the last ones
+_SLOW_AFTER, _SLOW_SHARE = 120, 0.1  # steps, and how many of them were left out: it is said
+
+
+class Session:
+    """Steps the robot `fps` times a second with the newest pose of a listener. A context manager;
+    what was recorded is a motion when it ends.
+
+    `note` is told what is amiss. Sinks get every step's coordinates, a view shows them.
+    """
+
+    def __init__(
+        self,
+        listener: Listener,
+        robot: str,
+        fps: float,
+        note: Note,
+        *,
+        sinks: Sequence[Sink] = (),
+        record: Path | None = None,
+        view: Viewer | None = None,
+    ) -> None:
+        self._listener, self._fps, self._note = listener, fps, note
+        self._robot, self._name = load_robot(robot), robot
+        self._sinks, self._view = sinks, view
+        self._pace = Pace(1.0 / fps)
+        where = Path(robot)
+        name = str(where.resolve()) if where.exists() else robot
+        self._journal = None
+        if record is not None:
+            self._journal = Journal(record, self._robot, name, 1.0 / fps)
+        self._retargeter: Retargeter | None = None
+        self._handover = Handover(self._robot.on_robot.robot.mjcf, fps)
+        self._latencies: deque[float] = deque(maxlen=_COUNTED)
+        self._silent: set[str] = set()
+        self._looked, self._same = 0.0, np.inf
+        self._began, self._told_slow = np.inf, False
+        self._told: set[str] = set()
+        self._place: Float[np.ndarray, 2] | None = None
+        self._anchor = np.zeros(2)
+        self.frames = 0
+        """How many steps the robot took."""
+        self.stopping = False
+
+    def __enter__(self) -> "Session":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for sink in self._sinks:
+            sink.close()
+        if self._view is not None:
+            self._view.close()
+        if self._journal is not None and self._journal.close() is not None:
+            self._note(f"recorded {self._journal.path}")
+
+    def run(self) -> None:
+        """Run until `stopping` is set."""
+        while not self.stopping:
+            self._listener.listen(self._pace.left)
+            if self._retargeter is None:
+                if self._listener.ready:
+                    self._begin()
+                self._pace.restart()
+                time.sleep(0.001)
+                continue
+            self._step(self._retargeter)
+            now = time.monotonic()
+            if now - self._looked > _LOOK_EVERY:
+                self._looked = now
+                self._watch(now)
+            self._pace.advance()
+
+    def _begin(self) -> None:
+        """Follow the person who is heard of now, from the pose that the robot has."""
+        try:
+            person = self._listener.person(self._fps)
+            self._retargeter = Retargeter(person, self._robot, fps=self._fps)
+        except SparkSimError as error:  # the next poses may be better
+            self._once(f"who is sent can't be followed: {error}")
+            self._same = np.inf
+            return
+        self._handover.begin()
+        self._anchor[:] = 0.0
+        self._place, self._same = None, np.inf
+        self._began = min(self._began, time.monotonic())
+        for note in self._listener.pose.notes:
+            self._note(note)
+        bones, hips = len(person.motion.skeleton), person.rig.hip_height
+        self._note(f"follows a person with {bones} bones, hips at {hips:.2f} m")
+        if self._view is not None:
+            self._view.begin(person, self._name, len(self._robot.qpos[0]))
+        self._pace.restart()
+
+    def _step(self, retargeter: Retargeter) -> None:
+        listener = self._listener
+        fresh, arrived = listener.fresh, listener.arrived
+        frame = self._anchored(listener.frame())
+        try:
+            qpos = self._handover.follow(retargeter.step(frame))
+        except FrameError as error:
+            self._once(f"a pose is left out: {error}")
+            return
+        now = time.time()
+        for sink in self._sinks:
+            sink.send(self.frames, now, qpos)
+        if fresh:
+            self._latencies.append(time.time() - arrived)
+            self._pace.follow(now - arrived if now - arrived < self._pace.frame_time else 0.0)
+        if self._journal is not None:
+            self._journal.write(self._pace.step, qpos)
+        if self._view is not None:
+            self._view.show(frame, qpos, self._words())
+        self.frames += 1
+
+    def _anchored(self, frame: Frame) -> Frame:
+        """The frame where the person would be if nothing had put them elsewhere."""
+        place = frame.root_pos[:2] + self._anchor
+        if self._place is not None:
+            jump = place - self._place
+            far = float(np.hypot(*jump))
+            if far > _FASTEST * self._pace.frame_time * (1 + self._pace.just_missed):
+                self._note(f"the sender jumped by {far:.2f} m: the robot goes on where it is")
+                self._anchor -= jump
+                place -= jump
+        self._place = place
+        moved = frame.root_pos.copy()
+        moved[:2] = place
+        return frame._replace(root_pos=moved)
+
+    def _watch(self, now: float) -> None:
+        """Say which bones are heard of no more, and which again; notice another body."""
+        heard = self._listener.pose.heard
+        silent = {bone for bone, last in heard.items() if now - last > _SILENT}
+        for bones, words in (
+            (silent - self._silent, "no news of {}: held"),
+            (self._silent - silent, "{} again"),
+        ):
+            if bones:
+                every = len(bones) == len(heard)
+                self._note(words.format("the sender" if every else ", ".join(sorted(bones))))
+        self._silent = silent
+        if not self._listener.changed:
+            self._same = now
+        elif now - min(self._same, now) > _CHANGED_FOR:
+            self._note("the sender's body is another now")
+            self._begin()
+        else:
+            self._same = min(self._same, now)
+        if self._journal is not None and self._journal.lost:
+            self._once(self._journal.lost)
+        if self._view is not None and self._view.closed:
+            self._view = None
+            self._note("the window is closed; the robot goes on, Ctrl-C ends it")
+            self.stopping = self._journal is None and not self._sinks
+        self._say_slow()
+
+    def _once(self, text: str) -> None:
+        if text not in self._told:
+            self._told.add(text)
+            self._note(text)
+
+    def _say_slow(self) -> None:
+        pace = self._pace
+        if self._told_slow or self.frames < _SLOW_AFTER:
+            return
+        if pace.missed > _SLOW_SHARE * (self.frames + pace.missed):
+            self._told_slow = True
+            able = self._fps * self.frames / (self.frames + pace.missed)
+            self._note(
+                f"the robot takes {able:.0f} steps a second here, not {self._fps:g}: steps that "
+                f"are over are left out, the newest pose counts; give --fps {0.9 * able:.0f}"
+            )
+
+    def _words(self) -> str:
+        """What a view says of a step."""
+        late = f"{1000 * self._latencies[-1]:.0f} ms" if self._latencies else "-"
+        held = ", ".join(sorted(self._silent)[:3])
+        if self._silent and len(self._silent) == len(self._listener.pose.heard):
+            held = "the sender is silent"
+        return f"live   {self._fps:g} steps a second   latency {late}   {held}".rstrip()
+
+    def summary(self) -> str:
+        """What happened, in words."""
+        listener, pose = self._listener, self._listener.pose
+        if not self.frames:
+            return f"no pose came{listener.lacking}"
+        seconds = max(time.monotonic() - self._began, 1e-3)
+        lines = [
+            f"{self.frames} steps in {seconds:.1f} s, {self._pace.missed} left out; {pose.frames} "
+            f"poses came, {pose.frames / seconds:.0f} a second",
+            f"of the poses {listener.skipped} were followed by a newer one before a step; of the "
+            f"packets {pose.reordered} came too late, {pose.repeated} twice, {pose.dropped} broken"
+            + (f", {listener.flooded} too many at once" if listener.flooded else ""),
+        ]
+        if self._latencies:
+            half, most = 1000 * np.percentile(self._latencies, [50, 95])
+            ahead = Retargeter.latency
+            lines.append(
+                f"latency from a pose's packet in to its coordinates out: p50 {half:.1f} ms, p95 "
+                f"{most:.1f} ms;\n  beside it the solver looks {ahead} frames ahead "
+                f"({1000 * ahead * self._pace.frame_time:.0f} ms)"
+            )
+        return "\n".join(lines)

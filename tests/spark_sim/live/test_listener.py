@@ -1,0 +1,87 @@
+"""Poses as they come to a port."""
+
+import socket
+import time
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import spark_sim
+from spark.errors import ConventionError
+from spark_sim.live import listener as module
+from spark_sim.live.listener import Listener
+from tests.helpers import mvn, vmc
+
+
+@pytest.fixture
+def out() -> socket.socket:
+    return socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+
+
+def test_the_newest_of_several_poses_counts(out: socket.socket) -> None:
+    with out, Listener("xsens://127.0.0.1:0") as person:
+        for sample in range(8):
+            bent = {"Head": Rotation.from_euler("z", 0.1 * sample)}
+            packet = mvn.quaternions(mvn.world(bent), sample=sample)
+            out.sendto(packet, ("127.0.0.1", person.port))
+        began = time.time()
+        clip = person.wait(fps=90.0, timeout=10.0)
+        assert clip.fps == pytest.approx(90)
+        assert began - 1 < person.arrived <= time.time()
+        frame = person.frame()
+        head = clip.joint_names.index("Head")
+        assert frame.rotations[head][3] == pytest.approx(np.sin(0.35), abs=1e-5)
+        assert person.skipped == 7
+        assert not person.fresh
+        assert not person.changed
+        live = spark_sim.Retargeter(clip, "robot", fps=90.0)
+        assert np.isfinite(live.step(frame)).all()
+
+
+def test_of_a_flood_the_newest_are_taken(
+    out: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "_MOST_WAITING", 16)
+    with out, Listener("vmc://127.0.0.1:0") as person:
+        for clock in range(50):
+            out.sendto(vmc.packet({}, float(clock)), ("127.0.0.1", person.port))
+        time.sleep(0.1)
+        person.listen(0.0)
+        assert person.pose.frames == 16
+        assert person.flooded == 34
+        assert person.pose.missing == ()
+
+
+def test_what_is_lacking_is_said(out: socket.socket) -> None:
+    with out, Listener("vmc://127.0.0.1:0") as person:
+        with pytest.raises(ConventionError, match=r"no person was heard of in 0\.1 s$"):
+            person.wait(timeout=0.1)
+        with pytest.raises(ConventionError, match="wait"):
+            person.frame()
+        out.sendto(b"what is this", ("127.0.0.1", person.port))
+        with pytest.raises(ConventionError, match="1 packets were none of this protocol"):
+            person.wait(timeout=0.1)
+        headless = vmc.packet({}, 0.0).replace(b"Head", b"Xead")
+        out.sendto(headless, ("127.0.0.1", person.port))
+        with pytest.raises(ConventionError, match="not heard of: Head"):
+            person.wait(timeout=0.1)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["vmc://localhost", "osc://:39539", "vmc://:x", "39539", "vmc://:39539/path", "xsens://:99999"],
+)
+def test_addresses_that_are_none(text: str) -> None:
+    with pytest.raises(ConventionError, match=r"such as vmc://:39539 or xsens://:9763"):
+        Listener(text)
+
+
+def test_a_port_that_is_taken_is_said() -> None:
+    with (
+        Listener("vmc://127.0.0.1:0") as person,
+        pytest.raises(ConventionError, match="can't be listened on"),
+    ):
+        Listener(f"vmc://127.0.0.1:{person.port}")
+    with pytest.raises(ConventionError, match="can't be listened on"):
+        Listener("vmc://no.such.host.invalid:39539")

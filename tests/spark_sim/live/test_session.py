@@ -1,0 +1,194 @@
+"""A robot follows senders on the loopback that lose, repeat, shuffle, vanish and change."""
+
+import json
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import spark_sim
+from spark_sim.live import session as module
+from spark_sim.live.journal import ENDING
+from spark_sim.live.listener import Listener
+from spark_sim.live.retargeter import Retargeter
+from spark_sim.live.session import Session
+from spark_sim.live.sinks import sink
+from tests.helpers import mvn, vmc
+from tests.helpers.live import running, send
+
+FPS = 30.0
+
+
+def test_a_robot_follows_a_sender_that_loses_and_shuffles(tmp_path: Path) -> None:
+    """Half of the packets are lost, some come late, some twice, some are broken, and the trackers
+    of an arm vanish and come back."""
+    receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    receiver.bind(("127.0.0.1", 0))
+    receiver.settimeout(20)
+    told: list[str] = []
+    out, rng = tmp_path / "live.npz", np.random.default_rng(1)
+
+    def packets(step: int, clock: float) -> list[bytes]:
+        turn = Rotation.from_euler("z", 60 * np.sin(3 * clock), degrees=True)
+        data = vmc.packet({"LeftUpperArm": turn}, clock)
+        if 15 < session.frames < 30:
+            data = data.replace(b"RightHand", b"RightXand")
+        late, broken = vmc.packet({}, clock - 0.05), data[: rng.integers(0, len(data))]
+        sent = [[data], [], [data, late], [data, data], [broken], [data], [], [late, data]]
+        return sent[rng.integers(0, len(sent))]
+
+    listener = Listener("vmc://127.0.0.1:0")
+    to = sink(f"udp://127.0.0.1:{receiver.getsockname()[1]}")
+    session = Session(listener, "robot", FPS, told.append, sinks=[to], record=out)
+    with listener, session:
+        with running(session):
+            send(
+                listener.port,
+                packets,
+                until=lambda: session.frames > 40 and any(" again" in each for each in told),
+            )
+        summary = session.summary()
+    first = json.loads(receiver.recv(65535))
+    receiver.close()
+    assert first["frame"] == 0
+    assert len(first["qpos"]) == 7 + 29
+    recorded = spark_sim.load(out, robot="robot")
+    assert isinstance(recorded, spark_sim.RobotClip)
+    assert len(recorded) > 40
+    shoulder = np.ptp(np.stack([*recorded.joints.values()], axis=1), axis=0)
+    assert shoulder.max() > 0.8  # [rad]: the arm goes up and down
+    assert np.ptp(recorded.qpos[10:, :2], axis=0).max() < 0.1  # it stands
+    assert any("no news of RightHand: held" in each for each in told)
+    assert listener.pose.reordered > 0
+    assert listener.pose.dropped > 0
+    assert "p50" in summary
+    assert "the solver looks 2 frames ahead (67 ms)" in summary
+    assert not out.with_name(out.name + ENDING).exists()
+
+
+def test_a_sender_that_changes_its_body_and_jumps(tmp_path: Path) -> None:
+    """The robot stays where it is, and takes its time to the new pose."""
+    told: list[str] = []
+    answers: list[np.ndarray] = []
+
+    class Kept(module.Sink):
+        def _send(self, data: bytes) -> None:
+            answers.append(np.array(json.loads(data)["qpos"]))
+
+        def close(self) -> None:
+            pass
+
+    arm = {"LeftUpperArm": Rotation.from_euler("x", 1.2)}
+    scales = [mvn.scale(mvn.world({}, size=size)) for size in (1.0, 0.8)]
+    poses = [
+        mvn.quaternions(mvn.world({}, at=(0.5, 0.2))),
+        mvn.quaternions(mvn.world(arm, size=0.8, at=(0.5, 0.2))),
+        mvn.quaternions(mvn.world(arm, size=0.8, at=(3.0, -1.0))),
+    ]
+
+    def packets(step: int, clock: float) -> list[bytes]:
+        phase = (session.frames > 15) + (session.frames > 50)
+        about = [scales[min(phase, 1)]] if step % 20 == 0 else []
+        return [*about, mvn.numbered(poses[phase], step)]
+
+    listener = Listener("xsens://127.0.0.1:0")
+    with listener:
+        session = Session(listener, "robot", FPS, told.append, sinks=[Kept("json")])
+        with session, running(session):
+            send(listener.port, packets, until=lambda: session.frames > 65)
+    qpos = np.array(answers)
+    assert any("body is another now" in each for each in told)
+    assert sum("follows a person" in each for each in told) == 2
+    assert any("jumped by 2.7" in each for each in told)
+    assert np.abs(np.diff(qpos[:, :3], axis=0)).max() < 0.05  # [m a step]
+    assert np.ptp(qpos[:, :2], axis=0).max() < 0.25
+    moved = np.abs(np.diff(qpos[:, 7:], axis=0)).max(1)
+    assert moved.max() < 0.6  # [rad a step]: no faster than hinges may be
+    assert np.abs(qpos[-1, 7:] - qpos[12, 7:]).max() > 0.8
+
+
+def test_a_solver_that_is_too_slow_leaves_steps_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Twice as slow as the steps: every other step is left out and said, the newest pose counts,
+    and what is recorded keeps its time."""
+    told: list[str] = []
+    real, pose = Retargeter.step, mvn.quaternions(mvn.world({}))
+
+    def slow(self: Retargeter, frame: tuple[np.ndarray, ...]) -> np.ndarray:
+        answer = real(self, frame)
+        time.sleep(2.2 / 60)
+        return answer
+
+    monkeypatch.setattr(Retargeter, "step", slow)
+    monkeypatch.setattr(module, "_SLOW_AFTER", 20)
+    listener = Listener("xsens://127.0.0.1:0")
+    with listener:
+        session = Session(listener, "robot", 60.0, told.append, record=tmp_path / "slow.npz")
+        with session:
+            with running(session):
+                send(
+                    listener.port,
+                    lambda step, clock: [mvn.numbered(pose, step)],
+                    until=lambda: session.frames > 30,
+                    every=0.004,
+                )
+            steps, missed = session.frames, session._pace.missed
+    assert missed > 0.5 * steps
+    assert any("steps a second here, not 60" in each for each in told)
+    assert listener.skipped > steps
+    recorded = spark_sim.load(tmp_path / "slow.npz", robot="robot")
+    assert abs(len(recorded) - (steps + missed)) < 0.1 * (steps + missed)
+
+
+@pytest.mark.parametrize("how", ["kill", "interrupt"])
+def test_what_was_recorded_is_kept(tmp_path: Path, how: str) -> None:
+    """Killed, the steps up to the last are recovered; Ctrl-C makes a motion of them."""
+    out = tmp_path / "session.npz"
+    part = tmp_path / "session.npz.part"
+    free = Listener("xsens://127.0.0.1:0")
+    port = free.port
+    free.close()
+    pose = mvn.quaternions(mvn.world({}))
+    command = [sys.executable, "-m", "spark_sim", "live"]
+    options = ["--from", f"xsens://127.0.0.1:{port}", "--to", "robot", "--fps", "30"]
+    with subprocess.Popen(
+        [*command, *options, "--record", str(out)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        send(
+            port,
+            lambda step, clock: [mvn.numbered(pose, step)],
+            until=lambda: part.exists() and part.stat().st_size > 40 * 8 * 37,
+            longest=100.0,
+        )
+        size = part.stat().st_size
+        if how == "kill":
+            process.kill()
+        else:
+            process.send_signal(2)
+        printed, said = process.communicate(timeout=60)
+    if how == "kill":
+        assert not out.exists()
+        part.write_bytes(part.read_bytes()[:-5])  # torn in the middle of a step
+        again = subprocess.run(
+            [*command, *options, "--record", str(out)], capture_output=True, text=True
+        )
+        assert again.returncode == 2
+        assert f"--recover {part}" in again.stderr
+        done = subprocess.run(
+            [*command, "--recover", str(part)], capture_output=True, text=True, check=True
+        )
+        assert str(out) in done.stdout
+    else:
+        assert process.returncode == 0, said
+        assert "p50" in printed
+    assert not part.exists()
+    assert len(spark_sim.load(out)) >= size // (8 * 37) - 3
