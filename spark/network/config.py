@@ -7,6 +7,7 @@ N_GROUPS = 6
 QUERIES_PER_GROUP = 4
 N_TOKENS = N_GROUPS * QUERIES_PER_GROUP
 TPOSE_FEATURES = 13
+TPOSE_ROTATION = slice(3, 9)  # of them: 6D, between position and velocity
 SHAPE_FEATURES = 6  # bone offset, depth, leaf flag, degrees of freedom
 # A step of Adam moves a head's output by about rate times width, whatever is still missing. What a
 # residual has to say is small (some degrees); unscaled, steps overshoot it and learn nothing.
@@ -37,6 +38,7 @@ class Config:
     blur_bodies: float = 0.0  # noise on joints' positions in the T-pose, in training [hip heights]
     share_joints: bool = True  # False: the ablation "w/o share"
     positions_in: bool = False  # True: the ablation "w/ pos"
+    tpose_rotations: bool = False  # read how the file's joints are turned in the T-pose
     residual: bool = False  # correct the analytic transfer's unmatched joints
     shrink: float = 1.0  # share of a correction that is made: others are not quite like those seen
     noise: bool = True  # decoder starts from noise, as in the paper, or from a learned query
@@ -48,7 +50,7 @@ class Config:
     @classmethod
     def paper(cls) -> "Config":
         """The published network."""
-        return cls()
+        return cls(tpose_rotations=True)
 
     @classmethod
     def default(cls) -> "Config":

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.kinematics import local_rotations, world_rotations
+from spark.network.config import NO_ROTATION, TPOSE_ROTATION
 from spark.rig.rig import Rig
 from spark.rig.roles import Group, Role
 from spark.rotation import (
@@ -44,11 +45,19 @@ class BodyFeatures:
 
     `joints[k]` is the rig's joint of network joint k; network joint 0 is the pelvis, placed at the
     middle of the hips. `skeleton` holds parents and offsets in hip heights, canonical axes.
+    `tpose_world` are the rotations of the file's joints in the T-pose, by default the rig's: a
+    changed copy of a body has those of the body.
     """
 
     rig: Rig
     joints: Int[np.ndarray, "K"]
     skeleton: Skeleton
+    tpose_world: Float[np.ndarray, "K 4"] | None = None
+
+    @cached_property
+    def turned(self) -> Float[np.ndarray, "K 4"]:
+        """How the file's joints are turned in the T-pose, in world axes."""
+        return self.rig.tpose[self.joints] if self.tpose_world is None else self.tpose_world
 
     @cached_property
     def groups(self) -> tuple[tuple[int, ...], ...]:
@@ -75,10 +84,15 @@ class BodyFeatures:
 
     @cached_property
     def tpose(self) -> Float[np.ndarray, "K 13"]:
-        """Position, 6D rotation, velocity and foot contact of each joint in the T-pose."""
+        """Position, 6D rotation, velocity and foot contact of each joint in the T-pose.
+
+        The position is relative to the root [hip heights], the rotation is the joint's in its file,
+        relative to its parent, and none at the root. A pose stands still: its velocity is 0.
+        """
         features = np.zeros((len(self.joints), 13))
         features[:, :3] = self.skeleton.rest_positions
-        features[:, 3:9] = (1, 0, 0, 0, 1, 0)
+        features[:, TPOSE_ROTATION] = sixd_from_quat(local_rotations(self.skeleton, self.turned))
+        features[0, TPOSE_ROTATION] = NO_ROTATION
         features[:, 12] = self.holding(*_FEET)
         return features
 

@@ -19,6 +19,7 @@ from spark.network.config import (
     NO_ROTATION,
     RESIDUAL_SCALE,
     ROTATION_GAIN,
+    TPOSE_ROTATION,
     Config,
 )
 from spark.network.features import BodyFeatures
@@ -52,7 +53,6 @@ class Network:
             world = world_rotations(body.skeleton, quat_from_sixd(source.rotations))
             relative = world_positions(body.skeleton, world, np.zeros_like(root))
             joints = np.concatenate([joints, relative], -1)
-            root = np.concatenate([root, np.diff(root, axis=1, prepend=root[:, :1])], -1)
         x = layers.linear("encoder.motion", joints.astype(np.float32))
         x[:, :, 0] += layers.linear("encoder.root", root.astype(np.float32))
         x += self._joint_embedding(body, names)
@@ -115,6 +115,9 @@ class Network:
     def _joint_embedding(self, body: BodyFeatures, names: Names) -> Float[np.ndarray, "J D"]:
         """E_name + MLP(T-pose) of each joint."""
         features = body.tpose
+        if not self.config.tpose_rotations:
+            features = features.copy()
+            features[:, TPOSE_ROTATION] = NO_ROTATION
         if self.config.shape_features:
             features = np.concatenate([features, body.shape], -1)
         tpose = self.layers.feedforward("embedding.tpose", features.astype(np.float32))

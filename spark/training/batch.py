@@ -18,6 +18,14 @@ from spark.training.tensors import Body, PoseTensors, Start
 Names = Callable[[Sequence[str]], Float[Tensor, "S E"]]
 
 
+class UnpairedBatch(NamedTuple):
+    """B windows, and the bodies that they go to; nobody knows what must come out."""
+
+    source: Body
+    target: Body
+    pose: PoseTensors
+
+
 class Batch(NamedTuple):
     """B windows: what is known, where it goes, what must come out, and what the losses weigh."""
 
@@ -62,6 +70,15 @@ class Collator:
             planted,
             _stack(effectors, counts),
             draws[0].frame_time,
+        )
+
+    def unpaired(self, draws: Sequence[tuple[Windows, BodyFeatures]]) -> UnpairedBatch:
+        """Windows, and where they go, stacked into one batch."""
+        counts = [len(windows.root) for windows, _ in draws]
+        return UnpairedBatch(
+            self.bodies([windows.body for windows, _ in draws], counts),
+            self.bodies([target for _, target in draws], counts),
+            _poses([windows for windows, _ in draws]),
         )
 
     def bodies(self, bodies: Sequence[BodyFeatures], counts: Sequence[int]) -> Body:

@@ -12,6 +12,7 @@ from spark.rig.contacts import planted_feet
 from spark.rig.rig import understand
 from spark.skeleton import Skeleton
 from spark.training.pairs import TrainingClip
+from spark.training.splits import character_and_motion
 from spark.transfer.canonical import (
     FRAME_TIME,
     CanonicalMotion,
@@ -38,7 +39,8 @@ def read_clips(
             key = _key(motion.skeleton)
             if key not in bodies:
                 bodies[key] = body_features(understand(motion))
-            clips.append(clip_of(path.stem, to_canonical(motion, bodies[key].rig), bodies[key]))
+            name = character_and_motion(path.stem, path.parent.name)[1]
+            clips.append(clip_of(name, to_canonical(motion, bodies[key].rig), bodies[key]))
         except SparkSimError as error:
             notes.append(f"{path}: left out: {error}")
     if not clips:

@@ -47,7 +47,7 @@ from spark.training.clips import read_clips
 from spark.training.dataset_parts import Part, make_part, read_part
 from spark.training.pairs import TrainingClip
 from spark.training.part_workers import parts_in_processes
-from spark.training.splits import cells, seen_characters, seen_motions
+from spark.training.splits import cells, character_and_motion, seen_characters, seen_motions
 from spark.training.variants import split_joints
 from spark.transfer.canonical import FRAME_TIME
 
@@ -75,7 +75,8 @@ def prepare(
     """Write the dataset of the motion files in and below `sources` into the folder `out`; gives its
     index.
 
-    A motion is a file's name. A body is a skeleton, named after the folder of its first file.
+    A motion is a file's name. A body is a skeleton, named after the folder of its first file, or
+    after its files where they name a character (`Mousey@Gangnam Style.bvh`).
     Files are read in `workers` processes; without a number in this one, which a fault in a library
     then ends. The same files and seed give the same bytes. A dataset that is there takes more
     files; it loses one, or gets another seed, only with `force`. Raises `OutputError` there, and
@@ -261,13 +262,14 @@ def _index(digests: dict[Path, str], parts: Path, seed: int) -> Index:
             continue
         seen[digest] = file
         frames, joints = part.rotations.shape[:2]
-        body = _body_of(part.rig, bodies, path.parent.name)
+        who, motion = character_and_motion(path.stem, path.parent.name)
+        body = _body_of(part.rig, bodies, path.parent.name, who)
         if frames > bodies[body]["frames"]:
             # What a longer clip tells of a T-pose is better founded.
             bodies[body] |= {"rig": part.rig, "frames": frames}
         clips.append(
             {
-                "motion": path.stem,
+                "motion": motion,
                 "body": body,
                 "file": file,
                 "sha256": digest,
@@ -304,13 +306,16 @@ def _index(digests: dict[Path, str], parts: Path, seed: int) -> Index:
     }
 
 
-def _body_of(rig: Rig, bodies: list[dict[str, Any]], folder: str) -> int:
-    """The place of this rig's body among `bodies`, which it joins where it is new."""
+def _body_of(rig: Rig, bodies: list[dict[str, Any]], folder: str, who: str | None) -> int:
+    """The place of this rig's body among `bodies`, which it joins where it is new. A character whom
+    files name (`who`) is no other, whatever the skeletons."""
+    own = folder if who is None else who
     skeleton = rig.skeleton
     for i, body in enumerate(bodies):
         other: Rig = body["rig"]
         if (
-            other.skeleton.names == skeleton.names
+            (body["own"] == own or (who is None and not body["named"]))
+            and other.skeleton.names == skeleton.names
             and np.array_equal(other.skeleton.parents, skeleton.parents)
             and other.roles.roles == rig.roles.roles
             and np.allclose(
@@ -319,9 +324,10 @@ def _body_of(rig: Rig, bodies: list[dict[str, Any]], folder: str) -> int:
         ):
             return i
     taken = {body["character"] for body in bodies}
-    names = (folder if n == 1 else f"{folder} {n}" for n in range(1, len(bodies) + 2))
+    names = (own if n == 1 else f"{own} {n}" for n in range(1, len(bodies) + 2))
     character = next(name for name in names if name not in taken)
-    bodies.append({"character": character, "rig": rig, "frames": 0})
+    named = who is not None
+    bodies.append({"character": character, "own": own, "named": named, "rig": rig, "frames": 0})
     return len(bodies) - 1
 
 

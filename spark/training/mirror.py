@@ -32,6 +32,7 @@ def mirrored_body(body: BodyFeatures) -> BodyFeatures:
         Rig(flipped, role_map, groups, rig.tpose, rig.root_joint, rig.hip_height),
         body.joints,
         flipped,
+        body.turned * _TURNED,
     )
 
 

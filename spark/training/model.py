@@ -27,6 +27,7 @@ from spark.network.config import (
     ROTATION_GAIN,
     SHAPE_FEATURES,
     TPOSE_FEATURES,
+    TPOSE_ROTATION,
     Config,
 )
 from spark.rotation import matrix_from_sixd
@@ -83,6 +84,7 @@ class JointEmbedding(nn.Module):
         width = config.width
         features = TPOSE_FEATURES + (SHAPE_FEATURES if config.shape_features else 0)
         self.shape_features, self.arc_length = config.shape_features, config.relative_time
+        self.tpose_rotations = config.tpose_rotations
         self.position = nn.Parameter(0.02 * torch.randn(N_GROUPS, config.max_group, width))
         self.arc = nn.Linear(1, width, bias=False)
         self.name = nn.Linear(config.name_width, width)
@@ -90,7 +92,12 @@ class JointEmbedding(nn.Module):
 
     def joints(self, body: Body) -> Float[Tensor, "B J D"]:
         """E_name + MLP(T-pose) of each joint."""
-        features = torch.cat([body.tpose, body.shape], -1) if self.shape_features else body.tpose
+        features = body.tpose
+        if not self.tpose_rotations:
+            features = features.clone()
+            features[..., TPOSE_ROTATION] = features.new_tensor(NO_ROTATION)
+        if self.shape_features:
+            features = torch.cat([features, body.shape], -1)
         return self.name(body.names) + self.tpose(features)
 
     def positions(self, body: Body) -> Float[Tensor, "B 6 N D"]:
@@ -109,7 +116,7 @@ class Encoder(nn.Module):
         width = config.width
         self.config = config
         self.motion = nn.Linear(6 + (3 if config.positions_in else 0), width)
-        self.root = nn.Linear(3 + (3 if config.positions_in else 0), width)
+        self.root = nn.Linear(3, width)
         self.queries = nn.Parameter(torch.rand(N_GROUPS, QUERIES_PER_GROUP, width) - 0.5)
         self.pool = Attention(width, config.heads)
         self.time = nn.ModuleList(_temporal_block(config) for _ in range(config.encoder_blocks))
@@ -150,16 +157,14 @@ class Encoder(nn.Module):
         return self.norm(tokens.view(B, N_TOKENS, T, D).transpose(1, 2))
 
     def _joint_features(self, pose: PoseTensors, body: Body) -> Float[Tensor, "B T J D"]:
-        joints, root = pose.rotations, pose.root
+        joints = pose.rotations
         if self.config.residual:
             joints = _rotation_features(joints)
         if self.config.positions_in:
             relative = forward_kinematics(pose, body) - pose.root[:, :, None]
             joints = torch.cat([joints, relative], -1)
-            velocity = torch.diff(root, dim=1, prepend=root[:, :1])
-            root = torch.cat([root, velocity], -1)
         x = self.motion(joints)
-        return torch.cat([x[:, :, :1] + self.root(root)[:, :, None], x[:, :, 1:]], 2)
+        return torch.cat([x[:, :, :1] + self.root(pose.root)[:, :, None], x[:, :, 1:]], 2)
 
 
 class Decoder(nn.Module):

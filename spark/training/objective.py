@@ -8,7 +8,7 @@ from torch import Tensor, nn
 
 from spark.network.config import Config
 from spark.training import losses
-from spark.training.batch import Batch
+from spark.training.batch import Batch, UnpairedBatch
 from spark.training.model import Spark
 from spark.training.settings import TrainConfig
 from spark.training.tensors import forward_kinematics
@@ -41,12 +41,16 @@ class Objective(nn.Module):
         weights = losses.PAIR_LOSS_WEIGHTS if model.config.residual else losses.PAPER_LOSS_WEIGHTS
         self.weights = {k: w for k, w in weights.items() if k != "fk" or "fk" not in config.ablate}
 
-    def forward(self, batch: Batch) -> tuple[Float[Tensor, ""], Terms]:
+    def forward(self, batch: Batch | UnpairedBatch) -> tuple[Float[Tensor, ""], Terms]:
         """The weighted sum of the terms, and each of them without its weight."""
-        terms = self._paired(batch) if self.model.config.residual else self._unpaired(batch)
+        if self.model.config.residual:
+            assert isinstance(batch, Batch)
+            terms = self._paired(batch)
+        else:
+            terms = self._unpaired(batch)
         return torch.stack([w * terms[k] for k, w in self.weights.items()]).sum(), terms
 
-    def _unpaired(self, batch: Batch) -> Terms:
+    def _unpaired(self, batch: Batch | UnpairedBatch) -> Terms:
         """Section 4.5: A reconstructs A; what A becomes on B is encoded as A was."""
         latent = self.model.encode(batch.pose, batch.source)
         same = self.model.decode(latent, batch.source)

@@ -1,13 +1,14 @@
 """A batch in one piece of memory, for the way from a worker to the trainer and on to a GPU."""
 
-from itertools import islice
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 import torch
 from torch import Tensor
 from torch.utils.data import get_worker_info
 
-from spark.training.batch import Batch
-from spark.training.tensors import Body, PoseTensors, Start
+from spark.training.batch import Batch, UnpairedBatch
 
 _ALIGNED = 64  # bytes
 AHEAD = 2  # batches that a worker may be ahead of the trainer
@@ -22,7 +23,7 @@ class Packer:
         self._pieces = [torch.empty(0, dtype=torch.uint8)] * _PIECES
         self._turn = 0
 
-    def __call__(self, batch: Batch) -> "Packed":
+    def __call__(self, batch: Batch | UnpairedBatch) -> "Packed":
         self._turn = (self._turn + 1) % _PIECES
         packed = Packed(batch, self._pieces[self._turn])
         self._pieces[self._turn] = packed.piece
@@ -33,37 +34,54 @@ class Packed:
     """What `on` makes a batch of again. Handing over one piece takes a fraction of the time that
     the thirty tensors of a batch take one by one. It lies in `piece`, or in a larger one."""
 
-    def __init__(self, batch: Batch, piece: Tensor) -> None:
-        tensors = [*batch.source, *batch.target, *batch.pose, *batch.truth, *batch.start]
-        tensors += [batch.planted, batch.effectors]
-        self._frame_time = batch.frame_time
-        self._layout: list[tuple[slice, torch.dtype, torch.Size]] = []
+    def __init__(self, batch: Batch | UnpairedBatch, piece: Tensor) -> None:
+        tensors: list[Tensor] = []
         end = 0
-        for tensor in tensors:
+
+        def placed(tensor: Tensor) -> _Place:
+            nonlocal end
+            tensors.append(tensor)
             size = tensor.numel() * tensor.element_size()
-            self._layout.append((slice(end, end + size), tensor.dtype, tensor.shape))
+            place = _Place(slice(end, end + size), tensor.dtype, tensor.shape)
             end += -(-size // _ALIGNED) * _ALIGNED
+            return place
+
+        self._layout = _mapped(batch, Tensor, placed)
         if piece.numel() < end:
             piece = torch.empty(end + end // 4, dtype=torch.uint8)
             if get_worker_info() is not None:
                 piece.share_memory_()  # type: ignore[no-untyped-call]
         self.piece = piece
-        for own, tensor in zip(self._tensors(piece), tensors, strict=True):
-            own.copy_(tensor)
+        copies = iter(tensors)
+        _mapped(self._layout, _Place, lambda place: place.of(piece).copy_(next(copies)))
 
     def pin_memory(self) -> "Packed":
         """Where a GPU fetches it from; torch's loader calls this."""
         self.piece = self.piece.pin_memory()
         return self
 
-    def on(self, device: torch.device) -> Batch:
+    def on(self, device: torch.device) -> Any:
         """The batch, on `device`."""
-        parts = iter(self._tensors(self.piece.to(device, non_blocking=True)))
-        source, target = (Body(*islice(parts, len(Body._fields))) for _ in range(2))
-        pose, truth = (PoseTensors(*islice(parts, len(PoseTensors._fields))) for _ in range(2))
-        start = Start(*islice(parts, len(Start._fields)))
-        planted, effectors = parts
-        return Batch(source, target, pose, truth, start, planted, effectors, self._frame_time)
+        memory = self.piece.to(device, non_blocking=True)
+        return _mapped(self._layout, _Place, lambda place: place.of(memory))
 
-    def _tensors(self, memory: Tensor) -> list[Tensor]:
-        return [memory[span].view(dtype).view(shape) for span, dtype, shape in self._layout]
+
+@dataclass(frozen=True)
+class _Place:
+    """Where in the memory a tensor lies."""
+
+    span: slice
+    dtype: torch.dtype
+    shape: torch.Size
+
+    def of(self, memory: Tensor) -> Tensor:
+        return memory[self.span].view(self.dtype).view(self.shape)
+
+
+def _mapped(value: Any, kind: type, change: Callable[[Any], Any]) -> Any:
+    """Nested named tuples with every item of `kind` changed, from first to last."""
+    if isinstance(value, kind):
+        return change(value)
+    if isinstance(value, tuple) and hasattr(value, "_fields"):
+        return type(value)(*(_mapped(part, kind, change) for part in value))
+    return value

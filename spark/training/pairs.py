@@ -84,11 +84,10 @@ class PairMaker:
 
     Making a skeleton costs as much as using it many times, so each body has a fixed set of
     `variants`, made when they are first met: itself, itself with joints split as in SAN, and random
-    ones. With `distinct`, no two of them have a motion in common as a source (the paper's training
-    set); without, any of them may perform any of the body's clips. With `varied`, the target is the
-    body itself under its own names, as real targets are; half of the draws are seen in a mirror,
-    half are slowed down or sped up by up to a third, and sources are drawn again where the analytic
-    transfer matches every joint: there is nothing to learn there.
+    ones. With `varied`, the target is the body itself under its own names, as real targets are;
+    half of the draws are seen in a mirror, half are slowed down or sped up by up to a third, and
+    sources are drawn again where the analytic transfer matches every joint: there is nothing to
+    learn there.
 
     Bodies are drawn by how much they turn, but the more of one there is the less each counts: what
     is to be learned differs between people more than within one.
@@ -101,11 +100,10 @@ class PairMaker:
         window: int = 64,
         variants: int = 256,
         seed: int = 0,
-        distinct: bool = False,
         varied: bool = False,
     ) -> None:
         self.window, self.variants, self.seed = window, variants, seed
-        self.distinct, self.varied = distinct, varied
+        self.varied = varied
         by_body: dict[int, list[TrainingClip]] = {}
         for clip in clips:
             if len(clip.hips) >= window:
@@ -185,16 +183,12 @@ class PairMaker:
             performer, receiver = rng.integers(self.variants, size=2).tolist()
             if self.varied:
                 receiver = 0
-            if self.distinct:
-                performer %= min(self.variants, len(clips))
             source, target = (
                 self._staged_body(k, mirrored, number) for number in (performer, receiver)
             )
             link = self._link(source, target)
             if (link.unmatched >= 0).any():
                 break
-        if self.distinct:
-            clips = clips[performer :: self.variants]
         rotations, hips, planted, lift = self._windows(clips, windows, rng)
         if mirrored:
             rotations, hips, planted = mirrored_motion(rotations, hips, planted)

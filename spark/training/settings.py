@@ -18,9 +18,9 @@ class TrainConfig:
 
     `ablate` names switches of the paper's table 2 to throw: share and mask are left out, pos gives
     the encoder joint positions too (or takes them away where the preset has them), fk drops the
-    loss on positions, mix lets the paper's characters share motions (table 2b). Encoder and decoder
-    have `blocks` blocks each. `batch` windows a
-    step are drawn `per_body` at a time from one pair of bodies, of which each recorded body has
+    loss on positions, mix lets any two of the paper's characters share ten motions (table 2b).
+    Encoder and decoder have `blocks` blocks each. `batch` windows a step are drawn `per_body` at a
+    time from one pair of bodies, of which each recorded body has, in pairs that are made,
     `variants`. The rate rises over `warmup` steps and then falls along a cosine to a tenth at
     `steps`. With `bf16`, matrix products are in bfloat16 where the processor has them. The encoder
     of joint names is the one that ships ("shipped"); `names` is a file with another, or one is
@@ -96,7 +96,7 @@ class TrainConfig:
                 rate=1e-3,
                 warmup=20,
             )
-        return cls(preset)
+        return cls(preset, per_body=1) if preset == "paper" else cls(preset)
 
     def changed(self, where: object, **values: Any) -> "TrainConfig":
         """These settings with others in their place. Raises `ConventionError` for unknown ones."""

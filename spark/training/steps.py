@@ -7,14 +7,15 @@ import torch
 from torch.utils.data import DataLoader, Dataset
 
 from spark.network.t5 import NAME_CACHE, T5Names
-from spark.training.batch import Batch, Collator, Names
+from spark.training.batch import Batch, Collator, Names, UnpairedBatch
 from spark.training.name_encoder import NameEncoder
 from spark.training.packed import AHEAD, Packed, Packer
 from spark.training.pairs import PairMaker, TrainingClip
 from spark.training.settings import TrainConfig
+from spark.training.unpaired import SHARED, UnpairedMaker
 
 
-class Steps(Dataset[Batch]):
+class Steps(Dataset[Batch | UnpairedBatch]):
     """Item n: this process's share of step n's windows."""
 
     def __init__(
@@ -26,19 +27,25 @@ class Steps(Dataset[Batch]):
         world: int,
     ) -> None:
         self.config, self.rank, self.world = config, rank, world
-        self.maker = PairMaker(
-            clips,
-            window=config.window,
-            variants=config.variants,
-            seed=config.seed,
-            distinct=config.preset == "paper" and "mix" not in config.ablate,
-            varied=config.preset != "paper",
-        )
         self.collator = Collator(names)
+        self.maker: PairMaker | UnpairedMaker
+        if config.preset == "paper":
+            shared = SHARED if "mix" in config.ablate else 0
+            self.maker = UnpairedMaker(clips, window=config.window, seed=config.seed, shared=shared)
+        else:
+            self.maker = PairMaker(
+                clips,
+                window=config.window,
+                variants=config.variants,
+                seed=config.seed,
+                varied=True,
+            )
 
-    def __getitem__(self, n: int) -> Batch:
+    def __getitem__(self, n: int) -> Batch | UnpairedBatch:
         first = n * self.config.draws
         mine = range(first + self.rank, first + self.config.draws, self.world)
+        if isinstance(self.maker, UnpairedMaker):
+            return self.collator.unpaired(self.maker.draws(mine, self.config.per_body))
         return self.collator.batch(self.maker.draws(mine, self.config.per_body))
 
 

@@ -19,7 +19,7 @@ from torch import nn
 from spark.errors import DivergedError
 from spark.network.known_bodies import distinct_trunks
 from spark.network.weights import SHIPPED
-from spark.training.batch import Batch
+from spark.training.batch import Batch, UnpairedBatch
 from spark.training.checkpoint import (
     Checkpoint,
     optimizer_tensors,
@@ -142,7 +142,7 @@ def _check_finite(done: int, numbers: Iterable[tuple[str, float]], saved: int) -
 def take_step(
     runner: nn.Module,
     optimiser: torch.optim.Optimizer,
-    batch: Batch,
+    batch: Batch | UnpairedBatch,
     n: int,
     config: TrainConfig,
     rank: int = 0,

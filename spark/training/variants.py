@@ -234,7 +234,9 @@ def _finish(nodes: list[_Node], base: BodyFeatures, convention: str | None = Non
     tpose = np.tile([1.0, 0, 0, 0], (len(nodes), 1))
     rig = Rig(skeleton, role_map, groups_of(skeleton, role_map), tpose, 0, 1.0)
     return Variant(
-        BodyFeatures(rig, np.arange(len(nodes)), skeleton),
+        BodyFeatures(
+            rig, np.arange(len(nodes)), skeleton, base.turned[[node.first for node in nodes]]
+        ),
         np.array([node.first for node in nodes]),
         np.array([node.second for node in nodes]),
         np.array([node.mix for node in nodes]),

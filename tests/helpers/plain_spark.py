@@ -57,7 +57,9 @@ def along_time(block: TemporalBlock, x: Tensor) -> Tensor:
 def joint_embeddings(model: Spark, body: Body) -> tuple[Tensor, list[dict[int, Tensor]]]:
     """E_name + MLP(T-pose) of each joint (J D), and E_pos of each joint in each of its groups."""
     embedding = model.embedding
-    features = body.tpose[0]
+    features = body.tpose[0].clone()
+    if not model.config.tpose_rotations:
+        features[:, 3:9] = torch.tensor(NO_ROTATION)
     if embedding.shape_features:
         features = torch.cat([features, body.shape[0]], -1)
     known = embedding.name(body.names[0]) + embedding.tpose(features)
@@ -80,7 +82,6 @@ def encode(model: Spark, pose: PoseTensors, body: Body) -> Tensor:
         joints = ROTATION_GAIN * (joints - torch.tensor(NO_ROTATION))
     if config.positions_in:
         joints = torch.cat([joints, positions(pose, body) - root[:, None]], -1)
-        root = torch.cat([root, torch.cat([root[:1] * 0, root[1:] - root[:-1]])], -1)
     x = encoder.motion(joints)
     x[:, 0] += encoder.root(root)
     known, places = joint_embeddings(model, body)

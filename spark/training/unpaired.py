@@ -1,0 +1,154 @@
+"""The paper's training set: characters that perform motions of their own, and no answers.
+
+A character is a recorded body, or that body with joints split as in SAN (section 5). Windows and
+targets are drawn as they were recorded: nothing is scaled, mirrored, slowed down or planted anew.
+"""
+
+import hashlib
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from spark.errors import SkeletonError
+from spark.network.features import BodyFeatures
+from spark.network.windows import Windows
+from spark.rotation import quat_from_yaw, quat_rotate, sixd_from_quat, yaw_from_quat
+from spark.training.pairs import TrainingClip
+from spark.training.staging import in_concatenation, interpolated_rows, local_rows, starts_of
+from spark.training.variants import Variant, same_body, split_body, split_joints
+
+SHARED = 10  # "every two characters have at most 10 paired motion sequences" (section 5.3)
+
+
+@dataclass(eq=False)
+class Character:
+    """One of the training set, with the clips that it performs."""
+
+    variant: Variant
+    clips: list[TrainingClip] = field(default_factory=list)
+
+    @property
+    def frames(self) -> int:
+        """Of all its clips."""
+        return sum(len(clip.hips) for clip in self.clips)
+
+
+class UnpairedMaker:
+    """Draws windows, and the characters that they go to. Draw `n` of a seed is always the same.
+
+    No motion is performed by two characters, but for `shared` ones by any two. Each window of the
+    training set is as likely as any other, and so is each other character as its target.
+    """
+
+    def __init__(
+        self, clips: Sequence[TrainingClip], *, window: int = 64, seed: int = 0, shared: int = 0
+    ) -> None:
+        self.window, self.seed = window, seed
+        clips = [clip for clip in clips if len(clip.hips) >= window]
+        if not clips:
+            raise SkeletonError(f"no clip has {window} frames: expected at least one to train on")
+        self.characters = assign(clips, seed, shared)
+        if len(self.characters) < 2:
+            raise SkeletonError(
+                "one character alone, without joints to split: expected two or more to train on"
+            )
+        self._acting = [k for k, one in enumerate(self.characters) if one.clips]
+        self._windows = [
+            np.array([len(clip.hips) - window + 1 for clip in one.clips], float)
+            for one in self.characters
+        ]
+        weights = np.array([self._windows[k].sum() for k in self._acting])
+        self._weights = weights / weights.sum()
+
+    def draws(self, numbers: Sequence[int], windows: int) -> list[tuple[Windows, BodyFeatures]]:
+        """The draws of these numbers: `windows` windows of one character each, and a target."""
+        drawn = [self._sample(n, windows) for n in numbers]
+        variants = [one.variant for one in drawn]
+        hips = np.stack([one.hips for one in drawn])
+        starts = starts_of([one.rotations for one in drawn])
+        rows = interpolated_rows(
+            np.concatenate([one.rotations for one in drawn]),
+            in_concatenation([v.first for v in variants], starts),
+            in_concatenation([v.second for v in variants], starts),
+            np.concatenate([v.mix for v in variants]),
+        )
+        bodies = [variant.body for variant in variants]
+        starts = starts_of([body.joints for body in bodies])
+        # As `spark.network.features.pose_features` sees a window: from its own first frame.
+        from_heading = quat_from_yaw(-yaw_from_quat(rows[starts, :, :1]))
+        roots = quat_rotate(from_heading, hips - hips[:, :, :1] * np.array([1, 1, 0], hips.dtype))
+        local = local_rows(rows, bodies, from_heading)
+        poses = np.split(np.moveaxis(sixd_from_quat(local), 0, 2), starts[1:], 2)
+        return [
+            (Windows(body, pose, root), one.target)
+            for body, pose, root, one in zip(bodies, poses, roots, drawn, strict=True)
+        ]
+
+    def _sample(self, n: int, windows: int) -> "_Draw":
+        rng = np.random.default_rng((self.seed, n))
+        k = int(rng.choice(self._acting, p=self._weights))
+        who, of_clips = self.characters[k], self._windows[k]
+        other = int(rng.integers(len(self.characters) - 1))
+        target = self.characters[other + (other >= k)].variant.body
+        chosen = rng.choice(len(who.clips), windows, p=of_clips / of_clips.sum())
+        rotations, hips = [], []
+        for i in chosen.tolist():
+            at = int(rng.integers(int(of_clips[i])))
+            span = slice(at, at + self.window)
+            # A view of a memory-mapped array costs more than what is read through it.
+            rotations.append(np.asarray(who.clips[i].rotations)[span])
+            hips.append(np.asarray(who.clips[i].hips)[span])
+        rows = np.moveaxis(np.array(rotations, np.float32), 2, 0)
+        return _Draw(who.variant, target, np.ascontiguousarray(rows), np.array(hips, np.float32))
+
+
+class _Draw(NamedTuple):
+    """W windows of one character's, as rows of the recorded body's K joints, and their target."""
+
+    variant: Variant
+    target: BodyFeatures
+    rotations: np.ndarray
+    hips: np.ndarray
+
+
+def assign(clips: Sequence[TrainingClip], seed: int, shared: int) -> list[Character]:
+    """The characters of a training set, every motion with one of those that recorded it: the one
+    that has least so far. Others get it too, as long as no two then share more than `shared`."""
+    bodies = list({id(clip.body): clip.body for clip in clips}.values())
+    characters: list[Character] = []
+    of_body: dict[int, list[int]] = {}
+    for body in bodies:
+        forms = [same_body(body), *([split_body(body)] if split_joints(body) else [])]
+        of_body[id(body)] = list(range(len(characters), len(characters) + len(forms)))
+        characters += [Character(form) for form in forms]
+    by_motion: dict[str, list[TrainingClip]] = defaultdict(list)
+    for clip in clips:
+        by_motion[clip.name].append(clip)
+    together: Counter[tuple[int, int]] = Counter()
+    for motion in sorted(by_motion, key=lambda name: _rank(seed, name)):
+        performances: dict[int, list[TrainingClip]] = defaultdict(list)
+        for clip in by_motion[motion]:
+            for k in of_body[id(clip.body)]:
+                performances[k].append(clip)
+        first = min(performances, key=lambda k: (characters[k].frames, _rank(seed, motion, k)))
+        chosen = [first]
+        for k in sorted(performances, key=lambda k: _rank(seed, motion, k)):
+            if k != first and all(together[_pair(k, other)] < shared for other in chosen):
+                chosen.append(k)
+        together.update(_pair(a, b) for a, b in combinations(chosen, 2))
+        for k in chosen:
+            characters[k].clips += performances[k]
+    return characters
+
+
+def _pair(a: int, b: int) -> tuple[int, int]:
+    return min(a, b), max(a, b)
+
+
+def _rank(*what: object) -> str:
+    """A number for a draw that stays, whatever else there is to draw."""
+    return hashlib.sha256("/".join(map(str, what)).encode()).hexdigest()
