@@ -230,9 +230,9 @@ def play(
 
             write_animation(scene, path, progress=progress)
     if html is not None:
-        from sim.view.page import write_page
+        from sim.report.watch import write_replay
 
-        write_page(figures, html, title=" · ".join(c.name for c in shown))
+        write_replay(figures, html, title=" · ".join(c.name for c in shown))
     if strip is not None:
         from sim.view.video import write_strip
 

@@ -39,6 +39,7 @@ SLOW = (
     "tests/spark_sim/live/test_session.py",
     "tests/spark_sim/test_policy_command.py",
     "tests/sim/test_template.py::test_the_policy_stops_what_would_slip_through",
+    "tests/sim/view/test_page_controls.py",
     "tests/sim/view/test_view.py::test_page_moves_in_a_browser",
     "tests/spark/evaluation/test_evaluate.py",
     "tests/spark/network/test_forward.py::test_onnx_is_the_network",

@@ -1,5 +1,7 @@
 """What a report knows of a motion, frame by frame, for a view to draw over the figure."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
@@ -8,7 +10,7 @@ from sim.report.clip_poses import ClipPoses, pose_clip
 from sim.report.limits import limited_joint
 from sim.report.names import FLAGS, LABELS
 from sim.report.palette import CORNER_COLORS
-from sim.report.result import Result
+from sim.report.result import Finding
 from sim.trajectory import Subject
 from sim.view.annotations import Annotations
 from sim.view.timeline import Event
@@ -16,9 +18,9 @@ from sim.view.timeline import Event
 _STANDS, _SLIDES, _SINKS = range(1, 4)  # states of a corner, in the order of `CORNER_COLORS`
 
 
-def annotate(result: Result, subject: Subject) -> Annotations:
-    """What `result`, which `assess` made of `subject`, says of each frame."""
-    clip, poses = result.clip, pose_clip(subject)
+def annotate(clip: ClipMetrics, subject: Subject, findings: Sequence[Finding] = ()) -> Annotations:
+    """What `assess` measured of `subject`, frame by frame, and its findings."""
+    poses = pose_clip(subject)
     step = clip.frame_time
     limits = [
         (limit, joint) for limit in clip.limits if (joint := _joint(poses, limit.joint)) is not None
@@ -42,7 +44,7 @@ def annotate(result: Result, subject: Subject) -> Annotations:
             sorted(
                 (
                     Event(f.start * step, (f.stop - 1) * step, LABELS[f.measure], f.sentence)
-                    for f in result.findings
+                    for f in findings
                 ),
                 key=lambda event: event.start,
             )

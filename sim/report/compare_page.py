@@ -6,10 +6,11 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from sim.report.annotate import annotate
 from sim.report.compare import lines
 from sim.report.explanations import MEANINGS
 from sim.report.names import LABELS
-from sim.report.page import finding_line, overlay
+from sim.report.page import finding_line
 from sim.report.palette import CORNER_COLORS, css, grade
 from sim.report.result import Result
 from sim.template import Template
@@ -49,7 +50,11 @@ def compare_page(
     if source is not None and theirs is not None:
         shown.append((f"{source[0]} (source)", source[1], theirs))
     figures = [Figure(subject, name, clip.floor_z) for name, subject, clip in shown]
-    overlays = [overlay(clip, subject) for _, subject, clip in shown]
+    found = [*(report.findings for report in reports.values()), ()]
+    known = [
+        annotate(clip, subject, findings)
+        for (_, subject, clip), findings in zip(shown, found, strict=False)
+    ]
     return _PAGE.render(
         title=title,
         palette=Markup(css()),
@@ -78,6 +83,6 @@ def compare_page(
             }
             for line in lines(reports)
         ],
-        replay=page(figures, title="", overlays=overlays),
+        replay=page(figures, title="", known=known),
         notes=list(dict.fromkeys(note for report in reports.values() for note in report.notes)),
     )

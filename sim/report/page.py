@@ -6,13 +6,12 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from sim.report.annotate import corner_states
+from sim.report.annotate import annotate
 from sim.report.clip_metrics import ClipMetrics
-from sim.report.clip_poses import pose_clip
 from sim.report.explanations import MEANINGS
 from sim.report.joints import joint_rows
 from sim.report.moments import worst_moments
-from sim.report.names import FLAGS, LABELS
+from sim.report.names import LABELS
 from sim.report.palette import CORNER_COLORS, css, grade
 from sim.report.plots import flag_strips, plots, svg
 from sim.report.record import record
@@ -21,7 +20,7 @@ from sim.report.table import shares
 from sim.report.text import details, share_base
 from sim.template import Template
 from sim.trajectory import Subject
-from sim.view.page import REPLAY, Overlay, page
+from sim.view.page import REPLAY, page
 from sim.view.scene import Figure
 from spark.files import write_atomically
 
@@ -57,7 +56,11 @@ def report_page(
     if source is not None and result.source is not None:
         shown.append((source, result.source, names[1]))
     figures = [Figure(each, name, metrics.floor_z) for each, metrics, name in shown]
-    overlays = [overlay(metrics, each) for each, metrics, _ in shown]
+    found = [result.findings, ()]
+    known = [
+        annotate(metrics, each, findings)
+        for (each, metrics, _), findings in zip(shown, found, strict=False)
+    ]
     clip, frame_time = result.clip, result.clip.frame_time
     duration = (len(clip) - 1) * frame_time
     source_duration = (subject if source is None else source).motion.duration
@@ -74,7 +77,7 @@ def report_page(
         about=f"{len(clip)} frames, {duration:.1f} s{beside}",
         cards=_cards(result),
         key=CORNER_COLORS,
-        replay=page(figures, title="", overlays=overlays),
+        replay=page(figures, title="", known=known),
         findings=[finding_line(f, f.start, clip) for f in result.findings[:_LISTED]],
         unlisted=max(len(result.findings) - _LISTED, 0),
         moments=[
@@ -94,16 +97,6 @@ def report_page(
         duration=duration,
         record=record(result),
     )
-
-
-def overlay(clip: ClipMetrics, subject: Subject) -> Overlay:
-    """The soles' corners as dots, and the labels of each frame's flags."""
-    poses = pose_clip(subject)
-    states = corner_states(clip, poses.corners)
-    labels = tuple(
-        tuple(LABELS[name] for name in FLAGS if clip.flags[name][t]) for t in range(len(clip))
-    )
-    return Overlay(poses.corners, states, labels, tuple(CORNER_COLORS.values()))
 
 
 def _cards(result: Result) -> list[dict[str, Any]]:

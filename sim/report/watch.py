@@ -1,11 +1,13 @@
-"""Motions in a window, with what their reports find."""
+"""Motions in a window or on a page, with what their reports find."""
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from sim.report.annotate import annotate
 from sim.report.assess import assess
 from sim.view.annotations import Annotations
+from sim.view.page import write_page
 from sim.view.player import Player
 from sim.view.scene import Figure, build_scene
 from sim.view.window import open_window
@@ -23,6 +25,13 @@ def watch(figures: Sequence[Figure], *, title: str) -> None:
     scene = build_scene(with_ghosts(figures), max_fps=_MAX_FPS)
     player = Player(scene, ghosts=len(shown) < len(figures))
     open_window(player, title=f"{title} - spark-sim", annotate=lambda: known_of(shown))
+
+
+def write_replay(figures: Sequence[Figure], path: str | Path, *, title: str) -> None:
+    """Write the page that shows figures with what their reports find."""
+    known = iter(known_of([figure for figure in figures if not figure.ghost]))
+    of_each = [None if figure.ghost else next(known) for figure in figures]
+    write_page(figures, path, title=title, known=of_each)
 
 
 def with_ghosts(figures: Sequence[Figure]) -> list[Figure]:
@@ -44,7 +53,8 @@ def known_of(figures: Sequence[Figure]) -> tuple[Annotations | None, ...]:
     out: list[Annotations | None] = []
     for figure in figures:
         try:
-            out.append(annotate(assess(figure.subject), figure.subject))
+            result = assess(figure.subject)
+            out.append(annotate(result.clip, figure.subject, result.findings))
         except SparkSimError:  # no feet, say: it is shown all the same
             out.append(None)
     return tuple(out)

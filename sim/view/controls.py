@@ -23,6 +23,17 @@ def _seek_digit(digit: int) -> Callable[[Player], object]:
     return lambda player: player.timeline.seek_share(digit / 10)
 
 
+TOGGLES = {
+    "overlaid": ("O", "overlaid, or side by side"),
+    "ghosts": ("G", "ghost of the source or target"),
+    "contacts": ("C", "contacts: stands, slides, sinks"),
+    "mass": ("M", "centre of mass and its support"),
+    "path": ("R", "path of the root"),
+    "limits": ("J", "joints at a limit"),
+    "names": ("T", "names and where they face"),
+}
+"""What can be shown or hidden: by which key, and in words."""
+
 CONTROLS = (
     Control("Space", "play, pause", {"space": lambda p: p.timeline.toggle()}),
     Control(
@@ -58,13 +69,7 @@ CONTROLS = (
     ),
     Control("Tab", "findings of the next figure", {"tab": lambda p: p.judge_next()}),
     Control("F", "follow all, one figure, none", {"f": lambda p: p.follow_next()}),
-    Control("O", "side by side, overlaid", {"o": _toggle("overlaid")}),
-    Control("G", "ghost of the source or target", {"g": _toggle("ghosts")}),
-    Control("C", "contacts: stands, slides, sinks", {"c": _toggle("contacts")}),
-    Control("M", "centre of mass and its support", {"m": _toggle("mass")}),
-    Control("R", "path of the root", {"r": _toggle("path")}),
-    Control("J", "joints at a limit", {"j": _toggle("limits")}),
-    Control("T", "names and where they face", {"t": _toggle("names")}),
+    *(Control(key, words, {key.lower(): _toggle(name)}) for name, (key, words) in TOGGLES.items()),
     Control("V", "the view from the start", {"v": lambda p: p.reset_view()}),
     Control("H F1", "this help", {"h": _toggle("help"), "f1": _toggle("help")}),
     Control("Q Esc", "close", {"q": lambda p: p.close(), "escape": lambda p: p.close()}),

@@ -2,11 +2,11 @@
 const gl = document.createElement("canvas").getContext("webgl2", { antialias: true });
 const VERTEX = `#version 300 es
 in vec3 place; in vec3 normal; in vec3 color;
-uniform vec4 q; uniform vec3 p; uniform mat4 camera; uniform bool flatten; uniform vec3 light;
+uniform vec4 q; uniform vec3 p; uniform mat4 camera; uniform bool flatten; uniform vec3 light; uniform float size;
 out vec3 at; out vec3 n; out vec3 rgb;
 vec3 rot(vec3 v) { return v + 2.0 * cross(q.yzw, cross(q.yzw, v) + q.x * v); }
 void main() {
-  at = rot(place) + p; n = rot(normal); rgb = color;
+  at = rot(place * size) + p; n = rot(normal); rgb = color;
   if (flatten) at = vec3(at.xy - light.xy / light.z * max(at.z, 0.0), 0.0);
   gl_Position = camera * vec4(at, 1.0);
 }`;
@@ -34,7 +34,7 @@ if (gl) {
     gl.shaderSource(shader, text); gl.compileShader(shader); gl.attachShader(program, shader);
   }
   gl.linkProgram(program); gl.useProgram(program);
-  for (const name of ["q", "p", "camera", "flatten", "light", "paint", "eye", "middle", "alpha"]) uniform[name] = gl.getUniformLocation(program, name);
+  for (const name of ["q", "p", "camera", "flatten", "light", "paint", "eye", "middle", "alpha", "size"]) uniform[name] = gl.getUniformLocation(program, name);
   const upload = numbers => {
     const array = gl.createVertexArray();
     gl.bindVertexArray(array);
@@ -59,24 +59,26 @@ if (gl) {
   gl.enable(gl.BLEND);
 }
 
-let basis, eye, focal, W, H;
+let basis, eye, focal, level, W, H;
 function setCamera(target) {
   const cy = Math.cos(view.yaw), sy = Math.sin(view.yaw), cp = Math.cos(view.pitch), sp = Math.sin(view.pitch);
   const back = [cp * cy, cp * sy, sp], right = [-sy, cy, 0], up = [-sp * cy, -sp * sy, cp];
   target = target.map((v, i) => v + right[i] * view.pan[0] + up[i] * view.pan[1]);
   eye = target.map((v, i) => v + back[i] * view.distance);
   basis = [right, up, back];
-  W = canvas.width; H = canvas.height; focal = 1.6 * H;
+  W = canvas.width; H = canvas.height;
+  const room = Math.max(H - view.below * devicePixelRatio, 0.4 * H); // over the bar
+  focal = 1.6 * room; level = room / 2;
 }
 function project(p) {
   const d = sub(p, eye), depth = -dot(d, basis[2]), s = focal / Math.max(depth, 0.05);
-  return [W / 2 + dot(d, basis[0]) * s, 0.46 * H - dot(d, basis[1]) * s, depth];
+  return [W / 2 + dot(d, basis[0]) * s, level - dot(d, basis[1]) * s, depth];
 }
 // The same projection as a matrix, by columns.
 function cameraMatrix() {
   const near = 0.05, far = 200, a = (far + near) / (far - near), b = -2 * far * near / (far - near);
   const ahead = basis[2].map(v => -v), [right, up] = basis;
-  const rows = [right.map(v => 2 * focal / W * v), up.map((v, i) => 2 * focal / H * v + 0.08 * ahead[i]), ahead.map(v => a * v), ahead];
+  const rows = [right.map(v => 2 * focal / W * v), up.map((v, i) => 2 * focal / H * v + (1 - 2 * level / H) * ahead[i]), ahead.map(v => a * v), ahead];
   return [0, 1, 2].flatMap(i => rows.map(row => row[i])).concat(rows.map((row, k) => -dot(row, eye) + (k === 2 ? b : 0)));
 }
 function rgb(css, alpha) { // "#rrggbb" or "#rgb"
@@ -92,13 +94,13 @@ function render(all, target, css) {
   gl.uniform3fv(uniform.middle, target);
   const bodies = (f, at) => f.bodies.forEach((body, k) => {
     if (!body.drawn) return;
-    gl.uniform4fv(uniform.q, at[k].q); gl.uniform3fv(uniform.p, at[k].p);
+    gl.uniform4fv(uniform.q, at[k].q); gl.uniform3fv(uniform.p, at[k].p); gl.uniform1f(uniform.size, at[k].size || 1);
     gl.bindVertexArray(body.drawn.array); gl.drawArrays(gl.TRIANGLES, 0, body.drawn.count);
   });
   gl.disable(gl.DEPTH_TEST);
   gl.uniform1i(uniform.flatten, 0);
   gl.uniform4fv(uniform.paint, rgb(css.line, 1));
-  gl.uniform4fv(uniform.q, [1, 0, 0, 0]); gl.uniform3fv(uniform.p, [Math.round(target[0]), Math.round(target[1]), 0]);
+  gl.uniform4fv(uniform.q, [1, 0, 0, 0]); gl.uniform3fv(uniform.p, [Math.round(target[0]), Math.round(target[1]), 0]); gl.uniform1f(uniform.size, 1);
   gl.bindVertexArray(lines.array); gl.drawArrays(gl.LINES, 0, lines.count);
   gl.uniform1i(uniform.flatten, 1);
   gl.uniform4fv(uniform.paint, rgb(css.shadow, 1));
@@ -107,13 +109,15 @@ function render(all, target, css) {
   gl.uniform1i(uniform.flatten, 0);
   gl.uniform4fv(uniform.paint, [0, 0, 0, 0]);
   gl.depthFunc(gl.LEQUAL);
-  for (const clear of [false, true]) DATA.figures.forEach((f, i) => {
-    if (clear !== f.alpha < 1) return;
-    gl.uniform1f(uniform.alpha, f.alpha);
-    if (clear) { // depth first: only its nearest faces are seen
-      gl.colorMask(false, false, false, false); bodies(f, all[i]); gl.colorMask(true, true, true, true);
-    }
-    bodies(f, all[i]);
-  });
+  // The clear ones last, and only their nearest faces: depth first.
+  const clear = DATA.figures.flatMap((f, i) => f.alpha < 1 ? shown.ghosts ? [[f, all[i], f.alpha]] : [] : []);
+  clear.push(...ghosts(all).map(at => [solid[0], at, 0.35]));
+  gl.uniform1f(uniform.alpha, 1);
+  DATA.figures.forEach((f, i) => { if (f.alpha === 1) bodies(f, all[i]); });
+  for (const [f, at, alpha] of clear) {
+    gl.uniform1f(uniform.alpha, alpha);
+    gl.colorMask(false, false, false, false); bodies(f, at); gl.colorMask(true, true, true, true);
+    bodies(f, at);
+  }
   ctx.drawImage(gl.canvas, 0, 0);
 }

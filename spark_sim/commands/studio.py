@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -20,14 +19,16 @@ from urllib.parse import parse_qs, unquote, urlsplit
 from robots import registry
 from sim.report import assess
 from sim.report.page import report_page
+from sim.template import Template
 from sim.view.page import page
 from spark.errors import ConventionError, SparkSimError
 from spark_sim import api
 from spark_sim.clips import AnyClip, Clip
 from spark_sim.loading import load
 
+_PAGE = Template("spark_sim.commands", "studio.html", ("studio.js",), server=True)
 MAX_UPLOAD = 64 * 1024 * 1024  # bytes
-UPLOADS = (".bvh", ".fbx")
+UPLOADS = (".bvh", ".fbx", ".glb", ".gltf", ".vrm", ".vrma", ".npz", ".npy")
 _KEPT = 8  # clips and pages; the oldest are forgotten
 _LOCAL = ("localhost", "127.0.0.1", "::1")
 
@@ -138,7 +139,7 @@ class _Handler(BaseHTTPRequestHandler):
         if not self._from_here():
             return
         if path == "/":
-            text = (files("spark_sim.commands") / "studio.html").read_text(encoding="utf-8")
+            text = _PAGE.render(title="spark-sim")
             self._send(HTTPStatus.OK, "text/html; charset=utf-8", text.encode())
         elif path == "/start":
             self._send_json(HTTPStatus.OK, self.studio.start())

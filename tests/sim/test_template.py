@@ -3,6 +3,7 @@
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import example, given, settings
@@ -15,6 +16,7 @@ from spark_sim import sample
 from spark_sim.loading import load
 from tests.helpers.browser import Elements, opened, watched
 
+NOTHING: dict[str, Any] = {"speeds": (), "toggles": (), "controls": ()}
 CHECKOUT = Path(__file__).parents[2]
 HOSTILE = (
     "__DATA__<img src=x onerror=document.title=1337>",
@@ -36,9 +38,9 @@ HOSTILE = (
 @example(HOSTILE[5])
 def test_a_name_is_text_and_nothing_else(name: str) -> None:
     """As title and in the data: the same elements as with any other name, and the name whole."""
-    text = REPLAY.render(title=name, data={"label": name})
+    text = REPLAY.render(**NOTHING, title=name, data={"label": name})
     shown = Elements(text)
-    assert shown.tags == Elements(REPLAY.render(title="x", data={"label": "x"})).tags
+    assert shown.tags == Elements(REPLAY.render(**NOTHING, title="x", data={"label": "x"})).tags
     assert name in shown.texts or not name
     block = re.search(r'<script id="data" type="application/json">(.*?)</script>', text, re.S)
     assert block
@@ -48,12 +50,12 @@ def test_a_name_is_text_and_nothing_else(name: str) -> None:
 
 def test_numbers_that_are_none_are_no_page() -> None:
     with pytest.raises(OutputError, match="a number that is none"):
-        REPLAY.render(title="x", data={"height": float("nan")})
+        REPLAY.render(**NOTHING, title="x", data={"height": float("nan")})
 
 
 def test_a_name_that_is_not_utf8() -> None:
     name = b"walk_\xff.bvh".decode("utf-8", "surrogateescape")
-    assert "<title>walk_?.bvh</title>" in REPLAY.render(title=name, data={"a": name})
+    assert "<title>walk_?.bvh</title>" in REPLAY.render(**NOTHING, title=name, data={"a": name})
 
 
 TEMPLATES = sorted(

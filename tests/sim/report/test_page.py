@@ -15,8 +15,10 @@ from robots.model.understand import understand_robot
 from sim.report import Report, Subject, assess
 from sim.report.page import report_page, write_report_page
 from sim.report.plots import Plot, svg
-from sim.view.page import Overlay, page
+from sim.view.annotations import Annotations
+from sim.view.page import page
 from sim.view.scene import Figure
+from sim.view.timeline import Event
 from spark.errors import OutputError
 from spark.rig.feet import sole_positions
 from tests.helpers.browser import opened, with_probe
@@ -96,24 +98,44 @@ def test_the_scale_is_of_what_is_drawn() -> None:
     assert "0 to 1<" in svg(Plot("x", "m", noise, never, None), 1.0, 1.0)
 
 
-def test_an_overlay_of_one_frame_outlasts_the_thinning() -> None:
-    """60 frames a second, of which the page has every other one: one slides, one floats."""
+def test_what_lasts_for_one_frame_outlasts_the_thinning() -> None:
+    """60 frames a second, of which the page has every other one: one slides, one floats, and a
+    joint is at its limit in one."""
     rig = stick_rig()
     still = standing(rig, 60)
-    states = np.zeros((60, 1), dtype=np.uint8)
-    states[31], labels = 2, [()] * 60
-    labels[41] = ("floating",)
-    overlay = Overlay(np.zeros((60, 1, 3)), states, tuple(labels), ("green", "red"))
+    states, at_limit = np.zeros((60, 1), dtype=np.uint8), np.zeros((60, 1), dtype=bool)
+    floats, points = np.zeros(60, dtype=bool), np.zeros((60, 1, 3))
+    states[31], floats[41], at_limit[51] = 2, True, True
+    event = Event(41 / 60, 41 / 60, "floating", "it floats")
+    known = Annotations(
+        frame_time=1 / 60,
+        corners=points,
+        states=states,
+        corner_states=(("stands", "#0f0"), ("slides", "#f00")),
+        com=points[:, 0],
+        support_height=0.04,
+        joints=points,
+        joint_names=("knee",),
+        at_limit=at_limit,
+        flags={"floating": floats, "skating": ~floats & floats},
+        events=(event,),
+    )
     data = re.search(
         r'<script id="data" type="application/json">(.*?)</script>',
-        page([Figure(Subject(still, rig), "x")], title="", overlays=[overlay]),
+        page([Figure(Subject(still, rig), "x")], title="", known=[known]),
     )
     assert data
-    shown = json.loads(data[1])["figures"][0]["overlay"]
+    shown = json.loads(data[1])["figures"][0]["marks"]
     seen = np.frombuffer(base64.b64decode(shown["states"]), dtype=np.uint8)
     assert len(seen) == 30
     assert np.flatnonzero(seen).tolist() in ([15], [16])
-    assert np.flatnonzero(shown["labels"]).tolist() in ([20], [21])
+    (limit,) = shown["limits"]
+    assert (limit["name"], limit["frames"]) in (("knee", [25]), ("knee", [26]))
+    (flag,) = shown["flags"]
+    np.testing.assert_allclose(flag["runs"], [[41 / 60, 42 / 60]], atol=1e-4)
+    assert shown["events"] == [
+        {"start": 41 / 60, "stop": 41 / 60, "measure": "floating", "sentence": "it floats"}
+    ]
 
 
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
