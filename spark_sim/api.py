@@ -191,8 +191,9 @@ def play(
 ) -> None:
     """Show motions side by side: in a window, or as the files that are named, a video (MP4), a web
     page (HTML), a strip of moments (PNG) and an animated picture (GIF, WebP). What `simulate`
-    returns is shown with its target as a ghost. With `same_height`, all stand as tall as the
-    tallest.
+    returns is shown with its target as a ghost. A character whose file has a skin is shown with it;
+    `Clip.wearing` gives it that of another. With `same_height`, all stand as tall as
+    the tallest.
 
     `progress` wraps the frames of the video and of animated pictures. Raises `DependencyError`
     where there is no display, or nothing to draw or encode with, and `OutputError` where a file

@@ -15,6 +15,7 @@ from spark.motion import Motion
 from spark.resample import frames_at_rate
 from spark.rig.contacts import feet_by_side
 from spark.rig.rig import Rig
+from spark.skin import Skin
 from spark.summary import counted, html_table, time_span
 from spark.transfer.canonical import CanonicalMotion, to_canonical
 from spark_sim import files
@@ -135,11 +136,16 @@ class ClipBase(ABC):
 
         return Subject(self.motion, self.rig, self.body)
 
+    @property
+    def surface(self) -> tuple[Skin | None, tuple[str, ...]]:
+        """The skin on the clip's joints that is shown of it, where there is one; and notes."""
+        return None, ()
+
     def figures(self) -> "list[Figure]":
         """What a picture or a video shows of the clip."""
         from sim.view.scene import Figure
 
-        return [Figure(self.subject, self.name, self.floor_z)]
+        return [Figure(self.subject, self.name, self.floor_z, skin=self.surface[0])]
 
     def save_mjcf(
         self,

@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from jaxtyping import Float
 
-from spark.errors import SkeletonError
+from spark.errors import FileFormatError, SkeletonError, SparkSimError
 from spark.io.encoding import encode
 from spark.io.recording import Recording
+from spark.io.skins import read_skin
 from spark.motion import Motion
 from spark.resample import motion_at
 from spark.rig.override import Override
 from spark.rig.rig import Rig, understand
+from spark.skin import Skin
+from spark.transfer.skin_binding import bind_to
 from spark_sim import character_files, files
 from spark_sim.choices import Format
 from spark_sim.clip_base import ClipBase, File
@@ -34,7 +37,8 @@ class Clip(ClipBase):
     """A motion on a character: a recording and, found when first asked for, its rig.
 
     `roles` is the user's own map of joints (`spark_sim.rolemap`), where one was given. `given_rig`
-    is the rig, where it is known already, and `target` the file of the body of a result.
+    is the rig, where it is known already, and `target` the file of the body of a result. `worn` is
+    a skin of another file, on these joints, and notes on it.
     """
 
     recording: Recording
@@ -42,11 +46,39 @@ class Clip(ClipBase):
     roles: Override | None = None
     given_rig: Rig | None = None
     target: Path | None = None
+    worn: tuple[Skin, tuple[str, ...]] | None = None
 
     @property
     def body_file(self) -> Path | None:
         """The file whose body moves: its own, or that of the target."""
         return self.path if self.target is None else self.target
+
+    @cached_property
+    def surface(self) -> tuple[Skin | None, tuple[str, ...]]:
+        """The skin that is shown: the one that it wears, or that of `body_file`; and notes. Without
+        one that can be read, None."""
+        if self.worn is not None or self.body_file is None:
+            return self.worn or (None, ())
+        try:
+            return read_skin(self.body_file, self.recording.convention)
+        except SparkSimError as error:
+            return None, (f"shown without its skin: {error}",)
+
+    def wearing(self, other: "Clip") -> "Clip":
+        """The clip with the skin of another, scaled and bound to these joints
+        (`spark.transfer.skin_binding`); `surface` has notes on it.
+
+        Raises `FileFormatError` where the other has none, and `SkeletonError` where one of the two
+        is no humanoid.
+        """
+        skin, notes = other.surface
+        if skin is None:
+            why = "; ".join(notes) or "expected a GLB, glTF, VRM or FBX with a mesh on its joints"
+            raise FileFormatError(
+                other.recording.bvh.path or other.name, None, f"has no skin: {why}"
+            )
+        bound, found = bind_to(skin, other.rig, self.rig)
+        return replace(self, worn=(bound, (f"wears the skin of {other.name}", *notes, *found)))
 
     @property
     def motion(self) -> Motion:

@@ -1,13 +1,15 @@
 """Reading clips: from files, and from the names of robots."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
 from robots import formats, registry
-from spark.errors import ConventionError, FileFormatError
+from spark.errors import ConventionError, FileFormatError, name_list
 from spark.io.reading import GLTF, format_of, holds_person, read_motion
 from spark.rig.override import Override
 from spark.skeleton import Skeleton
+from spark.transfer.skin_binding import named_alike
 from spark_sim import rolemap
 from spark_sim.choices import Quat, RobotName, Unit
 from spark_sim.clips import AnyClip, Clip, File, RobotClip
@@ -161,3 +163,34 @@ def load_robot_motion(
 
     moving = None if robot is None else known(robot)
     return RobotClip(dispatch.read(path, moving, quat=quat, fps=fps), path.stem, path)
+
+
+def dressed(clips: Sequence[AnyClip], meshes: Sequence[File]) -> list[AnyClip]:
+    """The clips, each with the skin of the first of some files that is on joints of its names. One
+    character alone wears a single file whatever its names; joints are matched by roles then.
+
+    Raises `ConventionError` where a file fits none of them, and what `load` and `Clip.wearing`
+    raise.
+    """
+    out = list(clips)
+    characters = [i for i, clip in enumerate(clips) if isinstance(clip, Clip)]
+    free = set(characters)
+    for path in meshes:
+        mesh = load(path)
+        if not isinstance(mesh, Clip):
+            raise ConventionError(f"{path}: a robot has no skin; expected a GLB, glTF, VRM or FBX")
+        fits = [i for i in characters if named_alike(mesh.rig, out[i].rig) is not None]
+        if len(characters) == len(meshes) == 1:
+            fits = characters
+        if not fits:
+            named = name_list([clips[i].name for i in characters]) or "no character"
+            raise ConventionError(
+                f"{path}: its joints are not named as those of {named}; play the one that it is "
+                "for alone"
+            )
+        for i in free.intersection(fits):
+            clip = out[i]
+            assert isinstance(clip, Clip)
+            out[i] = clip.wearing(mesh)
+        free -= set(fits)
+    return out

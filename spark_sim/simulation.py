@@ -52,7 +52,7 @@ class Simulated:
         clip, tracked = self.clip, self.tracked
         made, wanted = (Subject(clip.motion, clip.rig, b) for b in (tracked.body, tracked.target))
         return [
-            Figure(made, self.name, clip.floor_z),
+            Figure(made, self.name, clip.floor_z, skin=clip.surface[0]),
             Figure(wanted, "target", clip.floor_z, ghost=True),
         ]
 

@@ -9,8 +9,10 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from sim.body.parts import kept_joints
 from sim.trajectory import ModelTrajectory
 from sim.view.simplify import Mesh, simplify_together
+from spark.rig.rig import Rig
 
 MAX_FACES = 40_000  # of one figure's meshes
 GHOST_GROUP = 5  # of geoms: viewers hide it unless they are asked
@@ -39,17 +41,19 @@ def add_display(
     *,
     ghost: bool = False,
     scale: float = 1.0,
+    bare: bool = False,
 ) -> Int[np.ndarray, "n"]:
     """Add the body's root and all below it to the spec's world; names begin with `prefix`.
 
     Yields the columns of `body.qpos` that move it, in the order of the spec's coordinates. A
     `ghost` is seen through, in one colour, and in the group `GHOST_GROUP`. `scale` makes all of it
-    larger; of the coordinates, only the root's place changes with it; slides keep theirs.
+    larger; of the coordinates, only the root's place changes with it; slides keep theirs. Where it
+    is `bare`, its shapes are left out, for a skin.
     """
     model = body.model
     inside = _subtree(model, body.root)
     shown = [g for g in range(model.ngeom) if int(model.geom_bodyid[g]) in inside]
-    shown = [g for g in shown if int(model.geom_type[g]) in _SHOWN_TYPES]
+    shown = [g for g in shown if int(model.geom_type[g]) in _SHOWN_TYPES and not bare]
     visible = [g for g in shown if int(model.geom_group[g]) < _SHOWN_GROUPS]
     meshes = _add_meshes(spec, model, visible or shown, prefix, scale)
     columns: list[int] = []
@@ -67,6 +71,12 @@ def add_display(
     for g in visible or shown:
         _add_geom(bodies[int(model.geom_bodyid[g])], model, g, meshes, ghost=ghost, scale=scale)
     return np.array(columns)
+
+
+def body_names(model: mujoco.MjModel, rig: Rig, prefix: str) -> dict[int, str]:
+    """What the bodies of the rig's joints are called in a spec that they were added to."""
+    joints = ((j, rig.skeleton.names[j]) for j in kept_joints(rig))
+    return {j: f"{prefix}{int(model.body(name).id)}" for j, name in joints}
 
 
 def _subtree(model: mujoco.MjModel, root: int) -> list[int]:

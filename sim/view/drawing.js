@@ -3,16 +3,17 @@ const gl = document.createElement("canvas").getContext("webgl2", { antialias: tr
 const VERTEX = `#version 300 es
 in vec3 place; in vec3 normal; in vec3 color;
 uniform vec4 q; uniform vec3 p; uniform mat4 camera; uniform bool flatten; uniform vec3 light; uniform float size;
-out vec3 at; out vec3 n; out vec3 rgb;
+out vec3 at; out vec3 n; out vec3 rgb; out vec2 spot;
 vec3 rot(vec3 v) { return v + 2.0 * cross(q.yzw, cross(q.yzw, v) + q.x * v); }
 void main() {
-  at = rot(place * size) + p; n = rot(normal); rgb = color;
+  at = rot(place * size) + p; n = rot(normal); rgb = color; spot = vec2(0.0);
   if (flatten) at = vec3(at.xy - light.xy / light.z * max(at.z, 0.0), 0.0);
   gl_Position = camera * vec4(at, 1.0);
 }`;
 const FRAGMENT = `#version 300 es
 precision highp float;
-in vec3 at; in vec3 n; in vec3 rgb; out vec4 pixel;
+in vec3 at; in vec3 n; in vec3 rgb; in vec2 spot; out vec4 pixel;
+uniform sampler2D picture; uniform bool pictured;
 uniform vec4 paint; uniform vec3 light; uniform vec3 eye; uniform vec3 middle; uniform float alpha;
 void main() {
   if (paint.a > 0.0) { // floor lines and shadows: one colour that fades with the distance
@@ -23,18 +24,26 @@ void main() {
   if (dot(m, out_of) < 0.0) m = -m;
   float lit = 0.5 + 0.18 * m.z + 0.45 * max(dot(m, light), 0.0);
   float gloss = 0.14 * pow(max(dot(m, normalize(light + out_of)), 0.0), 18.0) + 0.10 * pow(1.0 - dot(m, out_of), 3.0);
-  pixel = vec4((rgb * lit + gloss) * alpha, alpha);
+  vec3 base = pictured ? rgb * texture(picture, spot).rgb : rgb;
+  pixel = vec4((base * lit + gloss) * alpha, alpha);
 }`;
-const uniform = {};
-let lines;
-if (gl) {
-  const program = gl.createProgram();
-  for (const [kind, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
+// A program of this vertex shader and the common fragment shader, and its uniforms by name.
+function linked(vertex) {
+  const program = gl.createProgram(), uniform = {};
+  for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
     const shader = gl.createShader(kind);
     gl.shaderSource(shader, text); gl.compileShader(shader); gl.attachShader(program, shader);
   }
   gl.linkProgram(program); gl.useProgram(program);
-  for (const name of ["q", "p", "camera", "flatten", "light", "paint", "eye", "middle", "alpha", "size"]) uniform[name] = gl.getUniformLocation(program, name);
+  const count = gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS);
+  for (let k = 0; k < count; k++) { const { name } = gl.getActiveUniform(program, k); uniform[name] = gl.getUniformLocation(program, name); }
+  gl.uniform3fv(uniform.light, LIGHT);
+  return { program, uniform };
+}
+const plain = gl ? linked(VERTEX) : null;
+let lines;
+if (gl) {
+  const program = plain.program;
   const upload = numbers => {
     const array = gl.createVertexArray();
     gl.bindVertexArray(array);
@@ -54,7 +63,6 @@ if (gl) {
   const grid = [], n = 12, rest = [0, 0, 1, 0, 0, 0];
   for (let i = -n; i <= n; i++) grid.push(i, -n, 0, ...rest, i, n, 0, ...rest, -n, i, 0, ...rest, n, i, 0, ...rest);
   lines = upload(grid);
-  gl.uniform3fv(uniform.light, LIGHT);
   gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   gl.enable(gl.BLEND);
 }
@@ -89,33 +97,41 @@ function render(all, target, css) {
   gl.canvas.width = W; gl.canvas.height = H;
   gl.viewport(0, 0, W, H);
   gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-  gl.uniformMatrix4fv(uniform.camera, false, cameraMatrix());
-  gl.uniform3fv(uniform.eye, eye);
-  gl.uniform3fv(uniform.middle, target);
-  const bodies = (f, at) => f.bodies.forEach((body, k) => {
-    if (!body.drawn) return;
-    gl.uniform4fv(uniform.q, at[k].q); gl.uniform3fv(uniform.p, at[k].p); gl.uniform1f(uniform.size, at[k].size || 1);
-    gl.bindVertexArray(body.drawn.array); gl.drawArrays(gl.TRIANGLES, 0, body.drawn.count);
-  });
+  const camera = cameraMatrix(), { uniform, program } = plain;
+  let flatten = false, paint = [0, 0, 0, 0], alpha = 1;
+  const shared = uniform => {
+    gl.uniformMatrix4fv(uniform.camera, false, camera);
+    gl.uniform3fv(uniform.eye, eye); gl.uniform3fv(uniform.middle, target);
+    gl.uniform1i(uniform.flatten, flatten); gl.uniform4fv(uniform.paint, paint); gl.uniform1f(uniform.alpha, alpha);
+  };
+  const bodies = (f, at) => {
+    f.bodies.forEach((body, k) => {
+      if (!body.drawn) return;
+      gl.uniform4fv(uniform.q, at[k].q); gl.uniform3fv(uniform.p, at[k].p); gl.uniform1f(uniform.size, at[k].size || 1);
+      gl.bindVertexArray(body.drawn.array); gl.drawArrays(gl.TRIANGLES, 0, body.drawn.count);
+    });
+    if (f.skin) drawSkin(f, at, shared);
+  };
+  gl.useProgram(program);
   gl.disable(gl.DEPTH_TEST);
-  gl.uniform1i(uniform.flatten, 0);
-  gl.uniform4fv(uniform.paint, rgb(css.line, 1));
+  paint = rgb(css.line, 1);
+  shared(uniform);
   gl.uniform4fv(uniform.q, [1, 0, 0, 0]); gl.uniform3fv(uniform.p, [Math.round(target[0]), Math.round(target[1]), 0]); gl.uniform1f(uniform.size, 1);
   gl.bindVertexArray(lines.array); gl.drawArrays(gl.LINES, 0, lines.count);
-  gl.uniform1i(uniform.flatten, 1);
-  gl.uniform4fv(uniform.paint, rgb(css.shadow, 1));
+  flatten = true; paint = rgb(css.shadow, 1);
+  shared(uniform);
   DATA.figures.forEach((f, i) => { if (f.alpha === 1) bodies(f, all[i]); });
   gl.enable(gl.DEPTH_TEST);
-  gl.uniform1i(uniform.flatten, 0);
-  gl.uniform4fv(uniform.paint, [0, 0, 0, 0]);
+  flatten = false; paint = [0, 0, 0, 0];
+  shared(uniform);
   gl.depthFunc(gl.LEQUAL);
   // The clear ones last, and only their nearest faces: depth first.
   const clear = DATA.figures.flatMap((f, i) => f.alpha < 1 ? shown.ghosts ? [[f, all[i], f.alpha]] : [] : []);
   clear.push(...ghosts(all).map(at => [solid[0], at, 0.35]));
-  gl.uniform1f(uniform.alpha, 1);
   DATA.figures.forEach((f, i) => { if (f.alpha === 1) bodies(f, all[i]); });
-  for (const [f, at, alpha] of clear) {
-    gl.uniform1f(uniform.alpha, alpha);
+  for (const [f, at, seen] of clear) {
+    alpha = seen;
+    shared(uniform);
     gl.colorMask(false, false, false, false); bodies(f, at); gl.colorMask(true, true, true, true);
     bodies(f, at);
   }

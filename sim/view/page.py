@@ -16,12 +16,14 @@ from sim.view.camera import shot
 from sim.view.controls import CONTROLS, MOUSE, TOGGLES
 from sim.view.packing import STEPS, in_base64, packed, short
 from sim.view.page_marks import page_marks
+from sim.view.page_skin import page_skin
 from sim.view.scene import Figure, Placement, Scene, build_scene
+from sim.view.skin import FRAME_GROUP
 from sim.view.timeline import SPEEDS
 from spark.files import write_atomically
 
 _SCRIPTS = (
-    *("kinematics.js", "shapes.js", "drawing.js", "marks.js", "player.js"),
+    *("kinematics.js", "shapes.js", "drawing.js", "skin.js", "marks.js", "player.js"),
     "page.js",
 )
 REPLAY = Template("sim.view", "page.html", _SCRIPTS)
@@ -105,12 +107,15 @@ def _figure(
         "geoms": [
             _geom(model, g, bodies[0], meshes)
             for g in range(model.ngeom)
-            if int(model.geom_bodyid[g]) in bodies
+            if int(model.geom_bodyid[g]) in bodies and int(model.geom_group[g]) != FRAME_GROUP
         ],
         "root": packed(qpos[:, :3]),
         "angles": angles,
         "joints": in_base64(whole),
     }
+    if placement.skin is not None:
+        numbers = [int(model.body(name).id) - bodies[0] for name in placement.skin.bodies]
+        out["skin"] = page_skin(placement.skin.skin, numbers)
     if known is not None:
         out["marks"] = page_marks(known, placement, scene)
     return out

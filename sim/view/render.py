@@ -71,9 +71,13 @@ class _Painter:
         self._option.geomgroup[GHOST_GROUP] = True
         self._camera = mujoco.MjvCamera()
         self._camera.azimuth, self._camera.elevation = AZIMUTH, ELEVATION
-        self._owners = np.zeros(scene.model.ngeom + 1, dtype=np.int64)  # the last: no geom
+        # By geom or skin; the last stands for none.
+        self._of_geoms = np.zeros(scene.model.ngeom + 1, dtype=np.int64)
+        self._of_skins = np.zeros(scene.model.nskin + 1, dtype=np.int64)
+        first_bones = scene.model.skin_bonebodyid[scene.model.skin_boneadr]
         for number, placement in enumerate(scene.placements, start=1):
-            self._owners[:-1][np.isin(scene.model.geom_bodyid, placement.bodies)] = number
+            self._of_geoms[:-1][np.isin(scene.model.geom_bodyid, placement.bodies)] = number
+            self._of_skins[:-1][np.isin(first_bones, placement.bodies)] = number
 
     def __enter__(self) -> "_Painter":
         return self
@@ -104,7 +108,9 @@ class _Painter:
             ids, kinds = np.moveaxis(self._renderer.render(), -1, 0)
         finally:
             self._renderer.disable_segmentation_rendering()
-        return self._owners[np.where(kinds == int(mujoco.mjtObj.mjOBJ_GEOM), ids, -1)]
+        geoms = self._of_geoms[np.where(kinds == int(mujoco.mjtObj.mjOBJ_GEOM), ids, -1)]
+        skins = self._of_skins[np.where(kinds == int(mujoco.mjtObj.mjOBJ_SKIN), ids, -1)]
+        return geoms + skins
 
 
 def _borders(figures: Int[np.ndarray, "H W"]) -> np.ndarray:

@@ -10,7 +10,8 @@ from jaxtyping import Float, Int
 
 from sim.interpolate import at_times
 from sim.trajectory import Subject, model_trajectory
-from sim.view.display import add_display
+from sim.view.display import add_display, body_names
+from sim.view.skin import WornSkin, add_skin, worn_by
 from sim.view.world import empty_world
 from spark.errors import SkeletonError
 from spark.kinematics import forward
@@ -18,6 +19,7 @@ from spark.motion import Motion
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
 from spark.rotation import quat_about, quat_conj, quat_mul, quat_rotate
+from spark.skin import Skin
 
 # A figure is lost to the camera once its root is faster than this [m/s], no man being so; further
 # from two standing heights over the floor than so many of them; or further [standing heights] from
@@ -33,7 +35,8 @@ class Figure:
 
     Where the subject has no model, one is built from its rig. A `ghost` is seen through, and stands
     where the figure before it stands: in the same world, or, where it is `aligned`, so that both
-    begin in one place. With a `height` [m], the body and its way are scaled to stand as tall.
+    begin in one place. With a `height` [m], the body and its way are scaled to stand as tall. A
+    `skin` on the rig's joints is shown instead of the body that is built from the rig.
     """
 
     subject: Subject
@@ -42,6 +45,7 @@ class Figure:
     ghost: bool = False
     aligned: bool = False
     height: float | None = None
+    skin: Skin | None = None
 
     @property
     def motion(self) -> Motion:
@@ -91,6 +95,7 @@ class Placement:
     height: float
     lane: float
     ahead: Float[np.ndarray, "3"]
+    skin: WornSkin | None = None
 
     def to_scene(self, points: Float[np.ndarray, "*N 3"]) -> Float[np.ndarray, "*N 3"]:
         """Points of the figure's own world in the scene's."""
@@ -175,7 +180,15 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
     for k, figure in enumerate(figures):
         body = figure.subject.body or model_trajectory(figure.rig, figure.motion)
         first_body = len(list(world.bodies))
-        columns = add_display(world, body, f"{k}_", ghost=figure.ghost, scale=figure.scale)
+        worn = None
+        if figure.skin is not None and not figure.ghost:
+            names = body_names(body.model, figure.rig, f"{k}_")
+            worn = worn_by(figure.skin, figure.rig, names, scale=figure.scale)
+        columns = add_display(
+            world, body, f"{k}_", ghost=figure.ghost, scale=figure.scale, bare=worn is not None
+        )
+        if worn is not None:
+            add_skin(world, worn, f"{k}_")
         qpos = at_times(body.model, body.qpos, figure.motion.frame_time, times)[:, columns]
         qpos = _finite(qpos)
         qpos[:, :3] *= figure.scale
@@ -203,6 +216,7 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
                 height=heights[k],
                 lane=float(lanes[k]),
                 ahead=quat_rotate(quat_conj(qpos[0, 3:7]), ahead),
+                skin=worn,
             )
         )
         column = following

@@ -3,13 +3,18 @@
 Rossignac and Borrel, "Multi-resolution 3D approximations for rendering complex scenes" (1993).
 """
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Float, Int
+
+from spark.skin import Skin
 
 Mesh = tuple[Float[np.ndarray, "_ 3"], Int[np.ndarray, "_ 3"]]
 
 # A grid's cells leave about this many faces on cell² of a smooth surface; of others more.
 _FACES_A_CELL = 2.5
+_PATCHES = (16, 8, 8, 4, 4, 2, 1, 1)  # of a picture, across and down, at each attempt
 _MAX_ATTEMPTS = 5  # at a grid that is coarse enough
 
 
@@ -26,6 +31,33 @@ def simplify_together(meshes: dict[int, Mesh], faces: int) -> dict[int, Mesh]:
             break
         cell *= 1.05 * np.sqrt(count / faces)
     return fewer
+
+
+def simplify_skin(skin: Skin, faces: int) -> Skin:
+    """The skin with about so many faces, or fewer. Each cell keeps one of its vertices, with its
+    bones and its place in the picture: neither is a mean of others. Vertices of other materials,
+    or from elsewhere in a picture, are not in the cell."""
+    if len(skin.faces) <= faces:
+        return skin
+    cell = float(np.sqrt(_FACES_A_CELL * area(skin.vertices, skin.faces) / faces))
+    look = np.zeros(len(skin.vertices), dtype=np.int64)
+    look[skin.faces] = skin.material_of[:, None]
+    side = _sides(skin.vertices, skin.faces)
+    for patches in _PATCHES:
+        place = np.floor((skin.vertices - skin.vertices.min(0)) / cell).astype(np.int64)
+        spot = np.floor((skin.uv - skin.uv.min(0)) * patches).astype(np.int64)
+        key = np.zeros(len(look), dtype=np.int64)
+        for column in (*place.T, *spot.T, look, side):
+            key = key * (int(column.max()) + 1) + column
+        _, first, merged = np.unique(key, return_index=True, return_inverse=True)
+        turned = first[merged][skin.faces]
+        a, b, c = turned.T
+        _, kept = np.unique(np.sort(turned, axis=1), axis=0, return_index=True)
+        kept = np.sort(kept[((a != b) & (b != c) & (c != a))[kept]])
+        if len(kept) <= faces:
+            break
+        cell *= 1.05 * np.sqrt(len(kept) / faces)
+    return replace(skin, faces=turned).with_faces(kept)
 
 
 def area(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> float:

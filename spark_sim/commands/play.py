@@ -11,10 +11,10 @@ from spark_sim.commands.options import add_corrections, add_force, add_json, add
 SUMMARY = "watch motions: window, video, web page, picture"
 USAGE = "FILE... [--video MP4] [--html HTML] [--strip PNG]"
 DESCRIPTION = """\
-Show the motions of all FILEs side by side, characters on MuJoCo bodies made
-from their skeletons, robots on their own models. This opens a window. With
---video, --html, --strip, --gif or --webp it writes files instead and needs no
-display.
+Show the motions of all FILEs side by side: characters with the skin of their
+file, or on MuJoCo bodies made from their skeletons, robots on their own
+models. This opens a window. With --video, --html, --strip, --gif or --webp it
+writes files instead and needs no display.
 
 With --physics, position servos track each motion in simulation. A summary says
 whether the body stays up, hangs on the assist or falls, how far it is from the
@@ -50,6 +50,13 @@ def configure(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--same-height", action="store_true", help="show all figures as tall as the tallest"
+    )
+    parser.add_argument(
+        "--mesh",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="show a character with the skin of this file (.glb, .gltf, .vrm, .fbx), on the same joints",
     )
     parser.add_argument(
         "--physics",
@@ -99,6 +106,13 @@ def run(args: Namespace) -> int:
     outputs = {name: getattr(args, name) for name in ("video", "html", "strip", "gif", "webp")}
     wanted = {name: Path(path) for name, path in outputs.items() if path is not None}
     shown: list[Any] = [load(args, path) for path in args.files]
+    if args.mesh:
+        from spark_sim.loading import dressed
+
+        shown = dressed(shown, args.mesh)
+    if wanted or not args.json:
+        for path, clip in zip(args.files, shown, strict=True):
+            console.notes(path, clip.surface[1])
     if args.physics:
         shown = _simulated(args, shown)
     if wanted or not args.json:

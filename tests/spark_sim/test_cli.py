@@ -15,6 +15,7 @@ import mujoco
 import pytest
 
 import spark_sim
+from tests.helpers.skins import write_character
 
 GOLDENS = Path(__file__).parent / "goldens"
 CHECKOUT = Path(__file__).parents[2]
@@ -459,3 +460,33 @@ def test_faults_of_our_own_ask_to_be_reported(wanted: bool, tmp_path: Path) -> N
     if not wanted:
         assert done.returncode == 70
         assert "Please report it" in done.stderr
+
+
+def test_play_with_the_skin_of_a_file(here: Path) -> None:
+    walk = spark_sim.load(here / WALK).part(0.0, 0.5)
+    write_character(walk.motion, here / "body.glb")
+    done = run("play", WALK, TARGET, "--mesh", "body.glb", "--strip", "mesh.png", cwd=here)
+    assert done.returncode == 0
+    assert "walker_walk.bvh: wears the skin of body" in done.stderr
+    assert "dancer" not in "".join(line for line in done.stderr.splitlines() if "wears" in line)
+    alone = run("play", TARGET, "--mesh", "body.glb", "--strip", "alone.png", cwd=here)
+    assert "wears the skin of body; scaled by" in alone.stderr
+    written = good("retarget", TARGET, "--to", "body.glb", "-o", "worn.glb", cwd=here)
+    assert "worn.glb" in written
+    good("play", "worn.glb", "--strip", "worn.png", cwd=here)
+    plain, worn = ((here / name).read_bytes() for name in ("alone.png", "worn.png"))
+    assert plain.startswith(b"\x89PNG")
+    assert worn.startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("mesh", "words"),
+    [
+        (WALK, "has no skin"),
+        ("ember", "a robot has no skin"),
+        ("none.glb", "no such file"),
+    ],
+)
+def test_a_mesh_that_is_none_is_refused(mesh: str, words: str, here: Path) -> None:
+    assert words in bad("play", WALK, "--mesh", mesh, "--strip", "x.png", cwd=here)
+    assert not (here / "x.png").exists()
