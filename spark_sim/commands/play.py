@@ -56,7 +56,8 @@ def configure(parser: ArgumentParser) -> None:
         metavar="FILE",
         action="append",
         default=[],
-        help="show a character with the skin of this file (.glb, .gltf, .vrm, .fbx), on the same joints",
+        help="show a character with the skin of this file (.glb, .gltf, .vrm, .fbx), on the same "
+        "joints",
     )
     parser.add_argument(
         "--physics",
