@@ -18,7 +18,6 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 import spark_sim
-from spark.evaluation.cases import SPARE_FRAMES
 from spark.evaluation.metrics import Score, mean_score, san_height, score_positions
 from spark.kinematics import forward
 from spark.motion import Motion
@@ -26,6 +25,7 @@ from spark.rig.contacts import ADULT_HEIGHT, floor_height, planted_feet, speeds
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig, understand
 from spark.rotation import quat_identity, quat_mul
+from spark.training.recorded_pairs import SPARE_FRAMES
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.foot_lock import lock_feet
@@ -102,11 +102,16 @@ def compare(moved: CanonicalMotion, truth: Truth) -> tuple[Score, Feet]:
     return score, Feet(float(toes), float(true_toes), clearance, sunk)
 
 
-def main(folder: str, step: str = "1") -> None:
+def shared_motions(folder: Path) -> dict[str, list[Path]]:
+    """The files of each motion that is on two characters or more."""
     by_motion: dict[str, list[Path]] = defaultdict(list)
-    for path in sorted(Path(folder).glob("[!_]*/*.bvh")):
+    for path in sorted(folder.glob("[!_]*/*.bvh")):
         by_motion[path.stem].append(path)
-    shared = {name: paths for name, paths in by_motion.items() if len(paths) > 1}
+    return {name: paths for name, paths in by_motion.items() if len(paths) > 1}
+
+
+def main(folder: str, step: str = "1") -> None:
+    shared = shared_motions(Path(folder))
     clips = {path: read(path) for paths in shared.values() for path in paths}
     pairs = [
         (a, b)

@@ -12,7 +12,6 @@ from spark.io.encoding import encode, encode_new
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, from_canonical
 from spark.transfer.foot_lock import lock_feet
-from spark.transfer.leg_fit import fit_legs
 from spark_sim import files
 from spark_sim.choices import Method, RobotName
 from spark_sim.clips import AnyClip, Clip, File, RobotClip
@@ -127,7 +126,7 @@ def _filled_in(
 
     if not network.network.config.residual:
         return network(source, target.rig)
-    return fit_legs(source, with_target_prior(network, source, target.canonical))
+    return network.fit_legs(source, with_target_prior(network, source, target.canonical))
 
 
 def _learned(checkpoint: File | None) -> "NetworkRetargeter":

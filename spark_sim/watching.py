@@ -45,12 +45,12 @@ def watching(out: Path, step: int, total: int, *, board: bool) -> "Iterator[Watc
 
 
 @contextmanager
-def watching_names(total: int) -> Iterator[Callable[[int, float], None]]:
-    """What the training of a name encoder tells of its steps."""
+def watching_stage(what: str, total: int) -> Iterator[Callable[[int, float], None]]:
+    """What a stage before the training itself tells of its steps: their loss."""
     if not is_first():
         yield lambda step, loss: None
         return
-    with console.meter(total, 0, "learning names", lines=total > 0) as tell:
+    with console.meter(total, 0, what, lines=total > 0) as tell:
         yield lambda step, loss: tell(step, {"loss": loss})
 
 

@@ -21,7 +21,9 @@ from spark.evaluation.metrics import san_height
 from spark.network.features import BodyFeatures
 from spark.rig.roles import Role
 from spark.training.dataset import Performance, is_dataset, prepare, read_performances
+from spark.training.grounded import on_ground
 from spark.training.pairs import TrainingClip
+from spark.training.recorded_pairs import SPARE_FRAMES
 from spark.training.staging import StagedBody
 from spark.training.variants import Variant, random_variant, same_body, scaled_body, split_body
 from spark.transfer.analytic import correspond
@@ -31,8 +33,6 @@ from spark.transfer.target_prior import MIN_DURATION
 Structure = Literal["intra", "cross", "missing"]
 STRUCTURES: tuple[Structure, ...] = ("intra", "cross", "missing")
 
-# Of one motion on two characters a frame or two may be lost in resampling; more is another motion.
-SPARE_FRAMES = 3
 # Made targets of each body and structure: its clips share them, so that results can be compared.
 _TARGETS_PER_BODY = 3
 _MAX_TRIES = 50  # random variants of a body
@@ -194,17 +194,19 @@ def _recorded(
 ) -> list[Case]:
     source_body, target_body = source.clip.body, target.clip.body
     height = san_height(target_body.rig) / target_body.rig.hip_height
-    source_motion = _canonical(source.clip, same_body(source_body), frames)
+    source_motion = on_ground(source, frames=frames)
     targets: dict[Structure, Variant] = {"cross": same_body(target_body)}
     if _structure(source_body) == _structure(target_body):
         targets = {"intra": same_body(target_body), "cross": split_body(target_body)}
     return [
         Case(
             *(motion, source.character, target.character, target.cell, structure, source_motion),
-            _canonical(target.clip, variant, frames),
+            truth := on_ground(target, variant, frames),
             height,
             target if variant.body.skeleton.names == target_body.skeleton.names else None,
-            None if own is None else _canonical(own, variant, len(own.hips)),
+            None
+            if own is None
+            else replace(_canonical(own, variant, len(own.hips)), rig=truth.rig),
         )
         for structure, variant in targets.items()
     ]

@@ -14,17 +14,25 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import FileFormatError, SkeletonError, name_list
-from spark.evaluation.cases import SPARE_FRAMES, STRUCTURES, Case, Structure
+from spark.evaluation.cases import STRUCTURES, Case, Structure
 from spark.evaluation.metrics import Score, mean_score, score_positions, source_sensitivity
 from spark.io.reading import SUFFIXES, read_motion
 from spark.rig.rig import understand
-from spark.transfer.canonical import FRAME_TIME, at_frame_time, canonical_positions, to_canonical
+from spark.training.recorded_pairs import SPARE_FRAMES
+from spark.transfer.canonical import (
+    FRAME_TIME,
+    CanonicalMotion,
+    at_frame_time,
+    canonical_positions,
+    to_canonical,
+)
 from spark.transfer.foot_lock import lock_feet
 from spark.transfer.leg_fit import fit_legs
 from spark.transfer.target_prior import RetargetMethod, with_target_prior
 
 Positions = Float[np.ndarray, "_ _ 3"]  # frames, joints
 Method = Callable[[Case], Positions]
+LegFitter = Callable[[CanonicalMotion, CanonicalMotion], CanonicalMotion]
 
 # Cells in the paper's order; a dataset without a split has one without a name.
 CELLS = ("sc+sm", "sc+um", "uc+sm", "uc+um")
@@ -103,12 +111,13 @@ def as_method(
     target_prior: bool = False,
     legs_fitted: bool = False,
     feet_held: bool = False,
+    legs: LegFitter = fit_legs,
 ) -> Method:
     """A retarget method as `evaluate` takes one.
 
     With `target_prior` it is corrected by another recording of the target
     (`spark.transfer.target_prior`), with `legs_fitted` its feet are led where the source's go
-    (`spark.transfer.leg_fit`), with `feet_held` locked where the source's stand
+    (`spark.transfer.leg_fit`, or by `legs`), with `feet_held` locked where the source's stand
     (`spark.transfer.foot_lock`). All three are what `retarget` does."""
 
     def run(case: Case) -> Positions:
@@ -117,7 +126,7 @@ def as_method(
         else:
             moved = method(case.source, case.truth.rig)
         if legs_fitted:
-            moved = fit_legs(case.source, moved)
+            moved = legs(case.source, moved)
         return canonical_positions(lock_feet(case.source, moved) if feet_held else moved)
 
     return run
@@ -127,7 +136,7 @@ def results_in(folder: Path) -> Method:
     """Another tool's results: FOLDER/TARGET/SOURCE/MOTION.bvh (or .fbx), named after characters and
     motion, on the target's skeleton.
 
-    Heights count from the floor of the truth's file. Raises `FileFormatError` where a result is
+    Heights count from the ground of the truth. Raises `FileFormatError` where a result is
     missing or unlike its truth.
     """
 
@@ -158,7 +167,9 @@ def results_in(folder: Path) -> Method:
         hips = positions[:, rig.hips].mean(1)
         positions = positions[:, joints]
         positions[:, 0] = hips
-        return (positions - [0, 0, answer.floor_z]) / own.rig.hip_height
+        # Where the truth counts from its file's own ground, so does the result.
+        ground = answer.floor_z - case.truth.floor_z * own.rig.hip_height
+        return (positions - [0, 0, ground]) / own.rig.hip_height
 
     return read
 

@@ -25,6 +25,8 @@ from spark.network.features import (
 from spark.network.forward import Network
 from spark.network.known_bodies import similarity
 from spark.network.names import NameNetwork
+from spark.network.recorded import as_recorded, tokens_of
+from spark.network.recorded_network import PREFIX, RecordedNetwork
 from spark.network.weights import Weights
 from spark.network.windows import Windows
 from spark.resample import rotations_at, values_at
@@ -32,6 +34,7 @@ from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_normalize
 from spark.transfer.analytic import correspond, transfer
 from spark.transfer.canonical import FRAME_TIME, CanonicalMotion, at_frame_time
+from spark.transfer.leg_fit import fit_legs
 
 _WINDOWS_AT_ONCE = 32  # bounds memory
 
@@ -45,6 +48,7 @@ class NetworkRetargeter:
             self._encode = _name_encoder(weights)
             self.window = int(weights.settings.get("window", 64))
             self.bodies = weights.bodies
+            self.recorded = RecordedNetwork(weights) if weights.below(PREFIX) else None
         except (KeyError, TypeError, ValueError) as error:
             raise weights.damaged(error) from error
 
@@ -96,6 +100,20 @@ class NetworkRetargeter:
             ),
             hips=start.hips + values_at(blended.hips - start_30fps.hips, at),
         )
+
+    def fit_legs(self, source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
+        """`moved`, the transfer of `source`, with its legs fitted: by the two bodies' proportions,
+        and where the network learned from recorded pairs, and met bodies like these two, as
+        these have it (`spark.network.recorded`)."""
+        if self.recorded is None:
+            return fit_legs(source, moved)
+        bodies = tokens_of(source.rig), tokens_of(moved.rig)
+        known = self.recorded.known
+        share = known.nearness(bodies[0]) * known.nearness(bodies[1])
+        moved = replace(moved, notes=(*moved.notes, known.told(*bodies)))
+        if not share:
+            return fit_legs(source, moved)
+        return as_recorded(self.recorded, source, moved, share, bodies=bodies)
 
     def _blend_windows(
         self,

@@ -16,6 +16,7 @@ from torch import Tensor
 from spark.files import write_atomically
 from spark.network.config import Config
 from spark.network.known_bodies import Trunk
+from spark.network.recorded_network import PREFIX as RECORDED
 from spark.network.weights import FORMAT, VERSION, Tensors, read_weights
 from spark.training.model import Spark
 from spark.training.name_encoder import NameConfig, NameEncoder
@@ -27,7 +28,8 @@ class Checkpoint:
 
     `names` is our own encoder, or the directory or hub name of a T5. `bodies` are those that it was
     trained on. `optimizer` holds the optimiser's state by `<parameter>/<key>`; empty where training
-    cannot be resumed.
+    cannot be resumed. `recorded` is what was learned from recorded pairs
+    (`spark.training.recorded_net`); empty without.
     """
 
     model: Spark
@@ -36,6 +38,7 @@ class Checkpoint:
     settings: dict[str, Any] = field(default_factory=dict)
     bodies: list[Trunk] = field(default_factory=list)
     optimizer: dict[str, Tensor] = field(default_factory=dict)
+    recorded: dict[str, Tensor] = field(default_factory=dict)
 
 
 def save_checkpoint(checkpoint: Checkpoint, path: Path) -> None:
@@ -53,6 +56,7 @@ def save_checkpoint(checkpoint: Checkpoint, path: Path) -> None:
     else:
         header["names"] = {"t5": checkpoint.names}
     tensors |= {f"optimizer.{k}": v for k, v in checkpoint.optimizer.items()}
+    tensors |= {f"{RECORDED}{k}": v for k, v in checkpoint.recorded.items()}
     plain = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
     metadata = {"format": FORMAT, "version": str(VERSION), "config": json.dumps(header)}
     write_atomically(path, save(plain, metadata))
@@ -74,7 +78,10 @@ def load_checkpoint(path: Path) -> Checkpoint:
     except (TypeError, ValueError, RuntimeError) as error:
         raise weights.damaged(error) from error
     optimizer = _tensors(weights.below("optimizer."))
-    return Checkpoint(model, names, weights.step, weights.settings, weights.bodies, optimizer)
+    recorded = _tensors(weights.below(RECORDED))
+    return Checkpoint(
+        model, names, weights.step, weights.settings, weights.bodies, optimizer, recorded
+    )
 
 
 def optimizer_tensors(

@@ -25,7 +25,8 @@ class TrainConfig:
     `steps`. With `bf16`, matrix products are in bfloat16 where the processor has them. The encoder
     of joint names is the one that ships ("shipped"); `names` is a file with another, or one is
     learned first in `name_steps`, or `t5` is a T5. A checkpoint is written every `save_every` steps
-    and every `save_minutes`.
+    and every `save_minutes`. `recorded_steps` are those on recorded pairs, where a dataset has some
+    (`spark.training.recorded_net`); the paper's preset takes none.
     """
 
     preset: str = "default"
@@ -49,6 +50,7 @@ class TrainConfig:
     save_minutes: float = 5.0
     log_every: int = 20
     name_steps: int = 0
+    recorded_steps: int = 300
     names: str = ""
     t5: str = ""
 
@@ -123,6 +125,7 @@ _LOWEST = {
     **dict.fromkeys(("width", "heads", "blocks", "steps", "batch", "per_body", "variants"), 1),
     **dict.fromkeys(("save_every", "log_every"), 1),
     **dict.fromkeys(("seed", "workers", "warmup", "weight_decay", "rate", "name_steps"), 0),
+    "recorded_steps": 0,
     "save_minutes": 0,
     "window": 2,
 }
@@ -131,6 +134,7 @@ _HIGHEST = {
     **dict.fromkeys(("heads", "blocks", "workers"), 512),
     **dict.fromkeys(("batch", "per_body", "variants"), 65536),
     **dict.fromkeys(("steps", "save_every", "log_every", "warmup", "name_steps"), 10**9),
+    "recorded_steps": 10**9,
     "seed": 2**63 - 1,
     **dict.fromkeys(("rate", "weight_decay", "save_minutes"), sys.float_info.max),  # finite
 }

@@ -119,7 +119,9 @@ def train(
                     sums = ((k, float(p.detach().sum())) for k, p in model.named_parameters())
                     _check_finite(done, sums, checkpoint.step)
                     state = optimizer_tensors(optimiser, model)
-                    checkpoint = Checkpoint(model, start.names, done, asdict(config), bodies, state)
+                    checkpoint = Checkpoint(
+                        model, start.names, done, asdict(config), bodies, state, start.recorded
+                    )
                     save_checkpoint(checkpoint, out / "checkpoint.safetensors")
                     saved = perf_counter()
             if stopped:

@@ -30,7 +30,7 @@ _MAX_GAP = 0.26
 _MIN_FINGER_BEND = np.radians(5)  # a finger that bends less against its hand is at rest
 
 # [hip heights] A floor further than this from z = 0 is moved to 0.
-_FLOOR_TOLERANCE = 0.1
+FLOOR_TOLERANCE = 0.1
 
 _SHOULDERS = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE)
 
@@ -143,7 +143,7 @@ def transfer(source: CanonicalMotion, target: Rig) -> CanonicalMotion:
     scale = target.hip_height / source.rig.hip_height
     notes = (*source.notes, *_without_arms(source.rig, target), *_without_fingers(source, target))
     lift = 0.0
-    if abs(source.floor_z) > _FLOOR_TOLERANCE * source.rig.hip_height:
+    if abs(source.floor_z) > FLOOR_TOLERANCE * source.rig.hip_height:
         lift = source.floor_z
         notes += (f"floor at z = {source.floor_z:.2f} m; moved to 0",)
     hips = (source.hips - np.array([0, 0, lift])) * scale

@@ -9,10 +9,11 @@ and so does this:
 - in height, the ankles' way above where they stand in the T-pose is scaled as the hips' is;
 - the feet keep their rotations, and the knees bend by two-bone inverse kinematics.
 
-A body's own motion comes back as it was.
+A body's own motion comes back as it was. Recorded answers tell more than proportions do
+(`spark.network.recorded`): a `LegFit` says what is kept.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -30,6 +31,29 @@ _SHOULDER_WEIGHT = 0.5
 _SHOULDERS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
 
 
+@dataclass(frozen=True)
+class LegFit:
+    """How steps are carried to another body.
+
+    Metres of the target for each metre of the source: `travel` over the ground, `hips_rise` and
+    `ankles_rise` in height. Metres by which the target's hips (`hips_up`) and ankles (`ankles_up`)
+    are higher when it stands than its skeleton says, and its ankles farther out (`out`).
+    """
+
+    travel: float
+    hips_rise: float
+    ankles_rise: float
+    hips_up: float = 0.0
+    ankles_up: float = 0.0
+    out: float = 0.0
+
+
+def leg_fit(source: Rig, target: Rig) -> LegFit:
+    """What the proportions of two bodies tell."""
+    rise = target.hip_height / source.hip_height
+    return LegFit(travel_scale(source, target), rise, rise)
+
+
 def travel_scale(source: Rig, target: Rig) -> float:
     """How far `target` goes for each metre that `source` goes.
 
@@ -44,43 +68,52 @@ def travel_scale(source: Rig, target: Rig) -> float:
     return hips * float(heights[1] / heights[0]) ** _SHOULDER_WEIGHT
 
 
-def fit_legs(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
-    """`moved`, the transfer of `source`, with its path over the ground scaled by `travel_scale` and
-    its ankles where the source's are. A leg stays as it is where one of the two rigs has no foot.
+def fit_legs(
+    source: CanonicalMotion, moved: CanonicalMotion, fit: LegFit | None = None
+) -> CanonicalMotion:
+    """`moved`, the transfer of `source`, with its path and its ankles where `fit` has them, by
+    default where the proportions of the two bodies do (`leg_fit`). A leg stays as it is where one
+    of the two rigs has no foot.
     """
+    fit = fit or leg_fit(source.rig, moved.rig)
     out = replace(moved, rotations=np.empty_like(moved.rotations), hips=np.empty_like(moved.hips))
     for block in blocks(len(moved)):
-        fitted = _fitted(source.picked(block), moved.picked(block))
+        fitted = _fitted(source.picked(block), moved.picked(block), fit)
         out.rotations[block], out.hips[block] = fitted.rotations, fitted.hips
     return out
 
 
-def _fitted(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
+def _fitted(source: CanonicalMotion, moved: CanonicalMotion, fit: LegFit) -> CanonicalMotion:
     start, target = source.rig, moved.rig
-    scale, rise = travel_scale(start, target), target.hip_height / start.hip_height
-    moved = replace(moved, hips=np.column_stack([source.hips[:, :2] * scale, moved.hips[:, 2]]))
+    standing = target.hip_height
+    copied_rise = standing / start.hip_height
+    height = standing + fit.hips_up + (moved.hips[:, 2] - standing) * (fit.hips_rise / copied_rise)
+    moved = replace(moved, hips=np.column_stack([source.hips[:, :2] * fit.travel, height]))
     outwards = quat_rotate(source.rotations[:, start.pelvis], np.array([0.0, 1.0, 0.0]))[:, :2]
     moves: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
     for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
         leg = leg_of(target.skeleton, target.roles.roles, group)
-        ankle = start.roles.joint(_foot(group))
+        ankle = start.roles.joint(foot_role(group))
         if leg is None or ankle is None:
             continue
-        rest, own_rest = _from_sole(start, ankle), _from_sole(target, leg.foot)
+        rest, own_rest = from_sole(start, ankle), from_sole(target, leg.foot)
         theirs = canonical_positions(source, [ankle])[:, 0]
         own = canonical_positions(moved, [leg.foot])[:, 0]
-        along = moved.hips[:, :2] + scale * (theirs[:, :2] - source.hips[:, :2])
-        along += (own_rest[1] - scale * rest[1]) * outwards
-        above = moved.floor_z + own_rest[2] + rise * (theirs[:, 2] - source.floor_z - rest[2])
+        along = moved.hips[:, :2] + fit.travel * (theirs[:, :2] - source.hips[:, :2])
+        side = 1.0 if group is Group.LEFT_LEG else -1.0
+        along += (own_rest[1] - fit.travel * rest[1] + side * fit.out) * outwards
+        above = moved.floor_z + own_rest[2] + fit.ankles_up
+        above = above + fit.ankles_rise * (theirs[:, 2] - source.floor_z - rest[2])
         moves.append((leg, np.column_stack([along, above]) - own))
     return move_ankles(moved, moves)
 
 
-def _foot(leg: Group) -> Role:
+def foot_role(leg: Group) -> Role:
+    """The role of a leg's ankle."""
     return LIMBS[leg][2]
 
 
-def _from_sole(rig: Rig, joint: int) -> Float[np.ndarray, "3"]:
+def from_sole(rig: Rig, joint: int) -> Float[np.ndarray, "3"]:
     """Where a joint is in the T-pose [m], from the point of the floor below the hips' middle."""
     at = rig.tpose_positions[joint] - rig.tpose_positions[rig.hips].mean(0)
     return at + np.array([0.0, 0.0, rig.hip_height])
@@ -89,5 +122,5 @@ def _from_sole(rig: Rig, joint: int) -> Float[np.ndarray, "3"]:
 def _shoulder_height(rig: Rig) -> float:
     """Of the upper arms' joints over the floor in the T-pose [hip heights]; 0 without arms."""
     joints = [j for role in _SHOULDERS for j in rig.roles.joints(role)[:1]]
-    heights = [_from_sole(rig, j)[2] / rig.hip_height for j in joints]
+    heights = [from_sole(rig, j)[2] / rig.hip_height for j in joints]
     return float(np.mean(heights)) if heights else 0.0

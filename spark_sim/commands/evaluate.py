@@ -2,6 +2,7 @@
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,7 @@ from spark_sim.commands.options import add_force
 
 if TYPE_CHECKING:
     from spark.evaluation.cases import Case
-    from spark.evaluation.evaluate import MethodScores
+    from spark.evaluation.evaluate import LegFitter, MethodScores
     from spark.transfer.target_prior import RetargetMethod
 
 SUMMARY = "measure methods against a ground truth"
@@ -91,10 +92,14 @@ def run(args: Namespace) -> int:
     from spark.errors import ConventionError
     from spark.evaluation.cases import made_cases, performances, recorded_cases
     from spark.evaluation.equal import Why, equal_rows, why_no_prior, why_silent
-    from spark.evaluation.evaluate import as_method, evaluate, results_in
+    from spark.evaluation.evaluate import CELLS, as_method, evaluate, results_in
     from spark.evaluation.tables import markdown
     from spark.files import write_atomically
+    from spark.network.recorded import as_recorded
+    from spark.training.recorded_pairs import recorded_pairs
+    from spark.training.recorded_ridge import fit_ridge
     from spark.transfer.analytic import transfer
+    from spark.transfer.leg_fit import fit_legs
     from spark_sim import console, files
 
     outputs = [Path(output) for output in args.output]
@@ -125,15 +130,24 @@ def run(args: Namespace) -> int:
     rows: list[MethodScores] = []
     why: dict[str, Why] = {"copy, target prior": why_no_prior}
 
-    def add(name: str, method: "RetargetMethod", ways: Ways, **about: Any) -> None:
+    def add(
+        name: str,
+        method: "RetargetMethod",
+        ways: Ways,
+        legs: "LegFitter" = fit_legs,
+        **about: Any,
+    ) -> None:
         rows.extend(
-            row(name + way, as_method(method, **added), cases, **about)
+            row(name + way, as_method(method, legs=legs, **added), cases, **about)
             for way, added in ways.items()
         )
 
     # Made answers keep the legs' rotations and the path in hip heights: they can't judge fitted
     # legs.
     add("copy", transfer, _PLAIN | _HELD | _PRIOR | ({} if args.made else _FITTED | _BOTH))
+    seen = recorded_pairs([] if args.made else [p for p in found if p.cell == CELLS[0]])
+    if seen.enough:
+        add("ridge", transfer, _FITTED | _BOTH, partial(as_recorded, fit_ridge(seen)))
     for name, weights in checkpoints.items():
         from spark.network.retarget import NetworkRetargeter
 
@@ -142,7 +156,9 @@ def run(args: Namespace) -> int:
         ways = _PLAIN
         if network.network.config.residual:
             ways = _PLAIN | _PRIOR | (_ALL_MADE if args.made else _ALL)
-        add(name, network, ways, settings=weights.settings)
+            if network.recorded and not args.made:
+                ways = _PLAIN | _FITTED | _BOTH | _ALL
+        add(name, network, ways, network.fit_legs, settings=weights.settings)
     for name, folder in results.items():
         answered = [case for case in cases if case.answer is not None]
         rows.append(row(name, results_in(Path(folder)), answered))

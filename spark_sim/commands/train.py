@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from spark.training.checkpoint import Checkpoint
     from spark.training.settings import TrainConfig
 
 SUMMARY = "train the network that retargets"
@@ -78,7 +79,7 @@ def run(args: Namespace) -> int:
     from spark.training.settings import TrainConfig, read_settings, toml
     from spark_sim import console
     from spark_sim.stopping import asked_to_stop
-    from spark_sim.watching import is_first, watching, watching_names
+    from spark_sim.watching import is_first, watching, watching_stage
 
     out = Path(args.output)
     path = out / "checkpoint.safetensors"
@@ -139,10 +140,13 @@ def run(args: Namespace) -> int:
             f"on {_device(threads)}"
         )
     if start is None:
-        with watching_names(0 if config.names or config.t5 else config.name_steps) as watch_names:
+        name_steps = 0 if config.names or config.t5 else config.name_steps
+        with watching_stage("learning names", name_steps) as watch_names:
             start = fresh_checkpoint(config, watch_names)
     out.mkdir(parents=True, exist_ok=True)
     write_atomically(out / "config.toml", toml(config).encode())
+    if not start.step and not start.recorded:
+        start = _learn_recorded(start, config, out)
     with (
         asked_to_stop(_say_stopping) as asked,
         watching(out, start.step, config.steps, board=args.tensorboard) as watch,
@@ -157,6 +161,26 @@ def run(args: Namespace) -> int:
                 f"spark-sim train -o {shlex.quote(str(out))} --resume"
             )
     return 128 + by_signal if done.step < config.steps else 0
+
+
+def _learn_recorded(start: "Checkpoint", config: "TrainConfig", out: Path) -> "Checkpoint":
+    """`start` with what the recorded pairs of the data say, where there are some."""
+    from spark.training.recorded_stage import recorded_stage, with_recorded
+    from spark_sim import console
+    from spark_sim.watching import is_first, watching_stage
+
+    stage = recorded_stage(config)
+    if stage is None:
+        return start
+    if is_first():
+        console.note(stage.about)
+    if not stage.steps:
+        return start
+    with watching_stage("recorded pairs", stage.steps) as watch:
+        start, told = with_recorded(start, stage, config, out, watch)
+    if is_first():
+        console.note(told)
+    return start
 
 
 def _device(threads: int | None) -> str:

@@ -1,0 +1,230 @@
+"""Recorded pairs: one motion on two bodies, and by what the answer differs from the analytic one.
+
+The same name of a motion on two characters of a dataset is a pair, both ways round. What a pair
+says is measured by least squares, as the differences of two bodies' `spark.network.recorded.Habits`
+would make it: each joint's mean turn, and how path, hips and ankles are scaled and moved.
+"""
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from spark.network.recorded import BodyTokens, matched_rows, tokens_of
+from spark.rig.roles import LIMBS, Group
+from spark.rotation import (
+    quat_conj,
+    quat_mul,
+    quat_rotate,
+    rotvec_from_quat,
+)
+from spark.training.dataset import Performance
+from spark.training.grounded import on_ground
+from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.leg_fit import from_sole, leg_fit
+
+MIN_BODIES = 4  # fewer tell nothing of others
+MAX_PAIRS = 4000  # drawn from those of a large dataset
+SPARE_FRAMES = 3  # of one motion on two characters may be lost in resampling; more is another one
+_FRAMES = 60  # of a clip that are looked at
+_LEGS = (Group.LEFT_LEG, Group.RIGHT_LEG)
+_WEAKEST = 1e-3  # [hip heights²] of movement; a scale that less depends on stays as it is
+_LARGEST = 0.7  # of a logarithm of a scale, or a length [hip heights]: more is a spoilt file
+
+# How much of the body an ankle carries, against the hips: foot, toe and half of the leg.
+_ANKLES_SHARE = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedPair:
+    """`source` and `target` number bodies. `rows` are rows of their tokens (target's, source's),
+    `turns` [rad] by which these turn, right sides mirrored. `scales` are differences of `HABITS`,
+    `weights` how much a joint's squared error [hip heights²] grows with theirs."""
+
+    motion: str
+    source: int
+    target: int
+    rows: list[tuple[int, int]]
+    turns: Float[np.ndarray, "R 3"]
+    scales: Float[np.ndarray, "6"]
+    weights: Float[np.ndarray, "6"]
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedPairs:
+    """Pairs, the bodies that they number, and the names of these characters."""
+
+    bodies: list[BodyTokens]
+    characters: list[str]
+    pairs: list[RecordedPair]
+
+    @property
+    def enough(self) -> bool:
+        """Whether something can be learned from them."""
+        return len({pair.target for pair in self.pairs}) >= MIN_BODIES
+
+    @cached_property
+    def balance(self) -> Float[np.ndarray, "P"]:
+        """Weights of the pairs that make each target count alike."""
+        counts = np.bincount([pair.target for pair in self.pairs], minlength=len(self.bodies))
+        return 1.0 / counts[[pair.target for pair in self.pairs]]
+
+    def without(self, characters: set[str]) -> "RecordedPairs":
+        """The pairs of other characters alone."""
+        out = {k for k, name in enumerate(self.characters) if name in characters}
+        kept = [pair for pair in self.pairs if not {pair.source, pair.target} & out]
+        return RecordedPairs(self.bodies, self.characters, kept)
+
+    def of(self, characters: set[str]) -> "RecordedPairs":
+        """The pairs whose target is one of these."""
+        kept = [pair for pair in self.pairs if self.characters[pair.target] in characters]
+        return RecordedPairs(self.bodies, self.characters, kept)
+
+
+def recorded_pairs(found: Sequence[Performance], seed: int = 0) -> RecordedPairs:
+    """All that the motions shared by two bodies say; of more than `MAX_PAIRS`, as many drawn."""
+    by_motion: dict[str, list[int]] = defaultdict(list)
+    for k, one in enumerate(found):
+        by_motion[one.clip.name].append(k)
+    drawn = [
+        (a, b)
+        for same in by_motion.values()
+        for a in same
+        for b in same
+        if found[a].clip.body is not found[b].clip.body
+        and abs(len(found[a].clip.hips) - len(found[b].clip.hips)) <= SPARE_FRAMES
+    ]
+    if len(drawn) > MAX_PAIRS:
+        chosen = np.random.default_rng(seed).permutation(len(drawn))[:MAX_PAIRS]
+        drawn = [drawn[k] for k in sorted(chosen.tolist())]
+    bodies: dict[int, int] = {}
+    tokens: list[BodyTokens] = []
+    names: list[str] = []
+    clips: dict[int, _Seen] = {}
+    for k in sorted({k for pair in drawn for k in pair}):
+        body = found[k].clip.body
+        if id(body) not in bodies:
+            bodies[id(body)] = len(tokens)
+            tokens.append(tokens_of(on_ground(found[k]).rig))
+            names.append(found[k].character)
+        clips[k] = _Seen(found[k], bodies[id(body)], tokens[bodies[id(body)]])
+    pairs = [_measured(clips[a], clips[b]) for a, b in drawn]
+    return RecordedPairs(tokens, names, [pair for pair in pairs if pair is not None])
+
+
+class _Seen:
+    """Some frames of a clip, spread over it, and where its ankles are."""
+
+    def __init__(self, one: Performance, number: int, body: BodyTokens) -> None:
+        self.motion, self.number, self.body = one.clip.name, number, body
+        count = len(one.clip.hips)
+        # Both clips of a pair are looked at in the same frames, whichever is longer.
+        at = np.arange(0, count, max(1, (count - SPARE_FRAMES) // _FRAMES))
+        self.at = at
+        self.seen: CanonicalMotion = _picked(on_ground(one), at)
+        self.ankles = []
+        for group in _LEGS:
+            joint = body.rig.roles.joint(LIMBS[group][2])
+            if joint is not None:
+                path = canonical_positions(self.seen, [joint])[:, 0]
+                self.ankles.append((path, from_sole(body.rig, joint)))
+
+
+def _picked(motion: CanonicalMotion, frames: Int[np.ndarray, "N"]) -> CanonicalMotion:
+    return replace(motion, rotations=motion.rotations[frames], hips=motion.hips[frames])
+
+
+def _measured(a: _Seen, b: _Seen) -> RecordedPair | None:
+    """What one pair says; None where that is nothing a body's habits would make."""
+    common, of_a, of_b = np.intersect1d(a.at, b.at, return_indices=True)
+    if len(common) < 2 or len(a.ankles) != 2 or len(b.ankles) != 2:
+        return None
+    theirs, own = _picked(a.seen, of_a), _picked(b.seen, of_b)
+    rows = matched_rows(a.body, b.body)
+    turns = np.stack(
+        [
+            _mean_turn(theirs.rotations[:, a.body.joints[i]], own.rotations[:, b.body.joints[k]])
+            for k, i in rows
+        ]
+    )
+    mirrored = np.array([b.body.mirrored[k] for k, _ in rows])
+    turns = np.where(mirrored[:, None], [-1.0, 1.0, -1.0] * turns, turns)
+    ankles = [
+        (path[of_a], rest, own_path[of_b], own_rest)
+        for (path, rest), (own_path, own_rest) in zip(a.ankles, b.ankles, strict=True)
+    ]
+    scales, weights = _scales(theirs, own, ankles)
+    if not np.isfinite(scales).all() or np.abs(scales).max() > _LARGEST:
+        return None
+    return RecordedPair(a.motion, a.number, b.number, rows, turns, scales, weights)
+
+
+def _mean_turn(
+    theirs: Float[np.ndarray, "T 4"], own: Float[np.ndarray, "T 4"]
+) -> Float[np.ndarray, "3"]:
+    """By what rotation in the T-pose's axes a joint turns further than its counterpart, mostly."""
+    further = quat_mul(quat_conj(theirs), own)
+    mean = np.linalg.eigh(further.T @ further)[1][:, -1]
+    return rotvec_from_quat(mean if mean[0] > 0 else -mean)
+
+
+_Ankle = tuple[
+    Float[np.ndarray, "T 3"],
+    Float[np.ndarray, "3"],
+    Float[np.ndarray, "T 3"],
+    Float[np.ndarray, "3"],
+]
+
+
+def _scales(
+    theirs: CanonicalMotion, own: CanonicalMotion, ankles: Sequence[_Ankle]
+) -> tuple[Float[np.ndarray, "6"], Float[np.ndarray, "6"]]:
+    """Differences of `HABITS`, and their weights: `spark.transfer.leg_fit` solved for its
+    numbers, each a little drawn to what proportions tell."""
+    start, size, other = theirs.rig, own.rig.hip_height, theirs.rig.hip_height
+    analytic = leg_fit(start, own.rig)
+    outwards = quat_rotate(theirs.rotations[:, start.pelvis], np.array([0.0, 1.0, 0.0]))[:, :2]
+    # Over the ground: hips and ankles, by one scale about the origin and one distance outwards.
+    columns, known = [np.stack([theirs.hips[:, :2], 0 * outwards], -1)], [own.hips[:, :2]]
+    for path, rest, own_path, own_rest in ankles:
+        side = np.sign(own_rest[1])
+        columns.append(np.stack([path[:, :2] - rest[1] * outwards, side * outwards], -1))
+        known.append(own_path[:, :2] - own_rest[1] * outwards)
+    A, y = np.concatenate(columns).reshape(-1, 2), np.concatenate(known).ravel()
+    travelled = float(np.mean(A[:, 0] ** 2)) / other**2
+    travel, out = _drawn(A, y, analytic.travel, _WEAKEST * len(A) * other**2)
+    # In height: standing hips are moved, and what they move about that is scaled.
+    rise = size / other
+    lift = theirs.hips[:, 2] - other
+    A = np.stack([lift, np.ones_like(lift)], -1)
+    hips_rise, hips_up = _drawn(A, own.hips[:, 2] - size, rise, _WEAKEST * len(A) * other**2)
+    floor = theirs.floor_z
+    lifted = np.concatenate([path[:, 2] - rest[2] - floor for path, rest, _, _ in ankles])
+    heights = np.concatenate([path[:, 2] - rest[2] - rise * floor for _, _, path, rest in ankles])
+    A = np.stack([lifted, np.ones_like(lifted)], -1)
+    ankles_rise, ankles_up = _drawn(A, heights, rise, _WEAKEST * len(A) * other**2)
+    logs = [
+        np.log(max(found / told, 1e-3))
+        for found, told in (
+            (travel, analytic.travel),
+            (hips_rise, analytic.hips_rise),
+            (ankles_rise, analytic.ankles_rise),
+        )
+    ]
+    scales = np.array([*logs, hips_up / size, ankles_up / size, out / size])
+    moves = [travelled, np.var(lift) / other**2, _ANKLES_SHARE * np.var(lifted) / other**2]
+    # A clip that crosses a hall says no more of a scale than one that takes a few steps.
+    weights = np.array([*np.minimum(moves, 1.0), 1.0, _ANKLES_SHARE, _ANKLES_SHARE])
+    return scales, weights
+
+
+def _drawn(
+    A: Float[np.ndarray, "N 2"], y: Float[np.ndarray, "N"], told: float, strength: float
+) -> tuple[float, float]:
+    """Least squares of two numbers, the first drawn to `told`."""
+    pull = np.array([strength, 0.0])
+    first, second = np.linalg.solve(A.T @ A + np.diag(pull + 1e-12), A.T @ y + pull * told)
+    return float(first), float(second)

@@ -1,0 +1,69 @@
+"""What comes before the steps of a training run: recorded pairs, where datasets have some."""
+
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from spark.training.checkpoint import Checkpoint, save_checkpoint
+from spark.training.dataset import is_dataset, read_performances
+from spark.training.recorded_net import Recorded, Watch, learn_recorded, total_steps
+from spark.training.recorded_pairs import MIN_BODIES, RecordedPairs, recorded_pairs
+from spark.training.settings import TrainConfig
+
+_SEEN = "sc+sm"  # the cell that is trained on
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """The recorded pairs of a run's data, and how many steps are taken on them."""
+
+    known: RecordedPairs
+    steps: int
+    about: str
+
+
+def recorded_stage(config: TrainConfig) -> Stage | None:
+    """The pairs in the cell of `config.data` that is trained on; None where there are none to
+    learn from, or the run does not want them."""
+    if config.preset == "paper" or not config.recorded_steps:
+        return None
+    datasets = [path for path in map(Path, config.data) if is_dataset(path)]
+    found = [p for path in datasets for p in read_performances(path) if p.cell == _SEEN]
+    known = recorded_pairs(found, config.seed)
+    targets = len({pair.target for pair in known.pairs})
+    if not known.pairs:
+        return None
+    about = f"{len(known.pairs)} recorded pairs on {targets} characters"
+    if not known.enough:
+        return Stage(known, 0, f"{about}: at least {MIN_BODIES} are needed to learn from them")
+    return Stage(known, total_steps(config.recorded_steps), f"{about}: learned from first")
+
+
+def with_recorded(
+    start: Checkpoint, stage: Stage, config: TrainConfig, out: Path, watch: Watch
+) -> tuple[Checkpoint, str]:
+    """`start` with what the pairs say, saved; and a sentence on what was learned."""
+    learned = learn_recorded(
+        stage.known,
+        width=config.width,
+        heads=config.heads,
+        blocks=config.blocks,
+        steps=config.recorded_steps,
+        seed=config.seed,
+        watch=watch,
+    )
+    start = replace(start, recorded=learned.tensors(), settings=asdict(config))
+    save_checkpoint(start, out / "checkpoint.safetensors")
+    return start, _told(learned)
+
+
+def _told(learned: Recorded) -> str:
+    if not learned.known.reach:
+        return (
+            "recorded pairs: nothing that helped characters left out of the training, so nothing "
+            "of it is used"
+        )
+    return (
+        f"recorded pairs: {learned.gain:.2f} of the squared error of proportions alone is left on "
+        f"characters left out; used on bodies up to {learned.known.reach:.2g} from a known one, "
+        "less and less up to twice that"
+    )
