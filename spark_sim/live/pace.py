@@ -45,5 +45,7 @@ class Pace:
     def follow(self, age: float) -> None:
         """Move the steps towards the moments when poses come, so that a pose of `age` [s] would be
         `_LEAD` old: no faster than a clock may be off."""
+        if age > self.frame_time:  # it waited while a step took too long
+            return
         most = _PULL * self.frame_time
         self._due -= min(max(0.1 * (age - _LEAD), -most), most)

@@ -121,6 +121,7 @@ class Session:
     def _step(self, retargeter: Retargeter) -> None:
         listener = self._listener
         fresh, arrived = listener.fresh, listener.arrived
+        age = time.time() - arrived
         frame = self._anchored(listener.frame())
         try:
             qpos = self._handover.follow(retargeter.step(frame))
@@ -132,7 +133,7 @@ class Session:
             sink.send(self.frames, now, qpos)
         if fresh:
             self._latencies.append(time.time() - arrived)
-            self._pace.follow(now - arrived if now - arrived < self._pace.frame_time else 0.0)
+            self._pace.follow(age)
         if self._journal is not None:
             self._journal.write(self._pace.step, qpos)
         if self._view is not None:
