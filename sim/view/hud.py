@@ -59,9 +59,10 @@ class Hud:
         self._rect(bar.strip, _TRACK)
         now = bar.x_of(timeline.time)
         strip = bar.strip
-        self._rect(Rect(strip.left, strip.bottom, now - strip.left, strip.height), _DONE)
         top = bar.height - 0.4 * line
-        self._rect(Rect(now - 1, strip.bottom - 3, 2.0, top - strip.bottom), _INK)
+        if not player.status:
+            self._rect(Rect(strip.left, strip.bottom, now - strip.left, strip.height), _DONE)
+            self._rect(Rect(now - 1, strip.bottom - 3, 2.0, top - strip.bottom), _INK)
         state = "" if timeline.playing else "   paused"
         speed = "" if timeline.speed == 1 else f"   speed {timeline.speed:g}"
         once = "" if timeline.loop else "   once"

@@ -27,6 +27,7 @@ _SCRIPTS = (
     "page.js",
 )
 REPLAY = Template("sim.view", "page.html", _SCRIPTS)
+_LIVE = Template("sim.view", "page.html", (*_SCRIPTS, "live.js"), server=True)
 _HALF_VIEW = 0.27  # tan of half the page's angle, less what its bar and labels take
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 _PRIMITIVES = {
@@ -50,12 +51,17 @@ def write_page(
 
 
 def page(
-    figures: Sequence[Figure], *, title: str, known: Sequence[Annotations | None] | None = None
+    figures: Sequence[Figure],
+    *,
+    title: str,
+    known: Sequence[Annotations | None] | None = None,
+    live: bool = False,
 ) -> str:
     """The page as text. Frames are thinned to at most 30 a second: the page blends between them.
 
     `known` has one entry for each figure, and is drawn over it. Inside another page's frame, a
-    message `{seek: seconds}` sets the time, and messages `{time: seconds}` tell it.
+    message `{seek: seconds}` sets the time, and messages `{time: seconds}` tell it. A `live` page
+    asks its server for coordinates (`/live`, `live.js`) instead.
     """
     scene = build_scene(figures, max_fps=30.0)
     meshes: dict[bytes, dict[str, Any]] = {}
@@ -75,7 +81,7 @@ def page(
     }
     # A browser needs Tab to get from control to control, and closes its own windows.
     keys = [(c.label, c.words) for c in CONTROLS if not {"tab", "escape"} & c.keys.keys()]
-    return REPLAY.render(
+    return (_LIVE if live else REPLAY).render(
         title=title,
         data=data,
         speeds=SPEEDS,

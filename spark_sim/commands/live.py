@@ -2,9 +2,14 @@
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from spark_sim.commands.options import add_force
 
+if TYPE_CHECKING:
+    from spark_sim.live.viewer import Viewer
+
+_INSIST = 1.0  # [s]: a second Ctrl-C later than this ends it at once
 SUMMARY = "let a robot follow a person who moves now"
 USAGE = "--from vmc://[HOST]:PORT --to ROBOT [--send udp://HOST:PORT] [--record NPZ] [--view]"
 DESCRIPTION = """\
@@ -93,13 +98,13 @@ def run(args: Namespace) -> int:
 
 def _follow(args: Namespace) -> int:
     import signal
+    import time
     from contextlib import ExitStack
 
     from spark_sim import console, files
     from spark_sim.live.listener import Listener
     from spark_sim.live.session import Session
     from spark_sim.live.sinks import sink
-    from spark_sim.live.viewer import Viewer
 
     record = None if args.record is None else Path(args.record)
     if record is not None:
@@ -113,11 +118,14 @@ def _follow(args: Namespace) -> int:
             console.note,
             sinks=[sink(address) for address in args.send],
             record=record,
-            view=Viewer() if args.view else None,
+            view=_viewer(args),
         )
 
+        asked: list[float] = []
+
         def stop(*_: object) -> None:
-            if session.stopping:  # asked twice: at once
+            asked.append(time.monotonic())
+            if asked[-1] - asked[0] > _INSIST:  # what is recorded stays in the part
                 raise KeyboardInterrupt
             session.stopping = True
 
@@ -130,6 +138,21 @@ def _follow(args: Namespace) -> int:
             session.run()
     console.say(session.summary())
     return 0
+
+
+def _viewer(args: Namespace) -> "Viewer | None":
+    if not (args.view or args.serve):
+        return None
+    from spark_sim import console
+    from spark_sim.commands.studio import address
+    from spark_sim.live.viewer import Viewer
+
+    if args.view:
+        return Viewer()
+    host, port = address(args.address or "localhost:8765")
+    made = Viewer((host, port))
+    console.say(f"http://{host}:{port}  (once a person is heard of)")
+    return made
 
 
 def _play(args: Namespace) -> int:

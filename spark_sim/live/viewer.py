@@ -2,6 +2,7 @@
 
 import multiprocessing
 import signal
+import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -17,7 +18,7 @@ from sim.body.qpos import qpos_from_motion
 from sim.trajectory import Subject, model_trajectory
 from sim.view.live import LivePlayer, Now
 from sim.view.scene import Figure
-from spark.errors import DependencyError
+from spark.errors import ConventionError, DependencyError
 from spark.motion import Motion
 from spark.rig.rig import understand
 from spark_sim.clips import Clip
@@ -30,12 +31,20 @@ _PATIENCE = 5.0  # [s] that a window may take to close
 class Viewer:
     """Shows person and robot of a session, in a window or, where there is an address, on a page.
 
-    Raises `DependencyError` where no window can be opened.
+    Raises `DependencyError` where no window can be opened, and `ConventionError` where the address
+    can't be served on.
     """
 
     def __init__(self, address: tuple[str, int] | None = None) -> None:
         if address is None and not has_display():
             raise DependencyError("there is no display to open a window on; use --serve")
+        if address is not None:
+            try:
+                with socket.create_server(address):
+                    pass
+            except (OSError, OverflowError) as error:
+                told = f"{address[0]}:{address[1]}: can't be served on ({error}); give another"
+                raise ConventionError(f"{told} --address HOST:PORT") from error
         self._address = address
         self._process: Any = None
         self._board: Board | None = None
@@ -113,8 +122,8 @@ class Board:
         return person[:3], person[3:].reshape(-1, 4), np.frombuffer(self.robot).copy(), words
 
 
-def live_player(motion: Motion, robot: str, board: Board) -> LivePlayer:
-    """Person and robot, as they stand on a board."""
+def live_player(motion: Motion, robot: str, board: Board) -> tuple[LivePlayer, list[Figure]]:
+    """Person and robot, as they stand on a board, and as they are drawn."""
     rig = understand(motion)
     person = model_trajectory(rig, motion)
     target = load_robot(robot)
@@ -127,12 +136,24 @@ def live_player(motion: Motion, robot: str, board: Board) -> LivePlayer:
         return Now((qpos_from_motion(person.model, moved, rig)[0], qpos), words)
 
     figures = [Figure(Subject(motion, rig, person), "person"), *target.figures()]
-    return LivePlayer(figures, newest)
+    return LivePlayer(figures, newest), figures
 
 
 def _show(motion: Motion, robot: str, board: Board, address: tuple[str, int] | None) -> None:
-    """What the process of the window does."""
-    from sim.view.window import open_window
+    """What the process of the window, or of the page, does."""
+    title = f"spark-sim live: {robot}"
+    player, figures = live_player(motion, robot, board)
+    if address is None:
+        from sim.view.window import open_window
 
-    with suppress(KeyboardInterrupt):
-        open_window(live_player(motion, robot, board), title=f"spark-sim live: {robot}")
+        with suppress(KeyboardInterrupt):
+            open_window(player, title=title)
+        return
+    from sim.view.page import page
+    from spark_sim.live.page import server
+
+    with (
+        suppress(KeyboardInterrupt),
+        server(address, page(figures, title=title, live=True), player) as made,
+    ):
+        made.serve_forever(poll_interval=0.1)
