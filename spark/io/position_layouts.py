@@ -253,3 +253,44 @@ _HOLOSOMA = _of_table(
     120.0,
     usual_up="z",
 )  # fmt: skip
+
+
+def layout_of_joints(name: str, points: tuple[str, ...], fps: float) -> Layout:
+    """A layout of some of SMPL's joints, each on the nearest one above it that is there.
+
+    The hips' middle is the pelvis where that is not there, and the shoulders' middle the chest and
+    the neck.
+    """
+    names, parents = joints_of(22)
+    above = {n: "" if p < 0 else names[p] for n, p in zip(names, parents, strict=True)}
+    means: dict[str, tuple[str, ...]] = {}
+    hints: dict[str, str] = {}
+    places = {joint: joint for joint in names}
+    if "pelvis" not in points:
+        means["pelvis"] = ("left_hip", "right_hip")
+        places["pelvis"] = "middle of hips"
+    shoulders = ("left_shoulder", "right_shoulder")
+    if all(joint in points for joint in shoulders):
+        for joint in {"spine3", "neck"}.difference(points):
+            means[joint] = shoulders
+            places[joint] = "middle of shoulders"
+            hints |= {"spine3": "pelvis"} if joint == "spine3" else {}
+    there = {*points, *means}
+
+    def parent(joint: str) -> str:
+        line = above[joint]
+        while line and line not in there:
+            line = above[line]
+        return line
+
+    kept = [joint for joint in names if joint in there]
+    return Layout(
+        name,
+        points,
+        {joint: parent(joint) for joint in kept},
+        {joint: _at(places[joint]) for joint in kept},
+        fps,
+        usual_up="z",
+        means=means,
+        hints=hints,
+    )

@@ -35,13 +35,12 @@ FBX = Format("FBX", (".fbx",), (*UNIT_AND_UP, "clip"), b"Kaydara FBX Binary")
 GLTF = Format("glTF", (".glb", ".gltf", ".vrm", ".vrma"), (*UNIT_AND_UP, "fps", "clip"), b"glTF")
 ACCLAIM = Format("ASF/AMC", (".amc", ".asf"), (*UNIT_AND_UP, "fps"))
 SMPL = Format("SMPL", (".npz", ".npy", ".pt", ".pth"), (*UNIT_AND_UP, "fps", "body_model"))
+C3D = Format("C3D", (".c3d",), (*UNIT_AND_UP, "fps"))
 POSITIONS = Format("positions", (".npz", ".npy"), (*UNIT_AND_UP, "fps"))
 
-FORMATS = (BVH, FBX, GLTF, ACCLAIM, SMPL, POSITIONS)
+FORMATS = (BVH, FBX, GLTF, ACCLAIM, C3D, SMPL, POSITIONS)
 SMPL_KEYS = KEYS | SIGNS
 _NOT_READ = {
-    ".c3d": "C3D holds markers; expected joints: export BVH or FBX from the program that solved "
-    "them, or joint centres as an npz with 'positions' and 'names'",
     ".trc": "TRC holds markers; expected joints: export BVH or FBX, or joint centres as an npz "
     "with 'positions' and 'names'",
     ".mvnx": "MVNX is not read; export BVH or FBX from Xsens MVN",
@@ -132,6 +131,10 @@ def _reader(known: Format) -> Reader:
         from spark.io.acclaim import read_acclaim
 
         return read_acclaim
+    if known is C3D:
+        from spark.io.c3d import read_c3d
+
+        return read_c3d
     if known is SMPL:
         from spark.io.smpl import read_smpl
 
