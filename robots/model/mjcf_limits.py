@@ -16,8 +16,8 @@ from pathlib import Path
 from spark.errors import FileFormatError
 
 _ELEMENTS = 20_000  # after copying; compiled in seconds
-_DEPTH = 200  # bodies in bodies
-_JOINTS = 2_000  # MuJoCo's matrices grow with their square
+DEPTH = 200  # bodies in bodies
+_JOINTS = 1_000  # the work on them grows with their square
 _KEYED = 5_000_000  # keyframes times elements: numbers of all of them together
 _PIXELS = 64 << 20  # of textures and height fields together
 _FILE = 256 << 20  # bytes of a mesh, or what else a model loads
@@ -77,8 +77,8 @@ class _Counter:
         waiting = [(root, 1.0, 0)]
         while waiting:
             element, copies, depth = waiting.pop()
-            if depth > _DEPTH:
-                raise FileFormatError(self.path, None, f"nests elements deeper than {_DEPTH}")
+            if depth > DEPTH:
+                raise FileFormatError(self.path, None, f"nests elements deeper than {DEPTH}")
             if element.tag == "attach":
                 more, moving = self._of_attached(files, element.get("model", ""))
                 elements, joints = elements + copies * more, joints + copies * moving

@@ -4,7 +4,7 @@ Real hinges miss each other by centimetres and are anchored anywhere along their
 centre is the point nearest to all of its axes.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -177,6 +177,9 @@ def _centers(tree: Tree, groups: Sequence[tuple[int, ...]]) -> list[Float[np.nda
     }
     of_joint = {j: g for g, group in enumerate(groups) for j in group}
     above = [of_joint.get(int(tree.parents[group[0]]), -1) for group in groups]
+    below: dict[int, list[int]] = {}
+    for g, up in enumerate(above):
+        below.setdefault(up, []).append(g)
     centers = []
     for g, group in enumerate(groups):
         if g in fixed:
@@ -185,8 +188,8 @@ def _centers(tree: Tree, groups: Sequence[tuple[int, ...]]) -> list[Float[np.nda
         up = above[g]
         while up >= 0 and up not in fixed:
             up = above[up]
-        known = [fixed[up]] if up >= 0 else _fixed_below(-1, above, fixed, but=g)
-        known += _fixed_below(g, above, fixed)
+        known = [fixed[up]] if up >= 0 else _fixed_below(-1, below, fixed, but=g)
+        known += _fixed_below(g, below, fixed)
         anchor, axis = tree.anchors[group[0]], tree.axes[group[0]]
         middle = np.mean(known, axis=0) if known else anchor
         centers.append(anchor + axis * (axis @ (middle - anchor)))
@@ -194,15 +197,17 @@ def _centers(tree: Tree, groups: Sequence[tuple[int, ...]]) -> list[Float[np.nda
 
 
 def _fixed_below(
-    g: int, above: Sequence[int], fixed: dict[int, Float[np.ndarray, "3"]], but: int | None = None
+    g: int,
+    below: Mapping[int, Sequence[int]],
+    fixed: dict[int, Float[np.ndarray, "3"]],
+    but: int | None = None,
 ) -> list[Float[np.ndarray, "3"]]:
     """The middle of the nearest groups below g whose centres are known; nothing without any."""
     found = []
     waiting = [g]
     while waiting:
-        group = waiting.pop()
-        for child, parent in enumerate(above):
-            if parent != group or child == but:
+        for child in below.get(waiting.pop(), ()):
+            if child == but:
                 continue
             if child in fixed:
                 found.append(fixed[child])

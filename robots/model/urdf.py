@@ -13,8 +13,9 @@ import mujoco
 import numpy as np
 
 from robots.model.meshes import as_obj
+from robots.model.mjcf_limits import DEPTH, check_limits
 from spark.errors import FileFormatError, SkeletonError, name_list
-from spark.opening import LARGEST_TEXT, read_bytes
+from spark.opening import LARGEST_TEXT, beginning, read_bytes
 from spark.summary import counted
 
 SUFFIX = ".urdf"
@@ -27,7 +28,7 @@ _COMPILER = {
 _TYPICAL_RADIUS = 0.05  # [m]
 _BEGINNING = 4096  # bytes that tell an MJCF from a URDF
 _MOVING = ("revolute", "continuous", "prismatic")
-_LEAST = 1e-10  # [kg m²] of a principal moment
+_LEAST, _MOST = 1e-10, 1e12  # [kg m²] of a principal moment
 _LOCKED = 1e-6  # [rad] MuJoCo ignores limits without a range, and the joint would turn freely
 
 
@@ -35,10 +36,7 @@ def is_urdf(path: Path) -> bool:
     """Whether a model is URDF: by its ending, or by what it begins with."""
     if path.suffix.lower() == SUFFIX:
         return True
-    if not path.is_file():
-        return False
-    with path.open("rb") as file:
-        return bool(re.search(rb"<robot[\s>]", file.read(_BEGINNING)))
+    return bool(re.search(rb"<robot[\s>]", beginning(path, _BEGINNING)))
 
 
 def read_urdf(path: Path, notes: list[str], *, visuals: bool = True) -> tuple[mujoco.MjSpec, str]:
@@ -60,6 +58,7 @@ def read_urdf(path: Path, notes: list[str], *, visuals: bool = True) -> tuple[mu
         raise FileFormatError(
             path, None, "holds xacro macros; expand them first: xacro FILE > robot.urdf"
         )
+    check_limits(path, robot, {})
     _check_tree(robot, path)
     for element in [e for e in robot if e.tag not in ("link", "joint", "material")]:
         robot.remove(element)  # transmissions, sensors of simulators, other settings of MuJoCo's
@@ -91,7 +90,7 @@ def read_urdf(path: Path, notes: list[str], *, visuals: bool = True) -> tuple[mu
 
 def _check_tree(robot: ET.Element, path: Path) -> None:
     """Raise where joints name links that are not there, or go round in a circle."""
-    links = [link.get("name", "") for link in robot.findall("link")]
+    links = {link.get("name", "") for link in robot.findall("link")}
     parents: dict[str, str] = {}
     for joint in robot.findall("joint"):
         name = joint.get("name")
@@ -112,6 +111,8 @@ def _check_tree(robot: ET.Element, path: Path) -> None:
             if above in seen:
                 raise SkeletonError(f"{path}: the links {name_list(sorted(seen))} hang in a circle")
             seen.add(above)
+        if len(seen) > DEPTH:
+            raise FileFormatError(path, None, f"nests links deeper than {DEPTH}")
 
 
 def _mend_inertia(link: ET.Element) -> bool:
@@ -132,8 +133,8 @@ def _mend_inertia(link: ET.Element) -> bool:
     if mass <= 0:
         link.remove(inertial)
         return mass < 0
-    least = np.linalg.eigvalsh([[x, xy, xz], [xy, y, yz], [xz, yz, z]])[0]
-    if np.isfinite(least) and least > _LEAST:
+    tensor = np.array([[x, xy, xz], [xy, y, yz], [xz, yz, z]])
+    if (np.abs(tensor) < _MOST).all() and np.linalg.eigvalsh(tensor)[0] > _LEAST:
         return False
     inertia = inertial.find("inertia")
     assert inertia is not None

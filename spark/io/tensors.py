@@ -59,7 +59,9 @@ class Tensor:
         """The numbers. Raises `FileFormatError` where the file does not hold them."""
         with zipfile.ZipFile(self.path) as stored:
             member = _member(stored, f"data/{self.storage}", self.path)
-            flat = np.frombuffer(_unpacked(stored, member, self.path), self.dtype)
+            data = _unpacked(stored, member, self.path)
+        kind = np.dtype(self.dtype)
+        flat = np.frombuffer(data, kind, count=len(data) // kind.itemsize)
         last = self.offset + sum((n - 1) * s for n, s in zip(self.shape, self.strides, strict=True))
         if 0 in self.shape:
             return np.zeros(self.shape, self.dtype)

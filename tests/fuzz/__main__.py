@@ -1,7 +1,8 @@
 """`python -m tests.fuzz [FORMAT ...]`: spoilt files of each format for a while.
 
 Led by coverage where atheris is installed, else by hypothesis, which also makes what it finds
-small. Every format has a process of its own; what it finds lies in `out/fuzz/` afterwards.
+small. `--blind` spoils by chance alone, as fast as files are read, and goes on after what it finds:
+for nights. Every format has a process of its own; what it finds lies in `out/fuzz/` afterwards.
 """
 
 import argparse
@@ -13,13 +14,14 @@ import traceback
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
+from random import Random
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 
-from tests.fuzz.spoil import changes, numbers, spoilt
+from tests.fuzz.spoil import by_chance, changes, numbers, spoilt
 
 _AT_ONCE = 500  # cases of hypothesis
 
@@ -33,6 +35,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, default=Path("out/fuzz"))
     parser.add_argument("--hypothesis", action="store_true", help="even where atheris is installed")
+    parser.add_argument("--blind", action="store_true", help="by chance alone: for nights")
     parser.add_argument("--one", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.one:
@@ -58,7 +61,7 @@ def _one(args: argparse.Namespace) -> int:
     folder = args.out / args.one
     corpus = folder / "corpus"
     corpus.mkdir(parents=True, exist_ok=True)
-    led = not args.hypothesis and find_spec("atheris") is not None
+    led = not (args.hypothesis or args.blind) and find_spec("atheris") is not None
     if led:
         import atheris
 
@@ -71,7 +74,7 @@ def _one(args: argparse.Namespace) -> int:
     with TemporaryDirectory() as scratch:
         seeds = target.seeds(Path(scratch))
         path = Path(scratch) / f"case{target.ending}"
-        began, cases = time.monotonic(), 0
+        began, cases, found = time.monotonic(), 0, 0
 
         def use(data: bytes) -> None:
             nonlocal cases
@@ -80,12 +83,23 @@ def _one(args: argparse.Namespace) -> int:
             try:
                 case.judge(target, path)
             except BaseException as error:
-                (folder / f"found{target.ending}").write_bytes(data)
-                (folder / "found.txt").write_text("".join(traceback.format_exception(error)))
+                name = f"found{found or ''}"
+                (folder / f"{name}{target.ending}").write_bytes(data)
+                (folder / f"{name}.txt").write_text("".join(traceback.format_exception(error)))
                 raise
 
         for seed in seeds:
             use(seed)
+        if args.blind:
+            random, until = Random(args.seed), began + args.seconds
+            while cases < args.cases and time.monotonic() < until:
+                try:
+                    use(by_chance(random.choice(seeds), random))
+                except Exception:
+                    found += 1
+            took = time.monotonic() - began
+            print(f"{args.one}: {cases} cases in {took:.0f} s, by chance; {found} found")
+            return 1 if found else 0
         if led:
             for k, data in enumerate(seeds):
                 (corpus / f"seed{k}").write_bytes(data)

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from spark.errors import SparkSimError
-from tests.fuzz.targets import Target
+from tests.fuzz.target import Target
 
 SECONDS = 5.0  # of the processor
 MEMORY = 300e6  # bytes, and ten times the file

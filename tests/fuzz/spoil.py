@@ -1,6 +1,9 @@
 """Good files spoilt: bytes changed at random, and numbers that no one meant."""
 
+import io
 import re
+import zipfile
+from random import Random
 
 from hypothesis import strategies as st
 
@@ -32,3 +35,27 @@ def spoilt(
 
 changes = st.one_of(st.just([]), edits)
 """None where numbers alone are spoilt: the file is still one of its format."""
+
+
+def by_chance(data: bytes, random: Random) -> bytes:
+    """The file spoilt as `spoilt` does it, by chance alone: ten times as fast as hypothesis. Of
+    every second archive the members are spoilt, whose checksums would else tell of any change."""
+    if data.startswith(b"PK") and random.random() < 0.5:
+        return _with_members(data, random)
+    values = [(random.randrange(1 << 20), random.choice(_ODD)) for _ in range(random.randrange(5))]
+    edits = [
+        (random.choice("xdic"), random.randrange(1 << 20), random.randrange(256))
+        for _ in range(random.choice((0, 0, 1, 2, 4)))
+    ]
+    return spoilt(data, values, edits)
+
+
+def _with_members(data: bytes, random: Random) -> bytes:
+    out = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(data)) as old, zipfile.ZipFile(out, "w") as new:
+        names = old.namelist()
+        chosen = random.choice(names)
+        for name in names:
+            member = old.read(name)
+            new.writestr(name, by_chance(member, random) if name == chosen else member)
+    return out.getvalue()

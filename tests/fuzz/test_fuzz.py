@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from tests.fuzz import case
 from tests.fuzz.case import OverBoundError, judge
 from tests.fuzz.spoil import changes, numbers, spoilt
-from tests.fuzz.targets import FORMATS, Target, finite
+from tests.fuzz.target import Target, finite
+from tests.fuzz.targets import FORMATS
 
 Edits = list[tuple[str, int, int]]
 
