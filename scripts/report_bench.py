@@ -16,7 +16,7 @@ from tqdm import tqdm
 
 from scripts.corruptions import CORRUPTIONS, HARMLESS
 from sim.report import Report, Subject, assess
-from sim.report.clip_poses import pose_clip
+from sim.report.course import course_of
 from sim.report.names import FLAGS
 from sim.report.thresholds import PLAUSIBILITY_V2
 from spark.constants import GRAVITY
@@ -97,7 +97,7 @@ def clips(data: Path) -> Iterator[tuple[str, Motion, Rig]]:
                 motion = read_recording(path).motion
                 motion = motion.frames(0, int(SECONDS / motion.frame_time))
                 rig = understand(motion)
-                lowest = pose_clip(Subject(motion, rig)).lowest_corner
+                lowest = course_of(Subject(motion, rig)).lowest[:, 2]
             except SparkSimError as error:
                 print(f"left out: {error}", file=sys.stderr)
                 continue

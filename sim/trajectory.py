@@ -1,6 +1,6 @@
 """A motion on a body: on a MuJoCo model that exists already, or on one that is built from a rig."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -38,6 +38,13 @@ class Subject:
     motion: Motion
     rig: Rig
     body: ModelTrajectory | None = None
+
+    def picked(self, span: slice) -> "Subject":
+        """The frames of a slice."""
+        body = self.body
+        if body is not None:
+            body = replace(body, qpos=body.qpos[span])
+        return replace(self, motion=self.motion.picked(span), body=body)
 
 
 def model_trajectory(rig: Rig, motion: Motion) -> ModelTrajectory:

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from sim.report.clip_metrics import ClipMetrics
-from sim.report.clip_poses import ClipPoses, pose_clip
+from sim.report.clip_poses import pose_clip
 from sim.report.limits import limited_joint
 from sim.report.names import FLAGS, LABELS
 from sim.report.palette import CORNER_COLORS
@@ -14,29 +14,40 @@ from sim.report.result import Finding
 from sim.trajectory import Subject
 from sim.view.annotations import Annotations
 from sim.view.timeline import Event
+from spark.blocks import in_blocks
 
 _STANDS, _SLIDES, _SINKS = range(1, 4)  # states of a corner, in the order of `CORNER_COLORS`
 
 
 def annotate(clip: ClipMetrics, subject: Subject, findings: Sequence[Finding] = ()) -> Annotations:
     """What `assess` measured of `subject`, frame by frame, and its findings."""
-    poses = pose_clip(subject)
     step = clip.frame_time
     limits = [
-        (limit, joint) for limit in clip.limits if (joint := _joint(poses, limit.joint)) is not None
+        (limit, joint)
+        for limit in clip.limits
+        if (joint := _joint(subject, limit.joint)) is not None
     ]
+    joints = [joint for _, joint in limits]
+
+    def places(block: slice) -> Float[np.ndarray, "T N 3"]:
+        poses = pose_clip(subject.picked(block))
+        parts = [poses.mass.com[:, None], poses.positions[:, joints], poses.corners]
+        return np.concatenate(parts, axis=1)
+
+    found = in_blocks(places, len(clip))
+    corners = found[:, 1 + len(joints) :]
     at_limit = [(limit.beyond > -clip.thresholds.limit_margin).any(axis=1) for limit, _ in limits]
     flags = {LABELS[name]: clip.flags[name] for name in FLAGS}
     flags[LABELS["joint_limit"]] = _any([limit.excess > 0 for limit in clip.limits], len(clip))
     flags[LABELS["self_penetration"]] = clip.self_penetration
     return Annotations(
         frame_time=step,
-        corners=poses.corners,
-        states=corner_states(clip, poses.corners),
+        corners=corners,
+        states=corner_states(clip, corners),
         corner_states=tuple(CORNER_COLORS.items()),
-        com=poses.mass.com,
+        com=found[:, 0],
         support_height=clip.floor_z + clip.thresholds.contact_height,
-        joints=poses.positions[:, [joint for _, joint in limits]],
+        joints=found[:, 1 : 1 + len(joints)],
         joint_names=tuple(limit.joint for limit, _ in limits),
         at_limit=np.array(at_limit, dtype=bool).reshape(len(limits), len(clip)).T,
         flags=flags,
@@ -68,11 +79,11 @@ def _any(masks: list[Bool[np.ndarray, "T E"]], frames: int) -> Bool[np.ndarray, 
     return np.any([mask.any(axis=1) for mask in masks] or [np.zeros(frames, bool)], axis=0)
 
 
-def _joint(poses: ClipPoses, name: str) -> int | None:
+def _joint(subject: Subject, name: str) -> int | None:
     """The rig's joint where a joint with limits is; of a model, the one whose part carries it."""
-    if poses.body is None:
-        return limited_joint(poses.rig, name)
-    model, names = poses.body.model, poses.rig.skeleton.names
+    if subject.body is None:
+        return limited_joint(subject.rig, name)
+    model, names = subject.body.model, subject.rig.skeleton.names
     known = {model.joint(j).name: int(model.jnt_bodyid[j]) for j in range(model.njnt)}
     body = known.get(name, 0)
     while body > 0 and model.body(body).name not in names:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from sim.report.clip_metrics import ClipMetrics, measure
-from sim.report.clip_poses import ClipPoses, pose_clip
+from sim.report.clip_metrics import ClipMetrics
+from sim.report.course import Course, course_of
 from sim.report.findings import findings_of
 from sim.report.measures import (
     ContactMatch,
@@ -17,6 +17,7 @@ from sim.report.measures import (
     root_drift,
 )
 from sim.report.report import Report
+from sim.report.stretches import measure_clip
 from sim.report.swing import swing_of
 from sim.report.thresholds import PLAUSIBILITY_V2
 from sim.report.truth import accuracy
@@ -24,7 +25,7 @@ from sim.trajectory import Subject
 from spark.errors import SkeletonError
 from spark.motion import Motion
 from spark.resample import values_at
-from spark.rig.contacts import planted_feet
+from spark.rig.contacts import planted_points
 from spark.rig.rig import Rig
 from spark.transfer.leg_fit import travel_scale
 
@@ -49,32 +50,32 @@ def assess(
     on another skeleton or has other frames.
     """
     motion, rig = subject.motion, subject.rig
-    clip_poses = _pose("the motion", subject)
+    course = _course("the motion", subject)
     known = None if truth is None else accuracy(motion, truth, rig)
-    notes = _about_model(clip_poses)
+    notes = _about_model(course)
     if source is None:
-        clip = measure(clip_poses, _own_floor(clip_poses))
+        clip = measure_clip(subject, _own_floor(course))
         if subject.body is None:
             notes = (
                 "the floor is the clip's own: one that floats or sinks as a whole can't be told",
             )
-        notes += _slope(clip_poses, "the")
+        notes += _slope(course, "the")
         return Report(clip, None, None, None, findings_of(clip), notes, known)
-    source_poses = _pose("the source", source)
-    source_floor = _own_floor(source_poses)
+    source_course = _course("the source", source)
+    source_floor = _own_floor(source_course)
     floor = 0.0
     if subject.body is None:
-        floor, notes = _floor_from_source(clip_poses, source_poses.rig, source_floor)
-    source_clip = measure(source_poses, source_floor)
-    times = np.arange(len(clip_poses)) * motion.frame_time
-    scale = rig.hip_height / source_poses.rig.hip_height
-    clip = _beyond_source(measure(clip_poses, floor), source_clip, times, scale)
-    travel = scale if subject.body is not None else travel_scale(source_poses.rig, rig)
-    drift = _drift(clip_poses, source_poses, times, travel)
+        floor, notes = _floor_from_source(course, source.rig, source_floor)
+    source_clip = measure_clip(source, source_floor)
+    times = np.arange(len(course)) * motion.frame_time
+    scale = rig.hip_height / source.rig.hip_height
+    clip = _beyond_source(measure_clip(subject, floor), source_clip, times, scale)
+    travel = scale if subject.body is not None else travel_scale(source.rig, rig)
+    drift = _drift(course, source_course, times, travel)
     swing = swing_of(clip, source_clip, times, scale)
     contacts = _contacts(clip, source_clip, times)
-    notes += _slope(source_poses, "the source's")
-    notes += _pace(motion, source_poses.motion)
+    notes += _slope(source_course, "the source's")
+    notes += _pace(motion, source.motion)
     thrown = scale * source_clip.base_acceleration_p99
     findings = findings_of(clip, drift, swing, thrown)
     return Report(clip, source_clip, drift, contacts, findings, notes, known, swing, scale)
@@ -96,22 +97,22 @@ def _pace(motion: Motion, source: Motion) -> tuple[str, ...]:
     return (note,)
 
 
-def _pose(name: str, subject: Subject) -> ClipPoses:
+def _course(name: str, subject: Subject) -> Course:
     if not len(subject.motion):
         raise SkeletonError(f"{name} has no frames: nothing to assess")
-    return pose_clip(subject)
+    return course_of(subject)
 
 
-def _about_model(poses: ClipPoses) -> tuple[str, ...]:
+def _about_model(course: Course) -> tuple[str, ...]:
     """Notes where a model has nothing that collides, and where its floor seems to be elsewhere."""
-    body, notes = poses.body, []
+    body, notes = course.subject.body, []
     if body is None:
         return ()
     own = body.model.body_rootid[body.model.geom_bodyid] == body.root
     if not ((body.model.geom_contype | body.model.geom_conaffinity)[own] != 0).any():
         notes.append("none of the model's shapes collide: self-penetration is not measured")
-    height = floor_height(poses.lowest_corner)
-    if abs(height) > PLAUSIBILITY_V2.scaled(poses.rig.hip_height).penetration:
+    height = floor_height(course.lowest[:, 2])
+    if abs(height) > PLAUSIBILITY_V2.scaled(course.rig.hip_height).penetration:
         notes.append(
             f"the model's floor is at z = 0; the clip's own (the 5th percentile of its lowest sole "
             f"point) is {100 * abs(height):.1f} cm {'above' if height > 0 else 'below'} that"
@@ -119,17 +120,17 @@ def _about_model(poses: ClipPoses) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _own_floor(poses: ClipPoses) -> float:
-    return floor_height(poses.lowest_corner) if poses.body is None else 0.0
+def _own_floor(course: Course) -> float:
+    return floor_height(course.lowest[:, 2]) if course.subject.body is None else 0.0
 
 
 def _floor_from_source(
-    poses: ClipPoses, source_rig: Rig, source_floor: float
+    course: Course, source_rig: Rig, source_floor: float
 ) -> tuple[float, tuple[str, ...]]:
-    scaled = source_floor * poses.rig.hip_height / source_rig.hip_height
+    scaled = source_floor * course.rig.hip_height / source_rig.hip_height
     if abs(source_floor) < _MAX_FLOOR_OFFSET * source_rig.hip_height:
         return scaled, ()
-    own = floor_height(poses.lowest_corner)
+    own = floor_height(course.lowest[:, 2])
     floor = min((0.0, scaled, source_floor), key=lambda z: abs(z - own))
     return floor, (
         f"the source's floor is at z = {source_floor:.2f} m; for the motion it is taken to be at "
@@ -149,13 +150,11 @@ def _beyond_source(
     return replace(clip, self_depth=np.maximum(depth, 0.0))
 
 
-def _drift(
-    poses: ClipPoses, source: ClipPoses, times: Float[np.ndarray, "T"], scale: float
-) -> Drift:
+def _drift(course: Course, source: Course, times: Float[np.ndarray, "T"], scale: float) -> Drift:
     at = times / source.motion.frame_time
     return root_drift(
-        poses.hips,
-        poses.heading,
+        course.hips,
+        course.heading,
         values_at(source.hips, at),
         values_at(source.heading, at),
         scale,
@@ -174,12 +173,12 @@ def _contacts(
     )
 
 
-def _slope(poses: ClipPoses, whose: str) -> tuple[str, ...]:
+def _slope(course: Course, whose: str) -> tuple[str, ...]:
     """A note where the feet stand on a slope: recorded floors are off level by a degree or two."""
-    lowest = poses.corners[np.arange(len(poses)), poses.corners[..., 2].argmin(axis=1)]
-    planted = planted_feet(poses.rig, poses.positions, poses.motion.frame_time).any(axis=1)
-    angle, rise = floor_slope(lowest[planted])
-    if rise < PLAUSIBILITY_V2.scaled(poses.rig.hip_height).floating / 2:
+    rig, step = course.rig, course.motion.frame_time
+    planted = planted_points(course.feet, step, rig.standing_height).any(axis=1)
+    angle, rise = floor_slope(course.lowest[planted])
+    if rise < PLAUSIBILITY_V2.scaled(rig.hip_height).floating / 2:
         return ()
     return (
         f"{whose} floor slopes by {np.degrees(angle):.1f}°: the feet stand {100 * rise:.0f} cm "

@@ -37,7 +37,7 @@ class ClipMetrics:
     floor can't give.
     `imbalance` [m]: how far the centre of mass lies outside the support; nan in frames that move.
     `self_depth` [m]: how deep the parts of each of `self_pairs` are in each other; more than
-    `self_bound` is too deep.
+    `self_bound` is too deep. Pairs that never are have no column.
     `joint_speed` [rad/s], `joint_jerk` [rad/s³]: of the joints `joint_names`.
     """
 

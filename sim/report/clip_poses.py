@@ -15,7 +15,7 @@ from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig.feet import Sole, sole_positions
 from spark.rig.rig import Rig
-from spark.rotation import quat_conj, quat_mul, yaw_from_quat
+from spark.rotation import quat_conj, quat_mul
 
 # They have soles, or lie inside other flesh.
 _NO_FLESH = ("foot", "toe", "clavicle")
@@ -29,10 +29,9 @@ class ClipPoses:
     what else may touch the floor, of the parts `part_names`: the other joints with a role, inside
     spheres of flesh of `part_radii` [m], or the lowest points of a model's own geoms (radius 0).
     `carriers` are the model's bodies that corners and parts belong to; none without a model.
-    `hips` is the middle of the hip joints, `heading` [rad] the pelvis's turn about Z since the
-    T-pose, without jumps. `positions` and `rotations` are those of the joints as `forward` gives
-    them, `since_tpose` their rotations G since the T-pose in world axes. `model_poses` are those of
-    `body`, where the motion has a model.
+    `hips` is the middle of the hip joints. `positions` and `rotations` are those of the joints as
+    `forward` gives them, `since_tpose` their rotations G since the T-pose in world axes.
+    `model_poses` are those of `body`, where the motion has a model.
     """
 
     motion: Motion
@@ -45,7 +44,6 @@ class ClipPoses:
     carriers: Int[np.ndarray, "N"]
     mass: Mass
     hips: Float[np.ndarray, "T 3"]
-    heading: Float[np.ndarray, "T"]
     positions: Float[np.ndarray, "T J 3"]
     rotations: Float[np.ndarray, "T J 4"]
     since_tpose: Float[np.ndarray, "T J 4"]
@@ -55,11 +53,6 @@ class ClipPoses:
     def __len__(self) -> int:
         return len(self.hips)
 
-    @property
-    def lowest_corner(self) -> Float[np.ndarray, "T"]:
-        """Height [m, world] of the lowest sole corner in each frame."""
-        return self.corners[..., 2].min(axis=1)
-
 
 def pose_clip(subject: Subject) -> ClipPoses:
     """Pose a motion frame by frame, on its model where it has one.
@@ -68,6 +61,7 @@ def pose_clip(subject: Subject) -> ClipPoses:
     another number of frames.
     """
     motion, rig, body = subject.motion, subject.rig, subject.body
+    check_frames(subject)
     positions, rotations = forward(motion)
     since_tpose = quat_mul(rotations, quat_conj(rig.tpose))
     if body is None:
@@ -75,15 +69,11 @@ def pose_clip(subject: Subject) -> ClipPoses:
         part_names, part_points, part_radii = _flesh(rig, positions)
         part_bodies: tuple[int, ...] = ()
     else:
-        if len(body.qpos) != len(motion):
-            raise SkeletonError(
-                f"the body has {len(body.qpos)} frames, the motion {len(motion)}; expected as many"
-            )
         model_poses = pose_model(body)
         mass = model_mass(body, model_poses)
         part_names, part_points, part_bodies = lowest_points(body, model_poses, _feet_of(body, rig))
         part_radii = np.zeros(len(part_names))
-    soles = _soles(rig)
+    soles = soles_of(rig)
     corner_feet = tuple(f"{sole.side} foot" for sole in soles for _ in sole.joints)
     corner_bodies = [] if body is None else _bodies_of(body, rig, soles)
     corners = np.concatenate([sole_positions(s, positions, rotations) for s in soles], axis=1)
@@ -98,13 +88,30 @@ def pose_clip(subject: Subject) -> ClipPoses:
         carriers=np.array([*corner_bodies, *part_bodies], dtype=int),
         mass=mass,
         hips=positions[:, rig.hips].mean(axis=1),
-        heading=np.unwrap(yaw_from_quat(since_tpose[:, rig.pelvis])),
         positions=positions,
         rotations=rotations,
         since_tpose=since_tpose,
         body=body,
         model_poses=model_poses,
     )
+
+
+def check_frames(subject: Subject) -> None:
+    """Raise SkeletonError where a subject's body has another number of frames than its motion."""
+    motion, body = subject.motion, subject.body
+    if body is not None and len(body.qpos) != len(motion):
+        raise SkeletonError(
+            f"the body has {len(body.qpos)} frames, the motion {len(motion)}; expected as many"
+        )
+
+
+def soles_of(rig: Rig) -> tuple[Sole, ...]:
+    """The soles that a rig stands on. Raises SkeletonError where it has none."""
+    if not rig.soles:
+        raise SkeletonError(
+            "the body has no foot: floor contact can't be measured; name its feet in a role map"
+        )
+    return rig.soles
 
 
 def _flesh(
@@ -119,15 +126,6 @@ def _flesh(
     radii = rig.standing_height * np.array([RADII[role.part] for _, role in others])
     names = tuple(role.replace("_", " ") for _, role in others)
     return names, positions[:, [j for j, _ in others]], radii
-
-
-def _soles(rig: Rig) -> tuple[Sole, ...]:
-    soles = rig.soles
-    if not soles:
-        raise SkeletonError(
-            "the body has no foot: floor contact can't be measured; name its feet in a role map"
-        )
-    return soles
 
 
 def _bodies_of(body: ModelTrajectory, rig: Rig, soles: tuple[Sole, ...]) -> list[int]:

@@ -89,7 +89,8 @@ def capsules(poses: ClipPoses) -> Capsules:
 def self_penetration(
     body: Capsules,
 ) -> tuple[tuple[tuple[str, str], ...], Float[np.ndarray, "T K"]]:
-    """The pairs of parts that are no neighbours, and how deep each is in the other [m]; 0 apart."""
+    """The pairs of parts that are no neighbours and in each other in some frame, and how deep [m];
+    0 apart."""
     names = body.names
     pairs = [
         (a, b)
@@ -100,7 +101,8 @@ def self_penetration(
     first, second = [a for a, _ in pairs], [b for _, b in pairs]
     gap = segment_distance(body.ends[:, first], body.ends[:, second])
     depth = np.maximum(body.radii[first] + body.radii[second] - gap, 0.0)
-    return tuple((names[a], names[b]) for a, b in pairs), depth
+    meet = np.flatnonzero(depth.any(axis=0))
+    return tuple((names[a], names[b]) for a, b in (pairs[k] for k in meet)), depth[:, meet]
 
 
 def segment_distance(

@@ -6,8 +6,9 @@ from itertools import zip_longest
 import numpy as np
 from jaxtyping import Float
 
+from spark.blocks import in_blocks
 from spark.errors import SkeletonError
-from spark.evaluation.metrics import san_height, score
+from spark.evaluation.metrics import san_height
 from spark.motion import Motion
 from spark.network.features import body_features
 from spark.rig.rig import Rig
@@ -40,12 +41,21 @@ def accuracy(motion: Motion, truth: Motion, rig: Rig) -> Accuracy:
             f"the ground truth has {len(truth)} frames at {truth.fps:.4g} fps, the motion "
             f"{len(motion)} at {motion.fps:.4g}; expected the same frames: resample one of them"
         )
-    own, theirs = to_canonical(motion, rig), to_canonical(truth, rig)
-    result = score(own, theirs)
-    joints = body_features(rig).joints
-    away = (canonical_positions(own) - canonical_positions(theirs))[:, joints]
-    errors = 100 * np.linalg.norm(away, axis=-1).mean(axis=1) / san_height(rig)
-    return Accuracy(result.mse, result.relative_mse, result.mpjpe, errors)
+    joints, height = body_features(rig).joints, san_height(rig)
+
+    def apart(block: slice) -> Float[np.ndarray, "T 3"]:
+        own, theirs = (
+            canonical_positions(to_canonical(each.picked(block), rig)) for each in (motion, truth)
+        )
+        away = (own - theirs) / height
+        relative = away - away[:, [rig.pelvis]]
+        away, relative = away[:, joints], relative[:, joints]
+        means = [(away**2).mean((1, 2)), (relative**2).mean((1, 2))]
+        return np.column_stack([*means, np.linalg.norm(away, axis=-1).mean(axis=1)])
+
+    found = in_blocks(apart, len(motion))
+    mse, relative_mse, mpjpe = found.mean(axis=0).tolist()
+    return Accuracy(mse, relative_mse, 100 * mpjpe, 100 * found[:, 2])
 
 
 def _check_skeletons(motion: Motion, truth: Motion, rig: Rig) -> None:

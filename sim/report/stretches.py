@@ -1,0 +1,85 @@
+"""Long clips measured a stretch at a time: what poses and forces take in between is the same for an
+hour as for a minute, and each measure comes out as of the whole."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from sim.report.clip_metrics import ClipMetrics, measure
+from sim.report.clip_poses import pose_clip
+from sim.report.thresholds import PLAUSIBILITY_V2
+from sim.trajectory import Subject
+from spark.blocks import blocks
+
+# Velocities are taken over a window, of cubic splines, which frames bend less and less: one so far
+# away by less than rounding does (0.27 to this power).
+_SPLINE = 32  # frames
+_ROWS = (
+    *("depth", "clearance", "corner_skates", "corner_speeds", "sole_heights", "sole_speeds"),
+    *("base_acceleration", "unexplained_wrench", "imbalance", "joint_speed", "joint_jerk"),
+)
+
+Name = tuple[Any, ...]
+Rows = dict[Name, np.ndarray]
+
+
+def measure_clip(subject: Subject, floor_z: float) -> ClipMetrics:
+    """The measures of a motion over a floor at `floor_z` [m]. Raises what `pose_clip` raises."""
+    count = len(subject.motion)
+    stretches = [*blocks(count)]
+    if len(stretches) == 1:
+        return measure(pose_clip(subject), floor_z)
+    margin = _margin(subject.motion.frame_time)
+    rows: Rows = {}
+    for block in stretches:
+        near = slice(max(block.start - margin, 0), min(block.stop + margin, count))
+        clip = measure(pose_clip(subject.picked(near)), floor_z)
+        own = slice(block.start - near.start, block.stop - near.start)
+        for name, values in _rows_of(clip):
+            if name not in rows:  # pages of zeros take no memory until something is written
+                rows[name] = np.zeros((count, *values.shape[1:]), values.dtype)
+            rows[name][block] = values[own]
+    return _with_rows(clip, rows)
+
+
+def _margin(frame_time: float) -> int:
+    """How many frames beside a stretch its measures depend on: those of the second derivative of a
+    first one, and of the least of a first one over `static_time`."""
+    limits = PLAUSIBILITY_V2
+    seconds = max(2 * limits.window, limits.window + limits.static_time)
+    return int(np.ceil(seconds / frame_time)) + 2 * _SPLINE
+
+
+def _rows_of(clip: ClipMetrics) -> Iterator[tuple[Name, np.ndarray]]:
+    """All that has a row for each frame, by name."""
+    yield from (((name,), getattr(clip, name)) for name in _ROWS)
+    yield from ((("flags", name), flag) for name, flag in clip.flags.items())
+    yield from ((("standing", foot), stands) for foot, stands in clip.standing.items())
+    yield from ((("limits", k), each.beyond) for k, each in enumerate(clip.limits))
+    yield from ((("torques", k), each.torque) for k, each in enumerate(clip.torques))
+    yield from (
+        (("self_pairs", pair), depth)
+        for pair, depth in zip(clip.self_pairs, clip.self_depth.T, strict=True)
+    )
+
+
+def _with_rows(clip: ClipMetrics, rows: Rows) -> ClipMetrics:
+    """The measures of one stretch with the rows of all; pairs of parts that no frame of the others
+    shows are added."""
+    of: dict[str, Any] = {name: rows[name,] for name in _ROWS}
+    pairs = tuple(key[1] for key in rows if key[0] == "self_pairs")
+    depth = [rows["self_pairs", pair] for pair in pairs]
+    return replace(
+        clip,
+        **of,
+        flags={name: rows["flags", name] for name in clip.flags},
+        standing={foot: rows["standing", foot] for foot in clip.standing},
+        limits=tuple(replace(each, beyond=rows["limits", k]) for k, each in enumerate(clip.limits)),
+        torques=tuple(
+            replace(each, torque=rows["torques", k]) for k, each in enumerate(clip.torques)
+        ),
+        self_pairs=pairs,
+        self_depth=np.stack(depth, axis=1) if depth else np.zeros((len(of["clearance"]), 0)),
+    )
