@@ -11,11 +11,13 @@ import numpy as np
 import orjson
 from jaxtyping import Float, Int
 
+from spark.errors import OutputError
 from spark.files import write_atomically
 
 VERTICES, ELEMENTS = 34962, 34963  # what a buffer's view is for
 _AXES = [1, 2, 0]  # ours that are glTF's X, Y, Z: left, up, ahead
 _FLOAT, _USHORT, _UINT = 5126, 5123, 5125
+_PLACED = ("translation", "rotation", "scale", "matrix")
 _KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 
 
@@ -36,10 +38,13 @@ class FileNumbers:
         self.data = bytearray()
         self.views: list[dict[str, Any]] = []
         self.accessors: list[dict[str, Any]] = []
+        self.finite = True
 
     def add(self, values: np.ndarray, *, target: int | None = None, bounds: bool = False) -> int:
         """The number of an accessor of floats, with its bounds where glTF wants them."""
-        floats = np.ascontiguousarray(values, dtype="<f4")
+        with np.errstate(over="ignore"):  # what single precision can't hold is told of below
+            floats = np.ascontiguousarray(values, dtype="<f4")
+        self.finite &= bool(np.isfinite(floats).all())
         wide = floats.reshape(len(floats), -1)
         accessor = {"componentType": _FLOAT, "count": len(wide), "type": _KINDS[wide.shape[1]]}
         if bounds:
@@ -78,7 +83,16 @@ class FileNumbers:
 
 
 def container(gltf: dict[str, Any], numbers: FileNumbers, path: Path) -> None:
-    """Write the JSON and the numbers as chunks of a GLB, each padded to four bytes."""
+    """Write the JSON and the numbers as chunks of a GLB, each padded to four bytes. Raises
+    `OutputError` where a number is none, or larger than single precision holds."""
+    placed = (node[key] for node in gltf["nodes"] for key in _PLACED if key in node)
+    if not (numbers.finite and all(np.isfinite(values).all() for values in placed)):
+        raise OutputError(
+            f"{path}: not written: a place or a rotation is no number; is a bone of the target "
+            "without length, or the source far from the origin?"
+        )
+    for animation in gltf["animations"]:  # named after a file, whose name may be no text
+        animation["name"] = animation["name"].encode(errors="replace").decode()
     data = bytes(numbers.data)
     text = orjson.dumps(gltf)
     text += b" " * (-len(text) % 4)

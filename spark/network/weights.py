@@ -22,6 +22,9 @@ FORMAT = "spark-sim checkpoint"
 VERSION = 3
 SHIPPED = Path(__file__).parent / "shipped" / "spark.safetensors"
 
+_LONGEST = 8192  # frames of a window
+_WIDEST = 65536  # of what is neither a width nor a number of blocks
+
 Tensors = dict[str, Shaped[np.ndarray, "..."]]
 
 
@@ -81,6 +84,11 @@ def read_weights(path: Path) -> Weights:
         header = parse_json(path, metadata["config"], "its header")
         network, names = dict(header["network"]), dict(header["names"])
         settings = dict(header["settings"])
+        if not 1 <= int(settings.get("window", 64)) <= _LONGEST:
+            raise ValueError(f"a window of {settings['window']} frames")
+        elements = sum(tensor.size for tensor in tensors.values())
+        _check_sizes(network, ("encoder_blocks", "decoder_blocks"), elements)
+        _check_sizes(names, ("blocks", "rig_blocks"), elements)
         bodies: list[Trunk] = [
             {str(name): (float(x), float(y), float(z)) for name, (x, y, z) in body.items()}
             for body in header["bodies"]
@@ -88,3 +96,14 @@ def read_weights(path: Path) -> Weights:
         return Weights(path, network, names, int(header["step"]), settings, bodies, tensors)
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise FileFormatError(path, None, f"is a damaged checkpoint ({error!r})") from error
+
+
+def _check_sizes(sizes: dict[str, Any], blocks: tuple[str, ...], elements: int) -> None:
+    """Raise ValueError where a network is said to be larger than the file that holds it: each block
+    has matrices as wide as the network. Nothing of its size is built before."""
+    given = {name: value for name, value in sizes.items() if type(value) is int}
+    if any(not 0 <= value <= _WIDEST for value in given.values()):
+        raise ValueError(f"sizes beyond {_WIDEST}")
+    width, count = given.get("width", 0), sum(given.get(name, 0) for name in blocks)
+    if width * width * count > elements:
+        raise ValueError(f"{count} blocks of width {width} in {elements} numbers")

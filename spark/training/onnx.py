@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 from torch.export import Dim
 
-from spark.errors import ConventionError, DependencyError
+from spark.errors import ConventionError, DependencyError, OutputError
 from spark.files import write_atomically
 from spark.training.checkpoint import Checkpoint
 from spark.training.tensors import Body, PoseTensors, Start
@@ -43,13 +43,20 @@ def export_onnx(checkpoint: Checkpoint, path: Path) -> None:
     T-pose in 6D; the root's path stays that of the start.
 
     Raises `ConventionError` for networks that don't correct a transfer, `DependencyError` where
-    `onnx` or `onnxscript` is missing, and `OutputError` where `path` can't be written.
+    `onnx` or `onnxscript` is missing, and `OutputError` where a weight is not finite, or `path`
+    can't be written.
     """
     config = checkpoint.model.config
     if not config.residual:
         raise ConventionError(
             "only networks of the default preset are exported: the paper's starts from noise"
         )
+    for name, tensor in checkpoint.model.state_dict().items():
+        if not tensor.isfinite().all():
+            raise OutputError(
+                f"{path}: not written: the network's {name!r} holds NaN or infinity; the training "
+                "went wrong"
+            )
     T, S, J, N, K = (Dim(name, min=2) for name in ("T", "S", "J", "N", "K"))
     source, target = _body(5, 3, config.name_width), _body(6, 4, config.name_width)
     start = torch.zeros(1, 8, 6, 6), torch.zeros(1, 8, 3), torch.full((1, 6), -1)
