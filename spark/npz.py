@@ -116,8 +116,15 @@ def array_in(data: bytes) -> np.ndarray:
     dtype = np.dtype(kind)
     if len(shape) > 8 or prod(shape) * dtype.itemsize != len(content):
         raise ValueError(f"{len(content)} bytes are no array of shape {str(shape)[:80]}")
+    if dtype.kind == "U" and not _is_text(np.frombuffer(content, f"{dtype.byteorder}u4")):
+        raise ValueError("its text holds what is no letter")
     array = np.frombuffer(content, dtype) if len(content) else np.zeros(0, dtype)
     return array.reshape(shape, order="F" if order == "True" else "C")
+
+
+def _is_text(codes: np.ndarray) -> bool:
+    """Whether all are code points of Unicode: Python's text breaks on others."""
+    return not ((codes > 0x10FFFF) | ((codes >= 0xD800) & (codes < 0xE000))).any()
 
 
 def holds_objects(data: bytes) -> bool:

@@ -4,10 +4,12 @@ A pipe may never end, a device such as `/dev/zero` never does, and a sparse file
 the machine has.
 """
 
+import json
 import os
 import re
 import stat
 import tomllib
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +81,14 @@ def parse_json(path: Path, text: bytes | str, what: str) -> Any:
     try:
         return orjson.loads(text)
     except orjson.JSONDecodeError as error:
+        if "surrogate" in str(error):  # the name of a file that is no text, as Python writes it
+            with suppress(ValueError, RecursionError):
+                return json.loads(text, parse_constant=_no_number)
         raise FileFormatError(path, None, f"{what} is no JSON: {error}") from error
+
+
+def _no_number(name: str) -> None:
+    raise ValueError(name)
 
 
 def unreadable(path: Path, error: Exception, expected: str) -> FileFormatError:

@@ -65,7 +65,7 @@ def write_sonic(motion: RobotMotion, path: Path, source: Path | None = None) -> 
         f"Metadata for: {path.name}\n==============================\n\n"
         f"Body part indexes:\n[{numbers}]\n\nTotal timesteps: {len(motion)}\n"
     )
-    write_atomically(path / "metadata.txt", metadata.encode())
+    write_atomically(path / "metadata.txt", metadata.encode(errors="replace"))
     facts = {
         "format": "sonic",
         "fps": SONIC_FPS,

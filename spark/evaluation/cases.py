@@ -130,7 +130,7 @@ def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = 
             number = i % _TARGETS_PER_BODY
             key = (id(body), structure, number)
             if key not in staged:
-                name = zlib.crc32(one.character.encode())
+                name = zlib.crc32(one.character.encode(errors="surrogateescape"))
                 rng = np.random.default_rng((seed, name, number, STRUCTURES.index(structure)))
                 make = {"intra": scaled_body, "cross": random_variant, "missing": lacking_body}
                 staged[key] = StagedBody(make[structure](body, rng))

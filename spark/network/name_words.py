@@ -39,7 +39,7 @@ def rig_words(names: Sequence[str]) -> list[str]:
 
 def name_tokens(words: str) -> list[int]:
     """ByT5's tokens: UTF-8 bytes plus 3 and an end mark; the last 48 bytes count."""
-    return [byte + BYTE_OFFSET for byte in words.encode()[-_MAX_BYTES:]] + [END]
+    return [byte + BYTE_OFFSET for byte in words.encode(errors="replace")[-_MAX_BYTES:]] + [END]
 
 
 def relative_buckets(length: int, buckets: int, max_distance: int) -> Int[np.ndarray, "L L"]:

@@ -84,7 +84,7 @@ def _draw(names: list[str], what: str, seed: int) -> dict[str, bool]:
     count = math.ceil(HELD_OUT * len(names)) if len(names) > 1 else 0
 
     def rank(name: str) -> str:
-        return hashlib.sha256(f"{seed}/{what}/{name}".encode()).hexdigest()
+        return hashlib.sha256(f"{seed}/{what}/{name}".encode(errors="surrogateescape")).hexdigest()
 
     held_out = set(sorted(names, key=rank)[:count])
     return {name: name not in held_out for name in names}

@@ -92,7 +92,7 @@ def write_folder_report(
         clips=[
             {
                 "name": each.name,
-                "href": quote(f"{clips.name}/{each.name}.html"),
+                "href": quote(f"{clips.name}/{each.name}.html", errors="surrogateescape"),
                 "picture": Markup(each.picture),
                 "duration": each.facts["duration_s"],
                 "worst": each.facts["worst"],

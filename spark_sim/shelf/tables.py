@@ -54,9 +54,14 @@ def write_parquet(rows: Sequence[dict[str, Any]], path: Path) -> None:
         "frames": pyarrow.int64(),
     }
     columns = {
-        name: pyarrow.array([row.get(name) for row in rows], type=kind)
+        name: pyarrow.array([_text(row.get(name)) for row in rows], type=kind)
         for name, kind in types.items()
     }
     out = io.BytesIO()
     parquet.write_table(pyarrow.table(columns), out)
     write_atomically(path, out.getvalue())
+
+
+def _text(value: Any) -> Any:
+    """The name of a file may be no text."""
+    return value.encode(errors="replace").decode() if isinstance(value, str) else value

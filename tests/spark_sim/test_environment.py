@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -53,6 +54,9 @@ def test_every_kind_of_output_in_poor_surroundings(tmp_path: Path) -> None:
     stem = os.fsdecode(b"\xff\xe9" + 240 * b"w")
     (tmp_path / "walker_walk.bvh").rename(tmp_path / f"{stem}.bvh")
     source, target = f"{stem}.bvh", "dancer_wave.bvh"
+    (tmp_path / "takes").mkdir()
+    shutil.copy(tmp_path / source, tmp_path / "takes")
+    shutil.copy(tmp_path / target, tmp_path / "takes")
     gone = ("DISPLAY", "WAYLAND_DISPLAY", "HOME", "MUJOCO_GL", "PYOPENGL_PLATFORM", "PYTHONUTF8")
     kept = {key: value for key, value in os.environ.items() if key not in gone}
     poor = {"TMPDIR": str(tmp_path / "none"), "XDG_CACHE_HOME": "/proc/none", "LC_ALL": "C"}
@@ -63,7 +67,11 @@ def test_every_kind_of_output_in_poor_surroundings(tmp_path: Path) -> None:
         ["report", f"{stem}o.bvh", "--source", source, "--html", f"{stem}r.html"],
         ["report", target, "--html", "again.html"],
         ["play", f"{stem}.npz", "--html", f"{stem}.html"],
+        ["retarget", target, "--to", source, "-o", f"{stem}.glb"],
         ["mjcf", target, "-o", "body.xml"],
+        ["batch", "takes", "--to", target, "-o", "out", "--workers", "1"],
+        ["report", "out", "--workers", "1"],
+        ["prepare", "takes", "-o", "dataset", "--workers", "1"],
         ["retarget", source, "--to", target],  # the name that it would get is too long
     ]
     done = subprocess.run(
@@ -78,8 +86,9 @@ def test_every_kind_of_output_in_poor_surroundings(tmp_path: Path) -> None:
         timeout=300,
     )
     codes = [int(line) for line in done.stderr.splitlines() if line.strip().isdigit()]
-    assert codes == [0, 0, 0, 0, 0, 0, 0, 2], done.stderr.replace(240 * b"w", b"w")
+    assert codes == [*[0] * 11, 2], done.stderr.replace(240 * b"w", b"w")
     assert b"File name too long" in done.stderr
+    assert (tmp_path / "dataset" / "index.json").is_file()
     for path in (f"{stem}o.bvh", f"{stem}.npz", f"{stem}r.html", "again.html", f"{stem}.html"):
         assert (tmp_path / path).stat().st_size > 1000
     assert not list(tmp_path.glob(".spark-sim*"))

@@ -1,5 +1,6 @@
 """Robots as URDF: the same as their twins in MJCF, whatever is wrong with meshes and inertias."""
 
+import re
 from pathlib import Path
 
 import mujoco
@@ -167,6 +168,23 @@ def test_what_is_no_tree_of_links_is_refused(
     (tmp_path / "twin.urdf").write_text(text.replace(*change))
     with pytest.raises((FileFormatError, SkeletonError), match=says):
         read_mjcf(tmp_path / "twin.urdf")
+
+
+def test_an_inertia_without_end_is_mended(folder: Path, tmp_path: Path) -> None:
+    text = re.sub(r'ixx="[^"]*"', 'ixx="1e308"', (folder / "twin.urdf").read_text(), count=1)
+    (tmp_path / "twin.urdf").write_text(text)
+    assert any(
+        "have an inertia that no body has" in n for n in read_mjcf(tmp_path / "twin.urdf").notes
+    )
+
+
+def test_a_chain_without_end_is_refused(tmp_path: Path) -> None:
+    links = "".join(f'<link name="{k}"/>' for k in range(400))
+    joint = '<joint name="j{0}" type="fixed"><parent link="{1}"/><child link="{0}"/></joint>'
+    joints = "".join(joint.format(k, k - 1) for k in range(1, 400))
+    (tmp_path / "long.urdf").write_text(f'<robot name="long">{links}{joints}</robot>')
+    with pytest.raises(FileFormatError, match="nests links deeper than 200"):
+        read_mjcf(tmp_path / "long.urdf")
 
 
 def without_legs(text: str) -> str:

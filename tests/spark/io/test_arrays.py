@@ -1,5 +1,6 @@
 """npy and npz: as numpy reads them, without pickles, in no more memory than there are bytes."""
 
+import struct
 import tracemalloc
 import zipfile
 from pathlib import Path
@@ -12,6 +13,7 @@ from hypothesis.extra import numpy as arrays_of
 
 from spark.errors import FileFormatError
 from spark.io.arrays import npz_names, read_npy, read_npz
+from spark.npz import array_in
 from tests.helpers.hostile import Bomb, damaged, edits
 
 PLAIN = st.sampled_from(["<f4", ">f8", "<i8", "|u1", "?", "<U5", "|S3", "<f2", "<c8"])
@@ -92,3 +94,13 @@ def test_damaged_files_give_arrays_or_an_error_of_ours(
     except FileFormatError:
         return
     assert all(a.dtype != object for a in (found.values() if isinstance(found, dict) else [found]))
+
+
+@pytest.mark.parametrize("code", [0x110000, 0xFFFFFFFF, 0xD800])
+def test_text_of_no_letters_is_refused(code: int, tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", np.array(["hips"]))
+    whole = (tmp_path / "a.npy").read_bytes()
+    assert array_in(whole).tolist() == ["hips"]
+    spoilt = whole.replace(struct.pack("<I", ord("h")), struct.pack("<I", code))
+    with pytest.raises(ValueError, match="no letter"):
+        array_in(spoilt)

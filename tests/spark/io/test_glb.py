@@ -2,6 +2,8 @@
 
 import json
 import struct
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,8 @@ import pytest
 
 import spark_sim
 from spark.errors import OutputError
+from spark.io.glb import write_glb
+from spark.io.glb_skin import write_on_skin
 from spark.kinematics import forward
 from spark_sim.clips import Clip
 from tests.helpers.glb import write_glb as skinned
@@ -119,3 +123,20 @@ def test_meshes_stay_as_they_are(embed: bool, walk: Clip, tmp_path: Path) -> Non
 def test_other_endings_are_refused(walk: Clip, tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"written as \.bvh, \.glb or \.vrma, not as"):
         walk.save(tmp_path / "walk.fbx")
+
+
+@pytest.mark.parametrize("value", [np.nan, 1e39])
+@pytest.mark.parametrize("skin", [False, True])
+def test_numbers_that_are_none_are_not_written(
+    walk: Clip, value: float, skin: bool, tmp_path: Path
+) -> None:
+    """1e39 is more than single precision holds."""
+    worn, out = animated(walk.motion).write(tmp_path / "skin.glb"), tmp_path / "out.glb"
+    motion = spark_sim.load(worn).motion
+    place = motion.root_pos.copy()
+    place[3, 1] = value
+    motion = replace(motion, root_pos=place)
+    write = partial(write_on_skin, motion, worn) if skin else partial(write_glb, motion)
+    with pytest.raises(OutputError, match="not written: a place or a rotation is no number"):
+        write(out)
+    assert not out.exists()

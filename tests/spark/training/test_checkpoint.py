@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from safetensors import safe_open
 from safetensors.torch import save_file
 
 from spark.errors import FileFormatError
@@ -69,4 +70,29 @@ def test_weights_that_are_no_numbers_are_refused(tmp_path: Path, value: float) -
         next(spoilt.model.parameters()).view(-1)[-1] = value
     save_checkpoint(spoilt, path)
     with pytest.raises(FileFormatError, match="holds NaN or infinity"):
+        read_weights(path)
+
+
+@pytest.mark.parametrize(
+    ("part", "sizes"),
+    [
+        ("network", {"width": 60_000}),
+        ("network", {"decoder_blocks": 60_000}),
+        ("network", {"max_group": 10**9}),
+        ("names", {"rig_blocks": 60_000}),
+        ("names", {"width": -1}),
+        ("settings", {"window": 0}),
+    ],
+)
+def test_sizes_that_the_file_does_not_hold_are_refused(
+    part: str, sizes: dict[str, int], tmp_path: Path
+) -> None:
+    """Before anything of that size is made: 60,000 blocks would take hours and all memory."""
+    path = save_checkpoint(fresh(TINY), tmp_path / "x.safetensors") or tmp_path / "x.safetensors"
+    with safe_open(path, framework="pt") as file:
+        metadata, tensors = file.metadata(), {k: file.get_tensor(k) for k in file.keys()}  # noqa: SIM118
+    config = json.loads(metadata["config"])
+    config[part] |= sizes
+    save_file(tensors, path, metadata | {"config": json.dumps(config)})
+    with pytest.raises(FileFormatError, match="is a damaged checkpoint"):
         read_weights(path)
