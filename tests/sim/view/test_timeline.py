@@ -101,7 +101,8 @@ def player() -> Player:
     subject = sliding()
     figures = [Figure(subject, "slides"), Figure(subject, "too")]
     made = Player(build_scene(with_ghosts(figures)), ghosts=False)
-    known = annotate(assess(subject), subject)
+    report = assess(subject)
+    known = annotate(report.clip, subject, report.findings)
     made.annotate([known, known])
     return made
 
