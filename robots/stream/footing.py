@@ -6,18 +6,21 @@ A foot in swing is as high as the source's, scaled, and as it is pitched.
 """
 
 from collections import deque
+from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from robots.solver.foot_path import FAST, SLOW, STEP_HEIGHT, SWING_HOLD
-from robots.solver.footprints import MAX_TWIST, MAX_WOBBLE, flat_sole, on_points
+from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
+from robots.stream.footprint import Footprint, yaw_between
 from robots.stream.frame_targets import FrameReader, FrameTargets
 from robots.stream.terms import FootTargets
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
 
 RAMP = 0.05  # [s] over which a foot is taken hold of and let go
-_SWING = np.array([0.0, 0.0, SWING_HOLD[2]])  # where it will come down is not known
+_SWING = np.array([0.0, 0.0, SWING_HOLD[2]])  # held: its height alone
 _RELEASE_FACTOR = (
     1.5  # times the speed and height at which a foot comes to stand: there it is let go
 )
@@ -35,6 +38,11 @@ class ContactTracker:
         self._max_speed, self._max_height = PLANTED_SPEED * size, PLANTED_HEIGHT * size
         self._reach = max(1, round(SPEED_WINDOW / 2 / frame_time))
         self._has_foot = reader.has_feet[:, None]
+        ends = np.cumsum([len(sole) for sole in self._robot.soles])
+        self._own = [
+            slice(end - len(sole), end) for sole, end in zip(self._robot.soles, ends, strict=True)
+        ]
+        self._wobble = MAX_WOBBLE * self._robot.rig.hip_height
         self._flat = [flat_sole(self._robot, sole) for sole in self._robot.soles]
         self._length = self._reach + ahead + 1
         self._history: deque[FrameTargets] = deque(maxlen=self._length)
@@ -44,47 +52,79 @@ class ContactTracker:
         self._footprints = [Footprint() for _ in range(soles)]
 
     def update(self, targets: FrameTargets, points: Float[np.ndarray, "P 3"]) -> FootTargets:
-        """Takes in the newest frame, and says how the feet stand `ahead` frames before it, when
-        the points of the robot's soles are at `points`."""
+        """Takes in the newest frame, and says how the feet stand in those since `ahead` before it;
+        the points of the robot's soles are at `points` in the first of these. How they stand in
+        that one is settled then; of the later ones it is what can be seen so far."""
         first = not self._history
         self._history.extend([targets] * (self._length if first else 1))
-        here = len(self._history) - 1 - self._ahead
-        now, before = self._history[here], self._history[here - 1]
-        after = min(self._reach, self._ahead)
-        travelled = self._history[here + after].feet - self._history[here - self._reach].feet
+        settled = len(self._history) - 1 - self._ahead
+        ramp = 1.0 if first else self._frame_time / RAMP
+        planted, holds, footprints = self._planted, self._holds, self._footprints
+        frames = []
+        for at in range(settled, len(self._history)):
+            planted, height = self._standing(at, planted)
+            if at == settled:
+                for s, own in enumerate(self._own):
+                    if not holds[s].any():
+                        on_toe = bool(planted[s, 1] or not planted[s, 0])
+                        footprints[s].put(points[own], self._flat[s], on_toe=on_toe)
+            else:
+                footprints = [copy(footprint) for footprint in footprints]
+            after = holds + np.clip(planted - holds, -ramp, ramp)
+            frames.append(self._held(at, planted, holds, after, height, footprints))
+            holds = after
+            if at == settled:
+                self._planted, self._holds = planted, holds
+        places, shares = (np.array(part) for part in zip(*frames, strict=True))
+        return FootTargets(places, shares)
+
+    def _standing(
+        self, at: int, planted: Bool[np.ndarray, "S 2"]
+    ) -> tuple[Bool[np.ndarray, "S 2"], Float[np.ndarray, "S"]]:
+        """Whether heels and toes stand that were `planted` in the frame before, and how high [m]
+        the soles are that don't."""
+        after = min(self._reach, len(self._history) - 1 - at)
+        now = self._history[at]
+        travelled = self._history[at + after].feet - self._history[at - self._reach].feet
         speed = np.hypot(travelled[..., 0], travelled[..., 1]) / (
             (self._reach + after) * self._frame_time
         )
         height = now.feet[..., 2] - self._low
-        swing = np.maximum(now.clearance, self._lift(speed.max(axis=1)))
-        factor = np.where(self._planted, _RELEASE_FACTOR, 1.0)
-        self._planted = (
+        factor = np.where(planted, _RELEASE_FACTOR, 1.0)
+        planted = (
             self._has_foot
             & (speed < factor * self._max_speed)
             & (height < factor * self._max_height)
         )
-        ramp = 1.0 if first else self._frame_time / RAMP
-        step = np.clip(self._planted - self._holds, -ramp, ramp)
-        places, holds, end = np.zeros_like(points), np.zeros_like(points), 0
-        for s, (sole, footprint) in enumerate(
-            zip(self._robot.soles, self._footprints, strict=True)
-        ):
-            own = slice(end, end := end + len(sole))
-            point = int(self._planted[s, 1] or not self._planted[s, 0])
-            if not self._holds[s].any():
-                footprint.put(points[own], self._flat[s], on_toe=point == 1)
-            else:
-                moved = self._scale * (now.feet - before.feet)[s, point, :2]
-                turn = _yaw_between(before.world[sole.foot], now.world[sole.foot])
-                wobble = MAX_WOBBLE * self._robot.rig.hip_height
-                footprint.follow(moved, turn, float(self._holds[s].max()), wobble)
-            places[own, :2] = footprint.positions(self._flat[s])
-            self._holds[s] += step[s]
-            held = on_points(sole, self._holds[s])[:, None]
-            raised = (1 - held[:, 0]) * now.pitched[own]
-            places[own, 2] = raised + (1 - held.max()) * swing[s]
-            holds[own] = held + (1 - held) * _SWING
-        return FootTargets(places, holds)
+        return planted, np.maximum(now.clearance, self._lift(speed.max(axis=1)))
+
+    def _held(
+        self,
+        at: int,
+        planted: Bool[np.ndarray, "S 2"],
+        before: Float[np.ndarray, "S 2"],
+        holds: Float[np.ndarray, "S 2"],
+        height: Float[np.ndarray, "S"],
+        footprints: Sequence[Footprint],
+    ) -> tuple[Float[np.ndarray, "P 3"], Float[np.ndarray, "P 3"]]:
+        """Where the soles' points are held in a frame, and how firmly; heels and toes are held by
+        `holds`, and by `before` in the frame before."""
+        now, last = self._history[at], self._history[at - 1]
+        places, shares = np.zeros((2, len(now.pitched), 3))
+        for s, (sole, own) in enumerate(zip(self._robot.soles, self._own, strict=True)):
+            held_before = float(before[s].max())
+            if held_before:
+                point = int(planted[s, 1] or not planted[s, 0])
+                moved = self._scale * (now.feet - last.feet)[s, point, :2]
+                turned = yaw_between(last.world[sole.foot], now.world[sole.foot])
+                footprints[s].follow(moved, turned, held_before, self._wobble)
+            held = on_points(sole, holds[s])[:, None]
+            places[own, :2] = footprints[s].positions(self._flat[s])
+            places[own, 2] = (1 - held[:, 0]) * now.pitched[own] + (1 - held.max()) * height[s]
+            shares[own] = held + (1 - held) * _SWING
+            if not held_before and at > len(self._history) - 1 - self._ahead:
+                shares[own, :2] = 0.0  # where it will come down is not known yet
+        return places, shares
 
     def _lift(self, speed: Float[np.ndarray, "S"]) -> Float[np.ndarray, "S"]:
         """How high [m] feet step that are as fast in the source [m/s]: as in
@@ -93,46 +133,3 @@ class ContactTracker:
         share = np.clip((self._scale * speed / hip_height - SLOW) / (FAST - SLOW), 0.0, 1.0)
         lift: Float[np.ndarray, S] = share * STEP_HEIGHT * hip_height
         return lift
-
-
-class Footprint:
-    """Where one foot is held: the middle of its toes' edge, and its heading."""
-
-    def __init__(self) -> None:
-        self._pivot, self._away = np.zeros((2, 2))
-        self._heading = self._turned = 0.0
-
-    def put(
-        self, points: Float[np.ndarray, "P 3"], flat: Float[np.ndarray, "P 2"], *, on_toe: bool
-    ) -> None:
-        """Where the foot is; on its heel, where its toes will come down."""
-        heel, toe = points[:2, :2].mean(0), points[-2:, :2].mean(0)
-        along = toe - heel
-        self._heading = float(np.arctan2(along[1], along[0]))
-        ahead = np.array([np.cos(self._heading), np.sin(self._heading)])
-        length = flat[-2:].mean(0)[0] - flat[:2].mean(0)[0]
-        self._pivot = toe if on_toe else heel + length * ahead
-        self._away, self._turned = np.zeros(2), 0.0
-
-    def follow(
-        self, moved: Float[np.ndarray, "2"], turned: float, hold: float, wobble: float
-    ) -> None:
-        """Go along with the source's foot where it is not firmly held, and beyond its wobble."""
-        away = self._away + hold * moved
-        far = float(np.hypot(*away))
-        self._away = away * min(1.0, wobble / max(far, 1e-12))
-        self._pivot = self._pivot + (1 - hold) * moved + (away - self._away)
-        turn = self._turned + hold * turned
-        self._turned = float(np.clip(turn, -MAX_TWIST, MAX_TWIST))
-        self._heading += (1 - hold) * turned + (turn - self._turned)
-
-    def positions(self, flat: Float[np.ndarray, "P 2"]) -> Float[np.ndarray, "P 2"]:
-        """Where the points of the sole stand."""
-        cos, sin = np.cos(self._heading), np.sin(self._heading)
-        return self._pivot + (flat - flat[-2:].mean(0)) @ np.array([[cos, sin], [-sin, cos]])
-
-
-def _yaw_between(before: Float[np.ndarray, "3 3"], now: Float[np.ndarray, "3 3"]) -> float:
-    """The rotation about the vertical [rad] from one frame to the next."""
-    R = now @ before.T
-    return float(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]))

@@ -48,6 +48,7 @@ class Stream:
     def reset(self) -> None:
         """Forget what has been seen: the next frame is a first one."""
         self._count = 0
+        self._window.reset()
         self._targets: list[FrameTargets] = []
         self._q = np.zeros((_FRAMES, self.robot.mjcf.model.nq))
         self._contacts = ContactTracker(self._reader, self.frame_time, LATENCY)
@@ -83,7 +84,7 @@ class Stream:
         projected = project(robot, quat_from_matrix(targets.world)[None], targets.hips[None])
         q = robot.to_qpos(projected)[np.zeros(_FRAMES, dtype=int)]
         points = sum(map(len, robot.soles))
-        foot_targets = FootTargets(np.zeros((points, 3)), np.zeros((points, 3)))
+        foot_targets = FootTargets(*np.zeros((2, LATENCY + 1, points, 3)))
         for held in (False, True):
             if held:
                 foot_targets = self._contacts.update(

@@ -47,8 +47,8 @@ class FootTargets:
     """The footholds of the soles' points: `positions` [m, world], and by axis the share of the
     weight with which they are held there (`holds`, 0 to 1)."""
 
-    positions: Float[np.ndarray, "P 3"]
-    holds: Float[np.ndarray, "P 3"]
+    positions: Float[np.ndarray, "T P 3"]
+    holds: Float[np.ndarray, "T P 3"]
 
 
 @dataclass(frozen=True, eq=False)

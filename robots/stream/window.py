@@ -9,6 +9,7 @@ from robots.model.morphology import Morphology
 from robots.solver.descent import LIMIT_CLEARANCE
 from robots.stream.coupling import Coupling
 from robots.stream.frame_targets import FrameTargets
+from robots.stream.prediction import TargetMotion
 from robots.stream.terms import FootTargets, Posture, Terms
 
 _DAMPING = 1e-3  # [1] on the diagonal of the normal equations,
@@ -20,8 +21,8 @@ _STEP_TOL = 0.1  # [rad, m] after a shorter step there is no further one
 
 
 class Window:
-    """Solves for the last frames of a trajectory of qpos: `free` frames, coupled by accelerations
-    and speeds to each other and to the `fixed` ones before them."""
+    """Solves for the last frames of a trajectory of qpos: `free` frames, coupled by their jerk and
+    the base's acceleration to each other, to the `fixed` ones before them and to what may come."""
 
     def __init__(
         self, robot: Morphology, terms: Terms, frame_time: float, *, fixed: int, free: int
@@ -40,7 +41,12 @@ class Window:
         lower, upper = tree.limits_within(LIMIT_CLEARANCE)
         rest = self._model.qpos0[self._angles]
         self._lower, self._upper = lower[hinges] + rest, upper[hinges] + rest
+        self._motion = TargetMotion(self._model, self._dofs, frame_time)
         self._coupling = Coupling(robot, frame_time, fixed=fixed, free=free)
+
+    def reset(self) -> None:
+        """Forget what has been seen."""
+        self._motion.reset()
 
     def solve(
         self,
@@ -55,6 +61,7 @@ class Window:
             q, length = self._step(q, targets, foot_targets, posture, candidates)
             if length < _STEP_TOL:
                 break
+        self._motion.next()
         return q
 
     def settle(
@@ -98,7 +105,8 @@ class Window:
         for t in range(free):
             blocks[t, :, t] = H[t]
         if lone_damping is None:
-            self._coupling.add_to(self._steps(q), targets.hips, blocks, g)
+            ahead = self._motion.of(q[-1], H[-1], g[-1])
+            self._coupling.add_to(self._steps(q), targets.hips, ahead, blocks, g)
         held = self._at_limits(q[-free:], g)
         g[held] = 0.0
         whole.reshape(-1)[:: free * D + 1] += np.where(

@@ -1,0 +1,113 @@
+"""What a stream's answer costs beyond its newest frame.
+
+A window that ends at the newest frame spends there what smoothness will cost afterwards: its
+answers run behind the source, overshoot, and jerk back. So each dof is taken to go on as its target
+has last moved, ever slower, and the window's smoothness reaches over these frames too. They are not
+solved for: of each dof they leave a quadratic in its last three frames, the cost to go of a
+linear-quadratic tracker with preview (Anderson & Moore, Optimal Control, 4.3). It depends on one
+number alone, the ratio of both weights, and is read from a table.
+"""
+
+from collections import deque
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+
+HORIZON = 0.3  # [s] that is looked beyond the newest frame
+SLOWING = 0.1  # [s] in which a target loses most of its speed
+_SPEED_WINDOW = 0.05  # [s] before the newest frame over which that speed is measured
+_DAMPING = 0.02  # [1] on the diagonal of the normal equations that say where a target is
+_MAX_STEP = 0.5  # [rad, m] to it
+_MAX_SPEED = 10.0  # [rad/s, m/s]
+_RATIOS = np.geomspace(1e-6, 1e9, 400)  # of a derivative's squared weight to the target's
+
+
+class Ahead(NamedTuple):
+    """Of the dofs of a stream's newest frame: how far from where they are their targets are [rad,
+    m], how fast these move [rad/s, m/s], and how much they weigh, squared."""
+
+    targets: Float[np.ndarray, "D"]
+    speeds: Float[np.ndarray, "D"]
+    weights: Float[np.ndarray, "D"]
+
+
+class CostToGo:
+    """Of dofs whose derivatives of one order, 2 or 3, are weighed, frame by frame."""
+
+    def __init__(self, frame_time: float, order: int) -> None:
+        count = max(4, round(HORIZON / frame_time))
+        differences = np.diff(np.eye(3 + count), order, axis=0)[3 - order :]
+        weighed = _RATIOS[:, None, None] * (differences.T @ differences)
+        time = frame_time * np.arange(1, count + 1)
+        ways = np.stack([np.ones(count), SLOWING * (1 - np.exp(-time / SLOWING))], axis=1)
+        across = weighed[:, 3:, :3]
+        right = np.concatenate([across, np.broadcast_to(ways, (len(_RATIOS), count, 2))], axis=2)
+        beyond = weighed[:, 3:, 3:] + np.eye(count)
+        reduced = across.transpose(0, 2, 1) @ np.linalg.solve(beyond, right)
+        reduced[:, :, :3] = weighed[:, :3, :3] - reduced[:, :, :3]
+        self._table = reduced
+
+    def of(
+        self,
+        weights: Float[np.ndarray, "D"],
+        target_weights: Float[np.ndarray, "D"],
+        targets: Float[np.ndarray, "D"],
+        speeds: Float[np.ndarray, "D"],
+    ) -> tuple[Float[np.ndarray, "D 3 3"], Float[np.ndarray, "D 3"]]:
+        """P and p of `x P x / 2 + p x` in the last three values x of each dof; weights squared.
+        `targets` are where the dofs should be in the newest frame, `speeds` how fast these move
+        [1/s]."""
+        ratio = np.log(weights / np.maximum(target_weights, 1e-12))
+        first, last = np.log(_RATIOS[[0, -1]])
+        at = np.clip((ratio - first) / (last - first), 0.0, 1.0) * (len(_RATIOS) - 1)
+        k = np.minimum(at.astype(int), len(_RATIOS) - 2)
+        share = (at - k)[:, None, None]
+        of_one = (1 - share) * self._table[k] + share * self._table[k + 1]
+        of_one *= target_weights[:, None, None]
+        p = of_one[:, :, 3] * targets[:, None] + of_one[:, :, 4] * speeds[:, None]
+        return of_one[:, :, :3], p
+
+
+class TargetMotion:
+    """Where the dofs of a stream's newest frame should be if smoothness did not matter, and how
+    fast that moves."""
+
+    def __init__(
+        self, model: mujoco.MjModel, dofs: Int[np.ndarray, "D"], frame_time: float
+    ) -> None:
+        self._model, self._dofs, self._frame_time = model, dofs, frame_time
+        self._past: deque[Float[np.ndarray, nq]] = deque(
+            maxlen=max(1, round(_SPEED_WINDOW / frame_time))
+        )
+        self._now = np.zeros(model.nq)
+
+    def of(
+        self,
+        q: Float[np.ndarray, "nq"],
+        H: Float[np.ndarray, "D D"],
+        g: Float[np.ndarray, "D"],
+    ) -> Ahead:
+        """What is expected of the dofs of `q`; H and g are the normal equations of that frame
+        alone."""
+        model = self._model
+        target = np.linalg.solve(H + _DAMPING * np.eye(len(g)), -g).clip(-_MAX_STEP, _MAX_STEP)
+        step = np.zeros(model.nv)
+        step[self._dofs] = target
+        self._now = q.copy()
+        mujoco.mj_integratePos(model, self._now, step, 1.0)
+        speeds = np.zeros(model.nv)
+        if self._past:
+            time = len(self._past) * self._frame_time
+            mujoco.mj_differentiatePos(model, speeds, time, self._past[0], self._now)
+        speeds = speeds[self._dofs].clip(-_MAX_SPEED, _MAX_SPEED)
+        return Ahead(target, speeds, np.diagonal(H).copy())
+
+    def next(self) -> None:
+        """The newest frame is not the newest any more."""
+        self._past.append(self._now)
+
+    def reset(self) -> None:
+        """Forget what has been seen."""
+        self._past.clear()
