@@ -26,13 +26,22 @@ class Coupling:
     def __init__(self, robot: Morphology, frame_time: float, *, fixed: int, free: int) -> None:
         whole = acceleration_weights(robot) * (2 * np.pi * WHOLE_CLIP_CUTOFF) ** 2
         base, hinges = 2 * np.pi * BASE_CUTOFF * frame_time, 2 * np.pi * JERK_CUTOFF * frame_time
-        self._weights = (whole / hinges**3) ** 2
-        self._weights[_BASE] = (whole[_BASE] / base**2) ** 2
+        weights = (whole / hinges**3) ** 2
+        weights[_BASE] = (whole[_BASE] / base**2) ** 2
+        orders = np.full(len(weights), 3)
+        orders[_BASE] = 2
+        to_steps = np.diff(np.eye(fixed + free), axis=0)
+        self._first = to_steps[:, fixed:]
+        self._products = np.zeros((free, free, len(weights)))
+        self._to_gradient = np.zeros((free, len(to_steps), len(weights)))
+        for order in (2, 3):
+            own = orders == order
+            over_steps = np.diff(np.eye(len(to_steps)), order - 1, axis=0)
+            over_frames = over_steps @ self._first
+            self._products[:, :, own] = (over_frames.T @ over_frames)[..., None] * weights[own]
+            self._to_gradient[:, :, own] = (over_frames.T @ over_steps)[..., None] * weights[own]
+        self._to_go = CostToGo(frame_time, orders, weights)
         self._overspeed_weight = (W_OVERSPEED / frame_time) ** 2
-        self._first, self._second, self._third = (
-            np.diff(np.eye(fixed + free), k, axis=0)[:, fixed:] for k in (1, 2, 3)
-        )
-        self._base_to_go, self._to_go = CostToGo(frame_time, 2), CostToGo(frame_time, 3)
         self._max_steps = np.full(robot.tree.nv, np.inf)
         hinges = robot.tree.dof_starts[~robot.tree.balls]
         self._max_steps[hinges] = MAX_HINGE_SPEED * frame_time
@@ -47,51 +56,18 @@ class Coupling:
     ) -> None:
         """Add to the normal equations: `steps` are the dofs' from frame to frame, `hips` the path
         that the source asks for [m], and `ahead` is what is expected of the dofs."""
-        against = steps.copy()
+        against = steps.copy()  # and what is expected is that they do not move
         against[:, _BASE] -= np.diff(hips, axis=0)
-        base, rest = np.zeros_like(self._weights), self._weights.copy()
-        base[_BASE], rest[_BASE] = self._weights[_BASE], 0.0
-        accelerations = np.diff(against, axis=0)
-        for differences, values, weights in (
-            (self._second, accelerations, base),
-            (self._third, np.diff(accelerations, axis=0), rest),
-        ):
-            g += weights * (differences.T @ values)
-            _add_products(blocks, differences.T @ differences, weights)
-        self._add_beyond(against, ahead, blocks, g)
-        overspeed = steps - np.clip(steps, -self._max_steps, self._max_steps)
+        diagonals = np.einsum("sdtd->std", blocks)  # a view
+        diagonals += self._products
+        g += (self._to_gradient * against).sum(axis=1)
+        ahead.speeds[_BASE] = 0.0
+        P, p = self._to_go.of(ahead)
+        x = np.stack([-against[-1] - against[-2], -against[-1], np.zeros(g.shape[1])])
+        diagonals[-3:, -3:] += P.transpose(1, 2, 0)
+        g[-3:] += (P @ x.T[..., None])[..., 0].T + p.T
+        overspeed = steps - np.minimum(np.maximum(steps, -self._max_steps), self._max_steps)
         if overspeed.any():
             g += self._overspeed_weight * (self._first.T @ overspeed)
             fast = self._overspeed_weight * (overspeed != 0)
-            for row, weights in zip(self._first, fast, strict=True):
-                _add_products(blocks, np.outer(row, row), weights)
-
-    def _add_beyond(
-        self,
-        steps: Float[np.ndarray, "V D"],
-        ahead: Ahead,
-        blocks: Float[np.ndarray, "F D F D"],
-        g: Float[np.ndarray, "F D"],
-    ) -> None:
-        """What the frames after the newest one will cost; `steps` of the base are against the
-        source's, so that it is taken to stand still."""
-        weights = self._weights
-        P, p = self._to_go.of(weights, ahead.weights, ahead.targets, ahead.speeds)
-        P[_BASE], p[_BASE] = self._base_to_go.of(
-            weights[_BASE], ahead.weights[_BASE], ahead.targets[_BASE], np.zeros(3)
-        )
-        x = np.stack([-steps[-1] - steps[-2], -steps[-1], np.zeros_like(steps[-1])])
-        g[-3:] += np.einsum("dst,td->sd", P, x) + p.T
-        at = np.arange(g.shape[1])
-        for s, t in np.ndindex(3, 3):
-            blocks[s - 3, at, t - 3, at] += P[:, s, t]
-
-
-def _add_products(
-    blocks: Float[np.ndarray, "F D F D"],
-    products: Float[np.ndarray, "F F"],
-    weights: Float[np.ndarray, "D"],
-) -> None:
-    at = np.arange(len(weights))
-    for s, t in np.argwhere(products):
-        blocks[s, at, t, at] += products[s, t] * weights
+            diagonals += np.einsum("vs,vt,vd->std", self._first, self._first, fast)

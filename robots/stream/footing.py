@@ -7,7 +7,8 @@ A foot in swing is as high as the source's, scaled, and as it is pitched.
 
 from collections import deque
 from collections.abc import Sequence
-from copy import copy
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -24,6 +25,17 @@ _SWING = np.array([0.0, 0.0, SWING_HOLD[2]])  # held: its height alone
 _RELEASE_FACTOR = (
     1.5  # times the speed and height at which a foot comes to stand: there it is let go
 )
+
+
+class _Seen(NamedTuple):
+    """Of the feet in one frame: how far heels and toes are held, how high [m] they are where not,
+    whether it is known where, and their footprints."""
+
+    holds: Float[np.ndarray, "S 2"]
+    height: Float[np.ndarray, "S"]
+    known: Bool[np.ndarray, "S"]
+    pivots: tuple[complex, ...]
+    headings: tuple[float, ...]
 
 
 class ContactTracker:
@@ -60,23 +72,33 @@ class ContactTracker:
         settled = len(self._history) - 1 - self._ahead
         ramp = 1.0 if first else self._frame_time / RAMP
         planted, holds, footprints = self._planted, self._holds, self._footprints
-        frames = []
+        seen = []
         for at in range(settled, len(self._history)):
             planted, height = self._standing(at, planted)
+            self._follow(at, planted, holds, footprints)
+            # Where a foot will come down that is still in the air is not known yet.
+            known = np.logical_or(holds.any(axis=1), at == settled)
             if at == settled:
-                for s, own in enumerate(self._own):
-                    if not holds[s].any():
-                        on_toe = bool(planted[s, 1] or not planted[s, 0])
-                        footprints[s].put(points[own], self._flat[s], on_toe=on_toe)
-            else:
-                footprints = [copy(footprint) for footprint in footprints]
-            after = holds + np.clip(planted - holds, -ramp, ramp)
-            frames.append(self._held(at, planted, holds, after, height, footprints))
-            holds = after
+                self._put(points, planted, holds)
+            holds = holds + np.clip(planted - holds, -ramp, ramp)
+            pivots, headings = zip(*((f.pivot, f.heading) for f in footprints), strict=True)
+            seen.append(_Seen(holds, height, known, pivots, headings))
             if at == settled:
                 self._planted, self._holds = planted, holds
-        places, shares = (np.array(part) for part in zip(*frames, strict=True))
-        return FootTargets(places, shares)
+                footprints = [replace(footprint) for footprint in footprints]
+        return self._targets([self._history[k] for k in range(settled, len(self._history))], seen)
+
+    def _put(
+        self,
+        points: Float[np.ndarray, "P 3"],
+        planted: Bool[np.ndarray, "S 2"],
+        holds: Float[np.ndarray, "S 2"],
+    ) -> None:
+        """The footprints of feet that are not held yet, where these are."""
+        for s in np.flatnonzero(~holds.any(axis=1)).tolist():
+            length = float(self._flat[s][-2:, 0].mean() - self._flat[s][:2, 0].mean())
+            on_toe = bool(planted[s, 1] or not planted[s, 0])
+            self._footprints[s].put(points[self._own[s]], length, on_toe=on_toe)
 
     def _standing(
         self, at: int, planted: Bool[np.ndarray, "S 2"]
@@ -98,33 +120,37 @@ class ContactTracker:
         )
         return planted, np.maximum(now.clearance, self._lift(speed.max(axis=1)))
 
-    def _held(
+    def _follow(
         self,
         at: int,
         planted: Bool[np.ndarray, "S 2"],
-        before: Float[np.ndarray, "S 2"],
         holds: Float[np.ndarray, "S 2"],
-        height: Float[np.ndarray, "S"],
         footprints: Sequence[Footprint],
-    ) -> tuple[Float[np.ndarray, "P 3"], Float[np.ndarray, "P 3"]]:
-        """Where the soles' points are held in a frame, and how firmly; heels and toes are held by
-        `holds`, and by `before` in the frame before."""
+    ) -> None:
+        """Takes those along that were held by `holds` in the frame before."""
         now, last = self._history[at], self._history[at - 1]
-        places, shares = np.zeros((2, len(now.pitched), 3))
+        for s in np.flatnonzero(holds.any(axis=1)).tolist():
+            point = int(planted[s, 1] or not planted[s, 0])
+            moved = self._scale * (now.feet[s, point, :2] - last.feet[s, point, :2])
+            foot = self._robot.soles[s].foot
+            turned = yaw_between(last.world[foot], now.world[foot])
+            footprints[s].follow(complex(*moved), turned, float(holds[s].max()), self._wobble)
+
+    def _targets(self, frames: Sequence[FrameTargets], seen: Sequence[_Seen]) -> FootTargets:
+        """Where the soles' points are held, and how firmly."""
+        holds, height, known, pivot, heading = (np.array(part) for part in zip(*seen, strict=True))
+        places, shares = np.zeros((2, len(frames), sum(map(len, self._robot.soles)), 3))
+        pitched = np.stack([frame.pitched for frame in frames])
         for s, (sole, own) in enumerate(zip(self._robot.soles, self._own, strict=True)):
-            held_before = float(before[s].max())
-            if held_before:
-                point = int(planted[s, 1] or not planted[s, 0])
-                moved = self._scale * (now.feet - last.feet)[s, point, :2]
-                turned = yaw_between(last.world[sole.foot], now.world[sole.foot])
-                footprints[s].follow(moved, turned, held_before, self._wobble)
-            held = on_points(sole, holds[s])[:, None]
-            places[own, :2] = footprints[s].positions(self._flat[s])
-            places[own, 2] = (1 - held[:, 0]) * now.pitched[own] + (1 - held.max()) * height[s]
-            shares[own] = held + (1 - held) * _SWING
-            if not held_before and at > len(self._history) - 1 - self._ahead:
-                shares[own, :2] = 0.0  # where it will come down is not known yet
-        return places, shares
+            flat = self._flat[s] - self._flat[s][-2:].mean(0)
+            place = pivot[:, s, None] + np.exp(1j * heading[:, s, None]) * (flat @ (1, 1j))
+            held = on_points(sole, holds[:, s].T).T
+            places[:, own, 0], places[:, own, 1] = place.real, place.imag
+            most = held.max(axis=1, keepdims=True)
+            places[:, own, 2] = (1 - held) * pitched[:, own] + (1 - most) * height[:, s, None]
+            shares[:, own] = held[..., None] + (1 - held[..., None]) * _SWING
+            shares[~known[:, s], own, :2] = 0.0
+        return FootTargets(places, shares)
 
     def _lift(self, speed: Float[np.ndarray, "S"]) -> Float[np.ndarray, "S"]:
         """How high [m] feet step that are as fast in the source [m/s]: as in

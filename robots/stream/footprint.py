@@ -1,47 +1,41 @@
 """Where a foot of a stream is held: put down where the robot's foot is, it follows the source's
 beyond what that one wobbles while it stands."""
 
+import cmath
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Float
 
 from robots.solver.footprints import MAX_TWIST
 
 
+@dataclass
 class Footprint:
-    """Where one foot is held: the middle of its toes' edge, and its heading."""
+    """The middle of a foot's toes' edge on the floor [m, x + iy] and its heading [rad]; how far the
+    source's foot has moved and turned away from there since."""
 
-    def __init__(self) -> None:
-        self._pivot, self._away = np.zeros((2, 2))
-        self._heading = self._turned = 0.0
+    pivot: complex = 0j
+    heading: float = 0.0
+    away: complex = 0j
+    turned: float = 0.0
 
-    def put(
-        self, points: Float[np.ndarray, "P 3"], flat: Float[np.ndarray, "P 2"], *, on_toe: bool
-    ) -> None:
-        """Where the foot is; on its heel, where its toes will come down."""
+    def put(self, points: Float[np.ndarray, "P 3"], length: float, *, on_toe: bool) -> None:
+        """Where the foot is that is so long; on its heel, where its toes will come down."""
         heel, toe = points[:2, :2].mean(0), points[-2:, :2].mean(0)
-        along = toe - heel
-        self._heading = float(np.arctan2(along[1], along[0]))
-        ahead = np.array([np.cos(self._heading), np.sin(self._heading)])
-        length = flat[-2:].mean(0)[0] - flat[:2].mean(0)[0]
-        self._pivot = toe if on_toe else heel + length * ahead
-        self._away, self._turned = np.zeros(2), 0.0
+        self.heading = float(np.arctan2(*(toe - heel)[::-1]))
+        to_toe = 0.0 if on_toe else cmath.rect(length, self.heading)
+        self.pivot = complex(*(toe if on_toe else heel)) + to_toe
+        self.away, self.turned = 0j, 0.0
 
-    def follow(
-        self, moved: Float[np.ndarray, "2"], turned: float, hold: float, wobble: float
-    ) -> None:
+    def follow(self, moved: complex, turned: float, hold: float, wobble: float) -> None:
         """Go along with the source's foot where it is not firmly held, and beyond its wobble."""
-        away = self._away + hold * moved
-        far = float(np.hypot(*away))
-        self._away = away * min(1.0, wobble / max(far, 1e-12))
-        self._pivot = self._pivot + (1 - hold) * moved + (away - self._away)
-        turn = self._turned + hold * turned
-        self._turned = float(np.clip(turn, -MAX_TWIST, MAX_TWIST))
-        self._heading += (1 - hold) * turned + (turn - self._turned)
-
-    def positions(self, flat: Float[np.ndarray, "P 2"]) -> Float[np.ndarray, "P 2"]:
-        """Where the points of the sole stand."""
-        cos, sin = np.cos(self._heading), np.sin(self._heading)
-        return self._pivot + (flat - flat[-2:].mean(0)) @ np.array([[cos, sin], [-sin, cos]])
+        away = self.away + hold * moved
+        self.away = away * min(1.0, wobble / max(abs(away), 1e-12))
+        self.pivot += (1 - hold) * moved + (away - self.away)
+        turn = self.turned + hold * turned
+        self.turned = min(max(turn, -MAX_TWIST), MAX_TWIST)
+        self.heading += (1 - hold) * turned + (turn - self.turned)
 
 
 def yaw_between(before: Float[np.ndarray, "3 3"], now: Float[np.ndarray, "3 3"]) -> float:

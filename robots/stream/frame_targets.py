@@ -89,7 +89,8 @@ class FrameReader:
     def __init__(self, source: Rig, robot: Morphology, ground: Ground) -> None:
         self.source, self.robot, self.ground = source, robot, ground
         self.scale = robot.rig.hip_height / source.hip_height
-        self._parents = source.skeleton.parents.tolist()
+        skeleton = source.skeleton
+        self._levels = [(level, skeleton.parents[level]) for level in skeleton.levels[1:]]
         self._untpose = matrix_from_quat(quat_conj(source.tpose))
         self._tpose = matrix_from_quat(robot.rig.tpose)
         self._chest = source.chest
@@ -154,10 +155,10 @@ class FrameReader:
         turns = matrix_from_quat(rotations / length[:, None])
         places = np.empty_like(local)
         places[0] = root
-        for j, parent in enumerate(self._parents):
-            if parent >= 0:
-                places[j] = places[parent] + turns[parent] @ local[j]
-                turns[j] = turns[parent] @ turns[j]
+        for level, parents in self._levels:
+            above = turns[parents]
+            places[level] = places[parents] + (above @ local[level][..., None])[..., 0]
+            turns[level] = above @ turns[level]
         return turns, places
 
     def _own(self, turns: Float[np.ndarray, "N 3 3"]) -> Float[np.ndarray, "J 3 3"]:

@@ -21,7 +21,7 @@ _SPEED_WINDOW = 0.05  # [s] before the newest frame over which that speed is mea
 _DAMPING = 0.02  # [1] on the diagonal of the normal equations that say where a target is
 _MAX_STEP = 0.5  # [rad, m] to it
 _MAX_SPEED = 10.0  # [rad/s, m/s]
-_RATIOS = np.geomspace(1e-6, 1e9, 400)  # of a derivative's squared weight to the target's
+_LOG_RATIOS = np.linspace(-14.0, 21.0, 400)  # of a derivative's squared weight to the target's
 
 
 class Ahead(NamedTuple):
@@ -34,40 +34,40 @@ class Ahead(NamedTuple):
 
 
 class CostToGo:
-    """Of dofs whose derivatives of one order, 2 or 3, are weighed, frame by frame."""
+    """Of dofs whose derivatives of an order, 2 or 3, are weighed (squared), frame by frame."""
 
-    def __init__(self, frame_time: float, order: int) -> None:
-        count = max(4, round(HORIZON / frame_time))
-        differences = np.diff(np.eye(3 + count), order, axis=0)[3 - order :]
-        weighed = _RATIOS[:, None, None] * (differences.T @ differences)
-        time = frame_time * np.arange(1, count + 1)
-        ways = np.stack([np.ones(count), SLOWING * (1 - np.exp(-time / SLOWING))], axis=1)
-        across = weighed[:, 3:, :3]
-        right = np.concatenate([across, np.broadcast_to(ways, (len(_RATIOS), count, 2))], axis=2)
-        beyond = weighed[:, 3:, 3:] + np.eye(count)
-        reduced = across.transpose(0, 2, 1) @ np.linalg.solve(beyond, right)
-        reduced[:, :, :3] = weighed[:, :3, :3] - reduced[:, :, :3]
-        self._table = reduced
+    def __init__(
+        self, frame_time: float, orders: Int[np.ndarray, "D"], weights: Float[np.ndarray, "D"]
+    ) -> None:
+        self._tables = np.stack([_table(frame_time, order) for order in (2, 3)])
+        self._which, self._log_weights = orders - 2, np.log(weights)
 
-    def of(
-        self,
-        weights: Float[np.ndarray, "D"],
-        target_weights: Float[np.ndarray, "D"],
-        targets: Float[np.ndarray, "D"],
-        speeds: Float[np.ndarray, "D"],
-    ) -> tuple[Float[np.ndarray, "D 3 3"], Float[np.ndarray, "D 3"]]:
-        """P and p of `x P x / 2 + p x` in the last three values x of each dof; weights squared.
-        `targets` are where the dofs should be in the newest frame, `speeds` how fast these move
-        [1/s]."""
-        ratio = np.log(weights / np.maximum(target_weights, 1e-12))
-        first, last = np.log(_RATIOS[[0, -1]])
-        at = np.clip((ratio - first) / (last - first), 0.0, 1.0) * (len(_RATIOS) - 1)
-        k = np.minimum(at.astype(int), len(_RATIOS) - 2)
+    def of(self, ahead: Ahead) -> tuple[Float[np.ndarray, "D 3 3"], Float[np.ndarray, "D 3"]]:
+        """P and p of `x P x / 2 + p x` in the last three values x of each dof, from its newest."""
+        ratio = self._log_weights - np.log(np.maximum(ahead.weights, 1e-12))
+        at = (ratio - _LOG_RATIOS[0]) / (_LOG_RATIOS[1] - _LOG_RATIOS[0])
+        at = np.minimum(np.maximum(at, 0.0), len(_LOG_RATIOS) - 1.001)
+        k = at.astype(int)
         share = (at - k)[:, None, None]
-        of_one = (1 - share) * self._table[k] + share * self._table[k + 1]
-        of_one *= target_weights[:, None, None]
-        p = of_one[:, :, 3] * targets[:, None] + of_one[:, :, 4] * speeds[:, None]
-        return of_one[:, :, :3], p
+        cost = (1 - share) * self._tables[self._which, k] + share * self._tables[self._which, k + 1]
+        cost *= ahead.weights[:, None, None]
+        p = cost[:, :, 3] * ahead.targets[:, None] + cost[:, :, 4] * ahead.speeds[:, None]
+        return cost[:, :, :3], p
+
+
+def _table(frame_time: float, order: int) -> Float[np.ndarray, "R 3 5"]:
+    """P, and p for a target at 1 and for one that moves from 0 with a speed of 1, where the target
+    weighs 1."""
+    count = max(4, round(HORIZON / frame_time))
+    differences = np.diff(np.eye(3 + count), order, axis=0)[3 - order :]
+    weighed = np.exp(_LOG_RATIOS)[:, None, None] * (differences.T @ differences)
+    time = frame_time * np.arange(1, count + 1)
+    ways = np.stack([np.ones(count), SLOWING * (1 - np.exp(-time / SLOWING))], axis=1)
+    across = weighed[:, 3:, :3]
+    right = np.concatenate([across, np.broadcast_to(ways, (len(across), count, 2))], axis=2)
+    out = across.transpose(0, 2, 1) @ np.linalg.solve(weighed[:, 3:, 3:] + np.eye(count), right)
+    out[:, :, :3] = weighed[:, :3, :3] - out[:, :, :3]
+    return out
 
 
 class TargetMotion:

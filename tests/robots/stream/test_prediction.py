@@ -1,0 +1,46 @@
+"""What a stream expects beyond its newest frame, against the same problem written out."""
+
+import numpy as np
+import pytest
+
+from robots.stream.prediction import HORIZON, SLOWING, Ahead, CostToGo
+
+FRAME_TIME = 1 / 60
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_the_cost_to_go_is_the_least_that_later_frames_can_cost(order: int) -> None:
+    rng = np.random.default_rng(order)
+    weight, target_weight, target, speed = 30.0, 4.0, 0.3, -1.2
+    count = round(HORIZON / FRAME_TIME)
+    time = FRAME_TIME * np.arange(1, count + 1)
+    wanted = target + speed * SLOWING * (1 - np.exp(-time / SLOWING))
+
+    def least(x: np.ndarray) -> float:
+        """Of the frames after three at x, by least squares over all of them."""
+        differences = np.diff(np.eye(3 + count), order, axis=0)[3 - order :]
+        rows = np.concatenate(
+            [np.sqrt(weight) * differences[:, 3:], np.sqrt(target_weight) * np.eye(count)]
+        )
+        right = np.concatenate(
+            [-np.sqrt(weight) * differences[:, :3] @ x, np.sqrt(target_weight) * wanted]
+        )
+        return float(np.linalg.lstsq(rows, right, rcond=None)[1].sum()) / 2
+
+    to_go = CostToGo(FRAME_TIME, np.array([order]), np.array([weight]))
+    P, p = to_go.of(Ahead(np.array([target]), np.array([speed]), np.array([target_weight])))
+
+    def quadratic(x: np.ndarray) -> float:
+        return float(x @ P[0] @ x / 2 + p[0] @ x)
+
+    # x is seen from the newest frame, which is at 0; a constant is free.
+    for _ in range(5):
+        x = np.append(rng.normal(size=2), 0.0)
+        assert quadratic(x) == pytest.approx(least(x) - least(np.zeros(3)), rel=2e-3)
+
+
+def test_a_target_that_nothing_holds_costs_nothing() -> None:
+    to_go = CostToGo(FRAME_TIME, np.array([3]), np.array([10.0]))
+    P, p = to_go.of(Ahead(np.ones(1), np.ones(1), np.zeros(1)))
+    np.testing.assert_allclose(P, 0.0, atol=1e-9)
+    np.testing.assert_allclose(p, 0.0, atol=1e-9)
