@@ -34,30 +34,52 @@ def simplify_together(meshes: dict[int, Mesh], faces: int) -> dict[int, Mesh]:
 
 
 def simplify_skin(skin: Skin, faces: int) -> Skin:
-    """The skin with about so many faces, or fewer. Each cell keeps one of its vertices, with its
-    bones and its place in the picture: neither is a mean of others. Vertices of other materials,
-    or from elsewhere in a picture, are not in the cell."""
+    """The skin with about so many faces, or fewer. Each cell keeps one of its places, with its
+    bones: neither is a mean of others. Vertices in one place stay in one, so that the seam of a
+    material or a picture does not open; those from elsewhere in a picture keep their own place
+    there."""
     if len(skin.faces) <= faces:
         return skin
     cell = float(np.sqrt(_FACES_A_CELL * area(skin.vertices, skin.faces) / faces))
+    _, weld = np.unique(np.round(skin.vertices, 6), axis=0, return_inverse=True)
+    weld = weld.ravel()
+    places = np.zeros((int(weld.max()) + 1, 3))
+    places[weld] = skin.vertices
+    side = _sides(places, weld[skin.faces])[weld]
     look = np.zeros(len(skin.vertices), dtype=np.int64)
     look[skin.faces] = skin.material_of[:, None]
-    side = _sides(skin.vertices, skin.faces)
+    cells = skin.vertices - skin.vertices.min(0)
     for patches in _PATCHES:
-        place = np.floor((skin.vertices - skin.vertices.min(0)) / cell).astype(np.int64)
+        _, place, group = _grouped(*np.floor(cells / cell).astype(np.int64).T, side)
         spot = np.floor((skin.uv - skin.uv.min(0)) * patches).astype(np.int64)
-        key = np.zeros(len(look), dtype=np.int64)
-        for column in (*place.T, *spot.T, look, side):
-            key = key * (int(column.max()) + 1) + column
-        _, first, merged = np.unique(key, return_index=True, return_inverse=True)
-        turned = first[merged][skin.faces]
-        a, b, c = turned.T
+        _, first, merged = _grouped(group, look, *spot.T)
+        turned = merged[skin.faces]
+        a, b, c = place[group[first]][turned].T
         _, kept = np.unique(np.sort(turned, axis=1), axis=0, return_index=True)
         kept = np.sort(kept[((a != b) & (b != c) & (c != a))[kept]])
         if len(kept) <= faces:
             break
         cell *= 1.05 * np.sqrt(len(kept) / faces)
-    return replace(skin, faces=turned).with_faces(kept)
+    at = place[group[first]]
+    fewer = replace(
+        skin,
+        vertices=skin.vertices[at],
+        bones_of=skin.bones_of[at],
+        weights=skin.weights[at],
+        uv=skin.uv[first],
+        faces=turned,
+    )
+    return fewer.with_faces(kept)
+
+
+def _grouped(
+    *columns: Int[np.ndarray, "V"],
+) -> tuple[Int[np.ndarray, "G"], Int[np.ndarray, "G"], Int[np.ndarray, "V"]]:
+    """What `np.unique` gives of rows of small numbers: keys, first rows, groups."""
+    key = np.zeros(len(columns[0]), dtype=np.int64)
+    for column in columns:
+        key = key * (int(column.max()) + 1) + column
+    return np.unique(key, return_index=True, return_inverse=True)
 
 
 def area(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "F 3"]) -> float:

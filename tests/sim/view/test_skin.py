@@ -138,6 +138,33 @@ def test_a_dense_skin_is_thinned_but_keeps_its_shape(clip: Clip) -> None:
         assert len(own) > 50
 
 
+def test_thinning_opens_no_seam(clip: Clip) -> None:
+    """The corners of a closed surface that a picture cuts into patches meet as before."""
+    skin = skin_of(clip)
+    for _ in range(2):
+        skin = divided(skin)
+    rng = np.random.default_rng(0)
+    corners = skin.faces.ravel()
+    cut = replace(  # every face for itself, each with another part of the picture
+        skin,
+        vertices=skin.vertices[corners],
+        bones_of=skin.bones_of[corners],
+        weights=skin.weights[corners],
+        uv=np.repeat(rng.uniform(size=(len(skin.faces), 2)), 3, axis=0),
+        faces=np.arange(len(corners)).reshape(-1, 3),
+    )
+    fewer = simplify_skin(cut, 5000)
+    assert len(fewer.faces) <= 5000
+
+    def borders(mesh: Skin) -> int:
+        _, place = np.unique(np.round(mesh.vertices, 6), axis=0, return_inverse=True)
+        at = place.ravel()[mesh.faces]
+        edges = np.sort(np.concatenate([at[:, [0, 1]], at[:, [1, 2]], at[:, [2, 0]]]), axis=1)
+        return int((np.unique(edges, axis=0, return_counts=True)[1] == 1).sum())
+
+    assert borders(fewer) <= borders(cut)
+
+
 def test_normals_are_smooth_over_the_seam_of_a_picture() -> None:
     # A roof of two faces; its ridge is in the file twice, once for each side's picture.
     vertices = np.array([[0, 0, 1], [1, 0, 1], [0, -1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 0.0]])
