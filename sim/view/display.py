@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 
 from sim.body.parts import kept_joints
 from sim.trajectory import ModelTrajectory
+from sim.view.sides import tinted, tints
 from sim.view.simplify import Mesh, simplify_together
 from spark.rig.rig import Rig
 
@@ -68,8 +69,12 @@ def add_display(
         for j in range(model.njnt):
             if int(model.jnt_bodyid[j]) == b:
                 columns += _add_joint(bodies[b], model, j, scale)
+    sides = tints(body, inside)
     for g in visible or shown:
-        _add_geom(bodies[int(model.geom_bodyid[g])], model, g, meshes, ghost=ghost, scale=scale)
+        b = int(model.geom_bodyid[g])
+        rgba = GHOST_RGBA if ghost else tinted(lit(rgba_of(model, g)), sides.get(b))
+        made = _add_geom(bodies[b], model, g, meshes, scale=scale)
+        made.rgba, made.group = rgba, GHOST_GROUP if ghost else 0
     return np.array(columns)
 
 
@@ -105,24 +110,22 @@ def _add_geom(
     geom: int,
     meshes: dict[int, str],
     *,
-    ghost: bool,
     scale: float,
-) -> None:
+) -> mujoco.MjsGeom:
     kind = int(model.geom_type[geom])
     made = body.add_geom(
         type=mujoco.mjtGeom(kind),
         pos=scale * model.geom_pos[geom],
         quat=model.geom_quat[geom],
-        rgba=GHOST_RGBA if ghost else lit(rgba_of(model, geom)),
         contype=0,
         conaffinity=0,
         mass=0,
-        group=GHOST_GROUP if ghost else 0,
     )
     if kind == _MESH:
         made.meshname = meshes[int(model.geom_dataid[geom])]
     else:
         made.size = scale * model.geom_size[geom]
+    return made
 
 
 def lit(rgba: Float[np.ndarray, "4"]) -> Float[np.ndarray, "4"]:
