@@ -22,12 +22,14 @@ function aim(all) {
 if (parent !== window) addEventListener("message", e => {
   if (typeof e.data.seek === "number") { play(false); seekTo(e.data.seek); }
 });
-let last = null, told = null;
+let last = null, told = null, drawn = "", drawnAt = 0;
 function tick(now) {
   if (view.playing && last !== null) advance((now - last) / 1000);
   last = now;
   tell();
-  draw();
+  // What stands still is drawn twice a second: a picture of a skin may have come, or the night.
+  const state = JSON.stringify([view, shown, player.followed, canvas.width, canvas.height]);
+  if (state !== drawn || now - drawnAt > 500) { draw(); drawn = state; drawnAt = now; }
   if (parent !== window && told !== view.time) parent.postMessage({ time: told = view.time }, "*");
   requestAnimationFrame(tick);
 }

@@ -3,6 +3,7 @@ const el = id => document.getElementById(id);
 let clip = null, most = 0, order = 0;
 function tell(text, bad) { el("told").textContent = text; el("told").classList.toggle("bad", !!bad); }
 function show(page) { el("empty").hidden = true; el("view").hidden = false; el("view").src = "/page/" + page; }
+function hide() { el("empty").hidden = false; el("view").hidden = true; el("view").src = "about:blank"; }
 async function ask(path, body) {
   let reply;
   try { reply = await fetch(path, body === undefined ? {} : { method: "POST", body }); }
@@ -15,6 +16,7 @@ async function drop(file) {
   const mine = ++order;
   if (file.size > most) return tell(`${file.name} has ${(file.size / 1e6).toFixed(0)} MB; at most ${(most / 1e6).toFixed(0)} MB`, true);
   tell(`reads ${file.name} ...`);
+  hide(); // what it shows takes the time that the new file needs
   try {
     const made = await ask("/upload?name=" + encodeURIComponent(file.name), file);
     if (mine !== order) return;
