@@ -3,7 +3,8 @@
     python scripts/time_drop.py dance.bvh
 
 A server of its own and a headless Chromium: the file is dropped onto the page three times, by an
-event as a mouse makes it, each after the report of the one before. The figure moves when the replay's clock does, which is drawn with it.
+event as a mouse makes it, each after the report of the one before. The figure moves when the
+replay's clock does, which is drawn with it.
 """
 
 import base64

@@ -19,6 +19,11 @@ if TYPE_CHECKING:
 # picture: 71 ms of CPU time with 28 and 16, 31 ms with 12 and 6 (two Mixamo characters, 960 x 540).
 _FINE, _FAST = (28, 16), (12, 6)
 _OUTLINE = (255, 255, 255)
+# The floor's texture and the sky take half of the time of a picture: a video has lines instead.
+_FLOOR = (0.90, 0.91, 0.92, 1.0)
+_LINES = np.array([0.78, 0.80, 0.82, 1.0], dtype=np.float32)
+_LINE, _NO_SIZE, _UPRIGHT = int(mujoco.mjtGeom.mjGEOM_LINE), np.zeros(3), np.eye(3).ravel()
+_GRID, _REACH, _LIFT = 0.5, 8.0, 0.003  # [m]: between lines, how far they go, over the floor
 
 
 def frames(
@@ -32,6 +37,7 @@ def frames(
         seen = shot(scene, aspect=width / height)
         for frame in indices:
             painter.pose(frame, seen, 0)
+            painter.simplify_ground()
             yield painter.picture()
 
 
@@ -96,6 +102,29 @@ class _Painter:
         renderer.update_scene(self._data, self._camera, self._option)
         renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
         renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
+
+    def simplify_ground(self) -> None:
+        """Show a plain floor with lines on it, and no sky."""
+        scene = self._renderer.scene
+        geoms = scene.geoms
+        scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = False
+        scene.flags[mujoco.mjtRndFlag.mjRND_HAZE] = False
+        for geom in geoms[: scene.ngeom]:
+            if int(geom.type) == int(mujoco.mjtGeom.mjGEOM_PLANE):
+                geom.matid, geom.rgba = -1, _FLOOR
+        middle = np.round(self._camera.lookat[:2] / _GRID) * _GRID
+        for axis in (0, 1):
+            for off in np.arange(-_REACH, _REACH + _GRID, _GRID):
+                start = np.array([*middle, _LIFT])
+                start[axis] += off
+                end = start.copy()
+                start[1 - axis] -= _REACH
+                end[1 - axis] += _REACH
+                if scene.ngeom < scene.maxgeom:
+                    geom = geoms[scene.ngeom]
+                    mujoco.mjv_initGeom(geom, _LINE, _NO_SIZE, _NO_SIZE, _UPRIGHT, _LINES)
+                    mujoco.mjv_connector(geom, _LINE, 1.0, start, end)
+                    scene.ngeom += 1
 
     def picture(self) -> UInt8[np.ndarray, "H W 3"]:
         """What is seen."""
