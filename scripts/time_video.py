@@ -1,6 +1,6 @@
 """How fast a video of some files is written: in all, and what of it is drawing and encoding.
 
-    python scripts/time_video.py dance.bvh dance_on_g1.npz
+python scripts/time_video.py dance.bvh dance_on_g1.npz
 """
 
 import resource
