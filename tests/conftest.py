@@ -49,6 +49,7 @@ SLOW = (
     "tests/spark/training/test_name_encoder.py::test_names_are_learned",
     "tests/spark/training/test_train.py",
     "tests/spark/evaluation/test_equal.py",
+    "tests/spark/training/test_compiling.py::test_a_run_is_one_graph",
     "tests/spark/training/test_splits.py::test_a_flat_folder_splits_by_name",
     "tests/spark/transfer/test_analytic.py::test_every_pair_of_humanoids_keeps_limb_directions",
     "tests/spark_sim/shelf/test_batch.py::test_killed_at_random_moments_it_resumes_to_the_same_bytes",

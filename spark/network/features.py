@@ -107,6 +107,12 @@ class BodyFeatures:
         features[:, 5] = 1
         return features
 
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """What each joint is, without its side; empty where it has no role."""
+        roles = (self.rig.roles.roles[j] for j in self.joints.tolist())
+        return tuple(role.part if role else "" for role in roles)
+
     @cached_property
     def sides(self) -> Float[np.ndarray, "K 2"]:
         """1 at the joints of the left and of the right side."""

@@ -14,6 +14,8 @@ from torch import Tensor, nn
 from spark.network.config import LN_ROTARY_BASE, LN_SINUSOID_BASE
 from spark.training.precision import exactly
 
+MOST_SEQUENCES = 65535  # blocks of a CUDA grid's last axis, along which the kernels lay sequences
+
 Heads = Float[Tensor, "M H _ C"]  # of any number of tokens
 
 
@@ -59,12 +61,26 @@ class Attention(nn.Module):
         allowed = None if mask is None else mask[:, None]
         if q.device.type == "cpu":
             with exactly(q):
-                attended = nnf.scaled_dot_product_attention(
-                    q.float(), k.float(), v.float(), allowed, is_causal=self.causal
-                )
+                attended = self._in_chunks(q.float(), k.float(), v.float(), allowed)
         else:
-            attended = nnf.scaled_dot_product_attention(q, k, v, allowed, is_causal=self.causal)
+            attended = self._in_chunks(q, k, v, allowed)
         return self.out(attended.transpose(1, 2).flatten(2))
+
+    def _in_chunks(
+        self, q: Heads, k: Heads, v: Heads, allowed: Bool[Tensor, "M 1 #Q K"] | None
+    ) -> Heads:
+        """Fused attention on no more sequences at once than its kernels take."""
+        parts = [
+            nnf.scaled_dot_product_attention(
+                q[at : at + MOST_SEQUENCES],
+                k[at : at + MOST_SEQUENCES],
+                v[at : at + MOST_SEQUENCES],
+                None if allowed is None else allowed[at : at + MOST_SEQUENCES],
+                is_causal=self.causal,
+            )
+            for at in range(0, len(q), MOST_SEQUENCES)
+        ]
+        return parts[0] if len(parts) == 1 else torch.cat(parts)
 
     def _split(self, x: Float[Tensor, "M L PD"], parts: int) -> tuple[Heads, ...]:
         return x.view(*x.shape[:-1], parts, self.heads, -1).transpose(1, 3).unbind(2)

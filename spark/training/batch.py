@@ -1,7 +1,7 @@
 """Bodies and motions as the network's tensors: padded, stacked, with their names embedded."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -9,10 +9,11 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from spark.network.config import NO_ROTATION
+from spark.network.config import N_GROUPS, NO_ROTATION
 from spark.network.features import BodyFeatures
 from spark.network.windows import Windows
 from spark.training.pairs import Pairs
+from spark.training.sizes import Sizes
 from spark.training.tensors import Body, PoseTensors, Start
 
 Names = Callable[[Sequence[str]], Float[Tensor, "S E"]]
@@ -40,17 +41,28 @@ class Batch(NamedTuple):
 
 
 class Collator:
-    """Makes batches; a body's tensors are made once and kept while the body lives."""
+    """Makes batches; a body's tensors are made once and kept while the body lives. Batches are
+    padded to `sizes`, or to their largest body where that is larger."""
 
-    def __init__(self, names: Names) -> None:
-        self._names = names
+    def __init__(self, names: Names, sizes: Sizes | None = None) -> None:
+        self._names, self._sizes = names, sizes or Sizes()
         self._bodies: WeakKeyDictionary[BodyFeatures, Body] = WeakKeyDictionary()
 
+    def __getstate__(self) -> dict[str, object]:
+        # For another process, which has bodies of its own.
+        return {**vars(self), "_bodies": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _bodies=WeakKeyDictionary())
+
     def batch(self, draws: Sequence[Pairs]) -> Batch:
-        """Draws stacked into one batch, padded to the largest body."""
+        """Draws stacked into one batch."""
         counts = [len(draw.source.root) for draw in draws]
         targets = [draw.target.body for draw in draws]
-        J = max(len(body.joints) for body in targets)
+        least = (self._sizes.joints,)
+        J = max(*least, *(len(body.joints) for body in targets))
+        unmatched = [torch.as_tensor(draw.unmatched) for draw in draws]
+        corrected = [torch.nonzero(u == torch.arange(len(u)))[:, 0] for u in unmatched]
         planted = torch.zeros(sum(counts), draws[0].source.root.shape[1], J, dtype=torch.bool)
         row = 0
         for draw, count in zip(draws, counts, strict=True):
@@ -61,14 +73,15 @@ class Collator:
         return Batch(
             self.bodies([draw.source.body for draw in draws], counts),
             self.bodies(targets, counts),
-            _poses([draw.source for draw in draws]),
-            _poses([draw.target for draw in draws]),
+            _poses([draw.source for draw in draws], *least),
+            _poses([draw.target for draw in draws], *least),
             Start(
-                *_poses([draw.start for draw in draws]),
-                _stack([torch.as_tensor(draw.unmatched) for draw in draws], counts, -1),
+                *_poses([draw.start for draw in draws], *least),
+                _stack(unmatched, counts, -1, least),
+                _stack(corrected, counts, -1, (self._sizes.corrected,)),
             ),
             planted,
-            _stack(effectors, counts),
+            _stack(effectors, counts, 0, least),
             draws[0].frame_time,
         )
 
@@ -78,20 +91,21 @@ class Collator:
         return UnpairedBatch(
             self.bodies([windows.body for windows, _ in draws], counts),
             self.bodies([target for _, target in draws], counts),
-            _poses([windows for windows, _ in draws]),
+            _poses([windows for windows, _ in draws], self._sizes.joints),
         )
 
     def bodies(self, bodies: Sequence[BodyFeatures], counts: Sequence[int]) -> Body:
         """Each body repeated as often as `counts` says."""
         made = [self._body(body) for body in bodies]
-        J = max(body.valid.shape[1] for body in made)
+        J = max(self._sizes.joints, *(body.valid.shape[1] for body in made))
         parts = []
         for field in Body._fields:
             tensors = [getattr(body, field)[0] for body in made]
             if field == "parents":  # a padding joint is its own parent
                 tensors = [torch.cat([t, torch.arange(len(t), J)]) for t in tensors]
             fill = -1 if field == "groups" else 0
-            parts.append(_stack(tensors, counts, fill))
+            least = (N_GROUPS, self._sizes.group) if field in ("groups", "arc") else (J,)
+            parts.append(_stack(tensors, counts, fill, least))
         return Body(*parts)
 
     def _body(self, features: BodyFeatures) -> Body:
@@ -119,8 +133,8 @@ class Collator:
         )
 
 
-def _poses(windows: Sequence[Windows]) -> PoseTensors:
-    J = max(w.rotations.shape[2] for w in windows)
+def _poses(windows: Sequence[Windows], least: int) -> PoseTensors:
+    J = max(least, *(w.rotations.shape[2] for w in windows))
     root = np.concatenate([w.root for w in windows]).astype(np.float32, copy=False)
     rotations = np.empty((*root.shape[:2], J, 6), np.float32)
     row = 0
@@ -132,9 +146,12 @@ def _poses(windows: Sequence[Windows]) -> PoseTensors:
     return PoseTensors(torch.from_numpy(rotations), torch.from_numpy(root))
 
 
-def _stack(tensors: Sequence[Tensor], counts: Sequence[int], fill: int = 0) -> Tensor:
-    """Tensors padded to a common shape along each axis, each repeated."""
+def _stack(
+    tensors: Sequence[Tensor], counts: Sequence[int], fill: int = 0, least: Sequence[int] = ()
+) -> Tensor:
+    """Tensors padded to a common shape, and along the first axes to `least`; each repeated."""
     shape = [max(sizes) for sizes in zip(*(t.shape for t in tensors), strict=True)]
+    shape[: len(least)] = map(max, shape, least)
     out = tensors[0].new_full((sum(counts), *shape), fill)
     row = 0
     for tensor, count in zip(tensors, counts, strict=True):

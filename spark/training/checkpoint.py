@@ -1,4 +1,5 @@
-"""Checkpoints: one file (`spark.network.weights`) with weights, settings and what resuming needs.
+"""Checkpoints: a file (`spark.network.weights`) with weights and settings, and beside it one that
+only resuming needs, the optimiser's state at that step.
 
 Draws and noise are functions of the step's number, so the step is all that there is of the state
 of random numbers.
@@ -10,16 +11,21 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor
 
+from spark.errors import FileFormatError
 from spark.files import write_atomically
 from spark.network.config import Config
 from spark.network.known_bodies import Trunk
 from spark.network.recorded_network import PREFIX as RECORDED
 from spark.network.weights import FORMAT, VERSION, Tensors, read_weights
+from spark.opening import check_regular
 from spark.training.model import Spark
 from spark.training.name_encoder import NameConfig, NameEncoder
+
+_OPTIMIZER = "spark-sim optimizer"
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +48,11 @@ class Checkpoint:
 
 
 def save_checkpoint(checkpoint: Checkpoint, path: Path) -> None:
-    """Write `checkpoint` whole or not at all. Raises `OutputError` where `path` can't be."""
+    """Write `checkpoint` whole or not at all. Raises `OutputError` where `path` can't be.
+
+    The optimiser's state goes to a file of its own, named after the step, before the weights do: a
+    run that is killed in between still has both of the step before.
+    """
     tensors = {f"model.{k}": v for k, v in checkpoint.model.state_dict().items()}
     header: dict[str, Any] = {
         "network": asdict(checkpoint.model.config),
@@ -55,15 +65,21 @@ def save_checkpoint(checkpoint: Checkpoint, path: Path) -> None:
         header["names"] = asdict(checkpoint.names.config)
     else:
         header["names"] = {"t5": checkpoint.names}
-    tensors |= {f"optimizer.{k}": v for k, v in checkpoint.optimizer.items()}
     tensors |= {f"{RECORDED}{k}": v for k, v in checkpoint.recorded.items()}
-    plain = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
+    beside = _optimizer_path(path, checkpoint.step)
+    if checkpoint.optimizer:
+        about = {"format": _OPTIMIZER, "step": str(checkpoint.step)}
+        write_atomically(beside, save(_plain(checkpoint.optimizer), about))
     metadata = {"format": FORMAT, "version": str(VERSION), "config": json.dumps(header)}
-    write_atomically(path, save(plain, metadata))
+    write_atomically(path, save(_plain(tensors), metadata))
+    for old in path.parent.glob(_optimizer_path(path, "*").name):
+        if old != beside:
+            old.unlink(missing_ok=True)
 
 
 def load_checkpoint(path: Path) -> Checkpoint:
-    """Read a checkpoint onto the CPU. Raises `FileFormatError` for anything that is not one."""
+    """Read a checkpoint onto the CPU, with the optimiser's state where it lies beside. Raises
+    `FileFormatError` for anything that is not one."""
     weights = read_weights(path)
     try:
         model = Spark(Config(**weights.network))
@@ -77,11 +93,39 @@ def load_checkpoint(path: Path) -> Checkpoint:
             names.requires_grad_(False)
     except (TypeError, ValueError, RuntimeError) as error:
         raise weights.damaged(error) from error
-    optimizer = _tensors(weights.below("optimizer."))
+    optimizer = _tensors(weights.below("optimizer."))  # in older files
+    beside = _optimizer_path(weights.path, weights.step)
+    if beside.exists():
+        optimizer = _read_optimizer(beside, weights.step)
     recorded = _tensors(weights.below(RECORDED))
     return Checkpoint(
         model, names, weights.step, weights.settings, weights.bodies, optimizer, recorded
     )
+
+
+def _optimizer_path(path: Path, step: int | str) -> Path:
+    """`optimizer-1000.safetensors` beside `checkpoint.safetensors`; other names go in front."""
+    own = "" if path.stem == "checkpoint" else f"{path.stem}-"
+    return path.with_name(f"{own}optimizer-{step}.safetensors")
+
+
+def _read_optimizer(path: Path, step: int) -> dict[str, Tensor]:
+    check_regular(path, expected="an optimiser's state")
+    try:
+        with safe_open(path, framework="pt") as file:
+            about = file.metadata() or {}
+            if (about.get("format"), about.get("step")) != (_OPTIMIZER, str(step)):
+                raise FileFormatError(path, None, f"is no optimiser's state at step {step}")
+            tensors = {key: file.get_tensor(key) for key in file.keys()}  # noqa: SIM118
+    except (SafetensorError, OSError, ValueError) as error:
+        raise FileFormatError(path, None, f"is no safetensors file ({error})") from error
+    if not all(bool(torch.isfinite(tensor).all()) for tensor in tensors.values()):
+        raise FileFormatError(path, None, "holds NaN or infinity: the training went wrong")
+    return tensors
+
+
+def _plain(tensors: dict[str, Tensor]) -> dict[str, Tensor]:
+    return {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
 
 
 def optimizer_tensors(

@@ -45,6 +45,7 @@ from spark.rig.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_conj, quat_mul
 from spark.training.clips import read_clips
 from spark.training.dataset_parts import Part, make_part, read_part
+from spark.training.mapped import MappedArray
 from spark.training.pairs import TrainingClip
 from spark.training.part_workers import parts_in_processes
 from spark.training.splits import cells, character_and_motion, seen_characters, seen_motions
@@ -177,7 +178,7 @@ def _array(folder: Path, name: str) -> Shaped[np.ndarray, "..."]:
     its index, or holds a number that is none."""
     path = folder / Path(name).name
     check_regular(path, limit=1 << 50, expected="an array of the dataset")
-    array = np.load(path, mmap_mode="r")
+    array = np.load(path, mmap_mode="r").view(MappedArray)
     at = first_not_finite(array)
     if at is not None:
         raise FileFormatError(path, None, f"holds {array[at]} at {at[0]}; prepare it again")

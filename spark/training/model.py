@@ -214,14 +214,7 @@ class Decoder(nn.Module):
         body: Body,
     ) -> PoseTensors:
         """`start` with its unmatched joints corrected: they alone are decoded."""
-        joints = torch.arange(start.unmatched.shape[1], device=known.device).expand_as(
-            start.unmatched
-        )
-        valid = start.unmatched == joints
-        if not torch.compiler.is_exporting():  # a graph can't cut its tensors by their values
-            count = max(1, int(valid.sum(1).max()))
-            joints = valid.int().argsort(dim=1, descending=True, stable=True)[:, :count]
-            valid = torch.gather(valid, 1, joints)
+        joints, valid = _corrected_joints(start)
         assert self.start is not None
         y = (
             take(known[:, None], joints)
@@ -294,6 +287,20 @@ def _temporal_block(config: Config) -> TemporalBlock:
     return TemporalBlock(
         config.width, config.heads, rotary=config.relative_time, causal=config.causal
     )
+
+
+def _corrected_joints(start: Start) -> tuple[Int[Tensor, "B C"], Bool[Tensor, "B C"]]:
+    """The joints of `start` to decode, and which of them are no padding."""
+    if start.corrected is not None:
+        return start.corrected.clamp(min=0), start.corrected >= 0
+    joints = torch.arange(start.unmatched.shape[1], device=start.unmatched.device)
+    joints = joints.expand_as(start.unmatched)
+    valid = start.unmatched == joints
+    if not torch.compiler.is_exporting():  # a graph can't cut its tensors by their values
+        count = max(1, int(valid.sum(1).max()))
+        joints = valid.int().argsort(dim=1, descending=True, stable=True)[:, :count]
+        valid = torch.gather(valid, 1, joints)
+    return joints, valid
 
 
 def _rotation_features(rotations: Float[Tensor, "B T J 6"]) -> Float[Tensor, "B T J 6"]:

@@ -11,7 +11,7 @@ name's bytes, blocks of the same kind, without positions, let every name attend 
 Text embeddings confuse left and right, so the side stands beside them as two features of its own.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -76,21 +76,9 @@ class NameEncoder(nn.Module):
         """The vectors of `names`: the joints of one rig."""
         return self(tokenize_rigs([names]).to(self.embed.weight.device))[0]
 
-    def remembering(self) -> Callable[[Sequence[str]], Float[Tensor, "S D"]]:
-        """`encode` for many rigs that have names in common, as long as the weights stay: each name
-        is read once, and by itself, so that its vector does not depend on what was read before."""
-        read: dict[str, Float[Tensor, " D"]] = {}
-
-        @torch.no_grad()
-        def encode(names: Sequence[str]) -> Float[Tensor, "S D"]:
-            words = rig_words(names)
-            for word in words:
-                if word not in read:
-                    read[word] = self._alike(tokenize([word]))[0]
-            own = torch.stack([read[word] for word in words])[None]
-            return self._together(own, torch.ones(own.shape[:2], dtype=torch.bool))[0]
-
-        return encode
+    def remembering(self) -> "RememberedNames":
+        """`encode` for many rigs that have names in common, as long as the weights stay."""
+        return RememberedNames(self)
 
     def _together(
         self, x: Float[Tensor, "R N D"], named: Bool[Tensor, "R N"]
@@ -120,6 +108,25 @@ class NameEncoder(nn.Module):
         buckets = relative_buckets(length, self.config.buckets, self.config.max_distance)
         bucket = torch.as_tensor(buckets, device=self.embed.weight.device)
         return self.bias(bucket).permute(2, 0, 1)[None]
+
+
+class RememberedNames:
+    """The vectors of rigs' names. Each name is read once, and by itself, so that its vector does
+    not depend on what was read before."""
+
+    def __init__(self, encoder: NameEncoder) -> None:
+        self._encoder = encoder
+        self._read: dict[str, Float[Tensor, " D"]] = {}
+
+    @torch.no_grad()
+    def __call__(self, names: Sequence[str]) -> Float[Tensor, "S D"]:
+        """The vectors of the joints of one rig."""
+        words = rig_words(names)
+        for word in words:
+            if word not in self._read:
+                self._read[word] = self._encoder._alike(tokenize([word]))[0]
+        own = torch.stack([self._read[word] for word in words])[None]
+        return self._encoder._together(own, torch.ones(own.shape[:2], dtype=torch.bool))[0]
 
 
 class _Block(nn.Module):

@@ -10,6 +10,7 @@ from spark.network.config import Config
 from spark.training import losses
 from spark.training.batch import Batch, UnpairedBatch
 from spark.training.model import Spark
+from spark.training.precision import exactly
 from spark.training.settings import TrainConfig
 from spark.training.tensors import forward_kinematics
 
@@ -48,33 +49,37 @@ class Objective(nn.Module):
             terms = self._paired(batch)
         else:
             terms = self._unpaired(batch)
-        return torch.stack([w * terms[k] for k, w in self.weights.items()]).sum(), terms
+        with exactly(batch.pose.root):
+            return torch.stack([w * terms[k] for k, w in self.weights.items()]).sum(), terms
 
     def _unpaired(self, batch: Batch | UnpairedBatch) -> Terms:
         """Section 4.5: A reconstructs A; what A becomes on B is encoded as A was."""
         latent = self.model.encode(batch.pose, batch.source)
         same = self.model.decode(latent, batch.source)
         moved = self.model.decode(latent, batch.target)
-        return {
-            "rec": losses.reconstruction(same, batch.pose, batch.source),
-            "cyc": losses.cycle(latent, self.model.encode(moved, batch.target)),
-            "root": losses.root(same, batch.pose),
-            "fk": losses.positions(
-                forward_kinematics(same, batch.source),
-                forward_kinematics(batch.pose, batch.source),
-                batch.source,
-            ),
-        }
+        again = self.model.encode(moved, batch.target)
+        with exactly(batch.pose.root):
+            return {
+                "rec": losses.reconstruction(same, batch.pose, batch.source),
+                "cyc": losses.cycle(latent.float(), again.float()),
+                "root": losses.root(same, batch.pose),
+                "fk": losses.positions(
+                    forward_kinematics(same, batch.source),
+                    forward_kinematics(batch.pose, batch.source),
+                    batch.source,
+                ),
+            }
 
     def _paired(self, batch: Batch) -> Terms:
         """Against the exact answer on B, with the feet and the ends of limbs on top."""
         moved = self.model(batch.pose, batch.source, batch.target, batch.start)
-        positions = forward_kinematics(moved, batch.target)
-        truth = forward_kinematics(batch.truth, batch.target)
-        return {
-            "rec": losses.reconstruction(moved, batch.truth, batch.target),
-            "root": losses.root(moved, batch.truth),
-            "fk": losses.positions(positions, truth, batch.target),
-            "contact": losses.contact(positions, batch.planted, batch.frame_time, batch.target),
-            "ends": losses.end_effectors(positions, truth, batch.effectors),
-        }
+        with exactly(batch.pose.root):
+            positions = forward_kinematics(moved, batch.target)
+            truth = forward_kinematics(batch.truth, batch.target)
+            return {
+                "rec": losses.reconstruction(moved, batch.truth, batch.target),
+                "root": losses.root(moved, batch.truth),
+                "fk": losses.positions(positions, truth, batch.target),
+                "contact": losses.contact(positions, batch.planted, batch.frame_time, batch.target),
+                "ends": losses.end_effectors(positions, truth, batch.effectors),
+            }

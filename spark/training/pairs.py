@@ -26,6 +26,7 @@ from spark.rotation import (
     yaw_from_quat,
 )
 from spark.training.mirror import mirrored_body, mirrored_motion
+from spark.training.sizes import Sizes, sizes_of_variants
 from spark.training.staging import (
     StagedBody,
     foot_lift,
@@ -118,6 +119,11 @@ class PairMaker:
         self._seen: dict[tuple[int, bool], BodyFeatures] = {}
         self._staged_bodies: dict[tuple[int, bool, int], StagedBody] = {}
         self._links: dict[tuple[StagedBody, StagedBody], Correspondence] = {}
+
+    @property
+    def sizes(self) -> Sizes:
+        """What holds every draw."""
+        return sizes_of_variants([group[0].body for group in self._bodies])
 
     def draw(self, n: int, windows: int) -> Pairs:
         """Draw number `n`: `windows` windows of one body's clips on one pair of its variants."""

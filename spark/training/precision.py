@@ -16,7 +16,8 @@ def fast_products(device: torch.device, enabled: bool = True) -> AbstractContext
 def exactly(like: Tensor) -> torch.autocast:
     """Full precision within `fast_products`. For kinematics: 8 bits of a rotation are half a
     degree."""
-    return torch.autocast(like.device.type, enabled=False)
+    device = "cpu" if like.is_meta else like.device.type  # a tensor of no device has no autocast
+    return torch.autocast(device, enabled=False)
 
 
 def has_bfloat16(device: torch.device) -> bool:

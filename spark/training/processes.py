@@ -7,7 +7,7 @@ import torch.distributed as dist
 from torch import nn
 from torch.nn.parallel import DistributedDataParallel
 
-from spark.training.objective import Objective
+from spark.errors import ConventionError
 
 
 def join_processes() -> tuple[int, int, torch.device]:
@@ -23,11 +23,21 @@ def join_processes() -> tuple[int, int, torch.device]:
     return rank, world, torch.device("cuda", local) if cuda else torch.device("cpu")
 
 
-def distributed(objective: Objective) -> nn.Module:
-    """`objective` in each of several processes, their gradients averaged."""
-    # The published network leaves some of the parameters that there are unused.
-    unused = not objective.model.config.residual
+def distributed(objective: nn.Module, *, unused: bool) -> nn.Module:
+    """`objective` in each of several processes, their gradients averaged; `unused` where it leaves
+    some of its parameters aside, as the published network does."""
     return DistributedDataParallel(objective, find_unused_parameters=unused)
+
+
+def check_shares(draws: int, world: int) -> None:
+    """Raise `ConventionError` where `world` processes can't have equal shares of a step's draws:
+    the mean of their gradients would be another one."""
+    if draws % world:
+        fit = [n for n in range(1, draws + 1) if draws % n == 0]
+        raise ConventionError(
+            f"{world} processes for {draws} draws a step (batch / per_body): expected one of "
+            f"{', '.join(map(str, fit))} processes, or another batch"
+        )
 
 
 def agreed(wish: bool) -> bool:

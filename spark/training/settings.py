@@ -9,6 +9,7 @@ from spark.errors import ConventionError
 from spark.opening import parse_toml, read_text
 
 PRESETS = ("default", "paper", "tiny")
+COMPILE = ("auto", "on", "off")
 ABLATIONS = ("share", "mask", "pos", "fk", "mix")
 
 
@@ -22,10 +23,12 @@ class TrainConfig:
     Encoder and decoder have `blocks` blocks each. `batch` windows a step are drawn `per_body` at a
     time from one pair of bodies, of which each recorded body has, in pairs that are made,
     `variants`. The rate rises over `warmup` steps and then falls along a cosine to a tenth at
-    `steps`. With `bf16`, matrix products are in bfloat16 where the processor has them. The encoder
-    of joint names is the one that ships ("shipped"); `names` is a file with another, or one is
-    learned first in `name_steps`, or `t5` is a T5. A checkpoint is written every `save_every` steps
-    and every `save_minutes`. `recorded_steps` are those on recorded pairs, where a dataset has some
+    `steps`. Batches are made in `workers` processes (-1: 8 for a GPU, else none), and the network
+    is compiled (auto: for a GPU, where the run is long). With `bf16`, matrix products are in
+    bfloat16 where the processor has them. The encoder of joint names is the one that ships
+    ("shipped"); `names` is a file with another, or one is learned first in `name_steps`, or `t5` is
+    a T5. A checkpoint is written every `save_every` steps and every `save_minutes`.
+    `recorded_steps` are those on recorded pairs, where a dataset has some
     (`spark.training.recorded_net`); the paper's preset takes none.
     """
 
@@ -44,7 +47,8 @@ class TrainConfig:
     warmup: int = 500
     weight_decay: float = 0.01
     seed: int = 0
-    workers: int = 0
+    workers: int = -1
+    compile: str = "auto"
     bf16: bool = True
     save_every: int = 1000
     save_minutes: float = 5.0
@@ -56,6 +60,7 @@ class TrainConfig:
 
     def __post_init__(self) -> None:
         _one_of("preset", self.preset, PRESETS)
+        _one_of("compile", self.compile, COMPILE)
         for switch in self.ablate:
             _one_of("ablate", switch, ABLATIONS)
         for name, lowest in _LOWEST.items():
@@ -124,9 +129,10 @@ class TrainConfig:
 _LOWEST = {
     **dict.fromkeys(("width", "heads", "blocks", "steps", "batch", "per_body", "variants"), 1),
     **dict.fromkeys(("save_every", "log_every"), 1),
-    **dict.fromkeys(("seed", "workers", "warmup", "weight_decay", "rate", "name_steps"), 0),
+    **dict.fromkeys(("seed", "warmup", "weight_decay", "rate", "name_steps"), 0),
     "recorded_steps": 0,
     "save_minutes": 0,
+    "workers": -1,
     "window": 2,
 }
 _HIGHEST = {

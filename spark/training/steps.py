@@ -12,11 +12,15 @@ from spark.training.name_encoder import NameEncoder
 from spark.training.packed import AHEAD, Packed, Packer
 from spark.training.pairs import PairMaker, TrainingClip
 from spark.training.settings import TrainConfig
+from spark.training.sizes import Sizes
+from spark.training.threads import free_cores
 from spark.training.unpaired import SHARED, UnpairedMaker
+
+_GPU_WORKERS = 8
 
 
 class Steps(Dataset[Batch | UnpairedBatch]):
-    """Item n: this process's share of step n's windows."""
+    """Item n: this process's share of step n's windows; with `fixed_sizes` all of one shape."""
 
     def __init__(
         self,
@@ -25,9 +29,10 @@ class Steps(Dataset[Batch | UnpairedBatch]):
         config: TrainConfig,
         rank: int,
         world: int,
+        *,
+        fixed_sizes: bool = False,
     ) -> None:
         self.config, self.rank, self.world = config, rank, world
-        self.collator = Collator(names)
         self.maker: PairMaker | UnpairedMaker
         if config.preset == "paper":
             shared = SHARED if "mix" in config.ablate else 0
@@ -40,6 +45,7 @@ class Steps(Dataset[Batch | UnpairedBatch]):
                 seed=config.seed,
                 varied=True,
             )
+        self.collator = Collator(names, self.maker.sizes if fixed_sizes else Sizes())
 
     def __getitem__(self, n: int) -> Batch | UnpairedBatch:
         first = n * self.config.draws
@@ -51,18 +57,28 @@ class Steps(Dataset[Batch | UnpairedBatch]):
 
 def batches_from(steps: Steps, start: int) -> Iterator[Packed]:
     config = steps.config
+    workers = worker_count(config)
     return iter(
         DataLoader(
             steps,
             batch_size=None,
             sampler=range(start, config.steps),
-            num_workers=config.workers,
-            prefetch_factor=AHEAD if config.workers else None,
+            num_workers=workers,
+            prefetch_factor=AHEAD if workers else None,
+            # A process that is forked from one with a GPU, or with threads, may hang.
+            multiprocessing_context="spawn" if workers else None,
             worker_init_fn=_ignore_interrupts,
             collate_fn=Packer(),  # type: ignore[arg-type]  # of an item: there is no batch_size
             pin_memory=torch.cuda.is_available(),
         )
     )
+
+
+def worker_count(config: TrainConfig) -> int:
+    """Processes that make batches: as many as the run says, or 8 where a GPU waits for them."""
+    if config.workers >= 0:
+        return config.workers
+    return min(_GPU_WORKERS, max(1, free_cores() - 1)) if torch.cuda.is_available() else 0
 
 
 def _ignore_interrupts(worker: int) -> None:

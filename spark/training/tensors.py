@@ -42,6 +42,9 @@ class Start(NamedTuple):
     unmatched: Int[
         Tensor, "B J"
     ]  # `Correspondence.unmatched`: the joint whose correction moves each; or -1
+    # The joints that are their own; -1 pads. Without them the network must count them, which
+    # makes a GPU wait.
+    corrected: Int[Tensor, "B C"] | None = None
 
     @property
     def pose(self) -> PoseTensors:

@@ -26,6 +26,7 @@ from spark.training.checkpoint import (
     restore_optimizer,
     save_checkpoint,
 )
+from spark.training.compiling import compiled, compiles
 from spark.training.model import Spark
 from spark.training.name_encoder import NameEncoder
 from spark.training.name_file import load_names
@@ -33,7 +34,7 @@ from spark.training.objective import Objective, Terms, network
 from spark.training.optimiser import make_optimiser, rate_at
 from spark.training.pairs import TrainingClip
 from spark.training.precision import fast_products
-from spark.training.processes import agreed, distributed, join_processes
+from spark.training.processes import agreed, check_shares, distributed, join_processes
 from spark.training.run_log import open_log
 from spark.training.settings import TrainConfig
 from spark.training.steps import Steps, batches_from, name_vectors
@@ -76,19 +77,24 @@ def train(
 
     Raises `DivergedError` where a loss is no finite number; the last good checkpoint stays.
     `watch` is told each step that is done, with its loss terms where they are logged. Where `stop`
-    is true after a step, that step is saved, and is the last. On a GPU the network is compiled and
-    computes in bf16. Under `torchrun` the first process writes.
+    is true after a step, that step is saved, and is the last. On a GPU the network computes in
+    bf16, and is compiled where that pays. Under `torchrun` the first process writes;
+    `ConventionError` where there are more processes than a step has draws, or they can't share them
+    evenly.
     """
     rank, world, device = join_processes()
+    check_shares(config.draws, world)
     model = start.model.to(device)
     objective = Objective(model, config).to(device)
     optimiser = make_optimiser(model, config)
     restore_optimizer(optimiser, model, start.optimizer)
-    runner = distributed(objective) if world > 1 else objective
-    if device.type == "cuda":
-        runner = torch.compile(runner, dynamic=True)  # type: ignore[assignment]
+    one_graph = compiles(config, device)
+    runner: nn.Module = compiled(objective) if one_graph else objective
+    if world > 1:
+        runner = distributed(runner, unused=not model.config.residual)
     own = start.names == config.t5  # else it is the checkpoint's word alone
-    steps = Steps(clips, name_vectors(start.names, own=own), config, rank, world)
+    names = name_vectors(start.names, own=own)
+    steps = Steps(clips, names, config, rank, world, fixed_sizes=one_graph)
     bodies = distinct_trunks(clip.body for clip in clips)
     checkpoint = start
     model.train()

@@ -18,6 +18,7 @@ from spark.network.features import BodyFeatures
 from spark.network.windows import Windows
 from spark.rotation import quat_from_yaw, quat_rotate, sixd_from_quat, yaw_from_quat
 from spark.training.pairs import TrainingClip
+from spark.training.sizes import Sizes, sizes_of
 from spark.training.staging import in_concatenation, interpolated_rows, local_rows, starts_of
 from spark.training.variants import Variant, same_body, split_body, split_joints
 
@@ -63,6 +64,11 @@ class UnpairedMaker:
         ]
         weights = np.array([self._windows[k].sum() for k in self._acting])
         self._weights = weights / weights.sum()
+
+    @property
+    def sizes(self) -> Sizes:
+        """What holds every draw."""
+        return sizes_of(one.variant.body for one in self.characters)
 
     def draws(self, numbers: Sequence[int], windows: int) -> list[tuple[Windows, BodyFeatures]]:
         """The draws of these numbers: `windows` windows of one character each, and a target."""

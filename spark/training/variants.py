@@ -7,6 +7,7 @@ what they were, a new joint's lie between its neighbours', and only the feet nee
 again (`spark.transfer.leg_ik`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -134,6 +135,12 @@ def split_joints(base: BodyFeatures) -> list[str]:
     chosen = [*roles.joints(Role.SPINE)[:2][-1:]]
     chosen += [*roles.joints(Role.LEFT_CLAVICLE)[:1], *roles.joints(Role.RIGHT_CLAVICLE)[:1]]
     return [base.rig.skeleton.names[j] for j in chosen]
+
+
+def most_joints(base: BodyFeatures, joints: Sequence[int]) -> int:
+    """How many joints a variant can have in the place of these of `base`: each bone that may be
+    split is."""
+    return len(joints) + sum(base.parts[k] in (*_SPLIT, "clavicle") for k in joints)
 
 
 def _nodes(base: BodyFeatures) -> list[_Node]:

@@ -1,7 +1,7 @@
 """`spark-sim train`: a network of your own."""
 
 import shlex
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, BooleanOptionalAction, Namespace
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -33,7 +33,7 @@ _FLAGS = {
     "window": "frames in one window",
     "rate": "learning rate",
     "seed": "seed of all that is drawn",
-    "workers": "processes that load data",
+    "workers": "processes that make batches (default: 8 for a GPU, else none)",
 }
 # What the weights in a checkpoint were made for.
 _OF_THE_NETWORK = ("preset", "ablate", "width", "heads", "blocks", "names", "t5")
@@ -58,6 +58,11 @@ def configure(parser: ArgumentParser) -> None:
     for name, what in _FLAGS.items():
         number = float if name == "rate" else int
         parser.add_argument(f"--{name}", metavar="N", type=number, help=what)
+    parser.add_argument(
+        "--compile",
+        action=BooleanOptionalAction,
+        help="compile the network, or don't (default: on a GPU, for runs of half an hour or more)",
+    )
     parser.add_argument(
         "--names",
         metavar="FILE",
@@ -89,6 +94,8 @@ def run(args: Namespace) -> int:
         raise OutputError(f"{path}: no such file, so there is no run to resume")
     file = out / "config.toml" if args.resume else args.config and Path(args.config)
     given = {n: getattr(args, n) for n in (*_FLAGS, "preset", "ablate", "names", "t5")}
+    if args.compile is not None:
+        given["compile"] = "on" if args.compile else "off"
     given = {n: v for n, v in given.items() if v is not None} | (
         {"data": args.data} if args.data else {}
     )
@@ -126,6 +133,11 @@ def run(args: Namespace) -> int:
     if threads:
         torch.set_num_threads(threads)
     start = load_checkpoint(path) if args.resume else None
+    if start and start.step and not start.optimizer:
+        raise OutputError(
+            f"{path}: optimizer-{start.step}.safetensors is not beside it, and without it a run "
+            "can't go on as it was; put it back, or start anew with --force"
+        )
     if start:
         _check_same_network(path, start.settings, config)
     clips, notes = training_clips(

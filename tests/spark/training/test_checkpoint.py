@@ -15,7 +15,7 @@ from spark.training.checkpoint import load_checkpoint, save_checkpoint
 from spark.training.name_encoder import NameEncoder
 from spark.training.pairs import TrainingClip
 from spark.training.settings import TrainConfig
-from spark.training.train import train
+from spark.training.train import fresh_checkpoint, train
 from tests.helpers.training import TINY, fresh
 
 
@@ -30,6 +30,42 @@ def test_a_checkpoint_keeps_everything(clips: list[TrainingClip], tmp_path: Path
     assert isinstance(made.names, NameEncoder)
     torch.testing.assert_close(read.names.encode(["Hips"]), made.names.encode(["Hips"]))
     assert {k.partition("/")[2] for k in read.optimizer} == {"step", "exp_avg", "exp_avg_sq"}
+
+
+def test_weights_and_optimiser_lie_apart(clips: list[TrainingClip], tmp_path: Path) -> None:
+    """One of each, of the same step, whenever a run is stopped; weights alone are small."""
+    path, config = tmp_path / "checkpoint.safetensors", replace(TINY, steps=3, save_every=1)
+    made = train(clips, config, tmp_path, start=fresh(config))
+    assert sorted(p.name for p in tmp_path.glob("*.safetensors")) == [
+        "checkpoint.safetensors",
+        "optimizer-3.safetensors",
+    ]
+    assert not any(key.startswith("optimizer.") for key in read_weights(path).tensors)
+    beside = tmp_path / "optimizer-3.safetensors"
+    whole = beside.read_bytes()
+    for content, message in (
+        (whole[:-4], "no safetensors"),
+        (whole.replace(b'"step":"3"', b'"step":"2"'), "no optimiser's state at step 3"),
+    ):
+        assert content != whole
+        beside.write_bytes(content)
+        with pytest.raises(FileFormatError, match=message):
+            load_checkpoint(path)
+    beside.unlink()
+    assert load_checkpoint(path).optimizer == {}
+    # An older file, and a network of another name, keep what they have.
+    for name in ("checkpoint", "other"):
+        save_checkpoint(made, tmp_path / f"{name}.safetensors")
+    assert (tmp_path / "other-optimizer-3.safetensors").exists()
+    assert beside.exists()
+    assert load_checkpoint(tmp_path / "other.safetensors").optimizer.keys() == made.optimizer.keys()
+
+
+@pytest.mark.parametrize("preset", ["paper", "default"])
+def test_a_file_of_the_papers_size_is_small(tmp_path: Path, preset: str) -> None:
+    path = tmp_path / "checkpoint.safetensors"
+    save_checkpoint(fresh_checkpoint(TrainConfig.of(preset)), path)
+    assert path.stat().st_size <= 16e6
 
 
 def test_what_is_no_checkpoint_is_refused(tmp_path: Path) -> None:
