@@ -94,7 +94,7 @@ def train(
         runner = distributed(runner, unused=not model.config.residual)
     own = start.names == config.t5  # else it is the checkpoint's word alone
     names = name_vectors(start.names, own=own)
-    steps = Steps(clips, names, config, rank, world, fixed_sizes=one_graph)
+    steps = Steps(clips, names, config, rank, world, fixed_sizes=one_graph or device.type == "cuda")
     bodies = distinct_trunks(clip.body for clip in clips)
     checkpoint = start
     model.train()
