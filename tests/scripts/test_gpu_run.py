@@ -1,4 +1,4 @@
-"""`scripts/gpu_run.sh`, on a CPU: it ends with a network and tables, and goes on when called again."""
+"""`scripts/gpu_run.sh` on a CPU: it ends with a network, a plot and tables."""
 
 import os
 import subprocess
