@@ -19,9 +19,11 @@ import numpy as np
 
 from spark.errors import FileFormatError
 from spark.opening import read_bytes
+from spark.plain_pickle import plain_value
 
 _BASE, _RATIO = 128 << 20, 4  # bytes that arrays may take, and how many more for each of the file's
 _HEADER = 10_000  # bytes of an array's header, as numpy allows at most
+_SMALL = 4096  # bytes of an array of one Python object, such as a number
 _OBJECTS = re.compile(rb"'descr'\s*:.*[<>|=]?O\d?'", re.DOTALL)
 # A header is the text of a Python dict; what else may stand in one needs pickle.
 _FIELDS = (
@@ -61,6 +63,15 @@ class Npz(Mapping[str, np.ndarray]):
     def pickled(self) -> tuple[str, ...]:
         """The arrays of Python objects, which are read by running the pickles in them: not here."""
         return tuple(name for name in self if self._holds_objects(name))
+
+    def lone_value(self, name: str) -> np.ndarray | None:
+        """The one number or text in an array of Python objects, whose pickle is not run; None where
+        it holds anything else."""
+        data = self._content(name, _SMALL + 1)
+        try:
+            return None if len(data) > _SMALL else plain_value(bytes(_split(data)[1]))
+        except ValueError:
+            return None
 
     def __getitem__(self, name: str) -> np.ndarray:
         info = self._members[name]

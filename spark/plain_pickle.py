@@ -37,6 +37,15 @@ def read_plain_pickle(path: Path, *, expected: str) -> Any:
         ) from error
 
 
+def plain_value(data: bytes) -> np.ndarray | None:
+    """The one number or text in the pickle of an array of objects; None for anything else."""
+    try:
+        value = _plain(_NumpyMachine(len(data), objects=True).run(data))
+    except Exception:  # as above
+        return None
+    return value if isinstance(value, np.ndarray) else None
+
+
 @dataclass
 class _Dtype:
     """numpy.dtype: a kind and size, such as f8, and then a byte order."""
@@ -60,9 +69,10 @@ class _Array:
 class _NumpyMachine(PickleMachine):
     """Knows the few functions that numpy's pickles call."""
 
-    def __init__(self, size: int) -> None:
+    def __init__(self, size: int, *, objects: bool = False) -> None:
         super().__init__()
         self._left = 4 * size  # characters to encode: one text may be asked for again and again
+        self._objects = objects
 
     def call(self, called: Any, arguments: Any) -> Any:
         if not isinstance(called, Name):
@@ -91,6 +101,9 @@ class _NumpyMachine(PickleMachine):
             made.order = str(state[1])
         elif isinstance(made, _Array):
             _, shape, dtype, columns, content = state
+            if self._objects and isinstance(content, list) and len(content) == 1:
+                made.value = _lone(content[0])
+                return
             made.value = _array(dtype, shape, content, "F" if columns else "C")
         else:
             super().build(made, state)
@@ -108,6 +121,16 @@ def _array(dtype: Any, shape: Any, content: Any, order: Any) -> np.ndarray:
         raise ValueError(f"{len(content)} bytes are no array of shape {str(shape)[:80]}")
     array = np.frombuffer(content, kind) if content else np.zeros(0, kind)
     return array.reshape(shape, order=order)
+
+
+def _lone(value: Any) -> np.ndarray:
+    """One number or text as an array of one."""
+    value = _plain_entry(value)
+    if isinstance(value, np.ndarray | np.generic) and value.size == 1:
+        value = value.ravel()[0].item()
+    if type(value) not in (bool, int, float, str, bytes):
+        raise RefusedError("holds an array of objects, which are no plain numbers")
+    return np.array([value])
 
 
 def _plain(value: Any) -> Any:

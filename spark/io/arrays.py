@@ -21,7 +21,9 @@ _MAX_HEADER = 65536  # bytes; numpy's own writer stays below for plain dtypes
 
 
 class Arrays(dict[str, np.ndarray]):
-    """The plain arrays of an npz by name; `pickled` are the members that were left out."""
+    """The plain arrays of an npz by name; `pickled` are the members that were left out.
+
+    One number or text that was saved as a Python object is plain too: AMASS has such."""
 
     pickled: tuple[str, ...] = ()
 
@@ -31,7 +33,9 @@ def read_npz(path: Path) -> Arrays:
     stored = Npz(path, expected="a motion")
     pickled = stored.pickled
     arrays = Arrays({name: stored[name] for name in stored if name not in pickled})
-    arrays.pickled = pickled
+    lone = {name: stored.lone_value(name) for name in pickled}
+    arrays |= {name: value for name, value in lone.items() if value is not None}
+    arrays.pickled = tuple(name for name in pickled if lone[name] is None)
     return arrays
 
 

@@ -8,6 +8,7 @@ from jaxtyping import Float, Int
 
 from spark.errors import FileFormatError
 from spark.io.arrays import Arrays, held, numbers, read_npy, read_npz
+from spark.io.humanml3d import FPS, WIDTH, positions_of_features
 from spark.io.position_layouts import POSITION_KEYS
 from spark.io.position_tree import parents_first
 
@@ -31,7 +32,13 @@ class Points:
 
 def read_points(path: Path) -> Points:
     if path.suffix.lower() == ".npy":
-        return _points(read_npy(path), Arrays(), path, "the array")
+        array = read_npy(path)
+        if array.ndim == 2 and array.shape[1] == WIDTH and len(array):
+            features = numbers({"it": array}, "it", path)
+            positions = positions_of_features(features, path)
+            note = "HumanML3D's features: its rotations, velocities and contacts are not read"
+            return Points(positions, None, None, FPS, (note,))
+        return _points(array, Arrays(), path, "the array")
     arrays = read_npz(path)
     name = next((n for n in POSITION_KEYS if n in arrays and arrays[n].ndim >= 3), None)
     if name is None:

@@ -7,6 +7,7 @@ from typing import Any
 
 from spark.errors import ConventionError, FileFormatError
 from spark.io.arrays import npy_shape, npz_names
+from spark.io.humanml3d import WIDTH as FEATURES
 from spark.io.position_layouts import POSITION_KEYS, layouts
 from spark.io.recording import Recording
 from spark.io.smpl_layouts import KEYS, SIGNS
@@ -103,7 +104,8 @@ def holds_person(path: Path) -> bool:
             return bool(names & {*SMPL_KEYS, *POSITION_KEYS}) and not names & _ROBOTS
         case ".npy":
             shape = npy_shape(path)
-            return _is_smpl(path) or (len(shape) == 3 and bool(layouts(shape[1])))
+            known = len(shape) == 3 and bool(layouts(shape[1]))
+            return _is_smpl(path) or known or shape[1:] == (FEATURES,)
         case ".pt" | ".pth":
             return says(path, (b"global_orient", b"root_orient"))
         case ".asf":  # a skeleton, which its AMCs move

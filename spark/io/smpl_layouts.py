@@ -15,6 +15,7 @@ from spark.errors import FileFormatError
 from spark.io.arrays import Arrays, held, numbers
 from spark.io.convention import Up
 from spark.io.tensors import Tensor, Unknown, read_tensors
+from spark.rotation import quat_from_matrix, rotvec_from_quat
 
 # Names of one thing in files of different tools.
 _POSES = ("poses", "fullpose", "full_pose", "smpl_poses", "smplx_poses", "thetas", "pose")
@@ -34,6 +35,7 @@ KEYS = frozenset({*_POSES, *_ROOT, *_BODY} - {"pose"})
 SIGNS = frozenset({"betas", "v_template", "surface_model_type"})
 """An npz with one of these has to do with the family, though it may be no motion."""
 
+_SQUARE = 1e-2  # as far as a network's rotation matrix is from one
 _JOINTS = {66: 22, 72: 24, 156: 52, 165: 55}  # by the numbers in a pose
 
 # Of the vectors in a dict of a video method, those in the world come first.
@@ -77,7 +79,7 @@ def from_npz(arrays: Arrays, path: Path) -> SmplMotion:
             f"has no motion of a body: expected 'poses', or 'root_orient' and 'pose_body'; it "
             f"holds {held(arrays)}",
         )
-    amass = bool({"mocap_framerate", "mocap_frame_rate"} & arrays.keys())
+    amass = bool({"mocap_framerate", "mocap_frame_rate"} & {*arrays, *arrays.pickled})
     motion = _named(arrays, path, "AMASS" if amass else "SMPL", "z" if amass else "y")
     if arrays.pickled:
         left = ", ".join(map(repr, arrays.pickled))
@@ -145,6 +147,15 @@ def _named(arrays: Mapping[str, np.ndarray], path: Path, origin: str, up: Up) ->
     notes: list[str] = []
     if (poses := _first(arrays, _POSES)) is not None:
         rotvecs = _vectors(arrays, poses, path)
+        if rotvecs.shape[1] in (21, 23):
+            if (root := _first(arrays, _ROOT)) is None:
+                raise FileFormatError(
+                    path,
+                    None,
+                    f"{poses!r} has {rotvecs.shape[1]} joints, all but the root; expected "
+                    "'root_orient' or 'global_orient' beside it",
+                )
+            rotvecs = np.concatenate([_part(arrays, root, path, len(rotvecs), 1), rotvecs], axis=1)
         if rotvecs.shape[1] not in _JOINTS.values():
             raise FileFormatError(
                 path,
@@ -221,10 +232,8 @@ def _in_parts(
 
 
 def _vectors(arrays: Mapping[str, np.ndarray], name: str, path: Path) -> Float[np.ndarray, "T J 3"]:
-    """Rotation vectors in an array (T, J * 3) or (T, J, 3); matrices (T, J, 3, 3) are refused."""
-    values = numbers(arrays, name, path)
-    if values.ndim == 4 and values.shape[-2:] == (3, 3):
-        raise FileFormatError(path, None, f"{name!r} holds matrices; expected rotation vectors")
+    """Rotation vectors in an array (T, J * 3) or (T, J, 3), or of matrices (T, J, 3, 3)."""
+    values = _plain_vectors(arrays, name, path)
     if values.ndim not in (2, 3) or (values.ndim == 3 and values.shape[2] != 3):
         raise FileFormatError(
             path,
@@ -244,7 +253,7 @@ def _vectors(arrays: Mapping[str, np.ndarray], name: str, path: Path) -> Float[n
 def _part(
     arrays: Mapping[str, np.ndarray], name: str, path: Path, frames: int, joints: int
 ) -> Float[np.ndarray, "T J 3"]:
-    values = numbers(arrays, name, path)
+    values = _plain_vectors(arrays, name, path)
     if values.size != frames * joints * 3:
         raise FileFormatError(
             path,
@@ -253,6 +262,19 @@ def _part(
             f"{3 * joints}",
         )
     return values.reshape(frames, joints, 3)
+
+
+def _plain_vectors(arrays: Mapping[str, np.ndarray], name: str, path: Path) -> np.ndarray:
+    """The array, rotation vectors in place of matrices."""
+    values = numbers(arrays, name, path)
+    if values.ndim not in (3, 4) or values.shape[-2:] != (3, 3):
+        return values
+    if values.ndim == 3:  # (T, 3, 3): of one joint; three joints are no part of a body
+        values = values[:, None]
+    square = values @ values.swapaxes(-1, -2)
+    if np.abs(square - np.eye(3)).max(initial=0) > _SQUARE or (np.linalg.det(values) < 0).any():
+        raise FileFormatError(path, None, f"{name!r} holds 3 x 3 matrices that are no rotations")
+    return rotvec_from_quat(quat_from_matrix(values))
 
 
 def _first(arrays: Mapping[str, np.ndarray], names: Iterable[str]) -> str | None:

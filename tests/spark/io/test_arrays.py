@@ -104,3 +104,26 @@ def test_text_of_no_letters_is_refused(code: int, tmp_path: Path) -> None:
     spoilt = whole.replace(struct.pack("<I", ord("h")), struct.pack("<I", code))
     with pytest.raises(ValueError, match="no letter"):
         array_in(spoilt)
+
+
+@pytest.mark.parametrize("value", [120.0, 60, "male", b"female", np.float64(59.94), np.int32(30)])
+@pytest.mark.parametrize("shape", [(), (1,)])
+def test_one_value_saved_as_an_object_is_plain(
+    value: object, shape: tuple[int, ...], tmp_path: Path
+) -> None:
+    """AMASS has its rate and gender so, in some of its sets."""
+    held = np.empty(shape, dtype=object)
+    held[...] = value
+    np.savez(tmp_path / "a.npz", it=held)
+    arrays = read_npz(tmp_path / "a.npz")
+    assert arrays.pickled == ()
+    assert arrays["it"].ravel()[0] == value
+
+
+@pytest.mark.parametrize("value", [None, [1, 2], {"a": 1}, np.zeros(3), "x" * 5000])
+def test_other_objects_are_left_out_and_named(value: object, tmp_path: Path) -> None:
+    held = np.empty((), dtype=object)
+    held[()] = value
+    np.savez(tmp_path / "a.npz", it=held)
+    arrays = read_npz(tmp_path / "a.npz")
+    assert (arrays.pickled, dict(arrays)) == (("it",), {})

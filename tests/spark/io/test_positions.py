@@ -244,3 +244,56 @@ def test_an_npz_without_positions(tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", motion=np.zeros((4, 4)), other=np.zeros(3))
     with pytest.raises(FileFormatError, match=r"no positions: .* it holds motion 4x4, other 3"):
         spark_sim.load(tmp_path / "a.npz")
+
+
+def features_of(positions: np.ndarray) -> np.ndarray:
+    """HumanML3D's features of positions (T 22 3), Y up, in the steps of its `motion_process.py`."""
+    left, right = positions[:, 1] - positions[:, 2], positions[:, 16] - positions[:, 17]
+    ahead = np.cross(left + right, [0.0, 1.0, 0.0])
+    angle = np.arctan2(ahead[:, 0], ahead[:, 2])  # from +Z about Y
+    facing = np.zeros((len(positions), 4))
+    facing[:, 0], facing[:, 2] = np.cos(-angle / 2), np.sin(-angle / 2)
+    half = np.unwrap(-angle) / 2
+    root = positions[:, 0]
+    seen = positions - root[:, None] * [1.0, 0.0, 1.0]
+    seen = quat_rotate(np.broadcast_to(facing[:, None], (*seen.shape[:2], 4)), seen)
+    step = quat_rotate(facing[1:], np.diff(root, axis=0))
+    features = np.zeros((len(positions) - 1, 263))
+    features[:, 0], features[:, 1:3] = np.diff(half), step[:, [0, 2]]
+    features[:, 3] = root[:-1, 1]
+    features[:, 4:67] = seen[:-1, 1:].reshape(-1, 63)
+    return features
+
+
+def test_features_of_humanml3d(tmp_path: Path, walking: Motion) -> None:
+    """Its positions, from the first frame's place and heading on."""
+    (layout,) = layouts(22)
+    expected = points_of(layout, as_person(walking))
+    turn = np.zeros((*expected.shape[:2], 4))
+    turn[..., 0], turn[..., 3] = np.cos(0.4), np.sin(0.4)
+    features = features_of(quat_rotate(turn, expected)[..., TO_Y_UP])
+    np.save(tmp_path / "a.npy", features)
+    read = read_motion(tmp_path / "a.npy")
+    assert read.motion.fps == pytest.approx(20)
+    assert "HumanML3D" in " ".join(read.notes)
+    positions, _ = forward(read.motion)
+    places = [read.motion.skeleton.names.index(name) for name in layout.points]
+    got = positions[:, places]
+
+    def standard(points: np.ndarray) -> np.ndarray:
+        """From above the first place of the hips, facing along X in the first frame."""
+        points = points - points[0, 0] * [1, 1, 0]
+        across = points[0, 1] - points[0, 2] + points[0, 16] - points[0, 17]
+        back = -np.arctan2(-across[0], across[1]) / 2
+        q = np.zeros((*points.shape[:2], 4))
+        q[..., 0], q[..., 3] = np.cos(back), np.sin(back)
+        return quat_rotate(q, points)
+
+    away = np.linalg.norm(standard(got) - standard(expected[:-1]), axis=-1)
+    assert away.max() < 0.02 * 1.74
+
+
+def test_features_that_are_normalised_are_refused(tmp_path: Path) -> None:
+    np.save(tmp_path / "a.npy", np.random.default_rng(0).normal(size=(40, 263)))
+    with pytest.raises(FileFormatError, match=r"seem normalised.*Std\.npy"):
+        read_motion(tmp_path / "a.npy")

@@ -16,6 +16,7 @@ from spark.io.smpl_body import joints_of, mean_body, read_body_model
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig.rig import understand
+from spark.rotation import matrix_from_quat, quat_from_rotvec
 from tests.helpers.hostile import Bomb, damaged, edits
 from tests.helpers.recordings import recordings
 from tests.helpers.smpl import as_smpl
@@ -295,10 +296,10 @@ def test_body_models_that_are_none(tmp_path: Path, changes: dict[str, Any], mess
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ({"poses": np.zeros((2, 63))}, "'poses' has 21 joints; expected 22, 24"),
+        ({"poses": np.zeros((2, 63))}, "'poses' has 21 joints, all but the root"),
         ({"poses": np.zeros((2, 71))}, "71 numbers a frame; expected 3 for each joint"),
         ({"poses": np.full((2, 156), np.nan)}, r"'poses' holds nan at \[0, 0\]"),
-        ({"poses": np.zeros((2, 52, 3, 3))}, "holds matrices"),
+        ({"poses": np.zeros((2, 52, 3, 3))}, "no rotations"),
         ({"poses": np.zeros((0, 156))}, "has no frames"),
         ({"poses": np.array(["a"])}, "no real numbers"),
         ({"poses": np.zeros((2, 156)), "trans": np.zeros((3, 3))}, "'trans' has 3 rows of 3 for 2"),
@@ -363,3 +364,36 @@ def test_damaged_files_give_a_recording_or_an_error_of_ours(
     except SparkSimError:
         return
     assert np.isfinite(forward(read.motion)[0]).all()
+
+
+def test_amass_with_its_rate_as_an_object(waving: Motion, tmp_path: Path) -> None:
+    rotvecs, trans, _ = made(waving)
+    rate, gender = np.array(120.0, dtype=object), np.array("male", dtype=object)
+    poses = rotvecs.reshape(len(rotvecs), -1)
+    np.savez(tmp_path / "a.npz", poses=poses, trans=trans, mocap_frame_rate=rate, gender=gender)
+    read = read_motion(tmp_path / "a.npz")
+    assert read.motion.fps == pytest.approx(120)
+    assert read.notes[0].startswith("AMASS")
+    assert "gender, male" in " ".join(read.notes)
+
+
+@pytest.mark.parametrize("how", ["matrices", "poses without the root"])
+def test_rotations_written_otherwise(how: str, waving: Motion, tmp_path: Path) -> None:
+    """The same motion as from vectors of all joints."""
+    rotvecs, trans, _ = made(waving)
+    body = rotvecs[:, :22]
+    np.savez(tmp_path / "a.npz", poses=body.reshape(len(body), -1), trans=trans, fps=30)
+    if how == "matrices":
+        turned = matrix_from_quat(quat_from_rotvec(body))
+        arrays = {"global_orient": turned[:, :1], "body_pose": turned[:, 1:]}
+    else:
+        arrays = {"root_orient": body[:, 0], "poses": body[:, 1:].reshape(len(body), 63)}
+    np.savez(tmp_path / "b.npz", trans=trans, fps=30, **arrays)
+    one, other = (read_motion(tmp_path / name).motion for name in ("a.npz", "b.npz"))
+    np.testing.assert_allclose(forward(other)[0], forward(one)[0], atol=1e-6)
+
+
+def test_a_body_without_its_root_is_told(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", poses=np.zeros((5, 63)), trans=np.zeros((5, 3)))
+    with pytest.raises(FileFormatError, match="all but the root; expected 'root_orient'"):
+        read_motion(tmp_path / "a.npz")
