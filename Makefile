@@ -39,7 +39,8 @@ $(VENV)/.gl: $(VENV)/.video scripts/headless_gl.sh
 # What judges our GLBs, where there is npm; without it those tests are skipped, by name.
 $(VENV)/.node: $(BIN)/python tests/node/package.json
 	@command -v npm >/dev/null || { echo "no npm: GLBs are not validated in the tests"; exit 0; } && \
-	  npm install --prefix tests/node --no-package-lock --ignore-scripts --no-audit --no-fund --silent && \
+	  npm install --prefix tests/node --no-package-lock --ignore-scripts --no-audit --no-fund --silent \
+	    --fetch-retries=1 --fetch-timeout=30000 && \
 	  touch $@ || echo "npm installed nothing: GLBs are not validated in the tests"
 
 demo: $(VENV)/.video $(VENV)/.gl

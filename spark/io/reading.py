@@ -10,8 +10,8 @@ from spark.io.arrays import npy_shape, npz_names
 from spark.io.humanml3d import WIDTH as FEATURES
 from spark.io.position_layouts import POSITION_KEYS, layouts
 from spark.io.recording import Recording
+from spark.io.smpl_columns import WIDTHS as SMPL_WIDTHS
 from spark.io.smpl_layouts import KEYS, SIGNS
-from spark.io.smpl_layouts import WIDTHS as SMPL_WIDTHS
 from spark.io.tensors import says
 from spark.opening import beginning
 

@@ -15,7 +15,9 @@ from spark.io.convention import UPS, Up, given_up, standing_axis
 from spark.io.foreign import foreign_recording
 from spark.io.recording import Recording
 from spark.io.smpl_body import Body, mean_body, read_body_model
-from spark.io.smpl_layouts import SmplMotion, from_array, from_npz, from_tensors
+from spark.io.smpl_columns import from_array
+from spark.io.smpl_layouts import from_npz, from_tensors
+from spark.io.smpl_motion import SmplMotion
 from spark.io.stance import stance_scale, walked
 from spark.kinematics import end_positions, forward
 from spark.motion import Motion

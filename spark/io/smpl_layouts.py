@@ -1,11 +1,11 @@
-"""Where files of the SMPL family keep what: AMASS, GVHMR, Motion-X, PHUMA, and others like them.
+"""Where files of the SMPL family keep what, by names: AMASS, GVHMR, and others like them.
 
 All say rotations from parent to joint since the model's rest pose, as rotation vectors; they differ
 in names, in what is left out, and in the axis that points up.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from jaxtyping import Float
 from spark.errors import FileFormatError
 from spark.io.arrays import Arrays, held, numbers
 from spark.io.convention import Up
+from spark.io.smpl_motion import SmplMotion
 from spark.io.tensors import Tensor, Unknown, read_tensors
 from spark.rotation import quat_from_matrix, rotvec_from_quat
 
@@ -40,30 +41,6 @@ _JOINTS = {66: 22, 72: 24, 156: 52, 165: 55}  # by the numbers in a pose
 
 # Of the vectors in a dict of a video method, those in the world come first.
 _WORLD_FIRST = ("smpl_params_global", "smplx_params_global", "world", "global")
-
-WIDTHS = (69, 73, 165, 322)
-"""Numbers a frame in the layouts that are one array."""
-
-
-@dataclass(frozen=True, eq=False)
-class SmplMotion:
-    """What a file of the family says; None where it does not.
-
-    `rotvecs` are those of the model's joints in its order (22, 24, 52 or 55 of them), `trans` moves
-    the model's origin [m]. `usual_up` is the axis that points up in such files; `origin` says what
-    kind of file it is, `smplx` that the model is SMPL-X whatever the number of joints.
-    """
-
-    rotvecs: Float[np.ndarray, "T J 3"]
-    trans: Float[np.ndarray, "T 3"] | None
-    origin: str
-    usual_up: Up
-    usual_fps: float = 30.0
-    smplx: bool = False
-    betas: Float[np.ndarray, "B"] | None = None
-    gender: str | None = None
-    fps: float | None = None
-    notes: tuple[str, ...] = ()
 
 
 def from_npz(arrays: Arrays, path: Path) -> SmplMotion:
@@ -107,39 +84,6 @@ def from_tensors(path: Path) -> SmplMotion:
     if name == "smpl_params_global":
         return replace(_named(arrays, path, "GVHMR", "y"), smplx=True)
     return _named(arrays, path, "SMPL", "y")
-
-
-def from_array(array: np.ndarray, path: Path) -> SmplMotion:
-    """The motion in one array (T, 322) or (T, 165) of Motion-X, or (T, 69) or (T, 73) of PHUMA."""
-    values = numbers({"it": array}, "it", path)
-    if values.ndim != 2 or not len(values) or values.shape[1] not in WIDTHS:
-        raise FileFormatError(
-            path,
-            None,
-            f"is {' x '.join(map(str, array.shape)) or 'one number'}; expected frames x 69 or 73 "
-            "(PHUMA), x 165 or 322 (Motion-X)",
-        )
-    width = values.shape[1]
-    if width in (69, 73):
-        body = values[:, 3:69].reshape(-1, 22, 3)
-        note = () if width == 69 else ("its foot contacts are not read",)
-        return SmplMotion(body, values[:, :3], "PHUMA", "y", smplx=True, notes=note)
-    if width == 165:
-        rotvecs = values.reshape(-1, 55, 3)
-        notes = ("165 numbers a frame are SMPL-X's rotations; it has no positions",)
-        jaw, last = rotvecs[:, 22], rotvecs[:, 52]
-        if _turns(rotvecs[:, 53:]) == 0 and not _is_jaw(jaw) and _is_jaw(last):
-            # As in Motion-X's 322: hands before the jaw, and none of the eyes.
-            rotvecs = rotvecs[:, [*range(22), 52, 53, 54, *range(22, 52)]]
-            notes = ("165 numbers a frame: Motion-X's rotations, hands before the jaw",)
-        return SmplMotion(rotvecs, None, "Motion-X", "y", notes=notes)
-    rotvecs = np.zeros((len(values), 55, 3))
-    rotvecs[:, :22] = values[:, :66].reshape(-1, 22, 3)
-    rotvecs[:, 25:] = values[:, 66:156].reshape(-1, 30, 3)
-    rotvecs[:, 22] = values[:, 156:159]
-    betas = np.median(values[:, 312:], axis=0)
-    notes = ("the face's expression and shape are not read",)
-    return SmplMotion(rotvecs, values[:, 309:312], "Motion-X", "y", betas=betas, notes=notes)
 
 
 def _named(arrays: Mapping[str, np.ndarray], path: Path, origin: str, up: Up) -> SmplMotion:
@@ -319,13 +263,3 @@ def _find(content: object, depth: int) -> tuple[str, dict[object, object]] | Non
         if found is not None:
             return found[0] or str(key), found[1]
     return None
-
-
-def _turns(rotvecs: Float[np.ndarray, "T *n 3"]) -> float:
-    return float(np.abs(rotvecs).max(initial=0.0))
-
-
-def _is_jaw(rotvecs: Float[np.ndarray, "T 3"]) -> bool:
-    """Whether the rotations open and shut a mouth: about x alone, up to 45 degrees."""
-    most = np.abs(rotvecs).max(axis=0)
-    return bool(most[0] < np.pi / 4 and most[1:].max() <= 0.5 * most[0] and most[0] > 0)
