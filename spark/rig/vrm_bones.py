@@ -7,7 +7,7 @@ are called as other fingers' are.
 from collections.abc import Mapping
 
 from spark.errors import SkeletonError, name_list
-from spark.rig.fingers import FingerBone
+from spark.rig.fingers import FINGER_NAMES, FingerBone
 from spark.rig.override import Override
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
@@ -28,8 +28,6 @@ _ROLES = {"hips": Role.PELVIS, "neck": Role.NECK, "head": Role.HEAD} | {
     for side in ("left", "right")
     for bone, part in _LIMBS.items()
 }
-_FINGERS = {"Thumb": "thumb", "Index": "index", "Middle": "middle", "Ring": "ring"}
-_FINGERS["Little"] = "pinky"
 _PHALANGES = ("Proximal", "Intermediate", "Distal")
 _THUMB = ("Metacarpal", "Proximal", "Distal")
 _PARTS = ("UpperArm", "LowerArm", "Hand", "UpperLeg", "LowerLeg", "Foot")
@@ -59,11 +57,11 @@ def bones_of_rig(rig: Rig) -> dict[str, int]:
         spine = (spine[0], spine[len(spine) // 2], spine[-1])
     found |= dict(zip(_SPINE, spine, strict=False))
     for side in ("left", "right"):
-        for name, finger in _FINGERS.items():
+        for finger in FINGER_NAMES:
             for number, bone in enumerate(_THUMB if finger == "thumb" else _PHALANGES, start=1):
                 joint = rig.fingers.get(FingerBone(side, finger, number))
                 if joint is not None:
-                    found[f"{side}{name}{bone}"] = joint
+                    found[f"{side}{finger.capitalize()}{bone}"] = joint
     if missing := [name for name in _REQUIRED if name not in found]:
         raise SkeletonError(f"a VRM animation needs {name_list(missing)}, which the body lacks")
     return dict(sorted(found.items(), key=lambda item: item[1]))

@@ -7,13 +7,17 @@ import pytest
 
 import spark_sim
 from spark.errors import SkeletonError
+from spark.io.bvh import write_bvh
+from spark.io.encoding import encode_new
 from spark.io.gltf_file import GltfFile
 from spark.kinematics import forward
+from spark.motion import Motion
 from spark.rig.roles import Role
 from spark.rig.vrm_bones import bones_of_rig
 from spark.transfer.humanoid import on_bones
 from spark_sim import Clip
 from tests.helpers.node import in_three, needs, validated
+from tests.helpers.smpl import model_rig
 from tests.helpers.vrm import avatar
 
 TIMES = (0.0, 0.4, 0.9)  # [s]
@@ -122,6 +126,26 @@ def test_the_roles_of_a_vrm_are_those_that_it_says(
     given = [r for r, why in zip(clip.rig.roles.roles, clip.rig.roles.reasons, strict=True)
              if why == "given by the map"]  # fmt: skip
     assert len(given) >= 18
+
+
+def test_all_fingers_have_their_bones(tmp_path: Path) -> None:
+    """Of a body with fifteen joints a hand, through VRMA and back."""
+    body = model_rig(52, 1.7)
+    still = np.tile([1.0, 0, 0, 0], (2, len(body.skeleton), 1))
+    motion = Motion(body.skeleton, 1 / 30, np.tile([0.0, 0, 0.95], (2, 1)), still)
+    write_bvh(encode_new(motion, unit="m", up="z"), tmp_path / "hands.bvh")
+    clip = spark_sim.load(tmp_path / "hands.bvh", unit="m", up="z")
+    assert isinstance(clip, Clip)
+    bones = bones_of_rig(clip.rig)
+    for side in ("left", "right"):
+        for finger in ("Index", "Middle", "Ring", "Little"):
+            for bone in ("Proximal", "Intermediate", "Distal"):
+                assert f"{side}{finger}{bone}" in bones
+        for bone in ("Metacarpal", "Proximal", "Distal"):
+            assert f"{side}Thumb{bone}" in bones
+    back = spark_sim.load(clip.save(tmp_path / "hands.vrma"))
+    assert isinstance(back, Clip)
+    assert len(back.rig.fingers) == 30
 
 
 def test_what_has_no_hands_is_no_avatar(tmp_path: Path, walk: Clip) -> None:
