@@ -12,6 +12,7 @@ from sim.body.mjcf import to_xml
 from spark.demo.sample import sample_motion, sample_rig
 from spark.io.bvh import write_bvh
 from spark.io.encoding import encode_new
+from spark.io.fbx_skin import read_fbx_skin
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark_sim import Clip
@@ -55,7 +56,7 @@ _BODY: list[Clip] = []
 
 
 def _fbx_seeds(folder: Path) -> list[bytes]:
-    from tests.helpers.fbx_text import Fbx, Node, Take
+    from tests.helpers.fbx_text import Fbx, Mesh, Node, Surface, Take, as_binary
 
     nodes = [Node("Hips", translation=(0, 90, 0)), Node("Spine", 0, (0, 20, 0))]
     for side, x in (("Left", 10), ("Right", -10)):
@@ -65,7 +66,31 @@ def _fbx_seeds(folder: Path) -> list[bytes]:
             Node(f"{side}Leg", top, (0, -40, 0)),
             Node(f"{side}Foot", top + 1, (0, -40, 0)),
         ]
-    return [Fbx(nodes, [Take("walk", 2, times=(0.0, 0.4), angles=(0.0, 30.0))]).text().encode()]
+    take = Take("walk", 2, times=(0.0, 0.4), angles=(0.0, 30.0))
+    points = np.array([[0.0, 0, 0], [5, 0, 0], [5, 40, 0], [0, 40, 9]])
+    hung = [(1, np.eye(4), {0: 1.0, 1: 0.5}), (2, np.eye(4), {1: 0.5, 2: 1.0, 3: 1.0})]
+    nodes.append(Node("skin", kind="Mesh"))
+    mesh = Mesh(len(nodes) - 1, points, [(0, 1, 2, 3)], hung, points[:, :2], [Surface()])
+    text = Fbx(nodes, [take], [mesh]).text()
+    return [text.encode(), as_binary(text)]
+
+
+def _use_fbx(path: Path) -> None:
+    _use_clip(path)
+    skin = read_fbx_skin(path)
+    for mesh in () if skin is None else skin.meshes:
+        finite(vertices=mesh.vertices, normals=mesh.normals, weights=mesh.weights)
+
+
+def _c3d_seeds(folder: Path) -> list[bytes]:
+    from tests.helpers.c3d import write_c3d
+
+    words = "LHJC LKJC LAJC LTOE RHJC RKJC RAJC RTOE TRXO HEDO LSJC LEJC LWJC RSJC REJC RWJC"
+    points = 1000 * forward(_walk())[0][:, :16]
+    return [
+        write_c3d(folder / "a.c3d", words.split(), points, processor=kind).read_bytes()
+        for kind in ("intel", "dec", "sgi")
+    ]
 
 
 def _gltf_seeds(buffer: str) -> Callable[[Path], list[bytes]]:
@@ -157,7 +182,8 @@ def _positions_npz(folder: Path) -> list[bytes]:
 
 FORMATS: dict[str, Target] = {
     "bvh": Target(".bvh", motion_seeds, _use_clip),
-    "fbx": Target(".fbx", _fbx_seeds, _use_clip),
+    "fbx": Target(".fbx", _fbx_seeds, _use_fbx),
+    "c3d": Target(".c3d", _c3d_seeds, _use_clip),
     "glb": Target(".glb", _gltf_seeds("glb"), _use_clip),
     "gltf": Target(".gltf", _gltf_seeds("inside"), _use_clip),
     "amc": Target(".amc", _acclaim_seeds(".asf"), _use_clip),
