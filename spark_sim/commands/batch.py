@@ -143,8 +143,8 @@ def run(args: Namespace) -> int:
                 )
                 told = now
     tally, duplicates = batch.tally, batch.near_duplicates(jobs)
-    for group in duplicates:
-        console.note(f"nearly the same motion: {', '.join(group)}")
+    for sentence in duplicates.sentences():
+        console.note(sentence)
     if args.json:
         console.emit_json(
             {
@@ -155,7 +155,8 @@ def run(args: Namespace) -> int:
                 "left_out": tally.left_out,
                 "failed": tally.failed,
                 "reasons": [{"source": s, "error": error} for s, error in tally.reasons],
-                "near_duplicates": duplicates,
+                "near_duplicates": duplicates.groups,
+                "parts": duplicates.records(),
                 "seconds": time.perf_counter() - start,
             }
         )

@@ -39,14 +39,21 @@ def report_folder(args: Namespace) -> float | None:
             if each.error is not None:
                 console.error(f"{each.name}: {each.error}")
             tell(count, {})
-    rows, groups, notes = write_folder_report(done, page, folder.resolve().name)
+    rows, duplicates, notes = write_folder_report(done, page, folder.resolve().name)
     for note in notes:
         console.note(note)
-    for group in groups:
-        console.note(f"nearly the same motion: {', '.join(group)}")
+    for sentence in duplicates.sentences():
+        console.note(sentence)
     good = [row for row in rows if row["error"] is None]
     if args.json:
-        console.emit_json({"page": str(page), "clips": rows, "near_duplicates": groups})
+        console.emit_json(
+            {
+                "page": str(page),
+                "clips": rows,
+                "near_duplicates": duplicates.groups,
+                "parts": duplicates.records(),
+            }
+        )
     else:
         lines = [("implausible", "motion", "to mend first")]
         lines += [

@@ -17,7 +17,7 @@ from typing import TypeAlias
 from robots.model.known import model_sha256
 from robots.registry import find, is_robot
 from spark.errors import OutputError
-from spark_sim.shelf.duplicates import near_duplicates
+from spark_sim.shelf.duplicates import Duplicates, near_duplicates
 from spark_sim.shelf.keep import Keep
 from spark_sim.shelf.manifest import SCHEMA, Entry, Manifest, is_still, sha256
 from spark_sim.shelf.plan import Job
@@ -110,8 +110,8 @@ class Batch:
             self.manifest.tidy(self.parts)
             shutil.rmtree(self._all_parts, ignore_errors=True)
 
-    def near_duplicates(self, jobs: Sequence[Job]) -> list[list[str]]:
-        """Groups of sources, or pieces of them, that hold nearly the same motion."""
+    def near_duplicates(self, jobs: Sequence[Job]) -> Duplicates:
+        """Sources, or pieces of them, that hold nearly the same motion, or a part of another's."""
         prints: dict[str, str] = {}
         for job in jobs:
             for entry in self.manifest.of(job.output.as_posix()) if not job.mirrored else ():

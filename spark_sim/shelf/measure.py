@@ -10,7 +10,7 @@ from sim.trajectory import Subject
 from spark.errors import SparkSimError
 from spark_sim.clips import AnyClip
 from spark_sim.loading import load, takes
-from spark_sim.shelf.duplicates import fingerprint
+from spark_sim.shelf.fingerprint import fingerprint
 from spark_sim.shelf.headline import headline
 from spark_sim.shelf.items import Item, Origin
 from spark_sim.shelf.thumbnail import thumbnail
@@ -61,7 +61,10 @@ def _measure(item: Item, page: Path) -> Measured:
     }
     at = len(clip) // 2 if worst is None else (worst.start + worst.stop - 1) // 2
     picture = thumbnail(clip.motion, clip.rig, clip.floor_z, at, marked=worst is not None)
-    return Measured(item.name, facts, picture, fingerprint(clip.motion, clip.rig))
+    # What was mirrored on purpose is no duplicate, though half a step later it is nearly the same.
+    mirrored = item.origin is not None and item.origin.mirrored
+    found = "" if mirrored else fingerprint(clip.motion, clip.rig)
+    return Measured(item.name, facts, picture, found)
 
 
 def _load(path: Path, reading: Any) -> AnyClip:

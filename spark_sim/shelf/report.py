@@ -14,7 +14,7 @@ from sim.report.palette import css, grade
 from sim.template import Template
 from spark.errors import DependencyError
 from spark.files import write_atomically
-from spark_sim.shelf.duplicates import near_duplicates
+from spark_sim.shelf.duplicates import Duplicates, near_duplicates
 from spark_sim.shelf.headline import MEASURES, key
 from spark_sim.shelf.histogram import histogram
 from spark_sim.shelf.items import Item
@@ -48,22 +48,25 @@ def measure_all(
 
 def write_folder_report(
     measured: Sequence[Measured], page: Path, title: str
-) -> tuple[list[dict[str, Any]], list[list[str]], tuple[str, ...]]:
-    """Write the page and the tables, the worst motion first. Returns the rows, the groups of
+) -> tuple[list[dict[str, Any]], Duplicates, tuple[str, ...]]:
+    """Write the page and the tables, the worst motion first. Returns the rows, the
     near-duplicates, and notes on what could not be written."""
     good = sorted(
         (each for each in measured if each.error is None),
         key=lambda each: (-each.facts[key("implausible")], each.name),
     )
     failed = sorted((each for each in measured if each.error is not None), key=lambda e: e.name)
-    groups = near_duplicates({each.name: each.fingerprint for each in good})
-    twin = {name: group[0] for group in groups for name in group[1:]}
+    found = near_duplicates({each.name: each.fingerprint for each in good})
+    twin = {name: group[0] for group in found.groups for name in group[1:]}
+    whole = {part.name: part for part in found.parts}
     rows = [
-        each.facts | {"duplicate_of": twin.get(each.name), "error": each.error}
+        each.facts
+        | {"duplicate_of": twin.get(each.name), "error": each.error}
+        | {"part_of": whole[each.name].of if each.name in whole else None}
         for each in (*good, *failed)
     ]
     as_json, as_csv, as_parquet, clips = outputs(page)
-    write_json(rows, groups, as_json)
+    write_json(rows, found, as_json)
     write_csv(rows, as_csv)
     notes: tuple[str, ...] = ()
     tables = [as_json.name, as_csv.name]
@@ -97,15 +100,17 @@ def write_folder_report(
                 "duration": each.facts["duration_s"],
                 "worst": each.facts["worst"],
                 "duplicate_of": twin.get(each.name),
+                "part": whole.get(each.name),
                 "cells": [_cell(each, m) for m in shown],
             }
             for each in good
         ],
         failed=[{"name": each.name, "error": each.error} for each in failed],
-        duplicates=groups,
+        duplicates=found.groups,
+        parts=found.parts,
     )
     write_atomically(page, text.encode())
-    return rows, groups, notes
+    return rows, found, notes
 
 
 def _below(folder: Path, item: Item) -> Measured:

@@ -9,21 +9,27 @@ from typing import Any, Final
 
 from spark.errors import DependencyError
 from spark.files import write_atomically
+from spark_sim.shelf.duplicates import Duplicates
 from spark_sim.shelf.headline import MEASURES, key
 
 SCHEMA: Final = "spark-sim folder report 1"
 COLUMNS: Final = (
     *("file", "source", "frames", "fps", "duration_s"),
     *(key(measure) for measure in MEASURES),
-    *("worst", "duplicate_of", "error"),
+    *("worst", "duplicate_of", "part_of", "error"),
 )
 """Of CSV and Parquet: SI units, named in the columns; empty where a motion has no such measure."""
 
 
-def write_json(rows: Sequence[dict[str, Any]], duplicates: list[list[str]], path: Path) -> None:
-    """One object: a row for each motion, with its notes, and the groups of near-duplicates."""
+def write_json(rows: Sequence[dict[str, Any]], duplicates: Duplicates, path: Path) -> None:
+    """One object: a row for each motion, with its notes, and the near-duplicates."""
     text = json.dumps(
-        {"schema": SCHEMA, "clips": list(rows), "near_duplicates": duplicates},
+        {
+            "schema": SCHEMA,
+            "clips": list(rows),
+            "near_duplicates": duplicates.groups,
+            "parts": duplicates.records(),
+        },
         ensure_ascii=False,
         allow_nan=False,
         indent=1,
@@ -47,7 +53,7 @@ def write_parquet(rows: Sequence[dict[str, Any]], path: Path) -> None:
         from pyarrow import parquet
     except ImportError as error:
         raise DependencyError("Parquet needs pyarrow: pip install 'spark-sim[parquet]'") from error
-    texts = ("file", "source", "worst", "duplicate_of", "error")
+    texts = ("file", "source", "worst", "duplicate_of", "part_of", "error")
     types = {
         **dict.fromkeys(COLUMNS, pyarrow.float64()),
         **dict.fromkeys(texts, pyarrow.string()),

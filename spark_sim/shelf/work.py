@@ -20,7 +20,7 @@ from spark_sim.api import retarget
 from spark_sim.clips import AnyClip, Clip, RobotClip
 from spark_sim.loading import load, takes
 from spark_sim.shelf.cut import pieces
-from spark_sim.shelf.duplicates import fingerprint
+from spark_sim.shelf.fingerprint import fingerprint
 from spark_sim.shelf.headline import headline
 from spark_sim.shelf.manifest import file_facts
 from spark_sim.shelf.plan import Job
