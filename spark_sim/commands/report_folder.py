@@ -16,21 +16,20 @@ def report_folder(args: Namespace) -> float | None:
     from spark_sim import console, files
     from spark_sim.shelf.headline import key
     from spark_sim.shelf.items import items
-    from spark_sim.shelf.processes import in_processes
+    from spark_sim.shelf.outputs import claim_outputs
+    from spark_sim.shelf.processes import begin, in_processes
     from spark_sim.shelf.report import measure_all, outputs, write_folder_report
 
     if args.compare or args.truth is not None:
         raise ConventionError("--compare and --truth go with a file, and not with a folder")
     folder = Path(args.file)
     page = folder / "report.html" if args.html is None else Path(args.html)
-    files.claim(page, force=args.force, endings=(".html", ".htm"), what="a page")
     *tables, clips = outputs(page)
-    for path in tables:
-        files.claim(path, force=args.force)
-    if clips.exists() and not args.force:
-        files.check_free(clips, force=False)
+    files.claim(page, force=True, endings=(".html", ".htm"), what="a page")
+    begin()
     sources = None if args.source is None else Path(args.source)
     found = items(folder, given(args), sources, given(args, "source-"))
+    claim_outputs([page, *tables], clips, force=args.force)
     done = []
     backend = partial(in_processes, workers=min(workers(args), len(found)))
     with console.meter(len(found), 0, "report") as tell:

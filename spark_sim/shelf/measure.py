@@ -1,6 +1,5 @@
 """One motion of a folder: read, measured, drawn small, and with a page of its own."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,26 +12,20 @@ from spark_sim.loading import load, takes
 from spark_sim.shelf.fingerprint import fingerprint
 from spark_sim.shelf.headline import headline
 from spark_sim.shelf.items import Item, Origin
+from spark_sim.shelf.remembered import Measured, recall, remember
 from spark_sim.shelf.thumbnail import thumbnail
 from spark_sim.shelf.work import mirror_clip, stretch
 
 
-@dataclass(frozen=True)
-class Measured:
-    """A line of the table: the `facts` of a motion, or else the error; its picture as SVG and its
-    fingerprint."""
-
-    name: str
-    facts: dict[str, Any]
-    picture: str = ""
-    fingerprint: str = ""
-    error: str | None = None
-
-
 def measure(item: Item, page: Path) -> Measured:
-    """Measure a motion and write its page. Whatever fails becomes an error in words."""
+    """Measure a motion and write its page, where that was not done before. Whatever fails becomes
+    an error in words."""
     try:
-        return _measure(item, page)
+        known = recall(item, page)
+        if known is None:
+            known = _measure(item, page)
+            remember(item, page, known)
+        return known
     except (SparkSimError, OSError) as error:
         reason = str(error)
     except Exception as error:  # a fault of ours in one file must not end the others

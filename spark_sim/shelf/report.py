@@ -13,14 +13,15 @@ from sim.report.names import FLAGS, LABELS, UNITS
 from sim.report.palette import css, grade
 from sim.template import Template
 from spark.errors import DependencyError
-from spark.files import write_atomically
 from spark_sim.shelf.duplicates import Duplicates, near_duplicates
 from spark_sim.shelf.headline import MEASURES, key
 from spark_sim.shelf.histogram import histogram
 from spark_sim.shelf.items import Item
-from spark_sim.shelf.measure import Measured, measure
+from spark_sim.shelf.measure import measure
+from spark_sim.shelf.outputs import write_outputs
 from spark_sim.shelf.processes import Died
-from spark_sim.shelf.tables import write_csv, write_json, write_parquet
+from spark_sim.shelf.remembered import Measured
+from spark_sim.shelf.tables import as_csv, as_json, as_parquet
 
 Measurer: TypeAlias = Callable[
     [Callable[[Item], Measured], Sequence[Item]], Iterator[tuple[Item, Measured | Died]]
@@ -65,22 +66,19 @@ def write_folder_report(
         | {"part_of": whole[each.name].of if each.name in whole else None}
         for each in (*good, *failed)
     ]
-    as_json, as_csv, as_parquet, clips = outputs(page)
-    write_json(rows, found, as_json)
-    write_csv(rows, as_csv)
+    json_path, csv_path, parquet_path, clips = outputs(page)
+    files = {json_path: as_json(rows, found), csv_path: as_csv(rows)}
     notes: tuple[str, ...] = ()
-    tables = [as_json.name, as_csv.name]
     try:
-        write_parquet(rows, as_parquet)
-        tables.append(as_parquet.name)
+        files[parquet_path] = as_parquet(rows)
     except DependencyError as error:
-        notes = (f"no {as_parquet.name}: {error}",)
+        notes = (f"no {parquet_path.name}: {error}",)
     shown = [m for m in MEASURES if any(each.facts.get(key(m)) is not None for each in good)]
     text = _PAGE.render(
         title=title,
         palette=Markup(css()),
         about=_about(good, failed),
-        tables=tables,
+        tables=[path.name for path in files],
         measures=[
             {"name": m, "label": LABELS[m], "unit": UNITS[m], "flag": m in FLAGS} for m in shown
         ],
@@ -109,7 +107,7 @@ def write_folder_report(
         duplicates=found.groups,
         parts=found.parts,
     )
-    write_atomically(page, text.encode())
+    write_outputs({**files, page: text.encode()}, clips)
     return rows, found, notes
 
 

@@ -4,11 +4,9 @@ import csv
 import io
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, Final
 
 from spark.errors import DependencyError
-from spark.files import write_atomically
 from spark_sim.shelf.duplicates import Duplicates
 from spark_sim.shelf.headline import MEASURES, key
 
@@ -21,7 +19,7 @@ COLUMNS: Final = (
 """Of CSV and Parquet: SI units, named in the columns; empty where a motion has no such measure."""
 
 
-def write_json(rows: Sequence[dict[str, Any]], duplicates: Duplicates, path: Path) -> None:
+def as_json(rows: Sequence[dict[str, Any]], duplicates: Duplicates) -> bytes:
     """One object: a row for each motion, with its notes, and the near-duplicates."""
     text = json.dumps(
         {
@@ -34,19 +32,19 @@ def write_json(rows: Sequence[dict[str, Any]], duplicates: Duplicates, path: Pat
         allow_nan=False,
         indent=1,
     )
-    write_atomically(path, text.encode("utf-8", "replace"))
+    return text.encode("utf-8", "replace")
 
 
-def write_csv(rows: Sequence[dict[str, Any]], path: Path) -> None:
+def as_csv(rows: Sequence[dict[str, Any]]) -> bytes:
     """A line for each motion, below a line of `COLUMNS`."""
     out = io.StringIO(newline="")
     writer = csv.DictWriter(out, COLUMNS, extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    write_atomically(path, out.getvalue().encode("utf-8", "replace"))
+    return out.getvalue().encode("utf-8", "replace")
 
 
-def write_parquet(rows: Sequence[dict[str, Any]], path: Path) -> None:
+def as_parquet(rows: Sequence[dict[str, Any]]) -> bytes:
     """The same table with types. Raises `DependencyError` where pyarrow is not installed."""
     try:
         import pyarrow
@@ -65,7 +63,7 @@ def write_parquet(rows: Sequence[dict[str, Any]], path: Path) -> None:
     }
     out = io.BytesIO()
     parquet.write_table(pyarrow.table(columns), out)
-    write_atomically(path, out.getvalue())
+    return out.getvalue()
 
 
 def _text(value: Any) -> Any:

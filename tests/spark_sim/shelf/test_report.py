@@ -117,11 +117,56 @@ def test_the_page_sorts_in_a_browser(folder: Path, tmp_path: Path) -> None:
     assert seen["bars"] > 10
 
 
+def pages(out: Path) -> dict[str, int]:
+    """The inode of each motion's page, which is another one once the page is written anew."""
+    clips = out / "report_clips"
+    return {p.relative_to(clips).as_posix(): p.stat().st_ino for p in clips.rglob("*.html")}
+
+
+def test_a_second_run_measures_what_changed(folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(folder / "out", tmp_path / "out")
+    shutil.copytree(folder / "in", tmp_path / "in")
+    out = tmp_path / "out"
+    before = pages(out)
+    with Program(tmp_path) as program:
+
+        def again() -> set[str]:
+            """The pages that a run writes anew, or for the first time."""
+            nonlocal before
+            old, done = before, program("report", "out", "--workers", "1")
+            assert done.code == 2, done.stderr  # of the broken one
+            before = pages(out)
+            return {name for name, inode in before.items() if old.get(name) != inode}
+
+        again()  # the folder was copied: sources lie elsewhere now
+        table = (out / "report.json").read_bytes()
+        assert again() == set()
+        assert (out / "report.json").read_bytes() == table
+        for changed, name in {
+            tmp_path / "in" / "walk.bvh": "dancer_walk/walk.bvh",
+            out / "report_clips" / "dancer_walk" / "squat.bvh.html": "dancer_walk/squat.bvh",
+            out / f"{EVIL}.bvh": f"{EVIL}.bvh",
+        }.items():
+            changed.write_text(changed.read_text() + "\n")
+            assert again() == {f"{name}.html"}
+        one = out / "report_clips" / "dancer_walk" / "walk.bvh.json"
+        one.write_text(one.read_text()[:-20])  # torn, as no kill leaves it
+        assert again() == {"dancer_walk/walk.bvh.html"}
+
+
 def test_nothing_is_overwritten_unasked(folder: Path) -> None:
     with Program(folder) as program:
+        table = folder / "out" / "report.csv"
+        ours = table.read_bytes()
+        table.write_text("mine")
         done = program("report", "out")
         assert done.code == 2
-        assert "report.html: exists" in done.stderr
+        assert "report.csv: exists" in done.stderr
+        assert table.read_text() == "mine"
+        table.write_bytes(ours)
+        (folder / "mine_clips").mkdir(exist_ok=True)
+        done = program("report", "out", "--html", "mine.html")
+        assert "mine_clips: exists" in done.stderr
         done = program("report", "in/walk.bvh", "--html", "out/report.html")
         assert done.code == 2
         done = program("report", "samples", "--html", "out.txt")
