@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import re
 import shutil
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -268,7 +269,9 @@ def locked(folder: Path, shard: str = "") -> Iterator[None]:
 
 def _reason(error: str, source: Path) -> str:
     """An error without the file's own name, so that files that fail alike are counted together."""
-    return error.removeprefix(f"{source}: ")
+    error = error.removeprefix(f"{source}: ")
+    line = re.match(rf"{re.escape(str(source))}:(\d+): ", error)
+    return error if line is None else f"line {line[1]}: {error[line.end() :]}"
 
 
 def _exists(path: Path) -> str:
