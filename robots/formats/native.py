@@ -48,7 +48,9 @@ def write_npz(motion: RobotMotion, path: Path, *, source: Path | None = None) ->
         "joint_names": np.array(motion.robot.joint_names),
         "body_names": np.array(body_names(motion.robot, mjcf.bodies())),
         **contact_array(motion),
-        "about": np.array(json.dumps(facts)),
+        "about": np.array(
+            json.dumps(facts, ensure_ascii=False).encode("utf-8", "replace").decode()
+        ),
     }
     write_arrays(path, arrays)
 

@@ -1,7 +1,7 @@
 """Near-duplicates: a motion that is there twice, under another name, in other units, at another
 frame rate, turned about, trimmed, or with a little noise; and one that is a part of another."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -50,6 +50,15 @@ class Duplicates:
             yield f"nearly the same motion: {', '.join(group)}"
         for name, of, start in self.parts:
             yield f"{name} is a part of {of}, from {start:.1f} s on"
+
+
+def merged(found: Iterable[Duplicates]) -> Duplicates:
+    """What was found among several sets of motions."""
+    several = list(found)
+    return Duplicates(
+        [group for each in several for group in each.groups],
+        [part for each in several for part in each.parts],
+    )
 
 
 def near_duplicates(fingerprints: Mapping[str, str]) -> Duplicates:

@@ -28,12 +28,13 @@ class Origin:
 @dataclass(frozen=True)
 class Item:
     """A motion by its `name` in the folder, with its `origin` where that is known. `reading` is
-    what `spark_sim.load` must be given."""
+    what `spark_sim.load` must be given. `target` is the body that a batch put it on."""
 
     path: Path
     name: str
     reading: Mapping[str, Any]
     origin: Origin | None = None
+    target: str = ""
 
 
 def items(
@@ -56,7 +57,7 @@ def items(
                 name = path.relative_to(folder).as_posix()
                 robot = {"robot": entry["target"]} if is_robot(entry["target"]) else {}
                 known = {**robot, **reading}
-                found[path] = Item(path, name, known, _origin_of(entry, manifest))
+                found[path] = Item(path, name, known, _origin_of(entry, manifest), entry["target"])
     by_name = _by_name(sources)
     for path in _motions(folder, "robot" in reading):
         if path in found:

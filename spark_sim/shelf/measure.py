@@ -57,7 +57,7 @@ def _measure(item: Item, page: Path) -> Measured:
     # What was mirrored on purpose is no duplicate, though half a step later it is nearly the same.
     mirrored = item.origin is not None and item.origin.mirrored
     found = "" if mirrored else fingerprint(clip.motion, clip.rig)
-    return Measured(item.name, facts, picture, found)
+    return Measured(item.name, facts, picture, found, target=item.target)
 
 
 def _load(path: Path, reading: Any) -> AnyClip:

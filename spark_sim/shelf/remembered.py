@@ -22,13 +22,14 @@ SCHEMA: Final = "spark-sim clip report 1"
 @dataclass(frozen=True)
 class Measured:
     """A line of the table: the `facts` of a motion, or else the error; its picture as SVG and its
-    fingerprint."""
+    fingerprint; the `target` of a batch."""
 
     name: str
     facts: dict[str, Any]
     picture: str = ""
     fingerprint: str = ""
     error: str | None = None
+    target: str = ""
 
 
 def recall(item: Item, page: Path) -> Measured | None:
@@ -67,6 +68,7 @@ def _settings(item: Item) -> dict[str, Any]:
     return {
         "version": version("spark-sim"),
         "name": item.name,
+        "target": item.target,
         "reading": _words(item.reading),
         "model": None if robot is None else model_sha256(find(robot)),
         "source": None

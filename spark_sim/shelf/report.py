@@ -13,7 +13,7 @@ from sim.report.names import FLAGS, LABELS, UNITS
 from sim.report.palette import css, grade
 from sim.template import Template
 from spark.errors import DependencyError
-from spark_sim.shelf.duplicates import Duplicates, near_duplicates
+from spark_sim.shelf.duplicates import Duplicates, merged, near_duplicates
 from spark_sim.shelf.headline import MEASURES, key
 from spark_sim.shelf.histogram import histogram
 from spark_sim.shelf.items import Item
@@ -57,7 +57,12 @@ def write_folder_report(
         key=lambda each: (-each.facts[key("implausible")], each.name),
     )
     failed = sorted((each for each in measured if each.error is not None), key=lambda e: e.name)
-    found = near_duplicates({each.name: each.fingerprint for each in good})
+    # On several targets, a motion is the same on purpose.
+    targets = sorted({each.target for each in good})
+    found = merged(
+        near_duplicates({e.name: e.fingerprint for e in good if e.target == target})
+        for target in targets
+    )
     twin = {name: group[0] for group in found.groups for name in group[1:]}
     whole = {part.name: part for part in found.parts}
     rows = [
@@ -107,7 +112,7 @@ def write_folder_report(
         duplicates=found.groups,
         parts=found.parts,
     )
-    write_outputs({**files, page: text.encode()}, clips)
+    write_outputs({**files, page: text.encode("utf-8", "replace")}, clips)
     return rows, found, notes
 
 
