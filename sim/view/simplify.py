@@ -15,6 +15,7 @@ Mesh = tuple[Float[np.ndarray, "_ 3"], Int[np.ndarray, "_ 3"]]
 # A grid's cells leave about this many faces on cell² of a smooth surface; of others more.
 _FACES_A_CELL = 2.5
 _PATCHES = (16, 8, 8, 4, 4, 2, 1, 1)  # of a picture, across and down, at each attempt
+_SMALL, _CELLS_ACROSS = 0.06, 5  # [m] what hangs on a finger is no wider; cells that part it
 _MAX_ATTEMPTS = 5  # at a grid that is coarse enough
 
 
@@ -35,9 +36,9 @@ def simplify_together(meshes: dict[int, Mesh], faces: int) -> dict[int, Mesh]:
 
 def simplify_skin(skin: Skin, faces: int) -> Skin:
     """The skin with about so many faces, or fewer. Each cell keeps one of its places, with its
-    bones: neither is a mean of others. Vertices in one place stay in one, so that the seam of a
-    material or a picture does not open; those from elsewhere in a picture keep their own place
-    there."""
+    bones: neither is a mean of others. What hangs on a small bone, as on a finger's, has small
+    cells. Vertices in one place stay in one, so that the seam of a material or a picture does not
+    open; those from elsewhere in a picture keep their own place there."""
     if len(skin.faces) <= faces:
         return skin
     cell = float(np.sqrt(_FACES_A_CELL * area(skin.vertices, skin.faces) / faces))
@@ -48,9 +49,11 @@ def simplify_skin(skin: Skin, faces: int) -> Skin:
     side = _sides(places, weld[skin.faces])[weld]
     look = np.zeros(len(skin.vertices), dtype=np.int64)
     look[skin.faces] = skin.material_of[:, None]
-    cells = skin.vertices - skin.vertices.min(0)
+    away = skin.vertices - skin.vertices.min(0)
+    bone, small = (values[_firsts(weld)] for values in _small_bones(skin))
     for patches in _PATCHES:
-        _, place, group = _grouped(*np.floor(cells / cell).astype(np.int64).T, side)
+        edge = np.minimum(cell, small)[:, None]
+        _, place, group = _grouped(*np.floor(away / edge).astype(np.int64).T, side, bone)
         spot = np.floor((skin.uv - skin.uv.min(0)) * patches).astype(np.int64)
         _, first, merged = _grouped(group, look, *spot.T)
         turned = merged[skin.faces]
@@ -59,7 +62,8 @@ def simplify_skin(skin: Skin, faces: int) -> Skin:
         kept = np.sort(kept[((a != b) & (b != c) & (c != a))[kept]])
         if len(kept) <= faces:
             break
-        cell *= 1.05 * np.sqrt(len(kept) / faces)
+        coarser = 1.05 * np.sqrt(len(kept) / faces)
+        cell, small = coarser * cell, coarser * small
     at = place[group[first]]
     fewer = replace(
         skin,
@@ -70,6 +74,25 @@ def simplify_skin(skin: Skin, faces: int) -> Skin:
         faces=turned,
     )
     return fewer.with_faces(kept)
+
+
+def _small_bones(skin: Skin) -> tuple[Int[np.ndarray, "V"], Float[np.ndarray, "V"]]:
+    """The bone of the greatest weight of each vertex, 0 for those of size, and the edge of a cell
+    [m] that parts what hangs on it, infinite for those of size."""
+    strongest = skin.bones_of[np.arange(len(skin.bones_of)), skin.weights.argmax(axis=1)]
+    edges = np.full(len(skin.joints), np.inf)
+    for b in np.unique(strongest):
+        middle = np.sort(np.ptp(skin.vertices[strongest == b], axis=0))[1]
+        if middle < _SMALL:
+            edges[b] = max(float(middle), _SMALL / 10) / _CELLS_ACROSS
+    small = edges[strongest]
+    return np.where(np.isfinite(small), 1 + strongest, 0), small
+
+
+def _firsts(groups: Int[np.ndarray, "V"]) -> Int[np.ndarray, "V"]:
+    """For each row, the first row of its group."""
+    _, first, number = np.unique(groups, return_index=True, return_inverse=True)
+    return first[number]
 
 
 def _grouped(
