@@ -36,6 +36,7 @@ _LINES = {  # by whether they are arrows, and thin
     (True, False): mujoco.mjtGeom.mjGEOM_ARROW,
 }
 _MESSAGE_TIME = 2.0  # [s]
+_NAMES = 1.12  # of the distance: room for the names over the heads
 
 
 def open_window(player: Player, *, title: str, annotate: Annotate | None = None) -> None:
@@ -180,7 +181,7 @@ class Window:
         if player.view_is_new:
             camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
             seen = shot(player.scene, aspect=aspect)
-            camera.distance, self._offset = seen.distance, seen.offset[0]
+            camera.distance, self._offset = _NAMES * seen.distance, seen.offset[0]
             player.view_is_new = False
         if target is not None:
             camera.lookat[:] = target + self._offset
