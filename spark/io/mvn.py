@@ -132,7 +132,8 @@ def scale(datagram: Datagram) -> dict[str, Float[np.ndarray, "3"]]:
         if length < 0 or at + length + 12 > len(payload):
             raise ConventionError("an MVN datagram of the T-pose ends in the middle of a segment")
         name = payload[at : at + length].decode("utf-8", "replace")
-        place = np.frombuffer(payload, ">f4", 3, at + length).astype(float)
+        with np.errstate(invalid="ignore"):
+            place = np.frombuffer(payload, ">f4", 3, at + length).astype(float)
         at += length + 12
         known = _BY_NAME.get(name.replace(" ", "").replace("_", "").lower())
         if known is not None and np.isfinite(place).all() and np.abs(place).max() < _FAR:

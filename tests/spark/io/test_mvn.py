@@ -17,7 +17,17 @@ from spark.io.mvn_pose import MvnPose
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig.rig import understand
-from tests.helpers.mvn import NAMES, Placed, euler, header, quaternions, scale, unity, world
+from tests.helpers.mvn import (
+    NAMES,
+    Placed,
+    euler,
+    header,
+    numbered,
+    quaternions,
+    scale,
+    unity,
+    world,
+)
 
 SENDERS: dict[str, Callable[..., bytes]] = {
     "quaternions": quaternions,
@@ -221,6 +231,18 @@ def test_broken_datagrams_are_counted(packet: bytes) -> None:
     pose = MvnPose()
     assert not pose.take(packet, 0.0)
     assert pose.dropped == 1
+
+
+def test_numbers_that_are_none_are_left_out() -> None:
+    """Also those that signal (a NaN of which the first bit of its fraction is 0)."""
+    for bad in (b"\x7f\x80\x00\x01", b"\x7f\xc0\x00\x00", b"\xff\x80\x00\x00", b"\x7f\x7f\xff\xff"):
+        pose, tpose, whole = MvnPose(), scale(world({})), quaternions(world({}))
+        at = tpose.index(b"LeftFoot") + len(b"LeftFoot")
+        assert not pose.take(tpose[:at] + bad + tpose[at + 4 :], 0.0)
+        assert pose.take(whole[:28] + bad + whole[32:], 0.0)  # the pelvis, which is needed
+        assert pose.missing == ("Pelvis",)
+        assert pose.take(numbered(whole, 1), 0.1)
+        np.testing.assert_allclose(places(pose)["LeftFoot"], world({})["LeftFoot"][0], atol=1e-4)
 
 
 @given(st.binary(max_size=900), st.integers(0, 30), st.integers(0, 255), st.integers(0, 23))
