@@ -9,6 +9,7 @@ exits with 1 where something was lost.
 """
 
 import argparse
+import json
 import os
 import random
 import signal
@@ -20,6 +21,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import onnx
+import pyarrow.parquet
 
 import spark_sim
 from spark.training.dataset import read_dataset
@@ -29,13 +32,22 @@ COMMANDS = {
     "retarget": "retarget samples/walker_walk.bvh --to samples/dancer_wave.bvh -o out.bvh --force",
     "retarget to a robot": "retarget samples/walker_wave.bvh --to robot --method copy -o out.npz "
     "--force",
+    "retarget to GLB": "retarget samples/walker_walk.bvh --to samples/dancer_wave.bvh -o out.glb "
+    "--force",
+    "retarget to CSV": "retarget samples/walker_wave.bvh --to robot --method copy -o out.csv "
+    "--force",
+    "batch": "batch samples --to robot --method copy -o shelf --workers 2 --force",
+    "report on a folder": "report samples --html shelf.html --workers 2 --force",
     "mjcf": "mjcf samples/walker_walk.bvh -o body.xml --force",
     "play": "play samples/walker_wave.bvh --html play.html --force",
+    "pictures": "play samples/walker_wave.bvh --video v.mp4 --gif v.gif --webp v.webp "
+    "--strip v.png --force",
     "report": "report samples/walker_wave.bvh --html report.html --force",
     "inspect": "inspect samples/walker_walk.bvh --save-map map.toml --force",
     "prepare": "prepare samples -o dataset --workers 2 --force",
     "train": "train dataset_for_training -o run --preset tiny --steps 6 --force",
     "evaluate": "evaluate dataset_for_training --made --limit 1 -o table.md --force",
+    "export": "export run_to_export -o network.onnx --force",
 }
 
 
@@ -52,6 +64,8 @@ def main() -> int:
         here = Path(folder)
         spark_sim.sample(here / "samples")
         run(here, "prepare samples -o dataset_for_training --workers 2")
+        if "export" in names:
+            run(here, "train dataset_for_training -o run_to_export --preset tiny --steps 1")
         for k, name in enumerate(names):
             share = args.kills // len(names) + (k < args.kills % len(names))
             lost += killed(here, name, share, draw)
@@ -105,7 +119,7 @@ def problem(path: Path, data: bytes) -> str | None:
     """What is wrong with an output after a kill; None where it is whole."""
     if not path.exists():
         return f"{path.name} is gone"
-    check = CHECKS.get(path.suffix if path.parent.name != "run" else path.name)
+    check = CHECKS.get(path.name) or CHECKS.get(path.suffix)
     if check is None:
         return None if path.read_bytes() == data else f"{path.name} is another"
     try:
@@ -125,8 +139,29 @@ def _checkpoint(path: Path) -> None:
     load_checkpoint(path)
 
 
-def _log(path: Path) -> None:
+def _text(path: Path) -> None:
     path.read_text()
+
+
+def _lines(path: Path) -> None:
+    """The last line of what is appended to may be torn."""
+    for line in path.read_text().split("\n")[:-1]:
+        json.loads(line)
+
+
+def _picture(path: Path) -> None:
+    from PIL import Image
+
+    with Image.open(path) as picture:
+        picture.seek(getattr(picture, "n_frames", 1) - 1)
+        picture.load()
+
+
+def _video(path: Path) -> None:
+    from imageio_ffmpeg import count_frames_and_secs
+
+    frames, _ = count_frames_and_secs(str(path))
+    assert frames > 0
 
 
 def _page(path: Path) -> None:
@@ -135,14 +170,22 @@ def _page(path: Path) -> None:
 
 # What is not the same bytes in each run, or is there in parts: how it is looked at.
 CHECKS: dict[str, Callable[[Path], object]] = {
+    "index.json": _dataset,
+    "config.toml": _text,
     ".npy": lambda path: np.load(path, mmap_mode="r"),
     ".npz": lambda path: dict(np.load(path)),
-    ".json": _dataset,
+    ".json": lambda path: json.loads(path.read_text()),
+    ".jsonl": _lines,
     ".html": _page,
-    ".md": lambda path: path.read_text(),
-    "checkpoint.safetensors": _checkpoint,
-    "log.jsonl": _log,
-    "config.toml": lambda path: path.read_text(),
+    ".csv": _text,
+    ".md": _text,
+    ".parquet": lambda path: pyarrow.parquet.read_table(path),
+    ".mp4": _video,
+    ".gif": _picture,
+    ".webp": _picture,
+    ".png": _picture,
+    ".onnx": lambda path: onnx.load(path),
+    ".safetensors": _checkpoint,
 }
 
 

@@ -132,10 +132,12 @@ def read_mjcf(path: str | Path, *, visuals: bool = True) -> Mjcf:
 
 def _check_numbers(model: mujoco.MjModel, path: Path) -> None:
     """Raise FileFormatError where a number of the model is none, or no length or mass that is."""
-    if not (np.abs(model.body_pos) < _MAX_OFFSET).all():
-        raise FileFormatError(
-            path, None, f"a body's place is no number of metres below {_MAX_OFFSET:g}"
-        )
+    for what in ("body", "jnt", "geom"):
+        if not (np.abs(getattr(model, f"{what}_pos")) < _MAX_OFFSET).all():
+            name = {"jnt": "joint"}.get(what, what)
+            raise FileFormatError(
+                path, None, f"a {name}'s place is no number of metres below {_MAX_OFFSET:g}"
+            )
     for name in _NUMBERS:
         values = getattr(model, name)
         if not np.isfinite(values).all():

@@ -17,6 +17,7 @@ from robots.tree import ROOT, Tree
 _COS_PARALLEL = np.cos(np.radians(30))
 """Consecutive hinges nearer to parallel are two joints, as a hip's pitch and a knee. Within a joint
 of the registry's robots they are 90 degrees apart."""
+_NO_LIMIT = 1e3  # [rad] files that ask for a limit get such a one where there is none
 _MAX_OFFSET_OF_SIZE = 0.025
 """How far the axes of one joint may pass from its centre, as a share of the diagonal around all
 anchors. The G1's pass up to 2.3 cm from it, with a diagonal of 1.1 m."""
@@ -58,8 +59,8 @@ def tree_of(mjcf: Mjcf) -> tuple[Tree, list[int]]:
             above = int(model.body_parentid[above])
         parents.append(last[above])
         last[body] = i
-    limited = model.jnt_limited[joints].astype(bool)
     ranges = model.jnt_range[joints] - model.qpos0[model.jnt_qposadr[joints]][:, None]
+    limited = model.jnt_limited[joints].astype(bool) & (np.abs(ranges) < _NO_LIMIT).all(axis=1)
     tree = Tree(
         parents=np.array(parents, dtype=np.int64),
         anchors=data.xanchor[joints].reshape(-1, 3).copy(),

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from robots import registry
 from robots.model.mjcf import read_mjcf
 from robots.model.morphology import Morphology
 from robots.model.understand import understand_robot
@@ -385,3 +386,12 @@ def test_limits_that_forbid_a_t_pose_are_refused(tmp_path: Path) -> None:
 def test_a_missing_file_is_said(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match="no such file"):
         read_mjcf(tmp_path / "none.xml")
+
+
+def test_limits_of_more_than_any_turn_are_none(tmp_path: Path) -> None:
+    """Some files ask for a limit where a joint has none; and what is 1e308 breaks arithmetic."""
+    whole = registry.find("robot").read_text()
+    (tmp_path / "free.xml").write_text(whole.replace('range="-0.9 0.7"', 'range="-0.9 1e308"'))
+    robot = understand_robot(read_mjcf(tmp_path / "free.xml"))
+    assert robot.tree.upper.max() < 10
+    assert np.isfinite(robot.rig.tpose).all()
