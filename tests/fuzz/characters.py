@@ -171,17 +171,6 @@ def _positions_npy(folder: Path) -> list[bytes]:
     return out
 
 
-def _c3d_seeds(folder: Path) -> list[bytes]:
-    from tests.spark.io.test_c3d import centres
-
-    path = folder / "seed.c3d"
-    write_bvh(encode_new(_walk(), unit="cm", up="y"), folder / "walk.bvh")
-    walk = spark_sim.load(folder / "walk.bvh")
-    assert isinstance(walk, Clip)
-    kinds = [{"processor": "intel"}, {"processor": "sgi", "integers": True, "analogue": 6}]
-    return [centres(walk, path, **kind).read_bytes() for kind in kinds]
-
-
 def _positions_npz(folder: Path) -> list[bytes]:
     walk = _walk().frames(0, 3)
     names = np.array(walk.skeleton.names)
@@ -202,7 +191,6 @@ FORMATS: dict[str, Target] = {
     "smpl": Target(".npz", _smpl_layouts(".npz"), _use_clip),
     "smpl-npy": Target(".npy", _smpl_layouts(".npy"), _use_clip),
     "gvhmr": Target(".pt", _gvhmr_seeds, _use_clip),
-    "c3d": Target(".c3d", _c3d_seeds, _use_clip),
     "positions": Target(".npy", _positions_npy, _use_clip),
     "positions-npz": Target(".npz", _positions_npz, _use_clip),
 }
