@@ -108,6 +108,13 @@ class BodyTokens:
         ]
         return np.nan_to_num(np.array(found) / _TYPICAL)
 
+    @cached_property
+    def traits(self) -> Float[np.ndarray, "L"]:
+        """What tells whether a body is like another: the measures, and how its maker lets it rest:
+        turns of upper arm, hand and foot, 1 where two rest poses of one maker differ as they do."""
+        resting = [self.rest_turns[rows_of(self, part)[:1]].sum(0) for part in _RESTING]
+        return np.concatenate([self.measures, np.concatenate(resting) / _TYPICAL_TURN])
+
     @property
     def _resting_ankle(self) -> Float[np.ndarray, "3"]:
         """Where the left ankle is in the rest pose, from the middle of the hips."""
@@ -122,23 +129,26 @@ class BodyTokens:
         return places[self._places[role]] if role in self._places else np.full(3, np.nan)
 
 
+_RESTING = ("upper_arm", "hand", "foot")
+_TYPICAL_TURN = 0.2  # [rad]
 _LEG = (Role.LEFT_UPPER_LEG, Role.LEFT_LOWER_LEG, Role.LEFT_FOOT, Role.LEFT_TOE)
 HabitsOf = Callable[[BodyTokens], Habits]
 
 
 @dataclass(frozen=True, eq=False)
 class KnownBodies:
-    """The bodies that habits were learned from, by their `measures`, and within what distance of
-    the nearest one bodies that were left out of the training gained."""
+    """The bodies that habits were learned from, by their `traits`, and within what distance of the
+    nearest one bodies that were left out of the training gained."""
 
-    measures: Float[np.ndarray, "N M"]
+    traits: Float[np.ndarray, "N L"]
     reach: float
 
     def distance(self, body: BodyTokens) -> float:
         """How far a body is from the nearest known one: the root mean square of its measures'
-        differences, 1 between people."""
-        gaps = np.sqrt(np.mean((self.measures - body.measures) ** 2, axis=-1))
-        return float(gaps.min(initial=np.inf))
+        differences, about 1 between people, or that of its rest pose's turns where it is more."""
+        gaps = np.split((self.traits - body.traits) ** 2, [len(body.measures)], axis=-1)
+        worst = np.max([np.sqrt(gap.mean(-1)) for gap in gaps], axis=0)
+        return float(worst.min(initial=np.inf))
 
     def nearness(self, body: BodyTokens) -> float:
         """1 within the reach, falling to 0 at twice that distance."""

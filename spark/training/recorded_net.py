@@ -119,7 +119,7 @@ class Recorded:
             "heads": torch.tensor(float(self.net.heads)),
             "blocks": torch.tensor(float(len(self.net.layers))),
             "trust": torch.tensor(self.trust, dtype=torch.float32),
-            "known": torch.tensor(self.known.measures, dtype=torch.float32),
+            "known": torch.tensor(self.known.traits, dtype=torch.float32),
             "reach": torch.tensor(self.known.reach, dtype=torch.float32),
         }
         return {k: v.detach() for k, v in self.net.state_dict().items()} | about
@@ -174,8 +174,8 @@ def learn_recorded(
     net = train(known)
     trust, reach, gain = _tested(tests, bodies)
     met = sorted({end for pair in known.pairs for end in (pair.source, pair.target)})
-    measures = np.stack([known.bodies[k].measures for k in met])
-    return Recorded(net, trust, KnownBodies(measures, reach), gain)
+    traits = np.stack([known.bodies[k].traits for k in met])
+    return Recorded(net, trust, KnownBodies(traits, reach), gain)
 
 
 def total_steps(steps: int) -> int:
@@ -292,7 +292,7 @@ def _tested(
     before = after = 0.0
     for others, tested, sums in told:
         met = {end for pair in others.pairs for end in (pair.source, pair.target)}
-        near = KnownBodies(np.stack([tested.bodies[k].measures for k in sorted(met)]), 1.0)
+        near = KnownBodies(np.stack([tested.bodies[k].traits for k in sorted(met)]), 1.0)
         gained = (2 * trust * sums[..., 0] - trust**2 * sums[..., 1]).sum(1) * tested.balance
         for pair, value in zip(tested.pairs, gained.tolist(), strict=True):
             key = near.distance(tested.bodies[pair.target]), tested.characters[pair.target]

@@ -22,6 +22,7 @@ from spark.network.retarget import NetworkRetargeter
 from spark.network.weights import read_weights
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
+from spark.rotation import quat_from_rotvec, quat_mul
 from spark.training.checkpoint import load_checkpoint, save_checkpoint
 from spark.training.dataset import Performance
 from spark.training.pairs import TrainingClip
@@ -150,9 +151,9 @@ def test_a_checkpoint_says_the_same_without_torch(tmp_path: Path) -> None:
         "heads": torch.tensor(2.0),
         "blocks": torch.tensor(2.0),
         "trust": torch.tensor([0.5, *[1.0] * 5, 0.25]),
-        "known": torch.tensor(one.measures, dtype=torch.float32)[None],
+        "known": torch.tensor(one.traits, dtype=torch.float32)[None],
         "reach": torch.tensor(
-            0.75 * KnownBodies(one.measures[None], 1.0).distance(tokens_of(body(2)))
+            0.75 * KnownBodies(one.traits[None], 1.0).distance(tokens_of(body(2)))
         ),
     }
     path = tmp_path / "checkpoint.safetensors"
@@ -174,9 +175,21 @@ def test_a_checkpoint_says_the_same_without_torch(tmp_path: Path) -> None:
 
 def test_nearness_falls_from_the_reach_to_twice_of_it() -> None:
     one = tokens_of(body(1))
-    away = np.zeros_like(one.measures)
+    away = np.zeros_like(one.traits)
     for distance, expected in ((0.0, 1.0), (1.0, 1.0), (1.5, 0.5), (2.0, 0.0), (9.0, 0.0)):
         away[:] = distance  # the same on each measure, and so in the mean
-        known = KnownBodies(np.stack([one.measures + away, one.measures + 20]), 1.0)
+        known = KnownBodies(np.stack([one.traits + away, one.traits + 20]), 1.0)
         assert known.nearness(one) == pytest.approx(expected)
-    assert KnownBodies(one.measures[None], 0.0).nearness(one) == 0.0
+    assert KnownBodies(one.traits[None], 0.0).nearness(one) == 0.0
+
+
+def test_a_body_that_another_maker_lets_rest_otherwise_is_far() -> None:
+    """The same T-pose; the arms hang where the file rests, as in many captures."""
+    rig = body(1)
+    tpose = rig.tpose.copy()
+    for side, sign in (("left", 1), ("right", -1)):
+        arm = joint(Role(f"{side}_upper_arm"))
+        tpose[arm] = quat_mul(quat_from_rotvec(np.array([sign * 1.3, 0.0, 0.0])), tpose[arm])
+    known = KnownBodies(tokens_of(rig).traits[None], 1.0)
+    assert known.nearness(tokens_of(rig)) == 1.0
+    assert known.nearness(tokens_of(replace(rig, tpose=tpose))) == 0.0
