@@ -18,6 +18,7 @@ from tests.helpers.gltf import animated
 from tests.helpers.node import in_three, needs, validated
 from tests.helpers.recordings import recording
 from tests.helpers.stick import stick_rig
+from tests.helpers.vrm import avatar
 from tests.spark.io.test_fbx_skin import arm, placed, png, skin_of
 
 TIMES = (0.1, 0.5, 0.9)  # [s]
@@ -39,6 +40,7 @@ def test_khronos_validator_finds_no_error(walk: Clip, tmp_path: Path) -> None:
         skinned(tmp_path / "body.gltf", stick_rig(), embed=False),
         skinned(tmp_path / "body.glb", stick_rig()),
         animated(walk.motion, scale=0.01).write(tmp_path / "bare.glb"),
+        avatar(walk.motion).write(tmp_path / "body.vrm"),
     ]
     arm_file = arm(surfaces=[Surface(picture=png())]).write(tmp_path / "arm.fbx")
     made = [walk.save(tmp_path / "walk.glb"), spark_sim.load(arm_file).save(tmp_path / "arm.glb")]
