@@ -17,6 +17,7 @@ from robots.stream.prediction import Ahead, CostToGo
 
 BASE_CUTOFF = 1.0  # [Hz] above which the base's motion against the source's fades,
 JERK_CUTOFF = 2.5  # and that of hinges, by their jerk
+MAX_HIPS_ACCELERATION = 40.0  # [m/s²] of the source that the base goes along with: more is a glitch
 _BASE = slice(0, 3)  # dofs of the base's position
 
 
@@ -42,22 +43,33 @@ class Coupling:
             self._to_gradient[:, :, own] = (over_frames.T @ over_steps)[..., None] * weights[own]
         self._to_go = CostToGo(frame_time, orders, weights)
         self._overspeed_weight = (W_OVERSPEED / frame_time) ** 2
+        self._max_change = MAX_HIPS_ACCELERATION * frame_time**2
+        self.reset()
         self._max_steps = np.full(robot.tree.nv, np.inf)
         hinges = robot.tree.dof_starts[~robot.tree.balls]
         self._max_steps[hinges] = MAX_HINGE_SPEED * frame_time
 
+    def reset(self) -> None:
+        """The source has stood still."""
+        self._hips_steps = np.zeros((len(self._first), 3))
+
+    def follow(self, step: Float[np.ndarray, "3"]) -> None:
+        """Take in how far [m] the newest frame's hips are from those before."""
+        last = self._hips_steps[-1]
+        step = last + np.clip(step - last, -self._max_change, self._max_change)
+        self._hips_steps = np.concatenate([self._hips_steps[1:], step[None]])
+
     def add_to(
         self,
         steps: Float[np.ndarray, "V D"],
-        hips: Float[np.ndarray, "T 3"],
         ahead: Ahead,
         blocks: Float[np.ndarray, "F D F D"],
         g: Float[np.ndarray, "F D"],
     ) -> None:
-        """Add to the normal equations: `steps` are the dofs' from frame to frame, `hips` the path
-        that the source asks for [m], and `ahead` is what is expected of the dofs."""
+        """Add to the normal equations: `steps` are the dofs' from frame to frame, and `ahead` is
+        what is expected of them."""
         against = steps.copy()  # and what is expected is that they do not move
-        against[:, _BASE] -= np.diff(hips, axis=0)
+        against[:, _BASE] -= self._hips_steps
         diagonals = np.einsum("sdtd->std", blocks)  # a view
         diagonals += self._products
         g += (self._to_gradient * against).sum(axis=1)

@@ -47,6 +47,7 @@ class Window:
     def reset(self) -> None:
         """Forget what has been seen."""
         self._motion.reset()
+        self._coupling.reset()
 
     def solve(
         self,
@@ -57,6 +58,7 @@ class Window:
     ) -> Float[np.ndarray, "T nq"]:
         """`q` after at most `_MAX_ITER` steps of its free frames; `targets` are for all."""
         candidates = self._terms.candidates(q[-1:])
+        self._coupling.follow(targets.hips[-1] - targets.hips[-2])
         for _ in range(_MAX_ITER):
             q, length = self._step(q, targets, foot_targets, posture, candidates)
             if length < _STEP_TOL:
@@ -106,7 +108,7 @@ class Window:
             blocks[t, :, t] = H[t]
         if lone_damping is None:
             ahead = self._motion.of(q[-1], H[-1], g[-1])
-            self._coupling.add_to(self._steps(q), targets.hips, ahead, blocks, g)
+            self._coupling.add_to(self._steps(q), ahead, blocks, g)
         held = self._at_limits(q[-free:], g)
         g[held] = 0.0
         whole.reshape(-1)[:: free * D + 1] += np.where(

@@ -43,9 +43,11 @@ def test_no_writer_lets_one_out(tmp_path: Path) -> None:
             write_bvh(broken, tmp_path / "o.bvh")
     clip = spark_sim.load("robot")
     assert isinstance(clip, RobotClip)
-    clip.on_robot.coordinates.pos[0, 1] = np.nan
-    vars(clip.on_robot).pop("qpos", None)
+    coordinates = clip.on_robot.coordinates  # the robot's own T-pose, which others read
+    pos = coordinates.pos.copy()
+    pos[0, 1] = np.nan
+    broken = replace(clip.on_robot, coordinates=replace(coordinates, pos=pos))
     for name in ("o.npz", "o.csv", "o.pkl"):
         with pytest.raises(OutputError, match="not written: qpos 1 of frame 0 is nan"):
-            clip.save(tmp_path / name)
+            RobotClip(broken, clip.name).save(tmp_path / name)
     assert not list(tmp_path.glob("o.*"))

@@ -175,6 +175,13 @@ def test_standing_feet_stay_while_the_source_trembles(robot: str) -> None:
         assert np.ptp(at, axis=2).max() < 0.005
 
 
+def test_a_glitch_of_the_hips_hardly_moves_the_base() -> None:
+    glitch = standing(60, 0.0)
+    glitch.root_pos[30, 2] -= 0.15
+    base = said(glitch)[:, :3]
+    assert np.abs(np.diff(base, axis=0)).max() < 0.15 * EMBER.rig.hip_height / 10
+
+
 @pytest.mark.parametrize(("robot", "fps"), [("robot", 24.0), G1_60])
 def test_the_bars_hold_on_the_walk(robot: str, fps: float) -> None:
     source = to_canonical(sample_motion("walk", RIG, fps), RIG)
