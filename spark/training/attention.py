@@ -70,6 +70,8 @@ class Attention(nn.Module):
         self, q: Heads, k: Heads, v: Heads, allowed: Bool[Tensor, "M 1 #Q K"] | None
     ) -> Heads:
         """Fused attention on no more sequences at once than its kernels take."""
+        if torch.compiler.is_exporting():  # a graph has no number of sequences
+            return nnf.scaled_dot_product_attention(q, k, v, allowed, is_causal=self.causal)
         parts = [
             nnf.scaled_dot_product_attention(
                 q[at : at + MOST_SEQUENCES],

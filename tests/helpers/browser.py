@@ -68,13 +68,13 @@ def watched(text: str) -> str:
       const seen = [];
       addEventListener("error", e => seen.push(String(e.message)), true);
       addEventListener("securitypolicyviolation", e => seen.push(e.violatedDirective));
-      const tell = tries => {
+      const probe = tries => {
         const frame = document.getElementById("replay"), inner = frame && frame.contentDocument;
         const time = (inner || document).getElementById("time")?.textContent;
-        if (!time && tries) return setTimeout(tell, 100, tries - 1);  // a busy machine draws late
+        if (time === "" && tries) return setTimeout(probe, 100, tries - 1);  // a busy machine draws late
         document.body.dataset.result = JSON.stringify({seen, title: document.title, time});
       };
-      addEventListener("load", () => setTimeout(tell, 300, 6));"""
+      addEventListener("load", () => setTimeout(probe, 300, 50));"""
     before, meta, after = text.partition('<meta http-equiv="Content-Security-Policy"')
     return f"{before}<script>{script}</script>{meta}{after}"
 

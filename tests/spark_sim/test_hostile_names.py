@@ -53,7 +53,7 @@ def test_names_are_shown_and_do_nothing(kind: Any, tmp_path: Path) -> None:
     assert hostile == plain
     for page in sorted(folder.glob("*.html")):
         text = page.read_text()
-        came_to = opened(watched(text), tmp_path)
+        came_to = opened(watched(text), tmp_path, "--virtual-time-budget=8000")
         assert came_to["seen"] == []
         assert name in came_to["title"]
         assert "frame" in came_to["time"]
