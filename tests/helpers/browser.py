@@ -71,7 +71,8 @@ def watched(text: str) -> str:
       const probe = tries => {
         const frame = document.getElementById("replay"), inner = frame && frame.contentDocument;
         const time = (inner || document).getElementById("time")?.textContent;
-        if (time === "" && tries) return setTimeout(probe, 100, tries - 1);  // a busy machine draws late
+        // A busy machine draws late.
+        if (time === "" && tries) return setTimeout(probe, 100, tries - 1);
         document.body.dataset.result = JSON.stringify({seen, title: document.title, time});
       };
       addEventListener("load", () => setTimeout(probe, 300, 50));"""
