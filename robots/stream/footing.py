@@ -81,7 +81,8 @@ class ContactTracker:
             if at == settled:
                 self._put(points, planted, holds)
             holds = holds + np.clip(planted - holds, -ramp, ramp)
-            pivots, headings = zip(*((f.pivot, f.heading) for f in footprints), strict=True)
+            pivots = tuple(footprint.pivot for footprint in footprints)
+            headings = tuple(footprint.heading for footprint in footprints)
             seen.append(_Seen(holds, height, known, pivots, headings))
             if at == settled:
                 self._planted, self._holds = planted, holds
