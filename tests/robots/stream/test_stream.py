@@ -8,6 +8,7 @@ import pytest
 import spark_sim
 from robots.metrics import limb_error, measure
 from robots.model.known import known
+from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.solver.block import Block
 from robots.solver.collision import Candidate, collisions_of
@@ -173,6 +174,11 @@ def test_standing_feet_stay_while_the_source_trembles(robot: str) -> None:
     for sole in found.soles:
         at = points_of(found, forward_kinematics(found.tree, q), sole)
         assert np.ptp(at, axis=2).max() < 0.005
+
+
+def test_a_robot_without_feet_follows_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Morphology, "soles", ())
+    assert np.isfinite(said(standing(5, 0.002))).all()
 
 
 def test_a_glitch_of_the_hips_hardly_moves_the_base() -> None:
