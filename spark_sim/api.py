@@ -185,6 +185,7 @@ def play(
     gif: File | None = None,
     webp: File | None = None,
     same_height: bool = False,
+    speed: float = 1.0,
     force: bool = False,
     progress: Callable[[Iterable[int]], Iterable[int]] = iter,
 ) -> None:
@@ -192,14 +193,19 @@ def play(
     page (HTML), a strip of moments (PNG) and an animated picture (GIF, WebP). What `simulate`
     returns is shown with its target as a ghost. A character whose file has a skin is shown with it;
     `Clip.wearing` gives it that of another. With `same_height`, all stand as tall as
-    the tallest.
+    the tallest. At a `speed` of 0.25 a video takes four times as long as the motion, with frames
+    made between its own; a window and a page begin with it.
 
     `progress` wraps the frames of the video and of animated pictures. Raises `DependencyError`
     where there is no display, or nothing to draw or encode with, and `OutputError` where a file
     exists, unless forced.
     """
     from sim.view.scene import build_scene
+    from sim.view.timeline import SPEEDS
 
+    if speed not in SPEEDS:
+        known = ", ".join(f"{each:g}" for each in SPEEDS)
+        raise ConventionError(f"speed {speed:g}: expected one of {known}")
     for path, endings, what in (
         (video, (".mp4",), "a video"),
         (html, _PAGE, "a page"),
@@ -217,22 +223,22 @@ def play(
     if video is html is strip is gif is webp is None:
         from sim.report.watch import watch
 
-        watch(figures, title=" - ".join(c.name for c in shown))
+        watch(figures, title=" - ".join(c.name for c in shown), speed=speed)
         return
-    scene = build_scene(figures)
+    scene = build_scene(figures, max_fps=max(60.0, 30.0 / speed), blend=speed < 1)
     if video is not None:
         from sim.view.video import write_video
 
-        write_video(scene, video, progress=progress)
+        write_video(scene, video, speed=speed, progress=progress)
     for path in (gif, webp):
         if path is not None:
             from sim.view.video import write_animation
 
-            write_animation(scene, path, progress=progress)
+            write_animation(scene, path, speed=speed, progress=progress)
     if html is not None:
         from sim.report.watch import write_replay
 
-        write_replay(figures, html, title=" · ".join(c.name for c in shown))
+        write_replay(figures, html, title=" · ".join(c.name for c in shown), speed=speed)
     if strip is not None:
         from sim.view.video import write_strip
 

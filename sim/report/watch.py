@@ -16,22 +16,27 @@ from spark.errors import SparkSimError
 _MAX_FPS = 1000.0  # no frame of a motion is left out
 
 
-def watch(figures: Sequence[Figure], *, title: str) -> None:
-    """Show figures in a window until it is closed. `title` is the window's.
+def watch(figures: Sequence[Figure], *, title: str, speed: float = 1.0) -> None:
+    """Show figures in a window until it is closed. `title` is the window's; it begins at a `speed`
+    of `SPEEDS`.
 
     Raises `DependencyError` where there is no display.
     """
     shown = [figure for figure in figures if not figure.ghost]
     scene = build_scene(with_ghosts(figures), max_fps=_MAX_FPS)
     player = Player(scene, ghosts=len(shown) < len(figures))
+    player.timeline.speed = speed
     open_window(player, title=f"{title} - spark-sim", annotate=lambda: known_of(shown))
 
 
-def write_replay(figures: Sequence[Figure], path: str | Path, *, title: str) -> None:
-    """Write the page that shows figures with what their reports find."""
+def write_replay(
+    figures: Sequence[Figure], path: str | Path, *, title: str, speed: float = 1.0
+) -> None:
+    """Write the page that shows figures with what their reports find, at first at a `speed` of
+    `SPEEDS`."""
     known = iter(known_of([figure for figure in figures if not figure.ghost]))
     of_each = [None if figure.ghost else next(known) for figure in figures]
-    write_page(figures, path, title=title, known=of_each)
+    write_page(figures, path, title=title, known=of_each, speed=speed)
 
 
 def with_ghosts(figures: Sequence[Figure]) -> list[Figure]:

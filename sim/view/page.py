@@ -45,9 +45,10 @@ def write_page(
     *,
     title: str,
     known: Sequence[Annotations | None] | None = None,
+    speed: float = 1.0,
 ) -> None:
     """Write the replay of some figures side by side to `path`."""
-    write_atomically(Path(path), page(figures, title=title, known=known).encode())
+    write_atomically(Path(path), page(figures, title=title, known=known, speed=speed).encode())
 
 
 def page(
@@ -55,13 +56,14 @@ def page(
     *,
     title: str,
     known: Sequence[Annotations | None] | None = None,
+    speed: float = 1.0,
     live: bool = False,
 ) -> str:
     """The page as text. Frames are thinned to at most 30 a second: the page blends between them.
 
-    `known` has one entry for each figure, and is drawn over it. Inside another page's frame, a
-    message `{seek: seconds}` sets the time, and messages `{time: seconds}` tell it. A `live` page
-    asks its server for coordinates (`/live`, `live.js`) instead.
+    `known` has one entry for each figure, and is drawn over it. It begins at a `speed` of `SPEEDS`.
+    Inside another page's frame, a message `{seek: seconds}` sets the time, and messages `{time:
+    seconds}` tell it. A `live` page asks its server for coordinates (`/live`, `live.js`) instead.
     """
     scene = build_scene(figures, max_fps=30.0)
     meshes: dict[bytes, dict[str, Any]] = {}
@@ -85,6 +87,7 @@ def page(
         title=title,
         data=data,
         speeds=SPEEDS,
+        speed_at_first=speed,
         toggles=[(name, words) for name, (_, words) in TOGGLES.items()],
         controls=[*keys, *MOUSE],
     )

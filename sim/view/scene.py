@@ -156,19 +156,20 @@ class Scene:
         return next((p for p in self.placements if p.ghost), self.placements[0])
 
 
-def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0) -> Scene:
+def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0, blend: bool = False) -> Scene:
     """The scene of some figures that move together, left to right as they are given.
 
     All are turned by one angle, so that the first faces +X at first. Frames are those of the first
-    figure, thinned to at most `max_fps`; the others are read at the same times and rest in their
-    last frame when theirs is over.
+    figure, thinned to at most `max_fps`; to `blend`, as many as that allows are made between them.
+    The others are read at the same times and rest in their last frame when theirs is over.
     """
     if not figures:
         raise SkeletonError("nothing to show: expected at least one motion")
     world = empty_world()
     first = figures[0].motion
     step = max(1, int(np.ceil(first.fps / max_fps - 1e-6)))
-    frame_time = first.frame_time * step
+    between = max(1, int(np.floor(max_fps / first.fps + 1e-6))) if blend else 1
+    frame_time = first.frame_time * step / between
     longest = max(figure.motion.duration for figure in figures)
     times = np.arange(int(np.floor(longest / frame_time + 1e-6)) + 1) * frame_time
     heights = [figure.rig.standing_height * figure.scale for figure in figures]

@@ -25,25 +25,33 @@ def write_video(
     *,
     width: int = 960,
     height: int = 540,
+    speed: float = 1.0,
     progress: Progress = iter,
 ) -> None:
-    """An H.264 video of the whole scene, of at most `_VIDEO_FPS` frames a second. `progress` wraps
-    the frames."""
+    """An H.264 video of the whole scene, of at most `_VIDEO_FPS` frames a second, in which `speed`
+    seconds of it go by in one. `progress` wraps the frames."""
     path = Path(path)
     if not path.parent.is_dir():
         raise OutputError(f"{path}: there is no folder {path.parent}; make it first")
     with replacing(path) as unfinished:
-        _encode(scene, unfinished, path, width, height, progress)
+        _encode(scene, unfinished, path, width, height, speed, progress)
 
 
 def _encode(
-    scene: Scene, unfinished: Path, path: Path, width: int, height: int, progress: Progress
+    scene: Scene,
+    unfinished: Path,
+    path: Path,
+    width: int,
+    height: int,
+    speed: float,
+    progress: Progress,
 ) -> None:
     """Write the video to `unfinished`; errors call it `path`."""
-    step = max(1, int(np.ceil(1 / (_VIDEO_FPS * scene.frame_time) - 1e-6)))
+    step = max(1, int(np.ceil(speed / (_VIDEO_FPS * scene.frame_time) - 1e-6)))
+    fps = speed / (step * scene.frame_time)
     encoder = [
         *(_ffmpeg(), "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24"),
-        *("-s", f"{width}x{height}", "-r", f"{1 / (step * scene.frame_time):.6f}", "-i", "-"),
+        *("-s", f"{width}x{height}", "-r", f"{fps:.6f}", "-i", "-"),
         *("-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p"),
         *("-movflags", "+faststart", "-f", "mp4", str(unfinished)),
     ]
@@ -94,13 +102,14 @@ def write_animation(
     path: str | Path,
     *,
     height: int = 240,
+    speed: float = 1.0,
     progress: Progress = iter,
 ) -> None:
     """A GIF or a WebP, by the ending, that loops for ever: for a README. At most `_ANIMATED_FPS`
-    frames a second; just wide enough for the figures."""
+    frames a second; just wide enough for the figures. `speed` is that of `write_video`."""
     image = _pillow()
     path = Path(path)
-    step = max(1, round(1 / (_ANIMATED_FPS * scene.frame_time)))
+    step = max(1, round(speed / (_ANIMATED_FPS * scene.frame_time)))
     indices = progress(range(0, len(scene.qpos), step))
     width = round(height * fitting_aspect(scene))
     pictures = [
@@ -108,7 +117,7 @@ def write_animation(
         for picture in frames(scene, indices, width=width, height=height)
     ]
     # Hundredths of a second in a GIF: the rounding is spread, so that the whole lasts as long.
-    ends = np.round(100 * step * scene.frame_time * np.arange(len(pictures) + 1)) * 10
+    ends = np.round(100 * step * scene.frame_time / speed * np.arange(len(pictures) + 1)) * 10
     more: dict[str, object] = {"save_all": True, "append_images": pictures[1:], "loop": 0}
     if path.suffix.lower() == ".gif":
         palette = pictures[len(pictures) // 2].quantize(128)

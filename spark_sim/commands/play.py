@@ -6,6 +6,7 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any
 
+from sim.view.timeline import SPEEDS
 from spark_sim.commands.options import add_corrections, add_force, add_json, add_robot_motion, load
 
 SUMMARY = "watch motions: window, video, web page, picture"
@@ -52,6 +53,15 @@ def configure(parser: ArgumentParser) -> None:
         "--same-height", action="store_true", help="show all figures as tall as the tallest"
     )
     parser.add_argument(
+        "--speed",
+        metavar="X",
+        type=float,
+        choices=SPEEDS,
+        default=1.0,
+        help="0.1, 0.25, 0.5, 1 (default), 1.5, 2 or 4; at 0.25 a video is in slow motion, with "
+        "frames made between the motion's",
+    )
+    parser.add_argument(
         "--mesh",
         metavar="FILE",
         action="append",
@@ -92,7 +102,12 @@ def run(args: Namespace) -> int:
 
     if args.address and not args.serve:
         raise ConventionError("--address goes with --serve")
+    outputs = {name: getattr(args, name) for name in ("video", "html", "strip", "gif", "webp")}
+    wanted = {name: Path(path) for name, path in outputs.items() if path is not None}
     if args.serve:
+        if wanted or args.physics:
+            other = "physics" if args.physics else next(iter(wanted))
+            raise ConventionError(f"--serve shows a page in a browser; --{other} goes without it")
         return _serve(args)
     if not args.files:
         raise ConventionError("no FILE is given; only --serve needs none")
@@ -104,8 +119,6 @@ def run(args: Namespace) -> int:
         raise ConventionError("--assist helps servos; a policy goes without")
     if args.seeds and not args.policy:
         raise ConventionError("--seeds goes with --policy")
-    outputs = {name: getattr(args, name) for name in ("video", "html", "strip", "gif", "webp")}
-    wanted = {name: Path(path) for name, path in outputs.items() if path is not None}
     shown: list[Any] = [load(args, path) for path in args.files]
     if args.mesh:
         from spark_sim.loading import dressed
@@ -119,7 +132,12 @@ def run(args: Namespace) -> int:
     if wanted or not args.json:
         progress = partial(console.progress, label="video")
         api.play(
-            *shown, **wanted, same_height=args.same_height, force=args.force, progress=progress
+            *shown,
+            **wanted,
+            same_height=args.same_height,
+            speed=args.speed,
+            force=args.force,
+            progress=progress,
         )
     for out in wanted.values():
         size = f"{out}: {out.stat().st_size / 1000:.0f} kB"

@@ -21,7 +21,7 @@ from sim.view.scene import Figure, Scene, build_scene
 from sim.view.simplify import area, simplify_together
 from sim.view.video import write_animation, write_strip, write_video
 from spark.demo.sample import sample_motion, sample_rig
-from spark.errors import DependencyError, OutputError
+from spark.errors import ConventionError, DependencyError, OutputError
 from spark.motion import Motion
 from spark.rig.rig import Rig
 from spark.rotation import quat_mul, quat_rotate
@@ -362,6 +362,34 @@ def test_animated_pictures_last_as_long_as_the_motion(tmp_path: Path, ending: st
         assert opened.info.get("loop") == 0
     duration = (len(scene.qpos) - 1) * scene.frame_time
     assert abs(total / 1000 - duration) < 0.15
+
+
+def test_slow_motion_has_frames_between_those_of_the_motion(tmp_path: Path) -> None:
+    """At a quarter of the speed a video takes four times as long, at no fewer frames a second."""
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    (walk, *_) = spark_sim.sample(tmp_path)
+    short = tmp_path / "short.bvh"
+    spark_sim.load(walk).part(0.0, 0.4).save(short)
+    draw(build_scene(figures()), [0])
+    seconds, rates = {}, {}
+    for speed in (1.0, 0.25, 4.0):
+        out = tmp_path / f"{speed}.mp4"
+        spark_sim.play(short, video=out, speed=speed)
+        found = next(imageio_ffmpeg.read_frames(str(out)))
+        seconds[speed], rates[speed] = found["duration"], found["fps"]
+    assert seconds[0.25] == pytest.approx(4 * seconds[1.0], rel=0.1)
+    assert seconds[4.0] == pytest.approx(seconds[1.0] / 4, rel=0.3)
+    assert rates[0.25] >= 24
+    with pytest.raises(ConventionError, match=r"speed 3: expected one of 0\.1, 0\.25"):
+        spark_sim.play(walk, video=tmp_path / "three.mp4", speed=3.0)
+
+
+def test_blended_frames_lie_on_the_way() -> None:
+    own = build_scene(figures()[:1])
+    fine = build_scene(figures()[:1], max_fps=120.0, blend=True)
+    assert fine.frame_time == pytest.approx(own.frame_time / 4)
+    np.testing.assert_allclose(fine.qpos[::4], own.qpos, atol=1e-12)
+    np.testing.assert_allclose(fine.qpos[2::4, :3], (own.qpos[1:] + own.qpos[:-1])[:, :3] / 2)
 
 
 def test_dark_colours_are_lifted_and_others_stay() -> None:
