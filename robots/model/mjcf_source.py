@@ -26,13 +26,14 @@ _DEEPEST = 100  # elements in elements, of one file
 class MjcfSource:
     """A model's text, and that of the models it attaches by the names that it calls them.
 
-    `sha256` is that of the file and of what it includes, as they are; `whole` tells whether the
-    text is the file's own, so that MuJoCo's line numbers are the file's.
+    `sha256` is that of the file and of what it includes, as they are; `files` are these files.
+    `whole` tells whether the text is the file's own, so that MuJoCo's line numbers are the file's.
     """
 
     text: str
     models: dict[str, bytes]
     sha256: str
+    files: tuple[Path, ...]
     whole: bool
 
 
@@ -47,17 +48,19 @@ def read_source(path: Path) -> MjcfSource:
     root = reader.tree(path)
     check_limits(path, root, reader.attached)
     digest = hashlib.sha256(b"".join(reader.contents)).hexdigest()
-    if len(reader.contents) == 1:
-        return MjcfSource(reader.text, {}, digest, whole=True)
+    files = tuple(reader.files)
+    if len(files) == 1:
+        return MjcfSource(reader.text, {}, digest, files, whole=True)
     models = {name: ET.tostring(tree) for name, tree in reader.attached.items()}
-    return MjcfSource(ET.tostring(root, encoding="unicode"), models, digest, whole=False)
+    return MjcfSource(ET.tostring(root, encoding="unicode"), models, digest, files, whole=False)
 
 
 @dataclass
 class _Reader:
-    """The files of one model: in `contents` as they are, in the order in which they are named."""
+    """The `files` of one model and their `contents`, in the order in which they are named."""
 
     main: Path
+    files: list[Path] = field(default_factory=list)
     contents: list[bytes] = field(default_factory=list)
     text: str = ""
     attached: dict[str, ET.Element] = field(default_factory=dict)
@@ -72,6 +75,7 @@ class _Reader:
         if len(self.contents) == _MOST_FILES or len(above) > _DEEPEST_FILES:
             _fail(path, f"includes more than {_MOST_FILES} files, or {_DEEPEST_FILES} deep")
         content = read_bytes(path, limit=LARGEST_TEXT, expected="an MJCF (.xml)")
+        self.files.append(path)
         self.contents.append(content)
         # MuJoCo takes comments that XML does not, with -- inside; what it gets has none.
         text = content.decode("utf-8-sig", "replace")

@@ -11,7 +11,7 @@ import os
 import stat
 import tempfile
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -39,19 +39,26 @@ def key(spec: mujoco.MjSpec, text: str, visuals: bool) -> str | None:
     if not list(spec.meshes) or any(map(list, others)) or spec.strippath or attached:
         return None
     digest = hashlib.sha256(f"{mujoco.__version__} {_code()} {visuals}\n{text}".encode())
-    folder = Path(spec.modelfiledir)
-    try:
-        for below, name in _assets(spec):
-            content = spec.assets.get(name)
-            if content is None:
-                content = read_bytes(folder / below / name, limit=_LARGEST)
-            elif isinstance(content, str):
-                content = content.encode()
-            digest.update(f"\n{name} {len(content)}\n".encode())
-            digest.update(content)
-    except (FileFormatError, ValueError):  # MuJoCo says what is wrong
-        return None
+    for name, content in assets(spec):
+        if content is None:  # MuJoCo says what is wrong
+            return None
+        digest.update(f"\n{name} {len(content)}\n".encode())
+        digest.update(content)
     return digest.hexdigest()[:32]
+
+
+def assets(spec: mujoco.MjSpec) -> Iterator[tuple[str, bytes | None]]:
+    """The meshes and pictures of a spec by name, with their bytes; None where they can't be
+    read."""
+    folder = Path(spec.modelfiledir)
+    for below, name in _assets(spec):
+        content = spec.assets.get(name)
+        if content is None:
+            try:
+                content = read_bytes(folder / below / name, limit=_LARGEST)
+            except (FileFormatError, ValueError):
+                content = None
+        yield name, content.encode() if isinstance(content, str) else content
 
 
 def load(name: str) -> mujoco.MjModel | None:

@@ -1,5 +1,8 @@
 """The lowest points of a model's parts."""
 
+from functools import lru_cache
+
+import mujoco
 import numpy as np
 from jaxtyping import Float
 
@@ -21,18 +24,8 @@ def lowest_points(
     They are those of the shapes that collide, or of all where none does; of round meshes to within
     a millimetre or so. `feet` are what those parts are called that carry soles.
     """
-    model = body.model
-    weld = model.body_weldid
-    geoms = [int(g) for g in np.flatnonzero(np.isin(model.geom_bodyid, poses.bodies))]
-    colliding = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
-    outlines: dict[int, list[tuple[int, Float[np.ndarray, "P 3"], float]]] = {}
-    for g in colliding or geoms:
-        points, radius = outline(model, g, **_DETAIL, ring=_RING)
-        if len(points):
-            at = int(model.geom_bodyid[g])
-            placed = quat_rotate(model.geom_quat[g], points) + model.geom_pos[g]
-            outlines.setdefault(int(weld[at]), []).append((at, placed, radius))
-    names = tuple(feet.get(part) or part_name(model, part) for part in outlines)
+    outlines = _outlines(body.model, tuple(poses.bodies))
+    names = tuple(feet.get(part) or part_name(body.model, part) for part in outlines)
     lowest = np.zeros((len(body.qpos), len(outlines), 3))
     for k, pieces in enumerate(outlines.values()):
         least = np.full(len(body.qpos), np.inf)
@@ -42,6 +35,24 @@ def lowest_points(
             better = place[:, 2] < least
             lowest[better, k], least[better] = place[better], place[better, 2]
     return names, lowest, tuple(outlines)
+
+
+@lru_cache(maxsize=4)  # meshes have many vertices, and a model many motions
+def _outlines(
+    model: mujoco.MjModel, bodies: tuple[int, ...]
+) -> dict[int, list[tuple[int, Float[np.ndarray, "P 3"], float]]]:
+    """The shapes of each part: the body that carries one, and its outline in that body's axes."""
+    weld = model.body_weldid
+    geoms = [int(g) for g in np.flatnonzero(np.isin(model.geom_bodyid, bodies))]
+    colliding = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
+    found: dict[int, list[tuple[int, Float[np.ndarray, "P 3"], float]]] = {}
+    for g in colliding or geoms:
+        points, radius = outline(model, g, **_DETAIL, ring=_RING)
+        if len(points):
+            at = int(model.geom_bodyid[g])
+            placed = quat_rotate(model.geom_quat[g], points) + model.geom_pos[g]
+            found.setdefault(int(weld[at]), []).append((at, placed, radius))
+    return found
 
 
 def _lowest(

@@ -9,6 +9,7 @@ no forces of the floor need less.
 
 import copy
 from dataclasses import dataclass
+from functools import lru_cache
 
 import mujoco
 import numpy as np
@@ -61,7 +62,7 @@ def joint_torques(
     `points` [m, world] may touch the floor, on the model's bodies `carriers`, where `touching`. A
     torque of 1 body weight x `length` [m] at the root counts as much as a force of 1 body weight.
     """
-    model = copy.copy(body.model)
+    model = _without_contacts(body.model)
     limits = {
         j: limit
         for j in _hinges(model, body.root)
@@ -69,8 +70,6 @@ def joint_torques(
     }
     if not limits or len(body.qpos) < 2:
         return ()
-    model.opt.gravity = [0.0, 0.0, -GRAVITY]
-    model.opt.disableflags = int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     velocity, acceleration = (
         rates(model, body.qpos, frame_time, order, window) for order in (1, 2)
     )
@@ -99,6 +98,15 @@ def joint_torques(
         JointTorque(model.joint(j).name or f"joint {j}", out[:, k], limits[j])
         for k, j in enumerate(limits)
     )
+
+
+@lru_cache(maxsize=4)  # a model with meshes has tens of megabytes, and many motions
+def _without_contacts(model: mujoco.MjModel) -> mujoco.MjModel:
+    """A copy of the model, of which inverse dynamics asks what nothing gives."""
+    free = copy.copy(model)
+    free.opt.gravity = [0.0, 0.0, -GRAVITY]
+    free.opt.disableflags = int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    return free
 
 
 def rates(

@@ -37,7 +37,7 @@ def read_acclaim(
     """
     path = Path(path)
     notes: list[str] = []
-    skeleton_file = path if path.suffix.lower() == ".asf" else _beside(path)
+    skeleton_file = skeleton_of(path)
     figure = read_asf(skeleton_file)
     frames = np.zeros((1, sum(len(bone.dof) for bone in figure.bones)))
     if skeleton_file == path:
@@ -56,8 +56,10 @@ def read_acclaim(
     return foreign_recording(path, motion, notes, unit=unit, up=up, unit_m=unit_m)
 
 
-def _beside(path: Path) -> Path:
-    """The ASF of an AMC."""
+def skeleton_of(path: Path) -> Path:
+    """The ASF of an AMC; an ASF is its own. Raises `FileFormatError` where there is none."""
+    if path.suffix.lower() == ".asf":
+        return path
     folder = path.parent
     try:
         found = sorted(p for p in folder.iterdir() if p.suffix.lower() == ".asf")

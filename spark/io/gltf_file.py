@@ -140,9 +140,18 @@ class GltfFile:
             elif uri.startswith("data:"):
                 self._buffers[index] = base64.b64decode(uri.split(",", 1)[1])
             else:
-                beside = self.path.parent / unquote(uri)
+                beside = self._beside(uri)
                 self._buffers[index] = read_bytes(beside, expected=f"a part of {self.path.name}")
         return self._buffers[index]
+
+    def files_beside(self) -> tuple[Path, ...]:
+        """The files that its buffers are in, where they are not in it."""
+        with self.checked():
+            uris = [buffer.get("uri") for buffer in self.json.get("buffers", ())]
+            return tuple(self._beside(uri) for uri in uris if uri and not uri.startswith("data:"))
+
+    def _beside(self, uri: str) -> Path:
+        return self.path.parent / unquote(uri)
 
 
 def _chunks(content: bytes) -> tuple[bytes, bytes]:

@@ -13,14 +13,13 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from secrets import token_hex
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
-from robots.model.known import model_sha256
-from robots.registry import find, is_robot
 from spark.errors import OutputError
 from spark_sim.shelf.duplicates import Duplicates, near_duplicates
 from spark_sim.shelf.keep import Keep
-from spark_sim.shelf.manifest import SCHEMA, Entry, Manifest, is_still, sha256
+from spark_sim.shelf.made_of import is_still, is_still_made_of, target_sha256
+from spark_sim.shelf.manifest import SCHEMA, Entry, Manifest
 from spark_sim.shelf.plan import Job
 from spark_sim.shelf.processes import Died
 from spark_sim.shelf.work import Done, work
@@ -92,7 +91,7 @@ class Batch:
     def run(self, jobs: Sequence[Job], backend: Backend) -> Iterator[tuple[Job, list[Entry]]]:
         """Do what is missing or changed, the largest files first; yields each job as it is done,
         with its lines of the manifest. What is unchanged comes first."""
-        targets = {job.target: target_sha256(job.target) for job in jobs}
+        targets = {target: target_sha256(target) for target in {job.target for job in jobs}}
         missing = []
         for job in jobs:
             if self._is_done(job, targets[job.target]):
@@ -134,12 +133,13 @@ class Batch:
                 and self._is_there(entry)
                 for entry in entries
             )
-            and is_still([job.source], entries[0], "source")
+            and is_still_made_of(job.source, _part(entries[0], "source_"))
         )
 
     def _is_there(self, entry: Entry) -> bool:
         if entry["status"] == "written":
-            return is_still([self.folder / file for file in entry["files"]], entry, "output")
+            files = [self.folder / file for file in entry["files"]]
+            return is_still(files, _part(entry, "output_"))
         return entry["status"] == "left out" and not self._keeps(entry)
 
     def _keeps(self, entry: Entry) -> bool:
@@ -237,13 +237,15 @@ class Batch:
         return entries
 
 
+def _part(entry: Entry, which: str) -> dict[str, Any]:
+    """What a line says of its "source_" or its "output_"."""
+    return {
+        name.removeprefix(which): value for name, value in entry.items() if name.startswith(which)
+    }
+
+
 def _work_below(parts: Path, job: Job) -> Done:
     return work(job, parts / job.output)
-
-
-def target_sha256(target: str) -> str:
-    """Of a robot's model, or of a character's file."""
-    return model_sha256(find(target)) if is_robot(target) else sha256(Path(target))
 
 
 @contextmanager

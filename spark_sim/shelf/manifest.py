@@ -4,9 +4,8 @@ A line is appended before its result takes its final name. So a file that no lin
 batch's own, and a line whose file is missing is work that was interrupted.
 """
 
-import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -167,40 +166,6 @@ def _is_of(text: bytes, job: str) -> bool:
         return all(_parsed(line)["job"] == job for line in text.splitlines())
     except (ValueError, TypeError, KeyError):
         return False
-
-
-def is_still(paths: Sequence[Path], entry: Mapping[str, Any], which: str) -> bool:
-    """Whether files are what the line says of its "source" or "output": by size and time, or else
-    by their bytes."""
-    try:
-        now = file_facts(paths, entry[f"{which}_sha256"])
-        same_time = now["mtime_ns"] == entry[f"{which}_mtime_ns"]
-        return now["bytes"] == entry[f"{which}_bytes"] and (
-            same_time or file_facts(paths)["sha256"] == now["sha256"]
-        )
-    except OSError:
-        return False
-
-
-def file_facts(paths: Sequence[Path], known_sha256: str | None = None) -> dict[str, Any]:
-    """Size, time and hash of a file; of several the sum, the latest, and the hash of the hashes."""
-    stats = [path.stat() for path in paths]
-    return {
-        "sha256": known_sha256 or _sha256(paths),
-        "bytes": sum(stat.st_size for stat in stats),
-        "mtime_ns": max(stat.st_mtime_ns for stat in stats),
-    }
-
-
-def _sha256(paths: Sequence[Path]) -> str:
-    hashes = [sha256(path) for path in paths]
-    return hashes[0] if len(hashes) == 1 else hashlib.sha256("".join(hashes).encode()).hexdigest()
-
-
-def sha256(path: Path) -> str:
-    """Of a file's bytes, which are never all in memory."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _text(entries: Iterable[Entry]) -> bytes:

@@ -12,6 +12,7 @@ from spark_sim.loading import load, takes
 from spark_sim.shelf.fingerprint import fingerprint
 from spark_sim.shelf.headline import headline
 from spark_sim.shelf.items import Item, Origin
+from spark_sim.shelf.made_of import Facts, facts_of, robot_facts
 from spark_sim.shelf.remembered import Measured, recall, remember
 from spark_sim.shelf.thumbnail import thumbnail
 from spark_sim.shelf.work import mirror_clip, stretch
@@ -22,10 +23,7 @@ def measure(item: Item, page: Path) -> Measured:
     an error in words."""
     try:
         known = recall(item, page)
-        if known is None:
-            known = _measure(item, page)
-            remember(item, page, known)
-        return known
+        return _measure(item, page) if known is None else known
     except (SparkSimError, OSError) as error:
         reason = str(error)
     except Exception as error:  # a fault of ours in one file must not end the others
@@ -34,8 +32,10 @@ def measure(item: Item, page: Path) -> Measured:
 
 
 def _measure(item: Item, page: Path) -> Measured:
-    clip = _load(item.path, item.reading)
-    source = None if item.origin is None else _source(item.origin, clip.duration)
+    clip, made_of = _load(item.path, item.reading)
+    found, source = {"motion": made_of}, None
+    if item.origin is not None:
+        source, found["source"] = _source(item.origin, clip.duration)
     report = assess(clip.subject, source=source)
     page.parent.mkdir(parents=True, exist_ok=True)
     origin = None if item.origin is None else item.origin.path
@@ -56,17 +56,23 @@ def _measure(item: Item, page: Path) -> Measured:
     picture = thumbnail(clip.motion, clip.rig, clip.floor_z, at, marked=worst is not None)
     # What was mirrored on purpose is no duplicate, though half a step later it is nearly the same.
     mirrored = item.origin is not None and item.origin.mirrored
-    found = "" if mirrored else fingerprint(clip.motion, clip.rig)
-    return Measured(item.name, facts, picture, found, target=item.target)
+    text = "" if mirrored else fingerprint(clip.motion, clip.rig)
+    measured = Measured(item.name, facts, picture, text, target=item.target)
+    remember(item, page, measured, found)
+    return measured
 
 
-def _load(path: Path, reading: Any) -> AnyClip:
-    return load(path, **{name: value for name, value in reading.items() if name in takes(path)})
+def _load(path: Path, reading: Any) -> tuple[AnyClip, Facts]:
+    """The clip of a file, and what it was read from."""
+    facts = facts_of(path)
+    clip = load(path, **{name: value for name, value in reading.items() if name in takes(path)})
+    return clip, facts | robot_facts(path, clip)
 
 
-def _source(origin: Origin, duration: float) -> Subject:
-    """The stretch of the source that a motion of this duration [s] was made from."""
-    clip = _load(origin.path, origin.reading)
+def _source(origin: Origin, duration: float) -> tuple[Subject, Facts]:
+    """The stretch of the source that a motion of this duration [s] was made from, and what that
+    was read from."""
+    clip, facts = _load(origin.path, origin.reading)
     if origin.mirrored:
         clip = mirror_clip(clip)
-    return stretch(clip, origin.start, duration)
+    return stretch(clip, origin.start, duration), facts

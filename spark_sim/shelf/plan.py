@@ -3,6 +3,7 @@
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from spark.errors import ConventionError, FileFormatError, OutputError
 from spark.io.reading import SUFFIXES as CHARACTERS
 from spark.io.reading import motion_files
 from spark_sim.choices import Format, Method
+from spark_sim.shelf.made_of import reading_sha256
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,11 @@ class Options:
     fps: float | None = None
     cut: float | None = None
     reading: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def reading_sha256(self) -> dict[str, str]:
+        """Of the files that `reading` names. Raises `SparkSimError` where one can't be read."""
+        return reading_sha256(self.reading)
 
 
 @dataclass(frozen=True)
@@ -54,6 +61,7 @@ class Job:
             "cut": options.cut,
             "mirrored": self.mirrored,
             "reading": {name: str(value) for name, value in sorted(options.reading.items())},
+            "reading_sha256": options.reading_sha256,
         }
 
 

@@ -6,9 +6,10 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import forkserver, get_context
+from multiprocessing import forkserver, get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerContext, SpawnContext
+from threading import Thread
 from typing import Generic, TypeVar
 
 Job = TypeVar("Job")
@@ -125,7 +126,7 @@ class _Worker(Generic[Job, Result]):
         """The job with its result; None where the process died and the job may be tried again."""
         try:
             return self._job, self.pipe.recv()
-        except (EOFError, ConnectionResetError):
+        except (EOFError, OSError):  # in the midst of its answer, too
             self._process.join()
             if self._attempt < ATTEMPTS:
                 return None
@@ -139,9 +140,9 @@ class _Worker(Generic[Job, Result]):
         self._send(self._job)
 
     def end(self) -> None:
-        """End the process, whatever it does."""
+        """End the process, whatever it does, and though it be stopped."""
         self.pipe.close()
-        self._process.terminate()
+        self._process.kill()
         self._process.join()
 
     def _send(self, what: Callable[[Job], Result] | Job) -> None:
@@ -153,11 +154,20 @@ def _serve(pipe: Connection) -> None:
     """Receive the work and do it to what comes through the pipe, until it is closed, as it is when
     the other process ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that gives the jobs
+    Thread(target=_end_with_parent, daemon=True).start()
     os.environ.update(dict.fromkeys(THREADS, "1"))  # the server of forks may be someone else's
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):
         work = pipe.recv()  # it is imported now, with the threads that were set
         while True:
             pipe.send(work(pipe.recv()))
+
+
+def _end_with_parent() -> None:
+    """End this process as soon as the one that gives the jobs has ended, amid a job, too."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 @contextmanager

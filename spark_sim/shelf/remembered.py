@@ -8,13 +8,16 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
-from robots.formats.sidecar import sidecar_of
-from robots.model.known import model_sha256
-from robots.registry import find
 from spark.errors import SparkSimError
 from spark.files import write_atomically
 from spark_sim.shelf.items import Item
-from spark_sim.shelf.manifest import file_facts, is_still
+from spark_sim.shelf.made_of import (
+    Facts,
+    file_facts,
+    is_still,
+    is_still_made_of,
+    reading_sha256,
+)
 
 SCHEMA: Final = "spark-sim clip report 1"
 
@@ -40,21 +43,19 @@ def recall(item: Item, page: Path) -> Measured | None:
         same = (
             record["schema"] == SCHEMA
             and made_of["settings"] == _settings(item)
-            and all(
-                is_still(paths, made_of[name], "file") for name, paths in _files(item, page).items()
-            )
+            and is_still([page], made_of["page"])
+            and is_still_made_of(item.path, made_of["motion"])
+            and (item.origin is None or is_still_made_of(item.origin.path, made_of["source"]))
         )
         return Measured(**record["measured"]) if same else None
     except (OSError, ValueError, LookupError, TypeError, SparkSimError):
         return None
 
 
-def remember(item: Item, page: Path, measured: Measured) -> None:
-    """Write the record of a motion whose page is written."""
-    made_of: dict[str, Any] = {"settings": _settings(item)}
-    for name, paths in _files(item, page).items():
-        made_of[name] = {f"file_{key}": value for key, value in file_facts(paths).items()}
-    record = {"schema": SCHEMA, "made_of": made_of, "measured": asdict(measured)}
+def remember(item: Item, page: Path, measured: Measured, made_of: Mapping[str, Facts]) -> None:
+    """Write the record of a motion whose page is written, `made_of` a "motion" and a "source"."""
+    facts = {**made_of, "settings": _settings(item), "page": file_facts([page])}
+    record = {"schema": SCHEMA, "made_of": facts, "measured": asdict(measured)}
     write_atomically(_record(page), json.dumps(record).encode())
 
 
@@ -64,24 +65,20 @@ def _record(page: Path) -> Path:
 
 def _settings(item: Item) -> dict[str, Any]:
     """What beside files decides what is measured."""
-    robot, origin = item.reading.get("robot"), item.origin
+    origin = item.origin
     return {
         "version": version("spark-sim"),
         "name": item.name,
         "target": item.target,
-        "reading": _words(item.reading),
-        "model": None if robot is None else model_sha256(find(robot)),
+        "reading": [_words(item.reading), reading_sha256(item.reading)],
         "source": None
         if origin is None
-        else [str(origin.path), _words(origin.reading), origin.start, origin.mirrored],
+        else [
+            *(str(origin.path), origin.start, origin.mirrored),
+            *(_words(origin.reading), reading_sha256(origin.reading)),
+        ],
     }
 
 
 def _words(reading: Mapping[str, Any]) -> dict[str, str]:
     return {name: str(value) for name, value in sorted(reading.items())}
-
-
-def _files(item: Item, page: Path) -> dict[str, list[Path]]:
-    beside = sidecar_of(item.path)
-    files = {"motion": [item.path, *([beside] if beside.is_file() else [])], "page": [page]}
-    return files if item.origin is None else files | {"source": [item.origin.path]}

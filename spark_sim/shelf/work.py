@@ -22,7 +22,7 @@ from spark_sim.loading import load, takes
 from spark_sim.shelf.cut import pieces
 from spark_sim.shelf.fingerprint import fingerprint
 from spark_sim.shelf.headline import headline
-from spark_sim.shelf.manifest import file_facts
+from spark_sim.shelf.made_of import facts_of, file_facts, robot_facts
 from spark_sim.shelf.plan import Job
 
 
@@ -50,8 +50,12 @@ def work(job: Job, folder: Path) -> Done:
     """Do a job; what it writes lies in `folder`. Whatever fails becomes an error in words."""
     start, facts = time.perf_counter(), {}
     try:
-        facts = {f"source_{name}": value for name, value in file_facts([job.source]).items()}
-        made = tuple(_pieces(job, folder))
+        facts = _of_source(facts_of(job.source))
+        clip = _source(
+            job.source, job.source.stat().st_mtime_ns, tuple(job.options.reading.items())
+        )
+        facts |= _of_source(robot_facts(job.source, clip))
+        made = tuple(_pieces(job, clip, folder))
         return Done(made, facts, time.perf_counter() - start)
     except (SparkSimError, OSError) as error:
         reason = str(error)
@@ -60,9 +64,12 @@ def work(job: Job, folder: Path) -> Done:
     return Done((), facts, time.perf_counter() - start, reason)
 
 
-def _pieces(job: Job, folder: Path) -> Iterator[Piece]:
+def _of_source(facts: Mapping[str, Any]) -> dict[str, Any]:
+    return {f"source_{name}": value for name, value in facts.items()}
+
+
+def _pieces(job: Job, original: AnyClip, folder: Path) -> Iterator[Piece]:
     options = job.options
-    original = _source(job.source, job.source.stat().st_mtime_ns, tuple(options.reading.items()))
     source = original if options.fps is None else original.resampled(options.fps)
     if job.mirrored:
         original, source = mirror_clip(original), mirror_clip(source)

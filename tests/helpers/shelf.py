@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from spark_sim.shelf import batch
-from spark_sim.shelf.manifest import file_facts
+from spark_sim.shelf.made_of import file_facts
 from spark_sim.shelf.plan import Job, Options, plan
 from spark_sim.shelf.work import Done, Piece
 

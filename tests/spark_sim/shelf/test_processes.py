@@ -2,12 +2,18 @@
 
 import os
 import signal
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
 import pytest
 
 from spark_sim.shelf.processes import Died, in_processes
+from tests.helpers.program import CHECKOUT
 
 
 def square(number: int) -> int:
@@ -58,3 +64,78 @@ def test_a_killed_process_is_replaced(tmp_path: Path, always: bool) -> None:
         assert "SIGKILL" in str(died)
     else:
         assert died == 9
+
+
+def die_amid_the_answer(folder: Path, number: int) -> int:
+    if number == 3 and not (folder / "tried").exists():
+        (folder / "tried").touch()
+        pipe = sys._getframe(1).f_locals["pipe"]
+        os.write(pipe.fileno(), struct.pack("!i", 1000) + b"the first of a thousand bytes")
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number * number
+
+
+def end_the_server(folder: Path, number: int) -> int:
+    if number == 3 and not (folder / "tried").exists():
+        (folder / "tried").touch()
+        os.kill(os.getppid(), signal.SIGKILL)
+    return number * number
+
+
+@pytest.mark.parametrize("fault", [die_amid_the_answer, end_the_server])
+def test_neither_half_an_answer_nor_a_lost_server_of_forks_stops_the_others(
+    tmp_path: Path, fault: Callable[[Path, int], int]
+) -> None:
+    done = dict(in_processes(partial(fault, tmp_path), range(8), 2))
+    assert done == {k: k * k for k in range(8)}
+    assert (tmp_path / "tried").exists()
+
+
+def stop_at_zero(folder: Path, number: int) -> int:
+    if number == 0:
+        (folder / "stopped").write_text(str(os.getpid()))
+        os.kill(os.getpid(), signal.SIGSTOP)
+    return number
+
+
+def test_a_stopped_process_is_ended(tmp_path: Path) -> None:
+    found = in_processes(partial(stop_at_zero, tmp_path), range(4), 2)
+    assert next(found) == (1, 1)
+    found.close()
+    assert not Path("/proc", (tmp_path / "stopped").read_text()).exists()
+
+
+_PARENT = """
+import sys, time
+from pathlib import Path
+from spark_sim.shelf.processes import in_processes
+from tests.spark_sim.shelf.test_processes import busy_for_long
+list(in_processes(busy_for_long, [Path(name) for name in sys.argv[1:]], 2))
+"""
+
+
+def busy_for_long(told: Path) -> None:
+    told.write_text(str(os.getpid()))
+    end = time.monotonic() + 300
+    while time.monotonic() < end:
+        pass
+
+
+def test_processes_end_amid_a_job_with_the_one_that_gave_it(tmp_path: Path) -> None:
+    told = [tmp_path / "one", tmp_path / "other"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", _PARENT, *map(str, told)],
+        env=os.environ | {"PYTHONPATH": str(CHECKOUT)},
+    )
+    deadline = time.monotonic() + 60
+    while not all(path.exists() and path.read_text() for path in told):
+        assert process.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    process.kill()
+    process.wait()
+    workers = {Path("/proc", path.read_text()) for path in told}
+    deadline = time.monotonic() + 30  # they would be busy for ten times as long
+    while left := {path for path in workers if path.exists()}:
+        assert time.monotonic() < deadline, left
+        time.sleep(0.02)
