@@ -88,48 +88,60 @@ def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterat
     yield from tqdm(items, label, total, leave=False, dynamic_ncols=True, delay=0.5)
 
 
-_LINE_EVERY = 10.0  # seconds between the lines of a meter that is no bar
+_LINE_EVERY, _LINE_SHARE = 10.0, 0.01  # [s], and of the time so far, from line to line of a meter
+
+Tell = Callable[..., None]
+"""`tell(step, figures, share)`: how many are done, figures beside it, and how much of the work that
+is, where steps are not alike."""
 
 
 @contextmanager
-def meter(
-    total: int, done: int, label: str, *, lines: bool = False
-) -> Iterator[Callable[[int, Mapping[str, float]], None]]:
+def meter(total: int, done: int, label: str, *, lines: bool = False) -> Iterator[Tell]:
     """A bar for long work, with figures beside it and the time that is left; on other streams than
-    terminals nothing, or a line at the first step and then every ten seconds."""
+    terminals nothing, or a line at the first step and then every ten seconds, later more seldom."""
     if not sys.stderr.isatty():
-        yield _lines(total, done, label) if lines else lambda step, figures: None
+        yield _lines(total, done, label) if lines else lambda *_: None
         return
     from tqdm import tqdm
 
+    began = monotonic()
     with tqdm(total=total, initial=done, desc=label, dynamic_ncols=True) as bar:
 
-        def tell(step: int, figures: Mapping[str, float]) -> None:
-            if figures:
-                bar.set_postfix(
-                    {name: f"{value:.3g}" for name, value in figures.items()}, refresh=False
-                )
+        def tell(step: int, figures: Mapping[str, float], share: float | None = None) -> None:
+            shown = [f"{name}={value:.3g}" for name, value in figures.items()]
+            if share is not None:
+                bar.bar_format = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"
+                if 0 < share < 1:
+                    shown.append(f"{duration(_left(began, share))} left")
+            if shown:
+                bar.set_postfix_str(", ".join(shown), refresh=False)
             bar.update(step - bar.n)
 
         yield tell
 
 
-def _lines(total: int, done: int, label: str) -> Callable[[int, Mapping[str, float]], None]:
+def _left(began: float, share: float) -> float:
+    """Seconds that are left of work that began at this time and of which this share is done."""
+    return (monotonic() - began) * (1 - share) / share
+
+
+def _lines(total: int, done: int, label: str) -> Tell:
     """A meter that writes lines."""
     began, told = monotonic(), -math.inf
     known: dict[str, float] = {}
 
-    def tell(step: int, figures: Mapping[str, float]) -> None:
+    def tell(step: int, figures: Mapping[str, float], share: float | None = None) -> None:
         nonlocal told
         known.update(figures)
         now = monotonic()
-        if now - told < _LINE_EVERY and step < total:
+        if now - told < max(_LINE_EVERY, _LINE_SHARE * (now - began)) and step < total:
             return
         told = now
         shown = "".join(f", {name} {value:.3g}" for name, value in known.items())
-        if done + 1 < step < total:  # the first step tells nothing of the others
-            left = (total - step) * (now - began) / (step - done)
-            shown += f", {duration(left)} left"
+        if share is None and step > done + 1:  # the first step tells nothing of the others
+            share = (step - done) / (total - done)
+        if share is not None and 0 < share < 1:
+            shown += f", {duration(_left(began, share))} left"
         note(f"{label}: {step} of {total}{shown}")
 
     return tell

@@ -24,7 +24,7 @@ def lowest_points(
     They are those of the shapes that collide, or of all where none does; of round meshes to within
     a millimetre or so. `feet` are what those parts are called that carry soles.
     """
-    outlines = _outlines(body.model, tuple(poses.bodies))
+    outlines = _outlines(body.model, tuple(poses.bodies.tolist()))
     names = tuple(feet.get(part) or part_name(body.model, part) for part in outlines)
     lowest = np.zeros((len(body.qpos), len(outlines), 3))
     for k, pieces in enumerate(outlines.values()):

@@ -1,7 +1,6 @@
 """`spark-sim batch`: a shelf of motions onto several bodies."""
 
 import re
-import sys
 import time
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
@@ -21,6 +20,7 @@ from spark_sim.commands.options import (
 
 if TYPE_CHECKING:
     from spark_sim.shelf.batch import Backend
+    from spark_sim.shelf.plan import Job
 
 SUMMARY = "put a shelf of motions on several bodies"
 USAGE = "IN... --to TARGET [--to TARGET] -o OUT [options]"
@@ -40,7 +40,6 @@ examples:
   spark-sim batch mocap/ --to g1 -o out/ --keep "implausible < 5%"
   spark-sim batch mocap/ --to g1 -o out/ --shard 3/8  # the third of 8 machines
 """
-_SILENT = 30.0  # [s] between lines of progress where there is no terminal
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -126,22 +125,13 @@ def run(args: Namespace) -> int:
         number, count = args.shard
         jobs, shard = jobs[number - 1 :: count], f"{number}of{count}"
     start = time.perf_counter()
-    with locked(out, shard), console.meter(len(jobs), 0, "batch") as tell:
+    with locked(out, shard), console.meter(len(jobs), 0, "batch", lines=True) as tell:
         batch = Batch(out, keep=keep, shard=shard, force=args.force)
-        frames, told = 0, start
         for count, (job, entries) in enumerate(batch.run(jobs, backend), 1):
             if error := entries[0]["error"]:
                 console.error(error if str(job.source) in error else f"{job.source}: {error}")
-            now = time.perf_counter()
-            frames += sum(entry.get("frames", 0) for entry in entries)
-            tell(count, {"frames/s": frames / (now - start)})
-            if now - told > _SILENT and not sys.stderr.isatty():
-                left = (now - start) / count * (len(jobs) - count)
-                console.note(
-                    f"{count} of {len(jobs)} files, {frames / (now - start):,.0f} frames/s, "
-                    f"{left / 60:.0f} min left"
-                )
-                told = now
+            rate = batch.tally.frames / (time.perf_counter() - start)
+            tell(count, {"frames/s": rate} if rate else {}, batch.tally.share)
     tally, duplicates = batch.tally, batch.near_duplicates(jobs)
     for sentence in duplicates.sentences():
         console.note(sentence)
@@ -177,7 +167,13 @@ def _backend(args: Namespace) -> "Backend":
     from spark_sim.shelf.processes import begin, in_processes
 
     begin()
-    return partial(in_processes, workers=workers(args))
+    return partial(in_processes, workers=workers(args), slow=_at_work)
+
+
+def _at_work(job: "Job", seconds: float) -> None:
+    from spark_sim import console
+
+    console.note(f"{job.source} onto {job.target}: at work for {console.duration(seconds)}")
 
 
 def _seconds(text: str) -> float:

@@ -3,8 +3,12 @@
 from argparse import Namespace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from spark_sim.commands.options import given, workers
+
+if TYPE_CHECKING:
+    from spark_sim.shelf.items import Item
 
 _WORST = 10  # lines that are printed
 
@@ -31,8 +35,8 @@ def report_folder(args: Namespace) -> float | None:
     found = items(folder, given(args), sources, given(args, "source-"))
     claim_outputs([page, *tables], clips, force=args.force)
     done = []
-    backend = partial(in_processes, workers=min(workers(args), len(found)))
-    with console.meter(len(found), 0, "report") as tell:
+    backend = partial(in_processes, workers=min(workers(args), len(found)), slow=_at_work)
+    with console.meter(len(found), 0, "report", lines=True) as tell:
         for count, (_, each) in enumerate(measure_all(found, page, backend), 1):
             done.append(each)
             if each.error is not None:
@@ -65,3 +69,9 @@ def report_folder(args: Namespace) -> float | None:
     if len(good) < len(rows):
         return None
     return max(float(row[key("implausible")]) for row in good)
+
+
+def _at_work(item: "Item", seconds: float) -> None:
+    from spark_sim import console
+
+    console.note(f"{item.name}: at work for {console.duration(seconds)}")

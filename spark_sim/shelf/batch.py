@@ -4,10 +4,8 @@ import fcntl
 import os
 import re
 import shutil
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import partial
 from importlib.metadata import version
@@ -22,46 +20,13 @@ from spark_sim.shelf.made_of import is_still, is_still_made_of, target_sha256
 from spark_sim.shelf.manifest import SCHEMA, Entry, Manifest
 from spark_sim.shelf.plan import Job
 from spark_sim.shelf.processes import Died
+from spark_sim.shelf.tally import Tally
 from spark_sim.shelf.work import Done, work
 
 Backend: TypeAlias = Callable[
     [Callable[[Job], Done], Iterable[Job]], Iterator[tuple[Job, Done | Died]]
 ]
 """Does jobs, in any order; `spark_sim.shelf.processes.in_processes` is one."""
-
-
-@dataclass
-class Tally:
-    """What a run came to: how many motions of each kind, and why those that failed did."""
-
-    written: int = 0
-    unchanged: int = 0
-    left_out: int = 0
-    reasons: list[tuple[str, str]] = field(default_factory=list)
-
-    @property
-    def failed(self) -> int:
-        """How many jobs failed."""
-        return len(self.reasons)
-
-    def sentence(self) -> str:
-        """`11 written, 1 unchanged, 1 failed: walk.bvh: is empty`."""
-        counts = {
-            "written": self.written,
-            "unchanged": self.unchanged,
-            "left out by --keep": self.left_out,
-            "failed": self.failed,
-        }
-        words = ", ".join(f"{n} {what}" for what, n in counts.items() if n) or "nothing to do"
-        kinds = Counter(reason for _, reason in self.reasons)
-        first = {reason: source for source, reason in reversed(self.reasons)}
-        why = [
-            f"{first[reason]}: {reason}" + (f" (and {n - 1} more)" if n > 1 else "")
-            for reason, n in kinds.most_common(3)
-        ]
-        if len(kinds) > 3:
-            why.append(f"and {len(kinds) - 3} other reasons, in the manifest")
-        return words + (f": {'; '.join(why)}" if why else "")
 
 
 class Batch:
@@ -100,11 +65,14 @@ class Batch:
                 yield job, self._commit(job, targets[job.target], Done((), {}, 0.0, taken))
             else:
                 missing.append(job)
-        missing.sort(key=lambda job: (-_size(job.source), job.source, job.target))
+        sizes = {source: _size(source) for source in {job.source for job in missing}}
+        missing.sort(key=lambda job: (-sizes[job.source], str(job.source), job.target))
+        total = sum(sizes[job.source] for job in missing) or 1
         try:
             for job, done in backend(partial(_work_below, self.parts), missing):
                 if isinstance(done, Died):
                     done = Done((), {}, 0.0, str(done))
+                self.tally.share += sizes[job.source] / total
                 yield job, self._commit(job, targets[job.target], done)
         finally:
             self.manifest.tidy(self.parts)
@@ -234,6 +202,7 @@ class Batch:
         shutil.rmtree(self.parts / job.output, ignore_errors=True)
         self.tally.written += len(kept)
         self.tally.left_out += len(entries) - len(kept)
+        self.tally.frames += sum(each["frames"] for each in entries)
         return entries
 
 

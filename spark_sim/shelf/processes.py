@@ -10,12 +10,14 @@ from multiprocessing import forkserver, get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerContext, SpawnContext
 from threading import Thread
+from time import monotonic
 from typing import Generic, TypeVar
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 ATTEMPTS = 2  # a process may be killed for what another needed; twice is the job's own fault
+_TICK, _LONG = 5.0, 60.0  # [s] from look to look, and that a job may take untold
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 # A fork of this process would copy locks that other threads hold. A server of forks has no other
 # thread, and imports once what all jobs need; elsewhere each process imports it anew.
@@ -48,9 +50,13 @@ class Died:
 
 
 def in_processes(
-    work: Callable[[Job], Result], jobs: Iterable[Job], workers: int
+    work: Callable[[Job], Result],
+    jobs: Iterable[Job],
+    workers: int,
+    slow: Callable[[Job, float], None] | None = None,
 ) -> Iterator[tuple[Job, Result | Died]]:
-    """Each job with its result, in the order in which they are done.
+    """Each job with its result, in the order in which they are done. `slow` is told of a job that
+    has taken a minute, two, four, ..., and how many seconds it is.
 
     Only as many jobs are taken from `jobs` as there are `workers`, so that memory does not grow
     with their number. The processes compute on one thread each, and end when this one does,
@@ -68,7 +74,12 @@ def in_processes(
                     break
         while pool:
             by_pipe = {worker.pipe: worker for worker in pool}
-            for pipe in wait([*by_pipe]):
+            ready = wait([*by_pipe], None if slow is None else _TICK)
+            if slow is not None:
+                for worker in pool:
+                    if worker.takes_long():
+                        slow(worker.job, monotonic() - worker.since)
+            for pipe in ready:
                 worker = by_pipe[pipe]  # type: ignore[index]
                 done = worker.finish()
                 if done is None:
@@ -119,25 +130,33 @@ class _Worker(Generic[Job, Result]):
         if self._process.exitcode is not None:
             self.end()
             self._open()
-        self._job, self._attempt = job, 1
-        self._send(self._job)
+        self.job, self._attempt = job, 1
+        self.since, self._patience = monotonic(), _LONG
+        self._send(self.job)
 
     def finish(self) -> tuple[Job, Result | Died] | None:
         """The job with its result; None where the process died and the job may be tried again."""
         try:
-            return self._job, self.pipe.recv()
+            return self.job, self.pipe.recv()
         except (EOFError, OSError):  # in the midst of its answer, too
             self._process.join()
             if self._attempt < ATTEMPTS:
                 return None
-            return self._job, Died(self._process.exitcode or 0)
+            return self.job, Died(self._process.exitcode or 0)
+
+    def takes_long(self) -> bool:
+        """Whether the job has taken a minute, or twice as long as when this was last so."""
+        if monotonic() - self.since < self._patience:
+            return False
+        self._patience *= 2
+        return True
 
     def retry(self) -> None:
         """The same job in another process."""
         self.end()
         self._attempt += 1
         self._open()
-        self._send(self._job)
+        self._send(self.job)
 
     def end(self) -> None:
         """End the process, whatever it does, and though it be stopped."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from spark_sim.shelf import batch
 from spark_sim.shelf.made_of import file_facts
 from spark_sim.shelf.plan import Job, Options, plan
+from spark_sim.shelf.tally import Tally
 from spark_sim.shelf.work import Done, Piece
 
 BLOCKS = 8  # in which a result is written
@@ -57,7 +58,7 @@ def made(job: Job, folder: Path) -> Done:
     return Done(tuple(pieces), source, 0.0)
 
 
-def run(folder: Path, out: Path, **settings: object) -> batch.Tally:
+def run(folder: Path, out: Path, **settings: object) -> Tally:
     """A batch of all files in a folder."""
     batch.work = made
     jobs = plan([str(folder)], ["robot"], out, Options())
