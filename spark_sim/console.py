@@ -136,11 +136,11 @@ def _lines(total: int, done: int, label: str) -> Tell:
         now = monotonic()
         if now - told < max(_LINE_EVERY, _LINE_SHARE * (now - began)) and step < total:
             return
-        told = now
+        first, told = math.isinf(told), now
         shown = "".join(f", {name} {value:.3g}" for name, value in known.items())
-        if share is None and step > done + 1:  # the first step tells nothing of the others
+        if share is None:
             share = (step - done) / (total - done)
-        if share is not None and 0 < share < 1:
+        if not first and 0 < share < 1:  # the first step tells nothing of the others
             shown += f", {duration(_left(began, share))} left"
         note(f"{label}: {step} of {total}{shown}")
 
