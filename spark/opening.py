@@ -83,12 +83,17 @@ def parse_json(path: Path, text: bytes | str, what: str) -> Any:
     except orjson.JSONDecodeError as error:
         if "surrogate" in str(error):  # the name of a file that is no text, as Python writes it
             with suppress(ValueError, RecursionError):
-                return json.loads(text, parse_constant=_no_number)
+                return json.loads(text, parse_constant=_no_number, parse_int=_whole)
         raise FileFormatError(path, None, f"{what} is no JSON: {error}") from error
 
 
 def _no_number(name: str) -> None:
     raise ValueError(name)
+
+
+def _whole(digits: str) -> int | float:
+    """As orjson has them: beyond 64 bits they are floats."""
+    return int(digits) if len(digits) < 19 else float(digits)
 
 
 def unreadable(path: Path, error: Exception, expected: str) -> FileFormatError:

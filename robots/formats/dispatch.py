@@ -125,7 +125,7 @@ def _read_csv(
     seed = is_seed(path)
     said = _contradictions(path, fps, quat, facts)
     own = facts.get("fps"), facts.get("quaternion")
-    rate = fps if fps is not None else own[0] if isinstance(own[0], float | int) else None
+    rate = fps if fps is not None else float(own[0]) if isinstance(own[0], float | int) else None
     order = quat if quat is not None else own[1] if own[1] in ORDERS else None
     missing = []
     if robot is None and "model" not in facts:

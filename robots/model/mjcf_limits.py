@@ -82,7 +82,12 @@ class _Counter:
             if element.tag == "attach":
                 more, moving = self._of_attached(files, element.get("model", ""))
                 elements, joints = elements + copies * more, joints + copies * moving
-            own = prod(max(1.0, n) for name in _GRIDS for n in _numbers(element, name))
+            own = prod(
+                max(1.0, n)
+                for name in _GRIDS
+                if name in element.attrib
+                for n in _numbers(element, name)
+            )
             elements += copies * (own if element.tag != "replicate" else 1)
             if element.tag in ("joint", "freejoint"):
                 joints += copies
@@ -100,10 +105,12 @@ class _Counter:
 
 
 def _check_numbers(path: Path, element: ET.Element) -> None:
-    for name, limit in _NUMBERS.items():
+    for name in element.attrib:
+        if name not in _NUMBERS:
+            continue
         for value in _numbers(element, name):
-            if value > limit:
-                _refuse(path, element, name, f"at most {limit}")
+            if value > _NUMBERS[name]:
+                _refuse(path, element, name, f"at most {_NUMBERS[name]}")
     if element.tag == "numeric" and any(n > 1_000_000 for n in _numbers(element, "size")):
         _refuse(path, element, "size", "at most 1000000")
     if element.tag == "mesh" and any(n > 1_000 for n in _numbers(element, "params")):

@@ -10,6 +10,7 @@ import orjson
 from jaxtyping import Float, Int, UInt8
 
 from spark.errors import FileFormatError
+from spark.io.decimals import parse_decimals
 from spark.io.scanner import LARGEST, Scanner, number, shown
 from spark.summary import counted
 
@@ -64,11 +65,10 @@ def parse_motion(
     return frame_time, values, (note,)
 
 
-# Bytes that a table of numbers may hold, and what stands between them.
+# Bytes that a table of numbers may hold; those up to the space stand between them.
 _NUMERIC = b"0123456789+-.eE \t\r\n\v\f"
-_BLANK = np.isin(np.arange(256), [32, *range(9, 14)])
 
-_BLOCK = 4 << 20  # bytes of text that are read at a time: what is in between takes six times that
+_BLOCK = 1 << 20  # bytes of text that are read at a time: arrays of their words fit in a cache
 
 
 def _parse_rows(
@@ -86,13 +86,13 @@ def _parse_rows(
         if block.translate(None, _NUMERIC):
             return None
         letters = np.frombuffer(block, dtype=np.uint8)
-        blank = _BLANK[letters]
-        first = ~blank
-        first[1:] &= blank[:-1]
-        starts = np.flatnonzero(first)
+        edges = np.flatnonzero(np.diff(letters > ord(" "), prepend=False, append=False))
+        starts, stops = edges[::2], edges[1::2]
         ends = np.flatnonzero((letters == 10) | (letters == 13))
         widths.append(np.diff(np.searchsorted(starts, ends), prepend=0, append=len(starts)))
-        numbers = _numbers(block, letters, starts)
+        numbers = parse_decimals(block, starts, stops)
+        if numbers is None:
+            numbers = _numbers(block, letters, starts)
         if numbers is None or done + len(numbers) > count:
             return None
         values[done : done + len(numbers)] = numbers

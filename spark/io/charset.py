@@ -13,6 +13,8 @@ def to_utf8(data: bytes) -> tuple[bytes, str]:
     (MikuMikuDance and its converters); else "latin-1", which takes any bytes. Encoded again, the
     text gives the same bytes.
     """
+    if data.isascii():  # as most are: no second copy of what may be large
+        return data, "utf-8"
     for encoding in ("utf-8", "cp932"):
         try:
             text = data.decode(encoding)

@@ -19,8 +19,15 @@ class OverBoundError(AssertionError):
 def judge(target: Target, path: Path) -> None:
     """Use the file at `path`: it gives a result, or an error of ours. Raises what else comes of
     it: an untyped error, `AssertionError` for nonsense, `OverBoundError`."""
-    _restart_peak()
-    before = _peak()
+    before = start_of_memory()
+    judge_but_memory(target, path)
+    taken = memory_since(before)
+    if taken > MEMORY + 10 * path.stat().st_size:
+        raise OverBoundError(f"{taken / 1e6:.0f} MB for {path.stat().st_size / 1e6:.3f} MB")
+
+
+def judge_but_memory(target: Target, path: Path) -> None:
+    """As `judge`, for many files whose memory is looked at together."""
     signal.signal(signal.SIGPROF, _too_long)
     signal.setitimer(signal.ITIMER_PROF, SECONDS)
     try:
@@ -29,9 +36,17 @@ def judge(target: Target, path: Path) -> None:
         pass
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
-    taken = _peak() - before
-    if taken > MEMORY + 10 * path.stat().st_size:
-        raise OverBoundError(f"{taken / 1e6:.0f} MB for {path.stat().st_size / 1e6:.3f} MB")
+
+
+def start_of_memory() -> float:
+    """What `memory_since` counts from [bytes]."""
+    _restart_peak()
+    return _peak()
+
+
+def memory_since(start: float) -> float:
+    """The most memory [bytes] that was taken since `start_of_memory`."""
+    return _peak() - start
 
 
 def _too_long(number: int, frame: object) -> None:

@@ -120,8 +120,9 @@ def _urdf_seeds(folder: Path) -> list[bytes]:
 
 
 def _use_model(path: Path) -> None:
-    robot = understand_robot(read_mjcf(path, visuals=False))
-    finite(tpose=robot.rig.tpose)
+    model = read_mjcf(path, visuals=False)
+    if goes_further(path):
+        finite(tpose=understand_robot(model).rig.tpose)
 
 
 FORMATS: dict[str, Target] = {

@@ -7,7 +7,7 @@ from random import Random
 
 from hypothesis import strategies as st
 
-from tests.helpers.hostile import damaged, edits
+from tests.helpers.hostile import damaged, edits, place_in
 
 _NUMBER = re.compile(rb"-?\d+\.?\d*(?:e[+-]?\d+)?")
 _ODD = (
@@ -18,7 +18,7 @@ _ODD = (
 numbers = st.lists(
     st.tuples(st.integers(0, 1 << 20), st.sampled_from(_ODD)), min_size=0, max_size=4
 )
-"""Which of a file's numbers become which."""
+"""After which places of a file the next number becomes which."""
 
 
 def spoilt(
@@ -26,9 +26,9 @@ def spoilt(
 ) -> bytes:
     """The file with numbers replaced, then bytes as `damaged` changes them."""
     for place, value in values:
-        found = list(_NUMBER.finditer(data))
-        if found:
-            number = found[place % len(found)]
+        at = place_in(data, place) if data else 0
+        number = _NUMBER.search(data, max(at, 0)) or _NUMBER.search(data)
+        if number:
             data = data[: number.start()] + value.encode() + data[number.end() :]
     return damaged(data, changes)
 

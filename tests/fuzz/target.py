@@ -8,7 +8,7 @@ from zlib import crc32
 
 import numpy as np
 
-FRAMES = 12  # of a seed: short, so that most bytes matter
+FRAMES = 6  # of a seed: short, so that most bytes matter
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,6 @@ def finite(**arrays: Any) -> None:
 
 
 def goes_further(path: Path) -> bool:
-    """Whether more is done with a file than to read it: with one in eight, which the bytes say, so
-    that a file that was found does the same again."""
-    return crc32(path.read_bytes()) % 8 == 0
+    """Whether more is done with a file than to read it: with one in sixteen, which the bytes say,
+    so that a file that was found does the same again."""
+    return crc32(path.read_bytes()) % 16 == 0

@@ -26,15 +26,12 @@ edits = st.lists(
 
 
 def damaged(data: bytes, changes: list[tuple[str, int, int]]) -> bytes:
-    """The bytes with some replaced, deleted or put in, or cut off at the end. Most files say what
-    they are at their beginning and end, so half of the places are there."""
+    """The bytes with some replaced, deleted or put in, or cut off at the end."""
     out = bytearray(data)
     for kind, place, byte in changes:
         if not out:
             break
-        at = place % len(out)
-        if place % 2:
-            at = place % min(len(out), 300) if place % 4 == 1 else -1 - place % min(len(out), 300)
+        at = place_in(out, place)
         if kind == "x":
             out[at] = byte
         elif kind == "d":
@@ -44,3 +41,12 @@ def damaged(data: bytes, changes: list[tuple[str, int, int]]) -> bytes:
         else:
             del out[len(out) - place % min(len(out), 4000) :]
     return bytes(out)
+
+
+def place_in(data: bytes | bytearray, place: int) -> int:
+    """An index of the bytes. Most files say what they are at their beginning and end, so half of
+    the places are there."""
+    if place % 2:
+        near = place % min(len(data), 300)
+        return near if place % 4 == 1 else len(data) - 1 - near
+    return place % len(data)
