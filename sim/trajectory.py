@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.body.build import build_body
+from sim.body.compiling import compiled
 from sim.body.qpos import qpos_from_motion
 from spark.motion import Motion
 from spark.rig.rig import Rig
@@ -50,6 +51,6 @@ class Subject:
 def model_trajectory(rig: Rig, motion: Motion) -> ModelTrajectory:
     """The motion on the body that `sim.body.build.build_body` makes of its rig."""
     spec = build_body(rig)
-    model = spec.compile()
+    model = compiled(spec)
     root = int(model.body(rig.skeleton.names[rig.root_joint]).id)
     return ModelTrajectory(spec, model, root, qpos_from_motion(model, motion, rig))

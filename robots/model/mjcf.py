@@ -5,9 +5,6 @@ Only the kinematics matter here, so a file whose meshes are missing is read with
 """
 
 import re
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -20,6 +17,7 @@ from robots.model import model_cache
 from robots.model.compiling import compiled, one_line
 from robots.model.mjcf_source import read_source
 from robots.model.urdf import is_urdf, read_urdf
+from sim.body.compiling import warnings_as_notes
 from spark.errors import FileFormatError, SkeletonError
 from spark.summary import brief, counted
 
@@ -116,7 +114,7 @@ def read_mjcf(path: str | Path, *, visuals: bool = True) -> Mjcf:
     """
     path = Path(path)
     notes: list[str] = []
-    with _warnings_as_notes(notes):
+    with warnings_as_notes(notes):
         spec, text = _parse(path, notes, visuals=visuals)
         if not visuals:
             _drop_visuals(spec)
@@ -158,25 +156,6 @@ def _parse(path: Path, notes: list[str], *, visuals: bool) -> tuple[mujoco.MjSpe
         raise FileFormatError(path, None, "holds NaN where MuJoCo expects a number")
     spec.modelfiledir = str(path.parent)
     return spec, source.text
-
-
-@contextmanager
-def _warnings_as_notes(notes: list[str]) -> Iterator[None]:
-    """Collect MuJoCo's warnings as notes, each once: by itself it prints them, and leaves a log
-    file in the current folder."""
-
-    def note(message: str) -> None:
-        text = f"MuJoCo warns: {message}"
-        if text not in notes:
-            notes.append(text)
-
-    mujoco.set_mju_user_warning(note)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of attributes that MuJoCo calls deprecated
-            yield
-    finally:
-        mujoco.set_mju_user_warning(None)
 
 
 def _drop_visuals(spec: mujoco.MjSpec) -> None:

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from sim.body.actuators import add_servos, ctrl_of_qpos, set_strength, strengths
+from sim.body.compiling import warnings_as_notes
 from sim.body.geoms import add_geoms, add_materials
 from sim.body.inertia import Inertias, inertias
 from sim.body.joints import CONES, HINGES, JointType, Range, mirrored
@@ -73,9 +74,12 @@ def _built(
     add_sites(bodies, rig, masses)
     add_servos(spec, rig)
     add_sensors(spec, bodies, rig)
-    _add_keyframes(spec, rig, masses)
-    _add_excludes(spec, rig)
-    spec.comment = "\n".join([*mesh_notes, *_notes(rig, masses, joints)]).replace("--", "- -")
+    warned: list[str] = []
+    with warnings_as_notes(warned):
+        _add_keyframes(spec, rig, masses)
+        _add_excludes(spec, rig)
+    notes = [*mesh_notes, *_notes(rig, masses, joints), *warned[:1]]
+    spec.comment = "\n".join(notes).replace("--", "- -")
     return spec
 
 

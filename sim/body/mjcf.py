@@ -6,6 +6,7 @@ from xml.sax.saxutils import escape
 
 import mujoco
 
+from sim.body.compiling import compiled, warnings_as_notes
 from spark.errors import OutputError
 from spark.files import write_atomically
 
@@ -68,7 +69,7 @@ def _check_loads(text: str, path: Path) -> None:
         path.name.encode()  # the scene names it
         spec = mujoco.MjSpec.from_string(text)
         if not list(spec.meshes):  # whose files are still to come
-            spec.compile()
+            compiled(spec)
     except ValueError as error:
         message = " ".join(str(error).split())
         raise OutputError(f"{path}: not written: MuJoCo could not load it ({message})") from error
@@ -94,9 +95,11 @@ def notes_of(spec: mujoco.MjSpec) -> tuple[str, ...]:
 
 
 def _tree(spec: mujoco.MjSpec) -> ElementTree.Element:
-    spec.compile()
+    with warnings_as_notes([]):  # which `build_body` has noted
+        spec.compile()
+        xml = spec.to_xml()
     parser = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
-    root = ElementTree.fromstring(spec.to_xml(), parser)
+    root = ElementTree.fromstring(xml, parser)
     for servo in root.iter("general"):
         servo.tag = "position"
         attributes = servo.attrib

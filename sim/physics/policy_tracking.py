@@ -11,13 +11,13 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.ndimage import uniform_filter1d
 
+from sim.body.compiling import compiled, warnings_as_notes
 from sim.interpolate import at_times
 from sim.physics.policy_network import PolicyNetwork
 from sim.physics.policy_observation import Observer
 from sim.physics.policy_spec import PolicySpec
 from sim.physics.policy_terms import State
 from sim.physics.servos import on_floor, torque_limit
-from sim.physics.tracking import without_warnings
 from sim.trajectory import ModelTrajectory
 from spark.constants import GRAVITY
 from spark.errors import SkeletonError, name_list
@@ -77,7 +77,7 @@ class PolicyTracker:
         notes: list[str] = []
         mujoco_spec = on_floor(target, 0.0, notes)
         mujoco_spec.option.timestep, mujoco_spec.option.gravity = spec.timestep, [0, 0, -GRAVITY]
-        self.model = mujoco_spec.compile()
+        self.model = compiled(mujoco_spec)
         # The policy's torques are applied to the joints, and nothing else drives them.
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
@@ -137,7 +137,7 @@ class PolicyTracker:
 
     def run(self, seed: int) -> PolicyRun:
         """Follow the whole motion; the same seed gives the same run."""
-        with without_warnings():
+        with warnings_as_notes([]):
             return self._run(seed)
 
     def _run(self, seed: int) -> PolicyRun:

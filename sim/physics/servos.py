@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from sim.body.compiling import compiled
 from sim.trajectory import ModelTrajectory
 from spark.constants import GRAVITY
 from spark.errors import SkeletonError
@@ -30,7 +31,7 @@ def with_servos(
     _replace_motors(spec, body.model, height, timestep, notes)
     spec.option.timestep, spec.option.gravity = timestep, [0.0, 0.0, -GRAVITY]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    model = spec.compile()
+    model = compiled(spec)
     # What a target asks for is cut off by the torque that a joint has, not by the control's range.
     model.actuator_ctrllimited[:] = 0
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)

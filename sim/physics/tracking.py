@@ -5,13 +5,13 @@ concluded from it.
 """
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
+from sim.body.compiling import warnings_as_notes
 from sim.interpolate import at_times, velocities
 from sim.physics.servos import with_servos
 from sim.trajectory import ModelTrajectory
@@ -187,7 +187,7 @@ class _Simulation:
         mujoco.mj_resetData(model, data)
         data.qpos[:], data.qvel[:] = target[0], start
         diverged = None
-        with without_warnings():
+        with warnings_as_notes([]):  # here they are results
             self._log(rollout, 0, target_points, ups)
             for t, qpos, qvel in _interpolated_targets(model, target, speeds, frame_time, steps):
                 self._step_to(rollout, t, qpos, qvel)
@@ -331,13 +331,3 @@ def _interpolated_targets(
         for k in range(count):
             rows = slice(k * steps, (k + 1) * steps)
             yield start + k + 1, qpos[rows], qvel[rows]
-
-
-@contextmanager
-def without_warnings() -> Iterator[None]:
-    """MuJoCo writes warnings to the terminal and a file; here they are results."""
-    mujoco.set_mju_user_warning(lambda message: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(None)

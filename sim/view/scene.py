@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from sim.body.compiling import compiled
 from sim.interpolate import at_times
 from sim.trajectory import Subject, model_trajectory
 from sim.view.display import add_display, body_names
@@ -222,7 +223,7 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0, blend: bool
         )
         column = following
     qpos = np.concatenate(coordinates, axis=1)
-    return Scene(world.compile(), qpos, frame_time, tuple(placements))
+    return Scene(compiled(world), qpos, frame_time, tuple(placements))
 
 
 def _finite(qpos: Float[np.ndarray, "T n"]) -> Float[np.ndarray, "T n"]:
