@@ -68,7 +68,7 @@ def parse_motion(
 # Bytes that a table of numbers may hold; those up to the space stand between them.
 _NUMERIC = b"0123456789+-.eE \t\r\n\v\f"
 
-_BLOCK = 1 << 20  # bytes of text that are read at a time: arrays of their words fit in a cache
+_BLOCK = 1 << 18  # bytes of text that are read at a time: arrays of their words fit in a cache
 
 
 def _parse_rows(
@@ -83,8 +83,6 @@ def _parse_rows(
     done = 0
     for at, stop in _blocks(text, start):
         block = text[at:stop]
-        if block.translate(None, _NUMERIC):
-            return None
         letters = np.frombuffer(block, dtype=np.uint8)
         edges = np.flatnonzero(np.diff(letters > ord(" "), prepend=False, append=False))
         starts, stops = edges[::2], edges[1::2]
@@ -118,6 +116,8 @@ def _numbers(
     """The numbers of a text whose words begin at `starts`; None where a word is no finite one."""
     if not len(starts):
         return np.zeros(0)
+    if block.translate(None, _NUMERIC):
+        return None
     try:
         # A JSON reader is three times as fast as numpy's, but takes no "+1", ".5" or "01".
         listed = letters.copy()
