@@ -25,7 +25,7 @@ from spark.rig.contacts import ADULT_HEIGHT, floor_height, planted_feet, speeds
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig, understand
 from spark.rotation import quat_identity, quat_mul
-from spark.training.recorded_pairs import SPARE_FRAMES
+from spark.training.same_motion import same_motion
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.foot_lock import lock_feet
@@ -103,7 +103,7 @@ def compare(moved: CanonicalMotion, truth: Truth) -> tuple[Score, Feet]:
 
 
 def shared_motions(folder: Path) -> dict[str, list[Path]]:
-    """The files of each motion that is on two characters or more."""
+    """The files of each name that is on two characters or more."""
     by_motion: dict[str, list[Path]] = defaultdict(list)
     for path in sorted(folder.glob("[!_]*/*.bvh")):
         by_motion[path.stem].append(path)
@@ -118,9 +118,11 @@ def main(folder: str, step: str = "1") -> None:
         for paths in shared.values()
         for a in paths
         for b in paths
-        if a != b and abs(len(clips[a][0]) - len(clips[b][0])) <= SPARE_FRAMES
-    ][:: int(step)]
-    print(f"{len(pairs)} pairs\n")
+        if a != b
+    ]
+    named, pairs = len(pairs), [(a, b) for a, b in pairs if same_motion(clips[a][0], clips[b][0])]
+    print(f"{len(pairs)} pairs of {named}; the others share a name, but move differently\n")
+    pairs = pairs[:: int(step)]
     print("| | MSE | root-relative MSE | toes | clearance (5 to 95 % of pairs) | sunk |")
     print("|---|---|---|---|---|---|")
     worst = []

@@ -30,6 +30,7 @@ from spark.rig.rig import Rig
 from spark.training.recorded_net import habits_of, learn_recorded
 from spark.training.recorded_pairs import recorded_pairs
 from spark.training.recorded_ridge import fit_ridge
+from spark.training.same_motion import same_motion
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.foot_lock import lock_feet
@@ -43,7 +44,8 @@ def main(folder: str, *numbers: str) -> None:
     steps, width, heads, blocks, step = (*map(int, numbers), *(300, 48, 2, 2, 1)[len(numbers) :])
     motions = shared_motions(Path(folder))
     clips = {path: read(path) for paths in motions.values() for path in paths}
-    pairs = [(a, b) for paths in motions.values() for a in paths for b in paths if a != b]
+    named = [(a, b) for paths in motions.values() for a in paths for b in paths if a != b]
+    pairs = [(a, b) for a, b in named if same_motion(clips[a][0], clips[b][0])]
     found = [replace(p, character=_plain(p.character)) for p in performances(Path(folder))]
     characters = _folds(sorted({p.character for p in found}))
     held_motions = _folds(sorted(motions))
@@ -89,7 +91,7 @@ def main(folder: str, *numbers: str) -> None:
         sunk = 100 * np.mean([f.sunk for f in feet])
         print(f"| {name} | {' | '.join(told)} | {toes:.2f} | {sunk:.1f} % |")
     counts = (f"{cell} {sum(map(len, rows['copy'][cell].values()))}" for cell in cells)
-    print(f"\nPairs: {', '.join(counts)}")
+    print(f"\nPairs: {', '.join(counts)}; {len(named) - len(pairs)} of one name move differently")
 
 
 def _recorded(

@@ -20,10 +20,11 @@ from spark.errors import SkeletonError
 from spark.evaluation.metrics import san_height
 from spark.network.features import BodyFeatures
 from spark.rig.roles import Role
+from spark.summary import counted
 from spark.training.dataset import Performance, is_dataset, prepare, read_performances
 from spark.training.grounded import on_ground
 from spark.training.pairs import TrainingClip
-from spark.training.recorded_pairs import SPARE_FRAMES
+from spark.training.same_motion import SPARE_FRAMES, same_motion
 from spark.training.staging import StagedBody
 from spark.training.variants import Variant, random_variant, same_body, scaled_body, split_body
 from spark.transfer.analytic import correspond
@@ -85,6 +86,7 @@ def recorded_cases(found: Sequence[Performance]) -> tuple[list[Case], list[str]]
     cases: list[Case] = []
     notes: list[str] = []
     for motion, ones in sorted(by_motion.items()):
+        namesakes: list[str] = []
         for source in ones:
             for target in ones:
                 lengths = len(source.clip.hips), len(target.clip.hips)
@@ -96,9 +98,17 @@ def recorded_cases(found: Sequence[Performance]) -> tuple[list[Case], list[str]]
                         f"{abs(lengths[0] - lengths[1])} frames: not taken as one motion"
                     )
                     continue
+                if not same_motion(on_ground(source), on_ground(target)):
+                    namesakes.append(f"{source.character} and {target.character}")
+                    continue
                 others = [p.clip for p in found if p.clip.body is target.clip.body]
                 own = _longest([clip for clip in others if clip.name != motion])
                 cases += _recorded(motion, source, target, min(lengths), own)
+        if namesakes:
+            notes.append(
+                f"{motion}: {counted(len(namesakes), 'pair')} ({namesakes[0]}, for one) with this "
+                "name, but not the same motion: left out"
+            )
     if not cases:
         raise SkeletonError(
             f"no motion is on two characters among {len(found)} clips ("

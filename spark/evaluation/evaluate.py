@@ -18,7 +18,7 @@ from spark.evaluation.cases import STRUCTURES, Case, Structure
 from spark.evaluation.metrics import Score, mean_score, score_positions, source_sensitivity
 from spark.io.reading import SUFFIXES, read_motion
 from spark.rig.rig import understand
-from spark.training.recorded_pairs import SPARE_FRAMES
+from spark.training.same_motion import SPARE_FRAMES
 from spark.transfer.canonical import (
     FRAME_TIME,
     CanonicalMotion,

@@ -23,12 +23,12 @@ from spark.rotation import (
 )
 from spark.training.dataset import Performance
 from spark.training.grounded import on_ground
+from spark.training.same_motion import SPARE_FRAMES, same_motion
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.leg_fit import from_sole, leg_fit
 
 MIN_BODIES = 4  # fewer tell nothing of others
 MAX_PAIRS = 4000  # drawn from those of a large dataset
-SPARE_FRAMES = 3  # of one motion on two characters may be lost in resampling; more is another one
 _FRAMES = 60  # of a clip that are looked at
 _LEGS = (Group.LEFT_LEG, Group.RIGHT_LEG)
 _WEAKEST = 1e-3  # [hip heights²] of movement; a scale that less depends on stays as it is
@@ -55,11 +55,13 @@ class RecordedPair:
 
 @dataclass(frozen=True, eq=False)
 class RecordedPairs:
-    """Pairs, the bodies that they number, and the names of these characters."""
+    """Pairs, the bodies that they number, the names of these characters, and the motions of which
+    two characters have different ones under one name."""
 
     bodies: list[BodyTokens]
     characters: list[str]
     pairs: list[RecordedPair]
+    namesakes: tuple[str, ...] = ()
 
     @property
     def enough(self) -> bool:
@@ -76,16 +78,17 @@ class RecordedPairs:
         """The pairs of other characters alone."""
         out = {k for k, name in enumerate(self.characters) if name in characters}
         kept = [pair for pair in self.pairs if not {pair.source, pair.target} & out]
-        return RecordedPairs(self.bodies, self.characters, kept)
+        return replace(self, pairs=kept)
 
     def of(self, characters: set[str]) -> "RecordedPairs":
         """The pairs whose target is one of these."""
         kept = [pair for pair in self.pairs if self.characters[pair.target] in characters]
-        return RecordedPairs(self.bodies, self.characters, kept)
+        return replace(self, pairs=kept)
 
 
 def recorded_pairs(found: Sequence[Performance], seed: int = 0) -> RecordedPairs:
-    """All that the motions shared by two bodies say; of more than `MAX_PAIRS`, as many drawn."""
+    """All that the motions shared by two bodies say; of more than `MAX_PAIRS`, as many drawn.
+    Clips that share a name alone are left out (`same_motion`)."""
     by_motion: dict[str, list[int]] = defaultdict(list)
     for k, one in enumerate(found):
         by_motion[one.clip.name].append(k)
@@ -111,8 +114,14 @@ def recorded_pairs(found: Sequence[Performance], seed: int = 0) -> RecordedPairs
             tokens.append(tokens_of(on_ground(found[k]).rig))
             names.append(found[k].character)
         clips[k] = _Seen(found[k], bodies[id(body)], tokens[bodies[id(body)]])
-    pairs = [_measured(clips[a], clips[b]) for a, b in drawn]
-    return RecordedPairs(tokens, names, [pair for pair in pairs if pair is not None])
+    pairs, namesakes = [], set()
+    for a, b in drawn:
+        shared = _Shared(clips[a], clips[b])
+        if not same_motion(shared.theirs, shared.own):
+            namesakes.add(shared.a.motion)
+        elif (pair := _measured(shared)) is not None:
+            pairs.append(pair)
+    return RecordedPairs(tokens, names, pairs, tuple(sorted(namesakes)))
 
 
 class _Seen:
@@ -137,12 +146,20 @@ def _picked(motion: CanonicalMotion, frames: Int[np.ndarray, "N"]) -> CanonicalM
     return replace(motion, rotations=motion.rotations[frames], hips=motion.hips[frames])
 
 
-def _measured(a: _Seen, b: _Seen) -> RecordedPair | None:
+class _Shared:
+    """The frames that are looked at in both of two clips."""
+
+    def __init__(self, a: _Seen, b: _Seen) -> None:
+        self.a, self.b = a, b
+        _, self.of_a, self.of_b = np.intersect1d(a.at, b.at, return_indices=True)
+        self.theirs, self.own = _picked(a.seen, self.of_a), _picked(b.seen, self.of_b)
+
+
+def _measured(shared: _Shared) -> RecordedPair | None:
     """What one pair says; None where that is nothing a body's habits would make."""
-    common, of_a, of_b = np.intersect1d(a.at, b.at, return_indices=True)
-    if len(common) < 2 or len(a.ankles) != 2 or len(b.ankles) != 2:
+    a, b, theirs, own = shared.a, shared.b, shared.theirs, shared.own
+    if len(own) < 2 or len(a.ankles) != 2 or len(b.ankles) != 2:
         return None
-    theirs, own = _picked(a.seen, of_a), _picked(b.seen, of_b)
     rows = matched_rows(a.body, b.body)
     turns = np.stack(
         [
@@ -153,7 +170,7 @@ def _measured(a: _Seen, b: _Seen) -> RecordedPair | None:
     mirrored = np.array([b.body.mirrored[k] for k, _ in rows])
     turns = np.where(mirrored[:, None], [-1.0, 1.0, -1.0] * turns, turns)
     ankles = [
-        (path[of_a], rest, own_path[of_b], own_rest)
+        (path[shared.of_a], rest, own_path[shared.of_b], own_rest)
         for (path, rest), (own_path, own_rest) in zip(a.ankles, b.ankles, strict=True)
     ]
     scales, weights = _scales(theirs, own, ankles)

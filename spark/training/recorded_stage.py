@@ -3,6 +3,7 @@
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from spark.errors import name_list
 from spark.training.checkpoint import Checkpoint, save_checkpoint
 from spark.training.dataset import is_dataset, read_performances
 from spark.training.recorded_net import Recorded, Watch, learn_recorded, total_steps
@@ -33,6 +34,8 @@ def recorded_stage(config: TrainConfig) -> Stage | None:
     if not known.pairs:
         return None
     about = f"{len(known.pairs)} recorded pairs on {targets} characters"
+    if known.namesakes:
+        about += f" ({name_list(list(known.namesakes))}: the name of different motions, these pairs left out)"
     if not known.enough:
         return Stage(known, 0, f"{about}: at least {MIN_BODIES} are needed to learn from them")
     return Stage(known, total_steps(config.recorded_steps), f"{about}: learned from first")
