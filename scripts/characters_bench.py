@@ -113,13 +113,7 @@ def shared_motions(folder: Path) -> dict[str, list[Path]]:
 def main(folder: str, step: str = "1") -> None:
     shared = shared_motions(Path(folder))
     clips = {path: read(path) for paths in shared.values() for path in paths}
-    pairs = [
-        (a, b)
-        for paths in shared.values()
-        for a in paths
-        for b in paths
-        if a != b
-    ]
+    pairs = [(a, b) for paths in shared.values() for a in paths for b in paths if a != b]
     named, pairs = len(pairs), [(a, b) for a, b in pairs if same_motion(clips[a][0], clips[b][0])]
     print(f"{len(pairs)} pairs of {named}; the others share a name, but move differently\n")
     pairs = pairs[:: int(step)]

@@ -27,7 +27,8 @@ from spark.evaluation.cases import performances
 from spark.evaluation.metrics import Score, mean_score
 from spark.network.recorded import BodyTokens, Habits, KnownBodies, as_recorded, tokens_of
 from spark.rig.rig import Rig
-from spark.training.recorded_net import habits_of, learn_recorded
+from spark.training.recorded_learning import learn_recorded
+from spark.training.recorded_net import habits_of
 from spark.training.recorded_pairs import recorded_pairs
 from spark.training.recorded_ridge import fit_ridge
 from spark.training.same_motion import same_motion
@@ -58,14 +59,14 @@ def main(folder: str, *numbers: str) -> None:
         learned = learn_recorded(known, width=width, heads=heads, blocks=blocks, steps=steps)
         print(
             f"fold {number}: {len(known.pairs)} pairs, {time.process_time() - began:.0f} CPU s, "
-            f"left {learned.gain:.2f}, reach {learned.known.reach:.2f}, "
-            f"trust {learned.trust.round(2).tolist()}",
+            f"left {learned.trust.left:.2f}, reach {learned.trust.reach:.2f}, "
+            f"trust {learned.trust.shares.round(2).tolist()}",
             file=sys.stderr,
             flush=True,
         )
 
         def network(body: BodyTokens, learned=learned) -> Habits:  # type: ignore[no-untyped-def]
-            return habits_of(learned.net, [body])[0].shares(learned.trust[0], learned.trust[1:])
+            return habits_of(learned.net, [body], learned.trust.shares)[0]
 
         ridge = fit_ridge(known)
         methods: dict[str, Method] = dict(METHODS)

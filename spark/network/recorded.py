@@ -6,9 +6,9 @@ its feet and hands are turned against the T-pose. All of that is constant for a 
 has `Habits`, a function of its T-pose and rest pose, and an answer differs from the analytic one by
 the habits of the target without those of the source. A body's own motion comes back as it was.
 
-`spark.training.recorded_net` learns the function from pairs of recordings; so does a linear model
-(`spark.training.recorded_ridge`). Neither knows anything of bodies unlike those that it met:
-`nearness` tells how much of a correction is made.
+`spark.training.recorded_learning` learns the function from pairs of recordings: a linear model
+(`spark.training.recorded_ridge`), and a network beside it. Neither knows anything of bodies unlike
+those that it met: `nearness` tells how much of a correction is made.
 """
 
 from collections.abc import Callable
@@ -44,9 +44,9 @@ class Habits(NamedTuple):
     turns: Float[np.ndarray, "K 3"]
     scales: Float[np.ndarray, "6"]
 
-    def shares(self, turns: float, scales: Float[np.ndarray, "6"]) -> "Habits":
-        """As much of them as can be trusted."""
-        return Habits(turns * self.turns, scales * self.scales)
+    def plus(self, other: "Habits", share: Float[np.ndarray, "2"]) -> "Habits":
+        """With shares of the turns and of the scales of others."""
+        return Habits(self.turns + share[0] * other.turns, self.scales + share[1] * other.scales)
 
 
 class BodyTokens:

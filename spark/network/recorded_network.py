@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from spark.errors import FileFormatError
 from spark.network.layers import Layers, attend, join_heads, split_heads
 from spark.network.recorded import BodyTokens, Habits, KnownBodies
 from spark.network.weights import Weights
@@ -9,13 +10,29 @@ from spark.network.weights import Weights
 # A step of Adam moves a head's output by about rate times width: what habits have to say is small.
 HABIT_SCALE = 0.1
 PREFIX = "recorded."  # of its tensors in a checkpoint
+VERSION = 2.0  # of what these tensors mean
+
+
+def check_recorded(weights: Weights) -> None:
+    """Raise `FileFormatError` where a checkpoint holds what an older spark-sim made of recorded
+    pairs: the same tensors meant something else."""
+    held = weights.below(PREFIX)
+    if held and float(held.get("version", np.zeros(()))) != VERSION:
+        raise FileFormatError(
+            weights.path,
+            None,
+            "what it learned from recorded pairs is of an older spark-sim, which this one does not "
+            "read; train it again",
+        )
 
 
 class RecordedNetwork:
     """Habits of a body by a trained network, as far as characters that were left out of the
-    training say that they can be trusted. Raises `FileFormatError` where a tensor is missing."""
+    training say that they can be trusted. Raises `FileFormatError` where a tensor is missing, and
+    what `check_recorded` raises."""
 
     def __init__(self, weights: Weights) -> None:
+        check_recorded(weights)
         self.layers = Layers(weights, PREFIX)
         self.heads = int(self.layers["heads"])
         self.blocks = int(self.layers["blocks"])
@@ -24,7 +41,7 @@ class RecordedNetwork:
         self.known = KnownBodies(self.layers["known"].astype(np.float64), reach)
 
     def __call__(self, body: BodyTokens) -> Habits:
-        """Turns and scales, each times its trust."""
+        """What the linear model says, and the network as far as it can be trusted."""
         layers = self.layers
         features, measures = (x.astype(np.float32) for x in (body.features, body.measures))
         x = layers.linear("tokens", features) + layers.linear("body", measures)
@@ -36,8 +53,12 @@ class RecordedNetwork:
             x = x + layers.linear(f"{name}.attention.out", attended)
             x = x + layers.feedforward(f"{name}.ff", layers.layer_norm(f"{name}.norm_ff", x))
         x = layers.layer_norm("norm", x)
-        turns = HABIT_SCALE * layers.linear("turns", x)
-        turns = turns + np.einsum("kx,kxy->ky", body.rest_turns, layers["linear_turns"][body.parts])
-        scales = HABIT_SCALE * (layers.linear("scales", x.mean(0)) + layers["linear"] @ measures)
-        habits = Habits(turns.astype(np.float64), scales.astype(np.float64))
-        return habits.shares(float(self.trust[0]), self.trust[1:])
+        own = Habits(
+            HABIT_SCALE * layers.linear("turns", x).astype(np.float64),
+            HABIT_SCALE * layers.linear("scales", x.mean(0)).astype(np.float64),
+        )
+        linear = Habits(
+            np.einsum("kx,kxy->ky", body.rest_turns, layers["linear_turns"][body.parts]),
+            body.measures @ layers["linear"],
+        )
+        return linear.plus(own, self.trust)

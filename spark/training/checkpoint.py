@@ -20,6 +20,7 @@ from spark.files import write_atomically
 from spark.network.config import Config
 from spark.network.known_bodies import Trunk
 from spark.network.recorded_network import PREFIX as RECORDED
+from spark.network.recorded_network import check_recorded
 from spark.network.weights import FORMAT, VERSION, Tensors, read_weights
 from spark.opening import check_regular
 from spark.training.model import Spark
@@ -35,7 +36,7 @@ class Checkpoint:
     `names` is our own encoder, or the directory or hub name of a T5. `bodies` are those that it was
     trained on. `optimizer` holds the optimiser's state by `<parameter>/<key>`; empty where training
     cannot be resumed. `recorded` is what was learned from recorded pairs
-    (`spark.training.recorded_net`); empty without.
+    (`spark.training.recorded_learning`); empty without.
     """
 
     model: Spark
@@ -81,6 +82,7 @@ def load_checkpoint(path: Path) -> Checkpoint:
     """Read a checkpoint onto the CPU, with the optimiser's state where it lies beside. Raises
     `FileFormatError` for anything that is not one."""
     weights = read_weights(path)
+    check_recorded(weights)
     try:
         model = Spark(Config(**weights.network))
         model.load_state_dict(_tensors(weights.below("model.")))

@@ -1,6 +1,7 @@
 """Several processes on one run, as `torchrun` starts them."""
 
 import os
+from datetime import timedelta
 
 import torch
 import torch.distributed as dist
@@ -8,6 +9,9 @@ from torch import nn
 from torch.nn.parallel import DistributedDataParallel
 
 from spark.errors import ConventionError
+
+# Others wait so long for the first process, which alone learns from recorded pairs.
+_PATIENCE = timedelta(hours=6)
 
 
 def join_processes() -> tuple[int, int, torch.device]:
@@ -18,7 +22,7 @@ def join_processes() -> tuple[int, int, torch.device]:
     if cuda:
         torch.cuda.set_device(local)  # else every process also holds memory on the first GPU
     if world > 1 and not dist.is_initialized():
-        dist.init_process_group("nccl" if cuda else "gloo")
+        dist.init_process_group("nccl" if cuda else "gloo", timeout=_PATIENCE)
     rank = dist.get_rank() if world > 1 else 0
     return rank, world, torch.device("cuda", local) if cuda else torch.device("cpu")
 

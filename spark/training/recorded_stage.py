@@ -6,7 +6,7 @@ from pathlib import Path
 from spark.errors import name_list
 from spark.training.checkpoint import Checkpoint, save_checkpoint
 from spark.training.dataset import is_dataset, read_performances
-from spark.training.recorded_net import Recorded, Watch, learn_recorded, total_steps
+from spark.training.recorded_learning import Recorded, Watch, learn_recorded, total_steps
 from spark.training.recorded_pairs import MIN_BODIES, RecordedPairs, recorded_pairs
 from spark.training.settings import TrainConfig
 
@@ -35,7 +35,8 @@ def recorded_stage(config: TrainConfig) -> Stage | None:
         return None
     about = f"{len(known.pairs)} recorded pairs on {targets} characters"
     if known.namesakes:
-        about += f" ({name_list(list(known.namesakes))}: the name of different motions, these pairs left out)"
+        names = name_list(list(known.namesakes))
+        about += f" (without those of one name that are different motions: {names})"
     if not known.enough:
         return Stage(known, 0, f"{about}: at least {MIN_BODIES} are needed to learn from them")
     return Stage(known, total_steps(config.recorded_steps), f"{about}: learned from first")
@@ -66,7 +67,7 @@ def _told(learned: Recorded) -> str:
             "of it is used"
         )
     return (
-        f"recorded pairs: {learned.gain:.2f} of the squared error of proportions alone is left on "
-        f"characters left out; used on bodies up to {learned.known.reach:.2g} from a known one, "
-        "less and less up to twice that"
+        f"recorded pairs: {learned.trust.left:.2f} of the squared error of proportions alone is "
+        "left on characters left out; used on bodies up to "
+        f"{learned.known.reach:.2g} from a known one, less and less up to twice that"
     )

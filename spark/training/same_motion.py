@@ -34,8 +34,8 @@ def same_motion(source: CanonicalMotion, target: CanonicalMotion) -> bool:
         for j, role in enumerate(target.rig.roles.roles)
         if role is not None and not link.mix[j] and link.first[j] >= 0
     ]
-    own = target.rotations[np.ix_(at, joints)]
-    theirs = source.rotations[np.ix_(at, link.first[joints])]
+    own = target.rotations[at][:, joints]
+    theirs = source.rotations[at][:, link.first[joints]]
     moved = 0.5 * (_spread(own) + _spread(theirs))
     if moved < _STILL**2:
         return True

@@ -29,7 +29,7 @@ class TrainConfig:
     ("shipped"); `names` is a file with another, or one is learned first in `name_steps`, or `t5` is
     a T5. A checkpoint is written every `save_every` steps and every `save_minutes`.
     `recorded_steps` are those on recorded pairs, where a dataset has some
-    (`spark.training.recorded_net`); the paper's preset takes none.
+    (`spark.training.recorded_learning`); the paper's preset takes none.
     """
 
     preset: str = "default"

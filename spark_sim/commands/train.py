@@ -176,22 +176,21 @@ def run(args: Namespace) -> int:
 
 
 def _learn_recorded(start: "Checkpoint", config: "TrainConfig", out: Path) -> "Checkpoint":
-    """`start` with what the recorded pairs of the data say, where there are some."""
+    """`start` with what the recorded pairs of the data say, where there are some. Under `torchrun`
+    the process that writes learns from them, and the others wait for it."""
     from spark.training.recorded_stage import recorded_stage, with_recorded
     from spark_sim import console
     from spark_sim.watching import is_first, watching_stage
 
-    stage = recorded_stage(config)
+    stage = recorded_stage(config) if is_first() else None
     if stage is None:
         return start
-    if is_first():
-        console.note(stage.about)
+    console.note(stage.about)
     if not stage.steps:
         return start
     with watching_stage("recorded pairs", stage.steps) as watch:
         start, told = with_recorded(start, stage, config, out, watch)
-    if is_first():
-        console.note(told)
+    console.note(told)
     return start
 
 

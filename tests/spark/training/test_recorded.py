@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 
+from spark.errors import FileFormatError
 from spark.network.features import body_features
 from spark.network.recorded import (
     HABITS,
@@ -17,7 +18,7 @@ from spark.network.recorded import (
     as_recorded,
     tokens_of,
 )
-from spark.network.recorded_network import RecordedNetwork
+from spark.network.recorded_network import VERSION, RecordedNetwork
 from spark.network.retarget import NetworkRetargeter
 from spark.network.weights import read_weights
 from spark.rig.rig import Rig
@@ -26,14 +27,16 @@ from spark.rotation import quat_from_rotvec, quat_mul
 from spark.training.checkpoint import load_checkpoint, save_checkpoint
 from spark.training.dataset import Performance
 from spark.training.pairs import TrainingClip
-from spark.training.recorded_net import RecordedNet, habits_of, learn_recorded
+from spark.training.recorded_learning import learn_recorded
+from spark.training.recorded_net import RecordedNet, habits_of
 from spark.training.recorded_pairs import RecordedPairs, recorded_pairs
-from spark.training.recorded_ridge import fit_ridge
+from spark.training.recorded_ridge import Ridge, fit_ridge
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.leg_fit import fit_legs
 from tests.helpers.stick import joint, stick_rig, without
 from tests.helpers.training import TINY, fresh
+from tests.spark.training.test_same_motion import waving
 from tests.spark.transfer.test_leg_fit import big, stout, striding
 
 HIPS_UP, TRAVEL = HABITS.index("hips_up"), HABITS.index("travel")
@@ -134,7 +137,7 @@ def test_the_linear_model_foretells_bodies_that_it_has_not_seen(known: RecordedP
 
 def test_the_network_learns_what_left_out_bodies_confirm(known: RecordedPairs) -> None:
     learned = learn_recorded(known, width=16, heads=2, blocks=1, steps=150)
-    assert learned.gain < 0.5
+    assert learned.trust.left < 0.5
     assert learned.known.reach > 0
     again = learn_recorded(known, width=16, heads=2, blocks=1, steps=150)
     assert all(torch.equal(v, again.tensors()[k]) for k, v in learned.tensors().items())
@@ -143,14 +146,18 @@ def test_the_network_learns_what_left_out_bodies_confirm(known: RecordedPairs) -
 def test_a_checkpoint_says_the_same_without_torch(tmp_path: Path) -> None:
     one = tokens_of(body(1))
     torch.manual_seed(0)
-    net = RecordedNet(one.features.shape[1], len(one.measures), 16, 2, 2)
+    rng = np.random.default_rng(0)
+    ridge = Ridge(rng.normal(size=(len(PARTS), 3, 3)), rng.normal(size=(len(one.measures), 6)))
+    net = RecordedNet(ridge, one.features.shape[1], 16, 2, 2)
     for parameter in net.parameters():
         torch.nn.init.normal_(parameter, std=0.3)
-    expected = habits_of(net, [one, tokens_of(body(2))])[0]
+    trust = rng.uniform(size=2)
+    expected = habits_of(net, [one, tokens_of(body(2))], trust)[0]
     tensors = dict(net.state_dict()) | {
+        "version": torch.tensor(VERSION),
         "heads": torch.tensor(2.0),
         "blocks": torch.tensor(2.0),
-        "trust": torch.tensor([0.5, *[1.0] * 5, 0.25]),
+        "trust": torch.tensor(trust),
         "known": torch.tensor(one.traits, dtype=torch.float32)[None],
         "reach": torch.tensor(
             0.75 * KnownBodies(one.traits[None], 1.0).distance(tokens_of(body(2)))
@@ -161,8 +168,8 @@ def test_a_checkpoint_says_the_same_without_torch(tmp_path: Path) -> None:
     assert load_checkpoint(path).recorded.keys() == tensors.keys()
     network = RecordedNetwork(read_weights(path))
     found = network(one)
-    np.testing.assert_allclose(found.turns, 0.5 * expected.turns, atol=1e-5)
-    np.testing.assert_allclose(found.scales, [*[1.0] * 5, 0.25] * expected.scales, atol=1e-5)
+    np.testing.assert_allclose(found.turns, expected.turns, atol=1e-5)
+    np.testing.assert_allclose(found.scales, expected.scales, atol=1e-5)
 
     source, wide = striding(body(1)), without(stout(), Role.LEFT_TOE, Role.RIGHT_TOE)
     retargeter = NetworkRetargeter(read_weights(path))
@@ -171,6 +178,24 @@ def test_a_checkpoint_says_the_same_without_torch(tmp_path: Path) -> None:
     assert "unlike the characters of the training's recorded pairs" in far.notes[-1]
     np.testing.assert_array_equal(far.hips, fit_legs(source, transfer(source, wide)).hips)
     assert np.abs(near.hips - fit_legs(source, transfer(source, body(2))).hips).max() > 1e-3
+
+
+def test_what_an_older_version_learned_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "checkpoint.safetensors"
+    save_checkpoint(replace(fresh(TINY), recorded={"trust": torch.ones(7)}), path)
+    for read in (load_checkpoint, lambda path: NetworkRetargeter(read_weights(path))):
+        with pytest.raises(FileFormatError, match=r"of an older spark-sim.*; train it again"):
+            read(path)
+
+
+def test_pairs_that_share_a_name_alone_teach_nothing() -> None:
+    """The arms of the first three bodies swing twice, those of the others three times."""
+    first = striding(body(0))
+    found = [answered(waving(first, 2 + k // 3), body(k)) for k in range(6)]
+    known = recorded_pairs([performance(f"body {k}", motion) for k, motion in enumerate(found)])
+    assert {(p.source // 3, p.target // 3) for p in known.pairs} == {(0, 0), (1, 1)}
+    assert len(known.pairs) == 2 * 3 * 2
+    assert known.namesakes == ("stride",)
 
 
 def test_nearness_falls_from_the_reach_to_twice_of_it() -> None:
