@@ -56,7 +56,12 @@ def css() -> str:
     )
 
 
+GRADES = (1.0, 5.0)
+"""[%] Up to which a share of frames looks good, and fair."""
+
+
 def grade(percent: float) -> Grade:
     """How bad a share of frames looks: a hint for the eye. What makes a frame implausible stands in
     `sim.report.thresholds`."""
-    return "good" if percent <= 1 else "fair" if percent <= 5 else "bad"
+    good, fair = GRADES
+    return "good" if percent <= good else "fair" if percent <= fair else "bad"

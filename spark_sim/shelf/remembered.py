@@ -3,7 +3,7 @@ it was made of has changed."""
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
@@ -19,17 +19,17 @@ from spark_sim.shelf.made_of import (
     reading_sha256,
 )
 
-SCHEMA: Final = "spark-sim clip report 1"
+SCHEMA: Final = "spark-sim clip report 2"
 
 
 @dataclass(frozen=True)
 class Measured:
-    """A line of the table: the `facts` of a motion, or else the error; its picture as SVG and its
+    """A line of the table: the `facts` of a motion, or else the error; its picture and its
     fingerprint; the `target` of a batch."""
 
     name: str
     facts: dict[str, Any]
-    picture: str = ""
+    picture: dict[str, Any] = field(default_factory=dict)
     fingerprint: str = ""
     error: str | None = None
     target: str = ""

@@ -1,20 +1,27 @@
 """The report of a folder: what is measured, the tables, and the page in a browser."""
 
+import base64
 import csv
 import json
+import os
 import re
 import shutil
 from pathlib import Path
-from urllib.parse import unquote
+from urllib.parse import unquote, unquote_to_bytes
 
 import numpy as np
 import pytest
 from pyarrow import parquet
 
 import spark_sim
+from spark_sim.shelf.duplicates import Duplicates
+from spark_sim.shelf.headline import key
 from spark_sim.shelf.histogram import HEIGHT, histogram
 from spark_sim.shelf.items import items
+from spark_sim.shelf.overview import overview
+from spark_sim.shelf.remembered import Measured
 from spark_sim.shelf.tables import COLUMNS
+from spark_sim.shelf.thumbnail import BELOW, FOOT, LEFT, MOMENTS, UNIT, thumbnail
 from tests.helpers.browser import Elements, opened, with_probe
 from tests.helpers.program import Program
 
@@ -83,9 +90,11 @@ def test_the_tables_say_what_the_report_of_each_says(folder: Path) -> None:
             assert (float(line[name]) if line[name] else None) == value
 
 
-def test_each_motion_has_its_own_page(folder: Path) -> None:
+def test_each_motion_has_its_own_page(folder: Path, tmp_path: Path) -> None:
     text = (folder / "out" / "report.html").read_text()
-    links = set(re.findall(r'href="(report_clips/[^"]+)"', text))
+    script = """document.body.dataset.result = JSON.stringify(
+      [...document.querySelectorAll("#clips a")].map(a => a.getAttribute("href")))"""
+    links = set(opened(with_probe(text, script), tmp_path))
     assert len(links) == 3
     for link in links:
         assert "of the frames are implausible" in (folder / "out" / unquote(link)).read_text()
@@ -96,9 +105,9 @@ def test_the_page_sorts_in_a_browser(folder: Path, tmp_path: Path) -> None:
     text = (folder / "out" / "report.html").read_text()
     tags = Elements(text).tags
     assert not any("onerror" in attributes for _, attributes in tags)
-    script = """
+    script = """{
       const column = k => [...document.querySelectorAll("#clips tbody tr")].map(
-        row => row.cells[k].dataset.value);
+        row => (row.cells[k].querySelector("a") ?? row.cells[k]).textContent);
       const names = () => column(1), values = () => column(3).map(Number);
       const out = { first: names(), worst: values() };
       document.querySelector("th button[data-column='1']").click(); out.byName = names();
@@ -106,7 +115,12 @@ def test_the_page_sorts_in_a_browser(folder: Path, tmp_path: Path) -> None:
       head.click(); out.worstAgain = values(); head.click(); out.best = values();
       out.pictures = document.querySelectorAll("#clips tbody svg path.pose").length;
       out.bars = document.querySelectorAll("figure rect").length;
-      document.body.dataset.result = JSON.stringify(out);"""
+      const filter = document.getElementById("filter");
+      filter.value = "WALK.bvh dancer"; filter.oninput();
+      setTimeout(() => {
+        out.filtered = names(); out.count = document.getElementById("count").textContent;
+        document.body.dataset.result = JSON.stringify(out);
+      }, 400); }"""
     seen = opened(with_probe(text, script), tmp_path)
     assert seen["worst"] == sorted(seen["worst"], reverse=True)
     assert seen["first"][0] == f"{EVIL}.bvh"
@@ -115,6 +129,8 @@ def test_the_page_sorts_in_a_browser(folder: Path, tmp_path: Path) -> None:
     assert seen["best"] == seen["worst"][::-1]
     assert seen["pictures"] >= 3 * 4
     assert seen["bars"] > 10
+    assert seen["filtered"] == ["dancer_walk/walk.bvh"]
+    assert seen["count"] == "1 of 3 motions"
 
 
 def pages(out: Path) -> dict[str, int]:
@@ -191,9 +207,39 @@ def test_sources_are_found_by_name(tmp_path: Path) -> None:
 def test_bars_stand_for_every_value() -> None:
     values = [0.0] * 90 + [5.0] * 9 + [50.0]
     made = histogram(values)
-    counts = [int(bar["words"].rpartition(": ")[2]) for bar in made["bars"]]
-    assert sum(counts) == len(values)
+    counts = [int(re.search(r": (\d+);", bar["words"])[1]) for bar in made["bars"]]
+    assert counts == [90, 9, 1]
+    shares = [float(re.search(r"; (\S+) %", bar["words"])[1]) for bar in made["bars"]]
+    assert shares == [90, 99, 100]
     assert made["bars"][0]["height"] == HEIGHT
     assert made["bars"][-1]["height"] == pytest.approx(HEIGHT / np.sqrt(90), abs=0.01)
     assert made["median"] == "0"
     assert histogram([])["bars"] == []
+
+
+def test_a_name_that_is_no_text_is_found(tmp_path: Path) -> None:
+    """The link to the page of a motion leads to its file, whatever bytes its name has."""
+    name = os.fsdecode(b"w\xffalk #1?%.bvh")
+    facts = {"file": name, "duration_s": 1.0, "worst": None, key("implausible"): 0.5}
+    picture = {"bones": [[0, 1]], "points": "AAAAAAAAAAAAAAAAAAAAAAAAAAA=", "worst": 0}
+    text = overview("t", [Measured(name, facts, picture)], [], Duplicates([], []), ["", ""], "c d")
+    script = """
+      const href = document.querySelector("td a").href;
+      document.body.replaceChildren();  // the browser can't write a name that is no text
+      document.body.dataset.result = JSON.stringify(href);"""
+    href = opened(with_probe(text, script), tmp_path)
+    assert unquote_to_bytes(href).endswith(b"/c d/" + os.fsencode(name) + b".html")
+
+
+def test_a_drawing_is_of_the_body(tmp_path: Path) -> None:
+    """Each figure stands on the floor, as tall as the picture allows, and on its middle."""
+    clip, drawn = spark_sim.load(spark_sim.sample(tmp_path)[0]), 72
+    made = thumbnail(clip.motion, clip.rig, clip.floor_z, 3, marked=True)
+    count = sum(role is not None for role in clip.rig.roles.roles)
+    points = np.frombuffer(base64.b64decode(made["points"]), np.uint8).reshape(MOMENTS, count, 2)
+    x, y = np.moveaxis(points * UNIT + [LEFT, BELOW], -1, 0)
+    assert np.abs(y.min(axis=1)).max() < 8
+    assert y.max() == pytest.approx((drawn - FOOT) / 1.15, abs=10)
+    assert np.abs(x.mean(axis=1)).max() < 6
+    assert made["worst"] == 0
+    assert {child for _, child in made["bones"]} | {0} == set(range(count))
