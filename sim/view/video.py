@@ -52,7 +52,8 @@ def _encode(
     encoder = [
         *(_ffmpeg(), "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24"),
         *("-s", f"{width}x{height}", "-r", f"{fps:.6f}", "-i", "-"),
-        *("-an", "-c:v", "libx264", "-preset", "veryfast", "-crf", "20", "-pix_fmt", "yuv420p"),
+        *("-an", "-c:v", "libx264", "-preset", "superfast", "-crf", "20", "-pix_fmt", "yuv420p"),
+        *("-x264-params", "mbtree=1:rc-lookahead=10", "-threads", "1"),
         *("-movflags", "+faststart", "-f", "mp4", str(unfinished)),
     ]
     with subprocess.Popen(encoder, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,9 +14,10 @@ import pytest
 import spark_sim
 from sim.interpolate import at_times
 from sim.trajectory import ModelTrajectory, Subject
-from sim.view.camera import extents
+from sim.view.camera import extents, shot
 from sim.view.display import lit
 from sim.view.page import page, write_page
+from sim.view.painter import Painter
 from sim.view.render import frames, stills
 from sim.view.scene import Figure, Scene, build_scene
 from sim.view.simplify import area, simplify_together
@@ -72,6 +74,21 @@ def test_pictures_show_two_bodies_that_move(scene: Scene) -> None:
     columns = np.flatnonzero(limbs.any(0))
     assert np.diff(columns).max() > 3, "a gap between the two"
     assert np.abs(raised.astype(int) - rest).max() > 60
+
+
+def test_pictures_drawn_at_once_come_in_order(scene: Scene) -> None:
+    """Each is what a painter alone draws, and who stops listening leaves nothing running."""
+    picked = [0, 60, 30, 90, 60, 10, 0]
+    together = draw(scene, picked)
+    threads = threading.active_count()
+    with Painter(scene, 320, 240, (12, 6)) as painter:
+        seen = shot(scene, aspect=320 / 240)
+        for frame, picture in zip(picked, together, strict=True):
+            np.testing.assert_array_equal(picture, painter.frame(frame, seen))
+    some = frames(scene, iter(range(100)), width=320, height=240)
+    np.testing.assert_array_equal(next(iter(some)), together[0])
+    some.close()  # type: ignore[attr-defined]
+    assert threading.active_count() <= threads
 
 
 def test_video_and_strip(scene: Scene, tmp_path: Path) -> None:
