@@ -23,7 +23,7 @@ _OUTLINE = (255, 255, 255)
 
 
 def frames(
-    scene: Scene, indices: Iterable[int], *, width: int = 960, height: int = 540
+    scene: Scene, indices: Iterable[int], *, width: int = 854, height: int = 480
 ) -> Iterator[UInt8[np.ndarray, "H W 3"]]:
     """The scene at the picked frames, seen by a camera that follows the figures. `_AT_ONCE` are
     drawn at once, where that is possible.

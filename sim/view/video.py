@@ -23,8 +23,8 @@ def write_video(
     scene: Scene,
     path: str | Path,
     *,
-    width: int = 960,
-    height: int = 540,
+    width: int = 854,
+    height: int = 480,
     speed: float = 1.0,
     progress: Progress = iter,
 ) -> None:
