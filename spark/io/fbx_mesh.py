@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.io.fbx_document import Element
+from spark.io.scanner import LARGEST
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +30,8 @@ def read_mesh(geometry: Element) -> FbxMesh:
     """The mesh of an element `Geometry`. Raises `ValueError` where numbers don't go together."""
     points = geometry.numbers("Vertices")
     loops = geometry.numbers("PolygonVertexIndex").astype(np.int64)
-    if len(points) % 3 or not np.isfinite(points).all():
-        raise ValueError("the points of a mesh are no finite numbers, three each")
+    if len(points) % 3 or not (np.abs(points) <= LARGEST).all():
+        raise ValueError(f"the points of a mesh are no numbers up to {LARGEST:g}, three each")
     points = points.reshape(-1, 3)
     last = loops < 0  # the last corner of a polygon is written as -1 - index
     corners = np.where(last, -1 - loops, loops)
@@ -91,7 +92,7 @@ def _of_corners(
         at = index[at]
     if len(at) and not 0 <= at.min() <= at.max() < len(rows):
         raise ValueError(f"a mesh has {len(rows)} {data}, of which one is number {at.max()}")
-    return rows[at] if np.isfinite(rows).all() else None
+    return rows[at] if (np.abs(rows) <= LARGEST).all() else None
 
 
 def _welded(

@@ -21,6 +21,7 @@ from spark.io.fbx_mesh import FbxMesh, read_mesh
 from spark.io.fbx_scene import FbxScene
 from spark.io.nodes import NodeJoint
 from spark.io.recording import unique_names
+from spark.io.scanner import LARGEST
 from spark.rotation import matrix_from_quat, quat_from_euler
 from spark.skin import strongest
 
@@ -144,6 +145,8 @@ class _Reader:
         main = int(np.argmax([weight.sum() for _, weight in hangs]))
         if abs(np.linalg.det(bones[main][1][:3, :3])) < _FLAT:
             raise ValueError("a mesh is flat: a scale of zero")
+        if not all((np.abs(world) <= LARGEST).all() for _, world in bones):
+            raise ValueError(f"a mesh lies beyond {LARGEST:g}")
         bones_of, weights = _influences(len(mesh.points), hangs)
         materials = tuple(materials_of(self.links, model, self.path)) or (FbxMaterial("plain"),)
         return HungMesh(

@@ -21,6 +21,7 @@ from spark.io.convention import (
 )
 from spark.io.encoding import encode_new
 from spark.io.recording import Recording, in_si
+from spark.io.scanner import LARGEST
 from spark.motion import Motion
 
 
@@ -39,12 +40,13 @@ def foreign_recording(
 
     `unit` and `up` are what the user gives; `unit_m` and `up_axis` what the file or its format
     `says`. What neither tells is inferred. Raises `ConventionError` where it can't be, and
-    `FileFormatError` where numbers are not finite.
+    `FileFormatError` where numbers are not finite, or beyond any length.
     """
     found = list(notes)
-    values = (motion.root_pos, motion.rotations, motion.skeleton.offsets)
-    if not all(np.isfinite(value).all() for value in values):
-        raise FileFormatError(path, None, "holds numbers that are not finite")
+    skeleton = motion.skeleton
+    values = (motion.root_pos, motion.rotations, skeleton.offsets, skeleton.end_offsets)
+    if not all((np.abs(value) <= LARGEST).all() for value in values):
+        raise FileFormatError(path, None, f"holds numbers beyond {LARGEST:g}, or none at all")
     try:
         if unit is not None:
             unit_m = given_unit(unit)

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import FileFormatError
+from spark.io.scanner import LARGEST
 from spark.opening import parse_json, read_bytes
 
 _GLB, _JSON_CHUNK, _BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
@@ -112,8 +113,8 @@ class GltfFile:
             values = rows.astype(float)
         if accessor.get("normalized"):
             values = np.maximum(values / np.iinfo(dtype).max, -1.0)
-        if not np.isfinite(values).all():
-            raise self.error(f"accessor {index} has a value that is no number")
+        if not (np.abs(values) <= LARGEST).all():
+            raise self.error(f"accessor {index} has a value beyond {LARGEST:g}, or none")
         return values
 
     def _rows(

@@ -279,6 +279,15 @@ def test_a_result_wears_the_skin_of_its_target(tmp_path: Path) -> None:
     assert read_fbx_skin(tmp_path / "bare.fbx") is None
 
 
+def test_points_beyond_any_length_are_refused(tmp_path: Path) -> None:
+    far = BOX.copy()
+    far[3, 1] = 1e200  # whose normals would overflow
+    fbx = arm()
+    fbx.meshes = [Mesh(3, far, SIDES)]
+    with pytest.raises(FileFormatError, match=r"no numbers up to 1e\+12"):
+        read_fbx_skin(fbx.write(tmp_path / "far.fbx"))
+
+
 def test_a_cluster_with_a_point_that_the_mesh_lacks_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "arm.fbx"
     path.write_text(arm().text().replace("Indexes: *4 { a: 0", "Indexes: *4 { a: 99"))

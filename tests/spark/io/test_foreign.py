@@ -1,0 +1,26 @@
+"""What no BVH is is held to the same bounds as BVH."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spark.demo.sample import sample_motion, sample_rig
+from spark.errors import FileFormatError
+from spark.io.foreign import foreign_recording
+from spark.motion import Motion
+
+
+@pytest.mark.parametrize("far", [1e13, -1e200, np.inf, np.nan])
+@pytest.mark.parametrize("what", ["root_pos", "rotations", "offsets", "end_offsets"])
+def test_numbers_beyond_any_length_are_refused(what: str, far: float) -> None:
+    walk = sample_motion("walk", sample_rig("walker"), 30.0).frames(0, 3)
+    body = walk if what in ("root_pos", "rotations") else walk.skeleton
+    spoilt = getattr(body, what).copy()
+    spoilt[-1, -1] = far
+    changed = replace(body, **{what: spoilt})
+    motion = changed if isinstance(changed, Motion) else replace(walk, skeleton=changed)
+    foreign_recording(Path("walk.glb"), walk, unit="m", up="z")
+    with pytest.raises(FileFormatError, match=r"walk\.glb: holds numbers beyond 1e\+12, or none"):
+        foreign_recording(Path("walk.glb"), motion, unit="m", up="z")
