@@ -119,15 +119,14 @@ class FbxScene:
         self, joints: list[NodeJoint], baked: Any, times: Float[np.ndarray, "T"]
     ) -> tuple[Float[np.ndarray, "T J 3"], Float[np.ndarray, "T J 3 3"]]:
         """Where the joints are and how their axes lie (with scale) at `times`, in file units and
-        axes. Without `baked` that of the nodes' own transforms."""
+        axes; not finite where the file's numbers are too large. Without `baked` that of the nodes'
+        own transforms."""
         moved = {} if baked is None else {node.typed_id: node for node in baked.modified_nodes}
         position: dict[int, Any] = {}
         linear: dict[int, Any] = {}
         turn: dict[int, Any] = {}
-        for joint in joints:
-            for i in self.line(joint.node):
-                if i in position:
-                    continue
+        for i in dict.fromkeys(i for joint in joints for i in self.line(joint.node)):
+            with np.errstate(over="ignore", invalid="ignore"):
                 at, rotation, scale = self._local(i, moved.get(i), times)
                 own = matrix_from_quat(rotation)
                 above = self._parents[i]

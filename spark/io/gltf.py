@@ -19,6 +19,7 @@ from spark.io.gltf_file import GltfFile
 from spark.io.gltf_joints import joint_nodes
 from spark.io.nodes import NodeJoint, chosen_clip, joints_of, line_to, motion_of_axes
 from spark.io.recording import Recording
+from spark.io.scanner import LARGEST
 from spark.motion import Motion
 from spark.resample import frames_of_keys, rotations_at, values_at
 from spark.rotation import matrix_from_quat, quat_normalize
@@ -188,13 +189,14 @@ def _world(
             at, axes = _local(file, i, tracks, times)
             if parents[i] >= 0:
                 above_at, above = known[parents[i]]
-                at = above_at + np.einsum("tij,tj->ti", above, at)
-                axes = above @ axes
+                with np.errstate(over="ignore", invalid="ignore"):  # which is refused below
+                    at = above_at + np.einsum("tij,tj->ti", above, at)
+                    axes = above @ axes
             known[i] = at, axes
     positions = np.stack([known[joint.node][0] for joint in joints], axis=1)
     axes = np.stack([known[joint.node][1] for joint in joints], axis=1)
-    if not (np.isfinite(positions).all() and np.isfinite(axes).all()):
-        raise file.error("holds numbers that are not finite")
+    if not ((np.abs(positions) <= LARGEST).all() and (np.abs(axes) <= LARGEST).all()):
+        raise file.error(f"holds numbers beyond {LARGEST:g}, or none at all")
     if (np.abs(np.linalg.det(axes)) < 1e-30).any():
         raise file.error("has joints that are flat: a scale of zero")
     return positions, axes
