@@ -13,6 +13,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
 from sim import has_display
 from sim.view.annotations import Annotations
@@ -36,6 +37,7 @@ _LINES = {  # by whether they are arrows, and thin
     (True, False): mujoco.mjtGeom.mjGEOM_ARROW,
 }
 _MESSAGE_TIME = 2.0  # [s]
+_HIGHEST = 0.95  # of the way from the picture's middle to its upper edge: where words end
 _NAMES = 1.12  # of the distance: room for the names over the heads
 
 
@@ -196,7 +198,7 @@ class Window:
         if isinstance(mark, Dot):
             size, at = np.full(3, mark.radius), mark.at
         elif isinstance(mark, Label):
-            kind, at = mujoco.mjtGeom.mjGEOM_LABEL, mark.at
+            kind, at = mujoco.mjtGeom.mjGEOM_LABEL, self._below_edge(mark.at)
         else:
             kind = _LINES[mark.arrow, mark.thin]
         mujoco.mjv_initGeom(geom, int(kind), size, at, _UPRIGHT, np.array(mark.rgba, np.float32))
@@ -204,6 +206,14 @@ class Window:
             mujoco.mjv_connector(geom, int(kind), mark.width, mark.start, mark.end)
         elif isinstance(mark, Label):
             geom.label = plain(mark.text)
+
+    def _below_edge(self, at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+        """The place [m], or, where it is seen above the picture's upper edge, that below it."""
+        camera = self._scene.camera[0]
+        away = at - camera.pos
+        depth, over = float(away @ camera.forward), float(away @ camera.up)
+        highest = _HIGHEST * depth * camera.frustum_top / camera.frustum_near
+        return at + min(highest - over, 0.0) * camera.up if depth > 0 else at
 
     def _current_message(self) -> str:
         if self.player.message:
