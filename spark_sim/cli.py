@@ -186,7 +186,7 @@ def run(argv: Sequence[str], ready: Callable[[], None] = lambda: None) -> int:
 
 def _run(args: Namespace) -> int:
     try:
-        code: int = args.run(args)
+        code: int = _carry_out(args)
     except BrokenPipeError:
         raise
     except DivergedError as error:
@@ -204,6 +204,20 @@ def _run(args: Namespace) -> int:
             "what it prints when SPARK_SIM_TRACEBACK=1 is set.",
             INTERNAL_ERROR,
         )
+    return code
+
+
+def _carry_out(args: Namespace) -> int:
+    """What the command returns. A library's `import` makes an ImportError of Ctrl-C."""
+    try:
+        code: int = args.run(args)
+    except Exception as error:
+        cause: BaseException | None = error
+        while cause is not None and not isinstance(cause, KeyboardInterrupt):
+            cause = cause.__cause__ or cause.__context__
+        if cause is not None:
+            raise cause from None
+        raise
     return code
 
 

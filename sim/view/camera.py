@@ -13,7 +13,7 @@ from jaxtyping import Float
 from sim.view.scene import Scene
 
 AZIMUTH, ELEVATION = 210.0, -10.0  # [deg], MuJoCo's: of the direction in which the camera looks
-FIELD_OF_VIEW = 18.0  # [deg] up and down: from afar, so that who stands behind looks as tall
+FIELD_OF_VIEW = 10.0  # [deg] up and down: from afar, so that who stands behind looks as tall
 _HALF_VIEW = float(np.tan(np.radians(FIELD_OF_VIEW / 2)))
 _ASPECT_RATIOS = np.arange(0.4, 5.0, 0.05)
 _MARGIN = 1.06  # of the distance: room around the figures

@@ -28,11 +28,15 @@ function line(points, width, color, closed) {
   if (closed) ctx.closePath();
   ctx.stroke();
 }
-function write(text, p, color, up = 0) {
+function write(text, p, color, up = 0, around = null) {
   const q = project(p);
   if (q[2] < 0.1) return;
-  ctx.fillStyle = color;
-  text.split("\n").reverse().forEach((part, row) => ctx.fillText(part, q[0], q[1] - (up + 18 * row) * devicePixelRatio));
+  ctx.fillStyle = color; ctx.strokeStyle = around; ctx.lineWidth = 4 * devicePixelRatio; ctx.lineJoin = "round";
+  text.split("\n").reverse().forEach((part, row) => {
+    const at = [part, q[0], q[1] - (up + 18 * row) * devicePixelRatio];
+    if (around) ctx.strokeText(...at);
+    ctx.fillText(...at);
+  });
 }
 
 // On the floor, under the bodies: where a root goes, dark where it has been.
@@ -66,14 +70,14 @@ function drawMarks(all, css) {
 function isNow([start, stop]) { const now = frameNow() * dt; return start < now + dt - 1e-6 && stop > now + 1e-6; }
 
 function nameOf(f, at, css) {
-  const root = at[0].p;
+  const root = at[0].p, below = [root[0], root[1], -0.06];
   font(13);
-  write(f.label, [root[0], root[1], -0.06], css.ink, -18);
   const ahead = rotate(at[0].q, f.ahead), long = Math.hypot(ahead[0], ahead[1]);
-  if (long < 0.3) return; // it lies: the floor shows no way ahead
+  if (long < 0.3) return write(f.label, below, css.ink, -18, css.bg); // it lies: the floor shows no way ahead
   const to = (far, side) => [root[0] + (far * ahead[0] - side * ahead[1]) * f.height / long, root[1] + (far * ahead[1] + side * ahead[0]) * f.height / long, 0];
   line([to(0.16, 0), to(0.32, 0)], 2.5, BLUE);
   line([to(0.27, 0.04), to(0.33, 0), to(0.27, -0.04)], 2.5, BLUE);
+  write(f.label, below, css.ink, -18, css.bg);
 }
 function contactsOf(f, frame) {
   const { marks } = f;

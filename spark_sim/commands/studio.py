@@ -28,7 +28,7 @@ from spark_sim.loading import load
 
 _PAGE = Template("spark_sim.commands", "studio.html", ("studio.js",), server=True)
 MAX_UPLOAD = 64 * 1024 * 1024  # bytes
-UPLOADS = (".bvh", ".fbx", ".glb", ".gltf", ".vrm", ".vrma", ".npz", ".npy")
+UPLOADS = (".bvh", ".fbx", ".glb", ".gltf", ".vrm", ".vrma", ".c3d", ".npz", ".npy")
 _KEPT = 8  # clips and pages; the oldest are forgotten
 _LOCAL = ("localhost", "127.0.0.1", "::1")
 

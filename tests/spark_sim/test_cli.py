@@ -15,6 +15,7 @@ import mujoco
 import pytest
 
 import spark_sim
+from spark_sim import cli
 from tests.helpers.skins import write_character
 
 GOLDENS = Path(__file__).parent / "goldens"
@@ -395,6 +396,20 @@ def test_progress_and_color_are_for_terminals(here: Path) -> None:
     assert "\x1b[" in on_terminal(report, here, "stdout")
     assert "\x1b[" not in on_terminal(report, here, "stdout", NO_COLOR="1")
     assert "\x1b[" not in good(*report, cwd=here)
+
+
+def test_interrupting_an_import_is_quiet(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Extension modules make an ImportError of Ctrl-C; one of its own is a fault as before."""
+    for cause, expected in ((KeyboardInterrupt(), 130), (ValueError(), 70)):
+
+        def fail(args: object, cause: BaseException = cause) -> int:
+            raise ImportError("initialization failed") from cause
+
+        monkeypatch.setattr("spark_sim.commands.sample.run", fail)
+        assert cli.run(["sample"]) == expected
+        assert ("initialization failed" in capsys.readouterr().err) == (expected == 70)
 
 
 def test_interrupt_is_quiet(here: Path) -> None:
