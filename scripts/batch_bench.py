@@ -1,7 +1,7 @@
 """What a shelf costs: `spark-sim batch` onto the G1 with 1, 2 and all cores, and against the length
 and the number of the motions, also as a plot.
 
-python -m scripts.batch_bench [--files 16] [--frames 300] [--plot shelf.svg]
+python -m scripts.batch_bench [--files 60] [--frames 300] [--plot shelf.svg]
 """
 
 import argparse
@@ -60,37 +60,51 @@ def cost(source: Path, workers: int) -> Cost:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--files", type=int, default=16)
+    parser.add_argument("--files", type=int, default=60, help="0: leave out the table by cores")
     parser.add_argument("--frames", type=int, default=300)
     parser.add_argument("--plot", type=Path, metavar="SVG")
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        source = shelf(Path(folder) / "shelf", args.files, args.frames)
-        print("| cores | s | files/s | frames/s | efficiency | CPU s | efficiency, of CPU time |")
-        print("|---|---|---|---|---|---|---|")
-        one = None
-        for workers in sorted({1, 2, len(os.sched_getaffinity(0))}):
-            now = cost(source, workers)
-            one = one or now
-            print(
-                f"| {workers} | {now.clock:.1f} | {args.files / now.clock:.2f} "
-                f"| {args.files * args.frames / now.clock:.0f} "
-                f"| {one.clock / now.clock / workers:.2f} | {now.cpu:.1f} "
-                f"| {one.cpu / now.cpu:.2f} |",
-                flush=True,
-            )
-        print("\n| files | frames of each | CPU s | frames/s of a core |")
-        print("|---|---|---|---|")
-        lines: dict[str, list[tuple[float, float]]] = {"more files": [], "longer files": []}
-        for kind, counts in (("more files", (1, 4, 8, 16)), ("longer files", (1, 2, 4, 8))):
-            for count in counts:
-                files, frames = (count, args.frames) if kind == "more files" else (2, 150 * count)
-                used = cost(shelf(Path(folder) / f"{files}x{frames}", files, frames), 1).cpu
-                lines[kind].append((files * frames, used))
-                rate = files * frames / used
-                print(f"| {files} | {frames} | {used:.1f} | {rate:.0f} |", flush=True)
-    if args.plot is not None:
-        args.plot.write_text(plot(lines), encoding="utf-8")
+        if args.files:
+            by_cores(Path(folder), args.files, args.frames)
+        if args.plot is not None:
+            args.plot.write_text(plot(by_size(Path(folder), args.frames)), encoding="utf-8")
+
+
+def by_cores(folder: Path, files: int, frames: int) -> None:
+    """Print what a shelf costs on one core, on two and on all, start included."""
+    source = shelf(folder / "shelf", files, frames)
+    print("| cores | s | files/s | frames/s | efficiency | CPU s | efficiency, of CPU time |")
+    print("|---|---|---|---|---|---|---|")
+    one = None
+    for workers in sorted({1, 2, len(os.sched_getaffinity(0))}):
+        now = cost(source, workers)
+        one = one or now
+        print(
+            f"| {workers} | {now.clock:.1f} | {files / now.clock:.2f} "
+            f"| {files * frames / now.clock:.0f} "
+            f"| {one.clock / now.clock / workers:.2f} | {now.cpu:.1f} "
+            f"| {one.cpu / now.cpu:.2f} |",
+            flush=True,
+        )
+
+
+def by_size(folder: Path, frames: int) -> dict[str, list[tuple[float, float]]]:
+    """Print what more files and longer ones cost; the frames in all and the CPU time of each."""
+    print("\n| files | frames of each | CPU s | frames/s of a core |")
+    print("|---|---|---|---|")
+    more, longer = [(count, frames) for count in (1, 4, 16, 32)], [1, 2, 4, 8]
+    lines: dict[str, list[tuple[float, float]]] = {}
+    for kind, sizes in {
+        "more files": more,
+        "longer files": [(2, count * frames) for count in longer],
+    }.items():
+        lines[kind] = []
+        for files, length in sizes:
+            used = cost(shelf(folder / f"{files}x{length}", files, length), 1).cpu
+            lines[kind].append((files * length, used))
+            print(f"| {files} | {length} | {used:.1f} | {files * length / used:.0f} |", flush=True)
+    return lines
 
 
 def plot(lines: dict[str, list[tuple[float, float]]]) -> str:
