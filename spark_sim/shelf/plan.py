@@ -137,6 +137,8 @@ def _found(sources: Sequence[str], out: Path, suffixes: tuple[str, ...]) -> list
 def _folders(targets: Sequence[str]) -> list[str]:
     """A folder's name for each target: its own, without folders and ending."""
     names = [Path(target).stem for target in targets]
+    if len({*targets}) < len(targets):
+        raise ConventionError("--to names a target twice; give each once")
     for name in names:
         if names.count(name) > 1:
             both = " and ".join(t for t, n in zip(targets, names, strict=True) if n == name)

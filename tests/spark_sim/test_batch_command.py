@@ -16,7 +16,9 @@ import numpy as np
 import pytest
 
 import spark_sim
+from tests.helpers.gltf import animated
 from tests.helpers.program import CHECKOUT, Program
+from tests.helpers.rigs import RIGS, build, walk
 
 
 @pytest.fixture(scope="module")
@@ -193,6 +195,30 @@ def test_pieces_at_another_rate_in_any_format(shelf: Path, program: Program, for
         assert Path(row["source"]).name == "mutant.bvh"
         for name in ("implausible_share", "root_drift_m", "invented_contact_share"):
             assert row[name] == pytest.approx(entry["report"][name], abs=1e-4), name
+
+
+def test_a_changed_file_beside_a_source_or_a_target_is_noticed(
+    shelf: Path, program: Program
+) -> None:
+    """The buffers of a glTF lie beside it; the file itself stays as it is."""
+    for folder in ("mocap", "body"):
+        (shelf / folder).mkdir()
+        gltf = animated(walk(*build(RIGS["mixamo"])))
+        gltf.write(shelf / folder / "walk.gltf", buffer="beside")
+    arguments = ("batch", "mocap", "--to", "body/walk.gltf", "-o", "out", "--method", "copy")
+    assert program(*arguments).stdout == "out: 1 written\n"
+    assert program(*arguments).stdout == "out: 1 unchanged\n"
+    assert program("report", "out").code == 0
+    page = shelf / "out" / "report_clips" / "walk" / "walk.bvh.html"
+    for folder in ("mocap", "body"):
+        before = page.stat().st_mtime_ns
+        buffer = shelf / folder / "keys of it.bin"
+        buffer.write_bytes(buffer.read_bytes() + bytes(4))
+        assert program(*arguments).stdout == "out: 1 written\n", folder
+        assert program(*arguments).stdout == "out: 1 unchanged\n", folder
+        assert program("report", "out").code == 0
+        # The result is the same, and was made of another source, or onto the same body.
+        assert (page.stat().st_mtime_ns != before) == (folder == "mocap")
 
 
 def test_near_duplicates_are_named(shelf: Path, program: Program) -> None:
