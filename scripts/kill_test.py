@@ -36,7 +36,8 @@ COMMANDS = {
     "--force",
     "retarget to CSV": "retarget samples/walker_wave.bvh --to robot --method copy -o out.csv "
     "--force",
-    "batch": "batch samples --to robot --method copy -o shelf --workers 2 --force --mirror --cut 2s",
+    "batch": "batch samples --to robot --method copy -o shelf --workers 2 --mirror --cut 2s "
+    "--force",
     "report on a folder": "report samples --html shelf.html --workers 2 --force",
     "mjcf": "mjcf samples/walker_walk.bvh -o body.xml --force",
     "play": "play samples/walker_wave.bvh --html play.html --force",

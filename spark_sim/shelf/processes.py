@@ -23,6 +23,7 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 # thread, and imports once what all jobs need; elsewhere each process imports it anew.
 _FORKS = sys.platform == "linux"
 _IMPORTED_ONCE = [
+    "spark_sim.shelf.server_of_forks",
     "spark_sim.shelf.measure",
     "spark_sim.shelf.work",
     "robots.formats.dispatch",

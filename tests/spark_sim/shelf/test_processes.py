@@ -139,3 +139,46 @@ def test_processes_end_amid_a_job_with_the_one_that_gave_it(tmp_path: Path) -> N
     while left := {path for path in workers if path.exists()}:
         assert time.monotonic() < deadline, left
         time.sleep(0.02)
+
+
+_STARTING = """
+import time
+from multiprocessing import forkserver
+from spark_sim.shelf.processes import begin
+begin()
+print(forkserver._forkserver._forkserver_pid, flush=True)
+time.sleep(300)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="there are no servers of forks elsewhere")
+def test_a_server_of_forks_ends_while_it_still_imports() -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", _STARTING],
+        env=os.environ | {"PYTHONPATH": str(CHECKOUT)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    server = int(process.stdout.readline())
+    try:
+        deadline = time.monotonic() + 60
+        # It is stopped amid its imports: by itself it would never see that it is alone.
+        while "numpy" not in Path(f"/proc/{server}/maps").read_text():
+            assert time.monotonic() < deadline
+            time.sleep(0.005)
+        os.kill(server, signal.SIGSTOP)
+    finally:
+        process.kill()
+        process.communicate()
+    deadline = time.monotonic() + 30
+    while (state := _state(server)) not in ("", "Z", "X"):
+        assert time.monotonic() < deadline, state
+        time.sleep(0.02)
+
+
+def _state(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return ""
