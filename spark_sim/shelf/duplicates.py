@@ -197,15 +197,15 @@ def _candidates(motions: list[Fingerprint]) -> set[tuple[int, int]]:
     """Pairs of motions with keys that are near to each other."""
     if len(motions) < 2:
         return set()
-    keys = [_keys(each) for each in motions]
-    indexed = [_distinct(each[:: int(RATE)]) for each in keys]
+    indexed = [_distinct(_keys(each)[:: int(RATE)]) for each in motions]
     owner = np.repeat(np.arange(len(motions)), [len(each) for each in indexed])
     points = np.concatenate(indexed)
     # Most of how keys differ is in few directions; in more, a tree looks at nearly all of them.
     most = np.linalg.eigh(np.cov(points.T))[1][:, -_DIRECTIONS:]
     tree = cKDTree(points @ most)
     pairs: set[tuple[int, int]] = set()
-    for k, own in enumerate(keys):
+    for k, motion in enumerate(motions):
+        own = _keys(motion)
         last = max(len(own) - int(RATE), 0)
         at = {start + shift for start in (0, last // 2, last) for shift in range(int(RATE))}
         asked = own[sorted(i for i in at if i < len(own))]
@@ -222,7 +222,8 @@ def _candidates(motions: list[Fingerprint]) -> set[tuple[int, int]]:
 def _keys(motion: Fingerprint) -> Float[np.ndarray, "K D"]:
     """What a motion is like about each sample, whatever its heading: mean and spread, over a
     window, of how far limbs point up and aside."""
-    up, aside = motion.samples[..., 2], np.linalg.norm(motion.samples[..., :2], axis=-1)
+    samples = motion.samples
+    up, aside = samples[..., 2], np.linalg.norm(samples[..., :2], axis=-1)
     values = np.concatenate([up, aside], axis=1)
     width = min(_WINDOW, len(values))
     windows = np.lib.stride_tricks.sliding_window_view(values, width, axis=0)

@@ -5,7 +5,7 @@ import zlib
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int8
 from scipy.ndimage import gaussian_filter1d
 
 from spark.blocks import in_blocks
@@ -34,16 +34,21 @@ _FORM = "2"  # of the text
 
 @dataclass(frozen=True, eq=False)
 class Fingerprint:
-    """Smoothed samples of a motion of `duration` [s]: unit vectors along limbs, then the velocity
-    of the hips, in the world. `has` tells which limbs the body has."""
+    """Smoothed samples of a motion of `duration` [s], as the bytes that a shelf of them can keep in
+    memory. `has` tells which limbs the body has."""
 
     duration: float
-    samples: Float[np.ndarray, "S 9 3"]
+    numbers: Int8[np.ndarray, "S 9 3"]
+
+    @property
+    def samples(self) -> Float[np.ndarray, "S 9 3"]:
+        """Unit vectors along limbs, then the velocity of the hips, in the world."""
+        return self.numbers / _LEVELS
 
     @property
     def has(self) -> Bool[np.ndarray, "9"]:
         """Which of the vectors the body has; the last is the velocity."""
-        return (self.samples != 0).any(axis=(0, 2)) | (np.arange(len(LIMBS) + 1) == len(LIMBS))
+        return (self.numbers != 0).any(axis=(0, 2)) | (np.arange(len(LIMBS) + 1) == len(LIMBS))
 
 
 def fingerprint(motion: Motion, rig: Rig) -> str:
@@ -69,7 +74,7 @@ def read(text: str) -> Fingerprint | None:
     duration, _, packed = rest.partition(":")
     steps = np.frombuffer(zlib.decompress(base64.b64decode(packed)), np.int8)
     numbers = np.cumsum(steps.reshape(-1, 3 * (len(LIMBS) + 1)), axis=0, dtype=np.int8)
-    return Fingerprint(float(duration), numbers.reshape(len(numbers), -1, 3) / _LEVELS)
+    return Fingerprint(float(duration), numbers.reshape(len(numbers), -1, 3))
 
 
 def _vectors(motion: Motion, rig: Rig, block: slice) -> Float[np.ndarray, "T 9 3"]:
