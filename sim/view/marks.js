@@ -32,8 +32,9 @@ function write(text, p, color, up = 0, around = null) {
   const q = project(p);
   if (q[2] < 0.1) return;
   ctx.fillStyle = color; ctx.strokeStyle = around; ctx.lineWidth = 4 * devicePixelRatio; ctx.lineJoin = "round";
-  text.split("\n").reverse().forEach((part, row) => {
-    const at = [part, q[0], q[1] - (up + 18 * row) * devicePixelRatio];
+  const rows = text.split("\n").reverse(), low = Math.max(q[1], (up + 18 * rows.length) * devicePixelRatio); // below the edge
+  rows.forEach((part, row) => {
+    const at = [part, q[0], low - (up + 18 * row) * devicePixelRatio];
     if (around) ctx.strokeText(...at);
     ctx.fillText(...at);
   });

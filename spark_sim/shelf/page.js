@@ -20,7 +20,7 @@ const escaped = part => /^[\udc80-\udcff]$/u.test(part) ? "%" + (part.charCodeAt
 const page = name => [data.folder, ...name.split("/")].map(each => each.split(/([\udc80-\udcff])/u).map(escaped).join("")).join("/") + ".html";
 function draw(cell, [bones, text, worst]) {
   const points = atob(text), { width, height, moments, unit } = layout, size = points.length / moments;
-  const svg = add(cell, "svg", { viewBox: `0 0 ${width} ${height}`, role: "img" });
+  const svg = add(cell, "svg", { viewBox: `0 0 ${width} ${height}`, "aria-hidden": "true" });
   add(svg, "path", { class: "floor", d: `M0 ${height - layout.foot}H${width}` });
   for (let k = 0; k < moments; k++) {
     const x = j => (width / moments * (k + 0.5) + layout.left + unit * points.charCodeAt(k * size + 2 * j)).toFixed(1);

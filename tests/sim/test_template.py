@@ -83,3 +83,18 @@ def test_the_policy_stops_what_would_slip_through(tmp_path: Path) -> None:
     assert result["title"] == "x"
     ran = opened(re.sub('default-src[^"]*', "", watched(broken)), tmp_path)
     assert ran["title"] == "1337", "without a policy it runs"
+
+
+def test_each_page_has_one_main_part() -> None:
+    """Readers of a page aloud go there first; its pictures have words, or none are read."""
+    templates = [
+        path.read_text()
+        for package in ("sim", "spark_sim")
+        for path in (CHECKOUT / package).rglob("*.html")
+        if path.name not in ("base.html", "document.html")
+    ]
+    assert len(templates) > 4
+    for text in templates:
+        assert text.count("<main") == text.count("</main>") == 1
+        for picture in re.findall(r"<(?:svg|iframe|canvas)[^>]*>", text):
+            assert re.search(r'aria-label=|title=|aria-hidden="true"', picture), picture
