@@ -84,5 +84,17 @@ def compare_page(
             for line in lines(reports)
         ],
         replay=page(figures, title="", known=known),
-        notes=list(dict.fromkeys(note for report in reports.values() for note in report.notes)),
+        notes=_notes(reports),
     )
+
+
+def _notes(reports: Mapping[str, Result]) -> list[str]:
+    """Each note once, with the names of those that it is about, unless it is about all."""
+    about: dict[str, list[str]] = {}
+    for name, report in reports.items():
+        for note in dict.fromkeys(report.notes):
+            about.setdefault(note, []).append(name)
+    return [
+        note if len(names) == len(reports) else f"{', '.join(names)}: {note}"
+        for note, names in about.items()
+    ]

@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float
 
 from spark.errors import SparkSimError
 from spark.files import write_atomically
+from spark.io.companions import companions
 from spark.io.reading import read_motion
 from spark.network.features import body_features
 from spark.rig.rig import Rig, understand
@@ -71,11 +72,13 @@ def reject_part(path: Path, parts: Path, why: str) -> str:
 
 
 def _digest(path: Path) -> str:
+    """Of a file and those that are read with it: an AMC is nothing without its ASF."""
     digest = hashlib.sha256(path.suffix.lower().encode())
     try:
-        with path.open("rb") as file:
-            while block := file.read(1 << 20):
-                digest.update(block)
+        for each in (path, *companions(path)):
+            with each.open("rb") as file:
+                while block := file.read(1 << 20):
+                    digest.update(block)
     except OSError as error:
         digest.update(f"{path}: {error}".encode(errors="surrogateescape"))
     return digest.hexdigest()

@@ -130,7 +130,8 @@ def _compared(args: Namespace, paths: list[str], source: "AnyClip | None") -> fl
 
         origin = None if source is None else (source.name, source.subject)
         subjects = {name: clip.subject for name, clip in clips.items()}
-        title = " and ".join(names) + ("" if source is None else f", of {source.name}")
+        listed = ", ".join([*names][:-1]) + f" and {names[-1]}"
+        title = listed + ("" if source is None else f", of {source.name}")
         write_compare_page(reports, args.html, subjects, origin, title=title)
     if args.json:
         records = zip(paths, reports.values(), strict=True)

@@ -2,7 +2,7 @@
 it was made of has changed."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
 from pathlib import Path
@@ -19,7 +19,8 @@ from spark_sim.shelf.made_of import (
     reading_sha256,
 )
 
-SCHEMA: Final = "spark-sim clip report 2"
+_RECORD: Final = "spark-sim clip report"
+SCHEMA: Final = f"{_RECORD} 2"
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,22 @@ def remember(item: Item, page: Path, measured: Measured, made_of: Mapping[str, F
     facts = {**made_of, "settings": _settings(item), "page": file_facts([page])}
     record = {"schema": SCHEMA, "made_of": facts, "measured": asdict(measured)}
     write_atomically(_record(page), json.dumps(record).encode())
+
+
+def forget_others(clips: Path, pages: Collection[Path]) -> None:
+    """Remove the pages and records in a report's folder of motions that are there no longer."""
+    for record in clips.rglob("*.json"):
+        page = record.with_suffix(".html")
+        if page not in pages and page.is_file() and _is_record(record):
+            page.unlink()
+            record.unlink()
+
+
+def _is_record(path: Path) -> bool:
+    try:
+        return str(json.loads(path.read_bytes())["schema"]).startswith(_RECORD)
+    except (OSError, ValueError, LookupError, TypeError):
+        return False
 
 
 def _record(page: Path) -> Path:

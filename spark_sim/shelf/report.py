@@ -13,7 +13,7 @@ from spark_sim.shelf.measure import measure
 from spark_sim.shelf.outputs import write_outputs
 from spark_sim.shelf.overview import overview
 from spark_sim.shelf.processes import Died
-from spark_sim.shelf.remembered import Measured
+from spark_sim.shelf.remembered import Measured, forget_others
 from spark_sim.shelf.tables import as_csv, as_json, as_parquet
 
 Measurer: TypeAlias = Callable[
@@ -71,9 +71,14 @@ def write_folder_report(
         notes = (f"no {parquet_path.name}: {error}",)
     names = [path.name for path in files]
     text = overview(title, good, failed, found, names, clips.name)
+    forget_others(clips, {_page_of(clips, each.name) for each in measured})
     write_outputs({**files, page: text.encode("utf-8", "replace")}, clips)
     return rows, found, notes
 
 
 def _below(folder: Path, item: Item) -> Measured:
-    return measure(item, folder / f"{item.name}.html")
+    return measure(item, _page_of(folder, item.name))
+
+
+def _page_of(clips: Path, name: str) -> Path:
+    return clips / f"{name}.html"

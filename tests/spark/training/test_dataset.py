@@ -398,3 +398,15 @@ def test_an_index_cannot_name_files_elsewhere(made: Path, tmp_path: Path) -> Non
     (out / "index.json").write_text("[" * 100_000)
     with pytest.raises(FileFormatError, match="its index is no JSON"):
         read_dataset(out)
+
+
+def test_the_skeleton_of_an_amc_counts(tmp_path: Path) -> None:
+    """What was understood of a motion is not used again once the ASF beside it is another."""
+    (tmp_path / "02.asf").write_text(":version 1.10\n")
+    motion = tmp_path / "02_01.amc"
+    motion.write_text(":FULLY-SPECIFIED\n")
+    (tmp_path / "parts").mkdir()
+    before = make_part(motion, tmp_path / "parts")
+    assert make_part(motion, tmp_path / "parts") == before
+    (tmp_path / "02.asf").write_text(":version 1.10\n\n")
+    assert make_part(motion, tmp_path / "parts") != before

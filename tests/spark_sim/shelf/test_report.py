@@ -165,6 +165,11 @@ def test_a_second_run_measures_what_changed(folder: Path, tmp_path: Path) -> Non
         }.items():
             changed.write_text(changed.read_text() + "\n")
             assert again() == {f"{name}.html"}
+        (out / "dancer_walk" / "squat.bvh").unlink()
+        mine = out / "report_clips" / "mine.html"
+        mine.write_text("mine")
+        assert again() == {"mine.html"}
+        assert "dancer_walk/squat.bvh.html" not in before  # nor is there a page of what is gone
         one = out / "report_clips" / "dancer_walk" / "walk.bvh.json"
         one.write_text(one.read_text()[:-20])  # torn, as no kill leaves it
         assert again() == {"dancer_walk/walk.bvh.html"}
