@@ -38,6 +38,8 @@ COMMANDS = {
     "--force",
     "batch": "batch samples --to robot --method copy -o shelf --workers 2 --mirror --cut 2s "
     "--force",
+    "report with a source": "report samples/walker_walk.bvh --source samples/walker_walk.bvh "
+    "--html both.html --force",
     "report on a folder": "report samples --html shelf.html --workers 2 --force",
     "mjcf": "mjcf samples/walker_walk.bvh -o body.xml --force",
     "play": "play samples/walker_wave.bvh --html play.html --force",
@@ -45,6 +47,7 @@ COMMANDS = {
     "--strip v.png --force",
     "report": "report samples/walker_wave.bvh --html report.html --force",
     "inspect": "inspect samples/walker_walk.bvh --save-map map.toml --force",
+    "page of a rig": "inspect samples/walker_walk.bvh --html rig.html --force",
     "prepare": "prepare samples -o dataset --workers 2 --force",
     "train": "train dataset_for_training -o run --preset tiny --steps 6 --force",
     "evaluate": "evaluate dataset_for_training --made --limit 1 -o table.md --force",

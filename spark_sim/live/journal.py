@@ -11,6 +11,7 @@ from robots.model.motion import RobotMotion
 from sim.interpolate import quaternions
 from spark.errors import ConventionError, FileFormatError, OutputError
 from spark.motion import check_frame_time
+from spark.opening import read_bytes
 from spark.resample import frames_of_keys, rotations_at, values_at
 from spark_sim import files
 from spark_sim.clips import RobotClip
@@ -20,6 +21,10 @@ ENDING = ".part"
 _SCHEMA = "spark-sim live 1"
 _LONGEST_HEADER = 10_000  # bytes
 _MOST_GAP = 600  # steps: a longer one is a pause, which is not filled
+_MOST_FILLED = 10  # times the steps that were taken: with more, each gap is a pause
+_LARGEST = 1e8  # [m, rad], as robots' motions are read
+
+_NO_HEADER = (ValueError, OverflowError, KeyError, TypeError, RecursionError, ConventionError)
 
 
 class Journal:
@@ -73,18 +78,21 @@ def recover(part: Path, *, force: bool) -> Path:
     """Make the npz of what a killed session left. Raises `FileFormatError` where that is no such
     file, and `OutputError` where the npz is there already."""
     path = part.with_suffix("")
-    try:
-        content = part.read_bytes()
-    except OSError as error:
-        raise FileFormatError(part, None, f"can't be read ({error.strerror})") from error
-    written = _steps(part, content)
+    written = _steps(part, read_bytes(part, expected="what a live session recorded"))
     if written is None:
         raise FileFormatError(part, None, "holds no step; remove it")
     if path.suffix != ".npz":
         raise FileFormatError(part, None, f"expected a name that ends in .npz{ENDING}")
     files.claim(path, force=force)
     steps, qpos, about = written
-    _save(load_robot(about["robot"]), steps, qpos, float(about["frame_time"]), path)
+    robot = load_robot(about["robot"])
+    if qpos.shape[1] != len(robot.qpos[0]):
+        raise FileFormatError(
+            part,
+            None,
+            f"has {qpos.shape[1]} coordinates a step; {about['robot']} has {len(robot.qpos[0])}",
+        )
+    _save(robot, steps, qpos, float(about["frame_time"]), path)
     os.unlink(part)
     return path
 
@@ -102,13 +110,14 @@ def _steps(
         width = int(about["nq"])
         if not 7 <= width <= 10_000:
             raise ValueError
-    except (ValueError, OverflowError, KeyError, TypeError, ConventionError) as error:
+    except _NO_HEADER as error:
         raise FileFormatError(path, None, "is nothing that `spark-sim live` began") from error
     rows = content[len(head) + 1 :]
     count = len(rows) // (8 * (width + 1))
     table = np.frombuffer(rows, "<f8", count * (width + 1)).reshape(count, width + 1)
     steps = np.frombuffer(rows, "<i8", count * (width + 1)).reshape(count, width + 1)[:, 0]
-    whole = np.isfinite(table[:, 1:]).all(1) & (np.diff(steps, prepend=-1) > 0)
+    later = steps > np.maximum.accumulate(np.r_[-1, steps])[:-1]
+    whole = (np.abs(table[:, 1:]) <= _LARGEST).all(1) & later
     if not whole.any():
         return None
     return steps[whole].astype(float), table[whole, 1:], about
@@ -122,7 +131,11 @@ def _save(
     path: Path,
 ) -> None:
     """Write the motion; steps that were left out are filled in between."""
-    steps = np.cumsum(np.minimum(np.diff(steps, prepend=steps[0]), _MOST_GAP))
+    gaps = np.diff(steps, prepend=steps[0])
+    filled = np.minimum(gaps, _MOST_GAP)
+    if filled.sum() > _MOST_FILLED * len(gaps) + 10 * _MOST_GAP:
+        filled = np.minimum(gaps, 1)
+    steps = np.cumsum(filled)
     at = frames_of_keys(steps, np.arange(int(steps[-1]) + 1, dtype=float))
     body = robot.on_robot.robot
     columns = quaternions(body.mjcf.model)

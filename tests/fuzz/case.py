@@ -19,11 +19,11 @@ class OverBoundError(AssertionError):
 def judge(target: Target, path: Path) -> None:
     """Use the file at `path`: it gives a result, or an error of ours. Raises what else comes of
     it: an untyped error, `AssertionError` for nonsense, `OverBoundError`."""
-    before = start_of_memory()
+    size, before = path.stat().st_size, start_of_memory()
     judge_but_memory(target, path)
     taken = memory_since(before)
-    if taken > MEMORY + 10 * path.stat().st_size:
-        raise OverBoundError(f"{taken / 1e6:.0f} MB for {path.stat().st_size / 1e6:.3f} MB")
+    if taken > MEMORY + 10 * size:
+        raise OverBoundError(f"{taken / 1e6:.0f} MB for {size / 1e6:.3f} MB")
 
 
 def judge_but_memory(target: Target, path: Path) -> None:

@@ -14,6 +14,7 @@ from sim.body.build import build_body
 from sim.body.mjcf import to_xml
 from spark.demo.sample import sample_rig
 from spark_sim.choices import Format
+from spark_sim.live.journal import Journal, recover
 from tests.fuzz.characters import motion_seeds
 from tests.fuzz.target import FRAMES, Target, finite, goes_further
 
@@ -95,6 +96,20 @@ def _use_sonic(path: Path) -> None:
         target.write_bytes(whole)
 
 
+def _session_seeds(folder: Path) -> list[bytes]:
+    """What a live session that was killed leaves."""
+    robot = spark_sim.load("robot")
+    journal = Journal(folder / "session.npz", robot, "robot", 1 / 50)
+    for step in range(FRAMES):
+        journal.write(step + step // 4, robot.qpos[0])
+    return [(folder / "session.npz.part").read_bytes()]
+
+
+def _use_session(path: Path) -> None:
+    motion = dispatch.read(recover(path, force=True))
+    finite(qpos=motion.qpos, root=motion.motion.root_pos)
+
+
 def _legs() -> str:
     return _LEGS.format("".join(_LEG.format(side, sign) for side, sign in _SIDES))
 
@@ -138,6 +153,7 @@ FORMATS: dict[str, Target] = {
     "pkl": Target(".pkl", _seeds(("gmr", ".pkl")), _use_motion),
     "motion": Target(".motion", _seeds(("protomotions", ".motion")), _use_motion),
     "sidecar": Target(".csv.json", _beside_seeds, _use_beside),
+    "session": Target(".npz.part", _session_seeds, _use_session),
     "sonic": Target(".file", _sonic_seeds, _use_sonic),
     "mjcf": Target(".xml", _mjcf_seeds, _use_model),
     "urdf": Target(".urdf", _urdf_seeds, _use_model),

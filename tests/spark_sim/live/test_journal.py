@@ -1,5 +1,6 @@
 """What a session records, whole and torn."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,38 @@ def test_torn_at_any_byte_the_whole_steps_are_recovered(tmp_path: Path, cut: int
     assert len(spark_sim.load(path)) == (5 if cut == 0 else 4)
 
 
+def test_pauses_without_end_are_not_filled(tmp_path: Path) -> None:
+    made, robot = journal(tmp_path / "a.npz")
+    for step in range(100):
+        made.write(500 * step, robot.qpos[0])
+    made.close()
+    assert len(spark_sim.load(tmp_path / "a.npz")) == 100
+
+
+def test_steps_that_go_back_are_left_out(tmp_path: Path) -> None:
+    made, robot = journal(tmp_path / "a.npz")
+    for step in (5, 3, 4, -(2**63), 2**63 - 1, 6):
+        made.write(step, robot.qpos[0])
+    made.close()
+    assert len(spark_sim.load(tmp_path / "a.npz")) == 601  # 5, a pause, and the last one
+
+
+def test_coordinates_of_another_robot_are_refused(tmp_path: Path) -> None:
+    part = tmp_path / "a.npz.part"
+    head = b'{"schema": "spark-sim live 1", "robot": "robot", "frame_time": 0.02, "nq": 9}\n'
+    part.write_bytes(head + bytes(8 * 10 * 3) + np.arange(10.0).tobytes())
+    with pytest.raises(FileFormatError, match="has 9 coordinates a step; robot has 36"):
+        recover(part, force=False)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    part = tmp_path / "a.npz.part"
+    os.mkfifo(part)
+    with pytest.raises(FileFormatError, match="not a regular file"):
+        recover(part, force=False)
+
+
 def test_no_step_leaves_nothing(tmp_path: Path) -> None:
     made, _ = journal(tmp_path / "a.npz")
     assert made.close() is None
@@ -81,6 +114,7 @@ def test_nothing_is_overwritten(tmp_path: Path) -> None:
         b'{"schema": "spark-sim live 1", "robot": "robot", "frame_time": 0, "nq": 36}\n',
         b'{"schema": "spark-sim live 1", "robot": "robot", "frame_time": 0.02, "nq": 1e99}\n',
         b"\xff" * 20_000,
+        b"[" * 9_000 + b"\n",
     ],
 )
 def test_files_that_are_none(tmp_path: Path, content: bytes) -> None:
@@ -88,7 +122,7 @@ def test_files_that_are_none(tmp_path: Path, content: bytes) -> None:
     part.write_bytes(content)
     with pytest.raises(FileFormatError, match="nothing that `spark-sim live` began"):
         recover(part, force=False)
-    with pytest.raises(FileFormatError, match="can't be read"):
+    with pytest.raises(FileFormatError, match="no such file"):
         recover(tmp_path / "none.npz.part", force=False)
 
 
