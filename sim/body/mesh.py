@@ -14,9 +14,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from sim.body.gltf import SkinnedMesh, read_skinned_mesh
 from sim.body.parts import kept_joints
-from spark.errors import DependencyError, SkeletonError, name_list
+from spark.errors import DependencyError, FileFormatError, SkeletonError, name_list
+from spark.io.reading import GLTF, format_of, read_motion
+from spark.io.skins import read_skin
 from spark.kinematics import world_positions
 from spark.motion import Motion
 from spark.rig.rig import Rig
@@ -24,9 +25,24 @@ from spark.rig.roles import Role, RoleMap
 from spark.rig.tpose import find_tpose
 from spark.rotation import quat_rotate
 from spark.skeleton import Skeleton
+from spark.skin import joints_in
 
 _MIN_BONE = 0.01  # [m]: shorter bones say nothing about the scale
 _MAX_SPREAD = 0.1  # relative: by more than this the bones of one body do not differ in length
+
+
+@dataclass(frozen=True, eq=False)
+class SkinnedMesh:
+    """Joints, parents first, and vertices in the file's rest pose; [m], Z up.
+
+    `owners` is the joint that has the greatest weight on each vertex.
+    """
+
+    names: tuple[str, ...]
+    parents: Int[np.ndarray, "J"]
+    positions: Float[np.ndarray, "J 3"]
+    vertices: Float[np.ndarray, "V 3"]
+    owners: Int[np.ndarray, "V"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +77,32 @@ def hulls_of(path: str | Path, rig: Rig) -> tuple[dict[int, Hull], tuple[str, ..
             hull = convex_hull(points)
             hulls[j] = Hull(np.array(hull.vertices), np.array(hull.faces))
     return hulls, (f"{Path(path).name}: {len(hulls)} hulls; {notes}",)
+
+
+def read_skinned_mesh(path: str | Path) -> SkinnedMesh:
+    """The skin of a file, each vertex where the bone of its greatest weight has it. Raises
+    FileFormatError where it has none or can't be read."""
+    path = Path(path)
+    # The mesh is scaled to the rig: whether its metres are those of a human does not matter.
+    recording = read_motion(path, unit="m" if format_of(path) is GLTF else None)
+    skin, _ = read_skin(path, recording.convention)
+    if skin is None:
+        raise FileFormatError(
+            path,
+            None,
+            "has no skinned mesh; expected a GLB, glTF, VRM or FBX with a mesh that hangs on a "
+            "skeleton",
+        )
+    skeleton = recording.motion.skeleton
+    at_rest = np.tile([1.0, 0.0, 0.0, 0.0], (len(skeleton), 1))
+    positions = world_positions(skeleton, at_rest, np.zeros(3))
+    bones = skin.bones_of[np.arange(len(skin.vertices)), skin.weights.argmax(axis=1)]
+    owners = np.array(joints_in(skeleton, skin))[bones]
+    bind = skin.inverse_bind[bones]
+    vertices = np.einsum("vij,vj->vi", bind[:, :, :3], skin.vertices) + bind[:, :, 3]
+    return SkinnedMesh(
+        skeleton.names, skeleton.parents, positions, vertices + positions[owners], owners
+    )
 
 
 def _matched(path: str | Path, mesh: SkinnedMesh, rig: Rig) -> dict[int, int]:

@@ -36,9 +36,9 @@ def configure(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--mesh",
-        metavar="GLB",
-        help="a skinned mesh on the same skeleton (.glb, .gltf): its convex hulls replace the "
-        "capsules",
+        metavar="FILE",
+        help="a skinned mesh on the same skeleton (.glb, .gltf, .vrm, .fbx): its convex hulls "
+        "replace the capsules",
     )
     add_force(parser)
     add_corrections(parser, "RIG")
