@@ -127,10 +127,10 @@ def write_animation(
     else:
         more |= {"quality": 80, "method": 4}
     durations = np.diff(ends).astype(int).tolist()
-    try:
-        pictures[0].save(path, duration=durations, **more)
-    except OSError as error:
-        raise OutputError(f"{path}: can't be written ({error.strerror or error})") from error
+    buffer = BytesIO()
+    kind = "GIF" if path.suffix.lower() == ".gif" else "WebP"
+    pictures[0].save(buffer, format=kind, duration=durations, **more)
+    write_atomically(path, buffer.getvalue())
 
 
 def _pillow() -> Any:

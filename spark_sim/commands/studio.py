@@ -14,7 +14,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
-from urllib.parse import parse_qs, unquote, urlsplit
+from urllib.parse import parse_qs, unquote
 
 from robots import registry
 from sim.report import assess
@@ -25,6 +25,7 @@ from spark.errors import ConventionError, SparkSimError
 from spark_sim import api
 from spark_sim.clips import AnyClip, Clip
 from spark_sim.loading import load
+from spark_sim.web import host_name, origin_host
 
 _PAGE = Template("spark_sim.commands", "studio.html", ("studio.js",), server=True)
 MAX_UPLOAD = 64 * 1024 * 1024  # bytes
@@ -135,7 +136,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """The page, what it begins with, and the pages that it shows."""
-        path = urlsplit(self.path).path
+        path = self.path.partition("?")[0]
         if not self._from_here():
             return
         if path == "/":
@@ -150,17 +151,17 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_POST(self) -> None:
         """An upload, or an order to retarget one."""
-        parts = urlsplit(self.path)
+        path, _, query = self.path.partition("?")
         if not self._from_here():
             return
-        given = {key: values[0] for key, values in parse_qs(parts.query).items()}
+        given = {key: values[0] for key, values in parse_qs(query).items()}
         try:
-            if parts.path == "/upload":
+            if path == "/upload":
                 content = self._content()
                 if content is None:
                     return
                 answer = self.studio.upload(unquote(given.get("name", "")), content)
-            elif parts.path == "/retarget":
+            elif path == "/retarget":
                 answer = self.studio.retarget(given.get("clip", ""), given.get("target", ""))
             else:
                 self._send_json(HTTPStatus.NOT_FOUND, {"error": "there is no such thing"})
@@ -194,8 +195,8 @@ class _Handler(BaseHTTPRequestHandler):
         nor under a name of its own that leads here."""
         host = self.headers.get("Host", "")
         origin = self.headers.get("Origin")
-        known = self.names is None or (urlsplit(f"//{host}").hostname in self.names)
-        if known and (origin is None or urlsplit(origin).netloc == host):
+        known = self.names is None or host_name(host) in self.names
+        if known and (origin is None or origin_host(origin) == host):
             return True
         self._send_json(HTTPStatus.FORBIDDEN, {"error": "only the page itself may ask"})
         return False
@@ -219,6 +220,6 @@ class _Handler(BaseHTTPRequestHandler):
 def address(text: str) -> tuple[str, int]:
     """HOST:PORT in its parts."""
     host, _, port = text.rpartition(":")
-    if not host or not port.isdigit() or int(port) > 65535:
+    if not host or not port.isdecimal() or len(port) > 5 or int(port) > 65535:
         raise ConventionError(f"--address {text}: expected HOST:PORT, such as localhost:8765")
     return host.strip("[]"), int(port)

@@ -7,9 +7,9 @@ import time
 from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from urllib.parse import urlsplit
 
 from sim.view.live import LivePlayer
+from spark_sim.web import host_name
 
 _RATE = 30.0  # pictures a second
 _LOCAL = ("localhost", "127.0.0.1", "::1")
@@ -22,7 +22,7 @@ def server(address: tuple[str, int], text: str, player: LivePlayer) -> Threading
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
             """The page, or the coordinates, for as long as someone looks."""
-            host = urlsplit(f"//{self.headers.get('Host', '')}").hostname
+            host = host_name(self.headers.get("Host", ""))
             if address[0] in _LOCAL and host not in _LOCAL:
                 self.send_error(HTTPStatus.FORBIDDEN, "only the page itself may ask")
             elif self.path == "/":

@@ -104,12 +104,17 @@ def test_sizes_are_bounded_before_they_are_read(server: Server) -> None:
 
 
 def test_no_other_site_may_ask(server: Server) -> None:
-    for headers in ({"Host": "evil.example"}, {"Origin": "http://evil.example"}):
+    for headers in (
+        *({"Host": "evil.example"}, {"Origin": "http://evil.example"}),
+        *({"Host": "["}, {"Host": "[::1"}, {"Origin": "http://["}),
+    ):
         for method, path in (("GET", "/start"), ("POST", "/upload?name=a.bvh")):
             assert server.ask(method, path, b"", **headers)[0] == 403
 
 
-@pytest.mark.parametrize("text", ["localhost", ":80", "localhost:x", "localhost:99999"])
+@pytest.mark.parametrize(
+    "text", ["localhost", ":80", "localhost:x", "localhost:99999", "h:²", "h:" + "9" * 5000]
+)
 def test_addresses_that_are_none(text: str) -> None:
     with pytest.raises(Exception, match="HOST:PORT"):
         address(text)

@@ -381,6 +381,25 @@ def test_animated_pictures_last_as_long_as_the_motion(tmp_path: Path, ending: st
     assert abs(total / 1000 - duration) < 0.15
 
 
+@pytest.mark.parametrize("ending", ["gif", "webp"])
+def test_an_animation_is_whole_or_not_there(
+    tmp_path: Path, ending: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("PIL.Image")
+
+    def full(path: Path, flags: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    scene = build_scene(figures())
+    out = tmp_path / f"a.{ending}"
+    out.write_text("mine")
+    monkeypatch.setattr("spark.files._to_disk", full)
+    with pytest.raises(OutputError, match="No space left"):
+        write_animation(scene, out, height=40)
+    assert out.read_text() == "mine"
+    assert list(tmp_path.iterdir()) == [out]
+
+
 def test_slow_motion_has_frames_between_those_of_the_motion(tmp_path: Path) -> None:
     """At a quarter of the speed a video takes four times as long, at no fewer frames a second."""
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")

@@ -87,10 +87,11 @@ def test_a_page_gets_coordinates_as_they_come(person: spark_sim.AnyClip, board: 
             assert any(now["words"] == "frame 30" for now in told)
             stream.close()
             asked.close()
-            other = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
-            other.request("GET", "/live", headers={"Host": "evil.example"})
-            assert other.getresponse().status == 403
-            other.close()
+            for host in ("evil.example", "["):
+                other = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+                other.request("GET", "/live", headers={"Host": host})
+                assert other.getresponse().status == 403
+                other.close()
         finally:
             made.shutdown()
             thread.join(20)
