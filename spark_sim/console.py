@@ -111,7 +111,7 @@ def meter(total: int, done: int, label: str, *, lines: bool = False) -> Iterator
             shown = [f"{name}={value:.3g}" for name, value in figures.items()]
             if share is not None:
                 bar.bar_format = "{l_bar}{bar}| {n_fmt}/{total_fmt} [{elapsed}{postfix}]"
-                if 0 < share < 1:
+                if 0 < share < 1 and step < total:
                     shown.append(f"{duration(_left(began, share))} left")
             if shown:
                 bar.set_postfix_str(", ".join(shown), refresh=False)

@@ -61,6 +61,8 @@ def test_what_can_not_be_told_apart_is_refused(tmp_path: Path) -> None:
         outputs(tmp_path / "in", mirror=True)
     with pytest.raises(ConventionError, match=r"both be written to g1/"):
         outputs(tmp_path / "in", to=("g1", "my/g1.xml"))
+    with pytest.raises(ConventionError, match="give each once"):
+        outputs(tmp_path / "in", to=("g1", "g1"))
     with pytest.raises(FileFormatError, match="no such file or folder"):
         outputs(tmp_path / "gone")
     with pytest.raises(OutputError, match="is a character"):
