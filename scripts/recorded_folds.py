@@ -1,10 +1,9 @@
 """What recorded pairs teach about characters that were left out, in the rows of characters_bench.
 
-Usage: python scripts/recorded_folds.py FOLDER [STEPS [WIDTH HEADS BLOCKS [STEP]]] (a folder with
-one folder a character; steps and size of the network, by default those of the preset `tiny`; with
-STEP, every so many of the pairs)
+Usage: python scripts/recorded_folds.py FOLDER [STEP [SIZE...]] (a folder with one folder a
+character; with STEP, every so many of the pairs; a SIZE of network is WIDTHxHEADSxBLOCKSxSTEPS)
 
-Characters and motions are left out a sixth at a time. In each fold the linear model and the network
+Characters and motions are left out a sixth at a time. In each fold the linear model and networks
 learn from the pairs of the others; the pairs onto characters that were left out are measured, each
 once: uc+sm where training has seen the motion, uc+um where not. Of the first fold, so are the pairs
 onto other characters (sc+sm, sc+um).
@@ -25,11 +24,18 @@ import torch
 from scripts.characters_bench import METHODS, Feet, compare, read, shared_motions
 from spark.evaluation.cases import performances
 from spark.evaluation.metrics import Score, mean_score
-from spark.network.recorded import BodyTokens, Habits, KnownBodies, as_recorded, tokens_of
+from spark.network.recorded import (
+    BodyTokens,
+    Habits,
+    HabitsOf,
+    KnownBodies,
+    as_recorded,
+    tokens_of,
+)
 from spark.rig.rig import Rig
 from spark.training.recorded_learning import learn_recorded
 from spark.training.recorded_net import habits_of
-from spark.training.recorded_pairs import recorded_pairs
+from spark.training.recorded_pairs import RecordedPairs, recorded_pairs
 from spark.training.recorded_ridge import fit_ridge
 from spark.training.same_motion import same_motion
 from spark.transfer.analytic import transfer
@@ -37,12 +43,12 @@ from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.foot_lock import lock_feet
 
 FOLDS, SEED = 6, 0
+SIZES = "48x2x2x100", "128x4x4x30"  # the presets `tiny`, and `default` and `paper`
 Method = Callable[[CanonicalMotion, Rig], CanonicalMotion]
 
 
-def main(folder: str, *numbers: str) -> None:
+def main(folder: str, step: str = "1", *sizes: str) -> None:
     torch.set_num_threads(1)
-    steps, width, heads, blocks, step = (*map(int, numbers), *(300, 48, 2, 2, 1)[len(numbers) :])
     motions = shared_motions(Path(folder))
     clips = {path: read(path) for paths in motions.values() for path in paths}
     named = [(a, b) for paths in motions.values() for a in paths for b in paths if a != b]
@@ -55,25 +61,14 @@ def main(folder: str, *numbers: str) -> None:
     )
     for number, (fold, held) in enumerate(zip(characters, held_motions, strict=True)):
         known = recorded_pairs([p for p in found if p.clip.name not in held]).without(fold)
-        began = time.process_time()
-        learned = learn_recorded(known, width=width, heads=heads, blocks=blocks, steps=steps)
-        print(
-            f"fold {number}: {len(known.pairs)} pairs, {time.process_time() - began:.0f} CPU s, "
-            f"left {learned.trust.left:.2f}, reach {learned.trust.reach:.2f}, "
-            f"trust {learned.trust.shares.round(2).tolist()}",
-            file=sys.stderr,
-            flush=True,
-        )
-
-        def network(body: BodyTokens, learned=learned) -> Habits:  # type: ignore[no-untyped-def]
-            return habits_of(learned.net, [body], learned.trust.shares)[0]
-
-        ridge = fit_ridge(known)
+        habits: dict[str, HabitsOf] = {"ridge": fit_ridge(known)}
+        for size in sizes or SIZES:
+            habits[f"network {size}"], near = _network(known, size, f"fold {number}, {size}")
         methods: dict[str, Method] = dict(METHODS)
-        for name, habits in (("ridge", ridge), ("network", network)):
-            plain = partial(_recorded, habits, learned.known)
+        for name, of_body in habits.items():
+            plain = partial(_recorded, of_body, near)
             methods |= {name: plain, f"{name}, feet held": partial(_held, plain)}
-        for a, b in pairs[::step]:
+        for a, b in pairs[:: int(step)]:
             unseen = b.parent.name in fold
             if unseen or not number:
                 cell = f"{'uc' if unseen else 'sc'}+{'um' if a.stem in held else 'sm'}"
@@ -95,8 +90,27 @@ def main(folder: str, *numbers: str) -> None:
     print(f"\nPairs: {', '.join(counts)}; {len(named) - len(pairs)} of one name move differently")
 
 
+def _network(known: RecordedPairs, size: str, what: str) -> tuple[HabitsOf, KnownBodies]:
+    """What a network of this size learns, and the bodies that it knows."""
+    width, heads, blocks, steps = map(int, size.split("x"))
+    began = time.process_time()
+    learned = learn_recorded(known, width=width, heads=heads, blocks=blocks, steps=steps)
+    print(
+        f"{what}: {len(known.pairs)} pairs, {time.process_time() - began:.0f} CPU s, "
+        f"left {learned.trust.left:.2f}, reach {learned.trust.reach:.2f}, "
+        f"trust {learned.trust.shares.round(2).tolist()}",
+        file=sys.stderr,
+        flush=True,
+    )
+
+    def network(body: BodyTokens) -> Habits:
+        return habits_of(learned.net, [body], learned.trust.shares)[0]
+
+    return network, learned.known
+
+
 def _recorded(
-    habits: Callable[[BodyTokens], Habits], known: KnownBodies, source: CanonicalMotion, rig: Rig
+    habits: HabitsOf, known: KnownBodies, source: CanonicalMotion, rig: Rig
 ) -> CanonicalMotion:
     bodies = tokens_of(source.rig), tokens_of(rig)
     share = known.nearness(bodies[0]) * known.nearness(bodies[1])
