@@ -31,12 +31,13 @@ def test_a_robot_follows_a_sender_that_loses_and_shuffles(tmp_path: Path) -> Non
     receiver.bind(("127.0.0.1", 0))
     receiver.settimeout(20)
     told: list[str] = []
+    gone = "no news of RightHand: held"  # on a busy machine there is none of the sender, too
     out, rng = tmp_path / "live.npz", np.random.default_rng(1)
 
     def packets(step: int, clock: float) -> list[bytes]:
         turn = Rotation.from_euler("z", 60 * np.sin(3 * clock), degrees=True)
         data = vmc.packet({"LeftUpperArm": turn}, clock)
-        if session.frames > 15 and not any("no news" in each for each in told):
+        if session.frames > 15 and not any(gone in each for each in told):
             data = data.replace(b"RightHand", b"RightXand")
         late, broken = vmc.packet({}, clock - 0.05), data[: rng.integers(0, len(data))]
         sent = [[data], [], [data, late], [data, data], [broken], [data], [], [late, data]]
@@ -50,7 +51,11 @@ def test_a_robot_follows_a_sender_that_loses_and_shuffles(tmp_path: Path) -> Non
             send(
                 listener.port,
                 packets,
-                until=lambda: session.frames > 40 and any(" again" in each for each in told),
+                until=lambda: (
+                    session.frames > 40
+                    and any(gone in each for each in told)
+                    and any(" again" in each for each in told)
+                ),
             )
         summary = session.summary()
     first = json.loads(receiver.recv(65535))
@@ -63,7 +68,7 @@ def test_a_robot_follows_a_sender_that_loses_and_shuffles(tmp_path: Path) -> Non
     shoulder = np.ptp(np.stack([*recorded.joints.values()], axis=1), axis=0)
     assert shoulder.max() > 0.8  # [rad]: the arm goes up and down
     assert np.ptp(recorded.qpos[10:, :2], axis=0).max() < 0.1  # it stands
-    assert any("no news of RightHand: held" in each for each in told)
+    assert any(gone in each for each in told)
     assert listener.pose.reordered > 0
     assert listener.pose.dropped > 0
     assert "p50" in summary
