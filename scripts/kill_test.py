@@ -138,9 +138,14 @@ def _dataset(path: Path) -> None:
 
 
 def _checkpoint(path: Path) -> None:
+    from safetensors.numpy import load_file
+
     from spark.training.checkpoint import load_checkpoint
 
-    load_checkpoint(path)
+    if path.name.startswith("optimizer"):
+        load_file(path)
+    else:
+        load_checkpoint(path)
 
 
 def _text(path: Path) -> None:
