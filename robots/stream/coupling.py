@@ -51,33 +51,42 @@ class Coupling:
 
     def reset(self) -> None:
         """The source has stood still."""
-        self._hips_steps = np.zeros((len(self._first), 3))
+        self._source_steps = np.zeros((len(self._first), 3))
 
     def follow(self, step: Float[np.ndarray, "3"]) -> None:
-        """Take in how far [m] the newest frame's hips are from those before."""
-        last = self._hips_steps[-1]
+        """Take in how far [m] the source's centre of mass has moved with the newest frame."""
+        last = self._source_steps[-1]
         step = last + np.clip(step - last, -self._max_change, self._max_change)
-        self._hips_steps = np.concatenate([self._hips_steps[1:], step[None]])
+        self._source_steps = np.concatenate([self._source_steps[1:], step[None]])
 
     def add_to(
         self,
         steps: Float[np.ndarray, "V D"],
+        com_steps: Float[np.ndarray, "V 3"],
+        com_jacobian: Float[np.ndarray, "F 3 D"],
         ahead: Ahead,
         blocks: Float[np.ndarray, "F D F D"],
         g: Float[np.ndarray, "F D"],
     ) -> None:
-        """Add to the normal equations: `steps` are the dofs' from frame to frame, and `ahead` is
-        what is expected of them."""
+        """Add to the normal equations: `steps` are the dofs' from frame to frame, `com_steps` [m]
+        those of the centre of mass, and `ahead` is what is expected of the dofs."""
         against = steps.copy()  # and what is expected is that they do not move
-        against[:, _BASE] -= self._hips_steps
-        diagonals = np.einsum("sdtd->std", blocks)  # a view
-        diagonals += self._products
-        g += (self._to_gradient * against).sum(axis=1)
+        against[:, _BASE] = com_steps - self._source_steps
+        ahead.targets[_BASE] = com_jacobian[-1] @ ahead.targets
         ahead.speeds[_BASE] = 0.0
         P, p = self._to_go.of(ahead)
         x = np.stack([-against[-1] - against[-2], -against[-1], np.zeros(g.shape[1])])
-        diagonals[-3:, -3:] += P.transpose(1, 2, 0)
-        g[-3:] += (P @ x.T[..., None])[..., 0].T + p.T
+        products, gradient = self._products.copy(), (self._to_gradient * against).sum(axis=1)
+        products[-3:, -3:] += P.transpose(1, 2, 0)
+        gradient[-3:] += (P @ x.T[..., None])[..., 0].T + p.T
+        for axis in range(3):
+            J = com_jacobian[:, axis]
+            blocks += products[:, None, :, None, axis] * (J[:, :, None, None] * J)
+            g += gradient[:, axis, None] * J
+        products[:, :, _BASE] = gradient[:, _BASE] = 0.0
+        diagonals = np.einsum("sdtd->std", blocks)  # a view
+        diagonals += products
+        g += gradient
         overspeed = steps - np.minimum(np.maximum(steps, -self._max_steps), self._max_steps)
         if overspeed.any():
             g += self._overspeed_weight * (self._first.T @ overspeed)

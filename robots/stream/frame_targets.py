@@ -17,6 +17,7 @@ from robots.solver.targets import (
     palm_thickness,
     source_feet,
 )
+from sim.body.anthropometry import segments
 from spark.errors import FrameError
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
@@ -25,6 +26,7 @@ from spark.transfer.analytic import correspond
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
 LATENCY = 2  # [frames] between the newest frame of a stream and its answer
+THROWN = 1.06
 _MAX_NORM_ERROR = 0.05  # of a quaternion: beyond, it is not one that was merely rounded
 
 
@@ -52,7 +54,7 @@ class FrameTargets:
     """`robots.solver.targets.Targets` of one frame, or of some (T), floor at z = 0, turns as
     matrices (`R_world_joint`).
 
-    `bones` are in the order of `FrameReader.bones`. `feet` are the source's heel and toe of each of
+    `com` is the source's centre of mass, scaled. `bones` are in the order of `FrameReader.bones`. `feet` are the source's heel and toe of each of
     the robot's soles [m, the source's own world], `clearance` is how high its soles are, scaled,
     and `pitched` how high the points of the robot's would be above the lowest of each [m].
     """
@@ -60,6 +62,7 @@ class FrameTargets:
     world: Float[np.ndarray, "*T J 3 3"]
     chest: Float[np.ndarray, "*T 3 3"]
     hips: Float[np.ndarray, "*T 3"]
+    com: Float[np.ndarray, "*T 3"]
     bones: Float[np.ndarray, "*T B 3"]
     hands: Float[np.ndarray, "*T 3"]
     feet: Float[np.ndarray, "*T S 2 3"]
@@ -94,6 +97,7 @@ class FrameReader:
         self._untpose = matrix_from_quat(quat_conj(source.tpose))
         self._tpose = matrix_from_quat(robot.rig.tpose)
         self._chest = source.chest
+        self._segments = segments(source)
         self._correspondence = correspond(source, robot.rig)
         self._at_rest = np.flatnonzero(self._correspondence.first < 0)
         self._interpolated = np.flatnonzero(
@@ -116,15 +120,19 @@ class FrameReader:
             bones[row] = turns[joint] @ out
         hips = joints[self.source.hips].mean(0)
         hips[2] -= self.ground.z
+        thrown = self._thrown(hips[2])
+        hips *= self.scale
+        hips[2] += thrown
         own_world = self._own(turns) @ self._tpose
         return FrameTargets(
             world=own_world,
             chest=turns[self._chest] @ self._tpose[self.robot.rig.chest],
-            hips=self.scale * hips,
+            hips=hips,
+            com=self._com(world, joints) + [0.0, 0.0, thrown],
             bones=bones,
             hands=self._between_hands(joints),
             feet=self._feet(world, joints),
-            clearance=self._clearance(world, joints),
+            clearance=self._clearance(world, joints) + thrown,
             pitched=self._pitched(own_world),
         )
 
@@ -160,6 +168,21 @@ class FrameReader:
             places[level] = places[parents] + (above @ local[level][..., None])[..., 0]
             turns[level] = above @ turns[level]
         return turns, places
+
+    def _thrown(self, height: float) -> float:
+        """How much higher [m] than scaled the hips are that are so high [m]: above where they stand
+        a body is thrown, and falls as fast whatever its size."""
+        standing = self.source.hip_height
+        beyond = height - THROWN * standing
+        return (1 - self.scale) * max(0.0, beyond)
+
+    def _com(
+        self, world: Float[np.ndarray, "N 3 3"], joints: Float[np.ndarray, "N 3"]
+    ) -> Float[np.ndarray, "3"]:
+        own = self._segments
+        places = joints[own.joints] + (world[own.joints] @ own.coms[:, :, None])[..., 0]
+        com: Float[np.ndarray, 3] = self.scale * (own.masses @ places)
+        return com
 
     def _own(self, turns: Float[np.ndarray, "N 3 3"]) -> Float[np.ndarray, "J 3 3"]:
         """How the robot's joints turn since the T-pose: as `Correspondence.rotations` says."""

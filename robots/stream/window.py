@@ -29,6 +29,7 @@ class Window:
     ) -> None:
         self._terms, self._free = terms, free
         self._model, tree = robot.mjcf.model, robot.tree
+        self._data, self._root = mujoco.MjData(self._model), robot.mjcf.root
         starts = self._model.jnt_dofadr[list(robot.mj_joints)]
         base = int(self._model.jnt_dofadr[robot.mjcf.free_joint])
         dofs = [*range(base, base + 6)]
@@ -58,7 +59,7 @@ class Window:
     ) -> Float[np.ndarray, "T nq"]:
         """`q` after at most `_MAX_ITER` steps of its free frames; `targets` are for all."""
         candidates = self._terms.candidates(q[-1:])
-        self._coupling.follow(targets.hips[-1] - targets.hips[-2])
+        self._coupling.follow(targets.com[-1] - targets.com[-2])
         for _ in range(_MAX_ITER):
             q, length = self._step(q, targets, foot_targets, posture, candidates)
             if length < _STEP_TOL:
@@ -108,7 +109,10 @@ class Window:
             blocks[t, :, t] = H[t]
         if lone_damping is None:
             ahead = self._motion.of(q[-1], H[-1], g[-1])
-            self._coupling.add_to(self._steps(q), ahead, blocks, g)
+            com, jacobian = self._center_of_mass(q)
+            self._coupling.add_to(
+                self._steps(q), np.diff(com, axis=0), jacobian[-free:], ahead, blocks, g
+            )
         held = self._at_limits(q[-free:], g)
         g[held] = 0.0
         whole.reshape(-1)[:: free * D + 1] += np.where(
@@ -130,6 +134,20 @@ class Window:
         for t in range(len(q) - 1):
             mujoco.mj_differentiatePos(self._model, steps[t], 1.0, q[t], q[t + 1])
         return steps[:, self._dofs]
+
+    def _center_of_mass(
+        self, q: Float[np.ndarray, "T nq"]
+    ) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3 D"]]:
+        """Where it is [m, world], and by how much the dofs move it."""
+        model, data, root = self._model, self._data, self._root
+        com, jacobian = np.empty((len(q), 3)), np.empty((len(q), 3, model.nv))
+        for t in range(len(q)):
+            data.qpos = q[t]
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            com[t] = data.subtree_com[root]
+            mujoco.mj_jacSubtreeCom(model, data, jacobian[t], root)
+        return com, jacobian[:, :, self._dofs]
 
     def _at_limits(
         self, q: Float[np.ndarray, "F nq"], g: Float[np.ndarray, "F D"]
