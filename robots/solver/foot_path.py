@@ -8,6 +8,7 @@ foot is fast it is lifted, so that it steps and does not drag.
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float
+from scipy.ndimage import grey_opening
 
 from robots.model.morphology import Morphology
 from robots.solver.footprints import FootPlan, on_points
@@ -17,13 +18,14 @@ from spark.transfer.footfalls import between_contacts
 
 # How firmly the points of a sole are held, in x, y and z, as a share of those that stand:
 SWING_HOLD = np.array([0.35, 0.35, 0.6])  # its height in swing is what keeps it off the floor,
-RAISED_HOLD = np.array([0.2, 0.2, 0.3])  # the raised end of a standing foot follows its copy
+RAISED_HOLD = np.array([1.0, 1.0, 0.3])  # the raised end of a standing foot does not sweep over the floor
 # Hip heights that a fast foot is above the floor: the report sees feet skate below 0.028.
 STEP_HEIGHT = 0.03
 # Hip heights/s below which a foot may be on the floor, and above which it is lifted: the report
 # sees feet skate above 0.22.
 SLOW, FAST = 0.16, 0.22
 SWING_SPAN, STAND_SPAN = 0.05, 0.02  # [s] before and after a frame for a foot's speed
+MIN_CREEP = 0.08  # [s] that a standing foot has to move for before it is lifted
 LET_DOWN = 0.1  # [s] within which a foot comes down that is in the air where its contact begins
 _ON_FLOOR = 1e-3  # [m]
 
@@ -70,8 +72,11 @@ def _height(
     drop = np.where(stands, clearance, 0.0)
     clearance = clearance - _fading(drop, stands, max(1, round(LET_DOWN / plan.frame_time)))
     height = np.where(stands, 0.0, clearance + plan.lift)
-    spans = (_speed(points, low, plan.frame_time, span) for span in (STAND_SPAN, SWING_SPAN))
-    speed = np.where(stands, *spans) / plan.hip_height
+    standing, swinging = (
+        _speed(points, low, plan.frame_time, span) for span in (STAND_SPAN, SWING_SPAN)
+    )
+    standing = grey_opening(standing, max(1, round(MIN_CREEP / plan.frame_time)), mode="nearest")
+    speed = np.where(stands, standing, swinging) / plan.hip_height
     lifted = np.clip((speed - SLOW) / (FAST - SLOW), 0.0, 1.0) * STEP_HEIGHT * plan.hip_height
     return np.maximum(height, lifted)
 

@@ -15,7 +15,8 @@ from robots.solver.weights import MAX_HINGE_SPEED, W_OVERSPEED
 from robots.solver.weights import SMOOTH_CUTOFF as WHOLE_CLIP_CUTOFF
 from robots.stream.prediction import Ahead, CostToGo
 
-BASE_CUTOFF = 1.0  # [Hz] above which the base's motion against the source's fades,
+BASE_CUTOFF = np.array([0.7, 0.7, 1.2])  # [Hz] above which the centre of mass fades against the source's:
+# in height it gives way to landings
 JERK_CUTOFF = 2.5  # and that of hinges, by their jerk
 MAX_HIPS_ACCELERATION = 40.0  # [m/s²] of the source that the base goes along with: more is a glitch
 _BASE = slice(0, 3)  # dofs of the base's position

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from robots.solver.foot_path import FAST, SLOW, STEP_HEIGHT, SWING_HOLD
+from robots.solver.foot_path import FAST, RAISED_HOLD, SLOW, STEP_HEIGHT, SWING_HOLD
 from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
 from robots.stream.footprint import Footprint, yaw_between
 from robots.stream.frame_targets import FrameReader, FrameTargets
@@ -150,6 +150,7 @@ class ContactTracker:
             most = held.max(axis=1, keepdims=True)
             places[:, own, 2] = (1 - held) * pitched[:, own] + (1 - most) * height[:, s, None]
             shares[:, own] = held[..., None] + (1 - held[..., None]) * _SWING
+            shares[:, own, :2] = most[..., None] * RAISED_HOLD[:2]
             shares[~known[:, s], own, :2] = 0.0
         return FootTargets(places, shares)
 
