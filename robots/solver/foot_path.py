@@ -18,7 +18,7 @@ from spark.transfer.footfalls import between_contacts
 
 # How firmly the points of a sole are held, in x, y and z, as a share of those that stand:
 SWING_HOLD = np.array([0.35, 0.35, 0.6])  # its height in swing is what keeps it off the floor,
-RAISED_HOLD = np.array([1.0, 1.0, 0.3])  # the raised end of a standing foot does not sweep over the floor
+RAISED_HOLD = np.array([1.0, 1.0, 0.3])  # a standing foot's raised end turns about the other
 # Hip heights that a fast foot is above the floor: the report sees feet skate below 0.028.
 STEP_HEIGHT = 0.03
 # Hip heights/s below which a foot may be on the floor, and above which it is lifted: the report
@@ -75,7 +75,8 @@ def _height(
     standing, swinging = (
         _speed(points, low, plan.frame_time, span) for span in (STAND_SPAN, SWING_SPAN)
     )
-    standing = grey_opening(standing, max(1, round(MIN_CREEP / plan.frame_time)), mode="nearest")
+    creep = max(1, round(MIN_CREEP / plan.frame_time))
+    standing = grey_opening(standing, (creep,), mode="nearest")
     speed = np.where(stands, standing, swinging) / plan.hip_height
     lifted = np.clip((speed - SLOW) / (FAST - SLOW), 0.0, 1.0) * STEP_HEIGHT * plan.hip_height
     return np.maximum(height, lifted)

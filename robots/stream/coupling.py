@@ -1,9 +1,10 @@
-"""What couples the frames of a stream's window: jerk, the base's acceleration, and speed.
+"""What couples the frames of a stream's window: jerk, the mass's acceleration, and speed.
 
 `robots.solver.smoothness` couples those of whole clips. Without later frames, accelerations that
-are held back would lag. So those of the base are compared with the source's, and what gives way
-to feet and floor fades in it; and of hinges the jerk is held back, which leaves an even turn, and
-an even start of one, as it is. Both reach beyond the newest frame (`robots.stream.prediction`).
+are held back would lag. So those of the centre of mass are compared with the source's, and what
+gives way to feet and floor fades in it; and of hinges the jerk is held back, which leaves an even
+turn, and an even start of one, as it is. Both reach beyond the newest frame
+(`robots.stream.prediction`).
 """
 
 import numpy as np
@@ -15,10 +16,12 @@ from robots.solver.weights import MAX_HINGE_SPEED, W_OVERSPEED
 from robots.solver.weights import SMOOTH_CUTOFF as WHOLE_CLIP_CUTOFF
 from robots.stream.prediction import Ahead, CostToGo
 
-BASE_CUTOFF = np.array([0.7, 0.7, 1.2])  # [Hz] above which the centre of mass fades against the source's:
+COM_CUTOFF = np.array(
+    [0.7, 0.7, 1.2]
+)  # [Hz] above which the centre of mass fades against the source's:
 # in height it gives way to landings
 JERK_CUTOFF = 2.5  # and that of hinges, by their jerk
-MAX_HIPS_ACCELERATION = 40.0  # [m/s²] of the source that the base goes along with: more is a glitch
+MAX_ACCELERATION = 40.0  # [m/s²] of the source that the base goes along with: more is a glitch
 _BASE = slice(0, 3)  # dofs of the base's position
 
 
@@ -27,9 +30,9 @@ class Coupling:
 
     def __init__(self, robot: Morphology, frame_time: float, *, fixed: int, free: int) -> None:
         whole = acceleration_weights(robot) * (2 * np.pi * WHOLE_CLIP_CUTOFF) ** 2
-        base, hinges = 2 * np.pi * BASE_CUTOFF * frame_time, 2 * np.pi * JERK_CUTOFF * frame_time
+        mass, hinges = (2 * np.pi * cutoff * frame_time for cutoff in (COM_CUTOFF, JERK_CUTOFF))
         weights = (whole / hinges**3) ** 2
-        weights[_BASE] = (whole[_BASE] / base**2) ** 2
+        weights[_BASE] = (whole[_BASE] / mass**2) ** 2
         orders = np.full(len(weights), 3)
         orders[_BASE] = 2
         to_steps = np.diff(np.eye(fixed + free), axis=0)
@@ -44,7 +47,7 @@ class Coupling:
             self._to_gradient[:, :, own] = (over_frames.T @ over_steps)[..., None] * weights[own]
         self._to_go = CostToGo(frame_time, orders, weights)
         self._overspeed_weight = (W_OVERSPEED / frame_time) ** 2
-        self._max_change = MAX_HIPS_ACCELERATION * frame_time**2
+        self._max_change = MAX_ACCELERATION * frame_time**2
         self.reset()
         self._max_steps = np.full(robot.tree.nv, np.inf)
         hinges = robot.tree.dof_starts[~robot.tree.balls]
@@ -57,7 +60,10 @@ class Coupling:
     def follow(self, step: Float[np.ndarray, "3"]) -> None:
         """Take in how far [m] the source's centre of mass has moved with the newest frame."""
         last = self._source_steps[-1]
-        step = last + np.clip(step - last, -self._max_change, self._max_change)
+        change = step - last
+        step = last + change * min(
+            1.0, self._max_change / max(float(np.linalg.norm(change)), 1e-12)
+        )
         self._source_steps = np.concatenate([self._source_steps[1:], step[None]])
 
     def add_to(

@@ -143,14 +143,20 @@ class ContactTracker:
         places, shares = np.zeros((2, len(frames), sum(map(len, self._robot.soles)), 3))
         pitched = np.stack([frame.pitched for frame in frames])
         for s, (sole, own) in enumerate(zip(self._robot.soles, self._own, strict=True)):
-            flat = self._flat[s] - self._flat[s][-2:].mean(0)
-            place = pivot[:, s, None] + np.exp(1j * heading[:, s, None]) * (flat @ (1, 1j))
             held = on_points(sole, holds[:, s].T).T
-            places[:, own, 0], places[:, own, 1] = place.real, place.imag
             most = held.max(axis=1, keepdims=True)
-            places[:, own, 2] = (1 - held) * pitched[:, own] + (1 - most) * height[:, s, None]
+            flat = (self._flat[s] - self._flat[s][-2:].mean(0)) @ (1, 1j)
+            raised = pitched[:, own, :2] @ (1, 1j)
+            # What is raised turns about what stands.
+            raised += (held * (flat - raised)).sum(1, keepdims=True) / np.maximum(
+                held.sum(1, keepdims=True), 1e-9
+            )
+            over = held * flat + (1 - held) * raised
+            place = pivot[:, s, None] + np.exp(1j * heading[:, s, None]) * over
+            places[:, own, 0], places[:, own, 1] = place.real, place.imag
+            places[:, own, 2] = (1 - held) * pitched[:, own, 2] + (1 - most) * height[:, s, None]
             shares[:, own] = held[..., None] + (1 - held[..., None]) * _SWING
-            shares[:, own, :2] = most[..., None] * RAISED_HOLD[:2]
+            shares[:, own, :2] = np.maximum(held, RAISED_HOLD[0] * most)[..., None]
             shares[~known[:, s], own, :2] = 0.0
         return FootTargets(places, shares)
 

@@ -25,8 +25,8 @@ from spark.rotation import matrix_from_quat, quat_conj
 from spark.transfer.analytic import correspond
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
+STANDING = 1.06  # hips' heights of a T-pose up to which they stand; above, a body is thrown
 LATENCY = 2  # [frames] between the newest frame of a stream and its answer
-THROWN = 1.06
 _MAX_NORM_ERROR = 0.05  # of a quaternion: beyond, it is not one that was merely rounded
 
 
@@ -54,9 +54,11 @@ class FrameTargets:
     """`robots.solver.targets.Targets` of one frame, or of some (T), floor at z = 0, turns as
     matrices (`R_world_joint`).
 
-    `com` is the source's centre of mass, scaled. `bones` are in the order of `FrameReader.bones`. `feet` are the source's heel and toe of each of
-    the robot's soles [m, the source's own world], `clearance` is how high its soles are, scaled,
-    and `pitched` how high the points of the robot's would be above the lowest of each [m].
+    `com` is the source's centre of mass, scaled. `bones` are in the order of `FrameReader.bones`.
+    `feet` are the source's heel and toe of each of the robot's soles [m, the source's own world],
+    `clearance` is how high its soles are, scaled, and `pitched` where the points of the robot's
+    would be: from the middle of its toes along the foot and to its left, and above the lowest of
+    them [m].
     """
 
     world: Float[np.ndarray, "*T J 3 3"]
@@ -67,7 +69,7 @@ class FrameTargets:
     hands: Float[np.ndarray, "*T 3"]
     feet: Float[np.ndarray, "*T S 2 3"]
     clearance: Float[np.ndarray, "*T S"]
-    pitched: Float[np.ndarray, "*T P"]
+    pitched: Float[np.ndarray, "*T P 3"]
 
     def last(self, frames: int) -> "FrameTargets":
         """Those of the last frames."""
@@ -128,7 +130,7 @@ class FrameReader:
             world=own_world,
             chest=turns[self._chest] @ self._tpose[self.robot.rig.chest],
             hips=hips,
-            com=self._com(world, joints) + [0.0, 0.0, thrown],
+            com=self._com(world, joints) + np.array([0.0, 0.0, thrown]),
             bones=bones,
             hands=self._between_hands(joints),
             feet=self._feet(world, joints),
@@ -170,11 +172,9 @@ class FrameReader:
         return turns, places
 
     def _thrown(self, height: float) -> float:
-        """How much higher [m] than scaled the hips are that are so high [m]: above where they stand
-        a body is thrown, and falls as fast whatever its size."""
-        standing = self.source.hip_height
-        beyond = height - THROWN * standing
-        return (1 - self.scale) * max(0.0, beyond)
+        """How much higher [m] than scaled the hips are that are so high [m] in the source: a body
+        that is thrown falls as fast, and so rises as high, whatever its size."""
+        return (1 - self.scale) * max(0.0, height - STANDING * self.source.hip_height)
 
     def _com(
         self, world: Float[np.ndarray, "N 3 3"], joints: Float[np.ndarray, "N 3"]
@@ -221,12 +221,19 @@ class FrameReader:
             out[s] = self.scale * (heights.min() - self.ground.z)
         return out
 
-    def _pitched(self, world: Float[np.ndarray, "J 3 3"]) -> Float[np.ndarray, "P"]:
+    def _pitched(self, world: Float[np.ndarray, "J 3 3"]) -> Float[np.ndarray, "P 3"]:
         out = []
         for sole, from_foot in zip(self.robot.soles, self._from_foot, strict=True):
-            height = from_foot @ world[sole.foot, 2] + (world[sole.joints, 2] * sole.offsets).sum(1)
-            out.append(height - height.min())
-        return np.concatenate(out) if out else np.zeros(0)
+            points = from_foot @ world[sole.foot].T
+            points += (world[sole.joints] @ sole.offsets[:, :, None])[..., 0]
+            toe = points[-2:, :2].mean(0)
+            x, y = toe - points[:2, :2].mean(0)
+            along, across = np.array([[x, y], [-y, x]]) / max(np.hypot(x, y), 1e-9)
+            over = points[:, :2] - toe
+            out.append(
+                np.column_stack([over @ along, over @ across, points[:, 2] - points[:, 2].min()])
+            )
+        return np.concatenate(out) if out else np.zeros((0, 3))
 
     def _between_hands(self, joints: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "3"]:
         if self.hands is None:
