@@ -8,7 +8,7 @@ foot is fast it is lifted, so that it steps and does not drag.
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float
-from scipy.ndimage import grey_opening
+from scipy.ndimage import median_filter
 
 from robots.model.morphology import Morphology
 from robots.solver.footprints import FootPlan, on_points
@@ -25,7 +25,7 @@ STEP_HEIGHT = 0.03
 # sees feet skate above 0.22.
 SLOW, FAST = 0.16, 0.22
 SWING_SPAN, STAND_SPAN = 0.05, 0.02  # [s] before and after a frame for a foot's speed
-MIN_CREEP = 0.08  # [s] that a standing foot has to move for before it is lifted
+MIN_CREEP = 0.08  # [s], half of which a standing foot has to move for before it is lifted
 LET_DOWN = 0.1  # [s] within which a foot comes down that is in the air where its contact begins
 _ON_FLOOR = 1e-3  # [m]
 
@@ -76,7 +76,7 @@ def _height(
         _speed(points, low, plan.frame_time, span) for span in (STAND_SPAN, SWING_SPAN)
     )
     creep = max(1, round(MIN_CREEP / plan.frame_time))
-    standing = grey_opening(standing, (creep,), mode="nearest")
+    standing = median_filter(standing, creep, mode="nearest")
     speed = np.where(stands, standing, swinging) / plan.hip_height
     lifted = np.clip((speed - SLOW) / (FAST - SLOW), 0.0, 1.0) * STEP_HEIGHT * plan.hip_height
     return np.maximum(height, lifted)

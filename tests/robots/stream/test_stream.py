@@ -24,8 +24,8 @@ from robots.stream.stream import Stream
 from robots.stream.terms import FootTargets, Terms
 from robots.tree import forward_kinematics
 from scripts.robot_bars import follow
-from spark.demo.sample import sample_motion, sample_rig
 from spark.constants import GRAVITY
+from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import ConventionError, FrameError
 from spark.io.recording import read_recording
 from spark.motion import Motion
