@@ -86,10 +86,13 @@ class Coupling:
         products, gradient = self._products.copy(), (self._to_gradient * against).sum(axis=1)
         products[-3:, -3:] += P.transpose(1, 2, 0)
         gradient[-3:] += (P @ x.T[..., None])[..., 0].T + p.T
-        for axis in range(3):
-            J = com_jacobian[:, axis]
-            blocks += products[:, None, :, None, axis] * (J[:, :, None, None] * J)
-            g += gradient[:, axis, None] * J
+        frames, dofs = g.shape
+        weights, jacobian = np.zeros((frames, 3, frames, 3)), np.zeros((frames, 3, frames, dofs))
+        np.einsum("sata->sta", weights)[:] = products[:, :, _BASE]
+        np.einsum("tatd->tad", jacobian)[:] = com_jacobian
+        J = jacobian.reshape(3 * frames, -1)
+        blocks += (J.T @ (weights.reshape(len(J), -1) @ J)).reshape(blocks.shape)
+        g += (J.T @ gradient[:, _BASE].ravel()).reshape(g.shape)
         products[:, :, _BASE] = gradient[:, _BASE] = 0.0
         diagonals = np.einsum("sdtd->std", blocks)  # a view
         diagonals += products

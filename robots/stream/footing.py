@@ -55,7 +55,8 @@ class ContactTracker:
             slice(end - len(sole), end) for sole, end in zip(self._robot.soles, ends, strict=True)
         ]
         self._wobble = MAX_WOBBLE * self._robot.rig.hip_height
-        self._flat = [flat_sole(self._robot, sole) for sole in self._robot.soles]
+        flat = (flat_sole(self._robot, sole) @ (1, 1j) for sole in self._robot.soles)
+        self._flat = [points - points[-2:].mean() for points in flat]  # from the toes' middle
         self._length = self._reach + ahead + 1
         self._history: deque[FrameTargets] = deque(maxlen=self._length)
         soles = len(self._robot.soles)
@@ -97,7 +98,7 @@ class ContactTracker:
     ) -> None:
         """The footprints of feet that are not held yet, where these are."""
         for s in np.flatnonzero(~holds.any(axis=1)).tolist():
-            length = float(self._flat[s][-2:, 0].mean() - self._flat[s][:2, 0].mean())
+            length = -float(self._flat[s][:2].real.mean())
             on_toe = bool(planted[s, 1] or not planted[s, 0])
             self._footprints[s].put(points[self._own[s]], length, on_toe=on_toe)
 
@@ -145,7 +146,7 @@ class ContactTracker:
         for s, (sole, own) in enumerate(zip(self._robot.soles, self._own, strict=True)):
             held = on_points(sole, holds[:, s].T).T
             most = held.max(axis=1, keepdims=True)
-            flat = (self._flat[s] - self._flat[s][-2:].mean(0)) @ (1, 1j)
+            flat = self._flat[s]
             raised = pitched[:, own, :2] @ (1, 1j)
             # What is raised turns about what stands.
             raised += (held * (flat - raised)).sum(1, keepdims=True) / np.maximum(

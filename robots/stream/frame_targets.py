@@ -71,10 +71,6 @@ class FrameTargets:
     clearance: Float[np.ndarray, "*T S"]
     pitched: Float[np.ndarray, "*T P 3"]
 
-    def last(self, frames: int) -> "FrameTargets":
-        """Those of the last frames."""
-        return FrameTargets(*(getattr(self, f.name)[-frames:] for f in fields(self)))
-
 
 def stack_targets(targets: Sequence[FrameTargets]) -> FrameTargets:
     """Those of some frames in one."""

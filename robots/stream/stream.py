@@ -71,7 +71,8 @@ class Stream:
             foot_targets = self._contacts.update(targets, self._terms.sole_points(poses)[0])
             bones, angles = self._terms.bones(poses)[0], self._terms.angles(q)[_FIXED]
             posture = self._detours.update(self._targets[_FIXED], bones, angles)
-            self._q = self._window.solve(q, stack_targets(self._targets), foot_targets, posture)
+            wanted = stack_targets(self._targets[_FIXED:])
+            self._q = self._window.solve(q, wanted, foot_targets, posture)
         else:
             self._targets = [targets] * _FRAMES
             self._q = self._first(targets)
@@ -80,7 +81,7 @@ class Stream:
 
     def _first(self, targets: FrameTargets) -> Float[np.ndarray, "W nq"]:
         """A pose at rest: first as it comes, then with the feet that stand where they are in it."""
-        robot, wanted = self.robot, stack_targets(self._targets)
+        robot, wanted = self.robot, stack_targets(self._targets[_FIXED:])
         projected = project(robot, quat_from_matrix(targets.world)[None], targets.hips[None])
         q = robot.to_qpos(projected)[np.zeros(_FRAMES, dtype=int)]
         points = sum(map(len, robot.soles))

@@ -57,7 +57,7 @@ class Window:
         foot_targets: FootTargets,
         posture: Posture,
     ) -> Float[np.ndarray, "T nq"]:
-        """`q` after at most `_MAX_ITER` steps of its free frames; `targets` are for all."""
+        """`q` after at most `_MAX_ITER` steps of its free frames, which have these targets."""
         candidates = self._terms.candidates(q[-1:])
         self._coupling.follow(targets.com[-1] - targets.com[-2])
         for _ in range(_MAX_ITER):
@@ -100,8 +100,7 @@ class Window:
         """One Gauss-Newton step, and its largest entry [rad, m]; with `lone_damping`, frames are
         not coupled, and damped by so much."""
         model, free = self._model, self._free
-        wanted = targets.last(free)
-        H, g = self._terms.linearize(q[-free:], wanted, foot_targets, posture, candidates)
+        H, g = self._terms.linearize(q[-free:], targets, foot_targets, posture, candidates)
         D = g.shape[1]
         whole = np.zeros((free * D, free * D))
         blocks = whole.reshape(free, D, free, D)
