@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 from robots.model.morphology import Morphology
 from robots.model.shapes import surface
 from robots.solver.contacts import schedule
+from robots.solver.trunk import bends, leaning
 from robots.tree import forward_kinematics
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
@@ -101,9 +102,13 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
     paths = source_feet(source, positions, robot)
     scale = robot.rig.hip_height / rig.hip_height
     touches = schedule(source, positions, paths)
+    turns = moved.rotations
+    if not bends(robot):
+        pelvis = robot.rig.pelvis
+        turns[:, pelvis] = leaning(rig, turns[:, pelvis], positions)
     return Targets(
         frame_time=source.frame_time,
-        world=quat_mul(moved.rotations, robot.rig.tpose),
+        world=quat_mul(turns, robot.rig.tpose),
         chest=quat_mul(source.rotations[:, rig.chest], robot.rig.tpose[own_chest]),
         hips=moved.hips - np.array([0.0, 0.0, moved.floor_z]),
         bones=bone_directions(rig, positions, source.rotations),

@@ -17,11 +17,12 @@ from robots.solver.targets import (
     palm_thickness,
     source_feet,
 )
+from robots.solver.trunk import bends, leaning
 from sim.body.anthropometry import segments
 from spark.errors import FrameError
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
-from spark.rotation import matrix_from_quat, quat_conj
+from spark.rotation import matrix_from_quat, quat_conj, quat_from_matrix
 from spark.transfer.analytic import correspond
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
@@ -96,6 +97,7 @@ class FrameReader:
         self._tpose = matrix_from_quat(robot.rig.tpose)
         self._chest = source.chest
         self._segments = segments(source)
+        self._stiff = not bends(robot)
         self._correspondence = correspond(source, robot.rig)
         self._at_rest = np.flatnonzero(self._correspondence.first < 0)
         self._interpolated = np.flatnonzero(
@@ -121,7 +123,12 @@ class FrameReader:
         thrown = self._thrown(hips[2])
         hips *= self.scale
         hips[2] += thrown
-        own_world = self._own(turns) @ self._tpose
+        own = self._own(turns)
+        if self._stiff:
+            pelvis = self.robot.rig.pelvis
+            turn = quat_from_matrix(own[None, pelvis])
+            own[pelvis] = matrix_from_quat(leaning(self.source, turn, joints[None]))[0]
+        own_world = own @ self._tpose
         return FrameTargets(
             world=own_world,
             chest=turns[self._chest] @ self._tpose[self.robot.rig.chest],

@@ -1,0 +1,68 @@
+"""The lean of a trunk that cannot bend."""
+
+import numpy as np
+import pytest
+
+from robots.model.known import known
+from robots.solver.targets import targets_of
+from robots.solver.trunk import bends, leaning
+from spark.demo.sample import sample_motion, sample_rig
+from spark.kinematics import world_positions
+from spark.rig.roles import Role
+from spark.rotation import (
+    quat_angle,
+    quat_conj,
+    quat_from_rotvec,
+    quat_from_yaw,
+    quat_mul,
+    quat_rotate,
+    yaw_from_quat,
+)
+from spark.transfer.canonical import to_canonical
+
+RIG = sample_rig("walker")
+TURNS = [[0.0, 0.0, 1.2], [0.0, 0.5, 0.0], [0.3, 0.0, 0.0]]
+
+
+def trunk(positions: np.ndarray) -> np.ndarray:
+    shoulders = [RIG.roles.require(role) for role in (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)]
+    along = positions[shoulders].mean(0) - positions[RIG.hips].mean(0)
+    return along / np.linalg.norm(along)
+
+
+@pytest.mark.parametrize("rotvec", TURNS)
+def test_a_stiff_source_is_followed(rotvec: list[float]) -> None:
+    turn = quat_from_rotvec(np.array([rotvec]))
+    positions = quat_rotate(turn, RIG.tpose_positions)
+    found = leaning(RIG, turn, positions[None])
+    assert quat_angle(turn, found)[0] < np.radians(2)
+
+
+def test_a_tilted_pelvis_under_an_upright_trunk_bows_nobody() -> None:
+    heading = quat_from_yaw(np.array([2.0]))
+    pelvis = quat_mul(heading, quat_from_rotvec(np.array([[0.0, 0.6, 0.0]])))
+    positions = quat_rotate(heading, RIG.tpose_positions)
+    found = leaning(RIG, pelvis, positions[None])
+    np.testing.assert_allclose(
+        quat_rotate(found, trunk(RIG.tpose_positions)[None])[0], trunk(positions), atol=1e-9
+    )
+    assert yaw_from_quat(found)[0] == pytest.approx(2.0, abs=0.02)
+
+
+def test_only_what_cannot_bend_leans_as_a_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, source = known("robot"), to_canonical(sample_motion("walk", RIG, 30.0), RIG)
+    assert bends(robot)
+    bent = targets_of(source, robot).world[:, robot.rig.pelvis]
+    monkeypatch.setattr("robots.solver.targets.bends", lambda _: False)
+    stiff = targets_of(source, robot).world[:, robot.rig.pelvis]
+    own = quat_mul(source.rotations[:, RIG.pelvis], robot.rig.tpose[robot.rig.pelvis])
+    np.testing.assert_allclose(bent, own, atol=1e-9)
+    positions = world_positions(RIG.skeleton, quat_mul(source.rotations, RIG.tpose), source.hips)
+    along = np.stack([trunk(frame) for frame in positions])
+    turned = quat_mul(stiff, quat_conj(robot.rig.tpose[robot.rig.pelvis]))
+    np.testing.assert_allclose(quat_rotate(turned, trunk(RIG.tpose_positions)), along, atol=1e-6)
+
+
+@pytest.mark.parametrize(("name", "bend"), [("booster_t1", False), ("unitree_g1", True)])
+def test_waists_are_told_apart(name: str, bend: bool) -> None:
+    assert bends(known(name)) is bend
