@@ -92,9 +92,14 @@ def test_neither_half_an_answer_nor_a_lost_server_of_forks_stops_the_others(
 
 
 def stop_at_zero(folder: Path, number: int) -> int:
+    told = folder / "stopped"
     if number == 0:
-        (folder / "stopped").write_text(str(os.getpid()))
+        part = folder / "part"
+        part.write_text(str(os.getpid()))
+        part.rename(told)
         os.kill(os.getpid(), signal.SIGSTOP)
+    while not told.exists():
+        time.sleep(0.01)
     return number
 
 
