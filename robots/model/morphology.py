@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 from robots.model.mjcf import Mjcf, read_mjcf
 from robots.model.tpose import rest_pose
 from robots.tree import Coordinates, Tree, forward_kinematics
+from spark.blocks import in_blocks
 from spark.motion import Motion
 from spark.rig.feet import Sole
 from spark.rig.rig import Rig
@@ -141,15 +142,21 @@ class Morphology:
     def motion(self, q: Coordinates, frame_time: float) -> Motion:
         """The same motion on the rig's skeleton. Axes that miss each other move the joints' centres
         against each other by millimetres: `translations` says so."""
+        joints = in_blocks(lambda block: self._local(q.at(block)), len(q))
+        local, offsets = joints[..., :4], joints[..., 4:]
+        return Motion(self.rig.skeleton, frame_time, offsets[:, 0], local, offsets)
+
+    def _local(self, q: Coordinates) -> Float[np.ndarray, "T J 7"]:
+        """The joints' rotations and places [m] in their parents' axes, the root's in the world."""
         poses = forward_kinematics(self.tree, q)
         world = quat_from_matrix(np.moveaxis(poses.rotations[self.links], -1, 0))
         positions = np.stack(
             [poses.point(int(k), c).T for k, c in zip(self.links, self.centers, strict=True)], 1
         )
         parents = self.rig.skeleton.parents[1:]
-        local, offsets = world.copy(), positions.copy()
-        local[:, 1:] = quat_relative(world[:, parents], world[:, 1:])
+        out = np.concatenate([world, positions], axis=-1)
+        out[:, 1:, :4] = quat_relative(world[:, parents], world[:, 1:])
         turned = matrix_from_quat(quat_conj(world[:, parents]))
         steps = positions[:, 1:] - positions[:, parents]
-        offsets[:, 1:] = (turned @ steps[..., None])[..., 0]
-        return Motion(self.rig.skeleton, frame_time, positions[:, 0], local, offsets)
+        out[:, 1:, 4:] = (turned @ steps[..., None])[..., 0]
+        return out
