@@ -104,7 +104,7 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
     touches = schedule(source, positions, paths)
     turns = moved.rotations
     if not bends(robot):
-        pelvis = robot.rig.pelvis
+        pelvis, turns = robot.rig.pelvis, turns.copy()
         turns[:, pelvis] = leaning(rig, turns[:, pelvis], positions)
     return Targets(
         frame_time=source.frame_time,

@@ -16,13 +16,12 @@ from robots.solver.weights import MAX_HINGE_SPEED, W_OVERSPEED
 from robots.solver.weights import SMOOTH_CUTOFF as WHOLE_CLIP_CUTOFF
 from robots.stream.prediction import Ahead, CostToGo
 
-COM_CUTOFF = np.array(
-    [0.7, 0.7, 1.2]
-)  # [Hz] above which the centre of mass fades against the source's:
-# in height it gives way to landings
+# [Hz] above which the centre of mass's motion against the source's fades, in x, y and z: its height
+# gives way to landings,
+COM_CUTOFF = np.array([0.7, 0.7, 1.2])
 JERK_CUTOFF = 2.5  # and that of hinges, by their jerk
-MAX_ACCELERATION = 40.0  # [m/s²] of the source that the base goes along with: more is a glitch
-_BASE = slice(0, 3)  # dofs of the base's position
+MAX_ACCELERATION = 40.0  # [m/s²] of the source that the mass goes along with: more is a glitch
+_BASE = slice(0, 3)  # dofs of the base's position, in whose place the centre of mass is coupled
 
 
 class Coupling:
@@ -61,9 +60,8 @@ class Coupling:
         """Take in how far [m] the source's centre of mass has moved with the newest frame."""
         last = self._source_steps[-1]
         change = step - last
-        step = last + change * min(
-            1.0, self._max_change / max(float(np.linalg.norm(change)), 1e-12)
-        )
+        size = max(float(np.linalg.norm(change)), 1e-12)
+        step = last + change * min(1.0, self._max_change / size)
         self._source_steps = np.concatenate([self._source_steps[1:], step[None]])
 
     def add_to(

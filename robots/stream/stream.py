@@ -70,18 +70,18 @@ class Stream:
             poses = self._terms.poses(q[_FIXED : _FIXED + 1])  # what is next to be said
             foot_targets = self._contacts.update(targets, self._terms.sole_points(poses)[0])
             bones, angles = self._terms.bones(poses)[0], self._terms.angles(q)[_FIXED]
-            posture = self._detours.update(self._targets[_FIXED], bones, angles)
-            wanted = stack_targets(self._targets[_FIXED:])
+            posture = self._detours.update(self._targets[0], bones, angles)
+            wanted = stack_targets(self._targets)
             self._q = self._window.solve(q, wanted, foot_targets, posture)
         else:
-            self._targets = [targets] * _FRAMES
+            self._targets = [targets] * (LATENCY + 1)
             self._q = self._first(targets)
         self._count += 1
         return self._q[_FIXED].copy()
 
     def _first(self, targets: FrameTargets) -> Float[np.ndarray, "W nq"]:
         """A pose at rest: first as it comes, then with the feet that stand where they are in it."""
-        robot, wanted = self.robot, stack_targets(self._targets[_FIXED:])
+        robot, wanted = self.robot, stack_targets(self._targets)
         projected = project(robot, quat_from_matrix(targets.world)[None], targets.hips[None])
         q = robot.to_qpos(projected)[np.zeros(_FRAMES, dtype=int)]
         points = sum(map(len, robot.soles))

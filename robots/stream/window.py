@@ -109,9 +109,7 @@ class Window:
         if lone_damping is None:
             ahead = self._motion.of(q[-1], H[-1], g[-1])
             com, jacobian = self._center_of_mass(q)
-            self._coupling.add_to(
-                self._steps(q), np.diff(com, axis=0), jacobian[-free:], ahead, blocks, g
-            )
+            self._coupling.add_to(self._steps(q), np.diff(com, axis=0), jacobian, ahead, blocks, g)
         held = self._at_limits(q[-free:], g)
         g[held] = 0.0
         whole.reshape(-1)[:: free * D + 1] += np.where(
@@ -136,16 +134,18 @@ class Window:
 
     def _center_of_mass(
         self, q: Float[np.ndarray, "T nq"]
-    ) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T 3 D"]]:
-        """Where it is [m, world], and by how much the dofs move it."""
+    ) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "F 3 D"]]:
+        """Where it is [m, world], and by how much the dofs of the free frames move it."""
         model, data, root = self._model, self._data, self._root
-        com, jacobian = np.empty((len(q), 3)), np.empty((len(q), 3, model.nv))
+        com, jacobian = np.empty((len(q), 3)), np.empty((self._free, 3, model.nv))
+        fixed = len(q) - self._free
         for t in range(len(q)):
             data.qpos = q[t]
             mujoco.mj_kinematics(model, data)
             mujoco.mj_comPos(model, data)
             com[t] = data.subtree_com[root]
-            mujoco.mj_jacSubtreeCom(model, data, jacobian[t], root)
+            if t >= fixed:
+                mujoco.mj_jacSubtreeCom(model, data, jacobian[t - fixed], root)
         return com, jacobian[:, :, self._dofs]
 
     def _at_limits(
