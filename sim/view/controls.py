@@ -8,11 +8,13 @@ from sim.view.player import Player
 
 @dataclass(frozen=True)
 class Control:
-    """Keys, as the help calls them, what they do in words, and what each of them does."""
+    """Keys, as the help calls them, what they do in words, and what each of them does. Those that
+    are not `live` need a recording."""
 
     label: str
     words: str
     keys: dict[str, Callable[[Player], object]]
+    live: bool = False
 
 
 def _toggle(name: str) -> Callable[[Player], object]:
@@ -33,6 +35,7 @@ TOGGLES = {
     "names": ("T", "names and where they face"),
 }
 """What can be shown or hidden: by which key, and in words."""
+LIVE_TOGGLES = ("overlaid", "names")
 
 CONTROLS = (
     Control("Space", "play, pause", {"space": lambda p: p.timeline.toggle()}),
@@ -68,31 +71,31 @@ CONTROLS = (
         "N P", "next, previous finding", {"n": lambda p: p.next(), "p": lambda p: p.previous()}
     ),
     Control("Tab", "findings of the next figure", {"tab": lambda p: p.judge_next()}),
-    Control("F", "follow all, one figure, none", {"f": lambda p: p.follow_next()}),
-    *(Control(key, words, {key.lower(): _toggle(name)}) for name, (key, words) in TOGGLES.items()),
-    Control("V", "the view from the start", {"v": lambda p: p.reset_view()}),
-    Control("H F1", "this help", {"h": _toggle("help"), "f1": _toggle("help")}),
-    Control("Q Esc", "close", {"q": lambda p: p.close(), "escape": lambda p: p.close()}),
-)
-MOUSE = (
-    ("Drag", "turn; right button: move"),
-    ("Wheel", "nearer, further"),
-    ("Click below", "to that time, or finding"),
+    Control("F", "follow all, one figure, none", {"f": lambda p: p.follow_next()}, live=True),
+    *(
+        Control(key, words, {key.lower(): _toggle(name)}, live=name in LIVE_TOGGLES)
+        for name, (key, words) in TOGGLES.items()
+    ),
+    Control("V", "the view from the start", {"v": lambda p: p.reset_view()}, live=True),
+    Control("H F1", "this help", {"h": _toggle("help"), "f1": _toggle("help")}, live=True),
+    Control("Q Esc", "close", {"q": lambda p: p.close(), "escape": lambda p: p.close()}, live=True),
+    Control("Drag", "turn; right button: move", {}, live=True),
+    Control("Wheel", "nearer, further", {}, live=True),
+    Control("Click below", "to that time, or finding", {}),
 )
 
-_ACTIONS = {key: action for control in CONTROLS for key, action in control.keys.items()}
+_BY_KEY = {key: control for control in CONTROLS for key in control.keys}
 
 
 def press(player: Player, key: str) -> bool:
     """Do what a key does; whether it does anything."""
-    action = _ACTIONS.get(key.lower())
-    if action is not None:
-        action(player)
-    return action is not None
+    control = _BY_KEY.get(key.lower())
+    if control is None or (player.live and not control.live):
+        return False
+    control.keys[key.lower()](player)
+    return True
 
 
-def help_columns() -> tuple[str, str]:
-    """The help: keys, and what they do, line by line."""
-    rows = [*((c.label, c.words) for c in CONTROLS), *MOUSE]
-    keys, words = zip(*rows, strict=True)
-    return "\n".join(keys), "\n".join(words)
+def help_rows(*, live: bool = False) -> list[tuple[str, str]]:
+    """The help: keys, and what they do."""
+    return [(c.label, c.words) for c in CONTROLS if c.live or not live]

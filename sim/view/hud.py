@@ -3,7 +3,7 @@
 import mujoco
 
 from sim.view.bar import Bar, Rect
-from sim.view.controls import help_columns
+from sim.view.controls import help_rows
 from sim.view.marks import RGBA, rgba
 from sim.view.player import Player
 from sim.view.text import plain
@@ -45,7 +45,9 @@ class Hud:
         if message:
             self._overlay(mujoco.mjtGridPos.mjGRID_TOPRIGHT, above, message)
         if player.shown["help"]:
-            self._overlay(mujoco.mjtGridPos.mjGRID_TOPLEFT, above, *help_columns())
+            keys, words = zip(*help_rows(live=player.live), strict=True)
+            where = mujoco.mjtGridPos.mjGRID_TOPLEFT
+            self._overlay(where, above, "\n".join(keys), "\n".join(words))
 
     def _bar(self, player: Player, bar: Bar, viewport: mujoco.MjrRect, waiting: bool) -> None:
         timeline, line = player.timeline, self._line
@@ -56,11 +58,11 @@ class Hud:
             for shade in bar.shades(name):
                 self._rect(shade, _FLAG)
             self._text(name, float(line), row.bottom, viewport, _SOFT)
-        self._rect(bar.strip, _TRACK)
         now = bar.x_of(timeline.time)
         strip = bar.strip
         top = bar.height - 0.4 * line
-        if not player.status:
+        if not player.live:
+            self._rect(bar.strip, _TRACK)
             self._rect(Rect(strip.left, strip.bottom, now - strip.left, strip.height), _DONE)
             self._rect(Rect(now - 1, strip.bottom - 3, 2.0, top - strip.bottom), _INK)
         state = "" if timeline.playing else "   paused"

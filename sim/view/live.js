@@ -1,7 +1,8 @@
 "use strict";
 // Coordinates as they come from a session, instead of frames.
 let words = "waits for a session", session = null;
-for (const id of ["play", "back", "on", "scrub", "speed", "previous", "next", "judged", "loop"]) (el(id).closest("label") || el(id)).hidden = true;
+for (const id of ["play", "back", "on", "scrub", "speed", "previous", "next", "judged", "loop", "ghosts-row", "path-row"]) (el(id).closest("label") || el(id)).hidden = true;
+for (const key of Object.keys(KEYS)) if (!["f", "v", "o", "t", "h", "F1"].includes(key)) delete KEYS[key];
 tell = () => { el("time").textContent = words; };
 const source = new EventSource("/live");
 source.onmessage = e => {

@@ -25,6 +25,8 @@ class LivePlayer(Player):
     """Shows what `newest` yields; None as long as there is nothing. Figures stand side by side
     where they begin, and walk on from there."""
 
+    live = True
+
     def __init__(self, figures: Sequence[Figure], newest: Callable[[], Now | None]) -> None:
         super().__init__(build_scene(figures))
         self._newest = newest

@@ -13,7 +13,7 @@ import numpy as np
 from sim.template import Template
 from sim.view.annotations import Annotations
 from sim.view.camera import shot
-from sim.view.controls import CONTROLS, MOUSE, TOGGLES
+from sim.view.controls import TOGGLES, help_rows
 from sim.view.packing import STEPS, in_base64, packed, short
 from sim.view.page_marks import page_marks
 from sim.view.page_skin import page_skin
@@ -82,14 +82,14 @@ def page(
         "meshes": list(meshes.values()),
     }
     # A browser needs Tab to get from control to control, and closes its own windows.
-    keys = [(c.label, c.words) for c in CONTROLS if not {"tab", "escape"} & c.keys.keys()]
+    keys = [row for row in help_rows(live=live) if row[0] not in ("Tab", "Q Esc")]
     return (_LIVE if live else REPLAY).render(
         title=title,
         data=data,
         speeds=SPEEDS,
         speed_at_first=speed,
         toggles=[(name, words) for name, (_, words) in TOGGLES.items()],
-        controls=[*keys, *MOUSE],
+        controls=keys,
     )
 
 

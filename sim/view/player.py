@@ -17,6 +17,9 @@ class Player:
     """What the controls change. Without annotations, what they tell is not shown; they may come
     later (`annotate`)."""
 
+    live = False
+    """Whether it shows what happens now, so that there is no time to go to."""
+
     def __init__(self, scene: Scene, *, ghosts: bool = True) -> None:
         self.scene = scene
         self.timeline = Timeline(len(scene.qpos), scene.frame_time)

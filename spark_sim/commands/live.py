@@ -134,7 +134,8 @@ def _follow(args: Namespace) -> int:
                 number = getattr(signal, name)
                 stack.callback(signal.signal, number, signal.signal(number, stop))
         with session:
-            console.note(f"listens on UDP port {listener.port} for a person; Ctrl-C ends it")
+            opens = "the window opens once one is heard of; " if args.view else ""
+            console.note(f"listens on UDP port {listener.port} for a person; {opens}Ctrl-C ends it")
             session.run()
     console.say(session.summary())
     return 0

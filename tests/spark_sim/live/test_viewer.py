@@ -11,6 +11,7 @@ import pytest
 
 import spark_sim
 from robots.stream.frame_targets import Frame
+from sim.view.controls import help_rows, press
 from sim.view.page import page
 from spark.errors import ConventionError
 from spark_sim.live import viewer as module
@@ -106,3 +107,21 @@ def test_addresses_and_displays_that_are_not_there(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(module, "has_display", lambda: False)
     with pytest.raises(spark_sim.SparkSimError, match="--serve"):
         Viewer()
+
+
+def test_the_help_of_a_session_has_no_keys_of_a_replay(
+    person: spark_sim.AnyClip, board: Board
+) -> None:
+    player, figures = live_player(person.motion.frames(0, 1), "robot", board)
+    words = [word for _, word in help_rows(live=True)]
+    assert "close" in words
+    assert "play, pause" not in words
+    assert not press(player, "space")
+    assert player.timeline.playing
+    for key, name in (("t", "names"), ("o", "overlaid")):
+        before = player.shown[name]
+        assert press(player, key)
+        assert player.shown[name] != before
+    text = page(figures, title="live", live=True)
+    assert words[0] in text
+    assert "next, previous finding" not in text
