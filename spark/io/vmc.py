@@ -41,6 +41,7 @@ for _side in ("Left", "Right"):
         f"{_side}Hand": (f"{_side}LowerArm",),
     }
 _LIMBS = ("UpperLeg", "LowerLeg", "Foot", "UpperArm", "LowerArm", "Hand")
+_MOST_PACKETS = 256  # of one clock that are remembered
 NEEDED = ("Hips", "Spine", "Head", *(f"{s}{bone}" for s in ("Left", "Right") for bone in _LIMBS))
 
 
@@ -51,6 +52,10 @@ class VmcPose(LivePose):
     _order: Order = field(default_factory=Order)
     _root: Float[np.ndarray, "7"] = field(default_factory=lambda: np.array([0.0, 0, 0, 1, 0, 0, 0]))
     _bones: dict[str, Float[np.ndarray, "7"]] = field(default_factory=dict)
+    _clock: float = float("nan")
+    _seen: set[int] = field(
+        default_factory=set
+    )  # packets with that clock: a pose may be in several
 
     def take(self, packet: bytes, now: float) -> bool:
         try:
@@ -66,6 +71,9 @@ class VmcPose(LivePose):
         if times and self._order.is_late(times[-1], now):
             self.reordered += 1
             return False
+        if times and self._is_repeated(packet, times[-1]):
+            self.repeated += 1
+            return False
         told = False
         for name, arguments in parts:
             if name not in ("/VMC/Ext/Bone/Pos", "/VMC/Ext/Root/Pos"):
@@ -80,6 +88,14 @@ class VmcPose(LivePose):
                 self._bones[bone], self.heard[bone], told = pose, now, True
         self.frames += told
         return told
+
+    def _is_repeated(self, packet: bytes, clock: float) -> bool:
+        if clock != self._clock or len(self._seen) > _MOST_PACKETS:
+            self._clock, self._seen = clock, set()
+        content = hash(packet)
+        repeated = content in self._seen
+        self._seen.add(content)
+        return repeated
 
     @property
     def missing(self) -> tuple[str, ...]:

@@ -71,6 +71,16 @@ def test_packets_that_are_late_or_broken_change_nothing() -> None:
     assert pose.take(packet(old, 0.0), 0.9)  # the sender began anew
 
 
+def test_packets_that_come_twice_are_counted() -> None:
+    pose = VmcPose()
+    nod, rest = (packet({"Head": Rotation.from_euler("y", a)}, 5.0) for a in (0.5, 0.0))
+    assert pose.take(nod, 0.0)
+    assert not pose.take(nod, 0.1)
+    assert pose.take(rest, 0.1)  # more of the same pose, in a packet of its own
+    assert not pose.take(nod, 0.1)
+    assert (pose.repeated, pose.frames) == (2, 2)
+
+
 @given(st.binary(max_size=200))
 def test_any_bytes_are_taken_or_refused(data: bytes) -> None:
     VmcPose().take(data, 0.0)
