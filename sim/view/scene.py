@@ -26,6 +26,7 @@ from spark.skin import Skin
 # from two standing heights over the floor than so many of them; or further [standing heights] from
 # where the figure that leads has gone.
 _LOST_SPEED, _LOST_HEIGHT, _LOST_DISTANCE = 15.0, 3.0, 5.0
+_SAME_FPS = 1.005  # of frames a second: a file's 0.016666 s means 60, and 0.004166 s means 240
 _HEAD = 0.12  # of the standing height: from the head's joint to the crown
 _SPACING = 0.8  # of two neighbours' mean standing height, between their roots: arms do not meet
 
@@ -168,8 +169,8 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0, blend: bool
         raise SkeletonError("nothing to show: expected at least one motion")
     world = empty_world()
     first = figures[0].motion
-    step = max(1, int(np.ceil(first.fps / max_fps - 1e-6)))
-    between = max(1, int(np.floor(max_fps / first.fps + 1e-6))) if blend else 1
+    step = thinned(first.fps, max_fps)
+    between = max(1, int(max_fps / first.fps * _SAME_FPS)) if blend else 1
     frame_time = first.frame_time * step / between
     longest = max(figure.motion.duration for figure in figures)
     times = np.arange(int(np.floor(longest / frame_time + 1e-6)) + 1) * frame_time
@@ -224,6 +225,11 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0, blend: bool
         column = following
     qpos = np.concatenate(coordinates, axis=1)
     return Scene(compiled(world), qpos, frame_time, tuple(placements))
+
+
+def thinned(fps: float, most: float) -> int:
+    """Of how many frames one is shown, so that there are at most about `most` a second."""
+    return max(1, int(np.ceil(fps / most / _SAME_FPS)))
 
 
 def _finite(qpos: Float[np.ndarray, "T n"]) -> Float[np.ndarray, "T n"]:

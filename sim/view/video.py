@@ -11,7 +11,7 @@ import numpy as np
 
 from sim.view.camera import fitting_aspect
 from sim.view.render import frames, stills
-from sim.view.scene import Scene
+from sim.view.scene import Scene, thinned
 from spark.errors import DependencyError, OutputError
 from spark.files import replacing, write_atomically
 
@@ -47,7 +47,7 @@ def _encode(
     progress: Progress,
 ) -> None:
     """Write the video to `unfinished`; errors call it `path`."""
-    step = max(1, int(np.ceil(speed / (_VIDEO_FPS * scene.frame_time) - 1e-6)))
+    step = thinned(speed / scene.frame_time, _VIDEO_FPS)
     fps = speed / (step * scene.frame_time)
     encoder = [
         *(_ffmpeg(), "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24"),

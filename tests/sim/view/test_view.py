@@ -19,7 +19,7 @@ from sim.view.display import lit
 from sim.view.page import page, write_page
 from sim.view.painter import Painter
 from sim.view.render import frames, stills
-from sim.view.scene import Figure, Scene, build_scene
+from sim.view.scene import Figure, Scene, build_scene, thinned
 from sim.view.simplify import area, simplify_together
 from sim.view.video import write_animation, write_strip, write_video
 from spark.demo.sample import sample_motion, sample_rig
@@ -426,6 +426,26 @@ def test_blended_frames_lie_on_the_way() -> None:
     assert fine.frame_time == pytest.approx(own.frame_time / 4)
     np.testing.assert_allclose(fine.qpos[::4], own.qpos, atol=1e-12)
     np.testing.assert_allclose(fine.qpos[2::4, :3], (own.qpos[1:] + own.qpos[:-1])[:, :3] / 2)
+
+
+@pytest.mark.parametrize(
+    ("frame_time", "most", "step"),
+    [
+        *(("0.016666", 60.0, 1), ("0.016667", 30.0, 2), ("0.016666", 30.0, 2)),
+        *(("0.008333", 30.0, 4), ("0.004166", 30.0, 8)),
+        *(("0.04", 30.0, 1), ("0.02", 30.0, 2), ("0.01", 60.0, 2)),
+    ],
+)
+def test_a_rounded_frame_time_costs_no_frames(frame_time: str, most: float, step: int) -> None:
+    """A BVH has six digits: 60 frames a second are 59.9988, or 60.0024."""
+    fps = 1 / float(frame_time)
+    assert thinned(fps, most) == step
+    rig = sample_rig("walker")
+    figure = Figure(Subject(sample_motion("wave", rig, fps), rig), "walker")
+    scene = build_scene([figure], max_fps=most)
+    assert scene.frame_time == pytest.approx(step * float(frame_time))
+    fine = build_scene([figure], max_fps=120.0, blend=True)
+    assert 1 / fine.frame_time == pytest.approx(120, rel=0.2)
 
 
 def test_dark_colours_are_lifted_and_others_stay() -> None:
