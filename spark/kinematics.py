@@ -1,8 +1,11 @@
 """Forward kinematics, vectorised over frames and over the joints of one depth."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float
 
+from spark.blocks import in_blocks
 from spark.motion import Motion
 from spark.rotation import quat_mul, quat_relative, quat_rotate
 from spark.skeleton import Skeleton
@@ -54,6 +57,11 @@ def forward(motion: Motion) -> tuple[Float[np.ndarray, "T J 3"], Float[np.ndarra
     world = world_rotations(motion.skeleton, motion.rotations)
     positions = world_positions(motion.skeleton, world, motion.root_pos, motion.translations)
     return positions, world
+
+
+def joint_paths(motion: Motion, joints: Sequence[int]) -> Float[np.ndarray, "T K 3"]:
+    """Where some joints are in all frames [m, world]."""
+    return in_blocks(lambda block: forward(motion.picked(block))[0][:, joints], len(motion))
 
 
 def end_positions(

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from spark.blocks import blocks, in_blocks
 from spark.errors import ConventionError, SkeletonError
 from spark.skeleton import Skeleton
 from spark.summary import counted, time_span
@@ -134,3 +135,13 @@ class LazyMotion(Motion):
         """The frames of a slice, made now."""
         make: Callable[[slice], Motion] = vars(self)["_make"]
         return make(span)
+
+
+def lazy_motion(make: Callable[[slice], Motion], count: int) -> Motion:
+    """The motion of `count` frames, of which `make` makes those of a slice: a long one as they are
+    asked for, a short one at once."""
+    if len([*blocks(count)]) <= 1:
+        return make(slice(None))
+    root_pos = in_blocks(lambda block: make(block).root_pos, count)
+    first = make(slice(0, 1))
+    return LazyMotion(first.skeleton, first.frame_time, root_pos, make)

@@ -10,7 +10,6 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from spark.errors import ConventionError, SkeletonError, SparkSimError, name_list
-from spark.kinematics import forward
 from spark.motion import Motion
 from spark.resample import frames_at_rate
 from spark.rig.contacts import feet_by_side
@@ -122,7 +121,7 @@ class ClipBase(ABC):
     def contacts(self) -> dict[str, Bool[np.ndarray, "T"]]:
         """In which frames each foot stands (slow, and near its lowest height), by side: "left",
         "right"."""
-        return feet_by_side(self.rig, forward(self.motion)[0], self.frame_time)
+        return feet_by_side(self.rig, self.motion)
 
     @property
     def floor_z(self) -> float:

@@ -10,7 +10,6 @@ from jaxtyping import Bool, Float, Int
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.tree import Tree
-from spark.kinematics import forward
 from spark.rig.contacts import feet_by_side
 from spark.rotation import quat_conj, quat_mul, quat_rotate, rotvec_from_quat
 
@@ -82,7 +81,7 @@ def body_names(robot: Morphology, bodies: list[int]) -> tuple[str, ...]:
 
 def foot_contacts(motion: RobotMotion) -> dict[str, Bool[np.ndarray, "T"]]:
     """In which frames each foot stands, by side; empty for a robot without feet."""
-    return feet_by_side(motion.robot.rig, forward(motion.motion)[0], motion.frame_time)
+    return feet_by_side(motion.robot.rig, motion.motion)
 
 
 def contact_array(motion: RobotMotion) -> dict[str, np.ndarray]:

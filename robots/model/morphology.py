@@ -11,7 +11,7 @@ from robots.model.mjcf import Mjcf, read_mjcf
 from robots.model.tpose import rest_pose
 from robots.tree import Coordinates, Tree, forward_kinematics
 from spark.blocks import in_blocks
-from spark.motion import Motion
+from spark.motion import Motion, lazy_motion
 from spark.rig.feet import Sole
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
@@ -141,7 +141,11 @@ class Morphology:
 
     def motion(self, q: Coordinates, frame_time: float) -> Motion:
         """The same motion on the rig's skeleton. Axes that miss each other move the joints' centres
-        against each other by millimetres: `translations` says so."""
+        against each other by millimetres: `translations` says so. Of a long motion, frames are made
+        as they are asked for."""
+        return lazy_motion(lambda span: self._motion(q.at(span), frame_time), len(q))
+
+    def _motion(self, q: Coordinates, frame_time: float) -> Motion:
         joints = in_blocks(lambda block: self._local(q.at(block)), len(q))
         local, offsets = joints[..., :4], joints[..., 4:]
         return Motion(self.rig.skeleton, frame_time, offsets[:, 0], local, offsets)

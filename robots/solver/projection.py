@@ -14,6 +14,7 @@ from jaxtyping import Float
 
 from robots.model.morphology import Morphology
 from robots.tree import Coordinates, LinkPoses, Tree, forward_kinematics
+from spark.blocks import in_blocks
 from spark.rotation import (
     quat_from_rotvec,
     quat_mul,
@@ -52,9 +53,8 @@ def project(
             turned = quat_mul(turned, quat_from_rotvec(tree.axes[j] * angles[:, [j]]))
         links[group[-1]] = turned
     q = Coordinates(np.tile(tree.base, (count, 1)), links[-1], angles, balls)
-    return Coordinates(
-        q.pos + hips - hips_of(robot, forward_kinematics(tree, q)), q.quat, angles, balls
-    )
+    own = in_blocks(lambda block: hips_of(robot, forward_kinematics(tree, q.at(block))), count)
+    return Coordinates(q.pos + hips - own, q.quat, angles, balls)
 
 
 def hips_of(robot: Morphology, frames: LinkPoses) -> Float[np.ndarray, "T 3"]:

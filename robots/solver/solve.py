@@ -24,9 +24,9 @@ from robots.solver.repair import repair
 from robots.solver.resting import resting
 from robots.solver.smoothness import limit_speed
 from robots.solver.stretches import by_stretches
-from robots.solver.targets import Targets, targets_of
+from robots.solver.targets import Targets, poses_of, targets_of
 from robots.tree import Coordinates, forward_kinematics
-from spark.transfer.canonical import CanonicalMotion
+from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
 _MAX_ITER = (12, 10)  # Gauss-Newton steps, by block
 _REL_TOL = (0.02, 0.05)  # of the cost: a block ends where a step gains less,
@@ -40,9 +40,9 @@ def copy(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     baseline."""
     if robot.mount is not None:
         source = facing_ahead(source)
-    targets = targets_of(source, robot)
-    q = on_mount(robot, project(robot, targets.world, targets.hips))
-    return RobotMotion(robot, robot.following(q), source.frame_time, targets.notes)
+    world, hips, notes = poses_of(source, canonical_positions(source), robot)
+    q = on_mount(robot, project(robot, world, hips))
+    return RobotMotion(robot, robot.following(q), source.frame_time, notes)
 
 
 def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:

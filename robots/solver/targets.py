@@ -10,6 +10,7 @@ from robots.model.shapes import surface
 from robots.solver.contacts import schedule
 from robots.solver.trunk import bends, leaning
 from robots.tree import forward_kinematics
+from spark.blocks import blocks
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
@@ -95,22 +96,18 @@ class Targets:
 
 def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
     """The targets that `source` sets for `robot`."""
-    moved = transfer(source, robot.rig)
     positions = canonical_positions(source)
+    world, hips, notes = poses_of(source, positions, robot)
     rig = source.rig
     own_chest = robot.rig.chest
     paths = source_feet(source, positions, robot)
     scale = robot.rig.hip_height / rig.hip_height
     touches = schedule(source, positions, paths)
-    turns = moved.rotations
-    if not bends(robot):
-        pelvis, turns = robot.rig.pelvis, turns.copy()
-        turns[:, pelvis] = leaning(rig, turns[:, pelvis], positions)
     return Targets(
         frame_time=source.frame_time,
-        world=quat_mul(turns, robot.rig.tpose),
+        world=world,
         chest=quat_mul(source.rotations[:, rig.chest], robot.rig.tpose[own_chest]),
-        hips=moved.hips - np.array([0.0, 0.0, moved.floor_z]),
+        hips=hips,
         bones=bone_directions(rig, positions, source.rotations),
         contacts=touches.feet,
         parts=touches.parts,
@@ -121,8 +118,23 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
         feet=scale * paths[..., :2],
         clearance=scale * source_clearance(source, positions, robot),
         hands=_between_hands(rig, positions, robot),
-        notes=moved.notes,
+        notes=notes,
     )
+
+
+def poses_of(
+    source: CanonicalMotion, positions: Float[np.ndarray, "T S 3"], robot: Morphology
+) -> tuple[Float[np.ndarray, "T J 4"], Float[np.ndarray, "T 3"], tuple[str, ...]]:
+    """The poses of a source, whose joints are at `positions` [m], on the robot's rig: its joints'
+    rotations (`q_world_joint`), the path of the hips' middle [m] over a floor at z = 0, and notes.
+    """
+    moved = transfer(source, robot.rig)
+    turns, pelvis = moved.rotations, robot.rig.pelvis
+    if not bends(robot):
+        turns[:, pelvis] = leaning(source.rig, turns[:, pelvis], positions)
+    for block in blocks(len(turns)):
+        turns[block] = quat_mul(turns[block], robot.rig.tpose)
+    return turns, moved.hips - np.array([0.0, 0.0, moved.floor_z]), moved.notes
 
 
 def bone_directions(

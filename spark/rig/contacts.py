@@ -3,6 +3,8 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
+from spark.kinematics import joint_paths
+from spark.motion import Motion
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
 
@@ -71,10 +73,9 @@ def planted_feet(
     return planted_points(positions[:, rig.contact_joints], frame_time, rig.standing_height)
 
 
-def feet_by_side(
-    rig: Rig, positions: Float[np.ndarray, "T J 3"], frame_time: float
-) -> dict[str, Bool[np.ndarray, "T"]]:
+def feet_by_side(rig: Rig, motion: Motion) -> dict[str, Bool[np.ndarray, "T"]]:
     """In which frames each foot stands, by side: "left", "right"; empty for a body without feet."""
-    standing = planted_feet(rig, positions, frame_time)
+    feet = joint_paths(motion, rig.contact_joints)
+    standing = planted_points(feet, motion.frame_time, rig.standing_height)
     roles = [rig.roles.roles[j] for j in rig.contact_joints]
     return {role.side: standing[:, k] for k, role in enumerate(roles) if role is not None}

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from spark.blocks import BLOCK, in_blocks
+from spark.blocks import in_blocks
 from spark.kinematics import forward, local_rotations, world_positions
-from spark.motion import LazyMotion, Motion
+from spark.motion import Motion, lazy_motion
 from spark.resample import frames_at_rate, rotations_at, values_at
 from spark.rig.contacts import floor_under, lowest_sole
 from spark.rig.rig import Rig
@@ -89,19 +89,7 @@ def from_canonical(canonical: CanonicalMotion) -> Motion:
     The rig's root joint takes the path through the world; joints above it stay where they rest. Of
     a long motion, frames are made as they are asked for.
     """
-    count = len(canonical)
-    if count <= BLOCK:
-        return _on_skeleton(canonical)
-    root_pos = in_blocks(
-        lambda block: _on_skeleton(canonical.frames(block.start, block.stop)).root_pos, count
-    )
-
-    return LazyMotion(
-        canonical.rig.skeleton,
-        canonical.frame_time,
-        root_pos,
-        lambda span: _on_skeleton(canonical.picked(span)),
-    )
+    return lazy_motion(lambda span: _on_skeleton(canonical.picked(span)), len(canonical))
 
 
 def _on_skeleton(canonical: CanonicalMotion) -> Motion:

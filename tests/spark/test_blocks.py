@@ -8,10 +8,10 @@ import pytest
 import spark_sim
 from spark.blocks import blocks, in_blocks
 from spark.motion import LazyMotion
-from spark_sim import Clip
+from spark_sim import Clip, RobotClip
 from spark_sim.choices import Method
 
-IN_BLOCKS = ("spark.blocks.BLOCK", "spark.io.recording.BLOCK", "spark.transfer.canonical.BLOCK")
+IN_BLOCKS = ("spark.blocks.BLOCK", "spark.io.recording.BLOCK")
 
 
 def test_every_frame_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -45,3 +45,22 @@ def test_retargeting_in_blocks(
     np.testing.assert_allclose(parts.motion.rotations, whole.motion.rotations, atol=1e-9)
     one, other = parts.save(tmp_path / "a.bvh"), whole.save(tmp_path / "b.bvh")
     assert len(one.read_bytes().splitlines()) == len(other.read_bytes().splitlines())
+
+
+def test_a_robot_in_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Copied poses are the same to the bit; so are the file and the report's subject."""
+    spark_sim.sample(tmp_path)
+    walk = spark_sim.load(tmp_path / "walker_walk.bvh")
+    whole = spark_sim.retarget(walk, "robot", method="copy")
+    assert isinstance(whole, RobotClip)
+    file = whole.save(tmp_path / "whole.npz")
+    for name in IN_BLOCKS:
+        monkeypatch.setattr(name, 7)
+    parts = spark_sim.retarget(walk, "robot", method="copy")
+    assert isinstance(parts, RobotClip)
+    assert isinstance(parts.motion, LazyMotion)
+    assert not isinstance(whole.motion, LazyMotion)
+    np.testing.assert_array_equal(parts.qpos, whole.qpos)
+    for name in ("root_pos", "rotations", "translations"):
+        np.testing.assert_array_equal(getattr(parts.motion, name), getattr(whole.motion, name))
+    assert parts.save(tmp_path / "parts.npz").read_bytes() == file.read_bytes()
