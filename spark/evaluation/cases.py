@@ -21,9 +21,10 @@ from spark.evaluation.metrics import san_height
 from spark.network.features import BodyFeatures
 from spark.rig.roles import Role
 from spark.summary import counted
-from spark.training.dataset import Performance, is_dataset, prepare, read_performances
+from spark.training.dataset import Performance, is_dataset, read_performances
 from spark.training.grounded import on_ground
 from spark.training.pairs import TrainingClip
+from spark.training.prepare import prepare
 from spark.training.same_motion import SPARE_FRAMES, same_motion
 from spark.training.staging import StagedBody
 from spark.training.variants import Variant, random_variant, same_body, scaled_body, split_body
@@ -63,7 +64,7 @@ class Case:
 def performances(path: Path) -> list[Performance]:
     """The clips of a dataset, or of a folder with one folder a character, which has no cells.
 
-    Raises what `spark.training.dataset.prepare` and `read_performances` raise.
+    Raises what `spark.training.prepare.prepare` and `read_performances` raise.
     """
     if is_dataset(path):
         return read_performances(path)

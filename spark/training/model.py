@@ -15,7 +15,7 @@ Axes: B batch, T frames, J joints, G = 6 groups, N joints of a group (padded), D
 """
 
 import torch
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
 from spark.network.config import (
@@ -24,22 +24,22 @@ from spark.network.config import (
     NO_ROTATION,
     QUERIES_PER_GROUP,
     RESIDUAL_SCALE,
-    ROTATION_GAIN,
     SHAPE_FEATURES,
     TPOSE_FEATURES,
     TPOSE_ROTATION,
     Config,
 )
-from spark.rotation import matrix_from_sixd
 from spark.training.attention import Attention, Feedforward, TemporalBlock, sinusoids
 from spark.training.precision import exactly
+from spark.training.residual import corrected, corrected_joints, rotation_features
 from spark.training.tensors import (
     Body,
     PoseTensors,
     Start,
+    first_owner,
     forward_kinematics,
+    scatter_positions,
     take,
-    world_matrices,
 )
 
 
@@ -130,7 +130,7 @@ class Encoder(nn.Module):
         index = body.groups.clamp(min=0)
         in_group = body.groups >= 0
         if not self.config.share_joints:
-            in_group = in_group & _first_owner(body.groups)
+            in_group = in_group & first_owner(body.groups)
         B, T, _, D = x.shape
         groups = take(x, index.flatten(1)).view(B, T, *index.shape[1:], D)
         groups = groups + embedding.positions(body)[:, None]
@@ -159,7 +159,7 @@ class Encoder(nn.Module):
     def _joint_features(self, pose: PoseTensors, body: Body) -> Float[Tensor, "B T J D"]:
         joints = pose.rotations
         if self.config.residual:
-            joints = _rotation_features(joints)
+            joints = rotation_features(joints)
         if self.config.positions_in:
             relative = forward_kinematics(pose, body) - pose.root[:, :, None]
             joints = torch.cat([joints, relative], -1)
@@ -193,7 +193,7 @@ class Decoder(nn.Module):
     ) -> PoseTensors:
         """The motion on `body`; a residual network corrects `start`, the analytic transfer."""
         B, T = latent.shape[:2]
-        y = embedding.joints(body) + _scatter_positions(embedding.positions(body), body)
+        y = embedding.joints(body) + scatter_positions(embedding.positions(body), body)
         if start is not None:
             return self._correct(start, y, latent, body)
         J = body.valid.shape[1]
@@ -214,21 +214,19 @@ class Decoder(nn.Module):
         body: Body,
     ) -> PoseTensors:
         """`start` with its unmatched joints corrected: they alone are decoded."""
-        joints, valid = _corrected_joints(start)
+        joints, valid = corrected_joints(start)
         assert self.start is not None
         y = (
             take(known[:, None], joints)
             + self.query
-            + self.start(_rotation_features(take(start.rotations, joints)))
+            + self.start(rotation_features(take(start.rotations, joints)))
         )
         y = self._decoder_blocks(y, latent, valid | ~valid.any(1, keepdim=True))
         with exactly(y):
             scale = RESIDUAL_SCALE * (1.0 if self.training else self.config.shrink)
             sixd = scale * self.rotation(y.float()) * valid[:, None, :, None]
             index = joints[:, None, :, None].expand_as(sixd)
-            return _corrected(
-                start, torch.zeros_like(start.rotations).scatter(2, index, sixd), body
-            )
+            return corrected(start, torch.zeros_like(start.rotations).scatter(2, index, sixd), body)
 
     def _decoder_blocks(
         self,
@@ -289,57 +287,7 @@ def _temporal_block(config: Config) -> TemporalBlock:
     )
 
 
-def _corrected_joints(start: Start) -> tuple[Int[Tensor, "B C"], Bool[Tensor, "B C"]]:
-    """The joints of `start` to decode, and which of them are no padding."""
-    if start.corrected is not None:
-        return start.corrected.clamp(min=0), start.corrected >= 0
-    joints = torch.arange(start.unmatched.shape[1], device=start.unmatched.device)
-    joints = joints.expand_as(start.unmatched)
-    valid = start.unmatched == joints
-    if not torch.compiler.is_exporting():  # a graph can't cut its tensors by their values
-        count = max(1, int(valid.sum(1).max()))
-        joints = valid.int().argsort(dim=1, descending=True, stable=True)[:, :count]
-        valid = torch.gather(valid, 1, joints)
-    return joints, valid
-
-
-def _rotation_features(rotations: Float[Tensor, "B T J 6"]) -> Float[Tensor, "B T J 6"]:
-    """The deviation of a rotation from none, scaled to numbers of about 1."""
-    return ROTATION_GAIN * (rotations - rotations.new_tensor(NO_ROTATION))
-
-
 def _blurred(features: Float[Tensor, "B J F"], noise: float) -> Float[Tensor, "B J F"]:
     """Features whose first three are a place or an offset, which is moved at random."""
     moved = features[..., :3] + noise * torch.randn_like(features[..., :3])
     return torch.cat([moved, features[..., 3:]], -1)
-
-
-def _corrected(start: Start, sixd: Float[Tensor, "B T J 6"], body: Body) -> PoseTensors:
-    """`start` with its unmatched joints turned a little, each in its own axes, by no rotation plus
-    `sixd`. What follows them goes with them; all other joints keep their rotation in the world."""
-    world = world_matrices(start.rotations, body.parents)
-    small = matrix_from_sixd(sixd + sixd.new_tensor(NO_ROTATION))
-    turn = take(world @ small @ world.mT, start.unmatched.clamp(min=0))
-    world = torch.where((start.unmatched >= 0)[:, None, :, None, None], turn @ world, world)
-    upper = take(world, body.parents)
-    is_root = (body.parents == torch.arange(world.shape[2], device=world.device))[:, None, :]
-    local = torch.where(is_root[..., None, None], world, upper.mT @ world)
-    return PoseTensors(local[..., :2].transpose(-1, -2).flatten(-2), start.root)
-
-
-def _first_owner(groups: Int[Tensor, "B G N"]) -> Bool[Tensor, "B G N"]:
-    """Where a joint stands for the first time, groups in order: the others give it up."""
-    flat = groups.flatten(1)
-    same = flat[:, :, None] == flat[:, None, :]
-    earlier = torch.ones_like(same[0]).tril(-1)
-    return ~(same & earlier).any(-1).view_as(groups)
-
-
-def _scatter_positions(positions: Float[Tensor, "B G N D"], body: Body) -> Float[Tensor, "B J D"]:
-    """E_pos of each joint: that of the first group that holds it."""
-    B, J = body.valid.shape
-    first = (body.groups >= 0) & _first_owner(body.groups)
-    target = torch.where(first, body.groups, J).flatten(1)
-    out = positions.new_zeros(B, J + 1, positions.shape[-1])
-    index = target[..., None].expand(-1, -1, positions.shape[-1])
-    return out.scatter(1, index, positions.flatten(1, 2))[:, :J]

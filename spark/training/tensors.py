@@ -100,3 +100,21 @@ def take(x: Tensor, joints: Int[Tensor, "B J"]) -> Tensor:
     index = joints.view(len(joints), 1, -1, *([1] * (x.ndim - 3)))
     index = index.expand(-1, x.shape[1], -1, *x.shape[3:])
     return torch.gather(x, 2, index)
+
+
+def first_owner(groups: Int[Tensor, "B G N"]) -> Bool[Tensor, "B G N"]:
+    """Where a joint stands for the first time, groups in order: the others give it up."""
+    flat = groups.flatten(1)
+    same = flat[:, :, None] == flat[:, None, :]
+    earlier = torch.ones_like(same[0]).tril(-1)
+    return ~(same & earlier).any(-1).view_as(groups)
+
+
+def scatter_positions(positions: Float[Tensor, "B G N D"], body: Body) -> Float[Tensor, "B J D"]:
+    """E_pos of each joint: that of the first group that holds it."""
+    B, J = body.valid.shape
+    first = (body.groups >= 0) & first_owner(body.groups)
+    target = torch.where(first, body.groups, J).flatten(1)
+    out = positions.new_zeros(B, J + 1, positions.shape[-1])
+    index = target[..., None].expand(-1, -1, positions.shape[-1])
+    return out.scatter(1, index, positions.flatten(1, 2))[:, :J]

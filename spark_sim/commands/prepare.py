@@ -40,7 +40,7 @@ def configure(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     from spark.errors import ConventionError
-    from spark.training.dataset import prepare
+    from spark.training.prepare import prepare
     from spark_sim import console
 
     out = Path(args.output)

@@ -55,7 +55,7 @@ def _use_checkpoint(path: Path) -> None:
 
 
 def _dataset_seeds(folder: Path) -> list[bytes]:
-    from spark.training.dataset import prepare
+    from spark.training.prepare import prepare
 
     (folder / "motions").mkdir()
     spark_sim.sample(folder / "motions")

@@ -26,9 +26,10 @@ from spark.rig.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_about, quat_angle, quat_conj, quat_mul
 from spark.training import dataset_parts, part_workers
 from spark.training.clips import clip_of
-from spark.training.dataset import _on_body, is_dataset, prepare, read_dataset, training_clips
+from spark.training.dataset import is_dataset, read_dataset, training_clips
 from spark.training.dataset_parts import Part, Rejected, make_part, read_part
 from spark.training.pairs import PairMaker
+from spark.training.prepare import _on_body, prepare
 from spark.training.splits import TRAINING, UNSEEN, cells, seen_characters, seen_motions
 from spark.transfer.canonical import to_canonical
 from tests.helpers.recordings import recording

@@ -6,9 +6,10 @@ import torch
 from spark.network.config import Config
 from spark.training import losses
 from spark.training.batch import Batch, Collator
-from spark.training.model import Spark, _corrected
+from spark.training.model import Spark
 from spark.training.name_encoder import NameEncoder
 from spark.training.pairs import PairMaker
+from spark.training.residual import corrected
 from spark.training.tensors import (
     Body,
     PoseTensors,
@@ -89,7 +90,7 @@ def test_only_unmatched_joints_are_corrected_and_what_follows_them(maker: PairMa
     torch.manual_seed(0)
     batch = Collator(NameEncoder().encode).batch([maker.draw(n, 2) for n in range(8)])
     start, J = batch.start, batch.start.unmatched.shape[1]
-    moved = _corrected(start, 0.1 * torch.randn_like(start.rotations), batch.target)
+    moved = corrected(start, 0.1 * torch.randn_like(start.rotations), batch.target)
     before, after = (world_matrices(p.rotations, batch.target.parents) for p in (start, moved))
     kept = (start.unmatched < 0)[:, None, :, None, None]
     torch.testing.assert_close(before * kept, after * kept, atol=1e-5, rtol=0)
@@ -113,7 +114,7 @@ def test_one_step_learns_and_every_weight_takes_part(config: Config, batch: Batc
     # Far from the analytic transfer, so that a residual network has something to learn at once.
     truth = PoseTensors(batch.truth.rotations, batch.truth.root + 0.2)
     if config.residual:
-        truth = _corrected(batch.start, torch.full_like(batch.start.rotations, 0.3), batch.target)
+        truth = corrected(batch.start, torch.full_like(batch.start.rotations, 0.3), batch.target)
     seen: dict[str, bool] = {}
     errors = []
     for _ in range(30):

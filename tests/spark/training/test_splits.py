@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from spark.evaluation.cases import performances, recorded_cases
-from spark.training.dataset import prepare
+from spark.training.prepare import prepare
 from spark.training.splits import character_and_motion, seen_characters
 from spark_sim import sample
 

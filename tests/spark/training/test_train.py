@@ -13,11 +13,11 @@ import torch
 
 from spark.errors import DivergedError
 from spark.training.checkpoint import Checkpoint, load_checkpoint
-from spark.training.model import _corrected
 from spark.training.name_encoder import NameEncoder
 from spark.training.objective import Objective
 from spark.training.optimiser import make_optimiser
 from spark.training.pairs import TrainingClip
+from spark.training.residual import corrected
 from spark.training.steps import Steps
 from spark.training.train import take_step, train
 from spark_sim import sample
@@ -141,7 +141,7 @@ def test_a_handful_of_pairs_is_learned_by_heart(clips: list[TrainingClip]) -> No
     bent = torch.zeros_like(batch.truth.rotations)
     bent[..., 1] = 2 + 5 * batch.pose.root[:, :, None, 0]
     bent[..., 3] = -bent[..., 1]
-    batch = batch._replace(truth=_corrected(batch.start, bent, batch.target))
+    batch = batch._replace(truth=corrected(batch.start, bent, batch.target))
     model = checkpoint.model.eval()
     objective, optimiser = Objective(model, config), make_optimiser(model, config)
     terms = [take_step(objective, optimiser, batch, n, config) for n in range(config.steps)]
