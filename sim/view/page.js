@@ -10,11 +10,13 @@ function draw() {
   else { ctx.textAlign = "center"; font(13); ctx.fillStyle = css.ink; ctx.fillText("This browser draws no 3D: the replay needs WebGL 2.", W / 2, H / 2); }
   drawMarks(all, css);
 }
-// What the camera looks at: the middle of all, or one; where it stands still, what it did last.
+// What the camera looks at: the middle of all, or one; where it stands still, what it did last. Who
+// flies off is looked at where it was before.
 function aim(all) {
   if (player.followed === null && view.target) return view.target;
   const one = player.followed !== null && player.followed >= 0 ? people[player.followed] : null;
-  const seen = DATA.figures.flatMap((f, i) => one ? f === one ? [all[i][0].p] : [] : [all[i][0].p]);
+  const place = (f, i) => frameNow() >= f.lost ? moved(f, at3(f.root, Math.max(f.lost - 1, 0))) : all[i][0].p;
+  const seen = DATA.figures.flatMap((f, i) => one && f !== one ? [] : [place(f, i)]);
   const middle = [0, 1].map(i => { const at = seen.map(p => p[i]); return (Math.min(...at) + Math.max(...at)) / 2; });
   return view.target = [...middle, (one ? one.height : DATA.height) * 0.5];
 }

@@ -103,8 +103,9 @@ def _figure(
     """A figure's tree of bodies, what they look like, and its coordinates in every frame."""
     model, bodies = scene.model, placement.bodies
     qpos = scene.qpos[:, placement.columns]
-    angles = float(max(np.abs(qpos[:, 3:]).max(), 1.0)) / STEPS
-    whole = np.round(qpos[:, 3:] / angles).astype("<i2")
+    lost = scene.lost_from(placement)
+    most = float(np.abs(qpos[: max(lost, 1), 3:]).max(initial=1.0))
+    whole = np.round(np.clip(qpos[:, 3:] / most, -1.0, 1.0) * STEPS).astype("<i2")
     out = {
         "label": figure.label,
         "lane": placement.lane,
@@ -118,8 +119,9 @@ def _figure(
             for g in range(model.ngeom)
             if int(model.geom_bodyid[g]) in bodies and int(model.geom_group[g]) != FRAME_GROUP
         ],
-        "root": packed(qpos[:, :3]),
-        "angles": angles,
+        "root": packed(scene.in_reach(placement, qpos[:, :3])),
+        "lost": lost,
+        "angles": most / STEPS,
         "joints": in_base64(whole),
     }
     if placement.skin is not None:

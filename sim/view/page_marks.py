@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from sim.view.annotations import Annotations
 from sim.view.packing import in_base64, packed
@@ -22,18 +23,22 @@ def page_marks(known: Annotations, placement: Placement, scene: Scene) -> dict[s
     states, at_limit = known.states[frames], known.at_limit[frames]
     np.maximum.at(states, nearest, known.states)
     np.logical_or.at(at_limit, nearest, known.at_limit)
+
+    def placed(points: Float[np.ndarray, "T *n 3"]) -> Float[np.ndarray, "T *n 3"]:
+        return scene.in_reach(placement, placement.to_scene(points))
+
     low = np.array([0.0, 0.0, known.support_height])
     return {
-        "corners": packed(placement.to_scene(known.corners[frames])),
+        "corners": packed(placed(known.corners[frames])),
         "states": in_base64(states),
         "colors": [color for _, color in known.corner_states],
-        "com": packed(placement.to_scene(known.com[frames])),
+        "com": packed(placed(known.com[frames])),
         "support": float(placement.to_scene(low)[2]),
         "limits": [
             {
                 "name": name,
                 "frames": np.flatnonzero(at_limit[:, k]).tolist(),
-                "points": packed(placement.to_scene(known.joints[frames[at_limit[:, k]], k])),
+                "points": packed(placed(known.joints[frames, k])[at_limit[:, k]]),
             }
             for k, name in enumerate(known.joint_names)
             if at_limit[:, k].any()

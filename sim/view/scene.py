@@ -26,6 +26,7 @@ from spark.skin import Skin
 # from two standing heights over the floor than so many of them; or further [standing heights] from
 # where the figure that leads has gone.
 _LOST_SPEED, _LOST_HEIGHT, _LOST_DISTANCE = 15.0, 3.0, 5.0
+_FLOWN = 10.0  # standing heights
 _SAME_FPS = 1.005  # of frames a second: a file's 0.016666 s means 60, and 0.004166 s means 240
 _HEAD = 0.12  # of the standing height: from the head's joint to the crown
 _SPACING = 0.8  # of two neighbours' mean standing height, between their roots: arms do not meet
@@ -134,10 +135,17 @@ class Scene:
     def kept_paths(self) -> tuple[Float[np.ndarray, "T 3"], ...]:
         """Where each figure's root is, for as long as a camera can keep it in its picture: one that
         flies off, as a simulation that diverges does, rests where it was before."""
-        return tuple(self._kept(placement) for placement in self.placements)
+        return tuple(self.kept_path(placement) for placement in self.placements)
 
-    def _kept(self, placement: Placement) -> Float[np.ndarray, "T 3"]:
-        path, height = self.path(placement).copy(), placement.height
+    def kept_path(self, placement: Placement) -> Float[np.ndarray, "T 3"]:
+        """That of one figure."""
+        path, lost = self.path(placement).copy(), self.lost_from(placement)
+        path[lost:] = path[max(lost - 1, 0)]
+        return path
+
+    def lost_from(self, placement: Placement) -> int:
+        """From which frame on a figure has flown off; the number of frames where it never has."""
+        path, height = self.path(placement), placement.height
         jumps = np.zeros(len(path))
         jumps[1:] = np.linalg.norm(np.diff(path, axis=0), axis=1) / self.frame_time
         start = np.array([0.0, placement.lane, 0.0])
@@ -148,9 +156,20 @@ class Scene:
             | (np.abs(path[:, 2] - 2 * height) > _LOST_HEIGHT * height)
             | (apart > _LOST_DISTANCE * max(height, self._reference.height))
         )
-        first = int(lost.argmax()) if lost.any() else len(path)
-        path[first:] = path[max(first - 1, 0)]
-        return path
+        return int(lost.argmax()) if lost.any() else len(path)
+
+    def in_reach(
+        self,
+        placement: Placement,
+        points: Float[np.ndarray, "N *n 3"],
+        frames: slice | Int[np.ndarray, "N"] = slice(None),
+    ) -> Float[np.ndarray, "N *n 3"]:
+        """Points of a figure in some frames; once it has flown off, no further than `_FLOWN` from
+        where it was lost: 16-bit integers hold no more."""
+        kept = self.kept_path(placement)[frames]
+        kept = kept.reshape(len(kept), *[1] * (points.ndim - 2), 3)
+        most = _FLOWN * self.height
+        return kept + np.clip(points - kept, -most, most)
 
     @cached_property
     def _reference(self) -> Placement:

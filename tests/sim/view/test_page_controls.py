@@ -88,6 +88,27 @@ def test_every_toggle_changes_the_picture(text: str, tmp_path: Path) -> None:
     assert asked(text, script, tmp_path) == [[name, True, True] for name in TOGGLES]
 
 
+def test_who_flies_off_costs_the_others_neither_place_nor_precision(tmp_path: Path) -> None:
+    rig = stick_rig()
+    still = standing(rig, 60)
+    away = replace(still, root_pos=still.root_pos.copy())
+    away.root_pos[30:] += np.exp(np.arange(30))[:, None]
+    figures = [Figure(Subject(m, rig), name) for m, name in ((still, "he"), (away, "it"))]
+    script = """
+      const at = t => {
+        play(false); seekTo(t);
+        const all = placedPoses();
+        return [all.map(bodies => bodies[0].p), aim(all)];
+      };
+      return [at(0.4), at(end)];"""
+    text = page(figures, title="two", known=known_of(figures))
+    (before, middle), (after, later) = asked(text, script, tmp_path)
+    np.testing.assert_allclose(after[0], before[0], atol=1e-6)
+    np.testing.assert_allclose(later, middle, atol=0.01)
+    assert before[1][2] == pytest.approx(before[0][2], abs=0.002)
+    assert np.linalg.norm(after[1]) > 10.0
+
+
 def test_findings_are_gone_through_and_clicked(text: str, tmp_path: Path) -> None:
     script = """
       play(true); view.time = 0;
