@@ -68,8 +68,9 @@ class Hud:
         state = "" if timeline.playing else "   paused"
         speed = "" if timeline.speed == 1 else f"   speed {timeline.speed:g}"
         once = "" if timeline.loop else "   once"
+        time = min(timeline.time, timeline.duration)  # it goes on until the last frame is over
         words = player.status or (
-            f"{timeline.time:.2f} / {timeline.duration:.2f} s   frame {timeline.frame} of "
+            f"{time:.2f} / {timeline.duration:.2f} s   frame {timeline.frame} of "
             f"{timeline.frames}{speed}{once}{state}"
         )
         self._text(words, float(line), 0.45 * line, viewport, _INK)

@@ -107,7 +107,7 @@ def _figure(
     most = float(np.abs(qpos[: max(lost, 1), 3:]).max(initial=1.0))
     whole = np.round(np.clip(qpos[:, 3:] / most, -1.0, 1.0) * STEPS).astype("<i2")
     out = {
-        "label": figure.label,
+        "label": placement.label,
         "lane": placement.lane,
         "height": placement.height,
         "tall": figure.own_height * figure.scale,

@@ -13,6 +13,7 @@ from sim.interpolate import at_times
 from sim.trajectory import Subject, model_trajectory
 from sim.view.display import add_display, body_names
 from sim.view.skin import WornSkin, add_skin, worn_by
+from sim.view.text import shortened
 from sim.view.world import empty_world
 from spark.errors import SkeletonError
 from spark.kinematics import forward
@@ -227,7 +228,7 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0, blend: bool
         ahead = quat_rotate(turn, _ahead(figure))
         placements.append(
             Placement(
-                label=figure.label,
+                label=shortened(figure.label),
                 ghost=figure.ghost,
                 turn=turn,
                 translation=translation,

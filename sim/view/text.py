@@ -1,4 +1,4 @@
-"""Text in the letters that MuJoCo's fonts have."""
+"""Text in the letters that MuJoCo's fonts have, and names that have room beside others."""
 
 import unicodedata
 
@@ -11,3 +11,9 @@ def plain(text: str) -> str:
         c if c == "\n" or 32 <= ord(c) < 127 else "" if unicodedata.combining(c) else "?"
         for c in letters
     )
+
+
+def shortened(name: str, most: int = 32) -> str:
+    """The name, or its beginning and its end, where names mostly differ."""
+    half = (most - 3) // 2
+    return name if len(name) <= most else f"{name[: most - 3 - half]}...{name[-half:]}"

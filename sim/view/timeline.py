@@ -42,7 +42,7 @@ class Timeline:
 
     def advance(self, seconds: float) -> None:
         """Let `seconds` of real time go by."""
-        if not self.playing:
+        if not self.playing or self.frames == 1:
             return
         self.time += seconds * self.speed
         if self.time < self.duration + self.frame_time:  # the last frame lasts as long as others

@@ -36,6 +36,7 @@ _LINES = {  # by whether they are arrows, and thin
     (False, True): mujoco.mjtGeom.mjGEOM_LINE,
     (True, False): mujoco.mjtGeom.mjGEOM_ARROW,
 }
+_LONGEST = 99  # letters of a label, as MuJoCo has it
 _MESSAGE_TIME = 2.0  # [s]
 _HIGHEST = 0.95  # of the way from the picture's middle to its upper edge: where words end
 _NAMES = 1.12  # of the distance: room for the names over the heads
@@ -205,7 +206,7 @@ class Window:
         if isinstance(mark, Line):
             mujoco.mjv_connector(geom, int(kind), mark.width, mark.start, mark.end)
         elif isinstance(mark, Label):
-            geom.label = plain(mark.text)
+            geom.label = plain(mark.text)[:_LONGEST]
 
     def _below_edge(self, at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
         """The place [m], or, where it is seen above the picture's upper edge, that below it."""

@@ -15,7 +15,7 @@ from sim.view.controls import CONTROLS, help_rows, press
 from sim.view.marks import Dot, Label, Line, marks
 from sim.view.player import Player
 from sim.view.scene import Figure, build_scene
-from sim.view.text import plain
+from sim.view.text import plain, shortened
 from sim.view.timeline import Event, Timeline
 from spark.demo.sample import sample_motion, sample_rig
 
@@ -64,7 +64,8 @@ def test_a_step_is_one_frame_at_any_rate() -> None:
 
 def test_one_frame_is_a_motion_too() -> None:
     timeline = Timeline(1, 0.1)
-    timeline.advance(7.0)
+    timeline.advance(7.05)
+    assert timeline.time == 0.0
     timeline.seek_share(1.0)
     assert (timeline.frame, timeline.duration) == (0, 0.0)
 
@@ -216,3 +217,11 @@ def test_a_ghost_stands_in_the_target_as_tall_as_it() -> None:
 
 def test_text_is_what_the_fonts_have() -> None:
     assert plain("genou à 12°\n動") == "genou a 12 deg\n?"
+
+
+def test_long_names_keep_both_ends() -> None:
+    assert shortened("walk") == "walk"
+    name = "take_" + 200 * "x" + "_on_g1"
+    short = shortened(name)
+    assert len(short) == 32
+    assert (short[:5], short[-6:]) == ("take_", "_on_g1")

@@ -88,9 +88,12 @@ def test_ctrl_c_while_two_figures_play_ends_cleanly(
 
 
 @needs_xvfb
-def test_closing_while_it_plays_ends_cleanly(display: str, pair: list[str]) -> None:
+def test_closing_while_it_plays_ends_cleanly(display: str, pair: list[str], tmp_path: Path) -> None:
+    """A figure's name is longer than MuJoCo's labels may be."""
+    named = tmp_path / f"{200 * 'n'}.bvh"
+    named.write_bytes(Path(pair[0]).read_bytes())
     then = "if drawn == 5: self._glfw.set_window_should_close(self._window, True)"
-    with start(display, pair, then) as process:
+    with start(display, [*pair, str(named)], then) as process:
         _, told = process.communicate(timeout=60)
     assert process.returncode == 0, told
     assert "Traceback" not in told
