@@ -5,6 +5,7 @@ the machine has.
 """
 
 import json
+import math
 import os
 import re
 import stat
@@ -83,17 +84,22 @@ def parse_json(path: Path, text: bytes | str, what: str) -> Any:
     except orjson.JSONDecodeError as error:
         if "surrogate" in str(error):  # the name of a file that is no text, as Python writes it
             with suppress(ValueError, RecursionError):
-                return json.loads(text, parse_constant=_no_number, parse_int=_whole)
+                return json.loads(
+                    text, parse_constant=_finite, parse_int=_whole, parse_float=_finite
+                )
         raise FileFormatError(path, None, f"{what} is no JSON: {error}") from error
 
 
-def _no_number(name: str) -> None:
-    raise ValueError(name)
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(text)
+    return number
 
 
 def _whole(digits: str) -> int | float:
     """As orjson has them: beyond 64 bits they are floats."""
-    return int(digits) if len(digits) < 19 else float(digits)
+    return int(digits) if len(digits) < 19 else _finite(digits)
 
 
 def unreadable(path: Path, error: Exception, expected: str) -> FileFormatError:

@@ -65,7 +65,12 @@ def test_no_text_gets_past_the_parsers_untyped(text: str) -> None:
         parse_json(Path("a"), text, "it")
 
 
-def test_json_has_no_nan() -> None:
-    for text in ('{"x": NaN}', "[Infinity]", "1e999"):
+@pytest.mark.parametrize("first", ["0", '"\\udcff"'])  # half a pair, as in names of no text
+def test_json_has_finite_numbers_alone(first: str) -> None:
+    """Whole ones beyond 64 bits are floats."""
+    for digits in (20, 300):
+        number = parse_json(Path("a"), f"[{first}, {'9' * digits}]", "it")[1]
+        assert number == float("9" * digits)
+    for text in ("NaN", "Infinity", "1e999", "9" * 400, "9" * 5000):
         with pytest.raises(FileFormatError, match="no JSON"):
-            parse_json(Path("a"), text, "it")
+            parse_json(Path("a"), f"[{first}, {text}]", "it")
