@@ -80,6 +80,15 @@ def parse_json(path: Path, text: bytes | str, what: str) -> Any:
     """The JSON in `what` of a file. Raises `FileFormatError` where it is none, holds NaN, or is
     nested too deeply."""
     try:
+        return loads_json(text)
+    except ValueError as error:
+        raise FileFormatError(path, None, f"{what} is no JSON: {error}") from error
+
+
+def loads_json(text: bytes | str) -> Any:
+    """The value of a JSON text. Raises `ValueError` where it is none, holds NaN, or is nested too
+    deeply."""
+    try:
         return orjson.loads(text)
     except orjson.JSONDecodeError as error:
         if "surrogate" in str(error):  # the name of a file that is no text, as Python writes it
@@ -87,7 +96,7 @@ def parse_json(path: Path, text: bytes | str, what: str) -> Any:
                 return json.loads(
                     text, parse_constant=_finite, parse_int=_whole, parse_float=_finite
                 )
-        raise FileFormatError(path, None, f"{what} is no JSON: {error}") from error
+        raise
 
 
 def _finite(text: str) -> float:

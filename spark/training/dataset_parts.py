@@ -20,6 +20,7 @@ from spark.files import write_atomically
 from spark.io.companions import companions
 from spark.io.reading import read_motion
 from spark.network.features import body_features
+from spark.opening import loads_json
 from spark.rig.rig import Rig, understand
 from spark.rig.rig_json import rig_from_json, rig_to_json
 from spark.training.clips import clip_of
@@ -89,7 +90,7 @@ def read_part(parts: Path, digest: str) -> Part | Rejected | None:
     try:
         file = io.BytesIO(_part_path(parts, digest).read_bytes())
         with np.load(file, allow_pickle=False) as stored:
-            about = json.loads(stored["about"].tobytes())
+            about = loads_json(stored["about"].tobytes())
             if "why" in about:
                 return Rejected(about["why"], about.get("again", False))
             rig = rig_from_json(about["rig"])

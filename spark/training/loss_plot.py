@@ -1,12 +1,12 @@
 """A run's losses as a picture, drawn anew while it goes on."""
 
 import io
-import json
 from collections import defaultdict
 from pathlib import Path
 from time import perf_counter
 
 from spark.files import write_atomically
+from spark.opening import loads_json
 
 _PAUSE = 30.0  # seconds between two pictures: drawing one takes half of a second
 _NOTHING = 1e-9  # a term that never gets larger is rounding: the default preset leaves the root
@@ -38,7 +38,7 @@ def read_terms(log: Path) -> dict[str, list[tuple[int, float]]]:
     terms: dict[str, list[tuple[int, float]]] = defaultdict(list)
     for line in log.read_text(errors="replace").splitlines() if log.exists() else ():
         try:
-            entry = json.loads(line)
+            entry = loads_json(line)
             for name in entry.keys() - {"step", "seconds"}:
                 terms[name].append((int(entry["step"]), float(entry[name])))
         except (ValueError, KeyError, TypeError, AttributeError):

@@ -21,6 +21,7 @@ from spark.errors import FileFormatError, OutputError, SkeletonError, name_list
 from spark.files import alone, write_atomically
 from spark.io.reading import motion_files
 from spark.network.features import body_features
+from spark.opening import loads_json
 from spark.rig.rig import Rig
 from spark.rig.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_conj, quat_mul
@@ -90,7 +91,7 @@ def _prepared(
 def _clips_there(out: Path, seed: int) -> dict[str, str]:
     """The files in the dataset that `out` holds by their hashes; none where it holds nothing."""
     try:
-        index = json.loads((out / "index.json").read_bytes())
+        index = loads_json((out / "index.json").read_bytes())
         if index["format"] != FORMAT:
             raise ValueError
         there, clips = index["seed"], {clip["sha256"]: clip["file"] for clip in index["clips"]}

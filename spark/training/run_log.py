@@ -1,12 +1,12 @@
 """A run's log: a line of JSON for each step that is told of."""
 
-import json
 import math
 import os
 from pathlib import Path
 from typing import TextIO
 
 from spark.files import write_atomically
+from spark.opening import loads_json
 
 
 def open_log(out: Path, step: int, rank: int) -> TextIO:
@@ -27,6 +27,6 @@ def open_log(out: Path, step: int, rank: int) -> TextIO:
 def _logged_step(line: str) -> float:
     """Which step a line of the log tells of; none that was taken where it is half written."""
     try:
-        return float(json.loads(line)["step"])
+        return float(loads_json(line)["step"])
     except (ValueError, KeyError, TypeError):
         return math.inf

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import orjson
-
 from spark.errors import FileFormatError
 from spark.files import write_atomically
+from spark.opening import loads_json
 
 SCHEMA = "spark-sim manifest 1"
 NAME = "manifest.jsonl"
@@ -53,7 +52,7 @@ class Manifest:
     def of(self, job: str) -> list[Entry]:
         """The lines of a job; none where it was never done."""
         try:
-            return [_parsed(line) for line in self._bytes(job).splitlines()]
+            return [loads_json(line) for line in self._bytes(job).splitlines()]
         except (OSError, ValueError):
             return []  # removed meanwhile, by another program
 
@@ -139,19 +138,12 @@ class Manifest:
 
 def _entry(line: bytes, path: Path, number: int) -> Entry:
     try:
-        entry = _parsed(line)
+        entry = loads_json(line)
     except ValueError as error:
         raise FileFormatError(path, number, "is no line of JSON; remove it") from error
     if not isinstance(entry, dict) or entry.get("schema") != SCHEMA:
         raise FileFormatError(path, number, f"is no entry of {SCHEMA!r}; remove it")
     return entry
-
-
-def _parsed(line: bytes) -> Any:
-    try:
-        return orjson.loads(line)
-    except ValueError:  # it reads no half of a surrogate pair, as names that are no text have
-        return json.loads(line)
 
 
 def _read(lines: _Lines) -> bytes:
@@ -163,7 +155,7 @@ def _read(lines: _Lines) -> bytes:
 def _is_of(text: bytes, job: str) -> bool:
     """Whether bytes of a manifest are whole lines of a job."""
     try:
-        return all(_parsed(line)["job"] == job for line in text.splitlines())
+        return all(loads_json(line)["job"] == job for line in text.splitlines())
     except (ValueError, TypeError, KeyError):
         return False
 

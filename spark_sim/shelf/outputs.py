@@ -8,6 +8,7 @@ from typing import Final
 
 from spark.errors import OutputError
 from spark.files import write_atomically
+from spark.opening import loads_json
 from spark_sim.files import check_free
 
 _OUTPUTS: Final = "outputs.json"  # in the folder of the clips' pages
@@ -48,7 +49,7 @@ def write_outputs(contents: Mapping[Path, bytes], clips: Path) -> None:
 
 def _written(clips: Path) -> dict[str, list[str]]:
     try:
-        found = json.loads((clips / _OUTPUTS).read_bytes())
+        found = loads_json((clips / _OUTPUTS).read_bytes())
     except (OSError, ValueError):
         return {}
     return found if isinstance(found, dict) else {}

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from spark.errors import SparkSimError
 from spark.files import write_atomically
+from spark.opening import loads_json
 from spark_sim.shelf.items import Item
 from spark_sim.shelf.made_of import (
     Facts,
@@ -39,7 +40,7 @@ class Measured:
 def recall(item: Item, page: Path) -> Measured | None:
     """What was measured of a motion, where that and its page are as they would be made again."""
     try:
-        record = json.loads(_record(page).read_bytes())
+        record = loads_json(_record(page).read_bytes())
         made_of = record["made_of"]
         same = (
             record["schema"] == SCHEMA
@@ -71,7 +72,7 @@ def forget_others(clips: Path, pages: Collection[Path]) -> None:
 
 def _is_record(path: Path) -> bool:
     try:
-        return str(json.loads(path.read_bytes())["schema"]).startswith(_RECORD)
+        return str(loads_json(path.read_bytes())["schema"]).startswith(_RECORD)
     except (OSError, ValueError, LookupError, TypeError):
         return False
 

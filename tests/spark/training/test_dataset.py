@@ -272,9 +272,10 @@ def test_what_is_there_is_not_lost_unasked(tree: Path, tmp_path: Path) -> None:
         prepare([tree], out, seed=1)
     assert (out / "index.json").read_bytes() == before
     assert len(prepare([tree / "walker"], out, force=True)["clips"]) < len(whole["clips"])
-    (out / "index.json").write_text('{"name": "my page"}')
-    with pytest.raises(OutputError, match="no dataset's"):
-        prepare([tree], out)
+    for others in ('{"name": "my page"}', "[" * 100_000):
+        (out / "index.json").write_text(others)
+        with pytest.raises(OutputError, match="no dataset's"):
+            prepare([tree], out)
     assert prepare([tree], out, force=True) == whole
 
 

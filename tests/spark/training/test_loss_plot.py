@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from spark.training.loss_plot import LossPlot, read_terms
+from spark.training.run_log import open_log
 
 pytest.importorskip("matplotlib")
 
@@ -32,3 +33,12 @@ def test_the_plot_has_the_terms_of_the_log_and_grows(tmp_path: Path) -> None:
     log.write_text(log.read_text() + 'ss": 1}\n{"step": 61, "loss": 0.001}\n')
     plot.update(now=True)
     assert (tmp_path / "losses.png").read_bytes() != first
+
+
+@pytest.mark.parametrize("line", ["[" * 100_000, '{"step": 1e999, "loss": 1}', "[1]", "1"])
+def test_lines_of_others_are_passed_over(tmp_path: Path, line: str) -> None:
+    log = tmp_path / "log.jsonl"
+    log.write_text(f'{line}\n{{"step": 7, "loss": 0.5}}\n')
+    assert read_terms(log) == {"loss": [(7, 0.5)]}
+    open_log(tmp_path, 7, 0).close()
+    assert read_terms(log) == {"loss": [(7, 0.5)]}
