@@ -1,7 +1,7 @@
 """Train the rows of the evaluation's tables on one reduced schedule, and print the tables.
 
-Usage: python scripts/ablations.py DATASET RUNS NAMES
-(a dataset of `spark-sim prepare`; a folder; a name encoder of scripts/train_names.py)
+Usage: python scripts/ablations.py DATASET RUNS [STEPS [OPTION...]]
+(a dataset of `spark-sim prepare`; a folder; options of `spark-sim evaluate`, such as --made)
 
 Rows that are done are left alone, one that was stopped goes on. Each is a run of `spark-sim train`
 on the settings below: small, and the same for all. OMP_NUM_THREADS says how many cores it takes.
@@ -32,7 +32,6 @@ SCHEDULE = {
     "batch": 8,
     "per_body": 2,
     "variants": 16,
-    "steps": 600,
     "rate": 1e-3,
     "warmup": 50,
     "save_every": 100,
@@ -45,13 +44,13 @@ def folder_of(row: str) -> str:
     return row.replace("w/o", "without").replace("w/", "with").replace(" ", "_").lower()
 
 
-def main(dataset: str, runs: str, names: str) -> None:
+def main(dataset: str, runs: str, steps: str = "600", *options: str) -> None:
     checkpoints = []
     for row, config in ROWS.items():
         out = Path(runs) / folder_of(row)
         settings = Path(runs) / f"{out.name}.toml"
         out.mkdir(parents=True, exist_ok=True)
-        settings.write_text(toml(config.changed(row, **SCHEDULE, data=[dataset], names=names)))
+        settings.write_text(toml(config.changed(row, **SCHEDULE, steps=int(steps), data=[dataset])))
         if (out / "checkpoint.safetensors").exists():
             given = ["--resume"]
         else:
@@ -62,7 +61,7 @@ def main(dataset: str, runs: str, names: str) -> None:
     outputs = [
         f for kind in ("md", "json", "csv") for f in ("-o", str(Path(runs) / f"table.{kind}"))
     ]
-    spark_sim("evaluate", dataset, "--made", "--limit", "4", *checkpoints, *outputs, "--force")
+    spark_sim("evaluate", dataset, *options, *checkpoints, *outputs, "--force")
 
 
 def spark_sim(*arguments: str) -> None:
