@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -38,6 +38,8 @@ STRUCTURES: tuple[Structure, ...] = ("intra", "cross", "missing")
 # Made targets of each body and structure: its clips share them, so that results can be compared.
 _TARGETS_PER_BODY = 3
 _MAX_TRIES = 50  # random variants of a body
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,17 +76,19 @@ def performances(path: Path) -> list[Performance]:
         return [replace(p, clip=_in_memory(p.clip), cell="") for p in found]
 
 
-def recorded_cases(found: Sequence[Performance]) -> tuple[list[Case], list[str]]:
+def recorded_cases(
+    found: Sequence[Performance], seed: int = 0, limit: int | None = None
+) -> tuple[list[Case], list[str]]:
     """A case for each motion that is on two characters, both ways round, and notes on those that
     can't be one. Where both have the same structure, the target with its joints split as in SAN
-    makes a second, cross-structural one.
+    makes a second, cross-structural one. Of each cell at most `limit` such pairs, drawn by `seed`.
 
     Raises `SkeletonError` where there is none.
     """
     by_motion: dict[str, list[Performance]] = defaultdict(list)
     for one in found:
         by_motion[one.clip.name].append(one)
-    cases: list[Case] = []
+    pairs: list[tuple[str, list[Case]]] = []
     notes: list[str] = []
     for motion, ones in sorted(by_motion.items()):
         namesakes: list[str] = []
@@ -104,19 +108,20 @@ def recorded_cases(found: Sequence[Performance]) -> tuple[list[Case], list[str]]
                     continue
                 others = [p.clip for p in found if p.clip.body is target.clip.body]
                 own = _longest([clip for clip in others if clip.name != motion])
-                cases += _recorded(motion, source, target, min(lengths), own)
+                of_pair = _recorded(motion, source, target, min(lengths), own)
+                pairs.append((target.cell, of_pair))
         if namesakes:
             notes.append(
                 f"{motion}: {counted(len(namesakes), 'pair')} ({namesakes[0]}, for one) with this "
                 "name, but not the same motion: left out"
             )
-    if not cases:
+    if not pairs:
         raise SkeletonError(
             f"no motion is on two characters among {len(found)} clips ("
             f"{len(by_motion)} motions); expected files of one name in the folders of two "
             "characters, or --made for answers made by changing each clip's skeleton"
         )
-    return cases, notes
+    return [case for of_pair in _drawn(pairs, seed, limit) for case in of_pair], notes
 
 
 def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = None) -> list[Case]:
@@ -133,7 +138,8 @@ def made_cases(found: Sequence[Performance], seed: int = 0, limit: int | None = 
     """
     staged: dict[tuple[int, Structure, int], StagedBody] = {}
     cases = []
-    for i, one in _limited(found, seed, limit):
+    numbered = [(one.cell, (i, one)) for i, one in enumerate(found)]
+    for i, one in _drawn(numbered, seed, limit):
         body, (clip, other) = one.clip.body, _case_and_recording(one.clip, found)
         unchanged = StagedBody(same_body(body))
         recorded = _canonical(clip, unchanged.variant, len(clip.hips))
@@ -241,14 +247,13 @@ def _canonical(clip: TrainingClip, variant: Variant, frames: int) -> CanonicalMo
     return CanonicalMotion(variant.body.rig, clip.frame_time, rotations, hips)
 
 
-def _limited(
-    found: Sequence[Performance], seed: int, limit: int | None
-) -> list[tuple[int, Performance]]:
-    by_cell: dict[str, list[tuple[int, Performance]]] = defaultdict(list)
-    for numbered in enumerate(found):
-        by_cell[numbered[1].cell].append(numbered)
+def _drawn(items: Sequence[tuple[str, T]], seed: int, limit: int | None) -> list[T]:
+    """Of the items of each cell all, or at most `limit`, drawn by `seed`."""
+    by_cell: dict[str, list[T]] = defaultdict(list)
+    for cell, item in items:
+        by_cell[cell].append(item)
     if limit is None:
-        return [numbered for of_cell in by_cell.values() for numbered in of_cell]
+        return [item for of_cell in by_cell.values() for item in of_cell]
     rng = np.random.default_rng(seed)
     return [
         of_cell[k]

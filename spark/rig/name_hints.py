@@ -157,6 +157,8 @@ def _parts(words: set[str], sided: bool) -> tuple[dict[str, float], bool]:
     upper, lower = "upper" in words, "lower" in words
     if foreleg:
         return _foreleg_parts(words, upper, lower), True
+    if words & {"wrist", "palm"}:  # "HandWrist" and "HandPalm": the second word tells which
+        words = words - {"hand"}
     for limb in ("arm", "leg"):
         if limb in words and (upper or lower) and not words & SPECIFIC:
             return MEANINGS[f"{'upper' if upper else 'lower'} {limb}"], False

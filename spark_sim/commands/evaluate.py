@@ -68,7 +68,10 @@ def configure(parser: ArgumentParser) -> None:
         "share a motion",
     )
     parser.add_argument(
-        "--limit", metavar="N", type=int, help="with --made: draw N clips of each cell"
+        "--limit",
+        metavar="N",
+        type=int,
+        help="draw N pairs of each cell (with --made, N clips)",
     )
     parser.add_argument(
         "--seed",
@@ -106,8 +109,8 @@ def run(args: Namespace) -> int:
     for path in outputs:
         files.check_free(path, force=args.force)
         files.check_ending(path, (".md", ".json", ".csv"), "a table")
-    if args.limit is not None and (args.limit < 1 or not args.made):
-        raise ConventionError(f"--limit {args.limit}: expected 1 or more, together with --made")
+    if args.limit is not None and args.limit < 1:
+        raise ConventionError(f"--limit {args.limit}: expected 1 or more")
     results = dict(_named(result) for result in args.result)
     if results and args.made:
         raise ConventionError("--result goes with recorded answers: no tool was given those --made")
@@ -116,7 +119,7 @@ def run(args: Namespace) -> int:
     if args.made:
         cases = made_cases(found, args.seed, args.limit)
     else:
-        cases, notes = recorded_cases(found)
+        cases, notes = recorded_cases(found, args.seed, args.limit)
         for note in notes:
             console.note(note)
 

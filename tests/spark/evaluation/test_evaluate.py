@@ -116,6 +116,10 @@ def test_results_of_another_tool(tree: Path, found: list[Performance], tmp_path:
     """The truth itself has no error; moved by a tenth of the height along one axis, 0.01 / 3."""
     cases = [c for c in recorded_cases(found)[0] if c.answer is not None]
     assert len(cases) == 6
+    few = [c for c in recorded_cases(found, seed=1, limit=2)[0] if c.answer is not None]
+    assert len(few) == 2, "of the one cell that a folder has"
+    pairs = [{(c.motion, c.performer, c.target) for c in some} for some in (few, cases)]
+    assert pairs[0] < pairs[1]
     right, moved = tmp_path / "right", tmp_path / "moved"
     for case in cases:
         truth = tree / case.target / f"{case.motion}.bvh"

@@ -204,6 +204,21 @@ def _part(role: Role | None) -> str:
     return "" if role is None else role.part
 
 
+def test_a_palm_on_a_wrist_is_not_the_hand() -> None:
+    """Headsets track `LeftHandWrist` and, below it, `LeftHandPalm`: the hand turns at the wrist,
+    however long the forearm."""
+    skeleton, right = build(RIGS["headset"])
+    for factor in (0.5, 2.0, 3.0):
+        forearm = np.array([name.endswith("HandWrist") for name in skeleton.names])[:, None]
+        odd = replace(skeleton, offsets=skeleton.offsets * np.where(forearm, factor, 1.0))
+        odd = replace(odd, offsets=odd.offsets * np.where(_palms(skeleton), 4.0, 1.0))
+        assert wrong(odd, assign_roles(odd), right) == {}
+
+
+def _palms(skeleton: Skeleton) -> np.ndarray:
+    return np.array([name.endswith("Palm") for name in skeleton.names])[:, None]
+
+
 @pytest.mark.parametrize("convention", CONVENTIONS)
 def test_roles_of_made_rigs_are_those_they_were_made_with(convention: str) -> None:
     """Joints dropped, split and scaled, as in training, and named by one convention each."""
