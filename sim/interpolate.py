@@ -17,9 +17,20 @@ def at_times(
 ) -> Float[np.ndarray, "S nq"]:
     """Positions and angles interpolated linearly, rotations on the sphere; the first and the last
     frame hold beyond the ends."""
+    return at_frames(model, qpos, frames_of(times, frame_time))
+
+
+def frames_of(times: Float[np.ndarray, "S"], frame_time: float) -> Float[np.ndarray, "S"]:
+    """Times [s] as fractional frames. One that misses its frame by less than rounding does is that
+    frame's."""
     frames = times / frame_time
-    # A time that misses its frame by less than rounding does is that frame's.
-    frames = np.maximum(frames, np.floor(frames + 1e-6))
+    return np.maximum(frames, np.floor(frames + 1e-6))
+
+
+def at_frames(
+    model: mujoco.MjModel, qpos: Float[np.ndarray, "T nq"], frames: Float[np.ndarray, "S"]
+) -> Float[np.ndarray, "S nq"]:
+    """As `at_times`, at fractional frames."""
     out, columns = values_at(qpos, frames), quaternions(model)
     out[:, columns] = rotations_at(qpos[:, columns], frames)
     return out

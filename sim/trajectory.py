@@ -4,11 +4,13 @@ from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from sim.body.build import build_body
 from sim.body.compiling import compiled
 from sim.body.qpos import qpos_from_motion
+from sim.interpolate import at_frames, frames_of
+from spark.blocks import in_blocks
 from spark.motion import Motion
 from spark.rig.rig import Rig
 from spark.summary import brief
@@ -54,3 +56,27 @@ def model_trajectory(rig: Rig, motion: Motion) -> ModelTrajectory:
     model = compiled(spec)
     root = int(model.body(rig.skeleton.names[rig.root_joint]).id)
     return ModelTrajectory(spec, model, root, qpos_from_motion(model, motion, rig))
+
+
+def coordinates_at(
+    subject: Subject,
+    model: mujoco.MjModel,
+    times: Float[np.ndarray, "T"],
+    columns: Int[np.ndarray, "n"],
+) -> Float[np.ndarray, "T n"]:
+    """Some coordinates of a subject at rising times [s]. Of one without a model of its own, those
+    on the one that is built for it are made of no more frames at a time than are asked for."""
+    motion, last = subject.motion, len(subject.motion) - 1
+    frames = np.minimum(frames_of(times, motion.frame_time), last)
+
+    def some(block: slice) -> Float[np.ndarray, "T n"]:
+        at = frames[block]
+        start = max(min(int(at[0]), last - 1), 0)
+        near = slice(start, int(at[-1]) + 2)
+        if subject.body is not None:
+            qpos = subject.body.qpos[near]
+        else:
+            qpos = qpos_from_motion(model, motion.picked(near), subject.rig)
+        return at_frames(model, qpos, at - start)[:, columns]
+
+    return in_blocks(some, len(times))

@@ -56,15 +56,15 @@ def report_page(
     if source is not None and result.source is not None:
         shown.append((source, result.source, names[1]))
     figures = [Figure(each, name, metrics.floor_z) for each, metrics, name in shown]
+    clip, frame_time = result.clip, result.clip.frame_time
+    duration = (len(clip) - 1) * frame_time
+    source_duration = (subject if source is None else source).motion.duration
+    moments, note = worst_moments(result, figures)
     found = [result.findings, ()]
     known = [
         annotate(metrics, each, findings)
         for (each, metrics, _), findings in zip(shown, found, strict=False)
     ]
-    clip, frame_time = result.clip, result.clip.frame_time
-    duration = (len(clip) - 1) * frame_time
-    source_duration = (subject if source is None else source).motion.duration
-    moments, note = worst_moments(result, figures)
     columns, joints = _joints(clip)
     beside = ""
     if result.source is not None:

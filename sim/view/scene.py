@@ -9,8 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from sim.body.compiling import compiled
-from sim.interpolate import at_times
-from sim.trajectory import Subject, model_trajectory
+from sim.trajectory import Subject, coordinates_at, model_trajectory
 from sim.view.display import add_display, body_names
 from sim.view.skin import WornSkin, add_skin, worn_by
 from sim.view.text import shortened
@@ -201,7 +200,7 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0, blend: bool
     placements: list[Placement] = []
     column = 0
     for k, figure in enumerate(figures):
-        body = figure.subject.body or model_trajectory(figure.rig, figure.motion)
+        body = figure.subject.body or model_trajectory(figure.rig, figure.motion.frames(0, 1))
         first_body = len(list(world.bodies))
         worn = None
         if figure.skin is not None and not figure.ghost:
@@ -212,8 +211,7 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0, blend: bool
         )
         if worn is not None:
             add_skin(world, worn, f"{k}_")
-        qpos = at_times(body.model, body.qpos, figure.motion.frame_time, times)[:, columns]
-        qpos = _finite(qpos)
+        qpos = _finite(coordinates_at(figure.subject, body.model, times, columns))
         qpos[:, :3] *= figure.scale
         if figure.ghost and placements and not figure.aligned:
             translation = placements[-1].translation
@@ -255,6 +253,8 @@ def thinned(fps: float, most: float) -> int:
 def _finite(qpos: Float[np.ndarray, "T n"]) -> Float[np.ndarray, "T n"]:
     """Frames that are no numbers show the last one that was."""
     bad = ~np.isfinite(qpos).all(axis=1)
+    if not bad.any():
+        return qpos
     last = np.maximum.accumulate(np.where(bad, 0, np.arange(len(qpos))))
     return np.nan_to_num(qpos[last], posinf=0.0, neginf=0.0)
 

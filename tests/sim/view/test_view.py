@@ -313,6 +313,21 @@ def test_coordinates_between_frames(tmp_path: Path) -> None:
     np.testing.assert_allclose(halfway[1, 17:], [np.cos(0.75), 0, np.sin(0.75), 0], atol=1e-12)
 
 
+def test_scenes_of_long_motions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Made a few frames at a time they are the same to the bit: at other rates, with models of
+    their own and without, and beyond the end of the shorter ones."""
+    rig, motion, body = machine(tmp_path)
+    walker = sample_rig("walker")
+    shown = [
+        Figure(Subject(sample_motion("walk", walker, fps), walker), f"{fps:g}")
+        for fps in (120.0, 30.0, 47.0)
+    ]
+    shown.append(Figure(Subject(motion, rig, body), "machine"))
+    whole = build_scene(shown)
+    monkeypatch.setattr("spark.blocks.BLOCK", 7)
+    np.testing.assert_array_equal(build_scene(shown).qpos, whole.qpos)
+
+
 @pytest.mark.parametrize("option", ["html", "video", "strip"])
 def test_a_motion_is_not_overwritten_by_what_shows_it(option: str, tmp_path: Path) -> None:
     (walk, *_) = spark_sim.sample(tmp_path)
