@@ -47,6 +47,13 @@ def shot(
     return _fit(extents(scene, _picked(scene, frames)), scene, aspect, half_view, centered, frames)
 
 
+def distances(scene: Scene, aspects: Sequence[float], half_view: float) -> list[float]:
+    """How far [m] from the centres a camera is that sees all figures in all frames in pictures of
+    some shapes; `shot` has the rest."""
+    found = extents(scene, _picked(scene, None))
+    return [_fit(found, scene, aspect, half_view, True, None).distance for aspect in aspects]
+
+
 def fitting_aspect(scene: Scene, frames: Sequence[int] | None = None) -> float:
     """Width by height of a picture that is hardly wider than the figures, in any of some frames or
     in all of them."""

@@ -67,15 +67,23 @@ if (gl) {
   gl.enable(gl.BLEND);
 }
 
-let basis, eye, focal, level, W, H;
+// From where all figures are seen in a picture of this height over width.
+function fitting(tall) {
+  const known = DATA.distances, k = known.findIndex(([t]) => t >= tall), [t, d] = known.at(k);
+  if (k <= 0) return k ? d * tall / t : d;
+  const [before, nearer] = known[k - 1];
+  return nearer + (d - nearer) * (tall - before) / (t - before);
+}
+let basis, eye, focal, level, W, H, distance;
 function setCamera(target) {
   const cy = Math.cos(view.yaw), sy = Math.sin(view.yaw), cp = Math.cos(view.pitch), sp = Math.sin(view.pitch);
   const back = [cp * cy, cp * sy, sp], right = [-sy, cy, 0], up = [-sp * cy, -sp * sy, cp];
-  target = target.map((v, i) => v + right[i] * view.pan[0] + up[i] * view.pan[1]);
-  eye = target.map((v, i) => v + back[i] * view.distance);
-  basis = [right, up, back];
   W = canvas.width; H = canvas.height;
   const room = Math.max(H - view.below * devicePixelRatio, 0.4 * H); // over the bar
+  distance = view.zoom * fitting(room / W);
+  target = target.map((v, i) => v + right[i] * view.pan[0] + up[i] * view.pan[1]);
+  eye = target.map((v, i) => v + back[i] * distance);
+  basis = [right, up, back];
   focal = 1.6 * room; level = room / 2;
 }
 function project(p) {

@@ -5,7 +5,7 @@ const el = id => document.getElementById(id);
 const T = DATA.frames, dt = DATA.frame_time;
 const FREE = 0, BALL = 1, SLIDE = 2;
 const LIGHT = [0.42, 0.5, 0.76];
-const view = { yaw: 0.52, pitch: 0.18, distance: DATA.distance, pan: [0, 0], below: 0, time: 0, playing: true };
+const view = { yaw: 0.52, pitch: 0.18, zoom: 1, pan: [0, 0], below: 0, time: 0, playing: true };
 el("scrub").max = T - 1;
 
 const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer;

@@ -35,6 +35,7 @@ function tick(now) {
   if (parent !== window && told !== view.time) parent.postMessage({ time: told = view.time }, "*");
   requestAnimationFrame(tick);
 }
+function zoom(by) { view.zoom = Math.max(0.05, Math.min(8, view.zoom * by)); }
 const fingers = new Map();
 canvas.addEventListener("pointerdown", e => { fingers.set(e.pointerId, e); canvas.setPointerCapture(e.pointerId); });
 canvas.addEventListener("pointerup", e => fingers.delete(e.pointerId));
@@ -47,16 +48,16 @@ canvas.addEventListener("pointermove", e => {
   if (fingers.size === 2) {
     const other = [...fingers.values()].find(f => f.pointerId !== e.pointerId);
     const span = f => Math.hypot(f.clientX - other.clientX, f.clientY - other.clientY) || 1;
-    view.distance *= span(was) / span(e);
+    zoom(span(was) / span(e));
   } else if (e.buttons === 2 || e.shiftKey) {
-    const s = view.distance / (1.6 * innerHeight);
+    const s = distance / (1.6 * innerHeight);
     view.pan[0] -= dx * s; view.pan[1] += dy * s;
   } else {
     view.yaw -= dx * 0.008; view.pitch = Math.max(-0.2, Math.min(1.5, view.pitch + dy * 0.008));
   }
   fingers.set(e.pointerId, e);
 });
-canvas.addEventListener("wheel", e => { view.distance = Math.max(0.4, Math.min(60, view.distance * Math.exp(e.deltaY * 0.001))); e.preventDefault(); }, { passive: false });
+canvas.addEventListener("wheel", e => { zoom(Math.exp(e.deltaY * 0.001)); e.preventDefault(); }, { passive: false });
 function size() { canvas.width = innerWidth * devicePixelRatio; canvas.height = innerHeight * devicePixelRatio; }
 addEventListener("resize", size); size();
 new ResizeObserver(() => { view.below = innerHeight - el("bar").getBoundingClientRect().top; }).observe(el("bar"));

@@ -12,7 +12,7 @@ import numpy as np
 
 from sim.template import Template
 from sim.view.annotations import Annotations
-from sim.view.camera import shot
+from sim.view.camera import distances
 from sim.view.controls import TOGGLES, help_rows
 from sim.view.packing import STEPS, in_base64, packed, short
 from sim.view.page_marks import page_marks
@@ -29,6 +29,7 @@ _SCRIPTS = (
 REPLAY = Template("sim.view", "page.html", _SCRIPTS)
 _LIVE = Template("sim.view", "page.html", (*_SCRIPTS, "live.js"), server=True)
 _HALF_VIEW = 0.27  # tan of half the page's angle, less what its bar and labels take
+_ASPECTS = (2.5, 1.6, 1.2, 0.9, 0.7, 0.5, 0.35)  # of a wide window, ..., of a phone
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 _PRIMITIVES = {
     int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
@@ -71,7 +72,13 @@ def page(
         "frames": len(scene.qpos),
         "frame_time": scene.frame_time,
         "file_frame_time": figures[0].motion.frame_time,
-        "distance": shot(scene, aspect=1.6, half_view=_HALF_VIEW, centered=True).distance,
+        # By height over width of the picture.
+        "distances": [
+            [1 / aspect, distance]
+            for aspect, distance in zip(
+                _ASPECTS, distances(scene, _ASPECTS, _HALF_VIEW), strict=True
+            )
+        ],
         "height": scene.height,
         "figures": [
             _figure(scene, placement, figure, annotations, meshes)

@@ -45,7 +45,7 @@ function toggle(name) {
 function setLoop(on) { player.loop = on; el("loop").checked = on; say(on ? "loops" : "stops at the end"); }
 function resetView() { Object.assign(view, START, { pan: [0, 0], target: null }); follow(-1); }
 function showHelp(on) { el("help").open = on; }
-const START = { yaw: view.yaw, pitch: view.pitch, distance: view.distance };
+const START = { yaw: view.yaw, pitch: view.pitch, zoom: 1 };
 
 const KEYS = {
   " ": toggleTime, ArrowLeft: () => seekTo(view.time - 1), ArrowRight: () => seekTo(view.time + 1),

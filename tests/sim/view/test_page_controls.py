@@ -9,9 +9,10 @@ import pytest
 
 from sim.report import Subject
 from sim.report.watch import known_of
+from sim.view.camera import shot
 from sim.view.controls import CONTROLS, TOGGLES
 from sim.view.page import page
-from sim.view.scene import Figure
+from sim.view.scene import Figure, build_scene
 from spark.rig.roles import Role
 from spark.rotation import quat_about
 from tests.helpers.browser import opened, with_probe
@@ -107,6 +108,22 @@ def test_who_flies_off_costs_the_others_neither_place_nor_precision(tmp_path: Pa
     np.testing.assert_allclose(later, middle, atol=0.01)
     assert before[1][2] == pytest.approx(before[0][2], abs=0.002)
     assert np.linalg.norm(after[1]) > 10.0
+
+
+def test_all_are_seen_whatever_the_shape_of_the_window(tmp_path: Path) -> None:
+    """On a phone from further away, and never further than they need."""
+    rig = stick_rig()
+    figures = [Figure(Subject(standing(rig, 30), rig), name) for name in ("he", "she", "it")]
+    shapes = [0.3, 0.62, 0.7, 1.0, 1.55, 2.2, 2.8, 4.0]
+    text = page(figures, title="three")
+    found = asked(text, f"return {shapes}.map(fitting);", tmp_path)
+    scene = build_scene(figures, max_fps=30.0)
+    needed = [
+        shot(scene, aspect=1 / tall, half_view=0.27, centered=True).distance for tall in shapes
+    ]
+    assert needed[-1] > 2 * needed[0]
+    for got, least in zip(found[1:], needed[1:], strict=True):
+        assert least - 1e-6 <= got <= 1.08 * least
 
 
 def test_findings_are_gone_through_and_clicked(text: str, tmp_path: Path) -> None:
