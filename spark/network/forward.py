@@ -98,12 +98,11 @@ class Network:
     ) -> Windows:
         """The motion that H describes on `body`, by the paper's network.
 
-        Its decoder starts from noise, with a fixed seed: the same input gives the same output."""
+        Its decoder starts from `decoder_noise`."""
         y = self._joint_embedding(body, names) + self._position_embeddings(body)
         shape = (*latent.shape[:2], *y.shape)
         if self.config.noise:
-            noise = np.random.default_rng(0).random(shape, dtype=np.float32)
-            y = y + noise - np.float32(0.5)
+            y = y + decoder_noise(shape)
         else:
             y = np.broadcast_to(y + self.layers["decoder.query"], shape)
         y = self._decoder_blocks(y, latent)
@@ -211,6 +210,11 @@ class Network:
             if self.config.decoder_time:
                 y = np.swapaxes(self._along_time(f"{name}.along_time", np.swapaxes(y, 1, 2)), 1, 2)
         return layers.layer_norm("decoder.norm", y)
+
+
+def decoder_noise(shape: tuple[int, ...]) -> Float[np.ndarray, "W T J D"]:
+    """What the paper's decoder starts from, by a fixed seed: one input gives one output."""
+    return np.random.default_rng(0).random(shape, dtype=np.float32) - np.float32(0.5)
 
 
 def _rotation_features(rotations: Float[np.ndarray, "*n 6"]) -> Float[np.ndarray, "*n 6"]:

@@ -40,11 +40,12 @@ _WINDOWS_AT_ONCE = 32  # bounds memory
 
 
 class NetworkRetargeter:
-    """Retargets by a trained network. Raises `FileFormatError` where its checkpoint is damaged."""
+    """Retargets by a trained network, run on numpy or as `network` does. Raises `FileFormatError`
+    where its checkpoint is damaged."""
 
-    def __init__(self, weights: Weights) -> None:
+    def __init__(self, weights: Weights, network: type[Network] = Network) -> None:
         try:
-            self.network = Network(weights)
+            self.network = network(weights)
             self._encode = _name_encoder(weights)
             self.window = int(weights.settings.get("window", 64))
             self.bodies = weights.bodies

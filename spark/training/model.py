@@ -190,15 +190,19 @@ class Decoder(nn.Module):
         body: Body,
         embedding: JointEmbedding,
         start: Start | None = None,
+        noise: Float[Tensor, "B T J D"] | None = None,
     ) -> PoseTensors:
-        """The motion on `body`; a residual network corrects `start`, the analytic transfer."""
+        """The motion on `body`; a residual network corrects `start`, the analytic transfer, and
+        one that starts from noise draws it, or takes what is given."""
         B, T = latent.shape[:2]
         y = embedding.joints(body) + scatter_positions(embedding.positions(body), body)
         if start is not None:
             return self._correct(start, y, latent, body)
         J = body.valid.shape[1]
         if self.config.noise:
-            y = y[:, None] + torch.rand(B, T, J, y.shape[-1], device=y.device, dtype=y.dtype) - 0.5
+            if noise is None:
+                noise = torch.rand(B, T, J, y.shape[-1], device=y.device, dtype=y.dtype) - 0.5
+            y = y[:, None] + noise
         else:
             y = (y + self.query)[:, None].expand(B, T, J, -1)
         y = self._decoder_blocks(y, latent, body.valid)
@@ -254,14 +258,17 @@ class Spark(nn.Module):
         return self.encoder(pose, self._withhold(body), self.embedding)
 
     def decode(
-        self, latent: Float[Tensor, "B T 24 D"], body: Body, start: Start | None = None
+        self,
+        latent: Float[Tensor, "B T 24 D"],
+        body: Body,
+        start: Start | None = None,
+        noise: Float[Tensor, "B T J D"] | None = None,
     ) -> PoseTensors:
         """The motion that H describes, on `body`. A residual network must be given its `start`."""
         if self.config.residual and start is None:
             raise ValueError("this network corrects the analytic transfer: `start` is missing")
-        return self.decoder(
-            latent, self._withhold(body), self.embedding, start if self.config.residual else None
-        )
+        start = start if self.config.residual else None
+        return self.decoder(latent, self._withhold(body), self.embedding, start, noise)
 
     def forward(
         self, pose: PoseTensors, source: Body, target: Body, start: Start | None = None

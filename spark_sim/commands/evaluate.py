@@ -11,6 +11,8 @@ from spark_sim.commands.options import add_force
 if TYPE_CHECKING:
     from spark.evaluation.cases import Case
     from spark.evaluation.evaluate import LegFitter, MethodScores
+    from spark.network.forward import Network
+    from spark.network.weights import Weights
     from spark.transfer.target_prior import RetargetMethod
 
 SUMMARY = "measure methods against a ground truth"
@@ -154,7 +156,7 @@ def run(args: Namespace) -> int:
     for name, weights in checkpoints.items():
         from spark.network.retarget import NetworkRetargeter
 
-        network = NetworkRetargeter(weights)
+        network = NetworkRetargeter(weights, _runner(weights))
         why[name] = why_silent(network)
         ways = _PLAIN
         if network.network.config.residual:
@@ -173,6 +175,19 @@ def run(args: Namespace) -> int:
     for path in outputs:
         write_atomically(path, _text(path, rows, about).encode())
     return 0
+
+
+def _runner(weights: "Weights") -> "type[Network]":
+    """What runs a network: torch, if it is there, for one that decodes all joints of all frames."""
+    from spark.network.forward import Network
+
+    if weights.network.get("residual"):
+        return Network
+    try:
+        from spark.training.torch_network import TorchNetwork
+    except ImportError:
+        return Network
+    return TorchNetwork
 
 
 def _text(path: Path, rows: "Sequence[MethodScores]", about: dict[str, Any]) -> str:
