@@ -14,6 +14,7 @@ from spark.rig.contacts import floor_under, lowest_sole
 from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_rotate
 from spark.summary import counted, time_span
+from spark.transfer.breaks import breaks
 
 FRAME_TIME = 1 / 30  # [s] of what the network and the target prior read: 30 fps
 
@@ -63,7 +64,8 @@ def to_canonical(motion: Motion, rig: Rig) -> CanonicalMotion:
         return quat_mul(world, quat_conj(rig.tpose))
 
     rotations = in_blocks(turned, count)
-    return CanonicalMotion(rig, motion.frame_time, rotations, hips, floor_under(lowest))
+    notes = breaks(rotations[:, rig.pelvis], hips, motion.frame_time)
+    return CanonicalMotion(rig, motion.frame_time, rotations, hips, floor_under(lowest), notes)
 
 
 def canonical_positions(
