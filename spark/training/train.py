@@ -9,7 +9,7 @@ draws; losses are means over windows, so the processes' mean gradient is that of
 import json
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
 
@@ -130,6 +130,8 @@ def train(
                     )
                     save_checkpoint(checkpoint, out / "checkpoint.safetensors")
                     saved = perf_counter()
+            else:  # what the first process saves, or would
+                checkpoint = replace(checkpoint, step=done)
             if stopped:
                 break
     return checkpoint

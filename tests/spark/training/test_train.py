@@ -18,6 +18,7 @@ from spark.training.objective import Objective
 from spark.training.optimiser import make_optimiser
 from spark.training.pairs import TrainingClip
 from spark.training.residual import corrected
+from spark.training.settings import toml
 from spark.training.steps import Steps
 from spark.training.train import take_step, train
 from spark_sim import sample
@@ -93,6 +94,7 @@ from spark.training.clips import read_clips
 from tests.helpers.training import TINY, fresh
 from spark.training.objective import Objective
 from spark.training.processes import distributed, join_processes
+from spark.training.settings import toml
 from spark.training.steps import Steps
 folder, out = Path(sys.argv[1]), Path(sys.argv[2])
 rank, world, _ = join_processes()
@@ -129,6 +131,24 @@ if world > 1:
     one, two = gradients
     for name, gradient in one.items():
         assert (two[name] - gradient).abs().max() <= 1e-5 * gradient.abs().max(), name
+
+
+def test_torchrun_ends_well(tmp_path: Path) -> None:
+    """The command in two processes, each with a worker that it spawns: both end without fault."""
+    samples, run, settings = tmp_path / "samples", tmp_path / "run", tmp_path / "tiny.toml"
+    sample(samples)
+    settings.write_text(toml(TINY.changed("test", workers=1)))
+    torchrun = ["-m", "torch.distributed.run", "--standalone", "--nproc-per-node=2"]
+    train = ["-m", "spark_sim", "train", str(samples), "-o", str(run), "--config", str(settings)]
+    done = subprocess.run(
+        [sys.executable, *torchrun, *train],
+        env=os.environ | {"OMP_NUM_THREADS": "1", "PYTHONPATH": str(CHECKOUT)},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert load_checkpoint(run / "checkpoint.safetensors").step == TINY.steps
+    assert done.stdout.count("4 steps on") == 1, "the first process alone speaks"
 
 
 def test_a_handful_of_pairs_is_learned_by_heart(clips: list[TrainingClip]) -> None:
