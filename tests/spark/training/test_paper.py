@@ -282,6 +282,39 @@ def test_normh(batch: UnpairedBatch) -> None:
     )
 
 
+def test_input(batch: UnpairedBatch) -> None:
+    model = small(name_width=130).eval()
+    encoder = model.encoder
+    assert (encoder.motion.in_features, encoder.root.in_features) == (6, 3)
+    assert model.embedding.name.in_features == 130
+    moved = batch.pose._replace(root=batch.pose.root + 1)
+    apart = encoder._joint_features(moved, batch.source) != encoder._joint_features(
+        batch.pose, batch.source
+    )
+    assert apart[:, :, 0].any()
+    assert not apart[:, :, 1:].any()
+
+
+def test_empty(batch: UnpairedBatch) -> None:
+    """Whatever else there is, a group without joints says the same, and no NaN."""
+    groups = batch.source.groups.clone()
+    groups[:, -1] = -1
+    body = batch.source._replace(groups=groups)
+    latent = small(name_width=130).eval().encode(batch.pose, body)
+    assert latent.isfinite().all()
+    tokens = latent[:, :, -4:]
+    torch.testing.assert_close(tokens, tokens[:1].expand_as(tokens))
+
+
+def test_products(batch: UnpairedBatch) -> None:
+    assert PAPER.bf16
+    objective = Objective(small(name_width=130).eval(), PAPER)
+    with torch.autocast("cpu", torch.bfloat16):
+        loss, terms = objective(batch)
+    assert {x.dtype for x in (loss, *terms.values())} == {torch.float32}
+    assert {p.dtype for p in objective.parameters()} == {torch.float32}
+
+
 def test_places(batch: UnpairedBatch) -> None:
     """The same pose in every frame gives tokens that differ in time."""
     assert not network(PAPER, 8).relative_time
