@@ -56,7 +56,7 @@ function drawPose(each) {
     if (role && rows[j].dataset.unsure && role === DATA.joints[j].role) make("circle", picture, { ...place, r: 9, class: "unsure" });
     if (j === picked) make("circle", picture, { ...place, r: 8, class: "picked" });
   });
-  if (picked !== null) make("text", picture, { x: WIDTH / 2, y: HEIGHT - 8, class: "under" }, DATA.joints[picked].name);
+  if (picked !== null) make("text", picture, { x: WIDTH - 8, y: 16, class: "at-picked" }, DATA.joints[picked].name);
 }
 // The roles' names, each beside its joint where it covers least of the other names and joints.
 function labels(picture, at) {

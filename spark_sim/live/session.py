@@ -159,12 +159,12 @@ class Session:
         """Say which bones are heard of no more, and which again; notice another body."""
         heard = self._listener.pose.heard
         silent = {bone for bone, last in heard.items() if now - last > _SILENT}
-        for bones, words in (
-            (silent - self._silent, "no news of {}: held"),
-            (self._silent - silent, "{} again"),
+        for bones, of, words in (
+            (silent - self._silent, silent, "no news of {}: held"),
+            (self._silent - silent, self._silent, "{} again"),
         ):
             if bones:
-                every = len(bones) == len(heard)
+                every = len(of) == len(heard)
                 self._note(words.format("the sender" if every else ", ".join(sorted(bones))))
         self._silent = silent
         if not self._listener.changed:
@@ -202,7 +202,7 @@ class Session:
     def _words(self) -> str:
         """What a view says of a step."""
         late = f"{1000 * self._latencies[-1]:.0f} ms" if self._latencies else "-"
-        held = ", ".join(sorted(self._silent)[:3])
+        held = f"no news of {', '.join(sorted(self._silent)[:3])}" if self._silent else ""
         if self._silent and len(self._silent) == len(self._listener.pose.heard):
             held = "the sender is silent"
         return f"live   {self._fps:g} steps a second   latency {late}   {held}".rstrip()
