@@ -36,6 +36,7 @@ _WORDS = (
     | NOISE
     | AXES
 )
+_SPELT = sorted(w for w in {*MEANINGS, *SPELLINGS, *ASIDE} if len(w) > 3 and w.isalpha())
 _WHOLE = "|".join(
     sorted((re.escape(w) for w in _WORDS if len(w) > 2 or not w.isascii()), key=len, reverse=True)
 )
@@ -137,6 +138,8 @@ def _words(pieces: tuple[str, ...]) -> tuple[set[str], list[int], bool]:
     if unknown and (found := _known("".join(p for p in pieces if not p.isdigit()))):
         # "LUArm" is cut as LU + Arm; as one word it is l + uarm.
         words, unknown = found, False
+    if unknown:
+        words += [word for piece in pieces if not _known(piece) for word in _misspelt(piece)]
     spelled = " ".join(SPELLINGS.get(word, word) for word in words)
     return set(spelled.split()), numbers, unknown
 
@@ -149,6 +152,22 @@ def _known(piece: str) -> list[str]:
         around = [side for side in (match["before"], match["after"]) if side]
         return [*around, *_SPLIT.findall(match["words"])]
     return []
+
+
+@lru_cache(maxsize=4096)
+def _misspelt(piece: str) -> list[str]:
+    """The only word of a joint that a letter more, less, or another makes of `piece`."""
+    near = [word for word in _SPELT if abs(len(word) - len(piece)) < 2 and _one_off(word, piece)]
+    return near if len(near) == 1 else []
+
+
+def _one_off(a: str, b: str) -> bool:
+    """Whether one letter is added, left out, or another."""
+    same = next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), None)
+    if same is None:
+        return len(a) != len(b)
+    longer, shorter = (a, b) if len(a) >= len(b) else (b, a)
+    return longer[same + 1 :] == shorter[same + (len(a) == len(b)) :]
 
 
 def _parts(words: set[str], sided: bool) -> tuple[dict[str, float], bool]:

@@ -93,7 +93,8 @@ def mirrored_pairs(
     """Pairs of similar chains that one joint carries, each at least `shortest` [m] long.
 
     Chains whose first joint is by name a finger, hair, cloth, ... do not count, and of a pair
-    within a pair (fingers of a hand) only the outer one does.
+    within a pair (fingers of a hand) only the outer one does. Names that say a side and nothing
+    else that is known, say it here.
     """
     skeleton = measured.skeleton
     pairs: list[LimbPair] = []
@@ -122,7 +123,11 @@ def mirrored_pairs(
             if difference > MAX_ASYMMETRY:
                 break
             chains = [chain for chain in chains if chain not in (a, b)]
-            pairs.append(LimbPair(root_joint, a, b, sided=False))
+            says = [{hints[j].side for j in chain} - {""} for chain in (a, b)]
+            if says == [{"right"}, {"left"}]:
+                a, b = b, a
+            named = {"left"} in says and {"right"} in says
+            pairs.append(LimbPair(root_joint, a, b, sided=named))
             inside.update(skeleton.subtree(a[0]), skeleton.subtree(b[0]))
     return tuple(pairs)
 

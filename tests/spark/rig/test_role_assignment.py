@@ -10,6 +10,7 @@ from spark.demo.sample import sample_rig
 from spark.io.recording import read_recording
 from spark.network.features import body_features
 from spark.rig.name_conventions import CONVENTIONS
+from spark.rig.name_hints import read_names
 from spark.rig.role_assignment import assign_roles
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_mul
@@ -202,6 +203,29 @@ def test_sure_names_do_not_lose_to_lengths(convention: str) -> None:
 
 def _part(role: Role | None) -> str:
     return "" if role is None else role.part
+
+
+@pytest.mark.parametrize("convention", ["mixamo", "unreal", "xsens"])
+def test_sides_are_those_of_the_names_whatever_else_these_say(convention: str) -> None:
+    """Nothing but a side in any name, on a body that is seen in a mirror, or not."""
+    skeleton, right = build(RIGS[convention])
+    sides = ["" if role is None or not role.side else f"{role.side}_" for role in right]
+    names = tuple(f"{side}quux{j}" for j, side in enumerate(sides))
+    flip = np.array([1.0, -1.0, 1.0])
+    for offsets in (skeleton.offsets, skeleton.offsets * flip):
+        odd = replace(skeleton, names=names, offsets=offsets)
+        found = assign_roles(odd).roles
+        said = {role.side for role in found if role and role.side}
+        assert said == {"left", "right"}
+        for side, role in zip(sides, found, strict=True):
+            assert role is None or not side or f"{role.side}_" == side
+
+
+def test_a_name_with_a_letter_wrong_still_says_its_joint() -> None:
+    words = ["LeftSholder", "LeftForarm", "r_thgh", "klavicle_l", "Spne", "LeftLegg"]
+    parts = [max(hint.parts, key=hint.parts.get, default="") for hint in read_names(words)]
+    assert parts == ["clavicle", "forearm", "upper_leg", "clavicle", "spine", "lower_leg"]
+    assert read_names(["LeftHad"])[0].parts == {}, "a head or a hand"
 
 
 def test_a_palm_on_a_wrist_is_not_the_hand() -> None:
