@@ -51,7 +51,7 @@ COMMANDS = {
     "prepare": "prepare samples -o dataset --workers 2 --force",
     "train": "train dataset_for_training -o run --preset tiny --steps 6 --force",
     "evaluate": "evaluate dataset_for_training --made --limit 1 -o table.md --force",
-    "export": "export run_to_export -o network.onnx --force",
+    "export": "export network.onnx --checkpoint run_to_export/checkpoint.safetensors --force",
 }
 
 

@@ -23,20 +23,20 @@ def annotate(clip: ClipMetrics, subject: Subject, findings: Sequence[Finding] = 
     """What `assess` measured of `subject`, frame by frame, and its findings."""
     step = clip.frame_time
     limits = [
-        (limit, joint)
+        (limit, joint, at_limit)
         for limit in clip.limits
-        if (joint := _joint(subject, limit.joint)) is not None
+        if (at_limit := (limit.beyond > -clip.thresholds.limit_margin).any(axis=1)).any()
+        and (joint := _joint(subject, limit.joint)) is not None
     ]
-    joints = [joint for _, joint in limits]
+    joints = [joint for _, joint, _ in limits]
 
     def places(block: slice) -> Float[np.ndarray, "T N 3"]:
         poses = pose_clip(subject.picked(block))
         parts = [poses.mass.com[:, None], poses.positions[:, joints], poses.corners]
-        return np.concatenate(parts, axis=1)
+        return np.concatenate(parts, axis=1, dtype=np.float32)  # an hour of them is kept
 
     found = in_blocks(places, len(clip))
     corners = found[:, 1 + len(joints) :]
-    at_limit = [(limit.beyond > -clip.thresholds.limit_margin).any(axis=1) for limit, _ in limits]
     flags = {LABELS[name]: clip.flags[name] for name in FLAGS}
     flags[LABELS["joint_limit"]] = _any([limit.excess > 0 for limit in clip.limits], len(clip))
     flags[LABELS["self_penetration"]] = clip.self_penetration
@@ -48,8 +48,8 @@ def annotate(clip: ClipMetrics, subject: Subject, findings: Sequence[Finding] = 
         com=found[:, 0],
         support_height=clip.floor_z + clip.thresholds.contact_height,
         joints=found[:, 1 : 1 + len(joints)],
-        joint_names=tuple(limit.joint for limit, _ in limits),
-        at_limit=np.array(at_limit, dtype=bool).reshape(len(limits), len(clip)).T,
+        joint_names=tuple(limit.joint for limit, _, _ in limits),
+        at_limit=np.array([at for _, _, at in limits], dtype=bool).reshape(-1, len(clip)).T,
         flags=flags,
         events=tuple(
             sorted(

@@ -15,7 +15,7 @@ class Annotations:
     `corners` are points of the soles; one of state 0 is in the air, one of state k has the name and
     the colour (CSS) `corner_states[k - 1]`. `com` is the centre of mass; what is below
     `support_height` [m] may bear it.
-    `joints` are the places of the joints with limits, `joint_names` what they are called, and
+    `joints` are the places of joints that come to a limit, `joint_names` what they are called, and
     `at_limit` says when each is at one. `flags` says when each measure is up, by its label, and
     `events` which findings there are.
     """

@@ -1,7 +1,7 @@
 """How a skeleton is built and stands, measured on the frames of a motion."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -125,18 +125,11 @@ def measure(skeleton: Skeleton, motion: Motion | None) -> Measurements:
     """
     if motion is None or not len(motion):
         return rest_measurements(skeleton)
-    step = -(-len(motion) // MAX_FRAMES)
-    some = Motion(
-        skeleton,
-        motion.frame_time,
-        motion.root_pos[::step],
-        motion.rotations[::step],
-        None if motion.translations is None else motion.translations[::step],
-    )
+    some = replace(motion.thinned(MAX_FRAMES), skeleton=skeleton)
     joints, world = forward(some)
     measured = Measurements(skeleton, joints, end_positions(skeleton, joints, world), True)
     own = np.linalg.norm(skeleton.offsets[1:], axis=-1).sum()
-    if motion.translations is not None and not 0.5 * own < measured.bones.sum() < 2.0 * own:
+    if some.translations is not None and not 0.5 * own < measured.bones.sum() < 2.0 * own:
         joints, world = forward(Motion(skeleton, 1.0, some.root_pos, some.rotations))
         measured = Measurements(skeleton, joints, end_positions(skeleton, joints, world), True)
     return measured

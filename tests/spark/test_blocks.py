@@ -56,8 +56,10 @@ def test_a_robot_in_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     file = whole.save(tmp_path / "whole.npz")
     for name in IN_BLOCKS:
         monkeypatch.setattr(name, 7)
+    walk = spark_sim.load(tmp_path / "walker_walk.bvh")
     parts = spark_sim.retarget(walk, "robot", method="copy")
     assert isinstance(parts, RobotClip)
+    assert "_whole" not in vars(walk.motion), "nothing made all of it at once"
     assert isinstance(parts.motion, LazyMotion)
     assert not isinstance(whole.motion, LazyMotion)
     np.testing.assert_array_equal(parts.qpos, whole.qpos)
