@@ -15,6 +15,7 @@ _FLAG = rgba("#ff6b70")
 _INK: RGBA = (0.93, 0.94, 0.96, 1.0)
 _SOFT: RGBA = (0.65, 0.68, 0.74, 1.0)
 _FINDINGS = 3  # sentences at once
+_HELP_LINE = 1.32  # letters' heights: of an overlay's line
 
 
 class Hud:
@@ -45,9 +46,17 @@ class Hud:
         if message:
             self._overlay(mujoco.mjtGridPos.mjGRID_TOPRIGHT, above, message)
         if player.shown["help"]:
-            keys, words = zip(*help_rows(live=player.live), strict=True)
-            where = mujoco.mjtGridPos.mjGRID_TOPLEFT
-            self._overlay(where, above, "\n".join(keys), "\n".join(words))
+            rows = help_rows(live=player.live)
+            line = _HELP_LINE * self._context.charHeight
+            most = max(int(above.height / line) - len(lines), 1)
+            # What is too long for the picture goes on at its right.
+            for where, part in (
+                (mujoco.mjtGridPos.mjGRID_TOPLEFT, rows[:most]),
+                (mujoco.mjtGridPos.mjGRID_TOPRIGHT, rows[most:]),
+            ):
+                if part:
+                    keys, words = zip(*part, strict=True)
+                    self._overlay(where, above, "\n".join(keys), "\n".join(words))
 
     def _bar(self, player: Player, bar: Bar, viewport: mujoco.MjrRect, waiting: bool) -> None:
         timeline, line = player.timeline, self._line

@@ -77,23 +77,23 @@ class Window:
         if not glfw.init():
             raise DependencyError("no window can be opened on this display; use --html or --video")
         glfw.window_hint(glfw.SAMPLES, 4)
+        glfw.window_hint(glfw.SCALE_TO_MONITOR, True)  # its letters are larger there, too
         self._window = glfw.create_window(*_SIZE, self._title, None, None)
         if not self._window:
             glfw.terminate()
             raise DependencyError(
                 "this display has no OpenGL to draw a window with; use --html or --video"
             )
+        self._fit_screen()
         glfw.make_context_current(self._window)
         glfw.swap_interval(1)
         model = self.player.scene.model
         model.vis.global_.fovy = FIELD_OF_VIEW
         scale = glfw.get_window_content_scale(self._window)[0]
         font = (
-            mujoco.mjtFontScale.mjFONTSCALE_100
-            if scale < 1.5
-            else (mujoco.mjtFontScale.mjFONTSCALE_200)
-        )
-        self._context = mujoco.MjrContext(model, int(font))
+            min(max(round(2 * scale), 2), 6) * 50
+        )  # mjtFontScale: percent, from 50 in steps of 50
+        self._context = mujoco.MjrContext(model, font)
         self._hud = Hud(self._context)
         self._data = mujoco.MjData(model)
         self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + _MAX_MARKS)
@@ -143,6 +143,13 @@ class Window:
             coming.cancel()
         if self._interrupted:
             raise KeyboardInterrupt
+
+    def _fit_screen(self) -> None:
+        glfw, monitor = self._glfw, self._glfw.get_primary_monitor()
+        if monitor:
+            room = glfw.get_monitor_workarea(monitor)[2:]
+            most = zip(glfw.get_window_size(self._window), room, strict=True)
+            glfw.set_window_size(self._window, *(min(size, side) for size, side in most))
 
     def draw(self, *, waiting: bool = False) -> None:
         """One picture."""
