@@ -13,9 +13,13 @@ from robots.stream.frame_targets import LATENCY, FrameReader, FrameTargets
 from robots.stream.terms import Posture, Terms
 from spark.rotation import quat_from_matrix
 
-_COS_LOST = np.cos(np.radians(55))  # a bone farther from its direction is stuck,
-_COS_FOUND = np.cos(np.radians(25))  # a nearer one is free again
-_PATIENCE = 0.15  # [s] that a limb is stuck before it is led
+_LOST = np.radians(55)  # a bone farther from its direction is stuck,
+_ASTRAY = np.radians(30)  # one farther than this may be: it is given more time;
+_FOUND = np.radians(25)  # a nearer one is free again
+_GAIN = np.radians(15)  # by which a limb has to be nearer where it is led to
+_PATIENCE = 0.15  # [s] that a limb is stuck before it is led,
+_ASTRAY_PATIENCE = 0.5  # [s] or astray
+_OTHER_WAY = 1.0  # [rad] of a hinge between the same way to a pose and another one
 _MAX_DURATION = 0.6  # [s] that it is led, and that it is then left alone
 _W_DETOUR = 2.0  # [1/rad] of the angles that it is led to
 _SPEED = 8.0  # [rad/s] at which it is led
@@ -38,7 +42,7 @@ class Detours:
             chain = [j for j in robot.tree.chain(int(robot.links[lower])) if j not in inner]
             hinges = [int(numbers[j]) for j in chain if not robot.tree.balls[j]]
             self._limbs.append(([k, k + 1], hinges))
-        self._stuck = np.zeros(len(self._limbs))  # [s]
+        self._stuck = np.zeros(len(self._limbs))  # 1 where patience ends
         self._led = np.zeros(len(self._limbs))  # [s] left; below 0 it is left alone
         self._goals = np.full(len(terms.at_tpose.angles), np.nan)
 
@@ -49,25 +53,28 @@ class Detours:
         angles: Float[np.ndarray, "H"],
     ) -> Posture:
         """The posture that hinges are pulled to, where bones have the directions `bones` and hinges
-        are at `angles` [rad]."""
-        right = (bones * targets.bones).sum(1)
-        worst = np.array([right[rows].min() for rows, _ in self._limbs])
-        self._stuck = np.where(worst < _COS_LOST, self._stuck + self._frame_time, 0.0)
+        are at `angles` [rad] in the first frame of `targets`."""
+        wanted = targets.bones[0]
+        worst = self._away(bones, wanted)
+        patience = np.where(worst > _LOST, _PATIENCE, _ASTRAY_PATIENCE)
+        self._stuck = np.where(worst > _ASTRAY, self._stuck + self._frame_time / patience, 0.0)
         led = self._led > 0
         self._led -= np.clip(self._led, -self._frame_time, self._frame_time)
-        for limb in np.flatnonzero(led & ((worst > _COS_FOUND) | (self._led == 0))):
+        for limb in np.flatnonzero(led & ((worst < _FOUND) | (self._led == 0))):
             self._led[limb] = -_MAX_DURATION
             self._goals[self._limbs[limb][1]] = np.nan
-        stuck = np.flatnonzero((self._stuck > _PATIENCE) & (self._led == 0))
+        stuck = np.flatnonzero((self._stuck > 1.0) & (self._led == 0))
         if len(stuck):
-            world = quat_from_matrix(targets.world)[None]
-            q = self._robot.to_qpos(project(self._robot, world, targets.hips[None]))
-            there = (self._terms.bones(self._terms.poses(q))[0] * targets.bones).sum(1)
+            world = quat_from_matrix(targets.world[:1])
+            q = self._robot.to_qpos(project(self._robot, world, targets.hips[:1]))
+            there = self._away(self._terms.bones(self._terms.poses(q))[0], wanted)
+            goals = self._terms.angles(q)[0]
             for limb in stuck:
-                rows, hinges = self._limbs[limb]
-                better = there[rows].min() > _COS_FOUND
+                _, hinges = self._limbs[limb]
+                other_way = np.abs(goals[hinges] - angles[hinges]).max(initial=0.0) > _OTHER_WAY
+                better = other_way and there[limb] < worst[limb] - _GAIN
                 self._led[limb] = _MAX_DURATION if better else -_MAX_DURATION
-                self._goals[hinges] = self._terms.angles(q)[0, hinges] if better else np.nan
+                self._goals[hinges] = goals[hinges] if better else np.nan
         at_tpose, on_the_way = self._terms.at_tpose, np.isfinite(self._goals)
         if not on_the_way.any():
             return at_tpose
@@ -78,3 +85,10 @@ class Detours:
             np.where(on_the_way, next_angles, at_tpose.angles),
             np.where(on_the_way, _W_DETOUR, at_tpose.weights),
         )
+
+    def _away(
+        self, bones: Float[np.ndarray, "B 3"], wanted: Float[np.ndarray, "B 3"]
+    ) -> Float[np.ndarray, "L"]:
+        """How far [rad] each limb's bones are from their directions, the farthest of them."""
+        cosines = (bones * wanted).sum(1)
+        return np.arccos(np.clip([cosines[rows].min() for rows, _ in self._limbs], -1.0, 1.0))

@@ -11,20 +11,29 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Complex, Float
 
 from robots.solver.foot_path import FAST, RAISED_HOLD, SLOW, STEP_HEIGHT, SWING_HOLD
 from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
-from robots.stream.footprint import Footprint, yaw_between
+from robots.stream.footprint import Footprint
 from robots.stream.frame_targets import FrameReader, FrameTargets
 from robots.stream.terms import FootTargets
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
 
 RAMP = 0.05  # [s] over which a foot is taken hold of and let go
-_SWING = np.array([0.0, 0.0, SWING_HOLD[2]])  # held: its height alone
 _RELEASE_FACTOR = (
     1.5  # times the speed and height at which a foot comes to stand: there it is let go
 )
+
+
+class _Arrived(NamedTuple):
+    """A frame of the source: how far its heels and toes have moved over the floor since the one
+    before [m, x + iy, scaled], and how far the robot's feet should have turned about the vertical
+    [rad]."""
+
+    targets: FrameTargets
+    moved: Complex[np.ndarray, "S 2"]
+    turned: Float[np.ndarray, "S"]
 
 
 class _Seen(NamedTuple):
@@ -50,15 +59,10 @@ class ContactTracker:
         self._max_speed, self._max_height = PLANTED_SPEED * size, PLANTED_HEIGHT * size
         self._reach = max(1, round(SPEED_WINDOW / 2 / frame_time))
         self._has_foot = reader.has_feet[:, None]
-        ends = np.cumsum([len(sole) for sole in self._robot.soles])
-        self._own = [
-            slice(end - len(sole), end) for sole, end in zip(self._robot.soles, ends, strict=True)
-        ]
         self._wobble = MAX_WOBBLE * self._robot.rig.hip_height
-        flat = (flat_sole(self._robot, sole) @ (1, 1j) for sole in self._robot.soles)
-        self._flat = [points - points[-2:].mean() for points in flat]  # from the toes' middle
+        self._index_points()
         self._length = self._reach + ahead + 1
-        self._history: deque[FrameTargets] = deque(maxlen=self._length)
+        self._history: deque[_Arrived] = deque(maxlen=self._length)
         soles = len(self._robot.soles)
         self._planted = np.zeros((soles, 2), dtype=bool)
         self._holds = np.zeros((soles, 2))
@@ -69,7 +73,8 @@ class ContactTracker:
         the points of the robot's soles are at `points` in the first of these. How they stand in
         that one is settled then; of the later ones it is what can be seen so far."""
         first = not self._history
-        self._history.extend([targets] * (self._length if first else 1))
+        arrived = self._arrived(targets, targets if first else self._history[-1].targets)
+        self._history.extend([arrived] * (self._length if first else 1))
         settled = len(self._history) - 1 - self._ahead
         ramp = 1.0 if first else self._frame_time / RAMP
         planted, holds, footprints = self._planted, self._holds, self._footprints
@@ -88,7 +93,14 @@ class ContactTracker:
             if at == settled:
                 self._planted, self._holds = planted, holds
                 footprints = [replace(footprint) for footprint in footprints]
-        return self._targets([self._history[k] for k in range(settled, len(self._history))], seen)
+        pitched = [self._history[k].targets.pitched for k in range(settled, len(self._history))]
+        return self._targets(np.array(pitched), seen)
+
+    def _arrived(self, now: FrameTargets, last: FrameTargets) -> _Arrived:
+        moved = self._scale * ((now.feet - last.feet)[..., :2] @ (1, 1j))
+        R = now.world[self._feet] @ last.world[self._feet].transpose(0, 2, 1)
+        turned = np.arctan2(R[:, 1, 0] - R[:, 0, 1], R[:, 0, 0] + R[:, 1, 1])
+        return _Arrived(now, moved, turned)
 
     def _put(
         self,
@@ -98,9 +110,10 @@ class ContactTracker:
     ) -> None:
         """The footprints of feet that are not held yet, where these are."""
         for s in np.flatnonzero(~holds.any(axis=1)).tolist():
-            length = -float(self._flat[s][:2].real.mean())
+            own = self._sole == s
+            length = -float(self._flat[own][:2].real.mean())
             on_toe = bool(planted[s, 1] or not planted[s, 0])
-            self._footprints[s].put(points[self._own[s]], length, on_toe=on_toe)
+            self._footprints[s].put(points[own], length, on_toe=on_toe)
 
     def _standing(
         self, at: int, planted: Bool[np.ndarray, "S 2"]
@@ -108,8 +121,9 @@ class ContactTracker:
         """Whether heels and toes stand that were `planted` in the frame before, and how high [m]
         the soles are that don't."""
         after = min(self._reach, len(self._history) - 1 - at)
-        now = self._history[at]
-        travelled = self._history[at + after].feet - self._history[at - self._reach].feet
+        now = self._history[at].targets
+        before, later = (self._history[k].targets for k in (at - self._reach, at + after))
+        travelled = later.feet - before.feet
         speed = np.hypot(travelled[..., 0], travelled[..., 1]) / (
             (self._reach + after) * self._frame_time
         )
@@ -130,36 +144,45 @@ class ContactTracker:
         footprints: Sequence[Footprint],
     ) -> None:
         """Takes those along that were held by `holds` in the frame before."""
-        now, last = self._history[at], self._history[at - 1]
+        _, moved, turned = self._history[at]
         for s in np.flatnonzero(holds.any(axis=1)).tolist():
             point = int(planted[s, 1] or not planted[s, 0])
-            moved = self._scale * (now.feet[s, point, :2] - last.feet[s, point, :2])
-            foot = self._robot.soles[s].foot
-            turned = yaw_between(last.world[foot], now.world[foot])
-            footprints[s].follow(complex(*moved), turned, float(holds[s].max()), self._wobble)
-
-    def _targets(self, frames: Sequence[FrameTargets], seen: Sequence[_Seen]) -> FootTargets:
-        """Where the soles' points are held, and how firmly."""
-        holds, height, known, pivot, heading = (np.array(part) for part in zip(*seen, strict=True))
-        places, shares = np.zeros((2, len(frames), sum(map(len, self._robot.soles)), 3))
-        pitched = np.stack([frame.pitched for frame in frames])
-        for s, (sole, own) in enumerate(zip(self._robot.soles, self._own, strict=True)):
-            held = on_points(sole, holds[:, s].T).T
-            most = held.max(axis=1, keepdims=True)
-            flat = self._flat[s]
-            raised = pitched[:, own, :2] @ (1, 1j)
-            # What is raised turns about what stands.
-            raised += (held * (flat - raised)).sum(1, keepdims=True) / np.maximum(
-                held.sum(1, keepdims=True), 1e-9
+            footprints[s].follow(
+                complex(moved[s, point]), float(turned[s]), float(holds[s].max()), self._wobble
             )
-            over = held * flat + (1 - held) * raised
-            place = pivot[:, s, None] + np.exp(1j * heading[:, s, None]) * over
-            places[:, own, 0], places[:, own, 1] = place.real, place.imag
-            places[:, own, 2] = (1 - held) * pitched[:, own, 2] + (1 - most) * height[:, s, None]
-            shares[:, own] = held[..., None] + (1 - held[..., None]) * _SWING
-            shares[:, own, :2] = np.maximum(held, RAISED_HOLD[0] * most)[..., None]
-            shares[~known[:, s], own, :2] = 0.0
-        return FootTargets(places, shares)
+
+    def _targets(self, pitched: Float[np.ndarray, "T P 3"], seen: Sequence[_Seen]) -> FootTargets:
+        """Where the soles' points are held, and how firmly."""
+        feet = (np.array(part) for part in zip(*seen, strict=True))
+        holds, height, known, pivot, heading = (part[:, self._sole] for part in feet)
+        on = np.where(self._leaves_with, holds, 1.0)
+        held, most = np.minimum(on[..., 0], on[..., 1]), np.maximum(holds[..., 0], holds[..., 1])
+        raised = pitched[..., 0] + 1j * pitched[..., 1]
+        # What is raised turns about what stands.
+        raised += (
+            (held * (self._flat - raised)) @ self._beside / np.maximum(held @ self._beside, 1e-9)
+        )
+        place = pivot + np.exp(1j * heading) * (held * self._flat + (1 - held) * raised)
+        positions, shares = np.empty((2, *held.shape, 3))
+        positions[..., 0], positions[..., 1] = place.real, place.imag
+        positions[..., 2] = (1 - held) * pitched[..., 2] + (1 - most) * height
+        shares[..., :2] = (known * np.maximum(held, RAISED_HOLD[0] * most))[..., None]
+        shares[..., 2] = held + (1 - held) * SWING_HOLD[2]
+        return FootTargets(positions, shares)
+
+    def _index_points(self) -> None:
+        """Of all points of the soles: which sole's they are, where on the floor from the middle of
+        its toes, and with which of heel and toe they leave it."""
+        soles = self._robot.soles
+        self._feet = [sole.foot for sole in soles]
+        self._sole = np.repeat(np.arange(len(soles)), [len(sole) for sole in soles])
+        self._beside = (self._sole[:, None] == self._sole).astype(np.float64)
+        flat, ends = [np.zeros(0, dtype=complex)], [np.zeros((0, 2), dtype=bool)]
+        for sole in soles:
+            points = flat_sole(self._robot, sole) @ (1, 1j)
+            flat.append(points - points[-2:].mean())
+            ends.append(on_points(sole, np.array([[0.0, 1.0], [1.0, 0.0]])) == 0)
+        self._flat, self._leaves_with = np.concatenate(flat), np.concatenate(ends)
 
     def _lift(self, speed: Float[np.ndarray, "S"]) -> Float[np.ndarray, "S"]:
         """How high [m] feet step that are as fast in the source [m/s]: as in

@@ -36,9 +36,3 @@ class Footprint:
         turn = self.turned + hold * turned
         self.turned = min(max(turn, -MAX_TWIST), MAX_TWIST)
         self.heading += (1 - hold) * turned + (turn - self.turned)
-
-
-def yaw_between(before: Float[np.ndarray, "3 3"], now: Float[np.ndarray, "3 3"]) -> float:
-    """The rotation about the vertical [rad] from one frame to the next."""
-    R = now @ before.T
-    return float(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]))

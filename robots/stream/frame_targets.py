@@ -1,7 +1,6 @@
 """One frame of a source as a robot's targets: what `robots.solver.targets` makes of a clip, without
 what needs the whole clip, in a tenth of its time."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
@@ -18,6 +17,7 @@ from robots.solver.targets import (
     source_feet,
 )
 from robots.solver.trunk import bends, leaning
+from robots.stream.source_poses import SourcePoses
 from sim.body.anthropometry import segments
 from spark.errors import FrameError
 from spark.rig.rig import Rig
@@ -73,10 +73,17 @@ class FrameTargets:
     pitched: Float[np.ndarray, "*T P 3"]
 
 
-def stack_targets(targets: Sequence[FrameTargets]) -> FrameTargets:
-    """Those of some frames in one."""
-    names = [field.name for field in fields(FrameTargets)]
-    return FrameTargets(*(np.stack([getattr(one, name) for one in targets]) for name in names))
+def repeated(targets: FrameTargets, count: int) -> FrameTargets:
+    """Those of one frame, of so many frames like it."""
+    parts = (getattr(targets, field.name) for field in fields(FrameTargets))
+    return FrameTargets(*(np.repeat(part[None], count, axis=0) for part in parts))
+
+
+def move_on(targets: FrameTargets, newest: FrameTargets) -> None:
+    """Take the targets of some frames on by one, in place."""
+    for name, part in vars(targets).items():
+        part[:-1] = part[1:]
+        part[-1] = getattr(newest, name)
 
 
 def ground_of(source: CanonicalMotion, robot: Morphology) -> Ground:
@@ -91,8 +98,7 @@ class FrameReader:
     def __init__(self, source: Rig, robot: Morphology, ground: Ground) -> None:
         self.source, self.robot, self.ground = source, robot, ground
         self.scale = robot.rig.hip_height / source.hip_height
-        skeleton = source.skeleton
-        self._levels = [(level, skeleton.parents[level]) for level in skeleton.levels[1:]]
+        self._poses = SourcePoses(source.skeleton)
         self._untpose = matrix_from_quat(quat_conj(source.tpose))
         self._tpose = matrix_from_quat(robot.rig.tpose)
         self._chest = source.chest
@@ -165,14 +171,7 @@ class FrameReader:
             raise FrameError(
                 f"the quaternion of joint {names[j]!r} has length {length[j]:.3g}; expected 1"
             )
-        turns = matrix_from_quat(rotations / length[:, None])
-        places = np.empty_like(local)
-        places[0] = root
-        for level, parents in self._levels:
-            above = turns[parents]
-            places[level] = places[parents] + (above @ local[level][..., None])[..., 0]
-            turns[level] = above @ turns[level]
-        return turns, places
+        return self._poses.of(root, rotations / length[:, None], local)
 
     def _thrown(self, height: float) -> float:
         """How much higher [m] than scaled the hips are that are so high [m] in the source: a body

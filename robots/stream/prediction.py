@@ -14,6 +14,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from jaxtyping import Float, Int
+from scipy.linalg.lapack import dposv
 
 HORIZON = 0.3  # [s] that is looked beyond the newest frame
 SLOWING = 0.1  # [s] in which a target loses most of its speed
@@ -92,7 +93,10 @@ class TargetMotion:
         """What is expected of the dofs of `q`; H and g are the normal equations of that frame
         alone."""
         model = self._model
-        target = np.linalg.solve(H + _DAMPING * np.eye(len(g)), -g).clip(-_MAX_STEP, _MAX_STEP)
+        damped = H.copy()
+        damped.reshape(-1)[:: len(g) + 1] += _DAMPING
+        _, target, _ = dposv(damped.T, -g, overwrite_a=True)
+        target = np.minimum(np.maximum(target, -_MAX_STEP), _MAX_STEP)
         step = np.zeros(model.nv)
         step[self._dofs] = target
         self._now = q.copy()

@@ -18,7 +18,8 @@ from robots.stream.frame_targets import (
     FrameReader,
     FrameTargets,
     Ground,
-    stack_targets,
+    move_on,
+    repeated,
 )
 from robots.stream.terms import FootTargets, Terms
 from robots.stream.window import Window
@@ -43,13 +44,13 @@ class Stream:
         self._reader = FrameReader(source, robot, ground)
         self._terms = Terms(robot, self._reader.bones, self._reader.hands is not None)
         self._window = Window(robot, self._terms, frame_time, fixed=_FIXED, free=LATENCY + 1)
+        self._targets: FrameTargets  # of the window's free frames
         self.reset()
 
     def reset(self) -> None:
         """Forget what has been seen: the next frame is a first one."""
         self._count = 0
         self._window.reset()
-        self._targets: list[FrameTargets] = []
         self._q = np.zeros((_FRAMES, self.robot.mjcf.model.nq))
         self._contacts = ContactTracker(self._reader, self.frame_time, LATENCY)
         self._detours = Detours(self._reader, self._terms, self.frame_time)
@@ -66,22 +67,21 @@ class Stream:
             raise FrameError(f"frame {self._count} of the stream: {error}") from error
         if self._count:
             q = self._q[_SHIFTED]
-            self._targets = [*self._targets[1:], targets]
+            move_on(self._targets, targets)
             poses = self._terms.poses(q[_FIXED : _FIXED + 1])  # what is next to be said
             foot_targets = self._contacts.update(targets, self._terms.sole_points(poses)[0])
             bones, angles = self._terms.bones(poses)[0], self._terms.angles(q)[_FIXED]
-            posture = self._detours.update(self._targets[0], bones, angles)
-            wanted = stack_targets(self._targets)
-            self._q = self._window.solve(q, wanted, foot_targets, posture)
+            posture = self._detours.update(self._targets, bones, angles)
+            self._q = self._window.solve(q, self._targets, foot_targets, posture)
         else:
-            self._targets = [targets] * (LATENCY + 1)
+            self._targets = repeated(targets, LATENCY + 1)
             self._q = self._first(targets)
         self._count += 1
         return self._q[_FIXED].copy()
 
     def _first(self, targets: FrameTargets) -> Float[np.ndarray, "W nq"]:
         """A pose at rest: first as it comes, then with the feet that stand where they are in it."""
-        robot, wanted = self.robot, stack_targets(self._targets)
+        robot = self.robot
         projected = project(robot, quat_from_matrix(targets.world)[None], targets.hips[None])
         q = robot.to_qpos(projected)[np.zeros(_FRAMES, dtype=int)]
         points = sum(map(len, robot.soles))
@@ -91,6 +91,6 @@ class Stream:
                 foot_targets = self._contacts.update(
                     targets, self._terms.sole_points(self._terms.poses(q))[0]
                 )
-            q = self._window.settle(q, wanted, foot_targets, _FIRST_ITERATIONS)
+            q = self._window.settle(q, self._targets, foot_targets, _FIRST_ITERATIONS)
             q[:] = q[-1]
         return q

@@ -18,7 +18,7 @@ from robots.solver.holds import joined
 from robots.solver.objective import linearize
 from robots.solver.projection import project
 from robots.solver.solve import blocks_of
-from robots.solver.targets import targets_of
+from robots.solver.targets import bone_directions, targets_of
 from robots.stream.frame_targets import LATENCY, Frame, FrameReader, FrameTargets, ground_of
 from robots.stream.stream import Stream
 from robots.stream.terms import FootTargets, Terms
@@ -28,16 +28,18 @@ from spark.constants import GRAVITY
 from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import ConventionError, FrameError
 from spark.io.recording import read_recording
+from spark.kinematics import forward
 from spark.motion import Motion
-from spark.rig.rig import understand
+from spark.rig.rig import Rig, understand
 from spark.rotation import (
     matrix_from_quat,
+    quat_conj,
     quat_from_rotvec,
     quat_from_yaw,
     quat_mul,
     quat_rotate,
 )
-from spark.transfer.canonical import from_canonical, to_canonical
+from spark.transfer.canonical import at_frame_time, from_canonical, to_canonical
 from spark_sim.loading import load_robot
 from tests.helpers.recordings import recording
 
@@ -242,6 +244,33 @@ def test_a_source_that_stalls_makes_no_jump(walked: np.ndarray) -> None:
 
     given = fastest(EMBER.to_qpos(project_of(stalled)))
     assert fastest(said(stalled)) < 0.7 * given
+
+
+def test_an_arm_that_is_wound_up_when_the_source_stops_finds_its_way() -> None:
+    """By its limits, the left arm of this dancer comes to another pose of nearly the same wrist,
+    and a source that stands still does not bring it back."""
+    motion = read_recording(recording("cmu_dance/cmu_05_04.bvh")).motion
+    source = at_frame_time(to_canonical(motion, understand(motion)), 1 / 30)
+    played = from_canonical(source.picked(slice(189, 246)))
+    held = np.minimum(np.arange(len(played) + 60), len(played) - 1)
+    still = Motion(
+        played.skeleton, played.frame_time, played.root_pos[held], played.rotations[held]
+    )
+    robot = known("unitree_g1")
+    result = follow(to_canonical(still, source.rig), robot)
+    last = slice(len(still) - 1, len(still))
+    wanted, found = (
+        bone_directions(rig, *posed(m.picked(last), rig))
+        for m, rig in ((still, source.rig), (result.motion, robot.rig))
+    )
+    cosines = [(wanted[role] * found[role]).sum() for role in wanted]
+    assert np.degrees(np.arccos(np.clip(cosines, -1, 1))).max() < 25
+
+
+def posed(motion: Motion, rig: Rig) -> tuple[np.ndarray, np.ndarray]:
+    """Where the joints are [m], and how they have turned since the T-pose."""
+    positions, world = forward(motion)
+    return positions, quat_mul(world, quat_conj(rig.tpose))
 
 
 def project_of(motion: Motion):
