@@ -52,7 +52,7 @@ def css() -> str:
     )
     return (
         f":root {{ color-scheme: light dark; {light} }}\n"
-        f"  @media (prefers-color-scheme: dark) {{ :root {{ {dark} }} }}"
+        f"  @media screen and (prefers-color-scheme: dark) {{ :root {{ {dark} }} }}"
     )
 
 

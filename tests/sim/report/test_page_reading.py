@@ -22,6 +22,7 @@ from spark.demo.sample import sample_motion, sample_rig
 from spark.rig.roles import Role
 from spark.rotation import quat_about
 from tests.helpers.browser import opened, with_probe
+from tests.helpers.program import CHECKOUT
 from tests.helpers.stick import joint, standing, stick_rig
 
 FRAMES = 120
@@ -198,3 +199,12 @@ def test_joints_of_a_robot_have_torques() -> None:
         assert row.torque == pytest.approx(np.abs(each.torque).max())
         assert row.load == pytest.approx(row.torque / each.limit)
         assert row.speed == pytest.approx(0, abs=1e-9)
+
+
+def test_paper_is_white_whatever_the_screen_is() -> None:
+    """Dark colours are for screens alone: on paper they would be light words on white."""
+    pages = [*(CHECKOUT / "sim").rglob("*.html"), *(CHECKOUT / "spark_sim").rglob("*.html")]
+    texts = [css(), *(page.read_text() for page in pages)]
+    rules = [rule for text in texts for rule in re.findall(r"@media [^{]*dark", text)]
+    assert len(rules) >= 4
+    assert set(rules) == {"@media screen and (prefers-color-scheme: dark"}
