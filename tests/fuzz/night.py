@@ -20,7 +20,7 @@ from tests.fuzz import case
 from tests.fuzz.spoil import by_chance
 from tests.fuzz.target import Target
 
-_AT_ONCE = 400  # files of a process: forking costs a hundredth of using them
+_AT_ONCE = 4000  # files of a process, which imports and builds once what they need
 
 Found = tuple[int, str]  # which file, and the traceback of what came of it
 

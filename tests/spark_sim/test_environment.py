@@ -39,7 +39,8 @@ def test_ascii_terminals_and_names_that_are_no_text(tmp_path: Path) -> None:
 
 _RUN = """
 import mujoco  # before spark_sim, and so before it chooses how to draw without a display
-import json, sys
+import json, os, sys, tempfile
+tempfile.tempdir = os.getcwd()  # what is left without /tmp
 from spark_sim.cli import run
 for line in sys.stdin:
     print(run(json.loads(line)), file=sys.stderr, flush=True)
@@ -47,9 +48,10 @@ for line in sys.stdin:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names of files are text")
-def test_every_kind_of_output_in_poor_surroundings(tmp_path: Path) -> None:
-    """No home, no folder for temporary files, no display, one core, names of 250 bytes that are no
-    text, MuJoCo loaded first; two pages with pictures in one process."""
+@pytest.mark.parametrize("home", [None, "/proc"])  # in /proc nobody may write, root neither
+def test_every_kind_of_output_in_poor_surroundings(tmp_path: Path, home: str | None) -> None:
+    """No home or one that is read-only, no folder for temporary files, no display, one core, names
+    of 250 bytes that are no text, MuJoCo loaded first; two pages with pictures in one process."""
     spark_sim.sample(tmp_path)
     stem = os.fsdecode(b"\xff\xe9" + 240 * b"w")
     (tmp_path / "walker_walk.bvh").rename(tmp_path / f"{stem}.bvh")
@@ -58,8 +60,9 @@ def test_every_kind_of_output_in_poor_surroundings(tmp_path: Path) -> None:
     shutil.copy(tmp_path / source, tmp_path / "takes")
     shutil.copy(tmp_path / target, tmp_path / "takes")
     gone = ("DISPLAY", "WAYLAND_DISPLAY", "HOME", "MUJOCO_GL", "PYOPENGL_PLATFORM", "PYTHONUTF8")
+    gone = (*gone, "XDG_CACHE_HOME")
     kept = {key: value for key, value in os.environ.items() if key not in gone}
-    poor = {"TMPDIR": str(tmp_path / "none"), "XDG_CACHE_HOME": "/proc/none", "LC_ALL": "C"}
+    poor = {"LC_ALL": "C"} if home is None else {"LC_ALL": "C", "HOME": home}
     lines = [
         ["inspect", source, "--save-map", f"{stem}.toml"],
         ["retarget", source, "--to", target, "-o", f"{stem}o.bvh"],
