@@ -215,9 +215,8 @@ def collisions_of(robot: Morphology) -> Collisions:
                 continue
             # The longer chain is the limb's end: the slender part.
             small, large = (a, b) if len(tree.chain(a.link)) >= len(tree.chain(b.link)) else (b, a)
-            pair = ShapePair(small, large, CLEARANCE)
+            pair = ShapePair(small, large, 0.0, CLEARANCE)
             at_tpose = _distance(tree, poses, pair, small.spheres, np.zeros(1, dtype=np.int64))
-            pairs.append(
-                replace(pair, clearance=min(CLEARANCE, float((at_tpose[:, 0] - small.radii).min())))
-            )
+            gap = float((at_tpose[:, 0] - small.radii).min())
+            pairs.append(replace(pair, gap=gap, clearance=min(CLEARANCE, gap)))
     return Collisions(tree, tuple(pairs))

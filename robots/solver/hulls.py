@@ -39,11 +39,12 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class ShapePair:
-    """Two shapes, and how near [m] they may come (`clearance`, negative where the T-pose has them
-    in each other)."""
+    """Two shapes, how near [m] they are in the T-pose (`gap`), and how near they may come
+    (`clearance`, negative where the T-pose has them in each other)."""
 
     small: Shape
     large: Shape
+    gap: float
     clearance: float
 
 

@@ -13,6 +13,9 @@ from robots.solver.hulls import ShapePair
 from robots.solver.weights import W_COLLISION, W_LEG_COLLISION
 
 _ACTIVE = 3 * DEPTH_ROUNDING  # [m] between shapes beyond which the penalty is negligible
+# [m] that parts keep between them beyond a whole clip's clearance, for how far a soft penalty gives
+# way is not repaired here; and how far apart [m] they are in the T-pose: others are always near.
+MARGIN, _FAR = 0.005, 0.1
 _REACH = 0.03  # [m] that shapes may move between the searched frame and the others
 
 
@@ -47,9 +50,10 @@ class WindowCollisions:
         self._centers = self._local(centers, self._shapes)
         self._small = np.array([number[pair.small.geom] for pair in pairs], dtype=int)
         self._large = np.array([number[pair.large.geom] for pair in pairs], dtype=int)
+        apart = [pair.clearance + MARGIN * (pair.gap > _FAR) for pair in pairs]
         bounds = [
-            pair.small.bound + pair.large.bound + pair.clearance + _ACTIVE + _REACH
-            for pair in pairs
+            pair.small.bound + pair.large.bound + own + _ACTIVE + _REACH
+            for pair, own in zip(pairs, apart, strict=True)
         ]
         self._bounds = np.array(bounds) ** 2
         self._reach = np.array([pair.large.reach for pair in pairs]).reshape(-1, 26)
@@ -57,7 +61,7 @@ class WindowCollisions:
         self._pairs = np.repeat(np.arange(len(pairs)), counts)
         spheres = [s for pair in pairs for s in pair.small.spheres]
         self._spheres = self._local(spheres, self._shapes[self._small[self._pairs]])
-        radii = [r + pair.clearance for pair in pairs for r in pair.small.radii]
+        radii = [r + own for pair, own in zip(pairs, apart, strict=True) for r in pair.small.radii]
         self._radii = np.array(radii)
         self._index_dofs(robot, pairs, set(first_block.tolist()))
 

@@ -233,6 +233,13 @@ def test_the_bars_hold_on_real_clips(clip: str) -> None:
     assert found.fastest_rad_s <= 20
 
 
+def test_hands_that_hang_beside_a_wide_trunk_are_not_in_it() -> None:
+    motion = read_recording(recording("reactidle/009_acted.bvh")).motion
+    source = to_canonical(motion.frames(0, 240), understand(motion))
+    found = measure(from_canonical(source), source.rig, follow(source, known("booster_t1")))
+    assert found.self_collision == 0
+
+
 def test_a_source_that_stalls_makes_no_jump(walked: np.ndarray) -> None:
     """Every third frame comes thrice, and the two after it never."""
     kept = np.arange(len(WALK))
