@@ -8,22 +8,18 @@ from spark.skeleton import Skeleton
 
 
 class SourcePoses:
-    """The kinematics of a skeleton: a body of a ball joint each."""
+    """The kinematics of a skeleton: a tree of bodies that are put into each frame's pose. They have
+    no joints, which long chains would take minutes to compile with."""
 
     def __init__(self, skeleton: Skeleton) -> None:
         spec = mujoco.MjSpec()
         bodies: list[mujoco.MjsBody] = []
-        for parent, offset in zip(skeleton.parents.tolist(), skeleton.offsets, strict=True):
+        for parent in skeleton.parents.tolist():
             above = spec.worldbody if parent < 0 else bodies[parent]
-            # A body that moves needs a mass; nothing here asks for it.
-            body = above.add_body(pos=offset, mass=1.0, inertia=np.ones(3), explicitinertial=True)
-            body.add_joint(type=mujoco.mjtJoint.mjJNT_BALL)
-            bodies.append(body)
+            bodies.append(above.add_body())
         self._model = spec.compile()
         self._data = mujoco.MjData(self._model)
         self._bodies = np.array([body.id for body in bodies])
-        self._qpos = self._model.jnt_qposadr[self._model.body_jntadr[self._bodies]]
-        self._quats = self._qpos[:, None] + np.arange(4)
 
     def of(
         self,
@@ -33,9 +29,8 @@ class SourcePoses:
     ) -> tuple[Float[np.ndarray, "N 3 3"], Float[np.ndarray, "N 3"]]:
         """Rotations (`R_world_joint`) and places [m, world] of the joints whose local ones are
         `rotations` (`q_parent_joint`) and `offsets` [m]; the root is at `root_pos`."""
-        model, data = self._model, self._data
-        model.body_pos[self._bodies] = offsets
-        model.body_pos[self._bodies[0]] = root_pos
-        data.qpos[self._quats] = rotations
+        model, data, own = self._model, self._data, self._bodies
+        model.body_pos[own], model.body_quat[own] = offsets, rotations
+        model.body_pos[own[0]] = root_pos
         mujoco.mj_kinematics(model, data)
-        return data.xmat[self._bodies].reshape(-1, 3, 3), data.xpos[self._bodies]
+        return data.xmat[own].reshape(-1, 3, 3), data.xpos[own]
