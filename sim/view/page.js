@@ -61,4 +61,5 @@ canvas.addEventListener("wheel", e => { zoom(Math.exp(e.deltaY * 0.001)); e.prev
 function size() { canvas.width = innerWidth * devicePixelRatio; canvas.height = innerHeight * devicePixelRatio; }
 addEventListener("resize", size); size();
 new ResizeObserver(() => { view.below = innerHeight - el("bar").getBoundingClientRect().top; }).observe(el("bar"));
+tell(); // a window that is not seen draws no frame
 requestAnimationFrame(tick);
