@@ -17,7 +17,6 @@ from robots.solver.block import Block
 from robots.solver.hulls import Shape, ShapePair, can_collide, shapes_of
 from robots.tree import LinkPoses, Tree, forward_kinematics
 
-CLEARANCE = 0.0  # [m] that shapes keep between them; less where the T-pose has less
 DEPTH_ROUNDING = 0.003  # [m] over which the penalty of their depth sets in
 SEARCH_DISTANCE = 0.02  # [m] between shapes within which a pair is a candidate
 _PAIRS = len(DIRECTIONS) // 2  # a direction and the one against it, as many from the end
@@ -215,8 +214,8 @@ def collisions_of(robot: Morphology) -> Collisions:
                 continue
             # The longer chain is the limb's end: the slender part.
             small, large = (a, b) if len(tree.chain(a.link)) >= len(tree.chain(b.link)) else (b, a)
-            pair = ShapePair(small, large, 0.0, CLEARANCE)
+            pair = ShapePair(small, large, 0.0)
             at_tpose = _distance(tree, poses, pair, small.spheres, np.zeros(1, dtype=np.int64))
             gap = float((at_tpose[:, 0] - small.radii).min())
-            pairs.append(replace(pair, gap=gap, clearance=min(CLEARANCE, gap)))
+            pairs.append(replace(pair, gap=gap))
     return Collisions(tree, tuple(pairs))

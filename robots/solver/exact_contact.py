@@ -13,14 +13,13 @@ from robots.model.morphology import Morphology
 from robots.residuals import one_sided
 from robots.solver.block import Block
 from robots.solver.collision import (
-    CLEARANCE,
     DEPTH_ROUNDING,
     Candidate,
     Collisions,
     approach_jacobian,
     collisions_of,
 )
-from robots.solver.hulls import ShapePair
+from robots.solver.hulls import CLEARANCE, ShapePair
 from robots.tree import LinkPoses
 
 _MAX_DISTANCE = 0.02  # [m] beyond which MuJoCo need not measure

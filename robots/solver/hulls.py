@@ -14,6 +14,7 @@ from jaxtyping import Float
 from robots.model.mjcf import Mjcf
 from robots.model.shapes import DIRECTIONS, surface_of
 
+CLEARANCE = 0.0  # [m] that shapes keep between them; less where the T-pose has less
 _MAX_ALONG = 6  # spheres along a shape, at most
 _MAX_SPHERES = 24  # of a shape, its corners included
 _MAX_PROTRUSION = (
@@ -39,13 +40,17 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class ShapePair:
-    """Two shapes, how near [m] they are in the T-pose (`gap`), and how near they may come
-    (`clearance`, negative where the T-pose has them in each other)."""
+    """Two shapes, and how near [m] they are in the T-pose (`gap`, negative where it has them in
+    each other)."""
 
     small: Shape
     large: Shape
     gap: float
-    clearance: float
+
+    @property
+    def clearance(self) -> float:
+        """How near [m] they may come."""
+        return min(CLEARANCE, self.gap)
 
 
 def shapes_of(mjcf: Mjcf, joints: Sequence[int]) -> list[Shape]:

@@ -15,7 +15,7 @@ from robots.solver.weights import W_COLLISION, W_LEG_COLLISION
 _ACTIVE = 3 * DEPTH_ROUNDING  # [m] between shapes beyond which the penalty is negligible
 # [m] that parts keep between them beyond a whole clip's clearance, for how far a soft penalty gives
 # way is not repaired here; and how far apart [m] they are in the T-pose: others are always near.
-MARGIN, _FAR = 0.005, 0.1
+_MARGIN, _FAR = 0.005, 0.1
 _REACH = 0.03  # [m] that shapes may move between the searched frame and the others
 
 
@@ -50,7 +50,7 @@ class WindowCollisions:
         self._centers = self._local(centers, self._shapes)
         self._small = np.array([number[pair.small.geom] for pair in pairs], dtype=int)
         self._large = np.array([number[pair.large.geom] for pair in pairs], dtype=int)
-        apart = [pair.clearance + MARGIN * (pair.gap > _FAR) for pair in pairs]
+        apart = [pair.clearance + _MARGIN * (pair.gap > _FAR) for pair in pairs]
         bounds = [
             pair.small.bound + pair.large.bound + own + _ACTIVE + _REACH
             for pair, own in zip(pairs, apart, strict=True)

@@ -5,11 +5,10 @@ them follows; so whoever retargets one is told.
 """
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from spark.rotation import quat_angle
 from spark.runs import true_runs
-from spark.summary import counted
 
 # Dancers turn by up to 17 rad/s, skaters in a spin by 36, flips in recordings by 27 to 120.
 # Sprinters run at 12.4 m/s.
@@ -27,27 +26,27 @@ def breaks(
     reach = max(1, round(_SPAN / frame_time))
     turned = quat_angle(pelvis[:-reach], pelvis[reach:])
     moved = np.linalg.norm(hips[reach:] - hips[:-reach], axis=1)
+    span = reach * frame_time
     return (
-        *_said(turned, MAX_TURN, reach * frame_time, frame_time, "turn by {:.0f}°", 180 / np.pi),
-        *_said(moved, MAX_SPEED, reach * frame_time, frame_time, "move by {:.2f} m", 1.0),
+        *_said(turned > MAX_TURN * span, np.degrees(turned), "turn by {:.0f}°", reach, frame_time),
+        *_said(moved > MAX_SPEED * span, moved, "move by {:.2f} m", reach, frame_time),
     )
 
 
 def _said(
+    broken: Bool[np.ndarray, "T"],
     way: Float[np.ndarray, "T"],
-    fastest: float,
-    span: float,
-    frame_time: float,
     what: str,
-    unit: float,
+    reach: int,
+    frame_time: float,
 ) -> tuple[str, ...]:
-    found = true_runs(way > fastest * span, gap=round(_APART / frame_time))
+    found = true_runs(broken, gap=round(_APART / frame_time))
     if not found:
         return ()
     start, stop = found[0]
     worst = start + int(way[start:stop].argmax())
-    times = "" if len(found) == 1 else f", the first of {counted(len(found), 'time')}"
+    times = "" if len(found) == 1 else f", the first of {len(found)} times"
     return (
-        f"the hips {what.format(unit * way[worst])} within {span:.3f} s at {worst * frame_time:.2f}"
-        f" s{times}: faster than bodies do; is the recording broken there?",
+        f"the hips {what.format(way[worst])} within {reach * frame_time:.3f} s at "
+        f"{worst * frame_time:.2f} s{times}: faster than bodies do; is the recording broken there?",
     )
