@@ -67,9 +67,9 @@ __all__ = [
 
 def __getattr__(name: str) -> "Any":
     if name == "__version__":
-        from importlib.metadata import version
+        from spark_sim.version import own_version
 
-        return version(DISTRIBUTION)
+        return own_version()
     if name not in _MODULE_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module

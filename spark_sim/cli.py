@@ -99,9 +99,9 @@ class _Parser(ArgumentParser):
 
 class _Version(Action):
     def __call__(self, parser: ArgumentParser, *_: Any) -> NoReturn:
-        from importlib.metadata import version
+        from spark_sim.version import own_version
 
-        print(f"spark-sim {version('spark-sim')}")
+        print(f"spark-sim {own_version()}")
         parser.exit()
 
 
@@ -152,7 +152,17 @@ def parse(argv: Sequence[str]) -> Namespace:
             f"don't know what {' '.join(left)} is for; files stand side by side, and an option "
             "takes one value"
         )
+    if args.command is not None and (name := _without_value(args)):
+        command.error(f"{name} is empty; a variable of the shell that is not set, perhaps")
     return args
+
+
+def _without_value(args: Namespace) -> str | None:
+    """The name of an argument that is an empty text, which would stand for the current folder."""
+    for name, value in vars(args).items():
+        if "" in (value if isinstance(value, list) else [value]):
+            return name.replace("_", "-")
+    return None
 
 
 def _nearest(name: str, known: Iterable[str]) -> str:

@@ -26,6 +26,7 @@ from spark.errors import ConventionError, FileFormatError
 from spark.finite import check_output
 from spark.npz import Npz
 from spark.opening import check_regular
+from spark.summary import counted
 
 
 def write(
@@ -148,8 +149,8 @@ def _read_csv(
         read = read_csv(path, robot, quat=order, fps=rate)
     if facts.get("frames", len(read)) != len(read):
         said += (
-            f"has {len(read)} frames, {sidecar_of(path).name} says {facts['frames']}: it may be of "
-            "an older file",
+            f"has {counted(len(read), 'frame')}, {sidecar_of(path).name} says {facts['frames']}: "
+            "it may be of an older file",
         )
     return replace(read, notes=(*read.notes, *said))
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
+from robots.model.xml import parse_xml
 from spark.errors import FileFormatError
 from spark.opening import read_bytes
 from spark.rotation import matrix_from_quat
@@ -16,7 +17,8 @@ from spark.rotation import matrix_from_quat
 _LARGEST = 256 << 20  # bytes
 _MAX_STL_FACES = 200_000  # that MuJoCo reads of an STL
 _HEAD = 2000  # bytes in which a COLLADA file says what wrote it
-_MAX_DEPTH = 100  # of nodes in nodes
+_MAX_NODES = 20_000  # of a scene, each as often as it is placed
+_MAX_CORNERS = 6_000_000  # of triangles, placed
 
 
 def as_obj(path: Path) -> bytes | None:
@@ -75,21 +77,19 @@ def _text_stl(data: bytes, path: Path) -> Float[np.ndarray, "_ 3"]:
 def _collada(data: bytes, path: Path) -> tuple[Float[np.ndarray, "V 3"], Int[np.ndarray, "F 3"]]:
     """The triangles of all geometries where the scene puts them, in metres, Z up."""
     try:
-        root = ET.fromstring(data)
+        root = parse_xml(Path(path.name), data)
         for element in root.iter():
-            element.tag = element.tag.rpartition("}")[2]
+            element.tag = element.tag.rpartition(":")[2]
         unit = root.find("asset/unit")
         scale = 1.0 if unit is None else float(unit.get("meter", "1"))
         geometries = {
             geometry.get("id", ""): _triangles(geometry) for geometry in root.iter("geometry")
         }
         nodes = {node.get("id", ""): node for node in root.iter("node")}
-        placed: list[Float[np.ndarray, "_ 3"]] = []
         scene = root.find("library_visual_scenes/visual_scene")
-        for node in [] if scene is None else scene.findall("node"):
-            _place(node, np.eye(4), geometries, nodes, placed, _MAX_DEPTH)
+        placed = [] if scene is None else _placed(scene, geometries, nodes)
         points = np.concatenate(placed) if placed else np.concatenate([*geometries.values()])
-    except (ET.ParseError, ValueError, LookupError, TypeError, RecursionError) as error:
+    except (ValueError, LookupError, TypeError) as error:
         raise FileFormatError(path.name, None, f"is no COLLADA that is read ({error})") from error
     if not len(points):
         raise FileFormatError(path.name, None, "has no triangles")
@@ -99,28 +99,30 @@ def _collada(data: bytes, path: Path) -> tuple[Float[np.ndarray, "V 3"], Int[np.
     return scale * points, np.arange(len(points)).reshape(-1, 3)
 
 
-def _place(
-    node: ET.Element,
-    above: Float[np.ndarray, "4 4"],
+def _placed(
+    scene: ET.Element,
     geometries: dict[str, Float[np.ndarray, "_ 3"]],
     nodes: dict[str, ET.Element],
-    placed: list[Float[np.ndarray, "_ 3"]],
-    depth: int,
-) -> None:
-    """Add the triangles of a node and of those below it."""
-    if not depth:
-        raise ValueError("nodes in nodes without end")
-    here = above
-    for element in node:
-        if (move := _MOVES.get(element.tag)) is not None:
-            here = here @ move(np.array((element.text or "").split(), dtype=float))
-    for instance in node.findall("instance_geometry"):
-        points = geometries[instance.get("url", "")[1:]]
-        placed.append(points @ here[:3, :3].T + here[:3, 3])
-    for instance in node.findall("instance_node"):
-        _place(nodes[instance.get("url", "")[1:]], here, geometries, nodes, placed, depth - 1)
-    for child in node.findall("node"):
-        _place(child, here, geometries, nodes, placed, depth - 1)
+) -> list[Float[np.ndarray, "_ 3"]]:
+    """The triangles of each node of a scene where it is placed; nodes may stand for others."""
+    placed: list[Float[np.ndarray, "_ 3"]] = []
+    waiting = [(node, np.eye(4)) for node in reversed(scene.findall("node"))]
+    count = corners = 0
+    while waiting:
+        node, here = waiting.pop()
+        count += 1
+        for element in node:
+            if (move := _MOVES.get(element.tag)) is not None:
+                here = here @ move(np.array((element.text or "").split(), dtype=float))
+        for instance in node.findall("instance_geometry"):
+            points = geometries[instance.get("url", "")[1:]]
+            corners += len(points)
+            placed.append(points @ here[:3, :3].T + here[:3, 3])
+        below = [nodes[i.get("url", "")[1:]] for i in node.findall("instance_node")]
+        waiting += [(child, here) for child in reversed([*below, *node.findall("node")])]
+        if count > _MAX_NODES or corners > _MAX_CORNERS:
+            raise ValueError("nodes in nodes without end, or too many triangles")
+    return placed
 
 
 def _translation(v: Float[np.ndarray, "_"]) -> Float[np.ndarray, "4 4"]:
@@ -183,6 +185,8 @@ def _triangles(geometry: ET.Element) -> Float[np.ndarray, "_ 3"]:
 
 def _fans(corners: Int[np.ndarray, "_"], counts: Int[np.ndarray, "_"]) -> Int[np.ndarray, "_"]:
     """Polygons of `counts` corners as triangles around their first corner."""
+    if (counts > len(corners)).any() or counts.sum() != len(corners):
+        raise ValueError("polygons have another number of corners than they say")
     starts = np.cumsum(counts) - counts
     steps = np.concatenate([np.arange(n - 2) for n in counts]) if len(counts) else np.zeros(0, int)
     first = np.repeat(starts, counts - 2)

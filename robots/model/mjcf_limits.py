@@ -12,14 +12,18 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
 from math import prod
 from pathlib import Path
+from typing import NoReturn
 
 from spark.errors import FileFormatError
 
 _ELEMENTS = 20_000  # after copying; compiled in seconds
 DEPTH = 200  # bodies in bodies
 _JOINTS = 1_000  # the work on them grows with their square
-_KEYED = 5_000_000  # keyframes times elements: numbers of all of them together
-_PIXELS = 64 << 20  # of textures and height fields together
+_KEYED = 5_000_000  # keyframes, and numbers beside each element, times elements
+_PIXELS = 48 << 20  # of textures and height fields together
+_POINTS = 100_000  # of built-in meshes together; compiled in two seconds
+_FLEXIBLE = 300_000  # numbers in what bends, such as cloth
+_SENSED = 1_000_000  # values of the sensors that look through cameras, or are grids
 _FILE = 256 << 20  # bytes of a mesh, or what else a model loads
 _MEMORY = 4 << 30  # bytes that `size memory` sets aside
 
@@ -29,12 +33,18 @@ _NUMBERS = {
         ("nuser_actuator", "nuser_body", "nuser_cam", "nuser_geom", "nuser_jnt"), 1_000
     ),
     **dict.fromkeys(("nuser_sensor", "nuser_site", "nuser_tendon", "nsample", "actdim"), 1_000),
+    **dict.fromkeys(("num", "nchannel"), 1_000),  # contacts of a sensor; channels of a grid's
     **dict.fromkeys(("nuserdata", "nstack", "nconmax", "njmax"), 10_000_000),
     **dict.fromkeys(("nkey", "offwidth", "offheight", "shadowsize", "resolution"), 20_000),
     **dict.fromkeys(("numslices", "numstacks", "numquads", "offsamples", "maxhullvert"), 10_000),
     **dict.fromkeys(("ccd_iterations", "sdf_iterations", "sdf_initpoints"), 10_000),
     **dict.fromkeys(("iterations", "ls_iterations", "noslip_iterations"), 10_000),
     "dim": 1_000,
+}
+# Numbers that stand beside each element of a kind.
+_BESIDE = {
+    *("nuser_actuator", "nuser_body", "nuser_cam", "nuser_geom", "nuser_jnt", "nuser_sensor"),
+    *("nuser_site", "nuser_tendon", "nsample", "actdim", "dim", "num"),
 }
 _GRIDS = ("count", "cellcount")  # copies along one to three axes
 _LOADED = ("mesh", "hfield", "skin", "texture", "flexcomp")
@@ -50,12 +60,26 @@ def check_limits(path: Path, root: ET.Element, attached: Mapping[str, ET.Element
         raise FileFormatError(path, None, f"stands for {_many(elements, 'elements', _ELEMENTS)}")
     if joints > _JOINTS:
         raise FileFormatError(path, None, f"stands for {_many(joints, 'joints', _JOINTS)}")
+    every = [element for tree in trees for element in tree.iter()]
+    for element in every:
+        _check_numbers(path, element)
     keys = sum(len(tree.findall("./keyframe/key")) for tree in trees)
     if keys * elements > _KEYED:
         raise FileFormatError(path, None, f"has {keys} keyframes, more than such a model needs")
-    for tree in trees:
-        for element in tree.iter():
-            _check_numbers(path, element)
+    largest: dict[str, float] = {}
+    for element in every:
+        for name in _BESIDE & element.attrib.keys():
+            largest[name] = max(largest.get(name, 0.0), _largest(element, name))
+    beside = sum(largest.values())
+    if beside * elements > _KEYED:
+        raise FileFormatError(
+            path,
+            None,
+            f"sets {beside:,.0f} numbers aside for each of {elements:,.0f} elements; at most "
+            f"{_KEYED:,} in all are made",
+        )
+    _check_points(path, every)
+    _check_sensed(path, every)
     _check_pixels(path, trees)
     _check_files(path, trees)
 
@@ -119,6 +143,43 @@ def _check_numbers(path: Path, element: ET.Element) -> None:
         _refuse(path, element, "memory", "at most 4G")
 
 
+def _check_points(path: Path, every: list[ET.Element]) -> None:
+    """Built-in meshes, and what bends."""
+    points = flexible = 0.0
+    for element in every:
+        if element.tag == "mesh" and "builtin" in element.attrib:
+            size = _largest(element, "params")
+            # A sphere is an icosahedron whose faces are cut in four, so many times.
+            points += 10 * 4.0 ** min(size, 20) if element.get("builtin") == "sphere" else size**2
+        elif element.tag in ("flex", "flexcomp", "composite"):
+            words = (text.count(" ") + text.count("\n") for text in element.attrib.values())
+            flexible += sum(words)
+    if points > _POINTS:
+        _too_many(path, "built-in meshes", points, "points", _POINTS)
+    if flexible > _FLEXIBLE:
+        _too_many(path, "flexible parts", flexible, "numbers", _FLEXIBLE)
+
+
+def _check_sensed(path: Path, every: list[ET.Element]) -> None:
+    """Pictures that range finders measure, and grids of touch."""
+    sensors = sum(element.tag == "rangefinder" and "camera" in element.attrib for element in every)
+    pixels = max(prod(_numbers(element, "resolution")) for element in every)
+    values = sensors * pixels
+    for element in every:
+        if element.tag == "config" and element.get("key") == "size":
+            values += prod(_numbers(element, "value"))
+    if values > _SENSED:
+        _too_many(path, "sensors", values, "values", _SENSED)
+
+
+def _too_many(path: Path, what: str, count: float, noun: str, limit: int) -> NoReturn:
+    raise FileFormatError(path, None, f"has {what} of {count:,.0f} {noun}; at most {limit:,}")
+
+
+def _largest(element: ET.Element, name: str) -> float:
+    return max(_numbers(element, name), default=0.0)
+
+
 def _check_pixels(path: Path, trees: list[ET.Element]) -> None:
     pixels = 0.0
     of_classes = [e for tree in trees for d in tree.iter("default") for e in d.findall("texture")]
@@ -131,7 +192,7 @@ def _check_pixels(path: Path, trees: list[ET.Element]) -> None:
             # The six sides of a cube lie above each other, as high as they are wide.
             pixels += max(width * height, 6 * width * width if element.get("type") != "2d" else 0)
         elif element.tag == "hfield":
-            pixels += prod(max(_numbers(element, name), default=0.0) for name in ("nrow", "ncol"))
+            pixels += prod(_largest(element, name) for name in ("nrow", "ncol"))
         if element.tag in ("texture", "hfield"):
             pixels += sum(_png_pixels(file) for file in _files(path, trees, element))
     if not pixels <= _PIXELS:  # nor NaN

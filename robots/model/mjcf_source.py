@@ -11,15 +11,14 @@ import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
-from xml.parsers import expat
 
 from robots.model.mjcf_limits import check_limits
+from robots.model.xml import parse_xml
 from spark.errors import FileFormatError
 from spark.opening import LARGEST_TEXT, read_bytes
 
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _MOST_FILES, _DEEPEST_FILES = 200, 20  # included, and includes of includes
-_DEEPEST = 100  # elements in elements, of one file
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,7 @@ class _Reader:
         text = content.decode("utf-8-sig", "replace")
         text = _COMMENT.sub(lambda comment: "\n" * comment[0].count("\n"), text)
         self.text = self.text or text
-        root = _parsed(text, path)
+        root = parse_xml(path, text.encode("utf-8", "replace"), "utf-8")
         for parent in list(root.iter()):
             for include in parent.findall("include"):
                 file = self._found(include, path)
@@ -120,40 +119,6 @@ class _Reader:
 
 def _fail(path: Path, message: str) -> NoReturn:
     raise FileFormatError(path, None, message)
-
-
-def _parsed(text: str, path: Path) -> ET.Element:
-    """The elements of an XML text; no document type, and none of what comes with one."""
-    builder, depth = ET.TreeBuilder(), 0
-    parser = expat.ParserCreate("utf-8")
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth
-        depth += 1
-        if depth > _DEEPEST:
-            _refuse(f"nests elements deeper than {_DEEPEST}")
-        builder.start(tag, attributes)
-
-    def end(tag: str) -> None:
-        nonlocal depth
-        depth -= 1
-        builder.end(tag)
-
-    def doctype(*_: object) -> None:
-        _refuse("has a document type, which MJCF files do without")
-
-    def _refuse(message: str) -> NoReturn:
-        raise FileFormatError(path, parser.CurrentLineNumber, message)
-
-    parser.StartElementHandler, parser.EndElementHandler = start, end
-    parser.CharacterDataHandler = builder.data
-    parser.StartDoctypeDeclHandler = doctype
-    try:
-        parser.Parse(text.encode("utf-8", "replace"), True)
-        return builder.close()
-    except expat.ExpatError as error:
-        message = f"is no XML ({expat.errors.messages[error.code]})"
-        raise FileFormatError(path, error.lineno, message) from error
 
 
 def _set_folders(root: ET.Element, folder: Path) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from robots.model.meshes import as_obj
 from robots.model.mjcf_limits import DEPTH, check_limits
+from robots.model.xml import parse_xml
 from spark.errors import FileFormatError, SkeletonError, name_list
 from spark.opening import LARGEST_TEXT, beginning, read_bytes
 from spark.summary import counted
@@ -47,11 +48,7 @@ def read_urdf(path: Path, notes: list[str], *, visuals: bool = True) -> tuple[mu
     links are no trees.
     """
     data = read_bytes(path, limit=LARGEST_TEXT, expected="a URDF")
-    try:
-        robot = ET.fromstring(data)
-    except (ET.ParseError, ValueError, LookupError) as error:
-        line = getattr(error, "position", (None,))[0]
-        raise FileFormatError(path, line, f"is no XML ({error}); expected a URDF") from error
+    robot = parse_xml(path, data)
     if robot.tag != "robot":
         raise FileFormatError(path, 1, f"begins with <{robot.tag}>; a URDF begins with <robot>")
     if any("xacro" in element.tag for element in robot.iter()):

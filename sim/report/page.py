@@ -23,6 +23,7 @@ from sim.trajectory import Subject
 from sim.view.page import REPLAY, page
 from sim.view.scene import Figure
 from spark.files import write_atomically
+from spark.summary import counted
 
 _PAGE = Template("sim.report", "page.html", ("page.js",), frames=(REPLAY,))
 _LISTED = 200  # findings
@@ -74,7 +75,7 @@ def report_page(
         palette=Markup(css()),
         grade=grade(100 * result.implausible),
         headline=f"{100 * result.implausible:.1f} % of the frames are implausible",
-        about=f"{len(clip)} frames, {duration:.1f} s{beside}",
+        about=f"{counted(len(clip), 'frame')}, {duration:.1f} s{beside}",
         cards=_cards(result),
         key=CORNER_COLORS,
         replay=page(figures, title="", known=known),

@@ -10,6 +10,7 @@ from sim.report.names import LABELS, UNITS
 from sim.report.palette import BOLD, DIM, TERMINAL, grade
 from sim.report.result import Finding, Result
 from sim.report.table import RATES, shares, source_rate
+from spark.summary import counted
 
 _SHOWN = 3  # findings of one measure
 _RATE_KINDS = {
@@ -35,7 +36,7 @@ def render(result: Result, *, color: bool) -> str:
     beside = "" if source is None else f"; of the source's {100 * source.implausible_share:.1f} %"
     lines = [
         f"{paint(graded(implausible, headline), BOLD)}{beside}",
-        paint(f"{len(clip)} frames, {duration:.1f} s", DIM),
+        paint(f"{counted(len(clip), 'frame')}, {duration:.1f} s", DIM),
         "",
     ]
     theirs = {} if source is None else shares(source)

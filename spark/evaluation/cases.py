@@ -100,7 +100,7 @@ def recorded_cases(
                 if abs(lengths[0] - lengths[1]) > SPARE_FRAMES:
                     notes.append(
                         f"{motion}: {source.character} and {target.character} differ by "
-                        f"{abs(lengths[0] - lengths[1])} frames: not taken as one motion"
+                        f"{counted(abs(lengths[0] - lengths[1]), 'frame')}: not taken as one motion"
                     )
                     continue
                 if not same_motion(on_ground(source), on_ground(target)):

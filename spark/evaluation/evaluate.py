@@ -18,6 +18,7 @@ from spark.evaluation.cases import STRUCTURES, Case, Structure
 from spark.evaluation.metrics import Score, mean_score, score_positions, source_sensitivity
 from spark.io.reading import SUFFIXES, read_motion
 from spark.rig.rig import understand
+from spark.summary import counted
 from spark.training.same_motion import SPARE_FRAMES
 from spark.transfer.canonical import (
     FRAME_TIME,
@@ -159,7 +160,8 @@ def results_in(folder: Path) -> Method:
             raise FileFormatError(
                 path,
                 None,
-                f"{len(positions)} frames at 30 fps; expected {frames}, as the ground truth has",
+                f"{counted(len(positions), 'frame')} at 30 fps; expected {frames}, as the ground "
+                "truth has",
             )
         own = answer.clip.body
         joints = _same_joints(path, rig.skeleton.names, own.skeleton.names)

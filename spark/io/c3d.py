@@ -14,6 +14,7 @@ from spark.io.position_files import filled
 from spark.io.positions import on_layout, recording_of
 from spark.io.recording import Recording
 from spark.runs import true_runs
+from spark.summary import counted
 
 _UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0, "dm": 0.1, "in": 0.0254, "inch": 0.0254}
 _UNITS |= {"millimeters": 0.001, "meters": 1.0, "metres": 1.0}
@@ -82,5 +83,5 @@ def _told_gaps(values: np.ndarray, gaps: int, rate: float | None) -> str:
     missing = ~np.isfinite(values).all(axis=-1)
     gaps_of = [stop - start for column in missing.T for start, stop in true_runs(column)]
     longest = max(gaps_of, default=0)
-    span = f"{longest} frames" if rate is None else f"{longest / rate:.2g} s"
+    span = counted(longest, "frame") if rate is None else f"{longest / rate:.2g} s"
     return f"{gaps} positions are missing, {span} at the longest: filled in between neighbours"

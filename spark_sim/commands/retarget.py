@@ -117,6 +117,7 @@ def run(args: Namespace) -> int:
     from robots.registry import is_robot
     from spark.errors import OutputError, SparkSimError
     from spark.io.reading import SUFFIXES as CHARACTERS
+    from spark.summary import counted
     from spark_sim import character_files, console, files
 
     robot = is_robot(args.to) or Path(args.to).suffix.lower() in SUFFIXES or is_sonic(Path(args.to))
@@ -147,8 +148,10 @@ def run(args: Namespace) -> int:
             console.emit_json(summary)
         elif summary["output"] is not None:
             console.say(
-                "{output}: {frames} frames, {fps:.6g} fps, {source_joints} -> {joints} joints, "
-                "scaled by {scale:.3g}".format(**summary)
+                "{output}: {length}, {fps:.6g} fps, {source_joints} -> {joints} joints, "
+                "scaled by {scale:.3g}".format(
+                    **summary, length=counted(summary["frames"], "frame")
+                )
             )
     if failures:
         console.error(f"{failures} of {len(jobs)} motions could not be retargeted")

@@ -77,12 +77,12 @@ class Journal:
 def recover(part: Path, *, force: bool) -> Path:
     """Make the npz of what a killed session left. Raises `FileFormatError` where that is no such
     file, and `OutputError` where the npz is there already."""
-    path = part.with_suffix("")
     written = _steps(part, read_bytes(part, expected="what a live session recorded"))
     if written is None:
         raise FileFormatError(part, None, "holds no step; remove it")
-    if path.suffix != ".npz":
+    if not part.name.endswith(f".npz{ENDING}"):
         raise FileFormatError(part, None, f"expected a name that ends in .npz{ENDING}")
+    path = part.with_suffix("")
     files.claim(path, force=force)
     steps, qpos, about = written
     robot = load_robot(about["robot"])

@@ -15,6 +15,7 @@ from spark.kinematics import forward
 from spark.motion import Motion
 from spark.resample import frames_at_rate, motion_at
 from spark.rig.rig import Rig, understand
+from spark.summary import counted
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import from_canonical
 from spark.transfer.foot_lock import lock_feet
@@ -53,7 +54,8 @@ def play(clip: AnyClip, address: str, fps: float | None, note: Callable[[str], o
     rate = 1.0 / motion.frame_time
     packets = _as_vmc(motion) if where.scheme == "vmc" else _as_mvn(motion, clip.name)
     held = round(_STANDS * rate)
-    note(f"stands for {_STANDS:g} s, then sends {len(motion)} frames to {where}, {rate:g} a second")
+    frames = counted(len(motion), "frame")
+    note(f"stands for {_STANDS:g} s, then sends {frames} to {where}, {rate:g} a second")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
         began = time.monotonic()
         for k, several in enumerate(packets(held)):

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from secrets import token_hex
 from typing import Any, TypeAlias
@@ -22,6 +21,7 @@ from spark_sim.shelf.plan import Job
 from spark_sim.shelf.processes import Died
 from spark_sim.shelf.tally import Tally
 from spark_sim.shelf.work import Done, work
+from spark_sim.version import own_version
 
 Backend: TypeAlias = Callable[
     [Callable[[Job], Done], Iterable[Job]], Iterator[tuple[Job, Done | Died]]
@@ -46,7 +46,7 @@ class Batch:
         self.manifest = Manifest(folder, shard)
         self.manifest.tidy(self.parts)
         self.tally = Tally()
-        self._version = version("spark-sim")
+        self._version = own_version()
         self._written_by = {
             output: entry["job"]
             for entry in self.manifest

@@ -4,7 +4,6 @@ it was made of has changed."""
 import json
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,6 +18,7 @@ from spark_sim.shelf.made_of import (
     is_still_made_of,
     reading_sha256,
 )
+from spark_sim.version import own_version
 
 _RECORD: Final = "spark-sim clip report"
 SCHEMA: Final = f"{_RECORD} 2"
@@ -85,7 +85,7 @@ def _settings(item: Item) -> dict[str, Any]:
     """What beside files decides what is measured."""
     origin = item.origin
     return {
-        "version": version("spark-sim"),
+        "version": own_version(),
         "name": item.name,
         "target": item.target,
         "reading": [_words(item.reading), reading_sha256(item.reading)],

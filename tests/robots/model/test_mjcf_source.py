@@ -67,6 +67,26 @@ TOO_MUCH = {
     "joints": f"<worldbody><body>{'<joint/>' * 2500}<geom size='1'/></body></worldbody>",
     "keyframes": f"<keyframe>{'<key/>' * 19000}</keyframe>",
     "a fine ball": '<asset><mesh name="m" builtin="sphere" params="5000"/></asset>',
+    "a built-in mesh": '<asset><mesh name="m" builtin="supersphere" params="1000 1 1"/></asset>',
+    "built-in meshes": "<asset>"
+    + "".join(f'<mesh name="m{k}" builtin="sphere" params="4"/>' for k in range(100))
+    + "</asset>",
+    "numbers of users of all": '<size nuser_geom="1000"/><worldbody>'
+    + '<geom size="1"/>' * 10000
+    + "</worldbody>",
+    "histories": "<actuator>" + '<motor joint="waist_yaw" nsample="900"/>' * 9000 + "</actuator>",
+    "contacts of a sensor": '<sensor><contact num="100000000" subtree1="pelvis"/></sensor>',
+    "a picture of distances": '<worldbody><camera name="c" resolution="9000 9000"/></worldbody>'
+    '<sensor><rangefinder camera="c"/></sensor>',
+    "a grid of touch": '<worldbody><site name="s"/></worldbody><sensor><plugin objname="s" '
+    'plugin="mujoco.sensor.touch_grid" objtype="site"><config key="size" value="3000 3000"/>'
+    "</plugin></sensor>",
+    "a flexible line": '<worldbody><flexcomp name="f" type="direct" dim="1" rigid="true" point="'
+    + "0 0 0 " * 200_000
+    + '" element="0 1"/></worldbody>',
+    "attributes": "<worldbody><geom "
+    + " ".join(f"a{k}=''" for k in range(9999))
+    + "/></worldbody>",
     "depth": f"<worldbody>{'<body>' * 300}{'</body>' * 300}</worldbody>",
     "itself": '<include file="robot.xml"/>',
     "itself by another name": '<include file="./a/../robot.xml"/>',
@@ -102,7 +122,10 @@ def test_what_robots_do_need_is_read(tmp_path: Path) -> None:
             '<size nuser_body="3" memory="20M"/><worldbody><replicate count="9" offset="0 0 1">'
             '<geom size="1"/></replicate></worldbody><asset><texture name="t" type="2d" '
             'builtin="flat" width="30" height="30"/><hfield name="h" nrow="20" ncol="20" '
-            'size="1 1 1 1"/></asset><custom><numeric name="n" size="3"/></custom>',
+            'size="1 1 1 1"/><mesh name="m" builtin="sphere" params="3"/></asset><custom><numeric '
+            'name="n" size="3"/></custom><worldbody><site name="s"/><camera name="c" '
+            'resolution="20 20"/></worldbody><sensor><contact num="9" subtree1="pelvis"/>'
+            '<rangefinder camera="c"/></sensor>',
         )
     )
 

@@ -1,0 +1,53 @@
+"""The XML of models and meshes: its elements alone, and nothing that grows out of few bytes."""
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import NoReturn
+from xml.parsers import expat
+
+from spark.errors import FileFormatError
+
+_DEEPEST = 100  # elements in elements, of one file
+_MOST_ATTRIBUTES = 200  # of an element: work on them grows with their square
+
+
+def parse_xml(path: Path, content: bytes, encoding: str | None = None) -> ET.Element:
+    """The elements of an XML file, their names as they are written.
+
+    Raises `FileFormatError` with the line where it is none, nests too deeply, or has a document
+    type, whose entities could stand for any length of text.
+    """
+    builder, depth = ET.TreeBuilder(), 0
+    parser = expat.ParserCreate(encoding)
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        if depth > _DEEPEST:
+            refuse(f"nests elements deeper than {_DEEPEST}")
+        if len(attributes) > _MOST_ATTRIBUTES:
+            refuse(f"gives <{tag[:40]}> {len(attributes)} attributes; at most {_MOST_ATTRIBUTES}")
+        builder.start(tag, attributes)
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        builder.end(tag)
+
+    def doctype(*_: object) -> None:
+        refuse("has a document type, which such files do without")
+
+    def refuse(message: str) -> NoReturn:
+        raise FileFormatError(path, parser.CurrentLineNumber, message)
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler = builder.data
+    parser.StartDoctypeDeclHandler = doctype
+    try:
+        parser.Parse(content, True)
+        return builder.close()
+    except expat.ExpatError as error:
+        message = f"is no XML ({expat.errors.messages[error.code]})"
+        raise FileFormatError(path, error.lineno, message) from error
+    except (ValueError, LookupError) as error:  # an encoding that is none
+        raise FileFormatError(path, None, f"is no XML ({error})") from error
