@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from spark.errors import ConventionError, DependencyError, FileFormatError
+from spark.opening import real
 
 SUFFIXES = (".xml", ".mjcf", ".urdf")
 DEFAULT = "robot"
@@ -184,9 +185,9 @@ def find(robot: str | Path) -> Path:
 
 def name_of(model: str | Path) -> str | None:
     """The name under which `find` gives this file, not an alias; None where it has none."""
-    path = Path(model).resolve()
+    path = real(Path(model))
     known = ((entry.name, entry.path) for entry in ENTRIES)
-    return next((name for name, own in known if own is not None and own.resolve() == path), None)
+    return next((name for name, own in known if own is not None and real(own) == path), None)
 
 
 def downloads() -> tuple[str, ...]:

@@ -45,6 +45,12 @@ def check_regular(path: Path, *, limit: int = LARGEST, expected: str = "a regula
         raise unreadable(path, error, expected) from error
 
 
+def real(path: Path) -> Path:
+    """Where the links in a path lead; the path itself where they go round in a circle, which
+    `Path.resolve` makes an error of Python's own."""
+    return Path(os.path.realpath(path))
+
+
 def beginning(path: Path, size: int) -> bytes:
     """The first bytes of a regular file; nothing of anything else."""
     try:

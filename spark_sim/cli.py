@@ -152,8 +152,8 @@ def parse(argv: Sequence[str]) -> Namespace:
             f"don't know what {' '.join(left)} is for; files stand side by side, and an option "
             "takes one value"
         )
-    if args.command is not None and (name := _without_value(args)):
-        command.error(f"{name} is empty; a variable of the shell that is not set, perhaps")
+    if args.command is not None and (missing := _without_value(args)):
+        command.error(f"{missing} is empty; a variable of the shell that is not set, perhaps")
     return args
 
 

@@ -166,9 +166,9 @@ class ClipBase(ABC):
         from sim.body.build import build_body
         from sim.body.mjcf import notes_of, paths_of, write_mjcf
 
+        files.claim(Path(path), force=force, endings=(".xml",), what="a MuJoCo model")
         spec = build_body(self.rig, joints=joints, mesh=mesh)
-        body, *beside = paths_of(spec, path)
-        files.claim(body, force=force, endings=(".xml",), what="a MuJoCo model")
+        _, *beside = paths_of(spec, path)
         for written in beside:
             files.claim(written, force=force)
         return write_mjcf(spec, path), notes_of(spec)

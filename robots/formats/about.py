@@ -14,6 +14,7 @@ from robots.model.known import model_sha256
 from robots.model.motion import RobotMotion
 from spark.errors import FileFormatError
 from spark.files import write_atomically
+from spark.opening import real
 
 
 def about(motion: RobotMotion, path: Path, source: Path | None = None) -> dict[str, Any]:
@@ -88,13 +89,13 @@ def _sha256(path: Path) -> str | None:
 
 def _portable(model: Path, path: Path) -> str:
     """How `model` is called in a file at `path`, without a folder above it."""
-    folder = path.resolve().parent
-    found = model.resolve()
+    folder = real(path).parent
+    found = real(model)
     return found.relative_to(folder).as_posix() if found.is_relative_to(folder) else model.name
 
 
 def _without_folder(note: str, model: Path) -> str:
     """A note in which MuJoCo may have named files beside the model by their whole path."""
-    for folder in {model.parent.resolve(), model.parent.absolute()}:
+    for folder in {real(model.parent), model.parent.absolute()}:
         note = note.replace(f"{folder}/", "")
     return note

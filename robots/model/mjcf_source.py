@@ -15,7 +15,7 @@ from typing import NoReturn
 from robots.model.mjcf_limits import check_limits
 from robots.model.xml import parse_xml
 from spark.errors import FileFormatError
-from spark.opening import LARGEST_TEXT, read_bytes
+from spark.opening import LARGEST_TEXT, read_bytes, real
 
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _MOST_FILES, _DEEPEST_FILES = 200, 20  # included, and includes of includes
@@ -66,7 +66,7 @@ class _Reader:
 
     def tree(self, path: Path, above: tuple[Path, ...] = ()) -> ET.Element:
         """The elements of a model's file; `above` are the files of those that attach it."""
-        return self._tree(path, {path.resolve()}, (*above, path.resolve()))
+        return self._tree(path, {real(path)}, (*above, real(path)))
 
     def _tree(self, path: Path, seen: set[Path], above: tuple[Path, ...]) -> ET.Element:
         """The elements of a file, with those of what it includes in their places; `seen` are the
@@ -84,18 +84,18 @@ class _Reader:
         for parent in list(root.iter()):
             for include in parent.findall("include"):
                 file = self._found(include, path)
-                if file.resolve() in seen:
+                if real(file) in seen:
                     _fail(path, f"includes {file.name!r} again; expected once at most")
-                seen.add(file.resolve())
+                seen.add(real(file))
                 at = list(parent).index(include)
-                parent[at : at + 1] = list(self._tree(file, seen, (*above, file.resolve())))
+                parent[at : at + 1] = list(self._tree(file, seen, (*above, real(file))))
         for model in root.findall("./asset/model[@file]"):
             self._attach(model, self._found(model, path), path, above)
         return root
 
     def _attach(self, model: ET.Element, file: Path, path: Path, above: tuple[Path, ...]) -> None:
         """A model that another one attaches is a text of its own, and finds its meshes itself."""
-        if file.resolve() in above:
+        if real(file) in above:
             _fail(path, f"attaches {file.name!r}, which is itself, or attaches it")
         name = f"attached_{len(self.attached)}.xml"
         model.set("file", name)
@@ -109,7 +109,7 @@ class _Reader:
         try:
             tried = [self.main.parent / name, path.parent / name]
             found = next((p for p in tried if p.exists()), tried[0])
-            found.resolve()
+            real(found)
         except (OSError, RuntimeError, ValueError) as error:
             raise FileFormatError(
                 path, None, f"includes {name[:80]!r}, which can't be a file ({error})"
@@ -131,4 +131,4 @@ def _set_folders(root: ET.Element, folder: Path) -> None:
             compiler.attrib.pop(name, None)
     for name in ("meshdir", "texturedir"):
         below = given.get(name, given.get("assetdir", ""))
-        compilers[0].set(name, str((folder / below).resolve()))
+        compilers[0].set(name, str(real(folder / below)))

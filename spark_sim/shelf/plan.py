@@ -12,6 +12,7 @@ from robots.registry import is_robot
 from spark.errors import ConventionError, FileFormatError, OutputError
 from spark.io.reading import SUFFIXES as CHARACTERS
 from spark.io.reading import motion_files
+from spark.opening import real
 from spark_sim.choices import Format, Method
 from spark_sim.shelf.made_of import reading_sha256
 
@@ -105,18 +106,16 @@ def _ending(target: str, format: Format | None) -> str:
 def _found(sources: Sequence[str], out: Path, suffixes: tuple[str, ...]) -> list[tuple[Path, str]]:
     """The files to read, and the name of each result without its ending."""
     folders = [Path(source) for source in sources if Path(source).is_dir()]
-    made, found = out.resolve(), []
+    made, found = real(out), []
     for source in map(Path, sources):
-        own = Path(source.resolve().name) if len(folders) > 1 else Path()
+        own = Path(real(source).name) if len(folders) > 1 else Path()
         if not source.is_dir():
             if not source.is_file():
                 raise FileFormatError(source, None, "no such file or folder")
             found.append((source, Path()))
             continue
         paths = [
-            path
-            for path in motion_files(source, suffixes)
-            if not path.resolve().is_relative_to(made)
+            path for path in motion_files(source, suffixes) if not real(path).is_relative_to(made)
         ]
         if not paths:
             raise FileFormatError(
