@@ -11,7 +11,7 @@ export OMP_NUM_THREADS=1
 
 # One tree, since characters and their cells are named and drawn by where they lie in it.
 mkdir -p "$out/sets/mesh2motion"
-for set in animateddrawings cmu_asf cmu_expmap makehuman reactidle; do
+for set in animateddrawings cmu_asf cmu_dance cmu_expmap deepmimic makehuman reactidle; do
   ln -sfn "$(realpath "$data/$set")" "$out/sets/$set"
 done
 ln -sfn "$(realpath "$data")"/mesh2motion/human* "$out/sets/mesh2motion/"
