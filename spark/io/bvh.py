@@ -28,6 +28,7 @@ Vector = tuple[float, float, float]
 
 CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
 
+_MAX_JOINTS = 10_000  # the largest rigs, with faces and clothes, have a thousand
 _MAX_DEPTH = 512  # joints above a joint: no creature has as many, a deeper tree is a broken file
 
 _NAME = re.compile(r"[^\s{}]([^\r\n{}]*[^\s{}])?", re.ASCII)
@@ -221,6 +222,8 @@ def _parse_hierarchy(scanner: Scanner) -> tuple[tuple[BvhJoint, ...], tuple[str,
             case b"joint":
                 if len(open_joints) == _MAX_DEPTH:
                     scanner.fail(f"joints nest deeper than {_MAX_DEPTH}")
+                if len(joints) == _MAX_JOINTS:
+                    scanner.fail(f"more than {_MAX_JOINTS} joints")
                 open_joints.append(_open_joint(scanner, joints, open_joints[-1]))
             case b"end":
                 scanner.label()

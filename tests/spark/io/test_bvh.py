@@ -247,6 +247,11 @@ MALFORMED = {
         6,
         "no joint has CHANNELS",
     ),
+    "too many": (
+        "HIERARCHY\nROOT a {\nOFFSET 0 0 0\n" + "JOINT b { OFFSET 0 1 0 }\n" * 20_000,
+        10_003,
+        "more than 10000 joints",
+    ),
     "too deep": ("HIERARCHY\nROOT a {\n" + "JOINT b {\n" * 100_000, 514, "deeper than 512"),
 }
 
