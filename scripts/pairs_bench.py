@@ -16,27 +16,28 @@ from pathlib import Path
 import torch
 from torch.utils.data import DataLoader
 
-from spark.training.batch import Batch
+from spark.training.batch import PairDraws, UnpairedDraws
 from spark.training.dataset import training_clips
 from spark.training.name_encoder import NameEncoder
 from spark.training.packed import AHEAD, Packed, Packer
 from spark.training.settings import TrainConfig
-from spark.training.steps import Steps
+from spark.training.steps import Steps, Travelling
 
 FIRST, BEGUN, STEPS = 800, 400, 700
+Travels = PairDraws | UnpairedDraws
 
 
-class Timed(Steps):
+class Timed(Travelling):
     """Steps with the CPU time of their process when they were done."""
 
-    def __getitem__(self, n: int) -> tuple[Batch, float]:  # type: ignore[override]
+    def __getitem__(self, n: int) -> tuple[Travels, float]:  # type: ignore[override]
         return super().__getitem__(n), time.process_time()
 
 
 class TimedPacker(Packer):
     """Steps as the training hands them over."""
 
-    def __call__(self, item: tuple[Batch, float]) -> tuple[Packed, float]:  # type: ignore[override]
+    def __call__(self, item: tuple[Travels, float]) -> tuple[Packed, float]:  # type: ignore[override]
         return super().__call__(item[0]), item[1]
 
 
@@ -44,7 +45,8 @@ def main(*data: str) -> None:
     torch.set_num_threads(1)
     clips, _ = training_clips([Path(folder) for folder in data])
     config = replace(TrainConfig("default"), variants=16)
-    steps = Timed(clips, NameEncoder().eval().remembering(), config, 0, 1)
+    names = NameEncoder().eval().remembering()
+    steps = Timed(Steps(clips, names, config, 0, 1))
     began, clock = time.perf_counter(), time.process_time()
     for n in range(FIRST):
         done = steps[n][1]

@@ -19,8 +19,8 @@ from spark.evaluation.evaluate import Method, Positions, as_method, evaluate
 from spark.evaluation.tables import markdown
 from spark.network.retarget import NetworkRetargeter
 from spark.network.weights import read_weights
+from spark.training.cuts import TrainingClip
 from spark.training.dataset import Performance, read_performances
-from spark.training.pairs import TrainingClip
 from spark.training.settings import TrainConfig, read_settings
 from spark.training.train import fresh_checkpoint, train
 from spark.transfer.analytic import transfer

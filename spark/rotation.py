@@ -15,6 +15,8 @@ from typing import Any, Literal, get_args
 from array_api_compat import array_namespace
 from jaxtyping import Float
 
+from spark.vectors import cross, dot, joined, norm, unit
+
 Axis = Literal["x", "y", "z"]
 AXES: tuple[Axis, ...] = get_args(Axis)
 
@@ -24,63 +26,59 @@ _SMALL_SQUARED = 1e-6
 
 def quat_mul(q_a_b: Float[Any, "*#n 4"], q_b_c: Float[Any, "*#n 4"]) -> Float[Any, "*n 4"]:
     """Hamilton product: the rotation `q_b_c` followed by `q_a_b`."""
-    xp = array_namespace(q_a_b, q_b_c)
     w1, x1, y1, z1 = (q_a_b[..., i] for i in range(4))
     w2, x2, y2, z2 = (q_b_c[..., i] for i in range(4))
-    return xp.stack(
+    return joined(
         [
             w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
             w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
             w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
             w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
         ],
-        axis=-1,
+        q_b_c,
     )
 
 
 def quat_conj(q_a_b: Float[Any, "*n 4"]) -> Float[Any, "*n 4"]:
     """The inverse rotation `q_b_a` of a unit quaternion."""
-    xp = array_namespace(q_a_b)
     w, x, y, z = (q_a_b[..., i] for i in range(4))
-    return xp.stack([w, -x, -y, -z], axis=-1)
+    return joined([w, -x, -y, -z], q_a_b)
 
 
 def quat_relative(q_a_b: Float[Any, "*#n 4"], q_a_c: Float[Any, "*#n 4"]) -> Float[Any, "*n 4"]:
     """`q_b_c`: the conjugate of `q_a_b` times `q_a_c`, in one go."""
-    xp = array_namespace(q_a_b, q_a_c)
     w1, x1, y1, z1 = (q_a_b[..., i] for i in range(4))
     w2, x2, y2, z2 = (q_a_c[..., i] for i in range(4))
-    return xp.stack(
+    return joined(
         [
             w1 * w2 + x1 * x2 + y1 * y2 + z1 * z2,
             w1 * x2 - x1 * w2 - y1 * z2 + z1 * y2,
             w1 * y2 + x1 * z2 - y1 * w2 - z1 * x2,
             w1 * z2 - x1 * y2 + y1 * x2 - z1 * w2,
         ],
-        axis=-1,
+        q_a_c,
     )
 
 
 def quat_rotate(q_a_b: Float[Any, "*#n 4"], v_b: Float[Any, "*#n 3"]) -> Float[Any, "*n 3"]:
     """The vector `v_b` in a-coordinates."""
-    xp = array_namespace(q_a_b, v_b)
     w, x, y, z = (q_a_b[..., i] for i in range(4))
     a, b, c = (v_b[..., i] for i in range(3))
     tx, ty, tz = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
-    return xp.stack(
+    return joined(
         [
             a + w * tx + y * tz - z * ty,
             b + w * ty + z * tx - x * tz,
             c + w * tz + x * ty - y * tx,
         ],
-        axis=-1,
+        q_a_b,
     )
 
 
 def quat_normalize(q: Float[Any, "*n 4"]) -> Float[Any, "*n 4"]:
     """The unit quaternion along `q`; the zero quaternion becomes the identity."""
     xp = array_namespace(q)
-    squared = _dot(q, q)
+    squared = dot(q, q)
     zero = squared == 0
     identity = quat_identity(q)
     return xp.where(zero, identity, q / xp.sqrt(xp.where(zero, xp.ones_like(squared), squared)))
@@ -96,7 +94,7 @@ def quat_identity(like: Float[Any, "*n _"]) -> Float[Any, "*n 4"]:
 def quat_continuous(q: Float[Any, "T *n 4"]) -> Float[Any, "T *n 4"]:
     """The same rotations, signed so that neighbours along the first axis are the nearer pair."""
     xp = array_namespace(q)
-    dots = _dot(q[1:], q[:-1])
+    dots = dot(q[1:], q[:-1])
     flips = xp.where(dots < 0, -xp.ones_like(dots), xp.ones_like(dots))
     return xp.concat([q[:1], q[1:] * xp.cumulative_prod(flips, axis=0)], axis=0)
 
@@ -105,13 +103,13 @@ def quat_angle(q_a_b: Float[Any, "*#n 4"], q_a_c: Float[Any, "*#n 4"]) -> Float[
     """The angle in [0, pi] between two rotations, exact near 0 and near pi."""
     xp = array_namespace(q_a_b, q_a_c)
     relative = quat_relative(q_a_b, q_a_c)
-    return 2 * xp.atan2(_norm(relative[..., 1:])[..., 0], xp.abs(relative[..., 0]))
+    return 2 * xp.atan2(norm(relative[..., 1:])[..., 0], xp.abs(relative[..., 0]))
 
 
 def quat_from_rotvec(rotvec: Float[Any, "*n 3"]) -> Float[Any, "*n 4"]:
     """Exponential map: a rotation by `|rotvec|` radians about `rotvec`."""
     xp = array_namespace(rotvec)
-    squared = _dot(rotvec, rotvec)
+    squared = dot(rotvec, rotvec)
     small = squared < _SMALL_SQUARED
     safe = xp.where(small, xp.ones_like(squared), squared)
     angle = xp.sqrt(safe)
@@ -125,7 +123,7 @@ def rotvec_from_quat(q: Float[Any, "*n 4"]) -> Float[Any, "*n 3"]:
     xp = array_namespace(q)
     q = xp.where(q[..., :1] < 0, -q, q)
     w, vector = q[..., :1], q[..., 1:]
-    squared = _dot(vector, vector)
+    squared = dot(vector, vector)
     small = squared < _SMALL_SQUARED
     safe = xp.where(small, xp.ones_like(squared), squared)
     length = xp.sqrt(safe)
@@ -140,16 +138,17 @@ def quat_slerp(
 ) -> Float[Any, "*n 4"]:
     """Spherical interpolation along the shorter arc: `q0` at fraction 0, `q1` at 1."""
     xp = array_namespace(q0, q1)
-    q1 = xp.where(_dot(q0, q1) < 0, -q1, q1)
-    angle = 2 * xp.atan2(_norm(q1 - q0), _norm(q1 + q0))
+    q1 = xp.where(dot(q0, q1) < 0, -q1, q1)
+    angle = 2 * xp.atan2(norm(q1 - q0), norm(q1 + q0))
     part = fraction[..., None]
     small = angle * angle < _SMALL_SQUARED
     safe = xp.where(small, xp.ones_like(angle), angle)
+    sine = xp.sin(safe)
 
     def share(part: Any) -> Any:
         """sin(part * angle) / sin(angle)"""
         series = part * (1 + angle * angle * (1 - part * part) / 6)
-        return xp.where(small, series, xp.sin(part * safe) / xp.sin(safe))
+        return xp.where(small, series, xp.sin(part * safe) / sine)
 
     return share(1 - part) * q0 + share(part) * q1
 
@@ -162,18 +161,18 @@ def quat_between(u: Float[Any, "*#n 3"], v: Float[Any, "*#n 3"]) -> Float[Any, "
     """
     xp = array_namespace(u, v)
     u, v = xp.broadcast_arrays(u, v)
-    u, v = _unit(u), _unit(v)
-    short = xp.minimum(_norm(u), _norm(v)) < 0.5  # what `_unit` left alone
+    u, v = unit(u), unit(v)
+    short = xp.minimum(norm(u), norm(v)) < 0.5  # what `_unit` left alone
     # (1 + u.v, u x v) by way of the sum, which keeps its digits where the two nearly cancel.
     between = u + v
-    squared = _dot(between, between)
+    squared = dot(between, between)
     opposite = squared < (16 * xp.finfo(u.dtype).eps) ** 2
     x, y, z = u[..., :1], u[..., 1:2], u[..., 2:]
     zero = xp.zeros_like(x)
     orthogonal = xp.where(
         xp.abs(x) > xp.abs(z), xp.concat([-y, x, zero], axis=-1), xp.concat([zero, -z, y], axis=-1)
     )
-    axis = xp.where(opposite, orthogonal, _cross(u, between))
+    axis = xp.where(opposite, orthogonal, cross(u, between))
     q = xp.concat([xp.where(opposite, zero, squared / 2), axis], axis=-1)
     return xp.where(short, quat_identity(q), quat_normalize(q))
 
@@ -186,7 +185,7 @@ def quat_swing_twist(
     Where the twist is undefined (swing of pi) it is the identity.
     """
     xp = array_namespace(q, axis)
-    along = _dot(q[..., 1:], axis)
+    along = dot(q[..., 1:], axis)
     w = q[..., :1] + xp.zeros_like(along)
     twist = quat_normalize(xp.concat([w, along * axis], axis=-1))
     return quat_mul(q, quat_conj(twist)), twist
@@ -294,21 +293,20 @@ def matrix_from_sixd(sixd: Float[Any, "*n 6"]) -> Float[Any, "*n 3 3"]:
     """Gram-Schmidt on the two columns. Zero or parallel columns have no rotation: the gradient is
     finite there, the value is not a rotation."""
     xp = array_namespace(sixd)
-    x = _unit(sixd[..., :3])
+    x = unit(sixd[..., :3])
     second = sixd[..., 3:]
-    y = _unit(second - _dot(x, second) * x)
-    return xp.stack([x, y, _cross(x, y)], axis=-1)
+    y = unit(second - dot(x, second) * x)
+    return xp.stack([x, y, cross(x, y)], axis=-1)
 
 
 def sixd_from_quat(q: Float[Any, "*n 4"]) -> Float[Any, "*n 6"]:
     """`sixd_from_matrix` of a unit quaternion."""
-    xp = array_namespace(q)
     w, x, y, z = (q[..., i] for i in range(4))
     columns = [
         *(1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)),
         *(2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)),
     ]
-    return xp.stack(columns, axis=-1)
+    return joined(columns, q)
 
 
 def quat_from_sixd(sixd: Float[Any, "*n 6"]) -> Float[Any, "*n 4"]:
@@ -321,34 +319,3 @@ def _axes_of(order: str) -> tuple[Axis, ...]:
     if len(order) != 3 or len(set(axes)) != 3:
         raise ValueError(f"Euler order {order!r}: expected a permutation of 'xyz'")
     return axes
-
-
-def _cross(u: Float[Any, "*n 3"], v: Float[Any, "*n 3"]) -> Float[Any, "*n 3"]:
-    xp = array_namespace(u, v)
-    a, b, c = (u[..., i] for i in range(3))
-    d, e, f = (v[..., i] for i in range(3))
-    return xp.stack([b * f - c * e, c * d - a * f, a * e - b * d], axis=-1)
-
-
-def _dot(u: Float[Any, "*#n k"], v: Float[Any, "*#n k"]) -> Float[Any, "*n 1"]:
-    """The inner product, written out: sums over so short an axis take numpy eight times as long."""
-    total = u[..., :1] * v[..., :1]
-    for i in range(1, u.shape[-1]):
-        total = total + u[..., i : i + 1] * v[..., i : i + 1]
-    return total
-
-
-def _norm(v: Float[Any, "*n k"]) -> Float[Any, "*n 1"]:
-    """The length; its gradient at zero is zero."""
-    xp = array_namespace(v)
-    squared = _dot(v, v)
-    zero = squared == 0
-    return xp.where(zero, squared, xp.sqrt(xp.where(zero, xp.ones_like(squared), squared)))
-
-
-def _unit(v: Float[Any, "*n 3"]) -> Float[Any, "*n 3"]:
-    """The direction; vectors shorter than 1e-12 stay as they are."""
-    xp = array_namespace(v)
-    squared = _dot(v, v)
-    tiny = squared < 1e-24
-    return v / xp.sqrt(xp.where(tiny, xp.ones_like(squared), squared))

@@ -21,9 +21,9 @@ from spark.evaluation.metrics import san_height
 from spark.network.features import BodyFeatures
 from spark.rig.roles import Role
 from spark.summary import counted
+from spark.training.cuts import TrainingClip
 from spark.training.dataset import Performance, is_dataset, read_performances
 from spark.training.grounded import on_ground
-from spark.training.pairs import TrainingClip
 from spark.training.prepare import prepare
 from spark.training.same_motion import SPARE_FRAMES, same_motion
 from spark.training.staging import StagedBody

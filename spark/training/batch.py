@@ -1,22 +1,20 @@
-"""Bodies and motions as the network's tensors: padded, stacked, with their names embedded."""
+"""Batches, and what travels from a worker to the trainer to become one.
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
+Most rotations of a batch are the same on source, target and analytic transfer, and a body is that
+of several windows. So each travels once, a rotation as a quaternion, and the trainer's device
+spreads them out.
+"""
 
-import numpy as np
+from typing import NamedTuple
+
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from spark.network.config import N_GROUPS, NO_ROTATION
-from spark.network.features import BodyFeatures
-from spark.network.windows import Windows
-from spark.training.pairs import Pairs
-from spark.training.sizes import Sizes
+from spark.rotation import sixd_from_quat
 from spark.training.tensors import Body, PoseTensors, Start
 
-Names = Callable[[Sequence[str]], Float[Tensor, "S E"]]
+_ONES = slice(None, None, 4)  # of the 6D form of no rotation
 
 
 class UnpairedBatch(NamedTuple):
@@ -40,134 +38,75 @@ class Batch(NamedTuple):
     frame_time: float
 
 
-class Collator:
-    """Makes batches; a body's tensors are made once and kept while the body lives. Batches are
-    padded to `sizes`, or to their largest body where that is larger."""
+class Poses(NamedTuple):
+    """P poses of each of D draws of W windows. Joint j of a pose turns as row `rows[p, d, j]` of
+    the local rotations of all; a padding joint's row is the one behind the last."""
 
-    def __init__(self, names: Names, sizes: Sizes | None = None) -> None:
-        self._names, self._sizes = names, sizes or Sizes()
-        self._bodies: WeakKeyDictionary[BodyFeatures, Body] = WeakKeyDictionary()
+    local: Float[Tensor, "4 L W T"]
+    rows: Int[Tensor, "P D J"]
+    root: Float[Tensor, "D W T 3"]
 
-    def __getstate__(self) -> dict[str, object]:
-        # For another process, which has bodies of its own.
-        return {**vars(self), "_bodies": None}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state, _bodies=WeakKeyDictionary())
-
-    def batch(self, draws: Sequence[Pairs]) -> Batch:
-        """Draws stacked into one batch."""
-        counts = [len(draw.source.root) for draw in draws]
-        targets = [draw.target.body for draw in draws]
-        least = (self._sizes.joints,)
-        J = max(*least, *(len(body.joints) for body in targets))
-        unmatched = [torch.as_tensor(draw.unmatched) for draw in draws]
-        corrected = [torch.nonzero(u == torch.arange(len(u)))[:, 0] for u in unmatched]
-        planted = torch.zeros(sum(counts), draws[0].source.root.shape[1], J, dtype=torch.bool)
-        row = 0
-        for draw, count in zip(draws, counts, strict=True):
-            contacts = list(draw.target.body.contacts)
-            planted[row : row + count, :, contacts] = torch.as_tensor(draw.planted)
-            row += count
-        effectors = [torch.as_tensor(body.effectors > 0) for body in targets]
-        return Batch(
-            self.bodies([draw.source.body for draw in draws], counts),
-            self.bodies(targets, counts),
-            _poses([draw.source for draw in draws], *least),
-            _poses([draw.target for draw in draws], *least),
-            Start(
-                *_poses([draw.start for draw in draws], *least),
-                _stack(unmatched, counts, -1, least),
-                _stack(corrected, counts, -1, (self._sizes.corrected,)),
-            ),
-            planted,
-            _stack(effectors, counts, 0, least),
-            draws[0].frame_time,
+    def spread(self, *bodies: Body) -> list[PoseTensors]:
+        """Each pose of all windows, B = D W, on its bodies."""
+        sixd = sixd_from_quat(self.local.permute(1, 2, 3, 0))
+        none = sixd.new_zeros(1, *sixd.shape[1:])
+        none[..., _ONES] = (
+            1  # without a tensor made of numbers, for which a GPU would be waited for
         )
+        sixd, root = torch.cat([sixd, none]), self.root.flatten(0, 1)
+        rows = (
+            of_pose[:, : body.valid.shape[1]]
+            for of_pose, body in zip(self.rows, bodies, strict=True)
+        )
+        return [PoseTensors(sixd[at].permute(0, 2, 3, 1, 4).flatten(0, 1), root) for at in rows]
 
-    def unpaired(self, draws: Sequence[tuple[Windows, BodyFeatures]]) -> UnpairedBatch:
-        """Windows, and where they go, stacked into one batch."""
-        counts = [len(windows.root) for windows, _ in draws]
+
+class UnpairedDraws(NamedTuple):
+    """What an `UnpairedBatch` is made of."""
+
+    source: Body
+    target: Body
+    poses: Poses
+
+    def batch(self) -> UnpairedBatch:
+        windows = self.poses.root.shape[1]
         return UnpairedBatch(
-            self.bodies([windows.body for windows, _ in draws], counts),
-            self.bodies([target for _, target in draws], counts),
-            _poses([windows for windows, _ in draws], self._sizes.joints),
-        )
-
-    def bodies(self, bodies: Sequence[BodyFeatures], counts: Sequence[int]) -> Body:
-        """Each body repeated as often as `counts` says."""
-        made = [self._body(body) for body in bodies]
-        shapes = {tuple(tensor.shape for tensor in body) for body in made}
-        if len(shapes) == 1:  # bodies of one size, as `sizes` makes them: a third of the time
-            each = torch.repeat_interleave(torch.arange(len(made)), torch.tensor(counts))
-            return Body(*(torch.cat(tensors)[each] for tensors in zip(*made, strict=True)))
-        return self._padded(made, counts)
-
-    def _padded(self, made: Sequence[Body], counts: Sequence[int]) -> Body:
-        J = max(self._sizes.joints, *(body.valid.shape[1] for body in made))
-        parts = []
-        for field in Body._fields:
-            tensors = [getattr(body, field)[0] for body in made]
-            if field == "parents":  # a padding joint is its own parent
-                tensors = [torch.cat([t, torch.arange(len(t), J)]) for t in tensors]
-            fill = -1 if field == "groups" else 0
-            least = (N_GROUPS, self._sizes.group) if field in ("groups", "arc") else (J,)
-            parts.append(_stack(tensors, counts, fill, least))
-        return Body(*parts)
-
-    def _body(self, features: BodyFeatures) -> Body:
-        if features not in self._bodies:
-            body = self._make(features)
-            # Padded once where the size is known.
-            self._bodies[features] = body if self._sizes == Sizes() else self._padded([body], [1])
-        return self._bodies[features]
-
-    def _make(self, features: BodyFeatures) -> Body:
-        longest = max(map(len, features.groups))
-        groups = torch.full((len(features.groups), longest), -1)
-        arcs = torch.zeros(groups.shape)
-        for g, (joints, arc) in enumerate(zip(features.groups, features.arcs, strict=True)):
-            groups[g, : len(joints)] = torch.as_tensor(joints)
-            arcs[g, : len(joints)] = _float(arc)
-        parents = torch.as_tensor(features.skeleton.parents).clamp(min=0)
-        return Body(
-            torch.cat([self._names(features.skeleton.names), _float(features.sides)], -1)[None],
-            _float(features.tpose)[None],
-            _float(features.shape)[None],
-            groups[None],
-            arcs[None],
-            torch.ones(1, len(features.joints), dtype=torch.bool),
-            parents[None],
-            _float(features.skeleton.offsets)[None],
+            Body(*(each(x, windows) for x in self.source)),
+            Body(*(each(x, windows) for x in self.target)),
+            *self.poses.spread(self.source),
         )
 
 
-def _poses(windows: Sequence[Windows], least: int) -> PoseTensors:
-    J = max(least, *(w.rotations.shape[2] for w in windows))
-    root = np.concatenate([w.root for w in windows]).astype(np.float32, copy=False)
-    rotations = np.empty((*root.shape[:2], J, 6), np.float32)
-    row = 0
-    for w in windows:
-        W, _, K, _ = w.rotations.shape
-        rotations[row : row + W, :, :K] = w.rotations
-        rotations[row : row + W, :, K:] = NO_ROTATION
-        row += W
-    return PoseTensors(torch.from_numpy(rotations), torch.from_numpy(root))
+class PairDraws(NamedTuple):
+    """What a `Batch` is made of: D draws, with which joints of the targets touch the floor."""
+
+    source: Body
+    target: Body
+    poses: Poses
+    unmatched: Int[Tensor, "D J"]
+    corrected: Int[Tensor, "D C"]
+    planted: Bool[Tensor, "D W T 2"]
+    contacts: Int[Tensor, "D 2"]
+    effectors: Bool[Tensor, "D J"]
+    frame_time: float
+
+    def batch(self) -> Batch:
+        windows, frames = self.poses.root.shape[1:3]
+        pose, truth, start = self.poses.spread(self.source, self.target, self.target)
+        planted = self.planted.new_zeros(*self.planted.shape[:3], self.effectors.shape[1])
+        contacts = self.contacts[:, None, None].expand(-1, windows, frames, -1)
+        return Batch(
+            Body(*(each(x, windows) for x in self.source)),
+            Body(*(each(x, windows) for x in self.target)),
+            pose,
+            truth,
+            Start(*start, each(self.unmatched, windows), each(self.corrected, windows)),
+            planted.scatter(3, contacts, self.planted).flatten(0, 1),
+            each(self.effectors, windows),
+            self.frame_time,
+        )
 
 
-def _stack(
-    tensors: Sequence[Tensor], counts: Sequence[int], fill: int = 0, least: Sequence[int] = ()
-) -> Tensor:
-    """Tensors padded to a common shape, and along the first axes to `least`; each repeated."""
-    shape = [max(sizes) for sizes in zip(*(t.shape for t in tensors), strict=True)]
-    shape[: len(least)] = map(max, shape, least)
-    out = tensors[0].new_full((sum(counts), *shape), fill)
-    row = 0
-    for tensor, count in zip(tensors, counts, strict=True):
-        out[(slice(row, row + count), *map(slice, tensor.shape))] = tensor
-        row += count
-    return out
-
-
-def _float(array: Float[np.ndarray, "..."]) -> Float[Tensor, "..."]:
-    return torch.as_tensor(array, dtype=torch.float32)
+def each(of_draws: Tensor, windows: int) -> Tensor:
+    """What is one draw's, for each of its windows."""
+    return of_draws[:, None].expand(-1, windows, *of_draws.shape[1:]).flatten(0, 1)

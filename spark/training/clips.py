@@ -11,7 +11,7 @@ from spark.network.features import BodyFeatures, body_features
 from spark.rig.contacts import planted_feet
 from spark.rig.rig import understand
 from spark.skeleton import Skeleton
-from spark.training.pairs import TrainingClip
+from spark.training.cuts import TrainingClip
 from spark.training.splits import character_and_motion
 from spark.transfer.canonical import (
     FRAME_TIME,

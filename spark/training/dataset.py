@@ -9,7 +9,7 @@ mapped into memory.
     parts/         what each file gave (`spark.training.dataset_parts`): a run that stopped goes on,
                    and one with more files reads only those
 
-A clip is what `spark.training.pairs.TrainingClip` says: canonical, at 30 fps, on the network's view
+A clip is what `spark.training.cuts.TrainingClip` says: canonical, at 30 fps, on the network's view
 of its body.
 """
 
@@ -27,8 +27,8 @@ from spark.network.features import BodyFeatures, body_features
 from spark.opening import check_regular, parse_json, read_bytes
 from spark.rig.rig_json import rig_from_json
 from spark.training.clips import read_clips
+from spark.training.cuts import TrainingClip
 from spark.training.mapped import MappedArray
-from spark.training.pairs import TrainingClip
 from spark.transfer.canonical import FRAME_TIME
 
 FORMAT, VERSION = "spark-sim dataset", 3

@@ -32,7 +32,7 @@ VERSION = 3
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A file as a `spark.training.pairs.TrainingClip` on its own rig, at 30 fps; its own frame
+    """A file as a `spark.training.cuts.TrainingClip` on its own rig, at 30 fps; its own frame
     rate, and the height [m] of the floor that its feet stand on, which the path counts from."""
 
     rig: Rig

@@ -37,10 +37,10 @@ def mirrored_body(body: BodyFeatures) -> BodyFeatures:
 
 
 def mirrored_motion(
-    rotations: Float[np.ndarray, "*n J 4"],
+    rotations: Float[np.ndarray, "*r 4"],
     hips: Float[np.ndarray, "*n 3"],
     planted: Bool[np.ndarray, "*n 2"],
-) -> tuple[Float[np.ndarray, "*n J 4"], Float[np.ndarray, "*n 3"], Bool[np.ndarray, "*n 2"]]:
+) -> tuple[Float[np.ndarray, "*r 4"], Float[np.ndarray, "*n 3"], Bool[np.ndarray, "*n 2"]]:
     """What a body's motion is in the mirror, on the mirrored body; in the precision it comes in."""
     turned, across = _TURNED.astype(rotations.dtype), _ACROSS.astype(hips.dtype)
     return rotations * turned, hips * across, planted[..., ::-1]

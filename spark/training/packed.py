@@ -1,4 +1,4 @@
-"""A batch in one piece of memory, for the way from a worker to the trainer and on to a GPU."""
+"""Draws in one piece of memory, for the way from a worker to the trainer and on to a GPU."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from torch.utils.data import get_worker_info
 
-from spark.training.batch import Batch, UnpairedBatch
+from spark.training.batch import PairDraws, UnpairedDraws
 
 _ALIGNED = 64  # bytes
 AHEAD = 2  # batches that a worker may be ahead of the trainer
@@ -16,25 +16,25 @@ _PIECES = AHEAD + 2  # the one in use, and one to spare
 
 
 class Packer:
-    """Packs batches into memory that it has used for earlier ones: new shared memory comes page by
+    """Packs draws into memory that it has used for earlier ones: new shared memory comes page by
     page, which takes a third of a worker's time. What is packed holds until `_PIECES` later."""
 
     def __init__(self) -> None:
         self._pieces = [torch.empty(0, dtype=torch.uint8)] * _PIECES
         self._turn = 0
 
-    def __call__(self, batch: Batch | UnpairedBatch) -> "Packed":
+    def __call__(self, draws: PairDraws | UnpairedDraws) -> "Packed":
         self._turn = (self._turn + 1) % _PIECES
-        packed = Packed(batch, self._pieces[self._turn])
+        packed = Packed(draws, self._pieces[self._turn])
         self._pieces[self._turn] = packed.piece
         return packed
 
 
 class Packed:
-    """What `on` makes a batch of again. Handing over one piece takes a fraction of the time that
-    the thirty tensors of a batch take one by one. It lies in `piece`, or in a larger one."""
+    """What `on` makes draws of again. Handing over one piece takes a fraction of the time that the
+    thirty tensors of a step take one by one. It lies in `piece`, or in a larger one."""
 
-    def __init__(self, batch: Batch | UnpairedBatch, piece: Tensor) -> None:
+    def __init__(self, draws: PairDraws | UnpairedDraws, piece: Tensor) -> None:
         tensors: list[Tensor] = []
         end = 0
 
@@ -46,7 +46,7 @@ class Packed:
             end += -(-size // _ALIGNED) * _ALIGNED
             return place
 
-        self._layout = _mapped(batch, Tensor, placed)
+        self._layout = _mapped(draws, Tensor, placed)
         if piece.numel() < end:
             piece = torch.empty(end + end // 4, dtype=torch.uint8)
             if get_worker_info() is not None:
@@ -61,7 +61,7 @@ class Packed:
         return self
 
     def on(self, device: torch.device) -> Any:
-        """The batch, on `device`."""
+        """The draws, on `device`."""
         memory = self.piece.to(device, non_blocking=True)
         return _mapped(self._layout, _Place, lambda place: place.of(memory))
 

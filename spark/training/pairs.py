@@ -7,8 +7,6 @@ must find the second.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -16,26 +14,19 @@ from jaxtyping import Bool, Float, Int
 
 from spark.errors import SkeletonError
 from spark.network.features import BodyFeatures
-from spark.network.windows import Windows
-from spark.rotation import (
-    quat_angle,
-    quat_from_yaw,
-    quat_rotate,
-    quat_slerp,
-    sixd_from_quat,
-    yaw_from_quat,
-)
+from spark.rotation import quat_angle, quat_from_yaw, quat_rotate, yaw_from_quat
+from spark.training.cuts import Cut, TrainingClip, cut_rotations, frames_of, ground_of
 from spark.training.mirror import mirrored_body, mirrored_motion
-from spark.training.sizes import Sizes, sizes_of_variants
-from spark.training.staging import (
-    StagedBody,
-    foot_lift,
-    in_concatenation,
-    interpolated_rows,
-    local_rows,
-    pose_bodies,
-    starts_of,
+from spark.training.plan import (
+    Drawn,
+    Plan,
+    local_rotations,
+    plan_of_pair,
+    turn_between,
+    turn_legs,
 )
+from spark.training.sizes import Sizes, sizes_of_variants
+from spark.training.staging import StagedBody, empty_rows, in_concatenation, leg_turns
 from spark.training.variants import random_variant, same_body, split_body
 from spark.transfer.analytic import Correspondence, correspond
 
@@ -46,35 +37,13 @@ _DRAW_EXPONENT = 0.2
 _MAX_TRIES = 10  # draws of a source before one with nothing unmatched is taken after all
 
 
-@dataclass(frozen=True, eq=False)
-class TrainingClip:
-    """A recording in canonical form on the network's view of its own body, at 30 fps.
-
-    `rotations` are world rotations since the T-pose, `hips` the hips' path over the floor in hip
-    heights, `planted` whether the left and the right foot stand.
-    """
-
-    name: str
-    body: BodyFeatures
-    rotations: Float[np.ndarray, "T K 4"]
-    hips: Float[np.ndarray, "T 3"]
-    planted: Bool[np.ndarray, "T 2"]
-    frame_time: float
-
-    @cached_property
-    def lift(self) -> Float[np.ndarray, "T 2 2"]:
-        """How much higher ankle and toe of each foot are than in the T-pose [hip heights]."""
-        rotations, hips = (np.asarray(x, np.float64) for x in (self.rotations, self.hips))
-        return foot_lift(self.body, rotations, hips).astype(np.float32)
-
-
 class Pairs(NamedTuple):
     """W windows on two bodies; `start` is the analytic transfer of `source` to the target, and
     `unmatched` its `Correspondence.unmatched`."""
 
-    source: Windows
-    target: Windows
-    start: Windows
+    source: Drawn
+    target: Drawn
+    start: Drawn
     unmatched: Int[np.ndarray, "J"]
     planted: Bool[np.ndarray, "W T 2"]
     frame_time: float
@@ -115,10 +84,13 @@ class PairMaker:
         weights = (
             np.array([sum(map(_total_rotation, group)) for group in self._bodies]) ** _DRAW_EXPONENT
         )
-        self._weights = weights / weights.sum()
+        self._chances = _chances(weights)
+        self._chances_of_clips = [
+            _chances(np.array([len(clip.hips) for clip in group], float)) for group in self._bodies
+        ]
         self._seen: dict[tuple[int, bool], BodyFeatures] = {}
         self._staged_bodies: dict[tuple[int, bool, int], StagedBody] = {}
-        self._links: dict[tuple[StagedBody, StagedBody], Correspondence] = {}
+        self._links: dict[tuple[StagedBody, StagedBody], tuple[Correspondence, Plan]] = {}
 
     @property
     def sizes(self) -> Sizes:
@@ -132,58 +104,53 @@ class PairMaker:
     def draws(self, numbers: Sequence[int], windows: int) -> list[Pairs]:
         """The draws of these numbers, made together, which is faster."""
         drawn = [self._sample(n, windows) for n in numbers]
-        D = len(drawn)
-        staged = [one.source for one in drawn] + [one.target for one in drawn]
-        bodies = [body.variant.body for body in staged]
-        links = [one.link for one in drawn]
-        hips = np.stack([one.hips for one in drawn])
-        planted = np.stack([one.planted for one in drawn])
-        lift = np.stack([one.lift for one in drawn])
-        rows = pose_bodies(
-            staged,
-            2 * starts_of([one.rotations for one in drawn]),
-            np.concatenate([one.rotations for one in drawn]),
-            np.concatenate([hips, hips]),
-            np.concatenate([planted, planted]),
-            np.concatenate([lift, lift]),
-        )
-        starts = starts_of([body.joints for body in bodies])
-        copied = interpolated_rows(
+        plans = [one.plan for one in drawn]
+        *starts, total = np.cumsum([0, *(plan.rows for plan in plans)]).tolist()
+        rows = empty_rows(total, windows, self.window)
+        spans = [
+            slice(start, start + plan.recorded) for plan, start in zip(plans, starts, strict=True)
+        ]
+        cuts = [cut for one in drawn for cut in one.cuts]
+        frames = frames_of(cuts, self.window)
+        cut_rotations(cuts, frames, [rows[span, w] for span in spans for w in range(windows)])
+        ground = ground_of(cuts, frames).of_draws(windows)
+        for d, (one, span) in enumerate(zip(drawn, spans, strict=True)):
+            if one.mirrored:
+                hips, planted, lift = (each[d] for each in ground)
+                rows[span], hips[:], planted[:] = mirrored_motion(rows[span], hips, planted)
+                lift[:] = lift[:, :, ::-1].copy()
+        turn_between(rows, [plan.between for plan in plans], starts)
+        turns = leg_turns(
+            [body for one in drawn for body in (one.source, one.target)],
             rows,
-            in_concatenation([link.first for link in links], starts[:D]),
-            in_concatenation([link.second for link in links], starts[:D]),
-            np.concatenate([link.mix for link in links]),
+            in_concatenation([plan.legs.bones for plan in plans], starts),
+            in_concatenation([plan.legs.uppers for plan in plans], starts),
+            *(np.repeat(each, 2, 0) for each in ground),
         )
+        turn_legs(rows, turns, [plan.legs for plan in plans], starts)
+        turn_between(rows, [plan.copied for plan in plans], starts)
         # Windows are seen from their first frames, as `spark.network.features.pose_features` sees
         # one. The pelvis turns alike on all bodies.
-        from_heading = quat_from_yaw(-yaw_from_quat(rows[starts[:D], :, :1]))
+        from_heading = quat_from_yaw(-yaw_from_quat(rows[starts, :, :1]))
+        hips = ground.hips
         roots = quat_rotate(from_heading, hips - hips[:, :, :1] * np.array([1, 1, 0], hips.dtype))
-        bodies += bodies[D:]
-        local = local_rows(
-            np.concatenate([rows, copied]), bodies, np.tile(from_heading, (3, 1, 1, 1))
-        )
-        poses = np.moveaxis(sixd_from_quat(local), 0, 2)
-        ends = starts_of([body.joints for body in bodies])[1:]
-        seen = [
-            Windows(body, own, roots[k % D])
-            for k, (body, own) in enumerate(zip(bodies, np.split(poses, ends, 2), strict=True))
-        ]
-        return [
-            Pairs(
-                seen[k],
-                seen[D + k],
-                seen[2 * D + k],
-                links[k].unmatched,
-                planted[k],
-                one.frame_time,
+        local = local_rotations(rows, plans, starts, from_heading)
+        pairs = []
+        for k, one in enumerate(drawn):
+            ends = (one.source.variant.body, one.target.variant.body, one.target.variant.body)
+            source, target, start = (
+                Drawn(body, local[k], pose, roots[k])
+                for body, pose in zip(ends, one.plan.poses, strict=True)
             )
-            for k, one in enumerate(drawn)
-        ]
+            frame_time = one.cuts[0].clip.frame_time
+            pairs.append(
+                Pairs(source, target, start, one.link.unmatched, ground.planted[k], frame_time)
+            )
+        return pairs
 
     def _sample(self, n: int, windows: int) -> "_Draw":
         rng = np.random.default_rng((self.seed, n))
-        k = int(rng.choice(len(self._bodies), p=self._weights))
-        clips = self._bodies[k]
+        k = int(self._chances.searchsorted(rng.random(), "right"))
         mirrored = self.varied and bool(rng.random() < 0.5)
         for _ in range(_MAX_TRIES if self.varied else 1):
             performer, receiver = rng.integers(self.variants, size=2).tolist()
@@ -192,51 +159,20 @@ class PairMaker:
             source, target = (
                 self._staged_body(k, mirrored, number) for number in (performer, receiver)
             )
-            link = self._link(source, target)
-            if (link.unmatched >= 0).any():
+            link, plan = self._link(source, target)
+            if plan.some_unmatched:
                 break
-        rotations, hips, planted, lift = self._windows(clips, windows, rng)
-        if mirrored:
-            rotations, hips, planted = mirrored_motion(rotations, hips, planted)
-            lift = lift[:, :, ::-1]
-        rows = np.ascontiguousarray(np.moveaxis(rotations, 2, 0))
-        return _Draw(source, target, link, rows, hips, planted, lift, clips[0].frame_time)
+        return _Draw(source, target, link, plan, mirrored, self._cuts(k, windows, rng))
 
-    def _windows(
-        self, clips: list[TrainingClip], windows: int, rng: np.random.Generator
-    ) -> tuple[
-        Float[np.ndarray, "W T K 4"],
-        Float[np.ndarray, "W T 3"],
-        Bool[np.ndarray, "W T 2"],
-        Float[np.ndarray, "W T 2 2"],
-    ]:
-        lengths = np.array([len(c.hips) for c in clips], float)
-        chosen = [clips[i] for i in rng.choice(len(clips), windows, p=lengths / lengths.sum())]
-        spans, speeds = [], np.ones((windows, 1))
-        for w, clip in enumerate(chosen):
-            speed = float(np.exp(rng.uniform(-_MAX_LOG_SPEED, _MAX_LOG_SPEED)))
+    def _cuts(self, k: int, windows: int, rng: np.random.Generator) -> list[Cut]:
+        clips, cuts = self._bodies[k], []
+        for i in self._chances_of_clips[k].searchsorted(rng.random(windows), "right").tolist():
+            clip, speed = clips[i], float(np.exp(rng.uniform(-_MAX_LOG_SPEED, _MAX_LOG_SPEED)))
             frames = int(np.ceil((self.window - 1) * speed)) + 1
             if not self.varied or rng.random() < 0.5 or frames > len(clip.hips):
                 frames, speed = self.window, 1.0
-            at, speeds[w] = int(rng.integers(0, len(clip.hips) - frames + 1)), speed
-            spans.append(slice(at, at + frames))
-        times = np.arange(self.window) * speeds
-        last = np.array([[span.stop - span.start - 1] for span in spans])
-        before, nearest = times.astype(int), np.minimum(times.round().astype(int), last)
-        rotations = _gather([clip.rotations for clip in chosen], spans, before)
-        hips = _gather([clip.hips for clip in chosen], spans, before)
-        planted = _gather([clip.planted for clip in chosen], spans, nearest)
-        lift = _gather([clip.lift for clip in chosen], spans, nearest)
-        other_speed = np.flatnonzero(speeds != 1)
-        if len(other_speed):
-            share = (times - before)[other_speed, :, None].astype(np.float32)
-            after = np.minimum(before + 1, last)[other_speed]
-            chosen, spans = [chosen[w] for w in other_speed], [spans[w] for w in other_speed]
-            later = _gather([clip.rotations for clip in chosen], spans, after)
-            rotations[other_speed] = quat_slerp(rotations[other_speed], later, share)
-            later = _gather([clip.hips for clip in chosen], spans, after)
-            hips[other_speed] += share * (later - hips[other_speed])
-        return rotations, hips, planted, lift
+            cuts.append(Cut(clip, int(rng.integers(0, len(clip.hips) - frames + 1)), speed))
+        return cuts
 
     def _body(self, k: int, mirrored: bool) -> BodyFeatures:
         if (k, mirrored) not in self._seen:
@@ -255,12 +191,13 @@ class PairMaker:
             self._staged_bodies[key] = StagedBody(variant)
         return self._staged_bodies[key]
 
-    def _link(self, source: StagedBody, target: StagedBody) -> Correspondence:
+    def _link(self, source: StagedBody, target: StagedBody) -> tuple[Correspondence, Plan]:
         key = (source, target)
         if key not in self._links:
             if len(self._links) > 4096:
                 self._links.clear()
-            self._links[key] = correspond(source.variant.body.rig, target.variant.body.rig)
+            link = correspond(source.variant.body.rig, target.variant.body.rig)
+            self._links[key] = link, plan_of_pair(source, target, link)
         return self._links[key]
 
 
@@ -270,22 +207,15 @@ class _Draw(NamedTuple):
     source: StagedBody
     target: StagedBody
     link: Correspondence
-    rotations: Float[np.ndarray, "K W T 4"]
-    hips: Float[np.ndarray, "W T 3"]
-    planted: Bool[np.ndarray, "W T 2"]
-    lift: Float[np.ndarray, "W T 2 2"]
-    frame_time: float
+    plan: Plan
+    mirrored: bool
+    cuts: list[Cut]
 
 
-def _gather(
-    parts: Sequence[np.ndarray], spans: Sequence[slice], frames: Int[np.ndarray, "W T"]
-) -> np.ndarray:
-    """From a span of each part, these of its frames; in single precision what is not a flag."""
-    # A view of a memory-mapped array costs more than what is read through it.
-    cut = np.stack(
-        [np.asarray(p)[span][at] for p, span, at in zip(parts, spans, frames, strict=True)]
-    )
-    return cut if cut.dtype == bool else cut.astype(np.float32, copy=False)
+def _chances(weights: Float[np.ndarray, "N"]) -> Float[np.ndarray, "N"]:
+    """What a number in [0, 1) is looked up in, as numpy's `choice` does for each draw anew."""
+    summed = (weights / weights.sum()).cumsum()
+    return summed / summed[-1]
 
 
 def _total_rotation(clip: TrainingClip) -> float:

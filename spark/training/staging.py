@@ -2,6 +2,9 @@
 
 Bodies differ in their joints, so the joints of all of them are laid end to end: a *row* is one
 joint of one body over W windows of T frames. A few operations on large arrays then do for all.
+
+Rows lie in memory as planes, the four components of a quaternion one after the other ("4 N W T",
+seen as "N W T 4"): numpy works several times as fast on them (`spark.vectors.joined`).
 """
 
 from collections.abc import Sequence, Sized
@@ -15,18 +18,19 @@ from jaxtyping import Bool, Float, Int
 from spark.kinematics import world_positions
 from spark.network.features import BodyFeatures
 from spark.rig.roles import Group
-from spark.rotation import quat_mul, quat_relative, quat_rotate, quat_slerp
+from spark.rotation import quat_mul, quat_rotate
 from spark.training.variants import Variant
 from spark.transfer.leg_ik import Leg, leg_of, leg_rotations, stance_correction
+from spark.vectors import planes, seen
 
 
 class LegBones(NamedTuple):
-    """The bones of both legs, in 8 parts: pelvis to hip, thigh, shank and foot of each. Part p
-    starts with bone `starts[p]`; bone b turns with joint `joints[b]`."""
+    """The bones of both legs, in 8 parts: pelvis to hip, thigh, shank and foot of each. Bone b is
+    of part `parts[b]`, and turns with joint `joints[b]`."""
 
     joints: Int[np.ndarray, "B"]
     offsets: Float[np.ndarray, "B 3"]
-    starts: Int[np.ndarray, "8"]
+    parts: Int[np.ndarray, "B"]
 
 
 class LegJoints(NamedTuple):
@@ -52,15 +56,15 @@ class StagedBody:
         skeleton = self.variant.body.skeleton
         joints: list[int] = []
         offsets: list[np.ndarray] = []
-        starts: list[int] = []
-        for leg in self.legs:
-            for above, below in zip((0, *leg[:3]), leg[:4], strict=True):
-                starts.append(len(joints))
-                bones = [j for j in skeleton.ancestors(below) if above < j]
-                # Without a toe the foot is no bone: one of no length.
-                joints += [int(skeleton.parents[j]) for j in bones] or [above]
-                offsets += [skeleton.offsets[j] for j in bones] or [np.zeros(3)]
-        return LegBones(np.array(joints), np.array(offsets), np.array(starts))
+        parts: list[int] = []
+        between = (part for leg in self.legs for part in zip((0, *leg[:3]), leg[:4], strict=True))
+        for part, (above, below) in enumerate(between):
+            bones = [j for j in skeleton.ancestors(below) if above < j]
+            # Without a toe the foot is no bone: one of no length.
+            joints += [int(skeleton.parents[j]) for j in bones] or [above]
+            offsets += [skeleton.offsets[j] for j in bones] or [np.zeros(3)]
+            parts += [part] * max(len(bones), 1)
+        return LegBones(np.array(joints), np.array(offsets), np.array(parts))
 
     @cached_property
     def leg_joints(self) -> LegJoints:
@@ -82,59 +86,53 @@ class StagedBody:
         planted: Bool[np.ndarray, "W T 2"],
         lift: Float[np.ndarray, "W T 2 2"],
     ) -> Float[np.ndarray, "W T J 4"]:
-        """`pose_bodies` of this body alone."""
-        rows = np.ascontiguousarray(np.moveaxis(base, 2, 0))
-        return np.moveaxis(
-            pose_bodies([self], [0], rows, hips[None], planted[None], lift[None]), 0, 2
-        )
+        """World rotations on this body from those of its base. Planted feet rest where they are on
+        average over each stance, as high above the floor as the base's (`lift`, as `foot_lift`
+        gives it); the legs follow by inverse kinematics. Hips' paths and heights are in hip
+        heights."""
+        rows = np.moveaxis(self.variant.rotations(base), 2, 0)
+        bones, at = self.leg_bones, self.leg_joints
+        uppers = np.array([leg.upper_leg for leg in self.legs])
+        turns = leg_turns([self], rows, bones.joints, uppers, hips[None], planted[None], lift[None])
+        rows[at.joints] = quat_mul(turns[at.parts], rows[at.joints])
+        return np.moveaxis(rows, 0, 2)
 
 
-def pose_bodies(
+def leg_turns(
     bodies: Sequence[StagedBody],
-    base_starts: Sequence[int],
-    base: Float[np.ndarray, "R W T 4"],
+    rows: Float[np.ndarray, "R W T 4"],
+    bones: Int[np.ndarray, "B"],
+    uppers: Int[np.ndarray, "U"],
     hips: Float[np.ndarray, "S W T 3"],
     planted: Bool[np.ndarray, "S W T 2"],
     lift: Float[np.ndarray, "S W T 2 2"],
 ) -> Float[np.ndarray, "N W T 4"]:
-    """World rotations of all S bodies' joints, one body after the other, from those of their bases.
+    """By what the legs of S bodies turn in world axes so that planted feet rest: left thigh, left
+    shank, right thigh, right shank of each (`StagedBody.pose`).
 
-    The base of body s starts at row `base_starts[s]`. Planted feet rest where they are on average
-    over each stance, as high above the floor as the base's (`lift`, as `foot_lift` gives it); the
-    legs follow by inverse kinematics. Hips' paths and heights are in hip heights."""
-    variants = [body.variant for body in bodies]
-    rows = interpolated_rows(
-        base,
-        in_concatenation([v.first for v in variants], base_starts),
-        in_concatenation([v.second for v in variants], base_starts),
-        np.concatenate([v.mix for v in variants]),
+    `bones` are the rows of `rows` that the bodies' `leg_bones` turn with, one body after the other,
+    and `uppers` those of their upper legs, left and right."""
+    S = len(bodies)
+    offsets = np.concatenate([body.leg_bones.offsets for body in bodies]).astype(rows.dtype)
+    parts = in_concatenation([body.leg_bones.parts for body in bodies], range(0, 8 * S, 8))
+    along = quat_rotate(taken(rows, bones), offsets[:, None, None])
+    first = np.unique(parts, return_index=True)[1]
+    limbs = taken(along, first)
+    for bone in np.setdiff1d(np.arange(len(parts)), first).tolist():
+        limbs[parts[bone]] += along[bone]
+    to_hip, thigh, shank, foot = (taken(limbs, np.arange(k, 8 * S, 4)) for k in range(4))
+    paths = np.repeat(hips, 2, 0)
+    contact = to_hip + thigh + shank + foot + paths
+    index, rest = (np.concatenate(each) for each in zip(*(b.contacts for b in bodies), strict=True))
+    goal = contact.copy("K")
+    sides = np.moveaxis(lift, -2, 1).reshape(2 * S, *lift.shape[1:3], 2)
+    goal[..., 2] = rest.astype(rows.dtype)[:, None, None] + np.where(
+        index[:, None, None] > 0, sides[..., 1], sides[..., 0]
     )
-    starts = starts_of([v.first for v in variants])
-    bones = [body.leg_bones for body in bodies]
-    along = quat_rotate(
-        rows[in_concatenation([b.joints for b in bones], starts)],
-        np.concatenate([b.offsets for b in bones]).astype(rows.dtype)[:, None, None],
-    )
-    parts = in_concatenation([b.starts for b in bones], starts_of([b.joints for b in bones]))
-    limbs = np.add.reduceat(along, parts, axis=0).reshape(len(bodies), 2, 4, *along.shape[1:])
-    contact = hips[:, None] + limbs.sum(2)
-    contact_index, rest = (
-        np.stack(each) for each in zip(*(s.contacts for s in bodies), strict=True)
-    )
-    goal = contact.copy()
-    for s, side in np.ndindex(contact_index.shape):
-        goal[s, side, ..., 2] = rest[s, side] + lift[s, ..., side, contact_index[s, side]]
-    move = stance_correction(contact, goal, np.moveaxis(planted, -1, 1))
-    uppers = in_concatenation([np.array([leg.upper_leg for leg in s.legs]) for s in bodies], starts)
-    thighs_and_shanks = leg_rotations(
-        limbs[:, :, 1], limbs[:, :, 2], rows[uppers].reshape(*move.shape[:-1], 4), move
-    )
-    leg_rows = np.stack(thighs_and_shanks, 2).reshape(-1, *rows.shape[1:])
-    joints = [body.leg_joints for body in bodies]
-    at = in_concatenation([j.joints for j in joints], starts)
-    leg_parts = in_concatenation([j.parts for j in joints], range(0, 4 * len(bodies), 4))
-    rows[at] = quat_mul(leg_rows[leg_parts], rows[at])
-    return rows
+    stands = np.ascontiguousarray(np.moveaxis(planted, -1, 1)).reshape(contact.shape[:-1])
+    move = stance_correction(contact, goal, stands)
+    turns = leg_rotations(thigh, shank, taken(rows, uppers), move)
+    return taken(np.concatenate(turns), np.arange(4 * S).reshape(2, 2 * S).T.reshape(-1))
 
 
 def foot_lift(
@@ -148,32 +146,14 @@ def foot_lift(
     return heights[:, joints] - (1 + skeleton.rest_positions[joints, 2])
 
 
-def interpolated_rows(
-    rows: Float[np.ndarray, "R W T 4"],
-    first: Int[np.ndarray, "N"],
-    second: Int[np.ndarray, "N"],
-    mix: Float[np.ndarray, "N"],
-) -> Float[np.ndarray, "N W T 4"]:
-    """New rows: each turns from row `first` towards row `second` by `mix`."""
-    out = rows[first]
-    between = np.flatnonzero(mix)
-    if len(between):
-        share = mix[between].astype(rows.dtype)[:, None, None]
-        out[between] = quat_slerp(out[between], rows[second[between]], share)
-    return out
+def empty_rows(count: int, windows: int, frames: int) -> Float[np.ndarray, "N W T 4"]:
+    """Rows to be filled in, in single precision."""
+    return seen(np.empty((4, count, windows, frames), np.float32))
 
 
-def local_rows(
-    rows: Float[np.ndarray, "N W T 4"],
-    bodies: Sequence[BodyFeatures],
-    from_heading: Float[np.ndarray, "S W 1 4"],
-) -> Float[np.ndarray, "N W T 4"]:
-    """Local rotations of the bodies' rows, each pelvis first turned by `from_heading`."""
-    starts = starts_of([body.joints for body in bodies])
-    parents = in_concatenation([np.maximum(body.skeleton.parents, 0) for body in bodies], starts)
-    local = quat_relative(rows[parents], rows)
-    local[starts] = quat_mul(from_heading, rows[starts])
-    return local
+def taken(rows: Float[np.ndarray, "R *n"], at: Int[np.ndarray, "N"]) -> Float[np.ndarray, "N *n"]:
+    """`rows[at]`, in planes as `rows` are."""
+    return seen(planes(rows).take(at, axis=1))
 
 
 def starts_of(parts: Sequence[Sized]) -> list[int]:

@@ -1,16 +1,18 @@
 """The batches of a run: step n's are the same whatever ran before, in whichever process."""
 
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import torch
 from torch.utils.data import DataLoader, Dataset
 
 from spark.network.t5 import NAME_CACHE, T5Names
-from spark.training.batch import Batch, Collator, Names, UnpairedBatch
+from spark.training.batch import Batch, PairDraws, UnpairedBatch, UnpairedDraws
+from spark.training.collator import Collator, Names
+from spark.training.cuts import TrainingClip
 from spark.training.name_encoder import NameEncoder
 from spark.training.packed import AHEAD, Packed, Packer
-from spark.training.pairs import PairMaker, TrainingClip
+from spark.training.pairs import PairMaker
 from spark.training.settings import TrainConfig
 from spark.training.sizes import Sizes
 from spark.training.threads import free_cores
@@ -48,30 +50,44 @@ class Steps(Dataset[Batch | UnpairedBatch]):
         self.collator = Collator(names, self.maker.sizes if fixed_sizes else Sizes())
 
     def __getitem__(self, n: int) -> Batch | UnpairedBatch:
+        return self.draws(n).batch()
+
+    def draws(self, n: int) -> PairDraws | UnpairedDraws:
+        """What item n is made of."""
         first = n * self.config.draws
         mine = range(first + self.rank, first + self.config.draws, self.world)
         if isinstance(self.maker, UnpairedMaker):
             return self.collator.unpaired(self.maker.draws(mine, self.config.per_body))
-        return self.collator.batch(self.maker.draws(mine, self.config.per_body))
+        return self.collator.pairs(self.maker.draws(mine, self.config.per_body))
 
 
-def batches_from(steps: Steps, start: int) -> Iterator[Packed]:
+class Travelling(Dataset[PairDraws | UnpairedDraws]):
+    """Steps as they travel from a worker to the trainer."""
+
+    def __init__(self, steps: Steps) -> None:
+        self.steps = steps
+
+    def __getitem__(self, n: int) -> PairDraws | UnpairedDraws:
+        return self.steps.draws(n)
+
+
+def batches_from(steps: Steps, start: int, device: torch.device) -> Iterator[Batch | UnpairedBatch]:
+    """The batches of steps from `start` on, on `device`."""
     config = steps.config
     workers = worker_count(config)
-    return iter(
-        DataLoader(
-            steps,
-            batch_size=None,
-            sampler=range(start, config.steps),
-            num_workers=workers,
-            prefetch_factor=AHEAD if workers else None,
-            # A process that is forked from one with a GPU, or with threads, may hang.
-            multiprocessing_context="spawn" if workers else None,
-            worker_init_fn=_ignore_interrupts,
-            collate_fn=Packer(),  # type: ignore[arg-type]  # of an item: there is no batch_size
-            pin_memory=torch.cuda.is_available(),
-        )
+    packed: Iterable[Packed] = DataLoader(
+        Travelling(steps),
+        batch_size=None,
+        sampler=range(start, config.steps),
+        num_workers=workers,
+        prefetch_factor=AHEAD if workers else None,
+        # A process that is forked from one with a GPU, or with threads, may hang.
+        multiprocessing_context="spawn" if workers else None,
+        worker_init_fn=_ignore_interrupts,
+        collate_fn=Packer(),  # type: ignore[arg-type]  # of an item: there is no batch_size
+        pin_memory=torch.cuda.is_available(),
     )
+    return (draws.on(device).batch() for draws in packed)
 
 
 def worker_count(config: TrainConfig) -> int:

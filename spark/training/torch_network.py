@@ -9,7 +9,8 @@ from spark.network.features import BodyFeatures
 from spark.network.forward import Names, Network, decoder_noise
 from spark.network.weights import Weights
 from spark.network.windows import Windows
-from spark.training.batch import Collator
+from spark.training.batch import each
+from spark.training.collator import Collator
 from spark.training.model import Spark
 from spark.training.tensors import Body, PoseTensors
 
@@ -49,8 +50,8 @@ class TorchNetwork(Network):
 
     def _body(self, features: BodyFeatures, names: Names, windows: int) -> Body:
         own = torch.as_tensor(names[:, : -features.sides.shape[1]], dtype=torch.float32)
-        body = Collator(lambda _: own).bodies([features], [windows])
-        return Body(*(x.to(self._device) for x in body))
+        body = Collator(lambda _: own).bodies([features])
+        return Body(*(each(x.to(self._device), windows) for x in body))
 
     def _tensor(self, array: Float[np.ndarray, "..."]) -> Tensor:
         return torch.as_tensor(array, dtype=torch.float32, device=self._device)

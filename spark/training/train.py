@@ -27,12 +27,12 @@ from spark.training.checkpoint import (
     save_checkpoint,
 )
 from spark.training.compiling import compiled, compiles
+from spark.training.cuts import TrainingClip
 from spark.training.model import Spark
 from spark.training.name_encoder import NameEncoder
 from spark.training.name_file import load_names
 from spark.training.objective import Objective, Terms, network
 from spark.training.optimiser import make_optimiser, rate_at
-from spark.training.pairs import TrainingClip
 from spark.training.precision import fast_products
 from spark.training.processes import agreed, check_shares, distributed, join_processes
 from spark.training.run_log import open_log
@@ -101,9 +101,11 @@ def train(
     began = saved = perf_counter()
     with open_log(out, start.step, rank) as log:
         for n, batch in zip(
-            range(start.step, config.steps), batches_from(steps, start.step), strict=True
+            range(start.step, config.steps),
+            batches_from(steps, start.step, device),
+            strict=True,
         ):
-            terms = take_step(runner, optimiser, batch.on(device), n, config, rank)
+            terms = take_step(runner, optimiser, batch, n, config, rank)
             done, now = n + 1, perf_counter()
             last = done == config.steps
             logs = last or done == 1 or done % config.log_every == 0

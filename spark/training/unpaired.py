@@ -12,14 +12,15 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 
 from spark.errors import SkeletonError
 from spark.network.features import BodyFeatures
-from spark.network.windows import Windows
-from spark.rotation import quat_from_yaw, quat_rotate, sixd_from_quat, yaw_from_quat
-from spark.training.pairs import TrainingClip
+from spark.rotation import quat_from_yaw, quat_rotate, yaw_from_quat
+from spark.training.cuts import Cut, TrainingClip, cut_rotations, frames_of
+from spark.training.plan import Drawn, local_rotations, plan_of_body, turn_between
 from spark.training.sizes import Sizes, sizes_of
-from spark.training.staging import in_concatenation, interpolated_rows, local_rows, starts_of
+from spark.training.staging import empty_rows
 from spark.training.variants import Variant, same_body, split_body, split_joints
 
 SHARED = 10  # "every two characters have at most 10 paired motion sequences" (section 5.3)
@@ -62,6 +63,7 @@ class UnpairedMaker:
             np.array([len(clip.hips) - window + 1 for clip in one.clips], float)
             for one in self.characters
         ]
+        self._plans = [plan_of_body(one.variant) for one in self.characters]
         weights = np.array([self._windows[k].sum() for k in self._acting])
         self._weights = weights / weights.sum()
 
@@ -70,28 +72,31 @@ class UnpairedMaker:
         """What holds every draw."""
         return sizes_of(one.variant.body for one in self.characters)
 
-    def draws(self, numbers: Sequence[int], windows: int) -> list[tuple[Windows, BodyFeatures]]:
+    def draws(self, numbers: Sequence[int], windows: int) -> list[tuple[Drawn, BodyFeatures]]:
         """The draws of these numbers: `windows` windows of one character each, and a target."""
         drawn = [self._sample(n, windows) for n in numbers]
-        variants = [one.variant for one in drawn]
-        hips = np.stack([one.hips for one in drawn])
-        starts = starts_of([one.rotations for one in drawn])
-        rows = interpolated_rows(
-            np.concatenate([one.rotations for one in drawn]),
-            in_concatenation([v.first for v in variants], starts),
-            in_concatenation([v.second for v in variants], starts),
-            np.concatenate([v.mix for v in variants]),
+        plans = [self._plans[one.who] for one in drawn]
+        *starts, total = np.cumsum([0, *(plan.rows for plan in plans)]).tolist()
+        rows = empty_rows(total, windows, self.window)
+        cuts = [cut for one in drawn for cut in one.cuts]
+        cut_rotations(
+            cuts,
+            frames_of(cuts, self.window),
+            [
+                rows[start : start + plan.recorded, w]
+                for plan, start in zip(plans, starts, strict=True)
+                for w in range(windows)
+            ],
         )
-        bodies = [variant.body for variant in variants]
-        starts = starts_of([body.joints for body in bodies])
+        turn_between(rows, [plan.between for plan in plans], starts)
         # As `spark.network.features.pose_features` sees a window: from its own first frame.
         from_heading = quat_from_yaw(-yaw_from_quat(rows[starts, :, :1]))
+        hips = np.stack([one.hips for one in drawn])
         roots = quat_rotate(from_heading, hips - hips[:, :, :1] * np.array([1, 1, 0], hips.dtype))
-        local = local_rows(rows, bodies, from_heading)
-        poses = np.split(np.moveaxis(sixd_from_quat(local), 0, 2), starts[1:], 2)
+        local = local_rotations(rows, plans, starts, from_heading)
         return [
-            (Windows(body, pose, root), one.target)
-            for body, pose, root, one in zip(bodies, poses, roots, drawn, strict=True)
+            (Drawn(self.characters[one.who].variant.body, own, plan.poses[0], root), one.target)
+            for one, plan, own, root in zip(drawn, plans, local, roots, strict=True)
         ]
 
     def _sample(self, n: int, windows: int) -> "_Draw":
@@ -101,24 +106,19 @@ class UnpairedMaker:
         other = int(rng.integers(len(self.characters) - 1))
         target = self.characters[other + (other >= k)].variant.body
         chosen = rng.choice(len(who.clips), windows, p=of_clips / of_clips.sum())
-        rotations, hips = [], []
-        for i in chosen.tolist():
-            at = int(rng.integers(int(of_clips[i])))
-            span = slice(at, at + self.window)
-            # A view of a memory-mapped array costs more than what is read through it.
-            rotations.append(np.asarray(who.clips[i].rotations)[span])
-            hips.append(np.asarray(who.clips[i].hips)[span])
-        rows = np.moveaxis(np.array(rotations, np.float32), 2, 0)
-        return _Draw(who.variant, target, np.ascontiguousarray(rows), np.array(hips, np.float32))
+        cuts = [Cut(who.clips[i], int(rng.integers(int(of_clips[i])))) for i in chosen.tolist()]
+        # A view of a memory-mapped array costs more than what is read through it.
+        hips = [np.asarray(cut.clip.hips)[cut.at : cut.at + self.window] for cut in cuts]
+        return _Draw(k, target, cuts, np.array(hips, np.float32))
 
 
 class _Draw(NamedTuple):
-    """W windows of one character's, as rows of the recorded body's K joints, and their target."""
+    """Windows of one character's, their paths, and the target that they go to."""
 
-    variant: Variant
+    who: int
     target: BodyFeatures
-    rotations: np.ndarray
-    hips: np.ndarray
+    cuts: list[Cut]
+    hips: Float[np.ndarray, "W T 3"]
 
 
 def assign(clips: Sequence[TrainingClip], seed: int, shared: int) -> list[Character]:

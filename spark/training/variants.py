@@ -49,9 +49,11 @@ _SPLIT = {"spine": 0.3, "neck": 0.1, "upper_arm": 0.15, "forearm": 0.1, "lower_l
 
 @dataclass(frozen=True, eq=False)
 class Variant:
-    """A changed copy of a body: joint k turns from `first[k]` towards `second[k]` by `mix[k]`."""
+    """A changed copy of a body of `base` joints: joint k turns from `first[k]` towards `second[k]`
+    by `mix[k]`."""
 
     body: BodyFeatures
+    base: int
     first: Int[np.ndarray, "K"]
     second: Int[np.ndarray, "K"]
     mix: Float[np.ndarray, "K"]
@@ -244,6 +246,7 @@ def _finish(nodes: list[_Node], base: BodyFeatures, convention: str | None = Non
         BodyFeatures(
             rig, np.arange(len(nodes)), skeleton, base.turned[[node.first for node in nodes]]
         ),
+        len(base.joints),
         np.array([node.first for node in nodes]),
         np.array([node.second for node in nodes]),
         np.array([node.mix for node in nodes]),

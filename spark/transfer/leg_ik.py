@@ -11,13 +11,14 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from spark.blocks import in_blocks
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_between, quat_from_rotvec, quat_mul, quat_rotate
 from spark.skeleton import Skeleton
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.vectors import cross, dot
 
 # Of the leg's length: at full stretch the knee would lock, and the direction it bends in flip.
 _MAX_REACH = 0.999
@@ -61,32 +62,40 @@ def stance_correction(
 ) -> Float[np.ndarray, "*n T 3"]:
     """What must be added to contact points' paths so that over each stance they rest at the mean of
     the wanted path [same unit]; eased from one to the next in between, held at both ends."""
-    starts = planted & ~np.concatenate([np.zeros_like(planted[..., :1]), planted[..., :-1]], -1)
-    stance = starts.cumsum().reshape(planted.shape)  # a number for each stance of each path
-    frames = planted.nonzero()
-    counts = np.maximum(np.bincount(stance[frames]), 1)
-    held = np.zeros_like(contact_pos)
+    move = np.zeros_like(contact_pos)
+    frames = np.flatnonzero(planted)  # of all paths, one after the other
+    if not len(frames):
+        return move
+    before = np.concatenate([np.zeros_like(planted[..., :1]), planted[..., :-1]], -1)
+    stance = np.cumsum(before.reshape(-1)[frames] == 0) - 1
+    counts = np.bincount(stance)
+    before, after, ease = _neighbours(frames, planted)
+    ease, some = ease.astype(move.dtype), planted.any(-1, keepdims=True)
     for axis in range(3):
-        wanted = wanted_pos[..., axis][frames]
-        means = np.bincount(stance[frames], wanted) / counts if len(wanted) else counts
-        held[..., axis][frames] = means[stance[frames]] - contact_pos[..., axis][frames]
-    return _eased(held, planted)
+        wanted, at = (pos[..., axis].reshape(-1)[frames] for pos in (wanted_pos, contact_pos))
+        held = (np.bincount(stance, wanted) / counts)[stance].astype(move.dtype) - at
+        last = held[before]
+        move[..., axis] = some * (last + ease * (held[after] - last)).reshape(planted.shape)
+    return move
 
 
-def _eased(
-    values: Float[np.ndarray, "*n T 3"], known: Bool[np.ndarray, "*n T"]
-) -> Float[np.ndarray, "*n T 3"]:
-    """Values where they are known, carried over to all frames; zeros where none is known."""
-    count = known.shape[-1]
-    time = np.arange(count)
-    before = np.maximum.accumulate(np.where(known, time, -1), -1)
-    after = np.minimum.accumulate(np.where(known, time, count)[..., ::-1], -1)[..., ::-1]
-    before = np.where(before < 0, after, before) % count  # without any, `values` are 0
-    after = np.where(after == count, before, after)
-    u = np.clip((time - before) / np.maximum(after - before, 1), 0, 1)[..., None]
-    ease = u * u * (3 - 2 * u)
-    last, following = (np.take_along_axis(values, k[..., None], -2) for k in (before, after))
-    return last + ease * (following - last)
+def _neighbours(
+    frames: Int[np.ndarray, "M"], known: Bool[np.ndarray, "*n T"]
+) -> tuple[Int[np.ndarray, "N"], Int[np.ndarray, "N"], Float[np.ndarray, "N"]]:
+    """For each frame of each path, which of the `frames` that are `known` is the last one up to it,
+    which one the next from it on, and how far it is from the one to the other, eased. Before the
+    first and after the last both are that one; in a path without any they are of another path."""
+    size, T = known.size, known.shape[-1]
+    time, first = np.arange(size), np.repeat(np.arange(0, size, T), T)
+    rank = known.reshape(-1).cumsum()
+    before, after = np.maximum(rank - 1, 0), np.minimum(rank - known.reshape(-1), len(frames) - 1)
+    none_before = (frames[before] < first) | (frames[before] > time)
+    before = np.where(none_before, after, before)
+    none_after = (frames[after] >= first + T) | (frames[after] < time)
+    after = np.where(none_after, before, after)
+    since, until = frames[before], frames[after]
+    u = np.clip((time - since) / np.maximum(until - since, 1), 0, 1)
+    return before, after, u * u * (3 - 2 * u)
 
 
 def bend_leg(
@@ -131,26 +140,27 @@ def leg_rotations(
     goal = thigh + shank + move
     reach = np.clip(_length(goal), abs(a - b) * 1.01 + 1e-9, (a + b) * _MAX_REACH)
 
-    lateral = quat_rotate(upper_leg, np.array([0, 1, 0], upper_leg.dtype))
-    axis = np.cross(thigh, shank)
+    axis = cross(thigh, shank)
     sine = _length(axis)
     # A straight leg bends about the body's lateral axis, backwards; so does one without a bone.
-    straight = (sine <= _STRAIGHT * a * b)[..., None]
-    axis = np.where(straight, lateral, axis)
-    axis = axis / _length(axis)[..., None]
-    now = np.arctan2(sine, np.einsum("...i,...i", thigh, shank))
-    turn = quat_from_rotvec(axis * (_flexion(reach, a, b) - now)[..., None])
+    straight: Bool[np.ndarray, "*n"] = (sine <= _STRAIGHT * a * b)[..., 0]
+    if straight.any():
+        lateral = np.array([0, 1, 0], axis.dtype)
+        axis[straight] = quat_rotate(upper_leg[straight], lateral)
+    now = np.arctan2(sine, dot(thigh, shank))
+    turn = quat_from_rotvec(axis / _length(axis) * (_flexion(reach, a, b) - now))
     swing = quat_between(thigh + quat_rotate(turn, shank), goal)
     return swing, quat_mul(swing, turn)
 
 
-def _length(v: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n"]:
-    return np.sqrt(np.einsum("...i,...i", v, v))
+def _length(v: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 1"]:
+    length: Float[np.ndarray, "*n 1"] = np.sqrt(dot(v, v))
+    return length
 
 
 def _flexion(
-    reach: Float[np.ndarray, "*n"], a: Float[np.ndarray, "*n"], b: Float[np.ndarray, "*n"]
-) -> Float[np.ndarray, "*n"]:
+    reach: Float[np.ndarray, "*n 1"], a: Float[np.ndarray, "*n 1"], b: Float[np.ndarray, "*n 1"]
+) -> Float[np.ndarray, "*n 1"]:
     """The knee's angle from straight, by the law of cosines."""
     both = 2 * a * b
     cos = np.divide(reach**2 - a**2 - b**2, both, out=np.ones_like(both), where=both > 0)

@@ -10,10 +10,10 @@ from spark.network.features import body_features
 from spark.rig.contacts import planted_feet
 from spark.training.batch import Batch
 from spark.training.checkpoint import Checkpoint
+from spark.training.cuts import TrainingClip
 from spark.training.model import Spark
 from spark.training.name_encoder import NameConfig, NameEncoder
 from spark.training.objective import network
-from spark.training.pairs import TrainingClip
 from spark.training.settings import TrainConfig
 from spark.training.tensors import Start
 from spark.transfer.canonical import to_canonical

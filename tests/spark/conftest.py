@@ -8,7 +8,8 @@ import spark_sim
 
 if TYPE_CHECKING:
     from spark.training.batch import Batch
-    from spark.training.pairs import PairMaker, TrainingClip
+    from spark.training.cuts import TrainingClip
+from spark.training.pairs import PairMaker
 
 
 @pytest.fixture(scope="session")
@@ -40,8 +41,8 @@ def maker(walks: "list[TrainingClip]") -> "PairMaker":
 def batch(maker: "PairMaker") -> "Batch":
     import torch
 
-    from spark.training.batch import Collator
+    from spark.training.collator import Collator
     from spark.training.name_encoder import NameEncoder
 
     torch.manual_seed(0)
-    return Collator(NameEncoder().encode).batch([maker.draw(n, 2) for n in range(3)])
+    return Collator(NameEncoder().encode).pairs([maker.draw(n, 2) for n in range(3)]).batch()

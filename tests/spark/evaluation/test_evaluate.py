@@ -32,11 +32,11 @@ from spark.network.features import body_features
 from spark.network.known_bodies import distinct_trunks
 from spark.rig.contacts import planted_feet, speeds
 from spark.training.checkpoint import Checkpoint, save_checkpoint
+from spark.training.cuts import TrainingClip
 from spark.training.dataset import Performance
 from spark.training.model import Spark
 from spark.training.name_encoder import NameConfig, NameEncoder
 from spark.training.objective import network
-from spark.training.pairs import TrainingClip
 from spark.training.settings import TrainConfig
 from spark.training.variants import same_body, split_body, split_joints
 from spark.transfer.analytic import correspond, transfer

@@ -16,8 +16,8 @@ from spark.network.config import Config
 from spark.network.forward import Network
 from spark.network.names import NameNetwork
 from spark.network.weights import read_weights
-from spark.training.batch import Collator
 from spark.training.checkpoint import Checkpoint, save_checkpoint
+from spark.training.collator import Collator
 from spark.training.model import Spark
 from spark.training.name_encoder import NameConfig, NameEncoder
 from spark.training.onnx import INPUTS, export_onnx
@@ -59,7 +59,7 @@ def test_the_network_without_torch_is_the_network(
     unmatched_joints = 0
     for n in range(4):
         draw = maker.draw(n, 2)
-        batch = Collator(names.encode).batch([draw])
+        batch = Collator(names.encode).pairs([draw]).batch()
         start = batch.start if preset.residual else None
         with torch.no_grad():
             latent = model.encode(batch.pose, batch.source)
@@ -68,10 +68,10 @@ def test_the_network_without_torch_is_the_network(
             np.concatenate([vectors.encode(body.skeleton.names), body.sides], -1)
             for body in (draw.source.body, draw.target.body)
         )
-        own = network.encode(draw.source, given)
+        own = network.encode(draw.source.windows, given)
         np.testing.assert_allclose(own, latent.numpy(), atol=2e-4)
         if preset.residual:
-            out = network.correct(own, asked, draw.start, draw.unmatched)
+            out = network.correct(own, asked, draw.start.windows, draw.unmatched)
             unmatched_joints += int((draw.unmatched >= 0).sum())
         else:
             out = network.decode(own, asked, draw.target.body)
@@ -103,7 +103,7 @@ def test_onnx_is_the_network(maker: PairMaker, tmp_path: Path) -> None:
     assert [given.name for given in session.get_inputs()] == list(INPUTS)
     lengths = set()
     for n in (5, 13):
-        batch = Collator(names.encode).batch([maker.draw(n, 1)])
+        batch = Collator(names.encode).pairs([maker.draw(n, 1)]).batch()
         T = 16 - n
         pose = PoseTensors(*(t[:, :T] for t in batch.pose))
         start = batch.start._replace(
@@ -131,4 +131,4 @@ def test_weights_that_lack_a_tensor_are_damaged(maker: PairMaker, tmp_path: Path
         NameNetwork(weights).encode(draw.source.body.skeleton.names)
     vectors = np.zeros((len(draw.source.body.joints), 18))
     with pytest.raises(FileFormatError, match=r"damaged.*encoder\.motion"):
-        Network(weights).encode(draw.source, vectors)
+        Network(weights).encode(draw.source.windows, vectors)

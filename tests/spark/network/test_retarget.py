@@ -11,7 +11,7 @@ from spark.network.features import body_features
 from spark.network.known_bodies import trunk_of
 from spark.rig.roles import Role
 from spark.rotation import quat_about, quat_angle, quat_mul
-from spark.training.pairs import TrainingClip
+from spark.training.cuts import TrainingClip
 from spark.training.train import train
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import canonical_positions, to_canonical

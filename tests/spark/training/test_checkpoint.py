@@ -12,8 +12,8 @@ from safetensors.torch import save_file
 from spark.errors import FileFormatError
 from spark.network.weights import VERSION, read_weights
 from spark.training.checkpoint import load_checkpoint, save_checkpoint
+from spark.training.cuts import TrainingClip
 from spark.training.name_encoder import NameEncoder
-from spark.training.pairs import TrainingClip
 from spark.training.settings import TrainConfig
 from spark.training.train import fresh_checkpoint, train
 from tests.helpers.training import TINY, fresh

@@ -15,10 +15,10 @@ from spark.errors import ConventionError
 from spark.training import attention, losses
 from spark.training.attention import Attention
 from spark.training.compiling import compiles
+from spark.training.cuts import TrainingClip
 from spark.training.mapped import MappedArray
 from spark.training.objective import Objective
 from spark.training.packed import Packer
-from spark.training.pairs import TrainingClip
 from spark.training.processes import check_shares
 from spark.training.settings import TrainConfig
 from spark.training.steps import Steps, worker_count
@@ -89,7 +89,7 @@ def test_a_step_waits_for_no_number(walks: list[TrainingClip], preset: str) -> N
     """On the meta device, which has shapes and no numbers, whoever asks for one fails."""
     objective, steps = steps_of(walks, preset, fixed=False)
     meta = torch.device("meta")
-    loss, _ = objective.to(meta)(Packer()(steps[0]).on(meta))
+    loss, _ = objective.to(meta)(Packer()(steps.draws(0)).on(meta).batch())
     loss.backward()
     with pytest.raises(RuntimeError):
         float(loss)

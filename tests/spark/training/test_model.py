@@ -5,7 +5,8 @@ import torch
 
 from spark.network.config import Config
 from spark.training import losses
-from spark.training.batch import Batch, Collator
+from spark.training.batch import Batch
+from spark.training.collator import Collator
 from spark.training.model import Spark
 from spark.training.name_encoder import NameEncoder
 from spark.training.pairs import PairMaker
@@ -88,7 +89,7 @@ def test_the_default_network_starts_as_the_analytic_transfer(batch: Batch) -> No
 def test_only_unmatched_joints_are_corrected_and_what_follows_them(maker: PairMaker) -> None:
     """Whatever a residual network says: known joints keep their rotation in the world."""
     torch.manual_seed(0)
-    batch = Collator(NameEncoder().encode).batch([maker.draw(n, 2) for n in range(8)])
+    batch = Collator(NameEncoder().encode).pairs([maker.draw(n, 2) for n in range(8)]).batch()
     start, J = batch.start, batch.start.unmatched.shape[1]
     moved = corrected(start, 0.1 * torch.randn_like(start.rotations), batch.target)
     before, after = (world_matrices(p.rotations, batch.target.parents) for p in (start, moved))
@@ -182,12 +183,12 @@ def test_the_network_is_its_equations(config: Config, share: bool, maker: PairMa
             torch.nn.init.normal_(head.weight, std=0.3)
     collator = Collator(NameEncoder().encode)
     draws = [maker.draw(n, 1) for n in range(3)]
-    batch = collator.batch(draws)
+    batch = collator.pairs(draws).batch()
     assert len({len(draw.target.body.joints) for draw in draws}) > 1
     with torch.no_grad():
         fused = model(batch.pose, batch.source, batch.target, start_of(config, batch))
         for k, draw in enumerate(draws):
-            one = collator.batch([draw])
+            one = collator.pairs([draw]).batch()
             plain = plain_spark.retargeted(
                 model, one.pose, one.source, one.target, start_of(config, one)
             )

@@ -5,16 +5,16 @@ from dataclasses import replace
 
 import torch
 
+from spark.training.cuts import TrainingClip
 from spark.training.name_encoder import NameEncoder
 from spark.training.packed import Packer
-from spark.training.pairs import TrainingClip
 from spark.training.steps import Steps, batches_from
 from tests.helpers.training import SMALL_NAMES, TINY
 
 
 def test_a_packed_batch_is_the_batch(clips: list[TrainingClip]) -> None:
-    batch = Steps(clips, NameEncoder(SMALL_NAMES).encode, TINY, 0, 1)[0]
-    again = Packer()(batch).on(torch.device("cpu"))
+    draws = Steps(clips, NameEncoder(SMALL_NAMES).encode, TINY, 0, 1).draws(0)
+    batch, again = draws.batch(), Packer()(draws).on(torch.device("cpu")).batch()
     for part, other in zip(batch[:5], again[:5], strict=True):
         assert type(part) is type(other)
         for a, b in zip(part, other, strict=True):
@@ -28,8 +28,8 @@ def test_a_packed_batch_is_the_batch(clips: list[TrainingClip]) -> None:
 def test_batches_of_a_worker_hold_while_they_are_used(clips: list[TrainingClip]) -> None:
     """Their memory is used again, but not before the trainer is done with them."""
     steps = Steps(clips, NameEncoder(SMALL_NAMES).encode, replace(TINY, workers=1, steps=14), 0, 1)
-    for n, packed in enumerate(batches_from(steps, 0)):
+    for n, again in enumerate(batches_from(steps, 0, torch.device("cpu"))):
         time.sleep(0.02)  # so that the worker is as far ahead as it may be
-        batch, again = steps[n], packed.on(torch.device("cpu"))
+        batch = steps[n]
         assert torch.equal(batch.truth.rotations, again.truth.rotations), n
         assert torch.equal(batch.pose.root, again.pose.root), n

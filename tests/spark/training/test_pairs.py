@@ -6,7 +6,8 @@ import torch
 from spark.rig.roles import Role
 from spark.rotation import matrix_from_sixd
 from spark.training import losses
-from spark.training.batch import Batch, Collator
+from spark.training.batch import Batch
+from spark.training.collator import Collator
 from spark.training.name_encoder import NameEncoder
 from spark.training.pairs import PairMaker
 from spark.training.tensors import (
@@ -31,7 +32,7 @@ def test_the_answer_stands_where_the_copy_slides(maker: PairMaker) -> None:
         draw = maker.draw(n, 2)
         if Role.LEFT_TOE not in draw.target.body.rig.roles.roles:
             continue
-        made = collator.batch([draw])
+        made = collator.pairs([draw]).batch()
         for name, pose in (("truth", made.truth), ("start", made.start.pose)):
             positions = forward_kinematics(pose, made.target)
             speeds[name].append(

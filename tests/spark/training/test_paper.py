@@ -15,12 +15,13 @@ from spark.rig.roles import Group, Role
 from spark.rotation import quat_from_rotvec, quat_mul, sixd_from_quat
 from spark.training import losses
 from spark.training.attention import sinusoids
-from spark.training.batch import Collator, UnpairedBatch
+from spark.training.batch import UnpairedBatch
+from spark.training.collator import Collator
+from spark.training.cuts import TrainingClip
 from spark.training.model import Spark
 from spark.training.name_encoder import NameEncoder
 from spark.training.objective import Objective, network
 from spark.training.optimiser import BETAS, make_optimiser, rate_at
-from spark.training.pairs import TrainingClip
 from spark.training.settings import TrainConfig
 from spark.training.splits import TRAINING, UNSEEN, seen_characters
 from spark.training.steps import Steps
@@ -46,7 +47,7 @@ def steps(walks: list[TrainingClip]) -> Steps:
 
 @pytest.fixture(scope="module")
 def batch(steps: Steps) -> UnpairedBatch:
-    return Collator(NameEncoder().encode).unpaired(steps.maker.draws(range(3), 1))
+    return Collator(NameEncoder().encode).unpaired(steps.maker.draws(range(3), 1)).batch()
 
 
 def test_every_row_has_its_test() -> None:

@@ -25,8 +25,8 @@ from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_mul
 from spark.training.checkpoint import load_checkpoint, save_checkpoint
+from spark.training.cuts import TrainingClip
 from spark.training.dataset import Performance
-from spark.training.pairs import TrainingClip
 from spark.training.recorded_learning import learn_recorded
 from spark.training.recorded_net import RecordedNet, habits_of
 from spark.training.recorded_pairs import RecordedPairs, recorded_pairs

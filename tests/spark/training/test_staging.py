@@ -3,10 +3,20 @@
 import numpy as np
 import pytest
 
-from spark.kinematics import world_positions
+from spark.kinematics import local_rotations, world_positions
+from spark.rotation import (
+    quat_from_yaw,
+    quat_mul,
+    quat_rotate,
+    quat_slerp,
+    sixd_from_quat,
+    yaw_from_quat,
+)
 from spark.skeleton import Skeleton
+from spark.training.cuts import TrainingClip
+from spark.training.mirror import mirrored_motion
 from spark.training.name_encoder import NameEncoder
-from spark.training.pairs import PairMaker, TrainingClip
+from spark.training.pairs import PairMaker
 from spark.training.staging import StagedBody
 from spark.training.variants import midway, random_variant, same_body
 
@@ -23,6 +33,38 @@ def test_draws_made_together_are_those_made_alone(walks: list[TrainingClip]) -> 
             np.testing.assert_allclose(a.rotations, b.rotations, atol=1e-5)
             np.testing.assert_allclose(a.root, b.root, atol=1e-5)
         np.testing.assert_array_equal(draw.planted, alone.planted)
+
+
+@pytest.mark.parametrize("varied", [True, False])
+def test_a_draw_is_what_its_steps_give_one_by_one(walks: list[TrainingClip], varied: bool) -> None:
+    """In double precision, each body, window, and joint worked out for itself."""
+    maker = PairMaker(walks, window=16, variants=24, varied=varied)
+    for n, draw in enumerate(maker.draws(range(12), 2)):
+        one = maker._sample(n, 2)
+        base, hips, planted, lift = [], [], [], []
+        for clip, at, speed in one.cuts:
+            times = at + np.arange(16) * speed
+            frame, share = np.divmod(times, 1)
+            now, near = frame.astype(int), times.round().astype(int)
+            after = np.minimum(now + 1, len(clip.hips) - 1)
+            rotations, path = (np.asarray(x, np.float64) for x in (clip.rotations, clip.hips))
+            base.append(quat_slerp(rotations[now], rotations[after], share[:, None]))
+            hips.append(path[now] + share[:, None] * (path[after] - path[now]))
+            planted.append(clip.planted[near])
+            lift.append(clip.lift[near])
+        pose, path, stands, lifts = map(np.stack, (base, hips, planted, lift))
+        if one.mirrored:
+            pose, path, stands = mirrored_motion(pose, path, stands)
+            lifts = lifts[:, :, ::-1]
+        source, target = (body.pose(pose, path, stands, lifts) for body in (one.source, one.target))
+        copied = one.link.rotations(source, one.target.variant.body.rig)
+        heading = quat_from_yaw(-yaw_from_quat(source[:, :1, 0]))
+        for drawn, world in zip(draw[:3], (source, target, copied), strict=True):
+            local = local_rotations(drawn.body.skeleton, world)
+            local[:, :, 0] = quat_mul(heading, world[:, :, 0])
+            np.testing.assert_allclose(drawn.rotations, sixd_from_quat(local), atol=2e-5)
+            root = quat_rotate(heading, path - path[:, :1] * (1, 1, 0))
+            np.testing.assert_allclose(drawn.root, root, atol=1e-5)
 
 
 def test_a_planted_foot_rests_as_high_as_the_recorded_one(

@@ -7,7 +7,8 @@ from spark.demo.sample import sample_motion, sample_rig
 from spark.kinematics import forward
 from spark.network.features import body_features, pose_features
 from spark.rig.roles import Role
-from spark.training.batch import Batch, Collator
+from spark.training.batch import Batch
+from spark.training.collator import Collator
 from spark.training.name_encoder import NameEncoder
 from spark.training.pairs import PairMaker
 from spark.training.tensors import (
@@ -23,7 +24,7 @@ def test_network_kinematics_agree_with_ours(maker: PairMaker, batch: Batch) -> N
     motion = sample_motion("wave", rig, 30.0)
     body = body_features(rig)
     sixd, root, _ = pose_features(to_canonical(motion, rig), body)
-    made = Collator(NameEncoder().encode).bodies([body], [1])
+    made = Collator(NameEncoder().encode).bodies([body])
     pose = PoseTensors(torch.as_tensor(sixd)[None].float(), torch.as_tensor(root)[None].float())
     ours = forward_kinematics(pose, made)[0].numpy() * rig.hip_height
     expected = forward(motion)[0]

@@ -34,7 +34,7 @@ def test_torch_gives_the_same_answers(maker: PairMaker, tmp_path: Path) -> None:
     )
     latents, answers = [], []
     for network in (Network(weights), TorchNetwork(weights)):
-        latents.append(network.encode(draw.source, given))
+        latents.append(network.encode(draw.source.windows, given))
         answers.append(network.decode(latents[-1], asked, draw.target.body))
     np.testing.assert_allclose(*latents, atol=2e-5)
     np.testing.assert_allclose(*(answer.rotations for answer in answers), atol=2e-5)

@@ -13,10 +13,10 @@ import torch
 
 from spark.errors import DivergedError
 from spark.training.checkpoint import Checkpoint, load_checkpoint
+from spark.training.cuts import TrainingClip
 from spark.training.name_encoder import NameEncoder
 from spark.training.objective import Objective
 from spark.training.optimiser import make_optimiser
-from spark.training.pairs import TrainingClip
 from spark.training.residual import corrected
 from spark.training.settings import toml
 from spark.training.steps import Steps

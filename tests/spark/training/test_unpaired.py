@@ -9,7 +9,7 @@ import pytest
 
 from spark.errors import SkeletonError
 from spark.network.features import body_features, pose_features
-from spark.training.pairs import TrainingClip
+from spark.training.cuts import TrainingClip
 from spark.training.unpaired import SHARED, UnpairedMaker, assign
 from spark.transfer.canonical import CanonicalMotion
 

@@ -1,0 +1,207 @@
+"""Which rotations a draw consists of, each worked out once.
+
+A body is mostly a copy of the one that was recorded, and so is the analytic transfer to it: only
+legs, and joints between others, turn in ways of their own, and most local rotations are the same on
+all. A `Plan` says what there is to be worked out. It is made once for a pair of bodies.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from spark.network.features import BodyFeatures
+from spark.network.windows import Windows
+from spark.rotation import quat_mul, quat_relative, quat_slerp, sixd_from_quat
+from spark.training.staging import StagedBody, in_concatenation, taken
+from spark.training.variants import Variant
+from spark.transfer.analytic import Correspondence
+from spark.vectors import planes
+
+
+class Between(NamedTuple):
+    """Rows `at` turn from rows `first` towards rows `second` by `mix`."""
+
+    at: Int[np.ndarray, "N"]
+    first: Int[np.ndarray, "N"]
+    second: Int[np.ndarray, "N"]
+    mix: Float[np.ndarray, "N"]
+
+
+class LegPlan(NamedTuple):
+    """Where `spark.training.staging.leg_turns` finds the legs of several bodies, and rows `at` that
+    are rows `before` turned by part `parts` of its answer."""
+
+    bones: Int[np.ndarray, "B"]
+    uppers: Int[np.ndarray, "U"]
+    at: Int[np.ndarray, "N"]
+    before: Int[np.ndarray, "N"]
+    parts: Int[np.ndarray, "N"]
+
+
+class Plan(NamedTuple):
+    """A draw's rows: first those of the recorded body, then those that are worked out from them.
+    `parents` and `children` are the pairs of rows whose local rotations the `poses` consist of; the
+    first is the pelvis, which has no parent."""
+
+    recorded: int
+    rows: int
+    between: Between
+    legs: LegPlan
+    copied: Between
+    parents: Int[np.ndarray, "L"]
+    children: Int[np.ndarray, "L"]
+    poses: tuple[Int[np.ndarray, "_"], ...]
+    some_unmatched: bool = False
+
+
+def plan_of_pair(source: StagedBody, target: StagedBody, link: Correspondence) -> Plan:
+    """The poses of source, target, and analytic transfer."""
+    made = _Made(source.variant.base)
+    loose = [made.variant(body.variant) for body in (source, target)]
+    between = made.taken()
+    placed, leg_rows, before, parts = [], [], [], []
+    for k, (body, own) in enumerate(zip((source, target), loose, strict=True)):
+        at = body.leg_joints
+        own = own.copy()
+        before.append(own[at.joints])
+        parts.append(at.parts + 4 * k)
+        own[at.joints] = made.more(len(at.joints))
+        leg_rows.append(own[at.joints])
+        placed.append(own)
+    bones = [own[body.leg_bones.joints] for own, body in zip(loose, (source, target), strict=True)]
+    uppers = [
+        own[[leg.upper_leg for leg in body.legs]]
+        for own, body in zip(loose, (source, target), strict=True)
+    ]
+    legs = LegPlan(*map(np.concatenate, (bones, uppers, leg_rows, before, parts)))
+    start = made.between(placed[0], link.first, link.second, link.mix)
+    copied = made.taken()
+    bodies = [body.variant.body for body in (source, target, target)]
+    poses = _locals([*placed, start], bodies)
+    some_unmatched = bool((link.unmatched >= 0).any())
+    return Plan(made.recorded, made.rows, between, legs, copied, *poses, some_unmatched)
+
+
+def plan_of_body(variant: Variant) -> Plan:
+    """The pose of one body, as it was recorded."""
+    made = _Made(variant.base)
+    own = made.variant(variant)
+    none = np.zeros(0, int)
+    legs = LegPlan(none, none, none, none, none)
+    return Plan(
+        made.recorded, made.rows, made.taken(), legs, made.taken(), *_locals([own], [variant.body])
+    )
+
+
+class _Made:
+    """Rows beyond those of the recorded body, numbered as they are made."""
+
+    def __init__(self, recorded: int) -> None:
+        self.recorded = self.rows = recorded
+        self._base = np.arange(recorded)
+        self._between: list[Between] = []
+
+    def more(self, count: int) -> Int[np.ndarray, "N"]:
+        self.rows += count
+        return np.arange(self.rows - count, self.rows)
+
+    def variant(self, variant: Variant) -> Int[np.ndarray, "J"]:
+        return self.between(self._base, variant.first, variant.second, variant.mix)
+
+    def between(
+        self,
+        rows: Int[np.ndarray, "K"],
+        first: Int[np.ndarray, "J"],
+        second: Int[np.ndarray, "J"],
+        mix: Float[np.ndarray, "J"],
+    ) -> Int[np.ndarray, "J"]:
+        """The rows of joints that turn from `rows[first]` towards `rows[second]` by `mix`."""
+        at, new = rows[first], np.flatnonzero(mix)
+        at[new] = self.more(len(new))
+        found = Between(at[new], rows[first[new]], rows[second[new]], mix[new])
+        self._between.append(found)
+        return at
+
+    def taken(self) -> Between:
+        """What lies between other rows, since the last time."""
+        found, self._between = self._between, []
+        if not found:
+            none = np.zeros(0, int)
+            return Between(none, none, none, np.zeros(0))
+        return Between(*map(np.concatenate, zip(*found, strict=True)))
+
+
+def _locals(
+    placed: Sequence[Int[np.ndarray, "_"]], bodies: Sequence[BodyFeatures]
+) -> tuple[Int[np.ndarray, "L"], Int[np.ndarray, "L"], tuple[Int[np.ndarray, "_"], ...]]:
+    """The different pairs of parent and child rows, and those of each pose."""
+    numbers: dict[tuple[int, int], int] = {}
+    poses = []
+    for rows, body in zip(placed, bodies, strict=True):
+        above = np.where(body.skeleton.parents < 0, -1, rows[body.skeleton.parents])
+        pairs = zip(above.tolist(), rows.tolist(), strict=True)
+        poses.append(np.array([numbers.setdefault(pair, len(numbers)) for pair in pairs]))
+    parents, children = np.array(list(numbers)).T
+    return np.maximum(parents, 0), children, tuple(poses)
+
+
+def turn_between(
+    rows: Float[np.ndarray, "R W T 4"], plans: Sequence[Between], starts: Sequence[int]
+) -> None:
+    """Work out the rows that lie between others; draw d's begin at `starts[d]`."""
+    at, first, second = (in_concatenation([plan[k] for plan in plans], starts) for k in range(3))
+    if len(at):
+        share = np.concatenate([plan.mix for plan in plans]).astype(rows.dtype)[:, None, None]
+        rows[at] = quat_slerp(taken(rows, first), taken(rows, second), share)
+
+
+def turn_legs(
+    rows: Float[np.ndarray, "R W T 4"],
+    turns: Float[np.ndarray, "N W T 4"],
+    plans: Sequence[LegPlan],
+    starts: Sequence[int],
+) -> None:
+    """Work out the rows of legs, whose parts turn by `turns`."""
+    before, at = (in_concatenation([p[k] for p in plans], starts) for k in (3, 2))
+    parts = in_concatenation([p.parts for p in plans], range(0, 8 * len(plans), 8))
+    rows[at] = quat_mul(taken(turns, parts), taken(rows, before))
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """`windows` whose local rotations are those of `rows` among L that several bodies share."""
+
+    body: BodyFeatures
+    local: Float[np.ndarray, "4 L W T"]
+    rows: Int[np.ndarray, "K"]
+    root: Float[np.ndarray, "W T 3"]
+
+    @property
+    def rotations(self) -> Float[np.ndarray, "W T K 6"]:
+        """Local 6D rotations."""
+        return sixd_from_quat(self.local.take(self.rows, axis=1).transpose(2, 3, 1, 0))
+
+    @property
+    def windows(self) -> Windows:
+        """As networks read them without torch."""
+        return Windows(self.body, self.rotations, self.root)
+
+
+def local_rotations(
+    rows: Float[np.ndarray, "R W T 4"],
+    plans: Sequence[Plan],
+    starts: Sequence[int],
+    from_heading: Float[np.ndarray, "D W 1 4"],
+) -> list[Float[np.ndarray, "4 _ W T"]]:
+    """The local rotations of each draw, each pelvis first turned by `from_heading`."""
+    made = []
+    for plan, start, turn in zip(plans, starts, from_heading, strict=True):
+        # Draw by draw, so that what is at work stays in the processor's cache.
+        parents, children = (taken(rows, at + start) for at in (plan.parents, plan.children))
+        local = quat_relative(parents, children)
+        local[0] = quat_mul(turn, children[0])
+        made.append(planes(local))
+    return made
