@@ -69,9 +69,16 @@ def read_text(path: Path, *, limit: int = LARGEST_TEXT, expected: str = "text") 
         raise FileFormatError(path, None, f"is no text; expected {expected}") from error
 
 
+# Names joined by dots, each a table in a table: Python's work on them grows with their square.
+_DEEP_KEY = re.compile(r"""(?:(?:[^\s.,=\[\]{}"'#]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){100}""")
+
+
 def parse_toml(path: Path, text: str, expected: str) -> dict[str, Any]:
     """The table in a TOML text. Raises `FileFormatError` with the line where it is none, or nests
     too deeply."""
+    if deep := _DEEP_KEY.search(text):
+        at = text.count("\n", 0, deep.start()) + 1
+        raise FileFormatError(path, at, f"nests tables deeper than 100; expected {expected}")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

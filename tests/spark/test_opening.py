@@ -74,3 +74,25 @@ def test_json_has_finite_numbers_alone(first: str) -> None:
     for text in ("NaN", "Infinity", "1e999", "9" * 400, "9" * 5000):
         with pytest.raises(FileFormatError, match="no JSON"):
             parse_json(Path("a"), f"[{first}, {text}]", "it")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a" + ".a" * 100_000 + " = 1",
+        "[" + "a." * 100_000 + "a]",
+        "x = {'a b'" + ' . "b"' * 5000 + "=1}",
+    ],
+    ids=["key", "table", "quoted"],
+)
+def test_keys_of_many_names_are_refused_at_once(text: str) -> None:
+    """Python's parser takes time with the square of them: minutes for a file of 200 kB."""
+    with pytest.raises(FileFormatError, match=r"a:2: nests tables deeper than 100"):
+        parse_toml(Path("a"), f"b = 1\n{text}", "settings")
+
+
+def test_numbers_and_names_of_some_dots_are_read() -> None:
+    text = "a.b.c = [" + "1.5, " * 1000 + "]\nd.'e.f' = '" + "a.b " * 99 + "'"
+    table = parse_toml(Path("a"), text, "settings")
+    assert table["a"]["b"]["c"] == [1.5] * 1000
+    assert table["d"] == {"e.f": "a.b " * 99}
