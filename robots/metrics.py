@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float
 
 from robots.model.motion import RobotMotion
 from robots.solver.contacts import touching_joint
+from robots.solver.floor import sole_paths
 from robots.solver.resting import lowest_near
 from robots.solver.targets import bone_directions, targets_of
 from robots.tree import forward_kinematics
@@ -164,11 +165,7 @@ class _Soles:
 
 def _robot_soles(result: RobotMotion) -> list[Float[np.ndarray, "T _ 3"]]:
     poses = forward_kinematics(result.robot.tree, result.coordinates)
-    out = []
-    for sole in result.robot.soles:
-        pairs = zip(*result.robot.sole_points(sole), strict=True)
-        out.append(np.stack([poses.point(int(link), point).T for link, point in pairs], axis=1))
-    return out
+    return [sole_paths(result.robot, poses, sole) for sole in result.robot.soles]
 
 
 def _resting(source: CanonicalMotion, result: RobotMotion) -> dict[str, float | None]:

@@ -1,5 +1,6 @@
 """Points on the surface of a MuJoCo geom, in the geom's own axes."""
 
+from collections.abc import Sequence
 from itertools import product
 
 import mujoco
@@ -10,6 +11,16 @@ _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = (
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"))
     for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")
 )
+
+
+_HIDDEN = 3  # from this group on MuJoCo's viewer hides geoms: by custom those to collide with
+
+
+def solid(model: mujoco.MjModel, geoms: Sequence[int]) -> list[int]:
+    """Those of some geoms that collide. Where none does, as in models that leave it to their
+    scene's pairs: those that are hidden, or else all."""
+    colliding = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
+    return colliding or [g for g in geoms if model.geom_group[g] >= _HIDDEN] or list(geoms)
 
 
 def outline(

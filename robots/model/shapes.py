@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from scipy.spatial import ConvexHull, QhullError
 
 from robots.model.mjcf import Mjcf
-from sim.outline import outline
+from sim.outline import outline, solid
 from spark.rotation import quat_between
 
 _NEAR_LOWEST = 0.08  # of the foot's length: points this low belong to the sole
@@ -24,14 +24,13 @@ DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1, keepdims=True)
 
 
 def surface(mjcf: Mjcf, bodies: Iterable[int]) -> Float[np.ndarray, "P 3"]:
-    """Points on the shapes of some bodies: of those that collide, or of all where none does."""
+    """Points on the solid shapes of some bodies."""
     model = mjcf.model
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    geoms = np.flatnonzero(np.isin(model.geom_bodyid, list(bodies)))
-    colliding = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
+    geoms = np.flatnonzero(np.isin(model.geom_bodyid, list(bodies))).tolist()
     points = [np.zeros((0, 3))]
-    points.extend(surface_of(model, data, int(geom)) for geom in colliding or list(geoms))
+    points.extend(surface_of(model, data, geom) for geom in solid(model, geoms))
     return np.concatenate(points)
 
 

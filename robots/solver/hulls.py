@@ -13,6 +13,7 @@ from jaxtyping import Float
 
 from robots.model.mjcf import Mjcf
 from robots.model.shapes import DIRECTIONS, surface_of
+from sim.outline import solid
 
 CLEARANCE = 0.0  # [m] that shapes keep between them; less where the T-pose has less
 _MAX_ALONG = 6  # spheres along a shape, at most
@@ -54,24 +55,24 @@ class ShapePair:
 
 
 def shapes_of(mjcf: Mjcf, joints: Sequence[int]) -> list[Shape]:
-    """The shapes of a model that collide with anything."""
+    """The solid shapes of a model (`sim.outline`)."""
     model = mjcf.model
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     links = {mjcf.root: -1}
     for i, joint in enumerate(joints):
         links[int(model.jnt_bodyid[joint])] = i
-    shapes = []
+    geoms: list[int] = []
     for body in mjcf.bodies():
         if body not in links:
             links[body] = links[int(model.body_parentid[body])]
         start = int(model.body_geomadr[body])
-        for geom in range(start, start + int(model.body_geomnum[body])):
-            if not (model.geom_contype[geom] or model.geom_conaffinity[geom]):
-                continue
-            points = surface_of(model, data, geom)
-            if len(points):
-                shapes.append(_shape(links[body], body, geom, points))
+        geoms += range(start, start + int(model.body_geomnum[body]))
+    shapes = []
+    for geom in solid(model, geoms):
+        body, points = int(model.geom_bodyid[geom]), surface_of(model, data, geom)
+        if len(points):
+            shapes.append(_shape(links[body], body, geom, points))
     return shapes
 
 

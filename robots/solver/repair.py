@@ -36,8 +36,8 @@ _MAX_ITER, _REL_TOL = 12, 0.01  # of each round
 _AROUND = 0.4  # [s] before and after a violation that are solved again
 _MAX_JERK_RATIO = 5.0  # jerk, over the one from which hinges are smoothed, that is a violation
 _SEARCH_DISTANCE = 0.01  # [m] between approximate shapes within which the exact ones are measured
-_MAX_DEPTH = 0.006  # [m] of parts in each other, beyond their clearance
-_MAX_SINKING = 0.006  # [m] of a sole's corner, or another part, below the floor
+_MAX_DEPTH = 0.009  # hip heights of parts in each other, beyond their clearance,
+_MAX_SINKING = 0.009  # and of a sole's corner, or another part, below the floor
 _MAX_OVERSPEED = 0.5  # [rad/s] of a hinge beyond the speed at which it is held back
 
 
@@ -141,10 +141,11 @@ def violations(
     searched for in every `stride`-th frame and, where candidates are, in all."""
     poses = forward_kinematics(robot.tree, q)
     candidates = collisions_of(robot).candidates(poses, block, stride, _SEARCH_DISTANCE)
-    violated = exact_contacts_of(robot).depth(robot.to_qpos(q), candidates) > _MAX_DEPTH
+    max_depth, max_sinking = (x * robot.rig.hip_height for x in (_MAX_DEPTH, _MAX_SINKING))
+    violated = exact_contacts_of(robot).depth(robot.to_qpos(q), candidates) > max_depth
     fast = np.abs(overspeed(robot, q, targets.frame_time)[:, block.dofs]).max(1, initial=0.0)
     violated[1:] |= fast > _MAX_OVERSPEED * targets.frame_time
     if block.base:
         for sole in robot.soles:
-            violated |= points_of(robot, poses, sole)[:, 2].min(0) < -_MAX_SINKING
-    return violated | (depth_in_floor(robot, poses, block) > _MAX_SINKING)
+            violated |= points_of(robot, poses, sole)[:, 2].min(0) < -max_sinking
+    return violated | (depth_in_floor(robot, poses, block) > max_sinking)

@@ -70,13 +70,26 @@ def _trajectory(robot: Morphology, targets: Targets) -> Coordinates:
     feet = plan_feet(robot, targets)
     stride = coarse_stride(targets)
     coarse = targets.every(stride)
-    q = on_mount(robot, project(robot, coarse.world, coarse.hips))
+    q = idle_at_rest(robot, on_mount(robot, project(robot, coarse.world, coarse.hips)))
     q = limit_speed(robot, q, coarse.frame_time)
     q = solve(robot, coarse, [foot.every(stride) for foot in feet], q)
     if stride > 1:
         q = q.upsampled(stride, len(targets))
     targets, feet = with_dynamics(robot, targets, reachable(robot, feet, q), q)
     return solve(robot, targets, feet, q, polish=True)
+
+
+def idle_at_rest(robot: Morphology, q: Coordinates) -> Coordinates:
+    """`q` with the joints that no block moves as in the T-pose."""
+    moved = {j for block in blocks_of(robot) for j in block.joints}
+    idle = [j for j in range(len(robot.tree)) if j not in moved]
+    angles = q.angles.copy()
+    angles[:, idle] = robot.tpose.angles[0, idle]
+    balls = q.ball_quats
+    if balls is not None and robot.tpose.ball_quats is not None:
+        balls = balls.copy()
+        balls[:, idle] = robot.tpose.ball_quats[0, idle]
+    return Coordinates(q.pos, q.quat, angles, balls)
 
 
 def coarse_stride(targets: Targets) -> int:
@@ -125,15 +138,16 @@ def _may_collide(robot: Morphology, targets: Targets, q: Coordinates, block: Blo
 
 
 def blocks_of(robot: Morphology) -> tuple[Block, Block]:
-    """Base, trunk and legs; then the rest: arms and head. Of a robot without legs all at once."""
+    """Base, trunk and legs; then arms and head. Of a robot without legs all at once. Joints beyond
+    the last part with a role, as those of grippers, stay as in the T-pose."""
     tree = robot.tree
+    named = zip(robot.links, robot.rig.roles.roles, strict=True)
+    moved = sorted({j for link, role in named if role for j in tree.chain(int(link))})
     if robot.mount is not None:
-        named = zip(robot.links, robot.rig.roles.roles, strict=True)
-        moved = sorted({j for link, role in named if role for j in tree.chain(int(link))})
         return Block(tree, (), False), Block(tree, tuple(moved), False)
     links = {int(robot.links[robot.rig.chest])}
     links |= {int(link) for sole in robot.soles for link in robot.sole_points(sole)[0]}
     links |= {int(robot.links[j]) for j in robot.rig.contact_joints}
     first = sorted({j for link in links for j in tree.chain(link)})
-    rest = tuple(j for j in range(len(tree)) if j not in first)
+    rest = tuple(j for j in moved if j not in first)
     return Block(tree, tuple(first), True), Block(tree, rest, False)

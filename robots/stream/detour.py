@@ -10,7 +10,8 @@ from jaxtyping import Float
 
 from robots.solver.projection import project
 from robots.stream.frame_targets import LATENCY, FrameReader, FrameTargets
-from robots.stream.terms import Posture, Terms
+from robots.stream.hinges import Posture
+from robots.stream.terms import Terms
 from spark.rotation import quat_from_matrix
 
 _LOST = np.radians(55)  # a bone farther from its direction is stuck,
@@ -44,7 +45,7 @@ class Detours:
             self._limbs.append(([k, k + 1], hinges))
         self._stuck = np.zeros(len(self._limbs))  # 1 where patience ends
         self._led = np.zeros(len(self._limbs))  # [s] left; below 0 it is left alone
-        self._goals = np.full(len(terms.at_tpose.angles), np.nan)
+        self._goals = np.full(len(terms.hinges.at_tpose.angles), np.nan)
 
     def update(
         self,
@@ -68,14 +69,14 @@ class Detours:
             world = quat_from_matrix(targets.world[:1])
             q = self._robot.to_qpos(project(self._robot, world, targets.hips[:1]))
             there = self._away(self._terms.bones(self._terms.poses(q))[0], wanted)
-            goals = self._terms.angles(q)[0]
+            goals = self._terms.hinges.angles(q)[0]
             for limb in stuck:
                 _, hinges = self._limbs[limb]
                 other_way = np.abs(goals[hinges] - angles[hinges]).max(initial=0.0) > _OTHER_WAY
                 better = other_way and there[limb] < worst[limb] - _GAIN
                 self._led[limb] = _MAX_DURATION if better else -_MAX_DURATION
                 self._goals[hinges] = goals[hinges] if better else np.nan
-        at_tpose, on_the_way = self._terms.at_tpose, np.isfinite(self._goals)
+        at_tpose, on_the_way = self._terms.hinges.at_tpose, np.isfinite(self._goals)
         if not on_the_way.any():
             return at_tpose
         # `LATENCY` frames lie ahead of the one at `angles`.

@@ -20,7 +20,8 @@ from robots.stream.frame_targets import FrameReader, FrameTargets
 from robots.stream.terms import FootTargets
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
 
-RAMP = 0.05  # [s] over which a foot is taken hold of and let go
+TAKE = 0.06  # [s] over which a foot is taken hold of,
+LET_GO = 0.1  # [s] and let go
 _RELEASE_FACTOR = (
     1.5  # times the speed and height at which a foot comes to stand: there it is let go
 )
@@ -76,7 +77,7 @@ class ContactTracker:
         arrived = self._arrived(targets, targets if first else self._history[-1].targets)
         self._history.extend([arrived] * (self._length if first else 1))
         settled = len(self._history) - 1 - self._ahead
-        ramp = 1.0 if first else self._frame_time / RAMP
+        take, let_go = (1.0 if first else self._frame_time / time for time in (TAKE, LET_GO))
         planted, holds, footprints = self._planted, self._holds, self._footprints
         seen = []
         for at in range(settled, len(self._history)):
@@ -86,7 +87,7 @@ class ContactTracker:
             known = np.logical_or(holds.any(axis=1), at == settled)
             if at == settled:
                 self._put(points, planted, holds)
-            holds = holds + np.clip(planted - holds, -ramp, ramp)
+            holds = holds + np.clip(planted - holds, -let_go, take)
             pivots = tuple(footprint.pivot for footprint in footprints)
             headings = tuple(footprint.heading for footprint in footprints)
             seen.append(_Seen(holds, height, known, pivots, headings))

@@ -70,7 +70,7 @@ class Stream:
             move_on(self._targets, targets)
             poses = self._terms.poses(q[_FIXED : _FIXED + 1])  # what is next to be said
             foot_targets = self._contacts.update(targets, self._terms.sole_points(poses)[0])
-            bones, angles = self._terms.bones(poses)[0], self._terms.angles(q)[_FIXED]
+            bones, angles = self._terms.bones(poses)[0], self._terms.hinges.angles(q)[_FIXED]
             posture = self._detours.update(self._targets, bones, angles)
             self._q = self._window.solve(q, self._targets, foot_targets, posture)
         else:

@@ -1,6 +1,6 @@
 """The objective of a few frames, in a few tenths of a millisecond.
 
-The terms are those of `robots.solver.objective`, but for the floor under other parts than soles,
+The terms are those of `robots.solver.objective`, but for the floor under other parts than feet,
 with the same weights, and so is the order: arms and head hang on base, trunk and legs, and don't
 move them. There every term walks its own chain, over thousands of frames; here MuJoCo gives the
 bodies' poses, and the Jacobian of all terms is made at once. Its columns are MuJoCo's dofs, in the
@@ -16,23 +16,22 @@ from jaxtyping import Bool, Float, Int
 
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
+from robots.solver.floor import rims_of
 from robots.solver.solve import blocks_of
 from robots.solver.weights import (
     FLOOR_ROUNDING,
     HANDS_RANGE,
-    LIMIT_MARGIN,
     W_FLOOR,
     W_HANDS,
     W_HIPS_POSITION,
     W_HOLD,
     W_LIMB_DIRECTION,
-    W_LIMIT,
     W_OTHER_ROTATION,
     W_ROTATION,
-    W_TPOSE,
 )
 from robots.stream.collision import WindowCollisions, WindowPoses
 from robots.stream.frame_targets import FrameTargets
+from robots.stream.hinges import Hinges, Posture
 from robots.tree import BASE
 from spark.rig.roles import Role
 
@@ -51,14 +50,6 @@ class FootTargets:
     holds: Float[np.ndarray, "T P 3"]
 
 
-@dataclass(frozen=True, eq=False)
-class Posture:
-    """The angles that hinges are pulled to [rad, as in qpos], and the weights of that [1/rad]."""
-
-    angles: Float[np.ndarray, "H"]
-    weights: Float[np.ndarray, "H"]
-
-
 class Terms:
     """The residuals of a robot's poses, as normal equations. `bones` are the limbs' segments whose
     directions the source gives, `hands` says whether it gives the offset between both."""
@@ -73,15 +64,7 @@ class Terms:
         self._in_first_block[[*blocks_of(robot)[0].joints, -1]] = True
         joints = np.array(robot.mj_joints, dtype=int)
         self._joints = np.repeat(joints, np.where(tree.balls, 3, 1))
-        self._hinge_dofs = tree.dof_starts[~tree.balls]
-        hinges = joints[~tree.balls]
-        self._hinge_qpos = self._model.jnt_qposadr[hinges]
-        rest = self._model.qpos0[self._hinge_qpos]
-        lower, upper = (limit[~tree.balls] + rest for limit in (tree.lower, tree.upper))
-        margin = np.minimum(LIMIT_MARGIN, 0.1 * (upper - lower))
-        self._soft_limits = lower + margin, upper - margin
-        angles = robot.tpose.angles[0, ~tree.balls] + rest
-        self.at_tpose = Posture(angles, np.full(len(angles), W_TPOSE))
+        self.hinges = Hinges(robot)
         bodies = np.array([self._body(link) for link in (*range(len(tree)), -1)])
         self._collisions = WindowCollisions(
             robot, bodies, self._rest, np.flatnonzero(self._in_first_block[:-1])
@@ -109,10 +92,6 @@ class Terms:
     def bones(self, poses: WindowPoses) -> Float[np.ndarray, "T B 3"]:
         """The unit directions of the bones [world]."""
         return (poses.rotations[:, self._bone_bodies] @ self._bones[:, :, None])[..., 0]
-
-    def angles(self, q: Float[np.ndarray, "T nq"]) -> Float[np.ndarray, "T H"]:
-        """The hinges' part of a `qpos`."""
-        return q[:, self._hinge_qpos]
 
     def candidates(self, q: Float[np.ndarray, "T nq"]) -> Int[np.ndarray, "K"]:
         """The collision candidates, in these poses and others that are not far away."""
@@ -150,7 +129,7 @@ class Terms:
         H += across @ (J_rows * weights.reshape(len(q), -1, 1))
         g += (across @ forces.reshape(len(q), -1, 1))[..., 0]
         self._collisions.add_to(poses, axes, anchors, candidates, H, g)
-        self._add_limits_and_posture(q, posture, H, g)
+        self.hinges.add_to(q, posture, H, g)
         return H, g
 
     def _dof_axes(
@@ -208,7 +187,8 @@ class Terms:
             weight = (W_HANDS * np.exp(-squared / HANDS_RANGE**2)) ** 2
             J[:, hips + 1] -= J[:, hips + 2]
             weights[:, hips + 1], weights[:, hips + 2] = weight, 0.0
-            between = points[:, -2] - points[:, -1] - targets.hands
+            left, right = hips + 1 - B, hips + 2 - B
+            between = points[:, left] - points[:, right] - targets.hands
             forces[:, hips + 1], forces[:, hips + 2] = weight * between, 0.0
         return J, weights, forces
 
@@ -219,33 +199,17 @@ class Terms:
         weights: Float[np.ndarray, "T P 3"],
         forces: Float[np.ndarray, "T P 3"],
     ) -> None:
-        """The footholds of the soles' points, and the floor; weights squared."""
+        """The footholds of the soles' points, and the floor under them and the feet's rims; weights
+        squared."""
         count = self._sole_count
+        weights[:, self._rims] = forces[:, self._rims] = 0.0
         hold_weights = (W_HOLD * foot_targets.holds) ** 2
         weights[:, :count] = hold_weights
         forces[:, :count] = hold_weights * (points[:, :count] - foot_targets.positions)
-        depth, slope = one_sided(-points[:, :count, 2], FLOOR_ROUNDING)
-        weights[:, :count, 2] += (W_FLOOR * slope) ** 2
-        forces[:, :count, 2] -= W_FLOOR**2 * slope * depth
-
-    def _add_limits_and_posture(
-        self,
-        q: Float[np.ndarray, "T nq"],
-        posture: Posture,
-        H: Float[np.ndarray, "T D D"],
-        g: Float[np.ndarray, "T D"],
-    ) -> None:
-        """Limits, as `limit_residual` has them, and the pull to the posture."""
-        angles = self.angles(q)
-        lower, upper = self._soft_limits
-        above, rising = one_sided(angles - upper, LIMIT_MARGIN / 4)
-        below, falling = one_sided(lower - angles, LIMIT_MARGIN / 4)
-        pull = posture.weights**2
-        diagonal = np.full(g.shape, 1e-6)
-        diagonal[:, self._hinge_dofs] = pull + (W_LIMIT * (rising + falling)) ** 2
-        H.reshape(len(q), -1)[:, :: H.shape[1] + 1] += diagonal
-        gradient = W_LIMIT**2 * (rising + falling) * (above - below)
-        g[:, self._hinge_dofs] += gradient + pull * (angles - posture.angles)
+        for part, radii in ((slice(count), 0.0), (self._rims, self._rim_radii)):
+            depth, slope = one_sided(radii - points[:, part, 2], FLOOR_ROUNDING)
+            weights[:, part, 2] += (W_FLOOR * slope) ** 2
+            forces[:, part, 2] -= W_FLOOR**2 * slope * depth
 
     def _body(self, link: int) -> int:
         robot = self.robot
@@ -289,8 +253,8 @@ class Terms:
         self._bones = np.einsum("bji,bj->bi", self._rest[0][self._bone_bodies], along)
 
     def _index_points(self, hands: bool) -> None:
-        """The soles' points, the middle of the hips and, where asked, both wrists; the dofs that
-        move these and the bones."""
+        """The soles' points, the middle of the hips, both wrists where asked, and the feet's rims;
+        the dofs that move these and the bones."""
         robot = self.robot
         soles = [robot.sole_points(sole) for sole in robot.soles]
         links = [link for own, _ in soles for link in own.tolist()]
@@ -304,6 +268,16 @@ class Terms:
                 j = robot.rig.roles.require(role)
                 links.append(int(robot.links[j]))
                 rest.append(robot.centers[j])
+        rims = [
+            (solid.link, center, radius)
+            for sole in robot.soles
+            for solid in rims_of(robot, sole)
+            for center, radius in zip(solid.spheres, solid.radii, strict=True)
+        ]
+        self._rims = slice(len(links), len(links) + len(rims))
+        self._rim_radii = np.array([radius for _, _, radius in rims])
+        links += [link for link, _, _ in rims]
+        rest += [center for _, center, _ in rims]
         self._point_bodies = np.array([self._body(link) for link in links])
         rotations, positions = (part[self._point_bodies] for part in self._rest)
         self._arms = np.einsum("pji,pj->pi", rotations, np.array(rest) - positions)

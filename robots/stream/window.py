@@ -9,8 +9,9 @@ from robots.model.morphology import Morphology
 from robots.solver.descent import LIMIT_CLEARANCE
 from robots.stream.coupling import Coupling
 from robots.stream.frame_targets import FrameTargets
+from robots.stream.hinges import Posture
 from robots.stream.prediction import TargetMotion
-from robots.stream.terms import FootTargets, Posture, Terms
+from robots.stream.terms import FootTargets, Terms
 
 _DAMPING = 1e-3  # [1] on the diagonal of the normal equations,
 _LONE_DAMPING = 0.02  # where frames are not coupled,
@@ -81,7 +82,7 @@ class Window:
                 q,
                 targets,
                 foot_targets,
-                self._terms.at_tpose,
+                self._terms.hinges.at_tpose,
                 candidates,
                 lone_damping=_LONE_DAMPING,
             )

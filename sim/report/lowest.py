@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from sim.outline import fibonacci_sphere, outline
+from sim.outline import fibonacci_sphere, outline, solid
 from sim.report.model_poses import ModelPoses, part_name
 from sim.trajectory import ModelTrajectory
 from spark.rotation import quat_conj, quat_rotate
@@ -21,8 +21,8 @@ def lowest_points(
 ) -> tuple[tuple[str, ...], Float[np.ndarray, "T B 3"], tuple[int, ...]]:
     """The names of the model's parts, the lowest point of each [m, world], and its first body.
 
-    They are those of the shapes that collide, or of all where none does; of round meshes to within
-    a millimetre or so. `feet` are what those parts are called that carry soles.
+    They are those of the solid shapes (`sim.outline`); of round meshes to within a millimetre.
+    `feet` are what those parts are called that carry soles.
     """
     outlines = _outlines(body.model, tuple(poses.bodies.tolist()))
     names = tuple(feet.get(part) or part_name(body.model, part) for part in outlines)
@@ -44,9 +44,8 @@ def _outlines(
     """The shapes of each part: the body that carries one, and its outline in that body's axes."""
     weld = model.body_weldid
     geoms = [int(g) for g in np.flatnonzero(np.isin(model.geom_bodyid, bodies))]
-    colliding = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
     found: dict[int, list[tuple[int, Float[np.ndarray, "P 3"], float]]] = {}
-    for g in colliding or geoms:
+    for g in solid(model, geoms):
         points, radius = outline(model, g, **_DETAIL, ring=_RING)
         if len(points):
             at = int(model.geom_bodyid[g])

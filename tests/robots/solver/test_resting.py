@@ -1,11 +1,14 @@
 """Hands, knees and the back: where they touch the ground, they lie on it and stay."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from robots.metrics import measure
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
+from robots.model.understand import understand_robot
 from robots.registry import find
 from robots.solver.resting import lowest_near
 from robots.solver.solve import copy, retarget
@@ -84,6 +87,17 @@ def test_all_fours_of_a_robot_with_other_limbs_lie_on_the_ground(ember: Morpholo
     copied = heights(copy(source, ember), (*KNEES, *HANDS))
     assert np.ptp(copied, axis=0).max() > 0.04  # its arms are longer than its thighs, or shorter
     lying = heights(retarget(source, ember), (*KNEES, *HANDS))
+    assert np.abs(lying).max() < 0.02
+
+
+def test_they_do_on_a_robot_whose_shapes_collide_with_nothing(tmp_path: Path) -> None:
+    text = Path(find("robot")).read_text(encoding="utf-8")
+    hollow = text.replace('<geom group="3"', '<geom group="3" contype="0" conaffinity="0"')
+    (tmp_path / "robot.xml").write_text(hollow, encoding="utf-8")
+    robot = understand_robot(tmp_path / "robot.xml")
+    model = robot.mjcf.model
+    assert not (model.geom_contype | model.geom_conaffinity).any()
+    lying = heights(retarget(on_all_fours(), robot), (*KNEES, *HANDS))
     assert np.abs(lying).max() < 0.02
 
 

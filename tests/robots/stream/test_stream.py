@@ -122,7 +122,9 @@ def test_the_objective_is_that_of_whole_clips() -> None:
         foot_targets = FootTargets(holds.positions[None, ..., t], holds.shares[None, ..., t])
         here = FrameTargets(*(getattr(seen, name)[one] for name in FrameTargets.__annotations__))
         qpos = EMBER.to_qpos(q.at(one))
-        H, g = terms.linearize(qpos, here, foot_targets, terms.at_tpose, terms.candidates(qpos))
+        H, g = terms.linearize(
+            qpos, here, foot_targets, terms.hinges.at_tpose, terms.candidates(qpos)
+        )
         turn = np.eye(tree.nv)
         turn[3:6, 3:6] = body_axes[t]
         H, g = turn @ H[0] @ turn.T, turn @ g[0]

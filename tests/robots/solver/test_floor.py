@@ -1,0 +1,89 @@
+"""The floor under all that a robot has, whatever its shapes are and whether they collide."""
+
+import re
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from robots.model.morphology import Morphology
+from robots.model.understand import understand_robot
+from robots.registry import find
+from robots.solver.floor import sole_paths
+from robots.solver.solve import retarget
+from robots.tree import forward_kinematics
+from scripts.robot_bars import follow
+from sim.outline import outline, solid
+from spark.demo.sample import sample_motion, sample_rig
+from spark.rig.roles import Role
+from spark.rotation import quat_from_rotvec, quat_mul
+from spark.transfer.canonical import CanonicalMotion, to_canonical
+
+FEET = {  # in place of Ember's boxes
+    "a box": '<geom class="foot"',
+    "a ball": '<geom class="foot" type="sphere" mass="0.6" size="0.05" pos="0.03 0 0"/><geom '
+    'class="visual" type="box"',
+    "a rod": '<geom class="foot" type="capsule" mass="0.6" size="0.03" '
+    'fromto="-0.03 0 -0.02 0.12 0 -0.02"/><geom class="visual" type="box"',
+    "round toes": '<geom class="foot" type="ellipsoid" mass="0.6" pos="0.045 0 -0.02" '
+    'size="0.11 0.04 0.03"/><geom class="visual" type="box"',
+}
+
+
+def ember(tmp_path: Path, foot: str) -> Morphology:
+    """Ember with other feet."""
+    text = Path(find("robot")).read_text(encoding="utf-8")
+    changed, count = re.subn('<geom class="foot"(?= mass)', FEET[foot], text)
+    assert count == 2
+    (tmp_path / "robot.xml").write_text(changed, encoding="utf-8")
+    return understand_robot(tmp_path / "robot.xml")
+
+
+def tiptoeing(degrees: float = 50.0) -> CanonicalMotion:
+    """A walker that goes to its knees on its toes."""
+    rig = sample_rig("walker")
+    source = to_canonical(sample_motion("squat", rig, 60.0).frames(0, 60), rig)
+    rotations = source.rotations.copy()
+    for side in ("left", "right"):
+        foot = list(rig.skeleton.subtree(rig.roles.require(Role(f"{side}_foot"))))
+        pitch = quat_from_rotvec(np.array([0.0, np.radians(degrees), 0.0]))
+        rotations[:, foot] = quat_mul(pitch, rotations[:, foot])
+    return CanonicalMotion(rig, source.frame_time, rotations, source.hips, source.floor_z)
+
+
+def lowest(robot: Morphology, qpos: np.ndarray) -> np.ndarray:
+    """The lowest point of the feet [m] in each frame: by MuJoCo's poses and the geoms' sizes."""
+    model, data = robot.mjcf.model, mujoco.MjData(robot.mjcf.model)
+    feet = [g for g in range(model.ngeom) if "foot" in model.body(model.geom_bodyid[g]).name]
+    out = []
+    for q in qpos:
+        data.qpos = q
+        mujoco.mj_kinematics(model, data)
+        heights = []
+        for geom in solid(model, feet):
+            down = -data.geom_xmat[geom].reshape(3, 3)[2][None]
+            points, radius = outline(model, geom, ellipsoid=down, mesh=down, ring=16)
+            heights.append((data.geom_xpos[geom][2] - points @ down[0]).min() - radius)
+        out.append(min(heights))
+    return np.array(out)
+
+
+@pytest.mark.parametrize("foot", FEET)
+def test_no_point_of_a_tilted_foot_is_lower_than_is_known(tmp_path: Path, foot: str) -> None:
+    robot = ember(tmp_path, foot)
+    rng = np.random.default_rng(1)
+    q = robot.tpose.at(np.zeros(200, dtype=int))
+    tilt = rng.uniform(-1, 1, (200, 3)) * np.radians([50, 50, 180])
+    turned = [quat_from_rotvec(tilt[:, [k]] * np.eye(3)[k]) for k in (2, 1, 0)]
+    q = type(q)(q.pos, quat_mul(quat_mul(*turned[:2]), turned[2]), q.angles, q.ball_quats)
+    poses = forward_kinematics(robot.tree, q)
+    found = np.min([sole_paths(robot, poses, sole)[..., 2].min(1) for sole in robot.soles], axis=0)
+    assert (found - lowest(robot, robot.to_qpos(q))).max() < 0.006
+
+
+@pytest.mark.parametrize("foot", FEET)
+@pytest.mark.parametrize("follows", [retarget, follow], ids=["whole", "stream"])
+def test_who_stands_on_tiptoe_does_not_sink(tmp_path: Path, foot: str, follows) -> None:
+    result = follows(tiptoeing(), ember(tmp_path, foot))
+    assert lowest(result.robot, result.qpos).min() > -0.007
