@@ -10,10 +10,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from robots.model.motion import RobotMotion
-from robots.solver.contacts import touching_joint
 from robots.solver.floor import sole_paths
-from robots.solver.resting import lowest_near
 from robots.solver.targets import bone_directions, targets_of
+from robots.solver.touching import touches_of
 from robots.tree import forward_kinematics
 from sim.report.assess import assess
 from sim.report.clip_poses import pose_clip
@@ -170,17 +169,16 @@ def _robot_soles(result: RobotMotion) -> list[Float[np.ndarray, "T _ 3"]]:
 
 def _resting(source: CanonicalMotion, result: RobotMotion) -> dict[str, float | None]:
     """Of the parts that rest in the source: the share of times at which the robot's is in the air,
-    and how fast its joint then slides."""
+    and how fast it then slides."""
     robot, targets = result.robot, targets_of(source, result.robot)
     poses = forward_kinematics(robot.tree, result.coordinates)
     in_air, speeds = [], []
     for k, role in enumerate(targets.part_roles):
-        joint = touching_joint(robot.rig, role)
-        if joint is not None:
+        touch = touches_of(robot).get(role)
+        if touch is not None:
             rests = targets.rests[:, k]
-            path = poses.point(int(robot.links[joint]), robot.centers[joint]).T
-            in_air.append(lowest_near(robot, poses, joint)[rests] > IN_AIR)
-            speeds.append(_speed(path, source.frame_time)[rests])
+            in_air.append(touch.lowest(poses)[rests] > IN_AIR)
+            speeds.append(_speed(touch.path(poses).T, source.frame_time)[rests])
     if not sum(map(len, in_air)):
         return {"rests_in_air": None, "rests_slide_m_s": None}
     return {

@@ -1,51 +1,42 @@
 """The floor under hands, knees and all other parts; soles' corners have their own residuals."""
 
 from functools import lru_cache
-from itertools import product
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from robots.least_squares import NormalEquations
 from robots.model.morphology import Morphology
+from robots.model.rims import rim
 from robots.residuals import one_sided, point_jacobian
 from robots.solver.block import Block
 from robots.solver.hulls import shapes_of
 from robots.tree import LinkPoses, forward_kinematics
-from sim.outline import outline
 from spark.rig.feet import Sole
-from spark.rotation import quat_between, quat_rotate
 
 _REACH = 0.02  # [m] above the floor within which shapes are looked at
 _FOOT_HEIGHT = 0.02  # [m] above the sole, below which a shape is part of the foot
 _FELT = 3  # roundings above the floor from which on a residual is worth its time
-_SPARED = 0.005  # hip heights by which a foot's shape may reach below its sole's corners
-_TILTS, _SIDES = np.radians([20.0, 40.0, 60.0]), np.linspace(0, 2 * np.pi, 17)[:-1]
-_TILTED_DOWN = np.array(  # unit vectors around straight down
-    [
-        (np.sin(tilt) * np.cos(side), np.sin(tilt) * np.sin(side), -np.cos(tilt))
-        for tilt, side in product(_TILTS, _SIDES)
-    ]
-)
 
 
 class Solid(NamedTuple):
     """What of link `link` may touch the floor: spheres, given in the rest pose [m], all of them
-    within `bound` of `center`."""
+    within `bound` of `center`. Of a foot the first `standing` ones may, while it stands or walks;
+    of other parts none."""
 
     link: int
     spheres: Float[np.ndarray, "S 3"]
     radii: Float[np.ndarray, "S"]
     center: Float[np.ndarray, "3"]
     bound: float
+    standing: int = 0
 
 
 @lru_cache(maxsize=16)
 def solids_over_floor(robot: Morphology) -> tuple[Solid, ...]:
     """The robot's solid shapes; of feet, which carry soles or are about as low as one in the
-    T-pose, the `rim`s."""
+    T-pose, the rims."""
     poses = forward_kinematics(robot.tree, robot.tpose)
     points = [robot.sole_points(sole) for sole in robot.soles]
     corners: dict[int, list[Float[np.ndarray, 3]]] = {}
@@ -54,57 +45,40 @@ def solids_over_floor(robot: Morphology) -> tuple[Solid, ...]:
         corners.setdefault(int(link), []).append(point)
         heights.append(poses.point(int(link), point)[2, 0])
     low = min(heights, default=-np.inf) + _FOOT_HEIGHT
-    out = []
+    out: list[Solid] = []
+    feet: dict[int, list[int]] = {}
     for shape in shapes_of(robot.mjcf, robot.mj_joints):
         bottoms = [
             poses.point(shape.link, center)[2, 0] - radius
             for center, radius in zip(shape.spheres, shape.radii, strict=True)
         ]
-        if shape.link not in corners and min(bottoms) > low:
+        if shape.link in corners or min(bottoms) <= low:
+            feet.setdefault(shape.link, []).append(shape.geom)
+        else:
             out.append(Solid(shape.link, shape.spheres, shape.radii, shape.center, shape.bound))
-            continue
-        down = -poses.rotations[shape.link][2, :, 0]
-        own = np.array(corners.get(shape.link, [])).reshape(-1, 3)
-        rest, radius = rim(robot, shape.geom, down, own)
+    for link, geoms in feet.items():
+        down = -poses.rotations[link][2, :, 0]
+        own = np.array(corners.get(link, [])).reshape(-1, 3)
+        rest, radii, standing = rim(robot.mjcf.model, geoms, down, own, robot.rig.hip_height)
         if len(rest):
             center = rest.mean(axis=0)
-            bound = radius + float(np.linalg.norm(rest - center, axis=1).max())
-            out.append(Solid(shape.link, rest, np.full(len(rest), radius), center, bound))
+            bound = float((np.linalg.norm(rest - center, axis=1) + radii).max())
+            out.append(Solid(link, rest, radii, center, bound, standing))
     return tuple(out)
 
 
-def rim(
-    robot: Morphology,
-    geom: int,
-    down: Float[np.ndarray, "3"],
-    corners: Float[np.ndarray, "C 3"],
-) -> tuple[Float[np.ndarray, "P 3"], float]:
-    """Of a foot's shape what lies lowest while it is tilted, where that is lower than the `corners`
-    of its sole, as round toes and heels are: points, and the radius of the ball around each. All in
-    the rest pose [m]; there the floor lies in the direction `down` as the foot stands in the
-    T-pose."""
-    model = robot.mjcf.model
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    place, rotation = data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3)
-    ways = quat_rotate(quat_between(np.array([0.0, 0.0, -1.0]), down), _TILTED_DOWN)
-    points, radius = outline(model, geom, ellipsoid=ways @ rotation, mesh=ways @ rotation, ring=24)
-    points = points @ rotation.T + place
-    reach = (ways @ corners.T).max(axis=1, initial=-np.inf) + _SPARED * robot.rig.hip_height
-    kept: list[Float[np.ndarray, 3]] = []
-    while True:
-        along = ways @ points.T + radius
-        way = int((along.max(axis=1) - reach).argmax())
-        if along[way].max() <= reach[way]:
-            return np.array(kept).reshape(-1, 3), radius
-        kept.append(points[along[way].argmax()])
-        reach = np.maximum(reach, along[:, along[way].argmax()] + _SPARED * robot.rig.hip_height)
-
-
-def rims_of(robot: Morphology, sole: Sole) -> list[Solid]:
-    """The rims of a foot, beyond its sole's corners."""
+def rims_of(robot: Morphology, sole: Sole) -> list[tuple[int, Float[np.ndarray, "3"], float]]:
+    """What of a foot, beyond its sole's corners, may touch the floor while it stands or walks: the
+    link, and a ball's centre and radius, in the rest pose [m]."""
     links = robot.sole_points(sole)[0]
-    return [solid for solid in solids_over_floor(robot) if solid.link in links]
+    return [
+        (solid.link, center, float(radius))
+        for solid in solids_over_floor(robot)
+        if solid.link in links
+        for center, radius in zip(
+            solid.spheres[: solid.standing], solid.radii[: solid.standing], strict=True
+        )
+    ]
 
 
 def sole_paths(robot: Morphology, poses: LinkPoses, sole: Sole) -> Float[np.ndarray, "T P 3"]:
@@ -112,9 +86,8 @@ def sole_paths(robot: Morphology, poses: LinkPoses, sole: Sole) -> Float[np.ndar
     each ball of its rims."""
     links, corners = robot.sole_points(sole)
     paths = [poses.point(int(link), point) for link, point in zip(links, corners, strict=True)]
-    for solid in rims_of(robot, sole):
-        for center, radius in zip(solid.spheres, solid.radii, strict=True):
-            paths.append(poses.point(solid.link, center) - [[0.0], [0.0], [radius]])
+    for link, center, radius in rims_of(robot, sole):
+        paths.append(poses.point(link, center) - [[0.0], [0.0], [radius]])
     return np.stack([path.T for path in paths], axis=1)
 
 
@@ -130,7 +103,14 @@ def add_floor(
     is `weight`; it sets in over `rounding` [m]."""
     for shape in _moved_solids(robot, block):
         joints = block.free_joints(shape.link)
-        frames = np.flatnonzero(poses.point(shape.link, shape.center)[2] < shape.bound + _REACH)
+        low = np.flatnonzero(poses.point(shape.link, shape.center)[2] < shape.bound + _REACH)
+        if not len(low):
+            continue
+        here = poses.at(low, [shape.link])
+        depth = np.stack([-here.point(shape.link, center)[2] for center in shape.spheres])
+        depth += shape.radii[:, None]
+        felt = depth > -_FELT * rounding[low]
+        frames = low[felt.any(axis=0)]
         if not len(frames):
             continue
         near = poses.at(frames)
@@ -139,19 +119,15 @@ def add_floor(
             unit = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, len(frames)))
             axes = np.concatenate([unit, axes])
         dofs = block.local_dofs(joints)
-        for center, radius in zip(shape.spheres, shape.radii, strict=True):
-            point = near.point(shape.link, center)
-            depth = radius - point[2]
-            felt = np.flatnonzero(depth > -_FELT * rounding[frames])
-            if not len(felt):
-                continue
-            here = frames[felt]
-            residual, slope = one_sided(depth[felt], rounding[here])
+        for k in np.flatnonzero(felt.any(axis=1)).tolist():
+            own, at = low[felt[k]], np.flatnonzero(felt[k, felt.any(axis=0)])
+            residual, slope = one_sided(depth[k, felt[k]], rounding[own])
             if not normal.with_jacobian:
-                normal.cost[here] += 0.5 * (weight[here] * residual) ** 2
+                normal.cost[own] += 0.5 * (weight[own] * residual) ** 2
                 continue
-            J = point_jacobian(near, joints, axes, point, base=block.base)[:, 2, felt]
-            normal.add_at(here, dofs, -J * slope * weight[here], residual * weight[here])
+            point = near.point(shape.link, shape.spheres[k])
+            J = point_jacobian(near, joints, axes, point, base=block.base)[:, 2, at]
+            normal.add_at(own, dofs, -J * slope * weight[own], residual * weight[own])
 
 
 def depth_in_floor(robot: Morphology, poses: LinkPoses, block: Block) -> Float[np.ndarray, "T"]:

@@ -13,12 +13,12 @@ from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from robots.model.morphology import Morphology
 from robots.solver.com_plan import Support, plan_com
-from robots.solver.contacts import touching_joint
 from robots.solver.dynamics import angular_momentum, center_of_mass
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import FootPlan
 from robots.solver.projection import hips_of
 from robots.solver.targets import Targets
+from robots.solver.touching import touches_of
 from robots.tree import Coordinates, LinkPoses, forward_kinematics
 
 TOUCH_HEIGHT = 0.03  # hip heights below which a sole's point pushes; the report counts 0.044
@@ -61,13 +61,9 @@ def _support(
     reach = max(1, round(TOUCH_SPAN / targets.frame_time))
     low = minimum_filter1d(points[..., 2], 2 * reach + 1, axis=0, mode="nearest")
     touching: Bool[np.ndarray, "T K"] = low < TOUCH_HEIGHT * robot.rig.hip_height
-    joints = [touching_joint(robot.rig, role) for role in targets.part_roles]
-    known = [k for k, joint in enumerate(joints) if joint is not None]
-    parts = [
-        poses.point(int(robot.links[joint]), robot.centers[joint])[:2].T
-        for joint in joints
-        if joint is not None
-    ]
+    touches = [touches_of(robot).get(role) for role in targets.part_roles]
+    known = [k for k, touch in enumerate(touches) if touch is not None]
+    parts = [touch.path(poses)[:2].T for touch in touches if touch is not None]
     alone = ~touching.any(axis=1) & ~targets.flight & ~targets.parts[:, known].any(axis=1)
     lowest = points[..., 2].argsort(axis=1)[:, :_HELD_POINTS]
     touching[np.flatnonzero(alone)[:, None], lowest[alone]] = True

@@ -268,12 +268,7 @@ class Terms:
                 j = robot.rig.roles.require(role)
                 links.append(int(robot.links[j]))
                 rest.append(robot.centers[j])
-        rims = [
-            (solid.link, center, radius)
-            for sole in robot.soles
-            for solid in rims_of(robot, sole)
-            for center, radius in zip(solid.spheres, solid.radii, strict=True)
-        ]
+        rims = [rim for sole in robot.soles for rim in rims_of(robot, sole)]
         self._rims = slice(len(links), len(links) + len(rims))
         self._rim_radii = np.array([radius for _, _, radius in rims])
         links += [link for link, _, _ in rims]

@@ -1,5 +1,6 @@
 """Hands, knees and the back: where they touch the ground, they lie on it and stay."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,9 @@ from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.model.understand import understand_robot
 from robots.registry import find
-from robots.solver.resting import lowest_near
 from robots.solver.solve import copy, retarget
 from robots.solver.targets import targets_of
+from robots.solver.touching import touches_of
 from robots.tree import forward_kinematics
 from spark.demo.sample import sample_rig
 from spark.rig.roles import Role
@@ -70,8 +71,7 @@ def on_all_fours(sway: float = 0.0) -> CanonicalMotion:
 def heights(result: RobotMotion, roles: tuple[Role, ...]) -> np.ndarray:
     """How low the robot's parts reach [m], a row each."""
     poses = forward_kinematics(result.robot.tree, result.coordinates)
-    rig = result.robot.rig
-    return np.stack([lowest_near(result.robot, poses, rig.roles.require(role)) for role in roles])
+    return np.stack([touches_of(result.robot)[role].lowest(poses) for role in roles])
 
 
 def test_hands_and_knees_of_the_source_are_seen_to_rest(ember: Morphology) -> None:
@@ -90,15 +90,32 @@ def test_all_fours_of_a_robot_with_other_limbs_lie_on_the_ground(ember: Morpholo
     assert np.abs(lying).max() < 0.02
 
 
+def changed(tmp_path: Path, pattern: str, by: str) -> Morphology:
+    """Ember with other text in its file."""
+    text, count = re.subn(pattern, by, Path(find("robot")).read_text(encoding="utf-8"))
+    assert count
+    (tmp_path / "robot.xml").write_text(text, encoding="utf-8")
+    return understand_robot(tmp_path / "robot.xml")
+
+
 def test_they_do_on_a_robot_whose_shapes_collide_with_nothing(tmp_path: Path) -> None:
-    text = Path(find("robot")).read_text(encoding="utf-8")
-    hollow = text.replace('<geom group="3"', '<geom group="3" contype="0" conaffinity="0"')
-    (tmp_path / "robot.xml").write_text(hollow, encoding="utf-8")
-    robot = understand_robot(tmp_path / "robot.xml")
+    robot = changed(tmp_path, '<geom group="3"', '<geom group="3" contype="0" conaffinity="0"')
     model = robot.mjcf.model
     assert not (model.geom_contype | model.geom_conaffinity).any()
     lying = heights(retarget(on_all_fours(), robot), (*KNEES, *HANDS))
     assert np.abs(lying).max() < 0.02
+
+
+def test_a_robot_without_wrists_goes_on_the_ends_of_its_arms(tmp_path: Path) -> None:
+    robot = changed(
+        tmp_path, r"(?s)<(joint|position) class=.wrist.[^>]*/>|<keyframe>.*</keyframe>", ""
+    )
+    assert robot.rig.roles.joint(Role.LEFT_HAND) is None
+    source = on_all_fours()
+    result = retarget(source, robot)
+    assert np.abs(heights(result, (*KNEES, *HANDS))).max() < 0.02
+    found = measure(from_canonical(source), source.rig, result)
+    assert found.rests_in_air == 0
 
 
 def test_hands_and_knees_stay_where_they_are_while_the_body_sways(ember: Morphology) -> None:
