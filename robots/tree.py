@@ -201,6 +201,11 @@ class LinkPoses:
         anchor = self.tree.base if link < 0 else self.tree.anchors[link]
         return self.positions[link] + self.direction(link, rest - anchor)
 
+    def heights(self, link: int, rest: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "P T"]:
+        """How high [m] some points of a link are."""
+        anchor = self.tree.base if link < 0 else self.tree.anchors[link]
+        return self.positions[link][2] + (rest - anchor) @ self.rotations[link][2]
+
     def direction(self, link: int, rest: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 T"]:
         """A direction that is fixed in a link, given in the rest pose's world."""
         return _apply(self.rotations[link], rest)

@@ -15,21 +15,17 @@ from robots.solver.hulls import shapes_of
 from robots.tree import LinkPoses, forward_kinematics
 from spark.rig.feet import Sole
 
-_REACH = 0.02  # [m] above the floor within which shapes are looked at
 _FOOT_HEIGHT = 0.02  # [m] above the sole, below which a shape is part of the foot
 _FELT = 3  # roundings above the floor from which on a residual is worth its time
 
 
 class Solid(NamedTuple):
-    """What of link `link` may touch the floor: spheres, given in the rest pose [m], all of them
-    within `bound` of `center`. Of a foot the first `standing` ones may, while it stands or walks;
-    of other parts none."""
+    """What of link `link` may touch the floor: spheres, given in the rest pose [m]. Of a foot the
+    first `standing` ones may, while it stands or walks; of other parts none."""
 
     link: int
     spheres: Float[np.ndarray, "S 3"]
     radii: Float[np.ndarray, "S"]
-    center: Float[np.ndarray, "3"]
-    bound: float
     standing: int = 0
 
 
@@ -55,15 +51,13 @@ def solids_over_floor(robot: Morphology) -> tuple[Solid, ...]:
         if shape.link in corners or min(bottoms) <= low:
             feet.setdefault(shape.link, []).append(shape.geom)
         else:
-            out.append(Solid(shape.link, shape.spheres, shape.radii, shape.center, shape.bound))
+            out.append(Solid(shape.link, shape.spheres, shape.radii))
     for link, geoms in feet.items():
         down = -poses.rotations[link][2, :, 0]
         own = np.array(corners.get(link, [])).reshape(-1, 3)
         rest, radii, standing = rim(robot.mjcf.model, geoms, down, own, robot.rig.hip_height)
         if len(rest):
-            center = rest.mean(axis=0)
-            bound = float((np.linalg.norm(rest - center, axis=1) + radii).max())
-            out.append(Solid(link, rest, radii, center, bound, standing))
+            out.append(Solid(link, rest, radii, standing))
     return tuple(out)
 
 
@@ -103,30 +97,25 @@ def add_floor(
     is `weight`; it sets in over `rounding` [m]."""
     for shape in _moved_solids(robot, block):
         joints = block.free_joints(shape.link)
-        low = np.flatnonzero(poses.point(shape.link, shape.center)[2] < shape.bound + _REACH)
-        if not len(low):
-            continue
-        here = poses.at(low, [shape.link])
-        depth = np.stack([-here.point(shape.link, center)[2] for center in shape.spheres])
-        depth += shape.radii[:, None]
-        felt = depth > -_FELT * rounding[low]
-        frames = low[felt.any(axis=0)]
+        depth = shape.radii[:, None] - poses.heights(shape.link, shape.spheres)
+        felt = depth > -_FELT * rounding
+        frames = np.flatnonzero(felt.any(axis=0))
         if not len(frames):
             continue
-        near = poses.at(frames)
+        near = poses.at(frames, {shape.link, *joints, *robot.tree.parents[list(joints)].tolist()})
         axes = near.angular_jacobian(joints)
         if block.base:
             unit = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, len(frames)))
             axes = np.concatenate([unit, axes])
         dofs = block.local_dofs(joints)
         for k in np.flatnonzero(felt.any(axis=1)).tolist():
-            own, at = low[felt[k]], np.flatnonzero(felt[k, felt.any(axis=0)])
-            residual, slope = one_sided(depth[k, felt[k]], rounding[own])
+            own = np.flatnonzero(felt[k])
+            residual, slope = one_sided(depth[k, own], rounding[own])
             if not normal.with_jacobian:
                 normal.cost[own] += 0.5 * (weight[own] * residual) ** 2
                 continue
             point = near.point(shape.link, shape.spheres[k])
-            J = point_jacobian(near, joints, axes, point, base=block.base)[:, 2, at]
+            J = point_jacobian(near, joints, axes, point, base=block.base)[:, 2, felt[k, frames]]
             normal.add_at(own, dofs, -J * slope * weight[own], residual * weight[own])
 
 
@@ -134,12 +123,8 @@ def depth_in_floor(robot: Morphology, poses: LinkPoses, block: Block) -> Float[n
     """How deep [m] the deepest of those shapes is in the floor; 0 where none is."""
     out = np.zeros(poses.positions.shape[2])
     for shape in _moved_solids(robot, block):
-        frames = np.flatnonzero(poses.point(shape.link, shape.center)[2] < shape.bound)
-        if len(frames):
-            near = poses.at(frames, [shape.link])
-            for center, radius in zip(shape.spheres, shape.radii, strict=True):
-                depth = radius - near.point(shape.link, center)[2]
-                out[frames] = np.maximum(out[frames], depth)
+        depth = shape.radii[:, None] - poses.heights(shape.link, shape.spheres)
+        np.maximum(out, depth.max(axis=0), out=out)
     return out
 
 
