@@ -16,6 +16,7 @@ from spark.blocks import blocks
 # Velocities are taken over a window, of cubic splines, which frames bend less and less: one so far
 # away by less than rounding does (0.27 to this power).
 _SPLINE = 32  # frames
+_PRECISION = np.float32  # of what is kept of each frame: seven digits, half of an hour's memory
 _ROWS = (
     *("depth", "clearance", "corner_skates", "corner_speeds", "sole_heights", "sole_speeds"),
     *("base_acceleration", "unexplained_wrench", "imbalance", "joint_speed", "joint_jerk"),
@@ -39,7 +40,8 @@ def measure_clip(subject: Subject, floor_z: float) -> ClipMetrics:
         own = slice(block.start - near.start, block.stop - near.start)
         for name, values in _rows_of(clip):
             if name not in rows:  # pages of zeros take no memory until something is written
-                rows[name] = np.zeros((count, *values.shape[1:]), values.dtype)
+                kept = _PRECISION if values.dtype == np.float64 else values.dtype
+                rows[name] = np.zeros((count, *values.shape[1:]), kept)
             rows[name][block] = values[own]
     return _with_rows(clip, rows)
 

@@ -47,15 +47,17 @@ def by_pair(report: Report) -> Report:
     return replace(report, clip=sorted_pairs(report.clip), source=source)
 
 
-def assert_the_same(one: Report, other: Report) -> None:
+def assert_the_same(one: Report, other: Report, within: float = 1e-9) -> None:
     mine, theirs = dict(numbers(by_pair(one))), dict(numbers(by_pair(other)))
     assert mine.keys() == theirs.keys()
     for name, value in mine.items():
         if isinstance(value, np.ndarray) and value.dtype != bool:
             scale = np.abs(value[np.isfinite(value)]).max(initial=1.0)
-            np.testing.assert_allclose(theirs[name], value, rtol=0, atol=1e-9 * scale, err_msg=name)
+            np.testing.assert_allclose(
+                theirs[name], value, rtol=0, atol=within * scale, err_msg=name
+            )
         elif isinstance(value, float):
-            assert theirs[name] == pytest.approx(value, rel=1e-9, abs=1e-9), name
+            assert theirs[name] == pytest.approx(value, rel=within, abs=within), name
         else:
             assert np.all(value == theirs[name]), name
 
@@ -88,6 +90,13 @@ def other(dance: Subject) -> Subject:
     return Subject(broken(moved), rig)
 
 
+@pytest.fixture
+def exact(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is kept of each frame is not rounded."""
+    monkeypatch.setattr("sim.report.stretches._PRECISION", np.float64)
+
+
+@pytest.mark.usefixtures("exact")
 def test_a_character(dance: Subject, other: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
     truth = replace(other.motion, root_pos=other.motion.root_pos + 0.02)
     whole = assess(other, source=dance, truth=truth)
@@ -103,6 +112,17 @@ def test_a_character(dance: Subject, other: Subject, monkeypatch: pytest.MonkeyP
             np.testing.assert_allclose(again[name], value, atol=1e-9)
 
 
+def test_what_is_kept_of_each_frame_is_rounded_to_seven_digits(
+    dance: Subject, other: Subject, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = assess(other, source=dance)
+    monkeypatch.setattr(blocks, "BLOCK", STRETCH)
+    parts = assess(other, source=dance)
+    assert parts.clip.joint_speed.dtype == np.float32
+    assert_the_same(whole, parts, within=1e-6)
+
+
+@pytest.mark.usefixtures("exact")
 def test_a_robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With torques, shapes and limits of its model; the motion is bad on purpose."""
     spark_sim.sample(tmp_path)
@@ -115,6 +135,7 @@ def test_a_robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert_the_same(whole, assess(subject))
 
 
+@pytest.mark.usefixtures("exact")
 def test_a_margin_too_short_is_seen(dance: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
     """The law above can fail."""
     whole = assess(dance)
