@@ -11,8 +11,10 @@ from jaxtyping import Float
 from sim.outline import outline
 from spark.rotation import quat_between, quat_rotate
 
-_SPARED = 0.005  # hip heights by which a foot may reach below what is known of it
-_STANDING, _LYING = np.radians([20.0, 40.0, 60.0]), np.radians([80.0, 100.0, 120.0])
+# Tilts of a foot that stands, and of one that lies; hip heights by which it may then reach below
+# what is known of it.
+_STANDING = np.radians([20.0, 40.0, 60.0]), 0.005
+_LYING = np.radians([80.0, 100.0, 120.0]), 0.01
 _SIDES = np.linspace(0, 2 * np.pi, 17)[:-1]
 _RING = 24  # points on either edge of a cylinder
 
@@ -32,7 +34,7 @@ def rim(
     mujoco.mj_kinematics(model, data)
     upright = quat_between(np.array([0.0, 0.0, -1.0]), down)
     kept, kept_radii, counts = corners, np.zeros(len(corners)), []
-    for tilts in (_STANDING, _LYING):
+    for tilts, spared in (_STANDING, _LYING):
         ways = quat_rotate(upright, _tilted_down(tilts))
         points, radii = _outlines(model, data, geoms, ways)
         along = ways @ points.T + radii
@@ -40,7 +42,7 @@ def rim(
             reach = (ways @ kept.T + kept_radii).max(axis=1, initial=-np.inf)
             way = int((along.max(axis=1) - reach).argmax())
             best = int(along[way].argmax())
-            if along[way, best] <= reach[way] + _SPARED * hip_height:
+            if along[way, best] <= reach[way] + spared * hip_height:
                 break
             kept = np.concatenate([kept, points[[best]]])
             kept_radii = np.append(kept_radii, radii[best])
