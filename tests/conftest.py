@@ -64,6 +64,7 @@ SLOW = (
     "tests/spark_sim/test_train_command.py",
     "tests/test_packaging.py",
     "tests/test_readme.py",
+    "tests/spark_sim/test_odd_files.py",
 )
 
 

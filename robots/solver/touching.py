@@ -31,9 +31,8 @@ class Touch(NamedTuple):
 
     def lowest(self, poses: LinkPoses) -> Float[np.ndarray, "T"]:
         """How high [m] it reaches down."""
-        found = zip(self.spheres, self.radii, strict=True)
-        heights = [poses.point(self.link, center)[2] - radius for center, radius in found]
-        lowest: Float[np.ndarray, T] = np.min(heights, axis=0)
+        heights = poses.heights(self.link, self.spheres) - self.radii[:, None]
+        lowest: Float[np.ndarray, T] = heights.min(axis=0)
         return lowest
 
 

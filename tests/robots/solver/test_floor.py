@@ -1,6 +1,5 @@
 """The floor under all that a robot has, whatever its shapes are and whether they collide."""
 
-import re
 from pathlib import Path
 
 import mujoco
@@ -8,8 +7,6 @@ import numpy as np
 import pytest
 
 from robots.model.morphology import Morphology
-from robots.model.understand import understand_robot
-from robots.registry import find
 from robots.solver.floor import sole_paths
 from robots.solver.solve import retarget
 from robots.tree import forward_kinematics
@@ -19,6 +16,7 @@ from spark.demo.sample import sample_motion, sample_rig
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_mul
 from spark.transfer.canonical import CanonicalMotion, to_canonical
+from tests.helpers.ember import changed_ember
 
 FEET = {  # in place of Ember's boxes
     "a box": '<geom class="foot"',
@@ -33,11 +31,7 @@ FEET = {  # in place of Ember's boxes
 
 def ember(tmp_path: Path, foot: str) -> Morphology:
     """Ember with other feet."""
-    text = Path(find("robot")).read_text(encoding="utf-8")
-    changed, count = re.subn('<geom class="foot"(?= mass)', FEET[foot], text)
-    assert count == 2
-    (tmp_path / "robot.xml").write_text(changed, encoding="utf-8")
-    return understand_robot(tmp_path / "robot.xml")
+    return changed_ember(tmp_path, '<geom class="foot"(?= mass)', FEET[foot])
 
 
 def tiptoeing(degrees: float = 50.0) -> CanonicalMotion:

@@ -1,6 +1,5 @@
 """Hands, knees and the back: where they touch the ground, they lie on it and stay."""
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 from robots.metrics import measure
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
-from robots.model.understand import understand_robot
 from robots.registry import find
 from robots.solver.solve import copy, retarget
 from robots.solver.targets import targets_of
@@ -20,6 +18,7 @@ from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_mul
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, from_canonical
 from spark_sim.loading import load_robot
+from tests.helpers.ember import changed_ember
 
 KNEES = (Role.LEFT_LOWER_LEG, Role.RIGHT_LOWER_LEG)
 HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
@@ -90,16 +89,10 @@ def test_all_fours_of_a_robot_with_other_limbs_lie_on_the_ground(ember: Morpholo
     assert np.abs(lying).max() < 0.02
 
 
-def changed(tmp_path: Path, pattern: str, by: str) -> Morphology:
-    """Ember with other text in its file."""
-    text, count = re.subn(pattern, by, Path(find("robot")).read_text(encoding="utf-8"))
-    assert count
-    (tmp_path / "robot.xml").write_text(text, encoding="utf-8")
-    return understand_robot(tmp_path / "robot.xml")
-
-
 def test_they_do_on_a_robot_whose_shapes_collide_with_nothing(tmp_path: Path) -> None:
-    robot = changed(tmp_path, '<geom group="3"', '<geom group="3" contype="0" conaffinity="0"')
+    robot = changed_ember(
+        tmp_path, '<geom group="3"', '<geom group="3" contype="0" conaffinity="0"'
+    )
     model = robot.mjcf.model
     assert not (model.geom_contype | model.geom_conaffinity).any()
     lying = heights(retarget(on_all_fours(), robot), (*KNEES, *HANDS))
@@ -107,7 +100,7 @@ def test_they_do_on_a_robot_whose_shapes_collide_with_nothing(tmp_path: Path) ->
 
 
 def test_a_robot_without_wrists_goes_on_the_ends_of_its_arms(tmp_path: Path) -> None:
-    robot = changed(
+    robot = changed_ember(
         tmp_path, r"(?s)<(joint|position) class=.wrist.[^>]*/>|<keyframe>.*</keyframe>", ""
     )
     assert robot.rig.roles.joint(Role.LEFT_HAND) is None
