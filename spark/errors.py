@@ -37,6 +37,18 @@ class DependencyError(SparkSimError):
     """An optional package or system library is missing; the message says how to install it."""
 
 
+def unforeseen(error: Exception) -> str:
+    """What is told of an error that was not raised on purpose."""
+    if lacks_memory(error):
+        return "needs more memory than there is"
+    return f"{type(error).__name__}: {error}; this is a fault of spark-sim, please report it"
+
+
+def lacks_memory(error: Exception) -> bool:
+    """Whether Python, MuJoCo or torch say that there is no memory left."""
+    return isinstance(error, MemoryError) or "allocate memory" in str(error)
+
+
 def name_list(names: list[str]) -> str:
     """Names for a message: the first five in quotes, and how many more there are."""
     shown = ", ".join(map(repr, names[:5]))

@@ -1,9 +1,10 @@
 """The `spark-sim` program: makes sure that the packages are its own, then runs the command line.
 
-Only `sys` and `signal` are imported here: `sim` and `robots` are common names, and code of another
-distribution must not run any further than its own `__init__`.
+Only modules of Python's own are imported here: `sim` and `robots` are common names, and code of
+another distribution must not run any further than its own `__init__`.
 """
 
+import os
 import signal
 import sys
 
@@ -28,6 +29,7 @@ def main() -> int:
     """Run the command line; returns the exit code."""
     # Until the command runs, Ctrl-C ends the process as the system does it, without a traceback.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    _open_streams()
     problem = foreign_package()
     if problem is not None:
         print(
@@ -44,6 +46,14 @@ def main() -> int:
         if hasattr(stream, "reconfigure"):  # a terminal without our letters shows their numbers
             stream.reconfigure(errors="backslashreplace")
     return run(sys.argv[1:], ready=_listen)
+
+
+def _open_streams() -> None:
+    """Put nothing where the shell closed stdin, stdout or stderr: a file of ours that took their
+    number would get what libraries print."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115
 
 
 def _listen() -> None:

@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from itertools import takewhile
 from typing import Any, NoReturn
 
-from spark.errors import DivergedError, SparkSimError
+from spark.errors import DivergedError, SparkSimError, lacks_memory, unforeseen
 from spark_sim import console
 from spark_sim.commands import (
     batch,
@@ -56,8 +56,7 @@ class _Formatter(RawDescriptionHelpFormatter):
     """Help of one look on every Python, whatever the terminal."""
 
     def __init__(self, prog: str) -> None:
-        width = min(int(os.environ.get("COLUMNS") or _terminal_width()), 100)
-        super().__init__(prog, max_help_position=26, width=width - 2)
+        super().__init__(prog, max_help_position=26, width=min(_width(), 100) - 2)
 
     def _format_action_invocation(self, action: Action) -> str:
         if not action.option_strings or action.nargs == 0:
@@ -66,7 +65,10 @@ class _Formatter(RawDescriptionHelpFormatter):
         return f"{', '.join(action.option_strings)} {value}"
 
 
-def _terminal_width() -> int:
+def _width() -> int:
+    """The columns of the terminal, or what the environment says."""
+    if re.fullmatch("[0-9]{1,9}", columns := os.environ.get("COLUMNS", "")):
+        return int(columns) or 80
     try:
         return os.get_terminal_size(sys.stdout.fileno()).columns or 80
     except (OSError, ValueError):
@@ -205,8 +207,10 @@ def _run(args: Namespace) -> int:
         return _fail(str(error), FAILED)
     except OSError as error:
         place = "" if error.filename is None else f"{error.filename}: "
-        return _fail(f"{place}{error.strerror or error}", FAILED)
+        return _fail(f"{place or _lost_folder()}{error.strerror or error}", FAILED)
     except Exception as error:
+        if lacks_memory(error):
+            return _fail(f"this {unforeseen(error)}", FAILED)
         if os.environ.get("SPARK_SIM_TRACEBACK"):
             raise
         return _fail(
@@ -215,6 +219,15 @@ def _run(args: Namespace) -> int:
             INTERNAL_ERROR,
         )
     return code
+
+
+def _lost_folder() -> str:
+    """What to say before an error without a place: whether the current folder was deleted."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return "the current folder, which was deleted: "
+    return ""
 
 
 def _carry_out(args: Namespace) -> int:

@@ -42,12 +42,22 @@ def notes(path: str | Path, notes: Sequence[str]) -> None:
 
 def note(text: str) -> None:
     """What should be known."""
-    _line(f"{PROGRAM}: note: {text}", sys.stderr)
+    _aside(f"{PROGRAM}: note: {text}")
 
 
 def error(text: str) -> None:
     """What went wrong."""
-    _line(f"{PROGRAM}: error: {text}", sys.stderr)
+    _aside(f"{PROGRAM}: error: {text}")
+
+
+def _aside(text: str) -> None:
+    """A line on stderr. A disk that is full of such lines does not end the work."""
+    try:
+        _line(text, sys.stderr)
+    except BrokenPipeError:
+        raise
+    except OSError:
+        pass
 
 
 def _line(text: str, stream: TextIO) -> None:

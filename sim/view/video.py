@@ -72,6 +72,7 @@ def _encode(
             process.wait()
             raise
     if process.returncode:
+        message = message or f"it ended with {process.returncode}"
         raise OutputError(f"{path}: the video encoder failed: {message}")
 
 

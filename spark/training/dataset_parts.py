@@ -15,7 +15,7 @@ from zipfile import BadZipFile
 import numpy as np
 from jaxtyping import Bool, Float
 
-from spark.errors import SparkSimError
+from spark.errors import SparkSimError, unforeseen
 from spark.files import write_atomically
 from spark.io.companions import companions
 from spark.io.reading import read_motion
@@ -117,10 +117,8 @@ def _understood(path: Path) -> Part | Rejected:
     except SparkSimError as error:
         why = str(error).removeprefix(f"{path}: ").replace(f"{path}:", "line ")
         return Rejected(why.replace(str(path), path.name))
-    except MemoryError:
-        return Rejected("needs more memory than there is", again=True)
     except Exception as error:  # one bad file does not end the work on thousands
-        return Rejected(f"a fault of spark-sim: {type(error).__name__}: {error}", again=True)
+        return Rejected(unforeseen(error), again=True)
     return Part(
         rig,
         clip.rotations.astype(np.float32),

@@ -14,6 +14,7 @@ from spark_sim.commands.options import (
     add_json,
     add_robot_motion,
     add_workers,
+    check_given,
     given,
     workers,
 )
@@ -108,15 +109,14 @@ def run(args: Namespace) -> int:
     from spark_sim.shelf.work import target_clip
 
     out = Path(args.output)
-    reading = {name: value for name, value in given(args).items() if name != "fps"}
-    if args.source_fps is not None:
-        reading["fps"] = args.source_fps
+    reading = given(args, fps="source-fps")
     if args.fps is not None and not 0 < args.fps <= MAX_FPS:
         raise ConventionError(f"--fps {args.fps:g}: expected a rate above 0, up to {MAX_FPS}")
     fps = SONIC_FPS if args.fps is None and args.format == "sonic" else args.fps
     options = Options(args.method, args.format, fps, args.cut, reading)
     keep = None if args.keep is None else parse(args.keep)
     jobs = plan(args.sources, args.to, out, options, mirror=args.mirror)
+    check_given(args, list(dict.fromkeys(job.source for job in jobs)), fps="source-fps")
     backend = _backend(args)
     for target in args.to:
         console.notes(target, target_clip(target).notes)
@@ -159,7 +159,11 @@ def _backend(args: Namespace) -> "Backend":
     """Who does the jobs: processes of this machine, which begin to start, or a cluster's."""
     from functools import partial
 
+    from spark.errors import ConventionError
+
     if args.backend == "ray":
+        if args.workers is not None:
+            raise ConventionError("--workers goes with --backend local; Ray uses a cluster's cores")
         from spark_sim.shelf.ray_cluster import on_ray
 
         return on_ray

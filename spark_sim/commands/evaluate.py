@@ -113,6 +113,8 @@ def run(args: Namespace) -> int:
         files.check_ending(path, (".md", ".json", ".csv"), "a table")
     if args.limit is not None and args.limit < 1:
         raise ConventionError(f"--limit {args.limit}: expected 1 or more")
+    if args.seed < 0:
+        raise ConventionError(f"--seed {args.seed}: expected 0 or more")
     results = dict(_named(result) for result in args.result)
     if results and args.made:
         raise ConventionError("--result goes with recorded answers: no tool was given those --made")

@@ -8,6 +8,7 @@ from spark_sim.commands.options import (
     add_force,
     add_json,
     add_robot_motion,
+    check_given,
     load,
 )
 
@@ -63,6 +64,7 @@ def run(args: Namespace) -> int:
             if len(args.files) > 1:
                 raise OutputError(f"{option} takes one FILE; each rig has a map of its own")
             files.claim(written, force=args.force, endings=endings, what=what)
+    check_given(args, args.files)
     for path in args.files:
         clip = load(args, path, humanoid=False)
         described = describe(clip)

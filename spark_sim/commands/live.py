@@ -73,6 +73,10 @@ def run(args: Namespace) -> int:
     from spark_sim import console
 
     if args.recover is not None:
+        others = ("to", "send", "record", "fps", "view", "serve", "address")
+        refused = ["from"] * (args.source is not None) + [o for o in others if getattr(args, o)]
+        if refused:
+            raise ConventionError(f"--recover goes alone, without --{refused[0]}")
         from spark_sim.live.journal import recover
 
         console.say(str(recover(Path(args.recover), force=args.force)))
@@ -164,7 +168,7 @@ def _play(args: Namespace) -> int:
     from spark_sim.live.sender import play
     from spark_sim.loading import load
 
-    if args.to or args.record or args.view or args.serve or len(args.send) != 1:
+    if args.to or args.record or args.view or args.serve or args.address or len(args.send) != 1:
         raise ConventionError(
             f"{args.source} is played to a listener: give --send vmc://HOST:PORT or "
             "xsens://HOST:PORT, and no more (what moves a robot is --from vmc:// or xsens://)"

@@ -3,7 +3,7 @@
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from spark_sim.commands.options import add_corrections, add_force, load
+from spark_sim.commands.options import add_corrections, add_force, check_given, load
 
 SUMMARY = "make a MuJoCo body from a BVH skeleton"
 USAGE = "RIG [-o OUT] [options]"
@@ -48,6 +48,7 @@ def run(args: Namespace) -> int:
     from spark_sim import console
 
     out = Path(args.output or f"{Path(args.rig).stem}.xml")
+    check_given(args, [args.rig])
     rig = load(args, args.rig)
     written, notes = rig.save_mjcf(out, joints=args.joints, mesh=args.mesh, force=args.force)
     console.notes(out, notes)

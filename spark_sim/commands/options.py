@@ -2,6 +2,8 @@
 
 import os
 from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from spark_sim.choices import Quat
@@ -84,28 +86,62 @@ def add_robot_motion(
 _READING = ("unit", "up", "roles", "body_model", "clip", "robot", "quat", "fps")
 
 
-def given(args: Namespace, prefix: str = "") -> dict[str, Any]:
+def given(args: Namespace, prefix: str = "", *, fps: str | None = None) -> dict[str, Any]:
     """What the user says of the files that options with this prefix are for, as `load` of
-    `spark_sim` takes it."""
-    start = prefix.replace("-", "_")
-    values = {name: vars(args).get(start + name.replace("roles", "map")) for name in _READING}
+    `spark_sim` takes it. `fps` is another name for the option of their rate."""
+    options = _options(prefix, fps)
+    values = {name: vars(args).get(option.replace("-", "_")) for name, option in options.items()}
     return {name: value for name, value in values.items() if value is not None}
+
+
+def _options(prefix: str, fps: str | None) -> dict[str, str]:
+    """The option for each thing that `load` of `spark_sim` takes."""
+    of = {name: prefix + name.replace("_", "-") for name in _READING}
+    return of | {"roles": f"{prefix}map", "fps": fps or of["fps"]}
+
+
+def check_given(
+    args: Namespace, files: "Sequence[str | Path]", prefix: str = "", *, fps: str | None = None
+) -> None:
+    """Raise `ConventionError` where an option with this prefix goes with none of the `files` that
+    it is for; say which ones it is left out for, where it goes with others."""
+    from spark.errors import ConventionError, name_list
+    from spark_sim import console
+
+    for name in given(args, prefix, fps=fps):
+        option = f"--{_options(prefix, fps)[name]}"
+        others = [str(file) for file in files if not _may_take(file, name)]
+        if not files:
+            raise ConventionError(f"{option}: there is no file that it is for; leave it out")
+        if len(others) == len(files):
+            raise ConventionError(f"{option} does not go with {name_list(others)}; leave it out")
+        if others:
+            console.note(f"{option} is left out for {name_list(others)}, which it does not go with")
+
+
+def _may_take(file: "str | Path", name: str) -> bool:
+    """Whether `load` takes this of a file; also where it will say that the file can't be read."""
+    from spark.errors import SparkSimError
+    from spark_sim.loading import takes
+
+    try:
+        return name in takes(file)
+    except (SparkSimError, OSError):
+        return True
 
 
 def load(args: Namespace, path: str, prefix: str = "", *, humanoid: bool = True) -> "AnyClip":
     """The clip of `path`, read with the corrections given; its notes go to stderr.
 
-    Options go to the kinds of file that they are for, so that one command takes several kinds.
-    Raises `SkeletonError` where the body is no `humanoid` and must be one.
+    Options go to the kinds of file that they are for, so that one command takes several kinds:
+    `check_given` comes first. Raises `SkeletonError` where the body is no `humanoid` and must be
+    one.
     """
     from spark_sim import console, loading
     from spark_sim.clips import Clip
 
-    wanted = given(args, prefix)
-    for name in wanted.keys() - set(loading.takes(path)):
-        del wanted[name]
-        option = f"{prefix}{'map' if name == 'roles' else name.replace('_', '-')}"
-        console.note(f"{path}: --{option} is left out, it does not apply to such a file")
+    taken = loading.takes(path)
+    wanted = {name: value for name, value in given(args, prefix).items() if name in taken}
     loaded = loading.load(path, **wanted)
     if isinstance(loaded, Clip) and not humanoid:
         console.notes(path, loaded.recording.notes)

@@ -7,7 +7,14 @@ from textwrap import fill
 from typing import Any
 
 from sim.view.timeline import SPEEDS
-from spark_sim.commands.options import add_corrections, add_force, add_json, add_robot_motion, load
+from spark_sim.commands.options import (
+    add_corrections,
+    add_force,
+    add_json,
+    add_robot_motion,
+    check_given,
+    load,
+)
 
 SUMMARY = "watch motions: window, video, web page, picture"
 USAGE = "FILE... [--video MP4] [--html HTML] [--strip PNG]"
@@ -104,9 +111,13 @@ def run(args: Namespace) -> int:
         raise ConventionError("--address goes with --serve")
     outputs = {name: getattr(args, name) for name in ("video", "html", "strip", "gif", "webp")}
     wanted = {name: Path(path) for name, path in outputs.items() if path is not None}
+    check_given(args, args.files)
     if args.serve:
-        if wanted or args.physics:
-            other = "physics" if args.physics else next(iter(wanted))
+        others = ("physics", "assist", "policy", "spec", "seeds", "json", "mesh", "same_height")
+        refused = [*wanted, *(name for name in others if getattr(args, name))]
+        refused += ["speed"] * (args.speed != 1.0)
+        if refused:
+            other = refused[0].replace("_", "-")
             raise ConventionError(f"--serve shows a page in a browser; --{other} goes without it")
         return _serve(args)
     if not args.files:
@@ -115,6 +126,8 @@ def run(args: Namespace) -> int:
         raise ConventionError("--assist and --json go with --physics")
     if (args.policy is None) != (args.spec is None) or (args.policy and not args.physics):
         raise ConventionError("--policy FILE.onnx goes with --physics and --spec FILE.toml")
+    if args.speed != 1.0 and [*wanted] == ["strip"]:
+        raise ConventionError("--speed does not go with --strip, a picture that stands still")
     if args.policy and args.assist:
         raise ConventionError("--assist helps servos; a policy goes without")
     if args.seeds and not args.policy:

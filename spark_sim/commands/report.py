@@ -11,6 +11,7 @@ from spark_sim.commands.options import (
     add_json,
     add_robot_motion,
     add_workers,
+    check_given,
     load,
 )
 
@@ -99,6 +100,10 @@ def run(args: Namespace) -> int:
     paths = [path for path in (args.file, *args.compare) if path is not None]
     if len({*paths}) < len(paths) or not paths or (args.compare and len(paths) < 2):
         raise ConventionError("a report needs a FILE, and --compare at least two that differ")
+    if args.workers is not None:
+        raise ConventionError("--workers goes with a folder; files are measured one by one")
+    check_given(args, [*paths, args.truth] if args.truth else paths)
+    check_given(args, [args.source] if args.source else [], "source-")
     source = None if args.source is None else load(args, args.source, "source-")
     if len(paths) > 1:
         return _verdict(args, _compared(args, paths, source))

@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from spark_sim.commands.options import given, workers
+from spark_sim.commands.options import check_given, given, workers
 
 if TYPE_CHECKING:
     from spark_sim.shelf.items import Item
@@ -31,8 +31,12 @@ def report_folder(args: Namespace) -> float | None:
     files.claim(page, force=True, endings=(".html", ".htm"), what="a page")
     *tables, clips = outputs(page)
     begin()
+    source_reading = given(args, "source-")
     sources = None if args.source is None else Path(args.source)
-    found = items(folder, given(args), sources, given(args, "source-"))
+    found = items(folder, given(args), sources, source_reading)
+    check_given(args, [item.path for item in found])
+    origins = [item.origin for item in found if item.origin is not None]
+    check_given(args, [o.path for o in origins if o.reading == source_reading], "source-")
     claim_outputs([page, *tables], clips, force=args.force)
     done = []
     backend = partial(in_processes, workers=min(workers(args), len(found)), slow=_at_work)

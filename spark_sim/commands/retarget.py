@@ -12,6 +12,7 @@ from spark_sim.commands.options import (
     add_force,
     add_json,
     add_robot_motion,
+    check_given,
     load,
 )
 
@@ -133,6 +134,8 @@ def run(args: Namespace) -> int:
         else:
             files.check_free(out, force=args.force)
             files.check_ending(out, character_files.ENDINGS, "a character's motion")
+    check_given(args, [source for source, _ in jobs], fps="source-fps")
+    check_given(args, [args.to], "to-")
     target = load(args, args.to, "to-")
     failures = 0
     for source, out in console.progress(jobs, "retarget"):

@@ -21,7 +21,7 @@ from sim.report import assess
 from sim.report.page import report_page
 from sim.template import Template
 from sim.view.page import page
-from spark.errors import ConventionError, SparkSimError
+from spark.errors import ConventionError, SparkSimError, unforeseen
 from spark_sim import api
 from spark_sim.clips import AnyClip, Clip
 from spark_sim.loading import load
@@ -169,8 +169,8 @@ class _Handler(BaseHTTPRequestHandler):
         except SparkSimError as error:
             self._send_json(HTTPStatus.BAD_REQUEST, {"error": str(error)})
         except Exception as error:
-            told = f"a fault of spark-sim: {type(error).__name__}: {error}"
-            self._send_json(HTTPStatus.INTERNAL_SERVER_ERROR, {"error": told})
+            told = {"error": unforeseen(error)}
+            self._send_json(HTTPStatus.INTERNAL_SERVER_ERROR, told)
         else:
             self._send_json(HTTPStatus.OK, answer)
 

@@ -6,7 +6,7 @@ from typing import Any
 from sim.report import assess
 from sim.report.page import write_report_page
 from sim.trajectory import Subject
-from spark.errors import SparkSimError
+from spark.errors import SparkSimError, unforeseen
 from spark_sim.clips import AnyClip
 from spark_sim.loading import load, takes
 from spark_sim.shelf.fingerprint import fingerprint
@@ -27,7 +27,7 @@ def measure(item: Item, page: Path) -> Measured:
     except (SparkSimError, OSError) as error:
         reason = str(error)
     except Exception as error:  # a fault of ours in one file must not end the others
-        reason = f"{type(error).__name__}: {error}; this is a fault of spark-sim, please report it"
+        reason = unforeseen(error)
     return Measured(item.name, {"file": item.name}, error=reason)
 
 

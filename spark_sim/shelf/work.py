@@ -11,7 +11,7 @@ from typing import Any
 from robots.formats import written_files
 from sim.report import assess
 from sim.trajectory import Subject
-from spark.errors import SparkSimError
+from spark.errors import SparkSimError, unforeseen
 from spark.io.convention import Convention
 from spark.io.encoding import encode_new
 from spark.io.recording import Recording
@@ -60,7 +60,7 @@ def work(job: Job, folder: Path) -> Done:
     except (SparkSimError, OSError) as error:
         reason = str(error)
     except Exception as error:  # a fault of ours in one file must not end the others
-        reason = f"{type(error).__name__}: {error}; this is a fault of spark-sim, please report it"
+        reason = unforeseen(error)
     return Done((), facts, time.perf_counter() - start, reason)
 
 
