@@ -5,10 +5,11 @@ checkout; without one, the rigs that are built here alone)
 
 Recorded rigs are counted against tables that were written by looking at them
 (tests/helpers/role_tables.py), Mixamo's by its own names. The rigs that are built come as they are,
-as caricatures (each part of the body 0.4 to 2.5 times as long) and, of each convention, with joints
-dropped, split and scaled. Prints Markdown, and each wrong joint.
+as caricatures (each part of the body 0.4 to 2.5 times as long), both with every word misspelt, and,
+of each convention, with joints dropped, split and scaled. Prints Markdown, and each wrong joint.
 """
 
+import re
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -18,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from spark.demo.sample import sample_rig
+from spark.errors import SkeletonError
 from spark.io.reading import SUFFIXES, read_motion
 from spark.network.features import body_features
 from spark.rig.name_conventions import CONVENTIONS
@@ -77,6 +79,55 @@ def _caricature(skeleton: Skeleton, right: Roles, seed: int) -> Skeleton:
     return replace(skeleton, offsets=np.where(np.arange(len(right))[:, None], offsets, 0.0))
 
 
+def misspelt(spoil: Callable[[str, np.random.Generator], str], each: int = 6) -> Rigs:
+    """`each` of the ecosystem's rigs and of their caricatures, with all words of four letters and
+    more spoilt, but for sides."""
+    for name, chains in RIGS.items():
+        skeleton, right = build(chains)
+        for seed in range(each):
+            for made in (skeleton, _caricature(skeleton, right, seed)):
+                rng = np.random.default_rng(seed)
+                names = (_spoilt(joint, spoil, rng) for joint in made.names)
+                made = replace(made, names=tuple(names))
+                try:
+                    found = assign_roles(made).roles
+                except SkeletonError:
+                    found = (None,) * len(made)
+                yield f"{name} {seed}", made, right, found
+
+
+def _spoilt(
+    name: str, spoil: Callable[[str, np.random.Generator], str], rng: np.random.Generator
+) -> str:
+    def word(found: re.Match[str]) -> str:
+        own = found[0]
+        kept = len(own) < 4 or own.lower() in ("left", "right") or own == "mixamorig"
+        return own if kept else spoil(own, rng)
+
+    return _WORD.sub(word, name)
+
+
+_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
+
+
+def letter_missing(word: str, rng: np.random.Generator) -> str:
+    k = int(rng.integers(1, len(word)))
+    return word[:k] + word[k + 1 :]
+
+
+def letters_swapped(word: str, rng: np.random.Generator) -> str:
+    k = int(rng.integers(1, len(word) - 1))
+    return word[:k] + word[k + 1] + word[k] + word[k + 2 :]
+
+
+def three_letters(word: str, _: np.random.Generator) -> str:
+    return word[:3]
+
+
+def without_vowels(word: str, _: np.random.Generator) -> str:
+    return word[0] + re.sub("[aeiou]", "", word[1:])
+
+
 def conventions(each: int) -> Rigs:
     """Bodies made as training makes them, `each` named by every convention."""
     base = same_body(body_features(sample_rig("walker"))).body
@@ -98,6 +149,15 @@ def main(folder: str = str(DATA)) -> None:
         "the ecosystem's rigs": partial(ecosystem, 0),
         "their caricatures": partial(ecosystem, 40),
         "made conventions": partial(conventions, 42),
+        **{
+            f"misspelt: {told}": partial(misspelt, spoil)
+            for told, spoil in (
+                ("a letter missing", letter_missing),
+                ("two letters swapped", letters_swapped),
+                ("three letters", three_letters),
+                ("no vowels", without_vowels),
+            )
+        },
     }
     print("| | rigs | with a wrong role | wrong joints | confused sides |\n|---|---|---|---|---|")
     told = []

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 
+from spark.inference.name_words import rig_words
 from spark.motion import Motion
 from spark.network.features import body_features
-from spark.network.name_words import rig_words
 from spark.rig.name_conventions import CONVENTIONS
 from spark.rig.rig import understand
 from spark.rig.roles import Role

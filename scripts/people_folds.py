@@ -17,8 +17,8 @@ from pathlib import Path
 from spark.evaluation.cases import Case, made_cases
 from spark.evaluation.evaluate import Method, Positions, as_method, evaluate
 from spark.evaluation.tables import markdown
+from spark.inference.weights import read_weights
 from spark.network.retarget import NetworkRetargeter
-from spark.network.weights import read_weights
 from spark.training.cuts import TrainingClip
 from spark.training.dataset import Performance, read_performances
 from spark.training.settings import TrainConfig, read_settings

@@ -131,16 +131,16 @@ def _filled_in(
 
 def _learned(checkpoint: File | None) -> "NetworkRetargeter":
     """The network of a checkpoint, or the one that ships."""
+    from spark.inference.weights import read_weights
     from spark.network.retarget import NetworkRetargeter
-    from spark.network.weights import read_weights
 
     return _shipped() if checkpoint is None else NetworkRetargeter(read_weights(Path(checkpoint)))
 
 
 @cache
 def _shipped() -> "NetworkRetargeter":
+    from spark.inference.weights import SHIPPED, read_weights
     from spark.network.retarget import NetworkRetargeter
-    from spark.network.weights import SHIPPED, read_weights
 
     return NetworkRetargeter(read_weights(SHIPPED))
 

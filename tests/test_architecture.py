@@ -11,6 +11,7 @@ import pytest
 CHECKOUT = Path(__file__).parents[1]
 ROOMS = (
     ("spark",),  # its own files: errors, files, rotation, skeleton, motion, kinematics, resample
+    ("spark.inference",),
     ("spark.io", "spark.rig"),
     ("spark.transfer",),
     ("spark.demo", "spark.network"),

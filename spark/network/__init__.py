@@ -1,1 +1,1 @@
-"""Runs the SPARK network, on numpy alone: its features, forward pass and weights."""
+"""Runs the SPARK network, on numpy alone: its features and forward pass."""

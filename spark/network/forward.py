@@ -10,6 +10,8 @@ import math
 import numpy as np
 from jaxtyping import Float, Int
 
+from spark.inference.layers import Layers, attend, join_heads, split_heads
+from spark.inference.weights import Weights
 from spark.kinematics import local_rotations, world_positions, world_rotations
 from spark.network.config import (
     LN_ROTARY_BASE,
@@ -23,8 +25,6 @@ from spark.network.config import (
     Config,
 )
 from spark.network.features import BodyFeatures
-from spark.network.layers import Layers, attend, join_heads, split_heads
-from spark.network.weights import Weights
 from spark.network.windows import Windows
 from spark.rotation import quat_conj, quat_from_sixd, quat_mul, sixd_from_quat
 

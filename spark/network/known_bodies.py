@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from spark.inference.weights import Trunk
 from spark.network.features import BodyFeatures
 from spark.rig.roles import Role
 
@@ -19,9 +20,6 @@ from spark.rig.roles import Role
 _MAX_DISTANCE = 0.1
 _SAME_BODY = 0.001  # [hip heights]
 _TRUNK = (Role.SPINE, Role.NECK, Role.HEAD, Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE)
-
-Trunk = dict[str, tuple[float, ...]]
-"""Where the joints of a trunk lie in the T-pose, over the hips, by name [hip heights]."""
 
 
 def trunk_of(body: BodyFeatures) -> Trunk:

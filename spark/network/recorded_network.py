@@ -3,9 +3,9 @@
 import numpy as np
 
 from spark.errors import FileFormatError
-from spark.network.layers import Layers, attend, join_heads, split_heads
+from spark.inference.layers import Layers, attend, join_heads, split_heads
+from spark.inference.weights import Weights
 from spark.network.recorded import BodyTokens, Habits, KnownBodies
-from spark.network.weights import Weights
 
 # A step of Adam moves a head's output by about rate times width: what habits have to say is small.
 HABIT_SCALE = 0.1

@@ -16,6 +16,8 @@ from jaxtyping import Float, Int
 
 from spark.blocks import in_blocks
 from spark.errors import DependencyError, name_list
+from spark.inference.names import NameNetwork
+from spark.inference.weights import Weights
 from spark.network.features import (
     BodyFeatures,
     body_features,
@@ -24,10 +26,8 @@ from spark.network.features import (
 )
 from spark.network.forward import Network
 from spark.network.known_bodies import similarity
-from spark.network.names import NameNetwork
 from spark.network.recorded import as_recorded, tokens_of
 from spark.network.recorded_network import PREFIX, RecordedNetwork
-from spark.network.weights import Weights
 from spark.network.windows import Windows
 from spark.resample import rotations_at, values_at
 from spark.rig.rig import Rig

@@ -52,13 +52,15 @@ class NameHint:
     """What a name says. `parts` gives roles without their side and how surely the name means them.
 
     `aside` tells why the joint is none of the roles ("a finger"); `foreleg` marks a front leg,
-    `wing` a wing: limbs in the place of arms.
+    `wing` a wing: limbs in the place of arms. `unread`: no rule reads the name, which has a word
+    that is not known; its parts, if any, are the name encoder's (`spark.rig.name_votes`).
     """
 
     side: str = ""
     parts: dict[str, float] = field(default_factory=dict)
     aside: str = ""
     foreleg: bool = False
+    unread: bool = False
 
 
 def read_names(names: Sequence[str]) -> list[NameHint]:
@@ -113,14 +115,17 @@ def _read(pieces: tuple[str, ...], axes: bool) -> NameHint:
     if axes and "shoulder" in words:
         parts = {"upper_arm": 0.9}  # its hinges: robots have no clavicles
     if side and set(parts) <= {"pelvis", "spine", "neck", "head"}:
-        return NameHint(side, aside="beside the midline") if parts else NameHint(side)
+        return NameHint(
+            side, aside="beside the midline" if parts else "", unread=unknown and not parts
+        )
     if "foot" in parts and numbers and numbers[0] > 0:
         parts = {"foot": 0.5, "toe": 0.7}
     doubt = 0.6 if unknown else 1.0
     if set(parts) - {"spine", "neck", "wing"}:
         # Of a joint and its numbered companions the first is meant.
         doubt *= max(0.4, 1.0 - 0.08 * sum(min(n, 9) for n in numbers))
-    return NameHint(side, {p: doubt * s for p, s in parts.items()}, "", foreleg)
+    sure = {part: doubt * s for part, s in parts.items()}
+    return NameHint(side, sure, "", foreleg, unread=unknown and not parts)
 
 
 def _words(pieces: tuple[str, ...]) -> tuple[set[str], list[int], bool]:
@@ -156,16 +161,18 @@ def _known(piece: str) -> list[str]:
 
 @lru_cache(maxsize=4096)
 def _misspelt(piece: str) -> list[str]:
-    """The only word of a joint that a letter more, less, or another makes of `piece`."""
+    """The only word of a joint that is `piece` but for a letter, or for two swapped."""
     near = [word for word in _SPELT if abs(len(word) - len(piece)) < 2 and _one_off(word, piece)]
     return near if len(near) == 1 else []
 
 
 def _one_off(a: str, b: str) -> bool:
-    """Whether one letter is added, left out, or another."""
+    """Whether one letter is added, left out, or another, or two neighbours are swapped."""
     same = next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), None)
     if same is None:
         return len(a) != len(b)
+    if a[same : same + 2] == b[same : same + 2][::-1] and a[same + 2 :] == b[same + 2 :]:
+        return True
     longer, shorter = (a, b) if len(a) >= len(b) else (b, a)
     return longer[same + 1 :] == shorter[same + (len(a) == len(b)) :]
 

@@ -8,6 +8,7 @@ from spark.rig.anatomy import Anatomy, find_anatomy
 from spark.rig.facing import LabelledPair
 from spark.rig.measurements import measure
 from spark.rig.name_hints import NameHint, read_names
+from spark.rig.name_votes import with_votes
 from spark.rig.override import Override, check_chains, check_override
 from spark.rig.roles import Role, RoleMap
 from spark.skeleton import Skeleton
@@ -30,7 +31,7 @@ def assign_roles(
     """
     override = override or {}
     check_override(skeleton, override)
-    hints = read_names(skeleton.names)
+    hints = with_votes(skeleton, read_names(skeleton.names))
     try:
         found = _infer(skeleton, motion, hints)
     except SkeletonError as error:
@@ -71,7 +72,7 @@ def _infer(skeleton: Skeleton, motion: Motion | None, hints: Sequence[NameHint])
     ):
         for j in joints:
             named = part in hints[j].parts
-            why = f"name {skeleton.names[j]!r}" if named else reason
+            why = _by_name(skeleton, hints, j) if named else reason
             found[j] = (role, _confidence(named, True, role is not Role.HEAD), why)
     for limb in (anatomy.legs, anatomy.arms):
         if limb is not None:
@@ -97,12 +98,18 @@ def _infer_limb(
             sure = _confidence(named, joint in anatomy.mirrored, agreement > _CLEAR_SIDE)
             why = f"chain from the {'pelvis down' if is_leg else 'trunk outwards'}"
             if named:
-                why = f"name {skeleton.names[joint]!r}"
+                why = _by_name(skeleton, hints, joint)
             if limb.pair.sided and agreement < -_CLEAR_SIDE:
                 sure, why = 0.6 * sure, f"{why}, though it lies on the other side of the body"
             elif not limb.pair.sided and agreement < _CLEAR_SIDE:
                 sure, why = 0.6 * sure, f"{why}; the side is a guess"
             found[joint] = (Role(f"{side}_{part}"), sure, why)
+
+
+def _by_name(skeleton: Skeleton, hints: Sequence[NameHint], joint: int) -> str:
+    """The reason where a name tells the role."""
+    by = " as the name encoder reads it" if hints[joint].unread else ""
+    return f"name {skeleton.names[joint]!r}{by}"
 
 
 def _confidence(named: bool, chained: bool, shaped: bool) -> float:

@@ -1,4 +1,4 @@
-"""Checkpoints: a file (`spark.network.weights`) with weights and settings, and beside it one that
+"""Checkpoints: a file (`spark.inference.weights`) with weights and settings, and beside it one that
 only resuming needs, the optimiser's state at that step.
 
 Draws and noise are functions of the step's number, so the step is all that there is of the state
@@ -17,11 +17,11 @@ from torch import Tensor
 
 from spark.errors import FileFormatError
 from spark.files import write_atomically
+from spark.inference.weights import FORMAT, VERSION, Tensors, read_weights
 from spark.network.config import Config
 from spark.network.known_bodies import Trunk
 from spark.network.recorded_network import PREFIX as RECORDED
 from spark.network.recorded_network import check_recorded
-from spark.network.weights import FORMAT, VERSION, Tensors, read_weights
 from spark.opening import check_regular
 from spark.training.model import Spark
 from spark.training.name_encoder import NameConfig, NameEncoder

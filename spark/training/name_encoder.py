@@ -20,7 +20,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 from torch.nn.utils.rnn import pad_sequence
 
-from spark.network.name_words import BYTE_OFFSET, PAD, name_tokens, relative_buckets, rig_words
+from spark.inference.name_words import BYTE_OFFSET, PAD, name_tokens, relative_buckets, rig_words
 
 _CHUNKS = 4  # of a batch's names, by length: less padding
 

@@ -9,7 +9,7 @@ from safetensors.torch import save
 
 from spark.errors import FileFormatError
 from spark.files import write_atomically
-from spark.network.weights import FORMAT as CHECKPOINT
+from spark.inference.weights import FORMAT as CHECKPOINT
 from spark.opening import check_regular, parse_json
 from spark.training.checkpoint import load_checkpoint
 from spark.training.name_encoder import NameConfig, NameEncoder

@@ -11,13 +11,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from spark.network.name_words import rig_words
+from spark.inference.name_words import rig_words
+from spark.inference.weights import OTHER
 from spark.rig.name_conventions import CONVENTIONS, name_joints
 from spark.rig.roles import Role
 
 KINDS = tuple(dict.fromkeys(role.part for role in Role))
-OTHER = "other"
-"""The kind of a joint without a role."""
 
 Named = tuple[str, str, str]
 """A joint's name, side and kind."""

@@ -5,9 +5,9 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from spark.inference.weights import Weights
 from spark.network.features import BodyFeatures
 from spark.network.forward import Names, Network, decoder_noise
-from spark.network.weights import Weights
 from spark.network.windows import Windows
 from spark.training.batch import each
 from spark.training.collator import Collator

@@ -17,8 +17,8 @@ import torch
 from torch import nn
 
 from spark.errors import DivergedError
+from spark.inference.weights import SHIPPED
 from spark.network.known_bodies import distinct_trunks
-from spark.network.weights import SHIPPED
 from spark.training.batch import Batch, UnpairedBatch
 from spark.training.checkpoint import (
     Checkpoint,

@@ -11,8 +11,8 @@ from spark_sim.commands.options import add_force
 if TYPE_CHECKING:
     from spark.evaluation.cases import Case
     from spark.evaluation.evaluate import LegFitter, MethodScores
+    from spark.inference.weights import Weights
     from spark.network.forward import Network
-    from spark.network.weights import Weights
     from spark.transfer.target_prior import RetargetMethod
 
 SUMMARY = "measure methods against a ground truth"
@@ -210,7 +210,7 @@ def _named(given: str) -> tuple[str, str]:
 
 
 def _checkpoint(given: str) -> tuple[str, Any]:
-    from spark.network.weights import read_weights
+    from spark.inference.weights import read_weights
 
     name, equals, rest = given.partition("=")
     named = equals and not Path(given).exists()

@@ -30,7 +30,7 @@ def configure(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     from spark.errors import DependencyError
-    from spark.network.weights import SHIPPED
+    from spark.inference.weights import SHIPPED
     from spark_sim import console, files
 
     out = Path(args.output)

@@ -15,6 +15,7 @@ from sim.body.build import build_body
 from sim.body.qpos import qpos_from_motion
 from sim.report import Subject, assess
 from spark.demo.sample import BUILDS, Build, make_skeleton, sample_motion, sample_rig
+from spark.inference.weights import SHIPPED, read_weights
 from spark.io.bvh import read_bvh, write_bvh
 from spark.io.encoding import encode_new
 from spark.kinematics import forward
@@ -22,7 +23,6 @@ from spark.motion import Motion
 from spark.network.features import body_features
 from spark.network.known_bodies import trunk_of
 from spark.network.retarget import NetworkRetargeter
-from spark.network.weights import SHIPPED, read_weights
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.skeleton import Skeleton

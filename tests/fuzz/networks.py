@@ -7,8 +7,8 @@ from tempfile import TemporaryDirectory
 
 import spark_sim
 from spark.demo.sample import sample_rig
+from spark.inference.weights import read_weights
 from spark.network.retarget import NetworkRetargeter
-from spark.network.weights import read_weights
 from spark.skeleton import Skeleton
 from spark_sim import rolemap
 from tests.fuzz.target import Target, finite

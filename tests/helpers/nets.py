@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from spark.inference.weights import read_weights
 from spark.network.retarget import NetworkRetargeter
-from spark.network.weights import read_weights
 from spark.training.checkpoint import Checkpoint, save_checkpoint
 
 

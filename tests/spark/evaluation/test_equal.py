@@ -9,8 +9,8 @@ from spark.evaluation.cases import Case, performances, recorded_cases
 from spark.evaluation.equal import equal_rows, why_no_prior, why_silent
 from spark.evaluation.evaluate import MethodScores, as_method, evaluate
 from spark.evaluation.metrics import Score
+from spark.inference.weights import SHIPPED, read_weights
 from spark.network.retarget import NetworkRetargeter
-from spark.network.weights import SHIPPED, read_weights
 from spark.transfer.analytic import transfer
 
 

@@ -12,10 +12,10 @@ import torch
 from onnxruntime import InferenceSession
 
 from spark.errors import ConventionError, FileFormatError
+from spark.inference.names import NameNetwork
+from spark.inference.weights import read_weights
 from spark.network.config import Config
 from spark.network.forward import Network
-from spark.network.names import NameNetwork
-from spark.network.weights import read_weights
 from spark.training.checkpoint import Checkpoint, save_checkpoint
 from spark.training.collator import Collator
 from spark.training.model import Spark

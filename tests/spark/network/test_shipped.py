@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from spark.inference.weights import SHIPPED, read_weights
 from spark.io.reading import read_motion
 from spark.network.retarget import NetworkRetargeter
-from spark.network.weights import SHIPPED, read_weights
 from spark.rig.rig import understand
 from spark.rig.roles import Role
 from spark.transfer.analytic import transfer

@@ -10,7 +10,7 @@ from safetensors import safe_open
 from safetensors.torch import save_file
 
 from spark.errors import FileFormatError
-from spark.network.weights import VERSION, read_weights
+from spark.inference.weights import VERSION, read_weights
 from spark.training.checkpoint import load_checkpoint, save_checkpoint
 from spark.training.cuts import TrainingClip
 from spark.training.name_encoder import NameEncoder

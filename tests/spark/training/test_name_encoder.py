@@ -17,10 +17,10 @@ from safetensors.numpy import save_file as save_arrays
 from safetensors.torch import save_file
 
 from spark.errors import ConventionError, DependencyError, FileFormatError
-from spark.network.name_words import PAD, rig_words
+from spark.inference.name_words import PAD, rig_words
+from spark.inference.weights import SHIPPED, read_weights
 from spark.network.retarget import NetworkRetargeter
 from spark.network.t5 import T5Names
-from spark.network.weights import SHIPPED, read_weights
 from spark.rig.name_conventions import CONVENTIONS, HELD_OUT, name_joints
 from spark.rig.roles import Role
 from spark.training.checkpoint import load_checkpoint, save_checkpoint

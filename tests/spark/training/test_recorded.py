@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from spark.errors import FileFormatError
+from spark.inference.weights import read_weights
 from spark.network.features import body_features
 from spark.network.recorded import (
     HABITS,
@@ -20,7 +21,6 @@ from spark.network.recorded import (
 )
 from spark.network.recorded_network import VERSION, RecordedNetwork
 from spark.network.retarget import NetworkRetargeter
-from spark.network.weights import read_weights
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_mul

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from spark.inference.names import NameNetwork
+from spark.inference.weights import read_weights
 from spark.network.config import Config
 from spark.network.forward import Network
-from spark.network.names import NameNetwork
-from spark.network.weights import read_weights
 from spark.training.checkpoint import Checkpoint, save_checkpoint
 from spark.training.model import Spark
 from spark.training.name_encoder import NameConfig, NameEncoder

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from jaxtyping import Float
 
-from spark.network.weights import Weights
+from spark.inference.weights import Weights
 
 Array = Float[np.ndarray, "..."]
 

@@ -15,17 +15,22 @@ from safetensors import SafetensorError, safe_open
 
 from spark.errors import FileFormatError
 from spark.finite import first_not_finite
-from spark.network.known_bodies import Trunk
 from spark.opening import check_regular, parse_json
 
 FORMAT = "spark-sim checkpoint"
 VERSION = 3
 SHIPPED = Path(__file__).parent / "shipped" / "spark.safetensors"
+KINDS = SHIPPED.with_name("kinds.safetensors")
+"""The direction of each kind of joint among the vectors of the shipped encoder of names."""
+OTHER = "other"
+"""The kind of a joint without a role."""
 
 _LONGEST = 8192  # frames of a window
 _WIDEST = 65536  # of what is neither a width nor a number of blocks
 
 Tensors = dict[str, Shaped[np.ndarray, "..."]]
+Trunk = dict[str, tuple[float, ...]]
+"""Where the joints of a trunk lie in the T-pose, over the hips, by name [hip heights]."""
 
 
 @dataclass(frozen=True, eq=False)

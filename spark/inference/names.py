@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from spark.network.layers import Layers, attend, join_heads, split_heads
-from spark.network.name_words import name_tokens, relative_buckets, rig_words
-from spark.network.weights import Weights
+from spark.inference.layers import Layers, attend, join_heads, split_heads
+from spark.inference.name_words import name_tokens, relative_buckets, rig_words
+from spark.inference.weights import Weights
 
 
 class NameNetwork:

@@ -1,0 +1,1 @@
+"""What networks run on without torch: weights from a file, layers on arrays, the name encoder."""
