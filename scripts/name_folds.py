@@ -13,12 +13,13 @@ import numpy as np
 import torch
 
 from spark.inference.name_words import rig_words
+from spark.inference.weights import OTHER
 from spark.motion import Motion
 from spark.network.features import body_features
 from spark.rig.name_conventions import CONVENTIONS
 from spark.rig.rig import understand
 from spark.rig.roles import Role
-from spark.training.name_rigs import OTHER, Named, rig_of
+from spark.training.name_rigs import Named, rig_of
 from spark.training.train_names import score_rigs, train_names
 from tests.helpers.rigs import RIGS, build
 

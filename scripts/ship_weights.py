@@ -14,12 +14,12 @@ from jaxtyping import Float
 from safetensors.numpy import save
 
 from spark.inference.names import NameNetwork
-from spark.inference.weights import KINDS, SHIPPED, read_weights
+from spark.inference.weights import KINDS, OTHER, SHIPPED, read_weights
 from spark.rig.name_conventions import name_joints
 from spark.rig.roles import Role
 from spark.training.checkpoint import load_checkpoint, save_checkpoint
 from spark.training.name_encoder import NameEncoder
-from spark.training.name_rigs import OTHER, made_up_rig
+from spark.training.name_rigs import made_up_rig
 from spark.training.train_names import LEARNED
 
 _MADE_UP = 200  # rigs whose joints without a role say where these lie

@@ -17,9 +17,8 @@ from torch import Tensor
 
 from spark.errors import FileFormatError
 from spark.files import write_atomically
-from spark.inference.weights import FORMAT, VERSION, Tensors, read_weights
+from spark.inference.weights import FORMAT, VERSION, Tensors, Trunk, read_weights
 from spark.network.config import Config
-from spark.network.known_bodies import Trunk
 from spark.network.recorded_network import PREFIX as RECORDED
 from spark.network.recorded_network import check_recorded
 from spark.opening import check_regular

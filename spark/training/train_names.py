@@ -12,11 +12,12 @@ import numpy as np
 import torch
 import torch.nn.functional as nnf
 
+from spark.inference.weights import OTHER
 from spark.rig.name_conventions import CONVENTIONS, HELD_OUT, name_joints
 from spark.rig.name_hints import read_names
 from spark.rig.roles import Role
 from spark.training.name_encoder import NameConfig, NameEncoder, tokenize_rigs
-from spark.training.name_rigs import KINDS, OTHER, Named, made_up_rig, rig_of
+from spark.training.name_rigs import KINDS, Named, made_up_rig, rig_of
 from spark.training.precision import fast_products
 
 LEARNED = tuple(c for c in CONVENTIONS if c not in HELD_OUT)

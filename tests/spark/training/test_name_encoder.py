@@ -18,7 +18,7 @@ from safetensors.torch import save_file
 
 from spark.errors import ConventionError, DependencyError, FileFormatError
 from spark.inference.name_words import PAD, rig_words
-from spark.inference.weights import SHIPPED, read_weights
+from spark.inference.weights import OTHER, SHIPPED, read_weights
 from spark.network.retarget import NetworkRetargeter
 from spark.network.t5 import T5Names
 from spark.rig.name_conventions import CONVENTIONS, HELD_OUT, name_joints
@@ -26,7 +26,7 @@ from spark.rig.roles import Role
 from spark.training.checkpoint import load_checkpoint, save_checkpoint
 from spark.training.name_encoder import NameConfig, NameEncoder, tokenize, tokenize_rigs
 from spark.training.name_file import load_names, save_names
-from spark.training.name_rigs import KINDS, OTHER, made_up_rig, rig_of
+from spark.training.name_rigs import KINDS, made_up_rig, rig_of
 from spark.training.settings import TrainConfig
 from spark.training.train import fresh_checkpoint
 from spark.training.train_names import LEARNED, score_names, train_names
