@@ -40,13 +40,14 @@ class DependencyError(SparkSimError):
 def unforeseen(error: Exception) -> str:
     """What is told of an error that was not raised on purpose."""
     if lacks_memory(error):
-        return "needs more memory than there is"
+        return "needs more memory, or more threads, than there are"
     return f"{type(error).__name__}: {error}; this is a fault of spark-sim, please report it"
 
 
 def lacks_memory(error: Exception) -> bool:
-    """Whether Python, MuJoCo or torch say that there is no memory left."""
-    return isinstance(error, MemoryError) or "allocate memory" in str(error)
+    """Whether Python, MuJoCo or torch say that there is no memory left, or no thread."""
+    told = ("allocate memory", "can't start new thread")
+    return isinstance(error, MemoryError) or any(words in str(error) for words in told)
 
 
 def name_list(names: list[str]) -> str:

@@ -16,13 +16,14 @@ from spark.errors import OutputError
 T = TypeVar("T")
 
 PROGRAM = "spark-sim"
-# All but tab and line feed, and the colours (SGR) that the report's text has.
-_CONTROL = re.compile(r"(?!\x1b\[[0-9;]{0,9}m)[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+# All but tab and line feed, and what turns the direction of a line.
+_CONTROL = r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]"
+_COLOURS = r"(?!\x1b\[(?:0|1|2|31|32|33)m)"  # that a report's text has
 
 
 def say(text: str) -> None:
     """A result, for people."""
-    _line(text, sys.stdout)
+    _line(text, sys.stdout, _COLOURS)
 
 
 def emit_json(value: Mapping[str, Any]) -> None:
@@ -60,10 +61,10 @@ def _aside(text: str) -> None:
         pass
 
 
-def _line(text: str, stream: TextIO) -> None:
+def _line(text: str, stream: TextIO, but: str = "") -> None:
     """One flushed line, so that stdout and stderr keep their order; above a bar where one is up.
     Control characters are written out: names of files and joints must not steer a terminal."""
-    text = _CONTROL.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    text = re.sub(but + _CONTROL, lambda found: f"\\u{ord(found[0]):04x}", text)
     if "tqdm" in sys.modules:
         sys.modules["tqdm"].tqdm.write(text, file=stream)
         stream.flush()

@@ -35,5 +35,8 @@ def claim(path: Path, *, force: bool, endings: tuple[str, ...] = (), what: str =
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"{path}: can't make its folder ({error.strerror})") from error
-    if not os.access(Path(os.path.realpath(path)).parent, os.W_OK):
+    real = Path(os.path.realpath(path))
+    if not real.parent.is_dir():
+        raise OutputError(f"{path}: leads to {real}, and there is no such folder")
+    if not os.access(real.parent, os.W_OK):
         raise OutputError(f"{path}: can't be written, its folder is read-only")

@@ -263,9 +263,11 @@ def _jobs(
     jobs = [(path, folder / below / f"{path.stem}{made}") for path, below in found]
     outputs: dict[Path, Path] = {}
     for path, out in jobs:
-        other = outputs.setdefault(out, path)
-        if other != path:
+        if (other := outputs.setdefault(out, path)) != path:
             raise OutputError(f"{path} and {other} would both be written to {out}; rename one")
+    if len(outputs) < len(jobs):
+        twice = next(path for path, _ in jobs if [job[0] for job in jobs].count(path) > 1)
+        raise OutputError(f"{twice} is given twice; give each motion once")
     return jobs
 
 

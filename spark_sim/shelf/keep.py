@@ -157,7 +157,8 @@ class _Parser:
     def fail(self, message: str) -> NoReturn:
         rest = self.text[self.at :].strip()
         place = f"at {rest[:20]!r}" if rest else "at the end"
-        raise ConventionError(f"--keep {self.text!r}: {place}: {message}")
+        whole = self.text if len(self.text) <= 200 else f"{self.text[:200]}..."
+        raise ConventionError(f"--keep {whole!r}: {place}: {message}")
 
 
 def _not(value: bool | None) -> bool | None:

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import spark_sim
-from spark.errors import lacks_memory
-from spark_sim import cli
+from spark.errors import OutputError, lacks_memory
+from spark_sim import cli, files
 from tests.spark_sim.test_cli import command, environment
 
 WALK, TARGET = "walker_walk.bvh", "dancer_wave.bvh"
@@ -88,10 +88,41 @@ def test_too_little_memory_is_said(here: Path) -> None:
         [sys.executable, "-c", script], cwd=here, env=environment(), capture_output=True, text=True
     )
     assert done.returncode == 2
-    assert done.stderr == "spark-sim: error: this needs more memory than there is\n"
+    assert (
+        done.stderr == "spark-sim: error: this needs more memory, or more threads, than there are\n"
+    )
 
 
 def test_who_says_that_memory_lacks() -> None:
     assert lacks_memory(MemoryError())
     assert lacks_memory(RuntimeError("DefaultCPUAllocator: can't allocate memory: you tried"))
     assert not lacks_memory(ValueError("shape"))
+
+
+def test_names_do_not_steer_the_terminal(capfd: pytest.CaptureFixture[str]) -> None:
+    """Neither hide a line nor turn its direction; the report's own colours stay."""
+    hidden = "a\x1b[8mb\x1b[2K\u202ec\x07"
+    script = "import sys; from spark_sim import console; console.{}(sys.argv[1])"
+    for name, words in (("note", hidden), ("error", hidden), ("say", hidden)):
+        subprocess.run([sys.executable, "-c", script.format(name), words], env=environment())
+        told = "".join(capfd.readouterr())
+        assert "a\\u001b[8mb\\u001b[2K\\u202ec\\u0007" in told
+    subprocess.run(
+        [sys.executable, "-c", script.format("say"), "\x1b[31mbad\x1b[0m"], env=environment()
+    )
+    assert capfd.readouterr().out == "\x1b[31mbad\x1b[0m\n"
+
+
+def test_a_link_whose_folder_is_missing_is_named(tmp_path: Path) -> None:
+    link = tmp_path / "out.html"
+    link.symlink_to(tmp_path / "nowhere" / "out.html")
+    with pytest.raises(OutputError, match=r"leads to .*nowhere.*, and there is no such"):
+        files.claim(link, force=True)
+
+
+def test_a_motion_that_is_given_twice_is_refused(here: Path) -> None:
+    words = ("retarget", WALK, TARGET, WALK, "--to", TARGET, "-o", "twice/")
+    done = in_shell('"$@"', here, *words)
+    assert done.returncode == 2
+    assert f"{WALK} is given twice" in done.stderr
+    assert not (here / "twice").exists()
