@@ -30,6 +30,7 @@ def main() -> int:
     # Until the command runs, Ctrl-C ends the process as the system does it, without a traceback.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     _open_streams()
+    _keep_folder_out()
     problem = foreign_package()
     if problem is not None:
         print(
@@ -54,6 +55,17 @@ def _open_streams() -> None:
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115
+
+
+def _keep_folder_out() -> None:
+    """Python looks for modules in the current folder first where it is given a line of code, as
+    the processes are that `multiprocessing` starts. A `json.py` beside somebody's motions must not
+    run there."""
+    os.environ["PYTHONSAFEPATH"] = "1"
+    own = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    if sys.path[0] == own:  # a checkout that is not installed
+        known = os.environ.get("PYTHONPATH")
+        os.environ["PYTHONPATH"] = os.pathsep.join([own, known] if known else [own])
 
 
 def _listen() -> None:

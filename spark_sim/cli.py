@@ -211,6 +211,8 @@ def _run(args: Namespace) -> int:
     except Exception as error:
         if lacks_memory(error):
             return _fail(f"this {unforeseen(error)}", FAILED)
+        if "environment variable" in str(error):  # as MuJoCo says of a MUJOCO_GL that is none
+            return _fail(str(error), FAILED)
         if os.environ.get("SPARK_SIM_TRACEBACK"):
             raise
         return _fail(

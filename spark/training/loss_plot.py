@@ -48,6 +48,13 @@ def read_terms(log: Path) -> dict[str, list[tuple[int, float]]]:
 
 def picture(terms: dict[str, list[tuple[int, float]]]) -> bytes:
     """Loss terms over steps, as PNG: the loss in black, its terms in colours."""
+    from matplotlib import style
+
+    with style.context("default"):  # a matplotlibrc in the current folder may ask for LaTeX
+        return _drawn(terms)
+
+
+def _drawn(terms: dict[str, list[tuple[int, float]]]) -> bytes:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8, 5), dpi=110, layout="constrained")

@@ -126,3 +126,16 @@ def test_a_motion_that_is_given_twice_is_refused(here: Path) -> None:
     assert done.returncode == 2
     assert f"{WALK} is given twice" in done.stderr
     assert not (here / "twice").exists()
+
+
+def test_a_way_to_draw_that_is_none_is_named(here: Path) -> None:
+    told = ["play", WALK, "--html", "out.html"]
+    done = subprocess.run(
+        command(*told),
+        cwd=here,
+        env=environment(MUJOCO_GL="crayon"),
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 2
+    assert "MUJOCO_GL: crayon" in done.stderr

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spark.training.loss_plot import LossPlot, read_terms
+from spark.training.loss_plot import LossPlot, picture, read_terms
 from spark.training.run_log import open_log
 
 pytest.importorskip("matplotlib")
@@ -42,3 +42,15 @@ def test_lines_of_others_are_passed_over(tmp_path: Path, line: str) -> None:
     assert read_terms(log) == {"loss": [(7, 0.5)]}
     open_log(tmp_path, 7, 0).close()
     assert read_terms(log) == {"loss": [(7, 0.5)]}
+
+
+def test_settings_of_the_current_folder_have_no_say() -> None:
+    """A matplotlibrc there may ask for LaTeX, which runs programs; a twin shows that it would."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    terms = {"loss": [(1, 1.0), (2, 0.5)]}
+    plain = picture(terms)
+    with matplotlib.rc_context({"figure.facecolor": "red", "lines.linewidth": 9}):
+        assert Figure().get_facecolor() == (1, 0, 0, 1)
+        assert picture(terms) == plain
