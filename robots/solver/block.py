@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import cached_property
 
+from robots.model.morphology import Morphology
 from robots.tree import BASE, Tree
 
 
@@ -45,3 +46,19 @@ class Block:
 
     def _dofs_of(self, joints: tuple[int, ...]) -> list[int]:
         return [*(range(BASE) if self.base else ()), *self.tree.dofs(joints)]
+
+
+def blocks_of(robot: Morphology) -> tuple[Block, Block]:
+    """Base, trunk and legs; then arms and head. Of a robot without legs all at once. Joints beyond
+    the last part with a role, as those of grippers, stay as in the T-pose."""
+    tree = robot.tree
+    named = zip(robot.links, robot.rig.roles.roles, strict=True)
+    moved = sorted({j for link, role in named if role for j in tree.chain(int(link))})
+    if robot.mount is not None:
+        return Block(tree, (), False), Block(tree, tuple(moved), False)
+    links = {int(robot.links[robot.rig.chest])}
+    links |= {int(link) for sole in robot.soles for link in robot.sole_points(sole)[0]}
+    links |= {int(robot.links[j]) for j in robot.rig.contact_joints}
+    first = sorted({j for link in links for j in tree.chain(link)})
+    rest = tuple(j for j in moved if j not in first)
+    return Block(tree, tuple(first), True), Block(tree, rest, False)

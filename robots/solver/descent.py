@@ -10,6 +10,7 @@ from robots.least_squares import NormalEquations, Smoothness
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.collision import Candidate, collisions_of
+from robots.solver.hinges import LIMIT_CLEARANCE
 from robots.solver.holds import Holds
 from robots.solver.objective import linearize
 from robots.solver.smoothness import com_acceleration, jerk_stiffening, smoothness_of
@@ -28,7 +29,6 @@ _MAX_STEP = 1.0  # [rad, m] of a dof in one step
 _MIN_DAMPING = 1e-3  # [1] on the diagonal of the normal equations
 _REJECTED_DAMPING = 0.1  # at least, where a step was rejected
 _FIXED_DAMPING = 1e8  # where a frame must stay
-LIMIT_CLEARANCE = np.radians(0.75)  # that hinges keep from their limits: hard, by clipping
 
 
 @dataclass(frozen=True, eq=False)

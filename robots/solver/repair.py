@@ -14,7 +14,6 @@ from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.collision import collisions_of
 from robots.solver.descent import (
-    LIMIT_CLEARANCE,
     Repair,
     collision_stride,
     smooth_lower_envelope,
@@ -23,6 +22,7 @@ from robots.solver.descent import (
 from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.floor import depth_in_floor
 from robots.solver.footprints import points_of
+from robots.solver.hinges import LIMIT_CLEARANCE
 from robots.solver.holds import Holds
 from robots.solver.smoothness import jerk_stiffening, overspeed
 from robots.solver.targets import Targets

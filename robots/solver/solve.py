@@ -11,12 +11,13 @@ from collections.abc import Sequence
 
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
-from robots.solver.block import Block
+from robots.solver.block import Block, blocks_of
 from robots.solver.collision import collisions_of
 from robots.solver.descent import collision_stride, solve_block
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import FootPlan, plan_feet, reachable
 from robots.solver.holds import Holds, joined
+from robots.solver.marching import abrupt, calmed
 from robots.solver.motion_plan import with_dynamics
 from robots.solver.mounted import facing_ahead, on_mount
 from robots.solver.projection import project
@@ -121,6 +122,10 @@ def solve(
         holds = _holds_of(robot, targets, feet, q)
         if polish or _may_collide(robot, targets, q, block):
             q = solve_block(robot, targets, holds, q, block, *ends, avoid_collisions=True)
+        thrown = not block.base and not polish and abrupt(robot, targets, q, block).any()
+        if thrown:
+            q = calmed(robot, targets, holds, q, block)
+            q = solve_block(robot, targets, holds, q, block, *ends, avoid_collisions=True)
         q = repair(robot, targets, holds, q, block)
     return q
 
@@ -135,19 +140,3 @@ def _holds_of(
 def _may_collide(robot: Morphology, targets: Targets, q: Coordinates, block: Block) -> bool:
     poses = forward_kinematics(robot.tree, q)
     return bool(collisions_of(robot).candidates(poses, block, collision_stride(targets)))
-
-
-def blocks_of(robot: Morphology) -> tuple[Block, Block]:
-    """Base, trunk and legs; then arms and head. Of a robot without legs all at once. Joints beyond
-    the last part with a role, as those of grippers, stay as in the T-pose."""
-    tree = robot.tree
-    named = zip(robot.links, robot.rig.roles.roles, strict=True)
-    moved = sorted({j for link, role in named if role for j in tree.chain(int(link))})
-    if robot.mount is not None:
-        return Block(tree, (), False), Block(tree, tuple(moved), False)
-    links = {int(robot.links[robot.rig.chest])}
-    links |= {int(link) for sole in robot.soles for link in robot.sole_points(sole)[0]}
-    links |= {int(robot.links[j]) for j in robot.rig.contact_joints}
-    first = sorted({j for link in links for j in tree.chain(link)})
-    rest = tuple(j for j in moved if j not in first)
-    return Block(tree, tuple(first), True), Block(tree, rest, False)

@@ -8,10 +8,10 @@ solution; then the limb is led there.
 import numpy as np
 from jaxtyping import Float
 
+from robots.solver.hinges import Posture
 from robots.solver.projection import project
+from robots.solver.window_terms import Terms
 from robots.stream.frame_targets import LATENCY, FrameReader, FrameTargets
-from robots.stream.hinges import Posture
-from robots.stream.terms import Terms
 from spark.rotation import quat_from_matrix
 
 _LOST = np.radians(55)  # a bone farther from its direction is stuck,

@@ -15,9 +15,9 @@ from jaxtyping import Bool, Complex, Float
 
 from robots.solver.foot_path import FAST, RAISED_HOLD, SLOW, STEP_HEIGHT, SWING_HOLD
 from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
+from robots.solver.window_targets import FootTargets
 from robots.stream.footprint import Footprint
 from robots.stream.frame_targets import FrameReader, FrameTargets
-from robots.stream.terms import FootTargets
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
 
 TAKE = 0.06  # [s] over which a foot is taken hold of,

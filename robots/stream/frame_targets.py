@@ -17,6 +17,7 @@ from robots.solver.targets import (
     source_feet,
 )
 from robots.solver.trunk import bends, leaning
+from robots.solver.window_targets import PoseTargets
 from robots.stream.source_poses import SourcePoses
 from sim.body.anthropometry import segments
 from spark.errors import FrameError
@@ -51,23 +52,17 @@ class Ground:
 
 
 @dataclass(frozen=True, eq=False)
-class FrameTargets:
-    """`robots.solver.targets.Targets` of one frame, or of some (T), floor at z = 0, turns as
-    matrices (`R_world_joint`).
+class FrameTargets(PoseTargets):
+    """`robots.solver.targets.Targets` of one frame, or of some (T).
 
-    `com` is the source's centre of mass, scaled. `bones` are in the order of `FrameReader.bones`.
+    `bones` are in the order of `FrameReader.bones`. `com` is the source's centre of mass, scaled.
     `feet` are the source's heel and toe of each of the robot's soles [m, the source's own world],
     `clearance` is how high its soles are, scaled, and `pitched` where the points of the robot's
     would be: from the middle of its toes along the foot and to its left, and above the lowest of
     them [m].
     """
 
-    world: Float[np.ndarray, "*T J 3 3"]
-    chest: Float[np.ndarray, "*T 3 3"]
-    hips: Float[np.ndarray, "*T 3"]
     com: Float[np.ndarray, "*T 3"]
-    bones: Float[np.ndarray, "*T B 3"]
-    hands: Float[np.ndarray, "*T 3"]
     feet: Float[np.ndarray, "*T S 2 3"]
     clearance: Float[np.ndarray, "*T S"]
     pitched: Float[np.ndarray, "*T P 3"]

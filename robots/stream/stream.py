@@ -10,6 +10,8 @@ from jaxtyping import Float
 
 from robots.model.morphology import Morphology
 from robots.solver.projection import project
+from robots.solver.window_targets import FootTargets
+from robots.solver.window_terms import Terms
 from robots.stream.detour import Detours
 from robots.stream.footing import ContactTracker
 from robots.stream.frame_targets import (
@@ -21,7 +23,6 @@ from robots.stream.frame_targets import (
     move_on,
     repeated,
 )
-from robots.stream.terms import FootTargets, Terms
 from robots.stream.window import Window
 from spark.errors import FrameError
 from spark.rig.rig import Rig

@@ -2,16 +2,16 @@
 
 import mujoco
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from scipy.linalg.lapack import dposv
 
 from robots.model.morphology import Morphology
-from robots.solver.descent import LIMIT_CLEARANCE
+from robots.solver.hinges import Posture
+from robots.solver.window_targets import FootTargets
+from robots.solver.window_terms import Terms
 from robots.stream.coupling import Coupling
 from robots.stream.frame_targets import FrameTargets
-from robots.stream.hinges import Posture
 from robots.stream.prediction import TargetMotion
-from robots.stream.terms import FootTargets, Terms
 
 _DAMPING = 1e-3  # [1] on the diagonal of the normal equations,
 _LONE_DAMPING = 0.02  # where frames are not coupled,
@@ -29,20 +29,9 @@ class Window:
         self, robot: Morphology, terms: Terms, frame_time: float, *, fixed: int, free: int
     ) -> None:
         self._terms, self._free = terms, free
-        self._model, tree = robot.mjcf.model, robot.tree
+        self._model = robot.mjcf.model
         self._data, self._root = mujoco.MjData(self._model), robot.mjcf.root
-        starts = self._model.jnt_dofadr[list(robot.mj_joints)]
-        base = int(self._model.jnt_dofadr[robot.mjcf.free_joint])
-        dofs = [*range(base, base + 6)]
-        for start, ball in zip(starts.tolist(), tree.balls, strict=True):
-            dofs += range(start, start + (3 if ball else 1))
-        self._dofs = np.array(dofs)
-        hinges = ~tree.balls
-        self._hinge_dofs = tree.dof_starts[hinges]
-        self._angles = self._model.jnt_qposadr[np.array(robot.mj_joints)[hinges]]
-        lower, upper = tree.limits_within(LIMIT_CLEARANCE)
-        rest = self._model.qpos0[self._angles]
-        self._lower, self._upper = lower[hinges] + rest, upper[hinges] + rest
+        self._dofs = terms.mj_dofs
         self._motion = TargetMotion(self._model, self._dofs, frame_time)
         self._coupling = Coupling(robot, frame_time, fixed=fixed, free=free)
 
@@ -111,7 +100,7 @@ class Window:
             ahead = self._motion.of(q[-1], H[-1], g[-1])
             com, jacobian = self._center_of_mass(q)
             self._coupling.add_to(self._steps(q), np.diff(com, axis=0), jacobian, ahead, blocks, g)
-        held = self._at_limits(q[-free:], g)
+        held = self._terms.hinges.held(q[-free:], g)
         g[held] = 0.0
         whole.reshape(-1)[:: free * D + 1] += np.where(
             held, _HELD, lone_damping or _DAMPING
@@ -123,7 +112,7 @@ class Window:
         q = q.copy()
         for t in range(free):
             mujoco.mj_integratePos(model, q[t - free], moved[t], 1.0)
-        q[:, self._angles] = np.clip(q[:, self._angles], self._lower, self._upper)
+        self._terms.hinges.clip(q)
         return q, length
 
     def _steps(self, q: Float[np.ndarray, "T nq"]) -> Float[np.ndarray, "V D"]:
@@ -148,13 +137,3 @@ class Window:
             if t >= fixed:
                 mujoco.mj_jacSubtreeCom(model, data, jacobian[t - fixed], root)
         return com, jacobian[:, :, self._dofs]
-
-    def _at_limits(
-        self, q: Float[np.ndarray, "F nq"], g: Float[np.ndarray, "F D"]
-    ) -> Bool[np.ndarray, "F D"]:
-        """The dofs of hinges at their limits that the gradient would take beyond."""
-        held = np.zeros(g.shape, dtype=bool)
-        angles, gradient = q[:, self._angles], g[:, self._hinge_dofs]
-        below, above = angles <= self._lower + 1e-9, angles >= self._upper - 1e-9
-        held[:, self._hinge_dofs] = (above & (gradient < 0)) | (below & (gradient > 0))
-        return held

@@ -9,7 +9,7 @@ from robots.metrics import RobotMetrics, limb_error, measure
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.registry import find
-from robots.solver.block import Block
+from robots.solver.block import Block, blocks_of
 from robots.solver.collision import collisions_of
 from robots.solver.descent import smooth_lower_envelope
 from robots.solver.exact_contact import exact_contacts_of
@@ -20,7 +20,7 @@ from robots.solver.objective import linearize
 from robots.solver.projection import project
 from robots.solver.repair import repair, violations
 from robots.solver.smoothness import jerk_stiffening, limit_speed
-from robots.solver.solve import blocks_of, copy, retarget
+from robots.solver.solve import copy, retarget
 from robots.solver.targets import Targets, targets_of
 from robots.tree import Coordinates, forward_kinematics
 from scripts.robot_bars import mean_of, misses

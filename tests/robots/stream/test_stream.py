@@ -10,18 +10,18 @@ from robots.metrics import limb_error, measure
 from robots.model.known import known
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
-from robots.solver.block import Block
+from robots.solver.block import Block, blocks_of
 from robots.solver.collision import Candidate, collisions_of
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import plan_feet, points_of
 from robots.solver.holds import joined
 from robots.solver.objective import linearize
 from robots.solver.projection import project
-from robots.solver.solve import blocks_of
 from robots.solver.targets import bone_directions, targets_of
-from robots.stream.frame_targets import LATENCY, Frame, FrameReader, FrameTargets, ground_of
+from robots.solver.window_targets import FootTargets, pose_targets
+from robots.solver.window_terms import Terms
+from robots.stream.frame_targets import LATENCY, Frame, FrameReader, ground_of
 from robots.stream.stream import Stream
-from robots.stream.terms import FootTargets, Terms
 from robots.tree import forward_kinematics
 from scripts.robot_bars import follow
 from spark.constants import GRAVITY
@@ -98,18 +98,6 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     q.pos[:, 2] += 0.03  # streams know no floor under other parts than soles
     reader = FrameReader(RIG, EMBER, ground_of(source, EMBER))
     terms = Terms(EMBER, reader.bones, hands=True)
-    assert targets.hands is not None
-    seen = FrameTargets(
-        world=matrix_from_quat(targets.world),
-        chest=matrix_from_quat(targets.chest),
-        hips=targets.hips,
-        com=targets.hips,
-        bones=np.stack([targets.bones[role] for role in reader.bones], axis=1),
-        hands=targets.hands,
-        feet=np.zeros((4, 2, 2, 3)),
-        clearance=targets.clearance,
-        pitched=np.zeros((4, len(holds.points), 3)),
-    )
 
     def near(block: Block) -> list[Candidate]:
         return collisions_of(EMBER).candidates(forward_kinematics(tree, q), block, 1)
@@ -120,7 +108,7 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     for t in range(4):
         one = slice(t, t + 1)
         foot_targets = FootTargets(holds.positions[None, ..., t], holds.shares[None, ..., t])
-        here = FrameTargets(*(getattr(seen, name)[one] for name in FrameTargets.__annotations__))
+        here = pose_targets(targets, np.array([t]), reader.bones)
         qpos = EMBER.to_qpos(q.at(one))
         H, g = terms.linearize(
             qpos, here, foot_targets, terms.hinges.at_tpose, terms.candidates(qpos)

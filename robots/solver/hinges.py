@@ -1,13 +1,15 @@
-"""What is asked of each hinge of a stream's robot by itself: its limits, and a posture."""
+"""What is asked of each hinge by itself in a few frames: its limits, and a posture."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
 from robots.solver.weights import LIMIT_MARGIN, W_LIMIT, W_TPOSE
+
+LIMIT_CLEARANCE = np.radians(0.75)  # that hinges keep from their limits: hard, by clipping
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,12 +32,29 @@ class Hinges:
         lower, upper = (limit[hinges] + rest for limit in (tree.lower, tree.upper))
         margin = np.minimum(LIMIT_MARGIN, 0.1 * (upper - lower))
         self._soft_limits = lower + margin, upper - margin
+        lower, upper = tree.limits_within(LIMIT_CLEARANCE)
+        self._limits = lower[hinges] + rest, upper[hinges] + rest
         angles = robot.tpose.angles[0, hinges] + rest
         self.at_tpose = Posture(angles, np.full(len(angles), W_TPOSE))
 
     def angles(self, q: Float[np.ndarray, "T nq"]) -> Float[np.ndarray, "T H"]:
         """Their part of a `qpos`."""
         return q[:, self._qpos]
+
+    def clip(self, q: Float[np.ndarray, "T nq"]) -> None:
+        """Take a `qpos` within the limits, in place."""
+        q[:, self._qpos] = np.clip(q[:, self._qpos], *self._limits)
+
+    def held(
+        self, q: Float[np.ndarray, "T nq"], g: Float[np.ndarray, "T D"]
+    ) -> Bool[np.ndarray, "T D"]:
+        """The dofs of hinges at their limits that the gradient would take beyond."""
+        lower, upper = self._limits
+        out = np.zeros(g.shape, dtype=bool)
+        angles, gradient = q[:, self._qpos], g[:, self._dofs]
+        below, above = angles <= lower + 1e-9, angles >= upper - 1e-9
+        out[:, self._dofs] = (above & (gradient < 0)) | (below & (gradient > 0))
+        return out
 
     def add_to(
         self,

@@ -8,7 +8,6 @@ order of `robots.tree`: the base rotates about its own axes, and so do balls.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -16,8 +15,9 @@ from jaxtyping import Bool, Float, Int
 
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
+from robots.solver.block import blocks_of
 from robots.solver.floor import rims_of
-from robots.solver.solve import blocks_of
+from robots.solver.hinges import Hinges, Posture
 from robots.solver.weights import (
     FLOOR_ROUNDING,
     HANDS_RANGE,
@@ -29,9 +29,8 @@ from robots.solver.weights import (
     W_OTHER_ROTATION,
     W_ROTATION,
 )
-from robots.stream.collision import WindowCollisions, WindowPoses
-from robots.stream.frame_targets import FrameTargets
-from robots.stream.hinges import Hinges, Posture
+from robots.solver.window_collision import WindowCollisions, WindowPoses
+from robots.solver.window_targets import FootTargets, PoseTargets
 from robots.tree import BASE
 from spark.rig.roles import Role
 
@@ -41,18 +40,10 @@ LinearTerms = tuple[
 """J, squared weights, and squared weights times residuals, of R directions and points."""
 
 
-@dataclass(frozen=True, eq=False)
-class FootTargets:
-    """The footholds of the soles' points: `positions` [m, world], and by axis the share of the
-    weight with which they are held there (`holds`, 0 to 1)."""
-
-    positions: Float[np.ndarray, "T P 3"]
-    holds: Float[np.ndarray, "T P 3"]
-
-
 class Terms:
     """The residuals of a robot's poses, as normal equations. `bones` are the limbs' segments whose
-    directions the source gives, `hands` says whether it gives the offset between both."""
+    directions the source gives, `hands` says whether it gives the offset between both. `mj_dofs`
+    are MuJoCo's numbers of the dofs."""
 
     def __init__(self, robot: Morphology, bones: Sequence[Role], hands: bool) -> None:
         self.robot, tree = robot, robot.tree
@@ -63,7 +54,12 @@ class Terms:
         self._in_first_block = np.zeros(len(tree) + 1, dtype=bool)  # of the links, and -1
         self._in_first_block[[*blocks_of(robot)[0].joints, -1]] = True
         joints = np.array(robot.mj_joints, dtype=int)
-        self._joints = np.repeat(joints, np.where(tree.balls, 3, 1))
+        sizes = np.where(tree.balls, 3, 1)
+        self._joints = np.repeat(joints, sizes)
+        base = int(self._model.jnt_dofadr[robot.mjcf.free_joint])
+        within = BASE + np.arange(len(self._joints)) - np.repeat(tree.dof_starts, sizes)
+        own = self._model.jnt_dofadr[self._joints] + within
+        self.mj_dofs = np.append(base + np.arange(BASE), own)
         self.hinges = Hinges(robot)
         bodies = np.array([self._body(link) for link in (*range(len(tree)), -1)])
         self._collisions = WindowCollisions(
@@ -87,7 +83,7 @@ class Terms:
 
     def sole_points(self, poses: WindowPoses) -> Float[np.ndarray, "T P 3"]:
         """The points of the soles [m, world]."""
-        return self._points(poses)[:, : self._sole_count]
+        return self._points(poses)[:, : self.sole_count]
 
     def bones(self, poses: WindowPoses) -> Float[np.ndarray, "T B 3"]:
         """The unit directions of the bones [world]."""
@@ -100,7 +96,7 @@ class Terms:
     def linearize(
         self,
         q: Float[np.ndarray, "T nq"],
-        targets: FrameTargets,
+        targets: PoseTargets,
         foot_targets: FootTargets,
         posture: Posture,
         candidates: Int[np.ndarray, "K"],
@@ -156,7 +152,7 @@ class Terms:
         poses: WindowPoses,
         axes: Float[np.ndarray, "T D 3"],
         anchors: Float[np.ndarray, "T D 3"],
-        targets: FrameTargets,
+        targets: PoseTargets,
         foot_targets: FootTargets,
     ) -> LinearTerms:
         """The residuals of directions and points, as `robots.residuals` has them."""
@@ -178,7 +174,7 @@ class Terms:
         weights[:, :B] = W_LIMB_DIRECTION**2
         forces[:, :B] = W_LIMB_DIRECTION**2 * (bones - targets.bones)
         self._add_soles(points, foot_targets, weights[:, B:], forces[:, B:])
-        hips = B + self._sole_count
+        hips = B + self.sole_count
         weights[:, hips] = W_HIPS_POSITION**2
         forces[:, hips] = W_HIPS_POSITION**2 * (points[:, hips - B] - targets.hips)
         if self._hands:
@@ -201,7 +197,7 @@ class Terms:
     ) -> None:
         """The footholds of the soles' points, and the floor under them and the feet's rims; weights
         squared."""
-        count = self._sole_count
+        count = self.sole_count
         weights[:, self._rims] = forces[:, self._rims] = 0.0
         hold_weights = (W_HOLD * foot_targets.holds) ** 2
         weights[:, :count] = hold_weights
@@ -259,7 +255,7 @@ class Terms:
         soles = [robot.sole_points(sole) for sole in robot.soles]
         links = [link for own, _ in soles for link in own.tolist()]
         rest = [point for _, points in soles for point in points]
-        self._sole_count = len(links)
+        self.sole_count = len(links)
         links.append(int(robot.links[robot.rig.pelvis]))
         rest.append(robot.centers[robot.rig.hips].mean(0))
         self._hands = hands

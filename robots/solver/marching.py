@@ -1,0 +1,194 @@
+"""Marching: one frame after another, each from the answer to the one before.
+
+Where arms are deep in something, or can't be as the source's are, every frame has several answers
+that are nearly as good. Descent over a whole trajectory then takes one here and another there, and
+the arms are thrown to and fro. Frame after frame they stay with one (continuation: Nocedal and
+Wright, "Numerical Optimization", 11.3). Trajectories are marched through from both ends:
+entangled arms may be led out from one side alone.
+"""
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.ndimage import uniform_filter1d
+
+from robots.least_squares import second_differences
+from robots.model.morphology import Morphology
+from robots.solver.block import Block
+from robots.solver.collision import collisions_of
+from robots.solver.holds import Holds
+from robots.solver.objective import linearize
+from robots.solver.targets import Targets
+from robots.solver.window_targets import FootTargets, PoseTargets, pose_targets
+from robots.solver.window_terms import Terms
+from robots.tree import Coordinates, forward_kinematics
+from spark.rig.roles import Role
+
+_WINDOW = 0.15  # [s] before and after a frame over which angular accelerations are averaged
+_MAX_RATIO = 2.0  # of a limb's to the source's, and beyond that
+_MAX_EXCESS = 10.0  # [rad/s²], that is abrupt
+_FREE_SPEED = 3.0  # [rad/s] of a hinge that costs nothing where ways are compared, and what
+_W_TURN = 4.0  # [1/rad] a turn beyond that costs, from frame to frame
+_FIRST_STEPS, _STEPS = 60, 3  # in the first frame, from the T-pose, and in each that follows
+_FIRST_DAMPING, _DAMPING = 0.02, 1e-3  # [1] on the diagonal of the normal equations
+_W_STAY = 0.2  # [1/rad] of how far a hinge turns from frame to frame
+_MAX_STEP = 0.3  # [rad] of a dof in one step
+_STEP_TOL = 0.03  # [rad] after a shorter step there is no further one
+_HELD = 1e8  # damping of hinges at their limits
+
+
+def abrupt(
+    robot: Morphology, targets: Targets, q: Coordinates, block: Block
+) -> Bool[np.ndarray, "T"]:
+    """The frames around which limbs that the block moves are turned far more abruptly than the
+    source's."""
+    poses = forward_kinematics(robot.tree, q)
+    out = np.zeros(len(q), dtype=bool)
+    window = 2 * max(1, round(_WINDOW / targets.frame_time)) + 1
+
+    def acceleration(direction: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "A"]:
+        squared = (second_differences(direction) ** 2).sum(axis=1)
+        mean = uniform_filter1d(squared, window, mode="nearest")
+        return np.sqrt(np.maximum(np.asarray(mean), 0.0)) / targets.frame_time**2
+
+    if len(q) < 3:
+        return out
+    for role in _limbs(robot, targets, block):
+        link = int(robot.links[robot.rig.roles.require(role)])
+        own = acceleration(poses.direction(link, robot.bones[role]).T)
+        out[1:-1] |= own > _MAX_RATIO * acceleration(targets.bones[role]) + _MAX_EXCESS
+    return out
+
+
+def calmed(
+    robot: Morphology, targets: Targets, holds: Holds, q: Coordinates, block: Block
+) -> Coordinates:
+    """The cheapest way through three: `q`, and the block's joints marched forth and back through
+    all frames. What it costs to be in a frame says the solver's objective; from frame to frame a
+    turn by d [rad] beyond what is free costs (`_W_TURN` d)² / 2, also from way to way."""
+    forth = np.arange(len(q))
+    ways = [q, *_marched(robot, targets, q, block, (forth, forth[::-1]))]
+    costs = np.stack([_cost(robot, targets, holds, way, block) for way in ways])
+    hinges = [j for j in block.joints if not robot.tree.balls[j]]
+    angles = np.stack([way.angles[:, hinges] for way in ways])
+    turns = angles[:, None, 1:] - angles[None, :, :-1]
+    turns = np.maximum(np.abs(turns) - _FREE_SPEED * targets.frame_time, 0.0)
+    turned = 0.5 * _W_TURN**2 * np.einsum("abtn,abtn->tab", turns, turns)
+    taken = cheapest(costs.T, turned)
+    for k, way in enumerate(ways):
+        frames = np.flatnonzero(taken == k)
+        q = q.replaced(frames, way.at(frames))
+    return q
+
+
+def cheapest(
+    costs: Float[np.ndarray, "T W"], turned: Float[np.ndarray, "T-1 W W"]
+) -> Int[np.ndarray, "T"]:
+    """Which of W ways to take in each frame, by dynamic programming; `turned` [t, a, b] is what it
+    costs to be on way a in frame t + 1 after way b in frame t."""
+    total, came = costs[0], []
+    for cost, turn in zip(costs[1:], turned, strict=True):
+        through = turn + total
+        came.append(through.argmin(axis=1))
+        total = cost + through.min(axis=1)
+    taken = [int(total.argmin())]
+    for before in reversed(came):
+        taken.append(int(before[taken[-1]]))
+    return np.array(taken[::-1])
+
+
+def _marched(
+    robot: Morphology,
+    targets: Targets,
+    q: Coordinates,
+    block: Block,
+    orders: Sequence[Int[np.ndarray, "T"]],
+) -> list[Coordinates]:
+    """`q` with the block's joints marched through all frames, in each of the orders at once. The
+    first frame is begun from the T-pose."""
+    bones = tuple(role for role in targets.bones if role in robot.bones)
+    terms = _terms_of(robot, bones, targets.hands is not None)
+    columns = _qpos_columns(robot, block)
+    qpos = robot.to_qpos(q)
+    ways = [qpos.copy() for _ in orders]
+    last = np.repeat(robot.to_qpos(robot.tpose)[:, columns], len(orders), axis=0)
+    for k, frames in enumerate(zip(*orders, strict=True)):
+        here = qpos[list(frames)]
+        here[:, columns] = last
+        here = _settled(
+            terms, pose_targets(targets, np.array(frames), bones), here, block, first=k == 0
+        )
+        last = here[:, columns]
+        for way, frame, pose in zip(ways, frames, here, strict=True):
+            way[frame] = pose
+    return [robot.from_qpos(way) for way in ways]
+
+
+def _settled(
+    terms: Terms,
+    targets: PoseTargets,
+    begun: Float[np.ndarray, "L nq"],
+    block: Block,
+    *,
+    first: bool,
+) -> Float[np.ndarray, "L nq"]:
+    """`begun` after Gauss-Newton steps in the block's dofs, each frame for itself and, but in the
+    first, near where it was begun."""
+    model, dofs = terms.robot.mjcf.model, np.array(block.dofs)
+    moved = terms.mj_dofs[dofs]
+    at = np.arange(len(dofs))
+    q, count = begun.copy(), len(begun)
+    holds = FootTargets(*np.zeros((2, count, terms.sole_count, 3)))
+    step, stay = np.zeros((2, count, model.nv))
+    for k in range(_FIRST_STEPS if first else _STEPS):
+        if first or not k:
+            candidates = terms.candidates(q)
+        H, g = terms.linearize(q, targets, holds, terms.hinges.at_tpose, candidates)
+        held = terms.hinges.held(q, g)[:, dofs]
+        H, g = H[:, dofs[:, None], dofs], g[:, dofs]
+        if not first:
+            for row in range(count):
+                mujoco.mj_differentiatePos(model, stay[row], 1.0, begun[row], q[row])
+            H[:, at, at] += _W_STAY**2
+            g += _W_STAY**2 * stay[:, moved]
+        H[:, at, at] += np.where(held, _HELD, _FIRST_DAMPING if first else _DAMPING)
+        found = -np.linalg.solve(H, np.where(held, 0.0, g)[..., None])[..., 0]
+        length = np.abs(found).max(axis=1, initial=1e-9)
+        step[:, moved] = found * np.minimum(1.0, _MAX_STEP / length)[:, None]
+        for row in range(count):
+            mujoco.mj_integratePos(model, q[row], step[row], 1.0)
+        terms.hinges.clip(q)
+        if length.max() < _STEP_TOL:
+            break
+    return q
+
+
+def _cost(
+    robot: Morphology, targets: Targets, holds: Holds, q: Coordinates, block: Block
+) -> Float[np.ndarray, "T"]:
+    """The solver's objective, each frame for itself."""
+    candidates = collisions_of(robot).candidates(forward_kinematics(robot.tree, q), block, 1)
+    return linearize(robot, targets, holds, q, block, candidates, with_jacobian=False).cost
+
+
+def _limbs(robot: Morphology, targets: Targets, block: Block) -> list[Role]:
+    """The limbs' segments that the block moves, by the roles at their upper ends."""
+    roles = [role for role in targets.bones if role in robot.bones]
+    return [r for r in roles if int(robot.links[robot.rig.roles.require(r)]) in block.joints]
+
+
+def _qpos_columns(robot: Morphology, block: Block) -> Int[np.ndarray, "n"]:
+    """Where `qpos` has the block's joints."""
+    starts = robot.mjcf.model.jnt_qposadr
+    sizes = np.where(robot.tree.balls, 4, 1)
+    return np.concatenate(
+        [int(starts[robot.mj_joints[j]]) + np.arange(sizes[j]) for j in block.joints]
+    )
+
+
+@lru_cache(maxsize=16)
+def _terms_of(robot: Morphology, bones: tuple[Role, ...], hands: bool) -> Terms:
+    return Terms(robot, bones, hands)
