@@ -111,6 +111,7 @@ def run(args: Namespace) -> int:
             f"{out}: preset {config.preset}, {config.steps} steps of {config.batch} windows, on "
             f"{', '.join(config.data)}"
         )
+    Path.cwd()  # raises where it was deleted: there torch's oneMKL would end the process
     try:
         import torch
 

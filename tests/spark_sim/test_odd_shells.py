@@ -69,10 +69,16 @@ def test_notes_that_can_not_be_written_end_nothing(here: Path) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a folder in use can't be deleted")
-def test_a_folder_that_was_deleted_is_named(here: Path) -> None:
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("batch", f"HERE/{WALK}", "--to", f"HERE/{TARGET}", "-o", "out"),
+        ("train", "HERE", "-o", "HERE/run"),
+    ],
+)
+def test_a_folder_that_was_deleted_is_named(here: Path, words: tuple[str, ...]) -> None:
     line = 'mkdir gone && cd gone && rmdir ../gone && "$@"'
-    words = ("batch", here / WALK, "--to", here / TARGET, "-o", "out")
-    done = in_shell(line, here, *map(str, words))
+    done = in_shell(line, here, *(word.replace("HERE", str(here)) for word in words))
     assert done.returncode == 2
     assert "the current folder, which was deleted" in done.stderr
 
