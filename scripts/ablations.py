@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 from spark.errors import SparkSimError
+from spark.inference.weights import read_weights
 from spark.training.settings import TrainConfig, toml
 
 _SWITCHES = {"": (), "w/o share": ("share",), "w/o mask": ("mask",), "w/ pos": ("pos",)}
@@ -51,12 +52,11 @@ def main(dataset: str, runs: str, steps: str = "600", *options: str) -> None:
         settings = Path(runs) / f"{out.name}.toml"
         out.mkdir(parents=True, exist_ok=True)
         settings.write_text(toml(config.changed(row, **SCHEDULE, steps=int(steps), data=[dataset])))
-        if (out / "checkpoint.safetensors").exists():
-            given = ["--resume"]
-        else:
-            given = ["--config", str(settings), "--force"]
         print(row, flush=True)
-        spark_sim("train", "-o", str(out), *given)
+        done = read_weights(out).step if (out / "checkpoint.safetensors").exists() else 0
+        if done < int(steps):
+            given = ["--resume"] if done else ["--config", str(settings), "--force"]
+            spark_sim("train", "-o", str(out), *given)
         checkpoints += ["--checkpoint", f"{row}={out}"]
     outputs = [
         f for kind in ("md", "json", "csv") for f in ("-o", str(Path(runs) / f"table.{kind}"))
