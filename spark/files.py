@@ -60,8 +60,7 @@ def replacing(path: Path) -> Iterator[Path]:
 def alone(folder: Path) -> Iterator[None]:
     """Make `folder`, and keep other processes that ask for it out of it meanwhile.
 
-    What processes that were killed in it left half written is removed. Raises `OutputError` where
-    another one is in it, or where it can't be made.
+    Raises `OutputError` where another one is in it, or where it can't be made.
     """
     with _named(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -74,11 +73,15 @@ def alone(folder: Path) -> Iterator[None]:
                 f"{folder}: another run is writing to it; wait until that ends, or give another "
                 "folder"
             ) from error
-        for left in folder.rglob(_PART.format("*", "*")):
-            left.unlink(missing_ok=True)
         yield
     finally:
         os.close(lock)  # the system also does this when a process is killed
+
+
+def sweep(folder: Path) -> None:
+    """Remove what processes that were killed left half written in `folder`; none is in it now."""
+    for left in folder.glob(_PART.format("*", "*")):
+        left.unlink(missing_ok=True)
 
 
 def _lock(file: int) -> None:

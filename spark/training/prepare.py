@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from spark.errors import FileFormatError, OutputError, SkeletonError, name_list
-from spark.files import alone, write_atomically
+from spark.files import alone, sweep, write_atomically
 from spark.io.reading import motion_files
 from spark.network.features import body_features
 from spark.opening import loads_json
@@ -69,6 +69,8 @@ def _prepared(
     before = {} if force else _clips_there(out, seed)
     parts = out / "parts"
     parts.mkdir(exist_ok=True)
+    for folder in (out, parts):
+        sweep(folder)
     digests = dict(progress(_make_parts(files, parts, workers), len(files)))
     index = _index({path: digests[path] for path in files}, parts, seed)
     if not index["clips"]:

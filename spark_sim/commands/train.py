@@ -1,8 +1,10 @@
 """`spark-sim train`: a network of your own."""
 
+import errno
 import shlex
 from argparse import ArgumentParser, BooleanOptionalAction, Namespace
 from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -79,6 +81,11 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
+    with ExitStack() as held:
+        return _run(args, held)
+
+
+def _run(args: Namespace, held: ExitStack) -> int:
     from spark.errors import ConventionError, DependencyError, OutputError
     from spark.files import write_atomically
     from spark.training.settings import TrainConfig, read_settings, toml
@@ -133,6 +140,8 @@ def run(args: Namespace) -> int:
     threads = choose_threads(config.width)
     if threads:
         torch.set_num_threads(threads)
+    if args.resume:
+        _hold(out, held)  # before what another run may yet write is read
     start = load_checkpoint(path) if args.resume else None
     if start and start.step and not start.optimizer:
         raise OutputError(
@@ -156,7 +165,8 @@ def run(args: Namespace) -> int:
         name_steps = 0 if config.names or config.t5 else config.name_steps
         with watching_stage("learning names", name_steps) as watch_names:
             start = fresh_checkpoint(config, watch_names)
-    out.mkdir(parents=True, exist_ok=True)
+    if not args.resume:
+        _hold(out, held)
     write_atomically(out / "config.toml", toml(config).encode())
     if not start.step and not start.recorded:
         start = _learn_recorded(start, config, out)
@@ -174,6 +184,24 @@ def run(args: Namespace) -> int:
                 f"spark-sim train -o {shlex.quote(str(out))} --resume"
             )
     return 128 + by_signal if done.step < config.steps else 0
+
+
+def _hold(out: Path, held: ExitStack) -> None:
+    """Make the folder of the run, and keep other runs out of it. Under `torchrun` the process that
+    writes does. Raises `OutputError` where another run is in it."""
+    from spark.files import alone
+    from spark_sim import console
+    from spark_sim.watching import is_first
+
+    if not is_first():
+        out.mkdir(parents=True, exist_ok=True)
+        return
+    try:
+        held.enter_context(alone(out))
+    except OSError as error:
+        if error.errno not in (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP):
+            raise
+        console.note(f"{out}: can't be locked here ({error.strerror}): start one run in it alone")
 
 
 def _learn_recorded(start: "Checkpoint", config: "TrainConfig", out: Path) -> "Checkpoint":

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 import torch
 
+from spark.files import alone
 from spark.training.checkpoint import load_checkpoint
 from spark.training.settings import read_settings, toml
 from spark_sim import sample
@@ -111,3 +112,21 @@ def test_the_command_line_trains_resumes_and_retargets(tmp_path: Path) -> None:
         )
         assert lost.code == 2
         assert "checkpoint goes with" in lost.stderr
+
+
+def test_a_run_that_another_one_writes_to_is_refused(tmp_path: Path) -> None:
+    """Begun anew or resumed; what the other one wrote stays, and none of its files is in the way
+    of a second run after it."""
+    sample(tmp_path / "samples")
+    (tmp_path / "tiny.toml").write_text(toml(replace(TINY, steps=1)))
+    with Program(tmp_path) as command:
+        train = ("train", "samples", "-o", "run", "--config", "tiny.toml")
+        assert command(*train).code == 0
+        before = {path: path.read_bytes() for path in (tmp_path / "run").iterdir()}
+        with alone(tmp_path / "run"):
+            for line in ((*train, "--force"), ("train", "-o", "run", "--resume", "--steps", "2")):
+                done = command(*line)
+                assert done.code == 2
+                assert "another run is writing to it" in done.stderr
+        assert {path: path.read_bytes() for path in (tmp_path / "run").iterdir()} == before
+        assert command("train", "-o", "run", "--resume", "--steps", "2").code == 0
