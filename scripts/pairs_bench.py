@@ -1,9 +1,10 @@
 """Training windows a second: pairs made, put into batches and handed over, as Markdown.
 
-Usage: python scripts/pairs_bench.py DATA... (datasets of `spark-sim prepare`, or folders of files)
+Usage: python scripts/pairs_bench.py PRESET DATA...
+(default, paper or tiny; datasets of `spark-sim prepare`, or folders of files)
 
-Batches are those of the default preset (4 draws of 4 windows of 64 frames), with 16 variants of a
-body. The first steps, in which variants are made and names read, are counted apart, and those in
+Batches are those of the preset (of default: 4 draws of 4 windows of 64 frames), with 16 variants of
+a body. The first steps, in which variants are made and names read, are counted apart, and those in
 which workers begin are not counted. Beside the rate on the clock, which other work on the machine
 lowers, stands that for a CPU second of a worker.
 """
@@ -41,10 +42,10 @@ class TimedPacker(Packer):
         return super().__call__(item[0]), item[1]
 
 
-def main(*data: str) -> None:
+def main(preset: str, *data: str) -> None:
     torch.set_num_threads(1)
     clips, _ = training_clips([Path(folder) for folder in data])
-    config = replace(TrainConfig("default"), variants=16)
+    config = replace(TrainConfig.of(preset), variants=16)
     names = NameEncoder().eval().remembering()
     steps = Timed(Steps(clips, names, config, 0, 1))
     began, clock = time.perf_counter(), time.process_time()
@@ -53,6 +54,14 @@ def main(*data: str) -> None:
     print("| | windows/s | windows for a CPU second of a worker |\n|---|---|---|")
     rate, of_cpu = FIRST / (time.perf_counter() - began), FIRST / (done - clock)
     print(f"| the first {FIRST} steps | {_windows(rate, config)} | {_windows(of_cpu, config)} |")
+    padded = Timed(Steps(clips, names, config, 0, 1, fixed_sizes=True))
+    for n in range(FIRST + STEPS - BEGUN):
+        if n == FIRST:
+            began, clock = time.perf_counter(), time.process_time()
+        done = padded[n][1]
+    rate = (STEPS - BEGUN) / (time.perf_counter() - began)
+    of_cpu = (STEPS - BEGUN) / (done - clock)
+    print(f"| padded to one size | {_windows(rate, config)} | {_windows(of_cpu, config)} |")
     for workers in (1, 2):
         numbers = range(FIRST, FIRST + STEPS)
         loader = DataLoader(
