@@ -13,7 +13,7 @@ from spark.network.config import N_GROUPS
 from spark.network.features import BodyFeatures
 from spark.training.batch import PairDraws, Poses, UnpairedDraws
 from spark.training.pairs import Pairs
-from spark.training.plan import Drawn
+from spark.training.posing import Drawn
 from spark.training.sizes import Sizes
 from spark.training.tensors import Body
 

@@ -17,14 +17,8 @@ from spark.network.features import BodyFeatures
 from spark.rotation import quat_angle, quat_from_yaw, quat_rotate, yaw_from_quat
 from spark.training.cuts import Cut, TrainingClip, cut_rotations, frames_of, ground_of
 from spark.training.mirror import mirrored_body, mirrored_motion
-from spark.training.plan import (
-    Drawn,
-    Plan,
-    local_rotations,
-    plan_of_pair,
-    turn_between,
-    turn_legs,
-)
+from spark.training.plan import Plan, plan_of_pair
+from spark.training.posing import Drawn, local_rotations, turn_between, turn_legs
 from spark.training.sizes import Sizes, sizes_of_variants
 from spark.training.staging import StagedBody, empty_rows, in_concatenation, leg_turns
 from spark.training.variants import random_variant, same_body, split_body

@@ -18,7 +18,8 @@ from spark.errors import SkeletonError
 from spark.network.features import BodyFeatures
 from spark.rotation import quat_from_yaw, quat_rotate, yaw_from_quat
 from spark.training.cuts import Cut, TrainingClip, cut_rotations, frames_of
-from spark.training.plan import Drawn, local_rotations, plan_of_body, turn_between
+from spark.training.plan import plan_of_body
+from spark.training.posing import Drawn, local_rotations, turn_between
 from spark.training.sizes import Sizes, sizes_of
 from spark.training.staging import empty_rows
 from spark.training.variants import Variant, same_body, split_body, split_joints
