@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
+import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -19,6 +20,7 @@ from robots.tree import LinkPoses, Tree, forward_kinematics
 
 DEPTH_ROUNDING = 0.003  # [m] over which the penalty of their depth sets in
 SEARCH_DISTANCE = 0.02  # [m] between shapes within which a pair is a candidate
+_ONE_JOINT = 0.05  # hip heights between hinges that turn about one point
 _PAIRS = len(DIRECTIONS) // 2  # a direction and the one against it, as many from the end
 
 Moves = tuple[tuple[int, ...], tuple[int, ...]]
@@ -203,10 +205,14 @@ def approach_jacobian(
 @lru_cache(maxsize=16)
 def collisions_of(robot: Morphology) -> Collisions:
     """The pairs of the robot's colliding shapes, but for those of neighbouring bodies and those
-    that the file excludes. What touches in the T-pose may stay as near as it is there."""
+    that the file excludes. What touches in the T-pose may stay as near as it is there; but parts
+    around one joint of several hinges, in each other already there, are neighbours too."""
     mjcf, tree = robot.mjcf, robot.tree
     shapes = shapes_of(mjcf, robot.mj_joints)
     poses = forward_kinematics(tree, robot.tpose)
+    data = mujoco.MjData(mjcf.model)
+    data.qpos[:] = robot.to_qpos(robot.tpose)[0]
+    mujoco.mj_kinematics(mjcf.model, data)
     pairs = []
     for i, a in enumerate(shapes):
         for b in shapes[i + 1 :]:
@@ -217,5 +223,21 @@ def collisions_of(robot: Morphology) -> Collisions:
             pair = ShapePair(small, large, 0.0)
             at_tpose = _distance(tree, poses, pair, small.spheres, np.zeros(1, dtype=np.int64))
             gap = float((at_tpose[:, 0] - small.radii).min())
+            if gap < 0 and _at_one_joint(robot, small.link, large.link):
+                apart = mujoco.mj_geomDistance(mjcf.model, data, a.geom, b.geom, 1.0, None)
+                if apart < 0:
+                    continue
             pairs.append(replace(pair, gap=gap))
     return Collisions(tree, tuple(pairs))
+
+
+def _at_one_joint(robot: Morphology, outer: int, inner: int) -> bool:
+    """Whether all hinges between two links turn about one point, as those of an ankle do."""
+    tree = robot.tree
+    chain = tree.chain(outer)
+    if inner >= 0 and inner not in chain:
+        return False
+    between = chain[chain.index(inner) + 1 :] if inner >= 0 else chain
+    anchors = tree.anchors[list(between)]
+    reach = np.linalg.norm(anchors - anchors[0], axis=1).max()
+    return bool(reach < _ONE_JOINT * robot.rig.hip_height)

@@ -24,6 +24,7 @@ from robots.solver.floor import depth_in_floor
 from robots.solver.footprints import points_of
 from robots.solver.hinges import LIMIT_CLEARANCE
 from robots.solver.holds import Holds
+from robots.solver.objective import linearize
 from robots.solver.smoothness import jerk_stiffening, overspeed
 from robots.solver.targets import Targets
 from robots.tree import Coordinates, forward_kinematics
@@ -38,6 +39,7 @@ _MAX_JERK_RATIO = 5.0  # jerk, over the one from which hinges are smoothed, that
 _SEARCH_DISTANCE = 0.01  # [m] between approximate shapes within which the exact ones are measured
 _MAX_DEPTH = 0.009  # hip heights of parts in each other, beyond their clearance,
 _MAX_SINKING = 0.009  # and of a sole's corner, or another part, below the floor
+_W_VIOLATION = 20.0  # what a frame with a violation costs: as four limbs that are 90 degrees off
 _MAX_OVERSPEED = 0.5  # [rad/s] of a hinge beyond the speed at which it is held back
 
 
@@ -73,15 +75,17 @@ def _repair_stretch(
     block: Block,
     fixed: Bool[np.ndarray, "T"],
 ) -> Coordinates:
-    """The trajectory of the round with the fewest violations."""
+    """The trajectory of the round with the fewest violations, but for poses that are far worse."""
     penalty_scale = np.ones(len(q))
-    best, fewest = q, np.inf
+    best, least = q, np.inf
     for k in range(_MAX_ROUNDS + 1):
         violated = violations(robot, targets, q, block, 1)
         rough = violated | too_jerky(robot, targets, q, block)
-        if rough.sum() < fewest:
-            best, fewest = q, rough.sum()
-        if k == _MAX_ROUNDS or not fewest:
+        pose = linearize(robot, targets, holds, q, block, [], with_jacobian=False)
+        worth = _W_VIOLATION * rough.sum() + pose.cost.sum()
+        if worth < least:
+            best, least = q, worth
+        if k == _MAX_ROUNDS or not rough.any():
             break
         if k == _LEAD_OUT_ROUND and not block.base and violated.any():
             q = _lead_out(robot, q, block, violated, fixed)

@@ -14,7 +14,8 @@ from safetensors.numpy import load_file
 
 from spark.inference.names import NameNetwork
 from spark.inference.weights import KINDS, OTHER, SHIPPED, read_weights
-from spark.rig.name_hints import NameHint
+from spark.rig.aliases import LEFT, RIGHT
+from spark.rig.name_hints import NameHint, split_name
 from spark.rig.roles import Role
 from spark.skeleton import Skeleton
 
@@ -36,13 +37,21 @@ def with_votes(skeleton: Skeleton, hints: Sequence[NameHint]) -> Sequence[NameHi
     encoder, kinds = _encoder()
     cosines = encoder.encode(skeleton.names)[unread] @ np.stack(list(kinds.values())).T
     odds = np.exp(cosines / _TEMPERATURE)
+    shares_of = odds / odds.sum(-1, keepdims=True)
+    sides = _whatever_side([skeleton.names[j] for j in unread])
     voted = list(hints)
-    for j, shares in zip(unread, (odds / odds.sum(-1, keepdims=True)).tolist(), strict=True):
+    for j, side in zip(unread, sides, strict=True):
+        shares = shares_of[[k for k, other in enumerate(sides) if other == side]].mean(0).tolist()
         part, share = max(zip(kinds, shares, strict=True), key=lambda kind: kind[1])
         fits = part != OTHER and (part in _MIDLINE) != bool(hints[j].side)
         if fits and share >= _LEAST_SHARE and not _below_one(skeleton, voted, j, part):
             voted[j] = replace(hints[j], parts={part: _CERTAINTY * share})
     return voted
+
+
+def _whatever_side(names: Sequence[str]) -> list[tuple[str, ...]]:
+    """The pieces of names without those of a side: what is said of both sides is one vote."""
+    return [tuple(p for p in split_name(name) if p not in LEFT | RIGHT) for name in names]
 
 
 def _below_one(skeleton: Skeleton, hints: Sequence[NameHint], joint: int, part: str) -> bool:

@@ -215,6 +215,27 @@ def test_arms_in_the_body_are_led_out_and_the_rest_stays(
         np.testing.assert_array_equal(mended.angles[: middle - 50], pushed.angles[: middle - 50])
 
 
+def test_no_repair_gives_up_the_pose(
+    walk: CanonicalMotion, walked: RobotMotion, ember: Morphology, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Arms as in the T-pose are in nothing, and not those of a walk."""
+    arms, targets, q = blocks_of(ember)[1], targets_of(walk, ember), walked.coordinates
+    pushed = Coordinates(q.pos, q.quat, q.angles.copy(), q.ball_quats)
+    shoulder = int(ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)])
+    pushed.angles[100:103, shoulder] += 1.0  # [rad] in a frame: far too fast
+    assert 0 < violations(ember, targets, pushed, arms, 1).sum() < 10
+
+    def spread(*args: object, **_: object) -> Coordinates:
+        here = args[3]
+        assert isinstance(here, Coordinates)
+        tpose = np.repeat(ember.tpose.angles, len(here), axis=0)
+        return Coordinates(here.pos, here.quat, tpose, here.ball_quats)
+
+    monkeypatch.setattr("robots.solver.repair.solve_block", spread)
+    kept = repair(ember, targets, footholds(ember, targets), pushed, arms)
+    np.testing.assert_array_equal(kept.angles, pushed.angles)
+
+
 def test_what_is_measured_is_what_mujoco_finds(ember: Morphology) -> None:
     """Arms swung at random: parts that are in each other, by MuJoCo's contacts."""
     rng = np.random.default_rng(3)

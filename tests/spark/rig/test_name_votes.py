@@ -70,3 +70,24 @@ def test_below_a_hand_is_no_second_one() -> None:
         names[at], names[skeleton.parents[at]] = "LeftHnadBase", above
         rig = replace(skeleton, names=tuple(names))
         assert set(with_votes(rig, read_names(rig.names))[at].parts) == parts
+
+
+def test_both_sides_have_one_vote(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An encoder that takes the one for a hand, the other for a foot: together for neither."""
+
+    class Odd:
+        def encode(self, names: tuple[str, ...]) -> np.ndarray:
+            return np.array([[n.startswith("Right"), n.startswith("Left")] for n in names], float)
+
+    kinds = {"hand": np.array([1.0, 0.0]), "foot": np.array([0.0, 1.0])}
+    monkeypatch.setattr(name_votes, "_encoder", lambda: (Odd(), kinds))
+    skeleton, _ = build(RIGS["mixamo"])
+    names = [name.replace("mixamorig:", "") for name in skeleton.names]
+    pair = [names.index(f"{side}HandThumb1") for side in ("Left", "Right")]
+    for alone in (True, False):
+        for joint, side, word in zip(pair, ("Left", "Right"), ("Zorb", "Qua"), strict=True):
+            names[joint] = f"{side}{word if alone else 'Zorb'}"
+        rig = replace(skeleton, names=tuple(names))
+        left, right = (with_votes(rig, read_names(rig.names))[joint].parts for joint in pair)
+        assert left.keys() == ({"foot"} if alone else right.keys())
+        assert alone or left == right
