@@ -24,6 +24,7 @@ from robots.solver.projection import project
 from robots.solver.repair import repair
 from robots.solver.resting import resting
 from robots.solver.smoothness import limit_speed
+from robots.solver.stance import apart
 from robots.solver.stretches import by_stretches
 from robots.solver.targets import Targets, poses_of, targets_of
 from robots.tree import Coordinates, forward_kinematics
@@ -76,7 +77,7 @@ def _trajectory(robot: Morphology, targets: Targets) -> Coordinates:
     q = solve(robot, coarse, [foot.every(stride) for foot in feet], q)
     if stride > 1:
         q = q.upsampled(stride, len(targets))
-    targets, feet = with_dynamics(robot, targets, reachable(robot, feet, q), q)
+    targets, feet = with_dynamics(robot, targets, apart(reachable(robot, feet, q)), q)
     return solve(robot, targets, feet, q, polish=True)
 
 
@@ -118,7 +119,7 @@ def solve(
             sliding = _holds_of(robot, targets, feet, q).sliding()
             q = solve_block(robot, targets, sliding, q, block, *ends, avoid_collisions=False)
         if block.base and not polish:
-            feet = reachable(robot, feet, q)
+            feet = apart(reachable(robot, feet, q))
         holds = _holds_of(robot, targets, feet, q)
         if polish or _may_collide(robot, targets, q, block):
             q = solve_block(robot, targets, holds, q, block, *ends, avoid_collisions=True)
