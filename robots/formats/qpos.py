@@ -142,4 +142,4 @@ def _addresses(robot: Morphology) -> tuple[int, list[int]]:
     """Where the base and the hinges are in qpos."""
     model = robot.mjcf.model
     base = int(model.jnt_qposadr[robot.mjcf.free_joint])
-    return base, [int(model.jnt_qposadr[joint]) for joint in robot.mj_joints]
+    return base, robot.addresses.tolist()

@@ -69,7 +69,8 @@ class Morphology:
         return found
 
     @cached_property
-    def _addresses(self) -> Int[np.ndarray, "N"]:
+    def addresses(self) -> Int[np.ndarray, "N"]:
+        """Where `qpos` has the tree's joints: a hinge's angle, the first of a ball's four."""
         return np.asarray(self.mjcf.model.jnt_qposadr[list(self.mj_joints)], dtype=np.int64)
 
     @cached_property
@@ -91,10 +92,10 @@ class Morphology:
         qpos[:, base : base + 3] = q.pos
         qpos[:, base + 3 : base + 7] = quat_continuous(quat_mul(q.quat, root_quat))
         hinges = ~tree.balls
-        qpos[:, self._addresses[hinges]] += q.angles[:, hinges]
+        qpos[:, self.addresses[hinges]] += q.angles[:, hinges]
         for j in np.flatnonzero(tree.balls):
             assert q.ball_quats is not None
-            at = int(self._addresses[j])
+            at = int(self.addresses[j])
             local = quat_relative(body_quats[j], quat_mul(q.ball_quats[:, j], body_quats[j]))
             qpos[:, at : at + 4] = quat_continuous(local)
         return qpos
@@ -106,12 +107,12 @@ class Morphology:
         base = int(model.jnt_qposadr[self.mjcf.free_joint])
         angles = np.zeros((len(qpos), len(tree)))
         hinges = ~tree.balls
-        angles[:, hinges] = qpos[:, self._addresses[hinges]] - model.qpos0[self._addresses[hinges]]
+        angles[:, hinges] = qpos[:, self.addresses[hinges]] - model.qpos0[self.addresses[hinges]]
         balls = None
         if tree.balls.any():
             balls = np.tile([1.0, 0, 0, 0], (len(qpos), len(tree), 1))
             for j in np.flatnonzero(tree.balls):
-                at = int(self._addresses[j])
+                at = int(self.addresses[j])
                 local = quat_normalize(qpos[:, at : at + 4])
                 balls[:, j] = quat_mul(body_quats[j], quat_mul(local, quat_conj(body_quats[j])))
         quat = quat_normalize(qpos[:, base + 3 : base + 7])

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Complex, Float
 from scipy.ndimage import median_filter
 
 from robots.model.morphology import Morphology
-from robots.solver.footprints import FootPlan, on_points
+from robots.solver.footprints import FootPlan, on_points, on_prints
 from robots.solver.holds import Holds
 from spark.runs import true_runs
 from spark.transfer.footfalls import between_contacts
@@ -42,9 +42,7 @@ def footing_of(robot: Morphology, plan: FootPlan) -> Holds:
     own = pivot[:, None] + turn[:, None] * (
         copied - (plan.toe[:, 0] + 1j * plan.toe[:, 1])[:, None]
     )
-    flat = pivot[:, None] + np.exp(1j * (plan.heading + offset[:, 2]))[:, None] * (
-        plan.flat[:, 0] + 1j * plan.flat[:, 1]
-    )
+    flat = on_prints(plan.flat, pivot, plan.heading + offset[:, 2])
     pitched = plan.points[..., 2] - plan.points[..., 2].min(axis=1, keepdims=True)
     on = on_points(plan.sole, plan.contacts.T.astype(np.float64)).T > 0
     low = np.where(stands[:, None], on, pitched < STEP_HEIGHT * plan.hip_height)

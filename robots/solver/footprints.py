@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Complex, Float
 
 from robots.model.morphology import Morphology
 from robots.solver.targets import Targets
@@ -78,6 +78,15 @@ def points_of(robot: Morphology, poses: LinkPoses, sole: Sole) -> Float[np.ndarr
     return np.stack([poses.point(int(link), point) for link, point in pairs])
 
 
+def on_prints(
+    flat: Float[np.ndarray, "P 2"],
+    toe: Complex[np.ndarray, "T"],
+    heading: Float[np.ndarray, "T"],
+) -> Complex[np.ndarray, "T P"]:
+    """The points of a sole (`FootPlan.flat`) on footprints: x + iy [m, world]."""
+    return toe[:, None] + np.exp(1j * heading)[:, None] * (flat[:, 0] + 1j * flat[:, 1])
+
+
 def on_points(sole: Sole, holds: Float[np.ndarray, "2 *n"]) -> Float[np.ndarray, "P *n"]:
     """What holds of heel and toes, for each point of a sole: its ball as the lesser of both, for
     it leaves the floor with the heel."""
@@ -138,13 +147,12 @@ def _moved(plan: FootPlan, points: Float[np.ndarray, "P 3 T"]) -> FootPlan:
     """Each footprint shifted and turned as the sole's points are, where they stand, on average."""
     prints = plan.prints.copy()
     pivot, heading = prints[:, 0] + 1j * prints[:, 1], prints[:, 2]
-    flat = plan.flat[:, 0] + 1j * plan.flat[:, 1]
     stood = points[:, 0] + 1j * points[:, 1]
     on = on_points(plan.sole, plan.contacts.T.astype(np.float64))
     for start, stop in true_runs(plan.stands):
         here = slice(start, stop)
         weight = on[:, here] / on[:, here].sum()
-        planned = pivot[here] + np.exp(1j * heading[here]) * flat[:, None]
+        planned = on_prints(plan.flat, pivot[here], heading[here]).T
         shift = (weight * (stood[:, here] - planned)).sum()
         center = (weight * planned).sum()
         turn = (weight * (stood[:, here] - center - shift) * (planned - center).conj()).sum()

@@ -27,7 +27,7 @@ class Hinges:
         model, tree = robot.mjcf.model, robot.tree
         hinges = ~tree.balls
         self._dofs = tree.dof_starts[hinges]
-        self._qpos = model.jnt_qposadr[np.array(robot.mj_joints, dtype=int)[hinges]]
+        self._qpos = robot.addresses[hinges]
         rest = model.qpos0[self._qpos]
         lower, upper = (limit[hinges] + rest for limit in (tree.lower, tree.upper))
         margin = np.minimum(LIMIT_MARGIN, 0.1 * (upper - lower))

@@ -45,8 +45,10 @@ def abrupt(
 ) -> Bool[np.ndarray, "T"]:
     """The frames around which limbs that the block moves are turned far more abruptly than the
     source's."""
-    poses = forward_kinematics(robot.tree, q)
     out = np.zeros(len(q), dtype=bool)
+    if len(q) < 3:
+        return out
+    poses = forward_kinematics(robot.tree, q)
     window = 2 * max(1, round(_WINDOW / targets.frame_time)) + 1
 
     def acceleration(direction: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "A"]:
@@ -54,8 +56,6 @@ def abrupt(
         mean = uniform_filter1d(squared, window, mode="nearest")
         return np.sqrt(np.maximum(np.asarray(mean), 0.0)) / targets.frame_time**2
 
-    if len(q) < 3:
-        return out
     for role in _limbs(robot, targets, block):
         link = int(robot.links[robot.rig.roles.require(role)])
         own = acceleration(poses.direction(link, robot.bones[role]).T)
@@ -182,11 +182,8 @@ def _limbs(robot: Morphology, targets: Targets, block: Block) -> list[Role]:
 
 def _qpos_columns(robot: Morphology, block: Block) -> Int[np.ndarray, "n"]:
     """Where `qpos` has the block's joints."""
-    starts = robot.mjcf.model.jnt_qposadr
     sizes = np.where(robot.tree.balls, 4, 1)
-    return np.concatenate(
-        [int(starts[robot.mj_joints[j]]) + np.arange(sizes[j]) for j in block.joints]
-    )
+    return np.concatenate([robot.addresses[j] + np.arange(sizes[j]) for j in block.joints])
 
 
 @lru_cache(maxsize=16)

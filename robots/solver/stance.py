@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from robots.solver.footprints import FootPlan
+from robots.solver.footprints import FootPlan, on_prints
 from spark.runs import true_runs
 
 _APART = 0.005  # [m] between two soles, at least
@@ -29,22 +29,17 @@ def apart(plans: Sequence[FootPlan]) -> list[FootPlan]:
     ]
     for _ in range(_SWEEPS):
         for one, other, both in meetings:
-            shifts = _parting(
-                _outline(plans[0].flat, prints[0][both]), _outline(plans[1].flat, prints[1][both])
-            )
+            soles = (_on_floor(plan, own[both]) for plan, own in zip(plans, prints, strict=True))
+            shifts = _parting(*soles)
             most = shifts[np.linalg.norm(shifts, axis=1).argmax()]
             prints[0][one, :2] -= most / 2
             prints[1][other, :2] += most / 2
     return [replace(plan, prints=own) for plan, own in zip(plans, prints, strict=True)]
 
 
-def _outline(
-    flat: Float[np.ndarray, "P 2"], prints: Float[np.ndarray, "T 3"]
-) -> Float[np.ndarray, "T P 2"]:
-    """The points of a sole on its footprints [m, world]."""
-    cos, sin = np.cos(prints[:, 2]), np.sin(prints[:, 2])
-    turn = np.stack([np.stack([cos, -sin], axis=1), np.stack([sin, cos], axis=1)], axis=1)
-    return flat @ turn.transpose(0, 2, 1) + prints[:, None, :2]
+def _on_floor(plan: FootPlan, prints: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T P 2"]:
+    points = on_prints(plan.flat, prints[:, 0] + 1j * prints[:, 1], prints[:, 2])
+    return np.stack([points.real, points.imag], axis=-1)
 
 
 def _parting(

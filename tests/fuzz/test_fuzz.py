@@ -20,7 +20,7 @@ Edits = list[tuple[str, int, int]]
 @pytest.mark.parametrize("name", FORMATS)
 def test_spoilt_files(name: str) -> None:
     if name == "fbx":
-        pytest.importorskip("pufbx")
+        pytest.importorskip("pufbx", reason="pufbx is not installed (the extra fbx)")
     target = FORMATS[name]
     with TemporaryDirectory() as scratch:
         seeds = target.seeds(Path(scratch))
