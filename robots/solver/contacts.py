@@ -23,6 +23,9 @@ from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion
 
 MIN_DURATION = 0.08  # contacts and breaks shorter than this [s] are noise
+STAY_REACH = 0.03  # [m, of an adult] over the floor that a standing point may wobble without a step,
+STAY_LIFT = 0.015  # and up from it,
+STAY_TIME = 0.4  # [s] for that long
 MAX_CREEP = 0.6  # [m/s, of an adult] of a foot that stands because nothing else does
 FLIGHT_PUSH = 0.35  # [body weights] of push below which nothing holds the body up
 TOUCH_HEIGHT = 0.03  # [m, of an adult] between the floor and the flesh of a part that touches,
@@ -66,11 +69,31 @@ def schedule(
     for s in np.flatnonzero(exist).tolist():
         stands[:, s] = planted_points(paths[:, s], frame_time, rig.standing_height)
     frames = max(1, round(MIN_DURATION / frame_time))
-    feet = _majority(stands, frames)
+    feet = _with_wobbles(_majority(stands, frames), paths, rig.standing_height, frame_time)
     floating = _nothing_holds(feet, parts)
     floating[flight] = False
     feet[floating] |= _creeping(source, paths, exist)[floating]
     return Schedule(_majority(feet, frames), parts, rests, roles, flight, acceleration)
+
+
+def _with_wobbles(
+    feet: Bool[np.ndarray, "T S 2"],
+    paths: Float[np.ndarray, "T S 2 3"],
+    height: float,
+    frame_time: float,
+) -> Bool[np.ndarray, "T S 2"]:
+    """Points stand on where they are quick but don't leave their place: a foot that trembles, of a
+    body that shakes, takes no steps."""
+    scale, out = height / ADULT_HEIGHT, feet.copy()
+    for s, k in np.ndindex(feet.shape[1:]):
+        path = paths[:, s, k]
+        for start, stop in true_runs(~feet[:, s, k]):
+            if start == 0 or stop == len(feet) or (stop - start) * frame_time > STAY_TIME:
+                continue
+            away = path[start : stop + 1] - path[start - 1]
+            near = np.linalg.norm(away[:, :2], axis=1).max() < STAY_REACH * scale
+            out[start:stop, s, k] = near and np.abs(away[:, 2]).max() < STAY_LIFT * scale
+    return out
 
 
 def _nothing_holds(
