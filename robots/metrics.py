@@ -30,6 +30,7 @@ DRAG_SPEED, DRAG_HEIGHT = 0.5, 0.01  # [m/s], [m] of a sole that is fast, and lo
 # [m/s], [m] of a standing toe of the source, whatever its size: the figures that other tools are
 # compared by, apart from what the solver takes for a contact (`spark.rig.contacts`).
 PLANTED_SPEED, PLANTED_HEIGHT = 0.15, 0.06
+MAX_UNEVEN = 0.05  # [m] between the lowest heights of both feet: one may never come down
 IN_AIR = 0.02  # [m] that a planted foot may be above the floor
 AT_LIMIT = np.radians(0.5)
 _WINDOW = 0.05  # [s] before and after a frame over which accelerations are measured
@@ -203,6 +204,7 @@ def _over(
 
 def _planted(toes: Float[np.ndarray, "T F 3"], frame_time: float) -> Bool[np.ndarray, "T F"]:
     low = np.percentile(toes[..., 2], 1, axis=0)
+    low = np.minimum(low, low.min(initial=np.inf) + MAX_UNEVEN)
     return (_speed(toes, frame_time) < PLANTED_SPEED) & (toes[..., 2] < low + PLANTED_HEIGHT)
 
 

@@ -15,7 +15,14 @@ from sim.body.anthropometry import RADII
 from sim.report.derivatives import derivative
 from sim.report.mass import human_mass
 from spark.constants import GRAVITY
-from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, planted_points, speeds
+from spark.rig.contacts import (
+    ADULT_HEIGHT,
+    PLANTED_HEIGHT,
+    PLANTED_SPEED,
+    planted_points,
+    speeds,
+    standing_heights,
+)
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_mul
@@ -23,7 +30,9 @@ from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion
 
 MIN_DURATION = 0.08  # contacts and breaks shorter than this [s] are noise
-STAY_REACH = 0.03  # [m, of an adult] over the floor that a standing point may wobble without a step,
+STAY_REACH = (
+    0.03  # [m, of an adult] over the floor that a standing point may wobble without a step,
+)
 STAY_LIFT = 0.015  # and up from it,
 STAY_TIME = 0.4  # [s] for that long
 MAX_CREEP = 0.6  # [m/s, of an adult] of a foot that stands because nothing else does
@@ -65,15 +74,20 @@ def schedule(
     flight = np.less(acceleration[:, 2], (FLIGHT_PUSH - 1) * GRAVITY)
     roles, parts, rests = _touching_parts(source, positions)
     stands = np.zeros(paths.shape[:-1], dtype=bool)
-    exist = np.abs(paths).sum(axis=(0, 2, 3)) > 0
-    for s in np.flatnonzero(exist).tolist():
-        stands[:, s] = planted_points(paths[:, s], frame_time, rig.standing_height)
+    exist = has_feet(paths)
+    if exist.any():
+        stands[:, exist] = planted_points(paths[:, exist], frame_time, rig.standing_height)
     frames = max(1, round(MIN_DURATION / frame_time))
     feet = _with_wobbles(_majority(stands, frames), paths, rig.standing_height, frame_time)
     floating = _nothing_holds(feet, parts)
     floating[flight] = False
     feet[floating] |= _creeping(source, paths, exist)[floating]
     return Schedule(_majority(feet, frames), parts, rests, roles, flight, acceleration)
+
+
+def has_feet(paths: Float[np.ndarray, "T S 2 3"]) -> Bool[np.ndarray, "S"]:
+    """Which feet the source has: the others are 0 all over."""
+    return np.abs(paths).sum(axis=(0, 2, 3)) > 0
 
 
 def _with_wobbles(
@@ -143,9 +157,10 @@ def _creeping(
         return out
     scale = source.rig.standing_height / ADULT_HEIGHT
     slowness = speeds(paths, source.frame_time) / (PLANTED_SPEED * scale)
-    height = paths[..., 2] - np.percentile(paths[..., 2], 1, axis=0)
-    cost = slowness + height / (PLANTED_HEIGHT * scale)
-    cost[:, ~exist] = np.inf
+    own = paths[:, exist]
+    height = own[..., 2] - standing_heights(own, source.rig.standing_height)
+    cost = np.full(slowness.shape, np.inf)
+    cost[:, exist] = slowness[:, exist] + height / (PLANTED_HEIGHT * scale)
     frames, best = np.arange(len(paths)), cost.reshape(len(paths), -1).argmin(axis=1)
     slow = slowness.reshape(len(paths), -1)[frames, best] < MAX_CREEP / PLANTED_SPEED
     out.reshape(len(paths), -1)[frames[slow], best[slow]] = True

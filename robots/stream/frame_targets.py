@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from robots.model.morphology import Morphology
+from robots.solver.contacts import has_feet
 from robots.solver.targets import (
     LIMB_SEGMENTS,
     TPOSE_DIRECTIONS,
@@ -21,6 +22,7 @@ from robots.solver.window_targets import PoseTargets
 from robots.stream.source_poses import SourcePoses
 from sim.body.anthropometry import segments
 from spark.errors import FrameError
+from spark.rig.contacts import standing_heights
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import matrix_from_quat, quat_conj, quat_from_matrix
@@ -84,7 +86,10 @@ def move_on(targets: FrameTargets, newest: FrameTargets) -> None:
 def ground_of(source: CanonicalMotion, robot: Morphology) -> Ground:
     """The floor of a clip; of a T-pose alone, its soles' height."""
     feet = source_feet(source, canonical_positions(source), robot)
-    return Ground(source.floor_z, np.percentile(feet[..., 2], 1, axis=0))
+    exist, low = has_feet(feet), np.zeros(feet.shape[1:3])
+    if exist.any():
+        low[exist] = standing_heights(feet[:, exist], source.rig.standing_height)
+    return Ground(source.floor_z, low)
 
 
 class FrameReader:

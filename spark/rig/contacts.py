@@ -12,7 +12,8 @@ from spark.rig.rig import Rig
 # scale with the body. Walking feet roll over heel and ball below them, swinging ones pass at over
 # 1 m/s.
 PLANTED_SPEED = 0.15  # [m/s]
-PLANTED_HEIGHT = 0.06  # [m] over the foot's own lowest height
+PLANTED_HEIGHT = 0.06  # [m] over the foot's own lowest height,
+MAX_UNEVEN = 0.05  # [m] which is no higher than this over the other's: a leg may never come down
 ADULT_HEIGHT = 1.75  # [m]
 SPEED_WINDOW = 1 / 15  # [s] that a speed is measured over: two frames at 30 fps
 
@@ -53,16 +54,27 @@ def speeds(positions: Float[np.ndarray, "T *n 3"], frame_time: float) -> Float[n
     return way / time.reshape(-1, *[1] * (way.ndim - 1))
 
 
+def standing_heights(
+    positions: Float[np.ndarray, "T F *n 3"], height: float
+) -> Float[np.ndarray, "F *n"]:
+    """The heights [m] of feet's points where they stand, each foot's own: their lowest (1st
+    percentile), unless one foot stays far above the other.
+
+    `height` [m] is the body's standing height.
+    """
+    low = np.percentile(positions[..., 2], 1, axis=0)
+    return np.minimum(low, low.min(axis=0) + MAX_UNEVEN * height / ADULT_HEIGHT)
+
+
 def planted_points(
-    positions: Float[np.ndarray, "T *n 3"], frame_time: float, height: float
-) -> Bool[np.ndarray, "T *n"]:
-    """Which points stand: slow, and near their own lowest height (1st percentile).
+    positions: Float[np.ndarray, "T F *n 3"], frame_time: float, height: float
+) -> Bool[np.ndarray, "T F *n"]:
+    """Which points of feet stand: slow, and near `standing_heights`.
 
     `height` [m] is the body's standing height, which the thresholds scale with.
     """
     scale = height / ADULT_HEIGHT
-    low = np.percentile(positions[..., 2], 1, axis=0)
-    near = positions[..., 2] < low + PLANTED_HEIGHT * scale
+    near = positions[..., 2] < standing_heights(positions, height) + PLANTED_HEIGHT * scale
     return near & (speeds(positions, frame_time) < PLANTED_SPEED * scale)
 
 

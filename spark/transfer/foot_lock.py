@@ -33,17 +33,18 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
     as the source's."""
     scale = moved.rig.hip_height / source.rig.hip_height
     moves: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
+    feet = []
     for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
         leg = leg_of(moved.rig.skeleton, moved.rig.roles.roles, group)
         contact = _contact(source.rig, moved.rig, group)
-        if leg is None or contact is None:
-            continue
-        theirs, their_height = _foot(source, group, contact[0])
-        own, own_height = _foot(moved, group, contact[1])
-        stance = _stances(
-            planted_points(theirs, source.frame_time, source.rig.standing_height),
-            source.frame_time,
-        )
+        if leg is not None and contact is not None:
+            feet.append((leg, _foot(source, group, contact[0]), _foot(moved, group, contact[1])))
+    if not feet:
+        return moved
+    paths = np.stack([theirs for _, (theirs, _), _ in feet], axis=1)
+    planted = planted_points(paths, source.frame_time, source.rig.standing_height)
+    for s, (leg, (theirs, their_height), (own, own_height)) in enumerate(feet):
+        stance = _stances(planted[:, s], source.frame_time)
         offset = np.zeros((len(own), 2))
         for start, stop in true_runs(stance):
             here = slice(start, stop)

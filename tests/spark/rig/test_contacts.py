@@ -31,6 +31,16 @@ def test_a_sliding_point_and_a_raised_one_are_not_planted() -> None:
     assert (planted[:, 2] == (time < 1)).all()
 
 
+def test_a_foot_that_never_comes_down_does_not_stand() -> None:
+    points = np.zeros((60, 2, 3))
+    points[:, 1, 2] = 0.1  # as a shoe's thickness would be, or a block's
+    assert planted_points(points, 1 / 60, 1.75).all()
+    points[:, 1, 2] = 0.2
+    planted = planted_points(points, 1 / 60, 1.75)
+    assert planted[:, 0].all()
+    assert not planted[:, 1].any()
+
+
 @pytest.mark.parametrize("size", [0.5, 2.0])
 def test_a_body_of_another_size_stands_at_the_same_times(size: float) -> None:
     """Lengths and speeds grow with the body; time does not."""
