@@ -3,10 +3,12 @@
 Usage: python scripts/pairs_bench.py PRESET DATA...
 (default, paper or tiny; datasets of `spark-sim prepare`, or folders of files)
 
-Batches are those of the preset (of default: 4 draws of 4 windows of 64 frames), with 16 variants of
-a body. The first steps, in which variants are made and names read, are counted apart, and those in
-which workers begin are not counted. Beside the rate on the clock, which other work on the machine
-lowers, stands that for a CPU second of a worker.
+Batches are those of the preset (of default: 4 draws of 4 windows of 64 frames). In the first
+steps, counted apart, variants of bodies are made and names read, as many as the preset has; the
+other rows are of 16 variants a body, all made. Padded batches are what a GPU gets, with the way
+from a worker to the trainer in the last two rows, where the steps in which workers begin are not
+counted. Beside the rate on the clock, which other work on the machine lowers, stands that for a CPU
+second of a worker.
 """
 
 import sys
@@ -22,21 +24,21 @@ from spark.training.dataset import training_clips
 from spark.training.name_encoder import NameEncoder
 from spark.training.packed import AHEAD, Packed, Packer
 from spark.training.settings import TrainConfig
-from spark.training.steps import Steps, Travelling
+from spark.training.steps import Blocks, Steps
 
 FIRST, BEGUN, STEPS = 800, 400, 700
-Travels = PairDraws | UnpairedDraws
+Travels = tuple[PairDraws | UnpairedDraws, ...]
 
 
-class Timed(Travelling):
-    """Steps with the CPU time of their process when they were done."""
+class Timed(Blocks):
+    """Blocks of steps with the CPU time of their process when they were done."""
 
-    def __getitem__(self, n: int) -> tuple[Travels, float]:  # type: ignore[override]
-        return super().__getitem__(n), time.process_time()
+    def __getitem__(self, block: int) -> tuple[Travels, float]:  # type: ignore[override]
+        return super().__getitem__(block), time.process_time()
 
 
 class TimedPacker(Packer):
-    """Steps as the training hands them over."""
+    """Blocks as the training hands them over."""
 
     def __call__(self, item: tuple[Travels, float]) -> tuple[Packed, float]:  # type: ignore[override]
         return super().__call__(item[0]), item[1]
@@ -45,48 +47,49 @@ class TimedPacker(Packer):
 def main(preset: str, *data: str) -> None:
     torch.set_num_threads(1)
     clips, _ = training_clips([Path(folder) for folder in data])
-    config = replace(TrainConfig.of(preset), variants=16)
-    names = NameEncoder().eval().remembering()
-    steps = Timed(Steps(clips, names, config, 0, 1))
-    began, clock = time.perf_counter(), time.process_time()
-    for n in range(FIRST):
-        done = steps[n][1]
+    own = TrainConfig.of(preset)
+    config = replace(own, variants=16)
     print("| | windows/s | windows for a CPU second of a worker |\n|---|---|---|")
-    rate, of_cpu = FIRST / (time.perf_counter() - began), FIRST / (done - clock)
-    print(f"| the first {FIRST} steps | {_windows(rate, config)} | {_windows(of_cpu, config)} |")
-    padded = Timed(Steps(clips, names, config, 0, 1, fixed_sizes=True))
-    for n in range(FIRST + STEPS - BEGUN):
-        if n == FIRST:
-            began, clock = time.perf_counter(), time.process_time()
-        done = padded[n][1]
-    rate = (STEPS - BEGUN) / (time.perf_counter() - began)
-    of_cpu = (STEPS - BEGUN) / (done - clock)
-    print(f"| padded to one size | {_windows(rate, config)} | {_windows(of_cpu, config)} |")
+    for told, settings, fixed, warm, count in (
+        (f"the first {FIRST} steps", own, True, 0, FIRST),
+        ("one by one", config, False, FIRST, STEPS - BEGUN),
+        ("padded to one size", config, True, FIRST, STEPS - BEGUN),
+    ):
+        names = NameEncoder().eval().remembering()
+        blocks = Timed(Steps(clips, names, settings, 0, 1, fixed_sizes=fixed))
+        size = blocks.steps.block
+        began, clock = time.perf_counter(), time.process_time()
+        for n in range((warm + count) // size):
+            if n == warm // size:
+                began, clock = time.perf_counter(), time.process_time()
+            done = blocks[n][1]
+        rate = count / (time.perf_counter() - began)
+        _row(told, config, rate, count / (done - clock))
     for workers in (1, 2):
-        numbers = range(FIRST, FIRST + STEPS)
         loader = DataLoader(
-            steps,
+            blocks,
             batch_size=None,
-            sampler=numbers,
+            sampler=range(FIRST // size, (FIRST + STEPS) // size),
             num_workers=workers,
             prefetch_factor=AHEAD,
             collate_fn=TimedPacker(),
         )
-        clocks = []
+        clocks, begun = [], BEGUN // size
         for n, (_, clock) in enumerate(loader):
             clocks.append(clock)
-            if n + 1 == BEGUN:
+            if n + 1 == begun:
                 began = time.perf_counter()
-        rate = (STEPS - BEGUN) / (time.perf_counter() - began)
-        each = [clocks[BEGUN + k :: workers] for k in range(workers)]
+        made = (len(clocks) - begun) * size
+        rate = made / (time.perf_counter() - began)
+        each = [clocks[begun + k :: workers] for k in range(workers)]
         used = sum(of_one[-1] - of_one[0] for of_one in each)
-        of_cpu = (STEPS - BEGUN - workers) / used
-        told = f"{workers} worker{'s' * (workers > 1)}"
-        print(f"| {told} | {_windows(rate, config)} | {_windows(of_cpu, config)} |")
+        told = f"padded, {workers} worker{'s' * (workers > 1)}"
+        _row(told, config, rate, (made - workers * size) / used)
 
 
-def _windows(steps: float, config: TrainConfig) -> int:
-    return round(steps * config.batch)
+def _row(told: str, config: TrainConfig, *steps: float) -> None:
+    """Of steps a second, on the clock and of CPU time."""
+    print("|", " | ".join([told, *(f"{n * config.batch:.0f}" for n in steps)]), "|", flush=True)
 
 
 if __name__ == "__main__":

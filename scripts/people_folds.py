@@ -37,7 +37,7 @@ def folds_of(found: list[Performance]) -> dict[str, int]:
 def trained(clips: list[TrainingClip], config: TrainConfig, out: Path) -> NetworkRetargeter:
     """The recipe's network of these clips."""
     path = out / "checkpoint.safetensors"
-    if not path.exists():
+    if not path.exists() or read_weights(path).step < config.steps:
         out.mkdir(parents=True, exist_ok=True)
         train(clips, config, out, start=fresh_checkpoint(config))
     return NetworkRetargeter(read_weights(path))

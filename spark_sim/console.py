@@ -5,7 +5,7 @@ import math
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
 from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
@@ -88,10 +88,18 @@ def uses_color() -> bool:
     return wanted and sys.stdout.isatty()
 
 
-def progress(items: Iterable[T], label: str, total: int | None = None) -> Iterator[T]:
-    """`items`, with a bar on stderr while they are worked through; none where it is no terminal."""
+def progress(
+    items: Iterable[T], label: str, total: int | None = None, *, lines: bool = False
+) -> Iterator[T]:
+    """`items`, with a bar on stderr while they are worked through; where it is no terminal nothing,
+    or a line every ten seconds."""
     if not sys.stderr.isatty():
-        yield from items
+        began, count = monotonic(), len(items) if isinstance(items, Sized) else total
+        tell = _lines(count, 0, label) if lines and count else None
+        for done, item in enumerate(items, 1):
+            yield item
+            if tell and monotonic() - began > _LINE_EVERY:  # short work needs no line
+                tell(done, {})
         return
     from tqdm import tqdm
 

@@ -12,13 +12,13 @@ class _Sided(StrEnum):
     """What a body has one of (`spine`) or, by its value's prefix, one on each side
     (`left_foot`)."""
 
-    @property
+    @cached_property
     def side(self) -> str:
         """ "left", "right", or "" on the midline."""
         side, _, _ = self.value.partition("_")
         return side if side in ("left", "right") else ""
 
-    @property
+    @cached_property
     def part(self) -> str:
         """The value without its side: "foot" of `left_foot`."""
         return self.value.removeprefix(f"{self.side}_") if self.side else self.value
@@ -99,11 +99,11 @@ class RoleMap:
 
     @cached_property
     def _joints(self) -> dict[Role, tuple[int, ...]]:
-        return {
-            role: tuple(j for j, r in enumerate(self.roles) if r is role)
-            for role in Role
-            if role in self.roles
-        }
+        found: dict[Role, list[int]] = {}
+        for j, role in enumerate(self.roles):
+            if role is not None:
+                found.setdefault(role, []).append(j)
+        return {role: tuple(joints) for role, joints in found.items()}
 
     def joints(self, role: Role) -> tuple[int, ...]:
         """The joints that hold `role`, from the pelvis outwards; empty where there is none."""

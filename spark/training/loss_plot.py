@@ -2,13 +2,14 @@
 
 import io
 from collections import defaultdict
+from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter
 
 from spark.files import write_atomically
 from spark.opening import loads_json
 
-_PAUSE = 30.0  # seconds between two pictures: drawing one takes half of a second
+_PAUSE = 30.0  # seconds to the first picture and the next: drawing one takes half of a second
 _NOTHING = 1e-9  # a term that never gets larger is rounding: the default preset leaves the root
 _SMOOTHED = 25  # the line through the points is a mean over a 25th of them
 
@@ -17,10 +18,10 @@ class LossPlot:
     """`losses.png` beside the log of a run. Raises `ImportError` without matplotlib."""
 
     def __init__(self, run: Path) -> None:
-        import matplotlib.figure  # noqa: F401  # now, and not after the first steps
-
+        if find_spec("matplotlib") is None:  # it is loaded later: that takes as long as a step
+            raise ModuleNotFoundError("No module named 'matplotlib'", name="matplotlib")
         self._log, self._picture = run / "log.jsonl", run / "losses.png"
-        self._drawn = 0.0
+        self._drawn = perf_counter()
 
     def update(self, *, now: bool = False) -> None:
         """Draw what the log holds, if the last picture is old enough, or `now`."""

@@ -1,6 +1,6 @@
-"""Draws in one piece of memory, for the way from a worker to the trainer and on to a GPU."""
+"""Blocks of draws in one piece of memory, for the way from a worker to the trainer and a GPU."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,9 +23,9 @@ class Packer:
         self._pieces = [torch.empty(0, dtype=torch.uint8)] * _PIECES
         self._turn = 0
 
-    def __call__(self, draws: PairDraws | UnpairedDraws) -> "Packed":
+    def __call__(self, block: Sequence[PairDraws | UnpairedDraws]) -> "Packed":
         self._turn = (self._turn + 1) % _PIECES
-        packed = Packed(draws, self._pieces[self._turn])
+        packed = Packed(block, self._pieces[self._turn])
         self._pieces[self._turn] = packed.piece
         return packed
 
@@ -34,7 +34,7 @@ class Packed:
     """What `on` makes draws of again. Handing over one piece takes a fraction of the time that the
     thirty tensors of a step take one by one. It lies in `piece`, or in a larger one."""
 
-    def __init__(self, draws: PairDraws | UnpairedDraws, piece: Tensor) -> None:
+    def __init__(self, block: Sequence[PairDraws | UnpairedDraws], piece: Tensor) -> None:
         tensors: list[Tensor] = []
         end = 0
 
@@ -46,24 +46,25 @@ class Packed:
             end += -(-size // _ALIGNED) * _ALIGNED
             return place
 
-        self._layout = _mapped(draws, Tensor, placed)
+        self._layout = [_mapped(draws, Tensor, placed) for draws in block]
         if piece.numel() < end:
             piece = torch.empty(end + end // 4, dtype=torch.uint8)
             if get_worker_info() is not None:
                 piece.share_memory_()  # type: ignore[no-untyped-call]
         self.piece = piece
         copies = iter(tensors)
-        _mapped(self._layout, _Place, lambda place: place.of(piece).copy_(next(copies)))
+        for layout in self._layout:
+            _mapped(layout, _Place, lambda place: place.of(piece).copy_(next(copies)))
 
     def pin_memory(self) -> "Packed":
         """Where a GPU fetches it from; torch's loader calls this."""
         self.piece = self.piece.pin_memory()
         return self
 
-    def on(self, device: torch.device) -> Any:
+    def on(self, device: torch.device) -> list[Any]:
         """The draws, on `device`."""
         memory = self.piece.to(device, non_blocking=True)
-        return _mapped(self._layout, _Place, lambda place: place.of(memory))
+        return [_mapped(layout, _Place, lambda place: place.of(memory)) for layout in self._layout]
 
 
 @dataclass(frozen=True)

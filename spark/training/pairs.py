@@ -7,6 +7,8 @@ must find the second.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +30,7 @@ _MAX_LOG_SPEED = 0.3  # a clip is played slower or faster by up to exp(0.3) = 1.
 # A body is drawn in proportion to this power of how much it turns in all: ten times the motion
 # counts 1.6 times as often.
 _DRAW_EXPONENT = 0.2
+_MOST_PAIRS = 16_384  # of bodies that are kept, some 10 kB each
 _MAX_TRIES = 10  # draws of a source before one with nothing unmatched is taken after all
 
 
@@ -84,7 +87,7 @@ class PairMaker:
         ]
         self._seen: dict[tuple[int, bool], BodyFeatures] = {}
         self._staged_bodies: dict[tuple[int, bool, int], StagedBody] = {}
-        self._links: dict[tuple[StagedBody, StagedBody], tuple[Correspondence, Plan]] = {}
+        self._pairs: dict[tuple[StagedBody, StagedBody], _BodyPair] = {}
 
     @property
     def sizes(self) -> Sizes:
@@ -98,7 +101,7 @@ class PairMaker:
     def draws(self, numbers: Sequence[int], windows: int) -> list[Pairs]:
         """The draws of these numbers, made together, which is faster."""
         drawn = [self._sample(n, windows) for n in numbers]
-        plans = [one.plan for one in drawn]
+        plans = [one.bodies.plan for one in drawn]
         *starts, total = np.cumsum([0, *(plan.rows for plan in plans)]).tolist()
         rows = empty_rows(total, windows, self.window)
         spans = [
@@ -115,7 +118,7 @@ class PairMaker:
                 lift[:] = lift[:, :, ::-1].copy()
         turn_between(rows, [plan.between for plan in plans], starts)
         turns = leg_turns(
-            [body for one in drawn for body in (one.source, one.target)],
+            [body for one in drawn for body in (one.bodies.source, one.bodies.target)],
             rows,
             in_concatenation([plan.legs.bones for plan in plans], starts),
             in_concatenation([plan.legs.uppers for plan in plans], starts),
@@ -131,14 +134,15 @@ class PairMaker:
         local = local_rotations(rows, plans, starts, from_heading)
         pairs = []
         for k, one in enumerate(drawn):
-            ends = (one.source.variant.body, one.target.variant.body, one.target.variant.body)
+            to, of_target = one.bodies, one.bodies.target.variant.body
+            ends = (to.source.variant.body, of_target, of_target)
             source, target, start = (
                 Drawn(body, local[k], pose, roots[k])
-                for body, pose in zip(ends, one.plan.poses, strict=True)
+                for body, pose in zip(ends, to.plan.poses, strict=True)
             )
             frame_time = one.cuts[0].clip.frame_time
             pairs.append(
-                Pairs(source, target, start, one.link.unmatched, ground.planted[k], frame_time)
+                Pairs(source, target, start, to.link.unmatched, ground.planted[k], frame_time)
             )
         return pairs
 
@@ -150,13 +154,12 @@ class PairMaker:
             performer, receiver = rng.integers(self.variants, size=2).tolist()
             if self.varied:
                 receiver = 0
-            source, target = (
-                self._staged_body(k, mirrored, number) for number in (performer, receiver)
+            pair = self._pair(
+                *(self._staged_body(k, mirrored, number) for number in (performer, receiver))
             )
-            link, plan = self._link(source, target)
-            if plan.some_unmatched:
+            if pair.some_unmatched:
                 break
-        return _Draw(source, target, link, plan, mirrored, self._cuts(k, windows, rng))
+        return _Draw(pair, mirrored, self._cuts(k, windows, rng))
 
     def _cuts(self, k: int, windows: int, rng: np.random.Generator) -> list[Cut]:
         clips, cuts = self._bodies[k], []
@@ -185,23 +188,39 @@ class PairMaker:
             self._staged_bodies[key] = StagedBody(variant)
         return self._staged_bodies[key]
 
-    def _link(self, source: StagedBody, target: StagedBody) -> tuple[Correspondence, Plan]:
+    def _pair(self, source: StagedBody, target: StagedBody) -> "_BodyPair":
         key = (source, target)
-        if key not in self._links:
-            if len(self._links) > 4096:
-                self._links.clear()
-            link = correspond(source.variant.body.rig, target.variant.body.rig)
-            self._links[key] = link, plan_of_pair(source, target, link)
-        return self._links[key]
+        if key not in self._pairs:
+            if len(self._pairs) >= _MOST_PAIRS:
+                del self._pairs[next(iter(self._pairs))]
+            self._pairs[key] = _BodyPair(*key)
+        return self._pairs[key]
+
+
+@dataclass(eq=False)
+class _BodyPair:
+    """Two bodies and what carries motion from one to the other, each part made when asked for."""
+
+    source: StagedBody
+    target: StagedBody
+
+    @cached_property
+    def link(self) -> Correspondence:
+        return correspond(self.source.variant.body.rig, self.target.variant.body.rig)
+
+    @cached_property
+    def some_unmatched(self) -> bool:
+        return bool((self.link.unmatched >= 0).any())
+
+    @cached_property
+    def plan(self) -> Plan:
+        return plan_of_pair(self.source, self.target, self.link)
 
 
 class _Draw(NamedTuple):
     """What a draw consists of before it is put on its two bodies."""
 
-    source: StagedBody
-    target: StagedBody
-    link: Correspondence
-    plan: Plan
+    bodies: _BodyPair
     mirrored: bool
     cuts: list[Cut]
 

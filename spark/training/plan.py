@@ -50,7 +50,6 @@ class Plan(NamedTuple):
     parents: Int[np.ndarray, "L"]
     children: Int[np.ndarray, "L"]
     poses: tuple[Int[np.ndarray, "_"], ...]
-    some_unmatched: bool = False
 
 
 def plan_of_pair(source: StagedBody, target: StagedBody, link: Correspondence) -> Plan:
@@ -77,8 +76,7 @@ def plan_of_pair(source: StagedBody, target: StagedBody, link: Correspondence) -
     copied = made.taken()
     bodies = [body.variant.body for body in (source, target, target)]
     poses = _locals([*placed, start], bodies)
-    some_unmatched = bool((link.unmatched >= 0).any())
-    return Plan(made.recorded, made.rows, between, legs, copied, *poses, some_unmatched)
+    return Plan(made.recorded, made.rows, between, legs, copied, *poses)
 
 
 def plan_of_body(variant: Variant) -> Plan:

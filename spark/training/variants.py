@@ -162,7 +162,7 @@ def _drop(nodes: list[_Node], rng: np.random.Generator) -> list[_Node]:
         k: sparse or bool(rng.random() < p) for k, p in _DROP.items() if k not in ("spine", "neck")
     }
     spines = [node for node in nodes if node.role is Role.SPINE]
-    dropped: list[_Node] = []
+    dropped: set[int] = set()
     for node in nodes:
         if node.parent is None or node is (spines[-1] if spines else None):
             continue
@@ -170,11 +170,11 @@ def _drop(nodes: list[_Node], rng: np.random.Generator) -> list[_Node]:
         if (node.role is None and rng.random() < 0.5) or (
             chosen_kinds[node.kind] if node.kind in chosen_kinds else rng.random() < probability
         ):
-            dropped.append(node)
+            dropped.add(id(node))
             for child in nodes:
                 if child.parent is node:
                     child.parent, child.offset = node.parent, child.offset + node.offset
-    return [node for node in nodes if not any(node is gone for gone in dropped)]
+    return [node for node in nodes if id(node) not in dropped]
 
 
 def _split(nodes: list[_Node], base: Skeleton, rng: np.random.Generator) -> list[_Node]:

@@ -53,7 +53,7 @@ def run(args: Namespace) -> int:
         seed=args.seed,
         workers=workers,
         force=args.force,
-        progress=lambda files, total: console.progress(files, "preparing", total),
+        progress=lambda files, total: console.progress(files, "preparing", total, lines=True),
     )
     for left in index["left_out"]:
         console.note(f"{left['file']}: left out: {left['why']}")

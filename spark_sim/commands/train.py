@@ -116,7 +116,7 @@ def _run(args: Namespace, held: ExitStack) -> int:
     if is_first():
         console.note(
             f"{out}: preset {config.preset}, {config.steps} steps of {config.batch} windows, on "
-            f"{', '.join(config.data)}"
+            f"{', '.join(config.data)}; loading torch"
         )
     Path.cwd()  # raises where it was deleted: there torch's oneMKL would end the process
     try:
@@ -151,7 +151,8 @@ def _run(args: Namespace, held: ExitStack) -> int:
     if start:
         _check_same_network(path, start.settings, config)
     clips, notes = training_clips(
-        [Path(p) for p in config.data], lambda files: console.progress(files, "reading")
+        [Path(p) for p in config.data],
+        lambda files: console.progress(files, "reading", lines=is_first()),
     )
     if is_first():
         for note in notes:

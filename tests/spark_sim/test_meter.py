@@ -45,3 +45,14 @@ def test_a_log_of_many_files_does_not_grow_with_them(clock: list[float], told: l
     assert 100 < len(told) < 700
     assert told[1] == "batch: 11 of 100000, 27.8 h left"  # 99,989 seconds
     assert told[-1] == "batch: 100000 of 100000"
+
+
+def test_files_are_counted_in_a_log_where_reading_them_takes_long(
+    clock: list[float], told: list[str]
+) -> None:
+    for _ in console.progress(range(40), "reading", lines=True):
+        clock[0] += 0.2
+    assert told == []  # 8 s: short work
+    for _ in console.progress(range(40), "reading", lines=True):
+        clock[0] += 0.5
+    assert told == ["reading: 21 of 40", "reading: 40 of 40"]

@@ -89,7 +89,7 @@ def test_a_step_waits_for_no_number(walks: list[TrainingClip], preset: str) -> N
     """On the meta device, which has shapes and no numbers, whoever asks for one fails."""
     objective, steps = steps_of(walks, preset, fixed=False)
     meta = torch.device("meta")
-    loss, _ = objective.to(meta)(Packer()(steps.draws(0)).on(meta).batch())
+    loss, _ = objective.to(meta)(Packer()([steps.draws(0)]).on(meta)[0].batch())
     loss.backward()
     with pytest.raises(RuntimeError):
         float(loss)

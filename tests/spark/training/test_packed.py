@@ -14,7 +14,7 @@ from tests.helpers.training import SMALL_NAMES, TINY
 
 def test_a_packed_batch_is_the_batch(clips: list[TrainingClip]) -> None:
     draws = Steps(clips, NameEncoder(SMALL_NAMES).encode, TINY, 0, 1).draws(0)
-    batch, again = draws.batch(), Packer()(draws).on(torch.device("cpu")).batch()
+    batch, again = draws.batch(), Packer()([draws]).on(torch.device("cpu"))[0].batch()
     for part, other in zip(batch[:5], again[:5], strict=True):
         assert type(part) is type(other)
         for a, b in zip(part, other, strict=True):
@@ -33,3 +33,16 @@ def test_batches_of_a_worker_hold_while_they_are_used(clips: list[TrainingClip])
         batch = steps[n]
         assert torch.equal(batch.truth.rotations, again.truth.rotations), n
         assert torch.equal(batch.pose.root, again.pose.root), n
+
+
+def test_steps_are_the_same_wherever_in_a_block_a_run_begins(clips: list[TrainingClip]) -> None:
+    steps = Steps(clips, NameEncoder(SMALL_NAMES).encode, replace(TINY, workers=0, steps=11), 0, 1)
+    assert steps.block > 1
+    batches = list(batches_from(steps, 0, torch.device("cpu")))
+    assert len(batches) == 11
+    for start in (1, steps.block, steps.block + 1):
+        rest = list(batches_from(steps, start, torch.device("cpu")))
+        assert len(rest) == 11 - start
+        for n, batch in enumerate(rest, start):
+            assert torch.equal(batch.truth.rotations, batches[n].truth.rotations), n
+            assert torch.equal(batch.truth.rotations, steps[n].truth.rotations), n

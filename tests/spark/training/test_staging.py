@@ -56,8 +56,10 @@ def test_a_draw_is_what_its_steps_give_one_by_one(walks: list[TrainingClip], var
         if one.mirrored:
             pose, path, stands = mirrored_motion(pose, path, stands)
             lifts = lifts[:, :, ::-1]
-        source, target = (body.pose(pose, path, stands, lifts) for body in (one.source, one.target))
-        copied = one.link.rotations(source, one.target.variant.body.rig)
+        source, target = (
+            body.pose(pose, path, stands, lifts) for body in (one.bodies.source, one.bodies.target)
+        )
+        copied = one.bodies.link.rotations(source, one.bodies.target.variant.body.rig)
         heading = quat_from_yaw(-yaw_from_quat(source[:, :1, 0]))
         for drawn, world in zip(draw[:3], (source, target, copied), strict=True):
             local = local_rotations(drawn.body.skeleton, world)
