@@ -45,9 +45,9 @@ _LOWER = {
 @dataclass(frozen=True)
 class RobotMetrics:
     """Shares are of frames [0, 1]; those of `source` beside them. `swing_clearance` and the
-    accelerations (99th percentiles, of the middle of the hips and the centre of mass) are over the
-    source's, scaled by the hips' heights; `rests` is of hands, knees and other parts that lie on
-    the ground in the source. None where there is nothing to compare."""
+    accelerations (99th percentiles, of the middle of the hips, the centre of mass and the worst
+    limb) are over the source's, scaled by the hips' heights; `rests` is of hands, knees and other
+    parts that lie on the ground in the source. None where there is nothing to compare."""
 
     implausible: float
     implausible_source: float
@@ -63,6 +63,7 @@ class RobotMetrics:
     dragging_source: float
     hips_acceleration: float | None
     com_acceleration: float | None
+    limb_acceleration: float | None
     heading_rad: float
     drift_m: float
     contact_f1: float | None
@@ -117,6 +118,7 @@ def measure(motion: Motion, rig: Rig, result: RobotMotion) -> RobotMetrics:
         dragging_source=theirs.dragging,
         hips_acceleration=report.clip.base_acceleration_p99 / thrown if thrown > 0 else None,
         com_acceleration=_over(own_poses.mass.com, source_poses.mass.com, scale, frame_time),
+        limb_acceleration=None if report.limbs is None else report.limbs.ratio,
         heading_rad=float(np.abs(report.drift.heading).max()),
         drift_m=float(report.drift.distance.max()),
         contact_f1=report.contacts.f1,

@@ -168,11 +168,28 @@ def thrown(motion: Motion, rig: Rig, rng: np.random.Generator, *, distance: floa
     """Once a second the hips go to a side and back within 0.2 s, over feet that stay."""
     canonical = to_canonical(motion, rig)
     times = np.arange(len(motion)) * motion.frame_time
-    bump = np.where(times % 1.0 < 0.2, 0.5 - 0.5 * np.cos(2 * np.pi * times / 0.2), 0.0)
     angles = rng.uniform(0, 2 * np.pi, int(times[-1]) + 1)[times.astype(int)]
-    path = distance * bump[:, None] * np.stack([np.cos(angles), np.sin(angles), 0 * angles], 1)
+    way = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    path = distance * to_and_fro(times)[:, None] * way
     away = replace(canonical, hips=canonical.hips + path)
     return from_canonical(_with_feet_moved(away, np.stack([-path] * len(rig.soles))))
+
+
+def arm_thrown(motion: Motion, rig: Rig, rng: np.random.Generator, *, degrees: float) -> Motion:
+    """Once a second the left shoulder turns about an axis drawn by lot, and back, within 0.2 s."""
+    shoulder = rig.roles.require(Role.LEFT_UPPER_ARM)
+    times = np.arange(len(motion)) * motion.frame_time
+    axes = rng.normal(size=(int(times[-1]) + 1, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    turns = np.radians(degrees) * to_and_fro(times)[:, None] * axes[times.astype(int)]
+    world = forward(motion)[1]
+    wanted = quat_mul(quat_from_rotvec(turns), world[:, shoulder])
+    return _turned(motion, rig, world, {shoulder: wanted})
+
+
+def to_and_fro(times: Float[np.ndarray, "T"]) -> Float[np.ndarray, "T"]:
+    """From 0 to 1 and back within 0.2 s at the beginning of each second, then 0."""
+    return np.where(times % 1.0 < 0.2, 0.5 - 0.5 * np.cos(2 * np.pi * times / 0.2), 0.0)
 
 
 CORRUPTIONS: dict[str, Corruption] = {
@@ -192,6 +209,7 @@ CORRUPTIONS: dict[str, Corruption] = {
     "hand in chest": hand_in_chest,
     "feet drag": partial(dragging, height=0.3),
     "base thrown 6 cm": partial(thrown, distance=0.06),
+    "arm thrown 15°": partial(arm_thrown, degrees=15.0),
     "drift 10 cm/s": partial(sliding, speed=0.1),
 }
 """What the test-bench does to clips; the frame rates and the mirror change nothing that matters."""

@@ -33,6 +33,7 @@ TRAVEL = 2.0  # [m] that a clip must go for "in place" to change it
 # counts as nothing too [m, rad, share].
 DRIFT, HEADING, CONTACTS, CLEARANCE = 0.02, np.radians(5), 0.1, 0.05
 BASE = 1.05  # times the source's acceleration, or half of gravity where that is more
+LIMB = 1.2  # times the source's acceleration
 
 MEASURES = (
     "any",
@@ -44,6 +45,7 @@ MEASURES = (
     "contacts",
     "clearance",
     "base",
+    "limb",
     "speed",
     "jerk",
     "balance",
@@ -67,6 +69,7 @@ def scores(report: Report) -> dict[str, float]:
         "contacts": 0.0 if contacts.f1 is None else coarse(1 - contacts.f1, CONTACTS),
         "clearance": np.nan if swing is None else coarse(abs(1 - swing.clearance), CLEARANCE),
         "base": coarse(clip.base_acceleration_p99 / max(thrown, 0.5 * GRAVITY), BASE),
+        "limb": 0.0 if report.limbs is None else coarse(report.limbs.ratio, LIMB),
         "speed": float(clip.joint_speed.max()),
         "jerk": clip.jerk_rms,
         "balance": clip.unbalanced_share or 0.0,

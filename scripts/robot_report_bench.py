@@ -17,9 +17,11 @@ from tqdm import tqdm
 from robots.model.known import known
 from robots.model.motion import RobotMotion
 from robots.solver.solve import retarget
+from scripts.corruptions import to_and_fro
 from scripts.report_bench import MEASURES, clips, scores, separation, table
 from sim.interpolate import at_times
 from sim.report import Report, Subject, assess
+from spark.rig.roles import Role
 from spark.transfer.canonical import to_canonical
 
 Corruption = Callable[[RobotMotion, np.random.Generator], RobotMotion]
@@ -61,6 +63,21 @@ def flailing(motion: RobotMotion, rng: np.random.Generator, *, degrees: float) -
     return replace(motion, coordinates=replace(coordinates, angles=angles))
 
 
+def arm_thrown(motion: RobotMotion, rng: np.random.Generator, *, degrees: float) -> RobotMotion:
+    """Once a second the first hinge of the left shoulder turns to a side drawn by lot, and back,
+    within 0.2 s."""
+    robot, tree, coordinates = motion.robot, motion.robot.tree, motion.coordinates
+    hinge = int(robot.links[robot.rig.roles.require(Role.LEFT_UPPER_ARM)])
+    while (above := int(tree.parents[hinge])) not in robot.links:
+        hinge = above
+    times = np.arange(len(motion)) * motion.frame_time
+    sides = rng.choice([-1.0, 1.0], int(times[-1]) + 1)[times.astype(int)]
+    angles = coordinates.angles.copy()
+    angles[:, hinge] += np.radians(degrees) * sides * to_and_fro(times)
+    angles = np.clip(angles, tree.lower, tree.upper)
+    return replace(motion, coordinates=replace(coordinates, angles=angles))
+
+
 def resampled(motion: RobotMotion, rng: np.random.Generator, *, fps: float) -> RobotMotion:
     """The same motion at another frame rate."""
     robot, duration = motion.robot, (len(motion) - 1) * motion.frame_time
@@ -75,6 +92,7 @@ CORRUPTIONS: dict[str, Corruption] = {
     "slide 0.3 m/s": partial(sliding, speed=0.3),
     "jitter 2°": partial(jittering, degrees=2.0),
     "flail 10°": partial(flailing, degrees=10.0),
+    "arm thrown 15°": partial(arm_thrown, degrees=15.0),
     "twice as fast": partial(faster, factor=2.0),
     "30 fps": partial(resampled, fps=30.0),
     "120 fps": partial(resampled, fps=120.0),

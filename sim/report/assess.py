@@ -8,6 +8,7 @@ from jaxtyping import Float
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.course import Course, course_of
 from sim.report.findings import findings_of
+from sim.report.limbs import limbs_of
 from sim.report.measures import (
     ContactMatch,
     Drift,
@@ -77,8 +78,9 @@ def assess(
     notes += _slope(source_course, "the source's")
     notes += _pace(motion, source.motion)
     thrown = scale * source_clip.base_acceleration_p99
-    findings = findings_of(clip, drift, swing, thrown)
-    return Report(clip, source_clip, drift, contacts, findings, notes, known, swing, scale)
+    limbs = limbs_of(clip, source_clip, times, scale)
+    findings = findings_of(clip, drift, swing, thrown, limbs)
+    return Report(clip, source_clip, drift, contacts, findings, notes, known, swing, limbs, scale)
 
 
 def _pace(motion: Motion, source: Motion) -> tuple[str, ...]:

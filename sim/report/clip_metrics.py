@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float
 
 from sim.report.clip_poses import ClipPoses
 from sim.report.derivatives import derivative
+from sim.report.limb_ends import limb_ends
 from sim.report.limits import LimitExcess, limit_excess
 from sim.report.measures import floating, horizontal_speed, penetration_depth, windowed_min
 from sim.report.model_joints import model_joint_rates, model_limit_excess
@@ -32,6 +33,7 @@ class ClipMetrics:
     `sole_heights` [m], `sole_speeds` [m/s]: of the lowest corner of each foot's sole, and of the
     middle of its corners along the floor.
     `base_acceleration` [m/s²]: of the middle of the hips.
+    `limb_acceleration` [m/s²]: of the ends of the limbs `limb_names`.
     `torques`: of the joints of a model whose file tells what its motors give.
     `unexplained_wrench`: the force [body weights] and the torque [body weights x 1 m] that the
     floor can't give.
@@ -55,6 +57,8 @@ class ClipMetrics:
     sole_heights: Float[np.ndarray, "T F"]
     sole_speeds: Float[np.ndarray, "T F"]
     base_acceleration: Float[np.ndarray, "T"]
+    limb_names: tuple[str, ...]
+    limb_acceleration: Float[np.ndarray, "T L"]
     torques: tuple[JointTorque, ...]
     unexplained_wrench: Float[np.ndarray, "T 2"]
     imbalance: Float[np.ndarray, "T"]
@@ -127,6 +131,11 @@ class ClipMetrics:
         return float(np.percentile(self.base_acceleration, 99))
 
     @property
+    def limb_peaks(self) -> Float[np.ndarray, "L"]:
+        """The 99th percentile over the frames of each limb's acceleration [m/s²]."""
+        return np.percentile(self.limb_acceleration, 99, axis=0).astype(float)
+
+    @property
     def overload_share(self) -> float | None:
         """The share of frames in which a joint needs more torque than it has; None of a body that
         tells no limits."""
@@ -157,7 +166,9 @@ def measure(poses: ClipPoses, floor_z: float) -> ClipMetrics:
     acceleration = derivative(poses.mass.com[:, 2], frame_time, 2, window)
     # The window smears take-off and landing over itself.
     fall_error = windowed_min(np.abs(acceleration + GRAVITY), frame_time, window)
-    hips = derivative(poses.hips, frame_time, 2, window)
+    limb_names, ends = limb_ends(poses)
+    bodies = np.concatenate([poses.hips[:, None], ends], axis=1)
+    thrown = np.linalg.norm(derivative(bodies, frame_time, 2, window), axis=-1)
     feet = support.corners_of
     middles = np.stack([poses.corners[:, own].mean(axis=1) for own in feet.values()], axis=1)
     skates = support.skating()
@@ -206,7 +217,9 @@ def measure(poses: ClipPoses, floor_z: float) -> ClipMetrics:
             [support.heights[:, own].min(axis=1) for own in feet.values()], axis=1
         ),
         sole_speeds=horizontal_speed(middles, frame_time, window),
-        base_acceleration=np.linalg.norm(hips, axis=1),
+        base_acceleration=thrown[:, 0],
+        limb_names=limb_names,
+        limb_acceleration=thrown[:, 1:],
         torques=torques,
         unexplained_wrench=wrench,
         imbalance=support.imbalance(),

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sim.report.clip_metrics import ClipMetrics
+from sim.report.limbs import Limbs
 from sim.report.measures import Drift
 from sim.report.result import Finding
 from sim.report.swing import Swing
@@ -29,6 +30,7 @@ def findings_of(
     drift: Drift | None = None,
     swing: Swing | None = None,
     thrown: float | None = None,
+    limbs: Limbs | None = None,
 ) -> tuple[Finding, ...]:
     """All events of a clip, the gravest of each measure first.
 
@@ -52,6 +54,7 @@ def findings_of(
         *findings,
         *(_swing(swing) if swing else ()),
         *(_base(clip, thrown) if thrown is not None else ()),
+        *(_limbs(clip, limbs, gap) if limbs else ()),
         *(_root_drift(drift) if drift else ()),
     )
 
@@ -156,6 +159,19 @@ def _base(clip: ClipMetrics, thrown: float) -> Iterator[Finding]:
     amount = float(clip.base_acceleration[worst])
     sentence = f"the base is thrown by {amount:.0f} m/s², the source's by {thrown:.0f}"
     yield Finding("base_acceleration", "root", worst, worst + 1, amount, "m_s2", sentence)
+
+
+def _limbs(clip: ClipMetrics, limbs: Limbs, gap: int) -> list[Finding]:
+    findings = []
+    for k, (name, peak) in enumerate(zip(limbs.names, limbs.source_peaks, strict=True)):
+        own = clip.limb_acceleration[:, clip.limb_names.index(name)]
+        for start, stop in true_runs(limbs.thrown[:, k], gap):
+            amount = float(own[start:stop].max())
+            sentence = f"{name} is thrown by {amount:.1f} m/s², the source's by {peak:.1f}"
+            findings.append(
+                Finding("limb_acceleration", name, start, stop, amount, "m_s2", sentence)
+            )
+    return sorted(findings, key=lambda found: -found.amount)
 
 
 def _root_drift(drift: Drift) -> Iterator[Finding]:

@@ -19,6 +19,7 @@ LABELS = {
     "swing_clearance": "swing clearance off",
     "root_drift": "root drift",
     "base_acceleration": "base acceleration",
+    "limb_acceleration": "limb acceleration",
     "joint_speed": "joint speed",
     "joint_jerk": "joint jerk",
     "ground_truth_mse": "ground-truth MSE",
@@ -29,6 +30,7 @@ UNITS = {
     **dict.fromkeys(LABELS, "%"),  # shares of frames, contacts or height
     "root_drift": "cm",
     "base_acceleration": "m/s²",
+    "limb_acceleration": "x",  # times the source's
     "joint_speed": "rad/s",
     "joint_jerk": "rad/s³",
     "ground_truth_mse": "1e-4",

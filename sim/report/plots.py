@@ -84,6 +84,7 @@ def plots(result: Result) -> list[Plot]:
             None,
             None if source is None else result.scale * source.base_acceleration,
         ),
+        *_limbs(result),
         Plot(
             "fastest joint",
             "rad/s",
@@ -104,6 +105,22 @@ def plots(result: Result) -> list[Plot]:
             Plot("distance from the truth", "% of height", result.truth.errors, never, None)
         )
     return shown
+
+
+def _limbs(result: Result) -> list[Plot]:
+    """Of all limbs that both have, the hardest throw."""
+    clip, source, limbs = result.clip, result.source, result.limbs
+    names = clip.limb_names if limbs is None else limbs.names
+    if not names:
+        return []
+
+    def hardest(side: ClipMetrics) -> Float[np.ndarray, "T"]:
+        columns = [side.limb_names.index(name) for name in names]
+        return side.limb_acceleration[:, columns].max(axis=1)
+
+    thrown = np.zeros(len(clip), dtype=bool) if limbs is None else np.any(limbs.thrown, axis=1)
+    beside = None if source is None or limbs is None else result.scale * hardest(source)
+    return [Plot("acceleration of the limbs", "m/s²", hardest(clip), thrown, None, beside)]
 
 
 def svg(plot: Plot, duration: float, source_duration: float) -> Markup:

@@ -7,6 +7,7 @@ import numpy as np
 
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.joints import joint_rows
+from sim.report.limbs import Limbs
 from sim.report.measures import Drift
 from sim.report.result import Finding, Result
 from sim.report.swing import Swing
@@ -32,6 +33,7 @@ def record(result: Result) -> dict[str, Any]:
         "root_drift": None if result.drift is None else _drift(result.drift),
         "foot_contacts": None if result.contacts is None else asdict(result.contacts),
         "swing": None if result.swing is None else _swing(result.swing),
+        "limbs": None if result.limbs is None else _limbs(result.limbs, clip.frame_time),
         "ground_truth": None if result.truth is None else _truth(result.truth),
         "findings": [_finding(finding, clip.frame_time) for finding in result.findings],
         "notes": list(result.notes),
@@ -55,6 +57,8 @@ _UNITS = {
     "swing_speed": "m_s",
     "swing_height": "m",
     "swing_time": "s",
+    "limb_throw": "",
+    "limb_least": "m_s2",
     "torque": "",
     "limit_margin": "rad",
     "static_speed": "m_s",
@@ -94,6 +98,9 @@ def _clip(clip: ClipMetrics) -> dict[str, Any]:
         "static_share": float(np.isfinite(clip.imbalance).mean()),
         "over_torque_share": clip.overload_share,
         "base_acceleration_p99_m_s2": clip.base_acceleration_p99,
+        "limb_acceleration_p99_m_s2": dict(
+            zip(clip.limb_names, clip.limb_peaks.tolist(), strict=True)
+        ),
         "largest_joint_speed_rad_s": float(clip.joint_speed.max(initial=0.0)),
         "joint_jerk_rms_rad_s3": clip.jerk_rms,
         "joint_limits": {
@@ -145,6 +152,17 @@ def _swing(swing: Swing) -> dict[str, float]:
         "height_m": swing.height,
         "scaled_source_height_m": swing.source_height,
         "swing_s": swing.seconds,
+    }
+
+
+def _limbs(limbs: Limbs, frame_time: float) -> dict[str, Any]:
+    return {
+        "acceleration_of_source": limbs.ratio,
+        "worst": limbs.names[limbs.worst],
+        "worst_frame": limbs.worst_frame,
+        "worst_s": limbs.worst_frame * frame_time,
+        "of_source": dict(zip(limbs.names, limbs.ratios.tolist(), strict=True)),
+        "scaled_source_p99_m_s2": dict(zip(limbs.names, limbs.source_peaks.tolist(), strict=True)),
     }
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from sim.report.clip_metrics import ClipMetrics
+from sim.report.limbs import Limbs
 from sim.report.measures import ContactMatch, Drift
 from sim.report.swing import Swing
 from sim.report.truth import Accuracy
@@ -40,7 +41,8 @@ class Result:
     far from the ground truth where that is known.
 
     `clip.self_depth` is then what goes beyond the source's own self-penetration, and `scale` is the
-    hip height over the source's. `swing` is None where the source's feet hardly swing.
+    hip height over the source's. `swing` is None where the source's feet hardly swing, `limbs` is
+    what both have.
     """
 
     clip: ClipMetrics
@@ -51,6 +53,7 @@ class Result:
     notes: tuple[str, ...]
     truth: Accuracy | None = None
     swing: Swing | None = None
+    limbs: Limbs | None = None
     scale: float = 1.0
 
     @property

@@ -19,7 +19,8 @@ _SPLINE = 32  # frames
 _PRECISION = np.float32  # of what is kept of each frame: seven digits, half of an hour's memory
 _ROWS = (
     *("depth", "clearance", "corner_skates", "corner_speeds", "sole_heights", "sole_speeds"),
-    *("base_acceleration", "unexplained_wrench", "imbalance", "joint_speed", "joint_jerk"),
+    *("base_acceleration", "limb_acceleration", "unexplained_wrench", "imbalance"),
+    *("joint_speed", "joint_jerk"),
 )
 
 Name = tuple[Any, ...]

@@ -53,6 +53,7 @@ def rows(result: Result) -> list[Row]:
     contacts, drift, truth = result.contacts, result.drift, result.truth
     swing = result.swing
     theirs = {} if source is None else shares(source)
+    rates = [_row(name, value(clip), source_rate(result, name)) for name, value in RATES.items()]
     recall, precision = (None, None) if contacts is None else (contacts.recall, contacts.precision)
     return [
         _row(
@@ -65,7 +66,9 @@ def rows(result: Result) -> list[Row]:
         _row("invented_contact", None if precision is None else 100 * (1 - precision)),
         _row("swing_clearance", None if swing is None else 100 * abs(1 - swing.clearance)),
         _row("root_drift", None if drift is None else 100 * float(drift.distance.max())),
-        *(_row(name, value(clip), source_rate(result, name)) for name, value in RATES.items()),
+        *rates[:1],
+        _row("limb_acceleration", None if result.limbs is None else result.limbs.ratio),
+        *rates[1:],
         _row("ground_truth_mse", None if truth is None else 1e4 * truth.mse),
         _row("ground_truth_mpjpe", None if truth is None else truth.mpjpe),
     ]

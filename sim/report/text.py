@@ -134,3 +134,21 @@ def details(result: Result) -> Iterator[Detail]:
         beside = "" if theirs is None else f"; source {theirs:.0f}{scaled}"
         words = f"{value(clip):>6.0f} {unit:<6}   {kind}{beside}"
         yield Detail(measure, LABELS[measure], words)
+        if measure == "base_acceleration" and clip.limb_names:
+            yield Detail("limb_acceleration", LABELS["limb_acceleration"], _limbs(result))
+
+
+def _limbs(result: Result) -> str:
+    """The worst limb beside the source's, and when; without a source the fastest."""
+    clip, limbs = result.clip, result.limbs
+    if limbs is None:
+        peaks = clip.limb_peaks
+        hardest = int(peaks.argmax())
+        name = clip.limb_names[hardest]
+        return f"{peaks[hardest]:>6.0f} m/s²     {name}, at most in 99 % of the frames"
+    worst, frame = limbs.worst, limbs.worst_frame
+    return (
+        f"{limbs.ratio:>6.2f}          of the source's: {limbs.names[worst]}, "
+        f"{limbs.peaks[worst]:.1f} m/s² at most in 99 % of the frames; source "
+        f"{limbs.source_peaks[worst]:.1f}, scaled; worst at {frame * clip.frame_time:.2f} s"
+    )

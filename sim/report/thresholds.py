@@ -59,6 +59,12 @@ class Thresholds:
     swing_height: float = 0.02
     swing_time: float = 0.5
 
+    # Limb acceleration: the end of a limb is thrown where it is accelerated more than this many
+    # times as hard as the source's, which counts as this [m/s²] at least. People who stand and talk
+    # move their elbows by 3 m/s² (the median of eight recordings).
+    limb_throw: float = 2.0
+    limb_least: float = 3.0
+
     # Torque: a joint needs more than this share of what its motor gives.
     torque: float = 1.0
 
@@ -83,7 +89,7 @@ class Thresholds:
     def scaled(self, hip_height: float) -> "Thresholds":
         """The same table for a body of another size: lengths and speeds grow with the hip height.
 
-        Accelerations and times do not: gravity is the same for a doll.
+        Accelerations of the whole body and times do not: gravity is the same for a doll.
         """
         scale = hip_height / HUMAN_HIP_HEIGHT
         return replace(
@@ -97,6 +103,7 @@ class Thresholds:
             stand_height=self.stand_height * scale,
             swing_speed=self.swing_speed * scale,
             swing_height=self.swing_height * scale,
+            limb_least=self.limb_least * scale,
             self_penetration=self.self_penetration * scale,
             shape_penetration=self.shape_penetration * scale,
             static_speed=self.static_speed * scale,

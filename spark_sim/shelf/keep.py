@@ -28,12 +28,13 @@ _SCALES: Final = {
     "%": {"%": 0.01},
     "cm": {"cm": 0.01, "m": 1.0},
     "m/s²": {"m/s²": 1.0, "m/s2": 1.0, "": 1.0},
+    "x": {"x": 1.0, "": 1.0},
     "rad/s": {"rad/s": 1.0, "": 1.0},
     "rad/s³": {"rad/s³": 1.0, "rad/s3": 1.0, "": 1.0},
 }
 """How a measure of a unit may be given, and how many of its SI unit (`headline`) that is."""
 _TOKEN = re.compile(
-    r"\s*(?:(?P<number>\d+(?:\.\d*)?|\.\d+)\s*(?P<unit>%|rad/s[³3]?|cm|m(?:/s[²2])?)?"
+    r"\s*(?:(?P<number>\d+(?:\.\d*)?|\.\d+)\s*(?P<unit>%|x|rad/s[³3]?|cm|m(?:/s[²2])?)?"
     r"|(?P<word>[a-z_][\w-]*)|(?P<mark><=|>=|<|>|\(|\)))",
     re.IGNORECASE,
 )

@@ -108,6 +108,17 @@ def test_the_knee_bends_backwards_and_the_hand_reaches_the_breast_bone() -> None
     np.testing.assert_allclose(hand, [[0, 0, 0.75 * 0.5]] * 120, atol=1e-6)
 
 
+def test_an_arm_is_thrown_once_a_second() -> None:
+    motion, rig = standing(stick_rig(), 121), stick_rig()
+    shoulder = joint(Role.LEFT_UPPER_ARM)
+    changed = spoilt("arm thrown 15°", motion, rig)
+    turned = np.degrees(quat_angle(changed.rotations, motion.rotations))
+    assert turned[[6, 66], shoulder] == pytest.approx(15)
+    assert turned[[3, 9], shoulder] == pytest.approx(7.5)
+    assert turned[12:60].max() == pytest.approx(0, abs=1e-6)
+    assert np.delete(turned, shoulder, axis=1).max() == pytest.approx(0, abs=1e-6)
+
+
 def test_the_table_marks_harm_that_is_told_and_only_that() -> None:
     text = table({"float 5 cm": {"any": 0.96}, HARMLESS[0]: {"any": 0.96}})
     assert "| float 5 cm | **0.96** |" in text
@@ -122,6 +133,7 @@ TOLD = [
     ("jitter 2°", "root_wrench", 0.5),
     ("knee backwards 40°", "limits", 0.9),
     ("hand in chest", "self", 0.9),
+    ("arm thrown 15°", "limb", 1.2),
     ("drift 10 cm/s", "drift", 0.2),
 ]
 CLIPS = ("cmu_asf/cmu_02_05.bvh", "cmu_expmap/test_walking_13.bvh")

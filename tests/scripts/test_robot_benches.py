@@ -49,6 +49,15 @@ def test_hinges_move_within_their_ranges(standing: RobotMotion) -> None:
         assert rms == pytest.approx(size, rel=0.05)
 
 
+def test_one_hinge_of_an_arm_is_thrown_once_a_second(standing: RobotMotion) -> None:
+    still = standing.coordinates.angles
+    away = np.degrees(np.abs(spoilt("arm thrown 15°", standing).coordinates.angles - still))
+    (hinge,) = np.flatnonzero(away.any(axis=0))
+    assert "left_shoulder" in standing.robot.joint_names[hinge]
+    assert away[6, hinge] == pytest.approx(15)
+    assert away[12:60].max() == pytest.approx(0, abs=1e-9)
+
+
 def test_other_frame_rates_are_the_same_motion(standing: RobotMotion) -> None:
     for kind, count in (("30 fps", 31), ("120 fps", 121)):
         other = spoilt(kind, standing)
