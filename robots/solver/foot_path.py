@@ -18,6 +18,7 @@ from spark.transfer.footfalls import between_contacts
 
 # How firmly the points of a sole are held, in x, y and z, as a share of those that stand:
 SWING_HOLD = np.array([0.35, 0.35, 0.6])  # its height in swing is what keeps it off the floor,
+SWING_REACH = 0.2  # [hip heights] over which that fades: a kick is a matter of limbs,
 RAISED_HOLD = np.array([1.0, 1.0, 0.3])  # a standing foot's raised end turns about the other
 # Hip heights that a fast foot is above the floor: the report sees feet skate below 0.028.
 STEP_HEIGHT = 0.03
@@ -51,11 +52,19 @@ def footing_of(robot: Morphology, plan: FootPlan) -> Holds:
     on = on & stands[:, None]
     place = np.where(on, flat, own)
     z = np.where(on, 0.0, pitched + height[:, None])
-    holds = np.where(stands[:, None, None], RAISED_HOLD, SWING_HOLD)
+    near = near_floor(height / plan.hip_height)[:, None, None]
+    holds = np.where(stands[:, None, None], RAISED_HOLD, near * SWING_HOLD)
     holds = np.where(on[..., None], 1.0, holds)
     positions = np.stack([place.real, place.imag, z], axis=-1)
     over_time = (np.ascontiguousarray(x.transpose(1, 2, 0)) for x in (positions, holds))
     return Holds(*robot.sole_points(plan.sole), *over_time)
+
+
+def near_floor(height: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
+    """The share of its hold that a swinging foot keeps, which is so high [hip heights]: a robot
+    that can't kick as high would be drawn into the air."""
+    share: Float[np.ndarray, "*n"] = 1 / (1 + (height / SWING_REACH) ** 2)
+    return share
 
 
 def _height(

@@ -38,4 +38,4 @@ LEG_SHARE = 0.8  # of that weight for hinges of the legs: feet start and stop wi
 AVOIDANCE_CUTOFF = 2.2  # [Hz] above which the change fades by which a limb gives way to another
 MAX_JERK = 430.0  # [rad/s³], RMS, above which a hinge is smoothed more: the bar is 400 in the mean
 MAX_HINGE_SPEED = 12.0  # [rad/s] above which a hinge is held back; the bar is 15
-W_OVERSPEED = 0.5  # [s/rad] of the speed beyond
+W_OVERSPEED = 0.8  # [s/rad] of the speed beyond

@@ -13,7 +13,14 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 
-from robots.solver.foot_path import FAST, RAISED_HOLD, SLOW, STEP_HEIGHT, SWING_HOLD
+from robots.solver.foot_path import (
+    FAST,
+    RAISED_HOLD,
+    SLOW,
+    STEP_HEIGHT,
+    SWING_HOLD,
+    near_floor,
+)
 from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
 from robots.solver.window_targets import FootTargets
 from robots.stream.footprint import Footprint
@@ -168,7 +175,8 @@ class ContactTracker:
         positions[..., 0], positions[..., 1] = place.real, place.imag
         positions[..., 2] = (1 - held) * pitched[..., 2] + (1 - most) * height
         shares[..., :2] = (known * np.maximum(held, RAISED_HOLD[0] * most))[..., None]
-        shares[..., 2] = held + (1 - held) * SWING_HOLD[2]
+        near = near_floor(height / self._robot.rig.hip_height)
+        shares[..., 2] = held + (1 - held) * near * SWING_HOLD[2]
         return FootTargets(positions, shares)
 
     def _index_points(self) -> None:

@@ -1,6 +1,7 @@
 """When feet stand: not when they step, but when they tremble."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +9,6 @@ import pytest
 from robots.metrics import measure
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
-from robots.registry import find
 from robots.solver.contacts import schedule
 from robots.solver.solve import retarget
 from scripts.robot_bars import follow
@@ -16,7 +16,7 @@ from spark.demo.sample import sample_rig
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, from_canonical
-from spark_sim.loading import load_robot
+from tests.helpers.ember import changed_ember
 
 FRAME_TIME = 1 / 60
 TIME = FRAME_TIME * np.arange(240)
@@ -63,18 +63,32 @@ def test_a_step_is_a_step(way: float, around: float, lift: float) -> None:
     assert not found[90:108].all()
 
 
-@pytest.mark.parametrize("method", [retarget, follow])
-def test_a_leg_that_stays_up_is_no_foothold(
-    method: Callable[[CanonicalMotion, Morphology], RobotMotion],
-) -> None:
+def kicking(thigh: float, shank: float) -> CanonicalMotion:
+    """Two seconds on the right leg; left thigh and shank are raised to the front [rad]."""
     rig = sample_rig("walker")
     rotations = np.tile([1.0, 0, 0, 0], (60, len(rig.skeleton), 1))
-    for part, turn in (("upper_leg", -1.2), ("lower_leg", 0.2)):
+    for part, turn in (("upper_leg", thigh), ("lower_leg", shank)):
         below = list(rig.skeleton.subtree(rig.roles.require(Role(f"left_{part}"))))
-        rotations[:, below] = quat_from_rotvec(np.array([0.0, turn, 0.0]))
+        rotations[:, below] = quat_from_rotvec(np.array([0.0, -turn, 0.0]))
     hips = np.tile([0.0, 0, rig.hip_height], (60, 1))
-    source = CanonicalMotion(rig, 1 / 30, rotations, hips, 0.0)
-    result = method(source, load_robot(find("robot")).on_robot.robot)
-    metrics = measure(from_canonical(source), rig, result)
-    assert metrics.limb_error_rad < np.radians(5)
+    return CanonicalMotion(rig, 1 / 30, rotations, hips, 0.0)
+
+
+@pytest.mark.parametrize("method", [retarget, follow])
+@pytest.mark.parametrize(
+    ("thigh", "shank", "error"),
+    [pytest.param(1.2, -0.2, 0.1, id="knee"), pytest.param(2.8, 2.8, 0.7, id="too-high")],
+)
+def test_a_leg_that_stays_up_neither_stands_nor_lifts_the_body(
+    method: Callable[[CanonicalMotion, Morphology], RobotMotion],
+    thigh: float,
+    shank: float,
+    error: float,
+    tmp_path: Path,
+) -> None:
+    stiff = changed_ember(tmp_path, 'range="-2.4 1.2"', 'range="-1.3 1.2"')  # its hips' pitch
+    source = kicking(thigh, shank)
+    metrics = measure(from_canonical(source), source.rig, method(source, stiff))
+    assert metrics.limb_error_rad < error
     assert metrics.in_air == 0.0
+    assert metrics.floating == 0.0
