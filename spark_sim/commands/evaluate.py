@@ -96,7 +96,7 @@ def configure(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     from spark.errors import ConventionError
     from spark.evaluation.cases import made_cases, performances, recorded_cases
-    from spark.evaluation.equal import Why, equal_rows, why_no_prior, why_silent
+    from spark.evaluation.equal import Why, equal_rows, why_no_prior, why_silent, why_unfamiliar
     from spark.evaluation.evaluate import CELLS, as_method, evaluate, results_in
     from spark.evaluation.tables import markdown
     from spark.files import write_atomically
@@ -135,15 +135,23 @@ def run(args: Namespace) -> int:
         )
 
     rows: list[MethodScores] = []
-    why: dict[str, Why] = {"copy, target prior": why_no_prior}
+    parts: dict[str, list[Why]] = {}  # of the rows' methods, beside the analytic transfer
 
     def add(
         name: str,
         method: "RetargetMethod",
         ways: Ways,
         legs: "LegFitter" = fit_legs,
+        whys: Sequence[Why] = (),
+        of_legs: Sequence[Why] = (),
         **about: Any,
     ) -> None:
+        for way, added in ways.items():
+            parts[name + way] = [
+                *whys,
+                *(of_legs if added.get("legs_fitted") else ()),
+                *((why_no_prior,) if added.get("target_prior") else ()),
+            ]
         rows.extend(
             row(name + way, as_method(method, legs=legs, **added), cases, **about)
             for way, added in ways.items()
@@ -159,17 +167,19 @@ def run(args: Namespace) -> int:
         from spark.network.retarget import NetworkRetargeter
 
         network = NetworkRetargeter(weights, _runner(weights))
-        why[name] = why_silent(network)
+        of_legs: tuple[Why, ...] = ()
         ways = _PLAIN
         if network.network.config.residual:
             ways = _PLAIN | _PRIOR | (_ALL_MADE if args.made else _ALL)
             if network.recorded and not args.made:
                 ways = _PLAIN | _FITTED | _BOTH | _ALL
-        add(name, network, ways, network.fit_legs, settings=weights.settings)
+                of_legs = (why_unfamiliar(network.recorded.known),)
+        whys = (why_silent(network),)
+        add(name, network, ways, network.fit_legs, whys, of_legs, settings=weights.settings)
     for name, folder in results.items():
         answered = [case for case in cases if case.answer is not None]
         rows.append(row(name, results_in(Path(folder)), answered))
-    equal = equal_rows(rows, cases, why)
+    equal = equal_rows(rows, cases, parts)
     console.say(markdown(rows).rstrip("\n"))
     for sentence in equal:
         console.note(sentence)

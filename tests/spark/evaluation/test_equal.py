@@ -29,7 +29,7 @@ def test_rows_are_equal_case_by_case(case: Case) -> None:
     cases = [case, case]
     assert equal_rows([copy, half], cases, {}) == []  # some cases count where the reason is asked
     assert equal_rows([copy, same], cases, {}) == ["same equals copy in all 2 cases"]
-    why = {"half": lambda case: "it is silent"}
+    why = {"half": [lambda case: "it is silent"]}
     assert equal_rows([copy, half], cases, why) == [
         "half equals copy in 1 of 2 cases: 1 as it is silent"
     ]
@@ -37,15 +37,33 @@ def test_rows_are_equal_case_by_case(case: Case) -> None:
     assert equal_rows([copy, row("fewer", 1.0)], cases, {}) == []  # another tool's results
 
 
+def test_the_reason_is_of_what_the_earlier_row_lacks(case: Case) -> None:
+    """A silent network with fitted legs is fitted legs alone, because the network is silent."""
+
+    def silent(case: Case) -> str:
+        return "it is silent"
+
+    def prior(case: Case) -> str:
+        return "nothing is known"
+
+    rows = [row("copy", 1.0), row("copy, fitted", 2.0), row("n, fitted", 2.0), row("n, all", 2.0)]
+    parts = {"n, fitted": [silent], "n, all": [silent, prior]}
+    assert equal_rows(rows, [case], parts) == [
+        "n, fitted equals copy, fitted in all 1 cases: 1 as it is silent",
+        "n, all equals copy, fitted in all 1 cases: 1 as it is silent and nothing is known",
+    ]
+    parts["copy, fitted"] = [prior]
+    assert equal_rows(rows, [case], parts)[1].endswith("1 as it is silent")
+
+
 def test_the_network_that_ships_says_why_it_is_silent(case: Case) -> None:
     """And the published network, which always speaks, has nothing to say."""
     network = NetworkRetargeter(read_weights(SHIPPED))
     methods = {"copy": transfer, "n": network}
     rows = [evaluate(name, as_method(method), [case]) for name, method in methods.items()]
-    why = {"n": why_silent(network)}
-    (sentence,) = equal_rows(rows, [case], why)
-    assert "n equals copy in all 1 cases: 1 as " in sentence
-    assert why["n"](case) in sentence
+    why = why_silent(network)
+    (sentence,) = equal_rows(rows, [case], {"n": [why]})
+    assert sentence == f"n equals copy in all 1 cases: 1 as {why(case)}"
     assert "counterpart" in why_no_prior(replace(case, target_recording=None))
     object.__setattr__(network.network.config, "residual", False)
     assert why_silent(network)(case) == ""
