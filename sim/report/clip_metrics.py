@@ -33,7 +33,7 @@ class ClipMetrics:
     `sole_heights` [m], `sole_speeds` [m/s]: of the lowest corner of each foot's sole, and of the
     middle of its corners along the floor.
     `base_acceleration` [m/s²]: of the middle of the hips.
-    `limb_acceleration` [m/s²]: of the ends of the limbs `limb_names`.
+    `limb_acceleration` [m/s²]: of the ends of the limbs `limb_names`, of `limb_lengths` [m].
     `torques`: of the joints of a model whose file tells what its motors give.
     `unexplained_wrench`: the force [body weights] and the torque [body weights x 1 m] that the
     floor can't give.
@@ -58,6 +58,7 @@ class ClipMetrics:
     sole_speeds: Float[np.ndarray, "T F"]
     base_acceleration: Float[np.ndarray, "T"]
     limb_names: tuple[str, ...]
+    limb_lengths: Float[np.ndarray, "L"]
     limb_acceleration: Float[np.ndarray, "T L"]
     torques: tuple[JointTorque, ...]
     unexplained_wrench: Float[np.ndarray, "T 2"]
@@ -166,8 +167,8 @@ def measure(poses: ClipPoses, floor_z: float) -> ClipMetrics:
     acceleration = derivative(poses.mass.com[:, 2], frame_time, 2, window)
     # The window smears take-off and landing over itself.
     fall_error = windowed_min(np.abs(acceleration + GRAVITY), frame_time, window)
-    limb_names, ends = limb_ends(poses)
-    bodies = np.concatenate([poses.hips[:, None], ends], axis=1)
+    limbs = limb_ends(poses)
+    bodies = np.concatenate([poses.hips[:, None], limbs.places], axis=1)
     thrown = np.linalg.norm(derivative(bodies, frame_time, 2, window), axis=-1)
     feet = support.corners_of
     middles = np.stack([poses.corners[:, own].mean(axis=1) for own in feet.values()], axis=1)
@@ -218,7 +219,8 @@ def measure(poses: ClipPoses, floor_z: float) -> ClipMetrics:
         ),
         sole_speeds=horizontal_speed(middles, frame_time, window),
         base_acceleration=thrown[:, 0],
-        limb_names=limb_names,
+        limb_names=limbs.names,
+        limb_lengths=limbs.lengths,
         limb_acceleration=thrown[:, 1:],
         torques=torques,
         unexplained_wrench=wrench,

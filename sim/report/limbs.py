@@ -16,14 +16,16 @@ class Limbs:
     """The limbs that a motion and its source both have, by name.
 
     `peaks` and `source_peaks` [m/s²] are the 99th percentiles over the frames of the acceleration
-    of each limb's end, the source's scaled by the hip heights' ratio. Less than `least` [m/s²]
-    counts as that: beside a source that stands still, any move would be many times as hard.
+    of each limb's end, the source's times its part of `scales`: the ratio of the hip heights, or of
+    the limb's lengths where that is more. Less than `least` [m/s²] counts as that: beside a source
+    that stands still, any move would be many times as hard.
     `excess[t, k]` is the acceleration over the source's peak, or over what it reaches near that
     time, or over that of the own base, whichever is most; a limb is thrown where it is above
     `bound`.
     """
 
     names: tuple[str, ...]
+    scales: Float[np.ndarray, "L"]
     peaks: Float[np.ndarray, "L"]
     source_peaks: Float[np.ndarray, "L"]
     least: float
@@ -71,15 +73,17 @@ def limbs_of(
     limits, step = clip.thresholds, clip.frame_time
     own, theirs = ([side.limb_names.index(name) for name in names] for side in (clip, source))
     found = clip.limb_acceleration[:, own]
-    source_peaks = scale * source.limb_peaks[theirs]
+    scales = np.maximum(scale, clip.limb_lengths[own] / source.limb_lengths[theirs])
+    source_peaks = scales * source.limb_peaks[theirs]
     # A foot may land a little earlier or later than the source's.
-    there = scale * values_at(source.limb_acceleration[:, theirs], times / source.frame_time)
+    there = scales * values_at(source.limb_acceleration[:, theirs], times / source.frame_time)
     near = -windowed_min(-there, step, 2 * limits.window)
     usual = np.maximum(near, np.maximum(source_peaks, limits.limb_least))
     # What is thrown with the whole body is the base's throw.
     usual = np.maximum(usual, clip.base_acceleration[:, None])
     return Limbs(
         names=names,
+        scales=scales,
         peaks=clip.limb_peaks[own],
         source_peaks=source_peaks,
         least=limits.limb_least,

@@ -1,6 +1,7 @@
 """A report's measures over time, as inline SVG: no script, no library, any zoom."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -114,13 +115,13 @@ def _limbs(result: Result) -> list[Plot]:
     if not names:
         return []
 
-    def hardest(side: ClipMetrics) -> Float[np.ndarray, "T"]:
+    def hardest(side: ClipMetrics, scales: Float[np.ndarray, "L"] | float) -> Any:
         columns = [side.limb_names.index(name) for name in names]
-        return side.limb_acceleration[:, columns].max(axis=1)
+        return (scales * side.limb_acceleration[:, columns]).max(axis=1)
 
     thrown = np.zeros(len(clip), dtype=bool) if limbs is None else np.any(limbs.thrown, axis=1)
-    beside = None if source is None or limbs is None else result.scale * hardest(source)
-    return [Plot("acceleration of the limbs", "m/s²", hardest(clip), thrown, None, beside)]
+    beside = None if source is None or limbs is None else hardest(source, limbs.scales)
+    return [Plot("acceleration of the limbs", "m/s²", hardest(clip, 1.0), thrown, None, beside)]
 
 
 def svg(plot: Plot, duration: float, source_duration: float) -> Markup:

@@ -191,3 +191,21 @@ def test_a_base_that_is_thrown_takes_its_limbs_along() -> None:
     assert report.limbs is not None
     assert report.limbs.excess.max() == pytest.approx(1, abs=1e-6)
     assert sentences(report) == []
+
+
+def test_longer_arms_are_faster_by_their_length() -> None:
+    rig = stick_rig()
+    offsets = rig.skeleton.offsets.copy()
+    for role in (Role.LEFT_FOREARM, Role.LEFT_HAND):
+        offsets[joint(role)] *= 3
+    apish = replace(rig, skeleton=replace(rig.skeleton, offsets=offsets))
+    limbs = assess(turning(5.0, rig=apish), source=turning(5.0)).limbs
+    assert limbs is not None
+    np.testing.assert_allclose(limbs.ratios, 1.0, rtol=1e-9)
+    # Shorter arms may be as fast as the body is large.
+    back = assess(turning(5.0), source=turning(5.0, rig=apish)).limbs
+    assert back is not None
+    assert back.peaks[back.names.index("left hand")] == pytest.approx(HAND * 25, rel=0.02)
+    assert back.source_peaks[back.names.index("left hand")] == pytest.approx(
+        3 * HAND * 25, rel=0.02
+    )
