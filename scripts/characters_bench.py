@@ -102,6 +102,17 @@ def compare(moved: CanonicalMotion, truth: Truth) -> tuple[Score, Feet]:
     return score, Feet(float(toes), float(true_toes), clearance, sunk)
 
 
+def source_clearance(source: Truth, truth: Truth) -> float:
+    """How high the source's own soles pass, for the size, where the truth's swing, over the
+    truth's; NaN where it hardly swings."""
+    frames = min(len(source.clearance), len(truth.clearance))
+    swings = truth.swings[:frames]
+    if swings.sum() < MIN_SWINGS:
+        return float("nan")
+    theirs, own = (float(np.median(t.clearance[:frames][swings])) / t.size for t in (source, truth))
+    return theirs / own
+
+
 def shared_motions(folder: Path) -> dict[str, list[Path]]:
     """The files of each name that is on two characters or more."""
     by_motion: dict[str, list[Path]] = defaultdict(list)
@@ -131,13 +142,13 @@ def main(folder: str, step: str = "1") -> None:
         worst.append(_worst(name, by_target))
         mean = mean_score(by_target)
         toes = np.nanmean([f.toes for f in feet]) / np.nanmean([f.truth_toes for f in feet])
-        clearance = np.array([f.clearance for f in feet])
-        low, high = np.nanpercentile(clearance, (5, 95))
         print(
             f"| {name} | {mean.mse:.3g} | {mean.relative_mse:.3g} | {toes:.2f} | "
-            f"{np.nanmedian(clearance):.2f} ({low:.2f} to {high:.2f}) | "
+            f"{_spread([f.clearance for f in feet])} | "
             f"{100 * np.mean([f.sunk for f in feet]):.1f} % |"
         )
+    of_source = _spread([source_clearance(clips[a][1], clips[b][1]) for a, b in pairs])
+    print(f"| the source's own soles, for the size | | | | {of_source} | |")
     print(f"\nWorst characters, MSE (root-relative) in 1e-6:\n\n{chr(10).join(worst)}")
 
 
@@ -146,6 +157,11 @@ def _worst(name: str, by_target: dict[str, list[Score]]) -> str:
     first = sorted(means.items(), key=lambda item: -item[1].mse)[:WORST]
     named = (f"{who} {1e6 * s.mse:.0f} ({1e6 * s.relative_mse:.0f})" for who, s in first)
     return f"- {name}: {', '.join(named)}"
+
+
+def _spread(clearance: list[float]) -> str:
+    low, high = np.nanpercentile(clearance, (5, 95))
+    return f"{np.nanmedian(clearance):.2f} ({low:.2f} to {high:.2f})"
 
 
 def _soles(

@@ -20,6 +20,7 @@ from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.footfalls import between_contacts, beyond
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
+from spark.transfer.reach import within_reach
 
 _MIN_STANCE = 0.1  # [s] a shorter one is a swinging foot that is slow and low for a moment
 _CAPTURE_NOISE = 0.03  # [hip heights] 3 cm of an adult
@@ -53,7 +54,7 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
         along = between_contacts(offset, stance, own[:, :2])
         height = np.maximum(scale * their_height, -_MAX_SINK * moved.rig.hip_height)
         moves.append((leg, np.column_stack([along, height - own_height])))
-    return move_ankles(moved, moves)
+    return move_ankles(*within_reach(moved, moves))
 
 
 def _foot(

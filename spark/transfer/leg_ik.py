@@ -21,7 +21,7 @@ from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.vectors import cross, dot
 
 # Of the leg's length: at full stretch the knee would lock, and the direction it bends in flip.
-_MAX_REACH = 0.999
+MAX_REACH = 0.999
 _STRAIGHT = 0.02  # sine of the knee's angle; below it the bones show no plane to bend in
 
 
@@ -138,7 +138,7 @@ def leg_rotations(
     thigh's rotation since the T-pose."""
     a, b = _length(thigh), _length(shank)
     goal = thigh + shank + move
-    reach = np.clip(_length(goal), abs(a - b) * 1.01 + 1e-9, (a + b) * _MAX_REACH)
+    reach = np.clip(_length(goal), abs(a - b) * 1.01 + 1e-9, (a + b) * MAX_REACH)
 
     axis = cross(thigh, shank)
     sine = _length(axis)
