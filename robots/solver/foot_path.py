@@ -20,11 +20,10 @@ from spark.transfer.footfalls import between_contacts
 SWING_HOLD = np.array([0.35, 0.35, 0.6])  # its height in swing is what keeps it off the floor,
 SWING_REACH = 0.2  # [hip heights] over which that fades: a kick is a matter of limbs,
 RAISED_HOLD = np.array([1.0, 1.0, 0.3])  # a standing foot's raised end turns about the other
-# Hip heights that a fast foot is above the floor: the report sees feet skate below 0.028.
-STEP_HEIGHT = 0.03
-# Hip heights/s below which a foot may be on the floor, and above which it is lifted: the report
-# sees feet skate above 0.22.
-SLOW, FAST = 0.16, 0.22
+# Hip heights/s of a foot, and hip heights that it then is above the floor: the report sees feet
+# skate faster than 0.22 and lower than 0.028.
+STEP_SPEEDS = (0.16, 0.22, 0.6)
+STEP_HEIGHTS = (0.0, 0.03, 0.04)
 SWING_SPAN, STAND_SPAN = 0.05, 0.02  # [s] before and after a frame for a foot's speed
 MIN_CREEP = 0.08  # [s], half of which a standing foot has to move for before it is lifted
 LET_DOWN = 0.1  # [s] within which a foot comes down that is in the air where its contact begins
@@ -46,7 +45,7 @@ def footing_of(robot: Morphology, plan: FootPlan) -> Holds:
     flat = on_prints(plan.flat, pivot, plan.heading + offset[:, 2])
     pitched = plan.points[..., 2] - plan.points[..., 2].min(axis=1, keepdims=True)
     on = on_points(plan.sole, plan.contacts.T.astype(np.float64)).T > 0
-    low = np.where(stands[:, None], on, pitched < STEP_HEIGHT * plan.hip_height)
+    low = np.where(stands[:, None], on, pitched < STEP_HEIGHTS[1] * plan.hip_height)
     height = _height(plan, np.where(on, flat, own), low)
     stands = stands & (height < _ON_FLOOR)
     on = on & stands[:, None]
@@ -84,9 +83,13 @@ def _height(
     )
     creep = max(1, round(MIN_CREEP / plan.frame_time))
     standing = median_filter(standing, creep, mode="nearest")
-    speed = np.where(stands, standing, swinging) / plan.hip_height
-    lifted = np.clip((speed - SLOW) / (FAST - SLOW), 0.0, 1.0) * STEP_HEIGHT * plan.hip_height
-    return np.maximum(height, lifted)
+    return np.maximum(height, step_height(np.where(stands, standing, swinging), plan.hip_height))
+
+
+def step_height(speed: Float[np.ndarray, "*n"], hip_height: float) -> Float[np.ndarray, "*n"]:
+    """How high [m] a foot steps that is so fast [m/s], so that it does not drag."""
+    height: Float[np.ndarray, "*n"] = np.interp(speed / hip_height, STEP_SPEEDS, STEP_HEIGHTS)
+    return height * hip_height
 
 
 def _speed(

@@ -14,12 +14,10 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float
 
 from robots.solver.foot_path import (
-    FAST,
     RAISED_HOLD,
-    SLOW,
-    STEP_HEIGHT,
     SWING_HOLD,
     near_floor,
+    step_height,
 )
 from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
 from robots.solver.window_targets import FootTargets
@@ -142,7 +140,8 @@ class ContactTracker:
             & (speed < factor * self._max_speed)
             & (height < factor * self._max_height)
         )
-        return planted, np.maximum(now.clearance, self._lift(speed.max(axis=1)))
+        step = step_height(self._scale * speed.max(axis=1), self._robot.rig.hip_height)
+        return planted, np.maximum(now.clearance, step)
 
     def _follow(
         self,
@@ -192,11 +191,3 @@ class ContactTracker:
             flat.append(points - points[-2:].mean())
             ends.append(on_points(sole, np.array([[0.0, 1.0], [1.0, 0.0]])) == 0)
         self._flat, self._leaves_with = np.concatenate(flat), np.concatenate(ends)
-
-    def _lift(self, speed: Float[np.ndarray, "S"]) -> Float[np.ndarray, "S"]:
-        """How high [m] feet step that are as fast in the source [m/s]: as in
-        `robots.solver.foot_path`."""
-        hip_height = self._robot.rig.hip_height
-        share = np.clip((self._scale * speed / hip_height - SLOW) / (FAST - SLOW), 0.0, 1.0)
-        lift: Float[np.ndarray, S] = share * STEP_HEIGHT * hip_height
-        return lift
