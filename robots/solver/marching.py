@@ -13,7 +13,7 @@ from functools import lru_cache
 import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 
 from robots.least_squares import second_differences
 from robots.model.morphology import Morphology
@@ -34,6 +34,7 @@ _FREE_SPEED = 3.0  # [rad/s] of a hinge that costs nothing where ways are compar
 _W_TURN = 4.0  # [1/rad] a turn beyond that costs, from frame to frame
 _FIRST_STEPS, _STEPS = 60, 3  # in the first frame, from the T-pose, and in each that follows
 _FIRST_DAMPING, _DAMPING = 0.02, 1e-3  # [1] on the diagonal of the normal equations
+_SMOOTHING = 0.06  # [s] of the way taken: marching stops short of where each frame would be best
 _W_STAY = 0.2  # [1/rad] of how far a hinge turns from frame to frame
 _MAX_STEP = 0.3  # [rad] of a dof in one step
 _STEP_TOL = 0.03  # [rad] after a shorter step there is no further one
@@ -81,7 +82,10 @@ def calmed(
     for k, way in enumerate(ways):
         frames = np.flatnonzero(taken == k)
         q = q.replaced(frames, way.at(frames))
-    return q
+    angles = q.angles.copy()
+    deviation = _SMOOTHING / targets.frame_time
+    angles[:, hinges] = gaussian_filter1d(angles[:, hinges], deviation, axis=0, mode="nearest")
+    return Coordinates(q.pos, q.quat, angles, q.ball_quats)
 
 
 def cheapest(
