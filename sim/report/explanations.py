@@ -30,9 +30,9 @@ MEANINGS = {
     "base_acceleration": "How hard the hips are thrown about, in all but the worst 1 % of the "
     "frames. A base that gives way where feet or limits are repaired frame by frame has more than "
     "its source.",
-    "limb_acceleration": "How hard hands, elbows, feet and head are thrown about, where 1 is as "
-    "hard as the source's for the body's size. Arms that flip between two ways to reach a pose, or "
-    "are pushed out of the body frame by frame, have more.",
+    "limb_acceleration": "How hard hands, elbows, feet and head are thrown about, in all but the "
+    "worst 1 % of the frames, where 1 is as hard as the source's for the body's size. Arms that "
+    "flip between two ways to reach a pose, or are pushed out of the body, have more.",
     "joint_speed": "The fastest joint. One that is much faster than the source's flips: its angles "
     "jump, or a limb is stretched out and turns over.",
     "joint_jerk": "How unevenly joints speed up. Noise of the recording, and corrections from "

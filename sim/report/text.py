@@ -149,6 +149,6 @@ def _limbs(result: Result) -> str:
     worst, frame = limbs.worst, limbs.worst_frame
     return (
         f"{limbs.ratio:>6.2f}          of the source's: {limbs.names[worst]}, "
-        f"{limbs.peaks[worst]:.1f} m/s² at most in 99 % of the frames; source "
-        f"{limbs.source_peaks[worst]:.1f}, scaled; worst at {frame * clip.frame_time:.2f} s"
+        f"{limbs.peaks[worst]:.1f} m/s², the source's {limbs.source_peaks[worst]:.1f}, scaled; "
+        f"worst at {frame * clip.frame_time:.2f} s"
     )

@@ -31,7 +31,9 @@ function tick(now) {
   tell();
   // What stands still is drawn twice a second: a picture of a skin may have come, or the night.
   const state = JSON.stringify([view, shown, player.followed, canvas.width, canvas.height]);
-  if (state !== drawn || now - drawnAt > 500) { draw(); drawn = state; drawnAt = now; }
+  // A frame of a page that is not laid out yet has no size, and nothing to draw on.
+  const seen = canvas.width && canvas.height;
+  if (seen && (state !== drawn || now - drawnAt > 500)) { draw(); drawn = state; drawnAt = now; }
   if (parent !== window && told !== view.time) parent.postMessage({ time: told = view.time }, "*");
   requestAnimationFrame(tick);
 }

@@ -193,3 +193,14 @@ def test_the_bar_leaves_room_for_the_figures(text: str, size: str, tmp_path: Pat
     assert feet < bar
     assert wide <= width
     assert unnamed == 0
+
+
+def test_a_replay_that_is_laid_out_late_begins_all_the_same(text: str, tmp_path: Path) -> None:
+    """A phone opens the report's page with a frame that has no size yet."""
+    script = """
+      canvas.width = 0; drawn = ""; drawnAt = 0;
+      let asks = 0; requestAnimationFrame = () => ++asks;
+      tick(1000); const hidden = [asks, drawn];
+      size(); tick(2000);
+      return [...hidden, asks, drawn !== ""];"""
+    assert asked(text, script, tmp_path) == [1, "", 2, True]
