@@ -171,6 +171,8 @@ def _run(args: Namespace, held: ExitStack) -> int:
     write_atomically(out / "config.toml", toml(config).encode())
     if not start.step and not start.recorded:
         start = _learn_recorded(start, config, out)
+    if is_first():
+        console.note(f"training: {start.step} of {config.steps}; the first step takes longest")
     with (
         asked_to_stop(_say_stopping) as asked,
         watching(out, start.step, config.steps, board=args.tensorboard) as watch,
