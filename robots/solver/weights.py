@@ -19,11 +19,11 @@ W_ROTATION = {  # [1/rad] of a part by its role; low where the directions of lim
 }
 W_OTHER_ROTATION = 0.08  # [1/rad] of the rest: the twist of limbs
 W_HIPS_POSITION = np.array([6.0, 6.0, 6.0])  # [1/m] of their path: 1 cm is 2 degrees of a limb
-W_COM_ACCELERATION = 0.28  # [s²/m] of the planned centre of mass: 1 m/s² is 8 degrees of a limb
+W_COM_ACCELERATION = 0.35  # [s²/m] of the planned centre of mass: 1 m/s² is 10 degrees of a limb
 W_HOLD = np.array(
-    [25.0, 25.0, 20.0]
-)  # [1/m] of a point held, as a standing sole's: 1 cm is 7 degrees
-W_FLOOR = 80.0  # [1/m] of a sole's point, or another part, in the floor: three times a foothold's
+    [22.0, 22.0, 18.0]
+)  # [1/m] of a point held, as a standing sole's: 1 cm is 6 degrees
+W_FLOOR = 80.0  # [1/m] of a sole's point, or another part, in the floor: four times a foothold's
 FLOOR_ROUNDING = 0.004  # [m] over which that sets in
 W_LIMIT = 8.0  # [1/rad] of a hinge in the margin of its limit
 LIMIT_MARGIN = np.radians(2.0)
