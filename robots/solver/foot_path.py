@@ -23,7 +23,7 @@ RAISED_HOLD = np.array([1.0, 1.0, 0.3])  # a standing foot's raised end turns ab
 # Hip heights/s of a foot, and hip heights that it then is above the floor: the report sees feet
 # skate faster than 0.22 and lower than 0.028.
 STEP_SPEEDS = (0.2, 0.3, 0.6)
-STEP_HEIGHTS = (0.0, 0.03, 0.04)
+STEP_HEIGHTS = (0.0, 0.03, 0.033)
 SWING_SPAN, STAND_SPAN = 0.05, 0.02  # [s] before and after a frame for a foot's speed
 MIN_CREEP = 0.08  # [s], half of which a standing foot has to move for before it is lifted
 LET_DOWN = 0.1  # [s] within which a foot comes down that is in the air where its contact begins
