@@ -60,6 +60,12 @@ class Schedule:
     flight: Bool[np.ndarray, "T"]
     com_acceleration: Float[np.ndarray, "T 3"]
 
+    @property
+    def hovers(self) -> bool:
+        """Whether nothing carries the body in most frames, in which it does not fall either: feet
+        slide as on a treadmill, or it swims or climbs."""
+        return bool((_nothing_holds(self.feet, self.parts) & ~self.flight).mean() > 0.5)
+
 
 def schedule(
     source: CanonicalMotion,

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from robots.model.morphology import Morphology
 from robots.model.shapes import surface
-from robots.solver.contacts import schedule
+from robots.solver.contacts import has_feet, schedule
 from robots.solver.trunk import bends, leaning
 from robots.tree import forward_kinematics
 from spark.blocks import blocks
@@ -35,6 +35,10 @@ TPOSE_DIRECTIONS = {
     **{role: np.array([0.0, 1, 0]) for role in LIMBS[Group.LEFT_ARM]},
     **{role: np.array([0.0, -1, 0]) for role in LIMBS[Group.RIGHT_ARM]},
 }
+HOVERS = (
+    "in most frames nothing of the source stands on the floor, though it does not fall: does it "
+    "walk in place, as on a treadmill? The robot's feet pass over the floor and carry nothing there"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +122,7 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
         feet=scale * paths[..., :2],
         clearance=scale * source_clearance(source, positions, robot),
         hands=_between_hands(rig, positions, robot),
-        notes=notes,
+        notes=(*notes, HOVERS) if has_feet(paths).any() and touches.hovers else notes,
     )
 
 

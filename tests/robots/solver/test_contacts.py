@@ -1,6 +1,7 @@
 """When feet stand: not when they step, but when they tremble."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,17 @@ from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.solver.contacts import schedule
 from robots.solver.solve import retarget
+from robots.solver.targets import HOVERS
 from scripts.robot_bars import follow
-from spark.demo.sample import sample_rig
+from spark.demo.sample import sample_motion, sample_rig
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec
-from spark.transfer.canonical import CanonicalMotion, canonical_positions, from_canonical
+from spark.transfer.canonical import (
+    CanonicalMotion,
+    canonical_positions,
+    from_canonical,
+    to_canonical,
+)
 from tests.helpers.ember import changed_ember
 
 FRAME_TIME = 1 / 60
@@ -92,3 +99,11 @@ def test_a_leg_that_stays_up_neither_stands_nor_lifts_the_body(
     assert metrics.limb_error_rad < error
     assert metrics.in_air == 0.0
     assert metrics.floating == 0.0
+
+
+def test_a_walk_in_place_is_said_to_carry_nothing(tmp_path: Path) -> None:
+    robot, rig = changed_ember(tmp_path, "<mujoco", "<mujoco"), sample_rig("walker")
+    walk = to_canonical(sample_motion("walk", rig, 30.0), rig)
+    assert HOVERS not in retarget(walk, robot).notes
+    treadmill = replace(walk, hips=walk.hips * [0.0, 1.0, 1.0])
+    assert HOVERS in retarget(treadmill, robot).notes
