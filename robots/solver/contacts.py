@@ -30,9 +30,7 @@ from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion
 
 MIN_DURATION = 0.08  # contacts and breaks shorter than this [s] are noise
-STAY_REACH = (
-    0.03  # [m, of an adult] over the floor that a standing point may wobble without a step,
-)
+STAY_REACH = 0.03  # [m, of an adult] along the floor that a point may tremble without a step,
 STAY_LIFT = 0.015  # and up from it,
 STAY_TIME = 0.4  # [s] for that long
 MAX_CREEP = 0.6  # [m/s, of an adult] of a foot that stands because nothing else does

@@ -13,12 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 
-from robots.solver.foot_path import (
-    RAISED_HOLD,
-    SWING_HOLD,
-    near_floor,
-    step_height,
-)
+from robots.solver.foot_path import RAISED_HOLD, SWING_HOLD, near_floor, step_height
 from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
 from robots.solver.window_targets import FootTargets
 from robots.stream.footprint import Footprint
