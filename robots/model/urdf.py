@@ -30,6 +30,7 @@ _TYPICAL_RADIUS = 0.05  # [m]
 _BEGINNING = 4096  # bytes that tell an MJCF from a URDF
 _MOVING = ("revolute", "continuous", "prismatic")
 _LEAST, _MOST = 1e-10, 1e12  # [kg m²] of a principal moment
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _LOCKED = 1e-6  # [rad] MuJoCo ignores limits without a range, and the joint would turn freely
 
 
@@ -67,6 +68,8 @@ def read_urdf(path: Path, notes: list[str], *, visuals: bool = True) -> tuple[mu
                 joint.remove(mimic)
     for shape in [*robot.iter("visual"), *robot.iter("collision")]:
         shape.attrib.pop("name", None)  # they need not be unique
+    _drop_points(robot)
+    _mend_triples(robot, notes)
     mended = [link.get("name", "") for link in robot.findall("link") if _mend_inertia(link)]
     if mended:
         notes.append(
@@ -138,6 +141,30 @@ def _mend_inertia(link: ET.Element) -> bool:
     for ij in ("xx", "yy", "zz", "xy", "xz", "yz"):
         inertia.set(f"i{ij}", repr(0.4 * mass * _TYPICAL_RADIUS**2) if ij[0] == ij[1] else "0")
     return True
+
+
+def _drop_points(robot: ET.Element) -> None:
+    """Take away shapes without any size, which hold a place in the file and fill none."""
+    for link in robot.findall("link"):
+        for shape in [*link.findall("visual"), *link.findall("collision")]:
+            solids = shape.findall("geometry/*")
+            sizes = [solid.get(size) for solid in solids for size in ("radius", "length", "size")]
+            numbers = _NUMBER.findall(" ".join(size for size in sizes if size))
+            if numbers and not any(float(number) for number in numbers):
+                link.remove(shape)
+
+
+def _mend_triples(robot: ET.Element, notes: list[str]) -> None:
+    """Take commas between numbers for blanks: other readers do, MuJoCo refuses them."""
+    mended = 0
+    for element in robot.iter():
+        for name in ("xyz", "rpy"):
+            value = element.get(name, "")
+            if "," in value and len(_NUMBER.findall(value)) == 3:
+                element.set(name, value.replace(",", " "))
+                mended += 1
+    if mended:
+        notes.append(f"{counted(mended, 'triple')} of numbers with commas: read as if with blanks")
 
 
 def _keep_locked(joint: ET.Element) -> None:

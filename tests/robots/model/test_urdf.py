@@ -56,6 +56,7 @@ def test_a_urdf_stands_on_the_floor(folder: Path) -> None:
     np.testing.assert_allclose(data.xpos, other.xpos, atol=5e-3)
 
 
+_KINDS = ("visual", "collision")
 SHAPELESS = '<collision><geometry><mesh filename="{}"/></geometry></collision>'
 
 
@@ -176,6 +177,32 @@ def test_an_inertia_without_end_is_mended(folder: Path, tmp_path: Path) -> None:
     assert any(
         "have an inertia that no body has" in n for n in read_mjcf(tmp_path / "twin.urdf").notes
     )
+
+
+@pytest.mark.parametrize(
+    "point", ['<sphere radius="0.00"/>', '<box size="0 0 0"/>', '<cylinder radius="0" length="0"/>']
+)
+def test_a_shape_without_size_is_no_shape(point: str, folder: Path, tmp_path: Path) -> None:
+    """ARMAR-4 and Upkie have some, in the places of shapes to come."""
+    text = (folder / "twin.urdf").read_text()
+    shapes = "".join(f"<{kind}><geometry>{point}</geometry></{kind}>" for kind in _KINDS)
+    (tmp_path / "twin.urdf").write_text(text.replace("</link>", f"{shapes}</link>"))
+    plain, pointed = read_mjcf(folder / "twin.urdf"), read_mjcf(tmp_path / "twin.urdf")
+    assert pointed.model.ngeom == plain.model.ngeom
+    assert pointed.notes == plain.notes
+
+
+def test_triples_with_commas_are_read(folder: Path, tmp_path: Path) -> None:
+    """As ARMAR-6 has them."""
+    text = (folder / "twin.urdf").read_text()
+    commas = re.sub(r' xyz="(\S+) (\S+) (\S+)"', r' xyz="\1, \2,\3"', text)
+    assert commas != text
+    (tmp_path / "twin.urdf").write_text(commas)
+    mended = read_mjcf(tmp_path / "twin.urdf")
+    np.testing.assert_array_equal(
+        mended.model.body_pos, read_mjcf(folder / "twin.urdf").model.body_pos
+    )
+    assert any("with commas" in note for note in mended.notes)
 
 
 def test_a_chain_without_end_is_refused(tmp_path: Path) -> None:
