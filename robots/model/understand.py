@@ -31,6 +31,7 @@ from spark.rotation import quat_normalize
 from spark.skeleton import Skeleton
 
 _NOTED = np.radians(5)  # a limb farther from the T-pose is noted: its motions lean by as much
+_HIPS = (0.02, 5.0)  # [m] how high a robot's may be: others were drawn in another unit
 _REFUSED = np.radians(40)  # farther is nearly an A-pose (45): no rotation copied from it would do
 
 
@@ -93,6 +94,11 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
         notes=notes,
         shaped_soles=soles,
     )
+    if not _HIPS[0] < rig.hip_height < _HIPS[1]:
+        raise SkeletonError(
+            f"the hips stand {rig.hip_height:.3g} m high; expected {_HIPS[0]} to {_HIPS[1]} m. "
+            "MuJoCo takes all lengths for metres: scale a model that is drawn in another unit"
+        )
     return Morphology(
         mjcf=mjcf,
         tree=tree,

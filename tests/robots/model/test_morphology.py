@@ -383,6 +383,16 @@ def test_limits_that_forbid_a_t_pose_are_refused(tmp_path: Path) -> None:
         understand_robot(path)
 
 
+def test_a_model_in_another_unit_is_refused(tmp_path: Path) -> None:
+    spec = mujoco.MjSpec.from_file(str(registry.find("robot")))
+    for part in [*spec.bodies[1:], *spec.geoms, *spec.sites, *spec.joints]:
+        part.pos = 100 * np.asarray(part.pos)
+    for geom in spec.geoms:
+        geom.size, geom.fromto = 100 * np.asarray(geom.size), 100 * np.asarray(geom.fromto)
+    with pytest.raises(SkeletonError, match=r"hips stand .* metres"):
+        understand_robot(written(tmp_path, spec.to_xml()))
+
+
 def test_a_missing_file_is_said(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match="no such file"):
         read_mjcf(tmp_path / "none.xml")
