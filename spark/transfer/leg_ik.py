@@ -20,9 +20,9 @@ from spark.skeleton import Skeleton
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.vectors import cross, dot
 
-# Of the leg's length: at full stretch the knee would lock, and the direction it bends in flip.
-MAX_REACH = 0.999
-_STRAIGHT = 0.02  # sine of the knee's angle; below it the bones show no plane to bend in
+MAX_REACH = 0.999  # of the leg's length
+_STRAIGHT = 0.15  # sine of the knee's angle; the further below, the less the bones show its plane
+_SOFT = 0.05  # [rad] 3 degrees: a knee that bends by less makes a leg .3 thousandths shorter
 
 
 class Leg(NamedTuple):
@@ -135,33 +135,62 @@ def leg_rotations(
 ) -> tuple[Float[np.ndarray, "*n 4"], Float[np.ndarray, "*n 4"]]:
     """By which thigh and shank are turned, in world axes, so that the ankle moves by `move` or as
     near to it as the leg reaches. `thigh` and `shank` are the bones [m, world], `upper_leg` is the
-    thigh's rotation since the T-pose."""
+    thigh's rotation since the T-pose. A leg that is not moved stays as it is."""
     a, b = _length(thigh), _length(shank)
     goal = thigh + shank + move
-    reach = np.clip(_length(goal), abs(a - b) * 1.01 + 1e-9, (a + b) * MAX_REACH)
-
-    axis = cross(thigh, shank)
-    sine = _length(axis)
-    # A straight leg bends about the body's lateral axis, backwards; so does one without a bone.
-    straight: Bool[np.ndarray, "*n"] = (sine <= _STRAIGHT * a * b)[..., 0]
-    if straight.any():
-        lateral = np.array([0, 1, 0], axis.dtype)
-        axis[straight] = quat_rotate(upper_leg[straight], lateral)
-    now = np.arctan2(sine, dot(thigh, shank))
-    turn = quat_from_rotvec(axis / _length(axis) * (_flexion(reach, a, b) - now))
+    reach = np.maximum(_length(goal), abs(a - b) * 1.01 + 1e-9)
+    normal = cross(thigh, shank)
+    axis = _bend_axis(normal, a * b, upper_leg)
+    # Of the bones' product, what a turn about the axis leaves as it is, and what it changes.
+    fixed = dot(thigh, axis) * dot(shank, axis)
+    along, across = dot(thigh, shank) - fixed, dot(normal, axis)
+    changed = np.maximum(np.sqrt(along**2 + across**2), 1e-12)
+    bend = np.arctan2(across, along)
+    wanted = (reach**2 - a**2 - b**2) / 2 - fixed
+    exact = np.arccos(np.clip(wanted / changed, -1.0, 1.0))
+    turn = quat_from_rotvec(axis * (_bent(bend, exact) - bend))
     swing = quat_between(thigh + quat_rotate(turn, shank), goal)
     return swing, quat_mul(swing, turn)
+
+
+def _bend_axis(
+    normal: Float[np.ndarray, "*n 3"],
+    product: Float[np.ndarray, "*n 1"],
+    upper_leg: Float[np.ndarray, "*n 4"],
+) -> Float[np.ndarray, "*n 3"]:
+    """The axis that a knee bends about, forwards: `normal` to the bones, whose lengths have this
+    `product`, on the thigh's left; the thigh's lateral axis the more, the straighter the leg."""
+    lateral = quat_rotate(upper_leg, np.array([0, 1, 0], normal.dtype))
+    sine = _length(normal) / np.maximum(product, 1e-12)
+    u = np.minimum(sine / _STRAIGHT, 1)
+    weight = u * u * (3 - 2 * u)
+    left = np.where(dot(normal, lateral) < 0, -weight, weight)
+    axis = normal * (left / np.maximum(sine * product, 1e-12)) + lateral * (1 - weight)
+    return axis / _length(axis)
+
+
+def _bent(
+    bend: Float[np.ndarray, "*n 1"], exact: Float[np.ndarray, "*n 1"]
+) -> Float[np.ndarray, "*n 1"]:
+    """The knee's angle from straight [rad], forwards, from the one that it has and the one that the
+    ankle's new distance from the hip asks for.
+
+    That one asks for 5 degrees where a straight leg's ankle comes nearer by a millimetre, and bends
+    either way: knees would tremble that are nearly straight, and jump where they pass through
+    straight. So an angle below `_SOFT` is rounded off, and a knee that a recording overstretches
+    stays so while its ankle hardly moves, and bends forwards where it does."""
+    over = np.minimum(bend, 0)
+    moved = np.maximum(exact**2 - bend**2, 0) / (_SOFT**2 + over**2)
+    angle: Float[np.ndarray, "*n 1"] = _rounded(exact) + (bend - _rounded(bend)) * np.exp(-moved)
+    return angle
+
+
+def _rounded(angle: Float[np.ndarray, "*n 1"]) -> Float[np.ndarray, "*n 1"]:
+    """`abs(angle)` without its edge at 0, where this is `_SOFT`."""
+    ratio = np.maximum(abs(angle) / _SOFT, 1e-4)
+    return _SOFT * ratio / np.tanh(ratio)
 
 
 def _length(v: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 1"]:
     length: Float[np.ndarray, "*n 1"] = np.sqrt(dot(v, v))
     return length
-
-
-def _flexion(
-    reach: Float[np.ndarray, "*n 1"], a: Float[np.ndarray, "*n 1"], b: Float[np.ndarray, "*n 1"]
-) -> Float[np.ndarray, "*n 1"]:
-    """The knee's angle from straight, by the law of cosines."""
-    both = 2 * a * b
-    cos = np.divide(reach**2 - a**2 - b**2, both, out=np.ones_like(both), where=both > 0)
-    return np.arccos(np.clip(cos, -1.0, 1.0))
