@@ -18,10 +18,11 @@ from spark.rig.roles import Role
 from spark.runs import true_runs
 from spark.transfer.footfalls import between_contacts, beyond
 
-HOLD = 1.0  # how firmly a part is held where it touches the ground, as a share of a standing sole,
-CARRIED_HOLD = 0.8  # and the shoulder over an arm that touches
+HOLD = 2.5  # how firmly a part is held where it touches the ground, as a share of a standing sole,
+CARRIED_HOLD = 0.32  # and of that the shoulder over an arm that touches
 MAX_ROLL = 0.1  # hip heights that the joint of a part that rests may roll over it
-APPROACH = 0.2  # [s] before and after a touch in which a part is led to the ground and away
+SETTLE = 0.12  # [s] before and after a rest in which a part already stays, ever less
+APPROACH = 0.3  # [s] before and after a touch in which a part is led to the ground and away
 
 
 def resting(robot: Morphology, targets: Targets, q: Coordinates) -> Holds:
@@ -55,11 +56,26 @@ def _held(
         place = path.mean(axis=0) + beyond(path, MAX_ROLL * robot.rig.hip_height)
         offset[start:stop, :2] = place - path
     offset[:, :2] = between_contacts(offset[:, :2], rests, now[:2].T)
+    offset[:, :2] = _settled(offset[:, :2] + now[:2].T, rests, targets.frame_time) - now[:2].T
     lift = -touch.lowest(poses)
     offset[:, 2] = between_contacts(lift[:, None], touches, now[:2].T)[:, 0]
     along, up = (HOLD * _around(mask, targets.frame_time) for mask in (rests, touches))
     shares = np.stack([along, along, up])
     return Holds(np.array([touch.link]), touch.place[None], (now + offset.T)[None], shares[None])
+
+
+def _settled(
+    path: Float[np.ndarray, "T 2"], rests: Bool[np.ndarray, "T"], frame_time: float
+) -> Float[np.ndarray, "T 2"]:
+    """A path that comes to where it rests a little before it does, and leaves a little after: at
+    the speed at which the source's comes to rest, a robot's arm would slide on."""
+    if not rests.any():
+        return path
+    away, nearest = distance_transform_edt(~rests, return_indices=True)
+    share = np.clip(away * frame_time / SETTLE, 0.0, 1.0)[:, None]
+    share = share**2 * (3 - 2 * share)
+    settled: Float[np.ndarray, "T 2"] = share * path + (1 - share) * path[nearest[0]]
+    return settled
 
 
 def _carried(
