@@ -56,7 +56,7 @@ def _held(
         place = path.mean(axis=0) + beyond(path, MAX_ROLL * robot.rig.hip_height)
         offset[start:stop, :2] = place - path
     offset[:, :2] = between_contacts(offset[:, :2], rests, now[:2].T)
-    offset[:, :2] = _settled(offset[:, :2] + now[:2].T, rests, targets.frame_time) - now[:2].T
+    offset[:, :2] = settled(offset[:, :2] + now[:2].T, rests, targets.frame_time) - now[:2].T
     lift = -touch.lowest(poses)
     offset[:, 2] = between_contacts(lift[:, None], touches, now[:2].T)[:, 0]
     along, up = (HOLD * _around(mask, targets.frame_time) for mask in (rests, touches))
@@ -64,7 +64,7 @@ def _held(
     return Holds(np.array([touch.link]), touch.place[None], (now + offset.T)[None], shares[None])
 
 
-def _settled(
+def settled(
     path: Float[np.ndarray, "T 2"], rests: Bool[np.ndarray, "T"], frame_time: float
 ) -> Float[np.ndarray, "T 2"]:
     """A path that comes to where it rests a little before it does, and leaves a little after: at
