@@ -33,6 +33,8 @@ from spark.transfer.leg_fit import travel_scale
 # Hip heights: a source whose floor is further from z = 0 than this does not stand on z = 0, and
 # what was made of it may have been put there.
 _MAX_FLOOR_OFFSET = 0.1
+_STEEPEST = np.radians(15)  # of a floor that is walked on; feet whose places rise more climb
+_ROUND_RATE = 0.005  # share by which a rate may miss a whole number: 29.97 fps, or a frame in 200
 
 
 def assess(
@@ -93,9 +95,13 @@ def _pace(motion: Motion, source: Motion) -> tuple[str, ...]:
         f"the source's duration differs by {difference:.1f} s: it lasts {source.duration:.4g} s, "
         f"the motion {motion.duration:.4g} s, and frames may not match"
     )
-    if len(motion) > 1 and source.duration > 0:
-        rate = (len(motion) - 1) / source.duration
+    rate = (len(motion) - 1) / source.duration if source.duration > 0 else 0.0
+    if round(rate) > 0 and abs(rate - round(rate)) < _ROUND_RATE * rate:
         note += f". Is its rate {rate:.4g} fps, and not {motion.fps:.4g}?"
+    else:
+        note += (
+            ". If it was made from a part of the source, give that part: `clip.part(start, end)`"
+        )
     return (note,)
 
 
@@ -182,6 +188,11 @@ def _slope(course: Course, whose: str) -> tuple[str, ...]:
     angle, rise = floor_slope(course.lowest[planted])
     if rise < PLAUSIBILITY_V2.scaled(rig.hip_height).floating / 2:
         return ()
+    if angle > _STEEPEST:
+        return (
+            f"{whose} feet stand higher step by step: it climbs, and all that is high up counts as "
+            "floating",
+        )
     return (
         f"{whose} floor slopes by {np.degrees(angle):.1f}°: the feet stand {100 * rise:.0f} cm "
         "higher at one end of it, and there count as floating",

@@ -269,6 +269,37 @@ def test_a_source_floor_far_from_zero_is_found_where_the_motion_has_it() -> None
         assert any("floor" in note for note in report.notes)
 
 
+@pytest.mark.parametrize(
+    ("step", "told"),
+    [
+        ((0.0, 0.0), ""),
+        ((0.5, 0.025), "the source's floor slopes by 2.9°"),
+        ((0.02, 0.025), "the source's feet stand higher step by step: it climbs"),
+    ],
+)
+def test_a_floor_that_slopes_is_told_from_a_climb(step: tuple[float, float], told: str) -> None:
+    """Three stands, each so far ahead of the last and above it [m]."""
+    rig = stick_rig()
+    still = standing(rig, 180)
+    stands = along(still, 0, np.repeat(np.arange(3), 60) * step[0])
+    stands = along(stands, 2, np.repeat(np.arange(3), 60) * step[1])
+    notes = assess(Subject(still, rig), source=Subject(stands, rig)).notes
+    assert any(note.startswith(told) for note in notes) if told else not notes
+
+
+def test_a_part_of_the_source_is_told_from_a_wrong_rate() -> None:
+    rig = stick_rig()
+    source = standing(rig, 241)
+    part = replace(source, root_pos=source.root_pos[40:152], rotations=source.rotations[40:152])
+    (note,) = assess(Subject(part, rig), source=Subject(source, rig)).notes
+    assert note.endswith(
+        "If it was made from a part of the source, give that part: `clip.part(start, end)`"
+    )
+    fast = replace(source, frame_time=source.frame_time / 2)
+    (note,) = assess(Subject(fast, rig), source=Subject(source, rig)).notes
+    assert note.endswith("Is its rate 60 fps, and not 120?")
+
+
 def test_json_is_json_and_says_what_it_is() -> None:
     rig = stick_rig()
     record = assess(Subject(standing(rig, 30), rig), source=Subject(standing(rig, 30), rig)).json()
