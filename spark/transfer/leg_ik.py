@@ -177,8 +177,8 @@ def _bent(
 
     That one asks for 5 degrees where a straight leg's ankle comes nearer by a millimetre, and bends
     either way: knees would tremble that are nearly straight, and jump where they pass through
-    straight. So an angle below `_SOFT` is rounded off, and a knee that a recording overstretches
-    stays so while its ankle hardly moves, and bends forwards where it does."""
+    straight. So angles near 0 are rounded off, and a knee that a recording overstretches stays so
+    while its ankle hardly moves, and bends forwards where it does."""
     over = np.minimum(bend, 0)
     moved = np.maximum(exact**2 - bend**2, 0) / (_SOFT**2 + over**2)
     angle: Float[np.ndarray, "*n 1"] = _rounded(exact) + (bend - _rounded(bend)) * np.exp(-moved)
@@ -186,9 +186,9 @@ def _bent(
 
 
 def _rounded(angle: Float[np.ndarray, "*n 1"]) -> Float[np.ndarray, "*n 1"]:
-    """`abs(angle)` without its edge at 0, where this is `_SOFT`."""
-    ratio = np.maximum(abs(angle) / _SOFT, 1e-4)
-    return _SOFT * ratio / np.tanh(ratio)
+    """`abs(angle)` without its edge at 0, where this is `_SOFT`: a parabola up to twice that."""
+    near = _SOFT + angle**2 / (4 * _SOFT)
+    return np.where(abs(angle) < 2 * _SOFT, near, abs(angle))
 
 
 def _length(v: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 1"]:
