@@ -59,7 +59,7 @@ def _held(
     offset[:, :2] = settled(offset[:, :2] + now[:2].T, rests, targets.frame_time) - now[:2].T
     lift = -touch.lowest(poses)
     offset[:, 2] = between_contacts(lift[:, None], touches, now[:2].T)[:, 0]
-    along, up = (HOLD * _around(mask, targets.frame_time) for mask in (rests, touches))
+    along, up = (HOLD * _around(mask, targets.frame_time, APPROACH) for mask in (rests, touches))
     shares = np.stack([along, along, up])
     return Holds(np.array([touch.link]), touch.place[None], (now + offset.T)[None], shares[None])
 
@@ -71,10 +71,9 @@ def settled(
     the speed at which the source's comes to rest, a robot's arm would slide on."""
     if not rests.any():
         return path
-    away, nearest = distance_transform_edt(~rests, return_indices=True)
-    share = np.clip(away * frame_time / SETTLE, 0.0, 1.0)[:, None]
-    share = share**2 * (3 - 2 * share)
-    settled: Float[np.ndarray, "T 2"] = share * path + (1 - share) * path[nearest[0]]
+    nearest = distance_transform_edt(~rests, return_distances=False, return_indices=True)[0]
+    stays = _around(rests, frame_time, SETTLE)[:, None]
+    settled: Float[np.ndarray, "T 2"] = stays * path[nearest] + (1 - stays) * path
     return settled
 
 
@@ -88,11 +87,13 @@ def _carried(
     return Holds(np.array([link]), center[None], positions, CARRIED_HOLD * held.shares)
 
 
-def _around(mask: Bool[np.ndarray, "T"], frame_time: float) -> Float[np.ndarray, "T"]:
-    """1 where the mask holds, fading (a smoothstep) before and after."""
+def _around(
+    mask: Bool[np.ndarray, "T"], frame_time: float, seconds: float
+) -> Float[np.ndarray, "T"]:
+    """1 where the mask holds, fading (a smoothstep) within so many seconds before and after."""
     if not mask.any():
         return np.zeros(len(mask))
-    away = distance_transform_edt(~mask) * frame_time / APPROACH
+    away = distance_transform_edt(~mask) * frame_time / seconds
     share = np.clip(1.0 - away, 0.0, 1.0)
     faded: Float[np.ndarray, T] = share**2 * (3 - 2 * share)
     return faded

@@ -20,7 +20,6 @@ from spark.skeleton import Skeleton
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.vectors import cross, dot
 
-MAX_REACH = 0.999  # of the leg's length
 _STRAIGHT = 0.15  # sine of the knee's angle; the further below, the less the bones show its plane
 _SOFT = 0.05  # [rad] 3 degrees: a knee that bends by less makes a leg .3 thousandths shorter
 

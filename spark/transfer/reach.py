@@ -13,8 +13,9 @@ from jaxtyping import Float
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
-from spark.transfer.leg_ik import MAX_REACH, Leg
+from spark.transfer.leg_ik import Leg
 
+MAX_REACH = 0.999  # of a leg's length
 _AHEAD = 0.15  # [s] before a foot is out of reach the hips begin to come down
 _MAX_DROP = 0.1  # [hip heights] of a wide stance; a foot further away is let go of
 

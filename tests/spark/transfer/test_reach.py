@@ -9,8 +9,8 @@ from spark.demo.sample import sample_motion, sample_rig
 from spark.rig.roles import Group
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.transfer.foot_lock import lock_feet
-from spark.transfer.leg_ik import MAX_REACH, Leg, leg_of, move_ankles
-from spark.transfer.reach import within_reach
+from spark.transfer.leg_ik import Leg, leg_of, move_ankles
+from spark.transfer.reach import MAX_REACH, within_reach
 from tests.helpers.stick import standing, stick_rig
 
 LEG = 0.8  # [m] of the stick man, stretched out as he stands
