@@ -23,7 +23,8 @@ from spark.rotation import (
 )
 
 _W_BEYOND_LIMITS = 1.0  # [1/rad²] of an angle's square beyond the limits, a jump's square being 1
-_W_FROM_REST = 1e-6  # [1/rad²] of an angle's square, which decides where all else is equal
+# Nothing of a body is turned the long way round for seconds, though to come back takes a jump.
+_W_FROM_REST = 0.03  # [1/rad²] of an angle's square in each frame
 
 
 def project(

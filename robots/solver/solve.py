@@ -25,6 +25,7 @@ from robots.solver.repair import repair
 from robots.solver.resting import resting
 from robots.solver.smoothness import limit_speed
 from robots.solver.stance import apart
+from robots.solver.strays import without_strays
 from robots.solver.stretches import by_stretches
 from robots.solver.targets import Targets, poses_of, targets_of
 from robots.tree import Coordinates, forward_kinematics
@@ -51,12 +52,13 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     """The motion of `source` on a robot, its feet planted where the source's are, within limits.
 
     Recordings of more than 20 fps are solved at about 20 fps first; splines through that are then
-    polished in all frames. Long ones are solved a stretch at a time. A robot without legs stays
-    where it is mounted.
+    polished in all frames. Long ones are solved a stretch at a time. Frames of the source
+    that nothing leads to are passed over. A robot without legs stays where it is mounted.
     """
     if robot.mount is not None:
         source = facing_ahead(source)
-    notes = dict.fromkeys(robot.notes)
+    source, passed = without_strays(source)
+    notes = dict.fromkeys((*robot.notes, *passed))
 
     def solved(start: int, stop: int) -> Coordinates:
         targets = targets_of(source.frames(start, stop), robot)

@@ -1,0 +1,141 @@
+"""Frames in which a source, or one of its joints, jumps away and back are passed over.
+
+A T-pose that a converter put before the clip, a marker that was lost, a thigh that turns the long
+way round for three frames: the solver's motions are smooth, so a pose that nothing leads to would
+bend all around it.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.ndimage import binary_dilation
+
+from spark.blocks import in_blocks
+from spark.kinematics import local_rotations, world_rotations
+from spark.resample import rotations_at, values_at
+from spark.rotation import quat_angle, quat_conj, quat_mul
+from spark.summary import counted
+from spark.transfer.canonical import CanonicalMotion, canonical_positions
+
+_STRAY_TIME = 0.1  # [s] up to which frames between jumps belong to nothing
+# A joint's step in the mean: from a T-pose into the motion 0.2 to 0.5 hip heights, at the quickest
+# turn of a flip 0.15, but within 1/16 s.
+_LEAST_STEP = 0.12  # [hip heights]
+_LEAST_SPEED = 5.0  # [hip heights/s]
+_LEAST_TURN = 1.0  # [rad] of a joint in its parent; glitches turn it by up to pi
+_LEAST_TURN_SPEED = 40.0  # [rad/s]: wrists reach 30
+
+
+def without_strays(source: CanonicalMotion) -> tuple[CanonicalMotion, tuple[str, ...]]:
+    """`source` with what jumps away and back replaced by what lies between its neighbours, or, at
+    an end of the motion, by the only one; and notes that say where. What jumps in half of the
+    frames or more is left as it is, and so are jumps to where the motion goes on."""
+    whole, note = _without_stray_frames(source)
+    joints, notes = _without_stray_joints(whole)
+    return joints, (*note, *notes)
+
+
+def _without_stray_frames(source: CanonicalMotion) -> tuple[CanonicalMotion, tuple[str, ...]]:
+    stray = _strays(_jumps(source), source.frame_time)
+    if not stray.any():
+        return source, ()
+    rotations = _bridged(stray, source.rotations, rotations_at)
+    hips = _bridged(stray, source.hips, values_at)
+    note = f"the source jumps away from all other frames, as in a T-pose before a clip{_in(stray)}"
+    return replace(source, rotations=rotations, hips=hips), (note,)
+
+
+def _without_stray_joints(source: CanonicalMotion) -> tuple[CanonicalMotion, tuple[str, ...]]:
+    rig = source.rig
+    joints = [j for j, role in enumerate(rig.roles.roles) if role is not None]
+    least = max(_LEAST_TURN, _LEAST_TURN_SPEED * source.frame_time)
+
+    def local(frames: slice | Int[np.ndarray, "N"]) -> Float[np.ndarray, "N J 4"]:
+        return local_rotations(rig.skeleton, quat_mul(source.rotations[frames], rig.tpose))
+
+    def jumps(block: slice) -> Bool[np.ndarray, "N K"]:
+        """Whether a joint comes to a frame by a jump."""
+        start = max(block.start - 1, 0)
+        turned = local(slice(start, block.stop))[:, joints]
+        far = quat_angle(turned[:-1], turned[1:]) > least
+        return far if block.start else np.concatenate([np.zeros((1, len(joints)), dtype=bool), far])
+
+    jumped = in_blocks(jumps, len(source))
+    strays = {
+        j: stray
+        for k, j in enumerate(joints)
+        if (stray := _strays(jumped[:, k], source.frame_time)).any()
+    }
+    if not strays:
+        return source, ()
+    changed = np.any(list(strays.values()), axis=0)
+    near = np.flatnonzero(binary_dilation(changed))  # of an hour, not all frames
+    turned = local(near)
+    for j, stray in strays.items():
+        turned[:, j] = _bridged(stray[near], turned[:, j], rotations_at)
+    rotations = source.rotations.copy()
+    world = world_rotations(rig.skeleton, turned[changed[near]])
+    rotations[changed] = quat_mul(world, quat_conj(rig.tpose))
+    notes = [
+        f"the source's {rig.skeleton.names[j]!r} turns away and back{_in(stray)}"
+        for j, stray in strays.items()
+    ]
+    return replace(source, rotations=rotations), tuple(notes)
+
+
+def _jumps(source: CanonicalMotion) -> Bool[np.ndarray, "T"]:
+    """Whether a source jumps to a frame: its joints come there by a step that is long, and like
+    neither the one before nor the one after."""
+    rig, count = source.rig, len(source)
+    if count < 3:
+        return np.zeros(count, dtype=bool)
+    joints = [j for j, role in enumerate(rig.roles.roles) if role is not None]
+    least = max(_LEAST_STEP, _LEAST_SPEED * source.frame_time)
+
+    def length(step: Float[np.ndarray, "N J 3"]) -> Float[np.ndarray, "N"]:
+        return np.linalg.norm(step, axis=-1).mean(axis=-1) / rig.hip_height
+
+    def far(block: slice) -> Bool[np.ndarray, "N"]:
+        start, stop = max(block.start - 2, 0), min(block.stop + 1, count)
+        steps = np.diff(canonical_positions(source.frames(start, stop), joints), axis=0)
+        changes = length(np.diff(steps, axis=0))
+        nearest = np.minimum(np.append(np.inf, changes), np.append(changes, np.inf))
+        own = np.append(0.0, np.minimum(nearest, length(steps)))
+        return np.greater(own[block.start - start : block.stop - start], least)
+
+    return in_blocks(far, count)
+
+
+def _strays(jumps: Bool[np.ndarray, "T"], frame_time: float) -> Bool[np.ndarray, "T"]:
+    """The frames in short pieces between two jumps, or between one and an end."""
+    stray = np.zeros(len(jumps), dtype=bool)
+    edges = np.flatnonzero(jumps).tolist()
+    if not edges:
+        return stray
+    most = max(1, int(_STRAY_TIME / frame_time + 1e-6))
+    for start, stop in pairwise([0, *edges, len(jumps)]):
+        stray[start:stop] = stop - start <= most
+    return stray & (2 * stray.sum() < len(stray))
+
+
+def _bridged(
+    stray: Bool[np.ndarray, "T"],
+    values: Float[np.ndarray, "T *n"],
+    between: Callable[[Float[np.ndarray, "K *n"], Float[np.ndarray, "N"]], np.ndarray],
+) -> Float[np.ndarray, "T *n"]:
+    """`values` with those of stray frames `between` the others around them."""
+    kept = np.flatnonzero(~stray)
+    out = values.copy()
+    at = np.interp(np.flatnonzero(stray), kept, np.arange(len(kept)))
+    out[stray] = between(values[kept], at)
+    return out
+
+
+def _in(stray: Bool[np.ndarray, "T"]) -> str:
+    """` in 2 frames (7, 8): ...`."""
+    frames = np.flatnonzero(stray).tolist()
+    which = ", ".join(map(str, frames[:5])) + (", ..." if len(frames) > 5 else "")
+    return f" in {counted(len(frames), 'frame')} ({which}): the robot passes over that"

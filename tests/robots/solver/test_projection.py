@@ -1,0 +1,33 @@
+"""Angles of hinges for given rotations, each joint for itself."""
+
+import numpy as np
+
+from robots.solver.projection import _hinge_angles
+from robots.tree import Tree
+from spark.rotation import quat_from_rotvec, quat_mul
+
+PITCH_ROLL_YAW = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, 1]])
+HIP = Tree(
+    parents=np.array([-1, 0, 1]),
+    anchors=np.zeros((3, 3)),
+    axes=PITCH_ROLL_YAW,
+    balls=np.zeros(3, dtype=bool),
+    lower=np.array([-0.5, -3.14, -3.14]),
+    upper=np.full(3, 3.14),
+    base=np.zeros(3),
+)
+
+
+def turned(angles: np.ndarray) -> np.ndarray:
+    q1, q2, q3 = (quat_from_rotvec(PITCH_ROLL_YAW[k] * angles[:, [k]]) for k in range(3))
+    return quat_mul(quat_mul(q1, q2), q3)
+
+
+def test_two_seconds_are_not_spent_the_long_way_round_to_save_a_jump() -> None:
+    # At first both solutions are within the limits, later this one alone; and it is the other one
+    # that is near what comes later.
+    time = np.linspace(0, 2, 40)[:, None]
+    swing = np.array([-0.3, 0.0, -0.2]) + 0.1 * np.sin(3 * time)
+    angles = np.concatenate([swing, [1.9, -1.6, 1.7] + 0.0 * swing])
+    found = _hinge_angles(HIP, (0, 1, 2), turned(angles))
+    np.testing.assert_allclose(found, angles, atol=1e-6)
