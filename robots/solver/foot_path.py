@@ -1,9 +1,9 @@
 """The way of each point of a sole, standing and swinging: what the whole body follows.
 
 A standing foot stays on its footprint. A swinging one keeps the copied path, carried from the
-footprint behind it to the one before it, and the source's clearance, scaled. The ground is where
-the source's feet stood: a floor that slopes by a few centimetres is level under the robot. Where a
-foot is fast it is lifted, so that it steps and does not drag.
+footprint behind it to the one before it, and the source's clearance, scaled. Ground on which the
+source climbs is level under the robot. Where a foot is fast it is lifted, so that it steps and does
+not drag.
 """
 
 import numpy as np
@@ -26,7 +26,10 @@ STEP_SPEEDS = (0.2, 0.3, 0.6)
 STEP_HEIGHTS = (0.0, 0.03, 0.033)
 SWING_SPAN, STAND_SPAN = 0.05, 0.02  # [s] before and after a frame for a foot's speed
 MIN_CREEP = 0.08  # [s], half of which a standing foot has to move for before it is lifted
-LET_DOWN = 0.1  # [s] within which a foot comes down that is in the air where its contact begins
+LET_DOWN = 0.15  # [s] within which a foot comes down that is in the air where its contact begins
+# Hip heights above the floor at which a foot may stand on it: skeletons and recorded floors are off
+# by that. What it stands higher is ground.
+MAX_UNEVEN = 0.06
 _ON_FLOOR = 1e-3  # [m]
 
 
@@ -74,6 +77,7 @@ def _height(
     ground = np.zeros(len(stands))
     for start, stop in true_runs(stands):
         ground[start:stop] = plan.clearance[start:stop].min()
+    ground = np.maximum(ground - MAX_UNEVEN * plan.hip_height, 0.0)
     clearance = plan.clearance - between_contacts(ground[:, None], stands, plan.toe)[:, 0]
     drop = np.where(stands, clearance, 0.0)
     clearance = clearance - _fading(drop, stands, max(1, round(LET_DOWN / plan.frame_time)))

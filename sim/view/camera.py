@@ -68,7 +68,8 @@ def fitting_aspect(scene: Scene, frames: Sequence[int] | None = None) -> float:
 
 def extents(scene: Scene, frames: Sequence[int]) -> list[Float[np.ndarray, "N 3 2"]]:
     """For each of some frames, how far all shapes of the figures reach from the scene's centre [m]:
-    to the right, up, and towards the camera; from, and to. Figures that are lost are left out."""
+    to the right, up, and towards the camera; from, and to. Figures that are lost are left out;
+    where all are, the centre itself is what there is to see."""
     model, data = scene.model, mujoco.MjData(scene.model)
     axes = camera_axes()
     kept = [
@@ -81,6 +82,9 @@ def extents(scene: Scene, frames: Sequence[int]) -> list[Float[np.ndarray, "N 3 
         for placement, here in zip(scene.placements, kept, strict=True):
             seen[placement.bodies.start : placement.bodies.stop] = here[frame]
         geoms = np.flatnonzero(seen[model.geom_bodyid])
+        if not len(geoms):
+            out.append(np.zeros((1, 3, 2)))
+            continue
         data.qpos[:] = scene.qpos[frame]
         mujoco.mj_kinematics(model, data)
         turned = data.geom_xmat[geoms].reshape(-1, 3, 3)

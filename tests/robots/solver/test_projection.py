@@ -27,7 +27,7 @@ def test_two_seconds_are_not_spent_the_long_way_round_to_save_a_jump() -> None:
     # At first both solutions are within the limits, later this one alone; and it is the other one
     # that is near what comes later.
     time = np.linspace(0, 2, 40)[:, None]
-    swing = np.array([-0.3, 0.0, -0.2]) + 0.1 * np.sin(3 * time)
-    angles = np.concatenate([swing, [1.9, -1.6, 1.7] + 0.0 * swing])
+    swing = np.array([-0.3, 0.2, -0.2]) + 0.1 * np.sin(3 * time)
+    angles = np.concatenate([swing, [1.9, 1.6, 1.7] + 0.0 * swing])
     found = _hinge_angles(HIP, (0, 1, 2), turned(angles))
     np.testing.assert_allclose(found, angles, atol=1e-6)

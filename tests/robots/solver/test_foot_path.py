@@ -1,0 +1,31 @@
+"""How high feet pass above the floor."""
+
+import numpy as np
+import pytest
+
+from robots.registry import find
+from robots.solver.foot_path import LET_DOWN, MAX_UNEVEN, footing_of
+from robots.solver.footprints import plan_feet
+from robots.solver.targets import targets_of
+from spark.demo.sample import sample_motion, sample_rig
+from spark.transfer.canonical import to_canonical
+from spark_sim.loading import load_robot
+
+
+@pytest.mark.parametrize("stood", [0.0, 0.03, 0.05, 0.4])
+def test_feet_pass_as_high_above_the_floor_as_the_source_but_for_ground(stood: float) -> None:
+    """`stood` [hip heights] is how high above the floor the source's feet stand."""
+    rig = sample_rig("walker")
+    walk = to_canonical(sample_motion("walk", rig, 60.0), rig)
+    ember = load_robot(find("robot")).on_robot.robot
+    [plan, _] = plan_feet(ember, targets_of(walk, ember))
+    raised = stood * plan.hip_height
+    plan.clearance[:] = raised + np.where(plan.stands, 0.0, 0.12 * plan.hip_height)
+    lowest = footing_of(ember, plan).positions[:, 2].min(axis=0)
+    np.testing.assert_allclose(lowest[plan.stands], 0.0, atol=1e-9)
+    frames, standing = np.arange(len(walk)), np.flatnonzero(plan.stands)
+    apart = np.abs(frames[:, None] - standing).min(axis=1) * walk.frame_time
+    middle = apart > LET_DOWN
+    assert middle.sum() > 5
+    ground = max(raised - MAX_UNEVEN * plan.hip_height, 0.0)
+    np.testing.assert_allclose(lowest[middle], plan.clearance[middle] - ground, atol=1e-9)
