@@ -6,9 +6,9 @@ its feet and hands are turned against the T-pose. All of that is constant for a 
 has `Habits`, a function of its T-pose and rest pose, and an answer differs from the analytic one by
 the habits of the target without those of the source. A body's own motion comes back as it was.
 
-`spark.training.recorded_learning` learns the function from pairs of recordings: a linear model
-(`spark.training.recorded_ridge`), and a network beside it. Neither knows anything of bodies unlike
-those that it met: `nearness` tells how much of a correction is made.
+`spark.training.recorded_learning` learns the function from pairs of recordings: bodies tell of
+those like them (`spark.network.likeness`). They say nothing of others: `nearness` tells how much of
+a correction is made.
 """
 
 from collections.abc import Callable
@@ -35,6 +35,9 @@ HABITS = ("travel", "hips_rise", "ankles_rise", "hips_up", "ankles_up", "out")
 
 _MIRROR = np.array([1.0, -1.0, 1.0])  # of a place; of an axis to turn about, its opposite
 _TYPICAL = 0.05  # [hip heights] by which measures of people differ
+# Standard deviations of a difference that are not made: what is hardly known makes a pair that was
+# right much worse more often than it helps (docs/training.md).
+_UNSURE = 0.5
 
 
 class Habits(NamedTuple):
@@ -43,10 +46,6 @@ class Habits(NamedTuple):
 
     turns: Float[np.ndarray, "K 3"]
     scales: Float[np.ndarray, "6"]
-
-    def plus(self, other: "Habits", share: Float[np.ndarray, "2"]) -> "Habits":
-        """With shares of the turns and of the scales of others."""
-        return Habits(self.turns + share[0] * other.turns, self.scales + share[1] * other.scales)
 
 
 class BodyTokens:
@@ -78,16 +77,6 @@ class BodyTokens:
     def axes(self, rotvec: Float[np.ndarray, "K 3"]) -> Float[np.ndarray, "K 3"]:
         """Rotation vectors of all rows, those of the right side mirrored; its own inverse."""
         return np.where(self.mirrored[:, None], -_MIRROR * rotvec, rotvec)
-
-    @cached_property
-    def features(self) -> Float[np.ndarray, "K F"]:
-        """Place and bone in the T-pose, turn of the rest pose, part of the body."""
-        skeleton = self.body.skeleton
-        places, bones = skeleton.rest_positions[self._rows], skeleton.offsets[self._rows]
-        mirror = np.where(self.mirrored[:, None], _MIRROR, 1.0)
-        one_hot = np.eye(len(PARTS))[self.parts]
-        known = (places * mirror, 4 * bones * mirror, 2 * self.rest_turns)
-        return np.concatenate([*known, one_hot, self.sided[:, None]], axis=-1)
 
     @cached_property
     def measures(self) -> Float[np.ndarray, "M"]:
@@ -180,9 +169,11 @@ def as_recorded(
     share: float = 1.0,
     *,
     bodies: tuple[BodyTokens, BodyTokens] | None = None,
+    doubt: Float[np.ndarray, "6"] | None = None,
 ) -> CanonicalMotion:
     """`moved`, the transfer of `source`, as recorded answers have it: joints turned, legs fitted.
-    Of the difference from `fit_legs`, `share` is made. `bodies` are the two rigs, where known."""
+    Of the difference from `fit_legs`, `share` is made, of scales what is sure (`sure`) given
+    their standard deviations `doubt`. `bodies` are the two rigs, where known."""
     theirs, own = bodies or (tokens_of(source.rig), tokens_of(moved.rig))
     before, after = habits(theirs), habits(own)
     turns = [t.axes(h.turns) for t, h in ((theirs, before), (own, after))]
@@ -193,8 +184,21 @@ def as_recorded(
         for j in _rigid_with(own, own.joints[k]):
             rotations[:, j] = quat_mul(rotations[:, j], turn)
     turned = replace(moved, rotations=rotations)
-    fit = with_habits(leg_fit(source.rig, moved.rig), share * (after.scales - before.scales), own)
+    difference = after.scales - before.scales
+    if doubt is not None:
+        difference = sure(difference, doubt)
+    fit = with_habits(leg_fit(source.rig, moved.rig), share * difference, own)
     return fit_legs(source, turned, fit)
+
+
+def sure(
+    difference: Float[np.ndarray, "*n"], doubt: Float[np.ndarray, "*n"]
+) -> Float[np.ndarray, "*n"]:
+    """What is left of differences without half of their standard deviations; 0 for smaller ones."""
+    kept: Float[np.ndarray, "*n"] = np.sign(difference) * np.maximum(
+        np.abs(difference) - _UNSURE * doubt, 0.0
+    )
+    return kept
 
 
 def tokens_of(rig: Rig) -> BodyTokens:

@@ -27,7 +27,7 @@ from spark.network.features import (
 from spark.network.forward import Network
 from spark.network.known_bodies import similarity
 from spark.network.recorded import as_recorded, tokens_of
-from spark.network.recorded_network import PREFIX, RecordedNetwork
+from spark.network.recorded_weights import PREFIX, RecordedWeights
 from spark.network.windows import Windows
 from spark.resample import rotations_at, values_at
 from spark.rig.rig import Rig
@@ -49,7 +49,7 @@ class NetworkRetargeter:
             self._encode = _name_encoder(weights)
             self.window = int(weights.settings.get("window", 64))
             self.bodies = weights.bodies
-            self.recorded = RecordedNetwork(weights) if weights.below(PREFIX) else None
+            self.recorded = RecordedWeights(weights) if weights.below(PREFIX) else None
         except (KeyError, TypeError, ValueError) as error:
             raise weights.damaged(error) from error
 
@@ -114,7 +114,9 @@ class NetworkRetargeter:
         moved = replace(moved, notes=(*moved.notes, known.told(*bodies)))
         if not share:
             return fit_legs(source, moved)
-        return as_recorded(self.recorded, source, moved, share, bodies=bodies)
+        told = self.recorded.told
+        doubt = told.doubt(*bodies)
+        return as_recorded(told, source, moved, share, bodies=bodies, doubt=doubt)
 
     def _blend_windows(
         self,

@@ -19,8 +19,8 @@ from spark.errors import FileFormatError
 from spark.files import write_atomically
 from spark.inference.weights import FORMAT, VERSION, Tensors, Trunk, read_weights
 from spark.network.config import Config
-from spark.network.recorded_network import PREFIX as RECORDED
-from spark.network.recorded_network import check_recorded
+from spark.network.recorded_weights import PREFIX as RECORDED
+from spark.network.recorded_weights import check_recorded
 from spark.opening import check_regular
 from spark.training.model import Spark
 from spark.training.name_encoder import NameConfig, NameEncoder

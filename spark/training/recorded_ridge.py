@@ -1,7 +1,8 @@
 """The linear model of recorded pairs: habits as products with a body's measures and rest pose.
 
-The row to beat for the network of `spark.training.recorded_net`. In closed form; how strongly
-it is regularised, or whether a scale is left alone, is chosen by leaving characters out.
+The row to beat for what `spark.training.recorded_learning` learns; `spark-sim evaluate` prints it.
+In closed form; how strongly it is regularised, or whether a scale is left alone, is chosen by
+leaving characters out.
 """
 
 from dataclasses import dataclass
@@ -9,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from spark.network.recorded import HABITS, PARTS, BodyTokens, Habits
+from spark.network.recorded import HABITS, BodyTokens, Habits
 from spark.training.recorded_pairs import RecordedPairs
+from spark.training.recorded_turns import PairTurns
 
 _STRENGTHS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0, np.inf)  # the last leaves a scale alone
 _FOLDS = 8
-_TURN_STRENGTH = 1e-3  # [rad²] the mean square of a turn that is noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +40,7 @@ def fit_ridge(known: RecordedPairs) -> Ridge:
     W = np.stack([pair.weights for pair in known.pairs]) * known.balance[:, None]
     folds = _folds(ends)
     scales = [_of_scale(X, Y[:, h], W[:, h], ends, folds) for h in range(len(HABITS))]
-    return Ridge(_turns(known), np.stack(scales, -1))
+    return Ridge(PairTurns(known).fitted(), np.stack(scales, -1))
 
 
 def _folds(ends: np.ndarray) -> list[np.ndarray]:
@@ -79,25 +80,3 @@ def _solved(
     return np.linalg.solve(
         (X * share[:, None]).T @ X + strength * np.eye(X.shape[1]), (X * share[:, None]).T @ y
     )
-
-
-def _turns(known: RecordedPairs) -> Float[np.ndarray, "P 3 3"]:
-    """How far joints of each part are turned with their rest pose."""
-    out = np.zeros((len(PARTS), 3, 3))
-    products = [(np.zeros((3, 3)), np.zeros((3, 3)), [0.0]) for _ in PARTS]
-    mirror = np.array([-1.0, 1.0, -1.0])
-    for pair, weight in zip(known.pairs, known.balance, strict=True):
-        source, target = known.bodies[pair.source], known.bodies[pair.target]
-        for (k, i), turn in zip(pair.rows, pair.turns, strict=True):
-            part = target.parts[k]
-            x = target.rest_turns[k] - source.rest_turns[i]
-            # What lies in the middle of a body turns as likely to the other side.
-            for sign in (1.0, mirror) if not target.sided[k] else (1.0,):
-                xx, xy, total = products[part]
-                xx += weight * np.outer(x * sign, x * sign)
-                xy += weight * np.outer(x * sign, turn * sign)
-                total[0] += weight
-    for part, (xx, xy, total) in enumerate(products):
-        if total[0]:
-            out[part] = np.linalg.solve(xx + total[0] * _TURN_STRENGTH * np.eye(3), xy)
-    return out

@@ -28,8 +28,6 @@ class TrainConfig:
     bfloat16 where the processor has them. The encoder of joint names is the one that ships
     ("shipped"); `names` is a file with another, or one is learned first in `name_steps`, or `t5` is
     a T5. A checkpoint is written every `save_every` steps and every `save_minutes`.
-    `recorded_steps` are those on recorded pairs, where a dataset has some
-    (`spark.training.recorded_learning`); the paper's preset takes none.
     """
 
     preset: str = "default"
@@ -54,7 +52,6 @@ class TrainConfig:
     save_minutes: float = 5.0
     log_every: int = 20
     name_steps: int = 0
-    recorded_steps: int = 300
     names: str = ""
     t5: str = ""
 
@@ -130,7 +127,6 @@ _LOWEST = {
     **dict.fromkeys(("width", "heads", "blocks", "steps", "batch", "per_body", "variants"), 1),
     **dict.fromkeys(("save_every", "log_every"), 1),
     **dict.fromkeys(("seed", "warmup", "weight_decay", "rate", "name_steps"), 0),
-    "recorded_steps": 0,
     "save_minutes": 0,
     "workers": -1,
     "window": 2,
@@ -140,7 +136,6 @@ _HIGHEST = {
     **dict.fromkeys(("heads", "blocks", "workers"), 512),
     **dict.fromkeys(("batch", "per_body", "variants"), 65536),
     **dict.fromkeys(("steps", "save_every", "log_every", "warmup", "name_steps"), 10**9),
-    "recorded_steps": 10**9,
     "seed": 2**63 - 1,
     **dict.fromkeys(("rate", "weight_decay", "save_minutes"), sys.float_info.max),  # finite
 }

@@ -212,16 +212,15 @@ def _learn_recorded(start: "Checkpoint", config: "TrainConfig", out: Path) -> "C
     the process that writes learns from them, and the others wait for it."""
     from spark.training.recorded_stage import recorded_stage, with_recorded
     from spark_sim import console
-    from spark_sim.watching import is_first, watching_stage
+    from spark_sim.watching import is_first
 
     stage = recorded_stage(config) if is_first() else None
     if stage is None:
         return start
     console.note(stage.about)
-    if not stage.steps:
+    if not stage.known.enough:
         return start
-    with watching_stage("recorded pairs", stage.steps) as watch:
-        start, told = with_recorded(start, stage, config, out, watch)
+    start, told = with_recorded(start, stage, config, out)
     console.note(told)
     return start
 
