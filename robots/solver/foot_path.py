@@ -28,7 +28,7 @@ SWING_SPAN, STAND_SPAN = 0.05, 0.02  # [s] before and after a frame for a foot's
 MIN_CREEP = 0.08  # [s], half of which a standing foot has to move for before it is lifted
 LET_DOWN = 0.15  # [s] within which a foot comes down that is in the air where its contact begins
 # Hip heights above the floor at which a foot may stand on it: skeletons and recorded floors are off
-# by that. What it stands higher is ground.
+# by that. What it stands higher is ground, and so is all where it takes no step.
 MAX_UNEVEN = 0.06
 _ON_FLOOR = 1e-3  # [m]
 
@@ -73,15 +73,20 @@ def _height(
     plan: FootPlan, points: Complex[np.ndarray, "T P"], low: Bool[np.ndarray, "T P"]
 ) -> Float[np.ndarray, "T"]:
     """How high the lowest point of the sole is [m]; `low` points are on the floor, or near it."""
-    stands = plan.stands
+    stands, reach = plan.stands, max(1, round(LET_DOWN / plan.frame_time))
     ground = np.zeros(len(stands))
     for start, stop in true_runs(stands):
         ground[start:stop] = plan.clearance[start:stop].min()
-    ground = np.maximum(ground - MAX_UNEVEN * plan.hip_height, 0.0)
-    clearance = plan.clearance - between_contacts(ground[:, None], stands, plan.toe)[:, 0]
+    ground = between_contacts(ground[:, None], stands, plan.toe)[:, 0]
+    clearance = plan.clearance - ground
     drop = np.where(stands, clearance, 0.0)
-    clearance = clearance - _fading(drop, stands, max(1, round(LET_DOWN / plan.frame_time)))
-    height = np.where(stands, 0.0, clearance + plan.lift)
+    clearance = clearance - _fading(drop, stands, reach)
+    away = 1 - np.minimum(_fading(stands * 1.0, stands, reach), 1.0)
+    pivot = (plan.toe[:, 0] + 1j * plan.toe[:, 1])[:, None]
+    pace = _speed(pivot, np.ones_like(low[:, :1]), plan.frame_time, SWING_SPAN) / plan.hip_height
+    steps = np.interp(pace, [STEP_SPEEDS[0], STEP_SPEEDS[-1]], [0.0, 1.0])
+    uneven = away * steps * np.minimum(ground, MAX_UNEVEN * plan.hip_height)
+    height = np.where(stands, 0.0, clearance + uneven + plan.lift)
     standing, swinging = (
         _speed(points, low, plan.frame_time, span) for span in (STAND_SPAN, SWING_SPAN)
     )
