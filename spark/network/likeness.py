@@ -42,7 +42,7 @@ class Likeness:
         alike = covariance(apart(both, self.measures)[..., None], self.lengths)
         further = alike[1] - alike[0]
         told = np.einsum("nh,hnm,mh->h", further, self.certain, further)
-        unknown = 2.0 - 2.0 * covariance(apart(both, both)[0, 1], self.lengths) - told
+        unknown = 2.0 - 2.0 * covariance(apart(both, both)[:1, 1], self.lengths) - told
         doubt: Float[np.ndarray, 6] = self.sizes * np.sqrt(np.maximum(unknown, 0.0))
         return doubt
 

@@ -71,7 +71,7 @@ class _Told:
         found: list[tuple[tuple[float, float], float] | None] = []
         for habit in range(len(HABITS)):
             tests = [*self._tests(habit)]
-            best = surest(np.array([gains for gains, _ in tests]))
+            best = surest(np.reshape([gains for gains, _ in tests], (len(tests), len(_CHOICES))))
             variance = 0.0 if best is None else np.mean([spread[best] for _, spread in tests])
             found.append(None if best is None else (_CHOICES[best], float(np.sqrt(variance))))
         return found
