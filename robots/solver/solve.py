@@ -52,8 +52,8 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     """The motion of `source` on a robot, its feet planted where the source's are, within limits.
 
     Recordings of more than 20 fps are solved at about 20 fps first; splines through that are then
-    polished in all frames. Long ones are solved a stretch at a time. Frames of the source
-    that nothing leads to are passed over. A robot without legs stays where it is mounted.
+    polished in all frames. Long ones are solved a stretch at a time. Frames of the source that
+    nothing leads to are passed over. A robot without legs stays where it is mounted.
     """
     if robot.mount is not None:
         source = facing_ahead(source)

@@ -50,7 +50,7 @@ def _without_stray_frames(source: CanonicalMotion) -> tuple[CanonicalMotion, tup
 
 def _without_stray_joints(source: CanonicalMotion) -> tuple[CanonicalMotion, tuple[str, ...]]:
     rig = source.rig
-    joints = [j for j, role in enumerate(rig.roles.roles) if role is not None]
+    joints = rig.roles.held
     least = max(_LEAST_TURN, _LEAST_TURN_SPEED * source.frame_time)
 
     def local(frames: slice | Int[np.ndarray, "N"]) -> Float[np.ndarray, "N J 4"]:
@@ -92,7 +92,6 @@ def _jumps(source: CanonicalMotion) -> Bool[np.ndarray, "T"]:
     rig, count = source.rig, len(source)
     if count < 3:
         return np.zeros(count, dtype=bool)
-    joints = [j for j, role in enumerate(rig.roles.roles) if role is not None]
     least = max(_LEAST_STEP, _LEAST_SPEED * source.frame_time)
 
     def length(step: Float[np.ndarray, "N J 3"]) -> Float[np.ndarray, "N"]:
@@ -100,7 +99,7 @@ def _jumps(source: CanonicalMotion) -> Bool[np.ndarray, "T"]:
 
     def far(block: slice) -> Bool[np.ndarray, "N"]:
         start, stop = max(block.start - 2, 0), min(block.stop + 1, count)
-        steps = np.diff(canonical_positions(source.frames(start, stop), joints), axis=0)
+        steps = np.diff(canonical_positions(source.frames(start, stop), rig.roles.held), axis=0)
         changes = length(np.diff(steps, axis=0))
         nearest = np.minimum(np.append(np.inf, changes), np.append(changes, np.inf))
         own = np.append(0.0, np.minimum(nearest, length(steps)))

@@ -60,7 +60,7 @@ class Rig:
     shaped_soles: tuple[Sole, ...] = ()
 
     def __repr__(self) -> str:
-        held = sum(role is not None for role in self.roles.roles)
+        held = len(self.roles.held)
         joints = counted(len(self.skeleton), "joint")
         return f"Rig({joints}, {held} with a role, hips {self.hip_height:.3g} m high)"
 

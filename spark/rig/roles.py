@@ -94,8 +94,12 @@ class RoleMap:
     reasons: tuple[str, ...]
 
     def __repr__(self) -> str:
-        held = sum(role is not None for role in self.roles)
-        return f"RoleMap({counted(len(self.roles), 'joint')}, {held} with a role)"
+        return f"RoleMap({counted(len(self.roles), 'joint')}, {len(self.held)} with a role)"
+
+    @cached_property
+    def held(self) -> tuple[int, ...]:
+        """The joints that hold a role."""
+        return tuple(j for j, role in enumerate(self.roles) if role is not None)
 
     @cached_property
     def _joints(self) -> dict[Role, tuple[int, ...]]:

@@ -76,8 +76,7 @@ def named_alike(theirs: Rig, rig: Rig) -> dict[int, int] | None:
     names = zip(theirs.skeleton.names, _keys(theirs.skeleton.names), strict=True)
     found = {k: plain.get(name, keys.get(key, -1)) for k, (name, key) in enumerate(names)}
     found = {k: j for k, j in found.items() if j >= 0}
-    wanted = {j for j, role in enumerate(rig.roles.roles) if role is not None}
-    return found if wanted <= set(found.values()) else None
+    return found if set(rig.roles.held) <= set(found.values()) else None
 
 
 def _keys(names: Sequence[str]) -> list[str]:

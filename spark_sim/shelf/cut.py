@@ -37,8 +37,7 @@ def pieces(motion: Motion, rig: Rig, longest: float) -> list[tuple[int, int]]:
 def unrest(motion: Motion, rig: Rig) -> Float[np.ndarray, "T"]:
     """How fast the body moves around each frame: the mean speed of its joints with a role, in
     standing heights a second, over `WINDOW`. A cut between frames t - 1 and t is judged by t."""
-    joints = [j for j, role in enumerate(rig.roles.roles) if role is not None]
-    positions = forward(motion)[0][:, joints]
+    positions = forward(motion)[0][:, rig.roles.held]
     steps = np.linalg.norm(np.diff(positions, axis=0), axis=-1).mean(axis=1)
     speed = np.concatenate([steps[:1], steps]) / (rig.standing_height * motion.frame_time)
     half = max(int(WINDOW / 2 / motion.frame_time), 1)

@@ -137,18 +137,24 @@ def test_the_linear_model_foretells_bodies_that_it_has_not_seen(known: RecordedP
     assert (found < 0.1 * expected)[[TRAVEL, HIPS_UP]].all()
 
 
+def errors(told: Likeness, tested: RecordedPairs) -> tuple[float, float]:
+    """The squared error of scales without what is told, and with what of it is sure."""
+    before = after = 0.0
+    for pair in tested.pairs:
+        source, target = (tested.bodies[end] for end in (pair.source, pair.target))
+        found = sure(told(target).scales - told(source).scales, told.doubt(source, target))
+        before += float((pair.weights * pair.scales**2).sum())
+        after += float((pair.weights * (pair.scales - found) ** 2).sum())
+    return before, after
+
+
 def test_bodies_tell_of_bodies_like_them(known: RecordedPairs) -> None:
     learned = learn_recorded(known)
     assert learned.left < 0.6
     assert learned.known.reach > 0
     left_out = {"body 3", "body 7"}
     told = fit_likeness(known.without(left_out))
-    before = after = 0.0
-    for pair in known.of(left_out).pairs:
-        source, target = (known.bodies[end] for end in (pair.source, pair.target))
-        found = sure(told(target).scales - told(source).scales, told.doubt(source, target))
-        before += float((pair.weights * pair.scales**2).sum())
-        after += float((pair.weights * (pair.scales - found) ** 2).sum())
+    before, after = errors(told, known.of(left_out))
     assert after < 0.6 * before
 
 
@@ -167,12 +173,7 @@ def test_habits_that_go_with_nothing_to_see_are_left_alone(known: RecordedPairs)
         ]
         left_out = {"body 3", "body 7"}
         told = fit_likeness(replace(known, pairs=drawn).without(left_out))
-        before, after, pairs = 0.0, 0.0, replace(known, pairs=drawn).of(left_out).pairs
-        for pair in pairs:
-            source, target = (known.bodies[end] for end in (pair.source, pair.target))
-            found = sure(told(target).scales - told(source).scales, told.doubt(source, target))
-            before += float((pair.weights * pair.scales**2).sum())
-            after += float((pair.weights * (pair.scales - found) ** 2).sum())
+        before, after = errors(told, replace(known, pairs=drawn).of(left_out))
         assert after < 1.05 * before
         assert np.abs(told.turns).max() < 0.2
 
