@@ -3,7 +3,7 @@
 Where arms are deep in something, or can't be as the source's are, every frame has several answers
 that are nearly as good. Descent over a whole trajectory then takes one here and another there, and
 the arms are thrown to and fro. Frame after frame they stay with one (continuation: Nocedal and
-Wright, "Numerical Optimization", 11.3). Trajectories are marched through from both ends:
+Wright, "Numerical Optimization", 11.3). What is thrown is marched through from both ends:
 entangled arms may be led out from one side alone.
 """
 
@@ -13,7 +13,7 @@ from functools import lru_cache
 import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.ndimage import gaussian_filter1d, uniform_filter1d
+from scipy.ndimage import binary_dilation, gaussian_filter1d, uniform_filter1d
 
 from robots.least_squares import second_differences
 from robots.model.morphology import Morphology
@@ -26,10 +26,12 @@ from robots.solver.window_targets import FootTargets, PoseTargets, pose_targets
 from robots.solver.window_terms import Terms
 from robots.tree import Coordinates, forward_kinematics
 from spark.rig.roles import Role
+from spark.runs import true_runs
 
 _WINDOW = 0.15  # [s] before and after a frame over which angular accelerations are averaged
 _MAX_RATIO = 2.0  # of a limb's to the source's, and beyond that
 _MAX_EXCESS = 10.0  # [rad/s²], that is abrupt
+_AROUND = 1.0  # [s] before and after such frames that are marched through
 _FREE_SPEED = 3.0  # [rad/s] of a hinge that costs nothing where ways are compared, and what
 _W_TURN = 4.0  # [1/rad] a turn beyond that costs, from frame to frame
 _FIRST_STEPS, _STEPS = 60, 3  # in the first frame, from the T-pose, and in each that follows
@@ -65,14 +67,40 @@ def abrupt(
 
 
 def calmed(
-    robot: Morphology, targets: Targets, holds: Holds, q: Coordinates, block: Block
+    robot: Morphology,
+    targets: Targets,
+    holds: Holds,
+    q: Coordinates,
+    block: Block,
+    thrown: Bool[np.ndarray, "T"],
+) -> Coordinates:
+    """`q`, calmed around the frames in which limbs are thrown."""
+    around = max(1, round(_AROUND / targets.frame_time))
+    for start, stop in true_runs(binary_dilation(thrown, np.ones(2 * around + 1, dtype=bool))):
+        frames = np.arange(start, stop)
+        part = targets.at(frames), holds.at(frames), q.at(frames)
+        q = q.replaced(frames, _calmed(robot, *part, block, start > 0, stop < len(q)))
+    return q
+
+
+def _calmed(
+    robot: Morphology,
+    targets: Targets,
+    holds: Holds,
+    q: Coordinates,
+    block: Block,
+    led_in: bool,
+    led_out: bool,
 ) -> Coordinates:
     """The cheapest way through three: `q`, and the block's joints marched forth and back through
     all frames. What it costs to be in a frame says the solver's objective; from frame to frame a
-    turn by d [rad] beyond what is free costs (`_W_TURN` d)² / 2, also from way to way."""
+    turn by d [rad] beyond what is free costs (`_W_TURN` d)² / 2, also from way to way. It begins
+    and ends with `q` where frames before lead in, or others out."""
     forth = np.arange(len(q))
-    ways = [q, *_marched(robot, targets, q, block, (forth, forth[::-1]))]
+    ways = [q, *_marched(robot, targets, q, block, (forth, forth[::-1]), (led_in, led_out))]
     costs = np.stack([_cost(robot, targets, holds, way, block) for way in ways])
+    costs[1:, :1] += np.inf if led_in else 0.0
+    costs[1:, -1:] += np.inf if led_out else 0.0
     hinges = [j for j in block.joints if not robot.tree.balls[j]]
     angles = np.stack([way.angles[:, hinges] for way in ways])
     turns = angles[:, None, 1:] - angles[None, :, :-1]
@@ -110,15 +138,17 @@ def _marched(
     q: Coordinates,
     block: Block,
     orders: Sequence[Int[np.ndarray, "T"]],
+    led: Sequence[bool],
 ) -> list[Coordinates]:
-    """`q` with the block's joints marched through all frames, in each of the orders at once. The
-    first frame is begun from the T-pose."""
+    """`q` with the block's joints marched through all frames, in each of the orders at once. Those
+    that something has led to their first frame go on from there; others begin at the T-pose."""
     bones = tuple(role for role in targets.bones if role in robot.bones)
     terms = _terms_of(robot, bones, targets.hands is not None)
     columns = _qpos_columns(robot, block)
     qpos = robot.to_qpos(q)
     ways = [qpos.copy() for _ in orders]
-    last = np.repeat(robot.to_qpos(robot.tpose)[:, columns], len(orders), axis=0)
+    first = qpos[[order[0] for order in orders]][:, columns]
+    last = np.where(np.array(led)[:, None], first, robot.to_qpos(robot.tpose)[:, columns])
     for k, frames in enumerate(zip(*orders, strict=True)):
         here = qpos[list(frames)]
         here[:, columns] = last

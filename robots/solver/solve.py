@@ -125,9 +125,8 @@ def solve(
         holds = _holds_of(robot, targets, feet, q)
         if polish or _may_collide(robot, targets, q, block):
             q = solve_block(robot, targets, holds, q, block, *ends, avoid_collisions=True)
-        thrown = not block.base and not polish and abrupt(robot, targets, q, block).any()
-        if thrown:
-            q = calmed(robot, targets, holds, q, block)
+        if not block.base and not polish and (thrown := abrupt(robot, targets, q, block)).any():
+            q = calmed(robot, targets, holds, q, block, thrown)
             q = solve_block(robot, targets, holds, q, block, *ends, avoid_collisions=True)
         q = repair(robot, targets, holds, q, block)
     return q

@@ -84,12 +84,32 @@ def test_marching_calms_an_arm_and_leaves_the_rest(
     q = Coordinates(targets.hips, still, thrown)
     assert not abrupt(ember, targets, Coordinates(targets.hips, still, calm), arms).any()
     assert abrupt(ember, targets, q, arms).mean() > 0.9
-    marched = calmed(ember, targets, Holds.none(len(q)), q, arms)
+    marched = calmed(ember, targets, Holds.none(len(q)), q, arms, abrupt(ember, targets, q, arms))
     before, after = (np.abs(np.diff(way.angles[1:], 2, axis=0)).max() for way in (q, marched))
     assert after < before / 10
     others = [j for j in range(len(ember.tree)) if j not in arms.joints]
     np.testing.assert_allclose(marched.angles[:, others], q.angles[:, others], atol=1e-9)
     np.testing.assert_allclose(marched.pos, q.pos, atol=1e-9)
+
+
+def test_marching_begins_and_ends_with_what_leads_there(
+    folded: CanonicalMotion, ember: Morphology
+) -> None:
+    arms = blocks_of(ember)[1]
+    shoulder = int(ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)])
+    joint = next(j for j in ember.tree.chain(shoulder) if j in arms.joints)
+    solved = retarget(folded, ember).coordinates
+    angles = solved.angles.copy()
+    angles[58:62:2, joint] += 0.8
+    q = Coordinates(solved.pos, solved.quat, angles)
+    thrown = np.zeros(len(q), dtype=bool)
+    thrown[58:62] = True
+    targets, holds = targets_of(folded, ember), Holds.none(len(q))
+    marched = calmed(ember, targets, holds, q, arms, thrown).angles
+    changed = np.flatnonzero((np.abs(marched - angles) > 1e-9).any(axis=1))
+    assert changed.min() >= 28  # a second before
+    assert changed.max() <= 91  # and after
+    assert np.abs(np.diff(marched, 2, axis=0)).max() < 0.16  # a tenth of what it was
 
 
 @pytest.mark.parametrize("frames", [1, 2, 3])
