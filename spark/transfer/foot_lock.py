@@ -1,18 +1,19 @@
 """Foot lock: feet that stay where the source's feet stay, as high as they are.
 
 Copied rotations on legs of other proportions make standing feet slide, float or sink. Here each
-foot's contact point (its toe, or its ankle where one of the two rigs has no toe) is held over the
-ground during each stance of the source, at its own mean position, and carried from one footprint to
-the next (`spark.transfer.footfalls`). The lowest point of its sole is as high above the floor as
-the source's is, scaled: while it stands and while it swings, whatever the length of the foot.
-Where the source's own foot moves during a stance, the first `_CAPTURE_NOISE` from its mean position
-is taken for noise and removed; what goes beyond is motion and kept.
+foot rolls over the ground as the source's does: held is the part of the sole that rests in the
+source, be it the heel, the toes' end or all of it, so that a big foot that turns on its toes turns
+on them, too. During each stance of the source it stays at its own mean position, and it is carried
+from one footprint to the next (`spark.transfer.footfalls`). The lowest point of the sole is as high
+above the floor as the source's is, scaled: while it stands and while it swings, whatever the length
+of the foot. Where the source's own foot moves during a stance, the first `_CAPTURE_NOISE` from its
+mean position is taken for noise and removed; what goes beyond is motion and kept.
 """
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from spark.rig.contacts import planted_points
+from spark.rig.contacts import planted_points, speeds
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_mul, quat_rotate
@@ -22,11 +23,18 @@ from spark.transfer.footfalls import between_contacts, beyond
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
 from spark.transfer.reach import within_reach
 
-_MIN_STANCE = 0.1  # [s] a shorter one is a swinging foot that is slow and low for a moment
+# [s] A shorter stance is a swinging foot that is slow and low for a moment, and between two stances
+# no foot is lifted and put down elsewhere in a shorter time.
+_MIN_STANCE = 0.1
 _CAPTURE_NOISE = 0.03  # [hip heights] 3 cm of an adult
 # [hip heights] that a sole may sink: half a centimetre of an adult. A foot that sinks further in
 # the source is lifted.
 _MAX_SINK = 0.005
+# At this speed [hip heights/s], and this high above the lowest point of its sole [hip heights], a
+# point rests half as much as one that stays on the ground.
+_REST_SPEED = 0.05
+_REST_HEIGHT = 0.02
+_ENDS = [0, 1, -2, -1]  # of a sole's points: its heel and its toes' end
 
 
 def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
@@ -39,52 +47,75 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
         leg = leg_of(moved.rig.skeleton, moved.rig.roles.roles, group)
         contact = _contact(source.rig, moved.rig, group)
         if leg is not None and contact is not None:
-            feet.append((leg, _foot(source, group, contact[0]), _foot(moved, group, contact[1])))
+            path = canonical_positions(source, [contact])[:, 0]
+            feet.append((leg, path, _sole(source, group), _sole(moved, group)))
     if not feet:
         return moved
-    paths = np.stack([theirs for _, (theirs, _), _ in feet], axis=1)
+    paths = np.stack([path for _, path, _, _ in feet], axis=1)
     planted = planted_points(paths, source.frame_time, source.rig.standing_height)
-    for s, (leg, (theirs, their_height), (own, own_height)) in enumerate(feet):
+    for s, (leg, _, their_sole, own_sole) in enumerate(feet):
         stance = _stances(planted[:, s], source.frame_time)
+        theirs, own = _rolled(their_sole, own_sole, source)
         offset = np.zeros((len(own), 2))
         for start, stop in true_runs(stance):
             here = slice(start, stop)
-            drift = beyond(scale * theirs[here, :2], _CAPTURE_NOISE * moved.rig.hip_height)
-            offset[here] = own[here, :2].mean(0) + drift - own[here, :2]
-        along = between_contacts(offset, stance, own[:, :2])
-        height = np.maximum(scale * their_height, -_MAX_SINK * moved.rig.hip_height)
-        moves.append((leg, np.column_stack([along, height - own_height])))
+            drift = beyond(scale * theirs[here], _CAPTURE_NOISE * moved.rig.hip_height)
+            offset[here] = own[here].mean(0) + drift - own[here]
+        along = between_contacts(offset, stance, own)
+        wanted = scale * (their_sole[..., 2].min(axis=1) - source.floor_z)
+        wanted = np.maximum(wanted, -_MAX_SINK * moved.rig.hip_height)
+        height = own_sole[..., 2].min(axis=1) - moved.floor_z
+        moves.append((leg, np.column_stack([along, wanted - height])))
     return move_ankles(*within_reach(moved, moves))
 
 
-def _foot(
-    motion: CanonicalMotion, group: Group, contact: int
-) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "T"]]:
-    """Where a foot's contact joint is [m, world], and how high the lowest point of its sole is over
-    the floor [m]."""
+def _sole(motion: CanonicalMotion, group: Group) -> Float[np.ndarray, "T P 3"]:
+    """Where the points of a foot's sole are [m, world]."""
     rig = motion.rig
     sole = next(sole for sole in rig.soles if sole.side == group.side)
-    joints = [contact, *sole.joints.tolist()]
-    positions = canonical_positions(motion, joints)
+    positions = canonical_positions(motion, sole.joints.tolist())
     world = quat_mul(motion.rotations[:, sole.joints], rig.tpose[sole.joints])
-    lowest = (positions[:, 1:] + quat_rotate(world, sole.offsets))[..., 2].min(axis=1)
-    return positions[:, 0], lowest - motion.floor_z
+    return positions + quat_rotate(world, sole.offsets)
+
+
+def _rolled(
+    theirs: Float[np.ndarray, "T P 3"], own: Float[np.ndarray, "T Q 3"], source: CanonicalMotion
+) -> tuple[Float[np.ndarray, "T 2"], Float[np.ndarray, "T 2"]]:
+    """The way over the ground [m] of what rests of a foot in the source, on the source's sole and on
+    the own one."""
+    if theirs.shape != own.shape:
+        theirs, own = theirs[:, _ENDS], own[:, _ENDS]
+    size = source.rig.hip_height
+    fast = speeds(theirs, source.frame_time) / (_REST_SPEED * size)
+    high = (theirs[..., 2] - theirs[..., 2].min(axis=1, keepdims=True)) / (_REST_HEIGHT * size)
+    rests = 1 / ((1 + fast**2) * (1 + high**2))
+    rests /= rests.sum(axis=1, keepdims=True)
+    steps = (rests[1:] + rests[:-1])[..., None] / 2
+    return _way(theirs, steps), _way(own, steps)
+
+
+def _way(
+    points: Float[np.ndarray, "T P 3"], steps: Float[np.ndarray, "S P 1"]
+) -> Float[np.ndarray, "T 2"]:
+    """The sum of the points' steps, by so much of each, from where their middle is at first."""
+    along = (steps * np.diff(points[..., :2], axis=0)).sum(axis=1)
+    return np.cumsum(np.concatenate([points[:1, :, :2].mean(axis=1), along]), axis=0)
 
 
 def _stances(planted: Bool[np.ndarray, "T"], frame_time: float) -> Bool[np.ndarray, "T"]:
-    """The frames of stances that are long enough to be one."""
-    kept = planted.copy()
-    for start, stop in true_runs(planted):
-        if (stop - start) * frame_time < _MIN_STANCE:
-            kept[start:stop] = False
-    return kept
+    """The frames of stances that are long enough to be one; those that are not long enough apart
+    are one."""
+    stands = np.zeros_like(planted)
+    for start, stop in true_runs(planted, gap=int(_MIN_STANCE / frame_time)):
+        stands[start:stop] = (stop - start) * frame_time >= _MIN_STANCE
+    return stands
 
 
-def _contact(source: Rig, target: Rig, group: Group) -> tuple[int, int] | None:
-    """The source's and the target's joint that touch the floor; None where one has no foot."""
+def _contact(source: Rig, target: Rig, group: Group) -> int | None:
+    """The source's joint that touches the floor; None where one of the two has no foot."""
     roles: tuple[Role, ...] = LIMBS[group][:1:-1]
     for role in roles:
-        a, b = source.roles.joint(role), target.roles.joint(role)
-        if a is not None and b is not None:
-            return a, b
+        joint = source.roles.joint(role)
+        if joint is not None and target.roles.joint(role) is not None:
+            return joint
     return None

@@ -12,9 +12,14 @@ from spark.rig.contacts import planted_feet, speeds
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig, understand
 from spark.rig.roles import Role
-from spark.rotation import quat_from_rotvec
+from spark.rotation import quat_from_rotvec, quat_from_yaw, quat_mul, quat_rotate
 from spark.transfer.analytic import transfer
-from spark.transfer.canonical import canonical_positions, from_canonical, to_canonical
+from spark.transfer.canonical import (
+    CanonicalMotion,
+    canonical_positions,
+    from_canonical,
+    to_canonical,
+)
 from spark.transfer.foot_lock import lock_feet
 from spark.transfer.footfalls import between_contacts, beyond
 from spark.transfer.leg_ik import stance_correction
@@ -105,27 +110,33 @@ def test_only_what_goes_beyond_a_radius_moves_a_standing_foot() -> None:
     np.testing.assert_allclose(beyond(path, 0.03)[:, 0], [0, 0.01, 0, -0.01], atol=1e-12)
 
 
+def with_long_feet(rig: Rig) -> Rig:
+    """The rig with feet of twice the length."""
+    offsets, ends = rig.skeleton.offsets.copy(), rig.skeleton.end_offsets.copy()
+    for role in (Role.LEFT_TOE, Role.RIGHT_TOE):
+        offsets[joint(role), 0] *= 2
+    ends[:2] *= 2
+    return replace(rig, skeleton=replace(rig.skeleton, offsets=offsets, end_offsets=ends))
+
+
+def sole_paths(motion: CanonicalMotion) -> np.ndarray:
+    positions, world = forward(from_canonical(motion))
+    return np.stack([sole_positions(sole, positions, world) for sole in motion.rig.soles], axis=1)
+
+
 def test_a_longer_foot_on_its_toes_stays_on_the_floor() -> None:
     """The lowest point of the sole is as high as the source's, scaled, however long the foot is:
     raised heels and raised toes alike."""
     rig = stick_rig()
-    offsets = rig.skeleton.offsets.copy()
-    ends = rig.skeleton.end_offsets.copy()
-    for role in (Role.LEFT_TOE, Role.RIGHT_TOE):
-        offsets[joint(role), 0] *= 2
-    ends[:2] *= 2
-    long_feet = replace(rig, skeleton=replace(rig.skeleton, offsets=offsets, end_offsets=ends))
+    long_feet = with_long_feet(rig)
     motion = standing(rig, 60)
     for side in ("left", "right"):
         pitch = np.zeros((60, 3))
         pitch[:, 1] = 0.4 * np.sin(np.linspace(0, 6, 60))
         motion.rotations[:, joint(Role(f"{side}_foot"))] = quat_from_rotvec(pitch)
     source = to_canonical(motion, rig)
-    heights = []
-    for one in (source, lock_feet(source, transfer(source, long_feet))):
-        positions, world = forward(from_canonical(one))
-        soles = [sole_positions(sole, positions, world) for sole in one.rig.soles]
-        heights.append(np.stack([points[..., 2].min(1) for points in soles]) - one.floor_z)
+    moved = lock_feet(source, transfer(source, long_feet))
+    heights = [sole_paths(one)[..., 2].min(axis=2) - one.floor_z for one in (source, moved)]
     np.testing.assert_allclose(heights[1], np.maximum(heights[0], -0.0045), atol=2e-3)
 
 
@@ -151,3 +162,41 @@ def test_many_paths_at_once_are_each_by_itself() -> None:
         ease = u * u * (3 - 2 * u)
         wanted = held[k - 1] + ease * (held[k] - held[k - 1])
         np.testing.assert_allclose(made, wanted, atol=1e-12)
+
+
+def test_a_longer_foot_turns_on_the_corner_that_the_source_turns_on() -> None:
+    """A body that turns about a corner of its left toes' end, as stiff as a post: so does one with
+    longer feet, about the same corner of its own."""
+    rig = stick_rig()
+    source = to_canonical(standing(rig, 60), rig)
+    pivot = sole_paths(source)[0, 0, -1] * (1, 1, 0)
+    turn = quat_from_yaw(1.5 * np.arange(60) * source.frame_time)
+    source = replace(
+        source,
+        rotations=quat_mul(turn[:, None], source.rotations),
+        hips=pivot + quat_rotate(turn, source.hips - pivot),
+    )
+    target = with_long_feet(rig)
+    copied = transfer(source, target)
+    slid, held = (
+        speeds(sole_paths(motion), source.frame_time)[:, 0, -1].mean()
+        for motion in (copied, lock_feet(source, copied))
+    )
+    assert held < 0.2 * slid
+
+
+def test_a_foot_that_slips_within_a_stance_goes_no_further_on_another_body() -> None:
+    """Fast for 3 frames at 60 fps: no swing, in which a foot would go from one place to another
+    that other proportions give it."""
+    rig = stick_rig()
+    source = to_canonical(standing(rig, 60), rig)
+    slip = 0.012 * np.clip(np.arange(60) - 30, 0, 3)
+    source = replace(source, hips=source.hips + slip[:, None] * (1, 0, 0))
+    assert not planted_feet(rig, canonical_positions(source), source.frame_time)[31].any()
+    wobble = np.zeros((60, 3))
+    wobble[:, 0] = 0.1 * np.sin(np.arange(60) / 5)
+    copied = transfer(source, with_long_feet(rig))
+    copied = replace(copied, hips=copied.hips + wobble)
+    locked = sole_paths(lock_feet(source, copied))
+    gone = np.linalg.norm(np.diff(locked[..., :2], axis=0), axis=-1).max()
+    assert gone < 1.2 * 0.012
