@@ -115,7 +115,8 @@ def quat_from_rotvec(rotvec: Float[Any, "*n 3"]) -> Float[Any, "*n 4"]:
     angle = xp.sqrt(safe)
     half_sinc = xp.where(small, 0.5 - squared / 48, xp.sin(angle / 2) / angle)
     cos = xp.where(small, 1 - squared / 8 + squared**2 / 384, xp.cos(angle / 2))
-    return xp.concat([cos, half_sinc * rotvec], axis=-1)
+    parts = half_sinc * rotvec
+    return joined([cos[..., 0], *(parts[..., i] for i in range(3))], rotvec)
 
 
 def rotvec_from_quat(q: Float[Any, "*n 4"]) -> Float[Any, "*n 3"]:
@@ -162,19 +163,19 @@ def quat_between(u: Float[Any, "*#n 3"], v: Float[Any, "*#n 3"]) -> Float[Any, "
     xp = array_namespace(u, v)
     u, v = xp.broadcast_arrays(u, v)
     u, v = unit(u), unit(v)
-    short = xp.minimum(norm(u), norm(v)) < 0.5  # what `_unit` left alone
     # (1 + u.v, u x v) by way of the sum, which keeps its digits where the two nearly cancel.
     between = u + v
-    squared = dot(between, between)
+    squared = dot(between, between)[..., 0]
     opposite = squared < (16 * xp.finfo(u.dtype).eps) ** 2
-    x, y, z = u[..., :1], u[..., 1:2], u[..., 2:]
-    zero = xp.zeros_like(x)
-    orthogonal = xp.where(
-        xp.abs(x) > xp.abs(z), xp.concat([-y, x, zero], axis=-1), xp.concat([zero, -z, y], axis=-1)
-    )
-    axis = xp.where(opposite, orthogonal, cross(u, between))
-    q = xp.concat([xp.where(opposite, zero, squared / 2), axis], axis=-1)
-    return xp.where(short, quat_identity(q), quat_normalize(q))
+    short = xp.minimum(dot(u, u), dot(v, v))[..., 0] < 0.25  # what `unit` left alone
+    x, y, z = (u[..., i] for i in range(3))
+    zero, flat = xp.zeros_like(x), xp.abs(x) > xp.abs(z)
+    orthogonal = (xp.where(flat, -y, zero), xp.where(flat, x, -z), xp.where(flat, zero, y))
+    axis = cross(u, between)
+    turned = [xp.where(opposite, o, axis[..., i]) for i, o in enumerate(orthogonal)]
+    w = xp.where(short, xp.ones_like(x), xp.where(opposite, zero, squared / 2))
+    q = joined([w, *turned], u)
+    return q / xp.sqrt(dot(q, q))
 
 
 def quat_swing_twist(
