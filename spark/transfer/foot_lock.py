@@ -81,8 +81,7 @@ def _sole(motion: CanonicalMotion, group: Group) -> Float[np.ndarray, "T P 3"]:
 def _rolled(
     theirs: Float[np.ndarray, "T P 3"], own: Float[np.ndarray, "T Q 3"], source: CanonicalMotion
 ) -> tuple[Float[np.ndarray, "T 2"], Float[np.ndarray, "T 2"]]:
-    """The way over the ground [m] of what rests of a foot in the source: on its sole, and on the own
-    one."""
+    """The ways over the ground [m] of what rests of a source's foot, on both soles."""
     if theirs.shape != own.shape:
         theirs, own = theirs[:, _ENDS], own[:, _ENDS]
     size = source.rig.hip_height
