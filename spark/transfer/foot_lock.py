@@ -1,13 +1,14 @@
 """Foot lock: feet that stay where the source's feet stay, as high as they are.
 
 Copied rotations on legs of other proportions make standing feet slide, float or sink. Here each
-foot rolls over the ground as the source's does: held is the part of the sole that rests in the
-source, be it the heel, the toes' end or all of it, so that a big foot that turns on its toes turns
-on them, too. During each stance of the source it stays at its own mean position, and it is carried
-from one footprint to the next (`spark.transfer.footfalls`). The lowest point of the sole is as high
-above the floor as the source's is, scaled: while it stands and while it swings, whatever the length
-of the foot. Where the source's own foot moves during a stance, the first `_CAPTURE_NOISE` from its
-mean position is taken for noise and removed; what goes beyond is motion and kept.
+foot rolls over the ground as the source's does: during a stance of the source, what rests of its
+sole, be it the heel, the toes' end or all of it, moves as far on the other sole, scaled. So a big
+foot that turns on its toes turns on them, too. Where the source's own foot moves during a stance,
+its contact joint's first `_CAPTURE_NOISE` from the mean position are taken for noise and removed;
+what goes beyond is motion and kept. A stance is at its own mean position, and a foot is carried from
+one footprint to the next (`spark.transfer.footfalls`). The lowest point of the sole is as high above
+the floor as the source's is, scaled: while it stands and while it swings, whatever the length of
+the foot.
 """
 
 import numpy as np
@@ -53,14 +54,16 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
         return moved
     paths = np.stack([path for _, path, _, _ in feet], axis=1)
     planted = planted_points(paths, source.frame_time, source.rig.standing_height)
-    for s, (leg, _, their_sole, own_sole) in enumerate(feet):
+    for s, (leg, path, their_sole, own_sole) in enumerate(feet):
         stance = _stances(planted[:, s], source.frame_time)
         theirs, own = _rolled(their_sole, own_sole, source)
         offset = np.zeros((len(own), 2))
         for start, stop in true_runs(stance):
             here = slice(start, stop)
-            drift = beyond(scale * theirs[here], _CAPTURE_NOISE * moved.rig.hip_height)
-            offset[here] = own[here].mean(0) + drift - own[here]
+            rolls = scale * theirs[here] - own[here]
+            away = scale * (path[here, :2] - path[here, :2].mean(axis=0))
+            noise = away - beyond(away, _CAPTURE_NOISE * moved.rig.hip_height)
+            offset[here] = rolls - rolls.mean(axis=0) - noise
         along = between_contacts(offset, stance, own)
         wanted = scale * (their_sole[..., 2].min(axis=1) - source.floor_z)
         wanted = np.maximum(wanted, -_MAX_SINK * moved.rig.hip_height)
