@@ -1,13 +1,12 @@
-"""Rotations: the only rotation code of the project, for numpy arrays and torch tensors alike.
+"""Rotations, for numpy arrays and torch tensors alike (more forms: `spark.euler`, `spark.sixd`).
 
 Quaternions are wxyz, unit, Hamilton; matrices act on column vectors; angles are radians. `q_a_b`
 and `R_a_b` map b-coordinates into a, so `quat_mul(q_a_b, q_b_c)` is `q_a_c`. All functions
 broadcast over leading axes, keep the dtype and the device, and have finite values everywhere.
-Gradients are finite too, but for those of angles where these are undefined: Euler angles at their
-singularity, the heading of a body upside down.
+Gradients are finite too, but for the heading of a body upside down.
 
-Sources: Shoemake 1985 (slerp); Shepperd 1978 (matrix to quaternion); Zhou et al. 2019, arXiv
-1812.07035 (6D); Dobrowolski 2015, arXiv 1506.05481 (swing and twist).
+Sources: Shoemake 1985 (slerp); Shepperd 1978 (matrix to quaternion); Dobrowolski 2015 (swing and
+twist).
 """
 
 from typing import Any, Literal, get_args
@@ -87,8 +86,8 @@ def quat_normalize(q: Float[Any, "*n 4"]) -> Float[Any, "*n 4"]:
 def quat_identity(like: Float[Any, "*n _"]) -> Float[Any, "*n 4"]:
     """Identity quaternions with the leading shape, dtype and device of `like`."""
     xp = array_namespace(like)
-    one = xp.ones_like(like[..., :1])
-    return xp.concat([one, xp.zeros_like(one), xp.zeros_like(one), xp.zeros_like(one)], axis=-1)
+    zero = xp.zeros_like(like[..., 0])
+    return joined([xp.ones_like(zero), zero, zero, zero], like)
 
 
 def quat_continuous(q: Float[Any, "T *n 4"]) -> Float[Any, "T *n 4"]:
@@ -213,35 +212,6 @@ def quat_about(axis: Axis, angle: Float[Any, "*n"]) -> Float[Any, "*n 4"]:
     return xp.stack(parts, axis=-1)
 
 
-def quat_from_euler(angles: Float[Any, "*n 3"], order: str) -> Float[Any, "*n 4"]:
-    """Intrinsic Euler angles, as BVH means them: `order` "zxy" is `Rz(a0) Rx(a1) Ry(a2)`."""
-    first, second, third = (
-        quat_about(axis, angles[..., i]) for i, axis in enumerate(_axes_of(order))
-    )
-    return quat_mul(quat_mul(first, second), third)
-
-
-def euler_from_quat(q: Float[Any, "*n 4"], order: str) -> Float[Any, "*n 3"]:
-    """Intrinsic Euler angles of three different axes; the middle angle lies in [-pi/2, pi/2].
-
-    At the singularity (middle angle of pi/2) the third angle is 0. Bernardes and Viollet 2022.
-    """
-    xp = array_namespace(q)
-    k, j, i = (AXES.index(axis) for axis in _axes_of(order))  # intrinsic = extrinsic reversed
-    sign = float((i - j) * (j - k) * (k - i) // 2)
-    w, qi, qj, qk = q[..., 0], q[..., 1 + i], q[..., 1 + j], q[..., 1 + k] * sign
-    a, b, c, d = w - qj, qi + qk, qj + w, qk - qi
-    middle = 2 * xp.atan2(xp.sqrt(c * c + d * d), xp.sqrt(a * a + b * b)) - xp.pi / 2
-    half_sum, half_difference = xp.atan2(b, a), xp.atan2(d, c)
-    low, high = (c * c + d * d) < 1e-14, (a * a + b * b) < 1e-14
-    first = xp.where(
-        low, 2 * half_sum, xp.where(high, 2 * half_difference, half_sum + half_difference)
-    )
-    third = xp.where(low | high, xp.zeros_like(first), half_sum - half_difference)
-    angles = xp.stack([sign * first, middle, third], axis=-1)
-    return xp.remainder(angles + xp.pi, 2 * xp.pi) - xp.pi
-
-
 def matrix_from_quat(q: Float[Any, "*n 4"]) -> Float[Any, "*n 3 3"]:
     """The rotation matrix of a unit quaternion."""
     xp = array_namespace(q)
@@ -282,41 +252,3 @@ def quat_from_matrix(R: Float[Any, "*n 3 3"]) -> Float[Any, "*n 4"]:
     choice = best[..., None] == xp.arange(4, dtype=best.dtype)
     q = xp.sum(xp.where(choice[..., None], candidates, xp.zeros_like(candidates)), axis=-2)
     return quat_normalize(xp.where(q[..., :1] < 0, -q, q))
-
-
-def sixd_from_matrix(R: Float[Any, "*n 3 3"]) -> Float[Any, "*n 6"]:
-    """The first two columns of `R`, one after the other (Zhou et al. 2019)."""
-    xp = array_namespace(R)
-    return xp.concat([R[..., :, 0], R[..., :, 1]], axis=-1)
-
-
-def matrix_from_sixd(sixd: Float[Any, "*n 6"]) -> Float[Any, "*n 3 3"]:
-    """Gram-Schmidt on the two columns. Zero or parallel columns have no rotation: the gradient is
-    finite there, the value is not a rotation."""
-    xp = array_namespace(sixd)
-    x = unit(sixd[..., :3])
-    second = sixd[..., 3:]
-    y = unit(second - dot(x, second) * x)
-    return xp.stack([x, y, cross(x, y)], axis=-1)
-
-
-def sixd_from_quat(q: Float[Any, "*n 4"]) -> Float[Any, "*n 6"]:
-    """`sixd_from_matrix` of a unit quaternion."""
-    w, x, y, z = (q[..., i] for i in range(4))
-    columns = [
-        *(1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)),
-        *(2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)),
-    ]
-    return joined(columns, q)
-
-
-def quat_from_sixd(sixd: Float[Any, "*n 6"]) -> Float[Any, "*n 4"]:
-    """The quaternion of a 6D rotation."""
-    return quat_from_matrix(matrix_from_sixd(sixd))
-
-
-def _axes_of(order: str) -> tuple[Axis, ...]:
-    axes: tuple[Axis, ...] = tuple(a for c in order.lower() for a in AXES if a == c)
-    if len(order) != 3 or len(set(axes)) != 3:
-        raise ValueError(f"Euler order {order!r}: expected a permutation of 'xyz'")
-    return axes

@@ -10,7 +10,9 @@ import pytest
 
 CHECKOUT = Path(__file__).parents[1]
 ROOMS = (
-    ("spark",),  # its own files: errors, files, rotation, skeleton, motion, kinematics, resample
+    (
+        "spark",
+    ),  # its own files: errors, rotation, euler, sixd, skeleton, motion, kinematics, resample
     ("spark.inference",),
     ("spark.io", "spark.rig"),
     ("spark.transfer",),

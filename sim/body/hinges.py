@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
+from spark.euler import euler_from_quat
 from spark.rotation import (
-    euler_from_quat,
     quat_from_matrix,
     quat_from_rotvec,
     quat_mul,

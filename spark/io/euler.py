@@ -3,7 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
-from spark.rotation import AXES, euler_from_quat, quat_about, quat_mul
+from spark.euler import euler_from_quat
+from spark.rotation import AXES, quat_about, quat_mul
 
 # [rad] A middle angle this near to 90 degrees leaves only a sum of the other two defined.
 _SINGULAR = 1e-6

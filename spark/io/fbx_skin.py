@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.errors import FileFormatError
+from spark.euler import quat_from_euler
 from spark.io.fbx_document import Element, plain_name, read_document
 from spark.io.fbx_materials import FbxMaterial, Links, materials_of
 from spark.io.fbx_mesh import FbxMesh, read_mesh
@@ -22,7 +23,7 @@ from spark.io.fbx_scene import FbxScene
 from spark.io.nodes import NodeJoint
 from spark.io.recording import unique_names
 from spark.io.scanner import LARGEST
-from spark.rotation import matrix_from_quat, quat_from_euler
+from spark.rotation import matrix_from_quat
 from spark.skin import strongest
 
 _ROOT = 0  # the id of the scene itself

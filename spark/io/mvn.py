@@ -20,7 +20,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.errors import ConventionError
-from spark.rotation import quat_from_euler
+from spark.euler import quat_from_euler
 
 EULER, QUATERNION, UNITY, META, SCALE = 1, 2, 5, 12, 13
 KINDS = {

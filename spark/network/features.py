@@ -16,15 +16,8 @@ from spark.kinematics import local_rotations, world_rotations
 from spark.network.config import NO_ROTATION, TPOSE_ROTATION
 from spark.rig.rig import Rig
 from spark.rig.roles import Group, Role
-from spark.rotation import (
-    quat_from_sixd,
-    quat_from_yaw,
-    quat_mul,
-    quat_relative,
-    quat_rotate,
-    sixd_from_quat,
-    yaw_from_quat,
-)
+from spark.rotation import quat_from_yaw, quat_mul, quat_relative, quat_rotate, yaw_from_quat
+from spark.sixd import quat_from_sixd, sixd_from_quat
 from spark.skeleton import Skeleton
 from spark.transfer.canonical import CanonicalMotion
 

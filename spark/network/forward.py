@@ -26,7 +26,8 @@ from spark.network.config import (
 )
 from spark.network.features import BodyFeatures
 from spark.network.windows import Windows
-from spark.rotation import quat_conj, quat_from_sixd, quat_mul, sixd_from_quat
+from spark.rotation import quat_conj, quat_mul
+from spark.sixd import quat_from_sixd, sixd_from_quat
 
 Array = Float[np.ndarray, "..."]
 Tokens = Float[np.ndarray, "W T _ D"]

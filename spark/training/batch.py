@@ -11,7 +11,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from spark.rotation import sixd_from_quat
+from spark.sixd import sixd_from_quat
 from spark.training.tensors import Body, PoseTensors, Start
 
 _ONES = slice(None, None, 4)  # of the 6D form of no rotation

@@ -8,7 +8,8 @@ from jaxtyping import Float, Int
 
 from spark.network.features import BodyFeatures
 from spark.network.windows import Windows
-from spark.rotation import quat_mul, quat_relative, quat_slerp, sixd_from_quat
+from spark.rotation import quat_mul, quat_relative, quat_slerp
+from spark.sixd import sixd_from_quat
 from spark.training.plan import Between, LegPlan, Plan
 from spark.training.staging import in_concatenation, taken
 from spark.vectors import planes

@@ -5,7 +5,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from spark.network.config import NO_ROTATION, ROTATION_GAIN
-from spark.rotation import matrix_from_sixd
+from spark.sixd import matrix_from_sixd
 from spark.training.tensors import Body, PoseTensors, Start, take, world_matrices
 
 

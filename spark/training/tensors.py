@@ -10,7 +10,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from spark.rotation import matrix_from_sixd
+from spark.sixd import matrix_from_sixd
 from spark.training.precision import exactly
 
 

@@ -4,11 +4,11 @@ Copied rotations on legs of other proportions make standing feet slide, float or
 foot rolls over the ground as the source's does: during a stance of the source, what rests of its
 sole, be it the heel, the toes' end or all of it, moves as far on the other sole, scaled. So a big
 foot that turns on its toes turns on them, too. Where the source's own foot moves during a stance,
-its contact joint's first `_CAPTURE_NOISE` from the mean position are taken for noise and removed;
-what goes beyond is motion and kept. A stance is at its own mean position, and a foot is carried from
-one footprint to the next (`spark.transfer.footfalls`). The lowest point of the sole is as high above
-the floor as the source's is, scaled: while it stands and while it swings, whatever the length of
-the foot.
+the first `_CAPTURE_NOISE` of its contact joint from its mean position is taken for noise and
+removed; what goes beyond is motion and kept. A stance is at its own mean position, and a foot is
+carried from one footprint to the next (`spark.transfer.footfalls`). The lowest point of the sole is
+as high above the floor as the source's is, scaled: while it stands and while it swings, whatever
+the length of the foot.
 """
 
 import numpy as np

@@ -17,13 +17,8 @@ from spark.blocks import in_blocks
 from spark.errors import name_list
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
-from spark.rotation import (
-    quat_from_rotvec,
-    quat_mul,
-    quat_relative,
-    rotvec_from_quat,
-    sixd_from_quat,
-)
+from spark.rotation import quat_from_rotvec, quat_mul, quat_relative, rotvec_from_quat
+from spark.sixd import sixd_from_quat
 from spark.transfer.analytic import Correspondence, correspond, transfer
 from spark.transfer.canonical import FRAME_TIME, CanonicalMotion, at_frame_time
 

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from spark.network.config import NO_ROTATION, RESIDUAL_SCALE, ROTATION_GAIN
-from spark.rotation import matrix_from_sixd
+from spark.sixd import matrix_from_sixd
 from spark.training.attention import Attention, TemporalBlock
 from spark.training.model import Spark
 from spark.training.tensors import Body, PoseTensors, Start

@@ -12,7 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
+from spark import euler, sixd
 from spark import rotation as r
+from spark.euler import euler_from_quat, quat_from_euler
+from spark.sixd import matrix_from_sixd, quat_from_sixd, sixd_from_matrix, sixd_from_quat
 
 ORDERS = ["".join(p) for p in permutations("xyz")]
 KINDS = [
@@ -44,7 +47,7 @@ def test_conversions_agree_with_scipy(make: Any, dtype: Any, eps: float) -> None
     for result, expected in (
         (r.quat_from_rotvec(make(CASES.as_rotvec().astype(dtype))), CASES),
         (r.quat_from_matrix(make(CASES.as_matrix().astype(dtype))), CASES),
-        (r.quat_from_sixd(r.sixd_from_quat(q)), CASES),
+        (quat_from_sixd(sixd_from_quat(q)), CASES),
         (r.quat_mul(q, other), CASES * CASES[::-1]),
         (r.quat_conj(q), CASES.inv()),
         (r.quat_relative(q, other), CASES.inv() * CASES[::-1]),
@@ -59,9 +62,9 @@ def test_euler_angles_are_intrinsic_as_scipys_capitals(
     make: Any, dtype: Any, eps: float, order: str
 ) -> None:
     angles = CASES.as_euler(order.upper())
-    q = r.quat_from_euler(make(angles.astype(dtype)), order)
+    q = quat_from_euler(make(angles.astype(dtype)), order)
     np.testing.assert_allclose(as_matrix(q), CASES.as_matrix(), atol=20 * eps)
-    back = np.asarray(r.euler_from_quat(q, order), dtype=np.float64)
+    back = np.asarray(euler_from_quat(q, order), dtype=np.float64)
     away = np.abs(np.abs(angles[:, 1]) - np.pi / 2) > 0.05
     np.testing.assert_allclose(back[away], angles[away], atol=400 * eps)
 
@@ -76,16 +79,16 @@ def test_euler_angles_at_the_singularity_give_the_same_rotation(
     rng = np.random.default_rng(0)
     angles = rng.uniform(-3, 3, (50, 3)).astype(dtype)
     angles[:, 1] = middle + np.repeat([0, 1e-9, -1e-6, 1e-3, -1e-3], 10)
-    q = r.quat_from_euler(angles, order)
-    back = r.euler_from_quat(q, order)
+    q = quat_from_euler(angles, order)
+    back = euler_from_quat(q, order)
     assert dtype == np.float32 or np.all(back[:10, 2] == 0)
-    assert r.quat_angle(r.quat_from_euler(back, order), q).max() < atol
+    assert r.quat_angle(quat_from_euler(back, order), q).max() < atol
 
 
 @pytest.mark.parametrize("order", ["xy", "xxy", "abc", ""])
 def test_euler_orders_that_are_none_are_refused(order: str) -> None:
     with pytest.raises(ValueError, match="permutation"):
-        r.quat_from_euler(np.zeros(3), order)
+        quat_from_euler(np.zeros(3), order)
 
 
 HALF_TURNS = np.concatenate([np.eye(4), -np.eye(4)])
@@ -106,21 +109,23 @@ ALL = {
     "yaw_from_quat": lambda q, p, v: r.yaw_from_quat(q),
     "quat_from_yaw": lambda q, p, v: r.quat_from_yaw(v[..., 0]),
     "quat_about": lambda q, p, v: r.quat_about("y", v[..., 0]),
-    "quat_from_euler": lambda q, p, v: r.quat_from_euler(v, "yxz"),
-    "euler_from_quat": lambda q, p, v: r.euler_from_quat(q, "zxy"),
+    "quat_from_euler": lambda q, p, v: quat_from_euler(v, "yxz"),
+    "euler_from_quat": lambda q, p, v: euler_from_quat(q, "zxy"),
     "matrix_from_quat": lambda q, p, v: r.matrix_from_quat(q),
     "quat_from_matrix": lambda q, p, v: r.quat_from_matrix(r.matrix_from_quat(q)),
-    "sixd_from_matrix": lambda q, p, v: r.sixd_from_matrix(r.matrix_from_quat(q)),
-    "matrix_from_sixd": lambda q, p, v: r.matrix_from_sixd(r.sixd_from_quat(q)),
-    "sixd_from_quat": lambda q, p, v: r.sixd_from_quat(q),
-    "quat_from_sixd": lambda q, p, v: r.quat_from_sixd(r.sixd_from_quat(q)),
+    "sixd_from_matrix": lambda q, p, v: sixd_from_matrix(r.matrix_from_quat(q)),
+    "matrix_from_sixd": lambda q, p, v: matrix_from_sixd(sixd_from_quat(q)),
+    "sixd_from_quat": lambda q, p, v: sixd_from_quat(q),
+    "quat_from_sixd": lambda q, p, v: quat_from_sixd(sixd_from_quat(q)),
 }
 """Each function of two quaternions and a vector."""
 
 
 def test_the_list_of_functions_is_whole() -> None:
-    source = ast.parse(Path(r.__file__).read_text())
-    names = {node.name for node in source.body if isinstance(node, ast.FunctionDef)}
+    nodes = [
+        node for m in (r, euler, sixd) for node in ast.parse(Path(m.__file__).read_text()).body
+    ]
+    names = {node.name for node in nodes if isinstance(node, ast.FunctionDef)}
     assert {name for name in names if not name.startswith("_")} == set(ALL)
 
 
@@ -182,7 +187,7 @@ def test_half_turns_come_back_from_their_matrices(make: Any, dtype: Any, eps: fl
 
 
 def test_sixd_of_anything_gives_a_rotation() -> None:
-    matrix = r.matrix_from_sixd(np.random.default_rng(0).normal(size=(100, 6)))
+    matrix = matrix_from_sixd(np.random.default_rng(0).normal(size=(100, 6)))
     np.testing.assert_allclose(matrix @ np.swapaxes(matrix, 1, 2), [np.eye(3)] * 100, atol=1e-12)
     np.testing.assert_allclose(np.linalg.det(matrix), 1, atol=1e-12)
 
@@ -247,7 +252,7 @@ def test_gradients_agree_with_differences(size: float) -> None:
 
 def test_sixd_gradient_survives_degenerate_columns() -> None:
     sixd = torch.zeros(1, 6, requires_grad=True)
-    r.matrix_from_sixd(sixd).sum().backward()
+    matrix_from_sixd(sixd).sum().backward()
     assert sixd.grad is not None
     assert torch.isfinite(sixd.grad).all()
 

@@ -4,7 +4,7 @@ import numpy as np
 import torch
 
 from spark.rig.roles import Role
-from spark.rotation import matrix_from_sixd
+from spark.sixd import matrix_from_sixd
 from spark.training import losses
 from spark.training.batch import Batch
 from spark.training.collator import Collator

@@ -12,7 +12,8 @@ from spark.demo.sample import sample_rig
 from spark.network.config import Config
 from spark.network.features import _EXCLUDED_WORDS, BodyFeatures, body_features
 from spark.rig.roles import Group, Role
-from spark.rotation import quat_from_rotvec, quat_mul, sixd_from_quat
+from spark.rotation import quat_from_rotvec, quat_mul
+from spark.sixd import sixd_from_quat
 from spark.training import losses
 from spark.training.attention import sinusoids
 from spark.training.batch import UnpairedBatch

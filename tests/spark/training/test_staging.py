@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 
 from spark.kinematics import local_rotations, world_positions
-from spark.rotation import (
-    quat_from_yaw,
-    quat_mul,
-    quat_rotate,
-    quat_slerp,
-    sixd_from_quat,
-    yaw_from_quat,
-)
+from spark.rotation import quat_from_yaw, quat_mul, quat_rotate, quat_slerp, yaw_from_quat
+from spark.sixd import sixd_from_quat
 from spark.skeleton import Skeleton
 from spark.training.cuts import TrainingClip
 from spark.training.mirror import mirrored_motion

@@ -166,7 +166,8 @@ def test_many_paths_at_once_are_each_by_itself() -> None:
 
 def test_a_longer_foot_turns_on_the_corner_that_the_source_turns_on() -> None:
     """A body that turns about a corner of its left toes' end, as stiff as a post: so does one with
-    longer feet, about the same corner of its own."""
+    longer feet, about the same corner of its own, but for what counts as noise (3 cm) and a little
+    that is told by the corners beside it."""
     rig = stick_rig()
     source = to_canonical(standing(rig, 60), rig)
     pivot = sole_paths(source)[0, 0, -1] * (1, 1, 0)
@@ -178,11 +179,9 @@ def test_a_longer_foot_turns_on_the_corner_that_the_source_turns_on() -> None:
     )
     target = with_long_feet(rig)
     copied = transfer(source, target)
-    slid, held = (
-        speeds(sole_paths(motion), source.frame_time)[:, 0, -1].mean()
-        for motion in (copied, lock_feet(source, copied))
-    )
-    assert held < 0.2 * slid
+    corners = [sole_paths(one)[:, 0, -1, :2] for one in (copied, lock_feet(source, copied))]
+    slid, held = (np.linalg.norm(path - path.mean(0), axis=1).max() for path in corners)
+    assert held < 0.04 * rig.hip_height < slid / 2
 
 
 def test_a_foot_that_slips_within_a_stance_goes_no_further_on_another_body() -> None:
