@@ -12,7 +12,7 @@ CHECKOUT = Path(__file__).parents[1]
 ROOMS = (
     (
         "spark",
-    ),  # its own files: errors, rotation, euler, sixd, skeleton, motion, kinematics, resample
+    ),  # its own files: errors, rotation, euler, sixd, skeleton, kinematics, ...
     ("spark.inference",),
     ("spark.io", "spark.rig"),
     ("spark.transfer",),

@@ -181,7 +181,7 @@ def test_a_longer_foot_turns_on_the_corner_that_the_source_turns_on() -> None:
     copied = transfer(source, target)
     corners = [sole_paths(one)[:, 0, -1, :2] for one in (copied, lock_feet(source, copied))]
     slid, held = (np.linalg.norm(path - path.mean(0), axis=1).max() for path in corners)
-    assert held < 0.04 * rig.hip_height < slid / 2
+    assert held < 0.3 * slid
 
 
 def test_a_foot_that_slips_within_a_stance_goes_no_further_on_another_body() -> None:
