@@ -10,9 +10,7 @@ import pytest
 
 CHECKOUT = Path(__file__).parents[1]
 ROOMS = (
-    (
-        "spark",
-    ),  # its own files: errors, rotation, euler, sixd, skeleton, kinematics, ...
+    ("spark",),  # its own files: errors, rotation, euler, sixd, skeleton, kinematics, ...
     ("spark.inference",),
     ("spark.io", "spark.rig"),
     ("spark.transfer",),
