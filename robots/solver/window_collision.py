@@ -28,6 +28,12 @@ class WindowPoses:
     axes: Float[np.ndarray, "T N 3"]
     anchors: Float[np.ndarray, "T N 3"]
 
+    def at(self, frames: slice) -> "WindowPoses":
+        """Those of some frames."""
+        return WindowPoses(
+            self.rotations[frames], self.positions[frames], self.axes[frames], self.anchors[frames]
+        )
+
 
 class WindowCollisions:
     """A robot's pairs of shapes that can meet. `bodies` are those of the tree's links and, last, of
@@ -79,11 +85,12 @@ class WindowCollisions:
         axes: Float[np.ndarray, "T D 3"],
         anchors: Float[np.ndarray, "T D 3"],
         candidates: Int[np.ndarray, "K"],
+        penalty_scale: Float[np.ndarray, "T"],
         H: Float[np.ndarray, "T D D"],
         g: Float[np.ndarray, "T D"],
     ) -> None:
         """Add how deep shapes are in each other to the normal equations; `candidates` are the
-        spheres to look at."""
+        spheres to look at. `penalty_scale` is as in `robots.solver.objective`."""
         depth, side = self._depth(poses, candidates)
         frames, active = np.nonzero(depth > -_ACTIVE)
         if not len(active):
@@ -96,13 +103,15 @@ class WindowCollisions:
             self._rest_rotations[large].transpose(0, 2, 1), DIRECTIONS[side[frames, active]]
         )
         push = _turned(poses.rotations[frames, large], push)
-        residual, slope = one_sided(depth[frames, active], DEPTH_ROUNDING)
+        scale = penalty_scale[frames]
+        weights = self._weights[pairs] * scale
+        residual, slope = one_sided(depth[frames, active], DEPTH_ROUNDING / scale)
         # axis x arm . push = axis . arm x push
         (a, b, c), (x, y, z) = np.moveaxis(arm, 2, 0), push.T[:, :, None]
         u, v, w = np.moveaxis(axes[frames], 2, 0)
         J = u * (b * z - c * y) + v * (c * x - a * z) + w * (a * y - b * x)
-        J *= self._signs[pairs] * (slope * self._weights[pairs])[:, None]
-        residual = residual * self._weights[pairs]
+        J *= self._signs[pairs] * (slope * weights)[:, None]
+        residual = residual * weights
         for t in range(len(g)):
             rows = J[frames == t]
             H[t] += rows.T @ rows

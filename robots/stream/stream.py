@@ -69,11 +69,12 @@ class Stream:
         if self._count:
             q = self._q[_SHIFTED]
             move_on(self._targets, targets)
-            poses = self._terms.poses(q[_FIXED : _FIXED + 1])  # what is next to be said
-            foot_targets = self._contacts.update(targets, self._terms.sole_points(poses)[0])
-            bones, angles = self._terms.bones(poses)[0], self._terms.hinges.angles(q)[_FIXED]
+            poses = self._terms.poses(q[_FIXED:])
+            next_said = poses.at(slice(1))
+            foot_targets = self._contacts.update(targets, self._terms.sole_points(next_said)[0])
+            bones, angles = self._terms.bones(next_said)[0], self._terms.hinges.angles(q)[_FIXED]
             posture = self._detours.update(self._targets, bones, angles)
-            self._q = self._window.solve(q, self._targets, foot_targets, posture)
+            self._q = self._window.solve(q, poses, self._targets, foot_targets, posture)
         else:
             self._targets = repeated(targets, LATENCY + 1)
             self._q = self._first(targets)

@@ -86,8 +86,10 @@ def walked() -> np.ndarray:
     return said(WALK)
 
 
-def test_the_objective_is_that_of_whole_clips() -> None:
-    """The same normal equations, made in another way."""
+@pytest.mark.parametrize("scale", [1.0, 9.0])
+def test_the_objective_is_that_of_whole_clips(scale: float) -> None:
+    """The same normal equations, made in another way; with penalties that are so many times as
+    firm."""
     source = to_canonical(WALK.frames(20, 24), RIG)
     targets = targets_of(source, EMBER)
     holds = joined([footing_of(EMBER, foot) for foot in plan_feet(EMBER, targets)])
@@ -110,14 +112,22 @@ def test_the_objective_is_that_of_whole_clips() -> None:
         foot_targets = FootTargets(holds.positions[None, ..., t], holds.shares[None, ..., t])
         here = pose_targets(targets, np.array([t]), reader.bones)
         qpos = EMBER.to_qpos(q.at(one))
+        poses, firm = terms.poses(qpos), np.full(1, scale)
         H, g = terms.linearize(
-            qpos, here, foot_targets, terms.hinges.at_tpose, terms.candidates(qpos)
+            qpos,
+            poses,
+            here,
+            foot_targets,
+            terms.hinges.at_tpose,
+            terms.candidates(poses),
+            firm,
         )
         turn = np.eye(tree.nv)
         turn[3:6, 3:6] = body_axes[t]
         H, g = turn @ H[0] @ turn.T, turn @ g[0]
         for block in blocks_of(EMBER):
-            wanted = linearize(EMBER, targets, holds, q, block, near(block))
+            firm = np.full(4, scale)
+            wanted = linearize(EMBER, targets, holds, q, block, near(block), penalty_scale=firm)
             at = np.ix_(block.dofs, block.dofs)
             np.testing.assert_allclose(g[block.dofs], wanted.g[t], atol=1e-8)
             np.testing.assert_allclose(H[at], wanted.H[t], atol=1e-7)
