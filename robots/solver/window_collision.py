@@ -85,12 +85,11 @@ class WindowCollisions:
         axes: Float[np.ndarray, "T D 3"],
         anchors: Float[np.ndarray, "T D 3"],
         candidates: Int[np.ndarray, "K"],
-        penalty_scale: Float[np.ndarray, "T"],
         H: Float[np.ndarray, "T D D"],
         g: Float[np.ndarray, "T D"],
     ) -> None:
         """Add how deep shapes are in each other to the normal equations; `candidates` are the
-        spheres to look at. `penalty_scale` is as in `robots.solver.objective`."""
+        spheres to look at."""
         depth, side = self._depth(poses, candidates)
         frames, active = np.nonzero(depth > -_ACTIVE)
         if not len(active):
@@ -103,15 +102,13 @@ class WindowCollisions:
             self._rest_rotations[large].transpose(0, 2, 1), DIRECTIONS[side[frames, active]]
         )
         push = _turned(poses.rotations[frames, large], push)
-        scale = penalty_scale[frames]
-        weights = self._weights[pairs] * scale
-        residual, slope = one_sided(depth[frames, active], DEPTH_ROUNDING / scale)
+        residual, slope = one_sided(depth[frames, active], DEPTH_ROUNDING)
         # axis x arm . push = axis . arm x push
         (a, b, c), (x, y, z) = np.moveaxis(arm, 2, 0), push.T[:, :, None]
         u, v, w = np.moveaxis(axes[frames], 2, 0)
         J = u * (b * z - c * y) + v * (c * x - a * z) + w * (a * y - b * x)
-        J *= self._signs[pairs] * (slope * weights)[:, None]
-        residual = residual * weights
+        J *= self._signs[pairs] * (slope * self._weights[pairs])[:, None]
+        residual = residual * self._weights[pairs]
         for t in range(len(g)):
             rows = J[frames == t]
             H[t] += rows.T @ rows

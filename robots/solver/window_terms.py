@@ -110,12 +110,12 @@ class Terms:
         foot_targets: FootTargets,
         posture: Posture,
         candidates: Int[np.ndarray, "K"],
-        penalty_scale: Float[np.ndarray, "T"] | None = None,
+        floor_scale: Float[np.ndarray, "T"] | None = None,
     ) -> tuple[Float[np.ndarray, "T D D"], Float[np.ndarray, "T D"]]:
         """H and g of the normal equations `H step = -g`, each frame for itself. `poses` are those
-        of `q`, `candidates` those of poses near these; `penalty_scale` multiplies the weights of
-        collisions and the floor, as in `robots.solver.objective.linearize`."""
-        penalty_scale = np.ones(len(q)) if penalty_scale is None else penalty_scale
+        of `q`, `candidates` those of poses near these; `floor_scale` multiplies the weight of
+        the floor."""
+        floor_scale = np.ones(len(q)) if floor_scale is None else floor_scale
         axes, anchors = self._dof_axes(poses)
         # Parts that should be turned some way: an axial vector each
         # (`robots.residuals.rotation_residual`).
@@ -132,13 +132,13 @@ class Terms:
         H = self._rotation_gram * (axes @ axes.transpose(0, 2, 1))
         g = 0.5 * (axes * (self._rotation_weights @ axial)).sum(2)
         J, weights, forces = self._linear_terms(
-            poses, axes, anchors, targets, foot_targets, penalty_scale
+            poses, axes, anchors, targets, foot_targets, floor_scale
         )
         J_rows = J.reshape(len(q), -1, J.shape[3])
         across = J_rows.transpose(0, 2, 1)
         H += across @ (J_rows * weights.reshape(len(q), -1, 1))
         g += (across @ forces.reshape(len(q), -1, 1))[..., 0]
-        self._collisions.add_to(poses, axes, anchors, candidates, penalty_scale, H, g)
+        self._collisions.add_to(poses, axes, anchors, candidates, H, g)
         self.hinges.add_to(q, posture, H, g)
         return H, g
 
@@ -168,7 +168,7 @@ class Terms:
         anchors: Float[np.ndarray, "T D 3"],
         targets: PoseTargets,
         foot_targets: FootTargets,
-        penalty_scale: Float[np.ndarray, "T"],
+        floor_scale: Float[np.ndarray, "T"],
     ) -> LinearTerms:
         """The residuals of directions and points, as `robots.residuals` has them."""
         points = self._points(poses)
@@ -188,7 +188,7 @@ class Terms:
         weights, forces = np.empty((2, count, B + P, 3))
         weights[:, :B] = W_LIMB_DIRECTION**2
         forces[:, :B] = W_LIMB_DIRECTION**2 * (bones - targets.bones)
-        self._add_soles(points, foot_targets, penalty_scale, weights[:, B:], forces[:, B:])
+        self._add_soles(points, foot_targets, floor_scale, weights[:, B:], forces[:, B:])
         hips = B + self.sole_count
         weights[:, hips] = W_HIPS_POSITION**2
         forces[:, hips] = W_HIPS_POSITION**2 * (points[:, hips - B] - targets.hips)
@@ -207,7 +207,7 @@ class Terms:
         self,
         points: Float[np.ndarray, "T P 3"],
         foot_targets: FootTargets,
-        penalty_scale: Float[np.ndarray, "T"],
+        floor_scale: Float[np.ndarray, "T"],
         weights: Float[np.ndarray, "T P 3"],
         forces: Float[np.ndarray, "T P 3"],
     ) -> None:
@@ -220,8 +220,8 @@ class Terms:
         forces[:, :count] = hold_weights * (points[:, :count] - foot_targets.positions)
         for part, radii in ((slice(count), 0.0), (self._rims, self._rim_radii)):
             over = points[:, part, 2] - radii
-            scale = np.repeat(penalty_scale[:, None], over.shape[1], axis=1)
-            depth, slope = one_sided(-over, FLOOR_ROUNDING / scale)
+            scale = np.repeat(floor_scale[:, None], over.shape[1], axis=1)
+            depth, slope = one_sided(-over, FLOOR_ROUNDING)
             weights[:, part, 2] += (W_FLOOR * scale * slope) ** 2
             forces[:, part, 2] -= (W_FLOOR * scale) ** 2 * slope * depth
 

@@ -58,10 +58,10 @@ class Window:
         are in these poses at first."""
         candidates = self._terms.candidates(poses.at(slice(-1, None)))
         self._coupling.follow(targets.com[-1] - targets.com[-2])
-        overspeed = np.abs(self._coupling.overspeed(self._steps(q)))[-self._free :]
+        overspeed = np.abs(self._coupling.overspeed(self._steps(q)))[-self._free :].max(axis=1)
+        sinking = self._terms.sinking(poses)
         self._firmness.move_on(
-            (self._terms.sinking(poses) > self._max_sinking)
-            | (overspeed.max(axis=1) > self._max_overspeed)
+            np.maximum(sinking / self._max_sinking, overspeed / self._max_overspeed)
         )
         for k in range(_MAX_ITER):
             if k:

@@ -24,7 +24,6 @@ from robots.stream.frame_targets import LATENCY, Frame, FrameReader, ground_of
 from robots.stream.stream import Stream
 from robots.tree import forward_kinematics
 from scripts.robot_bars import follow
-from spark.constants import GRAVITY
 from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import ConventionError, FrameError
 from spark.io.recording import read_recording
@@ -86,10 +85,8 @@ def walked() -> np.ndarray:
     return said(WALK)
 
 
-@pytest.mark.parametrize("scale", [1.0, 9.0])
-def test_the_objective_is_that_of_whole_clips(scale: float) -> None:
-    """The same normal equations, made in another way; with penalties that are so many times as
-    firm."""
+def test_the_objective_is_that_of_whole_clips() -> None:
+    """The same normal equations, made in another way."""
     source = to_canonical(WALK.frames(20, 24), RIG)
     targets = targets_of(source, EMBER)
     holds = joined([footing_of(EMBER, foot) for foot in plan_feet(EMBER, targets)])
@@ -112,22 +109,15 @@ def test_the_objective_is_that_of_whole_clips(scale: float) -> None:
         foot_targets = FootTargets(holds.positions[None, ..., t], holds.shares[None, ..., t])
         here = pose_targets(targets, np.array([t]), reader.bones)
         qpos = EMBER.to_qpos(q.at(one))
-        poses, firm = terms.poses(qpos), np.full(1, scale)
+        poses = terms.poses(qpos)
         H, g = terms.linearize(
-            qpos,
-            poses,
-            here,
-            foot_targets,
-            terms.hinges.at_tpose,
-            terms.candidates(poses),
-            firm,
+            qpos, poses, here, foot_targets, terms.hinges.at_tpose, terms.candidates(poses)
         )
         turn = np.eye(tree.nv)
         turn[3:6, 3:6] = body_axes[t]
         H, g = turn @ H[0] @ turn.T, turn @ g[0]
         for block in blocks_of(EMBER):
-            firm = np.full(4, scale)
-            wanted = linearize(EMBER, targets, holds, q, block, near(block), penalty_scale=firm)
+            wanted = linearize(EMBER, targets, holds, q, block, near(block))
             at = np.ix_(block.dofs, block.dofs)
             np.testing.assert_allclose(g[block.dofs], wanted.g[t], atol=1e-8)
             np.testing.assert_allclose(H[at], wanted.H[t], atol=1e-7)
@@ -185,19 +175,13 @@ def test_a_robot_without_feet_follows_all_the_same(monkeypatch: pytest.MonkeyPat
     assert np.isfinite(said(standing(5, 0.002))).all()
 
 
-def test_what_is_thrown_falls_as_fast_as_in_the_source() -> None:
-    """Hips and centre of mass of a robot of another size: both fall by g, and stand lower."""
-    flight = standing(30, 0.0)
-    time = flight.frame_time * np.arange(30)
-    flight.root_pos[:, 2] += 2.5 * time - 0.5 * GRAVITY * time**2
-    reader = FrameReader(RIG, EMBER, ground_of(to_canonical(standing(1, 0.0), RIG), EMBER))
-    seen = [reader.targets(frame) for frame in frames_of(flight)]
-    high = flight.root_pos[:, 2] > flight.root_pos[0, 2] + 0.1 * RIG.hip_height
-    assert high.sum() > 10
-    for path in ([one.hips for one in seen], [one.com for one in seen]):
-        falling = np.diff(np.array(path)[high], 2, axis=0) / flight.frame_time**2
-        np.testing.assert_allclose(falling, np.broadcast_to([0, 0, -GRAVITY], falling.shape))
-    assert seen[0].hips[2] == pytest.approx(EMBER.rig.hip_height, rel=0.02)
+@WHEEL
+def test_soles_do_not_sink_where_a_body_lands_hard() -> None:
+    motion = read_recording(recording("animateddrawings/jumping.bvh")).motion
+    source = to_canonical(motion.frames(0, 420), understand(motion))
+    found = measure(from_canonical(source), source.rig, follow(source, known("booster_t1")))
+    assert found.deepest_m < 0.01
+    assert found.fastest_rad_s < 15
 
 
 def test_a_glitch_of_the_hips_hardly_moves_the_base() -> None:
