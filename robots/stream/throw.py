@@ -11,7 +11,8 @@ from spark.constants import GRAVITY
 
 STANDING = 1.06  # hips' heights of a T-pose up to which they stand; above, a body may be thrown
 FALL = 0.87  # g; of the rest, 0.13 body weights, the report takes no notice
-_FLYING = 0.5, 0.75  # g from which on a source that falls so fast flies, and does so surely
+# g from which on a source that falls so fast flies, and does so surely: below are those who rise on
+_FLYING = 0.7, 0.95  # tiptoe, or leap with a foot on the floor
 _SPAN = 1 / 15  # [s] over which that is measured
 
 
