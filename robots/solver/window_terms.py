@@ -1,10 +1,10 @@
 """The objective of a few frames, in a few tenths of a millisecond.
 
-The terms are those of `robots.solver.objective`, but for the floor under other parts than feet,
-with the same weights, and so is the order: arms and head hang on base, trunk and legs, and don't
-move them. There every term walks its own chain, over thousands of frames; here MuJoCo gives the
-bodies' poses, and the Jacobian of all terms is made at once. Its columns are MuJoCo's dofs, in the
-order of `robots.tree`: the base rotates about its own axes, and so do balls.
+The terms are those of `robots.solver.objective`, with the same weights, and so is the order: arms
+and head hang on base, trunk and legs, and don't move them. There every term walks its own chain,
+over thousands of frames; here MuJoCo gives the bodies' poses, and the Jacobian of all terms is made
+at once. Its columns are MuJoCo's dofs, in the order of `robots.tree`: the base rotates about its
+own axes, and so do balls.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Int
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
 from robots.solver.block import blocks_of
-from robots.solver.floor import rims_of
+from robots.solver.floor import solids_over_floor
 from robots.solver.hinges import Hinges, Posture
 from robots.solver.weights import (
     FLOOR_ROUNDING,
@@ -30,6 +30,7 @@ from robots.solver.weights import (
     W_ROTATION,
 )
 from robots.solver.window_collision import WindowCollisions, WindowPoses
+from robots.solver.window_floor import WindowFloor
 from robots.solver.window_targets import FootTargets, PoseTargets
 from robots.tree import BASE
 from spark.rig.roles import Role
@@ -65,6 +66,9 @@ class Terms:
         self._collisions = WindowCollisions(
             robot, bodies, self._rest, np.flatnonzero(self._in_first_block[:-1])
         )
+        solids = solids_over_floor(robot)
+        links = [solid.link for solid in solids]
+        self._floor = WindowFloor(solids, bodies[links], self._mask(links), self._rest)
         self._index_rotations()
         self._index_bones(bones)
         self._index_points(hands)
@@ -90,11 +94,9 @@ class Terms:
         return (poses.rotations[:, self._bone_bodies] @ self._bones[:, :, None])[..., 0]
 
     def sinking(self, poses: WindowPoses) -> Float[np.ndarray, "T"]:
-        """How deep [m] the deepest point of the feet is in the floor; below 0 over it."""
-        heights = self._points(poses)[..., 2]
-        depth = np.concatenate(
-            [-heights[:, : self.sole_count], self._rim_radii - heights[:, self._rims]], axis=1
-        )
+        """How deep [m] the deepest point is in the floor; below 0 over it."""
+        soles = -self.sole_points(poses)[..., 2]
+        depth = np.concatenate([soles, self._floor.depth(poses)], axis=1)
         deepest: Float[np.ndarray, T] = depth.max(axis=1, initial=-np.inf)
         return deepest
 
@@ -138,6 +140,7 @@ class Terms:
         across = J_rows.transpose(0, 2, 1)
         H += across @ (J_rows * weights.reshape(len(q), -1, 1))
         g += (across @ forces.reshape(len(q), -1, 1))[..., 0]
+        self._floor.add_to(poses, axes, anchors, floor_scale, H, g)
         self._collisions.add_to(poses, axes, anchors, candidates, H, g)
         self.hinges.add_to(q, posture, H, g)
         return H, g
@@ -211,19 +214,15 @@ class Terms:
         weights: Float[np.ndarray, "T P 3"],
         forces: Float[np.ndarray, "T P 3"],
     ) -> None:
-        """The footholds of the soles' points, and the floor under them and the feet's rims; weights
-        squared."""
+        """The footholds of the soles' points, and the floor under them; weights squared."""
         count = self.sole_count
-        weights[:, self._rims] = forces[:, self._rims] = 0.0
         hold_weights = (W_HOLD * foot_targets.holds) ** 2
         weights[:, :count] = hold_weights
         forces[:, :count] = hold_weights * (points[:, :count] - foot_targets.positions)
-        for part, radii in ((slice(count), 0.0), (self._rims, self._rim_radii)):
-            over = points[:, part, 2] - radii
-            scale = np.repeat(floor_scale[:, None], over.shape[1], axis=1)
-            depth, slope = one_sided(-over, FLOOR_ROUNDING)
-            weights[:, part, 2] += (W_FLOOR * scale * slope) ** 2
-            forces[:, part, 2] -= (W_FLOOR * scale) ** 2 * slope * depth
+        depth, slope = one_sided(-points[:, :count, 2], FLOOR_ROUNDING)
+        floor = (W_FLOOR * floor_scale[:, None]) ** 2 * slope
+        weights[:, :count, 2] += floor * slope
+        forces[:, :count, 2] -= floor * depth
 
     def _body(self, link: int) -> int:
         robot = self.robot
@@ -267,8 +266,8 @@ class Terms:
         self._bones = np.einsum("bji,bj->bi", self._rest[0][self._bone_bodies], along)
 
     def _index_points(self, hands: bool) -> None:
-        """The soles' points, the middle of the hips, both wrists where asked, and the feet's rims;
-        the dofs that move these and the bones."""
+        """The soles' points, the middle of the hips, and both wrists where asked; the dofs that
+        move these and the bones."""
         robot = self.robot
         soles = [robot.sole_points(sole) for sole in robot.soles]
         links = [link for own, _ in soles for link in own.tolist()]
@@ -282,11 +281,6 @@ class Terms:
                 j = robot.rig.roles.require(role)
                 links.append(int(robot.links[j]))
                 rest.append(robot.centers[j])
-        rims = [rim for sole in robot.soles for rim in rims_of(robot, sole)]
-        self._rims = slice(len(links), len(links) + len(rims))
-        self._rim_radii = np.array([radius for _, _, radius in rims])
-        links += [link for link, _, _ in rims]
-        rest += [center for _, center, _ in rims]
         self._point_bodies = np.array([self._body(link) for link in links])
         rotations, positions = (part[self._point_bodies] for part in self._rest)
         self._arms = np.einsum("pji,pj->pi", rotations, np.array(rest) - positions)

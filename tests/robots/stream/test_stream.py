@@ -12,6 +12,7 @@ from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.solver.block import Block, blocks_of
 from robots.solver.collision import Candidate, collisions_of
+from robots.solver.floor import solids_over_floor
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import plan_feet, points_of
 from robots.solver.holds import joined
@@ -94,7 +95,7 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     rng = np.random.default_rng(0)
     q = project(EMBER, targets.world, targets.hips)
     q = q.integrated(tree, rng.normal(size=(4, tree.nv)) * 0.05).clipped(tree, 0.02)
-    q.pos[:, 2] += 0.03  # streams know no floor under other parts than soles
+    q.pos[:, 2] -= 0.1  # shins in the floor, and one hand
     reader = FrameReader(RIG, EMBER, ground_of(source, EMBER))
     terms = Terms(EMBER, reader.bones, hands=True)
 
@@ -215,6 +216,17 @@ def test_the_bars_hold_on_real_clips(clip: str) -> None:
     assert found.limb_error_rad <= np.radians(6.5)  # dab hides its face, where hands give way
     assert found.at_limit == 0
     assert found.fastest_rad_s <= 20
+
+
+def test_hands_and_knees_of_one_who_crawls_are_not_in_the_floor() -> None:
+    motion = read_recording(recording("deepmimic/deepmimic_crawl.bvh")).motion
+    source = to_canonical(motion.frames(0, 120), understand(motion))
+    poses = forward_kinematics(EMBER.tree, follow(source, EMBER).coordinates)
+    lowest = [
+        (poses.heights(solid.link, solid.spheres) - solid.radii[:, None]).min()
+        for solid in solids_over_floor(EMBER)
+    ]
+    assert min(lowest) > -0.015
 
 
 def test_hands_that_hang_beside_a_wide_trunk_are_not_in_it() -> None:
