@@ -16,7 +16,7 @@ from robots.tree import LinkPoses, forward_kinematics
 from spark.rig.feet import Sole
 
 _FOOT_HEIGHT = 0.02  # [m] above the sole, below which a shape is part of the foot
-_FELT = 3  # roundings above the floor from which on a residual is worth its time
+FELT = 3  # roundings above the floor from which on a residual is worth its time
 
 
 class Solid(NamedTuple):
@@ -98,7 +98,7 @@ def add_floor(
     for shape in _moved_solids(robot, block):
         joints = block.free_joints(shape.link)
         depth = shape.radii[:, None] - poses.heights(shape.link, shape.spheres)
-        felt = depth > -_FELT * rounding
+        felt = depth > -FELT * rounding
         frames = np.flatnonzero(felt.any(axis=0))
         if not len(frames):
             continue

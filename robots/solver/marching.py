@@ -178,9 +178,10 @@ def _settled(
     holds = FootTargets(*np.zeros((2, count, terms.sole_count, 3)))
     step, stay = np.zeros((2, count, model.nv))
     for k in range(_FIRST_STEPS if first else _STEPS):
+        poses = terms.poses(q)
         if first or not k:
-            candidates = terms.candidates(q)
-        H, g = terms.linearize(q, targets, holds, terms.hinges.at_tpose, candidates)
+            candidates = terms.candidates(poses)
+        H, g = terms.linearize(q, poses, targets, holds, terms.hinges.at_tpose, candidates)
         held = terms.hinges.held(q, g)[:, dofs]
         H, g = H[:, dofs[:, None], dofs], g[:, dofs]
         if not first:

@@ -28,6 +28,12 @@ class WindowPoses:
     axes: Float[np.ndarray, "T N 3"]
     anchors: Float[np.ndarray, "T N 3"]
 
+    def at(self, frames: slice) -> "WindowPoses":
+        """Those of some frames."""
+        return WindowPoses(
+            self.rotations[frames], self.positions[frames], self.axes[frames], self.anchors[frames]
+        )
+
 
 class WindowCollisions:
     """A robot's pairs of shapes that can meet. `bodies` are those of the tree's links and, last, of

@@ -1,10 +1,10 @@
 """The objective of a few frames, in a few tenths of a millisecond.
 
-The terms are those of `robots.solver.objective`, but for the floor under other parts than feet,
-with the same weights, and so is the order: arms and head hang on base, trunk and legs, and don't
-move them. There every term walks its own chain, over thousands of frames; here MuJoCo gives the
-bodies' poses, and the Jacobian of all terms is made at once. Its columns are MuJoCo's dofs, in the
-order of `robots.tree`: the base rotates about its own axes, and so do balls.
+The terms are those of `robots.solver.objective`, with the same weights, and so is the order: arms
+and head hang on base, trunk and legs, and don't move them. There every term walks its own chain,
+over thousands of frames; here MuJoCo gives the bodies' poses, and the Jacobian of all terms is made
+at once. Its columns are MuJoCo's dofs, in the order of `robots.tree`: the base rotates about its
+own axes, and so do balls.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Int
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
 from robots.solver.block import blocks_of
-from robots.solver.floor import rims_of
+from robots.solver.floor import solids_over_floor
 from robots.solver.hinges import Hinges, Posture
 from robots.solver.weights import (
     FLOOR_ROUNDING,
@@ -30,6 +30,7 @@ from robots.solver.weights import (
     W_ROTATION,
 )
 from robots.solver.window_collision import WindowCollisions, WindowPoses
+from robots.solver.window_floor import WindowFloor
 from robots.solver.window_targets import FootTargets, PoseTargets
 from robots.tree import BASE
 from spark.rig.roles import Role
@@ -65,6 +66,9 @@ class Terms:
         self._collisions = WindowCollisions(
             robot, bodies, self._rest, np.flatnonzero(self._in_first_block[:-1])
         )
+        solids = solids_over_floor(robot)
+        links = [solid.link for solid in solids]
+        self._floor = WindowFloor(solids, bodies[links], self._mask(links), self._rest)
         self._index_rotations()
         self._index_bones(bones)
         self._index_points(hands)
@@ -89,21 +93,31 @@ class Terms:
         """The unit directions of the bones [world]."""
         return (poses.rotations[:, self._bone_bodies] @ self._bones[:, :, None])[..., 0]
 
-    def candidates(self, q: Float[np.ndarray, "T nq"]) -> Int[np.ndarray, "K"]:
+    def sinking(self, poses: WindowPoses) -> Float[np.ndarray, "T"]:
+        """How deep [m] the deepest point is in the floor; below 0 over it."""
+        soles = -self.sole_points(poses)[..., 2]
+        depth = np.concatenate([soles, self._floor.depth(poses)], axis=1)
+        deepest: Float[np.ndarray, T] = depth.max(axis=1, initial=-np.inf)
+        return deepest
+
+    def candidates(self, poses: WindowPoses) -> Int[np.ndarray, "K"]:
         """The collision candidates, in these poses and others that are not far away."""
-        return self._collisions.candidates(self.poses(q))
+        return self._collisions.candidates(poses)
 
     def linearize(
         self,
         q: Float[np.ndarray, "T nq"],
+        poses: WindowPoses,
         targets: PoseTargets,
         foot_targets: FootTargets,
         posture: Posture,
         candidates: Int[np.ndarray, "K"],
+        floor_scale: Float[np.ndarray, "T"] | None = None,
     ) -> tuple[Float[np.ndarray, "T D D"], Float[np.ndarray, "T D"]]:
-        """H and g of the normal equations `H step = -g`, each frame for itself. `candidates` are
-        those of poses near these."""
-        poses = self.poses(q)
+        """H and g of the normal equations `H step = -g`, each frame for itself. `poses` are those
+        of `q`, `candidates` those of poses near these; `floor_scale` multiplies the weight of
+        the floor."""
+        floor_scale = np.ones(len(q)) if floor_scale is None else floor_scale
         axes, anchors = self._dof_axes(poses)
         # Parts that should be turned some way: an axial vector each
         # (`robots.residuals.rotation_residual`).
@@ -119,11 +133,14 @@ class Terms:
         np.subtract(M[..., 1, 0], M[..., 0, 1], out=axial[..., 2])
         H = self._rotation_gram * (axes @ axes.transpose(0, 2, 1))
         g = 0.5 * (axes * (self._rotation_weights @ axial)).sum(2)
-        J, weights, forces = self._linear_terms(poses, axes, anchors, targets, foot_targets)
+        J, weights, forces = self._linear_terms(
+            poses, axes, anchors, targets, foot_targets, floor_scale
+        )
         J_rows = J.reshape(len(q), -1, J.shape[3])
         across = J_rows.transpose(0, 2, 1)
         H += across @ (J_rows * weights.reshape(len(q), -1, 1))
         g += (across @ forces.reshape(len(q), -1, 1))[..., 0]
+        self._floor.add_to(poses, axes, anchors, floor_scale, H, g)
         self._collisions.add_to(poses, axes, anchors, candidates, H, g)
         self.hinges.add_to(q, posture, H, g)
         return H, g
@@ -154,6 +171,7 @@ class Terms:
         anchors: Float[np.ndarray, "T D 3"],
         targets: PoseTargets,
         foot_targets: FootTargets,
+        floor_scale: Float[np.ndarray, "T"],
     ) -> LinearTerms:
         """The residuals of directions and points, as `robots.residuals` has them."""
         points = self._points(poses)
@@ -173,7 +191,7 @@ class Terms:
         weights, forces = np.empty((2, count, B + P, 3))
         weights[:, :B] = W_LIMB_DIRECTION**2
         forces[:, :B] = W_LIMB_DIRECTION**2 * (bones - targets.bones)
-        self._add_soles(points, foot_targets, weights[:, B:], forces[:, B:])
+        self._add_soles(points, foot_targets, floor_scale, weights[:, B:], forces[:, B:])
         hips = B + self.sole_count
         weights[:, hips] = W_HIPS_POSITION**2
         forces[:, hips] = W_HIPS_POSITION**2 * (points[:, hips - B] - targets.hips)
@@ -192,20 +210,19 @@ class Terms:
         self,
         points: Float[np.ndarray, "T P 3"],
         foot_targets: FootTargets,
+        floor_scale: Float[np.ndarray, "T"],
         weights: Float[np.ndarray, "T P 3"],
         forces: Float[np.ndarray, "T P 3"],
     ) -> None:
-        """The footholds of the soles' points, and the floor under them and the feet's rims; weights
-        squared."""
+        """The footholds of the soles' points, and the floor under them; weights squared."""
         count = self.sole_count
-        weights[:, self._rims] = forces[:, self._rims] = 0.0
         hold_weights = (W_HOLD * foot_targets.holds) ** 2
         weights[:, :count] = hold_weights
         forces[:, :count] = hold_weights * (points[:, :count] - foot_targets.positions)
-        for part, radii in ((slice(count), 0.0), (self._rims, self._rim_radii)):
-            depth, slope = one_sided(radii - points[:, part, 2], FLOOR_ROUNDING)
-            weights[:, part, 2] += (W_FLOOR * slope) ** 2
-            forces[:, part, 2] -= W_FLOOR**2 * slope * depth
+        depth, slope = one_sided(-points[:, :count, 2], FLOOR_ROUNDING)
+        floor = (W_FLOOR * floor_scale[:, None]) ** 2 * slope
+        weights[:, :count, 2] += floor * slope
+        forces[:, :count, 2] -= floor * depth
 
     def _body(self, link: int) -> int:
         robot = self.robot
@@ -249,8 +266,8 @@ class Terms:
         self._bones = np.einsum("bji,bj->bi", self._rest[0][self._bone_bodies], along)
 
     def _index_points(self, hands: bool) -> None:
-        """The soles' points, the middle of the hips, both wrists where asked, and the feet's rims;
-        the dofs that move these and the bones."""
+        """The soles' points, the middle of the hips, and both wrists where asked; the dofs that
+        move these and the bones."""
         robot = self.robot
         soles = [robot.sole_points(sole) for sole in robot.soles]
         links = [link for own, _ in soles for link in own.tolist()]
@@ -264,11 +281,6 @@ class Terms:
                 j = robot.rig.roles.require(role)
                 links.append(int(robot.links[j]))
                 rest.append(robot.centers[j])
-        rims = [rim for sole in robot.soles for rim in rims_of(robot, sole)]
-        self._rims = slice(len(links), len(links) + len(rims))
-        self._rim_radii = np.array([radius for _, _, radius in rims])
-        links += [link for link, _, _ in rims]
-        rest += [center for _, center, _ in rims]
         self._point_bodies = np.array([self._body(link) for link in links])
         rotations, positions = (part[self._point_bodies] for part in self._rest)
         self._arms = np.einsum("pji,pj->pi", rotations, np.array(rest) - positions)

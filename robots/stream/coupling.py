@@ -18,7 +18,7 @@ from robots.stream.prediction import Ahead, CostToGo
 
 # [Hz] above which the centre of mass's motion against the source's fades, in x, y and z: its height
 # gives way to landings,
-COM_CUTOFF = np.array([0.7, 0.7, 1.2])
+COM_CUTOFF = np.array([0.7, 0.7, 1.0])
 JERK_CUTOFF = 2.5  # and that of hinges, by their jerk
 MAX_ACCELERATION = 40.0  # [m/s²] of the source that the mass goes along with: more is a glitch
 _BASE = slice(0, 3)  # dofs of the base's position, in whose place the centre of mass is coupled
@@ -64,17 +64,23 @@ class Coupling:
         step = last + change * min(1.0, self._max_change / size)
         self._source_steps = np.concatenate([self._source_steps[1:], step[None]])
 
+    def overspeed(self, steps: Float[np.ndarray, "V D"]) -> Float[np.ndarray, "V D"]:
+        """By how much [rad] hinges turn farther from frame to frame than `MAX_HINGE_SPEED` lets."""
+        return steps - np.minimum(np.maximum(steps, -self._max_steps), self._max_steps)
+
     def add_to(
         self,
         steps: Float[np.ndarray, "V D"],
         com_steps: Float[np.ndarray, "V 3"],
         com_jacobian: Float[np.ndarray, "F 3 D"],
         ahead: Ahead,
+        penalty_scale: Float[np.ndarray, "F"],
         blocks: Float[np.ndarray, "F D F D"],
         g: Float[np.ndarray, "F D"],
     ) -> None:
         """Add to the normal equations: `steps` are the dofs' from frame to frame, `com_steps` [m]
-        those of the centre of mass, and `ahead` is what is expected of the dofs."""
+        those of the centre of mass, and `ahead` is what is expected of the dofs; `penalty_scale`
+        multiplies the weights of overspeed."""
         against = steps.copy()  # and what is expected is that they do not move
         against[:, _BASE] = com_steps - self._source_steps
         ahead.targets[_BASE] = com_jacobian[-1] @ ahead.targets
@@ -95,8 +101,10 @@ class Coupling:
         diagonals = np.einsum("sdtd->std", blocks)  # a view
         diagonals += products
         g += gradient
-        overspeed = steps - np.minimum(np.maximum(steps, -self._max_steps), self._max_steps)
+        overspeed = self.overspeed(steps)
         if overspeed.any():
-            g += self._overspeed_weight * (self._first.T @ overspeed)
-            fast = self._overspeed_weight * (overspeed != 0)
+            weights = np.full((len(steps), 1), self._overspeed_weight)
+            weights[-frames:] *= penalty_scale[:, None] ** 2
+            g += self._first.T @ (weights * overspeed)
+            fast = weights * (overspeed != 0)
             diagonals += np.einsum("vs,vt,vd->std", self._first, self._first, fast)

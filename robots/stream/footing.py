@@ -20,8 +20,7 @@ from robots.stream.footprint import Footprint
 from robots.stream.frame_targets import FrameReader, FrameTargets
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
 
-TAKE = 0.06  # [s] over which a foot is taken hold of,
-LET_GO = 0.1  # [s] and let go
+HOLD_TIME = 0.1  # [s] over which a foot is taken hold of, and let go
 _RELEASE_FACTOR = (
     1.5  # times the speed and height at which a foot comes to stand: there it is let go
 )
@@ -77,7 +76,7 @@ class ContactTracker:
         arrived = self._arrived(targets, targets if first else self._history[-1].targets)
         self._history.extend([arrived] * (self._length if first else 1))
         settled = len(self._history) - 1 - self._ahead
-        take, let_go = (1.0 if first else self._frame_time / time for time in (TAKE, LET_GO))
+        step = self._frame_time / HOLD_TIME
         planted, holds, footprints = self._planted, self._holds, self._footprints
         seen = []
         for at in range(settled, len(self._history)):
@@ -87,7 +86,7 @@ class ContactTracker:
             known = np.logical_or(holds.any(axis=1), at == settled)
             if at == settled:
                 self._put(points, planted, holds)
-            holds = holds + np.clip(planted - holds, -let_go, take)
+            holds = holds + np.clip(planted - holds, -step, 1.0 if first else step)
             pivots = tuple(footprint.pivot for footprint in footprints)
             headings = tuple(footprint.heading for footprint in footprints)
             seen.append(_Seen(holds, height, known, pivots, headings))

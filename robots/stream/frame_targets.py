@@ -1,7 +1,7 @@
 """One frame of a source as a robot's targets: what `robots.solver.targets` makes of a clip, without
 what needs the whole clip, in a tenth of its time."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import NamedTuple
 
 import mujoco
@@ -29,7 +29,6 @@ from spark.rotation import matrix_from_quat, quat_conj, quat_from_matrix
 from spark.transfer.analytic import correspond
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
-STANDING = 1.06  # hips' heights of a T-pose up to which they stand; above, a body is thrown
 LATENCY = 2  # [frames] between the newest frame of a stream and its answer
 _MAX_NORM_ERROR = 0.05  # of a quaternion: beyond, it is not one that was merely rounded
 
@@ -68,6 +67,17 @@ class FrameTargets(PoseTargets):
     feet: Float[np.ndarray, "*T S 2 3"]
     clearance: Float[np.ndarray, "*T S"]
     pitched: Float[np.ndarray, "*T P 3"]
+
+
+def raised(targets: FrameTargets, by: float) -> FrameTargets:
+    """The targets of a body that is higher by so much [m]."""
+    up = np.array([0.0, 0.0, by])
+    return replace(
+        targets,
+        hips=targets.hips + up,
+        com=targets.com + up,
+        clearance=targets.clearance + by,
+    )
 
 
 def repeated(targets: FrameTargets, count: int) -> FrameTargets:
@@ -126,9 +136,7 @@ class FrameReader:
             bones[row] = turns[joint] @ out
         hips = joints[self.source.hips].mean(0)
         hips[2] -= self.ground.z
-        thrown = self._thrown(hips[2])
         hips *= self.scale
-        hips[2] += thrown
         own = self._own(turns)
         if self._stiff:
             pelvis = self.robot.rig.pelvis
@@ -139,11 +147,11 @@ class FrameReader:
             world=own_world,
             chest=turns[self._chest] @ self._tpose[self.robot.rig.chest],
             hips=hips,
-            com=self._com(world, joints) + np.array([0.0, 0.0, thrown]),
+            com=self._com(world, joints),
             bones=bones,
             hands=self._between_hands(joints),
             feet=self._feet(world, joints),
-            clearance=self._clearance(world, joints) + thrown,
+            clearance=self._clearance(world, joints),
             pitched=self._pitched(own_world),
         )
 
@@ -172,11 +180,6 @@ class FrameReader:
                 f"the quaternion of joint {names[j]!r} has length {length[j]:.3g}; expected 1"
             )
         return self._poses.of(root, rotations / length[:, None], local)
-
-    def _thrown(self, height: float) -> float:
-        """How much higher [m] than scaled the hips are that are so high [m] in the source: a body
-        that is thrown falls as fast, and so rises as high, whatever its size."""
-        return (1 - self.scale) * max(0.0, height - STANDING * self.source.hip_height)
 
     def _com(
         self, world: Float[np.ndarray, "N 3 3"], joints: Float[np.ndarray, "N 3"]

@@ -22,6 +22,7 @@ _SPEED_WINDOW = 0.05  # [s] before the newest frame over which that speed is mea
 _DAMPING = 0.02  # [1] on the diagonal of the normal equations that say where a target is
 _MAX_STEP = 0.5  # [rad, m] to it
 _MAX_SPEED = 10.0  # [rad/s, m/s]
+_BASE = slice(0, 3)  # dofs of the base's position
 _LOG_RATIOS = np.linspace(-14.0, 21.0, 400)  # of a derivative's squared weight to the target's
 
 
@@ -95,8 +96,10 @@ class TargetMotion:
         model = self._model
         damped = H.copy()
         damped.reshape(-1)[:: len(g) + 1] += _DAMPING
-        _, target, _ = dposv(damped.T, -g, overwrite_a=True)
-        target = np.minimum(np.maximum(target, -_MAX_STEP), _MAX_STEP)
+        sides = np.zeros((len(g), 4), order="F")
+        sides[:, 0], sides[_BASE, 1:] = -g, np.eye(3)
+        _, solved, _ = dposv(damped.T, sides, overwrite_a=True, overwrite_b=True)
+        target = np.minimum(np.maximum(solved[:, 0], -_MAX_STEP), _MAX_STEP)
         step = np.zeros(model.nv)
         step[self._dofs] = target
         self._now = q.copy()
@@ -106,7 +109,13 @@ class TargetMotion:
             time = len(self._past) * self._frame_time
             mujoco.mj_differentiatePos(model, speeds, time, self._past[0], self._now)
         speeds = speeds[self._dofs].clip(-_MAX_SPEED, _MAX_SPEED)
-        return Ahead(target, speeds, np.diagonal(H).copy())
+        # Legs give way to the base where they bend: it weighs what is then left of its weight (a
+        # Schur complement), over the floor alike in all directions. By H's diagonal it would be as
+        # firm as if they could not bend.
+        weights = np.diagonal(H).copy()
+        x, y, z = np.diagonal(solved[_BASE, 1:])
+        weights[_BASE] = 2 / (x + y), 2 / (x + y), 1 / z
+        return Ahead(target, speeds, weights)
 
     def next(self) -> None:
         """The newest frame is not the newest any more."""

@@ -21,8 +21,10 @@ from robots.stream.frame_targets import (
     FrameTargets,
     Ground,
     move_on,
+    raised,
     repeated,
 )
+from robots.stream.throw import Throw
 from robots.stream.window import Window
 from spark.errors import FrameError
 from spark.rig.rig import Rig
@@ -45,6 +47,7 @@ class Stream:
         self._reader = FrameReader(source, robot, ground)
         self._terms = Terms(robot, self._reader.bones, self._reader.hands is not None)
         self._window = Window(robot, self._terms, frame_time, fixed=_FIXED, free=LATENCY + 1)
+        self._throw = Throw(self._reader.scale, source.hip_height, frame_time)
         self._targets: FrameTargets  # of the window's free frames
         self.reset()
 
@@ -52,6 +55,7 @@ class Stream:
         """Forget what has been seen: the next frame is a first one."""
         self._count = 0
         self._window.reset()
+        self._throw.reset()
         self._q = np.zeros((_FRAMES, self.robot.mjcf.model.nq))
         self._contacts = ContactTracker(self._reader, self.frame_time, LATENCY)
         self._detours = Detours(self._reader, self._terms, self.frame_time)
@@ -66,14 +70,17 @@ class Stream:
             targets = self._reader.targets(frame)
         except FrameError as error:
             raise FrameError(f"frame {self._count} of the stream: {error}") from error
+        thrown = self._throw.follow(targets.hips[2] / self._reader.scale)
+        targets = raised(targets, thrown)
         if self._count:
             q = self._q[_SHIFTED]
             move_on(self._targets, targets)
-            poses = self._terms.poses(q[_FIXED : _FIXED + 1])  # what is next to be said
-            foot_targets = self._contacts.update(targets, self._terms.sole_points(poses)[0])
-            bones, angles = self._terms.bones(poses)[0], self._terms.hinges.angles(q)[_FIXED]
+            poses = self._terms.poses(q[_FIXED:])
+            next_said = poses.at(slice(1))
+            foot_targets = self._contacts.update(targets, self._terms.sole_points(next_said)[0])
+            bones, angles = self._terms.bones(next_said)[0], self._terms.hinges.angles(q)[_FIXED]
             posture = self._detours.update(self._targets, bones, angles)
-            self._q = self._window.solve(q, self._targets, foot_targets, posture)
+            self._q = self._window.solve(q, poses, self._targets, foot_targets, posture)
         else:
             self._targets = repeated(targets, LATENCY + 1)
             self._q = self._first(targets)

@@ -7,9 +7,11 @@ from scipy.linalg.lapack import dposv
 
 from robots.model.morphology import Morphology
 from robots.solver.hinges import Posture
+from robots.solver.window_collision import WindowPoses
 from robots.solver.window_targets import FootTargets
 from robots.solver.window_terms import Terms
 from robots.stream.coupling import Coupling
+from robots.stream.firmness import MAX_OVERSPEED, MAX_SINKING, Firmness
 from robots.stream.frame_targets import FrameTargets
 from robots.stream.prediction import TargetMotion
 
@@ -34,24 +36,37 @@ class Window:
         self._dofs = terms.mj_dofs
         self._motion = TargetMotion(self._model, self._dofs, frame_time)
         self._coupling = Coupling(robot, frame_time, fixed=fixed, free=free)
+        self._firmness = Firmness(free)
+        self._max_sinking = MAX_SINKING * robot.rig.hip_height
+        self._max_overspeed = MAX_OVERSPEED * frame_time
 
     def reset(self) -> None:
         """Forget what has been seen."""
         self._motion.reset()
         self._coupling.reset()
+        self._firmness.reset()
 
     def solve(
         self,
         q: Float[np.ndarray, "T nq"],
+        poses: WindowPoses,
         targets: FrameTargets,
         foot_targets: FootTargets,
         posture: Posture,
     ) -> Float[np.ndarray, "T nq"]:
-        """`q` after at most `_MAX_ITER` steps of its free frames, which have these targets."""
-        candidates = self._terms.candidates(q[-1:])
+        """`q` after at most `_MAX_ITER` steps of its free frames, which have these targets, and
+        are in these poses at first."""
+        candidates = self._terms.candidates(poses.at(slice(-1, None)))
         self._coupling.follow(targets.com[-1] - targets.com[-2])
-        for _ in range(_MAX_ITER):
-            q, length = self._step(q, targets, foot_targets, posture, candidates)
+        overspeed = np.abs(self._coupling.overspeed(self._steps(q)))[-self._free :].max(axis=1)
+        sinking = self._terms.sinking(poses)
+        self._firmness.move_on(
+            np.maximum(sinking / self._max_sinking, overspeed / self._max_overspeed)
+        )
+        for k in range(_MAX_ITER):
+            if k:
+                poses = self._terms.poses(q[-self._free :])
+            q, length = self._step(q, poses, targets, foot_targets, posture, candidates)
             if length < _STEP_TOL:
                 break
         self._motion.next()
@@ -66,9 +81,11 @@ class Window:
     ) -> Float[np.ndarray, "T nq"]:
         """`q` with its free frames after some steps, each frame for itself."""
         for _ in range(steps):
-            candidates = self._terms.candidates(q[-1:])
+            poses = self._terms.poses(q[-self._free :])
+            candidates = self._terms.candidates(poses.at(slice(-1, None)))
             q, _ = self._step(
                 q,
+                poses,
                 targets,
                 foot_targets,
                 self._terms.hinges.at_tpose,
@@ -80,6 +97,7 @@ class Window:
     def _step(
         self,
         q: Float[np.ndarray, "T nq"],
+        poses: WindowPoses,
         targets: FrameTargets,
         foot_targets: FootTargets,
         posture: Posture,
@@ -90,7 +108,10 @@ class Window:
         """One Gauss-Newton step, and its largest entry [rad, m]; with `lone_damping`, frames are
         not coupled, and damped by so much."""
         model, free = self._model, self._free
-        H, g = self._terms.linearize(q[-free:], targets, foot_targets, posture, candidates)
+        scale = self._firmness.scale
+        H, g = self._terms.linearize(
+            q[-free:], poses, targets, foot_targets, posture, candidates, scale
+        )
         D = g.shape[1]
         whole = np.zeros((free * D, free * D))
         blocks = whole.reshape(free, D, free, D)
@@ -99,7 +120,8 @@ class Window:
         if lone_damping is None:
             ahead = self._motion.of(q[-1], H[-1], g[-1])
             com, jacobian = self._center_of_mass(q)
-            self._coupling.add_to(self._steps(q), np.diff(com, axis=0), jacobian, ahead, blocks, g)
+            com_steps = np.diff(com, axis=0)
+            self._coupling.add_to(self._steps(q), com_steps, jacobian, ahead, scale, blocks, g)
         held = self._terms.hinges.held(q[-free:], g)
         g[held] = 0.0
         whole.reshape(-1)[:: free * D + 1] += np.where(

@@ -1,9 +1,10 @@
 """What a stream expects beyond its newest frame, against the same problem written out."""
 
+import mujoco
 import numpy as np
 import pytest
 
-from robots.stream.prediction import HORIZON, SLOWING, Ahead, CostToGo
+from robots.stream.prediction import HORIZON, SLOWING, Ahead, CostToGo, TargetMotion
 
 FRAME_TIME = 1 / 60
 
@@ -44,3 +45,20 @@ def test_a_target_that_nothing_holds_costs_nothing() -> None:
     P, p = to_go.of(Ahead(np.ones(1), np.ones(1), np.zeros(1)))
     np.testing.assert_allclose(P, 0.0, atol=1e-9)
     np.testing.assert_allclose(p, 0.0, atol=1e-9)
+
+
+def test_a_base_that_legs_give_way_to_weighs_what_they_leave() -> None:
+    """Of two residuals, height + leg and leg / 2, only the second holds the height once the leg
+    has moved: (1 / 2)² of the weight of one."""
+    data = mujoco.MjModel.from_xml_string(
+        "<mujoco><worldbody><body><freejoint/><geom size='1'/>"
+        "<body><joint/><geom size='1'/></body></body></worldbody></mujoco>"
+    )
+    J = np.zeros((7, 7))
+    J[:6, :6] = np.eye(6)
+    J[2, 6] = 1.0
+    J[6, 6] = 0.5
+    motion = TargetMotion(data, np.arange(7), FRAME_TIME)
+    ahead = motion.of(data.qpos0, 1e3 * J.T @ J, np.zeros(7))
+    np.testing.assert_allclose(ahead.weights[:2], 1e3, rtol=1e-3)
+    assert ahead.weights[2] == pytest.approx(1e3 * 0.25 / 1.25, rel=1e-3)
