@@ -8,8 +8,10 @@ the first `_CAPTURE_NOISE` of its contact joint from its mean position is taken 
 removed; what goes beyond is motion and kept. A stance is at its own mean position, and a foot is
 carried from one footprint to the next (`spark.transfer.footfalls`). The lowest point of the sole is
 as high above the floor as the source's is, scaled: while it stands and while it swings, whatever
-the length of the foot.
+the length of the foot; the hips rise with it (`spark.transfer.hip_rise`).
 """
+
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -21,6 +23,7 @@ from spark.rotation import quat_mul, quat_rotate
 from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.footfalls import between_contacts, beyond
+from spark.transfer.hip_rise import Standing, hip_rise
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
 from spark.transfer.reach import within_reach
 
@@ -40,22 +43,25 @@ _ENDS = [0, 1, -2, -1]  # of a sole's points: its heel and its toes' end
 
 def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
     """`moved`, the transfer of `source`, with its feet held while the source's stand, and as high
-    as the source's."""
+    as the source's; its hips go with them."""
     scale = moved.rig.hip_height / source.rig.hip_height
-    moves: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
-    feet = []
+    feet: list[tuple[Leg, Float[np.ndarray, "T 3"], Standing, Standing]] = []
     for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
         leg = leg_of(moved.rig.skeleton, moved.rig.roles.roles, group)
         contact = _contact(source.rig, moved.rig, group)
         if leg is not None and contact is not None:
             path = canonical_positions(source, [contact])[:, 0]
-            feet.append((leg, path, _sole(source, group), _sole(moved, group)))
+            feet.append((leg, path, _standing(source, group), _standing(moved, group)))
     if not feet:
         return moved
+    rise = hip_rise(source, moved, [(theirs, own) for _, _, theirs, own in feet])
     paths = np.stack([path for _, path, _, _ in feet], axis=1)
     planted = planted_points(paths, source.frame_time, source.rig.standing_height)
-    for s, (leg, path, their_sole, own_sole) in enumerate(feet):
-        stance = _stances(planted[:, s], source.frame_time)
+    stances = [_stances(each, source.frame_time) for each in planted.T]
+    moves: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
+    for (leg, path, (_, _, their_sole), (_, _, own_sole)), stance in zip(
+        feet, stances, strict=True
+    ):
         theirs, own = _rolled(their_sole, own_sole, source)
         offset = np.zeros((len(own), 2))
         for start, stop in true_runs(stance):
@@ -67,18 +73,21 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
         along = between_contacts(offset, stance, own)
         wanted = scale * (their_sole[..., 2].min(axis=1) - source.floor_z)
         wanted = np.maximum(wanted, -_MAX_SINK * moved.rig.hip_height)
-        height = own_sole[..., 2].min(axis=1) - moved.floor_z
+        height = own_sole[..., 2].min(axis=1) + rise - moved.floor_z
         moves.append((leg, np.column_stack([along, wanted - height])))
-    return move_ankles(*within_reach(moved, moves))
+    risen = replace(moved, hips=moved.hips + rise[:, None] * np.array([0.0, 0.0, 1.0]))
+    return move_ankles(*within_reach(risen, moves, np.stack(stances)))
 
 
-def _sole(motion: CanonicalMotion, group: Group) -> Float[np.ndarray, "T P 3"]:
-    """Where the points of a foot's sole are [m, world]."""
+def _standing(motion: CanonicalMotion, group: Group) -> Standing:
+    """A leg's ends, and where the points of its sole are."""
     rig = motion.rig
     sole = next(sole for sole in rig.soles if sole.side == group.side)
     positions = canonical_positions(motion, sole.joints.tolist())
     world = quat_mul(motion.rotations[:, sole.joints], rig.tpose[sole.joints])
-    return positions + quat_rotate(world, sole.offsets)
+    points = positions + quat_rotate(world, sole.offsets)
+    hip, _, ankle, _ = LIMBS[group]
+    return Standing(rig.roles.require(hip), rig.roles.require(ankle), points)
 
 
 def _rolled(

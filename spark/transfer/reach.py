@@ -2,14 +2,15 @@
 
 A broad body on short legs takes longer steps than its legs alone would (`travel_scale`), and then
 some of its feet stand where a leg does not reach: they would be pulled along, and lifted. People
-lower their hips in a wide stance, and so does this.
+lower their hips in a wide stance, and so does this. A foot that swings is let go of: it has nothing
+to slide on, and the other leg would bend.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
@@ -22,10 +23,15 @@ _MAX_DROP = 0.1  # [hip heights] of a wide stance; a foot further away is let go
 Moves = Sequence[tuple[Leg, Float[np.ndarray, "T 3"]]]
 
 
-def within_reach(motion: CanonicalMotion, moves: Moves) -> tuple[CanonicalMotion, Moves]:
-    """`motion` with its hips as low as its legs need them to move their ankles by `moves` [m], and
-    the moves from there."""
-    drop = np.max([_drop(motion, leg, move) for leg, move in moves], axis=0)
+def within_reach(
+    motion: CanonicalMotion, moves: Moves, stands: Bool[np.ndarray, "L #T"]
+) -> tuple[CanonicalMotion, Moves]:
+    """`motion` with its hips as low as its legs need them to move their ankles by `moves` [m] while
+    they stand, and the moves from there."""
+    drop = np.max(
+        [here * _drop(motion, leg, move) for (leg, move), here in zip(moves, stands, strict=True)],
+        axis=0,
+    )
     if not drop.any():
         return motion, moves
     size = 2 * round(_AHEAD / motion.frame_time) + 1

@@ -126,11 +126,16 @@ def sole_paths(motion: CanonicalMotion) -> np.ndarray:
 
 def test_a_longer_foot_on_its_toes_stays_on_the_floor() -> None:
     """The lowest point of the sole is as high as the source's, scaled, however long the foot is:
-    raised heels and raised toes alike."""
+    raised heels and raised toes alike. Knees are bent, so that all of that is within reach."""
     rig = stick_rig()
     long_feet = with_long_feet(rig)
     motion = standing(rig, 60)
+    motion.root_pos[:, 2] -= 0.4 * (1 - np.cos(0.6))
     for side in ("left", "right"):
+        for part, bend in (("upper_leg", -0.6), ("lower_leg", 0.6)):
+            motion.rotations[:, joint(Role(f"{side}_{part}"))] = quat_from_rotvec(
+                np.array([0.0, bend, 0.0])
+            )
         pitch = np.zeros((60, 3))
         pitch[:, 1] = 0.4 * np.sin(np.linspace(0, 6, 60))
         motion.rotations[:, joint(Role(f"{side}_foot"))] = quat_from_rotvec(pitch)

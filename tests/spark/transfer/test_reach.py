@@ -15,6 +15,7 @@ from tests.helpers.stick import standing, stick_rig
 
 LEG = 0.8  # [m] of the stick man, stretched out as he stands
 FPS = 60.0
+ALWAYS = np.array([[True]])  # one leg that stands in every frame
 
 
 def stick() -> tuple[CanonicalMotion, Leg]:
@@ -34,7 +35,7 @@ def stepping(wide: float) -> np.ndarray:
 @pytest.mark.parametrize("wide", [0.1, 0.2, 0.3])
 def test_the_hips_come_down_to_a_wide_step(wide: float) -> None:
     motion, leg = stick()
-    lower, moves = within_reach(motion, [(leg, stepping(wide))])
+    lower, moves = within_reach(motion, [(leg, stepping(wide))], ALWAYS)
     down = motion.hips - lower.hips
     assert np.abs(down[:, :2]).max() == 0
     # By Pythagoras, of a leg that may stay as stretched as it was.
@@ -49,16 +50,24 @@ def test_the_hips_come_down_to_a_wide_step(wide: float) -> None:
     assert np.linalg.norm(ankle - wanted, axis=1).max() < 2 * (1 - MAX_REACH) * LEG
 
 
+def test_a_foot_that_swings_is_let_go_of() -> None:
+    motion, leg = stick()
+    stands = np.ones((1, 121), dtype=bool)
+    stands[:, 54:67] = False
+    same, _ = within_reach(motion, [(leg, stepping(0.3))], stands)
+    np.testing.assert_array_equal(same.hips, motion.hips)
+
+
 def test_a_foot_beyond_all_reach_is_let_go_of() -> None:
     motion, leg = stick()
-    lower, _ = within_reach(motion, [(leg, stepping(2.0))])
+    lower, _ = within_reach(motion, [(leg, stepping(2.0))], ALWAYS)
     assert (motion.hips - lower.hips)[:, 2].max() == pytest.approx(0.1 * motion.rig.hip_height)
 
 
 def test_feet_within_reach_leave_the_hips_where_they_are() -> None:
     motion, leg = stick()
     move = np.tile([0.02, 0.0, 0.05], (121, 1))
-    same, moves = within_reach(motion, [(leg, move)])
+    same, moves = within_reach(motion, [(leg, move)], ALWAYS)
     assert same is motion
     assert moves[0][1] is move
     for name in ("walk", "squat"):
@@ -70,8 +79,8 @@ def test_the_frame_rate_does_not_matter() -> None:
     motion, leg = stick()
     twice = to_canonical(standing(stick_rig(), 241, 2 * FPS), stick_rig())
     drops = [
-        (m.hips - within_reach(m, [(leg, np.repeat(stepping(0.2), k, 0)[: len(m)])])[0].hips)[:, 2]
-        for m, k in ((motion, 1), (twice, 2))
+        (m.hips - within_reach(m, [(leg, step[: len(m)])], ALWAYS)[0].hips)[:, 2]
+        for m, step in ((motion, stepping(0.2)), (twice, np.repeat(stepping(0.2), 2, 0)))
     ]
     np.testing.assert_allclose(drops[1][::2], drops[0], atol=0.004)
 
@@ -80,14 +89,15 @@ def test_the_higher_of_two_needs_counts() -> None:
     motion, leg = stick()
     other = leg_of(motion.rig.skeleton, motion.rig.roles.roles, Group.RIGHT_LEG)
     assert other is not None
-    both = within_reach(motion, [(leg, stepping(0.1)), (other, -stepping(0.3))])[0]
-    one = within_reach(motion, [(other, -stepping(0.3))])[0]
+    moves = [(leg, stepping(0.1)), (other, -stepping(0.3))]
+    both = within_reach(motion, moves, np.repeat(ALWAYS, 2, axis=0))[0]
+    one = within_reach(motion, moves[1:], ALWAYS)[0]
     np.testing.assert_array_equal(both.hips, one.hips)
 
 
 def test_a_body_without_frames_to_spare() -> None:
     motion, leg = stick()
     short = replace(motion, rotations=motion.rotations[:2], hips=motion.hips[:2])
-    lower, _ = within_reach(short, [(leg, np.tile([0.0, 0.2, 0.0], (2, 1)))])
+    lower, _ = within_reach(short, [(leg, np.tile([0.0, 0.2, 0.0], (2, 1)))], ALWAYS)
     needed = LEG - np.sqrt(LEG**2 - 0.2**2)
     np.testing.assert_allclose((short.hips - lower.hips)[:, 2], needed)
