@@ -80,14 +80,15 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
 
 
 def _standing(motion: CanonicalMotion, group: Group) -> Standing:
-    """A leg's ends, and where the points of its sole are."""
+    """A leg's ends and its sole."""
     rig = motion.rig
     sole = next(sole for sole in rig.soles if sole.side == group.side)
-    positions = canonical_positions(motion, sole.joints.tolist())
-    world = quat_mul(motion.rotations[:, sole.joints], rig.tpose[sole.joints])
-    points = positions + quat_rotate(world, sole.offsets)
     hip, _, ankle, _ = LIMBS[group]
-    return Standing(rig.roles.require(hip), rig.roles.require(ankle), points)
+    ends = rig.roles.require(hip), rig.roles.require(ankle)
+    positions = canonical_positions(motion, [*ends, *sole.joints.tolist()])
+    world = quat_mul(motion.rotations[:, sole.joints], rig.tpose[sole.joints])
+    points = positions[:, 2:] + quat_rotate(world, sole.offsets)
+    return Standing(ends, positions[:, :2, 2], points)
 
 
 def _rolled(

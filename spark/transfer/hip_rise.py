@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
 
-from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.leg_fit import from_sole
 
 # [hip heights] A foot whose sole is this high bears half as much as one that stands.
@@ -26,10 +26,11 @@ _EASE = 0.15
 
 
 class Standing(NamedTuple):
-    """The hip joint and the ankle of one leg, and where the points of its sole are [m, world]."""
+    """The hip joint and the ankle of one leg, how high they are, and where the points of its sole
+    are [m, world]."""
 
-    hip: int
-    ankle: int
+    joints: tuple[int, int]
+    heights: Float[np.ndarray, "T 2"]
     sole: Float[np.ndarray, "T P 3"]
 
 
@@ -55,13 +56,12 @@ def hip_rise(
 
 def _beside_leg(motion: CanonicalMotion, leg: Standing) -> Float[np.ndarray, "T"]:
     """By how much foot and pelvis make the hips' middle higher than in the T-pose [m]."""
-    at = canonical_positions(motion, [leg.hip, leg.ankle])[..., 2]
-    pelvis, foot = motion.hips[:, 2] - at[:, 0], at[:, 1] - leg.sole[..., 2].min(axis=1)
-    return np.asarray(pelvis + foot - from_sole(motion.rig, leg.ankle)[2])
+    hip, ankle = leg.heights.T
+    pelvis, foot = motion.hips[:, 2] - hip, ankle - leg.sole[..., 2].min(axis=1)
+    return np.asarray(pelvis + foot - from_sole(motion.rig, leg.joints[1])[2])
 
 
 def _upright(motion: CanonicalMotion, leg: Standing) -> Float[np.ndarray, "T"]:
     """How far the hip joint is above the ankle, over how far it is in the T-pose; 0 to 1."""
-    at = canonical_positions(motion, [leg.hip, leg.ankle])[..., 2]
-    rest = motion.rig.tpose_positions[[leg.hip, leg.ankle], 2]
-    return np.clip((at[:, 0] - at[:, 1]) / (rest[0] - rest[1]), 0.0, 1.0)
+    hip, ankle = motion.rig.tpose_positions[list(leg.joints), 2]
+    return np.clip((leg.heights[:, 0] - leg.heights[:, 1]) / (hip - ankle), 0.0, 1.0)
