@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
-from rigs_bench import middle
 
 import spark_sim
+from scripts.rigs_bench import middle
 from spark.rig.roles import LIMBS, Group
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
