@@ -31,14 +31,14 @@ from robots.tree import Coordinates, forward_kinematics
 from spark.runs import true_runs
 
 _MAX_ROUNDS = 6
-_PENALTY_GROWTH = 3.0  # from round to round, of the penalties' weights
+PENALTY_GROWTH = 3.0  # from round to round, of the penalties' weights
 _LEAD_OUT_ROUND = 3  # the round before which arms are led out of what they are stuck in
 _MAX_ITER, _REL_TOL = 12, 0.01  # of each round
 _AROUND = 0.4  # [s] before and after a violation that are solved again
 _MAX_JERK_RATIO = 5.0  # jerk, over the one from which hinges are smoothed, that is a violation
 _SEARCH_DISTANCE = 0.01  # [m] between approximate shapes within which the exact ones are measured
 _MAX_DEPTH = 0.009  # hip heights of parts in each other, beyond their clearance,
-_MAX_SINKING = 0.009  # and of a sole's corner, or another part, below the floor
+MAX_SINKING = 0.009  # and of a sole's corner, or another part, below the floor
 _W_VIOLATION = 20.0  # what a frame with a violation costs: as four limbs that are 90 degrees off
 _MAX_OVERSPEED = 0.5  # [rad/s] of a hinge beyond the speed at which it is held back
 
@@ -102,7 +102,7 @@ def _repair_stretch(
             repair=Repair(penalty_scale, fixed),
         )
         if violated.any():
-            penalty_scale = penalty_scale * _PENALTY_GROWTH
+            penalty_scale = penalty_scale * PENALTY_GROWTH
     return best
 
 
@@ -145,7 +145,7 @@ def violations(
     searched for in every `stride`-th frame and, where candidates are, in all."""
     poses = forward_kinematics(robot.tree, q)
     candidates = collisions_of(robot).candidates(poses, block, stride, _SEARCH_DISTANCE)
-    max_depth, max_sinking = (x * robot.rig.hip_height for x in (_MAX_DEPTH, _MAX_SINKING))
+    max_depth, max_sinking = (x * robot.rig.hip_height for x in (_MAX_DEPTH, MAX_SINKING))
     violated = exact_contacts_of(robot).depth(robot.to_qpos(q), candidates) > max_depth
     fast = np.abs(overspeed(robot, q, targets.frame_time)[:, block.dofs]).max(1, initial=0.0)
     violated[1:] |= fast > _MAX_OVERSPEED * targets.frame_time

@@ -9,10 +9,10 @@ frame of a stream is solved once with each frame that comes while it is free: fi
 import numpy as np
 from jaxtyping import Float
 
-MAX_SINKING = 0.009  # hip heights of a sole's point below the floor, as whole clips may sink
+from robots.solver.repair import PENALTY_GROWTH
+
 MAX_OVERSPEED = 2.0  # [rad/s] of a hinge beyond the speed at which it is held back
-_GROWTH = 3.0  # of the penalties' weights, from frame to frame
-_MOST = 27.0  # three times that: as often as a frame is solved
+_MOST = PENALTY_GROWTH**3  # as often as a frame is solved
 _SOUND = 0.5  # of that is what firmer walls may hold back: softer ones might not
 
 
@@ -31,5 +31,7 @@ class Firmness:
         """The frames are one later, the newest like the one before it. How far a wall gives way in
         them, over how far it may, makes it firmer beyond 1, and softer again below `_SOUND`."""
         scale = np.append(self.scale[1:], self.scale[-1])
-        scale *= np.where(strain > 1, _GROWTH, np.where(strain < _SOUND, 1 / _GROWTH, 1.0))
+        scale *= np.where(
+            strain > 1, PENALTY_GROWTH, np.where(strain < _SOUND, 1 / PENALTY_GROWTH, 1.0)
+        )
         self.scale = np.minimum(np.maximum(scale, 1.0), _MOST)

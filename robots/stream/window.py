@@ -7,11 +7,12 @@ from scipy.linalg.lapack import dposv
 
 from robots.model.morphology import Morphology
 from robots.solver.hinges import Posture
+from robots.solver.repair import MAX_SINKING
 from robots.solver.window_collision import WindowPoses
 from robots.solver.window_targets import FootTargets
 from robots.solver.window_terms import Terms
 from robots.stream.coupling import Coupling
-from robots.stream.firmness import MAX_OVERSPEED, MAX_SINKING, Firmness
+from robots.stream.firmness import MAX_OVERSPEED, Firmness
 from robots.stream.frame_targets import FrameTargets
 from robots.stream.prediction import TargetMotion
 
