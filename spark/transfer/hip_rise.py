@@ -62,6 +62,8 @@ def _beside_leg(motion: CanonicalMotion, leg: Standing) -> Float[np.ndarray, "T"
 
 
 def _upright(motion: CanonicalMotion, leg: Standing) -> Float[np.ndarray, "T"]:
-    """How far the hip joint is above the ankle, over how far it is in the T-pose; 0 to 1."""
+    """How far the hip joint is above the ankle, over how far it is in the T-pose; 0 to 1. A leg
+    without length is not upright."""
     hip, ankle = motion.rig.tpose_positions[list(leg.joints), 2]
-    return np.clip((leg.heights[:, 0] - leg.heights[:, 1]) / (hip - ankle), 0.0, 1.0)
+    above = leg.heights[:, 0] - leg.heights[:, 1]
+    return np.clip(above / max(hip - ankle, 1e-9), 0.0, 1.0)

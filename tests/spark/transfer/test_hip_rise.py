@@ -113,3 +113,18 @@ def test_a_body_of_its_own_keeps_its_path() -> None:
     source = posed(tilt=0.3, tiptoe=0.6, lift=1.0)
     moved = lock_feet(source, transfer(source, source.rig))
     np.testing.assert_allclose(moved.hips, source.hips, atol=1e-12)
+
+
+def test_a_source_whose_legs_have_no_length_says_nothing() -> None:
+    rig = stick_rig()
+    offsets = rig.skeleton.offsets.copy()
+    for side in ("left", "right"):
+        for part in ("lower_leg", "foot"):
+            offsets[joint(Role(f"{side}_{part}"))] = 0
+    flat = replace(rig, skeleton=replace(rig.skeleton, offsets=offsets))
+    source = to_canonical(standing(flat, FRAMES), flat)
+    moved = transfer(source, rig)
+    locked = lock_feet(source, moved)
+    assert np.isfinite(locked.rotations).all()
+    np.testing.assert_allclose(locked.hips[:, :2], moved.hips[:, :2], atol=1e-9)
+    assert np.isfinite(locked.hips).all()
