@@ -81,12 +81,12 @@ def schedule(
     exist = has_feet(paths)
     if exist.any():
         stands[:, exist] = planted_points(paths[:, exist], frame_time, rig.standing_height)
-    frames = max(1, round(MIN_DURATION / frame_time))
-    feet = _with_wobbles(_majority(stands, frames), paths, rig.standing_height, frame_time)
+    feet = _steady(stands, frame_time)
+    feet = _with_wobbles(feet, paths, rig.standing_height, frame_time)
     floating = _nothing_holds(feet, parts)
     floating[flight] = False
     feet[floating] |= _creeping(source, paths, exist)[floating]
-    return Schedule(_majority(feet, frames), parts, rests, roles, flight, acceleration)
+    return Schedule(_steady(feet, frame_time), parts, rests, roles, flight, acceleration)
 
 
 def has_feet(paths: Float[np.ndarray, "T S 2 3"]) -> Bool[np.ndarray, "S"]:
@@ -135,9 +135,8 @@ def _touching_parts(
     speed = np.linalg.norm(derivative(paths, frame_time, 1, _WINDOW), axis=-1) / scale
     height -= WRIST_HEIGHT * np.array([role.part == "hand" for role in joints])
     slow = speed < REST_SPEED
-    frames = max(1, round(MIN_DURATION / frame_time))
-    touches = _majority((height < TOUCH_HEIGHT) | ((height < REST_HEIGHT) & slow), frames)
-    stays = _majority(touches & (speed < ROLL_SPEED), frames) & touches
+    touches = _steady((height < TOUCH_HEIGHT) | ((height < REST_HEIGHT) & slow), frame_time)
+    stays = _steady(touches & (speed < ROLL_SPEED), frame_time) & touches
     return tuple(joints), touches, _runs_with(stays, slow)
 
 
@@ -176,6 +175,8 @@ def touching_joint(rig: Rig, role: Role) -> int | None:
     return rig.chest if role is Role.SPINE else rig.roles.joint(role)
 
 
-def _majority(mask: Bool[np.ndarray, "T *n"], frames: int) -> Bool[np.ndarray, "T *n"]:
-    """Over a short window: without flicker."""
+def _steady(mask: Bool[np.ndarray, "T *n"], frame_time: float) -> Bool[np.ndarray, "T *n"]:
+    """Without flicker: what most of the frames say over `MIN_DURATION`. They are an odd number, as
+    many before as after; of an even one half is no majority, and contacts lose their ends."""
+    frames = 2 * round(MIN_DURATION / frame_time / 2) + 1
     return uniform_filter1d(mask.astype(np.float64), frames, axis=0, mode="nearest") > 0.5

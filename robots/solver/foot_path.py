@@ -13,6 +13,7 @@ from scipy.ndimage import median_filter
 from robots.model.morphology import Morphology
 from robots.solver.footprints import FootPlan, on_points, on_prints
 from robots.solver.holds import Holds
+from robots.solver.settling import settled
 from spark.runs import true_runs
 from spark.transfer.footfalls import between_contacts
 
@@ -24,7 +25,8 @@ RAISED_HOLD = np.array([1.0, 1.0, 0.3])  # a standing foot's raised end turns ab
 # skate faster than 0.22 and lower than 0.028.
 STEP_SPEEDS = (0.2, 0.3, 0.6)
 STEP_HEIGHTS = (0.0, 0.03, 0.033)
-SWING_SPAN, STAND_SPAN = 0.05, 0.02  # [s] before and after a frame for a foot's speed
+SPEED_SPAN = 0.025  # [s] before and after a frame for a foot's speed
+SETTLE = 0.1  # [s] before and after a contact in which a foot already stays, ever less
 MIN_CREEP = 0.08  # [s], half of which a standing foot has to move for before it is lifted
 LET_DOWN = 0.15  # [s] within which a foot comes down that is in the air where its contact begins
 # Hip heights above the floor at which a foot may stand on it: skeletons and recorded floors are off
@@ -36,16 +38,16 @@ _ON_FLOOR = 1e-3  # [m]
 def footing_of(robot: Morphology, plan: FootPlan) -> Holds:
     """Where the points of a planned foot's sole are held."""
     stands = plan.stands
-    offset = plan.prints - np.column_stack([plan.toe, plan.heading])
+    toe, copied_toe = np.column_stack([plan.toe, plan.heading]), plan.toe @ [1, 1j]
+    offset = plan.prints - toe
     offset[:, 2] = np.remainder(offset[:, 2] + np.pi, 2 * np.pi) - np.pi
-    offset = between_contacts(offset, stands, plan.toe)
-    turn = np.exp(1j * offset[:, 2])
-    pivot = (plan.toe[:, 0] + offset[:, 0]) + 1j * (plan.toe[:, 1] + offset[:, 1])
+    way = toe + between_contacts(offset, stands, plan.toe)
+    way = settled(way, stands, plan.frame_time, SETTLE)
+    pivot, heading = way[:, 0] + 1j * way[:, 1], way[:, 2]
+    turn = np.exp(1j * (heading - plan.heading))[:, None]
     copied = plan.points[..., 0] + 1j * plan.points[..., 1]
-    own = pivot[:, None] + turn[:, None] * (
-        copied - (plan.toe[:, 0] + 1j * plan.toe[:, 1])[:, None]
-    )
-    flat = on_prints(plan.flat, pivot, plan.heading + offset[:, 2])
+    own = pivot[:, None] + turn * (copied - copied_toe[:, None])
+    flat = on_prints(plan.flat, pivot, heading)
     pitched = plan.points[..., 2] - plan.points[..., 2].min(axis=1, keepdims=True)
     on = on_points(plan.sole, plan.contacts.T.astype(np.float64)).T > 0
     low = np.where(stands[:, None], on, pitched < STEP_HEIGHTS[1] * plan.hip_height)
@@ -83,16 +85,17 @@ def _height(
     clearance = clearance - _fading(drop, stands, reach)
     away = 1 - np.minimum(_fading(stands * 1.0, stands, reach), 1.0)
     pivot = (plan.toe[:, 0] + 1j * plan.toe[:, 1])[:, None]
-    pace = _speed(pivot, np.ones_like(low[:, :1]), plan.frame_time, SWING_SPAN) / plan.hip_height
+    pace = _speed(pivot, np.ones_like(low[:, :1]), plan.frame_time, SPEED_SPAN) / plan.hip_height
     steps = np.interp(pace, [STEP_SPEEDS[0], STEP_SPEEDS[-1]], [0.0, 1.0])
     uneven = away * steps * np.minimum(ground, MAX_UNEVEN * plan.hip_height)
     height = np.where(stands, 0.0, clearance + uneven + plan.lift)
-    standing, swinging = (
-        _speed(points, low, plan.frame_time, span) for span in (STAND_SPAN, SWING_SPAN)
-    )
+    speed = _speed(points, low, plan.frame_time, SPEED_SPAN)
     creep = max(1, round(MIN_CREEP / plan.frame_time))
-    standing = median_filter(standing, creep, mode="nearest")
-    return np.maximum(height, step_height(np.where(stands, standing, swinging), plan.hip_height))
+    for start, stop in true_runs(stands):
+        own = slice(start, stop)  # how it comes and leaves is no creep
+        standing = _speed(points[own], low[own], plan.frame_time, SPEED_SPAN)
+        speed[own] = median_filter(standing, creep, mode="nearest")
+    return np.maximum(height, step_height(speed, plan.hip_height))
 
 
 def step_height(speed: Float[np.ndarray, "*n"], hip_height: float) -> Float[np.ndarray, "*n"]:

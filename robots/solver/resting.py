@@ -6,11 +6,11 @@ that the trunk comes to where its arms can reach the ground.
 """
 
 import numpy as np
-from jaxtyping import Bool, Float
-from scipy.ndimage import distance_transform_edt
+from jaxtyping import Bool
 
 from robots.model.morphology import Morphology
 from robots.solver.holds import Holds, joined
+from robots.solver.settling import around, settled
 from robots.solver.targets import Targets
 from robots.solver.touching import Touch, touches_of
 from robots.tree import Coordinates, LinkPoses, forward_kinematics
@@ -56,25 +56,14 @@ def _held(
         place = path.mean(axis=0) + beyond(path, MAX_ROLL * robot.rig.hip_height)
         offset[start:stop, :2] = place - path
     offset[:, :2] = between_contacts(offset[:, :2], rests, now[:2].T)
-    offset[:, :2] = settled(offset[:, :2] + now[:2].T, rests, targets.frame_time) - now[:2].T
+    offset[:, :2] = (
+        settled(offset[:, :2] + now[:2].T, rests, targets.frame_time, SETTLE) - now[:2].T
+    )
     lift = -touch.lowest(poses)
     offset[:, 2] = between_contacts(lift[:, None], touches, now[:2].T)[:, 0]
-    along, up = (HOLD * _around(mask, targets.frame_time, APPROACH) for mask in (rests, touches))
+    along, up = (HOLD * around(mask, targets.frame_time, APPROACH) for mask in (rests, touches))
     shares = np.stack([along, along, up])
     return Holds(np.array([touch.link]), touch.place[None], (now + offset.T)[None], shares[None])
-
-
-def settled(
-    path: Float[np.ndarray, "T 2"], rests: Bool[np.ndarray, "T"], frame_time: float
-) -> Float[np.ndarray, "T 2"]:
-    """A path that comes to where it rests a little before it does, and leaves a little after: at
-    the speed at which the source's comes to rest, a robot's arm would slide on."""
-    if not rests.any():
-        return path
-    nearest = distance_transform_edt(~rests, return_distances=False, return_indices=True)[0]
-    stays = _around(rests, frame_time, SETTLE)[:, None]
-    settled: Float[np.ndarray, "T 2"] = stays * path[nearest] + (1 - stays) * path
-    return settled
 
 
 def _carried(
@@ -85,15 +74,3 @@ def _carried(
     center = robot.centers[shoulder]
     positions = (poses.point(link, center) + held.positions[0] - touch.path(poses))[None]
     return Holds(np.array([link]), center[None], positions, CARRIED_HOLD * held.shares)
-
-
-def _around(
-    mask: Bool[np.ndarray, "T"], frame_time: float, seconds: float
-) -> Float[np.ndarray, "T"]:
-    """1 where the mask holds, fading (a smoothstep) within so many seconds before and after."""
-    if not mask.any():
-        return np.zeros(len(mask))
-    away = distance_transform_edt(~mask) * frame_time / seconds
-    share = np.clip(1.0 - away, 0.0, 1.0)
-    faded: Float[np.ndarray, T] = share**2 * (3 - 2 * share)
-    return faded

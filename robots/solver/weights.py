@@ -19,7 +19,7 @@ W_ROTATION = {  # [1/rad] of a part by its role; low where the directions of lim
 }
 W_OTHER_ROTATION = 0.08  # [1/rad] of the rest: the twist of limbs
 W_HIPS_POSITION = np.array([6.0, 6.0, 6.0])  # [1/m] of their path: 1 cm is 2 degrees of a limb
-W_COM_ACCELERATION = 0.35  # [s²/m] of the planned centre of mass: 1 m/s² is 10 degrees of a limb
+W_COM_ACCELERATION = 0.42  # [s²/m] of the planned centre of mass: 1 m/s² is 12 degrees of a limb
 W_HOLD = np.array(
     [22.0, 22.0, 18.0]
 )  # [1/m] of a point held, as a standing sole's: 1 cm is 6 degrees

@@ -29,13 +29,13 @@ FRAME_TIME = 1 / 60
 TIME = FRAME_TIME * np.arange(240)
 
 
-def stands(path: np.ndarray) -> np.ndarray:
+def stands(path: np.ndarray, frame_time: float = FRAME_TIME) -> np.ndarray:
     """[T] whether the left foot of a body at rest stands, whose sole is shifted along `path` [m];
     the right one stays."""
     rig = sample_rig("walker")
     rotations = np.tile([1.0, 0, 0, 0], (len(path), len(rig.skeleton), 1))
     hips = np.tile([0.0, 0, rig.hip_height], (len(path), 1))
-    source = CanonicalMotion(rig, FRAME_TIME, rotations, hips, 0.0)
+    source = CanonicalMotion(rig, frame_time, rotations, hips, 0.0)
     paths = np.zeros((len(path), 2, 2, 3))
     paths[:, :, 1, 0] = 0.2
     paths[:, 0, :, 1], paths[:, 1, :, 1] = 0.1, -0.1
@@ -68,6 +68,18 @@ def test_a_step_is_a_step(way: float, around: float, lift: float) -> None:
     assert found[:84].all()
     assert found[-84:].all()
     assert not found[90:108].all()
+
+
+@pytest.mark.parametrize("rate", [24, 30, 50, 60, 120])
+def test_a_contact_is_found_alike_at_both_its_ends(rate: int) -> None:
+    """The foot stands for half a second between two steps: played backwards, at the same times."""
+    time = np.arange(-rate, rate + 1) / rate
+    away = np.maximum(np.abs(time) - 0.25, 0.0)
+    path = np.stack([np.sign(time) * away, np.zeros_like(away), np.minimum(away, 0.1)], axis=1)
+    found = stands(path, 1 / rate)
+    np.testing.assert_array_equal(found, found[::-1])
+    assert found[np.abs(time) < 0.2].all()
+    assert not found[np.abs(time) > 0.35].any()
 
 
 def kicking(thigh: float, shank: float) -> CanonicalMotion:

@@ -46,3 +46,18 @@ def test_where_no_step_is_taken_all_is_ground_that_feet_stand_on() -> None:
     plan.clearance[:] = raised + np.where(plan.stands, 0.0, 0.12 * plan.hip_height)
     lowest = footing_of(ember, plan).positions[:, 2].min(axis=0)
     np.testing.assert_allclose(lowest, plan.clearance - raised, atol=1e-9)
+
+
+@pytest.mark.parametrize("seconds", [0.08, 0.15, 0.4])
+def test_a_foot_is_down_from_the_first_frame_that_it_stands_to_the_last(seconds: float) -> None:
+    """Whatever its speed before and after: it comes at 2 m/s, and leaves so."""
+    ember, plan = planned()
+    time = plan.frame_time * (np.arange(len(plan.toe)) - len(plan.toe) // 2)
+    stands = np.abs(time) < seconds / 2
+    along = 2.0 * np.sign(time) * np.maximum(np.abs(time) - seconds / 2, 0.0)
+    plan.points[..., 0] += (along - plan.toe[:, 0])[:, None]
+    plan.toe[:, 0], plan.contacts[:] = along, stands[:, None]
+    plan.prints[:] = np.column_stack([np.zeros(len(time)), plan.toe[:, 1], plan.heading])
+    plan.prints[stands, 1:] = plan.prints[stands, 1:].mean(axis=0)
+    lowest = footing_of(ember, plan).positions[:, 2].min(axis=0)
+    np.testing.assert_array_equal(lowest[stands], 0.0)

@@ -9,7 +9,6 @@ from robots.metrics import measure
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.registry import find
-from robots.solver.resting import SETTLE, settled
 from robots.solver.solve import copy, retarget
 from robots.solver.targets import targets_of
 from robots.solver.touching import touches_of
@@ -119,29 +118,6 @@ def test_hands_and_knees_stay_where_they_are_while_the_body_sways(ember: Morphol
     assert found.rests_in_air == 0
     assert found.rests_slide_m_s is not None
     assert found.rests_slide_m_s < 0.02
-
-
-@pytest.mark.parametrize("times", [[False] * 9, [True] * 9])
-def test_a_part_that_rests_never_or_always_keeps_its_path(times: list[bool]) -> None:
-    path = np.random.default_rng(0).normal(size=(9, 2))
-    np.testing.assert_array_equal(settled(path, np.array(times), 1 / 60), path)
-
-
-@pytest.mark.parametrize("rate", [30, 60, 120])
-def test_a_part_is_slow_already_as_it_comes_to_rest(rate: int) -> None:
-    """It comes at 1 m/s, lies for .5 s, and leaves at 1 m/s; long before and after it is free."""
-    time = np.arange(2 * rate) / rate
-    rests = (time >= 0.75) & (time < 1.25)
-    along = np.minimum(time, 0.75) + np.maximum(time, 1.25) - 1.25
-    path = np.stack([along, np.zeros_like(along)], axis=1)
-    path[rests] = path[np.flatnonzero(rests)[0]]
-    found = settled(path, rests, 1 / rate)
-    np.testing.assert_array_equal(found[rests], path[rests])
-    free = np.abs(time - 1.0) > 0.25 + SETTLE + 1 / rate
-    np.testing.assert_allclose(found[free], path[free], atol=1e-12)
-    steps = np.linalg.norm(np.diff(found, axis=0), axis=1) * rate
-    first, last = np.flatnonzero(rests)[[0, -1]]
-    assert steps[[first - 1, last]].max() < 0.25  # from 1 m/s
 
 
 def test_a_back_lies_on_the_ground(ember: Morphology) -> None:

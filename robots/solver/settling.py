@@ -1,0 +1,37 @@
+"""What comes to rest does so a little before it rests, and leaves a little after.
+
+At the speed at which a person's foot or hand comes to the ground, a robot's, which is larger and
+can't stop as short, would slide on.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.ndimage import distance_transform_edt
+
+
+def settled(
+    path: Float[np.ndarray, "T D"],
+    rests: Bool[np.ndarray, "T"],
+    frame_time: float,
+    seconds: float,
+) -> Float[np.ndarray, "T D"]:
+    """A path that within so many seconds before a rest comes to where that begins, and leaves from
+    where it ends, ever more slowly; as it was where it never rests."""
+    if not rests.any():
+        return path
+    nearest = distance_transform_edt(~rests, return_distances=False, return_indices=True)[0]
+    stays = around(rests, frame_time, seconds)[:, None]
+    settled: Float[np.ndarray, "T D"] = stays * path[nearest] + (1 - stays) * path
+    return settled
+
+
+def around(
+    mask: Bool[np.ndarray, "T"], frame_time: float, seconds: float
+) -> Float[np.ndarray, "T"]:
+    """1 where the mask holds, fading (a smoothstep) within so many seconds before and after."""
+    if not mask.any():
+        return np.zeros(len(mask))
+    away = distance_transform_edt(~mask) * frame_time / seconds
+    share = np.clip(1.0 - away, 0.0, 1.0)
+    faded: Float[np.ndarray, T] = share**2 * (3 - 2 * share)
+    return faded
