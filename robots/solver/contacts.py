@@ -33,6 +33,7 @@ MIN_DURATION = 0.08  # contacts and breaks shorter than this [s] are noise
 STAY_REACH = 0.03  # [m, of an adult] along the floor that a point may tremble without a step,
 STAY_LIFT = 0.015  # and up from it,
 STAY_TIME = 0.4  # [s] for that long
+CREEP_TIME = 0.1  # [s] over which the slowest and lowest is told: weight goes over no sooner
 MAX_CREEP = 0.6  # [m/s, of an adult] of a foot that stands because nothing else does
 FLIGHT_PUSH = 0.35  # [body weights] of push below which nothing holds the body up
 TOUCH_HEIGHT = 0.03  # [m, of an adult] between the floor and the flesh of a part that touches,
@@ -158,15 +159,13 @@ def _creeping(
     out = np.zeros(paths.shape[:-1], dtype=bool)
     if not exist.any():
         return out
-    scale = source.rig.standing_height / ADULT_HEIGHT
-    slowness = speeds(paths, source.frame_time) / (PLANTED_SPEED * scale)
-    own = paths[:, exist]
-    height = own[..., 2] - standing_heights(own, source.rig.standing_height)
-    cost = np.full(slowness.shape, np.inf)
-    cost[:, exist] = slowness[:, exist] + height / (PLANTED_HEIGHT * scale)
-    frames, best = np.arange(len(paths)), cost.reshape(len(paths), -1).argmin(axis=1)
-    slow = slowness.reshape(len(paths), -1)[frames, best] < MAX_CREEP / PLANTED_SPEED
-    out.reshape(len(paths), -1)[frames[slow], best[slow]] = True
+    own, size = paths[:, exist], source.rig.standing_height
+    slowness = speeds(own, source.frame_time) / (PLANTED_SPEED * size / ADULT_HEIGHT)
+    height = (own[..., 2] - standing_heights(own, size)) / (PLANTED_HEIGHT * size / ADULT_HEIGHT)
+    window = _odd(CREEP_TIME, source.frame_time)
+    cost = uniform_filter1d(slowness + height, window, axis=0, mode="nearest")
+    best = cost == cost.min(axis=(1, 2), keepdims=True)
+    out[:, exist] = best & (slowness < MAX_CREEP / PLANTED_SPEED)
     return out
 
 
@@ -176,7 +175,12 @@ def touching_joint(rig: Rig, role: Role) -> int | None:
 
 
 def _steady(mask: Bool[np.ndarray, "T *n"], frame_time: float) -> Bool[np.ndarray, "T *n"]:
-    """Without flicker: what most of the frames say over `MIN_DURATION`. They are an odd number, as
-    many before as after; of an even one half is no majority, and contacts lose their ends."""
-    frames = 2 * round(MIN_DURATION / frame_time / 2) + 1
+    """Without flicker: what most of the frames say over `MIN_DURATION`."""
+    frames = _odd(MIN_DURATION, frame_time)
     return uniform_filter1d(mask.astype(np.float64), frames, axis=0, mode="nearest") > 0.5
+
+
+def _odd(seconds: float, frame_time: float) -> int:
+    """About so long [frames]: as many before a frame as after. Of an even number one half is no
+    majority, and contacts would lose their ends."""
+    return 2 * round(seconds / frame_time / 2) + 1
