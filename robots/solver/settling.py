@@ -8,6 +8,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import distance_transform_edt
 
+from spark.runs import true_runs
+
+SHARE = 1 / 3  # of the time between two rests, at most, in which what rested stays
+
 
 def settled(
     path: Float[np.ndarray, "T D"],
@@ -16,17 +20,22 @@ def settled(
     seconds: float,
 ) -> Float[np.ndarray, "T D"]:
     """A path that within so many seconds before a rest comes to where that begins, and leaves from
-    where it ends, ever more slowly; as it was where it never rests."""
+    where it ends, ever more slowly; as it was where it never rests. Short ways between two rests
+    are left most of their time: a shuffle is no leap."""
     if not rests.any():
         return path
     nearest = distance_transform_edt(~rests, return_distances=False, return_indices=True)[0]
-    stays = around(rests, frame_time, seconds)[:, None]
+    reach = np.full(len(path), seconds)
+    for start, stop in true_runs(~rests):
+        if start and stop < len(path):
+            reach[start:stop] = min(seconds, (stop - start) * frame_time * SHARE)
+    stays = around(rests, frame_time, reach)[:, None]
     settled: Float[np.ndarray, "T D"] = stays * path[nearest] + (1 - stays) * path
     return settled
 
 
 def around(
-    mask: Bool[np.ndarray, "T"], frame_time: float, seconds: float
+    mask: Bool[np.ndarray, "T"], frame_time: float, seconds: float | Float[np.ndarray, "T"]
 ) -> Float[np.ndarray, "T"]:
     """1 where the mask holds, fading (a smoothstep) within so many seconds before and after."""
     if not mask.any():

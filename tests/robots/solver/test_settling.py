@@ -30,3 +30,13 @@ def test_a_part_is_slow_already_as_it_comes_to_rest(rate: int, seconds: float) -
     steps = np.linalg.norm(np.diff(found, axis=0), axis=1) * rate
     first, last = np.flatnonzero(rests)[[0, -1]]
     assert steps[[first - 1, last]].max() < 0.25  # from 1 m/s
+
+
+def test_a_short_way_between_two_rests_is_left_a_third_of_its_time() -> None:
+    """Six frames of a shuffle: no faster than three times its speed."""
+    rests = np.ones(60, dtype=bool)
+    rests[27:33] = False
+    path = np.interp(np.arange(60), [26, 33], [0.0, 0.07])[:, None]
+    steps = np.diff(settled(path, rests, 1 / 60, 0.1)[:, 0])
+    assert steps.min() >= 0
+    assert steps.max() < 3 * 0.01
