@@ -50,18 +50,28 @@ class NormalEquations:
             for here2, there2 in runs:
                 self.H[:, there, there2] += H[:, here, here2]
 
-    def add_at(
+    def add_pushes(
         self,
         frames: Int[np.ndarray, "S"],
         dofs: Sequence[int],
-        J: Float[np.ndarray, "C S"],
-        residuals: Float[np.ndarray, "S"],
+        twists: Float[np.ndarray, "S C 6"],
+        wrenches: Float[np.ndarray, "S 6 M"],
+        residuals: Float[np.ndarray, "M S"],
     ) -> None:
-        """One weighted residual in S of the frames, and its Jacobian by C of the dofs."""
-        self.cost[frames] += 0.5 * residuals**2
-        at = np.asarray(dofs)
-        self.g[frames[:, None], at] += (J * residuals).T
-        self.H[frames[:, None, None], at[:, None], at] += np.einsum("cs,ds->scd", J, J)
+        """M weighted residuals in S of the frames, all of one body that C of the dofs move by
+        `twists` (`robots.residuals.twists`): the Jacobian of each is the twists times its wrench,
+        so that however many there are, a product of 6 x 6 says it all."""
+        self.cost[frames] += 0.5 * np.einsum("ms,ms->s", residuals, residuals)
+        if not self.with_jacobian:
+            return
+        across = twists.transpose(0, 2, 1)
+        H = twists @ (wrenches @ wrenches.transpose(0, 2, 1)) @ across
+        g = (twists @ (wrenches @ residuals.T[:, :, None]))[:, :, 0]
+        runs = _runs(dofs)
+        for here, there in runs:
+            self.g[frames, there] += g[:, here]
+            for here2, there2 in runs:
+                self.H[frames, there, there2] += H[:, here, here2]
 
     def add_diagonal(
         self, J: Float[np.ndarray, "T D"], residuals: Float[np.ndarray, "T D"]

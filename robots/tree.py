@@ -65,6 +65,10 @@ class Tree:
         """The number of dofs (MuJoCo's nv)."""
         return BASE + int(np.where(self.balls, 3, 1).sum())
 
+    def anchor(self, link: int) -> Float[np.ndarray, "3"]:
+        """Of a link's joint, or the base's place, in the rest pose [m]."""
+        return self.base if link < 0 else self.anchors[link]
+
     def limits_within(self, margin: float) -> tuple[Float[np.ndarray, "N"], Float[np.ndarray, "N"]]:
         """Lower and upper limits drawn in by `margin` [rad], or by 1/20 of a small range."""
         with np.errstate(invalid="ignore"):
@@ -198,13 +202,12 @@ class LinkPoses:
 
     def point(self, link: int, rest: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 T"]:
         """The path [m] of a point of a link, given where it is in the rest pose [m, world]."""
-        anchor = self.tree.base if link < 0 else self.tree.anchors[link]
-        return self.positions[link] + self.direction(link, rest - anchor)
+        return self.positions[link] + self.direction(link, rest - self.tree.anchor(link))
 
     def heights(self, link: int, rest: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "P T"]:
         """How high [m] some points of a link are."""
-        anchor = self.tree.base if link < 0 else self.tree.anchors[link]
-        return self.positions[link][2] + (rest - anchor) @ self.rotations[link][2]
+        arms = rest - self.tree.anchor(link)
+        return self.positions[link][2] + arms @ self.rotations[link][2]
 
     def direction(self, link: int, rest: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 T"]:
         """A direction that is fixed in a link, given in the rest pose's world."""
@@ -254,8 +257,8 @@ def forward_kinematics(tree: Tree, q: Coordinates) -> LinkPoses:
     sin, cos = np.sin(q.angles.T), np.cos(q.angles.T)
     for j, parent in enumerate(tree.parents.tolist()):
         above = rotations[parent]
-        anchor = tree.base if parent < 0 else tree.anchors[parent]
-        positions[j] = positions[parent] + _apply(above, tree.anchors[j] - anchor)
+        arm = tree.anchors[j] - tree.anchor(parent)
+        positions[j] = positions[parent] + _apply(above, arm)
         if tree.balls[j]:
             assert q.ball_quats is not None
             local = np.moveaxis(matrix_from_quat(q.ball_quats[:, j]), 0, -1)

@@ -13,15 +13,15 @@ from jaxtyping import Float, Int
 from robots.least_squares import NormalEquations
 from robots.model.morphology import Morphology
 from robots.model.shapes import DIRECTIONS
-from robots.residuals import one_sided
+from robots.residuals import one_sided, twists
 from robots.solver.block import Block
-from robots.solver.hulls import Shape, ShapePair, can_collide, shapes_of
-from robots.tree import LinkPoses, Tree, forward_kinematics
+from robots.solver.hulls import Shape, ShapePair, can_collide, shapes_of, signed_distance
+from robots.tree import LinkPoses, Tree, cross, forward_kinematics
 
 DEPTH_ROUNDING = 0.003  # [m] over which the penalty of their depth sets in
+FELT = 3  # roundings of distance beyond which a residual is not worth its time
 SEARCH_DISTANCE = 0.02  # [m] between shapes within which a pair is a candidate
 _ONE_JOINT = 0.05  # hip heights between hinges that turn about one point
-_PAIRS = len(DIRECTIONS) // 2  # a direction and the one against it, as many from the end
 
 Moves = tuple[tuple[int, ...], tuple[int, ...]]
 """The free joints that move a pair's small shape but not the large one, and the reverse."""
@@ -37,6 +37,29 @@ class Candidate:
     spheres: Int[np.ndarray, "N"]
     moves: Moves
     frames: Int[np.ndarray, "S"]
+
+    def links(self, tree: Tree) -> set[int]:
+        """The links whose poses tell how the two move against each other."""
+        joints = self.moves[0] + self.moves[1]
+        parents = {int(tree.parents[j]) for j in joints}
+        return {self.pair.small.link, self.pair.large.link, *joints} | parents
+
+    def add_to(
+        self,
+        normal: NormalEquations,
+        poses: LinkPoses,
+        block: Block,
+        frames: Int[np.ndarray, "N"],
+        wrenches: Float[np.ndarray, "N 6 M"],
+        residuals: Float[np.ndarray, "M N"],
+    ) -> None:
+        """Add residuals that grow where the small shape, pushed by `wrenches` about its link's
+        anchor, is moved against them, or the large one with them; `poses` are those of `frames`."""
+        about = poses.positions[self.pair.small.link]
+        moved = twists(poses, self.moves[0] + self.moves[1], about, base=False)
+        moved[:, : len(poses.tree.dofs(self.moves[0]))] *= -1.0
+        dofs = block.local_joint_dofs(self.moves[0] + self.moves[1])
+        normal.add_pushes(frames, dofs, moved, wrenches, residuals)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,33 +144,29 @@ class Collisions:
             pair, at = candidate.pair, candidate.frames
             spheres = pair.small.spheres[candidate.spheres]
             local = _in_large_shape(self.tree, poses, pair, spheres, at)
-            distance = _signed_distance(pair.large, local)
+            distance = signed_distance(pair.large, local)
             excess = pair.clearance + pair.small.radii[candidate.spheres, None] - distance
-            joints = (*candidate.moves[0], *candidate.moves[1])
-            links = {pair.small.link, pair.large.link, *joints}
-            links |= {int(self.tree.parents[j]) for j in joints}
-            dofs = block.local_joint_dofs(joints)
-            for s, sphere in enumerate(spheres):
-                active = np.flatnonzero(excess[s] > -3 * DEPTH_ROUNDING)
-                if not len(active):
-                    continue
-                here = at[active]
-                residual, slope = one_sided(excess[s, active], DEPTH_ROUNDING / penalty_scale[here])
-                scaled = weight * penalty_scale[here]
-                if not normal.with_jacobian:
-                    normal.cost[here] += 0.5 * (scaled * residual) ** 2
-                    continue
-                touched = poses.at(here, links)
-                beyond = DIRECTIONS @ local[:, s, active] - pair.large.reach[:, None]
-                side_here = DIRECTIONS[beyond.argmax(0)].T
-                push = np.einsum("ijt,jt->it", touched.rotations[pair.large.link], side_here)
-                point = touched.point(pair.small.link, sphere)
-                J = [
-                    approach_jacobian(touched, moves, point, sign * push)
-                    for moves, sign in zip(candidate.moves, (-1.0, 1.0), strict=True)
-                    if moves
-                ]
-                normal.add_at(here, dofs, np.concatenate(J) * slope * scaled, residual * scaled)
+            felt = excess > -FELT * DEPTH_ROUNDING
+            active = felt.any(axis=0)
+            if not active.any():
+                continue
+            here, felt = at[active], felt[:, active]
+            scaled = weight * penalty_scale[here]
+            depth, slope = one_sided(excess[:, active], DEPTH_ROUNDING / penalty_scale[here])
+            residuals = np.where(felt, scaled * depth, 0.0)
+            if not normal.with_jacobian:
+                normal.cost[here] += 0.5 * (residuals**2).sum(0)
+                continue
+            touched = poses.at(here, candidate.links(self.tree))
+            s, t = np.nonzero(felt)
+            beyond = DIRECTIONS @ local[:, :, active][:, s, t] - pair.large.reach[:, None]
+            side = DIRECTIONS[beyond.argmax(0)].T
+            push = _turned(touched.rotations[pair.large.link][..., t], side)
+            rest = (spheres - self.tree.anchor(pair.small.link))[s].T
+            arm = _turned(touched.rotations[pair.small.link][..., t], rest)
+            wrenches = np.zeros((len(here), 6, len(spheres)))
+            wrenches[t, :, s] = ((scaled * slope)[s, t] * wrench(arm, push)).T
+            candidate.add_to(normal, touched, block, here, wrenches, residuals)
 
 
 def _in_large_shape(
@@ -159,13 +178,11 @@ def _in_large_shape(
 ) -> Float[np.ndarray, "3 S N"]:
     """Where points of the small shape are in some frames, in the rest pose of the large one [m]."""
     a, b = pair.small.link, pair.large.link
-    anchor_a = tree.base if a < 0 else tree.anchors[a]
-    anchor_b = tree.base if b < 0 else tree.anchors[b]
     R_b = poses.rotations[b][..., at]
     relative = np.einsum("jit,jkt->ikt", R_b, poses.rotations[a][..., at])
     offset = np.einsum("jit,jt->it", R_b, poses.positions[a][:, at] - poses.positions[b][:, at])
-    local = (points - anchor_a) @ relative
-    local += (offset + anchor_b[:, None])[:, None]
+    local = (points - tree.anchor(a)) @ relative
+    local += (offset + tree.anchor(b)[:, None])[:, None]
     return local
 
 
@@ -177,29 +194,23 @@ def _distance(
     at: Int[np.ndarray, "N"],
 ) -> Float[np.ndarray, "S N"]:
     """The signed distance [m] of points of the small shape from the large one in some frames."""
-    return _signed_distance(pair.large, _in_large_shape(tree, poses, pair, points, at))
+    return signed_distance(pair.large, _in_large_shape(tree, poses, pair, points, at))
 
 
-def _signed_distance(shape: Shape, points: Float[np.ndarray, "3 S N"]) -> Float[np.ndarray, "S N"]:
-    """The signed distance [m] of points from a shape, both in its rest pose: the maximum over its
-    sides, which come in opposite pairs; the distance from the middle of a pair gives both."""
-    towards, away = shape.reach[_PAIRS:], shape.reach[_PAIRS - 1 :: -1]
-    excess = DIRECTIONS[_PAIRS:] @ points.reshape(3, -1)
-    excess -= (towards - away)[:, None] / 2
-    np.abs(excess, out=excess)
-    excess -= (towards + away)[:, None] / 2
-    return excess.max(0).reshape(points.shape[1:])
+def _turned(
+    rotations: Float[np.ndarray, "3 3 N"], vectors: Float[np.ndarray, "3 N"]
+) -> Float[np.ndarray, "3 N"]:
+    return np.einsum("ijn,jn->in", rotations, vectors)
 
 
-def approach_jacobian(
-    poses: LinkPoses,
-    joints: tuple[int, ...],
-    point: Float[np.ndarray, "3 N"],
-    along: Float[np.ndarray, "3 N"],
-) -> Float[np.ndarray, "C N"]:
-    """The Jacobian of a point's coordinate along a unit vector [m] by some joints' dofs."""
-    jacobian = poses.point_jacobian(joints, poses.angular_jacobian(joints), point)
-    return (jacobian * along).sum(1)
+def wrench(
+    arm: Float[np.ndarray, "3 N"], push: Float[np.ndarray, "3 N"]
+) -> Float[np.ndarray, "6 N"]:
+    """Of a push along a vector at the end of an arm: arm x push, and the push."""
+    out = np.empty((6, arm.shape[1]))
+    cross(arm, push, out[:3])
+    out[3:] = push
+    return out
 
 
 @lru_cache(maxsize=16)

@@ -22,6 +22,7 @@ _MAX_PROTRUSION = (
     0.006  # [m] of a shape's corner beyond its spheres: above, it gets one of its own,
 )
 _CORNER_RADIUS = 0.008  # [m] of this radius
+_PAIRS = len(DIRECTIONS) // 2  # a direction and the one against it, as many from the end
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +125,17 @@ def _with_corners(
         spheres = np.concatenate([spheres, [corner - _CORNER_RADIUS * DIRECTIONS[side]]])
         radii = np.append(radii, _CORNER_RADIUS)
     return spheres, radii
+
+
+def signed_distance(shape: Shape, points: Float[np.ndarray, "3 S N"]) -> Float[np.ndarray, "S N"]:
+    """The signed distance [m] of points from a shape, both in its rest pose: the maximum over its
+    sides, which come in opposite pairs; the distance from the middle of a pair gives both."""
+    towards, away = shape.reach[_PAIRS:], shape.reach[_PAIRS - 1 :: -1]
+    excess = DIRECTIONS[_PAIRS:] @ points.reshape(3, -1)
+    excess -= (towards - away)[:, None] / 2
+    np.abs(excess, out=excess)
+    excess -= (towards + away)[:, None] / 2
+    return excess.max(0).reshape(points.shape[1:])
 
 
 def can_collide(mjcf: Mjcf, a: Shape, b: Shape) -> bool:
