@@ -187,9 +187,10 @@ class Smoothness:
 @dataclass(frozen=True, eq=False)
 class PointAcceleration:
     """A weighted residual r of a point's second differences, and w times its Jacobian by the dofs:
-    r at t changes with the steps at t, t + 1 and t + 2 as the second difference of J step does."""
+    r at t changes with the steps at t, t + 1 and t + 2 as the second difference of J step does. J
+    is empty where only the cost counts."""
 
-    J: Float[np.ndarray, "T D 3"]
+    J: Float[np.ndarray, "_ D 3"]
     residual: Float[np.ndarray, "A 3"]
 
     def add_to(self, band: Float[np.ndarray, "_ T D"]) -> Float[np.ndarray, "T D"]:

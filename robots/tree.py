@@ -11,6 +11,7 @@ contiguous rows. `Coordinates` has it first, as files and other trajectories do.
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -247,8 +248,18 @@ class LinkPoses:
         return out
 
 
+_POSES: WeakKeyDictionary[Coordinates, LinkPoses] = WeakKeyDictionary()
+
+
 def forward_kinematics(tree: Tree, q: Coordinates) -> LinkPoses:
-    """The poses of all links in all frames."""
+    """The poses of all links in all frames; of the same coordinates they are found once."""
+    known = _POSES.get(q)
+    if known is None or known.tree is not tree:
+        known = _POSES[q] = _forward_kinematics(tree, q)
+    return known
+
+
+def _forward_kinematics(tree: Tree, q: Coordinates) -> LinkPoses:
     count, time = len(tree), len(q)
     rotations = np.empty((count + 1, 3, 3, time))
     positions = np.empty((count + 1, 3, time))

@@ -94,9 +94,10 @@ def solve_block(
         terms = robot, targets, holds, q, block, candidates, penalty_scale
         return linearize(*terms, with_jacobian=with_jacobian, exact=repair is not None)
 
-    def smoothness_at(q: Coordinates) -> Smoothness:
+    def smoothness_at(q: Coordinates, with_jacobian: bool) -> Smoothness:
         frame_time = targets.frame_time
-        point = com_acceleration(robot, q, targets.com, frame_time, block)
+        terms = robot, q, targets.com, frame_time, block
+        point = com_acceleration(*terms, with_jacobian=with_jacobian)
         return smoothness_of(
             robot, q, start, frame_time, block.dofs, stiffening, penalty_scale, point
         )
@@ -105,7 +106,7 @@ def solve_block(
     for k in range(max_iter):
         jerky = jerk_stiffening(robot, q, targets.frame_time)[:, block.dofs]
         stiffening = np.maximum(stiffening, jerky)
-        coupling = smoothness_at(q)
+        coupling = smoothness_at(q, True)
         cost = uniform_filter1d(normal.cost + coupling.cost(len(q)), window)
         limits = q.at_limits(tree, LIMIT_CLEARANCE)[:, block.dofs]
         step = np.zeros((len(q), tree.nv))
@@ -118,7 +119,8 @@ def solve_block(
             if avoid_collisions and k % _COLLISION_PERIOD == _COLLISION_PERIOD - 1:
                 candidates = find_candidates(trial)
             trial_normal = linearize_at(trial, with_jacobian=k < max_iter - 1)
-            after = uniform_filter1d(trial_normal.cost + smoothness_at(trial).cost(len(q)), window)
+            trial_cost = trial_normal.cost + smoothness_at(trial, False).cost(len(q))
+            after = uniform_filter1d(trial_cost, window)
             if not repair or after.sum() <= cost.sum():
                 break
             step *= 0.5
