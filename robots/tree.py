@@ -252,10 +252,14 @@ _POSES: WeakKeyDictionary[Coordinates, LinkPoses] = WeakKeyDictionary()
 
 
 def forward_kinematics(tree: Tree, q: Coordinates) -> LinkPoses:
-    """The poses of all links in all frames; of the same coordinates they are found once."""
+    """The poses of all links in all frames; of the same coordinates, which no one may write to from
+    then on, they are found once."""
     known = _POSES.get(q)
     if known is None or known.tree is not tree:
         known = _POSES[q] = _forward_kinematics(tree, q)
+        for part in (q.pos, q.quat, q.angles, q.ball_quats):
+            if part is not None:
+                part.flags.writeable = False
     return known
 
 

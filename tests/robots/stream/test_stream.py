@@ -108,7 +108,7 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     for t in range(4):
         one = slice(t, t + 1)
         foot_targets = FootTargets(holds.positions[None, ..., t], holds.shares[None, ..., t])
-        here = pose_targets(targets, np.array([t]), reader.bones)
+        here = pose_targets(targets.at(np.array([t])), reader.bones)
         qpos = EMBER.to_qpos(q.at(one))
         poses = terms.poses(qpos)
         H, g = terms.linearize(
