@@ -7,7 +7,7 @@ and Van Loan, "Matrix Computations", section 4.3).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement, pairwise
 
 import numpy as np
@@ -91,6 +91,12 @@ class NormalEquations:
         out.cost = self.cost + share * (other.cost - self.cost)
         return out
 
+    def at(self, frames: Int[np.ndarray, "S"]) -> "NormalEquations":
+        """Those of some frames."""
+        out = NormalEquations(0, 0)
+        out.H, out.g, out.cost = self.H[frames], self.g[frames], self.cost[frames]
+        return out
+
     def hold(self, held: Bool[np.ndarray, "T D"]) -> None:
         """Keep some dofs from moving: their rows and columns become the identity's."""
         free = np.where(held, 0.0, 1.0)
@@ -171,6 +177,18 @@ class Smoothness:
     overspeed: Float[np.ndarray, "V D"]
     point: "PointAcceleration | None" = None
 
+    def cut(self, starts: Int[np.ndarray, "S"]) -> "Smoothness":
+        """Without what couples the frames from each of `starts` on to those before it."""
+        accelerated, fast = self.acceleration_weights.copy(), self.overspeed_weight.copy()
+        accelerated[starts - 1] = accelerated[starts - 2] = 0.0
+        fast[starts - 1] = 0.0
+        return replace(
+            self,
+            acceleration_weights=accelerated,
+            overspeed_weight=fast,
+            point=self.point.cut(starts) if self.point else None,
+        )
+
     def cost(self, frames: int) -> Float[np.ndarray, "T"]:
         """Half the squares of the residuals: an acceleration's at its middle frame, an overspeed's
         at the later one."""
@@ -192,6 +210,14 @@ class PointAcceleration:
 
     J: Float[np.ndarray, "_ D 3"]
     residual: Float[np.ndarray, "A 3"]
+    counts: Bool[np.ndarray, "A"]  # which of the residuals count
+
+    def cut(self, starts: Int[np.ndarray, "S"]) -> "PointAcceleration":
+        """Without what couples the frames from each of `starts` on to those before it."""
+        residual, counts = self.residual.copy(), self.counts.copy()
+        for across in (starts - 1, starts - 2):
+            residual[across], counts[across] = 0.0, False
+        return PointAcceleration(self.J, residual, counts)
 
     def add_to(self, band: Float[np.ndarray, "_ T D"]) -> Float[np.ndarray, "T D"]:
         """Add J'J to the lower band, and give J'r."""
@@ -200,7 +226,7 @@ class PointAcceleration:
         products = np.zeros((COUPLED + 1, T))  # how often frames t and t + m meet in a residual
         for first, second in combinations_with_replacement(range(COUPLED + 1), 2):
             product = _SECOND_DIFFERENCE[first] * _SECOND_DIFFERENCE[second]
-            products[second - first, first : first + count] += product
+            products[second - first, first : first + count] += product * self.counts
         for m in range(COUPLED + 1):
             here = self.J[: T - m] * products[m, : T - m, None, None]
             H = self.J[m:] @ here.transpose(0, 2, 1)

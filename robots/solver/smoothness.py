@@ -78,7 +78,8 @@ def com_acceleration(
     J = np.zeros((0, len(block.dofs), 3))
     if with_jacobian:
         J = weight * com_jacobian(robot, poses, block.joints, base=block.base).transpose(2, 0, 1)
-    return PointAcceleration(J, weight * second_differences(away))
+    residual = weight * second_differences(away)
+    return PointAcceleration(J, residual, np.ones(len(residual), dtype=bool))
 
 
 def jerk_stiffening(
