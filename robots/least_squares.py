@@ -124,32 +124,32 @@ class NormalEquations:
         where the step before would."""
         T, D = self.g.shape
         point = smoothness.point
-        band = np.zeros(((COUPLED + 1) * D if point else COUPLED * D + 1, T, D))
+        # Column by column, as LAPACK reads it: [t, i, k] couples dof i at t to the k-th one after.
+        band = np.zeros((T, D, (COUPLED + 1) * D if point else COUPLED * D + 1))
         for i in range(D):
-            for k in range(D - i):
-                band[k, :, i] = self.H[:, i + k, i]
+            band[:, i, : D - i] = self.H[:, i, i:]
         weights = smoothness.acceleration_weights**2
         for first, second in combinations_with_replacement(range(COUPLED + 1), 2):
             at = slice(first, first + len(weights))
             product = _SECOND_DIFFERENCE[first] * _SECOND_DIFFERENCE[second]
-            band[(second - first) * D, at] += product * weights
+            band[at, :, (second - first) * D] += product * weights
         g = self.g + second_differences_transposed(weights * smoothness.accelerations, T)
         if len(smoothness.overspeed):
             squared = smoothness.overspeed_weight**2
             fast = np.where(smoothness.overspeed != 0, squared, 0.0)
-            band[0, :-1] += fast
-            band[0, 1:] += fast
-            band[D, :-1] -= fast
+            band[:-1, :, 0] += fast
+            band[1:, :, 0] += fast
+            band[:-1, :, D] -= fast
             g[:-1] -= squared * smoothness.overspeed
             g[1:] += squared * smoothness.overspeed
         if point:
             g += point.add_to(band)
         held = at_limits * g < 0
-        diagonal = band[0].copy()
+        diagonal = band[..., 0].copy()
         for k in range(solves):
-            band[0] = diagonal + np.where(held, _HELD, damping[:, None])
+            band[..., 0] = diagonal + np.where(held, _HELD, damping[:, None])
             step = -solveh_banded(
-                band.reshape(len(band), T * D),
+                band.reshape(T * D, -1).T,
                 np.where(held, 0.0, g).ravel(),
                 lower=True,
                 overwrite_ab=k == solves - 1,
@@ -219,8 +219,9 @@ class PointAcceleration:
             residual[across], counts[across] = 0.0, False
         return PointAcceleration(self.J, residual, counts)
 
-    def add_to(self, band: Float[np.ndarray, "_ T D"]) -> Float[np.ndarray, "T D"]:
-        """Add J'J to the lower band, and give J'r."""
+    def add_to(self, band: Float[np.ndarray, "T D _"]) -> Float[np.ndarray, "T D"]:
+        """Add J'J to the lower band, [t, i, k] for dof i at t and the k-th one after, and give
+        J'r."""
         T, D = self.J.shape[:2]
         count = len(self.residual)
         products = np.zeros((COUPLED + 1, T))  # how often frames t and t + m meet in a residual
@@ -229,11 +230,11 @@ class PointAcceleration:
             products[second - first, first : first + count] += product * self.counts
         for m in range(COUPLED + 1):
             here = self.J[: T - m] * products[m, : T - m, None, None]
-            H = self.J[m:] @ here.transpose(0, 2, 1)
+            H = here @ self.J[m:].transpose(0, 2, 1)
             for i in range(D):
-                rows = slice(i if m == 0 else 0, D)
-                start = m * D + rows.start - i
-                band[start : start + D - rows.start, : T - m, i] += H[:, rows, i].T
+                after = i if m == 0 else 0
+                start = m * D + after - i
+                band[: T - m, i, start : start + D - after] += H[:, i, after:]
         differences = second_differences_transposed(self.residual, T)
         return np.einsum("tdx,tx->td", self.J, differences)
 

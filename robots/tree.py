@@ -66,6 +66,13 @@ class Tree:
         """The number of dofs (MuJoCo's nv)."""
         return BASE + int(np.where(self.balls, 3, 1).sum())
 
+    @cached_property
+    def _chains(self) -> dict[int, tuple[int, ...]]:
+        out: dict[int, tuple[int, ...]] = {ROOT: ()}
+        for j, parent in enumerate(self.parents.tolist()):
+            out[j] = (*out[parent], j)
+        return out
+
     def anchor(self, link: int) -> Float[np.ndarray, "3"]:
         """Of a link's joint, or the base's place, in the rest pose [m]."""
         return self.base if link < 0 else self.anchors[link]
@@ -78,11 +85,7 @@ class Tree:
 
     def chain(self, link: int) -> tuple[int, ...]:
         """The joints from the base out to `link`."""
-        joints: list[int] = []
-        while link >= 0:
-            joints.append(link)
-            link = int(self.parents[link])
-        return tuple(reversed(joints))
+        return self._chains[link]
 
     def dofs(self, joints: tuple[int, ...]) -> list[int]:
         """The dofs of some joints, in order."""

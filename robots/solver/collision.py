@@ -112,6 +112,23 @@ class Collisions:
                     found.append(Candidate(pair, np.flatnonzero(near.any(1)), moves, frames_near))
         return found
 
+    def nearer(
+        self, candidates: Sequence[Candidate], poses: LinkPoses, within: float
+    ) -> list[Candidate]:
+        """The candidates in those of their frames in which they are nearer than `within` [m]
+        beyond their clearance."""
+        out = []
+        for candidate in candidates:
+            pair, frames = candidate.pair, candidate.frames
+            spheres, radii = (
+                part[candidate.spheres] for part in (pair.small.spheres, pair.small.radii)
+            )
+            gap = _distance(self.tree, poses, pair, spheres, frames) - radii[:, None]
+            near = gap.min(axis=0) < pair.clearance + within
+            if near.any():
+                out.append(replace(candidate, frames=frames[near]))
+        return out
+
     def _moved_pairs(self, block: Block) -> dict[Shape, list[MovedPair]]:
         """The pairs that a block moves against each other, by their small shapes."""
         if block not in self._by_block:

@@ -1,5 +1,7 @@
 """Gauss-Newton in a block of a robot's coordinates, over all frames of the trajectory at once."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
@@ -31,6 +33,14 @@ def collision_stride(targets: Targets) -> int:
     return max(1, round(_COLLISION_INTERVAL / targets.frame_time))
 
 
+def collision_candidates(
+    robot: Morphology, targets: Targets, q: Coordinates, block: Block
+) -> list[Candidate]:
+    """The parts that are near each other at `q`, or between the frames that are searched."""
+    poses = forward_kinematics(robot.tree, q)
+    return collisions_of(robot).candidates(poses, block, collision_stride(targets))
+
+
 def solve_block(
     robot: Morphology,
     targets: Targets,
@@ -40,13 +50,12 @@ def solve_block(
     max_iter: int,
     rel_tol: float,
     max_rejected: float,
-    *,
-    avoid_collisions: bool,
+    candidates: Sequence[Candidate] | None = None,
 ) -> Coordinates:
     """At most `max_iter` Gauss-Newton steps in the block's dofs, from `q`.
 
-    With `avoid_collisions`, parts in each other are pushed apart, by a change of `q` that is
-    smoother than `q`.
+    With `candidates`, the parts that are near each other at `q`, parts in each other are pushed
+    apart, by a change of `q` that is smoother than `q`.
 
     A step is judged frame by frame: where the cost around a frame rises by more than a share
     of what is gained nearby, the step is rejected there and damping grows (Levenberg and
@@ -60,19 +69,12 @@ def solve_block(
     window = max(1, 2 * round(WINDOW / targets.frame_time) + 1)
     wide = max(1, 2 * round(_WIDE_WINDOW / targets.frame_time) + 1)
     damping = np.full(len(q), MIN_DAMPING)
-    start = q if avoid_collisions else None
-    stride = collision_stride(targets)
-    candidates: list[Candidate] = []
+    start = None if candidates is None else q
 
-    def find_candidates(q: Coordinates) -> list[Candidate]:
-        return collisions_of(robot).candidates(forward_kinematics(tree, q), block, stride)
-
-    if avoid_collisions:
-        candidates = find_candidates(q)
     stiffening = np.ones((max(len(q) - 2, 0), len(block.dofs)))
 
     def linearize_at(q: Coordinates, with_jacobian: bool = True) -> NormalEquations:
-        terms = robot, targets, holds, q, block, candidates
+        terms = robot, targets, holds, q, block, candidates or []
         return linearize(*terms, with_jacobian=with_jacobian)
 
     def smoothness_at(q: Coordinates, with_jacobian: bool) -> Smoothness:
@@ -96,8 +98,8 @@ def solve_block(
         step *= smooth_lower_envelope(shortening, window)[:, None]
         share = np.ones(len(q))
         trial = q.integrated(tree, step).clipped(tree, LIMIT_CLEARANCE)
-        if avoid_collisions and k % COLLISION_PERIOD == COLLISION_PERIOD - 1:
-            candidates = find_candidates(trial)
+        if candidates is not None and k % COLLISION_PERIOD == COLLISION_PERIOD - 1:
+            candidates = collision_candidates(robot, targets, trial, block)
         trial_normal = linearize_at(trial, with_jacobian=k < max_iter - 1)
         trial_cost = trial_normal.cost + smoothness_at(trial, False).cost(len(q))
         after = uniform_filter1d(trial_cost, window)

@@ -147,7 +147,9 @@ def violations(
     searched for in every `stride`-th frame and, where candidates are, in all. Between `spells`
     nothing is too fast."""
     poses = forward_kinematics(robot.tree, q)
-    candidates = collisions_of(robot).candidates(poses, block, stride, _SEARCH_DISTANCE)
+    collisions = collisions_of(robot)
+    candidates = collisions.candidates(poses, block, stride, _SEARCH_DISTANCE)
+    candidates = collisions.nearer(candidates, poses, _SEARCH_DISTANCE)
     max_depth, max_sinking = (x * robot.rig.hip_height for x in (_MAX_DEPTH, MAX_SINKING))
     violated = exact_contacts_of(robot).depth(robot.to_qpos(q), candidates) > max_depth
     fast = np.abs(overspeed(robot, q, targets.frame_time)[:, block.dofs]).max(1, initial=0.0)
