@@ -50,23 +50,19 @@ class NormalEquations:
             for here2, there2 in runs:
                 self.H[:, there, there2] += H[:, here, here2]
 
-    def add_pushes(
+    def add_moved(
         self,
         frames: Int[np.ndarray, "S"],
         dofs: Sequence[int],
         twists: Float[np.ndarray, "S C 6"],
-        wrenches: Float[np.ndarray, "S 6 M"],
-        residuals: Float[np.ndarray, "M S"],
+        squares: Float[np.ndarray, "S 6 6"],
+        sums: Float[np.ndarray, "S 6"],
     ) -> None:
-        """M weighted residuals in S of the frames, all of one body that C of the dofs move by
-        `twists` (`robots.residuals.twists`): the Jacobian of each is the twists times its wrench,
-        so that however many there are, a product of 6 x 6 says it all."""
-        self.cost[frames] += 0.5 * np.einsum("ms,ms->s", residuals, residuals)
-        if not self.with_jacobian:
-            return
-        across = twists.transpose(0, 2, 1)
-        H = twists @ (wrenches @ wrenches.transpose(0, 2, 1)) @ across
-        g = (twists @ (wrenches @ residuals.T[:, :, None]))[:, :, 0]
+        """Any number of residuals in S of the frames, all of one body that C of the dofs move by
+        `twists` (`robots.residuals.twists`): with w the wrench that makes a residual's Jacobian of
+        them, the sums of w w' (`squares`) and w r. What they cost is added by who knows them."""
+        H = twists @ squares @ twists.transpose(0, 2, 1)
+        g = (twists @ sums[:, :, None])[:, :, 0]
         runs = _runs(dofs)
         for here, there in runs:
             self.g[frames, there] += g[:, here]

@@ -13,18 +13,17 @@ from jaxtyping import Float, Int
 from robots.least_squares import NormalEquations
 from robots.model.morphology import Morphology
 from robots.model.shapes import DIRECTIONS
-from robots.residuals import one_sided, twists
+from robots.residuals import one_sided
 from robots.solver.block import Block
 from robots.solver.hulls import Shape, ShapePair, can_collide, shapes_of, signed_distance
-from robots.tree import LinkPoses, Tree, cross, forward_kinematics
+from robots.solver.pushes import Moves, Pushes
+from robots.tree import LinkPoses, Tree, forward_kinematics
 
 DEPTH_ROUNDING = 0.003  # [m] over which the penalty of their depth sets in
 FELT = 3  # roundings of distance beyond which a residual is not worth its time
 SEARCH_DISTANCE = 0.02  # [m] between shapes within which a pair is a candidate
 _ONE_JOINT = 0.05  # hip heights between hinges that turn about one point
 
-Moves = tuple[tuple[int, ...], tuple[int, ...]]
-"""The free joints that move a pair's small shape but not the large one, and the reverse."""
 MovedPair = tuple[ShapePair, Moves]
 
 
@@ -37,29 +36,6 @@ class Candidate:
     spheres: Int[np.ndarray, "N"]
     moves: Moves
     frames: Int[np.ndarray, "S"]
-
-    def links(self, tree: Tree) -> set[int]:
-        """The links whose poses tell how the two move against each other."""
-        joints = self.moves[0] + self.moves[1]
-        parents = {int(tree.parents[j]) for j in joints}
-        return {self.pair.small.link, self.pair.large.link, *joints} | parents
-
-    def add_to(
-        self,
-        normal: NormalEquations,
-        poses: LinkPoses,
-        block: Block,
-        frames: Int[np.ndarray, "N"],
-        wrenches: Float[np.ndarray, "N 6 M"],
-        residuals: Float[np.ndarray, "M N"],
-    ) -> None:
-        """Add residuals that grow where the small shape, pushed by `wrenches` about its link's
-        anchor, is moved against them, or the large one with them; `poses` are those of `frames`."""
-        about = poses.positions[self.pair.small.link]
-        moved = twists(poses, self.moves[0] + self.moves[1], about, base=False)
-        moved[:, : len(poses.tree.dofs(self.moves[0]))] *= -1.0
-        dofs = block.local_joint_dofs(self.moves[0] + self.moves[1])
-        normal.add_pushes(frames, dofs, moved, wrenches, residuals)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,33 +133,47 @@ class Collisions:
         depth [m] = clearance - signed distance of the sphere from the large shape; w [1/m] =
         `weight` x `penalty_scale`, which also sharpens the rounding.
         """
-        for candidate in candidates:
-            pair, at = candidate.pair, candidate.frames
-            spheres = pair.small.spheres[candidate.spheres]
-            local = _in_large_shape(self.tree, poses, pair, spheres, at)
-            distance = signed_distance(pair.large, local)
-            excess = pair.clearance + pair.small.radii[candidate.spheres, None] - distance
-            felt = excess > -FELT * DEPTH_ROUNDING
-            active = felt.any(axis=0)
-            if not active.any():
-                continue
-            here, felt = at[active], felt[:, active]
-            scaled = weight * penalty_scale[here]
-            depth, slope = one_sided(excess[:, active], DEPTH_ROUNDING / penalty_scale[here])
-            residuals = np.where(felt, scaled * depth, 0.0)
-            if not normal.with_jacobian:
-                normal.cost[here] += 0.5 * (residuals**2).sum(0)
-                continue
-            touched = poses.at(here, candidate.links(self.tree))
-            s, t = np.nonzero(felt)
-            beyond = DIRECTIONS @ local[:, :, active][:, s, t] - pair.large.reach[:, None]
-            side = DIRECTIONS[beyond.argmax(0)].T
-            push = _turned(touched.rotations[pair.large.link][..., t], side)
-            rest = (spheres - self.tree.anchor(pair.small.link))[s].T
-            arm = _turned(touched.rotations[pair.small.link][..., t], rest)
-            wrenches = np.zeros((len(here), 6, len(spheres)))
-            wrenches[t, :, s] = ((scaled * slope)[s, t] * wrench(arm, push)).T
-            candidate.add_to(normal, touched, block, here, wrenches, residuals)
+        for moves, own in by_moves(candidates).items():
+            pushes = Pushes(normal, poses, moves)
+            for candidate in own:
+                self._add_spheres(normal, poses, candidate, pushes, weight, penalty_scale)
+            pushes.add_to_normal(block)
+
+    def _add_spheres(
+        self,
+        normal: NormalEquations,
+        poses: LinkPoses,
+        candidate: Candidate,
+        pushes: Pushes,
+        weight: float,
+        penalty_scale: Float[np.ndarray, "T"],
+    ) -> None:
+        pair, at = candidate.pair, candidate.frames
+        small, large = pair.small.link, pair.large.link
+        spheres = pair.small.spheres[candidate.spheres]
+        local = _in_large_shape(self.tree, poses, pair, spheres, at)
+        distance = signed_distance(pair.large, local)
+        excess = pair.clearance + pair.small.radii[candidate.spheres, None] - distance
+        felt = excess > -FELT * DEPTH_ROUNDING
+        active = felt.any(axis=0)
+        if not active.any():
+            return
+        here, felt = at[active], felt[:, active]
+        scaled = weight * penalty_scale[here]
+        depth, slope = one_sided(excess[:, active], DEPTH_ROUNDING / penalty_scale[here])
+        residuals = np.where(felt, scaled * depth, 0.0)
+        normal.cost[here] += 0.5 * (residuals**2).sum(0)
+        if not normal.with_jacobian:
+            return
+        s, t = np.nonzero(felt)
+        beyond = DIRECTIONS @ local[:, :, active][:, s, t] - pair.large.reach[:, None]
+        side = DIRECTIONS[beyond.argmax(0)].T
+        push = np.zeros((3, *felt.shape))
+        out = np.einsum("ijn,jn->in", poses.rotations[large][..., here[t]], side)
+        push[:, s, t] = (scaled * slope)[s, t] * out
+        arms = (spheres - self.tree.anchor(small)) @ poses.rotations[small][..., here]
+        points = arms + poses.positions[small][:, None, here]
+        pushes.add(here, points, push, residuals)
 
 
 def _in_large_shape(
@@ -214,19 +204,11 @@ def _distance(
     return signed_distance(pair.large, _in_large_shape(tree, poses, pair, points, at))
 
 
-def _turned(
-    rotations: Float[np.ndarray, "3 3 N"], vectors: Float[np.ndarray, "3 N"]
-) -> Float[np.ndarray, "3 N"]:
-    return np.einsum("ijn,jn->in", rotations, vectors)
-
-
-def wrench(
-    arm: Float[np.ndarray, "3 N"], push: Float[np.ndarray, "3 N"]
-) -> Float[np.ndarray, "6 N"]:
-    """Of a push along a vector at the end of an arm: arm x push, and the push."""
-    out = np.empty((6, arm.shape[1]))
-    cross(arm, push, out[:3])
-    out[3:] = push
+def by_moves(candidates: Sequence[Candidate]) -> dict[Moves, list[Candidate]]:
+    """The candidates by the joints that move their two shapes against each other."""
+    out: dict[Moves, list[Candidate]] = {}
+    for candidate in candidates:
+        out.setdefault(candidate.moves, []).append(candidate)
     return out
 
 

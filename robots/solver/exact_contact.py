@@ -17,10 +17,11 @@ from robots.solver.collision import (
     FELT,
     Candidate,
     Collisions,
+    by_moves,
     collisions_of,
-    wrench,
 )
 from robots.solver.hulls import CLEARANCE, ShapePair
+from robots.solver.pushes import Pushes
 from robots.tree import LinkPoses
 
 _MAX_DISTANCE = 0.02  # [m] beyond which MuJoCo need not measure
@@ -69,22 +70,23 @@ class ExactContacts:
         penalty_scale: Float[np.ndarray, "T"],
     ) -> None:
         """Add one residual for each candidate, as `Collisions.add_to` does for each sphere."""
-        for x in self._measure(qpos, candidates):
-            excess = self._clearances[x.candidate.pair] - x.distance
-            active = excess > -FELT * DEPTH_ROUNDING
-            if not active.any():
-                continue
-            here = x.frames[active]
-            scaled = weight * penalty_scale[here]
-            depth, slope = one_sided(excess[active], DEPTH_ROUNDING / penalty_scale[here])
-            if not normal.with_jacobian:
+        measured = self._measure(qpos, candidates)
+        for moves in by_moves([x.candidate for x in measured]):
+            pushes = Pushes(normal, poses, moves)
+            for x in (x for x in measured if x.candidate.moves == moves):
+                excess = self._clearances[x.candidate.pair] - x.distance
+                active = excess > -FELT * DEPTH_ROUNDING
+                if not active.any():
+                    continue
+                here = x.frames[active]
+                scaled = weight * penalty_scale[here]
+                depth, slope = one_sided(excess[active], DEPTH_ROUNDING / penalty_scale[here])
                 normal.cost[here] += 0.5 * (scaled * depth) ** 2
-                continue
-            touched = poses.at(here, x.candidate.links(poses.tree))
-            arm = x.points[:, active] - touched.positions[x.candidate.pair.small.link]
-            wrenches = (scaled * slope) * wrench(arm, x.out[:, active])
-            residuals = (scaled * depth)[None]
-            x.candidate.add_to(normal, touched, block, here, wrenches.T[..., None], residuals)
+                if normal.with_jacobian:
+                    out = scaled * slope * x.out[:, active]
+                    points = x.points[:, active]
+                    pushes.add(here, points[:, None], out[:, None], (scaled * depth)[None])
+            pushes.add_to_normal(block)
 
     @cached_property
     def _clearances(self) -> dict[ShapePair, float]:

@@ -105,8 +105,8 @@ def add_floor(
         felt = felt[:, frames]
         sunk, slope = one_sided(depth[:, frames], rounding[frames])
         residuals = np.where(felt, weight[frames] * sunk, 0.0)
+        normal.cost[frames] += 0.5 * (residuals**2).sum(0)
         if not normal.with_jacobian:
-            normal.cost[frames] += 0.5 * (residuals**2).sum(0)
             continue
         near = poses.at(frames, {shape.link, *joints, *robot.tree.parents[list(joints)].tolist()})
         # A push down at the end of an arm (x, y): (-y, x, 0) is the arm's product with (0, 0, -1).
@@ -115,7 +115,9 @@ def add_floor(
         wrenches = np.zeros((len(frames), 6, len(shape.spheres)))
         wrenches[:, 0], wrenches[:, 1], wrenches[:, 5] = (-y * down).T, (x * down).T, -down.T
         moved = twists(near, joints, near.positions[shape.link], base=block.base)
-        normal.add_pushes(frames, block.local_dofs(joints), moved, wrenches, residuals)
+        squares = wrenches @ wrenches.transpose(0, 2, 1)
+        sums = (wrenches @ residuals.T[:, :, None])[:, :, 0]
+        normal.add_moved(frames, block.local_dofs(joints), moved, squares, sums)
 
 
 def depth_in_floor(robot: Morphology, poses: LinkPoses, block: Block) -> Float[np.ndarray, "T"]:
