@@ -15,7 +15,7 @@ from robots.model.morphology import Morphology
 from robots.model.shapes import DIRECTIONS
 from robots.residuals import one_sided
 from robots.solver.block import Block
-from robots.solver.hulls import Shape, ShapePair, can_collide, shapes_of, signed_distance
+from robots.solver.hulls import SLABS, Shape, ShapePair, can_collide, shapes_of, signed_distance
 from robots.solver.pushes import Moves, Pushes
 from robots.tree import LinkPoses, Tree, forward_kinematics
 
@@ -73,11 +73,15 @@ class Collisions:
             moved[:, 1:] = np.maximum(moved[:, 1:], step)
             reach = small.bound + within + moved + [[pair.clearance] for pair, _ in moved_pairs]
             bounds_meet = distance_between < reach + [[pair.large.bound] for pair, _ in moved_pairs]
-            for k in np.flatnonzero(bounds_meet.any(1)).tolist():
+            nearby = np.flatnonzero(bounds_meet.any(1)).tolist()
+            if not nearby:
+                continue
+            large = [moved_pairs[k][0].large for k in nearby]
+            from_center = self._from_shapes(searched, large, -between[nearby])
+            meet = bounds_meet[nearby] & (from_center < reach[nearby])
+            for k, at_all in zip(nearby, meet, strict=True):
                 pair, moves = moved_pairs[k]
-                at = np.flatnonzero(bounds_meet[k])
-                from_center = _distance(self.tree, searched, pair, small.center[None], at)[0]
-                at = at[from_center < reach[k, at]]
+                at = np.flatnonzero(at_all)
                 if not len(at):
                     continue
                 excess = _distance(self.tree, searched, pair, small.spheres, at)
@@ -87,6 +91,18 @@ class Collisions:
                     frames_near = np.unique(np.clip(around, 0, count - 1))
                     found.append(Candidate(pair, np.flatnonzero(near.any(1)), moves, frames_near))
         return found
+
+    @staticmethod
+    def _from_shapes(
+        poses: LinkPoses, shapes: Sequence[Shape], away: Float[np.ndarray, "K 3 T"]
+    ) -> Float[np.ndarray, "K T"]:
+        """How far [m] points are from some shapes, given where they are from their centers."""
+        R = poses.rotations[[shape.link for shape in shapes]]
+        inside = np.einsum("kjit,kjt->kit", R, away)
+        inside += np.stack([shape.center for shape in shapes])[:, :, None]
+        middle, half = np.stack([shape.slabs for shape in shapes], axis=1)
+        over = np.abs(SLABS @ inside - middle[:, :, None]) - half[:, :, None]
+        return over.max(axis=1)
 
     def nearer(
         self, candidates: Sequence[Candidate], poses: LinkPoses, within: float
