@@ -15,6 +15,7 @@ from robots.model.morphology import Morphology
 from robots.model.shapes import DIRECTIONS
 from robots.residuals import one_sided
 from robots.solver.block import Block
+from robots.solver.candidates import Candidate, by_moves
 from robots.solver.hulls import SLABS, Shape, ShapePair, can_collide, shapes_of, signed_distance
 from robots.solver.pushes import Moves, Pushes
 from robots.tree import LinkPoses, Tree, forward_kinematics
@@ -25,17 +26,6 @@ SEARCH_DISTANCE = 0.02  # [m] between shapes within which a pair is a candidate
 _ONE_JOINT = 0.05  # hip heights between hinges that turn about one point
 
 MovedPair = tuple[ShapePair, Moves]
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A pair of shapes that may collide: in which `frames`, with which of the small one's
-    `spheres`, and which joints move the two against each other."""
-
-    pair: ShapePair
-    spheres: Int[np.ndarray, "N"]
-    moves: Moves
-    frames: Int[np.ndarray, "S"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,14 +208,6 @@ def _distance(
 ) -> Float[np.ndarray, "S N"]:
     """The signed distance [m] of points of the small shape from the large one in some frames."""
     return signed_distance(pair.large, _in_large_shape(tree, poses, pair, points, at))
-
-
-def by_moves(candidates: Sequence[Candidate]) -> dict[Moves, list[Candidate]]:
-    """The candidates by the joints that move their two shapes against each other."""
-    out: dict[Moves, list[Candidate]] = {}
-    for candidate in candidates:
-        out.setdefault(candidate.moves, []).append(candidate)
-    return out
 
 
 @lru_cache(maxsize=16)

@@ -9,7 +9,8 @@ from scipy.ndimage import minimum_filter1d, uniform_filter1d
 from robots.least_squares import NormalEquations, Smoothness
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
-from robots.solver.collision import Candidate, collisions_of
+from robots.solver.candidates import Candidate
+from robots.solver.collision import collisions_of
 from robots.solver.hinges import LIMIT_CLEARANCE
 from robots.solver.holds import Holds
 from robots.solver.objective import linearize

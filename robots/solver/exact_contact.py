@@ -12,12 +12,11 @@ from robots.least_squares import NormalEquations
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
 from robots.solver.block import Block
+from robots.solver.candidates import Candidate, by_moves
 from robots.solver.collision import (
     DEPTH_ROUNDING,
     FELT,
-    Candidate,
     Collisions,
-    by_moves,
     collisions_of,
 )
 from robots.solver.hulls import CLEARANCE, ShapePair

@@ -8,7 +8,8 @@ from jaxtyping import Bool, Float
 from robots.least_squares import NormalEquations, Smoothness
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
-from robots.solver.collision import Candidate, collisions_of
+from robots.solver.candidates import Candidate, among
+from robots.solver.collision import collisions_of
 from robots.solver.descent import (
     COLLISION_PERIOD,
     MAX_STEP,
@@ -148,8 +149,8 @@ def solve_spells(broken: Repair) -> Coordinates:
         solved = solved.replaced(frames, q)
         if not going.any():
             return solved
+        candidates = among(candidates, going[of_frames])
         kept = np.flatnonzero(going[of_frames])
         broken, q, normal, frames = broken.only(going), q.at(kept), normal.at(kept), frames[kept]
         damping, stiffening, stalled = damping[kept], stiffening[kept], stalled[going]
-        candidates = broken.candidates(q)
     return solved.replaced(frames, q)

@@ -11,7 +11,8 @@ from robots.model.known import known
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.solver.block import Block, blocks_of
-from robots.solver.collision import Candidate, collisions_of
+from robots.solver.candidates import Candidate
+from robots.solver.collision import collisions_of
 from robots.solver.floor import solids_over_floor
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import plan_feet, points_of
