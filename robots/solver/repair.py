@@ -74,7 +74,6 @@ def _repaired(broken: Repair) -> Coordinates:
     robot, block = broken.robot, broken.block
     best, frames = broken.start, np.arange(len(broken))
     least = np.full(len(broken.spells), np.inf)
-    before = np.full(len(broken.spells), np.inf)
     for k in range(_MAX_ROUNDS + 1):
         q, targets, spells = broken.start, broken.targets, broken.spells
         violated = violations(robot, targets, q, block, 1, spells)
@@ -84,14 +83,12 @@ def _repaired(broken: Repair) -> Coordinates:
         better = np.flatnonzero((worth < least)[spells.of_frames])
         best = best.replaced(frames[better], q.at(better))
         least = np.minimum(least, worth)
-        # Without a violation no penalty grows: jerks that a round has left as they were stay so.
-        count = spells.total(rough * 1.0)
-        going = spells.any(violated) | ((count > 0) & (count < before))
+        going = spells.any(rough)
         if k == _MAX_ROUNDS or not going.any():
             break
         kept = going[spells.of_frames]
-        broken, frames, violated = broken.only(going), frames[kept], violated[kept]
-        least, before = least[going], count[going]
+        broken, frames, least = broken.only(going), frames[kept], least[going]
+        violated = violated[kept]
         if k == _LEAD_OUT_ROUND and not block.base:
             broken = _led_out(broken, violated)
         q = solve_spells(broken)
