@@ -7,7 +7,7 @@ and Van Loan, "Matrix Computations", section 4.3).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement, pairwise
 
 import numpy as np
@@ -50,18 +50,24 @@ class NormalEquations:
             for here2, there2 in runs:
                 self.H[:, there, there2] += H[:, here, here2]
 
-    def add_at(
+    def add_moved(
         self,
         frames: Int[np.ndarray, "S"],
         dofs: Sequence[int],
-        J: Float[np.ndarray, "C S"],
-        residuals: Float[np.ndarray, "S"],
+        twists: Float[np.ndarray, "S C 6"],
+        squares: Float[np.ndarray, "S 6 6"],
+        sums: Float[np.ndarray, "S 6"],
     ) -> None:
-        """One weighted residual in S of the frames, and its Jacobian by C of the dofs."""
-        self.cost[frames] += 0.5 * residuals**2
-        at = np.asarray(dofs)
-        self.g[frames[:, None], at] += (J * residuals).T
-        self.H[frames[:, None, None], at[:, None], at] += np.einsum("cs,ds->scd", J, J)
+        """Any number of residuals in S of the frames, all of one body that C of the dofs move by
+        `twists` (`robots.residuals.twists`): with w the wrench that makes a residual's Jacobian of
+        them, the sums of w w' (`squares`) and w r. What they cost is added by who knows them."""
+        H = twists @ squares @ twists.transpose(0, 2, 1)
+        g = (twists @ sums[:, :, None])[:, :, 0]
+        runs = _runs(dofs)
+        for here, there in runs:
+            self.g[frames, there] += g[:, here]
+            for here2, there2 in runs:
+                self.H[frames, there, there2] += H[:, here, here2]
 
     def add_diagonal(
         self, J: Float[np.ndarray, "T D"], residuals: Float[np.ndarray, "T D"]
@@ -79,6 +85,12 @@ class NormalEquations:
         out.H = self.H + share[:, None, None] * (other.H - self.H)
         out.g = self.g + share[:, None] * (other.g - self.g)
         out.cost = self.cost + share * (other.cost - self.cost)
+        return out
+
+    def at(self, frames: Int[np.ndarray, "S"]) -> "NormalEquations":
+        """Those of some frames."""
+        out = NormalEquations(0, 0)
+        out.H, out.g, out.cost = self.H[frames], self.g[frames], self.cost[frames]
         return out
 
     def hold(self, held: Bool[np.ndarray, "T D"]) -> None:
@@ -108,32 +120,32 @@ class NormalEquations:
         where the step before would."""
         T, D = self.g.shape
         point = smoothness.point
-        band = np.zeros(((COUPLED + 1) * D if point else COUPLED * D + 1, T, D))
+        # Column by column, as LAPACK reads it: [t, i, k] couples dof i at t to the k-th one after.
+        band = np.zeros((T, D, (COUPLED + 1) * D if point else COUPLED * D + 1))
         for i in range(D):
-            for k in range(D - i):
-                band[k, :, i] = self.H[:, i + k, i]
+            band[:, i, : D - i] = self.H[:, i, i:]
         weights = smoothness.acceleration_weights**2
         for first, second in combinations_with_replacement(range(COUPLED + 1), 2):
             at = slice(first, first + len(weights))
             product = _SECOND_DIFFERENCE[first] * _SECOND_DIFFERENCE[second]
-            band[(second - first) * D, at] += product * weights
+            band[at, :, (second - first) * D] += product * weights
         g = self.g + second_differences_transposed(weights * smoothness.accelerations, T)
         if len(smoothness.overspeed):
             squared = smoothness.overspeed_weight**2
             fast = np.where(smoothness.overspeed != 0, squared, 0.0)
-            band[0, :-1] += fast
-            band[0, 1:] += fast
-            band[D, :-1] -= fast
+            band[:-1, :, 0] += fast
+            band[1:, :, 0] += fast
+            band[:-1, :, D] -= fast
             g[:-1] -= squared * smoothness.overspeed
             g[1:] += squared * smoothness.overspeed
         if point:
             g += point.add_to(band)
         held = at_limits * g < 0
-        diagonal = band[0].copy()
+        diagonal = band[..., 0].copy()
         for k in range(solves):
-            band[0] = diagonal + np.where(held, _HELD, damping[:, None])
+            band[..., 0] = diagonal + np.where(held, _HELD, damping[:, None])
             step = -solveh_banded(
-                band.reshape(len(band), T * D),
+                band.reshape(T * D, -1).T,
                 np.where(held, 0.0, g).ravel(),
                 lower=True,
                 overwrite_ab=k == solves - 1,
@@ -161,6 +173,18 @@ class Smoothness:
     overspeed: Float[np.ndarray, "V D"]
     point: "PointAcceleration | None" = None
 
+    def cut(self, starts: Int[np.ndarray, "S"]) -> "Smoothness":
+        """Without what couples the frames from each of `starts` on to those before it."""
+        accelerated, fast = self.acceleration_weights.copy(), self.overspeed_weight.copy()
+        accelerated[starts - 1] = accelerated[starts - 2] = 0.0
+        fast[starts - 1] = 0.0
+        return replace(
+            self,
+            acceleration_weights=accelerated,
+            overspeed_weight=fast,
+            point=self.point.cut(starts) if self.point else None,
+        )
+
     def cost(self, frames: int) -> Float[np.ndarray, "T"]:
         """Half the squares of the residuals: an acceleration's at its middle frame, an overspeed's
         at the later one."""
@@ -177,26 +201,36 @@ class Smoothness:
 @dataclass(frozen=True, eq=False)
 class PointAcceleration:
     """A weighted residual r of a point's second differences, and w times its Jacobian by the dofs:
-    r at t changes with the steps at t, t + 1 and t + 2 as the second difference of J step does."""
+    r at t changes with the steps at t, t + 1 and t + 2 as the second difference of J step does. J
+    is empty where only the cost counts."""
 
-    J: Float[np.ndarray, "T D 3"]
+    J: Float[np.ndarray, "_ D 3"]
     residual: Float[np.ndarray, "A 3"]
+    counts: Bool[np.ndarray, "A"]  # which of the residuals count
 
-    def add_to(self, band: Float[np.ndarray, "_ T D"]) -> Float[np.ndarray, "T D"]:
-        """Add J'J to the lower band, and give J'r."""
+    def cut(self, starts: Int[np.ndarray, "S"]) -> "PointAcceleration":
+        """Without what couples the frames from each of `starts` on to those before it."""
+        residual, counts = self.residual.copy(), self.counts.copy()
+        for across in (starts - 1, starts - 2):
+            residual[across], counts[across] = 0.0, False
+        return PointAcceleration(self.J, residual, counts)
+
+    def add_to(self, band: Float[np.ndarray, "T D _"]) -> Float[np.ndarray, "T D"]:
+        """Add J'J to the lower band, [t, i, k] for dof i at t and the k-th one after, and give
+        J'r."""
         T, D = self.J.shape[:2]
         count = len(self.residual)
         products = np.zeros((COUPLED + 1, T))  # how often frames t and t + m meet in a residual
         for first, second in combinations_with_replacement(range(COUPLED + 1), 2):
             product = _SECOND_DIFFERENCE[first] * _SECOND_DIFFERENCE[second]
-            products[second - first, first : first + count] += product
+            products[second - first, first : first + count] += product * self.counts
         for m in range(COUPLED + 1):
             here = self.J[: T - m] * products[m, : T - m, None, None]
-            H = self.J[m:] @ here.transpose(0, 2, 1)
+            H = here @ self.J[m:].transpose(0, 2, 1)
             for i in range(D):
-                rows = slice(i if m == 0 else 0, D)
-                start = m * D + rows.start - i
-                band[start : start + D - rows.start, : T - m, i] += H[:, rows, i].T
+                after = i if m == 0 else 0
+                start = m * D + after - i
+                band[: T - m, i, start : start + D - after] += H[:, i, after:]
         differences = second_differences_transposed(self.residual, T)
         return np.einsum("tdx,tx->td", self.J, differences)
 

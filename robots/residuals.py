@@ -79,8 +79,31 @@ def point_jacobian(
     return jacobian
 
 
+def twists(
+    poses: LinkPoses,
+    chain: tuple[int, ...],
+    about: Float[np.ndarray, "3 T"],
+    *,
+    base: bool,
+) -> Float[np.ndarray, "T K 6"]:
+    """How each dof of a chain of joints, and with `base` the base's six before them, moves what is
+    beyond it: its turn [rad, world], and the shift [m] of the point `about` of it.
+
+    A point p then moves along a unit vector n as the twist's product with the wrench
+    ((p - about) x n, n) says (Lynch and Park, "Modern Robotics", ch. 3).
+    """
+    axes = poses.angular_jacobian(chain)
+    if base:
+        axes = np.concatenate([np.broadcast_to(np.eye(3)[:, :, None], (3, *about.shape)), axes])
+    shifts = point_jacobian(poses, chain, axes, about, base=base)
+    out = np.zeros((about.shape[1], len(shifts), 6))
+    out[:, len(shifts) - len(axes) :, :3] = axes.transpose(2, 0, 1)
+    out[:, :, 3:] = shifts.transpose(2, 0, 1)
+    return out
+
+
 def one_sided(
-    excess: Float[np.ndarray, "*n"], width: float | Float[np.ndarray, "*n"]
+    excess: Float[np.ndarray, "*n"], width: float | Float[np.ndarray, "*#n"]
 ) -> tuple[Float[np.ndarray, "*n"], Float[np.ndarray, "*n"]]:
     """max(excess, 0), rounded over `width` (both in the same unit), and its derivative.
 

@@ -11,6 +11,7 @@ contiguous rows. `Coordinates` has it first, as files and other trajectories do.
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -65,6 +66,17 @@ class Tree:
         """The number of dofs (MuJoCo's nv)."""
         return BASE + int(np.where(self.balls, 3, 1).sum())
 
+    @cached_property
+    def _chains(self) -> dict[int, tuple[int, ...]]:
+        out: dict[int, tuple[int, ...]] = {ROOT: ()}
+        for j, parent in enumerate(self.parents.tolist()):
+            out[j] = (*out[parent], j)
+        return out
+
+    def anchor(self, link: int) -> Float[np.ndarray, "3"]:
+        """Of a link's joint, or the base's place, in the rest pose [m]."""
+        return self.base if link < 0 else self.anchors[link]
+
     def limits_within(self, margin: float) -> tuple[Float[np.ndarray, "N"], Float[np.ndarray, "N"]]:
         """Lower and upper limits drawn in by `margin` [rad], or by 1/20 of a small range."""
         with np.errstate(invalid="ignore"):
@@ -73,11 +85,7 @@ class Tree:
 
     def chain(self, link: int) -> tuple[int, ...]:
         """The joints from the base out to `link`."""
-        joints: list[int] = []
-        while link >= 0:
-            joints.append(link)
-            link = int(self.parents[link])
-        return tuple(reversed(joints))
+        return self._chains[link]
 
     def dofs(self, joints: tuple[int, ...]) -> list[int]:
         """The dofs of some joints, in order."""
@@ -198,13 +206,12 @@ class LinkPoses:
 
     def point(self, link: int, rest: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 T"]:
         """The path [m] of a point of a link, given where it is in the rest pose [m, world]."""
-        anchor = self.tree.base if link < 0 else self.tree.anchors[link]
-        return self.positions[link] + self.direction(link, rest - anchor)
+        return self.positions[link] + self.direction(link, rest - self.tree.anchor(link))
 
     def heights(self, link: int, rest: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "P T"]:
         """How high [m] some points of a link are."""
-        anchor = self.tree.base if link < 0 else self.tree.anchors[link]
-        return self.positions[link][2] + (rest - anchor) @ self.rotations[link][2]
+        arms = rest - self.tree.anchor(link)
+        return self.positions[link][2] + arms @ self.rotations[link][2]
 
     def direction(self, link: int, rest: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 T"]:
         """A direction that is fixed in a link, given in the rest pose's world."""
@@ -244,8 +251,22 @@ class LinkPoses:
         return out
 
 
+_POSES: WeakKeyDictionary[Coordinates, LinkPoses] = WeakKeyDictionary()
+
+
 def forward_kinematics(tree: Tree, q: Coordinates) -> LinkPoses:
-    """The poses of all links in all frames."""
+    """The poses of all links in all frames; of the same coordinates, which no one may write to from
+    then on, they are found once."""
+    known = _POSES.get(q)
+    if known is None or known.tree is not tree:
+        known = _POSES[q] = _forward_kinematics(tree, q)
+        for part in (q.pos, q.quat, q.angles, q.ball_quats):
+            if part is not None:
+                part.flags.writeable = False
+    return known
+
+
+def _forward_kinematics(tree: Tree, q: Coordinates) -> LinkPoses:
     count, time = len(tree), len(q)
     rotations = np.empty((count + 1, 3, 3, time))
     positions = np.empty((count + 1, 3, time))
@@ -254,8 +275,8 @@ def forward_kinematics(tree: Tree, q: Coordinates) -> LinkPoses:
     sin, cos = np.sin(q.angles.T), np.cos(q.angles.T)
     for j, parent in enumerate(tree.parents.tolist()):
         above = rotations[parent]
-        anchor = tree.base if parent < 0 else tree.anchors[parent]
-        positions[j] = positions[parent] + _apply(above, tree.anchors[j] - anchor)
+        arm = tree.anchors[j] - tree.anchor(parent)
+        positions[j] = positions[parent] + _apply(above, arm)
         if tree.balls[j]:
             assert q.ball_quats is not None
             local = np.moveaxis(matrix_from_quat(q.ball_quats[:, j]), 0, -1)
@@ -283,7 +304,7 @@ def skew(v: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
 
 
 def cross(
-    u: Float[np.ndarray, "3 T"], v: Float[np.ndarray, "3 T"], out: Float[np.ndarray, "3 T"]
+    u: Float[np.ndarray, "3 *T"], v: Float[np.ndarray, "3 *T"], out: Float[np.ndarray, "3 *T"]
 ) -> None:
     """The cross product, four times as fast as numpy's."""
     np.subtract(u[1] * v[2], u[2] * v[1], out=out[0])

@@ -15,28 +15,17 @@ from robots.model.morphology import Morphology
 from robots.model.shapes import DIRECTIONS
 from robots.residuals import one_sided
 from robots.solver.block import Block
-from robots.solver.hulls import Shape, ShapePair, can_collide, shapes_of
+from robots.solver.candidates import Candidate, by_moves
+from robots.solver.hulls import SLABS, Shape, ShapePair, can_collide, shapes_of, signed_distance
+from robots.solver.pushes import Moves, Pushes
 from robots.tree import LinkPoses, Tree, forward_kinematics
 
 DEPTH_ROUNDING = 0.003  # [m] over which the penalty of their depth sets in
+FELT = 3  # roundings of distance beyond which a residual is not worth its time
 SEARCH_DISTANCE = 0.02  # [m] between shapes within which a pair is a candidate
 _ONE_JOINT = 0.05  # hip heights between hinges that turn about one point
-_PAIRS = len(DIRECTIONS) // 2  # a direction and the one against it, as many from the end
 
-Moves = tuple[tuple[int, ...], tuple[int, ...]]
-"""The free joints that move a pair's small shape but not the large one, and the reverse."""
 MovedPair = tuple[ShapePair, Moves]
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A pair of shapes that may collide: in which `frames`, with which of the small one's
-    `spheres`, and which joints move the two against each other."""
-
-    pair: ShapePair
-    spheres: Int[np.ndarray, "N"]
-    moves: Moves
-    frames: Int[np.ndarray, "S"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +63,15 @@ class Collisions:
             moved[:, 1:] = np.maximum(moved[:, 1:], step)
             reach = small.bound + within + moved + [[pair.clearance] for pair, _ in moved_pairs]
             bounds_meet = distance_between < reach + [[pair.large.bound] for pair, _ in moved_pairs]
-            for k in np.flatnonzero(bounds_meet.any(1)).tolist():
+            nearby = np.flatnonzero(bounds_meet.any(1)).tolist()
+            if not nearby:
+                continue
+            large = [moved_pairs[k][0].large for k in nearby]
+            from_center = self._from_shapes(searched, large, -between[nearby])
+            meet = bounds_meet[nearby] & (from_center < reach[nearby])
+            for k, at_all in zip(nearby, meet, strict=True):
                 pair, moves = moved_pairs[k]
-                at = np.flatnonzero(bounds_meet[k])
-                from_center = _distance(self.tree, searched, pair, small.center[None], at)[0]
-                at = at[from_center < reach[k, at]]
+                at = np.flatnonzero(at_all)
                 if not len(at):
                     continue
                 excess = _distance(self.tree, searched, pair, small.spheres, at)
@@ -88,6 +81,35 @@ class Collisions:
                     frames_near = np.unique(np.clip(around, 0, count - 1))
                     found.append(Candidate(pair, np.flatnonzero(near.any(1)), moves, frames_near))
         return found
+
+    @staticmethod
+    def _from_shapes(
+        poses: LinkPoses, shapes: Sequence[Shape], away: Float[np.ndarray, "K 3 T"]
+    ) -> Float[np.ndarray, "K T"]:
+        """How far [m] points are from some shapes, given where they are from their centers."""
+        R = poses.rotations[[shape.link for shape in shapes]]
+        inside = np.einsum("kjit,kjt->kit", R, away)
+        inside += np.stack([shape.center for shape in shapes])[:, :, None]
+        middle, half = np.stack([shape.slabs for shape in shapes], axis=1)
+        over = np.abs(SLABS @ inside - middle[:, :, None]) - half[:, :, None]
+        return over.max(axis=1)
+
+    def nearer(
+        self, candidates: Sequence[Candidate], poses: LinkPoses, within: float
+    ) -> list[Candidate]:
+        """The candidates in those of their frames in which they are nearer than `within` [m]
+        beyond their clearance."""
+        out = []
+        for candidate in candidates:
+            pair, frames = candidate.pair, candidate.frames
+            spheres, radii = (
+                part[candidate.spheres] for part in (pair.small.spheres, pair.small.radii)
+            )
+            gap = _distance(self.tree, poses, pair, spheres, frames) - radii[:, None]
+            near = gap.min(axis=0) < pair.clearance + within
+            if near.any():
+                out.append(replace(candidate, frames=frames[near]))
+        return out
 
     def _moved_pairs(self, block: Block) -> dict[Shape, list[MovedPair]]:
         """The pairs that a block moves against each other, by their small shapes."""
@@ -117,37 +139,47 @@ class Collisions:
         depth [m] = clearance - signed distance of the sphere from the large shape; w [1/m] =
         `weight` x `penalty_scale`, which also sharpens the rounding.
         """
-        for candidate in candidates:
-            pair, at = candidate.pair, candidate.frames
-            spheres = pair.small.spheres[candidate.spheres]
-            local = _in_large_shape(self.tree, poses, pair, spheres, at)
-            distance = _signed_distance(pair.large, local)
-            excess = pair.clearance + pair.small.radii[candidate.spheres, None] - distance
-            joints = (*candidate.moves[0], *candidate.moves[1])
-            links = {pair.small.link, pair.large.link, *joints}
-            links |= {int(self.tree.parents[j]) for j in joints}
-            dofs = block.local_joint_dofs(joints)
-            for s, sphere in enumerate(spheres):
-                active = np.flatnonzero(excess[s] > -3 * DEPTH_ROUNDING)
-                if not len(active):
-                    continue
-                here = at[active]
-                residual, slope = one_sided(excess[s, active], DEPTH_ROUNDING / penalty_scale[here])
-                scaled = weight * penalty_scale[here]
-                if not normal.with_jacobian:
-                    normal.cost[here] += 0.5 * (scaled * residual) ** 2
-                    continue
-                touched = poses.at(here, links)
-                beyond = DIRECTIONS @ local[:, s, active] - pair.large.reach[:, None]
-                side_here = DIRECTIONS[beyond.argmax(0)].T
-                push = np.einsum("ijt,jt->it", touched.rotations[pair.large.link], side_here)
-                point = touched.point(pair.small.link, sphere)
-                J = [
-                    approach_jacobian(touched, moves, point, sign * push)
-                    for moves, sign in zip(candidate.moves, (-1.0, 1.0), strict=True)
-                    if moves
-                ]
-                normal.add_at(here, dofs, np.concatenate(J) * slope * scaled, residual * scaled)
+        for moves, own in by_moves(candidates).items():
+            pushes = Pushes(normal, poses, moves)
+            for candidate in own:
+                self._add_spheres(normal, poses, candidate, pushes, weight, penalty_scale)
+            pushes.add_to_normal(block)
+
+    def _add_spheres(
+        self,
+        normal: NormalEquations,
+        poses: LinkPoses,
+        candidate: Candidate,
+        pushes: Pushes,
+        weight: float,
+        penalty_scale: Float[np.ndarray, "T"],
+    ) -> None:
+        pair, at = candidate.pair, candidate.frames
+        small, large = pair.small.link, pair.large.link
+        spheres = pair.small.spheres[candidate.spheres]
+        local = _in_large_shape(self.tree, poses, pair, spheres, at)
+        distance = signed_distance(pair.large, local)
+        excess = pair.clearance + pair.small.radii[candidate.spheres, None] - distance
+        felt = excess > -FELT * DEPTH_ROUNDING
+        active = felt.any(axis=0)
+        if not active.any():
+            return
+        here, felt = at[active], felt[:, active]
+        scaled = weight * penalty_scale[here]
+        depth, slope = one_sided(excess[:, active], DEPTH_ROUNDING / penalty_scale[here])
+        residuals = np.where(felt, scaled * depth, 0.0)
+        normal.cost[here] += 0.5 * (residuals**2).sum(0)
+        if not normal.with_jacobian:
+            return
+        s, t = np.nonzero(felt)
+        beyond = DIRECTIONS @ local[:, :, active][:, s, t] - pair.large.reach[:, None]
+        side = DIRECTIONS[beyond.argmax(0)].T
+        push = np.zeros((3, *felt.shape))
+        out = np.einsum("ijn,jn->in", poses.rotations[large][..., here[t]], side)
+        push[:, s, t] = (scaled * slope)[s, t] * out
+        arms = (spheres - self.tree.anchor(small)) @ poses.rotations[small][..., here]
+        points = arms + poses.positions[small][:, None, here]
+        pushes.add(here, points, push, residuals)
 
 
 def _in_large_shape(
@@ -159,13 +191,11 @@ def _in_large_shape(
 ) -> Float[np.ndarray, "3 S N"]:
     """Where points of the small shape are in some frames, in the rest pose of the large one [m]."""
     a, b = pair.small.link, pair.large.link
-    anchor_a = tree.base if a < 0 else tree.anchors[a]
-    anchor_b = tree.base if b < 0 else tree.anchors[b]
     R_b = poses.rotations[b][..., at]
     relative = np.einsum("jit,jkt->ikt", R_b, poses.rotations[a][..., at])
     offset = np.einsum("jit,jt->it", R_b, poses.positions[a][:, at] - poses.positions[b][:, at])
-    local = (points - anchor_a) @ relative
-    local += (offset + anchor_b[:, None])[:, None]
+    local = (points - tree.anchor(a)) @ relative
+    local += (offset + tree.anchor(b)[:, None])[:, None]
     return local
 
 
@@ -177,29 +207,7 @@ def _distance(
     at: Int[np.ndarray, "N"],
 ) -> Float[np.ndarray, "S N"]:
     """The signed distance [m] of points of the small shape from the large one in some frames."""
-    return _signed_distance(pair.large, _in_large_shape(tree, poses, pair, points, at))
-
-
-def _signed_distance(shape: Shape, points: Float[np.ndarray, "3 S N"]) -> Float[np.ndarray, "S N"]:
-    """The signed distance [m] of points from a shape, both in its rest pose: the maximum over its
-    sides, which come in opposite pairs; the distance from the middle of a pair gives both."""
-    towards, away = shape.reach[_PAIRS:], shape.reach[_PAIRS - 1 :: -1]
-    excess = DIRECTIONS[_PAIRS:] @ points.reshape(3, -1)
-    excess -= (towards - away)[:, None] / 2
-    np.abs(excess, out=excess)
-    excess -= (towards + away)[:, None] / 2
-    return excess.max(0).reshape(points.shape[1:])
-
-
-def approach_jacobian(
-    poses: LinkPoses,
-    joints: tuple[int, ...],
-    point: Float[np.ndarray, "3 N"],
-    along: Float[np.ndarray, "3 N"],
-) -> Float[np.ndarray, "C N"]:
-    """The Jacobian of a point's coordinate along a unit vector [m] by some joints' dofs."""
-    jacobian = poses.point_jacobian(joints, poses.angular_jacobian(joints), point)
-    return (jacobian * along).sum(1)
+    return signed_distance(pair.large, _in_large_shape(tree, poses, pair, points, at))
 
 
 @lru_cache(maxsize=16)

@@ -1,15 +1,16 @@
 """Gauss-Newton in a block of a robot's coordinates, over all frames of the trajectory at once."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from robots.least_squares import NormalEquations, Smoothness
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
-from robots.solver.collision import Candidate, collisions_of
+from robots.solver.candidates import Candidate
+from robots.solver.collision import collisions_of
 from robots.solver.hinges import LIMIT_CLEARANCE
 from robots.solver.holds import Holds
 from robots.solver.objective import linearize
@@ -17,32 +18,28 @@ from robots.solver.smoothness import com_acceleration, jerk_stiffening, smoothne
 from robots.solver.targets import Targets
 from robots.tree import Coordinates, forward_kinematics
 
-_WINDOW = 0.15  # [s] before and after a frame over which its cost is averaged to judge a step
+WINDOW = 0.15  # [s] before and after a frame over which its cost is averaged to judge a step
 _WIDE_WINDOW = 0.5  # [s] the same for what is gained nearby,
 _ALLOWED_LOSS = 0.5  # and the share of that by which a frame's cost may rise
-_MAX_HALVINGS = 6  # of a step in a repair
-_MAX_SOLVES = 4  # for which hinges stay at their limits, of a step in a repair
-_PATIENCE = 2  # steps without progress that are allowed while many frames reject them
-_COLLISION_PERIOD = 5  # steps from one search for collision candidates to the next
+PATIENCE = 2  # steps without progress that are allowed while many frames reject them
+COLLISION_PERIOD = 5  # steps from one search for collision candidates to the next
 _COLLISION_INTERVAL = 0.06  # [s] between the frames that are searched
-_MAX_STEP = 1.0  # [rad, m] of a dof in one step
-_MIN_DAMPING = 1e-3  # [1] on the diagonal of the normal equations
-_REJECTED_DAMPING = 0.1  # at least, where a step was rejected
-_FIXED_DAMPING = 1e8  # where a frame must stay
-
-
-@dataclass(frozen=True, eq=False)
-class Repair:
-    """How frames are solved again: `penalty_scale` multiplies the weights of collisions, floor and
-    overspeed; `fixed` frames stay."""
-
-    penalty_scale: Float[np.ndarray, "T"]
-    fixed: Bool[np.ndarray, "T"]
+MAX_STEP = 1.0  # [rad, m] of a dof in one step
+MIN_DAMPING = 1e-3  # [1] on the diagonal of the normal equations
+REJECTED_DAMPING = 0.1  # at least, where a step was rejected
 
 
 def collision_stride(targets: Targets) -> int:
     """The number of frames from one that is searched for collisions to the next."""
     return max(1, round(_COLLISION_INTERVAL / targets.frame_time))
+
+
+def collision_candidates(
+    robot: Morphology, targets: Targets, q: Coordinates, block: Block
+) -> list[Candidate]:
+    """The parts that are near each other at `q`, or between the frames that are searched."""
+    poses = forward_kinematics(robot.tree, q)
+    return collisions_of(robot).candidates(poses, block, collision_stride(targets))
 
 
 def solve_block(
@@ -54,16 +51,14 @@ def solve_block(
     max_iter: int,
     rel_tol: float,
     max_rejected: float,
-    *,
-    avoid_collisions: bool,
-    repair: Repair | None = None,
+    candidates: Sequence[Candidate] | None = None,
 ) -> Coordinates:
     """At most `max_iter` Gauss-Newton steps in the block's dofs, from `q`.
 
-    With `avoid_collisions`, parts in each other are pushed apart, by a change of `q` that is
-    smoother than `q`. In a `repair`, a step is judged as a whole, and halved until the cost falls.
+    With `candidates`, the parts that are near each other at `q`, parts in each other are pushed
+    apart, by a change of `q` that is smoother than `q`.
 
-    Otherwise it is judged frame by frame: where the cost around a frame rises by more than a share
+    A step is judged frame by frame: where the cost around a frame rises by more than a share
     of what is gained nearby, the step is rejected there and damping grows (Levenberg and
     Marquardt's rule, a frame each). Between rejected and accepted frames the step is blended, and
     the normal equations with it: exact where the cost is a parabola.
@@ -72,63 +67,47 @@ def solve_block(
     the frames reject it.
     """
     tree = robot.tree
-    window = max(1, 2 * round(_WINDOW / targets.frame_time) + 1)
+    window = max(1, 2 * round(WINDOW / targets.frame_time) + 1)
     wide = max(1, 2 * round(_WIDE_WINDOW / targets.frame_time) + 1)
-    penalty_scale, min_damping = np.ones(len(q)), np.full(len(q), _MIN_DAMPING)
-    if repair:
-        penalty_scale = repair.penalty_scale
-        min_damping = np.where(repair.fixed, _FIXED_DAMPING, _MIN_DAMPING)
-    damping = min_damping
-    start = q if avoid_collisions else None
-    stride, solves = (1, _MAX_SOLVES) if repair else (collision_stride(targets), 1)
-    candidates: list[Candidate] = []
+    damping = np.full(len(q), MIN_DAMPING)
+    start = None if candidates is None else q
 
-    def find_candidates(q: Coordinates) -> list[Candidate]:
-        return collisions_of(robot).candidates(forward_kinematics(tree, q), block, stride)
-
-    if avoid_collisions:
-        candidates = find_candidates(q)
     stiffening = np.ones((max(len(q) - 2, 0), len(block.dofs)))
 
     def linearize_at(q: Coordinates, with_jacobian: bool = True) -> NormalEquations:
-        terms = robot, targets, holds, q, block, candidates, penalty_scale
-        return linearize(*terms, with_jacobian=with_jacobian, exact=repair is not None)
+        terms = robot, targets, holds, q, block, candidates or []
+        return linearize(*terms, with_jacobian=with_jacobian)
 
-    def smoothness_at(q: Coordinates) -> Smoothness:
+    def smoothness_at(q: Coordinates, with_jacobian: bool) -> Smoothness:
         frame_time = targets.frame_time
-        point = com_acceleration(robot, q, targets.com, frame_time, block)
+        terms = robot, q, targets.com, frame_time, block
+        point = com_acceleration(*terms, with_jacobian=with_jacobian)
         return smoothness_of(
-            robot, q, start, frame_time, block.dofs, stiffening, penalty_scale, point
+            robot, q, start, frame_time, block.dofs, stiffening, np.ones(len(q)), point
         )
 
     normal, stalled = linearize_at(q), 0
     for k in range(max_iter):
         jerky = jerk_stiffening(robot, q, targets.frame_time)[:, block.dofs]
         stiffening = np.maximum(stiffening, jerky)
-        coupling = smoothness_at(q)
+        coupling = smoothness_at(q, True)
         cost = uniform_filter1d(normal.cost + coupling.cost(len(q)), window)
         limits = q.at_limits(tree, LIMIT_CLEARANCE)[:, block.dofs]
         step = np.zeros((len(q), tree.nv))
-        step[:, block.dofs] = normal.solve_coupled(coupling, damping, limits, solves=solves)
-        shortening = np.minimum(1.0, _MAX_STEP / np.maximum(np.abs(step).max(1), 1e-9))
+        step[:, block.dofs] = normal.solve_coupled(coupling, damping, limits)
+        shortening = np.minimum(1.0, MAX_STEP / np.maximum(np.abs(step).max(1), 1e-9))
         step *= smooth_lower_envelope(shortening, window)[:, None]
         share = np.ones(len(q))
-        for _ in range(_MAX_HALVINGS if repair else 1):
-            trial = q.integrated(tree, step).clipped(tree, LIMIT_CLEARANCE)
-            if avoid_collisions and k % _COLLISION_PERIOD == _COLLISION_PERIOD - 1:
-                candidates = find_candidates(trial)
-            trial_normal = linearize_at(trial, with_jacobian=k < max_iter - 1)
-            after = uniform_filter1d(trial_normal.cost + smoothness_at(trial).cost(len(q)), window)
-            if not repair or after.sum() <= cost.sum():
-                break
-            step *= 0.5
-        if repair:
-            rejected = np.full(len(q), after.sum() > cost.sum())
-        else:
-            gained = np.maximum(uniform_filter1d(cost - after, wide), 0.0)
-            rejected = after > cost * (1 + 1e-3) + _ALLOWED_LOSS * gained + 1e-9
-        damping = np.where(rejected, np.maximum(damping * 10, _REJECTED_DAMPING), damping / 10)
-        damping = np.maximum(damping, min_damping)
+        trial = q.integrated(tree, step).clipped(tree, LIMIT_CLEARANCE)
+        if candidates is not None and k % COLLISION_PERIOD == COLLISION_PERIOD - 1:
+            candidates = collision_candidates(robot, targets, trial, block)
+        trial_normal = linearize_at(trial, with_jacobian=k < max_iter - 1)
+        trial_cost = trial_normal.cost + smoothness_at(trial, False).cost(len(q))
+        after = uniform_filter1d(trial_cost, window)
+        gained = np.maximum(uniform_filter1d(cost - after, wide), 0.0)
+        rejected = after > cost * (1 + 1e-3) + _ALLOWED_LOSS * gained + 1e-9
+        damping = np.where(rejected, np.maximum(damping * 10, REJECTED_DAMPING), damping / 10)
+        damping = np.maximum(damping, MIN_DAMPING)
         if rejected.any():
             share = smooth_lower_envelope(1.0 - rejected, window)
             trial = q.integrated(tree, step * share[:, None]).clipped(tree, LIMIT_CLEARANCE)
@@ -137,7 +116,7 @@ def solve_block(
         q, normal = trial, trial_normal
         remaining = (cost + share * (after - cost)).sum()
         stalled = stalled + 1 if remaining > (1 - rel_tol) * cost.sum() else 0
-        if stalled > (_PATIENCE if rejected.mean() > max_rejected else 0):
+        if stalled > (PATIENCE if rejected.mean() > max_rejected else 0):
             break
     return q
 

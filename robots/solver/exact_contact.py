@@ -12,14 +12,15 @@ from robots.least_squares import NormalEquations
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
 from robots.solver.block import Block
+from robots.solver.candidates import Candidate, by_moves
 from robots.solver.collision import (
     DEPTH_ROUNDING,
-    Candidate,
+    FELT,
     Collisions,
-    approach_jacobian,
     collisions_of,
 )
 from robots.solver.hulls import CLEARANCE, ShapePair
+from robots.solver.pushes import Pushes
 from robots.tree import LinkPoses
 
 _MAX_DISTANCE = 0.02  # [m] beyond which MuJoCo need not measure
@@ -28,13 +29,13 @@ _MAX_DISTANCE = 0.02  # [m] beyond which MuJoCo need not measure
 @dataclass(frozen=True, eq=False)
 class PairDistance:
     """A pair's signed distance [m] in N frames, negative in a collision; the `points` of the small
-    and the large shape that are nearest to each other, or deepest in each other [m, world]; the
-    unit normal `out` of the large one there."""
+    shape that are nearest to the large one, or deepest in it [m, world]; the unit normal `out` of
+    the large one there."""
 
     candidate: Candidate
     frames: Int[np.ndarray, "N"]
     distance: Float[np.ndarray, "N"]
-    points: Float[np.ndarray, "2 3 N"]
+    points: Float[np.ndarray, "3 N"]
     out: Float[np.ndarray, "3 N"]
 
 
@@ -68,27 +69,23 @@ class ExactContacts:
         penalty_scale: Float[np.ndarray, "T"],
     ) -> None:
         """Add one residual for each candidate, as `Collisions.add_to` does for each sphere."""
-        for x in self._measure(qpos, candidates):
-            excess = self._clearances[x.candidate.pair] - x.distance
-            active = excess > -3 * DEPTH_ROUNDING
-            if not active.any():
-                continue
-            here = x.frames[active]
-            scaled = weight * penalty_scale[here]
-            residual, slope = one_sided(excess[active], DEPTH_ROUNDING / penalty_scale[here])
-            if not normal.with_jacobian:
-                normal.cost[here] += 0.5 * (scaled * residual) ** 2
-                continue
-            touched = poses.at(here)
-            J = [
-                approach_jacobian(touched, moves, point, sign * x.out[:, active])
-                for moves, point, sign in zip(
-                    x.candidate.moves, x.points[..., active], (-1.0, 1.0), strict=True
-                )
-                if moves
-            ]
-            columns = block.local_joint_dofs((*x.candidate.moves[0], *x.candidate.moves[1]))
-            normal.add_at(here, columns, np.concatenate(J) * slope * scaled, residual * scaled)
+        measured = self._measure(qpos, candidates)
+        for moves in by_moves([x.candidate for x in measured]):
+            pushes = Pushes(normal, poses, moves)
+            for x in (x for x in measured if x.candidate.moves == moves):
+                excess = self._clearances[x.candidate.pair] - x.distance
+                active = excess > -FELT * DEPTH_ROUNDING
+                if not active.any():
+                    continue
+                here = x.frames[active]
+                scaled = weight * penalty_scale[here]
+                depth, slope = one_sided(excess[active], DEPTH_ROUNDING / penalty_scale[here])
+                normal.cost[here] += 0.5 * (scaled * depth) ** 2
+                if normal.with_jacobian:
+                    out = scaled * slope * x.out[:, active]
+                    points = x.points[:, active]
+                    pushes.add(here, points[:, None], out[:, None], (scaled * depth)[None])
+            pushes.add_to_normal(block)
 
     @cached_property
     def _clearances(self) -> dict[ShapePair, float]:
@@ -131,7 +128,7 @@ class ExactContacts:
             if len(at):
                 large, small = points[at, :3].T, points[at, 3:].T
                 out = (small - large) / signed[at]
-                found.append(PairDistance(candidate, at, signed[at], np.stack([small, large]), out))
+                found.append(PairDistance(candidate, at, signed[at], small, out))
         return found
 
 

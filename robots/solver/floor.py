@@ -9,7 +9,7 @@ from jaxtyping import Float
 from robots.least_squares import NormalEquations
 from robots.model.morphology import Morphology
 from robots.model.rims import rim
-from robots.residuals import one_sided, point_jacobian
+from robots.residuals import one_sided, twists
 from robots.solver.block import Block
 from robots.solver.hulls import shapes_of
 from robots.tree import LinkPoses, forward_kinematics
@@ -102,21 +102,22 @@ def add_floor(
         frames = np.flatnonzero(felt.any(axis=0))
         if not len(frames):
             continue
+        felt = felt[:, frames]
+        sunk, slope = one_sided(depth[:, frames], rounding[frames])
+        residuals = np.where(felt, weight[frames] * sunk, 0.0)
+        normal.cost[frames] += 0.5 * (residuals**2).sum(0)
+        if not normal.with_jacobian:
+            continue
         near = poses.at(frames, {shape.link, *joints, *robot.tree.parents[list(joints)].tolist()})
-        axes = near.angular_jacobian(joints)
-        if block.base:
-            unit = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, len(frames)))
-            axes = np.concatenate([unit, axes])
-        dofs = block.local_dofs(joints)
-        for k in np.flatnonzero(felt.any(axis=1)).tolist():
-            own = np.flatnonzero(felt[k])
-            residual, slope = one_sided(depth[k, own], rounding[own])
-            if not normal.with_jacobian:
-                normal.cost[own] += 0.5 * (weight[own] * residual) ** 2
-                continue
-            point = near.point(shape.link, shape.spheres[k])
-            J = point_jacobian(near, joints, axes, point, base=block.base)[:, 2, felt[k, frames]]
-            normal.add_at(own, dofs, -J * slope * weight[own], residual * weight[own])
+        # A push down at the end of an arm (x, y): (-y, x, 0) is the arm's product with (0, 0, -1).
+        x, y = (shape.spheres - robot.tree.anchor(shape.link)) @ near.rotations[shape.link][:2]
+        down = np.where(felt, weight[frames] * slope, 0.0)
+        wrenches = np.zeros((len(frames), 6, len(shape.spheres)))
+        wrenches[:, 0], wrenches[:, 1], wrenches[:, 5] = (-y * down).T, (x * down).T, -down.T
+        moved = twists(near, joints, near.positions[shape.link], base=block.base)
+        squares = wrenches @ wrenches.transpose(0, 2, 1)
+        sums = (wrenches @ residuals.T[:, :, None])[:, :, 0]
+        normal.add_moved(frames, block.local_dofs(joints), moved, squares, sums)
 
 
 def depth_in_floor(robot: Morphology, poses: LinkPoses, block: Block) -> Float[np.ndarray, "T"]:

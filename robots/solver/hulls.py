@@ -6,6 +6,7 @@ k-DOP: Klosowski et al. 1998): the signed distance to it is a matrix product and
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -22,6 +23,7 @@ _MAX_PROTRUSION = (
     0.006  # [m] of a shape's corner beyond its spheres: above, it gets one of its own,
 )
 _CORNER_RADIUS = 0.008  # [m] of this radius
+SLABS = DIRECTIONS[len(DIRECTIONS) // 2 :]  # the others are these, reversed, against them
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +39,12 @@ class Shape:
     radii: Float[np.ndarray, "S"]
     center: Float[np.ndarray, "3"]
     bound: float
+
+    @cached_property
+    def slabs(self) -> Float[np.ndarray, "2 13"]:
+        """Opposite sides as slabs along `SLABS`: where their middles are, and half their widths."""
+        towards, away = self.reach[len(SLABS) :], self.reach[len(SLABS) - 1 :: -1]
+        return np.stack([towards - away, towards + away]) / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +132,17 @@ def _with_corners(
         spheres = np.concatenate([spheres, [corner - _CORNER_RADIUS * DIRECTIONS[side]]])
         radii = np.append(radii, _CORNER_RADIUS)
     return spheres, radii
+
+
+def signed_distance(shape: Shape, points: Float[np.ndarray, "3 S N"]) -> Float[np.ndarray, "S N"]:
+    """The signed distance [m] of points from a shape, both in its rest pose: the maximum over its
+    sides, of which a slab has two."""
+    middle, half = shape.slabs
+    excess = SLABS @ points.reshape(3, -1)
+    excess -= middle[:, None]
+    np.abs(excess, out=excess)
+    excess -= half[:, None]
+    return excess.max(0).reshape(points.shape[1:])
 
 
 def can_collide(mjcf: Mjcf, a: Shape, b: Shape) -> bool:

@@ -142,8 +142,9 @@ def _marched(
 ) -> list[Coordinates]:
     """`q` with the block's joints marched through all frames, in each of the orders at once. Those
     that something has led to their first frame go on from there; others begin at the T-pose."""
-    bones = tuple(role for role in targets.bones if role in robot.bones)
+    bones = tuple(_limbs(robot, targets, block))
     terms = _terms_of(robot, bones, targets.hands is not None)
+    poses = pose_targets(targets, bones)
     columns = _qpos_columns(robot, block)
     qpos = robot.to_qpos(q)
     ways = [qpos.copy() for _ in orders]
@@ -152,9 +153,7 @@ def _marched(
     for k, frames in enumerate(zip(*orders, strict=True)):
         here = qpos[list(frames)]
         here[:, columns] = last
-        here = _settled(
-            terms, pose_targets(targets, np.array(frames), bones), here, block, first=k == 0
-        )
+        here = _settled(terms, poses.at(np.array(frames)), here, block, first=k == 0)
         last = here[:, columns]
         for way, frame, pose in zip(ways, frames, here, strict=True):
             way[frame] = pose
@@ -223,4 +222,4 @@ def _qpos_columns(robot: Morphology, block: Block) -> Int[np.ndarray, "n"]:
 
 @lru_cache(maxsize=16)
 def _terms_of(robot: Morphology, bones: tuple[Role, ...], hands: bool) -> Terms:
-    return Terms(robot, bones, hands)
+    return Terms(robot, bones, hands, later_only=True)

@@ -19,7 +19,8 @@ from robots.residuals import (
     rotation_residual,
 )
 from robots.solver.block import Block
-from robots.solver.collision import Candidate, collisions_of
+from robots.solver.candidates import Candidate
+from robots.solver.collision import collisions_of
 from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.floor import add_floor
 from robots.solver.holds import Holds

@@ -66,15 +66,20 @@ def com_acceleration(
     planned: Float[np.ndarray, "T 3"] | None,
     frame_time: float,
     block: Block,
+    *,
+    with_jacobian: bool,
 ) -> PointAcceleration | None:
     """r = w (c'' - c_plan''), of the centre of mass; None without a plan."""
     if planned is None or len(q) < 3:
         return None
     poses = forward_kinematics(robot.tree, q)
     away = center_of_mass(robot, poses).T - planned
-    J = com_jacobian(robot, poses, block.joints, base=block.base).transpose(2, 0, 1)
     weight = W_COM_ACCELERATION / frame_time**2
-    return PointAcceleration(weight * J, weight * second_differences(away))
+    J = np.zeros((0, len(block.dofs), 3))
+    if with_jacobian:
+        J = weight * com_jacobian(robot, poses, block.joints, base=block.base).transpose(2, 0, 1)
+    residual = weight * second_differences(away)
+    return PointAcceleration(J, residual, np.ones(len(residual), dtype=bool))
 
 
 def jerk_stiffening(

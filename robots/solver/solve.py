@@ -11,9 +11,8 @@ from collections.abc import Sequence
 
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
-from robots.solver.block import Block, blocks_of
-from robots.solver.collision import collisions_of
-from robots.solver.descent import collision_stride, solve_block
+from robots.solver.block import blocks_of
+from robots.solver.descent import collision_candidates, solve_block
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import FootPlan, plan_feet, reachable
 from robots.solver.holds import Holds, joined
@@ -28,7 +27,7 @@ from robots.solver.stance import apart
 from robots.solver.strays import without_strays
 from robots.solver.stretches import by_stretches
 from robots.solver.targets import Targets, poses_of, targets_of
-from robots.tree import Coordinates, forward_kinematics
+from robots.tree import Coordinates
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
 _MAX_ITER = (12, 10)  # Gauss-Newton steps, by block
@@ -119,15 +118,17 @@ def solve(
         ends = _POLISH if polish else (max_iter, rel_tol, _MAX_REJECTED)
         if not polish:
             sliding = _holds_of(robot, targets, feet, q).sliding()
-            q = solve_block(robot, targets, sliding, q, block, *ends, avoid_collisions=False)
+            q = solve_block(robot, targets, sliding, q, block, *ends)
         if block.base and not polish:
             feet = apart(reachable(robot, feet, q))
         holds = _holds_of(robot, targets, feet, q)
-        if polish or _may_collide(robot, targets, q, block):
-            q = solve_block(robot, targets, holds, q, block, *ends, avoid_collisions=True)
+        near = collision_candidates(robot, targets, q, block)
+        if polish or near:
+            q = solve_block(robot, targets, holds, q, block, *ends, near)
         if not block.base and not polish and (thrown := abrupt(robot, targets, q, block)).any():
             q = calmed(robot, targets, holds, q, block, thrown)
-            q = solve_block(robot, targets, holds, q, block, *ends, avoid_collisions=True)
+            near = collision_candidates(robot, targets, q, block)
+            q = solve_block(robot, targets, holds, q, block, *ends, near)
         q = repair(robot, targets, holds, q, block)
     return q
 
@@ -137,8 +138,3 @@ def _holds_of(
 ) -> Holds:
     """Of the feet, and of what else of `q` touches the ground."""
     return joined([*(footing_of(robot, foot) for foot in feet), resting(robot, targets, q)])
-
-
-def _may_collide(robot: Morphology, targets: Targets, q: Coordinates, block: Block) -> bool:
-    poses = forward_kinematics(robot.tree, q)
-    return bool(collisions_of(robot).candidates(poses, block, collision_stride(targets)))

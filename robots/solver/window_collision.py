@@ -6,11 +6,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from robots.model.morphology import Morphology
-from robots.model.shapes import DIRECTIONS
 from robots.residuals import one_sided
 from robots.solver.collision import DEPTH_ROUNDING, collisions_of
-from robots.solver.hulls import ShapePair
+from robots.solver.hulls import SLABS, ShapePair
 from robots.solver.weights import W_COLLISION, W_LEG_COLLISION
+from robots.tree import Tree
 
 _ACTIVE = 3 * DEPTH_ROUNDING  # [m] between shapes beyond which the penalty is negligible
 # [m] that parts keep between them beyond a whole clip's clearance, for how far a soft penalty gives
@@ -38,7 +38,8 @@ class WindowPoses:
 class WindowCollisions:
     """A robot's pairs of shapes that can meet. `bodies` are those of the tree's links and, last, of
     the base; `rest` is where all bodies are in the rest pose; `first_block` are the links that are
-    solved for first: later ones give way to them."""
+    solved for first: later ones give way to them. With `later_only`, first ones are given: what
+    they do to each other is not looked at."""
 
     def __init__(
         self,
@@ -46,9 +47,14 @@ class WindowCollisions:
         bodies: Int[np.ndarray, "L"],
         rest: tuple[Float[np.ndarray, "B 3 3"], Float[np.ndarray, "B 3"]],
         first_block: Int[np.ndarray, "F"],
+        *,
+        later_only: bool,
     ) -> None:
         self._rest_rotations, self._rest_positions = rest
+        tree, first = robot.tree, set(first_block.tolist())
         pairs = collisions_of(robot).pairs
+        if later_only:
+            pairs = tuple(pair for pair in pairs if not _among(pair, tree, first))
         shapes = {x.geom: x for pair in pairs for x in (pair.small, pair.large)}
         number = {geom: k for k, geom in enumerate(shapes)}
         self._shapes = bodies[[shape.link for shape in shapes.values()]]
@@ -62,14 +68,14 @@ class WindowCollisions:
             for pair, own in zip(pairs, apart, strict=True)
         ]
         self._bounds = np.array(bounds) ** 2
-        self._reach = np.array([pair.large.reach for pair in pairs]).reshape(-1, 26)
+        self._slabs = np.array([pair.large.slabs for pair in pairs]).reshape(-1, 2, len(SLABS))
         counts = [len(pair.small.spheres) for pair in pairs]
         self._pairs = np.repeat(np.arange(len(pairs)), counts)
         spheres = [s for pair in pairs for s in pair.small.spheres]
         self._spheres = self._local(spheres, self._shapes[self._small[self._pairs]])
         radii = [r + own for pair, own in zip(pairs, apart, strict=True) for r in pair.small.radii]
         self._radii = np.array(radii)
-        self._index_dofs(robot, pairs, set(first_block.tolist()))
+        self._index_dofs(tree, pairs, first)
 
     def candidates(self, poses: WindowPoses) -> Int[np.ndarray, "K"]:
         """The spheres that collide, or may soon."""
@@ -77,7 +83,8 @@ class WindowCollisions:
         x, y, z = (centers[:, self._small] - centers[:, self._large]).transpose(2, 0, 1)
         pairs = (x * x + y * y + z * z < self._bounds).any(0)
         candidates = np.flatnonzero(pairs[self._pairs])
-        return candidates[(self._depth(poses, candidates)[0] > -_ACTIVE - _REACH).any(0)]
+        depth = self._depth(candidates, self._inside(poses, candidates))
+        return candidates[(depth > -_ACTIVE - _REACH).any(0)]
 
     def add_to(
         self,
@@ -90,7 +97,8 @@ class WindowCollisions:
     ) -> None:
         """Add how deep shapes are in each other to the normal equations; `candidates` are the
         spheres to look at."""
-        depth, side = self._depth(poses, candidates)
+        inside = self._inside(poses, candidates)
+        depth = self._depth(candidates, inside)
         frames, active = np.nonzero(depth > -_ACTIVE)
         if not len(active):
             return
@@ -98,9 +106,10 @@ class WindowCollisions:
         small, large = self._shapes[self._small[pairs]], self._shapes[self._large[pairs]]
         point = _turned(poses.rotations[frames, small], self._spheres[candidates[active]])
         arm = (point + poses.positions[frames, small])[:, None] - anchors[frames]
-        push = _turned(
-            self._rest_rotations[large].transpose(0, 2, 1), DIRECTIONS[side[frames, active]]
-        )
+        off = inside[frames, active] @ SLABS.T - self._slabs[pairs, 0]
+        slab = (np.abs(off) - self._slabs[pairs, 1]).argmax(axis=1)
+        side = SLABS[slab] * np.sign(off[np.arange(len(off)), slab])[:, None]
+        push = _turned(self._rest_rotations[large].transpose(0, 2, 1), side)
         push = _turned(poses.rotations[frames, large], push)
         residual, slope = one_sided(depth[frames, active], DEPTH_ROUNDING)
         # axis x arm . push = axis . arm x push
@@ -114,19 +123,30 @@ class WindowCollisions:
             H[t] += rows.T @ rows
             g[t] += residual[frames == t] @ rows
 
-    def _depth(
+    def _inside(
         self, poses: WindowPoses, candidates: Int[np.ndarray, "K"]
-    ) -> tuple[Float[np.ndarray, "T K"], Int[np.ndarray, "T K"]]:
-        """How deep [m] spheres are in the shapes of their pairs, and the nearest side of these."""
-        pairs = self._pairs[candidates]
+    ) -> Float[np.ndarray, "T K 3"]:
+        """Where spheres are in the rest pose of the large shapes of their pairs, whose sides are
+        known there."""
+        pairs, own = np.unique(self._pairs[candidates], return_inverse=True)
         small, large = self._shapes[self._small[pairs]], self._shapes[self._large[pairs]]
-        away = _placed(poses, small, self._spheres[candidates]) - poses.positions[:, large]
-        # In the rest pose of the large shape: its sides are known there.
-        back = self._rest_rotations @ poses.rotations.transpose(0, 1, 3, 2)
-        inside = _turned(back[:, large], away) + self._rest_positions[large]
-        over = inside @ DIRECTIONS.T - self._reach[pairs]
-        side = over.argmax(2)
-        return self._radii[candidates] - np.take_along_axis(over, side[..., None], 2)[..., 0], side
+        back = self._rest_rotations[large] @ poses.rotations[:, large].transpose(0, 1, 3, 2)
+        turns = back @ poses.rotations[:, small]
+        shifts = _turned(back, poses.positions[:, small] - poses.positions[:, large])
+        shifts += self._rest_positions[large]
+        return _turned(turns[:, own], self._spheres[candidates]) + shifts[:, own]
+
+    def _depth(
+        self, candidates: Int[np.ndarray, "K"], inside: Float[np.ndarray, "T K 3"]
+    ) -> Float[np.ndarray, "T K"]:
+        """How deep [m] spheres are in the large shapes of their pairs."""
+        middle, half = self._slabs[self._pairs[candidates]].transpose(1, 0, 2)
+        over = inside @ SLABS.T
+        over -= middle
+        np.abs(over, out=over)
+        over -= half
+        depth: Float[np.ndarray, "T K"] = self._radii[candidates] - over.max(axis=2)
+        return depth
 
     def _local(
         self, points: list[Float[np.ndarray, "3"]], bodies: Int[np.ndarray, "K"]
@@ -135,22 +155,24 @@ class WindowCollisions:
         away = np.array(points).reshape(-1, 3) - self._rest_positions[bodies]
         return np.einsum("kji,kj->ki", self._rest_rotations[bodies], away)
 
-    def _index_dofs(
-        self, robot: Morphology, pairs: tuple[ShapePair, ...], first_block: set[int]
-    ) -> None:
+    def _index_dofs(self, tree: Tree, pairs: tuple[ShapePair, ...], first: set[int]) -> None:
         """Which columns move the pairs together (-1) and apart, of the links that give way."""
-        tree = robot.tree
         self._signs = np.zeros((len(pairs), tree.nv))
         self._weights = np.full(len(pairs), W_COLLISION)
         for k, pair in enumerate(pairs):
             chains = [tree.chain(part.link) for part in (pair.small, pair.large)]
             both = set(chains[0]) & set(chains[1])
-            early = all(j in first_block for chain in chains for j in chain)
+            early = _among(pair, tree, first)
             if early:
                 self._weights[k] = W_LEG_COLLISION
             for sign, chain in zip((-1.0, 1.0), chains, strict=True):
-                moving = tuple(j for j in chain if j not in both and (j in first_block) == early)
+                moving = tuple(j for j in chain if j not in both and (j in first) == early)
                 self._signs[k, tree.dofs(moving)] = sign
+
+
+def _among(pair: ShapePair, tree: Tree, links: set[int]) -> bool:
+    """Whether no other links than these move the two."""
+    return links.issuperset(tree.chain(pair.small.link) + tree.chain(pair.large.link))
 
 
 def _placed(

@@ -23,6 +23,16 @@ class PoseTargets:
     bones: Float[np.ndarray, "*T B 3"]
     hands: Float[np.ndarray, "*T 3"]
 
+    def at(self, frames: Int[np.ndarray, "S"]) -> "PoseTargets":
+        """Those of some frames."""
+        return PoseTargets(
+            self.world[frames],
+            self.chest[frames],
+            self.hips[frames],
+            self.bones[frames],
+            self.hands[frames],
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class FootTargets:
@@ -33,16 +43,14 @@ class FootTargets:
     holds: Float[np.ndarray, "T P 3"]
 
 
-def pose_targets(
-    targets: Targets, frames: Int[np.ndarray, "S"], bones: Sequence[Role]
-) -> PoseTargets:
-    """Those of some frames, the directions of `bones` in this order."""
-    directions = [targets.bones[role][frames] for role in bones]
-    none = np.zeros((len(frames), 3))
+def pose_targets(targets: Targets, bones: Sequence[Role]) -> PoseTargets:
+    """Those of all frames, the directions of `bones` in this order."""
+    count = len(targets)
+    directions = [targets.bones[role] for role in bones]
     return PoseTargets(
-        matrix_from_quat(targets.world[frames]),
-        matrix_from_quat(targets.chest[frames]),
-        targets.hips[frames],
-        np.stack(directions, axis=1) if bones else np.zeros((len(frames), 0, 3)),
-        none if targets.hands is None else targets.hands[frames],
+        matrix_from_quat(targets.world),
+        matrix_from_quat(targets.chest),
+        targets.hips,
+        np.stack(directions, axis=1) if bones else np.zeros((count, 0, 3)),
+        np.zeros((count, 3)) if targets.hands is None else targets.hands,
     )

@@ -43,10 +43,13 @@ LinearTerms = tuple[
 
 class Terms:
     """The residuals of a robot's poses, as normal equations. `bones` are the limbs' segments whose
-    directions the source gives, `hands` says whether it gives the offset between both. `mj_dofs`
-    are MuJoCo's numbers of the dofs."""
+    directions the source gives, `hands` says whether it gives the offset between both. With
+    `later_only`, base, trunk and legs are given: what collides or sinks of these is not looked at.
+    `mj_dofs` are MuJoCo's numbers of the dofs."""
 
-    def __init__(self, robot: Morphology, bones: Sequence[Role], hands: bool) -> None:
+    def __init__(
+        self, robot: Morphology, bones: Sequence[Role], hands: bool, *, later_only: bool = False
+    ) -> None:
         self.robot, tree = robot, robot.tree
         self._model = robot.mjcf.model
         self._data = mujoco.MjData(self._model)
@@ -63,10 +66,11 @@ class Terms:
         self.mj_dofs = np.append(base + np.arange(BASE), own)
         self.hinges = Hinges(robot)
         bodies = np.array([self._body(link) for link in (*range(len(tree)), -1)])
-        self._collisions = WindowCollisions(
-            robot, bodies, self._rest, np.flatnonzero(self._in_first_block[:-1])
-        )
+        first = np.flatnonzero(self._in_first_block[:-1])
+        self._collisions = WindowCollisions(robot, bodies, self._rest, first, later_only=later_only)
         solids = solids_over_floor(robot)
+        if later_only:
+            solids = tuple(solid for solid in solids if not self._in_first_block[solid.link])
         links = [solid.link for solid in solids]
         self._floor = WindowFloor(solids, bodies[links], self._mask(links), self._rest)
         self._index_rotations()

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from jaxtyping import Float
 
+from robots.least_squares import NormalEquations
 from robots.residuals import (
     direction_residual,
     limit_residual,
     one_sided,
     point_jacobian,
     rotation_residual,
+    twists,
 )
 from robots.tree import BASE, Coordinates, LinkPoses, Tree, forward_kinematics
 from spark.rotation import matrix_from_quat, quat_normalize
@@ -84,6 +86,35 @@ def test_points_move_as_their_jacobian_says(tree: Tree, q: Coordinates) -> None:
     beside = tree.dofs((2,))
     assert np.abs(numeric[beside]).max() == 0  # a joint beside the chain moves nothing on it
     assert np.abs(numeric[BASE:]).max() > 0.1
+
+
+def test_pushes_say_how_far_points_yield(tree: Tree, q: Coordinates) -> None:
+    """Two points of a link, each pushed along its own vector, with one set of twists."""
+    points, pushes = np.array([POINT, POINT + BONE]), targets((2, 3, FRAMES))
+    chain = tree.chain(LINK)
+    poses = forward_kinematics(tree, q)
+    moved = twists(poses, chain, poses.positions[LINK], base=True)
+    dofs = [*range(BASE), *tree.dofs(chain)]
+    normal = NormalEquations(FRAMES, tree.nv)
+    wrenches = np.zeros((FRAMES, 6, 2))
+    numeric = np.zeros((FRAMES, tree.nv, 2))
+    for k, (rest, push) in enumerate(zip(points, pushes, strict=True)):
+        arm = poses.point(LINK, rest) - poses.positions[LINK]
+        wrenches[:, :, k] = np.concatenate([np.cross(arm, push, axis=0), push]).T
+
+        def along(poses: LinkPoses, rest=rest, push=push) -> np.ndarray:
+            return (poses.point(LINK, rest) * push).sum(0)
+
+        numeric[:, :, k] = differences(along, tree, q).T
+    np.testing.assert_allclose(moved @ wrenches, numeric[:, dofs], atol=1e-7)
+    residuals = targets((2, FRAMES))
+    squares, sums = (
+        wrenches @ wrenches.transpose(0, 2, 1),
+        np.einsum("tmk,kt->tm", wrenches, residuals),
+    )
+    normal.add_moved(np.arange(FRAMES), dofs, moved, squares, sums)
+    np.testing.assert_allclose(normal.H, numeric @ numeric.transpose(0, 2, 1), atol=1e-6)
+    np.testing.assert_allclose(normal.g, np.einsum("tdk,kt->td", numeric, residuals), atol=1e-6)
 
 
 @pytest.mark.parametrize("weight", [1.0, 3.0, np.array([1.0, 2.0, 0.5])])

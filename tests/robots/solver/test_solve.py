@@ -3,8 +3,14 @@
 import mujoco
 import numpy as np
 import pytest
+from jaxtyping import Float
 
-from robots.least_squares import NormalEquations, Smoothness, second_differences
+from robots.least_squares import (
+    NormalEquations,
+    PointAcceleration,
+    Smoothness,
+    second_differences,
+)
 from robots.metrics import RobotMetrics, limb_error, measure
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
@@ -19,6 +25,7 @@ from robots.solver.holds import Holds, joined
 from robots.solver.objective import linearize
 from robots.solver.projection import project
 from robots.solver.repair import repair, violations
+from robots.solver.repair_descent import Repair
 from robots.solver.smoothness import jerk_stiffening, limit_speed
 from robots.solver.solve import copy, retarget
 from robots.solver.targets import Targets, targets_of
@@ -145,6 +152,37 @@ def test_frames_are_tied_as_by_one_large_matrix() -> None:
     np.testing.assert_allclose(step.ravel(), -np.linalg.solve(H, g), atol=1e-10)
 
 
+def test_what_is_cut_is_solved_as_apart() -> None:
+    """Accelerations, of dofs and of a point, and speeds tie no frame to one beyond a cut."""
+    rng = np.random.default_rng(2)
+    T, D, cut = 11, 3, 5
+    J = rng.normal(size=(T, D, 4))
+    residuals, values = rng.normal(size=(4, T)), rng.normal(size=(T, D))
+    fast, weights = rng.normal(size=(T - 1, D)), rng.uniform(1, 2, (T - 2, D))
+    mass, path = rng.normal(size=(T, D, 3)), rng.normal(size=(T, 3))
+
+    def ties(own: slice) -> Smoothness:
+        within = slice(own.start, own.stop - 2)
+        residual = second_differences(path[own])
+        point = PointAcceleration(mass[own], residual, np.ones(len(residual), dtype=bool))
+        steps, bends = fast[own.start : own.stop - 1], second_differences(values[own])
+        return Smoothness(weights[within], bends, np.ones((len(steps), 1)), steps, point)
+
+    def solved(own: slice, coupling: Smoothness) -> tuple[np.ndarray, np.ndarray]:
+        count = own.stop - own.start
+        normal = NormalEquations(count, D)
+        normal.add([0, 1, 2], J[own], residuals[:, own])
+        step = normal.solve_coupled(coupling, np.full(count, 0.1), np.zeros((count, D)))
+        return step, coupling.cost(count)
+
+    whole, apart = slice(0, T), (slice(0, cut), slice(cut, T))
+    together = solved(whole, ties(whole).cut(np.array([cut])))
+    for part, own in zip(
+        together, zip(*(solved(x, ties(x)) for x in apart), strict=True), strict=True
+    ):
+        np.testing.assert_allclose(part, np.concatenate(own), atol=1e-10)
+
+
 def test_a_column_at_its_limit_does_not_go_beyond() -> None:
     normal = NormalEquations(3, 2)
     normal.add_diagonal(np.ones((3, 2)), -np.ones((3, 2)))
@@ -215,6 +253,27 @@ def test_arms_in_the_body_are_led_out_and_the_rest_stays(
         np.testing.assert_array_equal(mended.angles[: middle - 50], pushed.angles[: middle - 50])
 
 
+def test_repairs_far_apart_know_nothing_of_each_other(
+    walk: CanonicalMotion, walked: RobotMotion, ember: Morphology
+) -> None:
+    """Made in one go, they are as each alone, though one of them takes longer."""
+    arms, targets, q = blocks_of(ember)[1], targets_of(walk, ember), walked.coordinates
+    holds = footholds(ember, targets)
+    shoulder = int(ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)])
+    early, late = np.zeros((2, *q.angles.shape))
+    early[40:43, shoulder], late[140:144, shoulder] = 1.0, -2.0  # [rad] in a frame: far too fast
+
+    def repaired(push: Float[np.ndarray, "T N"]) -> Float[np.ndarray, "T N"]:
+        pushed = Coordinates(q.pos, q.quat, q.angles + push, q.ball_quats)
+        return repair(ember, targets, holds, pushed, arms).angles
+
+    first, second, both = repaired(early), repaired(late), repaired(early + late)
+    assert np.abs(first - q.angles - early).max() > 0.5
+    assert np.abs(second - q.angles - late).max() > 0.5
+    np.testing.assert_allclose(both[:90], first[:90], atol=1e-7)
+    np.testing.assert_allclose(both[90:], second[90:], atol=1e-7)
+
+
 def test_no_repair_gives_up_the_pose(
     walk: CanonicalMotion, walked: RobotMotion, ember: Morphology, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -225,13 +284,12 @@ def test_no_repair_gives_up_the_pose(
     pushed.angles[100:103, shoulder] += 1.0  # [rad] in a frame: far too fast
     assert 0 < violations(ember, targets, pushed, arms, 1).sum() < 10
 
-    def spread(*args: object, **_: object) -> Coordinates:
-        here = args[3]
-        assert isinstance(here, Coordinates)
+    def spread(broken: Repair) -> Coordinates:
+        here = broken.start
         tpose = np.repeat(ember.tpose.angles, len(here), axis=0)
         return Coordinates(here.pos, here.quat, tpose, here.ball_quats)
 
-    monkeypatch.setattr("robots.solver.repair.solve_block", spread)
+    monkeypatch.setattr("robots.solver.repair.solve_spells", spread)
     kept = repair(ember, targets, footholds(ember, targets), pushed, arms)
     np.testing.assert_array_equal(kept.angles, pushed.angles)
 

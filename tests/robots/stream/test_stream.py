@@ -11,7 +11,8 @@ from robots.model.known import known
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.solver.block import Block, blocks_of
-from robots.solver.collision import Candidate, collisions_of
+from robots.solver.candidates import Candidate
+from robots.solver.collision import collisions_of
 from robots.solver.floor import solids_over_floor
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import plan_feet, points_of
@@ -108,7 +109,7 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     for t in range(4):
         one = slice(t, t + 1)
         foot_targets = FootTargets(holds.positions[None, ..., t], holds.shares[None, ..., t])
-        here = pose_targets(targets, np.array([t]), reader.bones)
+        here = pose_targets(targets.at(np.array([t])), reader.bones)
         qpos = EMBER.to_qpos(q.at(one))
         poses = terms.poses(qpos)
         H, g = terms.linearize(

@@ -1,0 +1,40 @@
+"""Pairs of a robot's shapes that may collide."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from robots.solver.hulls import ShapePair
+from robots.solver.pushes import Moves
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A pair of shapes that may collide: in which `frames`, with which of the small one's
+    `spheres`, and which joints move the two against each other."""
+
+    pair: ShapePair
+    spheres: Int[np.ndarray, "N"]
+    moves: Moves
+    frames: Int[np.ndarray, "S"]
+
+
+def by_moves(candidates: Sequence[Candidate]) -> dict[Moves, list[Candidate]]:
+    """The candidates by the joints that move their two shapes against each other."""
+    out: dict[Moves, list[Candidate]] = {}
+    for candidate in candidates:
+        out.setdefault(candidate.moves, []).append(candidate)
+    return out
+
+
+def among(candidates: Sequence[Candidate], kept: Bool[np.ndarray, "T"]) -> list[Candidate]:
+    """The candidates in the frames that are kept, counted without the others."""
+    number = np.cumsum(kept) - 1
+    out = []
+    for candidate in candidates:
+        frames = candidate.frames[kept[candidate.frames]]
+        if len(frames):
+            out.append(replace(candidate, frames=number[frames]))
+    return out
