@@ -19,7 +19,7 @@ from robots.solver.collision import (
     Collisions,
     collisions_of,
 )
-from robots.solver.hulls import CLEARANCE, ShapePair
+from robots.solver.hulls import CLEARANCE
 from robots.solver.pushes import Pushes
 from robots.tree import LinkPoses
 
@@ -54,7 +54,7 @@ class ExactContacts:
         out = np.full(len(qpos), -np.inf)
         for x in self._measure(qpos, candidates):
             out[x.frames] = np.maximum(
-                out[x.frames], self._clearances[x.candidate.pair] - x.distance
+                out[x.frames], self._clearances[x.candidate.pair.geoms] - x.distance
             )
         return out
 
@@ -73,7 +73,7 @@ class ExactContacts:
         for moves in by_moves([x.candidate for x in measured]):
             pushes = Pushes(normal, poses, moves)
             for x in (x for x in measured if x.candidate.moves == moves):
-                excess = self._clearances[x.candidate.pair] - x.distance
+                excess = self._clearances[x.candidate.pair.geoms] - x.distance
                 active = excess > -FELT * DEPTH_ROUNDING
                 if not active.any():
                     continue
@@ -88,17 +88,16 @@ class ExactContacts:
             pushes.add_to_normal(block)
 
     @cached_property
-    def _clearances(self) -> dict[ShapePair, float]:
-        """How near [m] the pairs may come: `CLEARANCE`, or less where the T-pose has less."""
+    def _clearances(self) -> dict[tuple[int, int], float]:
+        """How near [m] the pairs may come, by their geoms: `CLEARANCE`, or less where the T-pose
+        has less."""
         data = mujoco.MjData(self.model)
         data.qpos[:] = self.tpose
         mujoco.mj_kinematics(self.model, data)
         return {
-            pair: min(
+            pair.geoms: min(
                 CLEARANCE,
-                mujoco.mj_geomDistance(
-                    self.model, data, pair.large.geom, pair.small.geom, _MAX_DISTANCE, None
-                ),
+                mujoco.mj_geomDistance(self.model, data, *pair.geoms[::-1], _MAX_DISTANCE, None),
             )
             for pair in self.collisions.pairs
         }

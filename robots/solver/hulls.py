@@ -57,6 +57,11 @@ class ShapePair:
     gap: float
 
     @property
+    def geoms(self) -> tuple[int, int]:
+        """The small and the large one's."""
+        return self.small.geom, self.large.geom
+
+    @property
     def clearance(self) -> float:
         """How near [m] they may come."""
         return min(CLEARANCE, self.gap)
