@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from spark.rig.contacts import speeds
+from spark.rig.contacts import planted_points, speeds
 from spark.rig.roles import LIMBS, Group
 from spark.rotation import quat_mul, quat_rotate
 from spark.runs import true_runs
@@ -66,7 +66,10 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
         height = own_sole[..., 2].min(axis=1) + rise - moved.floor_z
         moves.append((leg, np.column_stack([along, wanted - height])))
     risen = replace(moved, hips=moved.hips + rise[:, None] * np.array([0.0, 0.0, 1.0]))
-    return move_ankles(*within_reach(risen, moves, stands))
+    # A foot that rolls off has let go with its heel: if the hips came down for it, the other knee
+    # would bend where the source's is straight.
+    flat = planted_points(ends, source.frame_time, source.rig.standing_height).all(axis=2).T
+    return move_ankles(*within_reach(risen, moves, flat & stands))
 
 
 def _standing(motion: CanonicalMotion, group: Group) -> Standing:
