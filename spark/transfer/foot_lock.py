@@ -3,22 +3,21 @@
 Copied rotations on legs of other proportions make standing feet slide, float or sink. Here each
 foot rolls over the ground as the source's does: during a stance of the source, what rests of its
 sole, be it the heel, the toes' end or all of it, moves as far on the other sole, scaled. So a big
-foot that turns on its toes turns on them, too. Where the source's own foot moves during a stance,
-the first `_CAPTURE_NOISE` of its contact joint from its mean position is taken for noise and
-removed; what goes beyond is motion and kept. A stance is at its own mean position, and a foot is
-carried from one footprint to the next (`spark.transfer.footfalls`). The lowest point of the sole is
-as high above the floor as the source's is, scaled: while it stands and while it swings, whatever
-the length of the foot; the hips rise with it (`spark.transfer.hip_rise`).
+foot that turns on its toes turns on them, too. Where what rests moves, the first `_CAPTURE_NOISE`
+from its mean position is taken for noise and removed; what goes beyond is motion and kept. A stance
+(`spark.transfer.stances`) is at its own mean position, and a foot is carried from one footprint to
+the next (`spark.transfer.footfalls`). The lowest point of the sole is as high above the floor as
+the source's is, scaled: while it stands and while it swings, whatever the length of the foot; the
+hips rise with it (`spark.transfer.hip_rise`).
 """
 
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from spark.rig.contacts import planted_points, speeds
-from spark.rig.rig import Rig
-from spark.rig.roles import LIMBS, Group, Role
+from spark.rig.roles import LIMBS, Group
 from spark.rotation import quat_mul, quat_rotate
 from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
@@ -26,11 +25,9 @@ from spark.transfer.footfalls import between_contacts, beyond
 from spark.transfer.hip_rise import Standing, hip_rise
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
 from spark.transfer.reach import within_reach
+from spark.transfer.stances import stances
 
-# [s] A shorter stance is a swinging foot that is slow and low for a moment, and between two stances
-# no foot is lifted and put down elsewhere in a shorter time.
-_MIN_STANCE = 0.1
-_CAPTURE_NOISE = 0.03  # [hip heights] 3 cm of an adult
+_CAPTURE_NOISE = 0.02  # [hip heights] 2 cm of an adult
 # [hip heights] that a sole may sink: half a centimetre of an adult. A foot that sinks further in
 # the source is lifted.
 _MAX_SINK = 0.005
@@ -45,38 +42,34 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
     """`moved`, the transfer of `source`, with its feet held while the source's stand, and as high
     as the source's; its hips go with them."""
     scale = moved.rig.hip_height / source.rig.hip_height
-    feet: list[tuple[Leg, Float[np.ndarray, "T 3"], Standing, Standing]] = []
+    feet: list[tuple[Leg, Standing, Standing]] = []
     for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
         leg = leg_of(moved.rig.skeleton, moved.rig.roles.roles, group)
-        contact = _contact(source.rig, moved.rig, group)
-        if leg is not None and contact is not None:
-            path = canonical_positions(source, [contact])[:, 0]
-            feet.append((leg, path, _standing(source, group), _standing(moved, group)))
+        if leg is not None and source.rig.roles.joint(LIMBS[group][2]) is not None:
+            feet.append((leg, _standing(source, group), _standing(moved, group)))
     if not feet:
         return moved
-    rise = hip_rise(source, moved, [(theirs, own) for _, _, theirs, own in feet])
-    paths = np.stack([path for _, path, _, _ in feet], axis=1)
-    planted = planted_points(paths, source.frame_time, source.rig.standing_height)
-    stances = [_stances(each, source.frame_time) for each in planted.T]
+    rise = hip_rise(source, moved, [(theirs, own) for _, theirs, own in feet])
+    ends = np.stack([theirs.sole[:, _ENDS] for _, theirs, _ in feet], axis=1)
+    stands = stances(ends, source.frame_time, source.rig.standing_height)
     moves: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
-    for (leg, path, (_, _, their_sole), (_, _, own_sole)), stance in zip(
-        feet, stances, strict=True
-    ):
+    for (leg, (_, _, their_sole), (_, _, own_sole)), stance in zip(feet, stands, strict=True):
         theirs, own = _rolled(their_sole, own_sole, source)
         offset = np.zeros((len(own), 2))
         for start, stop in true_runs(stance):
             here = slice(start, stop)
-            rolls = scale * theirs[here] - own[here]
-            away = scale * (path[here, :2] - path[here, :2].mean(axis=0))
-            noise = away - beyond(away, _CAPTURE_NOISE * moved.rig.hip_height)
-            offset[here] = rolls - rolls.mean(axis=0) - noise
+            kept = beyond(scale * theirs[here], _CAPTURE_NOISE * moved.rig.hip_height)
+            offset[here] = own[here].mean(axis=0) + kept - own[here]
         along = between_contacts(offset, stance, own)
         wanted = scale * (their_sole[..., 2].min(axis=1) - source.floor_z)
         wanted = np.maximum(wanted, -_MAX_SINK * moved.rig.hip_height)
         height = own_sole[..., 2].min(axis=1) + rise - moved.floor_z
         moves.append((leg, np.column_stack([along, wanted - height])))
     risen = replace(moved, hips=moved.hips + rise[:, None] * np.array([0.0, 0.0, 1.0]))
-    return move_ankles(*within_reach(risen, moves, np.stack(stances)))
+    # A foot that rolls off has let go with its heel: if the hips came down for it, the other knee
+    # would bend where the source's is straight.
+    flat = planted_points(ends, source.frame_time, source.rig.standing_height).all(axis=2).T
+    return move_ankles(*within_reach(risen, moves, flat & stands))
 
 
 def _standing(motion: CanonicalMotion, group: Group) -> Standing:
@@ -112,22 +105,3 @@ def _way(
     """The sum of the points' steps, by so much of each, from where their middle is at first."""
     along = (steps * np.diff(points[..., :2], axis=0)).sum(axis=1)
     return np.cumsum(np.concatenate([points[:1, :, :2].mean(axis=1), along]), axis=0)
-
-
-def _stances(planted: Bool[np.ndarray, "T"], frame_time: float) -> Bool[np.ndarray, "T"]:
-    """The frames of stances that are long enough to be one; those that are not long enough apart
-    are one."""
-    stands = np.zeros_like(planted)
-    for start, stop in true_runs(planted, gap=int(_MIN_STANCE / frame_time)):
-        stands[start:stop] = (stop - start) * frame_time >= _MIN_STANCE
-    return stands
-
-
-def _contact(source: Rig, target: Rig, group: Group) -> int | None:
-    """The source's joint that touches the floor; None where one of the two has no foot."""
-    roles: tuple[Role, ...] = LIMBS[group][:1:-1]
-    for role in roles:
-        joint = source.roles.joint(role)
-        if joint is not None and target.roles.joint(role) is not None:
-            return joint
-    return None

@@ -2,8 +2,8 @@
 
 A broad body on short legs takes longer steps than its legs alone would (`travel_scale`), and then
 some of its feet stand where a leg does not reach: they would be pulled along, and lifted. People
-lower their hips in a wide stance, and so does this. A foot that swings is let go of: it has nothing
-to slide on, and the other leg would bend.
+lower their hips in a wide stance, and so does this. A foot that swings or rolls off is let go of:
+the other leg would bend.
 """
 
 from collections.abc import Sequence

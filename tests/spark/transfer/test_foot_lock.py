@@ -24,7 +24,7 @@ from spark.transfer.foot_lock import lock_feet
 from spark.transfer.footfalls import between_contacts, beyond
 from spark.transfer.leg_ik import stance_correction
 from tests.helpers.recordings import recording
-from tests.helpers.stick import joint, standing, stick_rig
+from tests.helpers.stick import joint, standing, stick_rig, without
 
 PAIRS = [
     ("cmu_asf/cmu_02_01.bvh", "zoo/m2m_human.bvh"),
@@ -203,3 +203,23 @@ def test_a_foot_that_slips_within_a_stance_goes_no_further_on_another_body() -> 
     locked = sole_paths(lock_feet(source, copied))
     gone = np.linalg.norm(np.diff(locked[..., :2], axis=0), axis=-1).max()
     assert gone < 1.2 * 0.012
+
+
+def test_a_foot_rolls_off_over_its_toes_whatever_its_length() -> None:
+    """A stiff body without toe joints that tips over the ends of its feet, at 2 rad/s: the ankles
+    move, what rests does not. Nor does it on feet of twice the length, but for what counts as
+    noise."""
+    rig = without(stick_rig(), Role.LEFT_TOE, Role.RIGHT_TOE)
+    source = to_canonical(standing(rig, 31), rig)
+    pivot = sole_paths(source)[0, 0, -1] * (1, 0, 1)
+    turn = quat_from_rotvec(2.0 * np.arange(31)[:, None] * source.frame_time * np.eye(3)[1])
+    source = replace(
+        source,
+        rotations=quat_mul(turn[:, None], source.rotations),
+        hips=pivot + quat_rotate(turn, source.hips - pivot),
+    )
+    assert not planted_feet(rig, canonical_positions(source), source.frame_time)[:20].all()
+    copied = transfer(source, without(with_long_feet(stick_rig()), Role.LEFT_TOE, Role.RIGHT_TOE))
+    ends = [sole_paths(one)[:, :, -2:, 0] for one in (copied, lock_feet(source, copied))]
+    slid, held = (np.ptp(path, axis=0).max() for path in ends)
+    assert held < 0.2 * slid
