@@ -19,6 +19,19 @@ _QUIET = (
     "--disable-background-networking --disable-component-update --virtual-time-budget=1000"
 )
 
+# The replay in a page's frame stands still: it draws when asked to, and messages between the two
+# arrive at once. No clock, no race.
+STILL_REPLAY = """
+  const replayed = document.getElementById("replay").contentWindow;
+  const inside = code => replayed.eval(code);
+  const deliver = (to, from) => data =>
+    to.dispatchEvent(new to.MessageEvent("message", { data, source: from }));
+  addEventListener("load", () => {
+    inside("requestAnimationFrame = () => 0");
+    replayed.postMessage = deliver(replayed, window);
+    window.postMessage = deliver(window, replayed);
+  });"""
+
 
 def chromium() -> str:
     """The browser; skips the test without one."""

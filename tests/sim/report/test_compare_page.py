@@ -10,7 +10,7 @@ import pytest
 
 from sim.report import Report, Subject, assess
 from sim.report.compare_page import compare_page
-from tests.helpers.browser import Elements, opened, with_probe
+from tests.helpers.browser import STILL_REPLAY, Elements, opened, with_probe
 from tests.helpers.stick import standing, stick_rig
 
 EVIL = "a & <img src=x onerror=alert(1)>"
@@ -59,15 +59,18 @@ def test_it_asks_for_nothing_and_names_are_text(text: str) -> None:
 
 def test_a_finding_goes_to_its_moment_in_the_replay(text: str, tmp_path: Path) -> None:
     script = """
-      const frame = document.getElementById("replay");
       addEventListener("load", () => {
-        document.querySelector("button[data-time]").click();
-        setTimeout(() => { document.body.dataset.result = JSON.stringify({
-          time: document.querySelector("button[data-time]").dataset.time,
-          shown: frame.contentDocument.getElementById("time").textContent,
-          figures: frame.contentDocument.body.textContent.includes("good"),
-        }); }, 900);
+        const button = document.querySelector("button[data-time]");
+        button.click();
+        inside("tell()");
+        document.body.dataset.result = JSON.stringify({
+          time: Number(button.dataset.time), playing: inside("view.playing"),
+          shown: Number.parseFloat(inside("el('time').textContent")),
+          figures: inside("document.body.textContent.includes('good')"),
+        });
       });"""
-    seen = opened(with_probe(text, script), tmp_path)
-    assert float(seen["time"]) >= 0.5
-    assert float(re.search(r"[\d.]+", seen["shown"])[0]) >= float(seen["time"]) - 0.1
+    seen = opened(with_probe(text, STILL_REPLAY + script), tmp_path)
+    assert seen["time"] >= 0.5
+    assert seen["shown"] == pytest.approx(seen["time"], abs=0.01)
+    assert seen["figures"]
+    assert not seen["playing"]

@@ -21,7 +21,7 @@ from sim.view.scene import Figure
 from sim.view.timeline import Event
 from spark.errors import OutputError
 from spark.rig.feet import sole_positions
-from tests.helpers.browser import opened, with_probe
+from tests.helpers.browser import STILL_REPLAY, opened, with_probe
 from tests.helpers.stick import standing, stick_rig
 
 # Stands for a second, sinks for one, slides for one.
@@ -151,10 +151,6 @@ def test_it_works_in_a_browser(body: str, request: pytest.FixtureRequest, tmp_pa
     probe = """
       const seen = []; onerror = m => seen.push(String(m)); console.error = onerror;
       const out = { seen, times: [], pictures: [], labels: [] };
-      const inside = code => replay.contentWindow.eval(code);
-      // Frames are drawn when they are asked for, and messages arrive at once: no clock, no race.
-      const deliver = (to, from) => data =>
-        to.dispatchEvent(new to.MessageEvent("message", { data, source: from }));
       const note = () => { inside("tell(); draw()"); out.times.push(inside("view.time"));
         out.labels.push(inside("el('time').textContent"));
         const c = replay.contentDocument.getElementById("view");
@@ -162,9 +158,6 @@ def test_it_works_in_a_browser(body: str, request: pytest.FixtureRequest, tmp_pa
         let s = 0; for (let i = 0; i < d.length; i += 4) s = (s * 31 + d[i]) % 1000003;
         out.pictures.push(s); };
       addEventListener("load", () => { try {
-        inside("requestAnimationFrame = () => 0");
-        replay.contentWindow.postMessage = deliver(replay.contentWindow, window);
-        window.postMessage = deliver(window, replay.contentWindow);
         seek(0); note();
         document.querySelector("#findings button").click(); note();
         const box = plots.getBoundingClientRect();
@@ -173,7 +166,7 @@ def test_it_works_in_a_browser(body: str, request: pytest.FixtureRequest, tmp_pa
         inside("told = null; tick(0)"); out.told = now.style.left;
       } catch (e) { seen.push(String(e)); }
       document.body.dataset.result = JSON.stringify(out); });"""
-    result = opened(with_probe(text, probe), tmp_path)
+    result = opened(with_probe(text, STILL_REPLAY + probe), tmp_path)
     assert result["seen"] == []
     np.testing.assert_allclose(result["times"], [0, 1, 0.75 * 179 / 60], atol=0.01)
     assert len(set(result["pictures"])) == 3
