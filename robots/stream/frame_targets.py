@@ -20,11 +20,11 @@ from robots.solver.targets import (
 from robots.solver.trunk import bends, leaning
 from robots.solver.window_targets import PoseTargets
 from robots.stream.source_poses import SourcePoses
-from sim.body.anthropometry import segments
 from spark.errors import FrameError
 from spark.rig.contacts import standing_heights
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
+from spark.rig.segments import segments
 from spark.rotation import matrix_from_quat, quat_conj, quat_from_matrix
 from spark.transfer.analytic import correspond
 from spark.transfer.canonical import CanonicalMotion, canonical_positions

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from sim.body.anthropometry import segments
 from spark.constants import GRAVITY
 from spark.kinematics import world_positions
 from spark.rig.rig import Rig
+from spark.rig.segments import segments
 from spark.rotation import matrix_from_quat
 
 MIN_MASS = 1e-3  # [kg] of fingers and helpers: MuJoCo refuses moving bodies without mass

@@ -6,10 +6,10 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from sim.body.anthropometry import segments
 from sim.report.model_poses import ModelPoses
 from sim.trajectory import ModelTrajectory
 from spark.rig.rig import Rig
+from spark.rig.segments import segments
 from spark.rotation import quat_mul, quat_rotate
 
 
@@ -36,7 +36,7 @@ class Mass:
 def human_mass(
     rig: Rig, positions: Float[np.ndarray, "T J 3"], world: Float[np.ndarray, "T J 4"]
 ) -> Mass:
-    """A human's mass on the rig's bones (`sim.body.anthropometry`)."""
+    """A human's mass on the rig's bones (`spark.rig.segments`)."""
     body = segments(rig)
     rotations = world[:, body.joints]
     coms = positions[:, body.joints] + quat_rotate(rotations, body.coms)

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.body.anthropometry import Segments, segments
 from spark.errors import SkeletonError
 from spark.kinematics import forward
 from spark.rig.rig import Rig
 from spark.rig.roles import Role, RoleMap
+from spark.rig.segments import Segments, segments
 from spark.rotation import quat_rotate
 from tests.helpers.stick import joint, standing, stick_rig
 
