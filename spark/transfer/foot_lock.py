@@ -81,7 +81,7 @@ def _standing(motion: CanonicalMotion, group: Group) -> Standing:
     positions = canonical_positions(motion, [*ends, *sole.joints.tolist()])
     world = quat_mul(motion.rotations[:, sole.joints], rig.tpose[sole.joints])
     points = positions[:, 2:] + quat_rotate(world, sole.offsets)
-    return Standing(ends, positions[:, :2, 2], points)
+    return Standing(ends, positions[:, :2], points)
 
 
 def _rolled(

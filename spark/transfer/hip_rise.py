@@ -1,11 +1,12 @@
-"""Hips that rise with what their legs stand on and hang from.
+"""Hips that rise with what their legs stand on and hang from, and come down as these are spread.
 
 The height of the hips' middle over the floor is a sum along the leg that bears the body: how high
 its sole is, the ankle over the lowest point of the sole, the hip joint over the ankle, and the
-middle over the hip joint. A path that is scaled as a whole scales foot and pelvis, too. But the
-rotations are copied: on its toes a body of large feet stands higher, and a tilt lowers the hip
-joints of a broad pelvis further. What the two differ by would be taken from the leg, and a knee
-would bend where the source's is straight. So it is added to the hips' height.
+middle over the hip joint. A path that is scaled as a whole scales each of them. But the rotations
+of foot and pelvis are copied: on its toes a body of large feet stands higher, and a tilt lowers the
+hip joints of a broad pelvis further. And a longer step spreads a leg further, whose hip joint is
+lower then. What the two bodies differ by would be taken from the leg: a knee would bend where the
+source's is straight, or a foot would not reach its print. So it is added to the hips' height.
 """
 
 from collections.abc import Sequence
@@ -26,11 +27,11 @@ _EASE = 0.15
 
 
 class Standing(NamedTuple):
-    """The hip joint and the ankle of one leg, how high they are, and where the points of its sole
-    are [m, world]."""
+    """The hip joint and the ankle of one leg, where they are, and where the points of its sole are
+    [m, world]."""
 
     joints: tuple[int, int]
-    heights: Float[np.ndarray, "T 2"]
+    ends: Float[np.ndarray, "T 2 3"]
     sole: Float[np.ndarray, "T P 3"]
 
 
@@ -39,14 +40,19 @@ def hip_rise(
     moved: CanonicalMotion,
     legs: Sequence[tuple[Standing, Standing]],
 ) -> Float[np.ndarray, "T"]:
-    """How much higher [m] the hips of `moved`, the transfer of `source`, are for what foot and
+    """How much higher [m] the hips of `moved`, the transfer of `source`, are for what foot, leg and
     pelvis are more than the source's, scaled; `legs` are the same ones on both.
 
     Each leg counts by how low the source's sole is, and of its rise as much is made as it is
     upright, from 0 (level, as on the ground) to 1: sum(w u rise) / sum(w).
     """
     scale = moved.rig.hip_height / source.rig.hip_height
-    rises = [_beside_leg(moved, own) - scale * _beside_leg(source, theirs) for theirs, own in legs]
+    rises = [
+        _beside_leg(moved, own)
+        - scale * _beside_leg(source, theirs)
+        + _along_leg(moved, own, source, theirs)
+        for theirs, own in legs
+    ]
     upright = [_upright(source, theirs) for theirs, _ in legs]
     low = np.stack([theirs.sole[..., 2].min(axis=1) for theirs, _ in legs]) - source.floor_z
     weights = 1 / (1 + (np.maximum(low, 0) / (_LIGHT * source.rig.hip_height)) ** 2)
@@ -56,14 +62,36 @@ def hip_rise(
 
 def _beside_leg(motion: CanonicalMotion, leg: Standing) -> Float[np.ndarray, "T"]:
     """By how much foot and pelvis make the hips' middle higher than in the T-pose [m]."""
-    hip, ankle = leg.heights.T
+    hip, ankle = leg.ends[..., 2].T
     pelvis, foot = motion.hips[:, 2] - hip, ankle - leg.sole[..., 2].min(axis=1)
     return np.asarray(pelvis + foot - from_sole(motion.rig, leg.joints[1])[2])
+
+
+def _along_leg(
+    moved: CanonicalMotion, own: Standing, source: CanonicalMotion, theirs: Standing
+) -> Float[np.ndarray, "T"]:
+    """How much higher [m] the hip joint of `own` is over its ankle than the source's, scaled.
+
+    The leg is shorter than in the T-pose by as many hip heights as the source's is, and its ends
+    are as far apart over the ground as they are: height = sqrt(length² - across²).
+    """
+    scale = moved.rig.hip_height / source.rig.hip_height
+    rest, their_rest = _bones_in_tpose(moved, own), _bones_in_tpose(source, theirs)
+    leg, their_leg = (each.ends[:, 0] - each.ends[:, 1] for each in (own, theirs))
+    shortened = np.linalg.norm(their_rest) - np.linalg.norm(their_leg, axis=1)
+    length = np.maximum(np.linalg.norm(rest) - scale * shortened, 0.0)
+    height = np.sqrt(np.maximum(length**2 - (leg[:, :2] ** 2).sum(axis=1), 0.0))
+    return np.asarray(height - rest[2] - scale * (their_leg[:, 2] - their_rest[2]))
+
+
+def _bones_in_tpose(motion: CanonicalMotion, leg: Standing) -> Float[np.ndarray, "3"]:
+    """From the ankle to the hip joint [m]."""
+    hip, ankle = motion.rig.tpose_positions[list(leg.joints)]
+    return np.asarray(hip - ankle)
 
 
 def _upright(motion: CanonicalMotion, leg: Standing) -> Float[np.ndarray, "T"]:
     """How far the hip joint is above the ankle, over how far it is in the T-pose; 0 to 1. A leg
     without length is not upright."""
-    hip, ankle = motion.rig.tpose_positions[list(leg.joints), 2]
-    above = leg.heights[:, 0] - leg.heights[:, 1]
-    return np.clip(above / max(hip - ankle, 1e-9), 0.0, 1.0)
+    above = leg.ends[:, 0, 2] - leg.ends[:, 1, 2]
+    return np.clip(above / max(_bones_in_tpose(motion, leg)[2], 1e-9), 0.0, 1.0)

@@ -62,19 +62,21 @@ def lowest_sole(motion: CanonicalMotion) -> np.ndarray:
     return sole_positions(left, positions, world)[..., 2].min(axis=1) - motion.floor_z
 
 
-def posed(tilt: float = 0.0, tiptoe: float = 0.0, lift: float = 0.0) -> CanonicalMotion:
+def posed(
+    tilt: float = 0.0, tiptoe: float = 0.0, lift: float = 0.0, spread: float = 0.0
+) -> CanonicalMotion:
     """The stick man on his straight left leg, with its foot on the floor: his pelvis tilted to it,
-    its heel raised, his right knee raised [rad]."""
+    its heel raised, his right knee raised, his legs spread to both sides [rad]."""
     rig = stick_rig()
     motion = standing(rig, FRAMES)
     turns = {
         Role.PELVIS: (-tilt, 0, 0),
-        Role.LEFT_UPPER_LEG: (tilt, 0, 0),
-        Role.RIGHT_UPPER_LEG: (tilt, -lift, 0),
+        Role.LEFT_UPPER_LEG: (tilt + spread, 0, 0),
+        Role.RIGHT_UPPER_LEG: (tilt - spread, -lift, 0),
         Role.RIGHT_LOWER_LEG: (0, 2 * lift, 0),
-        Role.LEFT_FOOT: (0, tiptoe, 0),
+        Role.LEFT_FOOT: (-spread, tiptoe, 0),
         Role.LEFT_TOE: (0, -tiptoe, 0),
-        Role.RIGHT_FOOT: (0, tiptoe - lift, 0),
+        Role.RIGHT_FOOT: (spread, tiptoe - lift, 0),
         Role.RIGHT_TOE: (0, -tiptoe, 0),
     }
     for role, turn in turns.items():
@@ -85,7 +87,9 @@ def posed(tilt: float = 0.0, tiptoe: float = 0.0, lift: float = 0.0) -> Canonica
 
 @pytest.mark.parametrize("body", BODIES)
 @pytest.mark.parametrize(
-    "pose", [{}, {"lift": 1.0}, {"tiptoe": 0.6}, {"tilt": 0.3, "lift": 1.0}], ids=str
+    "pose",
+    [{}, {"lift": 1.0}, {"tiptoe": 0.6}, {"tilt": 0.3, "lift": 1.0}, {"spread": 0.5}],
+    ids=str,
 )
 def test_a_straight_leg_that_stands_is_straight_on_any_body(
     body: str, pose: dict[str, float]
