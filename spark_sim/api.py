@@ -12,6 +12,7 @@ from spark.io.encoding import encode, encode_new
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, from_canonical
 from spark.transfer.foot_lock import lock_feet
+from spark.transfer.hip_sway import sway_hips
 from spark_sim import files
 from spark_sim.choices import Method, RobotName
 from spark_sim.clips import AnyClip, Clip, File, RobotClip
@@ -71,7 +72,8 @@ def retarget(
     (`spark.transfer.leg_fit`), and joints of spine, neck or shoulders without a counterpart are
     filled in: by a trained network (`checkpoint`, or the one that ships) on rigs like those that it
     was trained on, and by the target's own motion, where its file has one. With `refine`, each foot
-    is then held where the source's foot stands.
+    is then held where the source's foot stands, and with "spark" the hips sway so that the weight
+    moves as the source's does (`spark.transfer.hip_sway`).
 
     On a robot the whole trajectory is solved for, within the joints' limits, feet held. With method
     "copy" or without `refine`, each pose is only copied to the robot's hinges, as a baseline.
@@ -95,6 +97,8 @@ def retarget(
         moved = _filled_in(canonical, target, _learned(checkpoint))
     if refine:
         moved = lock_feet(canonical, moved)
+        if method == "spark":
+            moved = sway_hips(canonical, moved)
     motion = from_canonical(moved)
     bvh, notes = encode(motion, target.recording)
     recording = replace(target.recording, bvh=bvh, motion=motion, notes=(*moved.notes, *notes))

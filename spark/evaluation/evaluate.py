@@ -28,6 +28,7 @@ from spark.transfer.canonical import (
     to_canonical,
 )
 from spark.transfer.foot_lock import lock_feet
+from spark.transfer.hip_sway import sway_hips
 from spark.transfer.leg_fit import fit_legs
 from spark.transfer.target_prior import RetargetMethod, with_target_prior
 
@@ -119,7 +120,8 @@ def as_method(
     With `target_prior` it is corrected by another recording of the target
     (`spark.transfer.target_prior`), with `legs_fitted` its feet are led where the source's go
     (`spark.transfer.leg_fit`, or by `legs`), with `feet_held` locked where the source's stand
-    (`spark.transfer.foot_lock`). All three are what `retarget` does."""
+    (`spark.transfer.foot_lock`). All three are what `retarget` does. With fitted legs and held feet
+    the hips sway, as they do there (`spark.transfer.hip_sway`)."""
 
     def run(case: Case) -> Positions:
         if target_prior and case.target_recording is not None:
@@ -128,7 +130,11 @@ def as_method(
             moved = method(case.source, case.truth.rig)
         if legs_fitted:
             moved = legs(case.source, moved)
-        return canonical_positions(lock_feet(case.source, moved) if feet_held else moved)
+        if feet_held:
+            moved = lock_feet(case.source, moved)
+            if legs_fitted:
+                moved = sway_hips(case.source, moved)
+        return canonical_positions(moved)
 
     return run
 

@@ -1,0 +1,85 @@
+"""Hips that sway so that the body's weight moves as the source's does.
+
+What the floor has to give is the acceleration of the centre of mass. Hips whose path is scaled
+carry a longer trunk, other arms, a neck that the source lacks, and longer steps (`travel_scale`):
+each adds to that, and the same feet would have to push in another place, or harder. So over the
+ground the centre of mass accelerates as the source's does, scaled by the hips' height. Where it is
+and how far it goes remains the legs' to say: it is only within a short time that hips give way.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.linalg import solveh_banded
+
+from spark.blocks import in_blocks
+from spark.rig.rig import Rig
+from spark.rig.roles import Group
+from spark.rig.segments import segments
+from spark.rotation import quat_mul, quat_rotate
+from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.leg_ik import Leg, leg_of, move_ankles
+
+# [s] What is added within a shorter time is taken back, what comes more slowly is left: two frames
+# at 30 fps, the span of a recording's speeds. With the .3 s of a pendulum of a body's height, hips
+# would leave the path that retargeted characters take (docs/evaluation.md).
+_QUICK = 1 / 15
+
+
+def sway_hips(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
+    """`moved`, the transfer of `source`, whose hips sway over the ground so that its centre of mass
+    accelerates as the source's does, scaled; its feet stay where they are.
+
+    The centre of mass gives way by e - s, with e how far it is from the source's, scaled, and s
+    what of that is slow: s - tau² s'' = e.
+    """
+    scale = moved.rig.hip_height / source.rig.hip_height
+    away = (center_of_mass(moved) - scale * center_of_mass(source))[:, :2]
+    quick = away - _slow(away, _QUICK / moved.frame_time)
+    roles, skeleton = moved.rig.roles.roles, moved.rig.skeleton
+    both = [leg_of(skeleton, roles, group) for group in (Group.LEFT_LEG, Group.RIGHT_LEG)]
+    legs = [leg for leg in both if leg is not None]
+    sway = np.column_stack([-quick / _carried(moved.rig, legs), np.zeros(len(moved))])
+    return move_ankles(replace(moved, hips=moved.hips + sway), [(leg, -sway) for leg in legs])
+
+
+def center_of_mass(motion: CanonicalMotion) -> Float[np.ndarray, "T 3"]:
+    """Of a human's mass on the rig's bones [m, world]."""
+    body = segments(motion.rig)
+
+    def some(block: slice) -> Float[np.ndarray, "T 3"]:
+        part = motion.picked(block)
+        positions = canonical_positions(part, body.joints.tolist())
+        world = quat_mul(part.rotations[:, body.joints], part.rig.tpose[body.joints])
+        return np.einsum("s,tsx->tx", body.masses, positions + quat_rotate(world, body.coms))
+
+    return in_blocks(some, len(motion))
+
+
+def _carried(rig: Rig, legs: Sequence[Leg]) -> float:
+    """How far the centre of mass goes with the hips while the ankles of these legs stay: a leg goes
+    the less, the nearer to its ankle, and all else goes as far."""
+    if not legs:
+        return 1.0
+    body = segments(rig)
+    at = rig.tpose_positions[body.joints] + quat_rotate(rig.tpose[body.joints], body.coms)
+    ankles = rig.tpose_positions[[leg.foot for leg in legs], 2].mean()
+    above = (at[:, 2] - ankles) / max(rig.tpose_positions[rig.hips, 2].mean() - ankles, 1e-9)
+    return float(body.masses @ np.clip(above, 0.0, 1.0))
+
+
+def _slow(path: Float[np.ndarray, "T D"], frames: float) -> Float[np.ndarray, "T D"]:
+    """What of a path is slower than so many frames: s - frames² s'' = path, with both ends as they
+    are, so that straight ways stay as they are."""
+    if len(path) < 4:
+        return path
+    inner = len(path) - 2
+    bands = np.stack([np.full(inner, 1 + 2 * frames**2), np.full(inner, -(frames**2))])
+    wanted = path[1:-1].copy()
+    wanted[0] += frames**2 * path[0]
+    wanted[-1] += frames**2 * path[-1]
+    slow = path.copy()
+    slow[1:-1] = solveh_banded(bands, wanted, lower=True)
+    return slow
