@@ -23,6 +23,7 @@ from spark.rotation import (
     quat_rotate,
 )
 from spark.skeleton import Skeleton
+from spark.smoothstep import smoothstep
 
 _SHORT = 1e-3  # of the body's height: a bone this short has no direction
 _FLAT = 0.15  # a set of bones this much wider one way than the other two lies in a line
@@ -225,8 +226,7 @@ def _turned_to_bend(
     normal = np.cross(bone, after)
     bend = np.linalg.norm(normal, axis=-1)
     bend /= np.linalg.norm(bone, axis=-1) * np.linalg.norm(after, axis=-1) + 1e-12
-    ramp = np.clip((bend - _BENT[0]) / (_BENT[1] - _BENT[0]), 0, 1)
-    weight = ramp**2 * (3 - 2 * ramp)
+    weight = smoothstep((bend - _BENT[0]) / (_BENT[1] - _BENT[0]))
     angle, defined = _turn_about(bone, _carried(world, axis), normal)
     weight = weight * defined
     stiff = (_SMOOTH / frame_time) ** 2

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from spark.rig.contacts import planted_points, speeds
+from spark.rig.contacts import speeds
 from spark.rig.roles import LIMBS, Group
 from spark.rotation import quat_mul, quat_rotate
 from spark.runs import true_runs
@@ -51,7 +51,7 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
         return moved
     rise = hip_rise(source, moved, [(theirs, own) for _, theirs, own in feet])
     ends = np.stack([theirs.sole[:, _ENDS] for _, theirs, _ in feet], axis=1)
-    stands = stances(ends, source.frame_time, source.rig.standing_height)
+    stands, flat = stances(ends, source.frame_time, source.rig.standing_height)
     moves: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
     for (leg, (_, _, their_sole), (_, _, own_sole)), stance in zip(feet, stands, strict=True):
         theirs, own = _rolled(their_sole, own_sole, source)
@@ -68,8 +68,7 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
     risen = replace(moved, hips=moved.hips + rise[:, None] * np.array([0.0, 0.0, 1.0]))
     # A foot that rolls off has let go with its heel: if the hips came down for it, the other knee
     # would bend where the source's is straight.
-    flat = planted_points(ends, source.frame_time, source.rig.standing_height).all(axis=2).T
-    return move_ankles(*within_reach(risen, moves, flat & stands))
+    return move_ankles(*within_reach(risen, moves, flat))
 
 
 def _standing(motion: CanonicalMotion, group: Group) -> Standing:

@@ -17,6 +17,7 @@ from spark.blocks import in_blocks
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_between, quat_from_rotvec, quat_mul, quat_rotate
 from spark.skeleton import Skeleton
+from spark.smoothstep import smoothstep
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.vectors import cross, dot
 
@@ -93,8 +94,7 @@ def _neighbours(
     none_after = (frames[after] >= first + T) | (frames[after] < time)
     after = np.where(none_after, before, after)
     since, until = frames[before], frames[after]
-    u = np.clip((time - since) / np.maximum(until - since, 1), 0, 1)
-    return before, after, u * u * (3 - 2 * u)
+    return before, after, smoothstep((time - since) / np.maximum(until - since, 1))
 
 
 def bend_leg(
@@ -161,8 +161,7 @@ def _bend_axis(
     `product`, on the thigh's left; the thigh's lateral axis the more, the straighter the leg."""
     lateral = quat_rotate(upper_leg, np.array([0, 1, 0], normal.dtype))
     sine = _length(normal) / np.maximum(product, 1e-12)
-    u = np.minimum(sine / _STRAIGHT, 1)
-    weight = u * u * (3 - 2 * u)
+    weight = smoothstep(sine / _STRAIGHT)
     left = np.where(dot(normal, lateral) < 0, -weight, weight)
     axis = normal * (left / np.maximum(sine * product, 1e-12)) + lateral * (1 - weight)
     return axis / _length(axis)

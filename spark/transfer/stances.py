@@ -27,8 +27,9 @@ _BEARING_SPEED = 0.4
 
 def stances(
     ends: Float[np.ndarray, "T F P 3"], frame_time: float, height: float
-) -> Bool[np.ndarray, "F T"]:
-    """The frames in which each of F feet stands, by the points at the ends of its sole [m, world].
+) -> tuple[Bool[np.ndarray, "F T"], Bool[np.ndarray, "F T"]]:
+    """The frames in which each of F feet stands, by the points at the ends of its sole [m, world],
+    and those of them in which it stands flat: all of its points rest.
 
     `height` [m] is the body's standing height. A stance that the motion's start or end cuts short
     may have been longer, and counts.
@@ -45,4 +46,4 @@ def stances(
         for start, stop in true_runs(bear, gap=max(shortest - 1, 0)):
             cut = start == 0 or stop == len(bear)
             own[start:stop] = cut or stop - start >= shortest
-    return stands
+    return stands, stands & rests.all(axis=2).T
