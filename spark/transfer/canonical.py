@@ -73,12 +73,18 @@ def canonical_positions(
 ) -> Float[np.ndarray, "T J 3"]:
     """Where the joints are [m, world], or some of them; those above the root joint as if rigid with
     it."""
-    rig = canonical.rig
+    rig, skeleton = canonical.rig, canonical.rig.skeleton
+    # Fingers, hair and clothes are most of the joints of some rigs, and seldom asked for.
+    asked = range(len(skeleton)) if joints is None else {*joints, *rig.hips}
+    needed = np.zeros(len(skeleton), dtype=bool)
+    needed[[above for joint in asked for above in skeleton.ancestors(joint)]] = True
+    levels = [level[needed[level]] for level in skeleton.levels]
 
     def some(block: slice) -> Float[np.ndarray, "T J 3"]:
         hips = canonical.hips[block]
-        world = quat_mul(canonical.rotations[block], rig.tpose)
-        positions = world_positions(rig.skeleton, world, np.zeros_like(hips))
+        world = np.empty_like(canonical.rotations[block])
+        world[:, needed] = quat_mul(canonical.rotations[block][:, needed], rig.tpose[needed])
+        positions = world_positions(skeleton, world, np.zeros_like(hips), levels=levels)
         positions += (hips - positions[:, rig.hips].mean(1))[:, None]
         return positions if joints is None else positions[:, joints]
 
