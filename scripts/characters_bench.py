@@ -41,9 +41,7 @@ METHODS: dict[str, Callable[[CanonicalMotion, Rig], CanonicalMotion]] = {
     "copy, feet held": lambda s, rig: lock_feet(s, transfer(s, rig)),
     "legs fitted": lambda s, rig: fit_legs(s, transfer(s, rig)),
     "legs fitted, feet held": lambda s, rig: lock_feet(s, fit_legs(s, transfer(s, rig))),
-    "legs fitted, feet held, hips swaying": lambda s, rig: sway_hips(
-        s, lock_feet(s, fit_legs(s, transfer(s, rig)))
-    ),
+    "`retarget`": lambda s, rig: sway_hips(s, lock_feet(s, fit_legs(s, transfer(s, rig)))),
 }
 
 

@@ -31,6 +31,7 @@ from spark.training.same_motion import same_motion
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.foot_lock import lock_feet
+from spark.transfer.hip_sway import sway_hips
 
 FOLDS, SEED = 6, 0
 Method = Callable[[CanonicalMotion, Rig], CanonicalMotion]
@@ -103,7 +104,10 @@ def recorded_method(learned: Recorded, habits: HabitsOf) -> Method:
 
 
 def _both(name: str, plain: Method) -> dict[str, Method]:
-    return {name: plain, f"{name}, feet held": lambda s, rig: lock_feet(s, plain(s, rig))}
+    return {
+        name: plain,
+        f"{name}, as `retarget`": lambda s, rig: sway_hips(s, lock_feet(s, plain(s, rig))),
+    }
 
 
 def _folds(names: list[str]) -> list[set[str]]:
