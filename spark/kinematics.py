@@ -39,7 +39,7 @@ def world_positions(
     world: Float[np.ndarray, "*n J 4"],
     root_pos: Float[np.ndarray, "*n 3"],
     translations: Float[np.ndarray, "*n J 3"] | None = None,
-    levels: Sequence[Int[np.ndarray, "L"]] | None = None,
+    levels: Sequence[Int[np.ndarray, "_"]] | None = None,
 ) -> Float[np.ndarray, "*n J 3"]:
     """Joint positions [m, world] from world rotations; `translations` replace the offsets. With
     `levels`, some of each of the skeleton's, the others' are left undefined."""
