@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from sim.outline import outline
+from robots.model.hull import outlines, reaching
 from spark.rotation import quat_between, quat_rotate
 
 # Tilts of a foot that stands, and of one that lies; hip heights by which it may then reach below
@@ -16,7 +16,6 @@ from spark.rotation import quat_between, quat_rotate
 _STANDING = np.radians([20.0, 40.0, 60.0]), 0.005
 _LYING = np.radians([80.0, 100.0, 120.0]), 0.01
 _SIDES = np.linspace(0, 2 * np.pi, 17)[:-1]
-_RING = 24  # points on either edge of a cylinder
 
 
 def rim(
@@ -30,22 +29,12 @@ def rim(
     `corners` of its sole when it is tilted; and how many of them, the first, are so while it
     stands: tilted by up to 60 degrees. All in the rest pose [m], where the foot's sole faces the
     direction `down`."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
     upright = quat_between(np.array([0.0, 0.0, -1.0]), down)
     kept, kept_radii, counts = corners, np.zeros(len(corners)), []
     for tilts, spared in (_STANDING, _LYING):
         ways = quat_rotate(upright, _tilted_down(tilts))
-        points, radii = _outlines(model, data, geoms, ways)
-        along = ways @ points.T + radii
-        while True:
-            reach = (ways @ kept.T + kept_radii).max(axis=1, initial=-np.inf)
-            way = int((along.max(axis=1) - reach).argmax())
-            best = int(along[way].argmax())
-            if along[way, best] <= reach[way] + spared * hip_height:
-                break
-            kept = np.concatenate([kept, points[[best]]])
-            kept_radii = np.append(kept_radii, radii[best])
+        balls = outlines(model, geoms, ways)
+        kept, kept_radii = reaching(ways, balls, (kept, kept_radii), spared * hip_height)
         counts.append(len(kept) - len(corners))
     return kept[len(corners) :], kept_radii[len(corners) :], counts[0]
 
@@ -58,20 +47,3 @@ def _tilted_down(tilts: Float[np.ndarray, "A"]) -> Float[np.ndarray, "D 3"]:
             for tilt, side in product(tilts, _SIDES)
         ]
     )
-
-
-def _outlines(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    geoms: Sequence[int],
-    ways: Float[np.ndarray, "D 3"],
-) -> tuple[Float[np.ndarray, "P 3"], Float[np.ndarray, "P"]]:
-    """The points of some geoms that may lie farthest in one of the ways, and their radii."""
-    found, radii = [np.zeros((0, 3))], [np.zeros(0)]
-    for geom in geoms:
-        rotation = data.geom_xmat[geom].reshape(3, 3)
-        own = ways @ rotation
-        points, radius = outline(model, geom, ellipsoid=own, mesh=own, ring=_RING)
-        found.append(points @ rotation.T + data.geom_xpos[geom])
-        radii.append(np.full(len(points), radius))
-    return np.concatenate(found), np.concatenate(radii)

@@ -11,9 +11,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import uniform_filter1d
 
+from robots.solver.carrying import Points, carrying
 from sim.body.anthropometry import RADII
 from sim.report.derivatives import derivative
-from sim.report.mass import human_mass
+from sim.report.mass import Mass, human_mass
 from spark.constants import GRAVITY
 from spark.rig.contacts import (
     ADULT_HEIGHT,
@@ -77,9 +78,9 @@ def schedule(
     mass = human_mass(rig, positions, quat_mul(source.rotations, rig.tpose))
     acceleration = derivative(mass.com, frame_time, 2, _WINDOW)
     flight = np.less(acceleration[:, 2], (FLIGHT_PUSH - 1) * GRAVITY)
-    roles, parts, rests = _touching_parts(source, positions)
-    stands = np.zeros(paths.shape[:-1], dtype=bool)
     exist = has_feet(paths)
+    roles, parts, rests = _touching_parts(source, positions, paths[:, exist], mass)
+    stands = np.zeros(paths.shape[:-1], dtype=bool)
     if exist.any():
         stands[:, exist] = planted_points(paths[:, exist], frame_time, rig.standing_height)
     feet = _steady(stands, frame_time)
@@ -123,10 +124,13 @@ def _nothing_holds(
 
 
 def _touching_parts(
-    source: CanonicalMotion, positions: Float[np.ndarray, "T J 3"]
+    source: CanonicalMotion,
+    positions: Float[np.ndarray, "T J 3"],
+    feet: Float[np.ndarray, "T F 2 3"],
+    mass: Mass,
 ) -> tuple[tuple[Role, ...], Bool[np.ndarray, "T B"], Bool[np.ndarray, "T B"]]:
-    """Whether parts touch the ground: their flesh is near it, or not far and they are slow; and
-    whether they rest there."""
+    """Whether parts touch the ground: their flesh is near it, or not far and they are slow, or
+    carry the body; and whether they rest there."""
     rig, frame_time = source.rig, source.frame_time
     joints = {role: j for role in _PARTS if (j := touching_joint(rig, role)) is not None}
     scale = rig.standing_height / ADULT_HEIGHT
@@ -136,9 +140,27 @@ def _touching_parts(
     speed = np.linalg.norm(derivative(paths, frame_time, 1, _WINDOW), axis=-1) / scale
     height -= WRIST_HEIGHT * np.array([role.part == "hand" for role in joints])
     slow = speed < REST_SPEED
-    touches = _steady((height < TOUCH_HEIGHT) | ((height < REST_HEIGHT) & slow), frame_time)
+    near = (height < TOUCH_HEIGHT) | ((height < REST_HEIGHT) & slow)
+    carries = carrying(
+        mass,
+        Points(paths, height * scale),
+        _sole_points(feet, rig.standing_height),
+        source.floor_z,
+        frame_time,
+        scale,
+    )
+    touches = _steady(near | carries, frame_time)
     stays = _steady(touches & (speed < ROLL_SPEED), frame_time) & touches
     return tuple(joints), touches, _runs_with(stays, slow)
+
+
+def _sole_points(feet: Float[np.ndarray, "T F 2 3"], height: float) -> Points:
+    """Heels and toes, over where they stand."""
+    places = feet.reshape(len(feet), -1, 3)
+    if not feet.size:
+        return Points(places, places[..., 2])
+    over = feet[..., 2] - standing_heights(feet, height)
+    return Points(places, over.reshape(len(feet), -1))
 
 
 def _runs_with(

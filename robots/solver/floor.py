@@ -7,15 +7,18 @@ import numpy as np
 from jaxtyping import Float
 
 from robots.least_squares import NormalEquations
+from robots.model.hull import hull
 from robots.model.morphology import Morphology
 from robots.model.rims import rim
 from robots.residuals import one_sided, twists
-from robots.solver.block import Block
+from robots.solver.block import Block, blocks_of
 from robots.solver.hulls import shapes_of
-from robots.tree import LinkPoses, forward_kinematics
+from robots.tree import ROOT, LinkPoses, forward_kinematics
 from spark.rig.feet import Sole
 
 _FOOT_HEIGHT = 0.02  # [m] above the sole, below which a shape is part of the foot
+_SPARED = 0.004  # hip heights by which a shape is taken for larger, at most
+_CARRIED_REACH = 0.25  # and from shoulder or neck within which no arm or head lifts itself up
 FELT = 3  # roundings above the floor from which on a residual is worth its time
 
 
@@ -27,6 +30,13 @@ class Solid(NamedTuple):
     spheres: Float[np.ndarray, "S 3"]
     radii: Float[np.ndarray, "S"]
     standing: int = 0
+
+    def bottom(self, poses: LinkPoses) -> Float[np.ndarray, "T"]:
+        """A height [m] that nothing of it is below."""
+        center = (self.spheres.max(axis=0) + self.spheres.min(axis=0)) / 2
+        reach = (np.linalg.norm(self.spheres - center, axis=1) + self.radii).max()
+        bottom: Float[np.ndarray, T] = poses.heights(self.link, center[None])[0] - reach
+        return bottom
 
 
 @lru_cache(maxsize=16)
@@ -41,8 +51,8 @@ def solids_over_floor(robot: Morphology) -> tuple[Solid, ...]:
         corners.setdefault(int(link), []).append(point)
         heights.append(poses.point(int(link), point)[2, 0])
     low = min(heights, default=-np.inf) + _FOOT_HEIGHT
-    out: list[Solid] = []
     feet: dict[int, list[int]] = {}
+    others: dict[int, list[int]] = {}
     for shape in shapes_of(robot.mjcf, robot.mj_joints):
         bottoms = [
             poses.point(shape.link, center)[2, 0] - radius
@@ -51,7 +61,11 @@ def solids_over_floor(robot: Morphology) -> tuple[Solid, ...]:
         if shape.link in corners or min(bottoms) <= low:
             feet.setdefault(shape.link, []).append(shape.geom)
         else:
-            out.append(Solid(shape.link, shape.spheres, shape.radii))
+            others.setdefault(shape.link, []).append(shape.geom)
+    out = [
+        Solid(link, *hull(robot.mjcf.model, geoms, _SPARED * robot.rig.hip_height))
+        for link, geoms in others.items()
+    ]
     for link, geoms in feet.items():
         down = -poses.rotations[link][2, :, 0]
         own = np.array(corners.get(link, [])).reshape(-1, 3)
@@ -93,22 +107,22 @@ def add_floor(
     weight: Float[np.ndarray, "T"],
     rounding: Float[np.ndarray, "T"],
 ) -> None:
-    """r = w one_sided(radius - z) of the spheres of each shape that the block alone moves: w [1/m]
+    """r = w one_sided(radius - z) of the spheres of each shape that the block has to lift: w [1/m]
     is `weight`; it sets in over `rounding` [m]."""
-    for shape in _moved_solids(robot, block):
-        joints = block.free_joints(shape.link)
-        depth = shape.radii[:, None] - poses.heights(shape.link, shape.spheres)
-        felt = depth > -FELT * rounding
-        frames = np.flatnonzero(felt.any(axis=0))
+    for shape in _lifted_solids(robot, block):
+        frames = np.flatnonzero(shape.bottom(poses) < FELT * rounding)
         if not len(frames):
             continue
-        felt = felt[:, frames]
-        sunk, slope = one_sided(depth[:, frames], rounding[frames])
+        joints = block.free_joints(shape.link)
+        above = robot.tree.parents[list(joints)].tolist()
+        near = poses.at(frames, {ROOT, shape.link, *joints, *above})
+        depth = shape.radii[:, None] - near.heights(shape.link, shape.spheres)
+        felt = depth > -FELT * rounding[frames]
+        sunk, slope = one_sided(depth, rounding[frames])
         residuals = np.where(felt, weight[frames] * sunk, 0.0)
         normal.cost[frames] += 0.5 * (residuals**2).sum(0)
         if not normal.with_jacobian:
             continue
-        near = poses.at(frames, {shape.link, *joints, *robot.tree.parents[list(joints)].tolist()})
         # A push down at the end of an arm (x, y): (-y, x, 0) is the arm's product with (0, 0, -1).
         x, y = (shape.spheres - robot.tree.anchor(shape.link)) @ near.rotations[shape.link][:2]
         down = np.where(felt, weight[frames] * slope, 0.0)
@@ -123,16 +137,32 @@ def add_floor(
 def depth_in_floor(robot: Morphology, poses: LinkPoses, block: Block) -> Float[np.ndarray, "T"]:
     """How deep [m] the deepest of those shapes is in the floor; 0 where none is."""
     out = np.zeros(poses.positions.shape[2])
-    for shape in _moved_solids(robot, block):
+    for shape in _lifted_solids(robot, block):
         depth = shape.radii[:, None] - poses.heights(shape.link, shape.spheres)
         np.maximum(out, depth.max(axis=0), out=out)
     return out
 
 
-def _moved_solids(robot: Morphology, block: Block) -> list[Solid]:
-    """Those that the block moves, and no later one."""
-    return [
-        shape
-        for shape in solids_over_floor(robot)
-        if (block.frees(shape.link) if block.base else block.free_joints(shape.link))
-    ]
+def carried_solids(robot: Morphology) -> tuple[Solid, ...]:
+    """What of arms and head is so near to the trunk that this has to lift it."""
+    tree, trunk = robot.tree, blocks_of(robot)[0]
+    if not trunk.base:
+        return ()
+    out = []
+    for solid in solids_over_floor(robot):
+        later = [j for j in tree.chain(solid.link) if j not in trunk.joints]
+        if later:
+            away = np.linalg.norm(solid.spheres - tree.anchor(later[0]), axis=1) - solid.radii
+            near = away < _CARRIED_REACH * robot.rig.hip_height
+            out.append(Solid(solid.link, solid.spheres[near], solid.radii[near]))
+    return tuple(solid for solid in out if len(solid.spheres))
+
+
+@lru_cache(maxsize=32)
+def _lifted_solids(robot: Morphology, block: Block) -> tuple[Solid, ...]:
+    """Those that the block moves, and no later one; and what the trunk carries."""
+    solids = solids_over_floor(robot)
+    if not block.base:
+        return tuple(solid for solid in solids if block.free_joints(solid.link))
+    own = (solid for solid in solids if block.frees(solid.link))
+    return (*own, *carried_solids(robot))

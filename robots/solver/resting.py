@@ -2,8 +2,11 @@
 
 A part is held at the height at which its lowest shape touches the ground there
 (`robots.solver.touching`). Of arms, which give way to the trunk, the shoulder is held as well, so
-that the trunk comes to where its arms can reach the ground.
+that the trunk comes to where its arms can reach the ground. A head or a shoulder lies where the
+trunk lays it.
 """
+
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool
@@ -19,6 +22,7 @@ from spark.runs import true_runs
 from spark.transfer.footfalls import between_contacts, beyond
 
 HOLD = 2.5  # how firmly a part is held where it touches the ground, as a share of a standing sole,
+_ON_TRUNK = ("upper_arm", "head")
 CARRIED_HOLD = 0.32  # and of that the shoulder over an arm that touches
 MAX_ROLL = 0.1  # hip heights that the joint of a part that rests may roll over it
 SETTLE = 0.12  # [s] before and after a rest in which a part already stays, ever less
@@ -33,11 +37,15 @@ def resting(robot: Morphology, targets: Targets, q: Coordinates) -> Holds:
         touch, touches = touches_of(robot).get(role), targets.parts[:, k]
         if touch is None or not touches.any():
             continue
-        parts.append(_held(robot, targets, poses, touch, touches, targets.rests[:, k]))
-        if role.part in ("hand", "forearm"):
-            shoulder = robot.rig.roles.joint(Role(f"{role.side}_upper_arm"))
-            if shoulder is not None:
-                parts.append(_carried(robot, poses, shoulder, touch, parts[-1]))
+        held = _held(robot, targets, poses, touch, touches, targets.rests[:, k])
+        if role.part in _ON_TRUNK:
+            parts.append(_carried(robot, poses, robot.rig.roles.require(role), touch, held))
+            continue
+        parts.append(held)
+        shoulder = robot.rig.roles.joint(Role(f"{role.side}_upper_arm")) if role.side else None
+        if role.part in ("hand", "forearm") and shoulder is not None:
+            over = _carried(robot, poses, shoulder, touch, held)
+            parts.append(replace(over, shares=CARRIED_HOLD * over.shares))
     return joined(parts)
 
 
@@ -66,11 +74,9 @@ def _held(
     return Holds(np.array([touch.link]), touch.place[None], (now + offset.T)[None], shares[None])
 
 
-def _carried(
-    robot: Morphology, poses: LinkPoses, shoulder: int, touch: Touch, held: Holds
-) -> Holds:
-    """The shoulder, as a point of what the arm hangs on, shifted as the part of the arm is."""
-    link = int(robot.links[int(robot.rig.skeleton.parents[shoulder])])
-    center = robot.centers[shoulder]
+def _carried(robot: Morphology, poses: LinkPoses, joint: int, touch: Touch, held: Holds) -> Holds:
+    """The joint of an arm or head, as a point of what that hangs on, shifted as its part is."""
+    link = int(robot.links[int(robot.rig.skeleton.parents[joint])])
+    center = robot.centers[joint]
     positions = (poses.point(link, center) + held.positions[0] - touch.path(poses))[None]
-    return Holds(np.array([link]), center[None], positions, CARRIED_HOLD * held.shares)
+    return Holds(np.array([link]), center[None], positions, held.shares)

@@ -8,9 +8,11 @@ from jaxtyping import Float
 
 from robots.model.morphology import Morphology
 from robots.solver.contacts import touching_joint
-from robots.solver.hulls import Shape, shapes_of
+from robots.solver.floor import Solid, solids_over_floor
 from robots.tree import LinkPoses
 from spark.rig.roles import Role
+
+Solids = tuple[Solid, ...]
 
 _NEAR = 0.1  # hip heights from its place within which a part's shapes may touch for it
 
@@ -40,23 +42,23 @@ class Touch(NamedTuple):
 def touches_of(robot: Morphology) -> dict[Role, Touch]:
     """Of each role that a robot has: by its joint's centre. A forearm without a wrist has the hand
     of its side at its end."""
-    shapes = shapes_of(robot.mjcf, robot.mj_joints)
+    solids = solids_over_floor(robot)
     out = {}
     for role in Role:
         joint = touching_joint(robot.rig, role)
         if joint is not None:
             link, place = int(robot.links[joint]), robot.centers[joint]
-            out[role] = _near(link, place, shapes, _NEAR * robot.rig.hip_height)
+            out[role] = _near(link, place, solids, _NEAR * robot.rig.hip_height)
         elif role.part == "hand":
             forearm = Role(f"{role.side}_forearm")
             elbow, along = robot.rig.roles.joint(forearm), robot.bones.get(forearm)
             if elbow is not None and along is not None:
-                out[role] = _end(int(robot.links[elbow]), robot.centers[elbow], along, shapes)
+                out[role] = _end(int(robot.links[elbow]), robot.centers[elbow], along, solids)
     return out
 
 
-def _near(link: int, place: Float[np.ndarray, "3"], shapes: list[Shape], reach: float) -> Touch:
-    spheres, radii = _spheres_of(link, shapes)
+def _near(link: int, place: Float[np.ndarray, "3"], solids: Solids, reach: float) -> Touch:
+    spheres, radii = _spheres_of(link, solids)
     if not len(spheres):
         return Touch(link, place, place[None], np.zeros(1))
     away = np.linalg.norm(spheres - place, axis=1) - radii
@@ -65,10 +67,13 @@ def _near(link: int, place: Float[np.ndarray, "3"], shapes: list[Shape], reach: 
 
 
 def _end(
-    link: int, elbow: Float[np.ndarray, "3"], along: Float[np.ndarray, "3"], shapes: list[Shape]
+    link: int,
+    elbow: Float[np.ndarray, "3"],
+    along: Float[np.ndarray, "3"],
+    solids: Solids,
 ) -> Touch:
     """By the sphere of a link's shapes that is farthest along a direction."""
-    spheres, radii = _spheres_of(link, shapes)
+    spheres, radii = _spheres_of(link, solids)
     if not len(spheres):
         return Touch(link, elbow, elbow[None], np.zeros(1))
     k = int((spheres @ along + radii).argmax())
@@ -76,10 +81,10 @@ def _end(
 
 
 def _spheres_of(
-    link: int, shapes: list[Shape]
+    link: int, solids: Solids
 ) -> tuple[Float[np.ndarray, "S 3"], Float[np.ndarray, "S"]]:
-    own = [shape for shape in shapes if shape.link == link]
-    spheres = [shape.spheres for shape in own]
+    own = [solid for solid in solids if solid.link == link]
+    spheres = [solid.spheres for solid in own]
     return np.concatenate([np.zeros((0, 3)), *spheres]), np.concatenate(
-        [np.zeros(0), *(shape.radii for shape in own)]
+        [np.zeros(0), *(solid.radii for solid in own)]
     )

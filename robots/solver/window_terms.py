@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Int
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
 from robots.solver.block import blocks_of
-from robots.solver.floor import solids_over_floor
+from robots.solver.floor import carried_solids, solids_over_floor
 from robots.solver.hinges import Hinges, Posture
 from robots.solver.weights import (
     FLOOR_ROUNDING,
@@ -69,10 +69,14 @@ class Terms:
         first = np.flatnonzero(self._in_first_block[:-1])
         self._collisions = WindowCollisions(robot, bodies, self._rest, first, later_only=later_only)
         solids = solids_over_floor(robot)
+        carried = carried_solids(robot)
         if later_only:
             solids = tuple(solid for solid in solids if not self._in_first_block[solid.link])
-        links = [solid.link for solid in solids]
-        self._floor = WindowFloor(solids, bodies[links], self._mask(links), self._rest)
+            carried = ()
+        links = [solid.link for solid in (*solids, *carried)]
+        own = self._in_first_block[[solid.link for solid in solids]]
+        moving = self._mask(links, np.append(own, np.ones(len(carried), dtype=bool)))
+        self._floor = WindowFloor((*solids, *carried), bodies[links], moving, self._rest)
         self._index_rotations()
         self._index_bones(bones)
         self._index_points(hands)
@@ -232,15 +236,17 @@ class Terms:
         robot = self.robot
         return int(self._model.jnt_bodyid[robot.mj_joints[link]]) if link >= 0 else robot.mjcf.root
 
-    def _mask(self, links: Sequence[int]) -> Bool[np.ndarray, "K D"]:
-        """The dofs that move some links, of the block that solves for these."""
+    def _mask(
+        self, links: Sequence[int], first: Bool[np.ndarray, "K"] | None = None
+    ) -> Bool[np.ndarray, "K D"]:
+        """The dofs that move some links, of the first block or the later one: by default that which
+        they are in."""
         tree = self.robot.tree
+        first = self._in_first_block[list(links)] if first is None else first
         out = np.zeros((len(links), tree.nv), dtype=bool)
         for k, link in enumerate(links):
-            out[k, :BASE] = self._in_first_block[link]
-            same = [
-                j for j in tree.chain(link) if self._in_first_block[j] == self._in_first_block[link]
-            ]
+            out[k, :BASE] = first[k]
+            same = [j for j in tree.chain(link) if self._in_first_block[j] == first[k]]
             out[k, tree.dofs(tuple(same))] = True
         return out
 

@@ -7,15 +7,19 @@ import numpy as np
 import pytest
 
 from robots.model.morphology import Morphology
+from robots.registry import find
 from robots.solver.floor import sole_paths
 from robots.solver.solve import retarget
 from robots.tree import forward_kinematics
 from scripts.robot_bars import follow
 from sim.outline import outline, solid
+from sim.report.clip_poses import pose_clip
+from sim.trajectory import Subject
 from spark.demo.sample import sample_motion, sample_rig
 from spark.rig.roles import Role
-from spark.rotation import quat_from_rotvec, quat_mul
+from spark.rotation import quat_conj, quat_from_rotvec, quat_mul
 from spark.transfer.canonical import CanonicalMotion, to_canonical
+from spark_sim.loading import load_robot
 from tests.helpers.ember import changed_ember
 
 FEET = {  # in place of Ember's boxes
@@ -27,6 +31,7 @@ FEET = {  # in place of Ember's boxes
     "round toes": '<geom class="foot" type="ellipsoid" mass="0.6" pos="0.045 0 -0.02" '
     'size="0.11 0.04 0.03"/><geom class="visual" type="box"',
 }
+EMBER = load_robot(find("robot")).on_robot.robot
 
 
 def ember(tmp_path: Path, foot: str) -> Morphology:
@@ -81,3 +86,25 @@ def test_no_point_of_a_tilted_foot_is_lower_than_is_known(tmp_path: Path, foot: 
 def test_who_stands_on_tiptoe_does_not_sink(tmp_path: Path, foot: str, follows) -> None:
     result = follows(tiptoeing(), ember(tmp_path, foot))
     assert lowest(result.robot, result.qpos).min() > -0.007
+
+
+def on_the_side(height: float) -> CanonicalMotion:
+    """A walker that lies on its left arm, the middle of its hips so high [m]."""
+    rig = sample_rig("walker")
+    roll = quat_from_rotvec(np.array([-np.pi / 2, 0.0, 0.0]))
+    rotations = np.tile(roll, (60, len(rig.skeleton), 1))
+    for role in (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM):
+        ahead = quat_from_rotvec(np.array([0.0, 0.0, -np.pi / 2]))
+        arm = list(rig.skeleton.subtree(rig.roles.require(role)))
+        rotations[:, arm] = quat_mul(roll, ahead if role.side == "left" else quat_conj(ahead))
+    return CanonicalMotion(rig, 1 / 60, rotations, np.tile([0.0, 0, height], (60, 1)), 0.0)
+
+
+@pytest.mark.parametrize("follows", [retarget, follow], ids=["whole", "stream"])
+def test_a_trunk_lifts_the_shoulder_that_no_arm_can_lift(follows) -> None:
+    result = follows(on_the_side(0.12), EMBER)
+    body = result.body
+    subject = Subject(result.motion, result.robot.rig, body)
+    parts = pose_clip(subject)
+    lowest = (parts.part_points[..., 2] - parts.part_radii).min()
+    assert lowest > -0.011 * result.robot.rig.hip_height  # what the report takes for sinking

@@ -1,5 +1,6 @@
 """Hands, knees and the back: where they touch the ground, they lie on it and stay."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -126,6 +127,24 @@ def test_a_back_lies_on_the_ground(ember: Morphology) -> None:
     body = (Role.PELVIS, Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
     assert heights(result, body).min(axis=1).max() < 0.06
     assert heights(result, body).min() > -0.01
+
+
+def test_who_hovers_on_all_fours_is_let_down(ember: Morphology) -> None:
+    """Of a recording whose skeleton or floor is off by 7 cm."""
+    level = on_all_fours()
+    source = replace(level, hips=level.hips + np.array([0, 0, 0.07]))
+    targets = targets_of(source, ember)
+    touching = {r for k, r in enumerate(targets.part_roles) if targets.parts[:, k].all()}
+    assert touching == {*KNEES, *HANDS}
+    assert np.abs(heights(retarget(source, ember), (*KNEES, *HANDS))).max() < 0.02
+
+
+def test_shoulders_stay_where_they_lie_while_the_body_sways(ember: Morphology) -> None:
+    """The source's are dragged along by 2 cm."""
+    source = posed({Role.PELVIS: turn(y=-1)}, 0.06, sway=0.02)
+    poses = forward_kinematics(ember.tree, retarget(source, ember).coordinates)
+    for role in (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM):
+        assert np.ptp(touches_of(ember)[role].path(poses)[0]) < 0.01
 
 
 def test_who_stands_rests_on_nothing_but_feet(ember: Morphology) -> None:

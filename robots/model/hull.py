@@ -1,0 +1,55 @@
+"""How far shapes reach in all directions: points, and balls around them, that reach as far."""
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from sim.outline import fibonacci_sphere, outline
+
+Balls = tuple[Float[np.ndarray, "_ 3"], Float[np.ndarray, "_"]]
+"""Points [m], and the radius [m] of the ball around each."""
+
+_WAYS = fibonacci_sphere(200)
+_RING = 24  # points on either edge of a cylinder
+
+
+def hull(model: mujoco.MjModel, geoms: Sequence[int], spared: float) -> Balls:
+    """Of shapes that move as one, in the rest pose: no less than they are in any direction, and
+    about `spared` [m] more at most."""
+    none = np.zeros((0, 3)), np.zeros(0)
+    points, radii = reaching(_WAYS, outlines(model, geoms, _WAYS), none, spared)
+    return points, radii + spared
+
+
+def reaching(ways: Float[np.ndarray, "D 3"], balls: Balls, kept: Balls, spared: float) -> Balls:
+    """Those that are kept, and as many of the other balls as it takes to reach as far in each of
+    the ways (unit vectors), but for `spared` [m]."""
+    (points, radii), (kept_points, kept_radii) = balls, kept
+    along = ways @ points.T + radii
+    farthest = along.max(axis=1, initial=-np.inf)
+    reach = (ways @ kept_points.T + kept_radii).max(axis=1, initial=-np.inf)
+    chosen: list[int] = []
+    while len(points):
+        way = int((farthest - reach).argmax())
+        best = int(along[way].argmax())
+        if along[way, best] <= reach[way] + spared:
+            break
+        chosen.append(best)
+        np.maximum(reach, along[:, best], out=reach)
+    return np.concatenate([kept_points, points[chosen]]), np.append(kept_radii, radii[chosen])
+
+
+def outlines(model: mujoco.MjModel, geoms: Sequence[int], ways: Float[np.ndarray, "D 3"]) -> Balls:
+    """What of some shapes may lie farthest in one of the ways, in the rest pose."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    found, radii = [np.zeros((0, 3))], [np.zeros(0)]
+    for geom in geoms:
+        rotation = data.geom_xmat[geom].reshape(3, 3)
+        own = ways @ rotation
+        points, radius = outline(model, geom, ellipsoid=own, mesh=own, ring=_RING)
+        found.append(points @ rotation.T + data.geom_xpos[geom])
+        radii.append(np.full(len(points), radius))
+    return np.concatenate(found), np.concatenate(radii)
