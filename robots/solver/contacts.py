@@ -31,6 +31,7 @@ from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion
 
 MIN_DURATION = 0.08  # contacts and breaks shorter than this [s] are noise
+MAX_TILT = 0.02  # [m, of an adult] by which one end of a standing sole may be higher than the other
 STAY_REACH = 0.03  # [m, of an adult] along the floor that a point may tremble without a step,
 STAY_LIFT = 0.015  # and up from it,
 STAY_TIME = 0.4  # [s] for that long
@@ -42,6 +43,7 @@ REST_HEIGHT = 0.05  # and of one that rests: recorded floors are off, and flesh 
 WRIST_HEIGHT = 0.04  # more above a palm or a fist
 REST_SPEED = 0.2  # [m/s, of an adult] below which a part comes to rest,
 ROLL_SPEED = 0.4  # and up to which it then stays in place, though its joint rolls over it
+_NEVER = 10.0  # of the speed at which it stands: an end that is no choice
 _WINDOW = 0.05  # [s] before and after a frame over which accelerations are measured
 _MAY_TOUCH = ("hand", "forearm", "upper_arm", "head", "spine", "pelvis", "lower_leg")
 _PARTS = tuple(role for role in Role if role.part in _MAY_TOUCH)  # and the feet
@@ -82,7 +84,8 @@ def schedule(
     roles, parts, rests = _touching_parts(source, positions, paths[:, exist], mass)
     stands = np.zeros(paths.shape[:-1], dtype=bool)
     if exist.any():
-        stands[:, exist] = planted_points(paths[:, exist], frame_time, rig.standing_height)
+        planted = planted_points(paths[:, exist], frame_time, rig.standing_height)
+        stands[:, exist] = planted & _lower_ends(paths[:, exist], rig.standing_height)
     feet = _steady(stands, frame_time)
     feet = _with_wobbles(feet, paths, rig.standing_height, frame_time)
     floating = _nothing_holds(feet, parts)
@@ -94,6 +97,15 @@ def schedule(
 def has_feet(paths: Float[np.ndarray, "T S 2 3"]) -> Bool[np.ndarray, "S"]:
     """Which feet the source has: the others are 0 all over."""
     return np.abs(paths).sum(axis=(0, 2, 3)) > 0
+
+
+def _lower_ends(paths: Float[np.ndarray, "T S 2 3"], height: float) -> Bool[np.ndarray, "T S 2"]:
+    """Which of heel and toe is the lower, or hardly higher than the other: who stands on the toes
+    does not stand on the heel."""
+    above = paths[..., 2] - standing_heights(paths, height)
+    lowest = above.min(axis=-1, keepdims=True)
+    lower: Bool[np.ndarray, "T S 2"] = above < lowest + MAX_TILT * height / ADULT_HEIGHT
+    return lower
 
 
 def _with_wobbles(
@@ -185,6 +197,7 @@ def _creeping(
     slowness = speeds(own, source.frame_time) / (PLANTED_SPEED * size / ADULT_HEIGHT)
     height = (own[..., 2] - standing_heights(own, size)) / (PLANTED_HEIGHT * size / ADULT_HEIGHT)
     window = _odd(CREEP_TIME, source.frame_time)
+    slowness[~_lower_ends(own, size)] = _NEVER
     cost = uniform_filter1d(slowness + height, window, axis=0, mode="nearest")
     best = cost == cost.min(axis=(1, 2), keepdims=True)
     out[:, exist] = best & (slowness < MAX_CREEP / PLANTED_SPEED)

@@ -2,13 +2,13 @@
 
 A standing foot stays on its footprint. A swinging one keeps the copied path, carried from the
 footprint behind it to the one before it, and the source's clearance, scaled. Ground on which the
-source climbs is level under the robot. Where a foot is fast it is lifted, so that it steps and does
-not drag.
+source climbs is level under the robot. An end of the foot that is fast is lifted, in time, so that
+it steps and does not drag: who turns on the toes raises the heel.
 """
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float
-from scipy.ndimage import median_filter
+from scipy.ndimage import grey_dilation, median_filter
 
 from robots.model.morphology import Morphology
 from robots.solver.footprints import FootPlan, on_points, on_prints
@@ -21,12 +21,15 @@ from spark.transfer.footfalls import between_contacts
 SWING_HOLD = np.array([0.35, 0.35, 0.6])  # its height in swing is what keeps it off the floor,
 SWING_REACH = 0.2  # [hip heights] over which that fades: a kick is a matter of limbs,
 RAISED_HOLD = np.array([1.0, 1.0, 0.3])  # a standing foot's raised end turns about the other
-# Hip heights/s of a foot, and hip heights that it then is above the floor: the report sees feet
-# skate faster than 0.22 and lower than 0.028.
+STEP_HOLD = 0.8  # the height of what steps, at least
+# Hip heights/s of an end of a foot, and hip heights that it then is above the floor: the report
+# sees feet skate faster than 0.22 and lower than 0.028.
 STEP_SPEEDS = (0.2, 0.3, 0.6)
 STEP_HEIGHTS = (0.0, 0.03, 0.033)
+STEP_RISE = 0.33  # [hip heights/s] at which it is lifted before that and let down after it
+UP_SHARE = 0.4  # of a contact, at each end, in which the foot may still, or already, be up
 SPEED_SPAN = 0.025  # [s] before and after a frame for a foot's speed
-SETTLE = 0.1  # [s] before and after a contact in which a foot already stays, ever less
+SETTLE = 0.13  # [s] before and after a contact in which a foot already stays, ever less
 MIN_CREEP = 0.08  # [s], half of which a standing foot has to move for before it is lifted
 LET_DOWN = 0.15  # [s] within which a foot comes down that is in the air where its contact begins
 # Hip heights above the floor at which a foot may stand on it: skeletons and recorded floors are off
@@ -50,15 +53,19 @@ def footing_of(robot: Morphology, plan: FootPlan) -> Holds:
     flat = on_prints(plan.flat, pivot, heading)
     pitched = plan.points[..., 2] - plan.points[..., 2].min(axis=1, keepdims=True)
     on = on_points(plan.sole, plan.contacts.T.astype(np.float64)).T > 0
-    low = np.where(stands[:, None], on, pitched < STEP_HEIGHTS[1] * plan.hip_height)
-    height = _height(plan, np.where(on, flat, own), low)
-    stands = stands & (height < _ON_FLOOR)
-    on = on & stands[:, None]
+    low = on | (pitched < STEP_HEIGHTS[1] * plan.hip_height)
+    step = _steps(plan, np.where(on, flat, own), low)
+    on &= step < _ON_FLOOR
     place = np.where(on, flat, own)
-    z = np.where(on, 0.0, pitched + height[:, None])
+    lift = _in_time(step, plan)
+    height = _height(plan)
+    z = np.where(on, lift, pitched + np.maximum(height[:, None], lift))
     near = near_floor(height / plan.hip_height)[:, None, None]
-    holds = np.where(stands[:, None, None], RAISED_HOLD, near * SWING_HOLD)
+    stands = np.any(on, axis=1)[:, None, None]
+    holds = np.where(stands, RAISED_HOLD, near * SWING_HOLD)
     holds = np.where(on[..., None], 1.0, holds)
+    up = np.minimum(lift / (STEP_HEIGHTS[1] * plan.hip_height), 1.0)
+    holds[..., 2] += up * (STEP_HOLD - holds[..., 2])
     positions = np.stack([place.real, place.imag, z], axis=-1)
     over_time = (np.ascontiguousarray(x.transpose(1, 2, 0)) for x in (positions, holds))
     return Holds(*robot.sole_points(plan.sole), *over_time)
@@ -71,10 +78,8 @@ def near_floor(height: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
     return share
 
 
-def _height(
-    plan: FootPlan, points: Complex[np.ndarray, "T P"], low: Bool[np.ndarray, "T P"]
-) -> Float[np.ndarray, "T"]:
-    """How high the lowest point of the sole is [m]; `low` points are on the floor, or near it."""
+def _height(plan: FootPlan) -> Float[np.ndarray, "T"]:
+    """How high the lowest point of the sole is [m], as the source's is."""
     stands, reach = plan.stands, max(1, round(LET_DOWN / plan.frame_time))
     ground = np.zeros(len(stands))
     for start, stop in true_runs(stands):
@@ -84,18 +89,40 @@ def _height(
     drop = np.where(stands, clearance, 0.0)
     clearance = clearance - _fading(drop, stands, reach)
     away = 1 - np.minimum(_fading(stands * 1.0, stands, reach), 1.0)
-    pivot = (plan.toe[:, 0] + 1j * plan.toe[:, 1])[:, None]
-    pace = _speed(pivot, np.ones_like(low[:, :1]), plan.frame_time, SPEED_SPAN) / plan.hip_height
-    steps = np.interp(pace, [STEP_SPEEDS[0], STEP_SPEEDS[-1]], [0.0, 1.0])
+    pace = _speeds(plan.toe[:, :1] + 1j * plan.toe[:, 1:], plan.frame_time)[:, 0]
+    steps = np.interp(pace / plan.hip_height, [STEP_SPEEDS[0], STEP_SPEEDS[-1]], [0.0, 1.0])
     uneven = away * steps * np.minimum(ground, MAX_UNEVEN * plan.hip_height)
-    height = np.where(stands, 0.0, clearance + uneven + plan.lift)
-    speed = _speed(points, low, plan.frame_time, SPEED_SPAN)
+    return np.where(stands, 0.0, clearance + uneven + plan.lift)
+
+
+def _steps(
+    plan: FootPlan, points: Complex[np.ndarray, "T P"], low: Bool[np.ndarray, "T P"]
+) -> Float[np.ndarray, "T P"]:
+    """How high [m] heel, ball and toes step, each as its faster side asks where that is low."""
+    speeds = np.where(low, _speeds(points, plan.frame_time), 0.0)
     creep = max(1, round(MIN_CREEP / plan.frame_time))
-    for start, stop in true_runs(stands):
+    for start, stop in true_runs(plan.stands):
         own = slice(start, stop)  # how it comes and leaves is no creep
-        standing = _speed(points[own], low[own], plan.frame_time, SPEED_SPAN)
-        speed[own] = median_filter(standing, creep, mode="nearest")
-    return np.maximum(height, step_height(speed, plan.hip_height))
+        standing = np.where(low[own], _speeds(points[own], plan.frame_time), 0.0)
+        speeds[own] = median_filter(standing, (creep, 1), mode="nearest")
+    ends = speeds.reshape(len(speeds), -1, 2).max(axis=2)
+    return np.repeat(step_height(ends, plan.hip_height), 2, axis=1)
+
+
+def _in_time(step: Float[np.ndarray, "T P"], plan: FootPlan) -> Float[np.ndarray, "T P"]:
+    """At least so high [m], rising and falling no faster than `STEP_RISE`; but a contact's middle
+    is only as high as given."""
+    rise, top = STEP_RISE * plan.hip_height * plan.frame_time, step.max(initial=0.0)
+    reach = int(top / rise)
+    cone = -rise * np.abs(np.arange(-reach, reach + 1))[:, None]
+    # The stubs of scipy want whole numbers there.
+    lifted: Float[np.ndarray, "T P"] = grey_dilation(step, structure=cone)  # type: ignore[arg-type]
+    for start, stop in true_runs(plan.stands):
+        own, frames = slice(start, stop), np.arange(stop - start)
+        inside = (1 + np.minimum(frames, frames[::-1])) / (UP_SHARE * len(frames))
+        most = top * np.maximum(1 - inside, 0.0)[:, None]
+        lifted[own] = np.maximum(step[own], np.minimum(lifted[own], most))
+    return lifted
 
 
 def step_height(speed: Float[np.ndarray, "*n"], hip_height: float) -> Float[np.ndarray, "*n"]:
@@ -104,18 +131,13 @@ def step_height(speed: Float[np.ndarray, "*n"], hip_height: float) -> Float[np.n
     return height * hip_height
 
 
-def _speed(
-    points: Complex[np.ndarray, "T P"],
-    low: Bool[np.ndarray, "T P"],
-    frame_time: float,
-    span: float,
-) -> Float[np.ndarray, "T"]:
-    """Of the fastest low point over the floor [m/s]; one-sided at the ends."""
-    reach, frames = max(1, round(span / frame_time)), np.arange(len(points))
+def _speeds(points: Complex[np.ndarray, "T P"], frame_time: float) -> Float[np.ndarray, "T P"]:
+    """Over the floor [m/s]; one-sided at the ends."""
+    reach, frames = max(1, round(SPEED_SPAN / frame_time)), np.arange(len(points))
     after, before = np.minimum(frames + reach, len(frames) - 1), np.maximum(frames - reach, 0)
-    way = np.where(low, np.abs(points[after] - points[before]), 0.0).max(axis=1)
-    speed: Float[np.ndarray, T] = way / np.maximum((after - before) * frame_time, 1e-9)
-    return speed
+    span = np.maximum((after - before) * frame_time, 1e-9)
+    speeds: Float[np.ndarray, "T P"] = np.abs(points[after] - points[before]) / span[:, None]
+    return speeds
 
 
 def _fading(

@@ -67,7 +67,8 @@ def plan_feet(robot: Morphology, targets: Targets) -> list[FootPlan]:
 
 def reachable(robot: Morphology, plans: Sequence[FootPlan], q: Coordinates) -> list[FootPlan]:
     """Footprints where the feet of `q` stand on average: hips may not open as wide, or turn as far,
-    as the planned ones ask."""
+    as the planned ones ask. And soles rolled as those of `q` are: ankles may not roll, or not far,
+    and the lower side would be too high by half of what the other should be."""
     poses = forward_kinematics(robot.tree, q)
     return [_moved(plan, points_of(robot, poses, plan.sole)) for plan in plans]
 
@@ -144,7 +145,8 @@ def _plan(
 
 
 def _moved(plan: FootPlan, points: Float[np.ndarray, "P 3 T"]) -> FootPlan:
-    """Each footprint shifted and turned as the sole's points are, where they stand, on average."""
+    """Each footprint shifted and turned as the sole's points are, where they stand, on average; and
+    the sole rolled as they are."""
     prints = plan.prints.copy()
     pivot, heading = prints[:, 0] + 1j * prints[:, 1], prints[:, 2]
     stood = points[:, 0] + 1j * points[:, 1]
@@ -159,4 +161,15 @@ def _moved(plan: FootPlan, points: Float[np.ndarray, "P 3 T"]) -> FootPlan:
         turn = turn / abs(turn) if abs(turn) > 1e-9 else 1.0
         at = center + shift + turn * (pivot[here] - center)
         prints[here] = np.column_stack([at.real, at.imag, heading[here] + np.angle(turn)])
-    return replace(plan, prints=prints)
+    wanted = plan.points.copy()
+    wanted[..., 2] += _rolls(points[:, 2].T) - _rolls(wanted[..., 2])
+    return replace(plan, prints=prints, points=wanted)
+
+
+def _rolls(heights: Float[np.ndarray, "T P"]) -> Float[np.ndarray, "T P"]:
+    """By how much [m] each point of a sole is higher than the middle of its end."""
+    ends = heights.reshape(len(heights), -1, 2)
+    rolls: Float[np.ndarray, "T P"] = (ends - ends.mean(axis=2, keepdims=True)).reshape(
+        heights.shape
+    )
+    return rolls

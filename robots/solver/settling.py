@@ -10,7 +10,7 @@ from scipy.ndimage import distance_transform_edt
 
 from spark.runs import true_runs
 
-SHARE = 1 / 3  # of the time between two rests, at most, in which what rested stays
+SHARE = 0.45  # of the time between two rests, at most, in which what rested stays
 
 
 def settled(
