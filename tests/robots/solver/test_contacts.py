@@ -47,6 +47,26 @@ def stands(path: np.ndarray, frame_time: float = FRAME_TIME) -> np.ndarray:
     return heel
 
 
+def test_who_stands_on_the_toes_does_not_stand_on_the_heel() -> None:
+    """Heels that stay in place 4 cm above the floor, over toes that tread from side to side: they
+    are slow, and low enough for a foot that lies flat."""
+    rig = sample_rig("walker")
+    rotations = np.tile([1.0, 0, 0, 0], (len(TIME), len(rig.skeleton), 1))
+    hips = np.tile([0.0, 0, rig.hip_height], (len(TIME), 1))
+    source = CanonicalMotion(rig, FRAME_TIME, rotations, hips, 0.0)
+    paths = np.zeros((len(TIME), 2, 2, 3))
+    paths[:, :, 1, 0] = 0.2
+    paths[:, 0, :, 1], paths[:, 1, :, 1] = 0.1, -0.1
+    tiptoe = (TIME > 1) & (TIME < 3)
+    paths[tiptoe, :, 0, 2] = 0.04
+    paths[:, :, 1, 1] += np.where(tiptoe, 0.03 * np.sin(2 * np.pi * TIME), 0.0)[:, None]
+    feet = schedule(source, canonical_positions(source), paths).feet
+    inner = (TIME > 1.1) & (TIME < 2.9)
+    assert not feet[inner][..., 0].any()
+    assert feet[inner][..., 1].any(axis=1).all()
+    assert feet[~tiptoe].all()
+
+
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_trembling_foot_stands(axis: int) -> None:
     # 3 Hz by 1 cm is 0.19 m/s at the fastest: no foot that stands is as fast
