@@ -15,6 +15,7 @@ from robots.solver.footprints import FootPlan, on_points, on_prints
 from robots.solver.holds import Holds
 from robots.solver.settling import settled
 from spark.runs import true_runs
+from spark.smoothstep import smoothstep
 from spark.transfer.footfalls import between_contacts
 
 # How firmly the points of a sole are held, in x, y and z, as a share of those that stand:
@@ -152,7 +153,7 @@ def _fading(
     for side in ("right", "left"):
         k = np.searchsorted(at, frames, side=side) - (side == "right")
         near = at[np.clip(k, 0, len(at) - 1)]
-        share = np.clip(1 - np.abs(frames - near) / reach, 0.0, 1.0)
+        share = smoothstep(1 - np.abs(frames - near) / reach)
         inside = (k >= 0) & (k < len(at))
-        out += np.where(inside & ~stands, values[near] * share**2 * (3 - 2 * share), 0.0)
+        out += np.where(inside & ~stands, values[near] * share, 0.0)
     return out

@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import distance_transform_edt
 
 from spark.runs import true_runs
+from spark.smoothstep import smoothstep
 
 SHARE = 0.45  # of the time between two rests, at most, in which what rested stays
 
@@ -41,6 +42,4 @@ def around(
     if not mask.any():
         return np.zeros(len(mask))
     away = distance_transform_edt(~mask) * frame_time / seconds
-    share = np.clip(1.0 - away, 0.0, 1.0)
-    faded: Float[np.ndarray, T] = share**2 * (3 - 2 * share)
-    return faded
+    return smoothstep(1.0 - away)

@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from robots.tree import Coordinates
 from spark.rotation import quat_normalize
+from spark.smoothstep import smoothstep
 
 MAX_FRAMES = 8000  # of a stretch, but for its margins: half a gigabyte
 _MARGIN = 2.0  # [s] by which a stretch goes beyond its share at either end; half of it is blended
@@ -42,8 +43,7 @@ def _appended(
     over `reach` frames on either side."""
     stop = min(edge + reach, len(before))
     start = max(edge - reach, first)
-    share = (np.arange(start, stop) - start + 1) / (stop - start + 1)
-    share = share**2 * (3 - 2 * share)
+    share = smoothstep((np.arange(start, stop) - start + 1) / (stop - start + 1))
     both = slice(start, stop), slice(start - first, stop - first)
 
     def joined(a: Float[np.ndarray, "A *n"], b: Float[np.ndarray, "B *n"]) -> np.ndarray:
