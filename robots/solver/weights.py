@@ -8,7 +8,7 @@ import numpy as np
 
 W_LIMB_DIRECTION = 2.0  # [1/rad] of upper and lower arms and legs: what a pose looks like
 W_ROTATION = {  # [1/rad] of a part by its role; low where the directions of limbs say enough,
-    "pelvis": 5.0,  # higher where they say nothing: the trunk, above all where it heads,
+    "pelvis": 5.5,  # higher where they say nothing: the trunk, above all where it heads,
     "chest": 0.8,
     "head": 0.5,  # what looks somewhere,
     "neck": 0.1,
