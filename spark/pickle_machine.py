@@ -6,6 +6,7 @@ as in `pickle.Unpickler`; by itself the machine refuses it.
 """
 
 import pickletools
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NoReturn
@@ -60,6 +61,14 @@ class PickleMachine:
 
     def run(self, data: bytes) -> Any:
         """The value that a pickle stands for."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            try:
+                return self._run(data)
+            except Warning as warning:  # of an escape in a text that no pickle writes
+                raise ValueError(str(warning)) from warning
+
+    def _run(self, data: bytes) -> Any:
         for count, (opcode, argument, _) in enumerate(pickletools.genops(data)):
             if count > LARGEST:
                 raise RefusedError(f"has more than {LARGEST:,} values beside its arrays")
