@@ -84,8 +84,8 @@ def schedule(
     roles, parts, rests = _touching_parts(source, positions, paths[:, exist], mass)
     stands = np.zeros(paths.shape[:-1], dtype=bool)
     if exist.any():
-        planted = planted_points(paths[:, exist], frame_time, rig.standing_height)
-        stands[:, exist] = planted & _lower_ends(paths[:, exist], rig.standing_height)
+        own, size = paths[:, exist], rig.standing_height
+        stands[:, exist] = planted_points(own, frame_time, size) & _lower_ends(own, size)
     feet = _steady(stands, frame_time)
     feet = _with_wobbles(feet, paths, rig.standing_height, frame_time)
     floating = _nothing_holds(feet, parts)
@@ -102,10 +102,16 @@ def has_feet(paths: Float[np.ndarray, "T S 2 3"]) -> Bool[np.ndarray, "S"]:
 def _lower_ends(paths: Float[np.ndarray, "T S 2 3"], height: float) -> Bool[np.ndarray, "T S 2"]:
     """Which of heel and toe is the lower, or hardly higher than the other: who stands on the toes
     does not stand on the heel."""
-    above = paths[..., 2] - standing_heights(paths, height)
+    above = _above(paths, height)
     lowest = above.min(axis=-1, keepdims=True)
     lower: Bool[np.ndarray, "T S 2"] = above < lowest + MAX_TILT * height / ADULT_HEIGHT
     return lower
+
+
+def _above(paths: Float[np.ndarray, "T S 2 3"], height: float) -> Float[np.ndarray, "T S 2"]:
+    """How high [m] heels and toes are over where they stand."""
+    above: Float[np.ndarray, "T S 2"] = paths[..., 2] - standing_heights(paths, height)
+    return above
 
 
 def _with_wobbles(
@@ -171,8 +177,7 @@ def _sole_points(feet: Float[np.ndarray, "T F 2 3"], height: float) -> Points:
     places = feet.reshape(len(feet), -1, 3)
     if not feet.size:
         return Points(places, places[..., 2])
-    over = feet[..., 2] - standing_heights(feet, height)
-    return Points(places, over.reshape(len(feet), -1))
+    return Points(places, _above(feet, height).reshape(len(feet), -1))
 
 
 def _runs_with(
@@ -195,9 +200,9 @@ def _creeping(
         return out
     own, size = paths[:, exist], source.rig.standing_height
     slowness = speeds(own, source.frame_time) / (PLANTED_SPEED * size / ADULT_HEIGHT)
-    height = (own[..., 2] - standing_heights(own, size)) / (PLANTED_HEIGHT * size / ADULT_HEIGHT)
-    window = _odd(CREEP_TIME, source.frame_time)
+    height = _above(own, size) / (PLANTED_HEIGHT * size / ADULT_HEIGHT)
     slowness[~_lower_ends(own, size)] = _NEVER
+    window = _odd(CREEP_TIME, source.frame_time)
     cost = uniform_filter1d(slowness + height, window, axis=0, mode="nearest")
     best = cost == cost.min(axis=(1, 2), keepdims=True)
     out[:, exist] = best & (slowness < MAX_CREEP / PLANTED_SPEED)

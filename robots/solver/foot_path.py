@@ -22,7 +22,7 @@ from spark.transfer.footfalls import between_contacts
 SWING_HOLD = np.array([0.35, 0.35, 0.6])  # its height in swing is what keeps it off the floor,
 SWING_REACH = 0.2  # [hip heights] over which that fades: a kick is a matter of limbs,
 RAISED_HOLD = np.array([1.0, 1.0, 0.3])  # a standing foot's raised end turns about the other
-STEP_HOLD = 0.8  # the height of what steps, at least
+STEP_HOLD = 0.8  # and the height of what steps
 # Hip heights/s of an end of a foot, and hip heights that it then is above the floor: the report
 # sees feet skate faster than 0.22 and lower than 0.028.
 STEP_SPEEDS = (0.2, 0.3, 0.6)

@@ -29,18 +29,24 @@ FRAME_TIME = 1 / 60
 TIME = FRAME_TIME * np.arange(240)
 
 
+def standing(moves: np.ndarray, frame_time: float = FRAME_TIME) -> np.ndarray:
+    """[T, foot, end] whether heels and toes stand, of a body at rest, where they are moved [m]."""
+    rig = sample_rig("walker")
+    rotations = np.tile([1.0, 0, 0, 0], (len(moves), len(rig.skeleton), 1))
+    hips = np.tile([0.0, 0, rig.hip_height], (len(moves), 1))
+    source = CanonicalMotion(rig, frame_time, rotations, hips, 0.0)
+    places = np.zeros((2, 2, 3))
+    places[:, 1, 0] = 0.2
+    places[0, :, 1], places[1, :, 1] = 0.1, -0.1
+    return schedule(source, canonical_positions(source), places + moves).feet
+
+
 def stands(path: np.ndarray, frame_time: float = FRAME_TIME) -> np.ndarray:
     """[T] whether the left foot of a body at rest stands, whose sole is shifted along `path` [m];
     the right one stays."""
-    rig = sample_rig("walker")
-    rotations = np.tile([1.0, 0, 0, 0], (len(path), len(rig.skeleton), 1))
-    hips = np.tile([0.0, 0, rig.hip_height], (len(path), 1))
-    source = CanonicalMotion(rig, frame_time, rotations, hips, 0.0)
-    paths = np.zeros((len(path), 2, 2, 3))
-    paths[:, :, 1, 0] = 0.2
-    paths[:, 0, :, 1], paths[:, 1, :, 1] = 0.1, -0.1
-    paths[:, 0] += path[:, None]
-    feet = schedule(source, canonical_positions(source), paths).feet
+    moves = np.zeros((len(path), 2, 2, 3))
+    moves[:, 0] = path[:, None]
+    feet = standing(moves, frame_time)
     assert feet[:, 1].all()
     heel, toe = feet[:, 0].T
     np.testing.assert_array_equal(heel, toe)
@@ -50,17 +56,11 @@ def stands(path: np.ndarray, frame_time: float = FRAME_TIME) -> np.ndarray:
 def test_who_stands_on_the_toes_does_not_stand_on_the_heel() -> None:
     """Heels that stay in place 4 cm above the floor, over toes that tread from side to side: they
     are slow, and low enough for a foot that lies flat."""
-    rig = sample_rig("walker")
-    rotations = np.tile([1.0, 0, 0, 0], (len(TIME), len(rig.skeleton), 1))
-    hips = np.tile([0.0, 0, rig.hip_height], (len(TIME), 1))
-    source = CanonicalMotion(rig, FRAME_TIME, rotations, hips, 0.0)
-    paths = np.zeros((len(TIME), 2, 2, 3))
-    paths[:, :, 1, 0] = 0.2
-    paths[:, 0, :, 1], paths[:, 1, :, 1] = 0.1, -0.1
     tiptoe = (TIME > 1) & (TIME < 3)
-    paths[tiptoe, :, 0, 2] = 0.04
-    paths[:, :, 1, 1] += np.where(tiptoe, 0.03 * np.sin(2 * np.pi * TIME), 0.0)[:, None]
-    feet = schedule(source, canonical_positions(source), paths).feet
+    moves = np.zeros((len(TIME), 2, 2, 3))
+    moves[tiptoe, :, 0, 2] = 0.04
+    moves[:, :, 1, 1] = np.where(tiptoe, 0.03 * np.sin(2 * np.pi * TIME), 0.0)[:, None]
+    feet = standing(moves)
     inner = (TIME > 1.1) & (TIME < 2.9)
     assert not feet[inner][..., 0].any()
     assert feet[inner][..., 1].any(axis=1).all()

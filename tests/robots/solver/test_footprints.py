@@ -5,7 +5,6 @@ import numpy as np
 from robots.registry import find
 from robots.solver.footprints import plan_feet, reachable
 from robots.solver.targets import targets_of
-from robots.tree import Coordinates
 from spark.demo.sample import sample_motion, sample_rig
 from spark.transfer.canonical import to_canonical
 from spark_sim.loading import load_robot
@@ -23,12 +22,8 @@ def test_soles_roll_as_far_as_the_robots_do() -> None:
         roll = np.tan(np.radians(20)) * np.linalg.norm(across, axis=-1) / 2
         plan.points[:, 0::2, 2] += roll
         plan.points[:, 1::2, 2] -= roll
-    level = ember.tpose
-    still = Coordinates(
-        *(np.repeat(part, len(plans[0].toe), axis=0) for part in (level.pos, level.quat)),
-        np.repeat(level.angles, len(plans[0].toe), axis=0),
-    )
-    for plan, found in zip(plans, reachable(ember, plans, still), strict=True):
+    level = ember.tpose.at(np.zeros(len(plans[0].toe), dtype=int))
+    for plan, found in zip(plans, reachable(ember, plans, level), strict=True):
         ends, wanted = (p.points[..., 2].reshape(len(p.toe), -1, 2) for p in (found, plan))
         assert np.ptp(wanted, axis=2).min() > 0.01
         np.testing.assert_allclose(np.ptp(ends, axis=2), 0.0, atol=1e-6)
