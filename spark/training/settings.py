@@ -114,8 +114,8 @@ class TrainConfig:
                 raise ConventionError(
                     f"{where}: {name} = {value!r}: expected a value such as {getattr(self, name)!r}"
                 )
-        lists = {k: tuple(v) for k, v in values.items() if isinstance(v, list | tuple)}
-        return replace(self, **{**values, **lists})
+        # TOML's 1 is a float, too, and its lists are tuples.
+        return replace(self, **{k: type(getattr(self, k))(v) for k, v in values.items()})
 
     @property
     def draws(self) -> int:
@@ -169,7 +169,9 @@ def _fits(value: Any, example: Any) -> bool:
     if isinstance(example, tuple):
         return isinstance(value, list | tuple) and all(isinstance(v, str) for v in value)
     if isinstance(example, float):
-        return isinstance(value, int | float)
+        return isinstance(value, float) or (
+            isinstance(value, int) and abs(value) <= sys.float_info.max
+        )
     return isinstance(value, type(example))
 
 

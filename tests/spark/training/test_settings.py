@@ -17,6 +17,14 @@ def test_settings_survive_their_file(tmp_path: Path) -> None:
     assert TrainConfig().changed(path, **read_settings(path)) == config
 
 
+def test_whole_numbers_are_rates_and_minutes_too(tmp_path: Path) -> None:
+    path = tmp_path / "config.toml"
+    path.write_text("rate = 0\nsave_minutes = 3\n")
+    config = TrainConfig().changed(path, **read_settings(path))
+    assert (config.rate, config.save_minutes) == (0.0, 3.0)
+    assert isinstance(config.rate, float)
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [
@@ -27,6 +35,7 @@ def test_settings_survive_their_file(tmp_path: Path) -> None:
         ({"ablate": ["feet"]}, "expected one of share, mask, pos, fk, mix"),
         ({"preset": "huge"}, "expected one of default, paper, tiny"),
         ({"seed": True}, "seed = True"),
+        ({"rate": 10**400}, "rate = 1000"),
     ],
 )
 def test_wrong_settings_are_named(values: dict[str, object], message: str) -> None:
