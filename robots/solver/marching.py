@@ -8,7 +8,7 @@ entangled arms may be led out from one side alone.
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import mujoco
 import numpy as np
@@ -21,6 +21,7 @@ from robots.solver.block import Block
 from robots.solver.collision import collisions_of
 from robots.solver.holds import Holds
 from robots.solver.objective import linearize
+from robots.solver.spells import Spells
 from robots.solver.targets import Targets
 from robots.solver.window_targets import FootTargets, PoseTargets, pose_targets
 from robots.solver.window_terms import Terms
@@ -74,46 +75,40 @@ def calmed(
     block: Block,
     thrown: Bool[np.ndarray, "T"],
 ) -> Coordinates:
-    """`q`, calmed around the frames in which limbs are thrown."""
+    """`q`, calmed around the frames in which limbs are thrown.
+
+    In each spell of such frames the cheapest way is taken through three: `q`, and the block's
+    joints marched forth and back. What it costs to be in a frame says the solver's objective; from
+    frame to frame a turn by d [rad] beyond what is free costs (`_W_TURN` d)² / 2, also from way to
+    way. A spell begins and ends with `q` where frames before lead in, or others out.
+    """
     around = max(1, round(_AROUND / targets.frame_time))
-    for start, stop in true_runs(binary_dilation(thrown, np.ones(2 * around + 1, dtype=bool))):
-        frames = np.arange(start, stop)
-        part = targets.at(frames), holds.at(frames), q.at(frames)
-        q = q.replaced(frames, _calmed(robot, *part, block, start > 0, stop < len(q)))
-    return q
-
-
-def _calmed(
-    robot: Morphology,
-    targets: Targets,
-    holds: Holds,
-    q: Coordinates,
-    block: Block,
-    led_in: bool,
-    led_out: bool,
-) -> Coordinates:
-    """The cheapest way through three: `q`, and the block's joints marched forth and back through
-    all frames. What it costs to be in a frame says the solver's objective; from frame to frame a
-    turn by d [rad] beyond what is free costs (`_W_TURN` d)² / 2, also from way to way. It begins
-    and ends with `q` where frames before lead in, or others out."""
-    forth = np.arange(len(q))
-    ways = [q, *_marched(robot, targets, q, block, (forth, forth[::-1]), (led_in, led_out))]
-    costs = np.stack([_cost(robot, targets, holds, way, block) for way in ways])
-    costs[1:, :1] += np.inf if led_in else 0.0
-    costs[1:, -1:] += np.inf if led_out else 0.0
+    runs = true_runs(binary_dilation(thrown, np.ones(2 * around + 1, dtype=bool)))
+    spells = Spells(np.array([stop - start for start, stop in runs], dtype=int))
+    frames = np.concatenate([np.arange(start, stop) for start, stop in runs])
+    led = [(start > 0, stop < len(q)) for start, stop in runs]
+    part, targets, holds = q.at(frames), targets.at(frames), holds.at(frames)
+    ways = [part, *_marched(robot, targets, part, block, spells, led)]
+    costs = np.stack([_cost(robot, targets, holds, way, block) for way in ways], axis=1)
     hinges = [j for j in block.joints if not robot.tree.balls[j]]
     angles = np.stack([way.angles[:, hinges] for way in ways])
     turns = angles[:, None, 1:] - angles[None, :, :-1]
     turns = np.maximum(np.abs(turns) - _FREE_SPEED * targets.frame_time, 0.0)
     turned = 0.5 * _W_TURN**2 * np.einsum("abtn,abtn->tab", turns, turns)
-    taken = cheapest(costs.T, turned)
+    taken = np.zeros(len(frames), dtype=int)
+    for own, (led_in, led_out) in zip(spells.slices(), led, strict=True):
+        costs[own.start, 1:] += np.inf if led_in else 0.0
+        costs[own.stop - 1, 1:] += np.inf if led_out else 0.0
+        taken[own] = cheapest(costs[own], turned[own.start : own.stop - 1])
     for k, way in enumerate(ways):
-        frames = np.flatnonzero(taken == k)
-        q = q.replaced(frames, way.at(frames))
-    angles = q.angles.copy()
-    deviation = _SMOOTHING / targets.frame_time
-    angles[:, hinges] = gaussian_filter1d(angles[:, hinges], deviation, axis=0, mode="nearest")
-    return Coordinates(q.pos, q.quat, angles, q.ball_quats)
+        at = np.flatnonzero(taken == k)
+        part = part.replaced(at, way.at(at))
+    smooth = partial(
+        gaussian_filter1d, sigma=_SMOOTHING / targets.frame_time, axis=0, mode="nearest"
+    )
+    angles = part.angles.copy()
+    angles[:, hinges] = spells.each(smooth, angles[:, hinges])
+    return q.replaced(frames, Coordinates(part.pos, part.quat, angles, part.ball_quats))
 
 
 def cheapest(
@@ -137,26 +132,32 @@ def _marched(
     targets: Targets,
     q: Coordinates,
     block: Block,
-    orders: Sequence[Int[np.ndarray, "T"]],
-    led: Sequence[bool],
+    spells: Spells,
+    led: Sequence[tuple[bool, bool]],
 ) -> list[Coordinates]:
-    """`q` with the block's joints marched through all frames, in each of the orders at once. Those
-    that something has led to their first frame go on from there; others begin at the T-pose."""
+    """`q` with the block's joints marched through all spells at once, forth, and back. Those that
+    something has led to their first frame go on from there; others begin at the T-pose."""
     bones = tuple(_limbs(robot, targets, block))
     terms = _terms_of(robot, bones, targets.hands is not None)
     poses = pose_targets(targets, bones)
-    columns = _qpos_columns(robot, block)
+    columns, tpose = _qpos_columns(robot, block), robot.to_qpos(robot.tpose)
     qpos = robot.to_qpos(q)
-    ways = [qpos.copy() for _ in orders]
-    first = qpos[[order[0] for order in orders]][:, columns]
-    last = np.where(np.array(led)[:, None], first, robot.to_qpos(robot.tpose)[:, columns])
-    for k, frames in enumerate(zip(*orders, strict=True)):
-        here = qpos[list(frames)]
-        here[:, columns] = last
-        here = _settled(terms, poses.at(np.array(frames)), here, block, first=k == 0)
+    ways = np.stack([qpos, qpos])
+    # The longest first, so that those that still march are the first ones.
+    longest = np.argsort(-spells.sizes, kind="stable")
+    sizes = np.repeat(spells.sizes[longest], 2)
+    back = np.tile([0, 1], len(spells))
+    first = np.repeat(spells.starts[longest], 2) + back * (sizes - 1)
+    begun = np.array(led).reshape(-1, 2)[longest].ravel()[:, None]
+    last = np.where(begun, qpos[first][:, columns], tpose[:, columns])
+    for k in range(sizes.max(initial=0)):
+        going = int((sizes > k).sum())
+        frames = first[:going] + k * (1 - 2 * back[:going])
+        here = qpos[frames]
+        here[:, columns] = last[:going]
+        here = _settled(terms, poses.at(frames), here, block, first=k == 0)
         last = here[:, columns]
-        for way, frame, pose in zip(ways, frames, here, strict=True):
-            way[frame] = pose
+        ways[back[:going], frames] = here
     return [robot.from_qpos(way) for way in ways]
 
 
@@ -174,28 +175,32 @@ def _settled(
     moved = terms.mj_dofs[dofs]
     at = np.arange(len(dofs))
     q, count = begun.copy(), len(begun)
-    holds = FootTargets(*np.zeros((2, count, terms.sole_count, 3)))
-    step, stay = np.zeros((2, count, model.nv))
+    rows = np.arange(count)  # of those that still move
     for k in range(_FIRST_STEPS if first else _STEPS):
-        poses = terms.poses(q)
+        poses = terms.poses(q[rows])
         if first or not k:
             candidates = terms.candidates(poses)
-        H, g = terms.linearize(q, poses, targets, holds, terms.hinges.at_tpose, candidates)
-        held = terms.hinges.held(q, g)[:, dofs]
+        holds = FootTargets(*np.zeros((2, len(rows), terms.sole_count, 3)))
+        own = targets.at(rows)
+        H, g = terms.linearize(q[rows], poses, own, holds, terms.hinges.at_tpose, candidates)
+        held = terms.hinges.held(q[rows], g)[:, dofs]
         H, g = H[:, dofs[:, None], dofs], g[:, dofs]
+        step = np.zeros((len(rows), model.nv))
         if not first:
-            for row in range(count):
-                mujoco.mj_differentiatePos(model, stay[row], 1.0, begun[row], q[row])
+            for stay, row in zip(step, rows.tolist(), strict=True):
+                mujoco.mj_differentiatePos(model, stay, 1.0, begun[row], q[row])
             H[:, at, at] += _W_STAY**2
-            g += _W_STAY**2 * stay[:, moved]
+            g += _W_STAY**2 * step[:, moved]
         H[:, at, at] += np.where(held, _HELD, _FIRST_DAMPING if first else _DAMPING)
         found = -np.linalg.solve(H, np.where(held, 0.0, g)[..., None])[..., 0]
         length = np.abs(found).max(axis=1, initial=1e-9)
+        step[:] = 0.0
         step[:, moved] = found * np.minimum(1.0, _MAX_STEP / length)[:, None]
-        for row in range(count):
-            mujoco.mj_integratePos(model, q[row], step[row], 1.0)
+        for own_step, row in zip(step, rows.tolist(), strict=True):
+            mujoco.mj_integratePos(model, q[row], own_step, 1.0)
         terms.hinges.clip(q)
-        if length.max() < _STEP_TOL:
+        rows = rows[length >= _STEP_TOL]
+        if not len(rows):
             break
     return q
 

@@ -112,6 +112,27 @@ def test_marching_begins_and_ends_with_what_leads_there(
     assert np.abs(np.diff(marched, 2, axis=0)).max() < 0.16  # a tenth of what it was
 
 
+def test_spells_are_marched_through_as_each_alone(
+    folded: CanonicalMotion, ember: Morphology
+) -> None:
+    arms = blocks_of(ember)[1]
+    shoulder = int(ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)])
+    joint = next(j for j in ember.tree.chain(shoulder) if j in arms.joints)
+    solved = retarget(folded, ember).coordinates
+    angles = solved.angles.copy()
+    thrown = np.zeros((2, len(folded)), dtype=bool)
+    for k, own in enumerate((slice(16, 20), slice(96, 98))):
+        angles[own.start : own.stop : 2, joint] += 0.8
+        thrown[k, own] = True
+    q = Coordinates(solved.pos, solved.quat, angles)
+    targets, holds = targets_of(folded, ember), Holds.none(len(q))
+    both = calmed(ember, targets, holds, q, arms, thrown.any(axis=0)).angles
+    first, second = (calmed(ember, targets, holds, q, arms, own).angles for own in thrown)
+    assert (both != angles).any(axis=1)[[18, 96]].all()
+    np.testing.assert_allclose(both[:60], first[:60], atol=1e-6)
+    np.testing.assert_allclose(both[60:], second[60:], atol=1e-6)
+
+
 @pytest.mark.parametrize("frames", [1, 2, 3])
 def test_few_frames_need_no_marching(
     folded: CanonicalMotion, ember: Morphology, frames: int
