@@ -24,8 +24,6 @@ from robots.solver.pushes import Pushes
 from robots.tree import LinkPoses
 
 _MAX_DISTANCE = 0.02  # [m] beyond which MuJoCo need not measure
-# [m] between approximate shapes within which the exact ones are: spheres fall short of a shape.
-_NEAR = (FELT + 1) * DEPTH_ROUNDING
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +69,7 @@ class ExactContacts:
         penalty_scale: Float[np.ndarray, "T"],
     ) -> None:
         """Add one residual for each candidate, as `Collisions.add_to` does for each sphere."""
-        measured = self._measure(qpos, self.collisions.nearer(candidates, poses, _NEAR))
+        measured = self._measure(qpos, candidates)
         for moves in by_moves([x.candidate for x in measured]):
             pushes = Pushes(normal, poses, moves)
             for x in (x for x in measured if x.candidate.moves == moves):
