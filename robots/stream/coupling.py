@@ -19,7 +19,7 @@ from robots.stream.prediction import Ahead, CostToGo
 # [Hz] above which the centre of mass's motion against the source's fades, in x, y and z: its height
 # gives way to landings,
 COM_CUTOFF = np.array([0.7, 0.7, 1.0])
-JERK_CUTOFF = 2.5  # and that of hinges, by their jerk
+JERK_CUTOFF = 2.45  # and that of hinges, by their jerk
 MAX_ACCELERATION = 40.0  # [m/s²] of the source that the mass goes along with: more is a glitch
 _BASE = slice(0, 3)  # dofs of the base's position, in whose place the centre of mass is coupled
 

@@ -2,7 +2,8 @@
 
 A foot is held where it comes down. What the source's foot wobbles while it stands is lost, what it
 drifts beyond that is motion and stays; as in `robots.solver.footprints`, which sees the whole clip.
-A foot in swing is as high as the source's, scaled, and as it is pitched.
+A foot in swing is as high as the source's, scaled, and as it is pitched; an end of it that is fast
+steps, as there.
 """
 
 from collections import deque
@@ -13,7 +14,15 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 
-from robots.solver.foot_path import RAISED_HOLD, SWING_HOLD, near_floor, step_height
+from robots.solver.contacts import MAX_TILT
+from robots.solver.foot_path import (
+    MAX_UNEVEN,
+    RAISED_HOLD,
+    STEP_SPEEDS,
+    SWING_HOLD,
+    near_floor,
+    step_height,
+)
 from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
 from robots.solver.window_targets import FootTargets
 from robots.stream.footprint import Footprint
@@ -37,11 +46,12 @@ class _Arrived(NamedTuple):
 
 
 class _Seen(NamedTuple):
-    """Of the feet in one frame: how far heels and toes are held, how high [m] they are where not,
-    whether it is known where, and their footprints."""
+    """Of the feet in one frame: how far heels and toes are held, how high [m] soles are where not,
+    and how high heels and toes step, whether it is known where, and their footprints."""
 
     holds: Float[np.ndarray, "S 2"]
     height: Float[np.ndarray, "S"]
+    step: Float[np.ndarray, "S 2"]
     known: Bool[np.ndarray, "S"]
     pivots: tuple[complex, ...]
     headings: tuple[float, ...]
@@ -57,6 +67,7 @@ class ContactTracker:
         self._frame_time, self._ahead = frame_time, ahead
         size = reader.source.standing_height / ADULT_HEIGHT
         self._max_speed, self._max_height = PLANTED_SPEED * size, PLANTED_HEIGHT * size
+        self._max_tilt = MAX_TILT * size
         self._reach = max(1, round(SPEED_WINDOW / 2 / frame_time))
         self._has_foot = reader.has_feet[:, None]
         self._wobble = MAX_WOBBLE * self._robot.rig.hip_height
@@ -66,6 +77,8 @@ class ContactTracker:
         soles = len(self._robot.soles)
         self._planted = np.zeros((soles, 2), dtype=bool)
         self._holds = np.zeros((soles, 2))
+        self._ground = np.zeros(soles)
+        self._uneven = MAX_UNEVEN * self._robot.rig.hip_height
         self._footprints = [Footprint() for _ in range(soles)]
 
     def update(self, targets: FrameTargets, points: Float[np.ndarray, "P 3"]) -> FootTargets:
@@ -76,22 +89,27 @@ class ContactTracker:
         arrived = self._arrived(targets, targets if first else self._history[-1].targets)
         self._history.extend([arrived] * (self._length if first else 1))
         settled = len(self._history) - 1 - self._ahead
-        step = self._frame_time / HOLD_TIME
+        grip = self._frame_time / HOLD_TIME
         planted, holds, footprints = self._planted, self._holds, self._footprints
-        seen = []
+        ground, seen = self._ground, []
         for at in range(settled, len(self._history)):
-            planted, height = self._standing(at, planted)
+            stood, clearance = planted.any(axis=1), self._history[at].targets.clearance
+            planted, speed = self._standing(at, planted)
+            lowest = np.where(stood, np.minimum(ground, clearance), clearance)
+            ground = np.where(planted.any(axis=1), lowest, ground)
             self._follow(at, planted, holds, footprints)
             # Where a foot will come down that is still in the air is not known yet.
             known = np.logical_or(holds.any(axis=1), at == settled)
             if at == settled:
                 self._put(points, planted, holds)
-            holds = holds + np.clip(planted - holds, -step, 1.0 if first else step)
+            holds = holds + np.clip(planted - holds, -grip, 1.0 if first else grip)
             pivots = tuple(footprint.pivot for footprint in footprints)
             headings = tuple(footprint.heading for footprint in footprints)
-            seen.append(_Seen(holds, height, known, pivots, headings))
+            height = self._height(clearance, ground, speed)
+            step = step_height(speed, self._robot.rig.hip_height)
+            seen.append(_Seen(holds, height, step, known, pivots, headings))
             if at == settled:
-                self._planted, self._holds = planted, holds
+                self._planted, self._holds, self._ground = planted, holds, ground
                 footprints = [replace(footprint) for footprint in footprints]
         pitched = [self._history[k].targets.pitched for k in range(settled, len(self._history))]
         return self._targets(np.array(pitched), seen)
@@ -117,9 +135,9 @@ class ContactTracker:
 
     def _standing(
         self, at: int, planted: Bool[np.ndarray, "S 2"]
-    ) -> tuple[Bool[np.ndarray, "S 2"], Float[np.ndarray, "S"]]:
-        """Whether heels and toes stand that were `planted` in the frame before, and how high [m]
-        the soles are that don't."""
+    ) -> tuple[Bool[np.ndarray, "S 2"], Float[np.ndarray, "S 2"]]:
+        """Whether heels and toes stand that were `planted` in the frame before, and how fast they
+        are [m/s, scaled]."""
         after = min(self._reach, len(self._history) - 1 - at)
         now = self._history[at].targets
         before, later = (self._history[k].targets for k in (at - self._reach, at + after))
@@ -134,8 +152,23 @@ class ContactTracker:
             & (speed < factor * self._max_speed)
             & (height < factor * self._max_height)
         )
-        step = step_height(self._scale * speed.max(axis=1), self._robot.rig.hip_height)
-        return planted, np.maximum(now.clearance, step)
+        # Who stands on the toes does not stand on the heel.
+        planted[:, 0] &= ~planted[:, 1] | (height[:, 0] < height[:, 1] + self._max_tilt)
+        return planted, self._scale * speed
+
+    def _height(
+        self,
+        clearance: Float[np.ndarray, "S"],
+        ground: Float[np.ndarray, "S"],
+        speed: Float[np.ndarray, "S 2"],
+    ) -> Float[np.ndarray, "S"]:
+        """How high [m] soles are in swing: as the source's, scaled; but where a foot takes no step
+        it is put down by what it last stood over the floor."""
+        pace = speed[:, 1] / self._robot.rig.hip_height
+        slow = np.interp(pace, STEP_SPEEDS[:2], [1.0, 0.0])
+        off = np.minimum(np.minimum(ground, self._uneven), np.maximum(clearance, 0.0))
+        height: Float[np.ndarray, S] = clearance - slow * off
+        return height
 
     def _follow(
         self,
@@ -155,7 +188,7 @@ class ContactTracker:
     def _targets(self, pitched: Float[np.ndarray, "T P 3"], seen: Sequence[_Seen]) -> FootTargets:
         """Where the soles' points are held, and how firmly."""
         feet = (np.array(part) for part in zip(*seen, strict=True))
-        holds, height, known, pivot, heading = (part[:, self._sole] for part in feet)
+        holds, height, step, known, pivot, heading = (part[:, self._sole] for part in feet)
         on = np.where(self._leaves_with, holds, 1.0)
         held, most = np.minimum(on[..., 0], on[..., 1]), np.maximum(holds[..., 0], holds[..., 1])
         raised = pitched[..., 0] + 1j * pitched[..., 1]
@@ -166,7 +199,9 @@ class ContactTracker:
         place = pivot + np.exp(1j * heading) * (held * self._flat + (1 - held) * raised)
         positions, shares = np.empty((2, *held.shape, 3))
         positions[..., 0], positions[..., 1] = place.real, place.imag
-        positions[..., 2] = (1 - held) * pitched[..., 2] + (1 - most) * height
+        step = np.where(self._leaves_with, step, 0.0).max(axis=-1)
+        up = np.maximum((1 - most) * height, (1 - held) * step)
+        positions[..., 2] = (1 - held) * pitched[..., 2] + up
         shares[..., :2] = (known * np.maximum(held, RAISED_HOLD[0] * most))[..., None]
         near = near_floor(height / self._robot.rig.hip_height)
         shares[..., 2] = held + (1 - held) * near * SWING_HOLD[2]
