@@ -3,8 +3,10 @@
 What the floor has to give is the acceleration of the centre of mass. Hips whose path is scaled
 carry a longer trunk, other arms, a neck that the source lacks, and longer steps (`travel_scale`):
 each adds to that, and the same feet would have to push in another place, or harder. So over the
-ground the centre of mass accelerates as the source's does, scaled by the hips' height. Where it is
-and how far it goes remains the legs' to say: it is only within a short time that hips give way.
+ground the centre of mass accelerates as the source's does, scaled by the hips' height. Where the
+source's accelerates more, as one does that shakes or has its weight elsewhere, the two meet half
+way. Where the centre of mass is and how far it goes remains the legs' to say: it is only within a
+short time that hips give way.
 """
 
 from collections.abc import Sequence
@@ -22,27 +24,42 @@ from spark.rotation import quat_mul, quat_rotate
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
 
-# [s] What is added within a shorter time is taken back, what comes more slowly is left: two frames
-# at 30 fps, the span of a recording's speeds. With the .3 s of a pendulum of a body's height, hips
-# would leave the path that retargeted characters take (docs/evaluation.md).
-_QUICK = 1 / 15
+# [s] What is added within a shorter time is taken back, what comes more slowly is left. With the
+# .3 s of a pendulum of a body's height, hips would leave the path that retargeted characters take
+# (docs/evaluation.md).
+_QUICK = 0.1
 
 
 def sway_hips(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
     """`moved`, the transfer of `source`, whose hips sway over the ground so that its centre of mass
     accelerates as the source's does, scaled; its feet stay where they are.
 
-    The centre of mass gives way by e - s, with e how far it is from the source's, scaled, and s
-    what of that is slow: s - tau² s'' = e.
+    The centre of mass gives way by g - tau² g'' = tau² (a - b), with a how it accelerates and b how
+    it should (`_wanted`): b where that is quick, a where it is slow.
     """
     scale = moved.rig.hip_height / source.rig.hip_height
-    away = (center_of_mass(moved) - scale * center_of_mass(source))[:, :2]
-    quick = away - _slow(away, _QUICK / moved.frame_time)
+    theirs, own = (
+        _acceleration(center_of_mass(motion)[:, :2], motion.frame_time)
+        for motion in (source, moved)
+    )
+    surplus = own - _wanted(own, scale * theirs)
+    way = _quick(_QUICK**2 * surplus, _QUICK / moved.frame_time)
     roles, skeleton = moved.rig.roles.roles, moved.rig.skeleton
     both = [leg_of(skeleton, roles, group) for group in (Group.LEFT_LEG, Group.RIGHT_LEG)]
     legs = [leg for leg in both if leg is not None]
-    sway = np.column_stack([-quick / _carried(moved.rig, legs), np.zeros(len(moved))])
+    sway = np.column_stack([way / _carried(moved.rig, legs), np.zeros(len(moved))])
     return move_ankles(replace(moved, hips=moved.hips + sway), [(leg, -sway) for leg in legs])
+
+
+def _wanted(
+    own: Float[np.ndarray, "T 2"], theirs: Float[np.ndarray, "T 2"]
+) -> Float[np.ndarray, "T 2"]:
+    """Half way from the source's acceleration [m/s²] to the least of all between the two: the
+    source's own where that asks for less."""
+    between = own - theirs
+    length = np.maximum((between**2).sum(axis=1, keepdims=True), 1e-12)
+    share = np.clip(-(theirs * between).sum(axis=1, keepdims=True) / length, 0.0, 1.0)
+    return theirs + share * between / 2
 
 
 def center_of_mass(motion: CanonicalMotion) -> Float[np.ndarray, "T 3"]:
@@ -70,16 +87,19 @@ def _carried(rig: Rig, legs: Sequence[Leg]) -> float:
     return float(body.masses @ np.clip(above, 0.0, 1.0))
 
 
-def _slow(path: Float[np.ndarray, "T D"], frames: float) -> Float[np.ndarray, "T D"]:
-    """What of a path is slower than so many frames: s - frames² s'' = path, with both ends as they
-    are, so that straight ways stay as they are."""
-    if len(path) < 4:
-        return path
-    inner = len(path) - 2
-    bands = np.stack([np.full(inner, 1 + 2 * frames**2), np.full(inner, -(frames**2))])
-    wanted = path[1:-1].copy()
-    wanted[0] += frames**2 * path[0]
-    wanted[-1] += frames**2 * path[-1]
-    slow = path.copy()
-    slow[1:-1] = solveh_banded(bands, wanted, lower=True)
-    return slow
+def _acceleration(path: Float[np.ndarray, "T D"], frame_time: float) -> Float[np.ndarray, "T D"]:
+    """Second differences; 0 in the first and the last frame."""
+    out = np.zeros_like(path)
+    out[1:-1] = np.diff(path, 2, axis=0) / frame_time**2
+    return out
+
+
+def _quick(push: Float[np.ndarray, "T D"], frames: float) -> Float[np.ndarray, "T D"]:
+    """The way g that gives back a push within so many frames: g - frames² g'' = push, with both
+    ends at 0, so that straight ways stay as they are."""
+    way = np.zeros_like(push)
+    if len(push) > 3:
+        inner = len(push) - 2
+        bands = np.stack([np.full(inner, 1 + 2 * frames**2), np.full(inner, -(frames**2))])
+        way[1:-1] = solveh_banded(bands, push[1:-1], lower=True)
+    return way

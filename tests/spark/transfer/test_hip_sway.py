@@ -18,7 +18,7 @@ from spark.transfer.leg_fit import fit_legs
 from tests.helpers.stick import joint, standing, stick_rig
 
 SECONDS = 4.0
-TAU = 1 / 15  # [s]
+TAU = 0.1  # [s]
 
 
 def with_trunk(longer: float) -> Rig:
@@ -63,6 +63,19 @@ def test_what_a_longer_trunk_adds_is_left_the_less_the_quicker_it_is(hz: float, 
     was, left = (np.ptp(away(source, m)[middle, 1]) for m in (before, after))
     assert was > 0.01
     assert left / was == pytest.approx(1 / (1 + (2 * np.pi * hz * TAU) ** 2), rel=0.08, abs=0.02)
+
+
+@pytest.mark.parametrize("hz", [3.0, 6.0])
+def test_a_source_that_shakes_more_is_met_half_way(hz: float) -> None:
+    """Of what its longer trunk shakes more than the target's, half of what is quick is made."""
+    source = transfer(leaning(hz, 240.0), with_trunk(1.5))
+    before = transfer(source, stick_rig())
+    after = sway_hips(source, before)
+    middle = slice(len(source) // 4, -len(source) // 4)
+    was, left = (np.ptp(away(source, m)[middle, 1]) for m in (before, after))
+    assert was > 0.01
+    quick = (2 * np.pi * hz * TAU) ** 2
+    assert left / was == pytest.approx(1 - 0.5 * quick / (1 + quick), rel=0.05)
 
 
 def test_feet_stay() -> None:
