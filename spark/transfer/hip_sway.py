@@ -3,10 +3,10 @@
 What the floor has to give is the acceleration of the centre of mass. Hips whose path is scaled
 carry a longer trunk, other arms, a neck that the source lacks, and longer steps (`travel_scale`):
 each adds to that, and the same feet would have to push in another place, or harder. So over the
-ground the centre of mass accelerates as the source's does, scaled by the hips' height. Where the
-source's accelerates more, as one does that shakes or has its weight elsewhere, the two meet half
-way. Where the centre of mass is and how far it goes remains the legs' to say: it is only within a
-short time that hips give way.
+ground the centre of mass accelerates as the source's does, scaled by the hips' height. A source
+that shakes, or whose weight lies elsewhere, would be pushed from beyond its own feet: then the
+least of all accelerations between the two is enough. Where the centre of mass is and how far it
+goes remains the legs' to say: it is only within a short time that hips give way.
 """
 
 from collections.abc import Sequence
@@ -23,11 +23,14 @@ from spark.rig.segments import segments
 from spark.rotation import quat_mul, quat_rotate
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
+from spark.transfer.pressure import acceleration, beyond_feet
 
 # [s] What is added within a shorter time is taken back, what comes more slowly is left. With the
 # .3 s of a pendulum of a body's height, hips would leave the path that retargeted characters take
 # (docs/evaluation.md).
-_QUICK = 0.1
+_QUICK = 0.08
+# [hip heights] A source that is pushed from so far beyond its feet is half believed.
+_BEYOND = 0.1
 
 
 def sway_hips(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
@@ -35,15 +38,15 @@ def sway_hips(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
     accelerates as the source's does, scaled; its feet stay where they are.
 
     The centre of mass gives way by g - tau² g'' = tau² (a - b), with a how it accelerates and b how
-    it should (`_wanted`): b where that is quick, a where it is slow.
+    it should (`_wanted`): what is quicker than tau accelerates as b, what is slower stays.
     """
     scale = moved.rig.hip_height / source.rig.hip_height
-    theirs, own = (
-        _acceleration(center_of_mass(motion)[:, :2], motion.frame_time)
-        for motion in (source, moved)
-    )
-    surplus = own - _wanted(own, scale * theirs)
-    way = _quick(_QUICK**2 * surplus, _QUICK / moved.frame_time)
+    weight = center_of_mass(source)
+    believed = 1 / (1 + (beyond_feet(source, weight) / _BEYOND) ** 2)
+    theirs = scale * acceleration(weight[:, :2], source.frame_time)
+    own = acceleration(center_of_mass(moved)[:, :2], moved.frame_time)
+    surplus = own - _wanted(own, theirs, believed)
+    way = _given_back(_QUICK**2 * surplus, _QUICK / moved.frame_time)
     roles, skeleton = moved.rig.roles.roles, moved.rig.skeleton
     both = [leg_of(skeleton, roles, group) for group in (Group.LEFT_LEG, Group.RIGHT_LEG)]
     legs = [leg for leg in both if leg is not None]
@@ -52,14 +55,16 @@ def sway_hips(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
 
 
 def _wanted(
-    own: Float[np.ndarray, "T 2"], theirs: Float[np.ndarray, "T 2"]
+    own: Float[np.ndarray, "T 2"],
+    theirs: Float[np.ndarray, "T 2"],
+    believed: Float[np.ndarray, "T"],
 ) -> Float[np.ndarray, "T 2"]:
-    """Half way from the source's acceleration [m/s²] to the least of all between the two: the
-    source's own where that asks for less."""
+    """The source's acceleration as far as it is `believed`, 0 to 1, and else the least of all
+    between the two [m/s²]."""
     between = own - theirs
-    length = np.maximum((between**2).sum(axis=1, keepdims=True), 1e-12)
-    share = np.clip(-(theirs * between).sum(axis=1, keepdims=True) / length, 0.0, 1.0)
-    return theirs + share * between / 2
+    length = np.maximum((between**2).sum(axis=1), 1e-12)
+    least = np.clip(-(theirs * between).sum(axis=1) / length, 0.0, 1.0)
+    return theirs + ((1 - believed) * least)[:, None] * between
 
 
 def center_of_mass(motion: CanonicalMotion) -> Float[np.ndarray, "T 3"]:
@@ -87,14 +92,7 @@ def _carried(rig: Rig, legs: Sequence[Leg]) -> float:
     return float(body.masses @ np.clip(above, 0.0, 1.0))
 
 
-def _acceleration(path: Float[np.ndarray, "T D"], frame_time: float) -> Float[np.ndarray, "T D"]:
-    """Second differences; 0 in the first and the last frame."""
-    out = np.zeros_like(path)
-    out[1:-1] = np.diff(path, 2, axis=0) / frame_time**2
-    return out
-
-
-def _quick(push: Float[np.ndarray, "T D"], frames: float) -> Float[np.ndarray, "T D"]:
+def _given_back(push: Float[np.ndarray, "T D"], frames: float) -> Float[np.ndarray, "T D"]:
     """The way g that gives back a push within so many frames: g - frames² g'' = push, with both
     ends at 0, so that straight ways stay as they are."""
     way = np.zeros_like(push)
