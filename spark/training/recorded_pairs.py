@@ -25,6 +25,7 @@ from spark.training.dataset import Performance
 from spark.training.grounded import on_ground
 from spark.training.same_motion import SPARE_FRAMES, same_motion
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.hip_rise import hip_rise, standing
 from spark.transfer.leg_fit import from_sole, leg_fit
 
 MIN_BODIES = 4  # fewer tell nothing of others
@@ -143,7 +144,14 @@ class _Seen:
 
 
 def _picked(motion: CanonicalMotion, frames: Int[np.ndarray, "N"]) -> CanonicalMotion:
-    return replace(motion, rotations=motion.rotations[frames], hips=motion.hips[frames])
+    """Some frames, evenly spread: their frame time is the time from one to the next."""
+    apart = int(frames[1] - frames[0]) if len(frames) > 1 else 1
+    return replace(
+        motion,
+        rotations=motion.rotations[frames],
+        hips=motion.hips[frames],
+        frame_time=motion.frame_time * apart,
+    )
 
 
 class _Shared:
@@ -217,10 +225,14 @@ def _scales(
     rise = size / other
     lift = theirs.hips[:, 2] - other
     A = np.stack([lift, np.ones_like(lift)], -1)
-    hips_rise, hips_up = _drawn(A, own.hips[:, 2] - size, rise, _WEAKEST * len(A) * other**2)
+    # Hips beyond what they rise with the leg that stands, and ankles by what stands under them: the
+    # soles. Where `retarget` holds feet, it adds the one and keeps the other.
+    legs = [(standing(theirs, group), standing(own, group)) for group in _LEGS]
+    heights = own.hips[:, 2] - size - hip_rise(theirs, own, legs)
+    hips_rise, hips_up = _drawn(A, heights, rise, _WEAKEST * len(A) * other**2)
     floor = theirs.floor_z
-    lifted = np.concatenate([path[:, 2] - rest[2] - floor for path, rest, _, _ in ankles])
-    heights = np.concatenate([path[:, 2] - rest[2] - rise * floor for _, _, path, rest in ankles])
+    lifted = np.concatenate([leg.sole[..., 2].min(axis=1) - floor for leg, _ in legs])
+    heights = np.concatenate([leg.sole[..., 2].min(axis=1) - rise * floor for _, leg in legs])
     A = np.stack([lifted, np.ones_like(lifted)], -1)
     ankles_rise, ankles_up = _drawn(A, heights, rise, _WEAKEST * len(A) * other**2)
     logs = [

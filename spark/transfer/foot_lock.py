@@ -18,11 +18,10 @@ from jaxtyping import Float
 
 from spark.rig.contacts import speeds
 from spark.rig.roles import LIMBS, Group
-from spark.rotation import quat_mul, quat_rotate
 from spark.runs import true_runs
-from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.footfalls import between_contacts, beyond
-from spark.transfer.hip_rise import Standing, hip_rise
+from spark.transfer.hip_rise import Standing, hip_rise, standing
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
 from spark.transfer.reach import within_reach
 from spark.transfer.stances import stances
@@ -46,7 +45,7 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
     for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
         leg = leg_of(moved.rig.skeleton, moved.rig.roles.roles, group)
         if leg is not None and source.rig.roles.joint(LIMBS[group][2]) is not None:
-            feet.append((leg, _standing(source, group), _standing(moved, group)))
+            feet.append((leg, standing(source, group), standing(moved, group)))
     if not feet:
         return moved
     rise = hip_rise(source, moved, [(theirs, own) for _, theirs, own in feet])
@@ -69,18 +68,6 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
     # A foot that rolls off has let go with its heel: if the hips came down for it, the other knee
     # would bend where the source's is straight.
     return move_ankles(*within_reach(risen, moves, flat))
-
-
-def _standing(motion: CanonicalMotion, group: Group) -> Standing:
-    """A leg's ends and its sole."""
-    rig = motion.rig
-    sole = next(sole for sole in rig.soles if sole.side == group.side)
-    hip, _, ankle, _ = LIMBS[group]
-    ends = rig.roles.require(hip), rig.roles.require(ankle)
-    positions = canonical_positions(motion, [*ends, *sole.joints.tolist()])
-    world = quat_mul(motion.rotations[:, sole.joints], rig.tpose[sole.joints])
-    points = positions[:, 2:] + quat_rotate(world, sole.offsets)
-    return Standing(ends, positions[:, :2], points)
 
 
 def _rolled(

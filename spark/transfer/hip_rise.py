@@ -16,7 +16,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
 
-from spark.transfer.canonical import CanonicalMotion
+from spark.rig.roles import LIMBS, Group
+from spark.rotation import quat_mul, quat_rotate
+from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.leg_fit import from_sole
 
 # [hip heights] A foot whose sole is this high bears half as much as one that stands.
@@ -33,6 +35,18 @@ class Standing(NamedTuple):
     joints: tuple[int, int]
     ends: Float[np.ndarray, "T 2 3"]
     sole: Float[np.ndarray, "T P 3"]
+
+
+def standing(motion: CanonicalMotion, group: Group) -> Standing:
+    """A leg's ends and its sole. Raises `SkeletonError` where the rig has no such foot."""
+    rig = motion.rig
+    hip, _, ankle, _ = LIMBS[group]
+    ends = rig.roles.require(hip), rig.roles.require(ankle)
+    sole = next(sole for sole in rig.soles if sole.side == group.side)
+    positions = canonical_positions(motion, [*ends, *sole.joints.tolist()])
+    world = quat_mul(motion.rotations[:, sole.joints], rig.tpose[sole.joints])
+    points = positions[:, 2:] + quat_rotate(world, sole.offsets)
+    return Standing(ends, positions[:, :2], points)
 
 
 def hip_rise(

@@ -37,7 +37,8 @@ class LegFit:
 
     Metres of the target for each metre of the source: `travel` over the ground, `hips_rise` and
     `ankles_rise` in height. Metres by which the target's hips (`hips_up`) and ankles (`ankles_up`)
-    are higher when it stands than its skeleton says, and its ankles farther out (`out`).
+    are higher when it stands than its skeleton says, and its ankles farther out (`out`). What its
+    soles stand on, as its skeleton has them, is as much higher as its ankles: its floor.
     """
 
     travel: float
@@ -72,15 +73,15 @@ def fit_legs(
     source: CanonicalMotion, moved: CanonicalMotion, fit: LegFit | None = None
 ) -> CanonicalMotion:
     """`moved`, the transfer of `source`, with its path and its ankles where `fit` has them, by
-    default where the proportions of the two bodies do (`leg_fit`). A leg stays as it is where one
-    of the two rigs has no foot.
+    default where the proportions of the two bodies do (`leg_fit`), and its floor under its soles.
+    A leg stays as it is where one of the two rigs has no foot.
     """
     fit = fit or leg_fit(source.rig, moved.rig)
     out = replace(moved, rotations=np.empty_like(moved.rotations), hips=np.empty_like(moved.hips))
     for block in blocks(len(moved)):
         fitted = _fitted(source.picked(block), moved.picked(block), fit)
         out.rotations[block], out.hips[block] = fitted.rotations, fitted.hips
-    return out
+    return replace(out, floor_z=out.floor_z + fit.ankles_up)
 
 
 def _fitted(source: CanonicalMotion, moved: CanonicalMotion, fit: LegFit) -> CanonicalMotion:
