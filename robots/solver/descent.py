@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from robots.least_squares import NormalEquations, Smoothness
@@ -20,6 +20,7 @@ from robots.tree import Coordinates, forward_kinematics
 
 WINDOW = 0.15  # [s] before and after a frame over which its cost is averaged to judge a step
 _WIDE_WINDOW = 0.5  # [s] the same for what is gained nearby,
+_MAX_HALVINGS = 4  # of a step, where it is rejected
 _ALLOWED_LOSS = 0.5  # and the share of that by which a frame's cost may rise
 PATIENCE = 2  # steps without progress that are allowed while many frames reject them
 COLLISION_PERIOD = 5  # steps from one search for collision candidates to the next
@@ -59,7 +60,9 @@ def solve_block(
     apart, by a change of `q` that is smoother than `q`.
 
     A step is judged frame by frame: where the cost around a frame rises by more than a share
-    of what is gained nearby, the step is rejected there and damping grows (Levenberg and
+    of what is gained nearby, the step is rejected there. If more than `max_rejected` of the frames
+    reject it, it is halved there, again and again: down to the floor, of which nothing is felt from
+    above, most steps are too long. Where it is rejected all the same, damping grows (Levenberg and
     Marquardt's rule, a frame each). Between rejected and accepted frames the step is blended, and
     the normal equations with it: exact where the cost is a parabola.
 
@@ -86,6 +89,18 @@ def solve_block(
             robot, q, start, frame_time, block.dofs, stiffening, np.ones(len(q)), point
         )
 
+    def taken(step: Float[np.ndarray, "T V"]) -> Coordinates:
+        return q.integrated(tree, step).clipped(tree, LIMIT_CLEARANCE)
+
+    def judged(
+        trial: Coordinates, normal: NormalEquations
+    ) -> tuple[Float[np.ndarray, "T"], Bool[np.ndarray, "T"]]:
+        """The cost around each frame after a step, and where that rejects it."""
+        trial_cost = normal.cost + smoothness_at(trial, False).cost(len(q))
+        after = uniform_filter1d(trial_cost, window)
+        gained = np.maximum(uniform_filter1d(cost - after, wide), 0.0)
+        return after, after > cost * (1 + 1e-3) + _ALLOWED_LOSS * gained + 1e-9
+
     normal, stalled = linearize_at(q), 0
     for k in range(max_iter):
         jerky = jerk_stiffening(robot, q, targets.frame_time)[:, block.dofs]
@@ -95,27 +110,32 @@ def solve_block(
         limits = q.at_limits(tree, LIMIT_CLEARANCE)[:, block.dofs]
         step = np.zeros((len(q), tree.nv))
         step[:, block.dofs] = normal.solve_coupled(coupling, damping, limits)
-        shortening = np.minimum(1.0, MAX_STEP / np.maximum(np.abs(step).max(1), 1e-9))
-        step *= smooth_lower_envelope(shortening, window)[:, None]
-        share = np.ones(len(q))
-        trial = q.integrated(tree, step).clipped(tree, LIMIT_CLEARANCE)
+        share = np.minimum(1.0, MAX_STEP / np.maximum(np.abs(step).max(1), 1e-9))
+        step *= smooth_lower_envelope(share, window)[:, None]
+        trial, is_last = taken(step), k == max_iter - 1
         if candidates is not None and k % COLLISION_PERIOD == COLLISION_PERIOD - 1:
             candidates = collision_candidates(robot, targets, trial, block)
-        trial_normal = linearize_at(trial, with_jacobian=k < max_iter - 1)
-        trial_cost = trial_normal.cost + smoothness_at(trial, False).cost(len(q))
-        after = uniform_filter1d(trial_cost, window)
-        gained = np.maximum(uniform_filter1d(cost - after, wide), 0.0)
-        rejected = after > cost * (1 + 1e-3) + _ALLOWED_LOSS * gained + 1e-9
+        trial_normal = linearize_at(trial, with_jacobian=not is_last)
+        after, rejected = judged(trial, trial_normal)
+        for _ in range(_MAX_HALVINGS):
+            if rejected.mean() <= max_rejected:
+                break
+            step *= smooth_lower_envelope(1.0 - 0.5 * rejected, window)[:, None]
+            trial = taken(step)
+            trial_normal = linearize_at(trial, with_jacobian=False)
+            after, rejected = judged(trial, trial_normal)
+        if not (is_last or trial_normal.with_jacobian):
+            trial_normal = linearize_at(trial)
         damping = np.where(rejected, np.maximum(damping * 10, REJECTED_DAMPING), damping / 10)
         damping = np.maximum(damping, MIN_DAMPING)
         if rejected.any():
             share = smooth_lower_envelope(1.0 - rejected, window)
-            trial = q.integrated(tree, step * share[:, None]).clipped(tree, LIMIT_CLEARANCE)
+            trial = taken(step * share[:, None])
             if trial_normal.with_jacobian:
                 trial_normal = normal.blended(trial_normal, share)
+            after = cost + share * (after - cost)
+        stalled = stalled + 1 if after.sum() > (1 - rel_tol) * cost.sum() else 0
         q, normal = trial, trial_normal
-        remaining = (cost + share * (after - cost)).sum()
-        stalled = stalled + 1 if remaining > (1 - rel_tol) * cost.sum() else 0
         if stalled > (PATIENCE if rejected.mean() > max_rejected else 0):
             break
     return q

@@ -1,0 +1,69 @@
+"""Gauss-Newton steps that are too long: halved where they are, and only there."""
+
+import numpy as np
+import pytest
+
+from robots.model.morphology import Morphology
+from robots.registry import find
+from robots.solver.block import blocks_of
+from robots.solver.descent import solve_block
+from robots.solver.holds import Holds
+from robots.solver.objective import linearize
+from robots.solver.targets import targets_of
+from robots.tree import Coordinates, forward_kinematics
+from spark.demo.sample import sample_rig
+from spark.transfer.canonical import CanonicalMotion
+from spark_sim.loading import load_robot
+
+COUNT = 120
+HOVERING = slice(70, COUNT)
+
+
+@pytest.fixture(scope="module")
+def ember() -> Morphology:
+    return load_robot(find("robot")).on_robot.robot
+
+
+def standing() -> CanonicalMotion:
+    rig = sample_rig("walker")
+    rotations = np.tile([1.0, 0, 0, 0], (COUNT, len(rig.skeleton), 1))
+    return CanonicalMotion(rig, 1 / 60, rotations, np.tile([0, 0, 0.9], (COUNT, 1)), 0.0)
+
+
+def raised(robot: Morphology) -> Coordinates:
+    """The T-pose on the floor, and for a while 5 cm above it."""
+    tpose = robot.tpose
+    poses, links = (
+        forward_kinematics(robot.tree, tpose),
+        [robot.sole_points(s) for s in robot.soles],
+    )
+    pairs = [(int(k), p) for own, rest in links for k, p in zip(own, rest, strict=True)]
+    pos = np.repeat(tpose.pos, COUNT, axis=0)
+    pos[:, 2] -= min(poses.point(link, point)[2, 0] for link, point in pairs)
+    pos[HOVERING, 2] += 0.05
+    return Coordinates(
+        pos, np.repeat(tpose.quat, COUNT, axis=0), np.repeat(tpose.angles, COUNT, axis=0)
+    )
+
+
+def drawn_down(robot: Morphology, q: Coordinates) -> Holds:
+    """The pelvis, while it hovers, to far below the ground."""
+    poses, pelvis = forward_kinematics(robot.tree, q), robot.rig.pelvis
+    link, center = int(robot.links[pelvis]), robot.centers[pelvis]
+    positions = poses.point(link, center) - [[0.0], [0.0], [0.5 * robot.rig.hip_height]]
+    shares = np.zeros((3, COUNT))
+    shares[2, HOVERING] = 2.5
+    return Holds(np.array([link]), center[None], positions[None], shares[None])
+
+
+def test_whoever_hovers_comes_down_though_the_first_step_ends_deep_in_the_floor(
+    ember: Morphology,
+) -> None:
+    targets, block = targets_of(standing(), ember), blocks_of(ember)[0]
+    start = raised(ember)
+    holds = drawn_down(ember, start)
+    before = linearize(ember, targets, holds, start, block, [], with_jacobian=False).cost
+    q = solve_block(ember, targets, holds, start, block, 6, 0.0, 0.1)
+    after = linearize(ember, targets, holds, q, block, [], with_jacobian=False).cost
+    assert after[HOVERING].mean() < 0.5 * before[HOVERING].mean()
+    assert (q.pos[90:, 2] < start.pos[90:, 2] - 0.04).all()
