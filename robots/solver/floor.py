@@ -31,6 +31,12 @@ class Solid(NamedTuple):
     radii: Float[np.ndarray, "S"]
     standing: int = 0
 
+    def lowest(self, poses: LinkPoses) -> Float[np.ndarray, "T"]:
+        """How high [m] it reaches down."""
+        heights = poses.heights(self.link, self.spheres) - self.radii[:, None]
+        lowest: Float[np.ndarray, T] = heights.min(axis=0)
+        return lowest
+
     def bottom(self, poses: LinkPoses) -> Float[np.ndarray, "T"]:
         """A height [m] that nothing of it is below."""
         center = (self.spheres.max(axis=0) + self.spheres.min(axis=0)) / 2

@@ -1,0 +1,54 @@
+"""Which of a robot's shapes touch the ground for a part: all that meet at its joint."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robots.model.morphology import Morphology
+from robots.registry import find
+from robots.solver.floor import solids_over_floor
+from robots.solver.touching import touches_of
+from robots.tree import forward_kinematics
+from spark.rig.roles import Role
+from spark_sim.loading import load_robot
+from tests.helpers.ember import changed_ember
+
+
+@pytest.fixture(scope="module")
+def ember() -> Morphology:
+    return load_robot(find("robot")).on_robot.robot
+
+
+def links_of(robot: Morphology, role: Role) -> set[int]:
+    return {solid.link for solid in touches_of(robot)[role].around}
+
+
+def test_a_knee_is_the_end_of_a_thigh_and_of_a_shank(ember: Morphology) -> None:
+    thigh, shank = (
+        int(ember.links[ember.rig.roles.require(role)])
+        for role in (Role.LEFT_UPPER_LEG, Role.LEFT_LOWER_LEG)
+    )
+    assert links_of(ember, Role.LEFT_LOWER_LEG) == {thigh, shank}
+
+
+def test_it_is_as_low_as_the_lower_of_both(ember: Morphology) -> None:
+    touch = touches_of(ember)[Role.LEFT_LOWER_LEG]
+    poses = forward_kinematics(ember.tree, ember.tpose)
+    lowest = [solid.lowest(poses) for solid in touch.around]
+    assert touch.lowest(poses) == pytest.approx(np.min(lowest, axis=0))
+
+
+def test_no_shape_of_a_hand_that_hangs_beside_it_touches_for_the_pelvis(ember: Morphology) -> None:
+    roles = (Role.LEFT_FOREARM, Role.LEFT_HAND)
+    arms = {int(ember.links[ember.rig.roles.require(role)]) for role in roles}
+    assert not arms & links_of(ember, Role.PELVIS)
+
+
+def test_a_pelvis_without_shapes_lies_on_the_hips(tmp_path: Path) -> None:
+    mass = '<inertial pos="0 0 0" mass="3.6" diaginertia="0.01 0.01 0.01"/>'
+    robot = changed_ember(tmp_path, r'<geom class="collision" mass="3.6"[^>]*/>', mass)
+    base = int(robot.links[robot.rig.pelvis])
+    assert base not in {solid.link for solid in solids_over_floor(robot)}
+    touch, poses = touches_of(robot)[Role.PELVIS], forward_kinematics(robot.tree, robot.tpose)
+    assert touch.lowest(poses)[0] < touch.path(poses)[2, 0] - 0.02
