@@ -41,6 +41,25 @@ def reaching(ways: Float[np.ndarray, "D 3"], balls: Balls, kept: Balls, spared: 
     return np.concatenate([kept_points, points[chosen]]), np.append(kept_radii, radii[chosen])
 
 
+def part_of_hull(
+    balls: Balls, places: Float[np.ndarray, "K 3"], within: float, spared: float
+) -> Balls:
+    """Of the hull of some balls what is no farther than `within` [m] from one of some places: those
+    balls that are, and on the lines between two of all the nearest points."""
+    points, radii = balls
+    one, other = np.triu_indices(len(points))
+    way = points[other] - points[one]
+    square = np.maximum((way**2).sum(axis=1), 1e-12)
+    along = ((places[:, None] - points[one]) * way).sum(axis=2) / square
+    share = np.clip(along, 0.0, 1.0)[..., None]
+    between = (points[one] + share * way).reshape(-1, 3)
+    thick = (radii[one] + share[..., 0] * (radii[other] - radii[one])).ravel()
+    points, radii = np.concatenate([points, between]), np.concatenate([radii, thick])
+    away = np.linalg.norm(points[:, None] - places, axis=2).min(axis=1) - radii
+    none = np.zeros((0, 3)), np.zeros(0)
+    return reaching(_WAYS, (points[away <= within], radii[away <= within]), none, spared)
+
+
 def outlines(model: mujoco.MjModel, geoms: Sequence[int], ways: Float[np.ndarray, "D 3"]) -> Balls:
     """What of some shapes may lie farthest in one of the ways, in the rest pose."""
     data = mujoco.MjData(model)

@@ -17,7 +17,7 @@ from robots.tree import ROOT, LinkPoses, forward_kinematics
 from spark.rig.feet import Sole
 
 _FOOT_HEIGHT = 0.02  # [m] above the sole, below which a shape is part of the foot
-_SPARED = 0.004  # hip heights by which a shape is taken for larger, at most
+SPARED = 0.004  # hip heights by which a shape is taken for larger, at most
 _CARRIED_REACH = 0.25  # and from shoulder or neck within which no arm or head lifts itself up
 FELT = 3  # roundings above the floor from which on a residual is worth its time
 
@@ -69,7 +69,7 @@ def solids_over_floor(robot: Morphology) -> tuple[Solid, ...]:
         else:
             others.setdefault(shape.link, []).append(shape.geom)
     out = [
-        Solid(link, *hull(robot.mjcf.model, geoms, _SPARED * robot.rig.hip_height))
+        Solid(link, *hull(robot.mjcf.model, geoms, SPARED * robot.rig.hip_height))
         for link, geoms in others.items()
     ]
     for link, geoms in feet.items():

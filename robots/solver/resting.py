@@ -3,7 +3,7 @@
 A part is held at the height at which its lowest shape touches the ground there
 (`robots.solver.touching`). Of arms, which give way to the trunk, the shoulder is held as well, so
 that the trunk comes to where its arms can reach the ground. A head or a shoulder lies where the
-trunk lays it.
+trunk lays it, and a head where its neck does.
 """
 
 from dataclasses import replace
@@ -38,10 +38,9 @@ def resting(robot: Morphology, targets: Targets, q: Coordinates) -> Holds:
         if touch is None or not touches.any():
             continue
         held = _held(robot, targets, poses, touch, touches, targets.rests[:, k])
+        parts.append(held)
         if role.part in _ON_TRUNK:
             parts.append(_carried(robot, poses, robot.rig.roles.require(role), touch, held))
-            continue
-        parts.append(held)
         shoulder = robot.rig.roles.joint(Role(f"{role.side}_upper_arm")) if role.side else None
         if role.part in ("hand", "forearm") and shoulder is not None:
             over = _carried(robot, poses, shoulder, touch, held)

@@ -6,13 +6,16 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from robots.model.hull import part_of_hull
 from robots.model.morphology import Morphology
 from robots.solver.contacts import touching_joint
-from robots.solver.floor import Solid, solids_over_floor
+from robots.solver.floor import SPARED, Solid, solids_over_floor
 from robots.tree import LinkPoses
 from spark.rig.roles import Role
 
-_NEAR = 0.1  # hip heights, beyond the nearest, within which shapes around a part touch for it
+# Hip heights, beyond the nearest of its own, within which shapes around a part touch for it,
+_NEAR = 0.1
+_NEAR_TRUNK = 0.2  # and around the trunk, whose flesh is twice as thick
 
 
 class Touch(NamedTuple):
@@ -57,53 +60,54 @@ def _at_joint(robot: Morphology, joint: int) -> Touch:
     """By all that meets there: a knee is the end of a thigh as well as of a shank. The pelvis
     reaches from hip to hip."""
     link, place, rig = int(robot.links[joint]), robot.centers[joint], robot.rig
-    around = robot.centers[rig.hips] if joint == rig.pelvis else np.zeros((0, 3))
-    return _near(robot, _meeting(robot, joint), Touch(link, place, ()), np.vstack([place, around]))
+    hips = robot.centers[rig.hips] if joint == rig.pelvis else np.zeros((0, 3))
+    reach = _NEAR_TRUNK if joint in (rig.pelvis, rig.chest) else _NEAR
+    around = _around(robot, link, _meeting(robot, joint), np.vstack([place, hips]), reach)
+    return Touch(link, place, around)
 
 
 def _at_end(robot: Morphology, elbow: int, along: Float[np.ndarray, "3"]) -> Touch:
     """By the ball of a link's shapes that is farthest along a direction."""
-    link = int(robot.links[elbow])
-    balls = [
-        (center @ along + radius, center)
-        for solid in solids_over_floor(robot)
-        for center, radius in zip(solid.spheres, solid.radii, strict=True)
-        if solid.link == link
-    ]
-    place = max(balls, key=lambda ball: float(ball[0]))[1] if balls else robot.centers[elbow]
-    return _near(robot, {link}, Touch(link, place, ()), place[None])
+    link, place = int(robot.links[elbow]), robot.centers[elbow]
+    own = [solid for solid in solids_over_floor(robot) if solid.link == link]
+    if own:
+        spheres = np.concatenate([solid.spheres for solid in own])
+        place = spheres[(spheres @ along + np.concatenate([solid.radii for solid in own])).argmax()]
+    return Touch(link, place, _around(robot, link, {link}, place[None], _NEAR))
 
 
 def _meeting(robot: Morphology, joint: int) -> set[int]:
     """The links from that of the part before a joint to those of the parts after."""
-    links, parents = robot.links, robot.rig.skeleton.parents
-    above = int(parents[joint])
-    chain = set(robot.tree.chain(int(links[joint])))
-    meeting = {int(links[joint])}
+    links, parents = robot.links, np.asarray(robot.rig.skeleton.parents)
+    own, above = int(links[joint]), int(parents[joint])
+    meeting, chain = {own}, set(robot.tree.chain(own))
     if above >= 0:
         meeting |= {int(links[above])} | chain - set(robot.tree.chain(int(links[above])))
-    for below in np.flatnonzero(np.asarray(parents) == joint):
-        meeting |= set(robot.tree.chain(int(links[below]))) - chain
+    for below in links[parents == joint].tolist():
+        meeting |= {below} | set(robot.tree.chain(below)) - chain
     return meeting
 
 
-def _near(
-    robot: Morphology, links: set[int], touch: Touch, points: Float[np.ndarray, "P 3"]
-) -> Touch:
-    """With what of the links' shapes is near points: nearly as near as the nearest of its own."""
-    solids = [solid for solid in solids_over_floor(robot) if solid.link in links]
-    away = [
-        np.linalg.norm(solid.spheres[:, None] - points, axis=2).min(axis=1) - solid.radii
+def _around(
+    robot: Morphology,
+    link: int,
+    meeting: set[int],
+    places: Float[np.ndarray, "K 3"],
+    reach: float,
+) -> tuple[Solid, ...]:
+    """What of some links' shapes is near places: nearly as near as the nearest of `link`'s own, or
+    of all where it has none. The first place alone where nothing is."""
+    size = robot.rig.hip_height
+    solids = [solid for solid in solids_over_floor(robot) if solid.link in meeting]
+    nearest = {
+        solid.link: (np.linalg.norm(solid.spheres[:, None] - places, axis=2).T - solid.radii).min()
+        for solid in solids
+    }
+    least = nearest.get(link, min(nearest.values(), default=0.0))
+    within = max(float(least), 0.0) + reach * size
+    parts = [
+        part_of_hull((solid.spheres, solid.radii), places, within, SPARED * size)
         for solid in solids
     ]
-    nearest = {solid.link: float(own.min()) for solid, own in zip(solids, away, strict=True)}
-    least = nearest.get(touch.link, min(nearest.values(), default=0.0))
-    within = max(least, 0.0) + _NEAR * robot.rig.hip_height
-    around = [
-        Solid(solid.link, solid.spheres[own <= within], solid.radii[own <= within])
-        for solid, own in zip(solids, away, strict=True)
-        if own.min() <= within
-    ]
-    return touch._replace(
-        around=tuple(around) or (Solid(touch.link, touch.place[None], np.zeros(1)),)
-    )
+    near = (Solid(s.link, *part) for s, part in zip(solids, parts, strict=True) if len(part[0]))
+    return tuple(near) or (Solid(link, places[:1], np.zeros(1)),)

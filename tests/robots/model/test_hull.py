@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from robots.model.hull import hull
+from robots.model.hull import hull, part_of_hull
 from sim.outline import fibonacci_sphere
 
 SPARED = 0.003
@@ -51,3 +51,18 @@ def test_no_shape_reaches_anywhere() -> None:
     points, radii = hull(model, [], SPARED)
     assert points.shape == (0, 3)
     assert radii.shape == (0,)
+
+
+def test_part_of_a_hull_lies_on_a_face_whose_corners_are_far_away() -> None:
+    corners = np.array(np.meshgrid([-0.2, 0.2], [-0.3, 0.3], [-0.1, 0.1])).reshape(3, -1).T
+    place, within = np.array([0.02, 0.01, -0.05]), 0.12
+    points, radii = part_of_hull((corners, np.full(8, 0.01)), place[None], within, SPARED)
+    away = np.linalg.norm(points - place, axis=1) - radii
+    assert (away <= within).all()
+    assert (points[:, 2] - radii).min() == pytest.approx(-0.11)
+    assert np.linalg.norm(corners - place, axis=1).min() - 0.01 > within
+
+
+def test_nothing_of_a_hull_that_is_far_away_is_part_of_it() -> None:
+    points, radii = part_of_hull((np.eye(3), np.zeros(3)), np.full((1, 3), -1.0), 0.5, SPARED)
+    assert len(points) == len(radii) == 0

@@ -52,3 +52,9 @@ def test_a_pelvis_without_shapes_lies_on_the_hips(tmp_path: Path) -> None:
     assert base not in {solid.link for solid in solids_over_floor(robot)}
     touch, poses = touches_of(robot)[Role.PELVIS], forward_kinematics(robot.tree, robot.tpose)
     assert touch.lowest(poses)[0] < touch.path(poses)[2, 0] - 0.02
+
+
+def test_what_lies_beside_the_joint_of_a_shoulder_is_the_trunk_s(ember: Morphology) -> None:
+    chest = int(ember.links[ember.rig.chest])
+    assert chest in links_of(ember, Role.LEFT_UPPER_ARM)
+    assert chest in links_of(ember, Role.PELVIS)
