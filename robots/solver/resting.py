@@ -21,9 +21,9 @@ from spark.rig.roles import Role
 from spark.runs import true_runs
 from spark.transfer.footfalls import between_contacts, beyond
 
-HOLD = 2.5  # how firmly a part is held where it touches the ground, as a share of a standing sole,
+HOLD = 3.2  # how firmly a part is held where it touches the ground, as a share of a standing sole,
 _ON_TRUNK = ("upper_arm", "head")
-CARRIED_HOLD = 0.32  # and of that the shoulder over an arm that touches
+CARRIED_HOLD = 0.45  # and of that the shoulder over an arm that touches
 MAX_ROLL = 0.1  # hip heights that the joint of a part that rests may roll over it
 SETTLE = 0.12  # [s] before and after a rest in which a part already stays, ever less
 APPROACH = 0.3  # [s] before and after a touch in which a part is led to the ground and away
