@@ -33,11 +33,7 @@ from spark.transfer.canonical import CanonicalMotion, canonical_positions
 _MAX_ITER = (12, 10)  # Gauss-Newton steps, by block
 _REL_TOL = (0.02, 0.05)  # of the cost: a block ends where a step gains less,
 _MAX_REJECTED = 0.1  # and no larger share of the frames rejects it
-_POLISH = (
-    2,
-    0.0,
-    _MAX_REJECTED,
-)  # the same three where splines through a solution are nearly right
+_POLISH = (2, 0.0, 1.0)  # the same three where splines through a solution are nearly right
 _COARSE_INTERVAL = 1 / 20  # [s] between the frames that are solved first
 
 
