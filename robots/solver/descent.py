@@ -61,10 +61,10 @@ def solve_block(
 
     A step is judged frame by frame: where the cost around a frame rises by more than a share
     of what is gained nearby, the step is rejected there. If more than `max_rejected` of the frames
-    reject it, it is halved there, again and again: down to the floor, of which nothing is felt from
-    above, most steps are too long. Where it is rejected all the same, damping grows (Levenberg and
-    Marquardt's rule, a frame each). Between rejected and accepted frames the step is blended, and
-    the normal equations with it: exact where the cost is a parabola.
+    reject a step of the base, it is halved there, again and again: down to the floor, of which
+    nothing is felt from above, most are too long. Where it is rejected all the same, damping grows
+    (Levenberg and Marquardt's rule, a frame each). Between rejected and accepted frames the step is
+    blended, and the normal equations with it: exact where the cost is a parabola.
 
     It ends where a step lowers the cost by less than `rel_tol` of it and at most `max_rejected` of
     the frames reject it.
@@ -118,7 +118,7 @@ def solve_block(
         trial_normal = linearize_at(trial, with_jacobian=not is_last)
         after, rejected = judged(trial, trial_normal)
         for _ in range(_MAX_HALVINGS):
-            if rejected.mean() <= max_rejected:
+            if not block.base or rejected.mean() <= max_rejected:
                 break
             step *= smooth_lower_envelope(1.0 - 0.5 * rejected, window)[:, None]
             trial = taken(step)
