@@ -63,7 +63,8 @@ def standing_heights(
     `height` [m] is the body's standing height.
     """
     low = np.percentile(positions[..., 2], 1, axis=0)
-    return np.minimum(low, low.min(axis=0) + MAX_UNEVEN * height / ADULT_HEIGHT)
+    lowest = low.min(axis=0, initial=np.inf)
+    return np.minimum(low, lowest + MAX_UNEVEN * height / ADULT_HEIGHT)
 
 
 def planted_points(

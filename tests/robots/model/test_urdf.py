@@ -14,7 +14,7 @@ from robots.model.mjcf import read_mjcf
 from robots.model.understand import understand_robot
 from robots.solver.solve import copy, retarget
 from spark.errors import ConventionError, FileFormatError, SkeletonError
-from spark_sim.clips import Clip
+from spark_sim.clips import Clip, RobotClip
 from tests.helpers.urdf import twins
 
 
@@ -252,6 +252,11 @@ def test_a_robot_without_legs_stays_and_its_arms_follow(folder: Path, walk: Clip
         if "shoulder" in name or "elbow" in name
     ]
     assert np.mean(off) < 8  # the whole robot stands as the person does, and leans
+    alone.save(folder / "alone.npz")
+    again = spark_sim.load(folder / "alone.npz")
+    assert isinstance(again, RobotClip)
+    np.testing.assert_allclose(again.qpos, alone.qpos, atol=1e-6)
+    assert again.contacts == {}
     with pytest.raises(ConventionError, match="has no legs"):
         spark_sim.Retargeter(wave, folder / "torso.urdf")
 

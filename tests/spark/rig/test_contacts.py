@@ -41,6 +41,10 @@ def test_a_foot_that_never_comes_down_does_not_stand() -> None:
     assert not planted[:, 1].any()
 
 
+def test_where_there_are_no_feet_none_stands() -> None:
+    assert planted_points(np.zeros((60, 0, 3)), 1 / 60, 1.75).shape == (60, 0)
+
+
 @pytest.mark.parametrize("size", [0.5, 2.0])
 def test_a_body_of_another_size_stands_at_the_same_times(size: float) -> None:
     """Lengths and speeds grow with the body; time does not."""
