@@ -9,15 +9,20 @@ from spark.errors import FileFormatError
 
 _DEEPEST = 100  # elements in elements, of one file
 _MOST_ATTRIBUTES = 200  # of an element: work on them grows with their square
+_BLANK = b" \t\r\n\0"
 
 
 def parse_xml(path: Path, content: bytes, encoding: str | None = None) -> ET.Element:
-    """The elements of an XML file, their names as they are written.
+    """The elements of an XML file, their names as they are written. Blanks before its declaration
+    and zeros after its end, which no parser of XML takes and files of robots have, are passed over.
 
     Raises `FileFormatError` with the line where it is none, nests too deeply, or has a document
     type, whose entities could stand for any length of text.
     """
-    builder, depth = ET.TreeBuilder(), 0
+    builder, depth, skipped = ET.TreeBuilder(), 0, 0
+    if b"\0" not in content[:4]:  # of UTF-16 a zero is half of a letter
+        skipped = content[: -len(content.lstrip(_BLANK)) or None].count(b"\n")
+        content = content.strip(_BLANK)
     parser = expat.ParserCreate(encoding)
 
     def start(tag: str, attributes: dict[str, str]) -> None:
@@ -38,7 +43,7 @@ def parse_xml(path: Path, content: bytes, encoding: str | None = None) -> ET.Ele
         refuse("has a document type, which such files do without")
 
     def refuse(message: str) -> NoReturn:
-        raise FileFormatError(path, parser.CurrentLineNumber, message)
+        raise FileFormatError(path, skipped + parser.CurrentLineNumber, message)
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler = builder.data
@@ -48,6 +53,6 @@ def parse_xml(path: Path, content: bytes, encoding: str | None = None) -> ET.Ele
         return builder.close()
     except expat.ExpatError as error:
         message = f"is no XML ({expat.errors.messages[error.code]})"
-        raise FileFormatError(path, error.lineno, message) from error
+        raise FileFormatError(path, skipped + error.lineno, message) from error
     except (ValueError, LookupError) as error:  # an encoding that is none
         raise FileFormatError(path, None, f"is no XML ({error})") from error
