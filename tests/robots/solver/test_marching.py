@@ -7,7 +7,7 @@ import pytest
 
 from robots.model.morphology import Morphology
 from robots.registry import find
-from robots.solver.block import blocks_of
+from robots.solver.block import Block, blocks_of
 from robots.solver.holds import Holds
 from robots.solver.marching import abrupt, calmed, cheapest
 from robots.solver.solve import retarget
@@ -49,6 +49,27 @@ def folded() -> CanonicalMotion:
     return CanonicalMotion(rig, FRAME_TIME, rotations, hips, 0.0)
 
 
+def left_shoulder(robot: Morphology) -> tuple[Block, int]:
+    """The arms, and the first joint of the left one."""
+    arms = blocks_of(robot)[1]
+    shoulder = int(robot.links[robot.rig.roles.require(Role.LEFT_UPPER_ARM)])
+    return arms, next(j for j in robot.tree.chain(shoulder) if j in arms.joints)
+
+
+def jerked(
+    source: CanonicalMotion, robot: Morphology, *spells: slice
+) -> tuple[Block, Coordinates, np.ndarray]:
+    """The arms, a solution whose left shoulder jumps in every second frame of some spells, and the
+    frames of each spell."""
+    arms, joint = left_shoulder(robot)
+    solved = retarget(source, robot).coordinates
+    angles, thrown = solved.angles.copy(), np.zeros((len(spells), len(source)), dtype=bool)
+    for own, mask in zip(spells, thrown, strict=True):
+        angles[own.start : own.stop : 2, joint] += 0.8
+        mask[own] = True
+    return arms, Coordinates(solved.pos, solved.quat, angles), thrown
+
+
 def test_the_cheapest_way_is_that_of_all_ways() -> None:
     rng = np.random.default_rng(0)
     for _ in range(20):
@@ -73,10 +94,8 @@ def test_folded_arms_that_hardly_move_are_not_thrown(
 def test_marching_calms_an_arm_and_leaves_the_rest(
     folded: CanonicalMotion, ember: Morphology
 ) -> None:
-    arms = blocks_of(ember)[1]
+    arms, joint = left_shoulder(ember)
     targets = targets_of(folded, ember)
-    shoulder = int(ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)])
-    joint = next(j for j in ember.tree.chain(shoulder) if j in arms.joints)
     calm = ember.tpose.angles.repeat(len(folded), axis=0)
     thrown = calm.copy()
     thrown[::6, joint] += 0.8
@@ -95,18 +114,10 @@ def test_marching_calms_an_arm_and_leaves_the_rest(
 def test_marching_begins_and_ends_with_what_leads_there(
     folded: CanonicalMotion, ember: Morphology
 ) -> None:
-    arms = blocks_of(ember)[1]
-    shoulder = int(ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)])
-    joint = next(j for j in ember.tree.chain(shoulder) if j in arms.joints)
-    solved = retarget(folded, ember).coordinates
-    angles = solved.angles.copy()
-    angles[58:62:2, joint] += 0.8
-    q = Coordinates(solved.pos, solved.quat, angles)
-    thrown = np.zeros(len(q), dtype=bool)
-    thrown[58:62] = True
+    arms, q, (thrown,) = jerked(folded, ember, slice(58, 62))
     targets, holds = targets_of(folded, ember), Holds.none(len(q))
     marched = calmed(ember, targets, holds, q, arms, thrown).angles
-    changed = np.flatnonzero((np.abs(marched - angles) > 1e-9).any(axis=1))
+    changed = np.flatnonzero((np.abs(marched - q.angles) > 1e-9).any(axis=1))
     assert changed.min() >= 28  # a second before
     assert changed.max() <= 91  # and after
     assert np.abs(np.diff(marched, 2, axis=0)).max() < 0.16  # a tenth of what it was
@@ -115,20 +126,11 @@ def test_marching_begins_and_ends_with_what_leads_there(
 def test_spells_are_marched_through_as_each_alone(
     folded: CanonicalMotion, ember: Morphology
 ) -> None:
-    arms = blocks_of(ember)[1]
-    shoulder = int(ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)])
-    joint = next(j for j in ember.tree.chain(shoulder) if j in arms.joints)
-    solved = retarget(folded, ember).coordinates
-    angles = solved.angles.copy()
-    thrown = np.zeros((2, len(folded)), dtype=bool)
-    for k, own in enumerate((slice(16, 20), slice(96, 98))):
-        angles[own.start : own.stop : 2, joint] += 0.8
-        thrown[k, own] = True
-    q = Coordinates(solved.pos, solved.quat, angles)
+    arms, q, thrown = jerked(folded, ember, slice(16, 20), slice(96, 98))
     targets, holds = targets_of(folded, ember), Holds.none(len(q))
     both = calmed(ember, targets, holds, q, arms, thrown.any(axis=0)).angles
     first, second = (calmed(ember, targets, holds, q, arms, own).angles for own in thrown)
-    assert (both != angles).any(axis=1)[[18, 96]].all()
+    assert (both != q.angles).any(axis=1)[[18, 96]].all()
     np.testing.assert_allclose(both[:60], first[:60], atol=1e-6)
     np.testing.assert_allclose(both[60:], second[60:], atol=1e-6)
 
