@@ -14,7 +14,8 @@ _DIGITS = 9  # of every number: nanometres on a body
 _ZERO = 1e-12
 # What holds names, which may look like numbers.
 _NAMES = {
-    *("name", "model", "class", "childclass", "body", "body1", "body2", "joint", "site", "geom"),
+    *("name", "model", "class", "childclass", "body", "body1", "body2", "site", "geom"),
+    *("joint", "jointinparent"),
     *("objname", "refname", "mesh", "material", "texture", "file", "actuator", "tendon"),
 }
 

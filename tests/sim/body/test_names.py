@@ -13,13 +13,13 @@ from spark.errors import SparkSimError
 
 
 def walker(folder: Path, names: dict[str, str]) -> Path:
-    """The sample walk, some of its joints called otherwise."""
+    """The sample walk, some of its joints, by their names after the colon, called otherwise."""
     path = folder / "walker_walk.bvh"
     if not path.exists():
         spark_sim.sample(folder)
-    text = re.sub(
-        r"(ROOT|JOINT) (\S+)", lambda m: f"{m[1]} {names.get(m[2], m[2])}", path.read_text()
-    )
+    joint = re.compile(rf"JOINT \S+:({'|'.join(names)})\n")
+    text, count = joint.subn(lambda m: f"JOINT {names[m[1]]}\n", path.read_text())
+    assert count == len(names)
     (folder / "renamed.bvh").write_text(text)
     return folder / "renamed.bvh"
 
