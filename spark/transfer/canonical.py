@@ -85,8 +85,8 @@ def canonical_positions(
         world = np.empty_like(canonical.rotations[block])
         world[:, needed] = quat_mul(canonical.rotations[block][:, needed], rig.tpose[needed])
         positions = world_positions(skeleton, world, np.zeros_like(hips), levels=levels)
-        positions += (hips - positions[:, rig.hips].mean(1))[:, None]
-        return positions if joints is None else positions[:, joints]
+        away = hips - positions[:, rig.hips].mean(1)
+        return (positions if joints is None else positions[:, joints]) + away[:, None]
 
     return in_blocks(some, len(canonical))
 

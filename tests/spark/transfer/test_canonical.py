@@ -143,3 +143,20 @@ def test_a_canonical_motion_is_frozen() -> None:
     canonical = to_canonical(standing(rig, 2), rig)
     with pytest.raises(FrozenInstanceError):
         canonical.floor_z = 1.0  # type: ignore[misc]
+
+
+def test_joints_that_nobody_asked_for_are_in_no_sum(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are left as memory was, which may hold any bits: a NaN that warns, say."""
+    rig = sample_rig("walker")
+    motion = to_canonical(sample_motion("walk", rig, 60.0).frames(0, 9), rig)
+    everywhere, empty = canonical_positions(motion), np.empty
+
+    def foul(*shape: object, **how: object) -> np.ndarray:
+        out = empty(*shape, **how)
+        if out.dtype == np.float64:
+            out.view(np.uint64)[...] = 0x7FF0000000000001
+        return out
+
+    monkeypatch.setattr(np, "empty", foul)
+    for j in range(len(rig.skeleton)):
+        np.testing.assert_array_equal(canonical_positions(motion, [j])[:, 0], everywhere[:, j])
