@@ -21,7 +21,7 @@ def parse_xml(path: Path, content: bytes, encoding: str | None = None) -> ET.Ele
     """
     builder, depth, skipped = ET.TreeBuilder(), 0, 0
     if b"\0" not in content[:4]:  # of UTF-16 a zero is half of a letter
-        skipped = content[: -len(content.lstrip(_BLANK)) or None].count(b"\n")
+        skipped = content[: len(content) - len(content.lstrip(_BLANK))].count(b"\n")
         content = content.strip(_BLANK)
     parser = expat.ParserCreate(encoding)
 

@@ -148,9 +148,9 @@ def _marched(
     sizes = np.repeat(spells.sizes[longest], 2)
     back = np.tile([0, 1], len(spells))
     first = np.repeat(spells.starts[longest], 2) + back * (sizes - 1)
-    begun = np.array(led).reshape(-1, 2)[longest].ravel()[:, None]
+    begun = np.array(led)[longest].ravel()[:, None]
     last = np.where(begun, qpos[first][:, columns], tpose[:, columns])
-    for k in range(sizes.max(initial=0)):
+    for k in range(sizes[0]):
         going = int((sizes > k).sum())
         frames = first[:going] + k * (1 - 2 * back[:going])
         here = qpos[frames]
@@ -174,8 +174,7 @@ def _settled(
     model, dofs = terms.robot.mjcf.model, np.array(block.dofs)
     moved = terms.mj_dofs[dofs]
     at = np.arange(len(dofs))
-    q, count = begun.copy(), len(begun)
-    rows = np.arange(count)  # of those that still move
+    q, rows = begun.copy(), np.arange(len(begun))  # of those that still move
     for k in range(_FIRST_STEPS if first else _STEPS):
         poses = terms.poses(q[rows])
         if first or not k:
@@ -185,16 +184,15 @@ def _settled(
         H, g = terms.linearize(q[rows], poses, own, holds, terms.hinges.at_tpose, candidates)
         held = terms.hinges.held(q[rows], g)[:, dofs]
         H, g = H[:, dofs[:, None], dofs], g[:, dofs]
-        step = np.zeros((len(rows), model.nv))
+        stay, step = np.zeros((2, len(rows), model.nv))
         if not first:
-            for stay, row in zip(step, rows.tolist(), strict=True):
-                mujoco.mj_differentiatePos(model, stay, 1.0, begun[row], q[row])
+            for away, row in zip(stay, rows.tolist(), strict=True):
+                mujoco.mj_differentiatePos(model, away, 1.0, begun[row], q[row])
             H[:, at, at] += _W_STAY**2
-            g += _W_STAY**2 * step[:, moved]
+            g += _W_STAY**2 * stay[:, moved]
         H[:, at, at] += np.where(held, _HELD, _FIRST_DAMPING if first else _DAMPING)
         found = -np.linalg.solve(H, np.where(held, 0.0, g)[..., None])[..., 0]
         length = np.abs(found).max(axis=1, initial=1e-9)
-        step[:] = 0.0
         step[:, moved] = found * np.minimum(1.0, _MAX_STEP / length)[:, None]
         for own_step, row in zip(step, rows.tolist(), strict=True):
             mujoco.mj_integratePos(model, q[row], own_step, 1.0)

@@ -14,18 +14,19 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.network.recorded import BodyTokens, matched_rows, tokens_of
-from spark.rig.roles import LIMBS
+from spark.rig.roles import LIMBS, Group
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 from spark.training.dataset import Performance
 from spark.training.grounded import on_ground
-from spark.training.recorded_scales import LEGS, measured_scales
+from spark.training.recorded_scales import measured_scales
 from spark.training.same_motion import SPARE_FRAMES, same_motion
-from spark.transfer.canonical import CanonicalMotion, canonical_positions
-from spark.transfer.leg_fit import from_sole
+from spark.transfer.canonical import CanonicalMotion
+from spark.transfer.hip_rise import standing
 
 MIN_BODIES = 4  # fewer tell nothing of others
 MAX_PAIRS = 4000  # drawn from those of a large dataset
 _FRAMES = 60  # of a clip that are looked at
+_LEGS = (Group.LEFT_LEG, Group.RIGHT_LEG)
 _LARGEST = 0.7  # of a logarithm of a scale, or a length [hip heights]: more is a spoilt file
 
 
@@ -116,7 +117,7 @@ def recorded_pairs(found: Sequence[Performance], seed: int = 0) -> RecordedPairs
 
 
 class _Seen:
-    """Some frames of a clip, spread over it, and where its ankles are."""
+    """Some frames of a clip, spread over it, and its legs in them."""
 
     def __init__(self, one: Performance, number: int, body: BodyTokens) -> None:
         self.motion, self.number, self.body = one.clip.name, number, body
@@ -125,12 +126,8 @@ class _Seen:
         at = np.arange(0, count, max(1, (count - SPARE_FRAMES) // _FRAMES))
         self.at = at
         self.seen: CanonicalMotion = _picked(on_ground(one), at)
-        self.ankles = []
-        for group in LEGS:
-            joint = body.rig.roles.joint(LIMBS[group][2])
-            if joint is not None:
-                path = canonical_positions(self.seen, [joint])[:, 0]
-                self.ankles.append((path, from_sole(body.rig, joint)))
+        roles = body.rig.roles
+        self.legs = [standing(self.seen, g) for g in _LEGS if roles.joint(LIMBS[g][2]) is not None]
 
 
 def _picked(motion: CanonicalMotion, frames: Int[np.ndarray, "N"]) -> CanonicalMotion:
@@ -156,7 +153,7 @@ class _Shared:
 def _measured(shared: _Shared) -> RecordedPair | None:
     """What one pair says; None where that is nothing a body's habits would make."""
     a, b, theirs, own = shared.a, shared.b, shared.theirs, shared.own
-    if len(own) < 2 or len(a.ankles) != 2 or len(b.ankles) != 2:
+    if len(own) < 2 or len(a.legs) != 2 or len(b.legs) != 2:
         return None
     rows = matched_rows(a.body, b.body)
     turns = np.stack(
@@ -167,11 +164,11 @@ def _measured(shared: _Shared) -> RecordedPair | None:
     )
     mirrored = np.array([b.body.mirrored[k] for k, _ in rows])
     turns = np.where(mirrored[:, None], [-1.0, 1.0, -1.0] * turns, turns)
-    ankles = [
-        (path[shared.of_a], rest, own_path[shared.of_b], own_rest)
-        for (path, rest), (own_path, own_rest) in zip(a.ankles, b.ankles, strict=True)
+    legs = [
+        (leg.at(shared.of_a), own_leg.at(shared.of_b))
+        for leg, own_leg in zip(a.legs, b.legs, strict=True)
     ]
-    scales, weights = measured_scales(theirs, own, ankles)
+    scales, weights = measured_scales(theirs, own, legs)
     if not np.isfinite(scales).all() or np.abs(scales).max() > _LARGEST:
         return None
     return RecordedPair(a.motion, a.number, b.number, rows, turns, scales, weights)

@@ -8,41 +8,32 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from spark.rig.roles import Group
 from spark.rotation import quat_rotate
 from spark.transfer.canonical import CanonicalMotion
-from spark.transfer.hip_rise import hip_rise, standing
-from spark.transfer.leg_fit import leg_fit
+from spark.transfer.hip_rise import Standing, hip_rise
+from spark.transfer.leg_fit import from_sole, leg_fit
 
-LEGS = (Group.LEFT_LEG, Group.RIGHT_LEG)
 _WEAKEST = 1e-3  # [hip heights²] of movement; a scale that less depends on stays as it is
 
 # How much of the body an ankle carries, against the hips: foot, toe and half of the leg.
 _ANKLES_SHARE = 0.25
 
-# The source's path and where it is in the T-pose (`from_sole`), and the target's [hip heights].
-Ankle = tuple[
-    Float[np.ndarray, "T 3"],
-    Float[np.ndarray, "3"],
-    Float[np.ndarray, "T 3"],
-    Float[np.ndarray, "3"],
-]
-
 
 def measured_scales(
-    theirs: CanonicalMotion, own: CanonicalMotion, ankles: Sequence[Ankle]
+    theirs: CanonicalMotion, own: CanonicalMotion, legs: Sequence[tuple[Standing, Standing]]
 ) -> tuple[Float[np.ndarray, "6"], Float[np.ndarray, "6"]]:
     """Differences of `HABITS`, and their weights: `spark.transfer.leg_fit` solved for its
-    numbers, each a little drawn to what proportions tell."""
+    numbers, each a little drawn to what proportions tell. `legs` are those of both."""
     start, size, other = theirs.rig, own.rig.hip_height, theirs.rig.hip_height
     analytic = leg_fit(start, own.rig)
     outwards = quat_rotate(theirs.rotations[:, start.pelvis], np.array([0.0, 1.0, 0.0]))[:, :2]
     # Over the ground: hips and ankles, by one scale about the origin and one distance outwards.
     columns, known = [np.stack([theirs.hips[:, :2], 0 * outwards], -1)], [own.hips[:, :2]]
-    for path, rest, own_path, own_rest in ankles:
+    for leg, own_leg in legs:
+        rest, own_rest = from_sole(start, leg.joints[1]), from_sole(own.rig, own_leg.joints[1])
         side = np.sign(own_rest[1])
-        columns.append(np.stack([path[:, :2] - rest[1] * outwards, side * outwards], -1))
-        known.append(own_path[:, :2] - own_rest[1] * outwards)
+        columns.append(np.stack([leg.ends[:, 1, :2] - rest[1] * outwards, side * outwards], -1))
+        known.append(own_leg.ends[:, 1, :2] - own_rest[1] * outwards)
     A, y = np.concatenate(columns).reshape(-1, 2), np.concatenate(known).ravel()
     travelled = float(np.mean(A[:, 0] ** 2)) / other**2
     travel, out = _drawn(A, y, analytic.travel, _WEAKEST * len(A) * other**2)
@@ -52,7 +43,6 @@ def measured_scales(
     A = np.stack([lift, np.ones_like(lift)], -1)
     # Hips beyond what they rise with the leg that stands, and ankles by what stands under them: the
     # soles. Where `retarget` holds feet, it adds the one and keeps the other.
-    legs = [(standing(theirs, group), standing(own, group)) for group in LEGS]
     heights = own.hips[:, 2] - size - hip_rise(theirs, own, legs)
     hips_rise, hips_up = _drawn(A, heights, rise, _WEAKEST * len(A) * other**2)
     floor = theirs.floor_z

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.ndimage import gaussian_filter1d
 
 from spark.rig.roles import LIMBS, Group
@@ -35,6 +35,10 @@ class Standing(NamedTuple):
     joints: tuple[int, int]
     ends: Float[np.ndarray, "T 2 3"]
     sole: Float[np.ndarray, "T P 3"]
+
+    def at(self, frames: Int[np.ndarray, "N"]) -> "Standing":
+        """In some frames."""
+        return self._replace(ends=self.ends[frames], sole=self.sole[frames])
 
 
 def standing(motion: CanonicalMotion, group: Group) -> Standing:
