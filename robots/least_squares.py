@@ -87,6 +87,13 @@ class NormalEquations:
         out.cost = self.cost + share * (other.cost - self.cost)
         return out
 
+    def replaced(self, frames: Int[np.ndarray, "S"], other: "NormalEquations") -> "NormalEquations":
+        """With the S frames of the others in these frames' places."""
+        out = NormalEquations(0, 0)
+        out.H, out.g, out.cost = self.H.copy(), self.g.copy(), self.cost.copy()
+        out.H[frames], out.g[frames], out.cost[frames] = other.H, other.g, other.cost
+        return out
+
     def at(self, frames: Int[np.ndarray, "S"]) -> "NormalEquations":
         """Those of some frames."""
         out = NormalEquations(0, 0)

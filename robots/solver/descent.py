@@ -22,12 +22,12 @@ WINDOW = 0.15  # [s] before and after a frame over which its cost is averaged to
 _WIDE_WINDOW = 0.5  # [s] the same for what is gained nearby,
 _MAX_HALVINGS = 4  # of a step, where it is rejected
 _ALLOWED_LOSS = 0.5  # and the share of that by which a frame's cost may rise
-PATIENCE = 2  # steps without progress that are allowed while many frames reject them
+_PATIENCE = 2  # steps without progress that are allowed while many frames reject them
 COLLISION_PERIOD = 5  # steps from one search for collision candidates to the next
 _COLLISION_INTERVAL = 0.06  # [s] between the frames that are searched
 MAX_STEP = 1.0  # [rad, m] of a dof in one step
 MIN_DAMPING = 1e-3  # [1] on the diagonal of the normal equations
-REJECTED_DAMPING = 0.1  # at least, where a step was rejected
+_REJECTED_DAMPING = 0.1  # at least, where a step was rejected
 
 
 def collision_stride(targets: Targets) -> int:
@@ -126,7 +126,7 @@ def solve_block(
             after, rejected = judged(trial, trial_normal)
         if not (is_last or trial_normal.with_jacobian):
             trial_normal = linearize_at(trial)
-        damping = np.where(rejected, np.maximum(damping * 10, REJECTED_DAMPING), damping / 10)
+        damping = np.where(rejected, np.maximum(damping * 10, _REJECTED_DAMPING), damping / 10)
         damping = np.maximum(damping, MIN_DAMPING)
         if rejected.any():
             share = smooth_lower_envelope(1.0 - rejected, window)
@@ -136,7 +136,7 @@ def solve_block(
             after = cost + share * (after - cost)
         stalled = stalled + 1 if after.sum() > (1 - rel_tol) * cost.sum() else 0
         q, normal = trial, trial_normal
-        if stalled > (PATIENCE if rejected.mean() > max_rejected else 0):
+        if stalled > (_PATIENCE if rejected.mean() > max_rejected else 0):
             break
     return q
 

@@ -14,8 +14,6 @@ from robots.solver.descent import (
     COLLISION_PERIOD,
     MAX_STEP,
     MIN_DAMPING,
-    PATIENCE,
-    REJECTED_DAMPING,
     WINDOW,
     smooth_lower_envelope,
 )
@@ -101,7 +99,7 @@ def solve_spells(broken: Repair) -> Coordinates:
     """Gauss-Newton steps in the block's dofs, all spells in one go, as each alone would take them.
 
     A step is judged over a whole spell, and halved there until the cost falls. A spell ends where
-    a step gains too little.
+    a step gains too little, or nothing at any length.
     """
     tree, dofs = broken.robot.tree, broken.block.dofs
     window = max(1, 2 * round(WINDOW / broken.targets.frame_time) + 1)
@@ -109,41 +107,24 @@ def solve_spells(broken: Repair) -> Coordinates:
     q = broken.start
     candidates = broken.candidates(q)
     normal = broken.linearize(q, candidates, True)
-    damping = np.where(broken.fixed, _FIXED_DAMPING, MIN_DAMPING)
     stiffening = np.ones((len(q), len(dofs)))
-    stalled = np.zeros(len(broken.spells), dtype=int)
     for k in range(_MAX_ITER):
         spells, of_frames = broken.spells, broken.spells.of_frames
         stiffening = np.maximum(stiffening, broken.stiffening(q))
         coupling = broken.smoothness(q, stiffening, True)
         cost = spells.total(normal.cost + coupling.cost(len(q)))
+        damping = np.where(broken.fixed, _FIXED_DAMPING, MIN_DAMPING)
         limits = q.at_limits(tree, LIMIT_CLEARANCE)[:, dofs]
         step = np.zeros((len(q), tree.nv))
         step[:, dofs] = normal.solve_coupled(coupling, damping, limits, solves=_MAX_SOLVES)
         shortening = np.minimum(1.0, MAX_STEP / np.maximum(np.abs(step).max(1), 1e-9))
         step *= spells.each(lambda own: smooth_lower_envelope(own, window), shortening)[:, None]
-        scale = np.ones(len(spells))
-        for _ in range(_MAX_HALVINGS):
-            trial = q.integrated(tree, step * scale[of_frames, None]).clipped(tree, LIMIT_CLEARANCE)
-            if k % COLLISION_PERIOD == COLLISION_PERIOD - 1:
-                candidates = broken.candidates(trial)
-            trial_normal = broken.linearize(trial, candidates, k < _MAX_ITER - 1)
-            coupled = broken.smoothness(trial, stiffening, False).cost(len(q))
-            after = spells.total(trial_normal.cost + coupled)
-            rejected = after > cost
-            if not rejected.any():
-                break
-            scale[rejected] *= 0.5
-        taken = ~rejected[of_frames]
-        at = np.flatnonzero(taken)
-        q = q.replaced(at, trial.at(at))
-        if trial_normal.with_jacobian:
-            normal = normal.blended(trial_normal, taken.astype(np.float64))
-        damping = np.where(taken, damping / 10, np.maximum(damping * 10, REJECTED_DAMPING))
-        damping = np.maximum(damping, np.where(broken.fixed, _FIXED_DAMPING, MIN_DAMPING))
-        gain = np.where(rejected, 0.0, cost - after)
-        stalled = np.where(gain < _REL_TOL * cost, stalled + 1, 0)
-        going = stalled <= np.where(rejected, PATIENCE, 0)
+        trial = q.integrated(tree, step).clipped(tree, LIMIT_CLEARANCE)
+        if k % COLLISION_PERIOD == COLLISION_PERIOD - 1:
+            candidates = broken.candidates(trial)
+        tried = broken, q, normal, step, candidates, stiffening, cost
+        q, normal, after = _halved(*tried, with_jacobian=k < _MAX_ITER - 1)
+        going = cost - after >= _REL_TOL * cost
         if going.all():
             continue
         solved = solved.replaced(frames, q)
@@ -152,5 +133,39 @@ def solve_spells(broken: Repair) -> Coordinates:
         candidates = among(candidates, going[of_frames])
         kept = np.flatnonzero(going[of_frames])
         broken, q, normal, frames = broken.only(going), q.at(kept), normal.at(kept), frames[kept]
-        damping, stiffening, stalled = damping[kept], stiffening[kept], stalled[going]
+        stiffening = stiffening[kept]
     return solved.replaced(frames, q)
+
+
+def _halved(
+    broken: Repair,
+    q: Coordinates,
+    normal: NormalEquations,
+    step: Float[np.ndarray, "T nv"],
+    candidates: list[Candidate],
+    stiffening: Float[np.ndarray, "T D"],
+    cost: Float[np.ndarray, "S"],
+    *,
+    with_jacobian: bool,
+) -> tuple[Coordinates, NormalEquations, Float[np.ndarray, "S"]]:
+    """The step from `q` taken in each spell, halved there until the `cost` falls: coordinates,
+    normal equations and cost, as they were in the spells that reject it at every length."""
+    tree, spells = broken.robot.tree, broken.spells
+    solved, after, trying = q, cost.copy(), np.ones(len(spells), dtype=bool)
+    for k in range(_MAX_HALVINGS):
+        tried = trying[spells.of_frames]
+        part, frames = broken.only(trying), np.flatnonzero(tried)
+        trial = q.at(frames).integrated(tree, step[frames] / 2**k).clipped(tree, LIMIT_CLEARANCE)
+        trial_normal = part.linearize(trial, among(candidates, tried), with_jacobian)
+        coupled = part.smoothness(trial, stiffening[frames], False).cost(len(frames))
+        trial_cost = part.spells.total(trial_normal.cost + coupled)
+        falls = trial_cost <= cost[trying]
+        taken = np.flatnonzero(falls[part.spells.of_frames])
+        solved = solved.replaced(frames[taken], trial.at(taken))
+        if with_jacobian:
+            normal = normal.replaced(frames[taken], trial_normal.at(taken))
+        fallen = np.flatnonzero(trying)[falls]
+        after[fallen], trying[fallen] = trial_cost[falls], False
+        if not trying.any():
+            break
+    return solved, normal, after
