@@ -10,7 +10,14 @@ from robots.residuals import Linearized, direction_residual, limit_residual, rot
 from robots.tree import BASE, Coordinates, Tree, forward_kinematics
 from spark.rig.bones import RigPose
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
-from spark.rotation import matrix_from_quat, quat_between, quat_from_matrix, quat_mul, quat_rotate
+from spark.rotation import (
+    matrix_from_quat,
+    quat_between,
+    quat_conj,
+    quat_from_matrix,
+    quat_mul,
+    quat_rotate,
+)
 from spark.skeleton import Skeleton
 
 _MAX_ITER = 60
@@ -34,6 +41,7 @@ _W_BASE = 1e-3  # keeps H regular for the base's position, which no term sees
 _W_LIMIT, _LIMIT_MARGIN = 3.0, np.radians(1.0)  # soft; hard ones by clipping
 _SAME_RANGE = 0.2  # [rad] ranges to both sides of straight that differ by less say nothing
 _BENT = 0.05  # [rad] of a joint in the rest pose that is bent, not merely drawn askew
+_ASKEW = 0.3  # of a turn's motion, along an axis: less of it says nothing
 _NOT_JUDGED = ("hand", "toe")  # ends of limbs: whether a limb is straight is not asked of them
 
 
@@ -67,7 +75,8 @@ def search_tpose(
     q = _initial_guesses(tree)
     pose = rest_pose(skeleton, roles)
     bone_targets = _bone_targets(pose, links)
-    bend_hinges = _bend_hinges(tree, pose, links)
+    forward = quat_rotate(quat_conj(ideal[roles.require(Role.PELVIS)]), np.array([1.0, 0, 0]))
+    bend_hinges = _bend_hinges(tree, pose, links, forward)
 
     def linearize(q: Coordinates) -> NormalEquations:
         return _linearize(tree, q, roles, links, ideal, bone_targets, bend_hinges, skeleton)
@@ -202,10 +211,10 @@ def _add(normal: NormalEquations, dofs: list[int], term: Linearized) -> None:
 
 
 def _bend_hinges(
-    tree: Tree, rest: RigPose, links: Int[np.ndarray, "J"]
+    tree: Tree, rest: RigPose, links: Int[np.ndarray, "J"], forward: Float[np.ndarray, "3"]
 ) -> dict[int, tuple[int, Float[np.ndarray, "3"]]]:
     """For each knee and elbow with hinges: the hinge that bends it, and the unit axis, in the rest
-    pose, about which growing angles bend it."""
+    pose, about which growing angles bend it. `forward` is where the rest pose looks."""
     out = {}
     for role in _BEND_AXES:
         for j in rest.roles.joints(role):
@@ -213,7 +222,8 @@ def _bend_hinges(
             moves = link >= 0 and link != links[int(rest.skeleton.parents[j])]
             if moves and not tree.balls[link]:
                 first = _first_own_hinge(tree, rest.skeleton, links, j)
-                out[j] = first, tree.axes[first] * _bend_sign(tree, rest, j, first)
+                bending = forward if role.part == "forearm" else -forward
+                out[j] = first, tree.axes[first] * _bend_sign(tree, rest, j, first, bending)
     return out
 
 
@@ -226,9 +236,12 @@ def _first_own_hinge(tree: Tree, skeleton: Skeleton, links: Int[np.ndarray, "J"]
     return own
 
 
-def _bend_sign(tree: Tree, rest: RigPose, j: int, hinge: int) -> float:
+def _bend_sign(
+    tree: Tree, rest: RigPose, j: int, hinge: int, bending: Float[np.ndarray, "3"]
+) -> float:
     """+1 where a growing angle bends the joint, -1 where a falling one does: joints bend to the
-    side to which they have the larger range, measured from straight."""
+    side to which they have the larger range, measured from straight. Of two that are as large, the
+    way it is bent already, or else the way that moves the bone's end along `bending`."""
     upper, lower = rest.bone(int(rest.skeleton.parents[j])), rest.bone(j)
     if upper is None or lower is None:
         return 1.0
@@ -236,7 +249,8 @@ def _bend_sign(tree: Tree, rest: RigPose, j: int, hinge: int) -> float:
     across = lower @ upper - (lower @ axis) * (upper @ axis)
     straight = float(np.arctan2(np.cross(lower, upper) @ axis, across))
     above, below = tree.upper[hinge] - straight, straight - tree.lower[hinge]
-    if np.isclose(above, below, atol=_SAME_RANGE):
-        # As wide to both sides: the way it is bent already, or else by growing angles.
-        return -1.0 if straight > _BENT else 1.0
-    return 1.0 if above > below else -1.0
+    if not np.isclose(above, below, atol=_SAME_RANGE):
+        return 1.0 if above > below else -1.0
+    if abs(straight) > _BENT:
+        return -1.0 if straight > 0 else 1.0
+    return -1.0 if np.cross(axis, lower) @ bending < -_ASKEW * np.linalg.norm(lower) else 1.0

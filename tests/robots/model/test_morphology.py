@@ -280,6 +280,17 @@ def humanoid(tmp_path: Path, **parts: str) -> Path:
     return written(tmp_path, HUMANOID.format(**(defaults | parts)))
 
 
+@pytest.mark.parametrize("axis", ["0 1 0", "0 -1 0"])
+def test_an_elbow_that_bends_both_ways_bends_forwards(tmp_path: Path, axis: str) -> None:
+    """The T-pose doesn't turn the arm about, so as to bend it backwards."""
+    text = registry.find("ember").read_text()
+    both = re.sub(r'(_elbow" axis=)"0 1 0" range="[^"]*"', rf'\1"{axis}" range="-2.4 2.4"', text)
+    assert both.count(f'_elbow" axis="{axis}" range="-2.4 2.4"') == 2
+    robots = [understand_robot(written(tmp_path, x)) for x in (both, text)]
+    tpose, expected = (robot.to_qpos(robot.tpose)[0] for robot in robots)
+    np.testing.assert_allclose(tpose, expected, atol=np.radians(5))
+
+
 def test_without_a_free_joint_one_is_given_and_said(tmp_path: Path) -> None:
     robot = understand_robot(humanoid(tmp_path, free=""))
     assert robot.mjcf.model.nq == 13
