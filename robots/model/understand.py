@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from robots.model.mirrored import unmirrored_limits
 from robots.model.mjcf import Mjcf, read_mjcf
 from robots.model.morphology import Morphology
 from robots.model.mount import roles_and_parts, standing_height
@@ -81,7 +82,8 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
     skeleton = with_soles(skeleton, soles)
     tree, assumed = _assume_limits(tree, segments, roles)
     tpose = search_tpose(tree, skeleton, roles, links, ideal)
-    notes = (*mjcf.notes, *assumed, *_check_tpose(tpose, skeleton))
+    odd = unmirrored_limits(mjcf.model, tree, joints, roles, links, tpose.coordinates)
+    notes = (*mjcf.notes, *assumed, *_check_tpose(tpose, skeleton), *odd)
     if mounted:
         notes = (*notes, "no legs: it stays on its base; arms, waist and head follow")
     rig = Rig(

@@ -291,6 +291,24 @@ def test_an_elbow_that_bends_both_ways_bends_forwards(tmp_path: Path, axis: str)
     np.testing.assert_allclose(tpose, expected, atol=np.radians(5))
 
 
+def test_limits_that_are_no_mirror_images_are_said(tmp_path: Path) -> None:
+    """A knee bends forwards. An elbow whose axis and range are both turned about is as before."""
+    text = registry.find("ember").read_text()
+    assert not any("alike" in note for note in understand_robot(written(tmp_path, text)).notes)
+
+    def turned(text: str, joint: str, axis: str | None = None) -> str:
+        at = re.search(rf'name="{joint}" axis="([^"]*)" range="(\S+) (\S+)"', text)
+        assert at is not None
+        lower, upper = -float(at[3]), -float(at[2])
+        new = f'name="{joint}" axis="{axis or at[1]}" range="{lower} {upper}"'
+        return text.replace(at[0], new)
+
+    both = turned(turned(text, "right_knee"), "left_elbow", "0 -1 0")
+    notes = [note for note in understand_robot(written(tmp_path, both)).notes if "alike" in note]
+    assert len(notes) == 1
+    assert "'left_knee' and 'right_knee' have" in notes[0]
+
+
 def test_without_a_free_joint_one_is_given_and_said(tmp_path: Path) -> None:
     robot = understand_robot(humanoid(tmp_path, free=""))
     assert robot.mjcf.model.nq == 13
