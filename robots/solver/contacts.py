@@ -45,8 +45,8 @@ REST_SPEED = 0.2  # [m/s, of an adult] below which a part comes to rest,
 ROLL_SPEED = 0.4  # and up to which it then stays in place, though its joint rolls over it
 _NEVER = 10.0  # of the speed at which it stands: an end that is no choice
 _WINDOW = 0.05  # [s] before and after a frame over which accelerations are measured
-_MAY_TOUCH = ("hand", "forearm", "upper_arm", "head", "spine", "pelvis", "lower_leg")
-_PARTS = tuple(role for role in Role if role.part in _MAY_TOUCH)  # and the feet
+_TOUCHING = ("hand", "forearm", "upper_arm", "head", "spine", "pelvis", "lower_leg")
+MAY_TOUCH = tuple(role for role in Role if role.part in _TOUCHING)  # and the feet
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +150,7 @@ def _touching_parts(
     """Whether parts touch the ground: their flesh is near it, or not far and they are slow, or
     carry the body; and whether they rest there."""
     rig, frame_time = source.rig, source.frame_time
-    joints = {role: j for role in _PARTS if (j := touching_joint(rig, role)) is not None}
+    joints = {role: j for role in MAY_TOUCH if (j := touching_joint(rig, role)) is not None}
     scale = rig.standing_height / ADULT_HEIGHT
     flesh = np.array([RADII[role.part] for role in joints]) * rig.standing_height
     paths = positions[:, list(joints.values())]

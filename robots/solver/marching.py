@@ -23,7 +23,7 @@ from robots.solver.holds import Holds
 from robots.solver.objective import linearize
 from robots.solver.spells import Spells
 from robots.solver.targets import Targets
-from robots.solver.window_targets import FootTargets, PoseTargets, pose_targets
+from robots.solver.window_targets import PointTargets, PoseTargets, pose_targets
 from robots.solver.window_terms import Terms
 from robots.tree import Coordinates, forward_kinematics
 from spark.rig.roles import Role
@@ -179,7 +179,7 @@ def _settled(
         poses = terms.poses(q[rows])
         if first or not k:
             candidates = terms.candidates(poses)
-        holds = FootTargets(*np.zeros((2, len(rows), terms.sole_count, 3)))
+        holds = PointTargets(*np.zeros((2, len(rows), terms.sole_count, 3)))
         own = targets.at(rows)
         H, g = terms.linearize(q[rows], poses, own, holds, terms.hinges.at_tpose, candidates)
         held = terms.hinges.held(q[rows], g)[:, dofs]

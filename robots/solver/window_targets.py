@@ -35,9 +35,9 @@ class PoseTargets:
 
 
 @dataclass(frozen=True, eq=False)
-class FootTargets:
-    """The footholds of the soles' points: `positions` [m, world], and by axis the share of the
-    weight with which they are held there (`holds`, 0 to 1)."""
+class PointTargets:
+    """Where points are held: `positions` [m, world], and by axis the share of the weight of a
+    standing foot's with which they are (`holds`)."""
 
     positions: Float[np.ndarray, "T P 3"]
     holds: Float[np.ndarray, "T P 3"]

@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Int
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
 from robots.solver.block import blocks_of
-from robots.solver.floor import carried_solids, solids_over_floor
+from robots.solver.floor import Solid, carried_solids, solids_over_floor
 from robots.solver.hinges import Hinges, Posture
 from robots.solver.weights import (
     FLOOR_ROUNDING,
@@ -31,7 +31,7 @@ from robots.solver.weights import (
 )
 from robots.solver.window_collision import WindowCollisions, WindowPoses
 from robots.solver.window_floor import WindowFloor
-from robots.solver.window_targets import FootTargets, PoseTargets
+from robots.solver.window_targets import PointTargets, PoseTargets
 from robots.tree import BASE
 from spark.rig.roles import Role
 
@@ -43,12 +43,19 @@ LinearTerms = tuple[
 
 class Terms:
     """The residuals of a robot's poses, as normal equations. `bones` are the limbs' segments whose
-    directions the source gives, `hands` says whether it gives the offset between both. With
-    `later_only`, base, trunk and legs are given: what collides or sinks of these is not looked at.
-    `mj_dofs` are MuJoCo's numbers of the dofs."""
+    directions the source gives, `hands` says whether it gives the offset between both, and `parts`
+    are points, in the rest pose [m], of links that may be held. With `later_only`, base, trunk and
+    legs are given: what collides or sinks of these is not looked at. `mj_dofs` are MuJoCo's numbers
+    of the dofs."""
 
     def __init__(
-        self, robot: Morphology, bones: Sequence[Role], hands: bool, *, later_only: bool = False
+        self,
+        robot: Morphology,
+        bones: Sequence[Role],
+        hands: bool,
+        parts: Sequence[tuple[int, Float[np.ndarray, "3"]]] = (),
+        *,
+        later_only: bool = False,
     ) -> None:
         self.robot, tree = robot, robot.tree
         self._model = robot.mjcf.model
@@ -79,7 +86,7 @@ class Terms:
         self._floor = WindowFloor((*solids, *carried), bodies[links], moving, self._rest)
         self._index_rotations()
         self._index_bones(bones)
-        self._index_points(hands)
+        self._index_points(hands, parts)
 
     def poses(self, q: Float[np.ndarray, "T nq"]) -> WindowPoses:
         """The poses of all bodies and joints, by MuJoCo."""
@@ -95,11 +102,21 @@ class Terms:
 
     def sole_points(self, poses: WindowPoses) -> Float[np.ndarray, "T P 3"]:
         """The points of the soles [m, world]."""
-        return self._points(poses)[:, : self.sole_count]
+        return self._points(poses, slice(self.sole_count))
+
+    def part_points(self, poses: WindowPoses) -> Float[np.ndarray, "T K 3"]:
+        """The points of the parts that may be held [m, world]."""
+        return self._points(poses, slice(self._before_parts, None))
 
     def bones(self, poses: WindowPoses) -> Float[np.ndarray, "T B 3"]:
         """The unit directions of the bones [world]."""
         return (poses.rotations[:, self._bone_bodies] @ self._bones[:, :, None])[..., 0]
+
+    def under(self, solids: Sequence[Solid]) -> WindowFloor:
+        """The floor under some shapes."""
+        links = [solid.link for solid in solids]
+        bodies = np.array([self._body(link) for link in links], dtype=int)
+        return WindowFloor(tuple(solids), bodies, self._mask(links), self._rest)
 
     def sinking(self, poses: WindowPoses) -> Float[np.ndarray, "T"]:
         """How deep [m] the deepest point is in the floor; below 0 over it."""
@@ -117,14 +134,15 @@ class Terms:
         q: Float[np.ndarray, "T nq"],
         poses: WindowPoses,
         targets: PoseTargets,
-        foot_targets: FootTargets,
+        foot_targets: PointTargets,
         posture: Posture,
         candidates: Int[np.ndarray, "K"],
         floor_scale: Float[np.ndarray, "T"] | None = None,
+        resting: PointTargets | None = None,
     ) -> tuple[Float[np.ndarray, "T D D"], Float[np.ndarray, "T D"]]:
         """H and g of the normal equations `H step = -g`, each frame for itself. `poses` are those
         of `q`, `candidates` those of poses near these; `floor_scale` multiplies the weight of
-        the floor."""
+        the floor, `resting` says where parts are held."""
         floor_scale = np.ones(len(q)) if floor_scale is None else floor_scale
         axes, anchors = self._dof_axes(poses)
         # Parts that should be turned some way: an axial vector each
@@ -142,7 +160,7 @@ class Terms:
         H = self._rotation_gram * (axes @ axes.transpose(0, 2, 1))
         g = 0.5 * (axes * (self._rotation_weights @ axial)).sum(2)
         J, weights, forces = self._linear_terms(
-            poses, axes, anchors, targets, foot_targets, floor_scale
+            poses, axes, anchors, targets, foot_targets, floor_scale, resting
         )
         J_rows = J.reshape(len(q), -1, J.shape[3])
         across = J_rows.transpose(0, 2, 1)
@@ -168,9 +186,10 @@ class Terms:
             axes[:, at : at + 3] = poses.rotations[:, self._body(link)].transpose(0, 2, 1)
         return axes, anchors
 
-    def _points(self, poses: WindowPoses) -> Float[np.ndarray, "T P 3"]:
-        rotations = poses.rotations[:, self._point_bodies]
-        return (rotations @ self._arms[:, :, None])[..., 0] + poses.positions[:, self._point_bodies]
+    def _points(self, poses: WindowPoses, which: slice) -> Float[np.ndarray, "T P 3"]:
+        bodies = self._point_bodies[which]
+        arms = (poses.rotations[:, bodies] @ self._arms[which, :, None])[..., 0]
+        return arms + poses.positions[:, bodies]
 
     def _linear_terms(
         self,
@@ -178,11 +197,12 @@ class Terms:
         axes: Float[np.ndarray, "T D 3"],
         anchors: Float[np.ndarray, "T D 3"],
         targets: PoseTargets,
-        foot_targets: FootTargets,
+        foot_targets: PointTargets,
         floor_scale: Float[np.ndarray, "T"],
+        resting: PointTargets | None,
     ) -> LinearTerms:
         """The residuals of directions and points, as `robots.residuals` has them."""
-        points = self._points(poses)
+        points = self._points(poses, slice(None if resting else self._before_parts))
         bones = self.bones(poses)
         (count, B, _), P, D = bones.shape, points.shape[1], axes.shape[1]
         arms = np.empty((3, count, B + P, D))
@@ -195,7 +215,7 @@ class Terms:
         np.subtract(az * x, ax * z, out=J[:, :, 1])
         np.subtract(ax * y, ay * x, out=J[:, :, 2])
         J[:, B:, :, :3] = np.eye(3)
-        J *= self._dof_mask
+        J *= self._dof_mask[: B + P]
         weights, forces = np.empty((2, count, B + P, 3))
         weights[:, :B] = W_LIMB_DIRECTION**2
         forces[:, :B] = W_LIMB_DIRECTION**2 * (bones - targets.bones)
@@ -212,12 +232,16 @@ class Terms:
             left, right = hips + 1 - B, hips + 2 - B
             between = points[:, left] - points[:, right] - targets.hands
             forces[:, hips + 1], forces[:, hips + 2] = weight * between, 0.0
+        if resting:
+            parts, own = slice(B + self._before_parts, None), points[:, self._before_parts :]
+            weights[:, parts] = (W_HOLD * resting.holds) ** 2
+            forces[:, parts] = weights[:, parts] * (own - resting.positions)
         return J, weights, forces
 
     def _add_soles(
         self,
         points: Float[np.ndarray, "T P 3"],
-        foot_targets: FootTargets,
+        foot_targets: PointTargets,
         floor_scale: Float[np.ndarray, "T"],
         weights: Float[np.ndarray, "T P 3"],
         forces: Float[np.ndarray, "T P 3"],
@@ -275,9 +299,11 @@ class Terms:
         along = np.array([robot.bones[role] for role in bones]).reshape(-1, 3)
         self._bones = np.einsum("bji,bj->bi", self._rest[0][self._bone_bodies], along)
 
-    def _index_points(self, hands: bool) -> None:
-        """The soles' points, the middle of the hips, and both wrists where asked; the dofs that
-        move these and the bones."""
+    def _index_points(
+        self, hands: bool, parts: Sequence[tuple[int, Float[np.ndarray, "3"]]]
+    ) -> None:
+        """The soles' points, the middle of the hips, both wrists where asked, and the parts that
+        may be held; the dofs that move these and the bones."""
         robot = self.robot
         soles = [robot.sole_points(sole) for sole in robot.soles]
         links = [link for own, _ in soles for link in own.tolist()]
@@ -291,6 +317,9 @@ class Terms:
                 j = robot.rig.roles.require(role)
                 links.append(int(robot.links[j]))
                 rest.append(robot.centers[j])
+        self._before_parts = len(links)
+        links += [link for link, _ in parts]
+        rest += [point for _, point in parts]
         self._point_bodies = np.array([self._body(link) for link in links])
         rotations, positions = (part[self._point_bodies] for part in self._rest)
         self._arms = np.einsum("pji,pj->pi", rotations, np.array(rest) - positions)

@@ -24,7 +24,7 @@ from robots.solver.foot_path import (
     step_height,
 )
 from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
-from robots.solver.window_targets import FootTargets
+from robots.solver.window_targets import PointTargets
 from robots.stream.footprint import Footprint
 from robots.stream.frame_targets import FrameReader, FrameTargets
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
@@ -81,7 +81,7 @@ class ContactTracker:
         self._uneven = MAX_UNEVEN * self._robot.rig.hip_height
         self._footprints = [Footprint() for _ in range(soles)]
 
-    def update(self, targets: FrameTargets, points: Float[np.ndarray, "P 3"]) -> FootTargets:
+    def update(self, targets: FrameTargets, points: Float[np.ndarray, "P 3"]) -> PointTargets:
         """Takes in the newest frame, and says how the feet stand in those since `ahead` before it;
         the points of the robot's soles are at `points` in the first of these. How they stand in
         that one is settled then; of the later ones it is what can be seen so far."""
@@ -185,7 +185,7 @@ class ContactTracker:
                 complex(moved[s, point]), float(turned[s]), float(holds[s].max()), self._wobble
             )
 
-    def _targets(self, pitched: Float[np.ndarray, "T P 3"], seen: Sequence[_Seen]) -> FootTargets:
+    def _targets(self, pitched: Float[np.ndarray, "T P 3"], seen: Sequence[_Seen]) -> PointTargets:
         """Where the soles' points are held, and how firmly."""
         feet = (np.array(part) for part in zip(*seen, strict=True))
         holds, height, step, known, pivot, heading = (part[:, self._sole] for part in feet)
@@ -205,7 +205,7 @@ class ContactTracker:
         shares[..., :2] = (known * np.maximum(held, RAISED_HOLD[0] * most))[..., None]
         near = near_floor(height / self._robot.rig.hip_height)
         shares[..., 2] = held + (1 - held) * near * SWING_HOLD[2]
-        return FootTargets(positions, shares)
+        return PointTargets(positions, shares)
 
     def _index_points(self) -> None:
         """Of all points of the soles: which sole's they are, where on the floor from the middle of

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from robots.model.morphology import Morphology
-from robots.solver.contacts import has_feet
+from robots.solver.contacts import MAY_TOUCH, has_feet, touching_joint
 from robots.solver.targets import (
     LIMB_SEGMENTS,
     TPOSE_DIRECTIONS,
@@ -17,6 +17,7 @@ from robots.solver.targets import (
     palm_thickness,
     source_feet,
 )
+from robots.solver.touching import touches_of
 from robots.solver.trunk import bends, leaning
 from robots.solver.window_targets import PoseTargets
 from robots.stream.source_poses import SourcePoses
@@ -60,13 +61,15 @@ class FrameTargets(PoseTargets):
     `feet` are the source's heel and toe of each of the robot's soles [m, the source's own world],
     `clearance` is how high its soles are, scaled, and `pitched` where the points of the robot's
     would be: from the middle of its toes along the foot and to its left, and above the lowest of
-    them [m].
+    them [m]. `parts` are its joints that may touch the ground, in the order of `FrameReader.parts`
+    [m, the source's own world].
     """
 
     com: Float[np.ndarray, "*T 3"]
     feet: Float[np.ndarray, "*T S 2 3"]
     clearance: Float[np.ndarray, "*T S"]
     pitched: Float[np.ndarray, "*T P 3"]
+    parts: Float[np.ndarray, "*T K 3"]
 
 
 def raised(targets: FrameTargets, by: float) -> FrameTargets:
@@ -102,6 +105,13 @@ def ground_of(source: CanonicalMotion, robot: Morphology) -> Ground:
     return Ground(source.floor_z, low)
 
 
+def parts_of(source: Rig, robot: Morphology) -> tuple[list[Role], Int[np.ndarray, "K"]]:
+    """The parts of both that may touch the ground, and the source's joints of them."""
+    found = {role: touching_joint(source, role) for role in MAY_TOUCH if role in touches_of(robot)}
+    joints = {role: joint for role, joint in found.items() if joint is not None}
+    return list(joints), np.array(list(joints.values()), dtype=int)
+
+
 class FrameReader:
     """Turns frames of motions on one rig into targets for one robot."""
 
@@ -122,6 +132,7 @@ class FrameReader:
         self._index_feet()
         self._index_bones()
         self._index_hands()
+        self.parts, self._part_joints = parts_of(source, robot)
 
     def targets(self, frame: Frame) -> FrameTargets:
         """The targets that a frame sets for the robot.
@@ -153,6 +164,7 @@ class FrameReader:
             feet=self._feet(world, joints),
             clearance=self._clearance(world, joints),
             pitched=self._pitched(own_world),
+            parts=joints[self._part_joints],
         )
 
     def _world(self, frame: Frame) -> tuple[Float[np.ndarray, "N 3 3"], Float[np.ndarray, "N 3"]]:

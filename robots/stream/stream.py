@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from robots.model.morphology import Morphology
 from robots.solver.projection import project
-from robots.solver.window_targets import FootTargets
+from robots.solver.window_targets import PointTargets
 from robots.solver.window_terms import Terms
 from robots.stream.detour import Detours
 from robots.stream.footing import ContactTracker
@@ -24,6 +24,7 @@ from robots.stream.frame_targets import (
     raised,
     repeated,
 )
+from robots.stream.resting import RestTracker, held_points
 from robots.stream.throw import Throw
 from robots.stream.window import Window
 from spark.errors import FrameError
@@ -45,7 +46,8 @@ class Stream:
     def __init__(self, source: Rig, robot: Morphology, frame_time: float, ground: Ground) -> None:
         self.robot, self.frame_time = robot, frame_time
         self._reader = FrameReader(source, robot, ground)
-        self._terms = Terms(robot, self._reader.bones, self._reader.hands is not None)
+        parts = held_points(robot, self._reader.parts)
+        self._terms = Terms(robot, self._reader.bones, self._reader.hands is not None, parts)
         self._window = Window(robot, self._terms, frame_time, fixed=_FIXED, free=LATENCY + 1)
         self._throw = Throw(self._reader.scale, source.hip_height, frame_time)
         self._targets: FrameTargets  # of the window's free frames
@@ -58,6 +60,7 @@ class Stream:
         self._throw.reset()
         self._q = np.zeros((_FRAMES, self.robot.mjcf.model.nq))
         self._contacts = ContactTracker(self._reader, self.frame_time, LATENCY)
+        self._rests = RestTracker(self._reader, self._terms, self.frame_time, LATENCY)
         self._detours = Detours(self._reader, self._terms, self.frame_time)
 
     def step(self, frame: Frame) -> Float[np.ndarray, "nq"]:
@@ -78,9 +81,10 @@ class Stream:
             poses = self._terms.poses(q[_FIXED:])
             next_said = poses.at(slice(1))
             foot_targets = self._contacts.update(targets, self._terms.sole_points(next_said)[0])
+            resting = self._rests.update(targets, next_said)
             bones, angles = self._terms.bones(next_said)[0], self._terms.hinges.angles(q)[_FIXED]
             posture = self._detours.update(self._targets, bones, angles)
-            self._q = self._window.solve(q, poses, self._targets, foot_targets, posture)
+            self._q = self._window.solve(q, poses, self._targets, foot_targets, resting, posture)
         else:
             self._targets = repeated(targets, LATENCY + 1)
             self._q = self._first(targets)
@@ -88,17 +92,18 @@ class Stream:
         return self._q[_FIXED].copy()
 
     def _first(self, targets: FrameTargets) -> Float[np.ndarray, "W nq"]:
-        """A pose at rest: first as it comes, then with the feet that stand where they are in it."""
+        """A pose at rest: first as it comes, then with what stands or lies where it is in it."""
         robot = self.robot
         projected = project(robot, quat_from_matrix(targets.world)[None], targets.hips[None])
         q = robot.to_qpos(projected)[np.zeros(_FRAMES, dtype=int)]
         points = sum(map(len, robot.soles))
-        foot_targets = FootTargets(*np.zeros((2, LATENCY + 1, points, 3)))
+        foot_targets = PointTargets(*np.zeros((2, LATENCY + 1, points, 3)))
+        resting = None
         for held in (False, True):
             if held:
-                foot_targets = self._contacts.update(
-                    targets, self._terms.sole_points(self._terms.poses(q))[0]
-                )
-            q = self._window.settle(q, self._targets, foot_targets, _FIRST_ITERATIONS)
+                poses = self._terms.poses(q[-1:])
+                foot_targets = self._contacts.update(targets, self._terms.sole_points(poses)[0])
+                resting = self._rests.update(targets, poses)
+            q = self._window.settle(q, self._targets, foot_targets, resting, _FIRST_ITERATIONS)
             q[:] = q[-1]
         return q

@@ -9,7 +9,7 @@ from robots.model.morphology import Morphology
 from robots.solver.hinges import Posture
 from robots.solver.repair import MAX_SINKING
 from robots.solver.window_collision import WindowPoses
-from robots.solver.window_targets import FootTargets
+from robots.solver.window_targets import PointTargets
 from robots.solver.window_terms import Terms
 from robots.stream.coupling import Coupling
 from robots.stream.firmness import MAX_OVERSPEED, Firmness
@@ -52,7 +52,8 @@ class Window:
         q: Float[np.ndarray, "T nq"],
         poses: WindowPoses,
         targets: FrameTargets,
-        foot_targets: FootTargets,
+        foot_targets: PointTargets,
+        resting: PointTargets | None,
         posture: Posture,
     ) -> Float[np.ndarray, "T nq"]:
         """`q` after at most `_MAX_ITER` steps of its free frames, which have these targets, and
@@ -67,7 +68,7 @@ class Window:
         for k in range(_MAX_ITER):
             if k:
                 poses = self._terms.poses(q[-self._free :])
-            q, length = self._step(q, poses, targets, foot_targets, posture, candidates)
+            q, length = self._step(q, poses, targets, foot_targets, resting, posture, candidates)
             if length < _STEP_TOL:
                 break
         self._motion.next()
@@ -77,7 +78,8 @@ class Window:
         self,
         q: Float[np.ndarray, "T nq"],
         targets: FrameTargets,
-        foot_targets: FootTargets,
+        foot_targets: PointTargets,
+        resting: PointTargets | None,
         steps: int,
     ) -> Float[np.ndarray, "T nq"]:
         """`q` with its free frames after some steps, each frame for itself."""
@@ -89,6 +91,7 @@ class Window:
                 poses,
                 targets,
                 foot_targets,
+                resting,
                 self._terms.hinges.at_tpose,
                 candidates,
                 lone_damping=_LONE_DAMPING,
@@ -100,7 +103,8 @@ class Window:
         q: Float[np.ndarray, "T nq"],
         poses: WindowPoses,
         targets: FrameTargets,
-        foot_targets: FootTargets,
+        foot_targets: PointTargets,
+        resting: PointTargets | None,
         posture: Posture,
         candidates: Int[np.ndarray, "K"],
         *,
@@ -111,7 +115,7 @@ class Window:
         model, free = self._model, self._free
         scale = self._firmness.scale
         H, g = self._terms.linearize(
-            q[-free:], poses, targets, foot_targets, posture, candidates, scale
+            q[-free:], poses, targets, foot_targets, posture, candidates, scale, resting
         )
         D = g.shape[1]
         whole = np.zeros((free * D, free * D))

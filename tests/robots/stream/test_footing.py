@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from robots.model.known import known
-from robots.solver.window_targets import FootTargets
+from robots.solver.window_targets import PointTargets
 from robots.stream.footing import ContactTracker
 from robots.stream.frame_targets import LATENCY, Frame, FrameReader, FrameTargets, ground_of
 from spark.demo.sample import sample_motion, sample_rig
@@ -27,7 +27,7 @@ def standing() -> FrameTargets:
     return replace(own, feet=feet, clearance=np.zeros(2), pitched=own.pitched * [1, 1, 0])
 
 
-def after(heel_speed: float, heel_height: float) -> FootTargets:
+def after(heel_speed: float, heel_height: float) -> PointTargets:
     """A foot that stood, and of which the heel has so far moved for a fifth of a second: so fast
     [m/s] to the side, so high [m] over the toes."""
     tracker, begun = ContactTracker(READER, FRAME_TIME, LATENCY), standing()

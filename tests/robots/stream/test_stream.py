@@ -16,13 +16,14 @@ from robots.solver.collision import collisions_of
 from robots.solver.floor import solids_over_floor
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import plan_feet, points_of
-from robots.solver.holds import joined
+from robots.solver.holds import Holds, joined
 from robots.solver.objective import linearize
 from robots.solver.projection import project
 from robots.solver.targets import bone_directions, targets_of
-from robots.solver.window_targets import FootTargets, pose_targets
+from robots.solver.window_targets import PointTargets, pose_targets
 from robots.solver.window_terms import Terms
 from robots.stream.frame_targets import LATENCY, Frame, FrameReader, ground_of
+from robots.stream.resting import held_points
 from robots.stream.stream import Stream
 from robots.tree import forward_kinematics
 from scripts.robot_bars import follow
@@ -98,7 +99,11 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     q = q.integrated(tree, rng.normal(size=(4, tree.nv)) * 0.05).clipped(tree, 0.02)
     q.pos[:, 2] -= 0.1  # shins in the floor, and one hand
     reader = FrameReader(RIG, EMBER, ground_of(source, EMBER))
-    terms = Terms(EMBER, reader.bones, hands=True)
+    parts = held_points(EMBER, reader.parts)
+    terms = Terms(EMBER, reader.bones, True, parts)
+    links, places = (np.array(part) for part in zip(*parts, strict=True))
+    laid = Holds(links, places, *rng.uniform(0.0, 1.0, (2, len(parts), 3, 4)))
+    both = joined([holds, laid])
 
     def near(block: Block) -> list[Candidate]:
         return collisions_of(EMBER).candidates(forward_kinematics(tree, q), block, 1)
@@ -108,18 +113,19 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     body_axes = matrix_from_quat(EMBER.to_qpos(q)[:, 3:7])
     for t in range(4):
         one = slice(t, t + 1)
-        foot_targets = FootTargets(holds.positions[None, ..., t], holds.shares[None, ..., t])
+        foot_targets = PointTargets(holds.positions[None, ..., t], holds.shares[None, ..., t])
         here = pose_targets(targets.at(np.array([t])), reader.bones)
         qpos = EMBER.to_qpos(q.at(one))
         poses = terms.poses(qpos)
-        H, g = terms.linearize(
-            qpos, poses, here, foot_targets, terms.hinges.at_tpose, terms.candidates(poses)
-        )
+        resting = PointTargets(laid.positions[None, ..., t], laid.shares[None, ..., t])
+        candidates = terms.candidates(poses)
+        posture, firm = terms.hinges.at_tpose, np.ones(1)
+        H, g = terms.linearize(qpos, poses, here, foot_targets, posture, candidates, firm, resting)
         turn = np.eye(tree.nv)
         turn[3:6, 3:6] = body_axes[t]
         H, g = turn @ H[0] @ turn.T, turn @ g[0]
         for block in blocks_of(EMBER):
-            wanted = linearize(EMBER, targets, holds, q, block, near(block))
+            wanted = linearize(EMBER, targets, both, q, block, near(block))
             at = np.ix_(block.dofs, block.dofs)
             np.testing.assert_allclose(g[block.dofs], wanted.g[t], atol=1e-8)
             np.testing.assert_allclose(H[at], wanted.H[t], atol=1e-7)
@@ -228,6 +234,16 @@ def test_hands_and_knees_of_one_who_crawls_are_not_in_the_floor() -> None:
         for solid in solids_over_floor(EMBER)
     ]
     assert min(lowest) > -0.015
+
+
+def test_what_lies_on_the_ground_carries() -> None:
+    """Hands, knees and trunk are let down to the floor: held up by nothing but the feet, as in a
+    third of the frames else, the body would be pushed by what nothing gives."""
+    motion = read_recording(recording("deepmimic/deepmimic_getup_facedown.bvh")).motion
+    source = to_canonical(motion, understand(motion))
+    found = measure(motion, source.rig, follow(source, EMBER))
+    assert found.root_wrench < 0.1
+    assert found.implausible < 0.15
 
 
 def test_hands_that_hang_beside_a_wide_trunk_are_not_in_it() -> None:
