@@ -5,6 +5,7 @@ this alone leaves gaps in which a walk would hang in the air; there the slowest 
 stands, unless the whole body falls freely or lies on something else.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,9 +74,10 @@ def schedule(
     source: CanonicalMotion,
     positions: Float[np.ndarray, "T J 3"],
     paths: Float[np.ndarray, "T S 2 3"],
+    sides: Sequence[str],
 ) -> Schedule:
-    """Of a source whose joints are at `positions` and heels and toes at `paths` [m, world]; feet
-    that it does not have are 0 all over."""
+    """Of a source whose joints are at `positions` and heels and toes at `paths` [m, world], of the
+    feet of some `sides`; feet that it does not have are 0 all over."""
     rig, frame_time = source.rig, source.frame_time
     mass = human_mass(rig, positions, quat_mul(source.rotations, rig.tpose))
     acceleration = derivative(mass.com, frame_time, 2, _WINDOW)
@@ -91,7 +93,8 @@ def schedule(
     floating = _nothing_holds(feet, parts)
     floating[flight] = False
     feet[floating] |= _creeping(source, paths, exist)[floating]
-    return Schedule(_steady(feet, frame_time), parts, rests, roles, flight, acceleration)
+    feet = _steady(feet, frame_time) & ~_kneeling(parts, roles, sides)[:, :, None]
+    return Schedule(feet, parts, rests, roles, flight, acceleration)
 
 
 def has_feet(paths: Float[np.ndarray, "T S 2 3"]) -> Bool[np.ndarray, "S"]:
@@ -139,6 +142,17 @@ def _nothing_holds(
 ) -> Bool[np.ndarray, "T"]:
     touching = np.concatenate([feet.reshape(len(feet), -1), parts], axis=1)
     return touching.sum(axis=1) == 0
+
+
+def _kneeling(
+    parts: Bool[np.ndarray, "T B"], roles: Sequence[Role], sides: Sequence[str]
+) -> Bool[np.ndarray, "T S"]:
+    """On which sides the knee is on the ground: the foot behind it lies, and carries nothing."""
+    out = np.zeros((len(parts), len(sides)), dtype=bool)
+    for s, side in enumerate(sides):
+        knees = [k for k, role in enumerate(roles) if role is Role(f"{side}_lower_leg")]
+        out[:, s] = parts[:, knees].any(axis=1)
+    return out
 
 
 def _touching_parts(

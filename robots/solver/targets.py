@@ -106,7 +106,7 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
     own_chest = robot.rig.chest
     paths = source_feet(source, positions, robot)
     scale = robot.rig.hip_height / rig.hip_height
-    touches = schedule(source, positions, paths)
+    touches = schedule(source, positions, paths, [sole.side for sole in robot.soles])
     return Targets(
         frame_time=source.frame_time,
         world=world,

@@ -38,7 +38,7 @@ def standing(moves: np.ndarray, frame_time: float = FRAME_TIME) -> np.ndarray:
     places = np.zeros((2, 2, 3))
     places[:, 1, 0] = 0.2
     places[0, :, 1], places[1, :, 1] = 0.1, -0.1
-    return schedule(source, canonical_positions(source), places + moves).feet
+    return schedule(source, canonical_positions(source), places + moves, ("left", "right")).feet
 
 
 def stands(path: np.ndarray, frame_time: float = FRAME_TIME) -> np.ndarray:

@@ -82,6 +82,11 @@ def test_hands_and_knees_of_the_source_are_seen_to_rest(ember: Morphology) -> No
     assert not {Role.HEAD, Role.PELVIS, Role.SPINE} & resting
 
 
+def test_feet_behind_knees_on_the_ground_do_not_stand(ember: Morphology) -> None:
+    """Though they lie as low as they ever come, and are still."""
+    assert not targets_of(on_all_fours(), ember).contacts.any()
+
+
 def test_all_fours_of_a_robot_with_other_limbs_lie_on_the_ground(ember: Morphology) -> None:
     source = on_all_fours()
     copied = heights(copy(source, ember), (*KNEES, *HANDS))
