@@ -27,7 +27,7 @@ COLLISION_PERIOD = 5  # steps from one search for collision candidates to the ne
 _COLLISION_INTERVAL = 0.06  # [s] between the frames that are searched
 MAX_STEP = 1.0  # [rad, m] of a dof in one step
 MIN_DAMPING = 1e-3  # [1] on the diagonal of the normal equations
-_REJECTED_DAMPING = 0.1  # at least, where a step was rejected
+REJECTED_DAMPING = 0.1  # at least, where a step was rejected
 
 
 def collision_stride(targets: Targets) -> int:
@@ -126,7 +126,7 @@ def solve_block(
             after, rejected = judged(trial, trial_normal)
         if not (is_last or trial_normal.with_jacobian):
             trial_normal = linearize_at(trial)
-        damping = np.where(rejected, np.maximum(damping * 10, _REJECTED_DAMPING), damping / 10)
+        damping = np.where(rejected, np.maximum(damping * 10, REJECTED_DAMPING), damping / 10)
         damping = np.maximum(damping, MIN_DAMPING)
         if rejected.any():
             share = smooth_lower_envelope(1.0 - rejected, window)

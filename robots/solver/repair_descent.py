@@ -14,6 +14,7 @@ from robots.solver.descent import (
     COLLISION_PERIOD,
     MAX_STEP,
     MIN_DAMPING,
+    REJECTED_DAMPING,
     WINDOW,
     smooth_lower_envelope,
 )
@@ -26,7 +27,6 @@ from robots.solver.targets import Targets
 from robots.tree import Coordinates, forward_kinematics
 
 _MAX_ITER, _REL_TOL = 12, 0.01  # steps; of the cost that a step gains, below which it is the last
-_MAX_HALVINGS = 6  # of a step
 _MAX_SOLVES = 4  # for which hinges stay at their limits, of a step
 _FIXED_DAMPING = 1e8  # where a frame must stay
 
@@ -98,8 +98,9 @@ class Repair:
 def solve_spells(broken: Repair) -> Coordinates:
     """Gauss-Newton steps in the block's dofs, all spells in one go, as each alone would take them.
 
-    A step is judged over a whole spell, and halved there until the cost falls. A spell ends where
-    a step gains too little, or nothing at any length.
+    A step is judged over a whole spell. Where it is rejected, damping grows (Levenberg and
+    Marquardt's rule): near a firm wall a shorter step the same way is one into the wall, too. A
+    spell ends where a step gains too little.
     """
     tree, dofs = broken.robot.tree, broken.block.dofs
     window = max(1, 2 * round(WINDOW / broken.targets.frame_time) + 1)
@@ -107,13 +108,13 @@ def solve_spells(broken: Repair) -> Coordinates:
     q = broken.start
     candidates = broken.candidates(q)
     normal = broken.linearize(q, candidates, True)
+    damping = np.where(broken.fixed, _FIXED_DAMPING, MIN_DAMPING)
     stiffening = np.ones((len(q), len(dofs)))
     for k in range(_MAX_ITER):
         spells, of_frames = broken.spells, broken.spells.of_frames
         stiffening = np.maximum(stiffening, broken.stiffening(q))
         coupling = broken.smoothness(q, stiffening, True)
         cost = spells.total(normal.cost + coupling.cost(len(q)))
-        damping = np.where(broken.fixed, _FIXED_DAMPING, MIN_DAMPING)
         limits = q.at_limits(tree, LIMIT_CLEARANCE)[:, dofs]
         step = np.zeros((len(q), tree.nv))
         step[:, dofs] = normal.solve_coupled(coupling, damping, limits, solves=_MAX_SOLVES)
@@ -122,9 +123,18 @@ def solve_spells(broken: Repair) -> Coordinates:
         trial = q.integrated(tree, step).clipped(tree, LIMIT_CLEARANCE)
         if k % COLLISION_PERIOD == COLLISION_PERIOD - 1:
             candidates = broken.candidates(trial)
-        tried = broken, q, normal, step, candidates, stiffening, cost
-        q, normal, after = _halved(*tried, with_jacobian=k < _MAX_ITER - 1)
-        going = cost - after >= _REL_TOL * cost
+        trial_normal = broken.linearize(trial, candidates, k < _MAX_ITER - 1)
+        coupled = broken.smoothness(trial, stiffening, False).cost(len(q))
+        after = spells.total(trial_normal.cost + coupled)
+        rejected = after > cost
+        taken = ~rejected[of_frames]
+        at = np.flatnonzero(taken)
+        q = q.replaced(at, trial.at(at))
+        if trial_normal.with_jacobian:
+            normal = normal.replaced(at, trial_normal.at(at))
+        damping = np.where(taken, damping / 10, np.maximum(damping * 10, REJECTED_DAMPING))
+        damping = np.maximum(damping, np.where(broken.fixed, _FIXED_DAMPING, MIN_DAMPING))
+        going = rejected | (cost - after > _REL_TOL * cost)
         if going.all():
             continue
         solved = solved.replaced(frames, q)
@@ -133,39 +143,5 @@ def solve_spells(broken: Repair) -> Coordinates:
         candidates = among(candidates, going[of_frames])
         kept = np.flatnonzero(going[of_frames])
         broken, q, normal, frames = broken.only(going), q.at(kept), normal.at(kept), frames[kept]
-        stiffening = stiffening[kept]
+        damping, stiffening = damping[kept], stiffening[kept]
     return solved.replaced(frames, q)
-
-
-def _halved(
-    broken: Repair,
-    q: Coordinates,
-    normal: NormalEquations,
-    step: Float[np.ndarray, "T nv"],
-    candidates: list[Candidate],
-    stiffening: Float[np.ndarray, "T D"],
-    cost: Float[np.ndarray, "S"],
-    *,
-    with_jacobian: bool,
-) -> tuple[Coordinates, NormalEquations, Float[np.ndarray, "S"]]:
-    """The step from `q` taken in each spell, halved there until the `cost` falls: coordinates,
-    normal equations and cost, as they were in the spells that reject it at every length."""
-    tree, spells = broken.robot.tree, broken.spells
-    solved, after, trying = q, cost.copy(), np.ones(len(spells), dtype=bool)
-    for k in range(_MAX_HALVINGS):
-        tried = trying[spells.of_frames]
-        part, frames = broken.only(trying), np.flatnonzero(tried)
-        trial = q.at(frames).integrated(tree, step[frames] / 2**k).clipped(tree, LIMIT_CLEARANCE)
-        trial_normal = part.linearize(trial, among(candidates, tried), with_jacobian)
-        coupled = part.smoothness(trial, stiffening[frames], False).cost(len(frames))
-        trial_cost = part.spells.total(trial_normal.cost + coupled)
-        falls = trial_cost <= cost[trying]
-        taken = np.flatnonzero(falls[part.spells.of_frames])
-        solved = solved.replaced(frames[taken], trial.at(taken))
-        if with_jacobian:
-            normal = normal.replaced(frames[taken], trial_normal.at(taken))
-        fallen = np.flatnonzero(trying)[falls]
-        after[fallen], trying[fallen] = trial_cost[falls], False
-        if not trying.any():
-            break
-    return solved, normal, after

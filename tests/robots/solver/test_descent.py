@@ -1,4 +1,5 @@
-"""Gauss-Newton steps that are too long: halved where they are, and only there."""
+"""Gauss-Newton steps that are too long: halved where they are, and only there; damped in repairs,
+where walls are firm."""
 
 import numpy as np
 import pytest
@@ -7,8 +8,11 @@ from robots.model.morphology import Morphology
 from robots.registry import find
 from robots.solver.block import blocks_of
 from robots.solver.descent import solve_block
+from robots.solver.footprints import points_of
 from robots.solver.holds import Holds
 from robots.solver.objective import linearize
+from robots.solver.repair_descent import Repair, solve_spells
+from robots.solver.spells import Spells
 from robots.solver.targets import targets_of
 from robots.tree import Coordinates, forward_kinematics
 from spark.demo.sample import sample_rig
@@ -67,3 +71,21 @@ def test_whoever_hovers_comes_down_though_the_first_step_ends_deep_in_the_floor(
     after = linearize(ember, targets, holds, q, block, [], with_jacobian=False).cost
     assert after[HOVERING].mean() < 0.5 * before[HOVERING].mean()
     assert (q.pos[90:, 2] < start.pos[90:, 2] - 0.04).all()
+
+
+@pytest.mark.parametrize("above", [0.07, 0.03])  # [m] the floor
+def test_a_repair_comes_down_to_a_floor_that_is_as_firm_as_it_gets(
+    ember: Morphology, above: float
+) -> None:
+    block, firm = blocks_of(ember)[0], np.full(COUNT, 729.0)
+    hovering = raised(ember)
+    holds = drawn_down(ember, hovering)
+    up = np.array([0.0, 0.0, above - 0.05])
+    start = Coordinates(hovering.pos + up, hovering.quat, hovering.angles)
+    spells, free = Spells(np.array([COUNT])), np.zeros(COUNT, dtype=bool)
+    targets = targets_of(standing(), ember)
+    broken = Repair(ember, block, spells, targets, holds, start, firm, free)
+    poses = forward_kinematics(ember.tree, solve_spells(broken))
+    lowest = np.min([points_of(ember, poses, sole)[:, 2].min(0) for sole in ember.soles], axis=0)
+    assert lowest.min() > -0.001
+    assert lowest[90:].max() < 0.02
