@@ -9,11 +9,10 @@ trunk lays it, and a head where its neck does.
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool
 
 from robots.model.morphology import Morphology
 from robots.solver.holds import Holds, joined
-from robots.solver.settling import around, settled
+from robots.solver.settling import around, led, settled
 from robots.solver.targets import Targets
 from robots.solver.touching import Touch, touches_of
 from robots.tree import Coordinates, LinkPoses, forward_kinematics
@@ -26,7 +25,8 @@ _ON_TRUNK = ("upper_arm", "head")
 CARRIED_HOLD = 0.45  # and of that the shoulder over an arm that touches
 MAX_ROLL = 0.1  # hip heights that the joint of a part that rests may roll over it
 SETTLE = 0.12  # [s] before and after a rest in which a part already stays, ever less
-APPROACH = 0.3  # [s] before and after a touch in which a part is led to the ground and away
+# [s] before and after a touch or a rest in which a part is led there and away
+APPROACH = 0.3
 
 
 def resting(robot: Morphology, targets: Targets, q: Coordinates) -> Holds:
@@ -34,10 +34,10 @@ def resting(robot: Morphology, targets: Targets, q: Coordinates) -> Holds:
     poses, frames = forward_kinematics(robot.tree, q), len(q)
     parts = [Holds.none(frames)]
     for k, role in enumerate(targets.part_roles):
-        touch, touches = touches_of(robot).get(role), targets.parts[:, k]
-        if touch is None or not touches.any():
+        touch = touches_of(robot).get(role)
+        if touch is None or not targets.parts[:, k].any():
             continue
-        held = _held(robot, targets, poses, touch, touches, targets.rests[:, k])
+        held = _held(robot, targets, poses, touch, k)
         parts.append(held)
         if role.part in _ON_TRUNK:
             parts.append(_carried(robot, poses, robot.rig.roles.require(role), touch, held))
@@ -48,27 +48,22 @@ def resting(robot: Morphology, targets: Targets, q: Coordinates) -> Holds:
     return joined(parts)
 
 
-def _held(
-    robot: Morphology,
-    targets: Targets,
-    poses: LinkPoses,
-    touch: Touch,
-    touches: Bool[np.ndarray, "T"],
-    rests: Bool[np.ndarray, "T"],
-) -> Holds:
-    now = touch.path(poses)
+def _held(robot: Morphology, targets: Targets, poses: LinkPoses, touch: Touch, k: int) -> Holds:
+    """The hold of the `k`-th part. Around a rest it goes as the source's does: an arm or a leg of
+    other length may swing by and back there."""
+    touches, rests, frame_time = targets.parts[:, k], targets.rests[:, k], targets.frame_time
+    now, source = touch.path(poses), targets.part_paths[:, k]
     offset = np.zeros((len(targets), 3))
     for start, stop in true_runs(rests):
         path = now[:2, start:stop].T
         place = path.mean(axis=0) + beyond(path, MAX_ROLL * robot.rig.hip_height)
         offset[start:stop, :2] = place - path
-    offset[:, :2] = between_contacts(offset[:, :2], rests, now[:2].T)
-    offset[:, :2] = (
-        settled(offset[:, :2] + now[:2].T, rests, targets.frame_time, SETTLE) - now[:2].T
-    )
+    way = now[:2].T + between_contacts(offset[:, :2], rests, now[:2].T)
+    way = settled(led(way, source, rests, frame_time, APPROACH), rests, frame_time, SETTLE)
+    offset[:, :2] = way - now[:2].T
     lift = -touch.lowest(poses)
     offset[:, 2] = between_contacts(lift[:, None], touches, now[:2].T)[:, 0]
-    along, up = (HOLD * around(mask, targets.frame_time, APPROACH) for mask in (rests, touches))
+    along, up = (HOLD * around(mask, frame_time, APPROACH) for mask in (rests, touches))
     shares = np.stack([along, along, up])
     return Holds(np.array([touch.link]), touch.place[None], (now + offset.T)[None], shares[None])
 

@@ -23,6 +23,18 @@ def settled(
     """A path that within so many seconds before a rest comes to where that begins, and leaves from
     where it ends, ever more slowly; as it was where it never rests. Short ways between two rests
     are left most of their time: a shuffle is no leap."""
+    return led(path, np.zeros_like(path), rests, frame_time, seconds)
+
+
+def led(
+    path: Float[np.ndarray, "T D"],
+    guide: Float[np.ndarray, "T D"],
+    rests: Bool[np.ndarray, "T"],
+    frame_time: float,
+    seconds: float,
+) -> Float[np.ndarray, "T D"]:
+    """A path that goes over, within so many seconds before a rest, to that on which `guide` comes
+    there, shifted to where the path's own rest begins; and so after it."""
     if not rests.any():
         return path
     nearest = distance_transform_edt(~rests, return_distances=False, return_indices=True)[0]
@@ -30,9 +42,10 @@ def settled(
     for start, stop in true_runs(~rests):
         if start and stop < len(path):
             reach[start:stop] = min(seconds, (stop - start) * frame_time * SHARE)
-    stays = around(rests, frame_time, reach)[:, None]
-    settled: Float[np.ndarray, "T D"] = stays * path[nearest] + (1 - stays) * path
-    return settled
+    share = around(rests, frame_time, reach)[:, None]
+    beside = path[nearest] + guide - guide[nearest]
+    led: Float[np.ndarray, "T D"] = share * beside + (1 - share) * path
+    return led
 
 
 def around(

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from robots.model.morphology import Morphology
 from robots.model.shapes import surface
-from robots.solver.contacts import has_feet, schedule
+from robots.solver.contacts import has_feet, schedule, touching_joint
 from robots.solver.trunk import bends, leaning
 from robots.tree import forward_kinematics
 from spark.blocks import blocks
@@ -48,9 +48,9 @@ class Targets:
     directions by the role at a segment's upper end; `contacts`, whether heel and toe of each of the
     robot's soles stand, `parts`, whether those of `part_roles` touch the floor, `rests`, whether
     they also stay in place, `flight`, whether nothing holds the body; `com_acceleration`, the
-    source's, scaled [m/s²]; `feet`, the paths of the source's heels and toes over the floor [m],
-    and `clearance`, how high its soles are, scaled; `hands`, from the right hand to the left [m].
-    `com` [m] is planned where it is known.
+    source's, scaled [m/s²]; `part_paths` and `feet`, the paths of the source's parts, and of its
+    heels and toes, over the floor [m], and `clearance`, how high its soles are, scaled; `hands`,
+    from the right hand to the left [m]. `com` [m] is planned where it is known.
     """
 
     frame_time: float
@@ -62,6 +62,7 @@ class Targets:
     parts: Bool[np.ndarray, "T B"]
     rests: Bool[np.ndarray, "T B"]
     part_roles: tuple[Role, ...]
+    part_paths: Float[np.ndarray, "T B 2"]
     flight: Bool[np.ndarray, "T"]
     com_acceleration: Float[np.ndarray, "T 3"]
     feet: Float[np.ndarray, "T S 2 2"]
@@ -89,6 +90,7 @@ class Targets:
             contacts=self.contacts[frames],
             parts=self.parts[frames],
             rests=self.rests[frames],
+            part_paths=self.part_paths[frames],
             flight=self.flight[frames],
             com_acceleration=self.com_acceleration[frames],
             feet=self.feet[frames],
@@ -107,6 +109,7 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
     paths = source_feet(source, positions, robot)
     scale = robot.rig.hip_height / rig.hip_height
     touches = schedule(source, positions, paths, [sole.side for sole in robot.soles])
+    touching = [j for r in touches.part_roles if (j := touching_joint(rig, r)) is not None]
     return Targets(
         frame_time=source.frame_time,
         world=world,
@@ -117,6 +120,7 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
         parts=touches.parts,
         rests=touches.rests,
         part_roles=touches.part_roles,
+        part_paths=scale * positions[:, touching, :2],
         flight=touches.flight,
         com_acceleration=scale * touches.com_acceleration,
         feet=scale * paths[..., :2],
