@@ -172,7 +172,7 @@ def _robot_soles(result: RobotMotion) -> list[Float[np.ndarray, "T _ 3"]]:
 
 def _resting(source: CanonicalMotion, result: RobotMotion) -> dict[str, float | None]:
     """Of the parts that rest in the source: the share of times at which the robot's is in the air,
-    and how fast it then slides."""
+    and how fast its lowest point then slides."""
     robot, targets = result.robot, targets_of(source, result.robot)
     poses = forward_kinematics(robot.tree, result.coordinates)
     in_air, speeds = [], []
@@ -181,7 +181,7 @@ def _resting(source: CanonicalMotion, result: RobotMotion) -> dict[str, float | 
         if touch is not None:
             rests = targets.rests[:, k]
             in_air.append(touch.lowest(poses)[rests] > IN_AIR)
-            speeds.append(_speed(touch.path(poses).T, source.frame_time)[rests])
+            speeds.append(_speed(touch.slid(poses), source.frame_time)[rests])
     if not sum(map(len, in_air)):
         return {"rests_in_air": None, "rests_slide_m_s": None}
     return {
@@ -210,7 +210,7 @@ def _planted(toes: Float[np.ndarray, "T F 3"], frame_time: float) -> Bool[np.nda
     return (_speed(toes, frame_time) < PLANTED_SPEED) & (toes[..., 2] < low + PLANTED_HEIGHT)
 
 
-def _speed(points: Float[np.ndarray, "T *n 3"], frame_time: float) -> Float[np.ndarray, "T *n"]:
+def _speed(points: Float[np.ndarray, "T *n _"], frame_time: float) -> Float[np.ndarray, "T *n"]:
     """Along the floor [m/s]; a single frame stands still."""
     if len(points) < 2:
         return np.zeros(points.shape[:-1])

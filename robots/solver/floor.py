@@ -4,7 +4,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from robots.least_squares import NormalEquations
 from robots.model.hull import hull
@@ -36,6 +36,18 @@ class Solid(NamedTuple):
         heights = poses.heights(self.link, self.spheres) - self.radii[:, None]
         lowest: Float[np.ndarray, T] = heights.min(axis=0)
         return lowest
+
+    def steps(self, poses: LinkPoses, frames: Int[np.ndarray, "S"]) -> Float[np.ndarray, "S 2"]:
+        """How far [m] over the floor its lowest point of some frames moves to the next."""
+        turns, places = poses.rotations[self.link], poses.positions[self.link]
+        depths = self.radii[:, None] - poses.heights(self.link, self.spheres)[:, frames]
+        deepest = depths.argmax(axis=0)
+        arms = (self.spheres - poses.tree.anchor(self.link))[deepest]
+        down = turns[2][:, frames].T * self.radii[deepest, None]  # in the rest pose's axes
+        points = arms - down
+        turned = np.einsum("ijt,tj->ti", turns[:2, :, frames + 1] - turns[:2, :, frames], points)
+        steps: Float[np.ndarray, "S 2"] = turned + (places[:2, frames + 1] - places[:2, frames]).T
+        return steps
 
     def bottom(self, poses: LinkPoses) -> Float[np.ndarray, "T"]:
         """A height [m] that nothing of it is below."""

@@ -1,9 +1,10 @@
 """Hands, knees, back and other parts that lie on the ground: held where they come to rest.
 
 A part is held at the height at which its lowest shape touches the ground there
-(`robots.solver.touching`). Of arms, which give way to the trunk, the shoulder is held as well, so
-that the trunk comes to where its arms can reach the ground. A head or a shoulder lies where the
-trunk lays it, and a head where its neck does.
+(`robots.solver.touching`), and along the ground so that this rolls over it and does not slide. Of
+arms, which give way to the trunk, the shoulder is held as well, so that the trunk comes to where
+its arms can reach the ground. A head or a shoulder lies where the trunk lays it, and a head where
+its neck does.
 """
 
 from dataclasses import replace
@@ -23,7 +24,7 @@ from spark.transfer.footfalls import between_contacts, beyond
 HOLD = 3.2  # how firmly a part is held where it touches the ground, as a share of a standing sole,
 _ON_TRUNK = ("upper_arm", "head")
 CARRIED_HOLD = 0.45  # and of that the shoulder over an arm that touches
-MAX_ROLL = 0.1  # hip heights that the joint of a part that rests may roll over it
+MAX_DRAG = 0.1  # hip heights that the copied part may slide as it rests without having moved
 SETTLE = 0.12  # [s] before and after a rest in which a part already stays, ever less
 # [s] before and after a touch or a rest in which a part is led there and away
 APPROACH = 0.3
@@ -53,16 +54,17 @@ def _held(robot: Morphology, targets: Targets, poses: LinkPoses, touch: Touch, k
     other length may swing by and back there."""
     touches, rests, frame_time = targets.parts[:, k], targets.rests[:, k], targets.frame_time
     now, source = touch.path(poses), targets.part_paths[:, k]
+    path, slid = now[:2].T, touch.slid(poses)
     offset = np.zeros((len(targets), 3))
     for start, stop in true_runs(rests):
-        path = now[:2, start:stop].T
-        place = path.mean(axis=0) + beyond(path, MAX_ROLL * robot.rig.hip_height)
-        offset[start:stop, :2] = place - path
-    way = now[:2].T + between_contacts(offset[:, :2], rests, now[:2].T)
+        here = slid[start:stop]
+        stays = here.mean(axis=0) + beyond(here, MAX_DRAG * robot.rig.hip_height)
+        offset[start:stop, :2] = stays - here
+    way = path + between_contacts(offset[:, :2], rests, path)
     way = settled(led(way, source, rests, frame_time, APPROACH), rests, frame_time, SETTLE)
-    offset[:, :2] = way - now[:2].T
+    offset[:, :2] = way - path
     lift = -touch.lowest(poses)
-    offset[:, 2] = between_contacts(lift[:, None], touches, now[:2].T)[:, 0]
+    offset[:, 2] = between_contacts(lift[:, None], touches, path)[:, 0]
     along, up = (HOLD * around(mask, frame_time, APPROACH) for mask in (rests, touches))
     shares = np.stack([along, along, up])
     return Holds(np.array([touch.link]), touch.place[None], (now + offset.T)[None], shares[None])

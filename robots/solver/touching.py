@@ -38,6 +38,16 @@ class Touch(NamedTuple):
         )
         return lowest
 
+    def slid(self, poses: LinkPoses) -> Float[np.ndarray, "T 2"]:
+        """How far [m] what is lowest of it has slid over the floor since the first frame. A part
+        that rolls over it does not slide, though its place moves on."""
+        lowest = np.stack([solid.lowest(poses) for solid in self.around]).argmin(axis=0)[:-1]
+        steps = np.zeros((len(lowest), 2))
+        for k, solid in enumerate(self.around):
+            frames = np.flatnonzero(lowest == k)
+            steps[frames] = solid.steps(poses, frames)
+        return np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+
 
 @lru_cache(maxsize=16)
 def touches_of(robot: Morphology) -> dict[Role, Touch]:

@@ -14,7 +14,7 @@ from jaxtyping import Complex, Float
 
 from robots.model.morphology import Morphology
 from robots.solver.contacts import REST_HEIGHT, REST_SPEED, ROLL_SPEED, WRIST_HEIGHT
-from robots.solver.resting import CARRIED_HOLD, MAX_ROLL
+from robots.solver.resting import CARRIED_HOLD
 from robots.solver.touching import touches_of
 from robots.solver.window_collision import WindowPoses
 from robots.solver.window_targets import PointTargets
@@ -32,6 +32,7 @@ OVER_FEET = (
     0.25,
 )  # and, along it, of the mass from those: nearer, arms don't carry; farther, so
 HOLD_TIME = 0.1  # [s] over which a part is taken hold of in its place, and let go
+_MAX_ROLL = 0.1  # hip heights that the joint of a part that rests may roll over it
 _FELT = 0.01  # of the hold of what lies on the ground, below which it is not worth its time
 
 
@@ -90,7 +91,7 @@ class RestTracker:
         self._floor = reader.ground.z
         self._lying = self._floor + flesh + palms
         self._arms = np.array([role.part in ("hand", "forearm") for role in parts], dtype=bool)
-        self._roll = MAX_ROLL * robot.rig.hip_height
+        self._roll = _MAX_ROLL * robot.rig.hip_height
         points = _points(robot, parts)
         self._part = np.array([point.part for point in points], dtype=int)
         self._share = np.array([point.share for point in points])

@@ -9,8 +9,9 @@ from robots.model.morphology import Morphology
 from robots.registry import find
 from robots.solver.floor import solids_over_floor
 from robots.solver.touching import touches_of
-from robots.tree import forward_kinematics
+from robots.tree import Coordinates, forward_kinematics
 from spark.rig.roles import Role
+from spark.rotation import quat_from_rotvec, quat_mul, quat_rotate
 from spark_sim.loading import load_robot
 from tests.helpers.ember import changed_ember
 
@@ -58,3 +59,32 @@ def test_what_lies_beside_the_joint_of_a_shoulder_is_the_trunk_s(ember: Morpholo
     chest = int(ember.links[ember.rig.chest])
     assert chest in links_of(ember, Role.LEFT_UPPER_ARM)
     assert chest in links_of(ember, Role.PELVIS)
+
+
+def moved(
+    robot: Morphology, turns: np.ndarray, about: np.ndarray, shift: np.ndarray
+) -> Coordinates:
+    """The T-pose turned by rotation vectors `turns` about a point, and shifted [m]."""
+    quat = quat_from_rotvec(turns)
+    start = np.broadcast_to(robot.tpose.pos - about, (len(turns), 3))
+    pos = quat_rotate(quat, start) + about + shift
+    angles = np.repeat(robot.tpose.angles, len(turns), axis=0)
+    return Coordinates(pos, quat_mul(quat, robot.tpose.quat), angles)
+
+
+@pytest.mark.parametrize("role", [Role.LEFT_LOWER_LEG, Role.PELVIS, Role.RIGHT_HAND])
+def test_what_tilts_over_its_lowest_point_does_not_slide_and_what_is_shifted_does(
+    ember: Morphology, role: Role
+) -> None:
+    touch, still = touches_of(ember)[role], np.zeros((61, 3))
+    poses = forward_kinematics(ember.tree, ember.tpose)
+    solid = min(touch.around, key=lambda s: s.lowest(poses)[0])
+    k = (poses.heights(solid.link, solid.spheres)[:, 0] - solid.radii).argmin()
+    pivot = poses.point(solid.link, solid.spheres[k])[:, 0] - [0.0, 0.0, solid.radii[k]]
+    along = np.linspace(0.0, 0.1, 61)[:, None]
+    shifted = forward_kinematics(ember.tree, moved(ember, still, pivot, along * [1.0, 0, 0]))
+    np.testing.assert_allclose(touch.slid(shifted), along * [1.0, 0], atol=1e-9)
+    ahead = along * np.array([0.0, 1.0, 0.0])
+    tilted = forward_kinematics(ember.tree, moved(ember, ahead, pivot, still))
+    place = np.ptp(touch.path(tilted)[0])
+    assert np.linalg.norm(touch.slid(tilted), axis=1).max() < 0.1 * place
