@@ -38,6 +38,7 @@ from robots.solver.weights import (
     W_LIMB_DIRECTION,
     W_LIMIT,
     W_OTHER_ROTATION,
+    W_PALM,
     W_REGULAR,
     W_ROTATION,
     W_TPOSE,
@@ -199,11 +200,8 @@ def _add_pose(
     link = int(robot.links[j])
     axes = terms.axes_of(link)
     wanted = np.moveaxis(matrix_from_quat(targets.world[:, j]), 0, -1)
-    terms.add_rotational(
-        rotation_residual(
-            poses.rotations[link], wanted, axes, W_ROTATION.get(role.part, W_OTHER_ROTATION)
-        )
-    )
+    weight = W_ROTATION.get(role.part, W_OTHER_ROTATION) + W_PALM * targets.palms.get(role, 0.0)
+    terms.add_rotational(rotation_residual(poses.rotations[link], wanted, axes, weight))
     if role in targets.bones and (bone := robot.bones.get(role)) is not None:
         now = poses.direction(link, bone)
         terms.add_rotational(direction_residual(now, targets.bones[role].T, axes, W_LIMB_DIRECTION))

@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 from robots.model.morphology import Morphology
 from robots.model.shapes import surface
 from robots.solver.contacts import has_feet, schedule, touching_joint
+from robots.solver.palms import laid, resting_palms
 from robots.solver.trunk import bends, leaning
 from robots.tree import forward_kinematics
 from spark.blocks import blocks
@@ -47,10 +48,11 @@ class Targets:
     that of the topmost part of the trunk; `hips`, the path of the hips' middle [m]; `bones`, unit
     directions by the role at a segment's upper end; `contacts`, whether heel and toe of each of the
     robot's soles stand, `parts`, whether those of `part_roles` touch the floor, `rests`, whether
-    they also stay in place, `flight`, whether nothing holds the body; `com_acceleration`, the
-    source's, scaled [m/s²]; `part_paths` and `feet`, the paths of the source's parts, and of its
-    heels and toes, over the floor [m], and `clearance`, how high its soles are, scaled; `hands`,
-    from the right hand to the left [m]. `com` [m] is planned where it is known.
+    they also stay in place, `palms`, how far (0 to 1) hands lie still, `flight`, whether nothing
+    holds the body; `com_acceleration`, the source's, scaled [m/s²]; `part_paths` and `feet`, the
+    paths of the source's parts, and of its heels and toes, over the floor [m], and `clearance`, how
+    high its soles are, scaled; `hands`, from the right hand to the left [m]. `com` [m] is planned
+    where it is known.
     """
 
     frame_time: float
@@ -63,6 +65,7 @@ class Targets:
     rests: Bool[np.ndarray, "T B"]
     part_roles: tuple[Role, ...]
     part_paths: Float[np.ndarray, "T B 2"]
+    palms: dict[Role, Float[np.ndarray, "T"]]
     flight: Bool[np.ndarray, "T"]
     com_acceleration: Float[np.ndarray, "T 3"]
     feet: Float[np.ndarray, "T S 2 2"]
@@ -91,6 +94,7 @@ class Targets:
             parts=self.parts[frames],
             rests=self.rests[frames],
             part_paths=self.part_paths[frames],
+            palms={role: palm[frames] for role, palm in self.palms.items()},
             flight=self.flight[frames],
             com_acceleration=self.com_acceleration[frames],
             feet=self.feet[frames],
@@ -110,6 +114,10 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
     scale = robot.rig.hip_height / rig.hip_height
     touches = schedule(source, positions, paths, [sole.side for sole in robot.soles])
     touching = [j for r in touches.part_roles if (j := touching_joint(rig, r)) is not None]
+    palms = resting_palms(robot, touches.part_roles, touches.rests, source.frame_time)
+    for role in palms:
+        j, rests = robot.rig.roles.require(role), touches.rests[:, touches.part_roles.index(role)]
+        world[:, j] = laid(world[:, j], rests, source.frame_time)
     return Targets(
         frame_time=source.frame_time,
         world=world,
@@ -121,6 +129,7 @@ def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
         rests=touches.rests,
         part_roles=touches.part_roles,
         part_paths=scale * positions[:, touching, :2],
+        palms=palms,
         flight=touches.flight,
         com_acceleration=scale * touches.com_acceleration,
         feet=scale * paths[..., :2],

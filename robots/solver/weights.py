@@ -17,6 +17,7 @@ W_ROTATION = {  # [1/rad] of a part by its role; low where the directions of lim
     "spine": 0.1,
     "clavicle": 0.2,
 }
+W_PALM = 0.8  # [1/rad] more of a hand that lies on the ground: one that turns there slides
 W_OTHER_ROTATION = 0.08  # [1/rad] of the rest: the twist of limbs
 W_HIPS_POSITION = np.array([6.0, 6.0, 6.0])  # [1/m] of their path: 1 cm is 2 degrees of a limb
 W_COM_ACCELERATION = 0.42  # [s²/m] of the planned centre of mass: 1 m/s² is 12 degrees of a limb

@@ -126,6 +126,22 @@ def test_hands_and_knees_stay_where_they_are_while_the_body_sways(ember: Morphol
     assert found.rests_slide_m_s < 0.02
 
 
+def test_a_palm_lies_still_though_the_source_s_turns_with_its_arm(ember: Morphology) -> None:
+    """As it does where a skeleton has no wrists: by 23 degrees to both sides."""
+    source, rotations = on_all_fours(), on_all_fours().rotations.copy()
+    swing = 0.4 * np.sin(2 * np.pi * np.arange(COUNT) / COUNT)
+    pitch = quat_from_rotvec(swing[:, None] * np.array([0.0, 1.0, 0.0]))
+    for role in HANDS:
+        j = source.rig.roles.require(role)
+        rotations[:, j] = quat_mul(pitch, rotations[:, j])
+    result = retarget(replace(source, rotations=rotations), ember)
+    poses = forward_kinematics(ember.tree, result.coordinates)
+    for role in HANDS:
+        turns = poses.rotations[int(ember.links[ember.rig.roles.require(role)])]
+        cosine = (np.einsum("ijt,ij->t", turns, turns[..., COUNT // 4]) - 1) / 2
+        assert np.arccos(np.clip(cosine, -1, 1)).max() < 0.1
+
+
 def test_a_back_lies_on_the_ground(ember: Morphology) -> None:
     source = posed({Role.PELVIS: turn(y=-1)}, 0.06)
     result = retarget(source, ember)
