@@ -15,6 +15,7 @@ from sim.report.derivatives import derivative
 from sim.report.mass import Mass
 from sim.report.wrench import angular_momentum
 from spark.constants import GRAVITY
+from spark.runs import true_runs
 
 MAX_HOVER = 0.12  # [m, of an adult] over the floor of a part that carries,
 MIN_SHARE = 0.06  # of the push that it gives,
@@ -22,6 +23,7 @@ MIN_PUSH = 0.35  # [body weights] and of that in all
 # What is as bad as no push at all: [m, of an adult] that it comes from so high, and that the centre
 # of pressure lies so far off. The latter is the dearer one: points high up explain where it is.
 _HIGH, _OFF = 0.3, 0.1
+COMING_DOWN = 0.05  # [m, of an adult] above where it lies, of a knee that is not down
 _LEAST = 0.01  # [m, of an adult] of a height that counts: points on the floor share evenly
 _WINDOW = 0.05  # [s] before and after a frame over which rates are measured
 
@@ -61,4 +63,18 @@ def carrying(
         rows = np.vstack([np.ones(len(cost)), away, cost])
         shares, _ = nnls(rows, np.append(1.0, np.zeros(len(rows) - 1)))
         out[t] = low[t] & (shares[: low.shape[1]] > MIN_SHARE)
+    return out
+
+
+def once_down(
+    touching: Bool[np.ndarray, "T"], height: Float[np.ndarray, "T"]
+) -> Bool[np.ndarray, "T"]:
+    """Of the times in which a knee touches, or carries though it is so high [m, of an adult]: each
+    from where it is first about as low as it lies then (the lower quartile) to where it last is.
+    Who kneels down is carried by the knee once it is down."""
+    out = np.zeros_like(touching)
+    for start, stop in true_runs(touching):
+        run = height[start:stop]
+        down = start + np.flatnonzero(run < np.percentile(run, 25) + COMING_DOWN)
+        out[down[0] : down[-1] + 1] = True
     return out

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import uniform_filter1d
 
-from robots.solver.carrying import Points, carrying
+from robots.solver.carrying import Points, carrying, once_down
 from sim.body.anthropometry import RADII
 from sim.report.derivatives import derivative
 from sim.report.mass import Mass, human_mass
@@ -181,7 +181,10 @@ def _touching_parts(
         frame_time,
         scale,
     )
-    touches = _steady(near | carries, frame_time)
+    touching = near | carries
+    for b in (b for b, role in enumerate(joints) if role.part == "lower_leg"):
+        touching[:, b] = near[:, b] | once_down(touching[:, b], height[:, b])
+    touches = _steady(touching, frame_time)
     stays = _steady(touches & (speed < ROLL_SPEED), frame_time) & touches
     return tuple(joints), touches, _runs_with(stays, slow)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from robots.solver.carrying import Points, carrying
+from robots.solver.carrying import Points, carrying, once_down
 from sim.report.mass import Mass
 from spark.constants import GRAVITY
 
@@ -72,3 +72,19 @@ def test_who_speeds_up_leans_on_what_is_behind() -> None:
     time = FRAME_TIME * (np.arange(COUNT) - COUNT // 2)
     com = np.column_stack([0.4 * GRAVITY / 0.5 * time**2 / 2, 0 * time, 0 * time + 0.5])
     assert carriers([0.05] * 4, com) == [True, True, False, False]
+
+
+def test_a_knee_carries_once_it_is_down() -> None:
+    """It comes down within a second, lies, and is raised again; one frame of it is a glitch."""
+    down = np.linspace(0.12, 0.01, 60)
+    height = np.concatenate([down, np.full(120, 0.01), down[::-1]])
+    height[100] = -0.2
+    found = once_down(np.ones(len(height), dtype=bool), height)
+    assert found[height < 0.05].all()
+    assert not found[height > 0.07].any()
+
+
+def test_a_knee_that_seems_to_hover_carries_all_the_same() -> None:
+    touching = np.zeros(100, dtype=bool)
+    touching[20:80] = True
+    np.testing.assert_array_equal(once_down(touching, np.full(100, 0.1)), touching)
