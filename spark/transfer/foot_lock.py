@@ -23,7 +23,7 @@ from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.footfalls import between_contacts, beyond
 from spark.transfer.hip_rise import Standing, hip_rise, standing
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
-from spark.transfer.reach import within_reach
+from spark.transfer.reach import stretch, swing_gently, within_reach
 from spark.transfer.stances import stances
 
 _CAPTURE_NOISE = 0.02  # [hip heights] 2 cm of an adult
@@ -42,10 +42,12 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
     as the source's; its hips go with them."""
     scale = moved.rig.hip_height / source.rig.hip_height
     feet: list[tuple[Leg, Standing, Standing]] = []
+    stretches: list[Float[np.ndarray, T]] = []
     for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
         leg = leg_of(moved.rig.skeleton, moved.rig.roles.roles, group)
         if leg is not None and source.rig.roles.joint(LIMBS[group][2]) is not None:
             feet.append((leg, standing(source, group), standing(moved, group)))
+            stretches.append(stretch(source, group))
     if not feet:
         return moved
     rise = hip_rise(source, moved, [(theirs, own) for _, theirs, own in feet])
@@ -67,7 +69,8 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
     risen = replace(moved, hips=moved.hips + rise[:, None] * np.array([0.0, 0.0, 1.0]))
     # A foot that rolls off has let go with its heel: if the hips came down for it, the other knee
     # would bend where the source's is straight.
-    return move_ankles(*within_reach(risen, moves, flat))
+    lower, moves_from_there = within_reach(risen, moves, flat)
+    return move_ankles(lower, swing_gently(lower, moves_from_there, stretches, stands))
 
 
 def _rolled(

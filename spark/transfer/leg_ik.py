@@ -158,12 +158,14 @@ def _bend_axis(
     upper_leg: Float[np.ndarray, "*n 4"],
 ) -> Float[np.ndarray, "*n 3"]:
     """The axis that a knee bends about, forwards: `normal` to the bones, whose lengths have this
-    `product`, on the thigh's left; the thigh's lateral axis the more, the straighter the leg."""
+    `product`, on the thigh's left; the thigh's lateral axis the more, the straighter the leg, and
+    the more it bends sideways: there neither side of its plane is the left."""
     lateral = quat_rotate(upper_leg, np.array([0, 1, 0], normal.dtype))
-    sine = _length(normal) / np.maximum(product, 1e-12)
-    weight = smoothstep(sine / _STRAIGHT)
-    left = np.where(dot(normal, lateral) < 0, -weight, weight)
-    axis = normal * (left / np.maximum(sine * product, 1e-12)) + lateral * (1 - weight)
+    size = np.maximum(_length(normal), 1e-12)
+    along = dot(normal, lateral) / size
+    sine = size / np.maximum(product, 1e-12)
+    weight = smoothstep(sine / _STRAIGHT) * smoothstep(abs(along))
+    axis = normal * (np.sign(along) * weight / size) + lateral * (1 - weight)
     return axis / _length(axis)
 
 

@@ -1,9 +1,11 @@
-"""Hips that come down to feet out of reach.
+"""Hips that come down to feet out of reach, and legs that stretch gently for feet that swing.
 
 A broad body on short legs takes longer steps than its legs alone would (`travel_scale`), and then
 some of its feet stand where a leg does not reach: they would be pulled along, and lifted. People
 lower their hips in a wide stance, and so does this. A foot that swings or rolls off is let go of:
-the other leg would bend.
+the other leg would bend. But a knee that is bent in the source would snap straight on its way to a
+place out of reach, and stay so until the foot is back. So in the air a leg stretches further than
+the source's by a part of what is left of it only: its knee straightens as the source's does.
 """
 
 from collections.abc import Sequence
@@ -13,11 +15,13 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
+from spark.rig.roles import Group
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
-from spark.transfer.leg_ik import Leg
+from spark.transfer.leg_ik import Leg, leg_of
 
 MAX_REACH = 0.999  # of a leg's length
 _AHEAD = 0.15  # [s] before a foot is out of reach the hips begin to come down
+_AIRBORNE = 0.05  # [s] after a foot has left the ground, or before it is put down, it swings
 _MAX_DROP = 0.1  # [hip heights] of a wide stance; a foot further away is let go of
 
 Moves = Sequence[tuple[Leg, Float[np.ndarray, "T 3"]]]
@@ -42,15 +46,62 @@ def within_reach(
     return lower, [(leg, move + down) for leg, move in moves]
 
 
+def stretch(motion: CanonicalMotion, group: Group) -> Float[np.ndarray, "T"]:
+    """How far a leg's ankle is from its hip joint, over the leg's length; 1, that of a leg which
+    can't stretch, without a knee or without length."""
+    leg = leg_of(motion.rig.skeleton, motion.rig.roles.roles, group)
+    if leg is None:
+        return np.ones(len(motion))
+    length, away = _length_and_ankle(motion, leg)
+    distance = np.linalg.norm(away, axis=1)
+    return np.divide(distance, length, out=np.ones(len(motion)), where=length > 0)
+
+
+def swing_gently(
+    motion: CanonicalMotion,
+    moves: Moves,
+    stretches: Sequence[Float[np.ndarray, "T"]],
+    stands: Bool[np.ndarray, "L T"],
+) -> Moves:
+    """The `moves` [m] of feet that do not stand, as far as their legs stretch for them gently.
+
+    `stretches` are those of the source's legs. What a leg is to stretch further than that takes
+    from what is left to its full length, left' = left exp(-further / left): nearly all of a little,
+    and never all that is left.
+    """
+    size = 2 * round(_AIRBORNE / motion.frame_time) + 1
+    gentle: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
+    for (leg, move), theirs, here in zip(moves, stretches, stands, strict=True):
+        length, away = _length_and_ankle(motion, leg)
+        goal = away + move
+        wanted = np.linalg.norm(goal, axis=1) / np.maximum(length, 1e-9)
+        left = np.maximum(1.0 - theirs, 1e-9)
+        further = np.maximum(wanted - theirs, 0.0)
+        spared = np.maximum(further + left * np.expm1(-further / left), 0.0)
+        ground = maximum_filter1d(here.astype(float), size, mode="nearest")
+        airborne = 1.0 - uniform_filter1d(ground, size, mode="nearest")
+        shorter = airborne * spared / np.maximum(wanted, 1e-9)
+        gentle.append((leg, move - shorter[:, None] * goal))
+    return gentle
+
+
 def _drop(
     motion: CanonicalMotion, leg: Leg, move: Float[np.ndarray, "T 3"]
 ) -> Float[np.ndarray, "T"]:
     """How far the hip has to come down for the leg to reach [m]."""
+    length, away = _length_and_ankle(motion, leg)
+    # A leg that was stretched out as it was copied may stay so.
+    reach = np.maximum(MAX_REACH * length, np.linalg.norm(away, axis=1))
+    goal = away + move
+    below = np.sqrt(np.maximum(reach**2 - goal[:, 0] ** 2 - goal[:, 1] ** 2, 0.0))
+    return np.clip(-goal[:, 2] - below, 0.0, _MAX_DROP * motion.rig.hip_height)
+
+
+def _length_and_ankle(
+    motion: CanonicalMotion, leg: Leg
+) -> tuple[Float[np.ndarray, "T"], Float[np.ndarray, "T 3"]]:
+    """A leg's length, and its ankle from its hip joint [m, world]."""
     at = canonical_positions(motion, [leg.upper_leg, leg.lower_leg, leg.foot])
     hip, knee, ankle = at[:, 0], at[:, 1], at[:, 2]
     length = np.linalg.norm(knee - hip, axis=1) + np.linalg.norm(ankle - knee, axis=1)
-    # A leg that was stretched out as it was copied may stay so.
-    reach = np.maximum(MAX_REACH * length, np.linalg.norm(ankle - hip, axis=1))
-    goal = ankle + move - hip
-    below = np.sqrt(np.maximum(reach**2 - goal[:, 0] ** 2 - goal[:, 1] ** 2, 0.0))
-    return np.clip(-goal[:, 2] - below, 0.0, _MAX_DROP * motion.rig.hip_height)
+    return length, ankle - hip

@@ -71,3 +71,19 @@ def test_a_bent_leg_reaches_what_it_is_asked_for(nearer: float) -> None:
     turned = leg_rotations(thigh, shank, upper, goal - thigh - shank)
     ankle = quat_rotate(turned[0], thigh) + quat_rotate(turned[1], shank)
     np.testing.assert_allclose(ankle, goal, atol=1e-4)
+
+
+@pytest.mark.parametrize("sideways", [5.0, 10.0, 30.0, -10.0])
+@pytest.mark.parametrize("nearer", [0.001, 0.005, 0.02])
+def test_a_knee_that_bends_sideways_goes_through_straight_without_a_jump(
+    sideways: float, nearer: float
+) -> None:
+    """As bow legs and knock knees of recordings do: forwards by 1/100 degree more a frame."""
+    degrees = np.arange(-3, 3, 0.01)
+    thigh, shank, upper = bent_leg(degrees)
+    shank = quat_rotate(quat_from_rotvec(np.radians([sideways, 0.0, 0.0])), shank)
+    leg = thigh + shank
+    move = -nearer * leg / np.linalg.norm(leg, axis=-1, keepdims=True)
+    for turned, bone in zip(leg_rotations(thigh, shank, upper, move), (thigh, shank), strict=True):
+        steps = np.linalg.norm(np.diff(quat_rotate(turned, bone), axis=0), axis=-1)
+        assert steps.max() < 0.001

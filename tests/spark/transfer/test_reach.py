@@ -1,4 +1,5 @@
-"""Hips come down as far as feet out of reach need it, in time, and no further."""
+"""Hips come down as far as feet out of reach need it, in time, and no further; legs of feet that
+swing stretch gently."""
 
 from dataclasses import replace
 
@@ -6,16 +7,18 @@ import numpy as np
 import pytest
 
 from spark.demo.sample import sample_motion, sample_rig
-from spark.rig.roles import Group
+from spark.rig.roles import Group, Role
+from spark.rotation import quat_from_rotvec
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.transfer.foot_lock import lock_feet
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
-from spark.transfer.reach import MAX_REACH, within_reach
-from tests.helpers.stick import standing, stick_rig
+from spark.transfer.reach import MAX_REACH, stretch, swing_gently, within_reach
+from tests.helpers.stick import joint, standing, stick_rig, without
 
 LEG = 0.8  # [m] of the stick man, stretched out as he stands
 FPS = 60.0
 ALWAYS = np.array([[True]])  # one leg that stands in every frame
+NEVER = np.zeros((1, 121), dtype=bool)
 
 
 def stick() -> tuple[CanonicalMotion, Leg]:
@@ -101,3 +104,89 @@ def test_a_body_without_frames_to_spare() -> None:
     lower, _ = within_reach(short, [(leg, np.tile([0.0, 0.2, 0.0], (2, 1)))], ALWAYS)
     needed = LEG - np.sqrt(LEG**2 - 0.2**2)
     np.testing.assert_allclose((short.hips - lower.hips)[:, 2], needed)
+
+
+def stretched(motion: CanonicalMotion, leg: Leg, to: np.ndarray) -> np.ndarray:
+    """What moves a leg's ankle so that it is so many lengths from the hip joint [m]."""
+    at = canonical_positions(motion, [leg.upper_leg, leg.foot])
+    return (to / stretch(motion, Group.LEFT_LEG) - 1)[:, None] * (at[:, 1] - at[:, 0])
+
+
+def knee(motion: CanonicalMotion, leg: Leg) -> np.ndarray:
+    """How far it is bent [rad]."""
+    at = canonical_positions(motion, list(leg[:3]))
+    thigh, shank = np.diff(at, axis=1).transpose(1, 0, 2)
+    sizes = np.linalg.norm(thigh, axis=1) * np.linalg.norm(shank, axis=1)
+    return np.arccos(np.clip((thigh * shank).sum(axis=1) / sizes, -1, 1))
+
+
+@pytest.mark.parametrize(("theirs", "wanted"), [(0.9, 0.95), (0.9, 1.0), (0.9, 1.3), (0.5, 0.9)])
+def test_a_leg_in_the_air_stretches_by_a_part_of_what_is_left(theirs: float, wanted: float) -> None:
+    motion, leg = stick()
+    moves = [(leg, stretched(motion, leg, np.full(121, wanted)))]
+    gentle = swing_gently(motion, moves, [np.full(121, theirs)], NEVER)
+    left = (1 - theirs) * np.exp(-(wanted - theirs) / (1 - theirs))
+    got = stretch(move_ankles(motion, gentle), Group.LEFT_LEG)
+    np.testing.assert_allclose(got, 1 - left, atol=1e-3)
+
+
+def test_a_leg_that_stretches_no_further_than_the_source_s_goes_where_it_should() -> None:
+    motion, leg = stick()
+    for theirs, wanted in ((0.9, 0.9), (0.9, 0.6), (1.0, 1.0), (1.1, 1.05)):
+        move = stretched(motion, leg, np.full(121, wanted))
+        [(_, same)] = swing_gently(motion, [(leg, move)], [np.full(121, theirs)], NEVER)
+        np.testing.assert_array_equal(same, move)
+
+
+def test_a_knee_straightens_gently_on_the_way_to_a_place_out_of_reach() -> None:
+    """The source's leg stretches from .7 to .95 of its length and bends again within a second, the
+    target's would be a tenth longer."""
+    motion, leg = stick()
+    theirs = 0.825 + 0.125 * np.sin(2 * np.pi * np.arange(121) / FPS)
+    there = [(leg, stretched(motion, leg, 1.1 * theirs))]
+    quickest = [
+        np.abs(np.diff(knee(move_ankles(motion, moves), leg))).max() * FPS
+        for moves in (
+            [(leg, stretched(motion, leg, theirs))],
+            there,
+            swing_gently(motion, there, [theirs], NEVER),
+        )
+    ]
+    assert quickest[1] > 1.9 * quickest[0]
+    assert quickest[2] < 1.3 * quickest[0]
+
+
+def test_held_feet_leave_a_raised_knee_bent() -> None:
+    """The left leg is kicked forwards, at .9 of its length; the target would stretch it out."""
+    motion = standing(stick_rig(), 121, FPS)
+    for part, bend in (("upper_leg", -2.02), ("lower_leg", 0.9)):
+        turn = quat_from_rotvec(np.array([0.0, bend, 0.0]))
+        motion.rotations[:, joint(Role(f"left_{part}"))] = turn
+    source, leg = to_canonical(motion, stick_rig()), stick()[1]
+    assert stretch(source, Group.LEFT_LEG)[0] == pytest.approx(np.cos(0.45), abs=0.01)
+    straight = move_ankles(source, [(leg, stretched(source, leg, np.full(121, 1.0)))])
+    held = lock_feet(source, straight)
+    assert knee(straight, leg).max() < 0.1 < 0.4 < knee(held, leg).min()
+
+
+def test_a_foot_that_stands_is_not_let_go_of() -> None:
+    motion, leg = stick()
+    stands = NEVER.copy()
+    stands[:, 40:80] = True
+    move = stretched(motion, leg, np.full(121, 1.1))
+    [(_, gentle)] = swing_gently(motion, [(leg, move)], [np.full(121, 0.8)], stands)
+    away = np.linalg.norm(gentle - move, axis=1)
+    assert away[40:80].max() == 0
+    np.testing.assert_allclose(away[:34], away[0])
+    assert (np.diff(away[79:86]) >= 0).all()
+
+
+def test_a_leg_without_a_knee_says_nothing() -> None:
+    rig = without(stick_rig(), Role.LEFT_LOWER_LEG)
+    motion = to_canonical(standing(rig, 121, FPS), rig)
+    theirs = stretch(motion, Group.LEFT_LEG)
+    whole, leg = stick()
+    for wanted in (0.7, 1.0):
+        move = stretched(whole, leg, np.full(121, wanted))
+        [(_, same)] = swing_gently(whole, [(leg, move)], [theirs], NEVER)
+        np.testing.assert_array_equal(same, move)
