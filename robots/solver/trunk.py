@@ -2,18 +2,37 @@
 
 Many robots have no hinge by which the chest leans against the hips. Humans have, and stand upright
 with a pelvis that is tilted by 30 degrees; a stiff trunk that followed it would bow. So it leans as
-the source's whole trunk does, from the hips to the shoulders, and heads as its pelvis does.
+the source's whole trunk does, from the hips to the shoulders, and heads as its pelvis does; but no
+further than its hips flex while its legs carry it: who crouches or kneels bows over the thighs.
 """
+
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float
 
 from robots.model.morphology import Morphology
+from robots.solver.over_feet import on_arms
+from robots.tree import forward_kinematics
+from spark.rig.contacts import ADULT_HEIGHT
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
-from spark.rotation import quat_between, quat_from_yaw, quat_mul, quat_rotate, yaw_from_quat
+from spark.rotation import (
+    quat_between,
+    quat_from_rotvec,
+    quat_from_yaw,
+    quat_mul,
+    quat_rotate,
+    yaw_from_quat,
+)
+from spark.vectors import dot
 
 _LEVEL = 0.5  # share of a hinge's axis along the floor from which on it bends the trunk
+_ROUNDING = 0.12  # [rad] before a hip flexes no further, and after: there the trunk begins to stay
+_THIGHS = {
+    Role.LEFT_UPPER_LEG: Role.LEFT_LOWER_LEG,
+    Role.RIGHT_UPPER_LEG: Role.RIGHT_LOWER_LEG,
+}
 _SHOULDERS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
 
 
@@ -26,16 +45,77 @@ def bends(robot: Morphology) -> bool:
     return bool((tree.balls[between] | (np.hypot(axes[:, 0], axes[:, 1]) > _LEVEL)).any())
 
 
+@lru_cache(maxsize=16)
+def max_flexion(robot: Morphology) -> float:
+    """By how much [rad] both thighs can be raised forwards against the trunk, from straight on."""
+    tree, poses, most = robot.tree, forward_kinematics(robot.tree, robot.tpose), np.pi
+    for role in _THIGHS:
+        joint = robot.rig.roles.joint(role)
+        trunk = set(tree.chain(int(robot.links[robot.rig.pelvis])))
+        chain = [] if joint is None else tree.chain(int(robot.links[joint]))
+        hinges = [j for j in chain if j not in trunk and not tree.balls[j]]
+        if hinges:
+            across = [float(poses.axis(j, 0)[1, 0]) for j in hinges]
+            k = int(np.argmax(np.abs(across)))
+            angle = float(robot.tpose.angles[0, hinges[k]])
+            # About the left, a growing angle lets what hangs down swing back.
+            forwards = angle - tree.lower[hinges[k]], tree.upper[hinges[k]] - angle
+            most = min(most, float(forwards[across[k] < 0]))
+    return most
+
+
 def leaning(
-    rig: Rig, pelvis: Float[np.ndarray, "T 4"], positions: Float[np.ndarray, "T J 3"]
+    rig: Rig,
+    pelvis: Float[np.ndarray, "T 4"],
+    positions: Float[np.ndarray, "T J 3"],
+    floor_z: float,
+    flexion: float,
 ) -> Float[np.ndarray, "T 4"]:
     """The rotations, since the T-pose, of the trunk of a source whose joints are at `positions` [m]
-    and whose pelvis has turned by `pelvis`; the same where a rig has no shoulders."""
+    and whose pelvis has turned by `pelvis`, over a floor at `floor_z` [m], for hips that flex by at
+    most `flexion` [rad]; those of the pelvis where a rig has no shoulders."""
     if not all(rig.roles.joints(role) for role in _SHOULDERS):
         return pelvis
     heading = quat_from_yaw(yaw_from_quat(pelvis))
     upright, along = _trunk(rig, rig.tpose_positions[None]), _trunk(rig, positions)
-    return quat_mul(quat_between(quat_rotate(heading, upright), along), heading)
+    leans = quat_mul(quat_between(quat_rotate(heading, upright), along), heading)
+    forwards, left = np.eye(3)[:1], quat_rotate(leans, np.eye(3)[1:2])
+    up = quat_rotate(leans, np.eye(3)[2:])
+    bowed = np.arctan2(dot(up, quat_rotate(heading, forwards)), up[:, 2:])
+    excess = _flexion(rig, leans, positions) - flexion
+    # max(excess, 0), rounded: a parabola around the kink, and none of it where hips flex far enough
+    near = np.clip(excess + _ROUNDING, 0.0, 2 * _ROUNDING)
+    back = near**2 / (4 * _ROUNDING) + np.maximum(excess - _ROUNDING, 0.0)
+    back = np.minimum(back, np.maximum(bowed, 0.0)) * _on_legs(rig, positions, along, floor_z)
+    return quat_mul(quat_from_rotvec(-back * left), leans)
+
+
+def _flexion(
+    rig: Rig, trunk: Float[np.ndarray, "T 4"], positions: Float[np.ndarray, "T J 3"]
+) -> Float[np.ndarray, "T 1"]:
+    """By how much [rad] the higher thigh is raised forwards against a trunk that has so turned."""
+    ahead, up = (quat_rotate(trunk, axis) for axis in np.eye(3)[[0, 2], None])
+    most = np.full((len(trunk), 1), -np.pi)
+    for role, below in _THIGHS.items():
+        hip, knee = rig.roles.joint(role), rig.roles.joint(below)
+        if hip is not None and knee is not None:
+            thigh = positions[:, knee] - positions[:, hip]
+            most = np.maximum(most, np.arctan2(dot(thigh, ahead), -dot(thigh, up)))
+    return most
+
+
+def _on_legs(
+    rig: Rig,
+    positions: Float[np.ndarray, "T J 3"],
+    along: Float[np.ndarray, "T 3"],
+    floor_z: float,
+) -> Float[np.ndarray, "T 1"]:
+    """How far (0 to 1) a body whose trunk reaches so far [m] from its hips is carried by its legs:
+    its mass is about where the middle of the trunk is."""
+    mass = positions[:, rig.hips].mean(1) + along / 2
+    feet = [j for role in Role if role.part in ("foot", "toe") for j in rig.roles.joints(role)]
+    over_floor = positions[:, feet] - np.array([0.0, 0.0, floor_z])
+    return 1 - on_arms(mass[:, :2], over_floor, rig.standing_height / ADULT_HEIGHT)[:, None]
 
 
 def _trunk(rig: Rig, positions: Float[np.ndarray, "T J 3"]) -> Float[np.ndarray, "T 3"]:

@@ -18,7 +18,7 @@ from robots.solver.targets import (
     source_feet,
 )
 from robots.solver.touching import touches_of
-from robots.solver.trunk import bends, leaning
+from robots.solver.trunk import bends, leaning, max_flexion
 from robots.solver.window_targets import PoseTargets
 from robots.stream.source_poses import SourcePoses
 from spark.errors import FrameError
@@ -123,7 +123,7 @@ class FrameReader:
         self._tpose = matrix_from_quat(robot.rig.tpose)
         self._chest = source.chest
         self._segments = segments(source)
-        self._stiff = not bends(robot)
+        self._stiff, self._flexion = not bends(robot), max_flexion(robot)
         self._correspondence = correspond(source, robot.rig)
         self._at_rest = np.flatnonzero(self._correspondence.first < 0)
         self._interpolated = np.flatnonzero(
@@ -152,7 +152,8 @@ class FrameReader:
         if self._stiff:
             pelvis = self.robot.rig.pelvis
             turn = quat_from_matrix(own[None, pelvis])
-            own[pelvis] = matrix_from_quat(leaning(self.source, turn, joints[None]))[0]
+            leans = leaning(self.source, turn, joints[None], self.ground.z, self._flexion)
+            own[pelvis] = matrix_from_quat(leans)[0]
         own_world = own @ self._tpose
         return FrameTargets(
             world=own_world,

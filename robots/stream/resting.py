@@ -14,6 +14,7 @@ from jaxtyping import Complex, Float
 
 from robots.model.morphology import Morphology
 from robots.solver.contacts import REST_HEIGHT, REST_SPEED, ROLL_SPEED, WRIST_HEIGHT
+from robots.solver.over_feet import on_arms
 from robots.solver.resting import CARRIED_HOLD
 from robots.solver.touching import touches_of
 from robots.solver.window_collision import WindowPoses
@@ -26,11 +27,6 @@ from spark.rig.roles import Role
 from spark.smoothstep import smoothstep
 
 LEAD_HEIGHT = 0.2  # [m, of an adult] of the source's flesh below which the robot's is led down
-STANDING_HEIGHT = 0.15  # [m, of an adult] of a heel or toe above the floor that may stand,
-OVER_FEET = (
-    0.1,
-    0.25,
-)  # and, along it, of the mass from those: nearer, arms don't carry; farther, so
 HOLD_TIME = 0.1  # [s] over which a part is taken hold of in its place, and let go
 _MAX_ROLL = 0.1  # hip heights that the joint of a part that rests may roll over it
 _FELT = 0.01  # of the hold of what lies on the ground, below which it is not worth its time
@@ -143,24 +139,12 @@ class RestTracker:
         self._rests = (height < REST_HEIGHT) & (speed < limit)
         over = np.maximum(height - REST_HEIGHT, 0.0)
         up = smoothstep(1 - over / (LEAD_HEIGHT - REST_HEIGHT))
-        up[self._arms] *= self._leaning(targets)
+        feet = targets.feet.reshape(1, -1, 3) - np.array([0.0, 0.0, self._floor])
+        up[self._arms] *= on_arms(targets.com[None, :2] / self._scale, feet, self._adult)
         grip = self._frame_time / HOLD_TIME
         self._free = self._along == 0
         self._along = self._along + np.clip(self._rests - self._along, -grip, grip)
         return _Seen(self._scale * self._adult * over, up, self._along)
-
-    def _leaning(self, targets: FrameTargets) -> Float[np.ndarray, "1"]:
-        """How far (0 to 1) the source leans on its arms: its mass is not over its feet."""
-        places = targets.feet.reshape(-1, 3)
-        stands = places[:, 2] - self._floor < STANDING_HEIGHT * self._adult
-        feet = places[stands, :2] @ (1, 1j) - targets.com[:2] @ (1, 1j) / self._scale
-        if not len(feet):
-            return np.ones(1)
-        along = feet - feet[:, None]  # from each to each: what lies between them is over them, too
-        nearest = -(feet[:, None] * along.conj()).real / np.maximum(np.abs(along) ** 2, 1e-12)
-        away = np.abs(feet[:, None] + np.clip(nearest, 0, 1) * along).min() / self._adult
-        near, far = OVER_FEET
-        return smoothstep(np.array([(away - near) / (far - near)]))
 
     def _follow(self, own: Complex[np.ndarray, "K"]) -> None:
         """Parts are held where they came to rest; with the source's, where that goes on beyond what

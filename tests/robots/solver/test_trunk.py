@@ -5,7 +5,7 @@ import pytest
 
 from robots.model.known import known
 from robots.solver.targets import targets_of
-from robots.solver.trunk import bends, leaning
+from robots.solver.trunk import bends, leaning, max_flexion
 from spark.demo.sample import sample_motion, sample_rig
 from spark.kinematics import world_positions
 from spark.rig.roles import Role
@@ -21,6 +21,8 @@ from spark.rotation import (
 from spark.transfer.canonical import to_canonical
 
 RIG = sample_rig("walker")
+FLOOR = -RIG.hip_height  # the T-pose's hips are at 0
+LEGS = "upper_leg", "lower_leg", "foot", "toe"
 TURNS = [[0.0, 0.0, 1.2], [0.0, 0.5, 0.0], [0.3, 0.0, 0.0]]
 
 
@@ -34,7 +36,7 @@ def trunk(positions: np.ndarray) -> np.ndarray:
 def test_a_stiff_source_is_followed(rotvec: list[float]) -> None:
     turn = quat_from_rotvec(np.array([rotvec]))
     positions = quat_rotate(turn, RIG.tpose_positions)
-    found = leaning(RIG, turn, positions[None])
+    found = leaning(RIG, turn, positions[None], FLOOR, np.pi)
     assert quat_angle(turn, found)[0] < np.radians(2)
 
 
@@ -42,7 +44,7 @@ def test_a_tilted_pelvis_under_an_upright_trunk_bows_nobody() -> None:
     heading = quat_from_yaw(np.array([2.0]))
     pelvis = quat_mul(heading, quat_from_rotvec(np.array([[0.0, 0.6, 0.0]])))
     positions = quat_rotate(heading, RIG.tpose_positions)
-    found = leaning(RIG, pelvis, positions[None])
+    found = leaning(RIG, pelvis, positions[None], FLOOR, np.pi)
     np.testing.assert_allclose(
         quat_rotate(found, trunk(RIG.tpose_positions)[None])[0], trunk(positions), atol=1e-9
     )
@@ -66,3 +68,41 @@ def test_only_what_cannot_bend_leans_as_a_whole(monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize(("name", "bend"), [("booster_t1", False), ("unitree_g1", True)])
 def test_waists_are_told_apart(name: str, bend: bool) -> None:
     assert bends(known(name)) is bend
+
+
+def crouching(bow: float, ahead: float = 0.0) -> np.ndarray:
+    """The T-pose with its trunk bowed by so much [rad] over thighs that are level and shanks that
+    are upright; the feet are so far [m] behind those places."""
+    positions = RIG.tpose_positions.copy()
+    upper = [j for j, role in enumerate(RIG.roles.roles) if role and role.part not in LEGS]
+    turn = quat_from_rotvec(np.array([0.0, bow, 0.0]))
+    middle = positions[RIG.hips].mean(0)
+    positions[upper] = middle + quat_rotate(turn, positions[upper] - middle)
+    for side in ("left", "right"):
+        hip, knee, foot = (RIG.roles.require(Role(f"{side}_{part}")) for part in LEGS[:3])
+        positions[knee] = positions[hip] + [0.4, 0.0, 0.0]
+        for joint in (foot, *RIG.roles.joints(Role(f"{side}_toe"))):
+            positions[joint] += [0.3 - ahead, 0.0, 0.4]
+    return positions
+
+
+@pytest.mark.parametrize(("flexion", "left"), [(2.0, 2.0 - np.pi / 2), (3.0, 1.2)])
+def test_a_trunk_bows_no_further_than_hips_flex(flexion: float, left: float) -> None:
+    """Thighs that are level are at right angles to an upright trunk."""
+    upright = np.array([[1.0, 0, 0, 0]])
+    found = leaning(RIG, upright, crouching(1.2)[None], FLOOR + 0.4, flexion)
+    assert quat_angle(upright, found)[0] == pytest.approx(left, abs=0.06)
+
+
+def test_who_leans_on_the_arms_bows_all_the_same() -> None:
+    upright = np.array([[1.0, 0, 0, 0]])
+    found = leaning(RIG, upright, crouching(1.2, ahead=0.8)[None], FLOOR + 0.4, 2.0)
+    assert quat_angle(upright, found)[0] == pytest.approx(1.2, abs=0.06)
+
+
+@pytest.mark.parametrize(
+    ("name", "degrees"), [("robot", np.degrees(2.4)), ("booster_t1", 103.0), ("unitree_h1", 90.0)]
+)
+def test_hips_flex_as_their_limits_say(name: str, degrees: float) -> None:
+    """To within how the T-pose stands beside the zero of the file."""
+    assert np.degrees(max_flexion(known(name))) == pytest.approx(degrees, abs=4)
