@@ -1,9 +1,11 @@
-"""How a trunk leans that cannot bend.
+"""How a trunk leans: one that cannot bend, and one whose hips flex less than people's.
 
 Many robots have no hinge by which the chest leans against the hips. Humans have, and stand upright
 with a pelvis that is tilted by 30 degrees; a stiff trunk that followed it would bow. So it leans as
-the source's whole trunk does, from the hips to the shoulders, and heads as its pelvis does; but no
-further than its hips flex while its legs carry it: who crouches or kneels bows over the thighs.
+the source's whole trunk does, from the hips to the shoulders, and heads as its pelvis does.
+
+No robot bows further over its thighs than its hips flex while its legs carry it: who crouches or
+kneels has thighs and feet where the source has them.
 """
 
 from functools import lru_cache
@@ -65,29 +67,36 @@ def max_flexion(robot: Morphology) -> float:
 
 
 def leaning(
+    rig: Rig, pelvis: Float[np.ndarray, "T 4"], positions: Float[np.ndarray, "T J 3"]
+) -> Float[np.ndarray, "T 4"]:
+    """The rotations, since the T-pose, of the trunk of a source whose joints are at `positions` [m]
+    and whose pelvis has turned by `pelvis`; the same where a rig has no shoulders."""
+    if not all(rig.roles.joints(role) for role in _SHOULDERS):
+        return pelvis
+    heading = quat_from_yaw(yaw_from_quat(pelvis))
+    upright, along = _trunk(rig, rig.tpose_positions[None]), _trunk(rig, positions)
+    return quat_mul(quat_between(quat_rotate(heading, upright), along), heading)
+
+
+def within_flexion(
     rig: Rig,
     pelvis: Float[np.ndarray, "T 4"],
     positions: Float[np.ndarray, "T J 3"],
     floor_z: float,
     flexion: float,
 ) -> Float[np.ndarray, "T 4"]:
-    """The rotations, since the T-pose, of the trunk of a source whose joints are at `positions` [m]
-    and whose pelvis has turned by `pelvis`, over a floor at `floor_z` [m], for hips that flex by at
-    most `flexion` [rad]; those of the pelvis where a rig has no shoulders."""
-    if not all(rig.roles.joints(role) for role in _SHOULDERS):
-        return pelvis
-    heading = quat_from_yaw(yaw_from_quat(pelvis))
-    upright, along = _trunk(rig, rig.tpose_positions[None]), _trunk(rig, positions)
-    leans = quat_mul(quat_between(quat_rotate(heading, upright), along), heading)
-    forwards, left = np.eye(3)[:1], quat_rotate(leans, np.eye(3)[1:2])
-    up = quat_rotate(leans, np.eye(3)[2:])
-    bowed = np.arctan2(dot(up, quat_rotate(heading, forwards)), up[:, 2:])
-    excess = _flexion(rig, leans, positions) - flexion
+    """The rotations `pelvis`, since the T-pose, but bowed no further forwards than lets hips that
+    flex by at most `flexion` [rad] raise the thighs of a source whose joints are at `positions` [m]
+    over a floor at `floor_z`, while its legs carry it."""
+    left, up = (quat_rotate(pelvis, axis) for axis in np.eye(3)[[1, 2], None])
+    ahead = quat_rotate(quat_from_yaw(yaw_from_quat(pelvis)), np.eye(3)[:1])
+    bowed = np.arctan2(dot(up, ahead), up[:, 2:])
+    excess = _flexion(rig, pelvis, positions) - flexion
     # max(excess, 0), rounded: a parabola around the kink, and none of it where hips flex far enough
     near = np.clip(excess + _ROUNDING, 0.0, 2 * _ROUNDING)
     back = near**2 / (4 * _ROUNDING) + np.maximum(excess - _ROUNDING, 0.0)
-    back = np.minimum(back, np.maximum(bowed, 0.0)) * _on_legs(rig, positions, along, floor_z)
-    return quat_mul(quat_from_rotvec(-back * left), leans)
+    back = np.minimum(back, np.maximum(bowed, 0.0)) * _on_legs(rig, positions, floor_z)
+    return quat_mul(quat_from_rotvec(-back * left), pelvis)
 
 
 def _flexion(
@@ -105,14 +114,12 @@ def _flexion(
 
 
 def _on_legs(
-    rig: Rig,
-    positions: Float[np.ndarray, "T J 3"],
-    along: Float[np.ndarray, "T 3"],
-    floor_z: float,
+    rig: Rig, positions: Float[np.ndarray, "T J 3"], floor_z: float
 ) -> Float[np.ndarray, "T 1"]:
-    """How far (0 to 1) a body whose trunk reaches so far [m] from its hips is carried by its legs:
-    its mass is about where the middle of the trunk is."""
-    mass = positions[:, rig.hips].mean(1) + along / 2
+    """How far (0 to 1) a body is carried by its legs: its mass is about where the middle of the
+    trunk is."""
+    shoulders = [j for role in _SHOULDERS for j in rig.roles.joints(role)] or [rig.chest]
+    mass = (positions[:, rig.hips].mean(1) + positions[:, shoulders].mean(1)) / 2
     feet = [j for role in Role if role.part in ("foot", "toe") for j in rig.roles.joints(role)]
     over_floor = positions[:, feet] - np.array([0.0, 0.0, floor_z])
     return 1 - on_arms(mass[:, :2], over_floor, rig.standing_height / ADULT_HEIGHT)[:, None]
