@@ -10,12 +10,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from robots.model.morphology import Morphology
-from robots.solver.settling import around, settled
+from robots.solver.settling import APPROACH, around, settled
 from spark.rig.roles import Role
 from spark.rotation import quat_continuous, quat_normalize
 from spark.runs import true_runs
-
-APPROACH = 0.3  # [s] before and after a rest over which a hand turns to how it lies, and back
 
 
 def resting_palms(

@@ -7,13 +7,14 @@ its arms can reach the ground. A head or a shoulder lies where the trunk lays it
 its neck does.
 """
 
-from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 
 from robots.model.morphology import Morphology
 from robots.solver.holds import Holds, joined
-from robots.solver.settling import around, led, settled
+from robots.solver.settling import APPROACH, around, led, settled
 from robots.solver.targets import Targets
 from robots.solver.touching import Touch, touches_of
 from robots.tree import Coordinates, LinkPoses, forward_kinematics
@@ -22,12 +23,18 @@ from spark.runs import true_runs
 from spark.transfer.footfalls import between_contacts, beyond
 
 HOLD = 3.2  # how firmly a part is held where it touches the ground, as a share of a standing sole,
-_ON_TRUNK = ("upper_arm", "head")
 CARRIED_HOLD = 0.45  # and of that the shoulder over an arm that touches
 MAX_DRAG = 0.1  # hip heights that the copied part may slide as it rests without having moved
 SETTLE = 0.12  # [s] before and after a rest in which a part already stays, ever less
-# [s] before and after a touch or a rest in which a part is led there and away
-APPROACH = 0.3
+
+
+class Carrier(NamedTuple):
+    """A joint of the trunk: the `link` that moves it, its `place` in the rest pose [m], and with
+    which share of a part's hold it is held."""
+
+    link: int
+    place: Float[np.ndarray, "3"]
+    share: float
 
 
 def resting(robot: Morphology, targets: Targets, q: Coordinates) -> Holds:
@@ -40,12 +47,8 @@ def resting(robot: Morphology, targets: Targets, q: Coordinates) -> Holds:
             continue
         held = _held(robot, targets, poses, touch, k)
         parts.append(held)
-        if role.part in _ON_TRUNK:
-            parts.append(_carried(robot, poses, robot.rig.roles.require(role), touch, held))
-        shoulder = robot.rig.roles.joint(Role(f"{role.side}_upper_arm")) if role.side else None
-        if role.part in ("hand", "forearm") and shoulder is not None:
-            over = _carried(robot, poses, shoulder, touch, held)
-            parts.append(replace(over, shares=CARRIED_HOLD * over.shares))
+        if (carried := carrier(robot, role)) is not None:
+            parts.append(_carried(poses, carried, touch, held))
     return joined(parts)
 
 
@@ -70,9 +73,22 @@ def _held(robot: Morphology, targets: Targets, poses: LinkPoses, touch: Touch, k
     return Holds(np.array([touch.link]), touch.place[None], (now + offset.T)[None], shares[None])
 
 
-def _carried(robot: Morphology, poses: LinkPoses, joint: int, touch: Touch, held: Holds) -> Holds:
-    """The joint of an arm or head, as a point of what that hangs on, shifted as its part is."""
+def carrier(robot: Morphology, role: Role) -> Carrier | None:
+    """Where what an arm or a head hangs on is held for it: the shoulder of a hand or a forearm, and
+    where an upper arm or a head begins; None for other parts."""
+    on_trunk = role.part in ("upper_arm", "head")
+    if not on_trunk and role.part not in ("hand", "forearm"):
+        return None
+    joint = robot.rig.roles.joint(role if on_trunk else Role(f"{role.side}_upper_arm"))
+    if joint is None:
+        return None
     link = int(robot.links[int(robot.rig.skeleton.parents[joint])])
-    center = robot.centers[joint]
-    positions = (poses.point(link, center) + held.positions[0] - touch.path(poses))[None]
-    return Holds(np.array([link]), center[None], positions, held.shares)
+    return Carrier(link, robot.centers[joint], 1.0 if on_trunk else CARRIED_HOLD)
+
+
+def _carried(poses: LinkPoses, carrier: Carrier, touch: Touch, held: Holds) -> Holds:
+    """What carries a part that is held, shifted as that is."""
+    place = poses.point(carrier.link, carrier.place)
+    positions = (place + held.positions[0] - touch.path(poses))[None]
+    links, points = np.array([carrier.link]), carrier.place[None]
+    return Holds(links, points, positions, carrier.share * held.shares)

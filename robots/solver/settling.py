@@ -11,6 +11,8 @@ from scipy.ndimage import distance_transform_edt
 from spark.runs import true_runs
 from spark.smoothstep import smoothstep
 
+# [s] before and after a touch or a rest in which a part is led there and away
+APPROACH = 0.3
 SHARE = 0.45  # of the time between two rests, at most, in which what rested stays
 
 

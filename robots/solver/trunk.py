@@ -88,10 +88,12 @@ def within_flexion(
     """The rotations `pelvis`, since the T-pose, but bowed no further forwards than lets hips that
     flex by at most `flexion` [rad] raise the thighs of a source whose joints are at `positions` [m]
     over a floor at `floor_z`, while its legs carry it."""
-    left, up = (quat_rotate(pelvis, axis) for axis in np.eye(3)[[1, 2], None])
+    forwards, left, up = (quat_rotate(pelvis, axis) for axis in np.eye(3)[:, None])
+    if not flexes_far(rig, forwards, up, positions, flexion):
+        return pelvis
     ahead = quat_rotate(quat_from_yaw(yaw_from_quat(pelvis)), np.eye(3)[:1])
     bowed = np.arctan2(dot(up, ahead), up[:, 2:])
-    excess = _flexion(rig, pelvis, positions) - flexion
+    excess = _flexion(rig, forwards, up, positions) - flexion
     # max(excess, 0), rounded: a parabola around the kink, and none of it where hips flex far enough
     near = np.clip(excess + _ROUNDING, 0.0, 2 * _ROUNDING)
     back = near**2 / (4 * _ROUNDING) + np.maximum(excess - _ROUNDING, 0.0)
@@ -99,12 +101,26 @@ def within_flexion(
     return quat_mul(quat_from_rotvec(-back * left), pelvis)
 
 
+def flexes_far(
+    rig: Rig,
+    ahead: Float[np.ndarray, "T 3"],
+    up: Float[np.ndarray, "T 3"],
+    positions: Float[np.ndarray, "T J 3"],
+    flexion: float,
+) -> bool:
+    """Whether thighs are ever raised so far against a trunk that is `ahead` and `up` there that
+    hips which flex by at most `flexion` [rad] change how it bows."""
+    return bool((_flexion(rig, ahead, up, positions) > flexion - _ROUNDING).any())
+
+
 def _flexion(
-    rig: Rig, trunk: Float[np.ndarray, "T 4"], positions: Float[np.ndarray, "T J 3"]
+    rig: Rig,
+    ahead: Float[np.ndarray, "T 3"],
+    up: Float[np.ndarray, "T 3"],
+    positions: Float[np.ndarray, "T J 3"],
 ) -> Float[np.ndarray, "T 1"]:
-    """By how much [rad] the higher thigh is raised forwards against a trunk that has so turned."""
-    ahead, up = (quat_rotate(trunk, axis) for axis in np.eye(3)[[0, 2], None])
-    most = np.full((len(trunk), 1), -np.pi)
+    """By how much [rad] the higher thigh is raised forwards against a trunk with these axes."""
+    most = np.full((len(up), 1), -np.pi)
     for role, below in _THIGHS.items():
         hip, knee = rig.roles.joint(role), rig.roles.joint(below)
         if hip is not None and knee is not None:

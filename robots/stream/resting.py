@@ -15,7 +15,7 @@ from jaxtyping import Complex, Float
 from robots.model.morphology import Morphology
 from robots.solver.contacts import REST_HEIGHT, REST_SPEED, ROLL_SPEED, WRIST_HEIGHT
 from robots.solver.over_feet import on_arms
-from robots.solver.resting import CARRIED_HOLD
+from robots.solver.resting import carrier
 from robots.solver.touching import touches_of
 from robots.solver.window_collision import WindowPoses
 from robots.solver.window_targets import PointTargets
@@ -61,18 +61,10 @@ def held_points(
 def _points(robot: Morphology, parts: Sequence[Role]) -> list[_Point]:
     """Those of the parts themselves and, of arms and head, which give way to the trunk, those of
     the trunk that carry them."""
-    touches, roles = touches_of(robot), robot.rig.roles
+    touches = touches_of(robot)
     own = [_Point(k, touches[role].link, touches[role].place, 1.0) for k, role in enumerate(parts)]
-    for k, role in enumerate(parts):
-        if role.part not in ("hand", "forearm", "upper_arm", "head"):
-            continue
-        on_trunk = role.part in ("upper_arm", "head")
-        joint = roles.joint(role if on_trunk else Role(f"{role.side}_upper_arm"))
-        if joint is not None:
-            link = int(robot.links[int(robot.rig.skeleton.parents[joint])])
-            share = 1.0 if on_trunk else CARRIED_HOLD
-            own.append(_Point(k, link, robot.centers[joint], share))
-    return own
+    carried = [(k, carrier(robot, role)) for k, role in enumerate(parts)]
+    return own + [_Point(k, *point) for k, point in carried if point is not None]
 
 
 class RestTracker:
@@ -139,8 +131,9 @@ class RestTracker:
         self._rests = (height < REST_HEIGHT) & (speed < limit)
         over = np.maximum(height - REST_HEIGHT, 0.0)
         up = smoothstep(1 - over / (LEAD_HEIGHT - REST_HEIGHT))
-        feet = targets.feet.reshape(1, -1, 3) - np.array([0.0, 0.0, self._floor])
-        up[self._arms] *= on_arms(targets.com[None, :2] / self._scale, feet, self._adult)
+        if up[self._arms].any():
+            feet = targets.feet.reshape(1, -1, 3) - np.array([0.0, 0.0, self._floor])
+            up[self._arms] *= on_arms(targets.com[None, :2] / self._scale, feet, self._adult)
         grip = self._frame_time / HOLD_TIME
         self._free = self._along == 0
         self._along = self._along + np.clip(self._rests - self._along, -grip, grip)
