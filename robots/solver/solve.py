@@ -28,6 +28,7 @@ from robots.solver.strays import without_strays
 from robots.solver.stretches import by_stretches
 from robots.solver.targets import Targets, poses_of, targets_of
 from robots.tree import Coordinates
+from spark.threads import one_thread
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
 _MAX_ITER = (12, 10)  # Gauss-Newton steps, by block
@@ -64,7 +65,8 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
         notes.update(dict.fromkeys(targets.notes))
         return _trajectory(robot, targets)
 
-    q = robot.following(by_stretches(solved, len(source), source.frame_time))
+    with one_thread():
+        q = robot.following(by_stretches(solved, len(source), source.frame_time))
     return RobotMotion(robot, q, source.frame_time, tuple(notes))
 
 

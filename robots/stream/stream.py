@@ -30,6 +30,7 @@ from robots.stream.window import Window
 from spark.errors import FrameError
 from spark.rig.rig import Rig
 from spark.rotation import quat_from_matrix
+from spark.threads import one_thread
 
 _FIXED = 3  # frames before the free ones
 _FRAMES = _FIXED + LATENCY + 1
@@ -69,6 +70,10 @@ class Stream:
 
         Raises `FrameError` where the frame is broken; it is then as if it had not been there.
         """
+        with one_thread():
+            return self._step(frame)
+
+    def _step(self, frame: Frame) -> Float[np.ndarray, "nq"]:
         try:
             targets = self._reader.targets(frame)
         except FrameError as error:

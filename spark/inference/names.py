@@ -10,6 +10,7 @@ from jaxtyping import Float
 from spark.inference.layers import Layers, attend, join_heads, split_heads
 from spark.inference.name_words import name_tokens, relative_buckets, rig_words
 from spark.inference.weights import Weights
+from spark.threads import one_thread
 
 
 class NameNetwork:
@@ -23,6 +24,10 @@ class NameNetwork:
 
     def encode(self, names: Sequence[str]) -> Float[np.ndarray, "S D"]:
         """The vectors of `names`: the joints of one rig."""
+        with one_thread():
+            return self._encode(names)
+
+    def _encode(self, names: Sequence[str]) -> Float[np.ndarray, "S D"]:
         x = np.stack([self._name(word) for word in rig_words(names)])
         for k in range(self.blocks[1]):
             x = self._block(f"rig_blocks.{k}", x, None)
