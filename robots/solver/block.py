@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from robots.model.morphology import Morphology
-from robots.tree import BASE, Tree
+from robots.tree import BASE, ROOT, Tree
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,16 @@ class Block:
 
     def _dofs_of(self, joints: tuple[int, ...]) -> list[int]:
         return [*(range(BASE) if self.base else ()), *self.tree.dofs(joints)]
+
+
+def carriers(robot: Morphology) -> list[int]:
+    """What carries each of the tree's links: itself or, where no block moves its joint, what
+    carries the link above it; `ROOT` for the base."""
+    moved = {j for block in blocks_of(robot) for j in block.joints}
+    out: list[int] = []
+    for link, above in enumerate(robot.tree.parents.tolist()):
+        out.append(link if link in moved else (out[above] if above >= 0 else ROOT))
+    return out
 
 
 def blocks_of(robot: Morphology) -> tuple[Block, Block]:

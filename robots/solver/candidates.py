@@ -29,6 +29,15 @@ def by_moves(candidates: Sequence[Candidate]) -> dict[Moves, list[Candidate]]:
     return out
 
 
+def by_larges(candidates: Sequence[Candidate]) -> list[list[Candidate]]:
+    """The candidates, those together whose small shapes one link carries against one large one."""
+    out: dict[tuple[int, int], list[Candidate]] = {}
+    for candidate in candidates:
+        small, large = candidate.pair.small, candidate.pair.large
+        out.setdefault((small.link, large.geom), []).append(candidate)
+    return list(out.values())
+
+
 def among(candidates: Sequence[Candidate], kept: Bool[np.ndarray, "T"]) -> list[Candidate]:
     """The candidates in the frames that are kept, counted without the others."""
     number = np.cumsum(kept) - 1

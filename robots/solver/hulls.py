@@ -19,10 +19,9 @@ from sim.outline import solid
 CLEARANCE = 0.0  # [m] that shapes keep between them; less where the T-pose has less
 _MAX_ALONG = 6  # spheres along a shape, at most
 _MAX_SPHERES = 24  # of a shape, its corners included
-_MAX_PROTRUSION = (
-    0.006  # [m] of a shape's corner beyond its spheres: above, it gets one of its own,
-)
+MAX_PROTRUSION = 0.006  # [m] of a shape's corner beyond its spheres: above, it gets one of its own,
 _CORNER_RADIUS = 0.008  # [m] of this radius
+_AT_ONCE = 8192  # points whose distances from all slabs fit into a processor's cache
 SLABS = DIRECTIONS[len(DIRECTIONS) // 2 :]  # the others are these, reversed, against them
 
 
@@ -67,10 +66,14 @@ class ShapePair:
         return min(CLEARANCE, self.gap)
 
 
-def shapes_of(mjcf: Mjcf, joints: Sequence[int]) -> list[Shape]:
-    """The solid shapes of a model (`sim.outline`)."""
+def shapes_of(
+    mjcf: Mjcf, joints: Sequence[int], qpos: Float[np.ndarray, "nq"] | None = None
+) -> list[Shape]:
+    """The solid shapes of a model (`sim.outline`), where they are at `qpos` or at rest."""
     model = mjcf.model
     data = mujoco.MjData(model)
+    if qpos is not None:
+        data.qpos = qpos
     mujoco.mj_kinematics(model, data)
     links = {mjcf.root: -1}
     for i, joint in enumerate(joints):
@@ -131,7 +134,7 @@ def _with_corners(
     while len(spheres) < _MAX_SPHERES:
         short = reach - ((DIRECTIONS @ spheres.T) + radii).max(1)
         side = int(short.argmax())
-        if short[side] < _MAX_PROTRUSION:
+        if short[side] < MAX_PROTRUSION:
             break
         corner = points[int((points @ DIRECTIONS[side]).argmax())]
         spheres = np.concatenate([spheres, [corner - _CORNER_RADIUS * DIRECTIONS[side]]])
@@ -142,12 +145,17 @@ def _with_corners(
 def signed_distance(shape: Shape, points: Float[np.ndarray, "3 S N"]) -> Float[np.ndarray, "S N"]:
     """The signed distance [m] of points from a shape, both in its rest pose: the maximum over its
     sides, of which a slab has two."""
-    middle, half = shape.slabs
-    excess = SLABS @ points.reshape(3, -1)
-    excess -= middle[:, None]
-    np.abs(excess, out=excess)
-    excess -= half[:, None]
-    return excess.max(0).reshape(points.shape[1:])
+    middle, half = shape.slabs[:, :, None]
+    flat = points.reshape(3, -1)
+    out = np.empty(flat.shape[1])
+    for start in range(0, len(out), _AT_ONCE):
+        here = slice(start, start + _AT_ONCE)
+        excess = SLABS @ flat[:, here]
+        excess -= middle
+        np.abs(excess, out=excess)
+        excess -= half
+        np.max(excess, axis=0, out=out[here])
+    return out.reshape(points.shape[1:])
 
 
 def can_collide(mjcf: Mjcf, a: Shape, b: Shape) -> bool:

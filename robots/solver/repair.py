@@ -2,8 +2,9 @@
 
 Collisions, the floor and the speed of hinges are soft penalties to the solver: other residuals may
 outweigh them. The frames around a violation are solved again with penalties that grow round by
-round (a penalty method: Nocedal and Wright, "Numerical Optimization", 17.1). Arms that are stuck in
-something are first led out of it.
+round (a penalty method: Nocedal and Wright, "Numerical Optimization", 17.1): in the first with
+approximate shapes, which suffices for most, then with MuJoCo's. Arms that are stuck in something
+are led out of it.
 """
 
 from dataclasses import replace
@@ -21,6 +22,7 @@ from robots.solver.floor import depth_in_floor
 from robots.solver.footprints import points_of
 from robots.solver.hinges import LIMIT_CLEARANCE
 from robots.solver.holds import Holds
+from robots.solver.hulls import MAX_PROTRUSION
 from robots.solver.objective import linearize
 from robots.solver.repair_descent import Repair, solve_spells
 from robots.solver.smoothness import jerk_stiffening, overspeed
@@ -64,7 +66,9 @@ def repair(
         fixed[own][:2] = start > 0
         fixed[own][-2:] |= stop < len(q)
     part = targets.at(frames), holds.at(frames), q.at(frames)
-    broken = Repair(robot, block, spells, *part, np.ones(len(frames)), fixed)
+    # What is rougher than the violations can't mend them.
+    exact = _MAX_DEPTH * robot.rig.hip_height < MAX_PROTRUSION
+    broken = Repair(robot, block, spells, *part, np.ones(len(frames)), fixed, exact)
     return q.replaced(frames, _repaired(broken))
 
 
@@ -94,7 +98,7 @@ def _repaired(broken: Repair) -> Coordinates:
         q = solve_spells(broken)
         growth = np.where(broken.spells.any(violated), PENALTY_GROWTH, 1.0)
         penalty_scale = broken.penalty_scale * growth[broken.spells.of_frames]
-        broken = replace(broken, start=q, penalty_scale=penalty_scale)
+        broken = replace(broken, start=q, penalty_scale=penalty_scale, exact=True)
     return best
 
 

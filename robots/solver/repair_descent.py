@@ -34,7 +34,8 @@ _FIXED_DAMPING = 1e8  # where a frame must stay
 @dataclass(frozen=True, eq=False)
 class Repair:
     """Spells of a trajectory to be solved again, from the coordinates `start`: `penalty_scale`
-    multiplies the weights of collisions, floor and overspeed; `fixed` frames stay."""
+    multiplies the weights of collisions, floor and overspeed; `fixed` frames stay; parts in each
+    other are measured by MuJoCo where `exact`, else roughly."""
 
     robot: Morphology
     block: Block
@@ -44,6 +45,7 @@ class Repair:
     start: Coordinates
     penalty_scale: Float[np.ndarray, "T"]
     fixed: Bool[np.ndarray, "T"]
+    exact: bool
 
     def __len__(self) -> int:
         return len(self.start)
@@ -73,9 +75,9 @@ class Repair:
     def linearize(
         self, q: Coordinates, candidates: list[Candidate], with_jacobian: bool
     ) -> NormalEquations:
-        """The objective of each frame, parts measured by MuJoCo."""
+        """The objective of each frame."""
         terms = self.robot, self.targets, self.holds, q, self.block, candidates, self.penalty_scale
-        return linearize(*terms, with_jacobian=with_jacobian, exact=True)
+        return linearize(*terms, with_jacobian=with_jacobian, exact=self.exact)
 
     def smoothness(
         self, q: Coordinates, stiffening: Float[np.ndarray, "T D"], with_jacobian: bool

@@ -84,7 +84,7 @@ def test_a_repair_comes_down_to_a_floor_that_is_as_firm_as_it_gets(
     start = Coordinates(hovering.pos + up, hovering.quat, hovering.angles)
     spells, free = Spells(np.array([COUNT])), np.zeros(COUNT, dtype=bool)
     targets = targets_of(standing(), ember)
-    broken = Repair(ember, block, spells, targets, holds, start, firm, free)
+    broken = Repair(ember, block, spells, targets, holds, start, firm, free, exact=True)
     poses = forward_kinematics(ember.tree, solve_spells(broken))
     lowest = np.min([points_of(ember, poses, sole)[:, 2].min(0) for sole in ember.soles], axis=0)
     assert lowest.min() > -0.001
