@@ -1,6 +1,6 @@
-"""Positions of joints in npy and npz files: frames x joints x 3, with names or without."""
+"""Positions of joints in npy, npz and pt files: frames x joints x 3, with names or without."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 from spark.errors import FileFormatError
 from spark.io.arrays import Arrays, held, numbers, read_npy, read_npz
 from spark.io.humanml3d import FPS, WIDTH, positions_of_features
+from spark.io.intermimic import read_states
 from spark.io.position_layouts import POSITION_KEYS
 from spark.io.position_tree import parents_first
 
@@ -39,6 +40,10 @@ def read_points(path: Path) -> Points:
             note = "HumanML3D's features: its rotations, velocities and contacts are not read"
             return Points(positions, None, None, FPS, (note,))
         return _points(array, Arrays(), path, "the array")
+    if path.suffix.lower() in (".pt", ".pth"):
+        note = "InterMimic's states: object, velocities and contacts are not read"
+        points = _points(read_states(path), Arrays(), path, "the tensor")
+        return replace(points, notes=(note, *points.notes))
     arrays = read_npz(path)
     name = next((n for n in POSITION_KEYS if n in arrays and arrays[n].ndim >= 3), None)
     if name is None:

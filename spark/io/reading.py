@@ -8,6 +8,7 @@ from typing import Any
 from spark.errors import ConventionError, FileFormatError
 from spark.io.arrays import npy_shape, npz_names
 from spark.io.humanml3d import WIDTH as FEATURES
+from spark.io.intermimic import holds_states
 from spark.io.position_layouts import POSITION_KEYS, layouts
 from spark.io.recording import Recording
 from spark.io.smpl_columns import WIDTHS as SMPL_WIDTHS
@@ -37,7 +38,7 @@ GLTF = Format("glTF", (".glb", ".gltf", ".vrm", ".vrma"), (*UNIT_AND_UP, "fps", 
 ACCLAIM = Format("ASF/AMC", (".amc", ".asf"), (*UNIT_AND_UP, "fps"))
 SMPL = Format("SMPL", (".npz", ".npy", ".pt", ".pth"), (*UNIT_AND_UP, "fps", "body_model"))
 C3D = Format("C3D", (".c3d",), (*UNIT_AND_UP, "fps"))
-POSITIONS = Format("positions", (".npz", ".npy"), (*UNIT_AND_UP, "fps"))
+POSITIONS = Format("positions", (".npz", ".npy", ".pt", ".pth"), (*UNIT_AND_UP, "fps"))
 
 FORMATS = (BVH, FBX, GLTF, ACCLAIM, C3D, SMPL, POSITIONS)
 SMPL_KEYS = KEYS | SIGNS
@@ -91,6 +92,8 @@ def format_of(path: Path) -> Format:
     head = beginning(path, 64).lstrip(b"\xef\xbb\xbf \t\r\n")
     if path.suffix.lower() in (".npy", ".npz") and head.startswith((b"\x93NUMPY", b"PK")):
         return SMPL if _is_smpl(path) else POSITIONS
+    if path.suffix.lower() in (".pt", ".pth") and holds_states(path):
+        return POSITIONS
     by_content = (f for f in FORMATS if f.magic is not None and head.startswith(f.magic))
     by_ending = (f for f in FORMATS if path.suffix.lower() in f.endings)
     return next(by_content, None) or next(by_ending, BVH)
@@ -107,7 +110,7 @@ def holds_person(path: Path) -> bool:
             known = len(shape) == 3 and bool(layouts(shape[1]))
             return _is_smpl(path) or known or shape[1:] == (FEATURES,)
         case ".pt" | ".pth":
-            return says(path, (b"global_orient", b"root_orient"))
+            return says(path, (b"global_orient", b"root_orient")) or holds_states(path)
         case ".asf":  # a skeleton, which its AMCs move
             return False
         case _:

@@ -297,3 +297,32 @@ def test_features_that_are_normalised_are_refused(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", np.random.default_rng(0).normal(size=(40, 263)))
     with pytest.raises(FileFormatError, match=r"seem normalised.*Std\.npy"):
         read_motion(tmp_path / "a.npy")
+
+
+def test_intermimic_s_states_are_read(walking: Motion, tmp_path: Path) -> None:
+    """A tensor of frames x 591, in which a limb comes after the other: the joints are where they
+    were. A tensor of another width is refused by name."""
+    torch = pytest.importorskip("torch")
+    person = as_person(walking)
+    positions, _ = forward(person)
+    named = dict(zip(person.skeleton.names, positions.transpose(1, 0, 2), strict=True))
+    fingers = [f"{f}{k}" for f in ("index", "middle", "pinky", "ring", "thumb") for k in (1, 2, 3)]
+    leg = ("hip", "knee", "ankle", "foot")
+    arm = ("collar", "shoulder", "elbow", "wrist", *fingers)
+    order = ["pelvis", *(f"{side}_{part}" for side in ("left", "right") for part in leg)]
+    order += ["spine1", "spine2", "spine3", "neck", "head"]
+    order += [f"{side}_{part}" for side in ("left", "right") for part in arm]
+    states = np.random.default_rng(1).normal(size=(len(person), 591))
+    states[:, 162:318] = np.concatenate([named[name] for name in order], axis=1)
+    torch.save(torch.tensor(states, dtype=torch.float32), tmp_path / "sub1_box_001.pt")
+    read = read_motion(tmp_path / "sub1_box_001.pt")
+    found, _ = forward(read.motion)
+    at = [person.skeleton.names.index(name) for name in read.motion.skeleton.names]
+    size = np.ptp(positions[0], axis=0).max()
+    off = np.linalg.norm(found - positions[:, at], axis=-1) / size
+    assert off.max() < 0.011
+    assert read.motion.fps == 30
+    assert "InterMimic" in " ".join(read.notes)
+    torch.save(torch.zeros(4, 590), tmp_path / "other.pt")
+    with pytest.raises(FileFormatError, match="has no motion of a body"):
+        read_motion(tmp_path / "other.pt")
