@@ -21,6 +21,7 @@ Format = Literal[
     "npz",
     "mjlab",
     "beyondmimic",
+    "holosoma",
     "holomotion",
     "locomujoco",
     "csv",

@@ -11,6 +11,7 @@ FORMATS = {
     "npz": ".npz",
     "mjlab": ".npz",
     "beyondmimic": ".npz",
+    "holosoma": ".npz",
     "holomotion": ".npz",
     "locomujoco": ".npz",
     "csv": ".csv",
@@ -30,7 +31,7 @@ SONIC_FILES = (
     *("joint_pos.csv", "joint_vel.csv", "body_pos.csv", "body_quat.csv"),
     *("body_lin_vel.csv", "body_ang_vel.csv", "metadata.txt", "info.txt"),
 )
-_TRACKERS = ("mjlab", "beyondmimic", "holomotion", "locomujoco", "protomotions")
+_TRACKERS = ("mjlab", "beyondmimic", "holosoma", "holomotion", "locomujoco", "protomotions")
 
 
 def unsaid(path: Path, format: str, fps: float) -> tuple[str, ...]:

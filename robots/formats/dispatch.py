@@ -10,6 +10,7 @@ from robots.formats import format_of, is_sonic
 from robots.formats.about import robot_of
 from robots.formats.gmr import read_pkl, write_pkl
 from robots.formats.holomotion import is_holomotion, read_holomotion, write_holomotion
+from robots.formats.holosoma import is_holosoma, read_holosoma, write_holosoma
 from robots.formats.locomujoco import is_locomujoco, read_locomujoco, write_locomujoco
 from robots.formats.mjlab import read_mjlab, write_beyondmimic, write_mjlab
 from robots.formats.native import is_native, read_npz, write_npz
@@ -44,6 +45,8 @@ def write(
             write_mjlab(motion, path)
         case "beyondmimic":
             write_beyondmimic(motion, path)
+        case "holosoma":
+            write_holosoma(motion, path)
         case "holomotion":
             write_holomotion(motion, path)
         case "locomujoco":
@@ -95,6 +98,7 @@ def read(
         (is_locomujoco, read_locomujoco),
         (is_plain, read_plain),
         (is_holomotion, read_holomotion),
+        (is_holosoma, read_holosoma),
         (lambda arrays: "joint_pos" in arrays, read_mjlab),
     ):
         if recognises(arrays):

@@ -68,8 +68,8 @@ def configure(parser: ArgumentParser) -> None:
         choices=tuple(FORMATS),
         metavar="NAME",
         help="of a robot's motion, where the ending leaves it open. For .npz: npz (default), "
-        "mjlab, beyondmimic (Isaac Lab's order), holomotion or locomujoco. For .csv: csv "
-        "(Unitree's, quaternions xyzw; default), csv-wxyz or bones-seed. For .pkl: gmr. For "
+        "mjlab, beyondmimic (Isaac Lab's order), holosoma, holomotion or locomujoco. For .csv: "
+        "csv (Unitree's, quaternions xyzw; default), csv-wxyz or bones-seed. For .pkl: gmr. For "
         ".motion: protomotions. A folder: sonic",
     )
     parser.add_argument(

@@ -145,7 +145,7 @@ FORMATS: dict[str, Target] = {
         ".npz",
         _seeds(
             *(("npz", ".npz"), ("mjlab", ".npz"), ("beyondmimic", ".npz")),
-            *(("holomotion", ".npz"), ("locomujoco", ".npz")),
+            *(("holomotion", ".npz"), ("holosoma", ".npz"), ("locomujoco", ".npz")),
         ),
         _use_motion,
     ),

@@ -394,3 +394,26 @@ def test_spoilt_files_end_in_an_error_that_says_so(
             file.write_bytes(whole[file])
 
     spoil()
+
+
+def test_holosoma_s_keys(g1: RobotClip, tmp_path: Path) -> None:
+    """What its trainer asks for; and with an object beside the robot, as its own files have."""
+    path = g1.save(tmp_path / "clip.npz", format="holosoma")
+    stored = dict(np.load(path, allow_pickle=False))
+    names = stored["joint_names"].tolist()
+    bodies = len(stored["body_names"])
+    assert stored["joint_pos"].shape == (FRAMES, 7 + len(names))
+    assert stored["joint_vel"].shape == (FRAMES, 6 + len(names))
+    assert stored["body_pos_w"].shape == (FRAMES, bodies, 3)
+    assert stored["body_ang_vel_w"].shape == (FRAMES, bodies, 3)
+    np.testing.assert_allclose(stored["joint_pos"], g1.qpos, atol=1e-12)
+    pelvis = stored["body_names"].tolist().index("pelvis")
+    np.testing.assert_allclose(stored["body_pos_w"][:, pelvis], stored["joint_pos"][:, :3])
+    stored["joint_names"] = np.array(names[::-1])
+    stored["joint_pos"] = np.column_stack([g1.qpos[:, :7], g1.qpos[:, :6:-1]])
+    stored["object_pos_w"] = np.zeros((FRAMES, 3))
+    np.savez(tmp_path / "mixed.npz", **stored)
+    back = spark_sim.load(tmp_path / "mixed.npz", robot="unitree_g1")
+    assert isinstance(back, RobotClip)
+    np.testing.assert_allclose(back.qpos, g1.qpos, atol=1e-9)
+    assert "'object_pos_w'" in " ".join(back.notes)
