@@ -14,6 +14,7 @@ from jaxtyping import Float
 
 from robots.model.mjcf import Mjcf
 from robots.model.shapes import DIRECTIONS, surface_of
+from robots.solver.hull_balls import Hull, balls_in, hull_of
 from sim.outline import solid
 
 CLEARANCE = 0.0  # [m] that shapes keep between them; less where the T-pose has less
@@ -88,30 +89,24 @@ def shapes_of(
     for geom in solid(model, geoms):
         body, points = int(model.geom_bodyid[geom]), surface_of(model, data, geom)
         if len(points):
-            shapes.append(_shape(links[body], body, geom, points))
+            hull = hull_of(model, data, geom)
+            shapes.append(_shape(links[body], body, geom, points, hull))
     return shapes
 
 
-def _shape(link: int, body: int, geom: int, points: Float[np.ndarray, "P 3"]) -> Shape:
+def _shape(
+    link: int, body: int, geom: int, points: Float[np.ndarray, "P 3"], hull: Hull | None
+) -> Shape:
     middle = (points.max(0) + points.min(0)) / 2
     axes = np.linalg.eigh(np.cov((points - middle).T) + 1e-12 * np.eye(3))[1]
     inside = (points - middle) @ axes
     low, high = inside.min(0), inside.max(0)
     center = middle + axes @ ((low + high) / 2)
     half = (high - low) / 2
-    order = np.argsort(half)
-    thin, middle_half, long_half = half[order]
-    # A rod is a row of spheres, a plate a grid of them.
-    radius = float((thin + middle_half) / 2 if middle_half < 1.3 * thin else thin)
-    grids = []
-    for reach, most in ((middle_half, 3), (long_half, _MAX_ALONG)):
-        spare = max(float(reach) - radius, 0.0)
-        count = int(np.clip(np.ceil(spare / max(radius, 1e-3)) + 1, 1, most))
-        grids.append(np.linspace(-spare, spare, count) if count > 1 else np.zeros(1))
-    across, along = (grid.ravel() for grid in np.meshgrid(*grids))
-    spheres = center + np.outer(across, axes[:, order[1]]) + np.outer(along, axes[:, order[2]])
     reach = (DIRECTIONS @ points.T).max(1)
-    spheres, radii = _with_corners(spheres, np.full(len(spheres), radius), points, reach)
+    spheres, radii = balls_in(hull) if hull is not None else (np.zeros((0, 3)), np.zeros(0))
+    if not len(spheres):
+        spheres, radii = _with_corners(*_along(center, axes, half), points, reach)
     return Shape(
         link=link,
         body=body,
@@ -122,6 +117,23 @@ def _shape(link: int, body: int, geom: int, points: Float[np.ndarray, "P 3"]) ->
         center=center,
         bound=float(np.linalg.norm(half)),
     )
+
+
+def _along(
+    center: Float[np.ndarray, "3"], axes: Float[np.ndarray, "3 3"], half: Float[np.ndarray, "3"]
+) -> tuple[Float[np.ndarray, "S 3"], Float[np.ndarray, "S"]]:
+    """Of a rod a row of spheres, of a plate a grid of them."""
+    order = np.argsort(half)
+    thin, middle_half, long_half = half[order]
+    radius = float((thin + middle_half) / 2 if middle_half < 1.3 * thin else thin)
+    grids = []
+    for reach, most in ((middle_half, 3), (long_half, _MAX_ALONG)):
+        spare = max(float(reach) - radius, 0.0)
+        count = int(np.clip(np.ceil(spare / max(radius, 1e-3)) + 1, 1, most))
+        grids.append(np.linspace(-spare, spare, count) if count > 1 else np.zeros(1))
+    across, along = (grid.ravel() for grid in np.meshgrid(*grids))
+    spheres = center + np.outer(across, axes[:, order[1]]) + np.outer(along, axes[:, order[2]])
+    return spheres, np.full(len(spheres), radius)
 
 
 def _with_corners(
