@@ -38,9 +38,12 @@ def test_balls_cover_a_limb_and_hardly_bulge(turned: dict[str, str]) -> None:
     hull = ConvexHull(corners)
     bulge = (hull.equations @ np.column_stack([centres, np.ones(len(centres))]).T).max(0) + radii
     assert bulge.max() < 0.007
-    shares = np.random.default_rng(5).dirichlet(np.ones(3), 2000)
-    sides = corners[hull.simplices[np.arange(2000) % len(hull.simplices)]]
-    surface = np.einsum("nk,nki->ni", shares, sides)
+    a, b, c = corners[hull.simplices].transpose(1, 0, 2)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    rng = np.random.default_rng(5)
+    side = rng.choice(len(area), 4000, p=area / area.sum())
+    shares = rng.dirichlet(np.ones(3), 4000)
+    surface = np.einsum("nk,nki->ni", shares, np.stack([a, b, c], axis=1)[side])
     away = np.linalg.norm(surface[:, None] - centres, axis=2) - radii
     uncovered = away.min(axis=1)
     assert np.percentile(uncovered, 90) < 0.012
