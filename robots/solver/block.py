@@ -72,3 +72,9 @@ def blocks_of(robot: Morphology) -> tuple[Block, Block]:
     first = sorted({j for link in links for j in tree.chain(link)})
     rest = tuple(j for j in moved if j not in first)
     return Block(tree, tuple(first), True), Block(tree, rest, False)
+
+
+def whole_of(robot: Morphology) -> Block:
+    """Both blocks at once."""
+    first, rest = blocks_of(robot)
+    return Block(robot.tree, tuple(sorted(first.joints + rest.joints)), first.base)

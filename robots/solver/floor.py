@@ -183,4 +183,4 @@ def _lifted_solids(robot: Morphology, block: Block) -> tuple[Solid, ...]:
     if not block.base:
         return tuple(solid for solid in solids if block.free_joints(solid.link))
     own = (solid for solid in solids if block.frees(solid.link))
-    return (*own, *carried_solids(robot))
+    return (*own, *(solid for solid in carried_solids(robot) if not block.frees(solid.link)))

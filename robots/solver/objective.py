@@ -56,7 +56,7 @@ class ChainTerms:
     """
 
     def __init__(self, block: Block, poses: LinkPoses, link: int, with_jacobian: bool) -> None:
-        self.block, self.poses = block, poses
+        self.block, self.poses, self.link = block, poses, link
         self.base = block.base and with_jacobian
         self.joints = block.free_joints(link) if with_jacobian else ()
         self.axes = poses.angular_jacobian(self.joints)
@@ -81,16 +81,24 @@ class ChainTerms:
         weight: Float[np.ndarray, "3 T"],
     ) -> None:
         """A link's point p [m] should be at p*: r = w (p - p*), the weight [1/m] by axis."""
+        self.parts.append((0, (self.jacobian_of(link, point) * weight, (point - target) * weight)))
+
+    def jacobian_of(self, link: int, point: Float[np.ndarray, "3 T"]) -> Float[np.ndarray, "C 3 T"]:
+        """That of a link's point p [m], by the free dofs of `dofs_of`."""
         chain, axes = self._joints_above(link), self.axes_of(link)
-        jacobian = point_jacobian(self.poses, chain, axes, point, base=self.base)
-        self.parts.append((0, (jacobian * weight, (point - target) * weight)))
+        return point_jacobian(self.poses, chain, axes, point, base=self.base)
+
+    def dofs_of(self, link: int) -> list[int]:
+        """The block's free dofs that move a link of the chain, the base's first."""
+        joints = self._joints_above(link)
+        return self.block.local_dofs(joints) if self.base or joints else []
 
     def add_to(self, normal: NormalEquations) -> None:
         """Into the block's normal equations."""
         if not self.parts:
             return
         residuals = np.concatenate([residual for _, (_, residual) in self.parts])
-        dofs = self.block.local_dofs(self.joints) if self.base or self.joints else []
+        dofs = self.dofs_of(self.link)
         J = np.zeros((residuals.shape[1], len(dofs), len(residuals)))
         row = 0
         for start, (jacobian, residual) in self.parts:
@@ -121,7 +129,7 @@ def linearize(
 
     Per frame: the rotation of each part with a role and the direction of each limb (`_add_pose`);
     points that are held; hips and the floor under soles, where the base is free; hands that touch,
-    where it is not;
+    where the block alone moves them;
     the depth of all other parts in the floor, and of the colliding `candidates` in each other,
     approximate or `exact`; limits; a pull to the T-pose.
     `penalty_scale` multiplies the weights of collisions and the floor, frame by frame.
@@ -150,8 +158,8 @@ def linearize(
     _add_holds(robot, holds, poses, chains, block)
     if block.base:
         _add_hips_and_soles(robot, targets, poses, chains, penalty_scale)
-    elif targets.hands is not None:
-        _add_hands(robot, targets, poses, block, normal, with_jacobian)
+    if targets.hands is not None:
+        _add_hands(robot, targets, poses, chains, block, normal)
     for terms in chains.values():
         terms.add_to(normal)
     add_floor(robot, poses, block, normal, W_FLOOR * penalty_scale, FLOOR_ROUNDING / penalty_scale)
@@ -207,13 +215,17 @@ def _add_pose(
         terms.add_rotational(direction_residual(now, targets.bones[role].T, axes, W_LIMB_DIRECTION))
 
 
+def _moves_alone(block: Block, link: int) -> bool:
+    """Whether a block moves a link and no later one does."""
+    return block.frees(link) if block.base else bool(block.free_joints(link))
+
+
 def _add_holds(
     robot: Morphology, holds: Holds, poses: LinkPoses, chains: dict[int, ChainTerms], block: Block
 ) -> None:
     """Each point that is held, where the block alone moves it: r = `W_HOLD` share (p - p*)."""
     for p, link in enumerate(holds.links.tolist()):
-        own = block.frees(link) if block.base else bool(block.free_joints(link))
-        terms = _chain_of(chains, robot, link) if own else None
+        terms = _chain_of(chains, robot, link) if _moves_alone(block, link) else None
         if terms is not None:
             point = poses.point(link, holds.points[p])
             weight = W_HOLD[:, None] * holds.shares[p]
@@ -253,9 +265,9 @@ def _add_hands(
     robot: Morphology,
     targets: Targets,
     poses: LinkPoses,
+    chains: dict[int, ChainTerms],
     block: Block,
     normal: NormalEquations,
-    with_jacobian: bool,
 ) -> None:
     """The offset d [m] from the right wrist to the left one should be d*: r = w (d - d*), where
     w = `W_HANDS` exp(-(|d*| / `HANDS_RANGE`)²): only hands that are near each other are held."""
@@ -263,15 +275,16 @@ def _add_hands(
     hands = [robot.rig.roles.require(role) for role in (Role.LEFT_HAND, Role.RIGHT_HAND)]
     weight = W_HANDS * np.exp(-((np.linalg.norm(targets.hands, axis=1) / HANDS_RANGE) ** 2))
     parts, positions = [], []
-    joints: tuple[int, ...] = ()
+    dofs: list[int] = []
     for sign, j in zip((1.0, -1.0), hands, strict=True):
         link = int(robot.links[j])
-        own = block.free_joints(link) if with_jacobian else ()
+        terms = _chain_of(chains, robot, link) if _moves_alone(block, link) else None
+        if terms is None:
+            return
         position = poses.point(link, robot.centers[j])
-        jacobian = point_jacobian(poses, own, poses.angular_jacobian(own), position, base=False)
-        joints += own
-        parts.append(sign * jacobian * weight)
+        dofs += terms.dofs_of(link)
+        parts.append(sign * terms.jacobian_of(link, position) * weight)
         positions.append(position)
     residual = (positions[0] - positions[1] - targets.hands.T) * weight
     J = np.ascontiguousarray(np.concatenate(parts).transpose(2, 0, 1))
-    normal.add(block.local_dofs(joints), J, residual)
+    normal.add(dofs, J, residual)

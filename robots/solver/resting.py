@@ -23,7 +23,8 @@ from spark.runs import true_runs
 from spark.transfer.footfalls import between_contacts, beyond
 
 HOLD = 3.2  # how firmly a part is held where it touches the ground, as a share of a standing sole,
-CARRIED_HOLD = 0.45  # and of that the shoulder over an arm that touches
+CARRIED_HOLD = 0.2  # and of that the shoulder over an arm that touches;
+UNSEEN_HOLD = 0.45  # more where the trunk is not solved together with the arm
 MAX_DRAG = 0.1  # hip heights that the copied part may slide as it rests without having moved
 SETTLE = 0.12  # [s] before and after a rest in which a part already stays, ever less
 
@@ -47,7 +48,7 @@ def resting(robot: Morphology, targets: Targets, q: Coordinates) -> Holds:
             continue
         held = _held(robot, targets, poses, touch, k)
         parts.append(held)
-        if (carried := carrier(robot, role)) is not None:
+        if (carried := carrier(robot, role, CARRIED_HOLD)) is not None:
             parts.append(_carried(poses, carried, touch, held))
     return joined(parts)
 
@@ -73,9 +74,17 @@ def _held(robot: Morphology, targets: Targets, poses: LinkPoses, touch: Touch, k
     return Holds(np.array([touch.link]), touch.place[None], (now + offset.T)[None], shares[None])
 
 
-def carrier(robot: Morphology, role: Role) -> Carrier | None:
+def leans(robot: Morphology, targets: Targets) -> bool:
+    """Whether arms or a head, which give way to a trunk that legs carry, ever carry it."""
+    touching = zip(targets.part_roles, targets.parts.any(axis=0), strict=True)
+    return robot.mount is None and any(
+        touches and carrier(robot, role) is not None for role, touches in touching
+    )
+
+
+def carrier(robot: Morphology, role: Role, share: float = UNSEEN_HOLD) -> Carrier | None:
     """Where what an arm or a head hangs on is held for it: the shoulder of a hand or a forearm, and
-    where an upper arm or a head begins; None for other parts."""
+    where an upper arm or a head begins; None for other parts. `share` is of a shoulder's hold."""
     on_trunk = role.part in ("upper_arm", "head")
     if not on_trunk and role.part not in ("hand", "forearm"):
         return None
@@ -83,7 +92,7 @@ def carrier(robot: Morphology, role: Role) -> Carrier | None:
     if joint is None:
         return None
     link = int(robot.links[int(robot.rig.skeleton.parents[joint])])
-    return Carrier(link, robot.centers[joint], 1.0 if on_trunk else CARRIED_HOLD)
+    return Carrier(link, robot.centers[joint], 1.0 if on_trunk else share)
 
 
 def _carried(poses: LinkPoses, carrier: Carrier, touch: Touch, held: Holds) -> Holds:

@@ -4,14 +4,14 @@ Damped Gauss-Newton over the coordinates of all frames: every frame's pose again
 footholds, the floor, limits (`robots.solver.objective`); neighbours coupled by their accelerations
 (`robots.solver.smoothness`, `robots.least_squares`). It runs over two blocks of coordinates, one
 after the other: base, trunk and legs, which the feet couple, then arms and head, which hang on the
-trunk and don't move it.
+trunk and don't move it. Where these carry the body they do, and both are solved at once.
 """
 
 from collections.abc import Sequence
 
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
-from robots.solver.block import blocks_of
+from robots.solver.block import blocks_of, whole_of
 from robots.solver.descent import collision_candidates, solve_block
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import FootPlan, plan_feet, reachable
@@ -21,7 +21,7 @@ from robots.solver.motion_plan import with_dynamics
 from robots.solver.mounted import facing_ahead, on_mount
 from robots.solver.projection import project
 from robots.solver.repair import repair
-from robots.solver.resting import resting
+from robots.solver.resting import leans, resting
 from robots.solver.smoothness import limit_speed
 from robots.solver.stance import apart
 from robots.solver.strays import without_strays
@@ -34,6 +34,7 @@ from spark.transfer.canonical import CanonicalMotion, canonical_positions
 _MAX_ITER = (12, 10)  # Gauss-Newton steps, by block
 _REL_TOL = (0.02, 0.05)  # of the cost: a block ends where a step gains less,
 _MAX_REJECTED = 0.1  # and no larger share of the frames rejects it
+_WHOLE = (8, 0.05)  # the same of both blocks at once, nearly solved one after the other
 _POLISH = (2, 0.0, 1.0)  # the same three where splines through a solution are nearly right
 _COARSE_INTERVAL = 1 / 20  # [s] between the frames that are solved first
 
@@ -112,9 +113,12 @@ def solve(
 ) -> Coordinates:
     """Block by block, from `q`: first without collisions and with feet that may slide; then with
     collisions, and feet held where they came to rest; then repaired. To `polish` what is nearly
-    solved, without the first.
+    solved, without the first. A body that leans on its arms is solved as a whole at last.
     """
-    for block, max_iter, rel_tol in zip(blocks_of(robot), _MAX_ITER, _REL_TOL, strict=True):
+    stages = [*zip(blocks_of(robot), _MAX_ITER, _REL_TOL, strict=True)]
+    if leans(robot, targets):
+        stages = [*([] if polish else stages), (whole_of(robot), *_WHOLE)]
+    for block, max_iter, rel_tol in stages:
         if not block.dofs:
             continue
         ends = _POLISH if polish else (max_iter, rel_tol, _MAX_REJECTED)

@@ -1,5 +1,7 @@
 """Whole trajectories on robots: the equations against plain ones, and what the result must keep."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from robots.metrics import RobotMetrics, limb_error, measure
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.registry import find
-from robots.solver.block import Block, blocks_of
+from robots.solver.block import Block, blocks_of, whole_of
 from robots.solver.collision import collisions_of
 from robots.solver.descent import smooth_lower_envelope
 from robots.solver.exact_contact import exact_contacts_of
@@ -99,18 +101,19 @@ def clap(rig: Rig, apart: np.ndarray) -> CanonicalMotion:
 
 
 @pytest.mark.parametrize("exact", [False, True])
-@pytest.mark.parametrize("block", [0, 1])
+@pytest.mark.parametrize("block", [0, 1, 2])
 def test_the_gradient_is_that_of_the_cost(
     walk: CanonicalMotion, ember: Morphology, block: int, exact: bool
 ) -> None:
+    """Of the blocks and of the whole body, whose hands are asked to come near each other."""
     source = walk.frames(0, 4)
-    targets = targets_of(source, ember)
+    targets = replace(targets_of(source, ember), hands=np.full((4, 3), 0.05))
     holds = footholds(ember, targets)
     rng = np.random.default_rng(0)
     tree = ember.tree
     q = project(ember, targets.world, targets.hips)
     q = q.integrated(tree, rng.normal(size=(4, tree.nv)) * 0.05).clipped(tree, 0.05)
-    which = blocks_of(ember)[block]
+    which = (*blocks_of(ember), whole_of(ember))[block]
     candidates = collisions_of(ember).candidates(forward_kinematics(tree, q), which, 1)
     normal = linearize(ember, targets, holds, q, which, candidates, exact=exact)
     for k, column in enumerate(which.dofs):
