@@ -204,16 +204,17 @@ class LinkPoses:
             positions[link] = self.positions[link][..., frames]
         return LinkPoses(self.tree, rotations, positions)
 
-    def point(self, link: int, rest: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 T"]:
-        """The path [m] of a point of a link, given where it is in the rest pose [m, world]."""
-        return self.positions[link] + self.direction(link, rest - self.tree.anchor(link))
+    def point(self, link: int, rest: Float[np.ndarray, "3 *T"]) -> Float[np.ndarray, "3 T"]:
+        """The path [m] of a point of a link, or of one a frame, given where it is in the rest pose
+        [m, world]."""
+        return self.positions[link] + self.direction(link, (rest.T - self.tree.anchor(link)).T)
 
     def heights(self, link: int, rest: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "P T"]:
         """How high [m] some points of a link are."""
         arms = rest - self.tree.anchor(link)
         return self.positions[link][2] + arms @ self.rotations[link][2]
 
-    def direction(self, link: int, rest: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 T"]:
+    def direction(self, link: int, rest: Float[np.ndarray, "3 *T"]) -> Float[np.ndarray, "3 T"]:
         """A direction that is fixed in a link, given in the rest pose's world."""
         return _apply(self.rotations[link], rest)
 
@@ -292,7 +293,7 @@ def _forward_kinematics(tree: Tree, q: Coordinates) -> LinkPoses:
 
 
 def _apply(
-    rotations: Float[np.ndarray, "3 3 T"], v: Float[np.ndarray, "3"]
+    rotations: Float[np.ndarray, "3 3 T"], v: Float[np.ndarray, "3 *T"]
 ) -> Float[np.ndarray, "3 T"]:
     return rotations[:, 0] * v[0] + rotations[:, 1] * v[1] + rotations[:, 2] * v[2]
 

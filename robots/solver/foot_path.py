@@ -69,7 +69,8 @@ def footing_of(robot: Morphology, plan: FootPlan) -> Holds:
     holds[..., 2] += up * (STEP_HOLD - holds[..., 2])
     positions = np.stack([place.real, place.imag, z], axis=-1)
     over_time = (np.ascontiguousarray(x.transpose(1, 2, 0)) for x in (positions, holds))
-    return Holds(*robot.sole_points(plan.sole), *over_time)
+    links, points = robot.sole_points(plan.sole)
+    return Holds(links, np.repeat(points[:, :, None], len(positions), axis=2), *over_time)
 
 
 def near_floor(height: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:

@@ -11,22 +11,23 @@ SLIDING_HOLD = 0.03  # over the floor nearly nothing, while points find where th
 
 @dataclass(frozen=True, eq=False)
 class Holds:
-    """Points of `links`, given in the rest pose: where each should be [m, world], and how firmly by
-    axis (0 to 1)."""
+    """Points of `links`, given in the rest pose [m] of each frame: where each should be [m, world],
+    and how firmly by axis (0 to 1)."""
 
     links: Int[np.ndarray, "P"]
-    points: Float[np.ndarray, "P 3"]
+    points: Float[np.ndarray, "P 3 T"]
     positions: Float[np.ndarray, "P 3 T"]
     shares: Float[np.ndarray, "P 3 T"]
 
     @staticmethod
     def none(frames: int) -> "Holds":
         """Of no point."""
-        return Holds(np.zeros(0, dtype=int), np.zeros((0, 3)), *np.zeros((2, 0, 3, frames)))
+        return Holds(np.zeros(0, dtype=int), *np.zeros((3, 0, 3, frames)))
 
     def at(self, frames: Int[np.ndarray, "S"]) -> "Holds":
         """Those in some frames."""
-        return Holds(self.links, self.points, self.positions[..., frames], self.shares[..., frames])
+        parts = (x[..., frames] for x in (self.points, self.positions, self.shares))
+        return Holds(self.links, *parts)
 
     def sliding(self) -> "Holds":
         """The same over the floor, but hardly held there."""

@@ -22,7 +22,7 @@ from spark.rig.roles import Role
 from spark.runs import true_runs
 from spark.transfer.footfalls import between_contacts, beyond
 
-HOLD = 3.2  # how firmly a part is held where it touches the ground, as a share of a standing sole,
+HOLD = 2.4  # how firmly a part is held where it touches the ground, as a share of a standing sole,
 CARRIED_HOLD = 0.2  # and of that the shoulder over an arm that touches;
 UNSEEN_HOLD = 0.45  # more where the trunk is not solved together with the arm
 MAX_DRAG = 0.1  # hip heights that the copied part may slide as it rests without having moved
@@ -46,19 +46,20 @@ def resting(robot: Morphology, targets: Targets, q: Coordinates) -> Holds:
         touch = touches_of(robot).get(role)
         if touch is None or not targets.parts[:, k].any():
             continue
-        held = _held(robot, targets, poses, touch, k)
-        parts.append(held)
+        shift, shares = _shift(robot, targets, poses, touch, k), _shares(targets, k)
+        parts.append(_lying(poses, touch, shift, shares))
         if (carried := carrier(robot, role, CARRIED_HOLD)) is not None:
-            parts.append(_carried(poses, carried, touch, held))
+            parts.append(_carried(poses, carried, shift, shares))
     return joined(parts)
 
 
-def _held(robot: Morphology, targets: Targets, poses: LinkPoses, touch: Touch, k: int) -> Holds:
-    """The hold of the `k`-th part. Around a rest it goes as the source's does: an arm or a leg of
-    other length may swing by and back there."""
+def _shift(
+    robot: Morphology, targets: Targets, poses: LinkPoses, touch: Touch, k: int
+) -> Float[np.ndarray, "3 T"]:
+    """How far [m] the `k`-th part should be from where it is. Around a rest it goes as the source's
+    does: an arm or a leg of other length may swing by and back there."""
     touches, rests, frame_time = targets.parts[:, k], targets.rests[:, k], targets.frame_time
-    now, source = touch.path(poses), targets.part_paths[:, k]
-    path, slid = now[:2].T, touch.slid(poses)
+    path, source, slid = touch.path(poses)[:2].T, targets.part_paths[:, k], touch.slid(poses)
     offset = np.zeros((len(targets), 3))
     for start, stop in true_runs(rests):
         here = slid[start:stop]
@@ -69,9 +70,48 @@ def _held(robot: Morphology, targets: Targets, poses: LinkPoses, touch: Touch, k
     offset[:, :2] = way - path
     lift = -touch.lowest(poses)
     offset[:, 2] = between_contacts(lift[:, None], touches, path)[:, 0]
-    along, up = (HOLD * around(mask, frame_time, APPROACH) for mask in (rests, touches))
-    shares = np.stack([along, along, up])
-    return Holds(np.array([touch.link]), touch.place[None], (now + offset.T)[None], shares[None])
+    return offset.T
+
+
+def _shares(targets: Targets, k: int) -> Float[np.ndarray, "3 T"]:
+    """How firmly the `k`-th part is held by axis."""
+    touching = targets.rests[:, k], targets.rests[:, k], targets.parts[:, k]
+    return HOLD * np.stack([around(mask, targets.frame_time, APPROACH) for mask in touching])
+
+
+def _lying(
+    poses: LinkPoses,
+    touch: Touch,
+    shift: Float[np.ndarray, "3 T"],
+    shares: Float[np.ndarray, "3 T"],
+) -> Holds:
+    """A part by what of it is on the ground below its place: held there, it rolls as it turns."""
+    above = touch.path(poses)[2] - touch.lowest(poses)
+    down = poses.rotations[touch.link][2] * above  # in the rest pose's axes
+    return _hold(poses, touch.link, touch.place[:, None] - down, shift, shares)
+
+
+def _carried(
+    poses: LinkPoses,
+    carrier: Carrier,
+    shift: Float[np.ndarray, "3 T"],
+    shares: Float[np.ndarray, "3 T"],
+) -> Holds:
+    """What carries a part that is held, shifted as that is."""
+    place = np.repeat(carrier.place[:, None], shift.shape[1], axis=1)
+    return _hold(poses, carrier.link, place, shift, carrier.share * shares)
+
+
+def _hold(
+    poses: LinkPoses,
+    link: int,
+    points: Float[np.ndarray, "3 T"],
+    shift: Float[np.ndarray, "3 T"],
+    shares: Float[np.ndarray, "3 T"],
+) -> Holds:
+    """Of a point of a link in each frame, in the rest pose [m], away from where it is."""
+    positions = poses.point(link, points) + shift
+    return Holds(np.array([link]), points[None], positions[None], shares[None])
 
 
 def leans(robot: Morphology, targets: Targets) -> bool:
@@ -93,11 +133,3 @@ def carrier(robot: Morphology, role: Role, share: float = UNSEEN_HOLD) -> Carrie
         return None
     link = int(robot.links[int(robot.rig.skeleton.parents[joint])])
     return Carrier(link, robot.centers[joint], 1.0 if on_trunk else share)
-
-
-def _carried(poses: LinkPoses, carrier: Carrier, touch: Touch, held: Holds) -> Holds:
-    """What carries a part that is held, shifted as that is."""
-    place = poses.point(carrier.link, carrier.place)
-    positions = (place + held.positions[0] - touch.path(poses))[None]
-    links, points = np.array([carrier.link]), carrier.place[None]
-    return Holds(links, points, positions, carrier.share * held.shares)

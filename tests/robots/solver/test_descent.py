@@ -57,7 +57,8 @@ def drawn_down(robot: Morphology, q: Coordinates) -> Holds:
     positions = poses.point(link, center) - [[0.0], [0.0], [0.5 * robot.rig.hip_height]]
     shares = np.zeros((3, COUNT))
     shares[2, HOVERING] = 2.5
-    return Holds(np.array([link]), center[None], positions[None], shares[None])
+    points = np.repeat(center[:, None], COUNT, axis=1)
+    return Holds(np.array([link]), points[None], positions[None], shares[None])
 
 
 def test_whoever_hovers_comes_down_though_the_first_step_ends_deep_in_the_floor(

@@ -102,7 +102,8 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     parts = held_points(EMBER, reader.parts)
     terms = Terms(EMBER, reader.bones, True, parts)
     links, places = (np.array(part) for part in zip(*parts, strict=True))
-    laid = Holds(links, places, *rng.uniform(0.0, 1.0, (2, len(parts), 3, 4)))
+    points = np.repeat(places[:, :, None], 4, axis=2)
+    laid = Holds(links, points, *rng.uniform(0.0, 1.0, (2, len(parts), 3, 4)))
     both = joined([holds, laid])
 
     def near(block: Block) -> list[Candidate]:
