@@ -26,6 +26,7 @@ HOLD = 2.4  # how firmly a part is held where it touches the ground, as a share 
 CARRIED_HOLD = 0.2  # and of that the shoulder over an arm that touches;
 UNSEEN_HOLD = 0.45  # more where the trunk is not solved together with the arm
 MAX_DRAG = 0.1  # hip heights that the copied part may slide as it rests without having moved
+BRUSH = 0.12  # [s] of a touch, at most, that carries nothing: a hand brushes the floor
 SETTLE = 0.12  # [s] before and after a rest in which a part already stays, ever less
 
 
@@ -116,10 +117,13 @@ def _hold(
 
 def leans(robot: Morphology, targets: Targets) -> bool:
     """Whether arms or a head, which give way to a trunk that legs carry, ever carry it."""
-    touching = zip(targets.part_roles, targets.parts.any(axis=0), strict=True)
-    return robot.mount is None and any(
-        touches and carrier(robot, role) is not None for role, touches in touching
-    )
+    touches = [
+        stop - start
+        for role, touching in zip(targets.part_roles, targets.parts.T, strict=True)
+        if carrier(robot, role) is not None
+        for start, stop in true_runs(touching)
+    ]
+    return robot.mount is None and max(touches, default=0) * targets.frame_time > BRUSH
 
 
 def carrier(robot: Morphology, role: Role, share: float = UNSEEN_HOLD) -> Carrier | None:

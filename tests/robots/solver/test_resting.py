@@ -109,6 +109,9 @@ def test_only_who_is_carried_by_arms_or_head_leans(ember: Morphology) -> None:
     for source, expected in ((on_all_fours(), True), (kneeling, False), (posed({}, 0.0), False)):
         assert leans(ember, targets_of(source, ember)) == expected
     assert targets_of(kneeling, ember).parts.any()
+    carried = targets_of(on_all_fours(), ember)
+    brush = np.arange(COUNT)[:, None] < 5
+    assert not leans(ember, replace(carried, parts=carried.parts & brush))
 
 
 def test_a_part_is_held_by_what_of_it_is_on_the_ground_and_rolls(ember: Morphology) -> None:
