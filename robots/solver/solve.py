@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
-from robots.solver.block import blocks_of, whole_of
+from robots.solver.block import blocks_of, carriers, whole_of
 from robots.solver.descent import collision_candidates, solve_block
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import FootPlan, plan_feet, reachable
@@ -87,8 +87,7 @@ def _trajectory(robot: Morphology, targets: Targets) -> Coordinates:
 
 def idle_at_rest(robot: Morphology, q: Coordinates) -> Coordinates:
     """`q` with the joints that no block moves as in the T-pose."""
-    moved = {j for block in blocks_of(robot) for j in block.joints}
-    idle = [j for j in range(len(robot.tree)) if j not in moved]
+    idle = [link for link, carrier in enumerate(carriers(robot)) if carrier != link]
     angles = q.angles.copy()
     angles[:, idle] = robot.tpose.angles[0, idle]
     balls = q.ball_quats
