@@ -6,7 +6,7 @@ k-DOP: Klosowski et al. 1998): the signed distance to it is a matrix product and
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import mujoco
 import numpy as np
@@ -69,12 +69,18 @@ class ShapePair:
 
 def shapes_of(
     mjcf: Mjcf, joints: Sequence[int], qpos: Float[np.ndarray, "nq"] | None = None
-) -> list[Shape]:
+) -> tuple[Shape, ...]:
     """The solid shapes of a model (`sim.outline`), where they are at `qpos` or at rest."""
+    at = mjcf.model.qpos0 if qpos is None else qpos
+    return _shapes_at(mjcf, tuple(joints), tuple(at.tolist()))
+
+
+@lru_cache(maxsize=16)
+def _shapes_at(mjcf: Mjcf, joints: tuple[int, ...], qpos: tuple[float, ...]) -> tuple[Shape, ...]:
+    """Made once: floor and collisions both ask for them."""
     model = mjcf.model
     data = mujoco.MjData(model)
-    if qpos is not None:
-        data.qpos = qpos
+    data.qpos = qpos
     mujoco.mj_kinematics(model, data)
     links = {mjcf.root: -1}
     for i, joint in enumerate(joints):
@@ -91,7 +97,7 @@ def shapes_of(
         if len(points):
             hull = hull_of(model, data, geom)
             shapes.append(_shape(links[body], body, geom, points, hull))
-    return shapes
+    return tuple(shapes)
 
 
 def _shape(

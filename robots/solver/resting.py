@@ -94,13 +94,13 @@ def _lying(
 
 def _carried(
     poses: LinkPoses,
-    carrier: Carrier,
+    carried: Carrier,
     shift: Float[np.ndarray, "3 T"],
     shares: Float[np.ndarray, "3 T"],
 ) -> Holds:
     """What carries a part that is held, shifted as that is."""
-    place = np.repeat(carrier.place[:, None], shift.shape[1], axis=1)
-    return _hold(poses, carrier.link, place, shift, carrier.share * shares)
+    place = np.repeat(carried.place[:, None], shift.shape[1], axis=1)
+    return _hold(poses, carried.link, place, shift, carried.share * shares)
 
 
 def _hold(
