@@ -9,7 +9,7 @@ from robots.model.morphology import Morphology
 from robots.model.shapes import surface
 from robots.solver.contacts import has_feet, schedule, touching_joint
 from robots.solver.palms import laid, resting_palms
-from robots.solver.trunk import bends, leaning, max_flexion, within_flexion
+from robots.solver.trunk import bowing
 from robots.tree import forward_kinematics
 from spark.blocks import blocks
 from spark.rig.feet import sole_positions
@@ -147,11 +147,7 @@ def poses_of(
     """
     moved = transfer(source, robot.rig)
     turns, pelvis = moved.rotations, robot.rig.pelvis
-    if not bends(robot):
-        turns[:, pelvis] = leaning(source.rig, turns[:, pelvis], positions)
-    turns[:, pelvis] = within_flexion(
-        source.rig, turns[:, pelvis], positions, source.floor_z, max_flexion(robot)
-    )
+    turns[:, pelvis] = bowing(source.rig, robot, turns[:, pelvis], positions, source.floor_z)
     for block in blocks(len(turns)):
         turns[block] = quat_mul(turns[block], robot.rig.tpose)
     return turns, moved.hips - np.array([0.0, 0.0, moved.floor_z]), moved.notes

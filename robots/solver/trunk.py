@@ -1,8 +1,9 @@
-"""How a trunk leans: one that cannot bend, and one whose hips flex less than people's.
+"""How a trunk leans: one that cannot bend, or not as far, or whose hips flex less than people's.
 
 Many robots have no hinge by which the chest leans against the hips. Humans have, and stand upright
 with a pelvis that is tilted by 30 degrees; a stiff trunk that followed it would bow. So it leans as
-the source's whole trunk does, from the hips to the shoulders, and heads as its pelvis does.
+the source's whole trunk does, from the hips to the shoulders, and heads as its pelvis does. Where
+hinges bend it, but less far than the source's spine, the pelvis bows by what is missing.
 
 No robot bows further over its thighs than its hips flex while its legs carry it: who crouches or
 kneels has thighs and feet where the source has them.
@@ -21,16 +22,18 @@ from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import (
     quat_between,
+    quat_conj,
     quat_from_rotvec,
     quat_from_yaw,
     quat_mul,
     quat_rotate,
+    rotvec_from_quat,
     yaw_from_quat,
 )
 from spark.vectors import dot
 
 _LEVEL = 0.5  # share of a hinge's axis along the floor from which on it bends the trunk
-_ROUNDING = 0.12  # [rad] before a hip flexes no further, and after: there the trunk begins to stay
+_ROUNDING = 0.12  # [rad] around where a hip or waist bends no further: there the pelvis gives way
 _THIGHS = {
     Role.LEFT_UPPER_LEG: Role.LEFT_LOWER_LEG,
     Role.RIGHT_UPPER_LEG: Role.RIGHT_LOWER_LEG,
@@ -38,13 +41,33 @@ _THIGHS = {
 _SHOULDERS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
 
 
+@lru_cache(maxsize=16)
 def bends(robot: Morphology) -> bool:
     """Whether a hinge lets the chest lean against the hips."""
-    tree, rig = robot.tree, robot.rig
-    to_pelvis, to_chest = (tree.chain(int(robot.links[j])) for j in (rig.pelvis, rig.chest))
-    between = [joint for joint in to_chest if joint not in to_pelvis]
+    tree, between = robot.tree, _waist(robot)
     axes = tree.axes[between]
     return bool((tree.balls[between] | (np.hypot(axes[:, 0], axes[:, 1]) > _LEVEL)).any())
+
+
+@lru_cache(maxsize=16)
+def max_lean(robot: Morphology) -> tuple[float, float]:
+    """By how much [rad] the line from the hips to the shoulders can bow against the pelvis, from
+    the T-pose on: backwards and forwards."""
+    tree, poses = robot.tree, forward_kinematics(robot.tree, robot.tpose)
+    hinges, backwards, forwards = _waist(robot), 0.0, 0.0
+    if tree.balls[hinges].any() or not _has_shoulders(robot.rig):
+        return np.pi, np.pi
+    hips = robot.centers[robot.rig.hips, 2].mean()
+    shoulders = robot.centers[_shoulders(robot.rig), 2].mean()
+    for j in hinges:
+        across, angle = float(poses.axis(j, 0)[1, 0]), float(robot.tpose.angles[0, j])
+        if abs(across) > _LEVEL:
+            # About the left, a growing angle lets what stands up bow, from the hinge upwards.
+            share = (shoulders - poses.positions[j, 2, 0]) / (shoulders - hips)
+            ranges = share * (angle - tree.lower[j]), share * (tree.upper[j] - angle)
+            backwards += ranges[across < 0]
+            forwards += ranges[across > 0]
+    return backwards, forwards
 
 
 @lru_cache(maxsize=16)
@@ -66,16 +89,54 @@ def max_flexion(robot: Morphology) -> float:
     return most
 
 
+def bowing(
+    rig: Rig,
+    robot: Morphology,
+    pelvis: Float[np.ndarray, "T 4"],
+    positions: Float[np.ndarray, "T J 3"],
+    floor_z: float,
+) -> Float[np.ndarray, "T 4"]:
+    """How far a robot's pelvis turns, since the T-pose, where that of a source turns by `pelvis`,
+    with joints at `positions` [m] over a floor at `floor_z`: as the robot's waist and hips allow.
+    """
+    if bends(robot):
+        pelvis = beyond_lean(rig, pelvis, positions, floor_z, max_lean(robot))
+    else:
+        pelvis = leaning(rig, pelvis, positions)
+    return within_flexion(rig, pelvis, positions, floor_z, max_flexion(robot))
+
+
 def leaning(
     rig: Rig, pelvis: Float[np.ndarray, "T 4"], positions: Float[np.ndarray, "T J 3"]
 ) -> Float[np.ndarray, "T 4"]:
     """The rotations, since the T-pose, of the trunk of a source whose joints are at `positions` [m]
     and whose pelvis has turned by `pelvis`; the same where a rig has no shoulders."""
-    if not all(rig.roles.joints(role) for role in _SHOULDERS):
+    if not _has_shoulders(rig):
         return pelvis
     heading = quat_from_yaw(yaw_from_quat(pelvis))
     upright, along = _trunk(rig, rig.tpose_positions[None]), _trunk(rig, positions)
     return quat_mul(quat_between(quat_rotate(heading, upright), along), heading)
+
+
+def beyond_lean(
+    rig: Rig,
+    pelvis: Float[np.ndarray, "T 4"],
+    positions: Float[np.ndarray, "T J 3"],
+    floor_z: float,
+    most: tuple[float, float],
+) -> Float[np.ndarray, "T 4"]:
+    """The rotations `pelvis`, since the T-pose, but bowed further by what of the lean of a source's
+    trunk against it is beyond the `most` [rad] that a waist allows backwards and forwards, while
+    legs carry the source, whose joints are at `positions` [m] over a floor at `floor_z`."""
+    against = quat_mul(quat_conj(pelvis), leaning(rig, pelvis, positions))
+    bow = rotvec_from_quat(against)[:, 1:2]
+    further = _rounded(bow - most[1]) - _rounded(-bow - most[0])
+    if not further.any():
+        return pelvis
+    further *= _on_legs(rig, positions, floor_z)
+    bowed = quat_mul(pelvis, quat_from_rotvec(further * np.eye(3)[1]))
+    # One that rolls, too, would turn away: it heads as before.
+    return quat_mul(quat_from_yaw(yaw_from_quat(pelvis) - yaw_from_quat(bowed)), bowed)
 
 
 def within_flexion(
@@ -89,28 +150,28 @@ def within_flexion(
     flex by at most `flexion` [rad] raise the thighs of a source whose joints are at `positions` [m]
     over a floor at `floor_z`, while its legs carry it."""
     forwards, left, up = (quat_rotate(pelvis, axis) for axis in np.eye(3)[:, None])
-    if not flexes_far(rig, forwards, up, positions, flexion):
+    excess = _flexion(rig, forwards, up, positions) - flexion
+    if not (excess > -_ROUNDING).any():
         return pelvis
     ahead = quat_rotate(quat_from_yaw(yaw_from_quat(pelvis)), np.eye(3)[:1])
     bowed = np.arctan2(dot(up, ahead), up[:, 2:])
-    excess = _flexion(rig, forwards, up, positions) - flexion
-    # max(excess, 0), rounded: a parabola around the kink, and none of it where hips flex far enough
-    near = np.clip(excess + _ROUNDING, 0.0, 2 * _ROUNDING)
-    back = near**2 / (4 * _ROUNDING) + np.maximum(excess - _ROUNDING, 0.0)
-    back = np.minimum(back, np.maximum(bowed, 0.0)) * _on_legs(rig, positions, floor_z)
+    back = np.minimum(_rounded(excess), np.maximum(bowed, 0.0))
+    back *= _on_legs(rig, positions, floor_z)
     return quat_mul(quat_from_rotvec(-back * left), pelvis)
 
 
-def flexes_far(
-    rig: Rig,
-    ahead: Float[np.ndarray, "T 3"],
-    up: Float[np.ndarray, "T 3"],
-    positions: Float[np.ndarray, "T J 3"],
-    flexion: float,
-) -> bool:
-    """Whether thighs are ever raised so far against a trunk that is `ahead` and `up` there that
-    hips which flex by at most `flexion` [rad] change how it bows."""
-    return bool((_flexion(rig, ahead, up, positions) > flexion - _ROUNDING).any())
+def _rounded(excess: Float[np.ndarray, "T 1"]) -> Float[np.ndarray, "T 1"]:
+    """max(excess, 0), with a parabola around the kink, and none of it where joints bend enough."""
+    near = np.clip(excess + _ROUNDING, 0.0, 2 * _ROUNDING)
+    out: Float[np.ndarray, "T 1"] = near**2 / (4 * _ROUNDING) + np.maximum(excess - _ROUNDING, 0.0)
+    return out
+
+
+def _waist(robot: Morphology) -> list[int]:
+    """The joints between pelvis and chest."""
+    tree, rig = robot.tree, robot.rig
+    to_pelvis, to_chest = (tree.chain(int(robot.links[j])) for j in (rig.pelvis, rig.chest))
+    return [joint for joint in to_chest if joint not in to_pelvis]
 
 
 def _flexion(
@@ -134,7 +195,7 @@ def _on_legs(
 ) -> Float[np.ndarray, "T 1"]:
     """How far (0 to 1) a body is carried by its legs: its mass is about where the middle of the
     trunk is."""
-    shoulders = [j for role in _SHOULDERS for j in rig.roles.joints(role)] or [rig.chest]
+    shoulders = _shoulders(rig) if _has_shoulders(rig) else [rig.chest]
     mass = (positions[:, rig.hips].mean(1) + positions[:, shoulders].mean(1)) / 2
     feet = [j for role in Role if role.part in ("foot", "toe") for j in rig.roles.joints(role)]
     over_floor = positions[:, feet] - np.array([0.0, 0.0, floor_z])
@@ -143,6 +204,13 @@ def _on_legs(
 
 def _trunk(rig: Rig, positions: Float[np.ndarray, "T J 3"]) -> Float[np.ndarray, "T 3"]:
     """From the middle of the hips to that of the shoulders [m]."""
-    shoulders = [rig.roles.joints(role)[0] for role in _SHOULDERS]
-    along: Float[np.ndarray, "T 3"] = positions[:, shoulders].mean(1)
+    along: Float[np.ndarray, "T 3"] = positions[:, _shoulders(rig)].mean(1)
     return along - positions[:, rig.hips].mean(1)
+
+
+def _has_shoulders(rig: Rig) -> bool:
+    return all(rig.roles.joints(role) for role in _SHOULDERS)
+
+
+def _shoulders(rig: Rig) -> list[int]:
+    return [rig.roles.joints(role)[0] for role in _SHOULDERS]

@@ -18,7 +18,7 @@ from robots.solver.targets import (
     source_feet,
 )
 from robots.solver.touching import touches_of
-from robots.solver.trunk import bends, flexes_far, leaning, max_flexion, within_flexion
+from robots.solver.trunk import bowing
 from robots.solver.window_targets import PoseTargets
 from robots.stream.source_poses import SourcePoses
 from spark.errors import FrameError
@@ -123,7 +123,6 @@ class FrameReader:
         self._tpose = matrix_from_quat(robot.rig.tpose)
         self._chest = source.chest
         self._segments = segments(source)
-        self._stiff, self._flexion = not bends(robot), max_flexion(robot)
         self._correspondence = correspond(source, robot.rig)
         self._at_rest = np.flatnonzero(self._correspondence.first < 0)
         self._interpolated = np.flatnonzero(
@@ -150,14 +149,10 @@ class FrameReader:
         hips *= self.scale
         own = self._own(turns)
         pelvis, places = self.robot.rig.pelvis, joints[None]
-        if self._stiff:
-            turn = leaning(self.source, quat_from_matrix(own[None, pelvis]), places)
-            own[pelvis] = matrix_from_quat(turn)[0]
-        ahead, _, up = own[pelvis].T[:, None]
-        if flexes_far(self.source, ahead, up, places, self._flexion):
-            turn, floor_z = quat_from_matrix(own[None, pelvis]), self.ground.z
-            turn = within_flexion(self.source, turn, places, floor_z, self._flexion)
-            own[pelvis] = matrix_from_quat(turn)[0]
+        turn = quat_from_matrix(own[None, pelvis])
+        own[pelvis] = matrix_from_quat(
+            bowing(self.source, self.robot, turn, places, self.ground.z)
+        )[0]
         own_world = own @ self._tpose
         return FrameTargets(
             world=own_world,

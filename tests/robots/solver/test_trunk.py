@@ -1,11 +1,19 @@
-"""The lean of a trunk that cannot bend."""
+"""The lean of a trunk that cannot bend, or not as far as the source's."""
 
+import mujoco
 import numpy as np
 import pytest
 
 from robots.model.known import known
 from robots.solver.targets import targets_of
-from robots.solver.trunk import bends, leaning, max_flexion, within_flexion
+from robots.solver.trunk import (
+    bends,
+    beyond_lean,
+    leaning,
+    max_flexion,
+    max_lean,
+    within_flexion,
+)
 from spark.demo.sample import sample_motion, sample_rig
 from spark.kinematics import world_positions
 from spark.rig.roles import Role
@@ -55,7 +63,7 @@ def test_only_what_cannot_bend_leans_as_a_whole(monkeypatch: pytest.MonkeyPatch)
     robot, source = known("robot"), to_canonical(sample_motion("walk", RIG, 30.0), RIG)
     assert bends(robot)
     bent = targets_of(source, robot).world[:, robot.rig.pelvis]
-    monkeypatch.setattr("robots.solver.targets.bends", lambda _: False)
+    monkeypatch.setattr("robots.solver.trunk.bends", lambda _: False)
     stiff = targets_of(source, robot).world[:, robot.rig.pelvis]
     own = quat_mul(source.rotations[:, RIG.pelvis], robot.rig.tpose[robot.rig.pelvis])
     np.testing.assert_allclose(bent, own, atol=1e-9)
@@ -70,14 +78,69 @@ def test_waists_are_told_apart(name: str, bend: bool) -> None:
     assert bends(known(name)) is bend
 
 
-def crouching(bow: float, ahead: float = 0.0) -> np.ndarray:
-    """The T-pose with its trunk bowed by so much [rad] over thighs that are level and shanks that
-    are upright; the feet are so far [m] behind those places."""
+UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0]])
+
+
+@pytest.mark.parametrize(
+    ("bow", "most", "left"),
+    [
+        (1.2, (0.3, 0.4), 0.8),
+        (-0.4, (0.1, 0.4), -0.3),
+        (0.6, (0.0, 0.4), 0.2),
+        (0.25, (0.3, 0.4), 0.0),
+        (-0.15, (0.3, 0.4), 0.0),
+    ],
+)
+def test_a_pelvis_bows_by_what_a_waist_lacks(
+    bow: float, most: tuple[float, float], left: float
+) -> None:
+    """A spine bends over a pelvis that stands upright, and heads where it likes."""
+    heading = quat_from_yaw(np.array([2.0]))
+    positions = quat_rotate(heading, bent(bow))[None]
+    found = beyond_lean(RIG, heading, positions, FLOOR, most)
+    expected = quat_mul(heading, quat_from_rotvec(np.array([[0.0, left, 0.0]])))
+    assert quat_angle(expected, found)[0] < 0.01
+
+
+def test_who_leans_on_the_arms_bows_by_nothing() -> None:
+    """Feet that are not near below the body do not carry it."""
+    positions = bent(1.2)
+    feet = [j for j, role in enumerate(RIG.roles.roles) if role and role.part in ("foot", "toe")]
+    positions[feet] -= [0.8, 0.0, 0.0]
+    np.testing.assert_allclose(
+        beyond_lean(RIG, UPRIGHT, positions[None], FLOOR, (0.3, 0.4)), UPRIGHT
+    )
+
+
+def test_a_waist_leans_by_its_limits_above_its_hinge() -> None:
+    """A line from the hips to the shoulders leans less than the chest: only from the hinge on."""
+    robot = known("unitree_g1")
+    model, data = robot.mjcf.model, mujoco.MjData(robot.mjcf.model)
+    mujoco.mj_forward(model, data)
+    height = {
+        name: data.joint(name).xanchor[2]
+        for name in ("left_hip_roll_joint", "waist_pitch_joint", "left_shoulder_roll_joint")
+    }
+    hips, waist, shoulders = height.values()
+    low, high = np.abs(model.joint("waist_pitch_joint").range)
+    share = (shoulders - waist) / (shoulders - hips)
+    np.testing.assert_allclose(max_lean(robot), share * np.array([low, high]), rtol=0.12)
+
+
+def bent(bow: float) -> np.ndarray:
+    """The T-pose with all above its hips bowed by so much [rad]."""
     positions = RIG.tpose_positions.copy()
     upper = [j for j, role in enumerate(RIG.roles.roles) if role and role.part not in LEGS]
     turn = quat_from_rotvec(np.array([0.0, bow, 0.0]))
     middle = positions[RIG.hips].mean(0)
     positions[upper] = middle + quat_rotate(turn, positions[upper] - middle)
+    return positions
+
+
+def crouching(bow: float, ahead: float = 0.0) -> np.ndarray:
+    """The T-pose with its trunk bowed by so much [rad] over thighs that are level and shanks that
+    are upright; the feet are so far [m] behind those places."""
+    positions = bent(bow)
     for side in ("left", "right"):
         hip, knee, foot = (RIG.roles.require(Role(f"{side}_{part}")) for part in LEGS[:3])
         positions[knee] = positions[hip] + [0.4, 0.0, 0.0]
