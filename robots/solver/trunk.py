@@ -27,7 +27,6 @@ from spark.rotation import (
     quat_from_yaw,
     quat_mul,
     quat_rotate,
-    rotvec_from_quat,
     yaw_from_quat,
 )
 from spark.vectors import dot
@@ -44,9 +43,8 @@ _SHOULDERS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
 @lru_cache(maxsize=16)
 def bends(robot: Morphology) -> bool:
     """Whether a hinge lets the chest lean against the hips."""
-    tree, between = robot.tree, _waist(robot)
-    axes = tree.axes[between]
-    return bool((tree.balls[between] | (np.hypot(axes[:, 0], axes[:, 1]) > _LEVEL)).any())
+    tree, poses = robot.tree, forward_kinematics(robot.tree, robot.tpose)
+    return any(tree.balls[j] or np.hypot(*poses.axis(j, 0)[:2, 0]) > _LEVEL for j in _waist(robot))
 
 
 @lru_cache(maxsize=16)
@@ -57,8 +55,11 @@ def max_lean(robot: Morphology) -> tuple[float, float]:
     hinges, backwards, forwards = _waist(robot), 0.0, 0.0
     if tree.balls[hinges].any() or not _has_shoulders(robot.rig):
         return np.pi, np.pi
-    hips = robot.centers[robot.rig.hips, 2].mean()
-    shoulders = robot.centers[_shoulders(robot.rig), 2].mean()
+    links, centers = robot.links, robot.centers
+    hips, shoulders = (
+        float(np.mean([poses.point(int(links[j]), centers[j])[2, 0] for j in joints]))
+        for joints in (robot.rig.hips, _shoulders(robot.rig))
+    )
     for j in hinges:
         across, angle = float(poses.axis(j, 0)[1, 0]), float(robot.tpose.angles[0, j])
         if abs(across) > _LEVEL:
@@ -100,7 +101,7 @@ def bowing(
     with joints at `positions` [m] over a floor at `floor_z`: as the robot's waist and hips allow.
     """
     if bends(robot):
-        pelvis = beyond_lean(rig, pelvis, positions, floor_z, max_lean(robot))
+        pelvis = beyond_lean(rig, pelvis, positions, max_lean(robot))
     else:
         pelvis = leaning(rig, pelvis, positions)
     return within_flexion(rig, pelvis, positions, floor_z, max_flexion(robot))
@@ -122,21 +123,24 @@ def beyond_lean(
     rig: Rig,
     pelvis: Float[np.ndarray, "T 4"],
     positions: Float[np.ndarray, "T J 3"],
-    floor_z: float,
     most: tuple[float, float],
 ) -> Float[np.ndarray, "T 4"]:
     """The rotations `pelvis`, since the T-pose, but bowed further by what of the lean of a source's
-    trunk against it is beyond the `most` [rad] that a waist allows backwards and forwards, while
-    legs carry the source, whose joints are at `positions` [m] over a floor at `floor_z`."""
-    against = quat_mul(quat_conj(pelvis), leaning(rig, pelvis, positions))
-    bow = rotvec_from_quat(against)[:, 1:2]
+    trunk against it is beyond the `most` [rad] that a waist allows backwards and forwards; its
+    joints are at `positions` [m]."""
+    if not _has_shoulders(rig):
+        return pelvis
+    upright = _trunk(rig, rig.tpose_positions[None])
+    along = quat_rotate(quat_conj(pelvis), _trunk(rig, positions))
+    bow = np.arctan2(along[:, :1], along[:, 2:]) - np.arctan2(upright[:, :1], upright[:, 2:])
     further = _rounded(bow - most[1]) - _rounded(-bow - most[0])
     if not further.any():
         return pelvis
-    further *= _on_legs(rig, positions, floor_z)
     bowed = quat_mul(pelvis, quat_from_rotvec(further * np.eye(3)[1]))
-    # One that rolls, too, would turn away: it heads as before.
-    return quat_mul(quat_from_yaw(yaw_from_quat(pelvis) - yaw_from_quat(bowed)), bowed)
+    # One that rolls, too, would turn away: it heads as before. Upside down there is no heading.
+    lowest = np.minimum(_up(pelvis)[:, 2], _up(bowed)[:, 2])
+    away = np.angle(np.exp(1j * (yaw_from_quat(pelvis) - yaw_from_quat(bowed))))
+    return quat_mul(quat_from_yaw(np.clip(1 + 2 * lowest, 0, 1) * away), bowed)
 
 
 def within_flexion(
@@ -165,6 +169,11 @@ def _rounded(excess: Float[np.ndarray, "T 1"]) -> Float[np.ndarray, "T 1"]:
     near = np.clip(excess + _ROUNDING, 0.0, 2 * _ROUNDING)
     out: Float[np.ndarray, "T 1"] = near**2 / (4 * _ROUNDING) + np.maximum(excess - _ROUNDING, 0.0)
     return out
+
+
+def _up(turns: Float[np.ndarray, "T 4"]) -> Float[np.ndarray, "T 3"]:
+    """Where what was up in the T-pose points."""
+    return quat_rotate(turns, np.eye(3)[2:])
 
 
 def _waist(robot: Morphology) -> list[int]:
