@@ -3,7 +3,8 @@
 Many robots have no hinge by which the chest leans against the hips. Humans have, and stand upright
 with a pelvis that is tilted by 30 degrees; a stiff trunk that followed it would bow. So it leans as
 the source's whole trunk does, from the hips to the shoulders, and heads as its pelvis does. Where
-hinges bend it, but less far than the source's spine, the pelvis bows by what is missing.
+hinges bend it, but less far than the source's spine, the pelvis bows by what is missing: whatever
+carries the body, since that comes and goes within a few frames, and hips would be thrown.
 
 No robot bows further over its thighs than its hips flex while its legs carry it: who crouches or
 kneels has thighs and feet where the source has them.
