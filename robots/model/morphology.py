@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from robots.model.followers import Follower, followers_of, following, led_by
 from robots.model.mjcf import Mjcf, read_mjcf
 from robots.model.tpose import rest_pose
 from robots.tree import Coordinates, Tree, forward_kinematics
@@ -120,16 +121,23 @@ class Morphology:
             qpos[:, base : base + 3].copy(), quat_mul(quat, quat_conj(root_quat)), angles, balls
         )
 
+    @cached_property
+    def moved(self) -> frozenset[int]:
+        """The tree's joints that move a part with a role or a sole: others, as a gripper's, stay
+        as in the T-pose."""
+        links = {int(k) for k, role in zip(self.links, self.rig.roles.roles, strict=True) if role}
+        links |= {int(link) for sole in self.soles for link in self.sole_points(sole)[0]}
+        links |= {int(self.links[j]) for j in self.rig.contact_joints}
+        return frozenset(j for link in links for j in self.tree.chain(link))
+
+    @cached_property
+    def followers(self) -> tuple[Follower, ...]:
+        """The joints that follow others, leaders before who follows them."""
+        return led_by(followers_of(self.mjcf, self.mj_joints), self.moved)
+
     def following(self, q: Coordinates) -> Coordinates:
         """The same with joints that follow others where those take them."""
-        pairs = self.mjcf.followers()
-        if not pairs:
-            return q
-        angles = q.angles.copy()
-        for follower, leader, polynomial in pairs:
-            turned = angles[:, self.mj_joints.index(leader)]
-            angles[:, self.mj_joints.index(follower)] = np.polyval(polynomial[::-1], turned)
-        return Coordinates(q.pos, q.quat, angles, q.ball_quats)
+        return following(self.followers, q)
 
     @property
     def soles(self) -> tuple[Sole, ...]:

@@ -1,11 +1,13 @@
 """The T-pose of a robot: the pose within its limits that comes nearest to one."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from robots.least_squares import NormalEquations
+from robots.model.followers import Follower, following
 from robots.residuals import Linearized, direction_residual, limit_residual, rotation_residual
 from robots.tree import BASE, Coordinates, Tree, forward_kinematics
 from spark.rig.bones import RigPose
@@ -38,6 +40,7 @@ _W_BEND_AXIS = 0.5  # knees bend forwards, elbows in the horizontal plane: the t
 _W_OTHER_ROTATION = 0.15  # what the above leaves open: hands, clavicles
 _W_REST_ANGLE = 0.01  # hinges that nothing determines stay at rest; keeps H regular
 _W_BASE = 1e-3  # keeps H regular for the base's position, which no term sees
+_W_FOLLOW = 100.0  # the file allows nothing else
 _W_LIMIT, _LIMIT_MARGIN = 3.0, np.radians(1.0)  # soft; hard ones by clipping
 _SAME_RANGE = 0.2  # [rad] ranges to both sides of straight that differ by less say nothing
 _BENT = 0.05  # [rad] of a joint in the rest pose that is bent, not merely drawn askew
@@ -65,12 +68,14 @@ def search_tpose(
     roles: RoleMap,
     links: Int[np.ndarray, "J"],
     ideal: Float[np.ndarray, "J 4"],
+    followers: Sequence[Follower] = (),
 ) -> TPose:
     """The pose within the limits that is nearest to the joints' rotations `ideal` [q_world_joint],
     which know no limits.
 
     Damped Gauss-Newton from several initial guesses at once, as frames of one trajectory; the one
-    with the least cost wins. The residuals are those of `_linearize`.
+    with the least cost wins. The residuals are those of `_linearize`, and `followers` where their
+    leaders take them.
     """
     q = _initial_guesses(tree)
     pose = rest_pose(skeleton, roles)
@@ -79,7 +84,12 @@ def search_tpose(
     bend_hinges = _bend_hinges(tree, pose, links, forward)
 
     def linearize(q: Coordinates) -> NormalEquations:
-        return _linearize(tree, q, roles, links, ideal, bone_targets, bend_hinges, skeleton)
+        normal = _linearize(tree, q, roles, links, ideal, bone_targets, bend_hinges, skeleton)
+        for follower in followers:
+            J, residual = follower.residual(q.angles, _W_FOLLOW)
+            dofs = tree.dofs((follower.joint, follower.leader))
+            normal.add(dofs, J[:, :, None], residual[None])
+        return normal
 
     for _ in range(_MAX_ITER):
         normal = linearize(q)
@@ -90,7 +100,7 @@ def search_tpose(
         q = after
         if moved < _STEP_TOL:
             break
-    one = q.at(np.array([np.argmin(linearize(q).cost)]))
+    one = following(followers, q.at(np.array([np.argmin(linearize(q).cost)])))
     poses = forward_kinematics(tree, one)
     world = quat_from_matrix(np.moveaxis(poses.rotations[links], -1, 0))[0]
     direction_errors = {}

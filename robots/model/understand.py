@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from robots.model.followers import followers_of
 from robots.model.mirrored import unmirrored_limits
 from robots.model.mjcf import Mjcf, read_mjcf
 from robots.model.morphology import Morphology
@@ -81,7 +82,7 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
     soles = soles_of(skeleton, roles, points, ideal, links)
     skeleton = with_soles(skeleton, soles)
     tree, assumed = _assume_limits(tree, segments, roles)
-    tpose = search_tpose(tree, skeleton, roles, links, ideal)
+    tpose = search_tpose(tree, skeleton, roles, links, ideal, followers_of(mjcf, joints))
     odd = unmirrored_limits(mjcf.model, tree, joints, roles, links, tpose.coordinates)
     notes = (*mjcf.notes, *assumed, *_check_tpose(tpose, skeleton), *odd)
     if mounted:

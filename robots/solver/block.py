@@ -11,12 +11,14 @@ from robots.tree import BASE, ROOT, Tree
 class Block:
     """The degrees of freedom (dofs) that are solved for while the others are given.
 
-    `joints` are the tree's joints that are free, in order; `base` says whether the base is.
+    `joints` are the tree's joints that are free, in order; `base` says whether the base is; no
+    block frees the `idle` ones.
     """
 
     tree: Tree
     joints: tuple[int, ...]
     base: bool
+    idle: frozenset[int] = frozenset()
 
     @cached_property
     def dofs(self) -> list[int]:
@@ -37,8 +39,8 @@ class Block:
         return tuple(j for j in self.tree.chain(link) if j in self._free)
 
     def frees(self, link: int) -> bool:
-        """Whether all joints on the way from the base to a link are free."""
-        return len(self.free_joints(link)) == len(self.tree.chain(link))
+        """Whether all joints on the way from the base to a link are free, but for idle ones."""
+        return all(j in self._free or j in self.idle for j in self.tree.chain(link))
 
     @cached_property
     def _free(self) -> frozenset[int]:
@@ -51,7 +53,7 @@ class Block:
 def carriers(robot: Morphology) -> list[int]:
     """What carries each of the tree's links: itself or, where no block moves its joint, what
     carries the link above it; `ROOT` for the base."""
-    moved = {j for block in blocks_of(robot) for j in block.joints}
+    moved = robot.moved
     out: list[int] = []
     for link, above in enumerate(robot.tree.parents.tolist()):
         out.append(link if link in moved else (out[above] if above >= 0 else ROOT))
@@ -61,20 +63,20 @@ def carriers(robot: Morphology) -> list[int]:
 def blocks_of(robot: Morphology) -> tuple[Block, Block]:
     """Base, trunk and legs; then arms and head. Of a robot without legs all at once. Joints beyond
     the last part with a role, as those of grippers, stay as in the T-pose."""
-    tree = robot.tree
-    named = zip(robot.links, robot.rig.roles.roles, strict=True)
-    moved = sorted({j for link, role in named if role for j in tree.chain(int(link))})
+    tree, moved = robot.tree, sorted(robot.moved)
+    idle = frozenset(range(len(tree))) - robot.moved
     if robot.mount is not None:
-        return Block(tree, (), False), Block(tree, tuple(moved), False)
+        return Block(tree, (), False, idle), Block(tree, tuple(moved), False, idle)
     links = {int(robot.links[robot.rig.chest])}
     links |= {int(link) for sole in robot.soles for link in robot.sole_points(sole)[0]}
     links |= {int(robot.links[j]) for j in robot.rig.contact_joints}
     first = sorted({j for link in links for j in tree.chain(link)})
     rest = tuple(j for j in moved if j not in first)
-    return Block(tree, tuple(first), True), Block(tree, rest, False)
+    return Block(tree, tuple(first), True, idle), Block(tree, rest, False, idle)
 
 
 def whole_of(robot: Morphology) -> Block:
     """Both blocks at once."""
     first, rest = blocks_of(robot)
-    return Block(robot.tree, tuple(sorted(first.joints + rest.joints)), first.base)
+    joints = tuple(sorted(first.joints + rest.joints))
+    return Block(robot.tree, joints, first.base, first.idle)

@@ -1,4 +1,4 @@
-"""What is asked of each hinge by itself in a few frames: its limits, and a posture."""
+"""What is asked of hinges in a few frames: their limits, a posture, and that some follow others."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float
 
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
-from robots.solver.weights import LIMIT_MARGIN, W_LIMIT, W_TPOSE
+from robots.solver.weights import LIMIT_MARGIN, W_FOLLOW, W_LIMIT, W_TPOSE
 
 LIMIT_CLEARANCE = np.radians(0.75)  # that hinges keep from their limits: hard, by clipping
 
@@ -35,6 +35,10 @@ class Hinges:
         lower, upper = tree.limits_within(LIMIT_CLEARANCE)
         self._limits = lower[hinges] + rest, upper[hinges] + rest
         angles = robot.tpose.angles[0, hinges] + rest
+        self._followers = robot.followers
+        self._solved = [f for f in robot.followers if robot.moved >= {f.joint, f.leader}]
+        self._all_qpos, self._all_rest = robot.addresses, model.qpos0[robot.addresses]
+        self._dof_starts = tree.dof_starts
         self.at_tpose = Posture(angles, np.full(len(angles), W_TPOSE))
 
     def angles(self, q: Float[np.ndarray, "T nq"]) -> Float[np.ndarray, "T H"]:
@@ -42,8 +46,15 @@ class Hinges:
         return q[:, self._qpos]
 
     def clip(self, q: Float[np.ndarray, "T nq"]) -> None:
-        """Take a `qpos` within the limits, in place."""
+        """Take a `qpos` within the limits, in place, and those that follow others where these take
+        them."""
         q[:, self._qpos] = np.clip(q[:, self._qpos], *self._limits)
+        if self._followers:
+            turned = self._turned(q)
+            for follower in self._followers:
+                turned[:, follower.joint] = follower.angle(turned)
+                at = self._all_qpos[follower.joint]
+                q[:, at] = turned[:, follower.joint] + self._all_rest[follower.joint]
 
     def held(
         self, q: Float[np.ndarray, "T nq"], g: Float[np.ndarray, "T D"]
@@ -63,7 +74,8 @@ class Hinges:
         H: Float[np.ndarray, "T D D"],
         g: Float[np.ndarray, "T D"],
     ) -> None:
-        """Limits, as `robots.residuals.limit_residual` has them, and the pull to the posture."""
+        """Limits, as `robots.residuals.limit_residual` has them, the pull to the posture, and
+        those that follow others."""
         angles = self.angles(q)
         lower, upper = self._soft_limits
         above, rising = one_sided(angles - upper, LIMIT_MARGIN / 4)
@@ -74,3 +86,13 @@ class Hinges:
         H.reshape(len(q), -1)[:, :: H.shape[1] + 1] += diagonal
         gradient = W_LIMIT**2 * (rising + falling) * (above - below)
         g[:, self._dofs] += gradient + pull * (angles - posture.angles)
+        turned = self._turned(q)
+        for follower in self._solved:
+            J, residual = follower.residual(turned, W_FOLLOW)
+            dofs = self._dof_starts[[follower.joint, follower.leader]]
+            H[:, dofs[:, None], dofs] += J[:, :, None] * J[:, None]
+            g[:, dofs] += J * residual[:, None]
+
+    def _turned(self, q: Float[np.ndarray, "T nq"]) -> Float[np.ndarray, "T N"]:
+        """The angles of the tree's hinges since the rest pose."""
+        return q[:, self._all_qpos] - self._all_rest

@@ -31,6 +31,7 @@ from robots.solver.weights import (
     LIMIT_MARGIN,
     W_COLLISION,
     W_FLOOR,
+    W_FOLLOW,
     W_HANDS,
     W_HIPS_POSITION,
     W_HOLD,
@@ -131,7 +132,7 @@ def linearize(
     points that are held; hips and the floor under soles, where the base is free; hands that touch,
     where the block alone moves them;
     the depth of all other parts in the floor, and of the colliding `candidates` in each other,
-    approximate or `exact`; limits; a pull to the T-pose.
+    approximate or `exact`; joints that follow others; limits; a pull to the T-pose.
     `penalty_scale` multiplies the weights of collisions and the floor, frame by frame.
     """
     tree, rig = robot.tree, robot.rig
@@ -170,6 +171,7 @@ def linearize(
         )
     else:
         collisions_of(robot).add_to(normal, poses, block, candidates, weight, penalty_scale)
+    _add_followers(robot, q, block, normal)
     beyond, derivatives = limit_residual(tree, q, margin=LIMIT_MARGIN, weight=W_LIMIT)
     normal.add_diagonal(derivatives[:, block.dofs], beyond[:, block.dofs])
     from_tpose, derivatives = np.zeros((2, len(q), tree.nv))
@@ -179,6 +181,20 @@ def linearize(
     from_tpose[:, tree.dof_starts[hinges]] = W_TPOSE * (q.angles - robot.tpose.angles)[:, hinges]
     normal.add_diagonal(derivatives[:, block.dofs], from_tpose[:, block.dofs])
     return normal
+
+
+def _add_followers(
+    robot: Morphology, q: Coordinates, block: Block, normal: NormalEquations
+) -> None:
+    """Each joint that follows another where that takes it, as soon as both are solved for."""
+    for follower in robot.followers:
+        pair = (follower.joint, follower.leader)
+        free = [k for k, joint in enumerate(pair) if joint in block.joints]
+        known = len(free) == 2 or not block.base
+        if free and known and robot.moved.issuperset(pair):
+            J, residual = follower.residual(q.angles, W_FOLLOW)
+            dofs = block.local_joint_dofs(tuple(pair[k] for k in free))
+            normal.add(dofs, J[:, free, None], residual[None])
 
 
 def _base_axes(poses: LinkPoses) -> Float[np.ndarray, "3 3 T"]:

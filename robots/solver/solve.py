@@ -77,6 +77,7 @@ def _trajectory(robot: Morphology, targets: Targets) -> Coordinates:
     stride = coarse_stride(targets)
     coarse = targets.every(stride)
     q = idle_at_rest(robot, on_mount(robot, project(robot, coarse.world, coarse.hips)))
+    q = robot.following(q)
     q = limit_speed(robot, q, coarse.frame_time)
     q = solve(robot, coarse, [foot.every(stride) for foot in feet], q)
     if stride > 1:

@@ -28,6 +28,7 @@ W_FLOOR = 80.0  # [1/m] of a sole's point, or another part, in the floor: four t
 FLOOR_ROUNDING = 0.004  # [m] over which that sets in
 W_LIMIT = 8.0  # [1/rad] of a hinge in the margin of its limit
 LIMIT_MARGIN = np.radians(2.0)
+W_FOLLOW = 100.0  # [1/rad] of a joint from where its leader takes it: the file allows nothing else
 W_HANDS = 20.0  # [1/m] of the offset between hands that touch; falls with their distance over
 HANDS_RANGE = 0.12  # [m] as exp(-(distance / range)²)
 W_COLLISION = 75.0  # [1/m] of the depth of parts in each other: as firm as the floor
