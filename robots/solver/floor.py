@@ -168,7 +168,7 @@ def carried_solids(robot: Morphology) -> tuple[Solid, ...]:
         return ()
     out = []
     for solid in solids_over_floor(robot):
-        later = [j for j in tree.chain(solid.link) if j not in trunk.joints]
+        later = [j for j in tree.chain(solid.link) if j in robot.moved and j not in trunk.joints]
         if later:
             away = np.linalg.norm(solid.spheres - tree.anchor(later[0]), axis=1) - solid.radii
             near = away < _CARRIED_REACH * robot.rig.hip_height

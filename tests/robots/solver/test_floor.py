@@ -8,7 +8,8 @@ import pytest
 
 from robots.model.morphology import Morphology
 from robots.registry import find
-from robots.solver.floor import sole_paths
+from robots.solver.block import blocks_of, whole_of
+from robots.solver.floor import depth_in_floor, sole_paths, solids_over_floor
 from robots.solver.solve import retarget
 from robots.tree import forward_kinematics
 from scripts.robot_bars import follow
@@ -108,3 +109,25 @@ def test_a_trunk_lifts_the_shoulder_that_no_arm_can_lift(follows) -> None:
     parts = pose_clip(subject)
     lowest = (parts.part_points[..., 2] - parts.part_radii).min()
     assert lowest > -0.011 * result.robot.rig.hip_height  # what the report takes for sinking
+
+
+@pytest.mark.parametrize("part", ["left_hand", "torso", "left_foot"])
+def test_what_nobody_moves_is_over_the_floor_with_what_carries_it(
+    tmp_path: Path, part: str
+) -> None:
+    """A finger, an antenna, or a spur: its hinge is idle, and its shape is in the floor or not."""
+    spike = (
+        '<body name="spike"><joint name="spike" axis="1 0 0" range="-0.1 1"/>'
+        '<geom class="collision" type="capsule" fromto="0 0 0 0 0 -1.5" size="0.01" mass="0.1"/>'
+        "</body>"
+    )
+    robot = changed_ember(tmp_path, rf'(<body name="{part}"[^>]*>)', rf"\1{spike}")
+    spiked = robot.joint_names.index("spike")
+    assert spiked not in robot.moved
+    standing = robot.from_qpos(robot.mjcf.model.qpos0[None])
+    poses = forward_kinematics(robot.tree, standing)
+    deepest = max(-solid.lowest(poses)[0] for solid in solids_over_floor(robot))
+    first, _ = blocks_of(robot)
+    assert deepest > 0.1
+    for block in (whole_of(robot), *([] if part == "left_hand" else [first])):
+        assert depth_in_floor(robot, poses, block)[0] == pytest.approx(deepest)
