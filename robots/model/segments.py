@@ -17,6 +17,7 @@ from robots.tree import ROOT, Tree
 _COS_PARALLEL = np.cos(np.radians(30))
 """Consecutive hinges nearer to parallel are two joints, as a hip's pitch and a knee. Within a joint
 of the registry's robots they are 90 degrees apart."""
+_COS_ALONG = np.cos(np.radians(45))  # of a hinge's axis to a limb that it turns about itself
 _NO_LIMIT = 1e3  # [rad] files that ask for a limit get such a one where there is none
 _MAX_OFFSET_OF_SIZE = 0.025
 """How far the axes of one joint may pass from its centre, as a share of the diagonal around all
@@ -168,7 +169,9 @@ def nearest_point(
 
 def _centers(tree: Tree, groups: Sequence[tuple[int, ...]]) -> list[Float[np.ndarray, "3"]]:
     """The centre of each group. A single hinge leaves its place along the axis open: there it lies
-    nearest to the middle of its neighbours."""
+    nearest to the middle of its neighbours. The last one of a limb that turns it about itself, as
+    a wrist does, stays where the file has it: the middle would be at the limb's other end.
+    """
     fixed = {
         g: tree.anchors[group[0]]
         if tree.balls[group[0]]
@@ -190,9 +193,12 @@ def _centers(tree: Tree, groups: Sequence[tuple[int, ...]]) -> list[Float[np.nda
         while up >= 0 and up not in fixed:
             up = above[up]
         known = [fixed[up]] if up >= 0 else _fixed_below(-1, below, fixed, but=g)
-        known += _fixed_below(g, below, fixed)
+        known += (beyond := _fixed_below(g, below, fixed))
         anchor, axis = tree.anchors[group[0]], tree.axes[group[0]]
         middle = np.mean(known, axis=0) if known else anchor
+        limb = anchor - middle
+        if up >= 0 and not beyond and abs(axis @ limb) > _COS_ALONG * np.linalg.norm(limb):
+            middle = anchor
         centers.append(anchor + axis * (axis @ (middle - anchor)))
     return centers
 

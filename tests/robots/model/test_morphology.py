@@ -434,3 +434,21 @@ def test_limits_of_more_than_any_turn_are_none(tmp_path: Path) -> None:
     robot = understand_robot(read_mjcf(tmp_path / "free.xml"))
     assert robot.tree.upper.max() < 10
     assert np.isfinite(robot.rig.tpose).all()
+
+
+def test_a_hand_stays_where_a_hinge_along_the_arm_has_it(tmp_path: Path) -> None:
+    """The last hinge of a limb may turn it about itself. Its place along its axis is the file's."""
+    text = registry.find("ember").read_text()
+    text = re.sub(r'<joint [^>]*name="\w+_wrist_pitch"[^>]*/>', "", text)
+    text = re.sub(
+        r'<position [^>]*joint="\w+_wrist_pitch"/>|(?s:<keyframe>.*</keyframe>)', "", text
+    )
+    text, count = re.subn(r'(_wrist_yaw" axis=)"[^"]*"', r'\1"0 0 1"', text)
+    robot = understand_robot(written(tmp_path, text))
+    assert count == 2
+    for side in ("left", "right"):
+        elbow, wrist = (
+            robot.centers[robot.rig.roles.require(Role(f"{side}_{part}"))]
+            for part in ("forearm", "hand")
+        )
+        np.testing.assert_allclose(wrist - elbow, [0.0, 0.0, -0.2], atol=1e-9)
