@@ -43,6 +43,7 @@ from robots.solver.weights import (
     W_REGULAR,
     W_ROTATION,
     W_TPOSE,
+    per_metre,
 )
 from robots.tree import Coordinates, LinkPoses, forward_kinematics
 from spark.rig.roles import Role
@@ -163,8 +164,9 @@ def linearize(
         _add_hands(robot, targets, poses, chains, block, normal)
     for terms in chains.values():
         terms.add_to(normal)
-    add_floor(robot, poses, block, normal, W_FLOOR * penalty_scale, FLOOR_ROUNDING / penalty_scale)
-    weight = W_LEG_COLLISION if block.base else W_COLLISION
+    firm = per_metre(robot) * penalty_scale
+    add_floor(robot, poses, block, normal, W_FLOOR * firm, FLOOR_ROUNDING / firm)
+    weight = per_metre(robot) * (W_LEG_COLLISION if block.base else W_COLLISION)
     if exact:
         exact_contacts_of(robot).add_to(
             normal, robot.to_qpos(q), poses, block, candidates, weight, penalty_scale
@@ -244,7 +246,7 @@ def _add_holds(
         terms = _chain_of(chains, robot, link) if _moves_alone(block, link) else None
         if terms is not None:
             point = poses.point(link, holds.points[p])
-            weight = W_HOLD[:, None] * holds.shares[p]
+            weight = per_metre(robot) * W_HOLD[:, None] * holds.shares[p]
             terms.add_point(link, point, holds.positions[p], weight)
 
 
@@ -259,12 +261,12 @@ def _add_hips_and_soles(
 
     With z a corner's height, r = w one_sided(-z), w = `W_FLOOR` x `penalty_scale`.
     """
-    count = len(targets)
+    count, firm = len(targets), per_metre(robot) * penalty_scale
     pelvis = int(robot.links[robot.rig.pelvis])
     terms = _chain_of(chains, robot, pelvis)
     assert terms is not None
     middle = robot.centers[robot.rig.hips].mean(0)
-    path = np.repeat(W_HIPS_POSITION[:, None], count, axis=1)
+    path = np.repeat(per_metre(robot) * W_HIPS_POSITION[:, None], count, axis=1)
     terms.add_point(pelvis, poses.point(pelvis, middle), targets.hips.T, path)
     for sole in robot.soles:
         for link, rest in zip(*robot.sole_points(sole), strict=True):
@@ -272,8 +274,8 @@ def _add_hips_and_soles(
             assert foot_terms is not None
             point = poses.point(int(link), rest)
             # As a point's residual: its weight is dr/dz, its distance what makes the product r.
-            depth, slope = one_sided(-point[2], FLOOR_ROUNDING / penalty_scale)
-            up = np.stack([np.zeros(count), np.zeros(count), -W_FLOOR * penalty_scale * slope])
+            depth, slope = one_sided(-point[2], FLOOR_ROUNDING / firm)
+            up = np.stack([np.zeros(count), np.zeros(count), -W_FLOOR * firm * slope])
             foot_terms.add_point(int(link), point, point + depth / np.maximum(slope, 1e-9), up)
 
 
@@ -289,7 +291,9 @@ def _add_hands(
     w = `W_HANDS` exp(-(|d*| / `HANDS_RANGE`)²): only hands that are near each other are held."""
     assert targets.hands is not None
     hands = [robot.rig.roles.require(role) for role in (Role.LEFT_HAND, Role.RIGHT_HAND)]
-    weight = W_HANDS * np.exp(-((np.linalg.norm(targets.hands, axis=1) / HANDS_RANGE) ** 2))
+    firm = per_metre(robot)
+    away = np.linalg.norm(targets.hands, axis=1)
+    weight = firm * W_HANDS * np.exp(-((firm * away / HANDS_RANGE) ** 2))
     parts, positions = [], []
     dofs: list[int] = []
     for sign, j in zip((1.0, -1.0), hands, strict=True):

@@ -20,6 +20,7 @@ from robots.solver.weights import (
     W_COM_ACCELERATION,
     W_HIPS_POSITION,
     W_OVERSPEED,
+    per_metre,
 )
 from robots.tree import Coordinates, forward_kinematics
 from spark.rig.roles import Role
@@ -74,7 +75,7 @@ def com_acceleration(
         return None
     poses = forward_kinematics(robot.tree, q)
     away = center_of_mass(robot, poses).T - planned
-    weight = W_COM_ACCELERATION / frame_time**2
+    weight = per_metre(robot) * W_COM_ACCELERATION / frame_time**2
     J = np.zeros((0, len(block.dofs), 3))
     if with_jacobian:
         J = weight * com_jacobian(robot, poses, block.joints, base=block.base).transpose(2, 0, 1)
@@ -119,7 +120,7 @@ def acceleration_weights(robot: Morphology) -> Float[np.ndarray, "D"]:
     sine of that frequency costs as much as its own absence from a residual of weight 1. The base's
     position [s²/m] is weighed as the hips' is, legs less."""
     weights = np.full(robot.tree.nv, 1.0 / (2 * np.pi * SMOOTH_CUTOFF) ** 2)
-    weights[:3] *= W_HIPS_POSITION
+    weights[:3] *= per_metre(robot) * W_HIPS_POSITION
     tree = robot.tree
     for sole in robot.soles:
         leg = robot.rig.roles.require(Role(f"{sole.side}_upper_leg"))

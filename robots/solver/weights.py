@@ -1,10 +1,23 @@
 """The weights and limits of the solver's residuals, each with its unit and its reason.
 
 The cost is half the sum of squared residuals. These have no unit: angles [rad] are weighed in
-1/rad, lengths [m] in 1/m, all against the direction of a limb. Streams weigh the same.
+1/rad, lengths [m] in 1/m, all against the direction of a limb. Streams weigh the same. Where the
+unit is 1/m, it is that of a robot of `TUNED_HIP_HEIGHT`: see `per_metre`.
 """
 
 import numpy as np
+
+from robots.model.morphology import Morphology
+
+TUNED_HIP_HEIGHT = 0.68  # [m] of the G1 and Ember, on which the weights were found
+
+
+def per_metre(robot: Morphology) -> float:
+    """By what weights per metre are multiplied, and lengths beside them divided, of a robot: a
+    centimetre of a small one is as much of a limb's direction as several of a large one, so that
+    the same pose costs the same in any size."""
+    return TUNED_HIP_HEIGHT / robot.rig.hip_height
+
 
 W_LIMB_DIRECTION = 2.0  # [1/rad] of upper and lower arms and legs: what a pose looks like
 W_ROTATION = {  # [1/rad] of a part by its role; low where the directions of limbs say enough,

@@ -9,7 +9,7 @@ from robots.model.morphology import Morphology
 from robots.residuals import one_sided
 from robots.solver.collision import DEPTH_ROUNDING, collisions_of
 from robots.solver.hulls import SLABS, ShapePair
-from robots.solver.weights import W_COLLISION, W_LEG_COLLISION
+from robots.solver.weights import W_COLLISION, W_LEG_COLLISION, per_metre
 from robots.tree import Tree
 
 _ACTIVE = 3 * DEPTH_ROUNDING  # [m] between shapes beyond which the penalty is negligible
@@ -75,7 +75,7 @@ class WindowCollisions:
         self._spheres = self._local(spheres, self._shapes[self._small[self._pairs]])
         radii = [r + own for pair, own in zip(pairs, apart, strict=True) for r in pair.small.radii]
         self._radii = np.array(radii)
-        self._index_dofs(tree, pairs, first)
+        self._index_dofs(per_metre(robot), tree, pairs, first)
 
     def candidates(self, poses: WindowPoses) -> Int[np.ndarray, "K"]:
         """The spheres that collide, or may soon."""
@@ -155,16 +155,18 @@ class WindowCollisions:
         away = np.array(points).reshape(-1, 3) - self._rest_positions[bodies]
         return np.einsum("kji,kj->ki", self._rest_rotations[bodies], away)
 
-    def _index_dofs(self, tree: Tree, pairs: tuple[ShapePair, ...], first: set[int]) -> None:
+    def _index_dofs(
+        self, firm: float, tree: Tree, pairs: tuple[ShapePair, ...], first: set[int]
+    ) -> None:
         """Which columns move the pairs together (-1) and apart, of the links that give way."""
         self._signs = np.zeros((len(pairs), tree.nv))
-        self._weights = np.full(len(pairs), W_COLLISION)
+        self._weights = np.full(len(pairs), firm * W_COLLISION)
         for k, pair in enumerate(pairs):
             chains = [tree.chain(part.link) for part in (pair.small, pair.large)]
             both = set(chains[0]) & set(chains[1])
             early = _among(pair, tree, first)
             if early:
-                self._weights[k] = W_LEG_COLLISION
+                self._weights[k] = firm * W_LEG_COLLISION
             for sign, chain in zip((-1.0, 1.0), chains, strict=True):
                 moving = tuple(j for j in chain if j not in both and (j in first) == early)
                 self._signs[k, tree.dofs(moving)] = sign

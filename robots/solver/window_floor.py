@@ -12,7 +12,7 @@ from robots.solver.window_collision import WindowPoses
 class WindowFloor:
     """Under a robot's solid shapes, but for the corners of its soles. `bodies` are those of the
     `solids`, `moving` the dofs that move them, of the block that solves for them; `rest` is where
-    all bodies are in the rest pose."""
+    all bodies are in the rest pose; `firm` is `robots.solver.weights.per_metre`."""
 
     def __init__(
         self,
@@ -20,7 +20,9 @@ class WindowFloor:
         bodies: Int[np.ndarray, "K"],
         moving: Bool[np.ndarray, "K D"],
         rest: tuple[Float[np.ndarray, "B 3 3"], Float[np.ndarray, "B 3"]],
+        firm: float,
     ) -> None:
+        self._weight, self._rounding = firm * W_FLOOR, FLOOR_ROUNDING / firm
         counts = [len(solid.spheres) for solid in solids]
         self._bodies, self._moving = np.repeat(bodies, counts), np.repeat(moving, counts, axis=0)
         self._radii = np.concatenate([np.zeros(0), *(solid.radii for solid in solids)])
@@ -46,7 +48,7 @@ class WindowFloor:
     ) -> None:
         """Add r = w one_sided(depth), w = `W_FLOOR` x `scale`, to the normal equations."""
         depth = self.depth(poses)
-        frames, own = np.nonzero(depth > -FELT * FLOOR_ROUNDING)
+        frames, own = np.nonzero(depth > -FELT * self._rounding)
         if not len(own):
             return
         rotations = poses.rotations[frames, self._bodies[own], :2]
@@ -54,8 +56,8 @@ class WindowFloor:
         arm = (point + poses.positions[frames, self._bodies[own], :2])[:, None] - anchors[
             frames, :, :2
         ]
-        residual, slope = one_sided(depth[frames, own], FLOOR_ROUNDING)
-        weight = W_FLOOR * scale[frames]
+        residual, slope = one_sided(depth[frames, own], self._rounding)
+        weight = self._weight * scale[frames]
         # What lifts a point: the upward part of axis x arm.
         J = axes[frames, :, 0] * arm[..., 1] - axes[frames, :, 1] * arm[..., 0]
         J[:, 2] = 1.0

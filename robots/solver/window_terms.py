@@ -28,6 +28,7 @@ from robots.solver.weights import (
     W_LIMB_DIRECTION,
     W_OTHER_ROTATION,
     W_ROTATION,
+    per_metre,
 )
 from robots.solver.window_collision import WindowCollisions, WindowPoses
 from robots.solver.window_floor import WindowFloor
@@ -58,6 +59,7 @@ class Terms:
         later_only: bool = False,
     ) -> None:
         self.robot, tree = robot, robot.tree
+        self._firm = per_metre(robot)
         self._model = robot.mjcf.model
         self._data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, self._data)
@@ -83,7 +85,9 @@ class Terms:
         links = [solid.link for solid in (*solids, *carried)]
         own = self._in_first_block[[solid.link for solid in solids]]
         moving = self._mask(links, np.append(own, np.ones(len(carried), dtype=bool)))
-        self._floor = WindowFloor((*solids, *carried), bodies[links], moving, self._rest)
+        self._floor = WindowFloor(
+            (*solids, *carried), bodies[links], moving, self._rest, self._firm
+        )
         self._index_rotations()
         self._index_bones(bones)
         self._index_points(hands, parts)
@@ -116,7 +120,7 @@ class Terms:
         """The floor under some shapes."""
         links = [solid.link for solid in solids]
         bodies = np.array([self._body(link) for link in links], dtype=int)
-        return WindowFloor(tuple(solids), bodies, self._mask(links), self._rest)
+        return WindowFloor(tuple(solids), bodies, self._mask(links), self._rest, self._firm)
 
     def sinking(self, poses: WindowPoses) -> Float[np.ndarray, "T"]:
         """How deep [m] the deepest point is in the floor; below 0 over it."""
@@ -221,12 +225,12 @@ class Terms:
         forces[:, :B] = W_LIMB_DIRECTION**2 * (bones - targets.bones)
         self._add_soles(points, foot_targets, floor_scale, weights[:, B:], forces[:, B:])
         hips = B + self.sole_count
-        weights[:, hips] = W_HIPS_POSITION**2
-        forces[:, hips] = W_HIPS_POSITION**2 * (points[:, hips - B] - targets.hips)
+        weights[:, hips] = (self._firm * W_HIPS_POSITION) ** 2
+        forces[:, hips] = weights[:, hips] * (points[:, hips - B] - targets.hips)
         if self._hands:
             # The residual is the difference of two points, so is its Jacobian.
-            squared = (targets.hands**2).sum(1, keepdims=True)
-            weight = (W_HANDS * np.exp(-squared / HANDS_RANGE**2)) ** 2
+            squared = (self._firm**2 * targets.hands**2).sum(1, keepdims=True)
+            weight = (self._firm * W_HANDS * np.exp(-squared / HANDS_RANGE**2)) ** 2
             J[:, hips + 1] -= J[:, hips + 2]
             weights[:, hips + 1], weights[:, hips + 2] = weight, 0.0
             left, right = hips + 1 - B, hips + 2 - B
@@ -234,7 +238,7 @@ class Terms:
             forces[:, hips + 1], forces[:, hips + 2] = weight * between, 0.0
         if resting:
             parts, own = slice(B + self._before_parts, None), points[:, self._before_parts :]
-            weights[:, parts] = (W_HOLD * resting.holds) ** 2
+            weights[:, parts] = (self._firm * W_HOLD * resting.holds) ** 2
             forces[:, parts] = weights[:, parts] * (own - resting.positions)
         return J, weights, forces
 
@@ -248,11 +252,11 @@ class Terms:
     ) -> None:
         """The footholds of the soles' points, and the floor under them; weights squared."""
         count = self.sole_count
-        hold_weights = (W_HOLD * foot_targets.holds) ** 2
+        hold_weights = (self._firm * W_HOLD * foot_targets.holds) ** 2
         weights[:, :count] = hold_weights
         forces[:, :count] = hold_weights * (points[:, :count] - foot_targets.positions)
-        depth, slope = one_sided(-points[:, :count, 2], FLOOR_ROUNDING)
-        floor = (W_FLOOR * floor_scale[:, None]) ** 2 * slope
+        depth, slope = one_sided(-points[:, :count, 2], FLOOR_ROUNDING / self._firm)
+        floor = (self._firm * W_FLOOR * floor_scale[:, None]) ** 2 * slope
         weights[:, :count, 2] += floor * slope
         forces[:, :count, 2] -= floor * depth
 
