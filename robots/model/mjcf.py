@@ -18,7 +18,7 @@ from robots.model.compiling import compiled, one_line
 from robots.model.mjcf_source import read_source
 from robots.model.urdf import is_urdf, read_urdf
 from sim.body.compiling import warnings_as_notes
-from spark.errors import FileFormatError, SkeletonError
+from spark.errors import FileFormatError, SkeletonError, name_list
 from spark.summary import brief, counted
 
 FREE, BALL, SLIDE, HINGE = (
@@ -256,9 +256,12 @@ def _stand(spec: mujoco.MjSpec, model: mujoco.MjModel, root: str) -> None:
 def _note_ignored(model: mujoco.MjModel, notes: list[str]) -> None:
     slides = [model.joint(j).name for j in range(model.njnt) if int(model.jnt_type[j]) == SLIDE]
     if slides:
-        notes.append(f"{len(slides)} sliding joints stay at 0 ({slides[0]!r}, ...)")
+        stay = "stays" if len(slides) == 1 else "stay"
+        notes.append(f"{counted(len(slides), 'sliding joint')} {stay} at 0: {name_list(slides)}")
     following = sum(int(kind) == _EQ_JOINT for kind in model.eq_type)
     if following:
-        notes.append(f"{counted(following, 'joint')} follow others, as the model's constraints say")
+        who = "1 joint follows another" if following == 1 else f"{following} joints follow others"
+        notes.append(f"{who}, as the model's constraints say")
     if model.neq > following:
-        notes.append(f"{model.neq - following} equality constraints between bodies are ignored")
+        others = counted(model.neq - following, "other equality constraint")
+        notes.append(f"ignored: {others}")

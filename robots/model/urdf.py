@@ -73,7 +73,7 @@ def read_urdf(path: Path, notes: list[str], *, visuals: bool = True) -> tuple[mu
     mended = [link.get("name", "") for link in robot.findall("link") if _mend_inertia(link)]
     if mended:
         notes.append(
-            f"{counted(len(mended), 'link')} have an inertia that no body has: {name_list(mended)}"
+            f"{counted(len(mended), 'inertia')} that no body has, mended: of {name_list(mended)}"
         )
     assets = _find_meshes(robot, path, notes, visuals=visuals)
     ET.SubElement(ET.SubElement(robot, "mujoco"), "compiler", _COMPILER)

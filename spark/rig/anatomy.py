@@ -17,6 +17,7 @@ from spark.skeleton import Skeleton
 # The certainties of a limb's joints' names (1.0 a sure one), summed, above which they settle which
 # limb it is: a sure name and a doubtful one.
 _CLEAR_NAMES = 1.5
+_ARM_NAMES = 0.5  # the same, above which a limb is no leg: numbers leave open which joint it is
 _REMEDY = "a map file can say which joint is what (spark-sim inspect --help)"
 
 
@@ -47,7 +48,7 @@ def find_anatomy(measured: Measurements, hints: Sequence[NameHint]) -> Anatomy:
     pairs = mirrored_pairs(measured, hints, 0.12 * float(measured.reach[0]))
     legs = named_pair(measured, hints, frozenset(LEG), _CLEAR_NAMES)
     arms = named_pair(measured, hints, frozenset((*ARM, "wing")), 0.5 * _CLEAR_NAMES)
-    human_arms = arms is not None and _human(hints, arms)
+    named = arms is not None
     if legs is None:
         legs = _legs_by_shape(measured, hints, pairs, arms)
     if legs is None:
@@ -55,7 +56,7 @@ def find_anatomy(measured: Measurements, hints: Sequence[NameHint]) -> Anatomy:
     others = _others(measured, skeleton, pairs, legs)
     if arms is None and others:
         arms = max(others, key=lambda pair: measured.reach[pair.first[0]])
-    if not human_arms:
+    if arms is None or not _human(hints, arms, named):
         _refuse_other_plans(measured, hints, legs, arms, others)
 
     leg_labels = label_limb(measured, hints, (legs.first, legs.second), LEG)
@@ -80,9 +81,10 @@ def find_anatomy(measured: Measurements, hints: Sequence[NameHint]) -> Anatomy:
     return Anatomy(pelvis, spine, neck, head, labelled_legs, labelled_arms, sides, mirrored)
 
 
-def _human(hints: Sequence[NameHint], arms: LimbPair) -> bool:
-    """Whether names speak of arms, not of front legs or wings."""
-    return not any(hints[j].foreleg or "wing" in hints[j].parts for j in arms.first)
+def _human(hints: Sequence[NameHint], arms: LimbPair, named: bool) -> bool:
+    """Whether names speak of arms, not of front legs or wings; `named` says that they do speak."""
+    other = any(hints[j].foreleg or "wing" in hints[j].parts for j in arms.first)
+    return not other and (named or all(_called_arm(hints, x) for x in (arms.first, arms.second)))
 
 
 def _others(
@@ -113,7 +115,13 @@ def _legs_by_shape(
     the tree.
     """
     taken = set() if arms is None else {*arms.first, *arms.second}
-    able = [p for p in pairs if not taken & set(p.roots) and min(len(p.first), len(p.second)) >= 2]
+    able = [
+        pair
+        for pair in pairs
+        if not taken & set(pair.roots)
+        and min(len(pair.first), len(pair.second)) >= 2
+        and not all(_called_arm(hints, chain) for chain in (pair.first, pair.second))
+    ]
     rest = rest_measurements(measured.skeleton)
 
     def height(pair: LimbPair) -> float:
@@ -130,6 +138,17 @@ def _legs_by_shape(
 
     legs = min(able, key=unlike, default=None)
     return legs if legs is not None and height(legs) <= 0.5 else None
+
+
+def _called_arm(hints: Sequence[NameHint], chain: Sequence[int]) -> bool:
+    """Whether names speak of a human's arm, and nowhere of a leg."""
+    parts: dict[str, float] = {}
+    for joint in chain:
+        for part, sure in hints[joint].parts.items():
+            parts[part] = max(sure, parts.get(part, 0.0))
+    said = sum(sure for part, sure in parts.items() if part in ARM)
+    front = any(hints[joint].foreleg for joint in chain)
+    return said >= _ARM_NAMES and not front and not parts.keys() & set(LEG)
 
 
 def _no_legs(skeleton: Skeleton, hints: Sequence[NameHint], arms: LimbPair | None) -> str:

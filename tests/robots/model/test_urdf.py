@@ -14,6 +14,7 @@ from robots.model.mjcf import read_mjcf
 from robots.model.understand import understand_robot
 from robots.solver.solve import copy, retarget
 from spark.errors import ConventionError, FileFormatError, SkeletonError
+from spark.rig.roles import Role
 from spark_sim.clips import Clip, RobotClip
 from tests.helpers.urdf import twins
 
@@ -123,7 +124,7 @@ def test_mimic_joints_follow(folder: Path, walk: Clip) -> None:
     )
     (folder / "mimic.urdf").write_text(text.replace("</robot>", tip + "</robot>"))
     out = spark_sim.retarget(walk, folder / "mimic.urdf", method="copy")
-    assert "1 joint follow others" in " ".join(known(folder / "mimic.urdf").notes)
+    assert "1 joint follows another" in " ".join(known(folder / "mimic.urdf").notes)
     knee, thumb = out.joints["left_knee"], out.joints["thumb_joint"]
     assert np.ptp(knee) > 0.1
     np.testing.assert_allclose(thumb, 0.25 - 0.5 * knee, atol=1e-9)
@@ -138,7 +139,7 @@ def test_links_without_inertia_and_several_roots_are_read(folder: Path, walk: Cl
     )
     (folder / "broken.urdf").write_text(broken)
     read = known(folder / "broken.urdf")
-    assert "have an inertia that no body has" in " ".join(read.notes)
+    assert "1 inertia that no body has, mended" in " ".join(read.notes)
     theirs = copy(walk.canonical, known(folder / "twin.urdf")).qpos
     ours = spark_sim.retarget(walk, folder / "broken.urdf", method="copy")
     assert isinstance(ours, spark_sim.RobotClip)
@@ -175,7 +176,7 @@ def test_an_inertia_without_end_is_mended(folder: Path, tmp_path: Path) -> None:
     text = re.sub(r'ixx="[^"]*"', 'ixx="1e308"', (folder / "twin.urdf").read_text(), count=1)
     (tmp_path / "twin.urdf").write_text(text)
     assert any(
-        "have an inertia that no body has" in n for n in read_mjcf(tmp_path / "twin.urdf").notes
+        "1 inertia that no body has, mended" in n for n in read_mjcf(tmp_path / "twin.urdf").notes
     )
 
 
@@ -297,3 +298,16 @@ def test_a_g1_is_a_g1_in_either_language() -> None:
         root = data.body(names[0]).xpos
         states.append(np.array([data.body(name).xpos - root for name in names]))
     np.testing.assert_allclose(states[0], states[1], atol=2e-3)
+
+
+def test_arms_that_hang_are_no_legs_whatever_tells_their_sides(folder: Path) -> None:
+    """Numbers tell the sides, and the arms are the lowest limbs that there are."""
+    text = without_legs((folder / "twin.urdf").read_text())
+    for side, number in (("left", 0), ("right", 1)):
+        text = re.sub(rf'"{side}_(\w+)"', rf'"arm_\1_n{number}"', text)
+    (folder / "numbered.urdf").write_text(text)
+    torso = known(folder / "numbered.urdf")
+    assert torso.mount is not None
+    left = torso.rig.roles.require(Role.LEFT_FOREARM)
+    assert torso.rig.skeleton.names[left] == "arm_forearm_n0"
+    assert torso.centers[left, 1] > 0
