@@ -4,7 +4,7 @@ Real hinges miss each other by centimetres and are anchored anywhere along their
 centre is the point nearest to all of its axes.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -133,23 +133,49 @@ def _groups(tree: Tree, bodies: Sequence[int]) -> list[tuple[int, ...]]:
         else:
             units.append([i])
     carried = np.bincount(tree.parents[[unit[0] for unit in units]] + 1, minlength=len(tree) + 1)
+
+    def meet(above: list[int], unit: list[int]) -> bool:
+        """Whether they make one joint with the one that carries them alone."""
+        parent, both = int(tree.parents[unit[0]]), [*above, *unit]
+        if carried[parent + 1] != 1 or len(both) > _MAX_DOFS or tree.balls[both].any():
+            return False
+        parallel = abs(tree.axes[unit[0]] @ tree.axes[parent]) > _COS_PARALLEL
+        _, offset = nearest_point(tree.anchors[both], tree.axes[both])
+        allowed = max(_MAX_OFFSET_OF_SIZE * size, _MAX_OFFSET_OF_LIMB * lengths[unit[-1]])
+        return bool(not parallel and offset <= allowed)
+
     groups: list[list[int]] = []
     of_joint: dict[int, int] = {}
     for unit in units:
-        parent = int(tree.parents[unit[0]])
-        at = of_joint.get(parent)
-        both = [*groups[at], *unit] if at is not None else unit
-        if at is not None and carried[parent + 1] == 1 and len(both) <= _MAX_DOFS:
-            parallel = abs(tree.axes[unit[0]] @ tree.axes[parent]) > _COS_PARALLEL
-            _, offset = nearest_point(tree.anchors[both], tree.axes[both])
-            allowed = max(_MAX_OFFSET_OF_SIZE * size, _MAX_OFFSET_OF_LIMB * lengths[unit[-1]])
-            if not parallel and offset <= allowed and not tree.balls[both].any():
-                groups[at] = both
-                of_joint.update(dict.fromkeys(unit, at))
-                continue
-        of_joint.update(dict.fromkeys(unit, len(groups)))
-        groups.append(unit)
+        at = of_joint.get(int(tree.parents[unit[0]]))
+        if at is not None and meet(groups[at], unit):
+            groups[at] = [*groups[at], *unit]
+        else:
+            at = len(groups)
+            groups.append(unit)
+        of_joint.update(dict.fromkeys(unit, at))
+    _leave_girdles_out(tree, groups, of_joint, meet)
     return [tuple(group) for group in groups]
+
+
+def _leave_girdles_out(
+    tree: Tree,
+    groups: list[list[int]],
+    of_joint: dict[int, int],
+    meet: Callable[[list[int], list[int]], bool],
+) -> None:
+    """Where a limb begins with two hinges that meet, of which the second one also meets the next
+    two, these three are its ball, as a shoulder's. The first one is a joint of its own, as a
+    clavicle's, though its axis passes through theirs."""
+    for lower in groups:
+        parent = int(tree.parents[lower[0]])
+        upper = groups[of_joint[parent]] if parent >= 0 else []
+        above = int(tree.parents[upper[0]]) if upper else ROOT
+        begins = above < 0 or int((tree.parents == above).sum()) > 1
+        pairs = begins and len(upper) == len(lower) == 2 and parent == upper[1]
+        if pairs and meet(upper[1:], lower[:1]) and meet([upper[1], lower[0]], lower[1:]):
+            lower.insert(0, upper.pop())
+            of_joint[lower[0]] = of_joint[lower[1]]
 
 
 def nearest_point(

@@ -1,6 +1,7 @@
 """Any humanoid MJCF is understood as it comes: roles, T-pose, centres, coordinates."""
 
 import re
+import xml.etree.ElementTree as ElementTree
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -452,3 +453,36 @@ def test_a_hand_stays_where_a_hinge_along_the_arm_has_it(tmp_path: Path) -> None
             for part in ("forearm", "hand")
         )
         np.testing.assert_allclose(wrist - elbow, [0.0, 0.0, -0.2], atol=1e-9)
+
+
+def test_a_girdle_before_a_shoulder_is_no_part_of_it(tmp_path: Path) -> None:
+    """Its axis meets the shoulder's first one, as any two lines in a plane do. The shoulder is
+    where three meet."""
+    root = ElementTree.fromstring(registry.find("ember").read_text())
+    for side, sign in (("left", 1), ("right", -1)):
+        arm = root.find(f".//body[@name='{side}_shoulder_pitch_link']")
+        above = root.find(f".//body[@name='{side}_shoulder_pitch_link']/..")
+        assert arm is not None
+        assert above is not None
+        x, y, z = map(float, arm.attrib["pos"].split())
+        girdle = ElementTree.SubElement(
+            above, "body", {"name": f"{side}_girdle", "pos": f"{x} {y - 0.1 * sign} {z}"}
+        )
+        axis, limits = f"0 0 {sign}", {"range": "-0.1 0.5"}
+        ElementTree.SubElement(girdle, "joint", {"name": f"{side}_girdle", "axis": axis, **limits})
+        ElementTree.SubElement(girdle, "geom", {"size": "0.01", "mass": "0.1"})
+        above.remove(arm)
+        arm.set("pos", f"0 {0.1 * sign} 0")
+        girdle.append(arm)
+    keys = root.find("keyframe")
+    assert keys is not None
+    root.remove(keys)
+    robot = understand_robot(written(tmp_path, ElementTree.tostring(root, encoding="unicode")))
+    for side in ("left", "right"):
+        link, above = (
+            int(robot.links[robot.rig.roles.require(Role(f"{side}_{part}"))])
+            for part in ("upper_arm", "clavicle")
+        )
+        ball = [robot.joint_names[j] for j in robot.tree.chain(link)[-3:]]
+        assert ball == [f"{side}_shoulder_{way}" for way in ("pitch", "roll", "yaw")]
+        assert robot.joint_names[above] == f"{side}_girdle"
