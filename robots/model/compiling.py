@@ -42,20 +42,59 @@ def _compile(spec: mujoco.MjSpec, path: Path, notes: list[str]) -> mujoco.MjMode
         spec.compiler.boundmass, spec.compiler.boundinertia = _MIN_MASS, _MIN_INERTIA
         notes.append("some moving bodies have no mass: they get next to none")
         return _compile(spec, path, notes)
-    assets = [mesh.file for mesh in spec.meshes if mesh.file]
-    if not (assets or list(spec.textures) or list(spec.hfields)):
-        raise FileFormatError(path, None, f"MuJoCo can't compile it: {message}")
-    _drop_assets(spec)
+    dropped: list[str] = []
+    meshes, last, lost = bool(list(spec.meshes)), "", ""
+    first = _drop_extras if _compiles_without_extras(spec) else _drop_assets
+    for parts, drop in sorted(_SPARED, key=lambda part: part[1] is not first):
+        if drop is _drop_assets and not _has_assets(spec):
+            continue
+        drop(spec)
+        dropped.append(parts)
+        if drop is _drop_assets and meshes:
+            lost = ": shapes and masses are incomplete"
+        try:
+            model = spec.compile()
+        except Exception as error:
+            last = one_line(error)
+            continue
+        notes.append(f"read without {', '.join(dropped)} ({message}){lost}")
+        return model
+    raise FileFormatError(
+        path,
+        None,
+        f"MuJoCo can't compile it: {message}"
+        + (f"; nor without {', '.join(dropped)}: {last}" if last != message else ""),
+    )
+
+
+def _compiles_without_extras(spec: mujoco.MjSpec) -> bool:
+    without = spec.copy()
+    _drop_extras(without)
     try:
-        model = spec.compile()
-    except Exception as again:
-        raise FileFormatError(
-            path,
-            None,
-            f"MuJoCo can't compile it: {message}; nor without meshes: {one_line(again)}",
-        ) from again
-    notes.append(f"read without meshes and textures ({message}): shapes and masses are incomplete")
-    return model
+        without.compile()
+    except Exception:
+        return False
+    return True
+
+
+def _has_assets(spec: mujoco.MjSpec) -> bool:
+    files = any(mesh.file for mesh in spec.meshes)
+    named = any(geom.material for geom in spec.geoms)
+    return bool(files or named or list(spec.textures) or list(spec.hfields))
+
+
+def _drop_extras(spec: mujoco.MjSpec) -> None:
+    """Delete what is no part of the body, and names parts that may not be there."""
+    for kind in ("sensors", "keys", "tuples"):
+        for element in list(getattr(spec, kind)):
+            spec.delete(element)
+
+
+def _drop_drives(spec: mujoco.MjSpec) -> None:
+    """Delete what moves the body, or says which of its shapes touch."""
+    for kind in ("actuators", "tendons", "pairs", "excludes"):
+        for element in list(getattr(spec, kind)):
+            spec.delete(element)
 
 
 def _drop_assets(spec: mujoco.MjSpec) -> None:
@@ -77,3 +116,11 @@ def _drop_assets(spec: mujoco.MjSpec) -> None:
 def one_line(error: Exception) -> str:
     """MuJoCo's message on one line."""
     return " ".join(str(error).split())
+
+
+# What a model is read without where it can't be compiled with it, one after another.
+_SPARED: tuple[tuple[str, Callable[[mujoco.MjSpec], None]], ...] = (
+    ("meshes and textures", _drop_assets),
+    ("sensors and keyframes", _drop_extras),
+    ("motors, tendons and contact pairs", _drop_drives),
+)

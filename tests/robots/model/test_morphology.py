@@ -486,3 +486,26 @@ def test_a_girdle_before_a_shoulder_is_no_part_of_it(tmp_path: Path) -> None:
         ball = [robot.joint_names[j] for j in robot.tree.chain(link)[-3:]]
         assert ball == [f"{side}_shoulder_{way}" for way in ("pitch", "roll", "yaw")]
         assert robot.joint_names[above] == f"{side}_girdle"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "without"),
+    [
+        ('<sensor><touch site="nowhere"/></sensor>', "sensors and keyframes"),
+        (f'<keyframe><key qpos="{"0 " * 50}"/></keyframe>', "sensors and keyframes"),
+        ('<actuator><motor joint="nobody"/></actuator>', "motors, tendons and contact pairs"),
+        ('<contact><pair geom1="none" geom2="no"/></contact>', "contact pairs"),
+        ('<worldbody><geom size="1" material="gone"/></worldbody>', "meshes and textures"),
+    ],
+)
+def test_a_model_is_read_without_what_is_no_part_of_its_body(
+    tmp_path: Path, wrong: str, without: str
+) -> None:
+    text = registry.find("ember").read_text()
+    expected = understand_robot(written(tmp_path, text))
+    robot = understand_robot(written(tmp_path, text.replace("</mujoco>", f"{wrong}</mujoco>")))
+    note = next(note for note in robot.notes if note.startswith("read without"))
+    assert without in note
+    assert "incomplete" not in note
+    assert robot.joint_names == expected.joint_names
+    np.testing.assert_array_equal(robot.tpose.angles, expected.tpose.angles)
