@@ -31,6 +31,7 @@ _BEGINNING = 4096  # bytes that tell an MJCF from a URDF
 _MOVING = ("revolute", "continuous", "prismatic")
 _LEAST, _MOST = 1e-10, 1e12  # [kg m²] of a principal moment
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_MEASURES = {"xyz", "rpy", "lower", "upper", "effort", "radius", "length", "size", "scale"}
 _LOCKED = 1e-6  # [rad] MuJoCo ignores limits without a range, and the joint would turn freely
 
 
@@ -62,14 +63,16 @@ def read_urdf(path: Path, notes: list[str], *, visuals: bool = True) -> tuple[mu
         robot.remove(element)  # transmissions, sensors of simulators, other settings of MuJoCo's
     moving = {j.get("name") for j in robot.findall("joint") if j.get("type") in _MOVING}
     for joint in robot.findall("joint"):
-        _keep_locked(joint)
         for mimic in joint.findall("mimic"):
             if not {joint.get("name"), mimic.get("joint")} <= moving:
                 joint.remove(mimic)
     for shape in [*robot.iter("visual"), *robot.iter("collision")]:
         shape.attrib.pop("name", None)  # they need not be unique
-    _drop_points(robot)
     _mend_triples(robot, notes)
+    _check_numbers(robot, path)
+    _drop_points(robot)
+    for joint in robot.findall("joint"):
+        _keep_locked(joint)
     mended = [link.get("name", "") for link in robot.findall("link") if _mend_inertia(link)]
     if mended:
         notes.append(
@@ -167,15 +170,34 @@ def _mend_triples(robot: ET.Element, notes: list[str]) -> None:
         notes.append(f"{counted(mended, 'triple')} of numbers with commas: read as if with blanks")
 
 
+def _check_numbers(robot: ET.Element, path: Path) -> None:
+    """Raise where a place, a size or a limit is no number. MuJoCo's message would have the line of
+    the text that it is given, and no name."""
+    for part in [*robot.findall("link"), *robot.findall("joint")]:
+        for element in part.iter():
+            for name in _MEASURES & element.attrib.keys():
+                for number in element.attrib[name].split() or [""]:
+                    if not _is_number(number):
+                        place = f"{part.tag} {part.get('name')!r}: <{element.tag} {name}="
+                        raise FileFormatError(
+                            path, None, f"{place}{element.attrib[name]!r}>: {number!r} is no number"
+                        )
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def _keep_locked(joint: ET.Element) -> None:
     """A hinge that may not turn keeps a tiny range."""
     limit = joint.find("limit")
     if joint.get("type") != "revolute" or limit is None:
         return
-    try:
-        lower, upper = (float(limit.get(end, "0")) for end in ("lower", "upper"))
-    except ValueError:
-        return  # MuJoCo says what is wrong
+    lower, upper = (float(limit.get(end, "0")) for end in ("lower", "upper"))
     if lower == upper:
         limit.set("lower", repr(lower - _LOCKED / 2))
         limit.set("upper", repr(upper + _LOCKED / 2))

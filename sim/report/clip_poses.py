@@ -109,7 +109,8 @@ def soles_of(rig: Rig) -> tuple[Sole, ...]:
     """The soles that a rig stands on. Raises SkeletonError where it has none."""
     if not rig.soles:
         raise SkeletonError(
-            "the body has no foot: floor contact can't be measured; name its feet in a role map"
+            "the body has no foot, so its floor contact can't be measured: one without legs has no "
+            "report; of another one, name the feet in a role map"
         )
     return rig.soles
 

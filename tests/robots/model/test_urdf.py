@@ -300,6 +300,23 @@ def test_a_g1_is_a_g1_in_either_language() -> None:
     np.testing.assert_allclose(states[0], states[1], atol=2e-3)
 
 
+@pytest.mark.parametrize(
+    ("pattern", "by", "said"),
+    [
+        (r'lower="[^"]*"', 'lower="-1.57."', "lower='-1.57.'>: '-1.57.' is no number"),
+        (r'axis xyz="[^"]*"', 'axis xyz="0 one 0"', "<axis xyz='0 one 0'>: 'one' is no number"),
+    ],
+)
+def test_what_is_no_number_is_named_with_its_place(
+    folder: Path, tmp_path: Path, pattern: str, by: str, said: str
+) -> None:
+    text = re.sub(pattern, by, (folder / "twin.urdf").read_text(), count=1)
+    (tmp_path / "twin.urdf").write_text(text)
+    with pytest.raises(FileFormatError, match="joint 'left_hip_pitch'") as error:
+        read_mjcf(tmp_path / "twin.urdf")
+    assert said in str(error.value)
+
+
 def test_arms_that_hang_are_no_legs_whatever_tells_their_sides(folder: Path) -> None:
     """Numbers tell the sides, and the arms are the lowest limbs that there are."""
     text = without_legs((folder / "twin.urdf").read_text())
