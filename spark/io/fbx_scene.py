@@ -171,7 +171,8 @@ class FbxScene:
 
     @staticmethod
     def _is_empty(node: Any) -> bool:
-        return node.mesh is None and node.light is None and node.camera is None
+        # By its type: the library can't hand on a light or a camera.
+        return node.attrib_type.name not in ("MESH", "LIGHT", "CAMERA")
 
 
 def _vectors_at(

@@ -95,8 +95,10 @@ class Fbx:
                 + 'P: "RotationActive", "bool", "", "",1\n} }\n'
             )
             links.append(f'C: "OO",{100 + i},{0 if node.parent < 0 else 100 + node.parent}')
-            if node.kind == "LimbNode":
-                objects.append(f'NodeAttribute: {200 + i}, "NodeAttribute::", "LimbNode" {{ }}\n')
+            if node.kind in ("LimbNode", "Light", "Camera"):
+                objects.append(
+                    f'NodeAttribute: {200 + i}, "NodeAttribute::", "{node.kind}" {{ }}\n'
+                )
                 links.append(f'C: "OO",{200 + i},{100 + i}')
         for i, take in enumerate(self.takes):
             stack, layer, value, curve = (1000 + 10 * i + k for k in range(4))

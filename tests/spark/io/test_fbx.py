@@ -109,6 +109,17 @@ def test_without_animation_or_bones(tmp_path: Path) -> None:
         read_fbx(Fbx([]).write(tmp_path / "none.fbx"))
 
 
+def test_lights_and_cameras_are_no_joints(tmp_path: Path) -> None:
+    """Neither beside empty nodes, nor alone."""
+    lamps = [Node("Lamp", kind="Light", translation=(0, 300, 0)), Node("View", kind="Camera")]
+    nulls = [replace(node, kind="Null") for node in ARM]
+    read = read_fbx(Fbx([*nulls, *lamps], [TURN]).write(tmp_path / "lit.fbx"))
+    assert read.motion.skeleton.names == ("Hips", "Spine")
+    assert len(read.motion) == 31
+    with pytest.raises(FileFormatError, match="holds no skeleton"):
+        read_fbx(Fbx(lamps).write(tmp_path / "lamps.fbx"))
+
+
 def test_the_largest_skeleton(tmp_path: Path) -> None:
     read = read_fbx(
         Fbx([Node("Prop"), *[replace(n, parent=n.parent + (n.parent >= 0)) for n in ARM]]).write(
