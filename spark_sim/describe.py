@@ -49,6 +49,7 @@ def describe(clip: "AnyClip") -> dict[str, Any]:
             "reason": roles.reasons[j],
             "groups": sorted(map(str, rig.groups[j])),
             "tpose_angle": round(float(turned[j]), 1),
+            "doubles": rig.skeleton.names[rig.doubles[j]] if j in rig.doubles else None,
         }
         for j, name in enumerate(rig.skeleton.names)
     ]
@@ -72,7 +73,12 @@ def text(facts: dict[str, Any]) -> str:
     if body is None:
         return "\n".join([*head, f"  {facts['refused']}"])
     held = [joint for joint in body["joints"] if joint["role"] is not None]
-    others = [joint["joint"] for joint in body["joints"] if joint["role"] is None]
+    doubles = [joint for joint in body["joints"] if joint["doubles"] is not None]
+    others = [
+        joint["joint"]
+        for joint in body["joints"]
+        if joint["role"] is None and joint["doubles"] is None
+    ]
     rows = [("role", "joint", "sure", "rest to T", "parts", "because")]
     rows += [
         (
@@ -91,6 +97,9 @@ def text(facts: dict[str, Any]) -> str:
         "",
         *columns(rows),
     ]
+    if doubles:
+        each = ", ".join(f"{joint['joint']} ({joint['doubles']})" for joint in doubles)
+        lines += ["", f"  turn with the joint that they double: {each}"]
     if others:
         lines += ["", f"  follow their parents: {', '.join(others)}"]
     return "\n".join(lines)

@@ -10,6 +10,7 @@ from jaxtyping import Float
 from spark.errors import SkeletonError
 from spark.kinematics import world_positions
 from spark.motion import Motion
+from spark.rig.doubles import doubles_of
 from spark.rig.feet import FEET, HIP_HEIGHT, UPPER_LEGS, Sole, hip_height, human_soles
 from spark.rig.fingers import FingerBone, finger_bones
 from spark.rig.groups import groups_of
@@ -110,6 +111,11 @@ class Rig:
         bones = np.diff(self.tpose_positions[joints], axis=0)
         *arc, length = np.cumsum(np.linalg.norm(bones, axis=1)).tolist()
         return Chain(joints, [0.0, *(a / (length or 1.0) for a in arc), 1.0])
+
+    @cached_property
+    def doubles(self) -> dict[int, int]:
+        """For each joint that doubles one with a role, that one: they turn alike."""
+        return doubles_of(self.skeleton, self.roles.roles)
 
     @cached_property
     def fingers(self) -> dict[FingerBone, int]:

@@ -18,6 +18,7 @@ from jaxtyping import Float
 
 from spark.motion import Motion
 from spark.rig.bones import RigPose
+from spark.rig.doubles import doubles_of
 from spark.rig.observed import bend_axis, resting_slope, standing_slope
 from spark.rig.reference_pose import GROUP_OF, Reference, pelvis_frame, reference_of, snap
 from spark.rig.roles import Group, Role, RoleMap
@@ -74,8 +75,12 @@ def find_tpose(motion: Motion, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"]
         if j >= root_joint:
             tpose[j] = quat_mul(tpose[child], quat_conj(reference.pose.local[child]))
     notes = list(reference.notes)
-    for j in range(len(skeleton)):
+    doubles = doubles_of(skeleton, roles.roles)
+    for j in _originals_first(skeleton, doubles):
         if j in above:
+            continue
+        if j in doubles:  # at rest all axes lie as the world's
+            tpose[j] = tpose[doubles[j]]
             continue
         parent = tpose[int(skeleton.parents[j])]
         q = quat_mul(parent, reference.pose.local[j])
@@ -89,6 +94,12 @@ def find_tpose(motion: Motion, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"]
             notes += note
         tpose[j] = q
     return tpose, tuple(notes)
+
+
+def _originals_first(skeleton: Skeleton, doubles: dict[int, int]) -> list[int]:
+    """All joints, parents before children, those of doubles' chains after all others."""
+    later = {k for j in doubles for k in skeleton.subtree(j)}
+    return sorted(range(len(skeleton)), key=lambda j: j in later)
 
 
 def root_joint_of(skeleton: Skeleton, pelvis: int) -> int:

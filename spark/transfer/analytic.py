@@ -3,8 +3,9 @@
 Joints of the same role turn alike. Where spine or neck have other joints, or the same number in
 other places, rotations are interpolated by normalised arc length, with the pelvis at 0 and the
 topmost spine joint at 1 (for the neck: topmost spine joint and head). Joints without a role copy
-those of the same name in the same place; fingers the same bone of the same finger, whatever its
-name; all others follow their parent. This is the row "copy" of every table.
+those of the same name in the same place; doubles turn with their originals; fingers as the same
+bone of the same finger, whatever its name; all others follow their parent. This is the row "copy"
+of every table.
 """
 
 from bisect import bisect_right
@@ -125,8 +126,9 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
         elif j in fingers:
             copy(j, fingers[j])
         else:
-            first[j], second[j], mix[j] = first[parent], second[parent], mix[parent]
-            unmatched[j] = j if target.roles.roles[j] in _SHOULDERS else unmatched[parent]
+            with_it = target.doubles.get(j, parent)
+            first[j], second[j], mix[j] = first[with_it], second[with_it], mix[with_it]
+            unmatched[j] = j if target.roles.roles[j] in _SHOULDERS else unmatched[with_it]
     return Correspondence(first, second, mix, unmatched)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from spark.blocks import in_blocks
+from spark.rig.doubles import doubles_of
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_between, quat_from_rotvec, quat_mul, quat_rotate
 from spark.skeleton import Skeleton
@@ -42,8 +43,14 @@ def leg_of(skeleton: Skeleton, roles: Sequence[Role | None], limb: Group) -> Leg
     upper, lower, foot, toe = held
     if upper is None or lower is None or foot is None:
         return None
+    doubles = doubles_of(skeleton, roles)
     below_hip, below_knee, below_ankle = (
-        set(skeleton.subtree(joint)) for joint in (upper, lower, foot)
+        {
+            below
+            for top in (joint, *(j for j, own in doubles.items() if own == joint))
+            for below in skeleton.subtree(top)
+        }
+        for joint in (upper, lower, foot)
     )
     return Leg(
         upper,

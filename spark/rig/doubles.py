@@ -1,0 +1,57 @@
+"""Chains of joints beside a limb's own: of many rigs the skin hangs on such doubles.
+
+MikuMikuDance's models have 左足D beside 左足, rigs of control bones DEF-thigh.L beside ORG-thigh.L.
+Inside the program that made them, constraints turn one as the other; a file has none of these.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from spark.rig.roles import Role
+from spark.skeleton import Skeleton
+
+_APART = 1e-3  # of the skeleton's size: files round their numbers
+
+
+def doubles_of(skeleton: Skeleton, roles: Sequence[Role | None]) -> dict[int, int]:
+    """For each joint that doubles one with a role, that one.
+
+    A double has no role, rests where its original does, hangs on what carries the original or on
+    a double of it, and the chain below goes on beside the original's.
+    """
+    rest = skeleton.rest_positions
+    near = _APART * float(np.ptp(rest, axis=0).max())
+    held = [j for j, role in enumerate(roles) if role is not None]
+    places = rest[held]
+    beside = {
+        j: [held[k] for k in np.flatnonzero(abs(places - rest[j]).max(axis=1) < near)]
+        for j, role in enumerate(roles)
+        if role is None
+    }
+    if not any(beside.values()):
+        return {}
+    above = {r: _next_above(skeleton, roles, r) for r in held}
+    found: dict[int, int] = {}
+    # The joint with a role that each joint turns with, and whether it does so through a double.
+    carriers: list[tuple[int, bool]] = []
+    for j, role in enumerate(roles):
+        parent = int(skeleton.parents[j])
+        carrier, doubled = carriers[parent] if parent >= 0 else (-1, False)
+        carriers.append((carrier, doubled) if role is None else (j, False))
+        for r in beside.get(j, ()):
+            if above[r] != carrier or carrier < 0:
+                continue
+            below = skeleton.subtree(j)
+            if r in below or r in skeleton.ancestors(j):
+                continue
+            after = {k for k in held if above[k] == r}
+            if doubled or any(not after.isdisjoint(beside.get(k, ())) for k in below):
+                found[j] = r
+                carriers[j] = (r, True)
+                break
+    return found
+
+
+def _next_above(skeleton: Skeleton, roles: Sequence[Role | None], joint: int) -> int:
+    return next((j for j in skeleton.ancestors(joint)[1:] if roles[j] is not None), -1)
