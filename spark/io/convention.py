@@ -41,8 +41,12 @@ _STEADY = 0.01  # of the body's height: a floor that moves less is steady
 # [heights] From a fingertip or toe to the farthest other one, along the bones.
 _LONGEST_PATH = 1.5
 
-_FEET = re.compile(r"foot|feet|toe|ankle|hoof|paw", re.IGNORECASE)
-_HEAD = re.compile(r"head|skull", re.IGNORECASE)
+# A foot hangs on two bones at least, each longer than this share of the way to the head; nodes that
+# carry its name, as goals of inverse kinematics and footsteps, hang beside the legs.
+_BONE_SHARE = 0.03
+
+_FEET = re.compile(r"foot|feet|toe|ankle|hoof|paw|足首|つま先", re.IGNORECASE)
+_HEAD = re.compile(r"head|skull|頭", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -206,8 +210,12 @@ def _stature(motion: Motion) -> tuple[float, str]:
     feet = [j for j, name in enumerate(skeleton.names) if _FEET.search(name)]
     if head is not None and feet:
         above = set(skeleton.ancestors(head))
-        paths = [bones[list(above.symmetric_difference(skeleton.ancestors(j)))] for j in feet]
-        height = min(float(path.sum()) for path in paths)
+        ways: dict[bool, list[float]] = {True: [], False: []}
+        for foot in feet:
+            leg = set(skeleton.ancestors(foot))
+            way = float(bones[list(above ^ leg)].sum())
+            ways[int((bones[list(leg - above)] > _BONE_SHARE * way).sum()) > 1].append(way)
+        height = min(ways[True] or ways[False])
         if height > 0:
             return height, "by the way from its head to its feet"
 

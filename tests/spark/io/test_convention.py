@@ -7,12 +7,17 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from spark.errors import ConventionError
-from spark.io.bvh import Bvh, BvhJoint
+from spark.io.bvh import Bvh, BvhJoint, write_bvh
 from spark.io.convention import UNITS
+from spark.io.encoding import encode_new
 from spark.io.recording import read_recording
 from spark.kinematics import forward
+from spark.motion import Motion
+from spark.rotation import quat_identity
+from spark.skeleton import Skeleton
 from tests.helpers.bvh_by_hand import human, save, to_file, zxy
 from tests.helpers.recordings import recording
+from tests.helpers.rigs import RIGS, build, walk
 
 # What each set is, as its README says. fair1 is about 3.5 to 4 cm: between inch and CMU's unit.
 CONVENTIONS = {
@@ -53,6 +58,36 @@ def test_people_of_all_sizes_show_the_unit(tmp_path: Path, unit: str, tall: floa
     found = read_recording(save(human("z", UNITS[unit], scale=tall / 1.7), tmp_path))
     assert (found.convention.unit, found.convention.up) == (unit, "z")
     assert f"unit {unit} " in found.notes[0]
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_rigs_of_the_ecosystem_show_unit_and_axis(tmp_path: Path, name: str) -> None:
+    """Whatever else carries a foot's name: goals of inverse kinematics, footsteps, controls."""
+    walking = walk(*build(RIGS[name]), frames=10)
+    for unit, up in (("cm", "y"), ("m", "z")):
+        write_bvh(encode_new(walking, unit=unit, up=up), tmp_path / "rig.bvh")
+        found = read_recording(tmp_path / "rig.bvh")
+        assert (found.convention.unit, found.convention.up) == (unit, up)
+
+
+def test_a_foot_on_a_single_bone_shows_the_height_all_the_same(tmp_path: Path) -> None:
+    """Of a body whose legs have no knees."""
+    joints = [("hips", -1, (0.0, 0.0, 0.0)), ("head", 0, (0.0, 0.0, 0.7))]
+    joints += [(f"{side}_foot", 0, (0.0, y, -0.9)) for side, y in (("l", 0.1), ("r", -0.1))]
+    size = len(joints)
+    skeleton = Skeleton(
+        tuple(name for name, _, _ in joints),
+        np.array([parent for _, parent, _ in joints]),
+        np.array([place for _, _, place in joints]),
+        np.arange(size) == 0,
+    )
+    still = Motion(
+        skeleton, 1 / 30, np.array([[0, 0, 0.9]] * 2), quat_identity(np.zeros((2, size, 1)))
+    )
+    write_bvh(encode_new(still, unit="cm", up="y"), tmp_path / "doll.bvh")
+    found = read_recording(tmp_path / "doll.bvh")
+    assert (found.convention.unit, found.convention.up) == ("cm", "y")
+    assert "from its head to its feet: 1.6" in found.notes[0]
 
 
 def test_a_size_between_two_units_is_pointed_out(tmp_path: Path) -> None:
