@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spark.errors import SkeletonError
-from spark.rig.facing import LabelledPair, first_is_left, stands_on_four
+from spark.rig.facing import LabelledPair, SideEvidence, first_is_left, stands_on_four
 from spark.rig.limb_roles import ARM, LEG, label_limb
 from spark.rig.measurements import Measurements, rest_measurements
 from spark.rig.name_hints import NameHint
@@ -36,7 +36,7 @@ class Anatomy:
     head: int | None
     legs: LabelledPair
     arms: LabelledPair | None
-    sides: float
+    sides: SideEvidence
     mirrored: frozenset[int]
 
 

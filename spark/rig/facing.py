@@ -1,6 +1,7 @@
 """Where a body's front is, which tells left from right, and whether it walks on four legs."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -29,10 +30,22 @@ class LabelledPair:
         return None if at is None else chain[at]
 
 
+class SideEvidence(NamedTuple):
+    """That the first limbs are the left ones: sure at 0.3, against below 0. Of how knees and elbows
+    bend, and of where feet point."""
+
+    bends: float
+    feet: float
+
+    @property
+    def both(self) -> float:
+        return self.bends + self.feet
+
+
 def first_is_left(
     measured: Measurements, legs: LabelledPair, arms: LabelledPair | None, above: int | None
-) -> float:
-    """Evidence that the pairs' `first` limbs are the left ones: sure at 0.3, against below 0.
+) -> SideEvidence:
+    """Evidence that the pairs' `first` limbs are the left ones.
 
     Feet point forward, knees bend forward and elbows backward; `above` is a joint of the upper
     body, if there is one. The frame is the body's own, so the pose may sit, lie or hang.
@@ -48,16 +61,17 @@ def first_is_left(
     forward = np.cross(across, up)
     forward /= np.maximum(np.linalg.norm(forward, axis=-1, keepdims=True), 1e-9)
 
-    evidence = 0.0
+    bends = feet = 0.0
     for side in (0, 1):
-        evidence += _KNEE_WEIGHT * _bend(
+        feet += _FOOT_WEIGHT * _foot(measured, legs, side, forward)
+        bends += _KNEE_WEIGHT * _bend(
             measured, legs, side, ("upper_leg", "lower_leg", "foot"), forward
-        ) + _FOOT_WEIGHT * _foot(measured, legs, side, forward)
+        )
         if arms is not None:
-            evidence -= _ELBOW_WEIGHT * _bend(
+            bends -= _ELBOW_WEIGHT * _bend(
                 measured, arms, side, ("upper_arm", "forearm", "hand"), forward
             )
-    return evidence
+    return SideEvidence(bends, feet)
 
 
 def _bend(

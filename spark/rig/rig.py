@@ -145,4 +145,5 @@ def understand(motion: Motion, override: Override | None = None) -> Rig:
         raise SkeletonError(
             f"the hips are {height:.2g} m above the soles; expected legs with a length"
         )
+    notes = (*roles.notes, *notes)
     return Rig(skeleton, roles, groups_of(skeleton, roles), tpose, root_joint, height, notes)

@@ -87,11 +87,13 @@ LIMBS: dict[Group, tuple[Role, ...]] = {
 
 @dataclass(frozen=True)
 class RoleMap:
-    """The role of each joint (None: it follows its parent), the confidence in [0, 1], and why."""
+    """The role of each joint (None: it follows its parent), the confidence in [0, 1], and why; and
+    notes on what was assumed."""
 
     roles: tuple[Role | None, ...]
     confidence: tuple[float, ...]
     reasons: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"RoleMap({counted(len(self.roles), 'joint')}, {len(self.held)} with a role)"

@@ -1,10 +1,12 @@
 """Sides: from names where they say them, else from the body's front."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from spark.rig.rig import understand
 from spark.rig.role_assignment import assign_roles
 from spark.rig.roles import Role
 from tests.helpers.rigs import RIGS, build, walk
@@ -27,18 +29,44 @@ def test_sides_that_names_give_to_one_pair_hold_for_the_other(part: str) -> None
     )
     named = replace(skeleton, names=names)
     assert wrong(named, assign_roles(named, walk(named, right)), right) == {}
-    motion = mirrored(walk(named, right))
-    assert wrong(motion.skeleton, assign_roles(motion.skeleton, motion), right) == {}
+    at_rest = mirrored(walk(named, right)).skeleton
+    assert wrong(at_rest, assign_roles(at_rest), right) == {}
 
 
-def test_a_name_on_the_other_side_of_the_body_is_doubted() -> None:
+def test_a_body_that_moves_against_its_names_tells_its_sides() -> None:
+    """As of a file that was mirrored, or named as a viewer sees it."""
     skeleton, right = build(RIGS["lafan1"])
     motion = mirrored(walk(skeleton, right))
+    swapped = tuple(role and role.mirrored for role in right)
     roles = assign_roles(motion.skeleton, motion)
-    assert wrong(motion.skeleton, roles, right) == {}
+    assert wrong(motion.skeleton, roles, swapped) == {}
     knee = skeleton.names.index("LeftLeg")
     assert "other side" in roles.reasons[knee]
     assert roles.confidence[knee] < 0.7 < assign_roles(skeleton).confidence[knee]
+    assert "'RightUpLeg' is taken for the left thigh" in roles.notes[0]
+    assert assign_roles(skeleton, walk(skeleton, right)).notes == ()
+
+
+def test_swapped_names_change_nothing_where_the_body_moves() -> None:
+    skeleton, right = build(RIGS["lafan1"])
+    other = {"Left": "Right", "Right": "Left"}
+    names = tuple(re.sub("Left|Right", lambda m: other[m[0]], name) for name in skeleton.names)
+    motion = walk(skeleton, right)
+    swapped = understand(replace(motion, skeleton=replace(skeleton, names=names)))
+    rig = understand(motion)
+    assert swapped.roles.roles == rig.roles.roles
+    np.testing.assert_allclose(swapped.tpose, rig.tpose, atol=1e-12)
+
+
+def test_a_name_on_the_other_side_of_a_rest_pose_is_doubted() -> None:
+    """Straight knees tell nothing, and feet alone may be drawn from the toes to the heels."""
+    skeleton, right = build(RIGS["lafan1"])
+    roles = assign_roles(mirrored(walk(skeleton, right)).skeleton)
+    assert wrong(skeleton, roles, right) == {}
+    knee = skeleton.names.index("LeftLeg")
+    assert "other side" in roles.reasons[knee]
+    assert roles.confidence[knee] < 0.7 < assign_roles(skeleton).confidence[knee]
+    assert "'LeftUpLeg' is taken for the left thigh" in roles.notes[0]
 
 
 def test_a_side_that_nothing_shows_is_a_guess_and_says_so() -> None:
