@@ -19,6 +19,7 @@ import orjson
 from spark.errors import FileFormatError
 
 LARGEST = 2 << 30  # bytes: a BVH of six hours at 120 fps
+_POINTER = b"version https://git-lfs.github.com/spec/"
 LARGEST_TEXT = 16 << 20  # bytes of settings, maps and models, which people write by hand
 
 
@@ -30,11 +31,13 @@ def read_bytes(path: Path, *, limit: int = LARGEST, expected: str = "a regular f
         with open(path, "rb", opener=_without_waiting) as file:
             state = os.fstat(file.fileno())
             _check(path, state, limit, expected)
-            return file.read(state.st_size)
+            content = file.read(state.st_size)
     except (OSError, ValueError) as error:
         raise unreadable(path, error, expected) from error
     except MemoryError as error:
         raise FileFormatError(path, None, "is larger than the memory that is left") from error
+    _check_fetched(path, content[: len(_POINTER)])
+    return content
 
 
 def check_regular(path: Path, *, limit: int = LARGEST, expected: str = "a regular file") -> None:
@@ -43,6 +46,7 @@ def check_regular(path: Path, *, limit: int = LARGEST, expected: str = "a regula
         _check(path, os.stat(path), limit, expected)
     except (OSError, ValueError) as error:
         raise unreadable(path, error, expected) from error
+    _check_fetched(path, beginning(path, len(_POINTER)))
 
 
 def real(path: Path) -> Path:
@@ -146,4 +150,12 @@ def _check(path: Path, state: os.stat_result, limit: int, expected: str) -> None
     if state.st_size > limit:
         raise FileFormatError(
             path, None, f"has {state.st_size / 2**20:.0f} MB; at most {limit >> 20} are read"
+        )
+
+
+def _check_fetched(path: Path, head: bytes) -> None:
+    """Raise where a file begins as what Git leaves in place of a large one."""
+    if head == _POINTER:
+        raise FileFormatError(
+            path, None, "is Git LFS's pointer to the file, not the file; fetch it: git lfs pull"
         )

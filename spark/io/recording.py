@@ -30,6 +30,7 @@ _ENCODINGS = {"cp932": "Shift-JIS", "latin-1": "Latin-1"}
 
 # Of the body's height: positions that vary less are constant.
 _CONSTANT = 1e-6
+_STILL_ANGLE = 0.3  # in the file's unit: what moves less has no angles to tell the unit by
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +114,7 @@ class _Decoder:
             values = np.zeros((1, values.shape[1]))
             values[0, columns] = offsets[placed, axes]
 
+        notes += _in_radians(np.delete(values, columns, axis=1))
         child = placed > 0
         middle = np.array([np.median(values[:, column]) for column in columns])
         spread = np.array([np.ptp(values[:, column]) for column in columns])
@@ -177,6 +179,17 @@ class _Decoder:
         root_pos[:, axes[root]] = self._values[:, columns[root]]
         first = make(slice(0, 1))
         return LazyMotion(first.skeleton, first.frame_time, convention.from_file(root_pos), make)
+
+
+def _in_radians(angles: Float[np.ndarray, "T C"]) -> list[str]:
+    """A note where a body that moves has no angle beyond a full turn in radians."""
+    largest = float(np.abs(angles).max(initial=0.0))
+    if largest > 2 * np.pi or not np.any(np.ptp(angles, axis=0) > _STILL_ANGLE):
+        return []
+    return [
+        f"no angle is larger than {largest:.3g}: a BVH holds degrees; if these are radians, "
+        "multiply them by 57.2958"
+    ]
 
 
 def _adds_offset(

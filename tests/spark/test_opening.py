@@ -39,6 +39,14 @@ def test_only_regular_files_are_read(kind: str, tmp_path: Path) -> None:
             read(path)
 
 
+def test_what_git_leaves_in_place_of_a_file_is_said_to_be_that(tmp_path: Path) -> None:
+    path = tmp_path / "walk.fbx"
+    path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n")
+    for read in (read_bytes, check_regular):
+        with pytest.raises(FileFormatError, match="git lfs pull"):
+            read(path)
+
+
 def test_names_that_no_file_has() -> None:
     for name in ("a\0b", "x" * 300, "\udcff" * 3):
         with pytest.raises(FileFormatError):

@@ -225,3 +225,11 @@ def test_rows_are_read_in_blocks_as_in_one(
     path.write_bytes(line_end.join(lines).encode())
     with pytest.raises(FileFormatError, match="values in this row"):
         read_bvh(path)
+
+
+def test_angles_that_may_be_radians_are_pointed_out(tmp_path: Path) -> None:
+    """Of a body that moves; one that stands still has none to tell."""
+    turns = np.linspace([0, 0, 0], [60.0, 30.0, 170.0], 9)
+    for angles, doubted in ((turns, False), (np.radians(turns), True), (0 * turns, False)):
+        notes = read_recording(save(human(turns=angles), tmp_path)).notes
+        assert any("radians" in note for note in notes) is doubted
