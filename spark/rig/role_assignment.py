@@ -22,6 +22,9 @@ _CLEAR_SIDE = 0.15  # of the evidence of `first_is_left`, which is sure at 0.3
 # Of both parts of it, for sides that the body shows against its names. Of 580 recordings and rest
 # poses that are named rightly none has both below 0; mirrored, their motions have both below -1.
 _AGAINST_NAMES = -0.5
+_TOES_BEHIND = (
+    -1.0
+)  # of the feet's part of it, where knees and elbows are straight: 180 to 120 degrees
 
 
 def assign_roles(
@@ -94,7 +97,7 @@ def _infer_limb(
 ) -> None:
     is_leg = limb is anatomy.legs
     shown, named_sides = anatomy.sides, limb.pair.sided
-    against = named_sides and max(shown) < _AGAINST_NAMES
+    against = named_sides and _against_names(hints, anatomy)
     first_left = (named_sides and not against) or (not named_sides and shown.both >= 0)
     sides = ("left", "right") if first_left else ("right", "left")
     agreement = shown.both if named_sides and not against else abs(shown.both)
@@ -134,6 +137,17 @@ def _on_sides(skeleton: Skeleton, roles: RoleMap) -> tuple[str, ...]:
         if legs:
             return (f"{what} ({skeleton.names[legs[0]]!r} is taken for the left thigh)",)
     return ()
+
+
+def _against_names(hints: Sequence[NameHint], anatomy: Anatomy) -> bool:
+    """Whether the body shows that its names call left what is right: by its bends and its feet, or
+    where it stands straight by joints that are toes by name."""
+    shown, legs = anatomy.sides, anatomy.legs
+    if max(shown) < _AGAINST_NAMES:
+        return True
+    toes = [legs.joint(side, "toe") for side in (0, 1)]
+    named = all(toe is not None and "toe" in hints[toe].parts for toe in toes)
+    return named and shown.feet < _TOES_BEHIND and shown.bends < _CLEAR_SIDE
 
 
 def _by_name(skeleton: Skeleton, hints: Sequence[NameHint], joint: int) -> str:

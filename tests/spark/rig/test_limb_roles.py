@@ -29,8 +29,9 @@ def test_sides_that_names_give_to_one_pair_hold_for_the_other(part: str) -> None
     )
     named = replace(skeleton, names=names)
     assert wrong(named, assign_roles(named, walk(named, right)), right) == {}
-    at_rest = mirrored(walk(named, right)).skeleton
-    assert wrong(at_rest, assign_roles(at_rest), right) == {}
+    motion = mirrored(walk(named, right))
+    swapped = tuple(role and role.mirrored for role in right)
+    assert wrong(motion.skeleton, assign_roles(motion.skeleton, motion), swapped) == {}
 
 
 def test_a_body_that_moves_against_its_names_tells_its_sides() -> None:
@@ -58,15 +59,23 @@ def test_swapped_names_change_nothing_where_the_body_moves() -> None:
     np.testing.assert_allclose(swapped.tpose, rig.tpose, atol=1e-12)
 
 
-def test_a_name_on_the_other_side_of_a_rest_pose_is_doubted() -> None:
-    """Straight knees tell nothing, and feet alone may be drawn from the toes to the heels."""
+def test_toes_tell_the_sides_of_a_rest_pose() -> None:
     skeleton, right = build(RIGS["lafan1"])
-    roles = assign_roles(mirrored(walk(skeleton, right)).skeleton)
-    assert wrong(skeleton, roles, right) == {}
-    knee = skeleton.names.index("LeftLeg")
+    at_rest = mirrored(walk(skeleton, right)).skeleton
+    swapped = tuple(role and role.mirrored for role in right)
+    assert wrong(at_rest, assign_roles(at_rest), swapped) == {}
+
+
+def test_a_name_on_the_other_side_of_feet_without_toes_is_doubted() -> None:
+    """They may be drawn from the ankles to the heels."""
+    skeleton, right = build(RIGS["poser"])
+    at_rest = mirrored(walk(skeleton, right)).skeleton
+    roles = assign_roles(at_rest)
+    assert wrong(at_rest, roles, right) == {}
+    knee = skeleton.names.index("lShin")
     assert "other side" in roles.reasons[knee]
     assert roles.confidence[knee] < 0.7 < assign_roles(skeleton).confidence[knee]
-    assert "'LeftUpLeg' is taken for the left thigh" in roles.notes[0]
+    assert "'lThigh' is taken for the left thigh" in roles.notes[0]
 
 
 def test_a_side_that_nothing_shows_is_a_guess_and_says_so() -> None:
