@@ -1,4 +1,4 @@
-"""C3D files as recordings: joint centres by their labels, or markers of known sets.
+"""C3D and TRC files as recordings: joint centres by their labels, or markers of known sets.
 
 What is there are points: rotations are fitted to them, as to any positions.
 """
@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from spark.errors import FileFormatError, name_list
-from spark.io.c3d_file import read_c3d_points
+from spark.io.c3d_file import C3dPoints, read_c3d_points
 from spark.io.marker_sets import Points, centres, centres_of_markers, layout_of, plain
 from spark.io.position_files import filled
 from spark.io.positions import on_layout, recording_of
 from spark.io.recording import Recording
+from spark.io.trc_file import read_trc_points
 from spark.runs import true_runs
 from spark.summary import counted
 
@@ -33,7 +34,28 @@ def read_c3d(
     stands. Raises `FileFormatError` where the points are neither, or the file is broken.
     """
     path = Path(path)
-    points = read_c3d_points(path)
+    return _of_points(path, read_c3d_points(path), unit, up, fps)
+
+
+def read_trc(
+    path: str | Path,
+    *,
+    unit: str | float | None = None,
+    up: str | None = None,
+    fps: float | None = None,
+) -> Recording:
+    """The recording in a TRC file, as `read_c3d` reads one of a C3D."""
+    path = Path(path)
+    return _of_points(path, read_trc_points(path), unit, up, fps)
+
+
+def _of_points(
+    path: Path,
+    points: C3dPoints,
+    unit: str | float | None,
+    up: str | None,
+    fps: float | None,
+) -> Recording:
     labelled: Points = {}
     for label, values in zip(points.labels, points.values.swapaxes(0, 1), strict=True):
         if (name := plain(label)) and np.isfinite(values).any():
@@ -42,7 +64,7 @@ def read_c3d(
     notes = list(points.notes)
     joints = centres(labelled)
     if joints:
-        notes.insert(0, f"{len(joints)} joint centres of the C3D's {len(points.labels)} points")
+        notes.insert(0, f"{len(joints)} joint centres of the file's {len(points.labels)} points")
     else:
         joints = centres_of_markers(labelled, unit_m)
         notes.insert(

@@ -38,13 +38,12 @@ GLTF = Format("glTF", (".glb", ".gltf", ".vrm", ".vrma"), (*UNIT_AND_UP, "fps", 
 ACCLAIM = Format("ASF/AMC", (".amc", ".asf"), (*UNIT_AND_UP, "fps"))
 SMPL = Format("SMPL", (".npz", ".npy", ".pt", ".pth"), (*UNIT_AND_UP, "fps", "body_model"))
 C3D = Format("C3D", (".c3d",), (*UNIT_AND_UP, "fps"))
+TRC = Format("TRC", (".trc",), (*UNIT_AND_UP, "fps"), b"PathFileType")
 POSITIONS = Format("positions", (".npz", ".npy", ".pt", ".pth"), (*UNIT_AND_UP, "fps"))
 
-FORMATS = (BVH, FBX, GLTF, ACCLAIM, C3D, SMPL, POSITIONS)
+FORMATS = (BVH, FBX, GLTF, ACCLAIM, C3D, TRC, SMPL, POSITIONS)
 SMPL_KEYS = KEYS | SIGNS
 _NOT_READ = {
-    ".trc": "TRC holds markers; expected joints: export BVH or FBX, or joint centres as an npz "
-    "with 'positions' and 'names'",
     ".mvnx": "MVNX is not read; export BVH or FBX from Xsens MVN",
     **dict.fromkeys(
         (".blend", ".dae", ".usd", ".usda", ".usdc", ".usdz", ".vmd", ".ma", ".mb", ".max"),
@@ -140,6 +139,10 @@ def _reader(known: Format) -> Reader:
         from spark.io.c3d import read_c3d
 
         return read_c3d
+    if known is TRC:
+        from spark.io.c3d import read_trc
+
+        return read_trc
     if known is SMPL:
         from spark.io.smpl import read_smpl
 

@@ -29,7 +29,7 @@ from spark_sim.web import host_name, origin_host
 
 _PAGE = Template("spark_sim.commands", "studio.html", ("studio.js",), server=True)
 MAX_UPLOAD = 64 * 1024 * 1024  # bytes
-UPLOADS = (".bvh", ".fbx", ".glb", ".gltf", ".vrm", ".vrma", ".c3d", ".npz", ".npy")
+UPLOADS = (".bvh", ".fbx", ".glb", ".gltf", ".vrm", ".vrma", ".c3d", ".trc", ".npz", ".npy")
 _KEPT = 8  # clips and pages; the oldest are forgotten
 _LOCAL = ("localhost", "127.0.0.1", "::1")
 

@@ -93,6 +93,14 @@ def _c3d_seeds(folder: Path) -> list[bytes]:
     ]
 
 
+def _trc_seeds(folder: Path) -> list[bytes]:
+    from tests.helpers.trc import HALPE, trc_text
+
+    walk = _walk()
+    points = forward(walk)[0][:, : len(HALPE)]
+    return [trc_text(list(HALPE), points, unit=unit).encode() for unit in ("m", "mm")]
+
+
 def _gltf_seeds(buffer: str) -> Callable[[Path], list[bytes]]:
     """With integers and sparse arrays, and the bones of a VRM without a skin."""
 
@@ -184,6 +192,7 @@ FORMATS: dict[str, Target] = {
     "bvh": Target(".bvh", motion_seeds, _use_clip),
     "fbx": Target(".fbx", _fbx_seeds, _use_fbx),
     "c3d": Target(".c3d", _c3d_seeds, _use_clip),
+    "trc": Target(".trc", _trc_seeds, _use_clip),
     "glb": Target(".glb", _gltf_seeds("glb"), _use_clip),
     "gltf": Target(".gltf", _gltf_seeds("inside"), _use_clip),
     "amc": Target(".amc", _acclaim_seeds(".asf"), _use_clip),

@@ -332,7 +332,7 @@ def test_files_beside_the_motions(
         spark_sim.load(tmp_path / "a.npz")
 
 
-@pytest.mark.parametrize("name", ["a.TRC", "a.mvnx", "a.blend"])
+@pytest.mark.parametrize("name", ["a.USD", "a.mvnx", "a.blend"])
 def test_files_that_are_not_read_say_what_to_do(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_bytes(b"\2P" + bytes(600))
     with pytest.raises(FileFormatError, match=rf"{name}: .*export"):
