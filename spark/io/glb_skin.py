@@ -15,6 +15,7 @@ from spark.errors import FileFormatError
 from spark.io.glb_file import FileNumbers, container, places, turns
 from spark.io.gltf_file import GltfFile
 from spark.io.gltf_joints import skeleton_nodes
+from spark.io.gltf_rest import rest_maps
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark.opening import read_bytes
@@ -84,33 +85,6 @@ def _local_maps(
         place = (inverse @ (moved[node][0] - at)[..., None])[..., 0]
         out[node] = place, inverse @ moved[node][1]
     return out
-
-
-def rest_maps(file: GltfFile) -> dict[int, tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]]:
-    """Every node's place and linear map in the world, as the file has them at rest."""
-    parents = file.parents()
-    known: dict[int, tuple[Float[np.ndarray, 3], Float[np.ndarray, "3 3"]]] = {}
-    for node in range(len(parents)):
-        line = [node]
-        while parents[line[-1]] >= 0 and parents[line[-1]] not in known:
-            line.append(parents[line[-1]])
-        for i in reversed(line):
-            at, axes = _own(file.nodes[i])
-            if parents[i] >= 0:
-                above_at, above = known[parents[i]]
-                at, axes = above_at + above @ at, above @ axes
-            known[i] = at, axes
-    return known
-
-
-def _own(node: dict[str, Any]) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
-    if "matrix" in node:
-        matrix = np.array(node["matrix"], dtype=float).reshape(4, 4).T
-        return matrix[:3, 3], matrix[:3, :3]
-    x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
-    scale = np.array(node.get("scale", (1.0, 1.0, 1.0)), dtype=float)
-    axes = matrix_from_quat(np.array([w, x, y, z], dtype=float)) * scale
-    return np.array(node.get("translation", (0.0, 0.0, 0.0)), dtype=float), axes
 
 
 def _as_trs(

@@ -1,6 +1,6 @@
 """glTF files (.glb, .gltf, and .vrm, .vrma, which are GLBs) as recordings.
 
-The rest pose is that of the nodes' own transforms. Khronos, "glTF 2.0 Specification", 3.5.2, 3.11
+Khronos, "glTF 2.0 Specification", 3.5.2, 3.11
 and appendix C: metres, Y up; keys at any times, with linear, stepped or cubic interpolation between
 them.
 """
@@ -17,6 +17,7 @@ from spark.io.convention import infer_unit
 from spark.io.foreign import foreign_recording
 from spark.io.gltf_file import GltfFile
 from spark.io.gltf_joints import joint_nodes
+from spark.io.gltf_rest import bound_maps
 from spark.io.nodes import NodeJoint, chosen_clip, joints_of, line_to, motion_of_axes
 from spark.io.recording import Recording
 from spark.io.scanner import LARGEST
@@ -84,9 +85,15 @@ def _motion(file: GltfFile, clip: str | None, fps: float | None) -> tuple[Motion
     inside = {node for joint in joints for node in line_to(joint.node, parents)}
     tracks = {key: track for key, track in tracks.items() if key[0] in inside}
     times, frame_time = _times(file, tracks, len(inside), fps, notes)
-    rest = _world(file, joints, parents, {}, np.zeros(1))
     seen = _world(file, joints, parents, tracks, times)
-    motion, renamed = motion_of_axes(joints, (rest[0][0], rest[1][0]), seen, frame_time)
+    if (bound := bound_maps(file)) is None:
+        at, axes = (each[0] for each in _world(file, joints, parents, {}, np.zeros(1)))
+    else:
+        at, axes = (np.array([bound[joint.node][k] for joint in joints]) for k in (0, 1))
+        notes.append(
+            "its nodes rest in a pose: the one that its skin was bound in is taken instead"
+        )
+    motion, renamed = motion_of_axes(joints, (at, axes), seen, frame_time)
     return motion, [*notes, *renamed]
 
 

@@ -12,10 +12,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.io.convention import Convention
-from spark.io.glb_skin import rest_maps
 from spark.io.gltf_file import GltfFile
 from spark.io.gltf_joints import skeleton_nodes
 from spark.io.gltf_materials import Surfaces
+from spark.io.gltf_rest import rest_maps
 from spark.io.nodes import line_to
 from spark.io.skin_parts import MAX_FACES, MAX_VERTICES, SkinPart, skin_of
 from spark.skin import Skin

@@ -179,3 +179,16 @@ def animated(
         columns = np.swapaxes(bind, 1, 2).reshape(count, 16)
         gltf.json["skins"] = [{"joints": node_of, "inverseBindMatrices": gltf.accessor(columns)}]
     return gltf
+
+
+def stand_as(gltf: Gltf, frame: int) -> None:
+    """Leave the nodes as the animation has them at a key, as exporters in its middle do."""
+    animation = gltf.json["animations"][0]
+    for channel in animation["channels"]:
+        accessor = gltf.json["accessors"][animation["samplers"][channel["sampler"]]["output"]]
+        view = gltf.json["bufferViews"][accessor["bufferView"]]
+        width = {"VEC3": 3, "VEC4": 4}[accessor["type"]]
+        row = view["byteOffset"] + 4 * width * frame
+        values = np.frombuffer(gltf.binary[row : row + 4 * width], "<f4")
+        node = gltf.json["nodes"][channel["target"]["node"]]
+        node[channel["target"]["path"]] = values.tolist()

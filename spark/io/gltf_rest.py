@@ -1,0 +1,161 @@
+"""How the nodes of a glTF file rest: as their own transforms have it, or as the skin was bound.
+
+Many exporters write the nodes as they stand at some frame of a motion. The inverse bind matrices
+still hold the pose in which an artist hung the skin on the bones, which is a T or an A. Of the two
+poses the straighter one is the rest pose.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from spark.io.gltf_file import GltfFile
+from spark.io.gltf_joints import joint_nodes
+from spark.io.nodes import line_to
+from spark.rotation import matrix_from_quat
+
+_SHORT = 0.03  # of the body's size: shorter bones point anywhere
+_STRAIGHTER = 0.5  # [rad] summed over all joints: two poses that bend alike are no reason to change
+_LEANS = np.radians(45)  # of hips at some frame of a motion
+_SAME_LENGTH = 0.05  # relative: bones that differ by more in the two poses are of another body
+
+Map = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
+"""A node's place and linear map in the world."""
+
+
+def rest_maps(file: GltfFile) -> dict[int, Map]:
+    """Every node's place and linear map in the world at rest."""
+    return bound_maps(file) or _own_maps(file)
+
+
+def bound_maps(file: GltfFile) -> dict[int, Map] | None:
+    """Where all nodes are in the pose in which the skins of the file's skeleton were bound; None
+    where that pose isn't told, or no straighter than the nodes' own transforms are."""
+    joints, parents, own = joint_nodes(file), file.parents(), _own_maps(file)
+    placed = _placed(file, joints, parents, {node: _matrix(own[node]) for node in own})
+    if not placed:
+        return None
+    bound: dict[int, Map] = {}
+    for node in sorted(own, key=lambda i: len(line_to(i, parents))):
+        if node in placed:
+            bound[node] = placed[node][:3, 3], placed[node][:3, :3]
+        elif (above := parents[node]) < 0:
+            bound[node] = own[node]
+        else:
+            back = np.linalg.inv(own[above][1])
+            at, axes = back @ (own[node][0] - own[above][0]), back @ own[node][1]
+            bound[node] = bound[above][0] + bound[above][1] @ at, bound[above][1] @ axes
+    before, after = (_bones(maps, joints, parents) for maps in (own, bound))
+    lengths = np.linalg.norm(list(before.values()), axis=1).reshape(-1)
+    since = np.linalg.norm(list(after.values()), axis=1).reshape(-1)
+    size = lengths.max(initial=0.0)
+    if not (abs(since - lengths) <= _SAME_LENGTH * size).all():
+        return None
+    straighter = _bend(before, parents) - _bend(after, parents) > _STRAIGHTER
+    return bound if straighter else None
+
+
+def _placed(
+    file: GltfFile,
+    joints: list[int],
+    parents: list[int],
+    own: Mapping[int, Float[np.ndarray, "4 4"]],
+) -> dict[int, Float[np.ndarray, "4 4"]]:
+    """Where joints were when the skins were bound, of which the topmost joint stays where it is."""
+    placed: dict[int, Float[np.ndarray, "4 4"]] = {}
+    skins = file.json.get("skins", [])
+    for k in sorted(range(len(skins)), key=lambda k: -len(skins[k]["joints"])):
+        nodes = [int(node) for node in skins[k]["joints"]]
+        if "inverseBindMatrices" not in skins[k]:
+            continue
+        inverse = file.accessor(skins[k]["inverseBindMatrices"])[: len(nodes)]
+        inverse = inverse.reshape(-1, 4, 4).swapaxes(1, 2)
+        known = placed or {node: own[node] for node in joints}
+        shared = [b for b, node in enumerate(nodes) if node in known]
+        solid = np.abs(np.linalg.det(inverse[:, :3, :3])) > 0
+        if not shared or len(inverse) < len(nodes) or not solid.all():
+            continue
+        top = min(shared, key=lambda b: len(line_to(nodes[b], parents)))
+        to_world = known[nodes[top]] @ inverse[top]
+        bound = np.linalg.inv(inverse)
+        if not placed:
+            wearers = [i for i, node in enumerate(file.nodes) if node.get("skin") == k]
+            spaces = [own[i] for i in (*wearers, *line_to(nodes[top], parents)[:-1])]
+            to_world = _upright(to_world, [*spaces, np.eye(4)])
+            to_world[:3, 3] += (own[nodes[top]] - to_world @ bound[top])[:3, 3]
+        for node, matrix in zip(nodes, bound, strict=True):
+            placed.setdefault(node, to_world @ matrix)
+    return {node: matrix for node, matrix in placed.items() if node in joints}
+
+
+def _upright(
+    to_world: Float[np.ndarray, "4 4"], spaces: list[Float[np.ndarray, "4 4"]]
+) -> Float[np.ndarray, "4 4"]:
+    """`to_world`, which brings a skin to where its topmost joint has it, without that joint's lean:
+    turned as the space of these that the skin is most likely bound in."""
+    out, least = to_world.copy(), _LEANS
+    size = np.cbrt(np.abs(np.linalg.det(to_world[:3, :3])))
+    for space in spaces:
+        axes = space[:3, :3] / np.cbrt(np.abs(np.linalg.det(space[:3, :3])))
+        turn = to_world[:3, :3] / size @ np.linalg.inv(axes)
+        # The angle of Y, which is up, to where it is turned; a turn about it is no lean.
+        lean = float(np.arccos(np.clip(turn[1, 1], -1.0, 1.0)))
+        if lean < least and np.allclose(turn @ turn.T, np.eye(3), atol=1e-3):
+            out[:3, :3], least = size * axes, lean
+    return out
+
+
+def _bones(
+    maps: Mapping[int, Map], joints: list[int], parents: list[int]
+) -> dict[int, Float[np.ndarray, "3"]]:
+    """The bone from its parent to each joint whose parent is a joint."""
+    inside = set(joints)
+    return {j: maps[j][0] - maps[parents[j]][0] for j in joints if parents[j] in inside}
+
+
+def _bend(bones: Mapping[int, Float[np.ndarray, "3"]], parents: list[int]) -> float:
+    """By how much chains of bones bend at all joints that carry one bone [rad]."""
+    least = _SHORT * float(np.ptp(list(bones.values()), axis=0).max(initial=0.0))
+    long = {j: bone for j, bone in bones.items() if np.linalg.norm(bone) > least}
+    carried = [parents[j] for j in long]
+    total = 0.0
+    for j, bone in long.items():
+        if (above := parents[j]) in long and carried.count(above) == 1:
+            cosine = bone @ long[above] / (np.linalg.norm(bone) * np.linalg.norm(long[above]))
+            total += float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    return total
+
+
+def _own_maps(file: GltfFile) -> dict[int, Map]:
+    """As the nodes' own transforms have them."""
+    parents = file.parents()
+    known: dict[int, Map] = {}
+    for node in range(len(parents)):
+        line = [node]
+        while parents[line[-1]] >= 0 and parents[line[-1]] not in known:
+            line.append(parents[line[-1]])
+        for i in reversed(line):
+            at, axes = _own(file.nodes[i])
+            if parents[i] >= 0:
+                above_at, above = known[parents[i]]
+                at, axes = above_at + above @ at, above @ axes
+            known[i] = at, axes
+    return known
+
+
+def _own(node: dict[str, Any]) -> Map:
+    if "matrix" in node:
+        matrix = np.array(node["matrix"], dtype=float).reshape(4, 4).T
+        return matrix[:3, 3], matrix[:3, :3]
+    x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
+    scale = np.array(node.get("scale", (1.0, 1.0, 1.0)), dtype=float)
+    axes = matrix_from_quat(np.array([w, x, y, z], dtype=float)) * scale
+    return np.array(node.get("translation", (0.0, 0.0, 0.0)), dtype=float), axes
+
+
+def _matrix(of: Map) -> Float[np.ndarray, "4 4"]:
+    matrix = np.eye(4)
+    matrix[:3, 3], matrix[:3, :3] = of
+    return matrix
