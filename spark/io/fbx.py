@@ -1,8 +1,8 @@
 """FBX files as recordings.
 
 A node has pivots, pre- and post-rotations, a scale and any orientation at rest: `spark.io.nodes`
-makes joints of them. The rest pose is that of the nodes' own transforms, which Mixamo leaves in the
-T-pose.
+makes joints of them. Mixamo leaves the nodes' own transforms in the T-pose; of others see
+`spark.io.bound_pose`.
 """
 
 from pathlib import Path
@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from spark.errors import ConventionError, FileFormatError
+from spark.io.bound_pose import NOTE
+from spark.io.fbx_rest import bound_maps
 from spark.io.fbx_scene import FbxScene
 from spark.io.fbx_settings import FbxSettings, read_settings
 from spark.io.foreign import foreign_recording
@@ -56,10 +58,14 @@ def _read_motion(path: Path, frame_time: float, clip: str | None) -> tuple[Motio
     scene = FbxScene(path)
     joints, notes = scene.joints()
     baked, times, found = scene.animation(frame_time, clip)
-    rest, rest_axes = scene.world(joints, None, np.zeros(1))
+    if (bound := bound_maps(scene)) is None:
+        rest, rest_axes = (each[0] for each in scene.world(joints, None, np.zeros(1)))
+    else:
+        rest, rest_axes = (np.array([bound[joint.node][k] for joint in joints]) for k in (0, 1))
+        notes += (NOTE,)
     positions, axes = scene.world(joints, baked, times)
     for numbers in (rest, positions, rest_axes, axes):
         if not (np.abs(numbers) < LARGEST).all():
             raise FileFormatError(path, None, f"holds numbers beyond {LARGEST:g}, or none at all")
-    motion, renamed = motion_of_axes(joints, (rest[0], rest_axes[0]), (positions, axes), frame_time)
+    motion, renamed = motion_of_axes(joints, (rest, rest_axes), (positions, axes), frame_time)
     return motion, notes + found + renamed

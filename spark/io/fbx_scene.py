@@ -42,6 +42,12 @@ class FbxScene:
             ) from error
         self._nodes: list[Any] = list(self._scene.nodes)
         self._parents = [-1 if n.parent is None else n.parent.typed_id for n in self._nodes]
+        self.is_bound = bool(len(self._scene.poses) or len(self._scene.skin_clusters))
+
+    @property
+    def parents(self) -> list[int]:
+        """The node above each; -1 for those that hang on the scene alone."""
+        return [parent if parent > 0 else -1 for parent in self._parents]
 
     def joints(self) -> tuple[list[NodeJoint], tuple[str, ...]]:
         """Bones, and other nodes that lie between them, depth-first below one root; and notes.
@@ -55,8 +61,7 @@ class FbxScene:
             notes += ("no node is a bone: its empty nodes are read as joints",)
         if not bones:
             raise FileFormatError(self.path, None, "holds no skeleton; expected bones")
-        parents = [parent if parent > 0 else -1 for parent in self._parents]
-        joints, found = joints_of(bones, parents, [node.name for node in self._nodes])
+        joints, found = joints_of(bones, self.parents, [node.name for node in self._nodes])
         return joints, notes + found
 
     def animation(

@@ -5,7 +5,6 @@ at the time of binding. Meshes without clusters that hang on a joint, such as ey
 is on no joint is no part of the character.
 """
 
-from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,9 +15,10 @@ from jaxtyping import Float, Int
 
 from spark.errors import FileFormatError
 from spark.euler import quat_from_euler
-from spark.io.fbx_document import Element, plain_name, read_document
+from spark.io.fbx_document import Element, read_document
 from spark.io.fbx_materials import FbxMaterial, Links, materials_of
 from spark.io.fbx_mesh import FbxMesh, read_mesh
+from spark.io.fbx_rest import bound_maps, scene_nodes
 from spark.io.fbx_scene import FbxScene
 from spark.io.nodes import NodeJoint
 from spark.io.recording import unique_names
@@ -26,7 +26,6 @@ from spark.io.scanner import LARGEST
 from spark.rotation import matrix_from_quat
 from spark.skin import strongest
 
-_ROOT = 0  # the id of the scene itself
 _FLAT = 1e-30  # the determinant of a map that has no inverse
 _Cluster = tuple[Any, Any]  # the points that hang on a bone, and their weights
 
@@ -82,7 +81,8 @@ class _Reader:
     def __init__(self, path: Path, scene: FbxScene, document: Element) -> None:
         self.path, self.scene = path, scene
         self.links = Links.of(document)
-        self.nodes = self._scene_nodes()
+        self.nodes = scene_nodes(scene, self.links)
+        self.bound = bound_maps(scene, self.links)
         joints, _ = scene.joints()
         names, _ = unique_names([joint.name for joint in joints])
         self.joints = {joint.node: name for joint, name in zip(joints, names, strict=True)}
@@ -100,27 +100,6 @@ class _Reader:
     def rest(self) -> dict[str, Float[np.ndarray, "3"]]:
         """Where each joint is at rest."""
         return {name: self._world(node)[:3, 3] for node, name in self.joints.items()}
-
-    def _scene_nodes(self) -> dict[int, int]:
-        """The scene's node of each model: that of the same names from the top down."""
-        by_path = defaultdict(list)
-        for node, line in self.scene.paths().items():
-            by_path[line].append(node)
-        nodes: dict[int, int] = {}
-        for id, model in self.links.objects.items():
-            if model.name == "Model" and (same := by_path[self._path(id)]):
-                nodes[id] = same.pop(0)
-        return nodes
-
-    def _path(self, id: int) -> tuple[str, ...]:
-        line: list[str] = []
-        seen = set()
-        while id != _ROOT and id not in seen:
-            seen.add(id)
-            line.append(plain_name(self.links.objects[id].values[1]))
-            above = self.links.above(id, "Model")
-            id = above[0] if above else _ROOT
-        return tuple(reversed(line))
 
     def _mesh(self, model: int, geometry: int, element: Element) -> HungMesh | None:
         mesh = read_mesh(element)
@@ -179,6 +158,10 @@ class _Reader:
 
     def _world(self, node: int) -> Float[np.ndarray, "4 4"]:
         """What maps a node's axes into the world at rest, as `read_fbx` has it."""
+        if self.bound is not None:
+            world = np.eye(4)
+            world[:3, 3], world[:3, :3] = self.bound[node]
+            return world
         if node not in self.known:
             at, axes = self.scene.world([NodeJoint(node, "", -1)], None, np.zeros(1))
             world = np.eye(4)

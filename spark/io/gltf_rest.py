@@ -1,8 +1,5 @@
-"""How the nodes of a glTF file rest: as their own transforms have it, or as the skin was bound.
-
-Many exporters write the nodes as they stand at some frame of a motion. The inverse bind matrices
-still hold the pose in which an artist hung the skin on the bones, which is a T or an A. Of the two
-poses the straighter one is the rest pose.
+"""How the nodes of a glTF file rest: as their own transforms have it, or as the skin was bound, of
+which the inverse bind matrices tell.
 """
 
 from collections.abc import Mapping
@@ -11,18 +8,13 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from spark.io.bound_pose import Map, bound_pose
 from spark.io.gltf_file import GltfFile
 from spark.io.gltf_joints import joint_nodes
 from spark.io.nodes import line_to
 from spark.rotation import matrix_from_quat
 
-_SHORT = 0.03  # of the body's size: shorter bones point anywhere
-_STRAIGHTER = 0.5  # [rad] summed over all joints: two poses that bend alike are no reason to change
 _LEANS = np.radians(45)  # of hips at some frame of a motion
-_SAME_LENGTH = 0.05  # relative: bones that differ by more in the two poses are of another body
-
-Map = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
-"""A node's place and linear map in the world."""
 
 
 def rest_maps(file: GltfFile) -> dict[int, Map]:
@@ -35,26 +27,7 @@ def bound_maps(file: GltfFile) -> dict[int, Map] | None:
     where that pose isn't told, or no straighter than the nodes' own transforms are."""
     joints, parents, own = joint_nodes(file), file.parents(), _own_maps(file)
     placed = _placed(file, joints, parents, {node: _matrix(own[node]) for node in own})
-    if not placed:
-        return None
-    bound: dict[int, Map] = {}
-    for node in sorted(own, key=lambda i: len(line_to(i, parents))):
-        if node in placed:
-            bound[node] = placed[node][:3, 3], placed[node][:3, :3]
-        elif (above := parents[node]) < 0:
-            bound[node] = own[node]
-        else:
-            back = np.linalg.inv(own[above][1])
-            at, axes = back @ (own[node][0] - own[above][0]), back @ own[node][1]
-            bound[node] = bound[above][0] + bound[above][1] @ at, bound[above][1] @ axes
-    before, after = (_bones(maps, joints, parents) for maps in (own, bound))
-    lengths = np.linalg.norm(list(before.values()), axis=1).reshape(-1)
-    since = np.linalg.norm(list(after.values()), axis=1).reshape(-1)
-    size = lengths.max(initial=0.0)
-    if not (abs(since - lengths) <= _SAME_LENGTH * size).all():
-        return None
-    straighter = _bend(before, parents) - _bend(after, parents) > _STRAIGHTER
-    return bound if straighter else None
+    return bound_pose(own, placed, joints, parents)
 
 
 def _placed(
@@ -105,27 +78,6 @@ def _upright(
         if lean < least and np.allclose(turn @ turn.T, np.eye(3), atol=1e-3):
             out[:3, :3], least = size * axes, lean
     return out
-
-
-def _bones(
-    maps: Mapping[int, Map], joints: list[int], parents: list[int]
-) -> dict[int, Float[np.ndarray, "3"]]:
-    """The bone from its parent to each joint whose parent is a joint."""
-    inside = set(joints)
-    return {j: maps[j][0] - maps[parents[j]][0] for j in joints if parents[j] in inside}
-
-
-def _bend(bones: Mapping[int, Float[np.ndarray, "3"]], parents: list[int]) -> float:
-    """By how much chains of bones bend at all joints that carry one bone [rad]."""
-    least = _SHORT * float(np.ptp(list(bones.values()), axis=0).max(initial=0.0))
-    long = {j: bone for j, bone in bones.items() if np.linalg.norm(bone) > least}
-    carried = [parents[j] for j in long]
-    total = 0.0
-    for j, bone in long.items():
-        if (above := parents[j]) in long and carried.count(above) == 1:
-            cosine = bone @ long[above] / (np.linalg.norm(bone) * np.linalg.norm(long[above]))
-            total += float(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    return total
 
 
 def _own_maps(file: GltfFile) -> dict[int, Map]:

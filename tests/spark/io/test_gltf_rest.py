@@ -110,6 +110,15 @@ def test_binds_of_another_body_are_left_alone(waving: Motion, tmp_path: Path) ->
     assert not told(gltf, tmp_path / "a.glb")
 
 
+def test_what_is_hidden_by_a_scale_of_zero_is_no_hindrance(waving: Motion, tmp_path: Path) -> None:
+    gltf = animated(waving)
+    stand_as(gltf, 20)
+    nodes = gltf.json["nodes"]
+    nodes += [{"name": "hidden", "scale": [0, 0, 0], "children": [len(nodes) + 1]}, {"name": "hat"}]
+    nodes[0]["children"].append(len(nodes) - 2)
+    assert told(gltf, tmp_path / "a.glb")
+
+
 def _whole(gltf: Gltf, numbers: np.ndarray) -> int:
     """An accessor of whole numbers, which `Gltf.accessor` would normalise."""
     view = gltf.view(numbers.astype("<u2").tobytes())
