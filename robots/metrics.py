@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from robots.likeness import foot_error, limb_error, trunk_error
 from robots.model.motion import RobotMotion
 from robots.solver.floor import sole_paths
-from robots.solver.targets import bone_directions, targets_of
+from robots.solver.targets import targets_of
 from robots.solver.touching import touches_of
 from robots.tree import forward_kinematics
 from sim.report.assess import assess
@@ -22,8 +23,6 @@ from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
-from spark.rig.roles import Role
-from spark.rotation import quat_conj, quat_mul
 from spark.transfer.canonical import CanonicalMotion, to_canonical
 
 DRAG_SPEED, DRAG_HEIGHT = 0.5, 0.01  # [m/s], [m] of a sole that is fast, and low: it drags
@@ -34,12 +33,6 @@ MAX_UNEVEN = 0.05  # [m] between the lowest heights of both feet: one may never 
 IN_AIR = 0.02  # [m] that a planted foot may be above the floor
 AT_LIMIT = np.radians(0.5)
 _WINDOW = 0.05  # [s] before and after a frame over which accelerations are measured
-_LOWER = {
-    "upper_leg": "lower_leg",
-    "lower_leg": "foot",
-    "upper_arm": "forearm",
-    "forearm": "hand",
-}
 
 
 @dataclass(frozen=True)
@@ -75,6 +68,8 @@ class RobotMetrics:
     rests_in_air: float | None
     rests_slide_m_s: float | None
     limb_error_rad: float
+    foot_error_rad: float | None
+    trunk_error_rad: float | None
     at_limit: float
     fastest_rad_s: float
     jerk_rad_s3: float
@@ -129,20 +124,13 @@ def measure(motion: Motion, rig: Rig, result: RobotMotion) -> RobotMetrics:
         skate_source_m_s=float(_speed(toes, frame_time)[planted].sum() / count),
         **_resting(to_canonical(motion, rig), result),
         limb_error_rad=limb_error(motion, rig, result),
+        foot_error_rad=foot_error(motion, rig, result),
+        trunk_error_rad=trunk_error(motion, rig, result),
         at_limit=float(near.any(axis=1).mean()),
         fastest_rad_s=float(np.abs(np.diff(angles, axis=0)).max(initial=0.0) / frame_time),
         jerk_rad_s3=float(np.sqrt(np.mean(jerk**2))) if len(jerk) else 0.0,
         self_collision=float(clip.self_penetration.mean()),
     )
-
-
-def limb_error(motion: Motion, rig: Rig, result: RobotMotion) -> float:
-    """The mean angle [rad] between the limbs' segments of both."""
-    wanted = _directions(motion, rig)
-    found = _directions(result.motion, result.robot.rig)
-    roles = [role for role in wanted if role in found and _has_end(result.robot.rig, role)]
-    a, b = (np.stack([bones[role] for role in roles], axis=1) for bones in (wanted, found))
-    return float(np.arccos(np.clip((a * b).sum(axis=-1), -1.0, 1.0)).mean())
 
 
 class _Soles:
@@ -218,12 +206,3 @@ def _speed(points: Float[np.ndarray, "T *n _"], frame_time: float) -> Float[np.n
         np.gradient(points[..., :2], frame_time, axis=0), axis=-1
     )
     return speed
-
-
-def _directions(motion: Motion, rig: Rig) -> dict[Role, Float[np.ndarray, "T 3"]]:
-    positions, world = forward(motion)
-    return bone_directions(rig, positions, quat_mul(world, quat_conj(rig.tpose)))
-
-
-def _has_end(rig: Rig, role: Role) -> bool:
-    return rig.roles.joint(Role(f"{role.side}_{_LOWER[role.part]}")) is not None

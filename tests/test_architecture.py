@@ -25,7 +25,8 @@ ROOMS = (
     ("robots.model",),
     ("robots.formats", "robots.solver"),
     ("robots.stream",),
-    ("robots.metrics",),  # a file of its own
+    ("robots.likeness",),
+    ("robots.metrics",),  # files of their own
     ("spark_sim",),  # its own files: choices, files, rolemap, console, clip_base
     ("spark_sim.clips",),
     ("spark_sim.loading",),

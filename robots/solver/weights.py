@@ -26,7 +26,7 @@ W_ROTATION = {  # [1/rad] of a part by its role; low where the directions of lim
     "head": 0.5,  # what looks somewhere,
     "neck": 0.1,
     "hand": 0.25,
-    "foot": 0.6,  # and what stands on the floor
+    "foot": 1.0,  # and what stands on the floor, as a limb's direction by its length
     "spine": 0.1,
     "clavicle": 0.2,
 }

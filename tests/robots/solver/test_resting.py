@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.metrics import limb_error, measure
+from robots.likeness import limb_error
+from robots.metrics import measure
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.registry import find

@@ -13,7 +13,8 @@ from robots.least_squares import (
     Smoothness,
     second_differences,
 )
-from robots.metrics import RobotMetrics, limb_error, measure
+from robots.likeness import limb_error
+from robots.metrics import RobotMetrics, measure
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.registry import find

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import spark_sim
-from robots.metrics import limb_error, measure
+from robots.likeness import limb_error
+from robots.metrics import measure
 from robots.model.known import known
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
