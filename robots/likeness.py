@@ -5,6 +5,7 @@ from jaxtyping import Float
 
 from robots.model.motion import RobotMotion
 from robots.solver.targets import bone_directions
+from robots.solver.trunk import has_shoulders, hips_to_shoulders
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig.rig import Rig
@@ -18,7 +19,6 @@ _LOWER = {
     "forearm": "hand",
 }
 _FEET = (Role.LEFT_FOOT, Role.RIGHT_FOOT)
-_SHOULDERS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
 
 
 def limb_error(motion: Motion, rig: Rig, result: RobotMotion) -> float:
@@ -74,9 +74,7 @@ def _feet(motion: Motion, rig: Rig) -> dict[Role, Float[np.ndarray, "T 3"]]:
 
 
 def _trunk(motion: Motion, rig: Rig) -> Float[np.ndarray, "T 3"] | None:
-    if not all(rig.roles.joints(role) for role in _SHOULDERS):
+    if not has_shoulders(rig):
         return None
-    positions, _ = forward(motion)
-    shoulders = [rig.roles.require(role) for role in _SHOULDERS]
-    along = positions[:, shoulders].mean(1) - positions[:, rig.hips].mean(1)
+    along = hips_to_shoulders(rig, forward(motion)[0])
     return along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)

@@ -126,9 +126,13 @@ class Morphology:
         """The tree's joints that move a part with a role or a sole: others, as a gripper's, stay
         as in the T-pose."""
         links = {int(k) for k, role in zip(self.links, self.rig.roles.roles, strict=True) if role}
-        links |= {int(link) for sole in self.soles for link in self.sole_points(sole)[0]}
-        links |= {int(self.links[j]) for j in self.rig.contact_joints}
-        return frozenset(j for link in links for j in self.tree.chain(link))
+        return frozenset(j for link in links | self.foot_links for j in self.tree.chain(link))
+
+    @property
+    def foot_links(self) -> set[int]:
+        """The tree's links with soles, or with joints that stand on the floor."""
+        soles = {int(link) for sole in self.soles for link in self.sole_points(sole)[0]}
+        return soles | {int(self.links[j]) for j in self.rig.contact_joints}
 
     @cached_property
     def followers(self) -> tuple[Follower, ...]:

@@ -53,10 +53,9 @@ class Block:
 def carriers(robot: Morphology) -> list[int]:
     """What carries each of the tree's links: itself or, where no block moves its joint, what
     carries the link above it; `ROOT` for the base."""
-    moved = robot.moved
     out: list[int] = []
     for link, above in enumerate(robot.tree.parents.tolist()):
-        out.append(link if link in moved else (out[above] if above >= 0 else ROOT))
+        out.append(link if link in robot.moved else (out[above] if above >= 0 else ROOT))
     return out
 
 
@@ -67,9 +66,7 @@ def blocks_of(robot: Morphology) -> tuple[Block, Block]:
     idle = frozenset(range(len(tree))) - robot.moved
     if robot.mount is not None:
         return Block(tree, (), False, idle), Block(tree, tuple(moved), False, idle)
-    links = {int(robot.links[robot.rig.chest])}
-    links |= {int(link) for sole in robot.soles for link in robot.sole_points(sole)[0]}
-    links |= {int(robot.links[j]) for j in robot.rig.contact_joints}
+    links = robot.foot_links | {int(robot.links[robot.rig.chest])}
     first = sorted({j for link in links for j in tree.chain(link)})
     rest = tuple(j for j in moved if j not in first)
     return Block(tree, tuple(first), True, idle), Block(tree, rest, False, idle)

@@ -86,12 +86,13 @@ class Hinges:
         H.reshape(len(q), -1)[:, :: H.shape[1] + 1] += diagonal
         gradient = W_LIMIT**2 * (rising + falling) * (above - below)
         g[:, self._dofs] += gradient + pull * (angles - posture.angles)
-        turned = self._turned(q)
-        for follower in self._solved:
-            J, residual = follower.residual(turned, W_FOLLOW)
-            dofs = self._dof_starts[[follower.joint, follower.leader]]
-            H[:, dofs[:, None], dofs] += J[:, :, None] * J[:, None]
-            g[:, dofs] += J * residual[:, None]
+        if self._solved:
+            turned = self._turned(q)
+            for follower in self._solved:
+                J, residual = follower.residual(turned, W_FOLLOW)
+                dofs = self._dof_starts[[follower.joint, follower.leader]]
+                H[:, dofs[:, None], dofs] += J[:, :, None] * J[:, None]
+                g[:, dofs] += J * residual[:, None]
 
     def _turned(self, q: Float[np.ndarray, "T nq"]) -> Float[np.ndarray, "T N"]:
         """The angles of the tree's hinges since the rest pose."""

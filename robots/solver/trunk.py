@@ -22,8 +22,8 @@ from spark.rig.contacts import ADULT_HEIGHT
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import (
+    matrix_from_quat,
     quat_between,
-    quat_conj,
     quat_from_rotvec,
     quat_from_yaw,
     quat_mul,
@@ -54,7 +54,7 @@ def max_lean(robot: Morphology) -> tuple[float, float]:
     the T-pose on: backwards and forwards."""
     tree, poses = robot.tree, forward_kinematics(robot.tree, robot.tpose)
     hinges, backwards, forwards = _waist(robot), 0.0, 0.0
-    if tree.balls[hinges].any() or not _has_shoulders(robot.rig):
+    if tree.balls[hinges].any() or not has_shoulders(robot.rig):
         return np.pi, np.pi
     links, centers = robot.links, robot.centers
     hips, shoulders = (
@@ -113,11 +113,11 @@ def leaning(
 ) -> Float[np.ndarray, "T 4"]:
     """The rotations, since the T-pose, of the trunk of a source whose joints are at `positions` [m]
     and whose pelvis has turned by `pelvis`; the same where a rig has no shoulders."""
-    if not _has_shoulders(rig):
+    if not has_shoulders(rig):
         return pelvis
     heading = quat_from_yaw(yaw_from_quat(pelvis))
-    upright, along = _trunk(rig, rig.tpose_positions[None]), _trunk(rig, positions)
-    return quat_mul(quat_between(quat_rotate(heading, upright), along), heading)
+    upright = quat_rotate(heading, _upright(rig))
+    return quat_mul(quat_between(upright, hips_to_shoulders(rig, positions)), heading)
 
 
 def beyond_lean(
@@ -129,17 +129,18 @@ def beyond_lean(
     """The rotations `pelvis`, since the T-pose, but bowed further by what of the lean of a source's
     trunk against it is beyond the `most` [rad] that a waist allows backwards and forwards; its
     joints are at `positions` [m]."""
-    if not _has_shoulders(rig):
+    if not has_shoulders(rig):
         return pelvis
-    upright = _trunk(rig, rig.tpose_positions[None])
-    along = quat_rotate(quat_conj(pelvis), _trunk(rig, positions))
-    bow = np.arctan2(along[:, :1], along[:, 2:]) - np.arctan2(upright[:, :1], upright[:, 2:])
-    further = _rounded(bow - most[1]) - _rounded(-bow - most[0])
-    if not further.any():
+    forwards, left, up = _axes(pelvis)
+    upright, along = _upright(rig), hips_to_shoulders(rig, positions)
+    bow = np.arctan2(dot(along, forwards), dot(along, up))
+    bow -= np.arctan2(upright[:, :1], upright[:, 2:])
+    beyond = bow - most[1], -bow - most[0]
+    if not (np.maximum(*beyond) > -_ROUNDING).any():
         return pelvis
-    bowed = quat_mul(pelvis, quat_from_rotvec(further * np.eye(3)[1]))
+    bowed = quat_mul(quat_from_rotvec((_rounded(beyond[0]) - _rounded(beyond[1])) * left), pelvis)
     # One that rolls, too, would turn away: it heads as before. Upside down there is no heading.
-    lowest = np.minimum(_up(pelvis)[:, 2], _up(bowed)[:, 2])
+    lowest = np.minimum(up[:, 2], _axes(bowed)[2][:, 2])
     away = np.angle(np.exp(1j * (yaw_from_quat(pelvis) - yaw_from_quat(bowed))))
     return quat_mul(quat_from_yaw(np.clip(1 + 2 * lowest, 0, 1) * away), bowed)
 
@@ -154,7 +155,7 @@ def within_flexion(
     """The rotations `pelvis`, since the T-pose, but bowed no further forwards than lets hips that
     flex by at most `flexion` [rad] raise the thighs of a source whose joints are at `positions` [m]
     over a floor at `floor_z`, while its legs carry it."""
-    forwards, left, up = (quat_rotate(pelvis, axis) for axis in np.eye(3)[:, None])
+    forwards, left, up = _axes(pelvis)
     excess = _flexion(rig, forwards, up, positions) - flexion
     if not (excess > -_ROUNDING).any():
         return pelvis
@@ -172,9 +173,9 @@ def _rounded(excess: Float[np.ndarray, "T 1"]) -> Float[np.ndarray, "T 1"]:
     return out
 
 
-def _up(turns: Float[np.ndarray, "T 4"]) -> Float[np.ndarray, "T 3"]:
-    """Where what was up in the T-pose points."""
-    return quat_rotate(turns, np.eye(3)[2:])
+def _axes(turns: Float[np.ndarray, "T 4"]) -> Float[np.ndarray, "3 T 3"]:
+    """Where what was ahead, on the left and up in the T-pose is."""
+    return np.moveaxis(matrix_from_quat(turns), -1, 0)
 
 
 def _waist(robot: Morphology) -> list[int]:
@@ -205,21 +206,27 @@ def _on_legs(
 ) -> Float[np.ndarray, "T 1"]:
     """How far (0 to 1) a body is carried by its legs: its mass is about where the middle of the
     trunk is."""
-    shoulders = _shoulders(rig) if _has_shoulders(rig) else [rig.chest]
+    shoulders = _shoulders(rig) if has_shoulders(rig) else [rig.chest]
     mass = (positions[:, rig.hips].mean(1) + positions[:, shoulders].mean(1)) / 2
     feet = [j for role in Role if role.part in ("foot", "toe") for j in rig.roles.joints(role)]
     over_floor = positions[:, feet] - np.array([0.0, 0.0, floor_z])
     return 1 - on_arms(mass[:, :2], over_floor, rig.standing_height / ADULT_HEIGHT)[:, None]
 
 
-def _trunk(rig: Rig, positions: Float[np.ndarray, "T J 3"]) -> Float[np.ndarray, "T 3"]:
-    """From the middle of the hips to that of the shoulders [m]."""
+def hips_to_shoulders(rig: Rig, positions: Float[np.ndarray, "T J 3"]) -> Float[np.ndarray, "T 3"]:
+    """From the middle of the hips to that of the shoulders [m], of a rig that has these."""
     along: Float[np.ndarray, "T 3"] = positions[:, _shoulders(rig)].mean(1)
     return along - positions[:, rig.hips].mean(1)
 
 
-def _has_shoulders(rig: Rig) -> bool:
+def has_shoulders(rig: Rig) -> bool:
+    """Whether there is an upper arm on both sides."""
     return all(rig.roles.joints(role) for role in _SHOULDERS)
+
+
+@lru_cache(maxsize=16)
+def _upright(rig: Rig) -> Float[np.ndarray, "1 3"]:
+    return hips_to_shoulders(rig, rig.tpose_positions[None])
 
 
 def _shoulders(rig: Rig) -> list[int]:

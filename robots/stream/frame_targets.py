@@ -26,7 +26,7 @@ from spark.rig.contacts import standing_heights
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rig.segments import segments
-from spark.rotation import matrix_from_quat, quat_conj, quat_from_matrix
+from spark.rotation import matrix_from_quat, quat_conj
 from spark.transfer.analytic import correspond
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
@@ -149,10 +149,11 @@ class FrameReader:
         hips *= self.scale
         own = self._own(turns)
         pelvis, places = self.robot.rig.pelvis, joints[None]
-        turn = quat_from_matrix(own[None, pelvis])
-        own[pelvis] = matrix_from_quat(
-            bowing(self.source, self.robot, turn, places, self.ground.z)
-        )[0]
+        turn, matrix = np.empty(4), np.empty(9)
+        mujoco.mju_mat2Quat(turn, own[pelvis].ravel())
+        bowed = bowing(self.source, self.robot, turn[None], places, self.ground.z)[0]
+        mujoco.mju_quat2Mat(matrix, bowed)
+        own[pelvis] = matrix.reshape(3, 3)
         own_world = own @ self._tpose
         return FrameTargets(
             world=own_world,

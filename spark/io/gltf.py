@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from spark.io.bound_pose import NOTE
 from spark.io.convention import infer_unit
 from spark.io.foreign import foreign_recording
 from spark.io.gltf_file import GltfFile
@@ -90,9 +91,7 @@ def _motion(file: GltfFile, clip: str | None, fps: float | None) -> tuple[Motion
         at, axes = (each[0] for each in _world(file, joints, parents, {}, np.zeros(1)))
     else:
         at, axes = (np.array([bound[joint.node][k] for joint in joints]) for k in (0, 1))
-        notes.append(
-            "its nodes rest in a pose: the one that its skin was bound in is taken instead"
-        )
+        notes.append(NOTE)
     motion, renamed = motion_of_axes(joints, (at, axes), seen, frame_time)
     return motion, [*notes, *renamed]
 

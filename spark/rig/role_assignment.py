@@ -22,9 +22,8 @@ _CLEAR_SIDE = 0.15  # of the evidence of `first_is_left`, which is sure at 0.3
 # Of both parts of it, for sides that the body shows against its names. Of 580 recordings and rest
 # poses that are named rightly none has both below 0; mirrored, their motions have both below -1.
 _AGAINST_NAMES = -0.5
-_TOES_BEHIND = (
-    -1.0
-)  # of the feet's part of it, where knees and elbows are straight: 180 to 120 degrees
+# Of the feet's part alone, where knees and elbows are straight: feet that point 120 degrees away.
+_TOES_BEHIND = -1.0
 
 
 def assign_roles(
