@@ -238,6 +238,16 @@ RIGS = {
         pelvis > torso_link S > head_link H
         torso_link > {left}_shoulder_pitch_link U > {left}_elbow_link F > {left}_wrist_yaw_link W
         """,
+    "atlas": """
+        pelvis P > back_bkz S > neck_ry H
+        back_bkz > {l}_arm_shz U > {l}_arm_elx F > {l}_arm_wrx W
+        pelvis > {l}_leg_hpz T > {l}_leg_kny K > {l}_leg_aky A
+        """,
+    "atlas's bodies": """
+        pelvis P > utorso S > head H
+        utorso > {l}_scap C > {l}_uarm U > {l}_larm F > {l}_hand W
+        pelvis > {l}_uleg T > {l}_lleg K > {l}_foot A
+        """,
     "robot without arms": """
         base - > torso_link P > {L}_HAA T > {L}_KFE K > {L}_AFE A
         """,

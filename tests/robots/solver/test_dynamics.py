@@ -96,6 +96,22 @@ def test_a_body_over_nothing_is_planned_over_its_feet() -> None:
     np.testing.assert_allclose(planned[:, 2], 0.8, atol=1e-6)
 
 
+@pytest.mark.parametrize("speed", [0.0, 0.1])
+def test_a_plan_does_not_fall_where_nothing_follows(speed: float) -> None:
+    """Over a foot that is a point at x = 0, what is beside it falls away from it, and faster where
+    the clip ends and begins: there it would come to stand no farther off than the reference."""
+    T, time = 120, np.sqrt(0.8 / GRAVITY)
+    reference = np.tile([0.1, 0.0, 0.8], (T, 1))
+    reference[:, 0] += speed * FRAME_TIME * (np.arange(T) - T / 2)
+    support = Support(np.zeros((T, 1, 2)), np.ones((T, 1), dtype=bool))
+    still = np.zeros((T, 3))
+    planned = plan_com(reference, still, still[:, :2], support, FRAME_TIME)
+    for path in (planned, planned[::-1]):
+        theirs = reference if path is planned else reference[::-1]
+        ends, there = (x[-1] + time * (x[-1] - x[-2]) / FRAME_TIME for x in (path, theirs))
+        assert min(0.0, there[0]) - 0.02 < ends[0] < max(0.0, there[0]) + 0.02
+
+
 def test_what_is_plausible_stays() -> None:
     T = 60
     reference = np.tile([0.02, -0.03, 0.8], (T, 1))
