@@ -87,13 +87,12 @@ def read(
     arrays = Npz(path, expected="the motion of a robot") if suffix == ".npz" else {}
     if is_native(arrays):
         return read_npz(arrays, path, robot)
-    robot = _robot(path, robot, facts)
     if folder:
-        return read_sonic(path, robot)
+        return read_sonic(path, _robot(path, robot, facts))
     if suffix == ".pkl":
-        return read_pkl(path, robot)
+        return read_pkl(path, _robot(path, robot, facts))
     if suffix == ".motion":
-        return read_protomotions(path, robot)
+        return read_protomotions(path, _robot(path, robot, facts))
     for recognises, reads in (
         (is_locomujoco, read_locomujoco),
         (is_plain, read_plain),
@@ -102,7 +101,7 @@ def read(
         (lambda arrays: "joint_pos" in arrays, read_mjlab),
     ):
         if recognises(arrays):
-            return reads(arrays, path, robot)
+            return reads(arrays, path, _robot(path, robot, facts))
     held = ", ".join(map(repr, arrays)) or "nothing"
     raise FileFormatError(
         path, None, f"has neither MuJoCo's 'qpos' nor mjlab's 'joint_pos'; it holds {held}"

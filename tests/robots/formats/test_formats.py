@@ -322,6 +322,12 @@ def test_small_deviations_are_normalised_and_said(
     assert any("0.01 off unit length" in note for note in read.notes)
 
 
+def test_arrays_without_a_motion_are_named_and_no_robot_is_asked_for(tmp_path: Path) -> None:
+    np.savez(tmp_path / "photos.npz", pixels=np.zeros(3))
+    with pytest.raises(FileFormatError, match="nor mjlab's 'joint_pos'; it holds 'pixels'"):
+        load_robot_motion(tmp_path / "photos.npz")
+
+
 @pytest.mark.parametrize(
     ("format", "change", "says"),
     [
