@@ -139,18 +139,11 @@ def quat_slerp(
     """Spherical interpolation along the shorter arc: `q0` at fraction 0, `q1` at 1."""
     xp = array_namespace(q0, q1)
     q1 = xp.where(dot(q0, q1) < 0, -q1, q1)
-    angle = 2 * xp.atan2(norm(q1 - q0), norm(q1 + q0))
-    part = fraction[..., None]
-    small = angle * angle < _SMALL_SQUARED
-    safe = xp.where(small, xp.ones_like(angle), angle)
-    sine = xp.sin(safe)
-
-    def share(part: Any) -> Any:
-        """sin(part * angle) / sin(angle)"""
-        series = part * (1 + angle * angle * (1 - part * part) / 6)
-        return xp.where(small, series, xp.sin(part * safe) / sine)
-
-    return share(1 - part) * q0 + share(part) * q1
+    # At most a right angle; at least one whose sine can be divided by.
+    chord = xp.clip(norm(q1 - q0), xp.finfo(q1.dtype).eps, 2**0.5)
+    angle = 2 * xp.asin(chord / 2)
+    part, sine = fraction[..., None], xp.sin(angle)
+    return xp.sin((1 - part) * angle) / sine * q0 + xp.sin(part * angle) / sine * q1
 
 
 def quat_between(u: Float[Any, "*#n 3"], v: Float[Any, "*#n 3"]) -> Float[Any, "*n 4"]:

@@ -12,6 +12,8 @@ from spark.network.features import BodyFeatures
 from spark.rotation import quat_slerp
 from spark.training.staging import foot_lift
 
+_FEW = 4  # windows at another pace that are turned at once: more leave the processor's cache
+
 
 @dataclass(frozen=True, eq=False)
 class TrainingClip:
@@ -112,19 +114,17 @@ def cut_rotations(
             place[:] = rotations[: place.shape[1]].swapaxes(0, 1)
         else:
             others.append((n, place, rotations))
-    if not others:
-        return
-    # Those at another pace all at once.
-    now, later = (
-        _planes([rotations[of_frames[n]] for n, _, rotations in others])
-        for of_frames in (frames.before, frames.after)
-    )
-    shares = np.concatenate([frames.share[n].repeat(len(place)) for n, place, _ in others])
-    turned, end = quat_slerp(now, later, shares), 0
-    for _, place, _ in others:
-        joints, T = place.shape[:2]
-        start, end = end, end + joints * T
-        place[:] = turned[start:end].reshape(T, joints, 4).swapaxes(0, 1)
+    for few in (others[k : k + _FEW] for k in range(0, len(others), _FEW)):
+        now, later = (
+            _planes([rotations[of_frames[n]] for n, _, rotations in few])
+            for of_frames in (frames.before, frames.after)
+        )
+        shares = np.concatenate([frames.share[n].repeat(len(place)) for n, place, _ in few])
+        turned, end = quat_slerp(now, later, shares), 0
+        for _, place, _ in few:
+            joints, T = place.shape[:2]
+            start, end = end, end + joints * T
+            place[:] = turned[start:end].reshape(T, joints, 4).swapaxes(0, 1)
 
 
 def _planes(parts: Sequence[Float[np.ndarray, "T K 4"]]) -> Float[np.ndarray, "M 4"]:

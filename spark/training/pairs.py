@@ -9,6 +9,7 @@ must find the second.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import ceil, exp
 from typing import NamedTuple
 
 import numpy as np
@@ -164,8 +165,8 @@ class PairMaker:
     def _cuts(self, k: int, windows: int, rng: np.random.Generator) -> list[Cut]:
         clips, cuts = self._bodies[k], []
         for i in self._chances_of_clips[k].searchsorted(rng.random(windows), "right").tolist():
-            clip, speed = clips[i], float(np.exp(rng.uniform(-_MAX_LOG_SPEED, _MAX_LOG_SPEED)))
-            frames = int(np.ceil((self.window - 1) * speed)) + 1
+            clip, speed = clips[i], exp(rng.uniform(-_MAX_LOG_SPEED, _MAX_LOG_SPEED))
+            frames = ceil((self.window - 1) * speed) + 1
             if not self.varied or rng.random() < 0.5 or frames > len(clip.hips):
                 frames, speed = self.window, 1.0
             cuts.append(Cut(clip, int(rng.integers(0, len(clip.hips) - frames + 1)), speed))

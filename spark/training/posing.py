@@ -65,10 +65,11 @@ def local_rotations(
 ) -> list[Float[np.ndarray, "4 _ W T"]]:
     """The local rotations of each draw, each pelvis first turned by `from_heading`."""
     made = []
-    for plan, start, turn in zip(plans, starts, from_heading, strict=True):
+    headed = quat_mul(from_heading, taken(rows, np.asarray(starts)))
+    for plan, start, pelvis in zip(plans, starts, headed, strict=True):
         # Draw by draw, so that what is at work stays in the processor's cache.
         parents, children = (taken(rows, at + start) for at in (plan.parents, plan.children))
         local = quat_relative(parents, children)
-        local[0] = quat_mul(turn, children[0])
+        local[0] = pelvis
         made.append(planes(local))
     return made

@@ -16,11 +16,11 @@ from jaxtyping import Bool, Float, Int
 from spark.blocks import in_blocks
 from spark.rig.doubles import doubles_of
 from spark.rig.roles import LIMBS, Group, Role
-from spark.rotation import quat_between, quat_from_rotvec, quat_mul, quat_rotate
+from spark.rotation import quat_between, quat_mul, quat_rotate
 from spark.skeleton import Skeleton
 from spark.smoothstep import smoothstep
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
-from spark.vectors import cross, dot
+from spark.vectors import cross, dot, joined
 
 _STRAIGHT = 0.15  # sine of the knee's angle; the further below, the less the bones show its plane
 _SOFT = 0.05  # [rad] 3 degrees: a knee that bends by less makes a leg .3 thousandths shorter
@@ -154,9 +154,17 @@ def leg_rotations(
     bend = np.arctan2(across, along)
     wanted = (reach**2 - a**2 - b**2) / 2 - fixed
     exact = np.arccos(np.clip(wanted / changed, -1.0, 1.0))
-    turn = quat_from_rotvec(axis * (_bent(bend, exact) - bend))
+    turn = _turn_about(axis, _bent(bend, exact) - bend)
     swing = quat_between(thigh + quat_rotate(turn, shank), goal)
     return swing, quat_mul(swing, turn)
+
+
+def _turn_about(
+    axis: Float[np.ndarray, "*n 3"], angle: Float[np.ndarray, "*n 1"]
+) -> Float[np.ndarray, "*n 4"]:
+    """A turn about a unit axis [rad]."""
+    cos, sin = np.cos(angle / 2)[..., 0], np.sin(angle / 2)[..., 0]
+    return joined([cos, *(sin * axis[..., i] for i in range(3))], axis)
 
 
 def _bend_axis(
