@@ -20,7 +20,7 @@ from spark.training.threads import free_cores
 from spark.training.unpaired import SHARED, UnpairedMaker
 
 _GPU_WORKERS = 8
-_TOGETHER = 16  # draws that are made at once: more of them than that leave the processor's cache
+_TOGETHER = 32  # draws that are made at once: more of them leave the processor's cache
 
 
 class Steps(Dataset[Batch | UnpairedBatch]):
