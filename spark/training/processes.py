@@ -14,9 +14,14 @@ from spark.errors import ConventionError
 _PATIENCE = timedelta(hours=6)
 
 
+def process_count() -> int:
+    """How many processes torchrun started."""
+    return int(os.environ.get("WORLD_SIZE", "1"))
+
+
 def join_processes() -> tuple[int, int, torch.device]:
     """This process's rank, how many there are, and its device; joins what torchrun started."""
-    world = int(os.environ.get("WORLD_SIZE", "1"))
+    world = process_count()
     cuda = torch.cuda.is_available()
     local = int(os.environ.get("LOCAL_RANK", "0"))
     if cuda:

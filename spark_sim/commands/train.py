@@ -124,6 +124,7 @@ def _run(args: Namespace, held: ExitStack) -> int:
 
         from spark.training.checkpoint import load_checkpoint
         from spark.training.dataset import training_clips
+        from spark.training.processes import check_shares, process_count
         from spark.training.threads import choose_threads
         from spark.training.train import fresh_checkpoint, train
     except ImportError as error:
@@ -137,6 +138,7 @@ def _run(args: Namespace, held: ExitStack) -> int:
             raise DependencyError(
                 f"--tensorboard needs {error.name}: pip install 'spark-sim[tensorboard]'"
             ) from error
+    check_shares(config.draws, process_count())  # before minutes of work, too
     threads = choose_threads(config.width)
     if threads:
         torch.set_num_threads(threads)

@@ -130,3 +130,17 @@ def test_a_run_that_another_one_writes_to_is_refused(tmp_path: Path) -> None:
                 assert "another run is writing to it" in done.stderr
         assert {path: path.read_bytes() for path in (tmp_path / "run").iterdir()} == before
         assert command("train", "-o", "run", "--resume", "--steps", "2").code == 0
+
+
+def test_processes_without_equal_shares_are_refused_before_anything_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sample(tmp_path / "samples")
+    (tmp_path / "tiny.toml").write_text(toml(replace(TINY, batch=4, per_body=2)))
+    monkeypatch.setenv("WORLD_SIZE", "3")
+    with Program(tmp_path) as command:
+        done = command("train", "samples", "-o", "run", "--config", "tiny.toml")
+    assert done.code == 2
+    assert "3 processes for 2 draws a step" in done.stderr
+    assert "clips of" not in done.stderr
+    assert not (tmp_path / "run").exists()
