@@ -27,7 +27,7 @@ def test_a_packed_batch_is_the_batch(clips: list[TrainingClip]) -> None:
 
 def test_batches_of_a_worker_hold_while_they_are_used(clips: list[TrainingClip]) -> None:
     """Their memory is used again, but not before the trainer is done with them."""
-    steps = Steps(clips, NameEncoder(SMALL_NAMES).encode, replace(TINY, workers=1, steps=14), 0, 1)
+    steps = Steps(clips, NameEncoder(SMALL_NAMES).encode, replace(TINY, workers=1, steps=28), 0, 1)
     for n, again in enumerate(batches_from(steps, 0, torch.device("cpu"))):
         time.sleep(0.02)  # so that the worker is as far ahead as it may be
         batch = steps[n]
@@ -36,13 +36,13 @@ def test_batches_of_a_worker_hold_while_they_are_used(clips: list[TrainingClip])
 
 
 def test_steps_are_the_same_wherever_in_a_block_a_run_begins(clips: list[TrainingClip]) -> None:
-    steps = Steps(clips, NameEncoder(SMALL_NAMES).encode, replace(TINY, workers=0, steps=11), 0, 1)
+    steps = Steps(clips, NameEncoder(SMALL_NAMES).encode, replace(TINY, workers=0, steps=19), 0, 1)
     assert steps.block > 1
     batches = list(batches_from(steps, 0, torch.device("cpu")))
-    assert len(batches) == 11
+    assert len(batches) == 19
     for start in (1, steps.block, steps.block + 1):
         rest = list(batches_from(steps, start, torch.device("cpu")))
-        assert len(rest) == 11 - start
+        assert len(rest) == 19 - start
         for n, batch in enumerate(rest, start):
             assert torch.equal(batch.truth.rotations, batches[n].truth.rotations), n
             assert torch.equal(batch.truth.rotations, steps[n].truth.rotations), n
