@@ -2,8 +2,9 @@
 
 `robots.solver.smoothness` couples those of whole clips. Without later frames, accelerations that
 are held back would lag. So those of the centre of mass are compared with the source's, and what
-gives way to feet and floor fades in it; and of hinges the jerk is held back, which leaves an even
-turn, and an even start of one, as it is. Both reach beyond the newest frame
+gives way to feet and floor fades in it. It is expected to go on as its target moves against the
+source: a crouch that hips can't follow would else throw it up. Of hinges the jerk is held back,
+which leaves an even turn, and an even start of one, as it is. Both reach beyond the newest frame
 (`robots.stream.prediction`).
 """
 
@@ -45,6 +46,7 @@ class Coupling:
             self._products[:, :, own] = (over_frames.T @ over_frames)[..., None] * weights[own]
             self._to_gradient[:, :, own] = (over_frames.T @ over_steps)[..., None] * weights[own]
         self._to_go = CostToGo(frame_time, orders, weights)
+        self._frame_time = frame_time
         self._overspeed_weight = (W_OVERSPEED / frame_time) ** 2
         self._max_change = MAX_ACCELERATION * frame_time**2
         self.reset()
@@ -81,10 +83,11 @@ class Coupling:
         """Add to the normal equations: `steps` are the dofs' from frame to frame, `com_steps` [m]
         those of the centre of mass, and `ahead` is what is expected of the dofs; `penalty_scale`
         multiplies the weights of overspeed."""
-        against = steps.copy()  # and what is expected is that they do not move
+        against = steps.copy()
         against[:, _BASE] = com_steps - self._source_steps
+        own_speed = com_jacobian[-1] @ ahead.speeds
         ahead.targets[_BASE] = com_jacobian[-1] @ ahead.targets
-        ahead.speeds[_BASE] = 0.0
+        ahead.speeds[_BASE] = own_speed - self._source_steps[-1] / self._frame_time
         P, p = self._to_go.of(ahead)
         x = np.stack([-against[-1] - against[-2], -against[-1], np.zeros(g.shape[1])])
         products, gradient = self._products.copy(), (self._to_gradient * against).sum(axis=1)
