@@ -3,6 +3,9 @@
 In flight the path falls freely. On the floor it only has to be pushed, never pulled, and its centre
 of pressure (Vukobratovic's zero-moment point; Kajita et al. 2003, eq. 3) lies inside the convex
 hull of what touches. Within that it stays near a reference, with accelerations near natural ones.
+Nothing looks at what follows a clip, or comes before it: so that the path doesn't fall there, its
+extrapolated centre of mass (Hof et al. 2005, eq. 5), where it would come to stand, ends in that
+hull, or on the way from there to where the reference's ends.
 
 The height is planned first, since the centre of pressure is linear in the rest once the height is
 known: two convex problems whose normal equations have seven diagonals. Pushing is an active set of
@@ -21,7 +24,7 @@ from spark.constants import GRAVITY
 NATURAL_CUTOFF = 0.8  # [Hz] above which accelerations are natural ones, below which the reference's
 SMOOTH_CUTOFF = 3.0  # [Hz] above which the plan has no jerk that the reference lacks
 W_FREE_FALL = 0.8  # [s²/m]: 1 m/s² off is as bad as 0.8 m off the path
-W_PRESSURE = 4.0  # [1] of a metre that the centre of pressure lies outside the hull
+W_PRESSURE = 4.0  # [1] of a metre that the centre of pressure lies outside the hull, or an end
 MIN_PUSH = 0.15  # [body weights] that the floor gives where anything touches it
 _ROUNDS = 24  # of the projection
 _PUSH_ROUNDS = 12  # of the active set
@@ -42,6 +45,12 @@ class Support:
     def flight(self) -> Bool[np.ndarray, "T"]:
         """Frames in which nothing touches."""
         return ~np.any(self.touching, axis=1)
+
+    def at_ends(self, places: Float[np.ndarray, "2 2"]) -> "Support":
+        """In the first and the last frame, with a place more in each that pushes."""
+        points = np.concatenate([self.points[[0, -1]], places[:, None]], axis=1)
+        touching = np.concatenate([self.touching[[0, -1]], np.ones((2, 1), dtype=bool)], axis=1)
+        return Support(points, touching, self.heading)
 
 
 def plan_com(
@@ -65,7 +74,9 @@ def plan_com(
     # p = c - z / (z'' + g) c'' + (-L_y', L_x') / (z'' + g), for unit mass.
     lever = out[:, 2] / push
     offset = np.stack([-momentum_rate[:, 1], momentum_rate[:, 0]], axis=1) / push[:, None]
-    out[:, :2] = _plan_path(reference[:, :2], natural[:, :2], lever, offset, support, frame_time)
+    out[:, :2] = _plan_path(
+        reference[:, :2], natural[:, :2], out[:, 2], lever, offset, support, frame_time
+    )
     return out
 
 
@@ -97,12 +108,14 @@ def _plan_height(
 def _plan_path(
     xy: Float[np.ndarray, "T 2"],
     natural: Float[np.ndarray, "T 2"],
+    height: Float[np.ndarray, "T"],
     lever: Float[np.ndarray, "T"],
     offset: Float[np.ndarray, "T 2"],
     support: Support,
     frame_time: float,
 ) -> Float[np.ndarray, "T 2"]:
     T, flight = len(xy), support.flight
+    ends = np.sqrt(height[[0, -1]].clip(0.0) / GRAVITY) / frame_time
     own = _accelerations(xy, frame_time)
     soft, fall = _natural_weight(T), np.where(flight, W_FREE_FALL, 0.0)
     press = np.where(flight, 0.0, W_PRESSURE)
@@ -110,18 +123,34 @@ def _plan_path(
     problem.add(0.0, 1.0, soft)
     problem.add(0.0, 1.0, fall)
     problem.add(1.0, -lever, press)
+    problem.add_ends(ends, W_PRESSURE)
     free = (soft**2)[:, None] * (natural - own) - (fall**2)[:, None] * own
     fixed = problem.transposed(0.0, 1.0, free)
     pressure = xy - lever[:, None] * own + offset  # of the reference
-    hull = _Hulls(support)
-    moved, dual = np.zeros_like(xy), np.zeros_like(xy)
+    stands = _extrapolated(xy, ends)
+    hull, last = _Hulls(support), _Hulls(support.at_ends(stands))
+    moved, dual, dual_stand = np.zeros_like(xy), np.zeros_like(xy), np.zeros_like(stands)
     for _ in range(_ROUNDS):
         place = pressure + moved - lever[:, None] * _accelerations(moved, frame_time)
         inside = np.where(flight[:, None], place, hull.nearest(place + dual))
         dual = np.where(flight[:, None], 0.0, dual + place - inside)
         rows = (press**2)[:, None] * (inside - dual - pressure)
-        moved = problem.solve(fixed + problem.transposed(1.0, -lever, rows))
+        place_stand = stands + _extrapolated(moved, ends)
+        inside_stand = last.nearest(place_stand + dual_stand)
+        dual_stand += place_stand - inside_stand
+        outer = W_PRESSURE**2 * (inside_stand - dual_stand - stands)
+        right = problem.transposed(1.0, -lever, rows) + problem.transposed_ends(ends, outer)
+        moved = problem.solve(fixed + right)
     return xy + moved
+
+
+def _extrapolated(
+    x: Float[np.ndarray, "T 2"], ends: Float[np.ndarray, "2"]
+) -> Float[np.ndarray, "2 2"]:
+    """Where a pendulum of the time `ends` [frames] comes to stand after the last frame, and came
+    from before the first."""
+    outer: Float[np.ndarray, "2 2"] = x[[0, -1]] + ends[:, None] * (x[[0, -1]] - x[[1, -2]])
+    return outer
 
 
 def _natural_weight(frames: int) -> Float[np.ndarray, "T"]:
@@ -161,6 +190,22 @@ class _Banded:
         for i in range(3):
             for j in range(i, 3):
                 self.band[j - i, i : i + count] += squared * row[i] * row[j]
+
+    def add_ends(self, ends: Float[np.ndarray, "2"], weight: float) -> None:
+        """Rows w (x + t x') of the last frame, and of the first as time runs back; t [frames]."""
+        for end, inner, time in zip((0, -1), (1, -2), ends, strict=True):
+            self.band[0, end] += (weight * (1 + time)) ** 2
+            self.band[0, inner] += (weight * time) ** 2
+            self.band[1, min(end, inner)] -= weight**2 * (1 + time) * time
+
+    def transposed_ends(
+        self, ends: Float[np.ndarray, "2"], values: Float[np.ndarray, "2 n"]
+    ) -> Float[np.ndarray, "T n"]:
+        """`transposed` of these rows."""
+        out = np.zeros((self.band.shape[1], values.shape[1]))
+        out[[0, -1]] += (1 + ends)[:, None] * values
+        out[[1, -2]] -= ends[:, None] * values
+        return out
 
     def transposed(
         self,
