@@ -9,21 +9,25 @@ from robots.model.mjcf import Mjcf
 from robots.model.segments import Segment
 from robots.model.shapes import surface
 from spark.rig.name_hints import read_names
+from spark.rig.roles import RoleMap
 from spark.skeleton import Skeleton
 
 
 def telling_names(segments: Sequence[Segment]) -> tuple[str, ...]:
-    """For each part the name that says most about its role: of its first joint, that joint's body,
-    or its own body. Of equals the joint's wins: `Left_Elbow_Yaw` may move a `left_hand_link`."""
+    """For each part the name that says most about its role: of its first joint, its own body, or
+    that joint's. Of equals the joint's wins: `Left_Elbow_Yaw` may move a `left_hand_link`."""
     candidates = [
         [_without_kind(segment.names[min(k, len(segment.names) - 1)]) for segment in segments]
-        for k in (1, 2, 0)
+        for k in (1, 0, 2)
     ]
     hints = [read_names(names) for names in candidates]
     telling = []
     for i in range(len(segments)):
-        # A part named for sure counts 1; a side breaks ties between names of the same part.
-        scores = [max(h[i].parts.values(), default=0.0) + 0.1 * bool(h[i].side) for h in hints]
+        # A part named for sure counts 1; a side, then a finger or the like, breaks ties.
+        scores = [
+            max(h[i].parts.values(), default=0.0) + 0.1 * bool(h[i].side) + 0.05 * bool(h[i].aside)
+            for h in hints
+        ]
         telling.append(candidates[int(np.argmax(scores))][i])
     return tuple(telling)
 
@@ -51,6 +55,20 @@ def _welded_to(mjcf: Mjcf, body: int, segments: Sequence[Segment]) -> list[int]:
         if above in inside and other not in own and not model.body_jntnum[other]:
             inside.add(other)
     return sorted(inside)
+
+
+def rigid_points(
+    segments: Sequence[Segment], roles: RoleMap, points: Sequence[Float[np.ndarray, "_ 3"]]
+) -> list[Float[np.ndarray, "_ 3"]]:
+    """`points`, with those of welded parts that have no role at the parts that carry them: a sole
+    that is welded to an ankle is the foot's."""
+    joined = list(points)
+    for i in reversed(range(len(segments))):
+        above = segments[i].parent
+        if above >= 0 and roles.roles[i] is None and not segments[i].joints:
+            joined[above] = np.concatenate([joined[above], joined[i]])
+            joined[i] = joined[i][:0]
+    return joined
 
 
 def skeleton_of(

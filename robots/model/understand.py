@@ -16,7 +16,7 @@ from robots.model.mirrored import unmirrored_limits
 from robots.model.mjcf import Mjcf, read_mjcf
 from robots.model.morphology import Morphology
 from robots.model.mount import roles_and_parts, standing_height
-from robots.model.parts import skeleton_of, surface_points
+from robots.model.parts import rigid_points, skeleton_of, surface_points
 from robots.model.segments import Segment, segments_of, tree_of
 from robots.model.soles import place_feet, soles_of, with_soles
 from robots.model.tpose import TPose, search_tpose
@@ -78,8 +78,9 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
     ideal, _ = find_tpose(rest, roles)  # as if joints had no limits
 
     links = np.array([segment.link for segment in segments])
-    place_feet(skeleton, roles, points, ideal)
-    soles = soles_of(skeleton, roles, points, ideal, links)
+    shapes = rigid_points(segments, roles, points)
+    place_feet(skeleton, roles, shapes, ideal)
+    soles = soles_of(skeleton, roles, shapes, ideal, links)
     skeleton = with_soles(skeleton, soles)
     tree, assumed = _assume_limits(tree, segments, roles)
     tpose = search_tpose(tree, skeleton, roles, links, ideal, followers_of(mjcf, joints))

@@ -198,6 +198,22 @@ SPELLINGS = {
     "ashikubi": "ankle",
 }
 
+# Hinges as Boston Dynamics' Atlas calls them: a joint and the axis that it turns about.
+HINGES = {
+    hinge: word
+    for word, hinges in {
+        "back": "lbz mby ubx bkx bky bkz",
+        "hip": "uhz mhx lhy hpx hpy hpz",
+        "knee": "kny",
+        "ankle": "uay lax akx aky",
+        "shoulder": "usy shx shz",
+        "elbow": "elx ely",
+        "wrist": "uwy mwx lwy wrx wry",
+    }.items()
+    for hinge in hinges.split()
+}
+SPELLINGS |= HINGES
+
 ASIDE: dict[str, str] = {
     word: kind
     for kind, words in {
@@ -236,7 +252,9 @@ FINGER_TIP = _set("end nub tip leaf site")
 METACARPAL = _set("metacarpal metacarpals carpal palm in cup")
 
 MODIFIERS = _set("upper lower front hind rear base bend bone center c m x stretch")
-NOISE = _set("fe aa ie jnt joint bn jt link def org bind skin sk rig j b bip biped valve mixamorig")
+NOISE = _set(
+    "fe aa ie angle jnt joint bn jt link def org bind skin sk rig j b bip biped valve mixamorig"
+)
 # A robot's hinge axes: "roll" is a twist bone elsewhere.
 AXES = _set("pitch roll yaw")
 

@@ -18,6 +18,12 @@ _NAME_WEIGHT = 3.0  # of a sure name, in units of the log-likelihoods of lengths
 # Of a joint and its numbered companions further down (shin, shin.001) the first is meant; in the
 # same units.
 _NOT_THE_FIRST = 6.0
+_FINGERS = 3  # joints that one past the elbow carries are fingers, and it is the wrist
+_BELOW_A_WRIST = 4.0  # of a hand below such a joint, in the same units
+# Of joints in one place at the end of a long bone the last one turns with all; breaks ties.
+_NOT_THE_LAST = 0.01
+_LONG = ("upper_leg", "lower_leg", "upper_arm", "forearm")
+_ONE_PLACE = 0.01  # of the limb's length
 _MIN_BEND = 0.2  # [rad] in a motion; of a chain that bends less, no joint is called stiff
 _MAX_CHAIN = 10  # joints of a chain that are tried as a limb's: more would be a hand's fingers
 
@@ -59,19 +65,34 @@ def _best_labels(
     along = [_arc_lengths(measured, chain) for chain in chains]
     stiff = np.mean([_stiffness(measured, chain) for chain in chains], axis=0)
     shape = _leg_shape if parts is LEG else _arm_shape
+    carried = np.bincount(measured.skeleton.parents[1:], minlength=len(measured.skeleton))
+    branching = {i for i in range(length) if min(carried[c[i]] for c in chains) >= _FINGERS}
+    repeated = {
+        i for i in range(length) if all(at[i + 1] - at[i] < _ONE_PLACE * at[-1] for at in along)
+    }
     best = Labels({}, float("-inf"))
-    # What is lost by leaving a joint out whose name speaks of this limb.
-    spoken = {i: max(0.0, *(names[part, i] for part in parts)) for i in free}
     for index in _placements(free, parts):
         score = _NAME_WEIGHT * sum(names[part, i] for part, i in index.items())
         left_out = [i for i in free if i not in index.values()]
-        score -= _NAME_WEIGHT * sum(spoken[i] for i in left_out)
+        # What is lost by leaving a joint out whose name speaks of this limb, unless one that is
+        # named as surely is there, as a clavicle is beside a scapula.
+        had = {part: names[part, i] for part, i in index.items()}
+        score -= _NAME_WEIGHT * sum(
+            max(0.0 if names[part, i] <= had.get(part, 0.0) else names[part, i] for part in parts)
+            for i in left_out
+        )
         score -= _NOT_THE_FIRST * sum(
             any(k < i and names[part, k] > names[part, i] > 0 for k in left_out)
             for part, i in index.items()
         )
+        score -= _NOT_THE_LAST * sum(
+            i in repeated and i + 1 in left_out for part, i in index.items() if part in _LONG
+        )
         score += sum(shape(index, at) for at in along) / len(chains)
         score -= stiff[index["lower_leg" if parts is LEG else "forearm"]]
+        if "hand" in index:
+            between = range(index["forearm"] + 1, index["hand"])
+            score -= _BELOW_A_WRIST * any(i in branching for i in between)
         if score > best.score + 1e-9:
             best = Labels(index, score)
     return best

@@ -15,6 +15,7 @@ from spark.rig.aliases import (
     ASIDE,
     AXES,
     FORELEG,
+    HINGES,
     LEFT,
     MEANINGS,
     MODIFIERS,
@@ -25,7 +26,9 @@ from spark.rig.aliases import (
 )
 
 _ON_THE_MIDLINE = {"spine", "neck", "chest", "back", "waist"}
+_HINGED = {"pitch", "yaw", *HINGES}  # in a robot's names
 _VERTEBRA = re.compile(r"([lct])(\d{1,2})")
+_HALF = re.compile(r"([ul])(arm|leg|farm)")  # upper or lower, where the name has its side already
 _PIECES = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+|[^\W\d_A-Za-z]+")
 
 _WORDS = (
@@ -69,7 +72,7 @@ def read_names(names: Sequence[str]) -> list[NameHint]:
     if len(names) >= 5:
         _strip_common(cut, 0)
         _strip_common(cut, -1)
-    axes = any(piece in ("pitch", "yaw") for pieces in cut for piece in pieces)
+    axes = any(piece in _HINGED for pieces in cut for piece in pieces)
     return [_read(tuple(pieces), axes) for pieces in cut]
 
 
@@ -113,7 +116,7 @@ def _read(pieces: tuple[str, ...], axes: bool) -> NameHint:
             return NameHint(side, aside=ASIDE[word])
     parts, foreleg = _parts(words, bool(side))
     if axes and "shoulder" in words:
-        parts = {"upper_arm": 0.9}  # its hinges: robots have no clavicles
+        parts = {"upper_arm": 1.0}  # its hinges: robots have no clavicles
     if side and set(parts) <= {"pelvis", "spine", "neck", "head"}:
         return NameHint(
             side, aside="beside the midline" if parts else "", unread=unknown and not parts
@@ -133,9 +136,12 @@ def _words(pieces: tuple[str, ...]) -> tuple[set[str], list[int], bool]:
     words: list[str] = []
     numbers: list[int] = []
     unknown = False
+    sided = any(piece in LEFT | RIGHT for piece in pieces)
     for piece in pieces:
         if piece.isdigit():
             numbers.append(int(piece[:4]))
+        elif sided and (half := _HALF.fullmatch(piece)):
+            words += ["upper" if half[1] == "u" else "lower", half[2]]
         elif found := _known(piece):
             words += found
         else:
@@ -161,8 +167,15 @@ def _known(piece: str) -> list[str]:
 
 @lru_cache(maxsize=4096)
 def _misspelt(piece: str) -> list[str]:
-    """The only word of a joint that is `piece` but for a letter, or for two swapped."""
-    near = [word for word in _SPELT if abs(len(word) - len(piece)) < 2 and _one_off(word, piece)]
+    """The only word of a joint that is `piece` but for a letter, or for two swapped. A short one
+    has to begin as that word does: few people miss the first letter."""
+    near = [
+        word
+        for word in _SPELT
+        if abs(len(word) - len(piece)) < 2
+        and _one_off(word, piece)
+        and (len(piece) > 3 or word[0] == piece[0])
+    ]
     return near if len(near) == 1 else []
 
 

@@ -239,7 +239,7 @@ RIGS = {
         torso_link > {left}_shoulder_pitch_link U > {left}_elbow_link F > {left}_wrist_yaw_link W
         """,
     "atlas": """
-        pelvis P > back_bkz S > neck_ry H
+        pelvis P > back_bkz S > head H
         back_bkz > {l}_arm_shz U > {l}_arm_elx F > {l}_arm_wrx W
         pelvis > {l}_leg_hpz T > {l}_leg_kny K > {l}_leg_aky A
         """,

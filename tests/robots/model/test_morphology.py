@@ -12,10 +12,13 @@ import pytest
 from robots import registry
 from robots.model.mjcf import read_mjcf
 from robots.model.morphology import Morphology
+from robots.model.parts import telling_names
+from robots.model.segments import Segment
 from robots.model.understand import understand_robot
 from robots.tree import forward_kinematics
 from spark.errors import FileFormatError, SkeletonError
 from spark.kinematics import forward as skeleton_forward
+from spark.rig.name_hints import read_names
 from spark.rig.roles import Role
 from spark.rotation import quat_rotate
 
@@ -486,6 +489,43 @@ def test_a_girdle_before_a_shoulder_is_no_part_of_it(tmp_path: Path) -> None:
         ball = [robot.joint_names[j] for j in robot.tree.chain(link)[-3:]]
         assert ball == [f"{side}_shoulder_{way}" for way in ("pitch", "roll", "yaw")]
         assert robot.joint_names[above] == f"{side}_girdle"
+
+
+def test_a_sole_that_is_welded_to_an_ankle_is_the_foot_s(tmp_path: Path) -> None:
+    root = ElementTree.fromstring(registry.find("ember").read_text())
+    for side in ("left", "right"):
+        foot = root.find(f".//body[@name='{side}_foot']")
+        assert foot is not None
+        shapes = foot.findall("geom")
+        plate = ElementTree.SubElement(foot, "body", {"name": f"{side}_plate"})
+        ElementTree.SubElement(foot, "geom", {"size": "0.01", "mass": "0.1"})
+        for shape in shapes:
+            foot.remove(shape)
+            plate.append(shape)
+    robot = understand_robot(written(tmp_path, ElementTree.tostring(root, encoding="unicode")))
+    ember = understand_robot(registry.find("ember"))
+    assert robot.rig.hip_height == pytest.approx(ember.rig.hip_height)
+    np.testing.assert_allclose(robot.tpose.angles, ember.tpose.angles, atol=1e-6)
+    for own, theirs in zip(robot.soles, ember.soles, strict=True):
+        np.testing.assert_allclose(own.offsets, theirs.offsets, atol=1e-9)
+
+
+def test_the_hinges_of_an_arm_tell_its_parts_where_bodies_between_them_have_names() -> None:
+    """Atlas's clavicle is the first body of its shoulder, and its `larm` the first of the elbow."""
+    called = (
+        ("l_uarm", "l_arm_shz", "l_clav"),
+        ("l_ufarm", "l_arm_elx", "l_larm"),
+        ("l_hand", "l_arm_wrx", "l_lfarm"),
+    )
+    parts = [Segment(-1, (0,), 0, 1, np.zeros(3), names) for names in called]
+    hints = read_names(telling_names(parts))
+    assert [set(hint.parts) for hint in hints] == [{"upper_arm"}, {"forearm"}, {"hand"}]
+
+
+def test_a_finger_is_known_by_its_body_where_its_hinge_is_not() -> None:
+    names = ("distal_thumb_l", "ip_flexion_l", "distal_thumb_l")
+    part = Segment(-1, (0,), 0, 1, np.zeros(3), names)
+    assert telling_names([part]) == ("distal_thumb_l",)
 
 
 @pytest.mark.parametrize(

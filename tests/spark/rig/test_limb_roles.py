@@ -1,4 +1,4 @@
-"""Sides: from names where they say them, else from the body's front."""
+"""Joints of limbs and their sides: from names where they say them, else from the body's build."""
 
 import re
 from dataclasses import replace
@@ -95,3 +95,48 @@ def test_a_side_that_nothing_shows_is_a_guess_and_says_so() -> None:
     assert len(legs) == 2
     assert all(roles.confidence[j] <= 0.5 for j in legs)
     assert all("guess" in roles.reasons[j] for j in legs)
+
+
+def test_the_shoulder_of_an_anatomical_model_is_the_last_joint_in_its_place() -> None:
+    """Below a clavicle and a scapula, and above a hand whose fingers no rule reads."""
+    skeleton, right = build(
+        """
+        pelvis P > lumbar S > thorax S > skull H
+        thorax > clavicle_{l} C > scapula_{l} - > 7_{l} - > 8_{l} U
+        8_{l} > radius_{l} F > lunate_{l} W > mcp5_flexion_{l} - > md5_flexion_{l} -
+        lunate_{l} > mcp4_flexion_{l} - > md4_flexion_{l} -
+        lunate_{l} > mcp3_flexion_{l} - > md3_flexion_{l} -
+        pelvis > femur_{l} T > tibia_{l} K > talus_{l} A > toes_{l} B
+        """
+    )
+    offsets = skeleton.offsets.copy()
+    for side in "lr":
+        phantom, shoulder = (skeleton.names.index(f"{n}_{side}") for n in ("7", "8"))
+        offsets[phantom] += offsets[shoulder]
+        offsets[shoulder] = 0.0
+    assert wrong(skeleton, assign_roles(replace(skeleton, offsets=offsets)), right) == {}
+
+
+METARIG = """
+    spine P > spine.001 S > spine.002 S > spine.003 S
+    spine.003 > spine.004 N > spine.005 N > spine.006 H > {crown}
+    spine.003 > shoulder.{L} C > upper_arm.{L} U > forearm.{L} F > hand.{L} W
+    spine > pelvis.{L} -
+    spine > thigh.{L} T > shin.{L} K > foot.{L} A > toe.{L} B
+    """
+
+
+@pytest.mark.parametrize("ends", [True, False])
+def test_the_tip_of_a_spine_that_goes_up_to_the_crown_is_no_head(ends: bool) -> None:
+    """As of Rigify's metarig in an FBX that Blender wrote, with its tips."""
+    skeleton, right = build(METARIG.replace("{crown}", "spine.006_end -"), ends=ends)
+    assert wrong(skeleton, assign_roles(skeleton), right) == {}
+
+
+def test_a_face_that_begins_where_its_joint_does_is_the_head_s() -> None:
+    """Rigify's skull hangs on that joint."""
+    skeleton, right = build(METARIG.replace("{crown}", "face - > jaw - > chin -"))
+    offsets = skeleton.offsets.copy()
+    offsets[skeleton.names.index("face")] = 0.0
+    odd = replace(skeleton, offsets=offsets)
+    assert wrong(odd, assign_roles(odd), right) == {}

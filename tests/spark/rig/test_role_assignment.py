@@ -226,6 +226,17 @@ def test_a_name_with_a_letter_wrong_still_says_its_joint() -> None:
     parts = [max(hint.parts, key=hint.parts.get, default="") for hint in read_names(words)]
     assert parts == ["clavicle", "forearm", "upper_leg", "clavicle", "spine", "lower_leg"]
     assert read_names(["LeftHad"])[0].parts == {}, "a head or a hand"
+    assert read_names(["elv_angle_l"])[0].parts == {}, "neither pelvis nor ankle"
+
+
+def test_a_half_of_a_limb_is_told_from_its_side() -> None:
+    """`l_larm` is the left lower arm: the name has its side already. `larm` is the left arm."""
+    words = ["l_larm", "r_larm", "r_uarm", "l_ufarm", "l_uleg", "r_lleg"]
+    hints = read_names(words)
+    assert [hint.side[0] for hint in hints] == [word[0] for word in words]
+    parts = ["forearm", "forearm", "upper_arm", "forearm", "upper_leg", "lower_leg"]
+    assert [set(hint.parts) for hint in hints] == [{part} for part in parts]
+    assert read_names(["larm"])[0].parts["upper_arm"] > read_names(["larm"])[0].parts["forearm"]
 
 
 def test_a_palm_on_a_wrist_is_not_the_hand() -> None:
