@@ -9,6 +9,9 @@ from spark.rig.name_hints import NameHint
 from spark.rig.topology import LimbPair, chain_below, common_ancestor, path_between
 from spark.skeleton import Skeleton
 
+_SURE = 0.8  # of a name that means a head; a face's is less
+_HERE = 0.1  # of the bone above: a face that begins so near to a joint is carried by the head
+
 
 def find_pelvis(skeleton: Skeleton, hints: Sequence[NameHint], legs: LimbPair) -> int:
     """The joint that carries the legs; 3ds Max hangs them on the spine's first joint."""
@@ -81,7 +84,10 @@ def _head(
         if j not in limbs and hints[j].parts.get("head", 0.0) > 0.3 and j != pelvis
     ]
     if named:
-        return max(named, key=lambda j: (hints[j].parts["head"], -j))
+        head = max(named, key=lambda j: (hints[j].parts["head"], -j))
+        above = int(skeleton.parents[head])
+        face = hints[head].parts["head"] < _SURE and above not in {pelvis, top, *limbs}
+        return above if face and measured.bones[head] < _HERE * measured.bones[above] else head
     # From the joint that carries the arms, the chain that is no limb and leads up.
     trunk = set(skeleton.ancestors(pelvis))
     starts = [c for c in skeleton.children[top] if c not in limbs and c not in trunk]
@@ -92,9 +98,10 @@ def _head(
     for j in chain:
         if len(skeleton.children[j]) > 1:
             return j
-    # A leaf without an End Site, where other leaves have one, is the crown and no joint.
-    nub = len(chain) > 1 and not measured.end_reach[chain[-1]] and len(skeleton.end_parents) > 0
-    return chain[-2] if nub else chain[-1]
+    # The crown is no joint: a leaf called an end, or without an End Site where others have one.
+    unlike = not measured.end_reach[chain[-1]] and len(skeleton.end_parents) > 0
+    crown = len(chain) > 1 and (bool(hints[chain[-1]].aside) or unlike)
+    return chain[-2] if crown else chain[-1]
 
 
 def _rises(measured: Measurements, joint: int, pelvis: int, top: int, legs: LimbPair) -> bool:
