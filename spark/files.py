@@ -1,5 +1,6 @@
 """Files written whole or not at all, and folders that one process writes to at a time."""
 
+import errno
 import os
 import stat
 import sys
@@ -112,7 +113,9 @@ def _named(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         reason = error.strerror or error
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        wanted = "a file name in a folder that exists and may be written to"
         raise OutputError(
-            f"{path}: can't be written ({reason}); expected a file name in a folder that exists "
-            "and may be written to"
+            f"{path}: can't be written ({reason}); "
+            f"{'make room there, or write elsewhere' if full else f'expected {wanted}'}"
         ) from error

@@ -2,6 +2,7 @@
 not. Both are said before the work, not after."""
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
 from spark.errors import OutputError
@@ -13,6 +14,16 @@ def check_free(path: Path, *, force: bool) -> None:
         raise OutputError(f"{path}: is a folder; expected the name of a file to write")
     if path.exists() and not force:
         raise OutputError(f"{path}: exists; give another name, or overwrite it with --force")
+
+
+def check_not_read(path: Path, inputs: Iterable[Path]) -> None:
+    """Raise `OutputError` where `path` is one of the files that it would be made from: these are
+    never overwritten, not even by force."""
+    for source in inputs:
+        if path.exists() and source.exists() and path.samefile(source):
+            raise OutputError(
+                f"{path}: is what the result is made from, and would be lost; give another name"
+            )
 
 
 def check_ending(path: Path, endings: tuple[str, ...], what: str) -> None:

@@ -127,12 +127,12 @@ def run(args: Namespace) -> int:
     suffixes = CHARACTERS if args.robot is None else (*CHARACTERS, *SUFFIXES)
     ending = FORMATS[args.format or "npz"] if robot else ".bvh"
     jobs = _jobs(args.sources, Path(args.to), args.output, ending, suffixes)
+    read = [*(source for source, _ in jobs), Path(args.to)]
     for _, out in jobs:
-        if robot:
-            for file in written_files(out, args.format):
-                files.check_free(file, force=args.force)
-        else:
-            files.check_free(out, force=args.force)
+        for file in written_files(out, args.format) if robot else [out]:
+            files.check_free(file, force=args.force)
+            files.check_not_read(file, read)
+        if not robot:
             files.check_ending(out, character_files.ENDINGS, "a character's motion")
     check_given(args, [source for source, _ in jobs], fps="source-fps")
     check_given(args, [args.to], "to-")

@@ -68,6 +68,8 @@ def test_errors_name_the_file(tmp_path: Path) -> None:
     for path in (tmp_path / "no" / "file", tmp_path / "a\0b", Path("/dev/full")):
         with pytest.raises(OutputError, match="can't be written"):
             write_atomically(path, b"new")
+    with pytest.raises(OutputError, match="make room there"):
+        write_atomically(Path("/dev/full"), b"new")
     (tmp_path / "folder").mkdir()
     with pytest.raises(OutputError, match="folder: can't be written"):
         write_atomically(tmp_path / "folder", b"new")

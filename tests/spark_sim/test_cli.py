@@ -506,3 +506,11 @@ def test_play_with_the_skin_of_a_file(here: Path) -> None:
 def test_a_mesh_that_is_none_is_refused(mesh: str, words: str, here: Path) -> None:
     assert words in bad("play", WALK, "--mesh", mesh, "--strip", "x.png", cwd=here)
     assert not (here / "x.png").exists()
+
+
+def test_a_result_never_overwrites_what_it_is_made_from(here: Path) -> None:
+    for source, target, out in ((WALK, TARGET, WALK), (WALK, TARGET, TARGET), (WALK, WALK, WALK)):
+        before = (here / out).read_bytes()
+        error = bad("retarget", source, "--to", target, "-o", out, "--force", cwd=here)
+        assert "what the result is made from" in error
+        assert (here / out).read_bytes() == before
