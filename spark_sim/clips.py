@@ -25,6 +25,7 @@ from spark_sim.clip_base import ClipBase, File
 if TYPE_CHECKING:  # these load MuJoCo, which a character's clip can do without
     from robots.model.motion import RobotMotion
     from sim.trajectory import ModelTrajectory
+    from sim.view.scene import Figure
 
 __all__ = ["AnyClip", "Clip", "File", "RobotClip"]
 
@@ -191,6 +192,24 @@ class RobotClip(ClipBase):
             name: self.qpos[:, start : start + 4] if ball else self.qpos[:, start]
             for name, start, ball in zip(self.joint_names, starts, robot.tree.balls, strict=True)
         }
+
+    @cached_property
+    def _has_shapes(self) -> bool:
+        model = self.on_robot.robot.whole
+        return bool(np.isin(model.model.geom_bodyid, list(model.bodies())).any())
+
+    @property
+    def surface(self) -> tuple[Skin | None, tuple[str, ...]]:
+        """No skin; a note where the model has no shapes, as one whose meshes are all missing."""
+        note = "the model has no shapes: a body made from its skeleton is shown"
+        return None, () if self._has_shapes else (note,)
+
+    def figures(self) -> "list[Figure]":
+        """The robot's shapes, or a body on its skeleton where it has none."""
+        figures = super().figures()
+        if self._has_shapes:
+            return figures
+        return [replace(each, subject=replace(each.subject, body=None)) for each in figures]
 
     def _at(self, frames: Float[np.ndarray, "N"], frame_time: float) -> "RobotClip":
         from sim.interpolate import at_times

@@ -1,5 +1,6 @@
 """What the API's objects look like at a prompt and in a notebook."""
 
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
@@ -128,3 +129,22 @@ def test_the_words_of_options_are_those_that_are_understood() -> None:
     assert set(get_args(choices.Format)) == set(formats.FORMATS)
     names = {*(entry.name for entry in registry.ENTRIES), *registry.ALIASES}
     assert set(get_args(choices.RobotName)) == names
+
+
+def test_a_robot_without_shapes_is_shown_as_its_skeleton(tmp_path: Path) -> None:
+    """As one whose meshes are all missing: there would be nothing to see."""
+    ember = registry.find("ember")
+    root = ElementTree.fromstring(ember.read_text())
+    for body in root.findall("worldbody//body"):
+        for shape in body.findall("geom"):
+            body.remove(shape)
+        inertial = {"pos": "0 0 0", "mass": "1", "diaginertia": "0.01 0.01 0.01"}
+        body.insert(0, ElementTree.Element("inertial", inertial))
+    bare = tmp_path / "bare.xml"
+    bare.write_text(ElementTree.tostring(root, encoding="unicode"))
+    clip, whole = spark_sim.load(bare), spark_sim.load(ember)
+    assert "no shapes" in clip.surface[1][0]
+    assert whole.surface[1] == ()
+    assert [figure.subject.body for figure in clip.figures()] == [None]
+    assert whole.figures()[0].subject.body is whole.body
+    spark_sim.play(clip, html=tmp_path / "bare.html")
