@@ -37,6 +37,7 @@ from spark.skeleton import Skeleton
 
 _MAX_ROLL = np.radians(100)  # of a forearm from its middle: pronation and supination reach 85 each
 _MAX_FINGER_SPREAD = np.radians(35)  # of the fingers' middle from the hand's axis they lie along
+_BESIDE = np.sin(np.radians(5))  # of a thumb to its hand's axis; nearer to it it tells no side
 _STEEPEST_FOOT = np.radians(-75)  # a foot that points further down at rest is not standing
 
 _LEFT, _UP = np.eye(3)[1:]
@@ -191,6 +192,8 @@ def _palm_down(pose: RigPose, hand: int, q: Quat) -> tuple[Quat, tuple[str, ...]
         return q, ()
     side, droop = found
     seen = quat_rotate(q, side)
+    if np.hypot(seen[0], seen[2]) < _BESIDE * np.linalg.norm(seen):
+        return q, ()
     quarter_turns = round((np.arctan2(-seen[2], seen[0]) - droop) / (np.pi / 2))
     if quarter_turns == 0:
         return q, ()

@@ -283,6 +283,21 @@ def test_palms_turn_down_where_thumbs_say_so(roll: float, turned: bool) -> None:
         assert side[0] > 0.8 * np.hypot(side[0], side[2])
 
 
+@pytest.mark.parametrize("way", [[0, 0, 1], [0, 0, -1], [-1, 0, 0]])
+def test_a_thumb_along_its_hand_turns_no_palm(way: list[int]) -> None:
+    """As where a glTF has no End Sites: what is left beside the axis is rounding."""
+    rig = with_thumbs(stick_rig())
+    offsets = rig.skeleton.offsets.copy()
+    offsets[18:] = np.array([[0, 0.05, 0], [0, -0.05, 0]]) + 1e-8 * np.array(way)
+    straight = replace(rig, skeleton=replace(rig.skeleton, offsets=offsets))
+    tpose, notes = find_tpose(standing(straight, 3), straight.roles)
+    assert notes == ()
+    plain = stick_rig()
+    np.testing.assert_allclose(
+        tpose[:18], find_tpose(standing(plain, 3), plain.roles)[0], atol=1e-9
+    )
+
+
 @pytest.mark.parametrize("build", BUILDS)
 def test_turning_the_file_does_not_turn_the_tpose(build: str) -> None:
     """A rig that faces elsewhere at rest has the same T-pose: it faces +X."""
