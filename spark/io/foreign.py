@@ -24,6 +24,8 @@ from spark.io.recording import Recording, in_si
 from spark.io.scanner import LARGEST
 from spark.motion import Motion
 
+_CREATURES = (0.05, 20.0)  # [m] sizes of creatures; of others a file's unit is not believed
+
 
 def foreign_recording(
     path: Path,
@@ -51,7 +53,8 @@ def foreign_recording(
         if unit is not None:
             unit_m = given_unit(unit)
         elif unit_m is not None:
-            found.append(f"unit {100 * unit_m:.4g} cm, {says}")
+            unit_m, note = _believed(motion, unit_m, says)
+            found.append(note)
         else:
             unit_m, more = infer_unit(motion)
             found += more
@@ -71,3 +74,19 @@ def foreign_recording(
         found.append(f"{tall:.3g} m is no human's height; check, and give --unit")
     bvh = replace(encode_new(motion, unit=unit_m, up=up_axis), path=path)
     return Recording(bvh, motion, convention, tuple(found))
+
+
+def _believed(motion: Motion, unit_m: float, says: str) -> tuple[float, str]:
+    """The unit that a file says, or the one that its body's size says where no creature has the
+    file's; and a note."""
+    said = f"{100 * unit_m:.4g} cm, {says}"
+    tall = unit_m * float(np.ptp(motion.skeleton.rest_positions, axis=0).max())
+    if not _CREATURES[0] < tall < _CREATURES[1]:
+        factor, _ = infer_unit(in_si(motion, Convention(unit_m, "z")))
+        if factor != 1.0:
+            unit = 100 * unit_m * factor
+            return (
+                unit_m * factor,
+                f"unit {unit:.4g} cm, by its size: in {said}, it is {tall:.4g} m",
+            )
+    return unit_m, f"unit {said}"

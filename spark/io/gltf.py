@@ -14,7 +14,6 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.io.bound_pose import NOTE
-from spark.io.convention import infer_unit
 from spark.io.foreign import foreign_recording
 from spark.io.gltf_file import GltfFile
 from spark.io.gltf_joints import joint_nodes
@@ -29,7 +28,6 @@ from spark.rotation import matrix_from_quat, quat_normalize
 _MAX_VALUES = 100_000_000  # frames times nodes of a file: 12 hours of a body with fingers at 30 fps
 _FPS = (15.0, 240.0)  # of keys; wider ones are of an animator's curves, closer ones of no motion
 _USUAL_FPS = 30.0
-_METRES = (0.05, 20.0)  # [m] heights of creatures that a file in metres may hold
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +61,8 @@ def read_gltf(
     file = GltfFile(path)
     with file.checked():
         motion, notes = _motion(file, clip, fps)
-    unit_m = 1.0
-    rest = motion.skeleton.rest_positions
-    tall = float(np.ptp(rest, axis=0).max())
-    if unit is None and not _METRES[0] < tall < _METRES[1]:
-        unit_m, found = infer_unit(motion)
-        notes = [*notes, f"glTF is in metres, but no creature is {tall:.4g} m tall", *found]
-    says = "as glTF has it" if unit_m == 1.0 else "by its size"
     return foreign_recording(
-        path, motion, notes, unit=unit, up=up, unit_m=unit_m, up_axis="y", says=says
+        path, motion, notes, unit=unit, up=up, unit_m=1.0, up_axis="y", says="as glTF has it"
     )
 
 

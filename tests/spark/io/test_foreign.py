@@ -24,3 +24,24 @@ def test_numbers_beyond_any_length_are_refused(what: str, far: float) -> None:
     foreign_recording(Path("walk.glb"), walk, unit="m", up="z")
     with pytest.raises(FileFormatError, match=r"walk\.glb: holds numbers beyond 1e\+12, or none"):
         foreign_recording(Path("walk.glb"), motion, unit="m", up="z")
+
+
+@pytest.mark.parametrize(("factor", "believed"), [(100.0, True), (1e4, False), (1e5, False)])
+def test_a_unit_in_which_no_creature_has_the_body_s_size_is_not_believed(
+    factor: float, believed: bool
+) -> None:
+    """As centimetres that went through Blender as metres, and say that they are centimetres."""
+    walk = sample_motion("walk", sample_rig("walker"), 30.0).frames(0, 3)
+    bones = walk.skeleton
+    large = replace(
+        walk,
+        root_pos=walk.root_pos * factor,
+        skeleton=replace(
+            bones, offsets=bones.offsets * factor, end_offsets=bones.end_offsets * factor
+        ),
+    )
+    read = foreign_recording(Path("walk.fbx"), large, unit=None, up="z", unit_m=0.01)
+    np.testing.assert_allclose(read.motion.skeleton.offsets, bones.offsets, atol=1e-9)
+    assert ("by its size" in " ".join(read.notes)) != believed
+    given = foreign_recording(Path("walk.fbx"), large, unit="cm", up="z", unit_m=0.01)
+    np.testing.assert_allclose(given.motion.skeleton.offsets, bones.offsets * factor / 100)

@@ -202,7 +202,7 @@ def test_centimetres(walking: Motion, tmp_path: Path) -> None:
     path = gltf.write(tmp_path / "a.glb")
     read = read_gltf(path)
     assert read.convention.unit == "cm"
-    assert any("glTF is in metres, but" in note for note in read.notes)
+    assert any("in 100 cm, as glTF has it, it is" in note for note in read.notes)
     assert read_gltf(path, unit="dm").convention.unit == "dm"
 
 
