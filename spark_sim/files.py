@@ -16,14 +16,21 @@ def check_free(path: Path, *, force: bool) -> None:
         raise OutputError(f"{path}: exists; give another name, or overwrite it with --force")
 
 
-def check_not_read(path: Path, inputs: Iterable[Path]) -> None:
-    """Raise `OutputError` where `path` is one of the files that it would be made from: these are
-    never overwritten, not even by force."""
-    for source in inputs:
-        if path.exists() and source.exists() and path.samefile(source):
+def check_not_read(paths: Iterable[Path], inputs: Iterable[Path]) -> None:
+    """Raise `OutputError` where one of `paths` is one of the files that they would be made from:
+    these are never overwritten, not even by force."""
+    read = {_identity(path) for path in inputs if path.exists()}
+    for path in paths:
+        if path.exists() and _identity(path) in read:
             raise OutputError(
                 f"{path}: is what the result is made from, and would be lost; give another name"
             )
+
+
+def _identity(path: Path) -> tuple[int, int]:
+    """What a file is the same by, whatever path leads to it."""
+    found = path.stat()
+    return found.st_dev, found.st_ino
 
 
 def check_ending(path: Path, endings: tuple[str, ...], what: str) -> None:

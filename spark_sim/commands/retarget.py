@@ -127,13 +127,14 @@ def run(args: Namespace) -> int:
     suffixes = CHARACTERS if args.robot is None else (*CHARACTERS, *SUFFIXES)
     ending = FORMATS[args.format or "npz"] if robot else ".bvh"
     jobs = _jobs(args.sources, Path(args.to), args.output, ending, suffixes)
-    read = [*(source for source, _ in jobs), Path(args.to)]
+    written: list[Path] = []
     for _, out in jobs:
-        for file in written_files(out, args.format) if robot else [out]:
-            files.check_free(file, force=args.force)
-            files.check_not_read(file, read)
+        written += written_files(out, args.format) if robot else [out]
         if not robot:
             files.check_ending(out, character_files.ENDINGS, "a character's motion")
+    for file in written:
+        files.check_free(file, force=args.force)
+    files.check_not_read(written, [*(source for source, _ in jobs), Path(args.to)])
     check_given(args, [source for source, _ in jobs], fps="source-fps")
     check_given(args, [args.to], "to-")
     target = load(args, args.to, "to-")
