@@ -14,7 +14,7 @@ from sim.view.scene import Figure
 from spark.errors import OutputError
 from spark_sim import sample
 from spark_sim.loading import load
-from tests.helpers.browser import Elements, opened, watched
+from tests.helpers.browser import LONG, Elements, opened, watched
 
 NOTHING: dict[str, Any] = {"speeds": (), "toggles": (), "controls": ()}
 CHECKOUT = Path(__file__).parents[2]
@@ -76,12 +76,11 @@ def test_the_policy_stops_what_would_slip_through(tmp_path: Path) -> None:
     text = page([Figure(walk.subject, "x")], title="x")
     broken = text.replace("<canvas", "<img src=x onerror=document.title=1337>" + "<canvas", 1)
     broken = broken.replace("<canvas", "<script>document.title = 1337</script><canvas", 1)
-    long = "--virtual-time-budget=8000"
-    fine, result = (opened(watched(page), tmp_path, long) for page in (text, broken))
+    fine, result = (opened(watched(page), tmp_path, *LONG) for page in (text, broken))
     assert fine["seen"] == []
     assert {"script-src-elem", "script-src-attr", "img-src"} <= set(result["seen"])
     assert result["title"] == "x"
-    ran = opened(re.sub('default-src[^"]*', "", watched(broken)), tmp_path, long)
+    ran = opened(re.sub('default-src[^"]*', "", watched(broken)), tmp_path, *LONG)
     assert ran["title"] == "1337", "without a policy it runs"
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import spark_sim
 from robots import registry
-from tests.helpers.browser import Elements, opened, watched
+from tests.helpers.browser import LONG, Elements, opened, watched
 
 # What works in an element, in a script, in an attribute, and in a chain of replacements. No `/`
 # where it names a file.
@@ -53,7 +53,7 @@ def test_names_are_shown_and_do_nothing(kind: Any, tmp_path: Path) -> None:
     assert hostile == plain
     for page in sorted(folder.glob("*.html")):
         text = page.read_text()
-        came_to = opened(watched(text), tmp_path, "--virtual-time-budget=8000")
+        came_to = opened(watched(text), tmp_path, *LONG)
         assert came_to["seen"] == []
         assert name in came_to["title"]
         assert "frame" in came_to["time"]

@@ -21,7 +21,7 @@ from sim.report.palette import css
 from spark.demo.sample import sample_motion, sample_rig
 from spark.rig.roles import Role
 from spark.rotation import quat_about
-from tests.helpers.browser import opened, with_probe
+from tests.helpers.browser import STILL_REPLAY, opened, with_probe
 from tests.helpers.program import CHECKOUT
 from tests.helpers.stick import joint, standing, stick_rig
 
@@ -126,7 +126,7 @@ PROBE = """
 
 @pytest.mark.parametrize("width", [1280, 500])
 def test_nothing_overlaps_or_sticks_out(text: str, width: int, tmp_path: Path) -> None:
-    shown = opened(with_probe(text, PROBE), tmp_path, f"--window-size={width},900")
+    shown = opened(with_probe(text, STILL_REPLAY + PROBE), tmp_path, f"--window-size={width},900")
     assert shown["width"] == pytest.approx(width, abs=20)
     assert shown["scrolls"] <= shown["width"]
     cards = len(Outline(text).all("details"))
