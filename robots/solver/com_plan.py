@@ -13,12 +13,11 @@ rows; the hull is a projection, alternated with the least squares (ADMM; Boyd et
 3.1).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
+from robots.solver.support import Hulls, Support
 from spark.constants import GRAVITY
 
 NATURAL_CUTOFF = 0.8  # [Hz] above which accelerations are natural ones, below which the reference's
@@ -28,29 +27,6 @@ W_PRESSURE = 4.0  # [1] of a metre that the centre of pressure lies outside the 
 MIN_PUSH = 0.15  # [body weights] that the floor gives where anything touches it
 _ROUNDS = 24  # of the projection
 _PUSH_ROUNDS = 12  # of the active set
-_DIRECTIONS = 16  # in which a hull is bounded
-_HULL_STEPS = 6  # by which a point is brought inside
-
-
-@dataclass(frozen=True, eq=False)
-class Support:
-    """What may push: `points` [m, x and y] while they are `touching` the floor. `heading` [rad] is
-    that of the body at first: hulls are bounded in directions that turn with it."""
-
-    points: Float[np.ndarray, "T K 2"]
-    touching: Bool[np.ndarray, "T K"]
-    heading: float = 0.0
-
-    @property
-    def flight(self) -> Bool[np.ndarray, "T"]:
-        """Frames in which nothing touches."""
-        return ~np.any(self.touching, axis=1)
-
-    def at_ends(self, places: Float[np.ndarray, "2 2"]) -> "Support":
-        """In the first and the last frame, with a place more in each that pushes."""
-        points = np.concatenate([self.points[[0, -1]], places[:, None]], axis=1)
-        touching = np.concatenate([self.touching[[0, -1]], np.ones((2, 1), dtype=bool)], axis=1)
-        return Support(points, touching, self.heading)
 
 
 def plan_com(
@@ -128,7 +104,7 @@ def _plan_path(
     fixed = problem.transposed(0.0, 1.0, free)
     pressure = xy - lever[:, None] * own + offset  # of the reference
     stands = _extrapolated(xy, ends)
-    hull, last = _Hulls(support), _Hulls(support.at_ends(stands))
+    hull, last = Hulls(support), Hulls(support.at_ends(stands))
     moved, dual, dual_stand = np.zeros_like(xy), np.zeros_like(xy), np.zeros_like(stands)
     for _ in range(_ROUNDS):
         place = pressure + moved - lever[:, None] * _accelerations(moved, frame_time)
@@ -233,24 +209,3 @@ class _Banded:
     ) -> tuple[Float[np.ndarray, "*A"], Float[np.ndarray, "*A"], Float[np.ndarray, "*A"]]:
         b = np.broadcast_to(acceleration, self.band.shape[1])[1:-1] / self.frame_time**2
         return b, position - 2 * b, b
-
-
-class _Hulls:
-    """The convex hulls of what touches, from the outside: how far they reach in some directions."""
-
-    def __init__(self, support: Support) -> None:
-        angle = support.heading + 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
-        self.directions = np.stack([np.cos(angle), np.sin(angle)])
-        along = support.points @ self.directions
-        self.reach = np.where(support.touching[..., None], along, -np.inf).max(axis=1)
-
-    def nearest(self, place: Float[np.ndarray, "T 2"]) -> Float[np.ndarray, "T 2"]:
-        """Nearly the nearest places inside: pushed in along the direction in which they lie
-        farthest outside, a few times. Where nothing touches, anything may come out."""
-        out, frames = place.copy(), np.arange(len(place))
-        for _ in range(_HULL_STEPS):
-            outside = out @ self.directions - self.reach
-            worst = outside.argmax(axis=1)
-            by = np.maximum(outside[frames, worst], 0.0)
-            out -= np.where(np.isfinite(by), by, 0.0)[:, None] * self.directions.T[worst]
-        return out

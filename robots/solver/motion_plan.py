@@ -12,11 +12,12 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from robots.model.morphology import Morphology
-from robots.solver.com_plan import Support, plan_com
+from robots.solver.com_plan import plan_com
 from robots.solver.dynamics import angular_momentum, center_of_mass
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import FootPlan
 from robots.solver.projection import hips_of
+from robots.solver.support import Support
 from robots.solver.targets import Targets
 from robots.solver.touching import touches_of
 from robots.tree import Coordinates, LinkPoses, forward_kinematics

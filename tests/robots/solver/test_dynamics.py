@@ -7,9 +7,10 @@ import pytest
 from robots.model.known import known
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
-from robots.solver.com_plan import Support, plan_com
+from robots.solver.com_plan import plan_com
 from robots.solver.dynamics import angular_momentum, center_of_mass, com_jacobian
 from robots.solver.solve import copy
+from robots.solver.support import Support
 from robots.tree import Coordinates, forward_kinematics
 from sim.report.clip_poses import pose_clip
 from sim.report.wrench import angular_momentum as momentum_of_the_model
