@@ -3,6 +3,8 @@
 import os
 from pathlib import Path
 
+from spark.training.processes import process_count
+
 _SMALL = 64  # networks narrower than this gain nothing from a second thread (docs/training.md)
 _QUOTA = Path("/sys/fs/cgroup/cpu.max")  # of a container: microseconds of CPU time in a period
 
@@ -10,7 +12,7 @@ _QUOTA = Path("/sys/fs/cgroup/cpu.max")  # of a container: microseconds of CPU t
 def choose_threads(width: int) -> int | None:
     """Threads for a network of `width` features: one a core that is free, and one for a small
     network. None where `OMP_NUM_THREADS` or `torchrun` has chosen."""
-    if "OMP_NUM_THREADS" in os.environ or int(os.environ.get("WORLD_SIZE", "1")) > 1:
+    if "OMP_NUM_THREADS" in os.environ or process_count() > 1:
         return None
     return 1 if width < _SMALL else free_cores()
 
