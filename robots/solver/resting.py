@@ -22,7 +22,7 @@ from spark.rig.roles import Role
 from spark.runs import true_runs
 from spark.transfer.footfalls import between_contacts, beyond
 
-HOLD = 2.4  # how firmly a part is held where it touches the ground, as a share of a standing sole,
+HOLD = 3.0  # how firmly a part is held where it touches the ground, as a share of a standing sole,
 CARRIED_HOLD = 0.2  # and of that the shoulder over an arm that touches;
 UNSEEN_HOLD = 0.45  # more where the trunk is not solved together with the arm
 MAX_DRAG = 0.1  # hip heights that the copied part may slide as it rests without having moved

@@ -113,7 +113,8 @@ def solve(
 ) -> Coordinates:
     """Block by block, from `q`: first without collisions and with feet that may slide; then with
     collisions, and feet held where they came to rest; then repaired. To `polish` what is nearly
-    solved, without the first. A body that leans on its arms is solved as a whole at last.
+    solved, without the first, and twice where parts rest: as these turn, other points of them are
+    on the ground. A body that leans on its arms is solved as a whole at last.
     """
     stages = [*zip(blocks_of(robot), _MAX_ITER, _REL_TOL, strict=True)]
     if leans(robot, targets):
@@ -127,10 +128,11 @@ def solve(
             q = solve_block(robot, targets, sliding, q, block, *ends)
         if block.base and not polish:
             feet = apart(reachable(robot, feet, q))
-        holds = _holds_of(robot, targets, feet, q)
-        near = collision_candidates(robot, targets, q, block)
-        if polish or near:
-            q = solve_block(robot, targets, holds, q, block, *ends, near)
+        for _ in range(2 if polish and targets.rests.any() else 1):
+            holds = _holds_of(robot, targets, feet, q)
+            near = collision_candidates(robot, targets, q, block)
+            if polish or near:
+                q = solve_block(robot, targets, holds, q, block, *ends, near)
         if not block.base and not polish and (thrown := abrupt(robot, targets, q, block)).any():
             q = calmed(robot, targets, holds, q, block, thrown)
             near = collision_candidates(robot, targets, q, block)
