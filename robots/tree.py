@@ -8,7 +8,7 @@ Time is the last axis of the arrays of `LinkPoses` and of the Jacobians: numpy t
 contiguous rows. `Coordinates` has it first, as files and other trajectories do.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from weakref import WeakKeyDictionary
@@ -144,12 +144,24 @@ class Coordinates:
             balls[frames] = others.ball_quats
         return Coordinates(pos, quat, angles, balls)
 
+    def with_joints(self, joints: Sequence[int], others: "Coordinates") -> "Coordinates":
+        """The same with some joints turned as in `others`."""
+        at, balls = list(joints), self.ball_quats
+        angles = self.angles.copy()
+        angles[:, at] = others.angles[:, at]
+        if balls is not None and others.ball_quats is not None:
+            balls = balls.copy()
+            balls[:, at] = others.ball_quats[:, at]
+        return Coordinates(self.pos, self.quat, angles, balls)
+
     def every(self, stride: int) -> "Coordinates":
         """Those of every `stride`-th frame."""
         return self.at(slice(None, None, stride))
 
     def upsampled(self, stride: int, frames: int) -> "Coordinates":
         """The inverse of `every`: natural cubic splines through these, at `frames` frames."""
+        if stride == 1:
+            return self
         time = np.arange(frames) / stride
 
         def spline(values: Float[np.ndarray, "K *n"]) -> Float[np.ndarray, "T *n"]:

@@ -53,11 +53,13 @@ def solve_block(
     rel_tol: float,
     max_rejected: float,
     candidates: Sequence[Candidate] | None = None,
+    penalty: float = 1.0,
 ) -> Coordinates:
     """At most `max_iter` Gauss-Newton steps in the block's dofs, from `q`.
 
     With `candidates`, the parts that are near each other at `q`, parts in each other are pushed
-    apart, by a change of `q` that is smoother than `q`.
+    apart, by a change of `q` that is smoother than `q`. `penalty` multiplies the weights of
+    collisions and the floor.
 
     A step is judged frame by frame: where the cost around a frame rises by more than a share
     of what is gained nearby, the step is rejected there. If more than `max_rejected` of the frames
@@ -79,7 +81,7 @@ def solve_block(
 
     def linearize_at(q: Coordinates, with_jacobian: bool = True) -> NormalEquations:
         terms = robot, targets, holds, q, block, candidates or []
-        return linearize(*terms, with_jacobian=with_jacobian)
+        return linearize(*terms, np.full(len(q), penalty), with_jacobian=with_jacobian)
 
     def smoothness_at(q: Coordinates, with_jacobian: bool) -> Smoothness:
         frame_time = targets.frame_time

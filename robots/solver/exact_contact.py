@@ -107,27 +107,26 @@ class ExactContacts:
     ) -> list[PairDistance]:
         """The candidates in their frames, where nearer than `_MAX_DISTANCE`."""
         model, data = self.model, mujoco.MjData(self.model)
-        measured: Bool[np.ndarray, "K T"] = np.zeros((len(candidates), len(qpos)), dtype=bool)
+        measured: Bool[np.ndarray, "T K"] = np.zeros((len(qpos), len(candidates)), dtype=bool)
         for k, candidate in enumerate(candidates):
-            measured[k, candidate.frames] = True
+            measured[candidate.frames, k] = True
+        frames, numbers = np.nonzero(measured)
         geoms = [(candidate.pair.large.geom, candidate.pair.small.geom) for candidate in candidates]
-        distance = np.full((len(candidates), len(qpos)), _MAX_DISTANCE)
-        ends = np.zeros((len(candidates), len(qpos), 6))
-        for t in np.flatnonzero(measured.any(0)).tolist():
-            data.qpos = qpos[t]
-            mujoco.mj_kinematics(model, data)
-            for k in np.flatnonzero(measured[:, t]).tolist():
-                a, b = geoms[k]
-                distance[k, t] = mujoco.mj_geomDistance(
-                    model, data, a, b, _MAX_DISTANCE, ends[k, t]
-                )
+        distance, ends = np.empty(len(frames)), np.empty((len(frames), 6))
+        placed = -1
+        for i, (t, k) in enumerate(zip(frames.tolist(), numbers.tolist(), strict=True)):
+            if t != placed:
+                placed, data.qpos = t, qpos[t]
+                mujoco.mj_kinematics(model, data)
+            distance[i] = mujoco.mj_geomDistance(model, data, *geoms[k], _MAX_DISTANCE, ends[i])
+        known = (distance < _MAX_DISTANCE) & (np.abs(distance) > 1e-9)
         found = []
-        for candidate, signed, points in zip(candidates, distance, ends, strict=True):
-            at = np.flatnonzero((signed < _MAX_DISTANCE) & (np.abs(signed) > 1e-9))
+        for k, candidate in enumerate(candidates):
+            at = np.flatnonzero(known & (numbers == k))
             if len(at):
-                large, small = points[at, :3].T, points[at, 3:].T
-                out = (small - large) / signed[at]
-                found.append(PairDistance(candidate, at, signed[at], small, out))
+                large, small = ends[at, :3].T, ends[at, 3:].T
+                out = (small - large) / distance[at]
+                found.append(PairDistance(candidate, frames[at], distance[at], small, out))
         return found
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
-from robots.solver.block import blocks_of, carriers, whole_of
+from robots.solver.block import Block, blocks_of, carriers, whole_of
 from robots.solver.descent import collision_candidates, solve_block
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import FootPlan, plan_feet, reachable
@@ -31,11 +31,15 @@ from robots.tree import Coordinates
 from spark.threads import one_thread
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
-_MAX_ITER = (12, 10)  # Gauss-Newton steps, by block
-_REL_TOL = (0.02, 0.05)  # of the cost: a block ends where a step gains less,
-_MAX_REJECTED = 0.1  # and no larger share of the frames rejects it
-_WHOLE = (8, 0.05)  # the same of both blocks at once, nearly solved one after the other
-_POLISH = (2, 0.0, 1.0)  # the same three where splines through a solution are nearly right
+Steps = tuple[int, float, float]
+"""How many Gauss-Newton steps at most; of the cost, what one must gain not to be the last; and the
+share of the frames that may reject that one."""
+
+_TRUNK, _LIMBS = (12, 0.02, 0.1), (20, 0.05, 0.1)
+_WHOLE = (8, 0.05, 0.1)  # both blocks at once, nearly solved one after the other
+_POLISH, _POLISH_LIMBS = (2, 0.0, 1.0), (1, 0.0, 1.0)  # splines through a solution
+_SOFT = (3, 0.05, 0.1)  # while collisions cost little:
+_SOFTNESS = 0.2  # a share of their weights, over as much wider a rounding
 _COARSE_INTERVAL = 1 / 20  # [s] between the frames that are solved first
 
 
@@ -72,18 +76,36 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
 
 
 def _trajectory(robot: Morphology, targets: Targets) -> Coordinates:
-    """That follows the targets."""
+    """That follows the targets: solved in few frames, then polished in all, around a centre of mass
+    that physics accepts.
+
+    Arms come last, on a trunk that stays: polishing moves it, and would lead hands that are done
+    into thighs. Before, they are solved for what they weigh. A body that leans on its arms is
+    polished as a whole.
+    """
     feet = plan_feet(robot, targets)
     stride = coarse_stride(targets)
-    coarse = targets.every(stride)
+    coarse, few = targets.every(stride), [foot.every(stride) for foot in feet]
     q = idle_at_rest(robot, on_mount(robot, project(robot, coarse.world, coarse.hips)))
-    q = robot.following(q)
-    q = limit_speed(robot, q, coarse.frame_time)
-    q = solve(robot, coarse, [foot.every(stride) for foot in feet], q)
-    if stride > 1:
-        q = q.upsampled(stride, len(targets))
+    q = limit_speed(robot, robot.following(q), coarse.frame_time)
+    trunk, limbs = blocks_of(robot)
+    q, few = _posed(robot, coarse, few, q, trunk, _TRUNK)
+    q = _parted(robot, coarse, few, q, trunk, _TRUNK)
+    q, _ = _posed(robot, coarse, few, q, limbs, _LIMBS)
+    leaning = leans(robot, targets)
+    if leaning:
+        q = _parted(robot, coarse, few, q, limbs, _LIMBS)
+        q, few = _posed(robot, coarse, few, q, whole_of(robot), _WHOLE)
+        q = _parted(robot, coarse, few, q, whole_of(robot), _WHOLE)
+    q = q.upsampled(stride, len(targets))
     targets, feet = with_dynamics(robot, targets, apart(reachable(robot, feet, q)), q)
-    return solve(robot, targets, feet, q, polish=True)
+    if leaning:
+        return _polished(robot, targets, feet, q, whole_of(robot), _POLISH)
+    q = _polished(robot, targets, feet, q, trunk, _POLISH)
+    coarse, few = targets.every(stride), [foot.every(stride) for foot in feet]
+    arms = _parted(robot, coarse, few, q.every(stride), limbs, _LIMBS)
+    q = q.with_joints(limbs.joints, arms.upsampled(stride, len(targets)))
+    return _polished(robot, targets, feet, q, limbs, _POLISH_LIMBS)
 
 
 def idle_at_rest(robot: Morphology, q: Coordinates) -> Coordinates:
@@ -103,46 +125,72 @@ def coarse_stride(targets: Targets) -> int:
     return min(max(1, round(_COARSE_INTERVAL / targets.frame_time)), max(len(targets) // 4, 1))
 
 
-def solve(
+def _posed(
     robot: Morphology,
     targets: Targets,
     feet: list[FootPlan],
     q: Coordinates,
-    *,
-    polish: bool = False,
+    block: Block,
+    steps: Steps,
+) -> tuple[Coordinates, list[FootPlan]]:
+    """Without collisions, on feet that may slide; and the feet where the legs then reach."""
+    if not block.dofs:
+        return q, feet
+    sliding = _holds_of(robot, targets, feet, q, block).sliding()
+    q = solve_block(robot, targets, sliding, q, block, *steps)
+    return q, apart(reachable(robot, feet, q)) if block.base else feet
+
+
+def _parted(
+    robot: Morphology,
+    targets: Targets,
+    feet: list[FootPlan],
+    q: Coordinates,
+    block: Block,
+    steps: Steps,
 ) -> Coordinates:
-    """Block by block, from `q`: first without collisions and with feet that may slide; then with
-    collisions, and feet held where they came to rest; then repaired. To `polish` what is nearly
-    solved, without the first, and twice where parts rest: as these turn, other points of them are
-    on the ground. A body that leans on its arms is solved as a whole at last.
-    """
-    stages = [*zip(blocks_of(robot), _MAX_ITER, _REL_TOL, strict=True)]
-    if leans(robot, targets):
-        stages = [*([] if polish else stages), (whole_of(robot), *_WHOLE)]
-    for block, max_iter, rel_tol in stages:
-        if not block.dofs:
-            continue
-        ends = _POLISH if polish else (max_iter, rel_tol, _MAX_REJECTED)
-        if not polish:
-            sliding = _holds_of(robot, targets, feet, q).sliding()
-            q = solve_block(robot, targets, sliding, q, block, *ends)
-        if block.base and not polish:
-            feet = apart(reachable(robot, feet, q))
-        for _ in range(2 if polish and targets.rests.any() else 1):
-            holds = _holds_of(robot, targets, feet, q)
-            near = collision_candidates(robot, targets, q, block)
-            if polish or near:
-                q = solve_block(robot, targets, holds, q, block, *ends, near)
-        if not block.base and not polish and (thrown := abrupt(robot, targets, q, block)).any():
-            q = calmed(robot, targets, holds, q, block, thrown)
-            near = collision_candidates(robot, targets, q, block)
-            q = solve_block(robot, targets, holds, q, block, *ends, near)
-        q = repair(robot, targets, holds, q, block)
-    return q
+    """With collisions, and feet held where they came to rest; arms calmed, and all repaired.
+
+    Arms begin deep in a body that is hard to get out of: steps from wall to wall see none but those
+    that they are in. Of softer ones they find the way to where few steps are left."""
+    if not block.dofs:
+        return q
+    holds = _holds_of(robot, targets, feet, q, block)
+    near = collision_candidates(robot, targets, q, block)
+    if near and not block.base:
+        q = solve_block(robot, targets, holds, q, block, *_SOFT, near, _SOFTNESS)
+        near = collision_candidates(robot, targets, q, block)
+    if near or not block.base:
+        q = solve_block(robot, targets, holds, q, block, *steps, near)
+    if not block.base and (thrown := abrupt(robot, targets, q, block)).any():
+        q = calmed(robot, targets, holds, q, block, thrown)
+        near = collision_candidates(robot, targets, q, block)
+        q = solve_block(robot, targets, holds, q, block, *steps, near)
+    return repair(robot, targets, holds, q, block)
+
+
+def _polished(
+    robot: Morphology,
+    targets: Targets,
+    feet: list[FootPlan],
+    q: Coordinates,
+    block: Block,
+    steps: Steps,
+) -> Coordinates:
+    """What is nearly solved, in all frames, and repaired. Twice where parts rest: as these turn,
+    other points of them are on the ground."""
+    if not block.dofs:
+        return q
+    for _ in range(2 if targets.rests.any() else 1):
+        holds = _holds_of(robot, targets, feet, q, block)
+        near = collision_candidates(robot, targets, q, block)
+        q = solve_block(robot, targets, holds, q, block, *steps, near)
+    return repair(robot, targets, holds, q, block)
 
 
 def _holds_of(
-    robot: Morphology, targets: Targets, feet: Sequence[FootPlan], q: Coordinates
+    robot: Morphology, targets: Targets, feet: Sequence[FootPlan], q: Coordinates, block: Block
 ) -> Holds:
-    """Of the feet, and of what else of `q` touches the ground."""
-    return joined([*(footing_of(robot, foot) for foot in feet), resting(robot, targets, q)])
+    """Of the feet, where the block moves them, and of what else of `q` touches the ground."""
+    footings = [footing_of(robot, foot) for foot in feet] if block.base else []
+    return joined([*footings, resting(robot, targets, q)])

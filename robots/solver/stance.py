@@ -28,12 +28,15 @@ def apart(plans: Sequence[FootPlan]) -> list[FootPlan]:
         if max(one[0], other[0]) < min(one[1], other[1])
     ]
     for _ in range(_SWEEPS):
+        before = [own.copy() for own in prints]
         for one, other, both in meetings:
             soles = (_on_floor(plan, own[both]) for plan, own in zip(plans, prints, strict=True))
             shifts = _parting(*soles)
             most = shifts[np.linalg.norm(shifts, axis=1).argmax()]
             prints[0][one, :2] -= most / 2
             prints[1][other, :2] += most / 2
+        if all(np.array_equal(*pair) for pair in zip(prints, before, strict=True)):
+            break
     return [replace(plan, prints=own) for plan, own in zip(plans, prints, strict=True)]
 
 
