@@ -63,6 +63,11 @@ class Cluster:
         return middle
 
     @cached_property
+    def away(self) -> Float[np.ndarray, "S"]:
+        """How far [m] the spheres' centres are from there."""
+        return np.linalg.norm(self.spheres - self.center, axis=1)
+
+    @cached_property
     def bound(self) -> float:
         """How far [m] they reach from there."""
         away = [np.linalg.norm(x.center - self.center) + x.bound for x in self.smalls]

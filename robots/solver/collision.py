@@ -14,7 +14,7 @@ from robots.model.morphology import Morphology
 from robots.model.shapes import DIRECTIONS
 from robots.residuals import one_sided
 from robots.solver.block import Block
-from robots.solver.candidates import Candidate, by_larges, by_moves
+from robots.solver.candidates import Candidate, by_larges, by_moves, in_order
 from robots.solver.clusters import Cluster, clusters_of
 from robots.solver.hulls import SLABS, Shape, ShapePair, signed_distance
 from robots.solver.pushes import Pushes
@@ -63,21 +63,26 @@ class Collisions:
             large = [cluster.larges[k] for k in nearby]
             from_center = self._from_shapes(searched, large, -between[nearby])
             meet = bounds_meet[nearby] & (from_center < reach[nearby])
-            for k, at_all in zip(nearby, meet, strict=True):
+            from_center -= moved[nearby]
+            for k, at_all, from_shape in zip(nearby, meet, from_center, strict=True):
                 at = np.flatnonzero(at_all)
                 if not len(at):
                     continue
+                # No sphere is nearer than the middle by more than it is away from that.
+                closest = from_shape[at].min() - within
+                kept = np.flatnonzero(cluster.away + cluster.reach[k] > closest)
                 apart = distances(
-                    self.tree, searched, cluster.link, cluster.spheres, cluster.larges[k], at
+                    self.tree, searched, cluster.link, cluster.spheres[kept], cluster.larges[k], at
                 )
-                near = apart - cluster.reach[k][:, None] < within + moved[k, at]
+                near = np.zeros((len(cluster.spheres), len(at)), dtype=bool)
+                near[kept] = apart - cluster.reach[k][kept, None] < within + moved[k, at]
                 for shape, own in zip(
                     cluster.smalls, np.split(near, cluster.starts[1:]), strict=True
                 ):
                     if not own.any():
                         continue
                     around = times[at[own.any(0)], None] + np.arange(-stride, stride + 1)
-                    frames_near = np.unique(np.clip(around, 0, count - 1))
+                    frames_near = in_order(np.clip(around, 0, count - 1), count)
                     spheres = np.flatnonzero(own.any(1))
                     pair = cluster.pairs[k][shape]
                     found.append(Candidate(pair, spheres, cluster.moves[k], frames_near))
@@ -148,7 +153,7 @@ class Collisions:
     ) -> None:
         """Of the small shapes of one link against one large one."""
         large, link = candidates[0].pair.large, candidates[0].pair.small.link
-        at = np.unique(np.concatenate([x.frames for x in candidates]))
+        at = in_order(np.concatenate([x.frames for x in candidates]), len(normal.cost))
         spheres = np.concatenate([x.pair.small.spheres[x.spheres] for x in candidates])
         reach = np.concatenate(
             [x.pair.clearance + x.pair.small.radii[x.spheres] for x in candidates]

@@ -162,13 +162,13 @@ def _with_corners(
 
 def signed_distance(shape: Shape, points: Float[np.ndarray, "3 S N"]) -> Float[np.ndarray, "S N"]:
     """The signed distance [m] of points from a shape, both in its rest pose: the maximum over its
-    sides, of which a slab has two."""
-    middle, half = shape.slabs[:, :, None]
+    sides, of which a slab has two; as exactly as the points are given."""
+    middle, half = shape.slabs[:, :, None].astype(points.dtype)
     flat = points.reshape(3, -1)
-    out = np.empty(flat.shape[1])
+    out, sides = np.empty(flat.shape[1], points.dtype), SLABS.astype(points.dtype)
     for start in range(0, len(out), _AT_ONCE):
         here = slice(start, start + _AT_ONCE)
-        excess = SLABS @ flat[:, here]
+        excess = sides @ flat[:, here]
         excess -= middle
         np.abs(excess, out=excess)
         excess -= half

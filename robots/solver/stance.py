@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from robots.solver.footprints import FootPlan, on_prints
 from spark.runs import true_runs
@@ -27,16 +27,21 @@ def apart(plans: Sequence[FootPlan]) -> list[FootPlan]:
         for other in runs[1]
         if max(one[0], other[0]) < min(one[1], other[1])
     ]
+    if not meetings:
+        return list(plans)
+    together = np.concatenate([both for *_, both in meetings])
+
+    def overlap(both: Int[np.ndarray, "S"]) -> Float[np.ndarray, "S 2"]:
+        return _parting(*(_on_floor(plan, x[both]) for plan, x in zip(plans, prints, strict=True)))
+
     for _ in range(_SWEEPS):
-        before = [own.copy() for own in prints]
+        if not overlap(together).any():
+            break
         for one, other, both in meetings:
-            soles = (_on_floor(plan, own[both]) for plan, own in zip(plans, prints, strict=True))
-            shifts = _parting(*soles)
+            shifts = overlap(both)
             most = shifts[np.linalg.norm(shifts, axis=1).argmax()]
             prints[0][one, :2] -= most / 2
             prints[1][other, :2] += most / 2
-        if all(np.array_equal(*pair) for pair in zip(prints, before, strict=True)):
-            break
     return [replace(plan, prints=own) for plan, own in zip(plans, prints, strict=True)]
 
 
