@@ -8,7 +8,10 @@ import pytest
 
 from robots.model.morphology import Morphology
 from robots.solver.block import blocks_of, carriers
+from robots.solver.candidates import in_order
 from robots.solver.collision import Collisions, collisions_of
+from robots.solver.hulls import signed_distance
+from robots.solver.shape_pairs import in_shape
 from robots.tree import Coordinates, forward_kinematics
 from spark.rig.roles import Role
 from tests.helpers.ember import changed_ember
@@ -102,3 +105,31 @@ def test_shapes_of_one_hand_are_searched_together_and_found_one_by_one(tmp_path:
             assert set(alone.frames) <= set(joint.frames)
             found += 1
     assert found > 10
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_what_is_near_is_found_among_all_spheres(tmp_path: Path, seed: int) -> None:
+    """Measured one by one, and exactly, as the search does not."""
+    robot = ember_with_fingers(tmp_path, "-1 1")
+    tree, within, at = robot.tree, 0.05, np.zeros(1, dtype=int)
+    rng = np.random.default_rng(seed)
+    angles = rng.uniform(np.maximum(tree.lower, -1.5), np.minimum(tree.upper, 1.5))
+    q = Coordinates(np.zeros((1, 3)), np.array([[1.0, 0, 0, 0]]), angles[None])
+    poses, arms = forward_kinematics(tree, q), blocks_of(robot)[1]
+    near = {}
+    for pair in collisions_of(robot).pairs:
+        small = pair.small
+        if arms.free_joints(small.link) == arms.free_joints(pair.large.link):
+            continue
+        places = in_shape(tree, poses, small.link, small.spheres, pair.large, at)
+        apart = signed_distance(pair.large, places)[:, 0] - small.radii - pair.clearance
+        if (apart < within).any():
+            near[pair.geoms] = np.flatnonzero(apart < within).tolist()
+    found = collisions_of(robot).candidates(poses, arms, 1, within)
+    assert near
+    assert {x.pair.geoms: x.spheres.tolist() for x in found} == near
+
+
+def test_frames_come_in_order_and_once() -> None:
+    frames = np.random.default_rng(0).integers(50, size=(7, 5))
+    np.testing.assert_array_equal(in_order(frames, 50), np.unique(frames))

@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from robots.model.morphology import Morphology
-from robots.registry import find
 from robots.solver import repair, solve
 from robots.solver.block import blocks_of
 from robots.solver.descent import collision_candidates, solve_block
@@ -15,7 +14,7 @@ from robots.solver.repair_descent import Repair
 from robots.solver.targets import targets_of
 from robots.tree import Coordinates
 from scripts.robot_memory import pacing
-from spark_sim.loading import load_robot
+from tests.helpers.ember import changed_ember
 
 STRIDE = 3
 
@@ -24,13 +23,8 @@ def digger(folder: Path, half_width: float) -> Morphology:
     """Ember with a shovel in either hand."""
     size = f"0.05 {half_width} 0.06"
     shovel = f'<geom class="collision" type="box" mass="0" size="{size}" pos="0 0 -0.08"/>'
-    text = Path(find("robot")).read_text(encoding="utf-8")
-    for side in ("left", "right"):
-        wrist = text.index("/>", text.index(f'name="{side}_wrist_pitch"')) + 2
-        text = text[:wrist] + shovel + text[wrist:]
-    path = folder / "digger.xml"
-    path.write_text(text, encoding="utf-8")
-    return load_robot(str(path)).on_robot.robot
+    pattern = r'<joint class="wrist" name="(?:left|right)_wrist_pitch"\s[^>]*/>'
+    return changed_ember(folder, pattern, lambda found: found[0] + shovel)
 
 
 def test_polishing_does_not_lead_hands_into_thighs(
