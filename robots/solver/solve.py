@@ -35,7 +35,7 @@ Steps = tuple[int, float, float]
 """How many Gauss-Newton steps at most; of the cost, what one must gain not to be the last; and the
 share of the frames that may reject that one."""
 
-_TRUNK, _LIMBS = (12, 0.02, 0.1), (20, 0.05, 0.1)
+_TRUNK, _LIMBS = (12, 0.02, 0.1), (10, 0.05, 0.1)
 _WHOLE = (8, 0.05, 0.1)  # both blocks at once, nearly solved one after the other
 _POLISH, _POLISH_LIMBS = (2, 0.0, 1.0), (1, 0.0, 1.0)  # splines through a solution
 _SOFT = (3, 0.05, 0.1)  # while collisions cost little:
@@ -103,7 +103,8 @@ def _trajectory(robot: Morphology, targets: Targets) -> Coordinates:
         return _polished(robot, targets, feet, q, whole_of(robot), _POLISH)
     q = _polished(robot, targets, feet, q, trunk, _POLISH)
     coarse, few = targets.every(stride), [foot.every(stride) for foot in feet]
-    arms = _parted(robot, coarse, few, q.every(stride), limbs, _LIMBS)
+    arms = _led_out(robot, coarse, q.every(stride), limbs)
+    arms = _parted(robot, coarse, few, arms, limbs, _LIMBS)
     q = q.with_joints(limbs.joints, arms.upsampled(stride, len(targets)))
     return _polished(robot, targets, feet, q, limbs, _POLISH_LIMBS)
 
@@ -141,6 +142,16 @@ def _posed(
     return q, apart(reachable(robot, feet, q)) if block.base else feet
 
 
+def _led_out(robot: Morphology, targets: Targets, q: Coordinates, limbs: Block) -> Coordinates:
+    """Arms a few steps out of what they are in, while that is soft. Steps see no firm wall but
+    those that they are in, and lead from one into the next."""
+    near = collision_candidates(robot, targets, q, limbs)
+    if not near:
+        return q
+    holds = _holds_of(robot, targets, [], q, limbs)
+    return solve_block(robot, targets, holds, q, limbs, *_SOFT, near, _SOFTNESS)
+
+
 def _parted(
     robot: Morphology,
     targets: Targets,
@@ -149,17 +160,11 @@ def _parted(
     block: Block,
     steps: Steps,
 ) -> Coordinates:
-    """With collisions, and feet held where they came to rest; arms calmed, and all repaired.
-
-    Arms begin deep in a body that is hard to get out of: steps from wall to wall see none but those
-    that they are in. Of softer ones they find the way to where few steps are left."""
+    """With collisions, and feet held where they came to rest; arms calmed, and all repaired."""
     if not block.dofs:
         return q
     holds = _holds_of(robot, targets, feet, q, block)
     near = collision_candidates(robot, targets, q, block)
-    if near and not block.base:
-        q = solve_block(robot, targets, holds, q, block, *_SOFT, near, _SOFTNESS)
-        near = collision_candidates(robot, targets, q, block)
     if near or not block.base:
         q = solve_block(robot, targets, holds, q, block, *steps, near)
     if not block.base and (thrown := abrupt(robot, targets, q, block)).any():
