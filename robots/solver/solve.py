@@ -3,8 +3,9 @@
 Damped Gauss-Newton over the coordinates of all frames: every frame's pose against its targets,
 footholds, the floor, limits (`robots.solver.objective`); neighbours coupled by their accelerations
 (`robots.solver.smoothness`, `robots.least_squares`). It runs over two blocks of coordinates, one
-after the other: base, trunk and legs, which the feet couple, then arms and head, which hang on the
-trunk and don't move it. Where these carry the body they do, and both are solved at once.
+after the other: base, trunk and legs, which the feet couple, up to the last step; then arms and
+head, which hang on the trunk and don't move it. Where these carry the body they do, and both are
+solved at once.
 """
 
 from collections.abc import Sequence
@@ -39,7 +40,7 @@ _TRUNK, _LIMBS = (12, 0.02, 0.1), (10, 0.05, 0.1)
 _WHOLE = (8, 0.05, 0.1)  # both blocks at once, nearly solved one after the other
 _POLISH, _POLISH_LIMBS = (2, 0.0, 1.0), (1, 0.0, 1.0)  # splines through a solution
 _SOFT = (3, 0.05, 0.1)  # while collisions cost little:
-_SOFTNESS = 0.2  # a share of their weights, over as much wider a rounding
+_SOFTNESS = 0.2  # this share of their weights, over a rounding that is wider by as much
 _COARSE_INTERVAL = 1 / 20  # [s] between the frames that are solved first
 
 
