@@ -73,6 +73,13 @@ class Tree:
             out[j] = (*out[parent], j)
         return out
 
+    @cached_property
+    def middle(self) -> Float[np.ndarray, "N"]:
+        """Each hinge's angle [rad] in the middle of its limits; 0 without them, and of balls."""
+        bounded = np.isfinite(self.lower) & np.isfinite(self.upper) & ~self.balls
+        lower, upper = (np.where(bounded, limit, 0.0) for limit in (self.lower, self.upper))
+        return (lower + upper) / 2
+
     def anchor(self, link: int) -> Float[np.ndarray, "3"]:
         """Of a link's joint, or the base's place, in the rest pose [m]."""
         return self.base if link < 0 else self.anchors[link]

@@ -9,18 +9,17 @@ from jaxtyping import Float, Int
 
 from robots.model.followers import Follower, followers_of, following, led_by
 from robots.model.mjcf import Mjcf, read_mjcf
+from robots.model.posing import local_poses
 from robots.model.tpose import rest_pose
-from robots.tree import Coordinates, Tree, forward_kinematics
+from robots.tree import Coordinates, Tree
 from spark.blocks import in_blocks
 from spark.motion import Motion, lazy_motion
 from spark.rig.feet import Sole
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import (
-    matrix_from_quat,
     quat_conj,
     quat_continuous,
-    quat_from_matrix,
     quat_mul,
     quat_normalize,
     quat_relative,
@@ -165,15 +164,4 @@ class Morphology:
 
     def _local(self, q: Coordinates) -> Float[np.ndarray, "T J 7"]:
         """The joints' rotations and places [m] in their parents' axes, the root's in the world."""
-        poses = forward_kinematics(self.tree, q)
-        world = quat_from_matrix(np.moveaxis(poses.rotations[self.links], -1, 0))
-        positions = np.stack(
-            [poses.point(int(k), c).T for k, c in zip(self.links, self.centers, strict=True)], 1
-        )
-        parents = self.rig.skeleton.parents[1:]
-        out = np.concatenate([world, positions], axis=-1)
-        out[:, 1:, :4] = quat_relative(world[:, parents], world[:, 1:])
-        turned = matrix_from_quat(quat_conj(world[:, parents]))
-        steps = positions[:, 1:] - positions[:, parents]
-        out[:, 1:, 4:] = (turned @ steps[..., None])[..., 0]
-        return out
+        return local_poses(self.tree, self.links, self.centers, self.rig.skeleton.parents, q)

@@ -8,8 +8,9 @@ import numpy as np
 from jaxtyping import Float
 
 from robots.model.parts import skeleton_of, telling_names
+from robots.model.posing import half_bent
 from robots.model.segments import Segment
-from robots.tree import ROOT
+from robots.tree import ROOT, Tree
 from spark.errors import SkeletonError
 from spark.rig.anatomy import NoLegsError
 from spark.rig.role_assignment import Override, assign_roles
@@ -28,13 +29,18 @@ _ARMS = tuple(
 
 
 def roles_and_parts(
-    segments: list[Segment], points: Points, override: Override | None
+    tree: Tree, segments: list[Segment], points: Points, override: Override | None
 ) -> tuple[RoleMap, list[Segment], Points, bool]:
     """The roles of a robot's parts; the parts, with virtual legs where it has none; and whether it
     has none. Raises `SkeletonError` where it has no arms either, or is no humanoid in another way.
     """
+
+    def roles_of(segments: list[Segment], points: Points) -> RoleMap:
+        skeleton = skeleton_of(segments, points, telling_names(segments))
+        return assign_roles(skeleton, None, override, half_bent(tree, segments, skeleton))
+
     try:
-        found = assign_roles(skeleton_of(segments, points, telling_names(segments)), None, override)
+        found = roles_of(segments, points)
     except NoLegsError as error:
         up, lateral = np.array([0.0, 0, 1]), np.array([0.0, 1, 0])
         middle = np.mean([segment.center for segment in segments], axis=0)
@@ -47,9 +53,7 @@ def roles_and_parts(
                     None
                 ]
             try:
-                found = assign_roles(
-                    skeleton_of(legged, shapes, telling_names(legged)), None, override
-                )
+                found = roles_of(legged, shapes)
             except SkeletonError:
                 raise error from None
             arms = [found.joint(role) for role in _ARMS]

@@ -77,10 +77,11 @@ def search_tpose(
     with the least cost wins. The residuals are those of `_linearize`, and `followers` where their
     leaders take them.
     """
-    q = _initial_guesses(tree)
+    upright = ideal[roles.require(Role.PELVIS)]
+    q = _initial_guesses(tree, upright)
     pose = rest_pose(skeleton, roles)
     bone_targets = _bone_targets(pose, links)
-    forward = quat_rotate(quat_conj(ideal[roles.require(Role.PELVIS)]), np.array([1.0, 0, 0]))
+    forward = quat_rotate(quat_conj(upright), np.array([1.0, 0, 0]))
     bend_hinges = _bend_hinges(tree, pose, links, forward)
 
     def linearize(q: Coordinates) -> NormalEquations:
@@ -116,12 +117,11 @@ def search_tpose(
     return TPose(one, world, direction_errors)
 
 
-def _initial_guesses(tree: Tree) -> Coordinates:
-    """The rest pose, the middle of the limits, and poses between, as frames."""
+def _initial_guesses(tree: Tree, upright: Float[np.ndarray, "4"]) -> Coordinates:
+    """The rest pose, the middle of the limits, and poses between, as frames; the base `upright` and
+    facing ahead however the file has it: from half a turn away no residual tells where to turn."""
     rest = np.clip(np.zeros(len(tree)), tree.lower, tree.upper)
-    bounded = np.isfinite(tree.lower) & np.isfinite(tree.upper)
-    lower, upper = (np.where(bounded, limit, 0.0) for limit in (tree.lower, tree.upper))
-    middle = (lower + upper) / 2
+    middle = tree.middle
     angles = np.stack([rest, middle, (rest + middle) / 2, rest + 0.3 * (middle - rest)])
     angles[:, tree.balls] = 0.0
     balls = None
@@ -129,7 +129,7 @@ def _initial_guesses(tree: Tree) -> Coordinates:
         balls = np.tile([1.0, 0, 0, 0], (len(angles), len(tree), 1))
     return Coordinates(
         np.tile(tree.base, (len(angles), 1)),
-        np.tile([1.0, 0, 0, 0], (len(angles), 1)),
+        np.tile(upright, (len(angles), 1)),
         angles,
         balls,
     )

@@ -65,7 +65,7 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
     segments = segments_of(mjcf, tree, joints)
     points = surface_points(mjcf, segments)
     standing = standing_height(points, tree.base)
-    found, segments, points, mounted = roles_and_parts(segments, points, override)
+    found, segments, points, mounted = roles_and_parts(tree, segments, points, override)
     segments, order = _rerooted(segments, found)
     points = [points[k] for k in order]
     roles = RoleMap(

@@ -166,6 +166,7 @@ def _drift(course: Course, source: Course, times: Float[np.ndarray, "T"], scale:
         values_at(source.hips, at),
         values_at(source.heading, at),
         scale,
+        course.subject.motion.frame_time,
     )
 
 

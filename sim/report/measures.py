@@ -9,10 +9,12 @@ from scipy.ndimage import minimum_filter1d
 from sim.report.derivatives import derivative
 from spark.resample import values_at
 from spark.summary import brief
+from spark.transfer.breaks import MAX_SPEED
 
 # The slope across a path is only told where the path is wider than this share of its length, and a
 # slope at all where it leaves at most this share of the heights' standard deviation.
 _MIN_WIDTH, _MAX_UNEXPLAINED = 0.3, 0.5
+_BEGIN = 0.25  # [s] in which a T-pose that a converter put before a source ends
 
 
 def floor_height(lowest: Float[np.ndarray, "T"]) -> float:
@@ -64,7 +66,8 @@ def horizontal_speed(
 class Drift:
     """How far the root strays from the source's path, which is scaled to the body.
 
-    `distance` [m] is horizontal, frame by frame, with both paths starting at the same point;
+    `distance` [m] is horizontal, frame by frame, with both paths starting at the same point. A
+    source that leaps in its first `_BEGIN` starts after that: a T-pose elsewhere has no distance.
     `path_length` [m] is that of the scaled source; `heading` [rad] is the difference of headings.
     """
 
@@ -81,17 +84,22 @@ def root_drift(
     source_hips: Float[np.ndarray, "T 3"],
     source_heading: Float[np.ndarray, "T"],
     scale: float,
+    frame_time: float,
 ) -> Drift:
     """Both motions at the same times; `scale` is how far the body goes for each metre of it."""
-    path = (hips - hips[0])[:, :2]
-    source_path = scale * (source_hips - source_hips[0])[:, :2]
+    steps = np.linalg.norm(np.diff(source_hips[: 1 + int(_BEGIN / frame_time)], axis=0), axis=-1)
+    leaps = np.flatnonzero(steps > MAX_SPEED * frame_time)
+    start = leaps[-1] + 1 if len(leaps) else 0
+    path = (hips - hips[start])[:, :2]
+    source_path = scale * (source_hips - source_hips[start])[:, :2]
     turned = heading - source_heading
     # Headings are known up to whole turns.
-    turned = turned - 2 * np.pi * np.round(turned[0] / (2 * np.pi))
+    turned = turned - 2 * np.pi * np.round(turned[start] / (2 * np.pi))
+    begun = np.arange(len(hips)) >= start
     return Drift(
-        distance=np.linalg.norm(path - source_path, axis=-1),
-        path_length=float(np.linalg.norm(np.diff(source_path, axis=0), axis=-1).sum()),
-        heading=turned,
+        distance=begun * np.linalg.norm(path - source_path, axis=-1),
+        path_length=float(np.linalg.norm(np.diff(source_path[start:], axis=0), axis=-1).sum()),
+        heading=begun * turned,
     )
 
 

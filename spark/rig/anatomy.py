@@ -40,8 +40,9 @@ class Anatomy:
     mirrored: frozenset[int]
 
 
-def find_anatomy(measured: Measurements, hints: Sequence[NameHint]) -> Anatomy:
-    """The anatomy of a two-legged body; SkeletonError with the reason where it is none."""
+def find_anatomy(measured: Measurements, hints: Sequence[NameHint], bent: Measurements) -> Anatomy:
+    """The anatomy of a two-legged body, whose knees and elbows are bent as they can be in `bent`;
+    SkeletonError with the reason where it is none."""
     skeleton = measured.skeleton
     if measured.reach[0] <= 0:
         raise SkeletonError(f"all bones of the skeleton ({len(skeleton)} joints) are 0 m long")
@@ -76,7 +77,10 @@ def find_anatomy(measured: Measurements, hints: Sequence[NameHint]) -> Anatomy:
     if labelled_arms is not None:
         labelled_legs, labelled_arms = _align(measured, labelled_legs, labelled_arms)
     above = next((j for j in (head, *reversed(neck), *reversed(spine)) if j is not None), None)
-    sides = first_is_left(measured, labelled_legs, labelled_arms, above)
+    sides = SideEvidence(
+        bends=first_is_left(bent, labelled_legs, labelled_arms, above).bends,
+        feet=first_is_left(measured, labelled_legs, labelled_arms, above).feet,
+    )
     mirrored = frozenset(j for p in pairs for j in (*p.first, *p.second))
     return Anatomy(pelvis, spine, neck, head, labelled_legs, labelled_arms, sides, mirrored)
 
@@ -90,14 +94,16 @@ def _human(hints: Sequence[NameHint], arms: LimbPair, named: bool) -> bool:
 def _others(
     measured: Measurements, skeleton: Skeleton, pairs: Sequence[LimbPair], legs: LimbPair
 ) -> list[LimbPair]:
-    """The pairs that are no part of the legs and long enough to be limbs beside them."""
+    """The pairs that are no part of the legs and long enough to be limbs beside them; a single
+    joint, as a horn, a shoulder's plate or a logo that is welded on, is none."""
     inside = {j for root in legs.roots for j in skeleton.subtree(root)}
     above = set(skeleton.ancestors(legs.roots[0])) | set(skeleton.ancestors(legs.roots[1]))
     least = 0.4 * float(measured.reach[legs.roots[0]])
     return [
         pair
         for pair in pairs
-        if not inside & set(pair.roots)
+        if len(pair.first) > 1
+        and not inside & set(pair.roots)
         and not above & set(pair.roots)
         and measured.reach[pair.first[0]] >= least
     ]

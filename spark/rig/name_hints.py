@@ -85,14 +85,16 @@ def split_name(name: str) -> list[str]:
 
 
 def _strip_common(cut: list[list[str]], end: int) -> None:
-    """Take away, in place, the words that most names begin (0) or end (-1) with."""
+    """Take away, in place, the words that most names begin (0) or end (-1) with, and of words that
+    mean a joint or a side those of all names."""
     for _ in range(4):
         counts = Counter(pieces[end] for pieces in cut if len(pieces) > 1)
         if not counts:
             return
         word, count = counts.most_common(1)[0]
         meaningful = word in LEFT | RIGHT or word in MEANINGS or word in ASIDE
-        if count < 0.7 * len(cut) or (meaningful and word != "root"):
+        most = len(cut) if meaningful and word != "root" else 0.7 * len(cut)
+        if count < most:
             return
         for pieces in cut:
             if len(pieces) > 1 and pieces[end] == word:

@@ -27,19 +27,23 @@ _TOES_BEHIND = -1.0
 
 
 def assign_roles(
-    skeleton: Skeleton, motion: Motion | None = None, override: Override | None = None
+    skeleton: Skeleton,
+    motion: Motion | None = None,
+    override: Override | None = None,
+    bent: Motion | None = None,
 ) -> RoleMap:
     """The role of each joint, how sure it is, and why.
 
     Evidence in this order: names; chains and their symmetry; the poses of `motion` (the rest pose
-    without one); `override` stands above all, and suffices where it gives pelvis and legs.
+    without one); `override` stands above all, and suffices where it gives pelvis and legs. Which
+    limbs are left, knees and elbows show in the poses of `bent` where it is given.
     SkeletonError with the reason where the body does not walk on two legs.
     """
     override = override or {}
     check_override(skeleton, override)
     hints = with_votes(skeleton, read_names(skeleton.names))
     try:
-        found = _infer(skeleton, motion, hints)
+        found = _infer(skeleton, motion, hints, bent)
     except SkeletonError as error:
         missing = [role.value for role in REQUIRED if not override.get(role)]
         if override and missing:
@@ -66,9 +70,12 @@ REQUIRED = (
 Found = dict[int, tuple[Role, float, str]]
 
 
-def _infer(skeleton: Skeleton, motion: Motion | None, hints: Sequence[NameHint]) -> Found:
+def _infer(
+    skeleton: Skeleton, motion: Motion | None, hints: Sequence[NameHint], bent: Motion | None
+) -> Found:
     """Joint to role, confidence and reason."""
-    anatomy = find_anatomy(measure(skeleton, motion), hints)
+    measured = measure(skeleton, motion)
+    anatomy = find_anatomy(measured, hints, measured if bent is None else measure(skeleton, bent))
     found: Found = {}
     pelvis = hints[anatomy.pelvis].parts.get("pelvis", 0.0) > 0.3
     found[anatomy.pelvis] = (Role.PELVIS, _confidence(pelvis, True, True), "carries the legs")

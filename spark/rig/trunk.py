@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Float
 
 from spark.rig.measurements import Measurements
 from spark.rig.name_hints import NameHint
@@ -33,7 +34,7 @@ def find_trunk(
     skeleton = measured.skeleton
     limbs = {j for p in (legs, arms) if p is not None for r in p.roots for j in skeleton.subtree(r)}
     top = pelvis if arms is None else arms.root_joint
-    head = _head(measured, hints, pelvis, top, legs, limbs)
+    head = _head(measured, hints, pelvis, top, legs, arms, limbs)
     spine = list(_between(measured, pelvis, top))
     if top != pelvis:
         spine.append(top)
@@ -74,6 +75,7 @@ def _head(
     pelvis: int,
     top: int,
     legs: LimbPair,
+    arms: LimbPair | None,
     limbs: set[int],
 ) -> int | None:
     """The joint named head, or the end of the chain that leaves the joint of the arms upwards."""
@@ -81,17 +83,21 @@ def _head(
     named = [
         j
         for j in range(len(skeleton))
-        if j not in limbs and hints[j].parts.get("head", 0.0) > 0.3 and j != pelvis
+        if j not in limbs
+        and j != pelvis
+        # the joint of the arms is hardly ever the head: its name has to be sure
+        and hints[j].parts.get("head", 0.0) > (_SURE if j == top else 0.3)
     ]
     if named:
         head = max(named, key=lambda j: (hints[j].parts["head"], -j))
         above = int(skeleton.parents[head])
-        face = hints[head].parts["head"] < _SURE and above not in {pelvis, top, *limbs}
+        face = hints[head].parts["head"] < _SURE and above not in {-1, pelvis, top, *limbs}
         return above if face and measured.bones[head] < _HERE * measured.bones[above] else head
     # From the joint that carries the arms, the chain that is no limb and leads up.
     trunk = set(skeleton.ancestors(pelvis))
     starts = [c for c in skeleton.children[top] if c not in limbs and c not in trunk]
-    starts = [c for c in starts if not hints[c].aside and _rises(measured, c, pelvis, top, legs)]
+    up = _up(measured, pelvis, top, legs, arms)
+    starts = [c for c in starts if not hints[c].aside and _rises(measured, c, top, up)]
     if not starts:
         return None
     chain = chain_below(measured, max(starts, key=lambda c: measured.reach[c] + measured.bones[c]))
@@ -104,11 +110,18 @@ def _head(
     return chain[-2] if crown else chain[-1]
 
 
-def _rises(measured: Measurements, joint: int, pelvis: int, top: int, legs: LimbPair) -> bool:
-    """Whether a chain leaves the trunk away from the legs, in most frames."""
+def _up(
+    measured: Measurements, pelvis: int, top: int, legs: LimbPair, arms: LimbPair | None
+) -> Float[np.ndarray, "T 3"]:
+    """From pelvis to shoulders, or where one joint carries legs and arms from the feet to it. A
+    robot's joint that carries the arms may lie anywhere, under the pelvis too: shoulders don't."""
     at = measured.joints
-    below = (
-        at[:, pelvis] if top != pelvis else np.mean([measured.tip(j) for j in legs.roots], axis=0)
-    )
-    up = at[:, top] - below
-    return bool(np.mean(((measured.tip(joint) - at[:, top]) * up).sum(-1) > 0) >= 0.5)
+    if top == pelvis:
+        return at[:, top] - np.mean([measured.tip(j) for j in legs.roots], axis=0)
+    shoulders = at[:, top] if arms is None else at[:, arms.roots].mean(axis=1)
+    return shoulders - at[:, pelvis]
+
+
+def _rises(measured: Measurements, joint: int, top: int, up: Float[np.ndarray, "T 3"]) -> bool:
+    """Whether a chain leaves the trunk's `top` upwards, in most frames."""
+    return bool(np.mean(((measured.tip(joint) - measured.joints[:, top]) * up).sum(-1) > 0) >= 0.5)

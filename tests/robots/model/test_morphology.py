@@ -1,7 +1,9 @@
 """Any humanoid MJCF is understood as it comes: roles, T-pose, centres, coordinates."""
 
+import itertools
 import re
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -169,6 +171,42 @@ def test_each_body_has_its_role(name: str) -> None:
         if role is not None
     }
     assert found == expected
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_names_need_not_say_which_side_a_limb_is_on(name: str) -> None:
+    """Knees and elbows show it by the way they bend, however straight the file draws them."""
+    robot = understood(name)
+    spec = robot.mjcf.spec.copy()
+    others = spec.actuators, spec.sensors, spec.excludes, spec.equalities, spec.tendons
+    for element in itertools.chain(*others, spec.lights, spec.cameras):
+        spec.delete(element)
+    bodies = {body.name: f"part_{k}" for k, body in enumerate(spec.bodies[1:])}
+    for body in spec.bodies[1:]:
+        body.name = bodies[body.name]
+    for k, joint in enumerate(spec.joints):
+        joint.name = f"revolute_{k}"
+    mjcf = replace(robot.mjcf, spec=spec, model=spec.compile())
+    nameless = understand_robot(mjcf).rig
+
+    found = dict(zip(nameless.skeleton.names, nameless.roles.roles, strict=True))
+    for joint, role in zip(robot.rig.skeleton.names, robot.rig.roles.roles, strict=True):
+        if role is not None and role.part in ("upper_leg", "lower_leg", "upper_arm", "forearm"):
+            assert found[bodies[joint]] is role
+
+
+@pytest.mark.parametrize("degrees", [90, 180, 217])
+def test_a_robot_may_look_anywhere_in_its_file(degrees: int, tmp_path: Path) -> None:
+    """Half a turn away from ahead, the search for its T-pose stood still."""
+    text = registry.find("ember").read_text()
+    turned, count = re.subn(
+        r'<body name="pelvis"', f'<body name="pelvis" euler="0 0 {np.radians(degrees)}"', text
+    )
+    assert count == 1
+    robots = [understand_robot(written(tmp_path, x)) for x in (turned, text)]
+    tpose, expected = (robot.to_qpos(robot.tpose)[0] for robot in robots)
+    np.testing.assert_allclose(tpose[7:], expected[7:], atol=1e-3)
+    assert abs(tpose[3:7] @ expected[3:7]) == pytest.approx(1)
 
 
 @pytest.mark.parametrize("name", TABLE)

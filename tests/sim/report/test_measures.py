@@ -83,10 +83,21 @@ def test_drift_compares_scaled_paths_from_a_common_start() -> None:
     source = np.stack([ahead, 0 * ahead, 0 * ahead + 0.9], axis=-1)
     path = np.stack([0 * ahead + 7, 0.5 * ahead, 0 * ahead + 0.45], axis=-1)
     turned = np.full(4, 2 * np.pi + 0.1)
-    drift = root_drift(path, turned, source, np.zeros(4), 0.5)
+    drift = root_drift(path, turned, source, np.zeros(4), 0.5, frame_time=1.0)
     assert drift.path_length == pytest.approx(1.5)
     np.testing.assert_allclose(drift.distance, 0.5 * ahead * np.sqrt(2))
     np.testing.assert_allclose(drift.heading, 0.1)
+
+
+def test_a_t_pose_elsewhere_before_the_source_is_no_drift_of_the_rest() -> None:
+    ahead = np.linspace(0, 3, 60)
+    source = np.stack([ahead, 0 * ahead, 0 * ahead + 0.9], axis=-1)
+    path, heading = source - source[1], np.zeros(60)
+    source[0], heading[0] = [40.0, -2.0, 0.9], 4.0
+    drift = root_drift(path, np.zeros(60), source, heading, 1.0, frame_time=1 / 60)
+    np.testing.assert_allclose(drift.distance, 0.0, atol=1e-12)
+    np.testing.assert_allclose(drift.heading, 0.0)
+    assert drift.path_length == pytest.approx(3.0, rel=0.02)
 
 
 def test_swing_and_twist_add_up_for_a_turn_about_one_axis() -> None:

@@ -273,3 +273,36 @@ def test_a_mouse_with_short_upper_arms_has_shoulders() -> None:
     assert table["mixamorig:LeftArm"] is Role.LEFT_UPPER_ARM
     assert table["mixamorig:RightForeArm"] is Role.RIGHT_FOREARM
     assert table["mixamorig:RightHand"] is Role.RIGHT_HAND
+
+
+@pytest.mark.parametrize("convention", ["lafan1", "unreal", "robot"])
+def test_what_all_names_share_says_nothing(convention: str) -> None:
+    """Whatever it means elsewhere: every joint of a model called `Head Hunter 2` is no head."""
+    skeleton, right = build(RIGS[convention])
+    for word in ("head_hunter2_{}", "hand-{}", "{}_right", "Spine{}"):
+        named = replace(skeleton, names=tuple(map(word.format, skeleton.names)))
+        assert wrong(named, assign_roles(named), right) == {}
+
+
+@pytest.mark.parametrize("chest", ["FaceUnit", "HeadRest"])
+def test_what_carries_the_arms_is_hardly_a_head(chest: str) -> None:
+    """By a doubtful name, and at the root of the file, too, as the trunks of robots are."""
+    skeleton, right = build(RIGS["smpl"])
+    at = right.index(Role.LEFT_CLAVICLE)
+    top = int(skeleton.parents[at])
+    named = replace(skeleton, names=_with(skeleton.names, top, chest))
+    assert wrong(named, assign_roles(named), right) == {}
+
+    # The trunk first, the pelvis below it, no clavicles: left and right by name.
+    rooted, roles = build(
+        f"""
+        {chest} S > Base P
+        Base > {{l}}_thigh T > {{l}}_shin K > {{l}}_foot A
+        {chest} > {{l}}_upperarm U > {{l}}_forearm F > {{l}}_hand W
+        """
+    )
+    assert wrong(rooted, assign_roles(rooted), roles) == {}
+
+
+def _with(names: tuple[str, ...], at: int, name: str) -> tuple[str, ...]:
+    return (*names[:at], name, *names[at + 1 :])
