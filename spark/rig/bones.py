@@ -8,11 +8,13 @@ from jaxtyping import Float
 
 from spark.kinematics import end_positions, world_positions, world_rotations
 from spark.rig.fingers import fingers_below
-from spark.rig.roles import LIMBS, RoleMap
+from spark.rig.roles import LIMBS, Role, RoleMap
 from spark.rotation import quat_conj, quat_rotate
 from spark.skeleton import Skeleton
 
+_HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
 SHORT = 1e-6  # [m] shorter vectors have no direction
+_COS_HELD = np.cos(np.radians(60))  # of what a hand holds to the forearm; fingers lie along it
 _THUMB_DROOP = np.radians(20)  # of a thumb below the plane of the palm, about, in artists' rigs
 
 Vector = Float[np.ndarray, "3"]
@@ -47,7 +49,8 @@ class RigPose:
 
     def bone(self, joint: int) -> Vector | None:
         """The vector [m] from `joint` to the next joint of its limb or, at the limb's end, to the
-        middle of what hangs there, thumbs aside. None where nothing shows a direction."""
+        middle of what hangs there, but for thumbs and what a hand holds. None where nothing shows a
+        direction."""
         role = self.roles.roles[joint]
         below = self.skeleton.subtree(joint)
         for limb in LIMBS.values():
@@ -55,9 +58,26 @@ class RigPose:
                 for j in self.roles.joints(after):
                     if j in below and (vector := self._vector(joint, [j], [])) is not None:
                         return vector
-        thumbs = {k for j in self._finger(joint, "thumb") for k in self.skeleton.subtree(j)}
-        fingers = [j for j in below if j not in thumbs]
+        aside = {*self._finger(joint, "thumb"), *self._held(joint)}
+        aside |= {k for j in aside for k in self.skeleton.subtree(j)}
+        fingers = [j for j in below if j not in aside]
         return self._vector(joint, fingers[1:], fingers)
+
+    def _held(self, hand: int) -> list[int]:
+        """What hangs on a hand and points away from its forearm, as swords and trays do: no wrist
+        rests so far bent that these are fingers."""
+        forearm = int(self.skeleton.parents[hand])
+        if self.roles.roles[hand] not in _HANDS or forearm < 0:
+            return []
+        along = self.positions[hand] - self.positions[forearm]
+        held = []
+        for joint in self.skeleton.children[hand]:
+            below = list(self.skeleton.subtree(joint))
+            points = self._vector(hand, below, below)
+            away = np.zeros(3) if points is None else quat_rotate(self.world[hand], points)
+            if away @ along < _COS_HELD * np.linalg.norm(away) * np.linalg.norm(along):
+                held.append(joint)
+        return held
 
     def thumb_side(self, hand: int) -> tuple[Vector, float] | None:
         """The vector towards the thumb's side of a hand, and how far [rad] it points below the

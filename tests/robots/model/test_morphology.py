@@ -587,3 +587,13 @@ def test_a_model_is_read_without_what_is_no_part_of_its_body(
     assert "incomplete" not in note
     assert robot.joint_names == expected.joint_names
     np.testing.assert_array_equal(robot.tpose.angles, expected.tpose.angles)
+
+
+def test_a_tool_in_a_hand_turns_no_hand(tmp_path: Path) -> None:
+    text = registry.find("ember").read_text()
+    sword = '<body name="rod"><geom type="capsule" fromto="0 0 0 .5 0 0" size=".01" mass=".01"/>'
+    held, count = re.subn(r'(<body name="left_hand"[^>]*>)', rf"\1{sword}</body>", text)
+    assert count == 1
+    robots = [understand_robot(written(tmp_path, x)) for x in (held, text)]
+    tpose, expected = (robot.to_qpos(robot.tpose)[0, 7:] for robot in robots)
+    np.testing.assert_allclose(tpose, expected, atol=1e-3)

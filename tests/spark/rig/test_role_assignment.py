@@ -286,23 +286,12 @@ def test_what_all_names_share_says_nothing(convention: str) -> None:
 
 @pytest.mark.parametrize("chest", ["FaceUnit", "HeadRest"])
 def test_what_carries_the_arms_is_hardly_a_head(chest: str) -> None:
-    """By a doubtful name, and at the root of the file, too, as the trunks of robots are."""
-    skeleton, right = build(RIGS["smpl"])
-    at = right.index(Role.LEFT_CLAVICLE)
-    top = int(skeleton.parents[at])
-    named = replace(skeleton, names=_with(skeleton.names, top, chest))
-    assert wrong(named, assign_roles(named), right) == {}
-
-    # The trunk first, the pelvis below it, no clavicles: left and right by name.
-    rooted, roles = build(
+    """By a doubtful name, of a body that begins with its trunk, as robots' do."""
+    skeleton, right = build(
         f"""
-        {chest} S > Base P
-        Base > {{l}}_thigh T > {{l}}_shin K > {{l}}_foot A
+        {chest} S > Waist S > Base P
         {chest} > {{l}}_upperarm U > {{l}}_forearm F > {{l}}_hand W
+        Base > {{l}}_thigh T > {{l}}_shin K > {{l}}_foot A
         """
     )
-    assert wrong(rooted, assign_roles(rooted), roles) == {}
-
-
-def _with(names: tuple[str, ...], at: int, name: str) -> tuple[str, ...]:
-    return (*names[:at], name, *names[at + 1 :])
+    assert wrong(skeleton, assign_roles(skeleton), right) == {}

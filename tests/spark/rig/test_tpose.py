@@ -12,6 +12,7 @@ from spark.io.recording import read_recording
 from spark.kinematics import local_rotations, world_positions
 from spark.motion import Motion
 from spark.rig.rig import Rig, understand
+from spark.rig.role_assignment import assign_roles
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rig.tpose import find_tpose
 from spark.rotation import (
@@ -27,6 +28,7 @@ from spark.transfer.canonical import to_canonical
 from tests.helpers.humanoids import EVERY_BODY, ONE_A_RIG
 from tests.helpers.recordings import DATA, recording, recordings
 from tests.helpers.rerig import along_x, rerig, rest_in
+from tests.helpers.rigs import RIGS, build
 from tests.helpers.stick import joint, standing, stick_rig
 
 DOWN, LEFT, RIGHT = np.array([0.0, 0, -1]), np.array([0.0, 1, 0]), np.array([0.0, -1, 0])
@@ -337,3 +339,22 @@ def test_a_body_in_one_point_is_refused() -> None:
     motion = replace(standing(rig, 2), skeleton=flat)
     with pytest.raises(SkeletonError, match="no direction is left"):
         find_tpose(motion, rig.roles)
+
+
+def test_what_a_hand_holds_does_not_turn_it() -> None:
+    """A sword that stands out in front of the fist, of a rig with fingers and of one without."""
+    for convention, hand in (("lafan1", "RightHand"), ("unreal", "hand_r")):
+        skeleton, _ = build(RIGS[convention])
+        at, end = skeleton.names.index(hand), len(skeleton)
+        armed = replace(
+            skeleton,
+            names=(*skeleton.names, "katana", "katana_tip"),
+            parents=np.array([*skeleton.parents, at, end]),
+            offsets=np.array([*skeleton.offsets, [0.05, -0.08, 0], [0.9, 0, 0]]),
+            translating=np.array([*skeleton.translating, False, False]),
+        )
+        tposes = []
+        for rig in (armed, skeleton):
+            rest = Motion(rig, 1.0, rig.offsets[:1], np.tile([1.0, 0, 0, 0], (1, len(rig), 1)))
+            tposes.append(find_tpose(rest, assign_roles(rig))[0][:end])
+        assert quat_angle(*tposes).max() < 1e-6
