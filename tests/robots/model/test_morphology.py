@@ -178,8 +178,8 @@ def test_names_need_not_say_which_side_a_limb_is_on(name: str) -> None:
     """Knees and elbows show it by the way they bend, however straight the file draws them."""
     robot = understood(name)
     spec = robot.mjcf.spec.copy()
-    others = spec.actuators, spec.sensors, spec.excludes, spec.equalities, spec.tendons
-    for element in itertools.chain(*others, spec.lights, spec.cameras):
+    named = spec.actuators, spec.sensors, spec.excludes, spec.equalities, spec.tendons, spec.keys
+    for element in [*itertools.chain(*named, spec.lights, spec.cameras)]:
         spec.delete(element)
     bodies = {body.name: f"part_{k}" for k, body in enumerate(spec.bodies[1:])}
     for body in spec.bodies[1:]:
