@@ -154,17 +154,23 @@ def parse(argv: Sequence[str]) -> Namespace:
             f"don't know what {' '.join(left)} is for; files stand side by side, and an option "
             "takes one value"
         )
-    if args.command is not None and (missing := _without_value(args)):
-        command.error(f"{missing} is empty; a variable of the shell that is not set, perhaps")
+    if args.command is not None:
+        _refuse_empty(command, args)
     return args
 
 
-def _without_value(args: Namespace) -> str | None:
-    """The name of an argument that is an empty text, which would stand for the current folder."""
-    for name, value in vars(args).items():
-        if "" in (value if isinstance(value, list) else [value]):
-            return name.replace("_", "-")
-    return None
+def _refuse_empty(command: ArgumentParser, args: Namespace) -> None:
+    """Refuse an empty text, which would stand for the current folder."""
+    for argument in command._actions:
+        value = getattr(args, argument.dest, None)
+        if "" not in (value if isinstance(value, list) else [value]):
+            continue
+        name = (*argument.option_strings[-1:], argument.metavar)[0]
+        or_not = "" if argument.required else ", or leave it out"
+        command.error(
+            f"{name} is an empty text: write a value there{or_not}; if a variable of the shell "
+            "stands there, it is not set"
+        )
 
 
 def _nearest(name: str, known: Iterable[str]) -> str:
