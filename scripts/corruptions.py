@@ -232,7 +232,7 @@ def _with_feet_moved(
     rig, rotations = canonical.rig, canonical.rotations
     for sole, move in zip(rig.soles, moves, strict=True):
         limb = {"left": Group.LEFT_LEG, "right": Group.RIGHT_LEG}[sole.side]
-        leg = leg_of(rig.skeleton, rig.roles.roles, limb)
+        leg = leg_of(rig, limb)
         if leg is None:
             raise SkeletonError("a leg without a knee")
         rotations = bend_leg(rotations, canonical_positions(canonical), leg, move)

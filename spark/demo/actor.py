@@ -53,7 +53,7 @@ class Actor:
     ) -> None:
         """Bring an ankle to a path [m, world] and turn its foot and toes since the T-pose."""
         skeleton, roles = self.rig.skeleton, self.rig.roles
-        joints = leg_of(skeleton, roles.roles, leg)
+        joints = leg_of(self.rig, leg)
         assert joints is not None  # the demo's rigs have legs
         positions = self.positions()
         move = ankle - positions[:, joints.foot]

@@ -170,7 +170,11 @@ def in_concatenation(
 
 def _leg(body: BodyFeatures, limb: Group) -> Leg:
     """The joints of one leg in the network's numbering."""
-    roles = [body.rig.roles.roles[j] for j in body.joints.tolist()]
-    leg = leg_of(body.skeleton, roles, limb)
+    leg = leg_of(body.rig, limb)
     assert leg is not None  # clips are of bodies with two feet (`spark.training.clips`)
-    return leg
+    number = {j: k for k, j in enumerate(body.joints.tolist())}
+    turned = (
+        tuple(sorted(number[j] for j in joints if j in number))
+        for joints in (leg.with_thigh, leg.with_shank)
+    )
+    return Leg(*(number[j] for j in leg[:4]), *turned)

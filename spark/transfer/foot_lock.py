@@ -44,7 +44,7 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
     feet: list[tuple[Leg, Standing, Standing]] = []
     stretches: list[Float[np.ndarray, T]] = []
     for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
-        leg = leg_of(moved.rig.skeleton, moved.rig.roles.roles, group)
+        leg = leg_of(moved.rig, group)
         if leg is not None and source.rig.roles.joint(LIMBS[group][2]) is not None:
             feet.append((leg, standing(source, group), standing(moved, group)))
             stretches.append(stretch(source, group))

@@ -93,7 +93,7 @@ def _fitted(source: CanonicalMotion, moved: CanonicalMotion, fit: LegFit) -> Can
     outwards = quat_rotate(source.rotations[:, start.pelvis], np.array([0.0, 1.0, 0.0]))[:, :2]
     moves: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
     for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
-        leg = leg_of(target.skeleton, target.roles.roles, group)
+        leg = leg_of(target, group)
         ankle = start.roles.joint(foot_role(group))
         if leg is None or ankle is None:
             continue

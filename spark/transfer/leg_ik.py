@@ -14,10 +14,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from spark.blocks import in_blocks
-from spark.rig.doubles import doubles_of
-from spark.rig.roles import LIMBS, Group, Role
+from spark.rig.rig import Rig
+from spark.rig.roles import LIMBS, Group
 from spark.rotation import quat_between, quat_mul, quat_rotate
-from spark.skeleton import Skeleton
 from spark.smoothstep import smoothstep
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.vectors import cross, dot, joined
@@ -37,18 +36,16 @@ class Leg(NamedTuple):
     with_shank: tuple[int, ...]
 
 
-def leg_of(skeleton: Skeleton, roles: Sequence[Role | None], limb: Group) -> Leg | None:
-    """The leg `limb` of a skeleton whose joints hold `roles`; None without a knee or an ankle."""
-    held = [next((j for j, own in enumerate(roles) if own is role), None) for role in LIMBS[limb]]
-    upper, lower, foot, toe = held
+def leg_of(rig: Rig, limb: Group) -> Leg | None:
+    """The leg `limb` of a rig; None without a knee or an ankle."""
+    upper, lower, foot, toe = (rig.roles.joint(role) for role in LIMBS[limb])
     if upper is None or lower is None or foot is None:
         return None
-    doubles = doubles_of(skeleton, roles)
     below_hip, below_knee, below_ankle = (
         {
             below
-            for top in (joint, *(j for j, own in doubles.items() if own == joint))
-            for below in skeleton.subtree(top)
+            for top in (joint, *(j for j, own in rig.doubles.items() if own == joint))
+            for below in rig.skeleton.subtree(top)
         }
         for joint in (upper, lower, foot)
     )

@@ -49,7 +49,7 @@ def within_reach(
 def stretch(motion: CanonicalMotion, group: Group) -> Float[np.ndarray, "T"]:
     """How far a leg's ankle is from its hip joint, over the leg's length; 1, that of a leg which
     can't stretch, without a knee or without length."""
-    leg = leg_of(motion.rig.skeleton, motion.rig.roles.roles, group)
+    leg = leg_of(motion.rig, group)
     if leg is None:
         return np.ones(len(motion))
     length, away = _length_and_ankle(motion, leg)

@@ -23,7 +23,7 @@ NEVER = np.zeros((1, 121), dtype=bool)
 
 def stick() -> tuple[CanonicalMotion, Leg]:
     motion = to_canonical(standing(stick_rig(), 121, FPS), stick_rig())
-    leg = leg_of(motion.rig.skeleton, motion.rig.roles.roles, Group.LEFT_LEG)
+    leg = leg_of(motion.rig, Group.LEFT_LEG)
     assert leg is not None
     return motion, leg
 
@@ -90,7 +90,7 @@ def test_the_frame_rate_does_not_matter() -> None:
 
 def test_the_higher_of_two_needs_counts() -> None:
     motion, leg = stick()
-    other = leg_of(motion.rig.skeleton, motion.rig.roles.roles, Group.RIGHT_LEG)
+    other = leg_of(motion.rig, Group.RIGHT_LEG)
     assert other is not None
     moves = [(leg, stepping(0.1)), (other, -stepping(0.3))]
     both = within_reach(motion, moves, np.repeat(ALWAYS, 2, axis=0))[0]
