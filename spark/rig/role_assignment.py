@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 from spark.errors import SkeletonError
 from spark.motion import Motion
@@ -18,6 +19,7 @@ __all__ = ["Override", "assign_roles"]
 
 # How often each kind of evidence alone is right, by judgement.
 _NAME_RELIABILITY, _CHAIN_RELIABILITY, _SHAPE_RELIABILITY = 0.85, 0.6, 0.6
+_DOUBTED = 0.6  # of the confidence is left where something speaks against a side
 _CLEAR_SIDE = 0.15  # of the evidence of `first_is_left`, which is sure at 0.3
 # Of both parts of it, for sides that the body shows against its names. Of 580 recordings and rest
 # poses that are named rightly none has both below 0; mirrored, their motions have both below -1.
@@ -42,17 +44,20 @@ def assign_roles(
     override = override or {}
     check_override(skeleton, override)
     hints = with_votes(skeleton, read_names(skeleton.names))
+    found: Found = {}
+    sides = _Sides(True)
     try:
-        found = _infer(skeleton, motion, hints, bent)
+        found, sides = _infer(skeleton, motion, hints, bent)
     except SkeletonError as error:
         missing = [role.value for role in REQUIRED if not override.get(role)]
         if override and missing:
             raise SkeletonError(f"{error}; the one given lacks {', '.join(missing)}") from error
         if missing:
             raise
-        found = {}
     roles = _merge(skeleton, hints, found, override)
-    roles = replace(roles, notes=_on_sides(skeleton, roles))
+    if sides.note and Role.LEFT_UPPER_LEG not in override:
+        left = skeleton.names[roles.require(Role.LEFT_UPPER_LEG)]
+        roles = replace(roles, notes=(f"{sides.note} ({left!r} is taken for the left thigh)",))
     if override:
         check_chains(skeleton, roles)
     return roles
@@ -70,10 +75,20 @@ REQUIRED = (
 Found = dict[int, tuple[Role, float, str]]
 
 
+class _Sides(NamedTuple):
+    """Whether the first one of a limb's two chains is the left one, and whether the body shows it
+    `clear`ly; what makes it doubtful, for the reasons of their joints, and for the user."""
+
+    first_left: bool
+    clear: bool = True
+    doubt: str = ""
+    note: str = ""
+
+
 def _infer(
     skeleton: Skeleton, motion: Motion | None, hints: Sequence[NameHint], bent: Motion | None
-) -> Found:
-    """Joint to role, confidence and reason."""
+) -> tuple[Found, _Sides]:
+    """Joint to role, confidence and reason; and what tells the legs' sides."""
     measured = measure(skeleton, motion)
     anatomy = find_anatomy(measured, hints, measured if bent is None else measure(skeleton, bent))
     found: Found = {}
@@ -91,7 +106,7 @@ def _infer(
     for limb in (anatomy.legs, anatomy.arms):
         if limb is not None:
             _infer_limb(skeleton, hints, anatomy, limb, found)
-    return found
+    return found, _sides_of(hints, anatomy, anatomy.legs)
 
 
 def _infer_limb(
@@ -102,47 +117,42 @@ def _infer_limb(
     found: Found,
 ) -> None:
     is_leg = limb is anatomy.legs
-    shown, named_sides = anatomy.sides, limb.pair.sided
-    against = named_sides and _against_names(hints, anatomy)
-    first_left = (named_sides and not against) or (not named_sides and shown.both >= 0)
-    sides = ("left", "right") if first_left else ("right", "left")
-    agreement = shown.both if named_sides and not against else abs(shown.both)
-    for index, side in enumerate(sides):
+    sides = _sides_of(hints, anatomy, limb)
+    for index, side in enumerate(("left", "right") if sides.first_left else ("right", "left")):
         for part in limb.labels[index].index:
             joint = limb.joint(index, part)
             assert joint is not None
             named = hints[joint].parts.get(part, 0.0) > 0.3
-            sure = _confidence(named, joint in anatomy.mirrored, agreement > _CLEAR_SIDE)
             why = f"chain from the {'pelvis down' if is_leg else 'trunk outwards'}"
             if named:
                 why = _by_name(skeleton, hints, joint)
-            if against:
-                sure, why = 0.6 * sure, f"{why}{_TURNED}"
-            elif named_sides and agreement < -_CLEAR_SIDE:
-                sure, why = 0.6 * sure, f"{why}{_DOUBTED}"
-            elif not named_sides and agreement < _CLEAR_SIDE:
-                sure, why = 0.6 * sure, f"{why}; the side is a guess"
-            found[joint] = (Role(f"{side}_{part}"), sure, why)
+            sure = _confidence(named, joint in anatomy.mirrored, sides.clear)
+            sure *= _DOUBTED if sides.doubt else 1.0
+            found[joint] = (Role(f"{side}_{part}"), sure, f"{why}{sides.doubt}")
 
 
-_TURNED = ", but the body bends and stands as on its other side"
-_DOUBTED = ", though it lies on the other side of the body"
-
-
-def _on_sides(skeleton: Skeleton, roles: RoleMap) -> tuple[str, ...]:
-    """A note where names and body tell other sides."""
-    for words, what in (
-        (_TURNED, "names call the body's left its right: knees, elbows and feet tell the sides"),
-        (
-            _DOUBTED,
-            "names call left what looks like the body's right, and are believed; if it is "
-            "wrong, give a map",
-        ),
-    ):
-        legs = [j for j in roles.joints(Role.LEFT_UPPER_LEG) if roles.reasons[j].endswith(words)]
-        if legs:
-            return (f"{what} ({skeleton.names[legs[0]]!r} is taken for the left thigh)",)
-    return ()
+def _sides_of(hints: Sequence[NameHint], anatomy: Anatomy, limb: LabelledPair) -> _Sides:
+    """Names tell the sides, unless the body shows the contrary; without names the body does."""
+    shown = anatomy.sides.both
+    if not limb.pair.sided:
+        clear = abs(shown) > _CLEAR_SIDE
+        return _Sides(shown >= 0, clear, "" if clear else "; the side is a guess")
+    if _against_names(hints, anatomy):
+        return _Sides(
+            False,
+            abs(shown) > _CLEAR_SIDE,
+            ", but the body bends and stands as on its other side",
+            "names call the body's left its right: knees, elbows and feet tell the sides",
+        )
+    if shown < -_CLEAR_SIDE:
+        return _Sides(
+            True,
+            False,
+            ", though it lies on the other side of the body",
+            "names call left what looks like the body's right, and are believed; if it is wrong, "
+            "give a map",
+        )
+    return _Sides(True, shown > _CLEAR_SIDE)
 
 
 def _against_names(hints: Sequence[NameHint], anatomy: Anatomy) -> bool:

@@ -177,4 +177,5 @@ def _leg(body: BodyFeatures, limb: Group) -> Leg:
         tuple(sorted(number[j] for j in joints if j in number))
         for joints in (leg.with_thigh, leg.with_shank)
     )
-    return Leg(*(number[j] for j in leg[:4]), *turned)
+    upper, lower, foot, contact = (number[j] for j in leg[:4])
+    return Leg(upper, lower, foot, contact, *turned)
