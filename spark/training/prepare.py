@@ -185,7 +185,7 @@ def _index(digests: dict[Path, str], parts: Path, seed: int) -> Index:
 
 def _body_of(rig: Rig, bodies: list[dict[str, Any]], folder: str, who: str | None) -> int:
     """The place of this rig's body among `bodies`, which it joins where it is new. A character whom
-    files name (`who`) is no other, whatever the skeletons."""
+    files name (`who`) is no other, and the same one on every skeleton."""
     own = folder if who is None else who
     skeleton = rig.skeleton
     for i, body in enumerate(bodies):
@@ -202,8 +202,8 @@ def _body_of(rig: Rig, bodies: list[dict[str, Any]], folder: str, who: str | Non
             return i
     taken = {body["character"] for body in bodies}
     names = (own if n == 1 else f"{own} {n}" for n in range(1, len(bodies) + 2))
-    character = next(name for name in names if name not in taken)
     named = who is not None
+    character = own if named else next(name for name in names if name not in taken)
     bodies.append({"character": character, "own": own, "named": named, "rig": rig, "frames": 0})
     return len(bodies) - 1
 

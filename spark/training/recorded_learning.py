@@ -18,7 +18,7 @@ from spark.training.recorded_pairs import RecordedPairs
 from spark.training.recorded_reach import Test, met, tested
 
 _FOLDS = 4
-_MIN_LEFT_OUT = 4  # characters; fewer are no test
+MIN_TESTED = 8  # characters; fewer are no test of one another
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +38,11 @@ class Recorded:
 
 
 def learn_recorded(known: RecordedPairs, seed: int = 0) -> Recorded:
-    """What these pairs say. Fewer than 8 characters are no test of one another: then nothing of it
-    is to be used."""
-    characters = sorted({known.characters[pair.target] for pair in known.pairs})
+    """What these pairs say. Of fewer than `MIN_TESTED` characters nothing is to be used."""
+    characters = known.sharing
     order = np.random.default_rng(seed).permutation(len(characters))
     tests = []
-    for k in range(_FOLDS if len(characters) >= 2 * _MIN_LEFT_OUT else 0):
+    for k in range(_FOLDS if len(characters) >= MIN_TESTED else 0):
         fold = {characters[i] for i in order[k::_FOLDS]}
         others, left_out = known.without(fold), known.of(fold)
         if others.enough and left_out.pairs:

@@ -23,7 +23,7 @@ from spark.training.same_motion import SPARE_FRAMES, same_motion
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.hip_rise import standing
 
-MIN_BODIES = 4  # fewer tell nothing of others
+_MIN_CHARACTERS = 4  # fewer tell nothing of others
 MAX_PAIRS = 4000  # drawn from those of a large dataset
 _FRAMES = 60  # of a clip that are looked at
 _LEGS = (Group.LEFT_LEG, Group.RIGHT_LEG)
@@ -55,10 +55,15 @@ class RecordedPairs:
     pairs: list[RecordedPair]
     namesakes: tuple[str, ...] = ()
 
+    @cached_property
+    def sharing(self) -> list[str]:
+        """The characters that pairs have."""
+        return sorted({self.characters[pair.target] for pair in self.pairs})
+
     @property
     def enough(self) -> bool:
         """Whether something can be learned from them."""
-        return len({pair.target for pair in self.pairs}) >= MIN_BODIES
+        return len(self.sharing) >= _MIN_CHARACTERS
 
     @cached_property
     def balance(self) -> Float[np.ndarray, "P"]:
@@ -79,7 +84,7 @@ class RecordedPairs:
 
 
 def recorded_pairs(found: Sequence[Performance], seed: int = 0) -> RecordedPairs:
-    """All that the motions shared by two bodies say; of more than `MAX_PAIRS`, as many drawn.
+    """All that the motions shared by two characters say; of more than `MAX_PAIRS`, as many drawn.
     Clips that share a name alone are left out (`same_motion`)."""
     by_motion: dict[str, list[int]] = defaultdict(list)
     for k, one in enumerate(found):
@@ -89,7 +94,7 @@ def recorded_pairs(found: Sequence[Performance], seed: int = 0) -> RecordedPairs
         for same in by_motion.values()
         for a in same
         for b in same
-        if found[a].clip.body is not found[b].clip.body
+        if found[a].character != found[b].character
         and abs(len(found[a].clip.hips) - len(found[b].clip.hips)) <= SPARE_FRAMES
     ]
     if len(drawn) > MAX_PAIRS:

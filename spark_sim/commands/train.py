@@ -210,8 +210,8 @@ def _hold(out: Path, held: ExitStack) -> None:
 
 
 def _learn_recorded(start: "Checkpoint", config: "TrainConfig", out: Path) -> "Checkpoint":
-    """`start` with what the recorded pairs of the data say, where there are some. Under `torchrun`
-    the process that writes learns from them, and the others wait for it."""
+    """`start` with what the recorded pairs of the data say, where they are enough. Under
+    `torchrun` the process that writes learns from them, and the others wait for it."""
     from spark.training.recorded_stage import recorded_stage, with_recorded
     from spark_sim import console
     from spark_sim.watching import is_first
@@ -220,9 +220,9 @@ def _learn_recorded(start: "Checkpoint", config: "TrainConfig", out: Path) -> "C
     if stage is None:
         return start
     console.note(stage.about)
-    if not stage.known.enough:
+    if stage.known is None:
         return start
-    start, told = with_recorded(start, stage, config, out)
+    start, told = with_recorded(start, stage.known, config, out)
     console.note(told)
     return start
 

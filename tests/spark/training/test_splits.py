@@ -81,3 +81,16 @@ def test_characters_whom_files_name_are_not_each_other(tmp_path: Path) -> None:
             (tree / place).write_text(text)
         index = prepare([tree], tmp_path / f"out{len(places[1])}{len(expected)}")
         assert [body["character"] for body in index["bodies"]] == expected
+
+
+def test_a_character_whom_files_name_is_one_on_every_skeleton(tmp_path: Path) -> None:
+    """Else training would see an unseen character, in files whose skeletons differ."""
+    made = sample(tmp_path / "samples")
+    (tmp_path / "flat").mkdir()
+    for number, path in enumerate(made):
+        who = ("Anna", "Bert", "Carl")[number % 3]
+        path.rename(tmp_path / "flat" / f"{who}@{path.stem}.bvh")
+    index = prepare([tmp_path / "flat"], tmp_path / "dataset")
+    assert len(index["bodies"]) > len({body["character"] for body in index["bodies"]}) == 3
+    cells = {(index["bodies"][c["body"]]["character"], c["cell"][:2]) for c in index["clips"]}
+    assert len(cells) == 3
