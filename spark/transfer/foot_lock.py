@@ -8,7 +8,7 @@ from its mean position is taken for noise and removed; what goes beyond is motio
 (`spark.transfer.stances`) is at its own mean position, and a foot is carried from one footprint to
 the next (`spark.transfer.footfalls`). The lowest point of the sole is as high above the floor as
 the source's is, scaled: while it stands and while it swings, whatever the length of the foot; the
-hips rise with it (`spark.transfer.hip_rise`).
+hips rise with it (`spark.transfer.hip_rise`). What hovers comes down (`spark.transfer.hover`).
 """
 
 from dataclasses import replace
@@ -21,7 +21,8 @@ from spark.rig.roles import LIMBS, Group
 from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.footfalls import between_contacts, beyond
-from spark.transfer.hip_rise import Standing, hip_rise, standing
+from spark.transfer.hip_rise import Standing, hip_rise, hips_with_feet, lowest, standing
+from spark.transfer.hover import put_down
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
 from spark.transfer.reach import stretch, swing_gently, within_reach
 from spark.transfer.stances import stances
@@ -40,7 +41,8 @@ _ENDS = [0, 1, -2, -1]  # of a sole's points: its heel and its toes' end
 def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
     """`moved`, the transfer of `source`, with its feet held while the source's stand, and as high
     as the source's; its hips go with them."""
-    scale = moved.rig.hip_height / source.rig.hip_height
+    size = moved.rig.hip_height
+    scale = size / source.rig.hip_height
     feet: list[tuple[Leg, Standing, Standing]] = []
     stretches: list[Float[np.ndarray, T]] = []
     for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
@@ -50,20 +52,23 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
             stretches.append(stretch(source, group))
     if not feet:
         return moved
-    rise = hip_rise(source, moved, [(theirs, own) for _, theirs, own in feet])
     ends = np.stack([theirs.sole[:, _ENDS] for _, theirs, _ in feet], axis=1)
     stands, flat = stances(ends, source.frame_time, source.rig.standing_height)
+    rolled = [_rolled(theirs.sole, own.sole, source) for _, theirs, own in feet]
+    low = np.stack([lowest(theirs, source) for _, theirs, _ in feet])
+    down = put_down(low, stands, [own for _, own in rolled])
+    rise = hip_rise(source, moved, [(theirs, own) for _, theirs, own in feet])
+    rise -= size * hips_with_feet(down, low, moved.frame_time)
     moves: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
-    for (leg, (_, _, their_sole), (_, _, own_sole)), stance in zip(feet, stands, strict=True):
-        theirs, own = _rolled(their_sole, own_sole, source)
+    for k, (leg, _, (_, _, own_sole)) in enumerate(feet):
+        (theirs, own), stance = rolled[k], stands[k]
         offset = np.zeros((len(own), 2))
         for start, stop in true_runs(stance):
             here = slice(start, stop)
-            kept = beyond(scale * theirs[here], _CAPTURE_NOISE * moved.rig.hip_height)
+            kept = beyond(scale * theirs[here], _CAPTURE_NOISE * size)
             offset[here] = own[here].mean(axis=0) + kept - own[here]
         along = between_contacts(offset, stance, own)
-        wanted = scale * (their_sole[..., 2].min(axis=1) - source.floor_z)
-        wanted = np.maximum(wanted, -_MAX_SINK * moved.rig.hip_height)
+        wanted = size * np.maximum(low[k] - down[k], -_MAX_SINK)
         height = own_sole[..., 2].min(axis=1) + rise - moved.floor_z
         moves.append((leg, np.column_stack([along, wanted - height])))
     risen = replace(moved, hips=moved.hips + rise[:, None] * np.array([0.0, 0.0, 1.0]))

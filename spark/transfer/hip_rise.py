@@ -72,10 +72,23 @@ def hip_rise(
         for theirs, own in legs
     ]
     upright = [_upright(source, theirs) for theirs, _ in legs]
-    low = np.stack([theirs.sole[..., 2].min(axis=1) for theirs, _ in legs]) - source.floor_z
-    weights = 1 / (1 + (np.maximum(low, 0) / (_LIGHT * source.rig.hip_height)) ** 2)
-    rise = (weights * upright * rises).sum(axis=0) / weights.sum(axis=0)
-    return np.asarray(gaussian_filter1d(rise, _EASE / moved.frame_time, mode="nearest"))
+    low = np.stack([lowest(theirs, source) for theirs, _ in legs])
+    return hips_with_feet(np.multiply(upright, rises), low, moved.frame_time)
+
+
+def lowest(leg: Standing, motion: CanonicalMotion) -> Float[np.ndarray, "T"]:
+    """The height over the floor of the lowest point of a sole [hip heights]."""
+    return np.asarray(leg.sole[..., 2].min(axis=1) - motion.floor_z) / motion.rig.hip_height
+
+
+def hips_with_feet(
+    moves: Float[np.ndarray, "L T"], low: Float[np.ndarray, "L T"], frame_time: float
+) -> Float[np.ndarray, "T"]:
+    """How the hips move with what moves at each of L legs, whose soles are so `low` [hip heights]:
+    the lower, the more a leg counts, and no faster than the floor would give."""
+    weights = 1 / (1 + (np.maximum(low, 0) / _LIGHT) ** 2)
+    mean = (weights * moves).sum(axis=0) / weights.sum(axis=0)
+    return np.asarray(gaussian_filter1d(mean, _EASE / frame_time, mode="nearest"))
 
 
 def _beside_leg(motion: CanonicalMotion, leg: Standing) -> Float[np.ndarray, "T"]:

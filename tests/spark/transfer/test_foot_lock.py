@@ -137,7 +137,7 @@ def test_a_longer_foot_on_its_toes_stays_on_the_floor() -> None:
                 np.array([0.0, bend, 0.0])
             )
         pitch = np.zeros((60, 3))
-        pitch[:, 1] = 0.4 * np.sin(np.linspace(0, 6, 60))
+        pitch[:, 1] = 0.2 * np.sin(np.linspace(0, 6, 60))
         motion.rotations[:, joint(Role(f"{side}_foot"))] = quat_from_rotvec(pitch)
     source = to_canonical(motion, rig)
     moved = lock_feet(source, transfer(source, long_feet))
