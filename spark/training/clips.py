@@ -42,7 +42,7 @@ def read_clips(
             name = character_and_motion(path.stem, path.parent.name)[1]
             clips.append(clip_of(name, to_canonical(motion, bodies[key].rig), bodies[key]))
         except SparkSimError as error:
-            notes.append(f"{path}: left out: {error}")
+            notes.append(f"{path}: left out: {why_left_out(path, error)}")
     if not clips:
         raise SkeletonError(
             f"{', '.join(map(str, paths))}: no recording of a humanoid to train on; {notes[0]}"
@@ -50,9 +50,17 @@ def read_clips(
     return clips, tuple(notes)
 
 
+def why_left_out(path: Path, error: SparkSimError) -> str:
+    """What is wrong with a file, without its path, which stands before it."""
+    why = str(error).removeprefix(f"{path}: ").replace(f"{path}:", "line ")
+    return why.replace(str(path), path.name)
+
+
 def clip_of(name: str, canonical: CanonicalMotion, body: BodyFeatures) -> TrainingClip:
-    """A motion on `body`'s rig as a clip. Raises `SkeletonError` without two feet."""
+    """A motion on `body`'s rig as a clip. Raises `SkeletonError` without two feet or two frames."""
     rig = canonical.rig
+    if len(canonical) < 2:
+        raise SkeletonError("holds a single frame; expected a motion")
     canonical = at_frame_time(canonical, FRAME_TIME)
     hips = canonical.hips - np.array([0, 0, canonical.floor_z])
     planted = planted_feet(rig, canonical_positions(canonical), FRAME_TIME)

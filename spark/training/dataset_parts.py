@@ -23,7 +23,7 @@ from spark.network.features import body_features
 from spark.opening import loads_json
 from spark.rig.rig import Rig, understand
 from spark.rig.rig_json import rig_from_json, rig_to_json
-from spark.training.clips import clip_of
+from spark.training.clips import clip_of, why_left_out
 from spark.transfer.canonical import to_canonical
 
 # Goes up whenever the same file gives another part.
@@ -110,13 +110,10 @@ def _understood(path: Path) -> Part | Rejected:
     try:
         motion = read_motion(path).motion
         rig = understand(motion)
-        if len(motion) < 2:
-            return Rejected("holds a single frame; expected a motion")
         canonical = to_canonical(motion, rig)
         clip = clip_of(path.stem, canonical, body_features(rig))
     except SparkSimError as error:
-        why = str(error).removeprefix(f"{path}: ").replace(f"{path}:", "line ")
-        return Rejected(why.replace(str(path), path.name))
+        return Rejected(why_left_out(path, error))
     except Exception as error:  # one bad file does not end the work on thousands
         return Rejected(unforeseen(error), again=True)
     return Part(

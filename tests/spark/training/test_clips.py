@@ -39,3 +39,17 @@ def test_a_broken_file_is_left_out_and_named(tmp_path: Path) -> None:
     assert len({id(clip.body) for clip in found}) == 2
     assert len(notes) == 1
     assert "broken.bvh" in notes[0]
+
+
+def test_a_pose_is_no_motion_and_a_path_is_named_once(tmp_path: Path) -> None:
+    """As `prepare` has it: datasets and folders give the same clips."""
+    walk, *_ = sample(tmp_path)
+    head, motion = walk.read_text().split("MOTION")
+    rows = motion.split("Frame Time:")[1].splitlines()
+    (tmp_path / "pose.bvh").write_text(f"{head}MOTION\nFrames: 1\nFrame Time:{rows[0]}\n{rows[1]}\n")
+    (tmp_path / "void.bvh").touch()
+    found, notes = read_clips([tmp_path])
+    assert len(found) == 6
+    pose, void = notes
+    assert pose == f"{tmp_path / 'pose.bvh'}: left out: holds a single frame; expected a motion"
+    assert void.count("void.bvh") == 1
