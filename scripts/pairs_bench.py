@@ -7,8 +7,8 @@ Batches are those of the preset (of default: 4 draws of 4 windows of 64 frames).
 steps, counted apart, variants of bodies are made and names read, as many as the preset has; the
 other rows are of 16 variants a body, all made. Padded batches are what a GPU gets, with the way
 from a worker to the trainer in the last two rows, where the steps in which workers begin are not
-counted. Beside the rate on the clock, which other work on the machine lowers, stands that for a CPU
-second of a worker.
+counted. Beside the rate on the clock stand those for a CPU second of a worker: of the median block
+of steps, and of the best tenth, as other work on the machine takes caches and half of a core, too.
 """
 
 import sys
@@ -16,7 +16,9 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import torch
+from jaxtyping import Float
 from torch.utils.data import DataLoader
 
 from spark.training.batch import PairDraws, UnpairedDraws
@@ -49,7 +51,7 @@ def main(preset: str, *data: str) -> None:
     clips, _ = training_clips([Path(folder) for folder in data])
     own = TrainConfig.of(preset)
     config = replace(own, variants=16)
-    print("| | windows/s | windows for a CPU second of a worker |\n|---|---|---|")
+    print("| | windows/s | for a CPU second of a worker | in the best tenth |\n|---|---|---|---|")
     for told, settings, fixed, warm, count in (
         (f"the first {FIRST} steps", own, True, 0, FIRST),
         ("one by one", config, False, FIRST, STEPS - BEGUN),
@@ -58,13 +60,13 @@ def main(preset: str, *data: str) -> None:
         names = NameEncoder().eval().remembering()
         blocks = Timed(Steps(clips, names, settings, 0, 1, fixed_sizes=fixed))
         size = blocks.steps.block
-        began, clock = time.perf_counter(), time.process_time()
+        clocks: list[float] = []
         for n in range((warm + count) // size):
             if n == warm // size:
-                began, clock = time.perf_counter(), time.process_time()
-            done = blocks[n][1]
+                began, clocks = time.perf_counter(), [time.process_time()]
+            clocks.append(blocks[n][1])
         rate = count / (time.perf_counter() - began)
-        _row(told, config, rate, count / (done - clock))
+        _row(told, config, rate, size / np.diff(clocks))
     for workers in (1, 2):
         loader = DataLoader(
             blocks,
@@ -81,14 +83,14 @@ def main(preset: str, *data: str) -> None:
                 began = time.perf_counter()
         made = (len(clocks) - begun) * size
         rate = made / (time.perf_counter() - began)
-        each = [clocks[begun + k :: workers] for k in range(workers)]
-        used = sum(of_one[-1] - of_one[0] for of_one in each)
+        used = np.concatenate([np.diff(clocks[begun + k :: workers]) for k in range(workers)])
         told = f"padded, {workers} worker{'s' * (workers > 1)}"
-        _row(told, config, rate, (made - workers * size) / used)
+        _row(told, config, rate, size / used)
 
 
-def _row(told: str, config: TrainConfig, *steps: float) -> None:
-    """Of steps a second, on the clock and of CPU time."""
+def _row(told: str, config: TrainConfig, rate: float, of_cpu: Float[np.ndarray, "B"]) -> None:
+    """Of steps a second on the clock, and in each block of CPU time."""
+    steps = (rate, float(np.median(of_cpu)), float(np.percentile(of_cpu, 90)))
     print("|", " | ".join([told, *(f"{n * config.batch:.0f}" for n in steps)]), "|", flush=True)
 
 

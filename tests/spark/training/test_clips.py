@@ -46,7 +46,8 @@ def test_a_pose_is_no_motion_and_a_path_is_named_once(tmp_path: Path) -> None:
     walk, *_ = sample(tmp_path)
     head, motion = walk.read_text().split("MOTION")
     rows = motion.split("Frame Time:")[1].splitlines()
-    (tmp_path / "pose.bvh").write_text(f"{head}MOTION\nFrames: 1\nFrame Time:{rows[0]}\n{rows[1]}\n")
+    one = f"MOTION\nFrames: 1\nFrame Time:{rows[0]}\n{rows[1]}\n"
+    (tmp_path / "pose.bvh").write_text(head + one)
     (tmp_path / "void.bvh").touch()
     found, notes = read_clips([tmp_path])
     assert len(found) == 6
