@@ -166,7 +166,7 @@ def _parted(
         return q
     holds = _holds_of(robot, targets, feet, q, block)
     near = collision_candidates(robot, targets, q, block)
-    if near or not block.base:
+    if near:
         q = solve_block(robot, targets, holds, q, block, *steps, near)
     if not block.base and (thrown := abrupt(robot, targets, q, block)).any():
         q = calmed(robot, targets, holds, q, block, thrown)
