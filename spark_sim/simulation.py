@@ -8,7 +8,7 @@ from sim.physics import policy_summary
 from sim.physics.policy_network import PolicyNetwork
 from sim.physics.policy_spec import read_spec
 from sim.physics.policy_tracking import PolicyRun, PolicyTracker
-from sim.physics.summary import LIMITS, render, summarize
+from sim.physics.summary import render, summarize
 from sim.physics.tracking import Assist, TrackingResult, track
 from sim.trajectory import Subject, model_trajectory
 from sim.view.scene import Figure
@@ -16,7 +16,7 @@ from spark.errors import SkeletonError
 from spark_sim.clips import AnyClip, File, RobotClip
 from spark_sim.loading import clip_of
 
-__all__ = ["LIMITS", "Followed", "Simulated", "follow", "simulate"]
+__all__ = ["Followed", "Simulated", "follow", "simulate"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +57,11 @@ class Simulated:
         ]
 
 
-def simulate(clip: AnyClip | File, *, assist: bool = False) -> Simulated:
+def simulate(clip: AnyClip | File, *, assist: bool = False, balance: bool = False) -> Simulated:
     """Track a motion with position servos, in simulation with contacts. A robot has its own servos;
     the body of a character is built with them. With `assist`, a force and a torque on the root
-    help.
+    help. With `balance`, a controller looks ahead and keeps the body up by its own strength
+    (docs/playback.md): some six seconds of CPU time for each of the motion.
 
     Raises `SkeletonError` where the body is no humanoid, or has no shape that collides.
     """
@@ -71,6 +72,7 @@ def simulate(clip: AnyClip | File, *, assist: bool = False) -> Simulated:
         height=clip.rig.standing_height,
         floor_z=clip.floor_z,
         assist=Assist() if assist else None,
+        balance=balance,
     )
     return Simulated(clip, tracked)
 

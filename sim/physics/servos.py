@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
 from sim.body.compiling import compiled
 from sim.trajectory import ModelTrajectory
@@ -17,18 +18,19 @@ _COLLISION_GROUP = 3  # by custom; viewers don't show it
 
 
 def with_servos(
-    body: ModelTrajectory, *, height: float, floor_z: float
+    body: ModelTrajectory, *, height: float, floor_z: float, own: bool = False
 ) -> tuple[mujoco.MjModel, tuple[str, ...]]:
     """The body's model on a floor, with a position servo where it has an actuator, and what was
     assumed on the way.
 
-    A model's own position servos stay as they are. Motors are replaced by servos with the torque
-    limits of the motors, and a model without actuators gets servos on all its joints.
+    A model's own position servos stay as they are, unless `own` asks for servos of ours in their
+    place. Motors are replaced by servos with the torque limits of the motors, and a model without
+    actuators gets servos on all its joints.
     """
     notes: list[str] = []
     spec = on_floor(body, floor_z, notes)
     timestep = min(float(body.model.opt.timestep), _MAX_TIMESTEP)
-    _replace_motors(spec, body.model, height, timestep, notes)
+    _replace_motors(spec, body.model, height, timestep, own, notes)
     spec.option.timestep, spec.option.gravity = timestep, [0.0, 0.0, -GRAVITY]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     model = compiled(spec)
@@ -72,6 +74,24 @@ def _bits(model: mujoco.MjModel, field: str) -> int:
     return int(np.bitwise_or.reduce(getattr(model, f"geom_{field}"), initial=0))
 
 
+def controls(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    error: Float[np.ndarray, "nv"],
+    speed: Float[np.ndarray, "nv"],
+) -> Float[np.ndarray, "nu"]:
+    """Controls with which every servo sees its `error` along the joints' own rotations, which a
+    ball joint's rotation vector only is for small angles, and damps what the wanted `speed`
+    leaves."""
+    moment = np.zeros((model.nu, model.nv))
+    mujoco.mju_sparse2dense(
+        moment, data.actuator_moment, data.moment_rownnz, data.moment_rowadr, data.moment_colind
+    )
+    lag = model.actuator_biasprm[:, 2] / model.actuator_biasprm[:, 1]  # kv / kp [s]
+    wanted: Float[np.ndarray, nu] = data.actuator_length + moment @ error + lag * (moment @ speed)
+    return wanted
+
+
 def is_servo(model: mujoco.MjModel, actuator: int) -> bool:
     """Whether an actuator's force is kp (control - length) - kv velocity."""
     kp = float(model.actuator_gainprm[actuator, 0])
@@ -85,12 +105,17 @@ def is_servo(model: mujoco.MjModel, actuator: int) -> bool:
 
 
 def _replace_motors(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, height: float, timestep: float, notes: list[str]
+    spec: mujoco.MjSpec,
+    model: mujoco.MjModel,
+    height: float,
+    timestep: float,
+    own: bool,
+    notes: list[str],
 ) -> None:
-    servos = [a for a in range(model.nu) if is_servo(model, a)]
+    servos = [a for a in range(model.nu) if not own and is_servo(model, a)]
     if model.nu and len(servos) == model.nu:
         return
-    motors = {_joint_of(model, a): a for a in range(model.nu) if a not in servos}
+    motors = {servo_joint(model, a): a for a in range(model.nu) if a not in servos}
     joints = [j for j in range(model.njnt) if int(model.jnt_type[j]) in (_HINGE, _BALL)]
     if model.nu:
         joints = [j for j in joints if j in motors]
@@ -117,14 +142,15 @@ def _replace_motors(
             servo.set_to_position(kp=kp, kv=2 * float(np.sqrt(kp * inertia)))
             servo.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
             servo.forcerange = [-limits[j], limits[j]]
-    what = "its motors" if model.nu else "joints without actuators"
+    given = "its actuators" if own else "its motors"
+    what = given if model.nu else "joints without actuators"
     notes.append(
         f"{what} are driven by servos of ours: full torque at {FULL_TORQUE_ERROR:g} rad from the "
         "target"
     )
 
 
-def _joint_of(model: mujoco.MjModel, actuator: int) -> int:
+def servo_joint(model: mujoco.MjModel, actuator: int) -> int:
     """The joint that an actuator drives; -1 where it is no single one."""
     kinds = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
     if int(model.actuator_trntype[actuator]) not in kinds:
@@ -139,7 +165,7 @@ def torque_limit(model: mujoco.MjModel, joint: int) -> float | None:
     if model.jnt_actfrclimited[joint]:
         limits.append(float(np.abs(model.jnt_actfrcrange[joint]).max()))
     for a in range(model.nu):
-        if _joint_of(model, a) != joint:
+        if servo_joint(model, a) != joint:
             continue
         gear = float(np.abs(model.actuator_gear[a]).max())
         if model.actuator_forcelimited[a]:

@@ -18,6 +18,10 @@ LIMITS = (
     "this motion up, not that no controller could; an assist that carries weight hides feet in the "
     "air. Compare only what the same servos tracked."
 )
+BALANCED_LIMITS = (
+    "This measures the controller as much as the motion: a fall shows that its tries found no way "
+    "to keep this motion up, not that there is none."
+)
 _HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
 _LISTED = 8  # joints and bodies in the text: the most loaded ones
 
@@ -58,6 +62,7 @@ def summarize(tracked: TrackingResult) -> dict[str, Any]:
         "frame_time": tracked.frame_time,
         "mass_kg": round(tracked.mass, 3),
         "height_m": round(tracked.height, 4),
+        "balanced": tracked.balanced,
         "verdict": verdict,
         "upright_s": upright_s,
         "stays_up_s": None if verdict == "carried" else upright_s,
@@ -89,7 +94,7 @@ def summarize(tracked: TrackingResult) -> dict[str, Any]:
             if loads[:, b].any()
         ],
         "notes": list(tracked.notes),
-        "limits": LIMITS,
+        "limits": BALANCED_LIMITS if tracked.balanced else LIMITS,
     }
 
 
@@ -107,7 +112,8 @@ def render(metrics: dict[str, Any], name: str) -> str:
         "diverged": f"at frame {metrics['diverged_frame']}; no numbers after it",
     }[metrics["verdict"]]
     lines = [
-        f"{name}: tracked in simulation, {'with' if assist else 'without'} assist",
+        f"{name}: tracked in simulation, {'balanced, ' * metrics['balanced']}"
+        f"{'with' if assist else 'without'} assist",
         f"  {metrics['verdict'].replace('_', ' '):<8}  {verdict}",
         f"  error     {error['joints_deg']:.1f} deg RMS of the joints; joints "
         f"{error['mpjpe_cm']:.1f} cm away, {error['mpjpe_root_cm']:.1f} cm relative to the root"

@@ -13,7 +13,8 @@ from jaxtyping import Bool, Float
 
 from sim.body.compiling import warnings_as_notes
 from sim.interpolate import at_times, velocities
-from sim.physics.servos import with_servos
+from sim.physics.balance import Balancer
+from sim.physics.servos import controls, with_servos
 from sim.trajectory import ModelTrajectory
 from spark.errors import SkeletonError
 from spark.summary import brief
@@ -86,6 +87,7 @@ class TrackingResult:
     height: float
     mass: float
     assist: Assist | None
+    balanced: bool
     diverged: int | None
     notes: tuple[str, ...]
 
@@ -104,24 +106,27 @@ def track(
     height: float,
     floor_z: float = 0.0,
     assist: Assist | None = None,
+    balance: bool = False,
 ) -> TrackingResult:
     """Simulate the body of `target` while its servos follow the target's coordinates.
 
     It begins in the first frame, with its velocity, or at rest where that is a jump. `height` [m]
-    is that of the standing body. The same input gives the same output, to the bit.
+    is that of the standing body. With `balance`, servos of ours are shifted so that it keeps its
+    balance (`sim.physics.balance`). The same input gives the same output, to the bit.
     """
     if not np.isfinite(target.qpos).all():
         raise SkeletonError("the motion has coordinates that are no finite numbers")
-    model, notes = with_servos(target, height=height, floor_z=floor_z)
+    model, notes = with_servos(target, height=height, floor_z=floor_z, own=balance)
     steps = int(np.ceil(frame_time / model.opt.timestep - 1e-6))
     model.opt.timestep = frame_time / steps
     root = int(model.body(target.model.body(target.root).name).id)
-    simulation = _Simulation(model, root, height, assist)
     speeds = velocities(model, target.qpos, frame_time)
     start, fastest = speeds[0], float(np.abs(speeds[0]).max())
     if fastest > _MAX_START_SPEED:
         start = np.zeros_like(start)
         notes += (f"the first frame is left at {fastest:.0f} rad/s: the simulation begins at rest",)
+    balancer = Balancer(model, root, target.qpos, speeds, frame_time, height) if balance else None
+    simulation = _Simulation(model, root, height, assist, balancer)
     rollout, target_points, diverged = simulation.run(target.qpos, speeds, start, frame_time, steps)
     return TrackingResult(
         model,
@@ -132,6 +137,7 @@ def track(
         height,
         simulation.mass,
         assist,
+        balance,
         diverged,
         notes,
     )
@@ -141,11 +147,16 @@ class _Simulation:
     """The stepping: servos, the assist, and the log."""
 
     def __init__(
-        self, model: mujoco.MjModel, root: int, height: float, assist: Assist | None
+        self,
+        model: mujoco.MjModel,
+        root: int,
+        height: float,
+        assist: Assist | None,
+        balancer: Balancer | None,
     ) -> None:
         self.model, self.data, self.root = model, mujoco.MjData(model), root
         self.mass = float(model.body_subtreemass[root])
-        self.assist = assist
+        self.assist, self.balancer, self.step = assist, balancer, 0
         self.height = height
         self.weight = self.mass * float(np.linalg.norm(model.opt.gravity))
         start = int(model.jnt_dofadr[model.body_jntadr[root]])
@@ -160,8 +171,6 @@ class _Simulation:
         self.force_limit = np.where(limited, model.actuator_forcerange[:, 1], np.inf)
         limited = np.asarray(model.jnt_actfrclimited, dtype=bool)
         self.joint_limit = np.where(limited, model.jnt_actfrcrange[:, 1], np.inf)
-        self.lag = model.actuator_biasprm[:, 2] / model.actuator_biasprm[:, 1]  # kv / kp [s]
-        self.moment = np.zeros((model.nu, model.nv))
         self.error = np.zeros(model.nv)
         self.wrench = np.zeros(6)
 
@@ -230,7 +239,10 @@ class _Simulation:
         for wanted, speed in zip(qpos, qvel, strict=True):
             mujoco.mj_step1(model, data)
             mujoco.mj_differentiatePos(model, self.error, 1.0, data.qpos, wanted)
-            self._set_controls(speed)
+            data.ctrl[:] = controls(model, data, self.error, speed)
+            if self.balancer is not None:
+                data.ctrl += self.balancer.shifts(data, self.step)
+            self.step += 1
             if self.assist is not None:
                 self._apply_assist(self.assist, speed)
                 rollout.wrench[t] += step_share * self.wrench
@@ -246,21 +258,6 @@ class _Simulation:
             at_limit = np.abs(data.actuator_force) >= _SATURATED * self.force_limit
             saturated[self.actuator_joint[at_limit]] = True
             rollout.saturated[t] += step_share * saturated
-
-    def _set_controls(self, speed: Float[np.ndarray, "nv"]) -> None:
-        """Controls with which every servo sees its error along the joints' own rotations, which a
-        ball joint's rotation vector only is for small angles, and damps what the target's velocity
-        leaves."""
-        data = self.data
-        mujoco.mju_sparse2dense(
-            self.moment,
-            data.actuator_moment,
-            data.moment_rownnz,
-            data.moment_rowadr,
-            data.moment_colind,
-        )
-        data.ctrl[:] = data.actuator_length + self.moment @ self.error
-        data.ctrl += self.lag * (self.moment @ speed)
 
     def _apply_assist(self, assist: Assist, speed: Float[np.ndarray, "nv"]) -> None:
         """The assist on the free joint: a force in world axes and a torque in the root's own."""

@@ -26,8 +26,8 @@ writes files instead and needs no display.
 
 With --physics, position servos track each motion in simulation. A summary says
 whether the body stays up, hangs on the assist or falls, how far it is from the
-motion, and the torques. With --policy and --spec a policy of yours follows a
-robot's motion instead."""
+motion, and the torques. With --balance a controller looks ahead and keeps it
+up. With --policy and --spec a policy of yours follows a robot's motion."""
 EXAMPLES = """\
 examples:
   spark-sim play walk.bvh              # a window
@@ -35,6 +35,7 @@ examples:
   spark-sim play walk.bvh walk_on_g1.npz --video walk.mp4 --strip walk.png
   spark-sim play theirs.csv --robot unitree_g1 --quat xyzw --fps 60
   spark-sim play walk_on_g1.npz --physics --assist --html physics.html
+  spark-sim play walk_on_g1.npz --physics --balance --video physics.mp4
   spark-sim play walk_on_g1.npz --physics --policy my.onnx --spec my.toml
 """
 
@@ -87,6 +88,11 @@ def configure(parser: ArgumentParser) -> None:
         help="with --physics: a force and a torque on the root help",
     )
     parser.add_argument(
+        "--balance",
+        action="store_true",
+        help="with --physics: a controller looks ahead and keeps the body up",
+    )
+    parser.add_argument(
         "--policy", metavar="ONNX", help="with --physics: follow a robot's motion with this policy"
     )
     parser.add_argument(
@@ -113,7 +119,8 @@ def run(args: Namespace) -> int:
     wanted = {name: Path(path) for name, path in outputs.items() if path is not None}
     check_given(args, args.files)
     if args.serve:
-        others = ("physics", "assist", "policy", "spec", "seeds", "json", "mesh", "same_height")
+        simulation = ("physics", "assist", "balance", "policy", "spec", "seeds")
+        others = (*simulation, "json", "mesh", "same_height")
         refused = [*wanted, *(name for name in others if getattr(args, name))]
         refused += ["speed"] * (args.speed != 1.0)
         if refused:
@@ -122,14 +129,14 @@ def run(args: Namespace) -> int:
         return _serve(args)
     if not args.files:
         raise ConventionError("no FILE is given; only --serve needs none")
-    if not args.physics and (args.assist or args.json):
-        raise ConventionError("--assist and --json go with --physics")
+    if not args.physics and (args.assist or args.balance or args.json):
+        raise ConventionError("--assist, --balance and --json go with --physics")
     if (args.policy is None) != (args.spec is None) or (args.policy and not args.physics):
         raise ConventionError("--policy FILE.onnx goes with --physics and --spec FILE.toml")
     if args.speed != 1.0 and [*wanted] == ["strip"]:
         raise ConventionError("--speed does not go with --strip, a picture that stands still")
-    if args.policy and args.assist:
-        raise ConventionError("--assist helps servos; a policy goes without")
+    if args.assist + args.balance + bool(args.policy) > 1:
+        raise ConventionError("--assist, --balance and --policy hold the body up; give one of them")
     if args.seeds and not args.policy:
         raise ConventionError("--seeds goes with --policy")
     shown: list[Any] = [load(args, path) for path in args.files]
@@ -161,11 +168,11 @@ def run(args: Namespace) -> int:
 def _simulated(args: Namespace, clips: list[Any]) -> list[Any]:
     """The clips as they come out of the simulation; the report is printed."""
     from spark_sim import console
-    from spark_sim.simulation import LIMITS, follow, simulate
+    from spark_sim.simulation import follow, simulate
 
     made: list[Any]
     if args.policy is None:
-        made = [simulate(each, assist=args.assist) for each in clips]
+        made = [simulate(each, assist=args.assist, balance=args.balance) for each in clips]
     else:
         seeds = args.seeds or 3
         made = [follow(each, args.policy, args.spec, seeds=seeds) for each in clips]
@@ -175,8 +182,9 @@ def _simulated(args: Namespace, clips: list[Any]) -> list[Any]:
         for each in made:
             console.emit_json(each.json())
     else:
-        caution = [fill(LIMITS, 79)] if args.policy is None else []
-        console.say("\n\n".join([*(each.text() for each in made), *caution]))
+        cautions = {each.json()["limits"]: None for each in made} if args.policy is None else {}
+        said = [*(each.text() for each in made), *(fill(each, 79) for each in cautions)]
+        console.say("\n\n".join(said))
     return made
 
 

@@ -1,0 +1,58 @@
+"""Which clips `play --physics --balance` keeps up, on any robot.
+
+    python -m scripts.balance_bench DATA --robots unitree_g1 [--clips 'cmu_asf/cmu_02_*.bvh']
+
+docs/policies.md has its figures, and those of `scripts/balance_qp.py` over the same clips.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+
+from robots.model.known import known
+from robots.solver.solve import retarget
+from scripts.robot_bars import clip, plausible
+from sim.physics.summary import summarize
+from sim.physics.tracking import track
+
+FOLDERS = ("cmu_asf/*", "animateddrawings/*", "reactidle/*", "cmu_dance/*")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("data", type=Path, help="the folder with the recordings")
+    parser.add_argument("--robots", nargs="+", default=["unitree_g1"])
+    parser.add_argument("--clips", nargs="+", default=FOLDERS)
+    parser.add_argument("--seconds", type=float, default=8.0, help="of each clip, at most")
+    args = parser.parse_args()
+    paths = sorted(path for pattern in args.clips for path in args.data.glob(pattern))
+    clips = {p.stem: clip(p, args.seconds) for p in paths if p.suffix == ".bvh"}
+    clips = {name: source for name, source in clips.items() if plausible(source)}
+    for name in args.robots:
+        robot = known(name)
+        shares, errors = [], []
+        for stem, source in clips.items():
+            result = retarget(source, robot)
+            start = time.process_time()
+            height = robot.rig.standing_height
+            tracked = track(result.body, result.frame_time, height=height, balance=True)
+            took = time.process_time() - start
+            found = summarize(tracked)
+            whole = (len(result) - 1) * result.frame_time
+            shares.append(found["upright_s"] / whole if found["verdict"] == "falls" else 1.0)
+            errors.append(found["error"]["mpjpe_cm"])
+            print(
+                f"{name} {stem}: {shares[-1] * whole:.2f} s of {whole:.2f} s, {errors[-1]:.1f} cm "
+                f"off ({took / whole:.1f} s a second)",
+                flush=True,
+            )
+        print(
+            f"{name}: {100 * np.mean(np.array(shares) >= 1):.0f} % of {len(shares)} clips, "
+            f"{100 * np.mean(shares):.0f} % of their time, {np.mean(errors):.1f} cm off in the mean"
+        )
+
+
+if __name__ == "__main__":
+    main()
