@@ -45,7 +45,7 @@ def step_stream() -> None:
     ("work", "owner", "inner"),
     [
         (encode_names, NameNetwork, "_name"),
-        (solve_clip, solve, "solve"),
+        (solve_clip, solve, "solve_block"),
         (step_stream, Stream, "_first"),
     ],
 )
