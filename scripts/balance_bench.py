@@ -13,11 +13,9 @@ import numpy as np
 
 from robots.model.known import known
 from robots.solver.solve import retarget
-from scripts.robot_bars import clip, plausible
+from scripts.robot_bars import FOLDERS, clips_of, plausible
 from sim.physics.summary import summarize
 from sim.physics.tracking import track
-
-FOLDERS = ("cmu_asf/*", "animateddrawings/*", "reactidle/*", "cmu_dance/*")
 
 
 def main() -> None:
@@ -27,8 +25,7 @@ def main() -> None:
     parser.add_argument("--clips", nargs="+", default=FOLDERS)
     parser.add_argument("--seconds", type=float, default=8.0, help="of each clip, at most")
     args = parser.parse_args()
-    paths = sorted(path for pattern in args.clips for path in args.data.glob(pattern))
-    clips = {p.stem: clip(p, args.seconds) for p in paths if p.suffix == ".bvh"}
+    clips = clips_of(args.data, args.clips, args.seconds)
     clips = {name: source for name, source in clips.items() if plausible(source)}
     for name in args.robots:
         robot = known(name)

@@ -22,7 +22,7 @@ from scipy.optimize import nnls
 from robots.model.known import known
 from robots.model.motion import RobotMotion
 from robots.solver.solve import retarget
-from scripts.robot_bars import clip, plausible
+from scripts.robot_bars import FOLDERS, clips_of, plausible
 from sim.interpolate import at_times
 from sim.physics.policy_tracking import FALL_DROP, FALL_TILT
 from sim.physics.servos import on_floor, torque_limit
@@ -186,12 +186,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("data", type=Path, help="the folder with the recordings")
     parser.add_argument("--robots", nargs="+", default=["unitree_g1"])
-    folders = ["cmu_asf/*", "animateddrawings/*", "reactidle/*", "cmu_dance/*"]
-    parser.add_argument("--clips", nargs="+", default=folders)
+    parser.add_argument("--clips", nargs="+", default=FOLDERS)
     parser.add_argument("--seconds", type=float, default=8.0, help="of each clip, at most")
     args = parser.parse_args()
-    paths = sorted(path for pattern in args.clips for path in args.data.glob(pattern))
-    clips = {p.stem: clip(p, args.seconds) for p in paths if p.suffix == ".bvh"}
+    clips = clips_of(args.data, args.clips, args.seconds)
     clips = {name: source for name, source in clips.items() if plausible(source)}
     for name, robot in {name: known(name) for name in args.robots}.items():
         shares = []

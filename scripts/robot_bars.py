@@ -9,6 +9,7 @@ too.
 
 import argparse
 import time
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -28,6 +29,7 @@ from spark.io.recording import read_recording
 from spark.rig.rig import understand
 from spark.transfer.canonical import CanonicalMotion, from_canonical, to_canonical
 
+FOLDERS = ("cmu_asf/*", "animateddrawings/*", "reactidle/*", "cmu_dance/*")
 CLEAN = 0.3  # share of implausible frames of a source that the bars are for
 
 CONTACTS = 0.97  # F1 of the feet's contacts, at least
@@ -66,14 +68,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--robots", nargs="+", required=True)
-    folders = ["cmu_asf/*", "animateddrawings/*", "reactidle/*", "cmu_dance/*"]
-    parser.add_argument("--clips", nargs="+", default=folders)
+    parser.add_argument("--clips", nargs="+", default=FOLDERS)
     parser.add_argument("--seconds", type=float, default=20.0, help="of each clip, at most")
     parser.add_argument("--all", action="store_true", help="sources that are implausible, too")
     parser.add_argument("--method", choices=("solve", "copy", "stream"), default="solve")
     args = parser.parse_args()
-    paths = sorted(path for pattern in args.clips for path in args.data.glob(pattern))
-    clips = {p.stem: clip(p, args.seconds) for p in paths if p.suffix == ".bvh"}
+    clips = clips_of(args.data, args.clips, args.seconds)
     if not args.all:
         clips = {name: c for name, c in clips.items() if plausible(c)}
     method = {"solve": retarget, "copy": copy, "stream": follow}[args.method]
@@ -91,6 +91,12 @@ def main() -> None:
         mean = mean_of(rows)
         show(f"mean of {len(rows)}", mean, np.nan)
         print(f"misses in the mean: {', '.join(misses(mean)) or 'none'}")
+
+
+def clips_of(data: Path, patterns: Sequence[str], seconds: float) -> dict[str, CanonicalMotion]:
+    """The BVH files of a folder that some patterns name, by their names."""
+    paths = sorted(path for pattern in patterns for path in data.glob(pattern))
+    return {path.stem: clip(path, seconds) for path in paths if path.suffix == ".bvh"}
 
 
 def clip(path: Path, seconds: float) -> CanonicalMotion:

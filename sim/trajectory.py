@@ -58,6 +58,15 @@ def model_trajectory(rig: Rig, motion: Motion) -> ModelTrajectory:
     return ModelTrajectory(spec, model, root, qpos_from_motion(model, motion, rig))
 
 
+def subtree(model: mujoco.MjModel, root: int) -> list[int]:
+    """A body and all that hang on it, in rising order."""
+    inside = {root}
+    for b in range(root + 1, model.nbody):
+        if int(model.body_parentid[b]) in inside:
+            inside.add(b)
+    return sorted(inside)
+
+
 def coordinates_at(
     subject: Subject,
     model: mujoco.MjModel,

@@ -18,6 +18,7 @@ from mujoco import rollout
 
 from sim.interpolate import at_frames, frames_of, quaternions
 from sim.physics.servos import controls, servo_joint, torque_limit
+from sim.trajectory import subtree
 from spark.constants import GRAVITY
 from spark.resample import values_at
 
@@ -183,9 +184,7 @@ def _carrying_servos(
     shifted in trials [rad]."""
     data, parents = mujoco.MjData(model), model.body_parentid
     inside = np.zeros(model.nbody, dtype=bool)
-    inside[root] = True
-    for body in range(root + 1, model.nbody):
-        inside[body] = inside[parents[body]]
+    inside[subtree(model, root)] = True
     heights = np.zeros((len(qpos), model.nbody))
     for t, pose in enumerate(qpos):
         data.qpos[:] = pose

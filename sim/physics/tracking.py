@@ -14,8 +14,8 @@ from jaxtyping import Bool, Float
 from sim.body.compiling import warnings_as_notes
 from sim.interpolate import at_times, velocities
 from sim.physics.balance import Balancer
-from sim.physics.servos import controls, with_servos
-from sim.trajectory import ModelTrajectory
+from sim.physics.servos import controls, servo_joint, with_servos
+from sim.trajectory import ModelTrajectory, subtree
 from spark.errors import SkeletonError
 from spark.summary import brief
 
@@ -161,12 +161,10 @@ class _Simulation:
         self.weight = self.mass * float(np.linalg.norm(model.opt.gravity))
         start = int(model.jnt_dofadr[model.body_jntadr[root]])
         self.root_dofs = slice(start, start + 6)
-        inside = {root}
-        for b in range(root + 1, model.nbody):
-            if int(model.body_parentid[b]) in inside:
-                inside.add(b)
-        self.points = [b for b in sorted(inside) if int(model.body_jntnum[b])]
-        self.actuator_joint = np.array([_joint_of(model, a) for a in range(model.nu)], dtype=int)
+        self.points = [b for b in subtree(model, root) if int(model.body_jntnum[b])]
+        # An actuator of no single joint counts as the root's own.
+        joints = [max(servo_joint(model, a), 0) for a in range(model.nu)]
+        self.actuator_joint = np.array(joints, dtype=int)
         limited = np.asarray(model.actuator_forcelimited, dtype=bool)
         self.force_limit = np.where(limited, model.actuator_forcerange[:, 1], np.inf)
         limited = np.asarray(model.jnt_actfrclimited, dtype=bool)
@@ -295,13 +293,6 @@ class _Simulation:
     def _has_diverged(self) -> bool:
         warned = any(self.data.warning[kind].number for kind in _DIVERGED)
         return warned or not np.isfinite(self.data.qpos).all()
-
-
-def _joint_of(model: mujoco.MjModel, actuator: int) -> int:
-    """The joint that an actuator turns; the root's own where it is no single one."""
-    kinds = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
-    single = int(model.actuator_trntype[actuator]) in kinds
-    return int(model.actuator_trnid[actuator, 0]) if single else 0
 
 
 def _clip_norm(vector: Float[np.ndarray, "3"], limit: float) -> Float[np.ndarray, "3"]:

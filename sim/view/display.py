@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from sim.body.parts import kept_joints
-from sim.trajectory import ModelTrajectory
+from sim.trajectory import ModelTrajectory, subtree
 from sim.view.sides import tinted, tints
 from sim.view.simplify import Mesh, simplify_together
 from spark.rig.rig import Rig
@@ -52,7 +52,7 @@ def add_display(
     is `bare`, its shapes are left out, for a skin.
     """
     model = body.model
-    inside = _subtree(model, body.root)
+    inside = subtree(model, body.root)
     shown = [g for g in range(model.ngeom) if int(model.geom_bodyid[g]) in inside]
     shown = [g for g in shown if int(model.geom_type[g]) in _SHOWN_TYPES and not bare]
     visible = [g for g in shown if int(model.geom_group[g]) < _SHOWN_GROUPS]
@@ -82,14 +82,6 @@ def body_names(model: mujoco.MjModel, rig: Rig, prefix: str) -> dict[int, str]:
     """What the bodies of the rig's joints are called in a spec that they were added to."""
     joints = ((j, rig.skeleton.names[j]) for j in kept_joints(rig))
     return {j: f"{prefix}{int(model.body(name).id)}" for j, name in joints}
-
-
-def _subtree(model: mujoco.MjModel, root: int) -> list[int]:
-    inside = {root}
-    for b in range(root + 1, model.nbody):
-        if int(model.body_parentid[b]) in inside:
-            inside.add(b)
-    return sorted(inside)
 
 
 def _add_joint(body: mujoco.MjsBody, model: mujoco.MjModel, joint: int, scale: float) -> list[int]:

@@ -40,9 +40,11 @@ class Anatomy:
     mirrored: frozenset[int]
 
 
-def find_anatomy(measured: Measurements, hints: Sequence[NameHint], bent: Measurements) -> Anatomy:
-    """The anatomy of a two-legged body, whose knees and elbows are bent as they can be in `bent`;
-    SkeletonError with the reason where it is none."""
+def find_anatomy(
+    measured: Measurements, hints: Sequence[NameHint], bent: Measurements | None
+) -> Anatomy:
+    """The anatomy of a two-legged body, whose knees and elbows are bent as they can be in `bent`
+    where that is given; SkeletonError with the reason where it is none."""
     skeleton = measured.skeleton
     if measured.reach[0] <= 0:
         raise SkeletonError(f"all bones of the skeleton ({len(skeleton)} joints) are 0 m long")
@@ -77,10 +79,9 @@ def find_anatomy(measured: Measurements, hints: Sequence[NameHint], bent: Measur
     if labelled_arms is not None:
         labelled_legs, labelled_arms = _align(measured, labelled_legs, labelled_arms)
     above = next((j for j in (head, *reversed(neck), *reversed(spine)) if j is not None), None)
-    sides = SideEvidence(
-        bends=first_is_left(bent, labelled_legs, labelled_arms, above).bends,
-        feet=first_is_left(measured, labelled_legs, labelled_arms, above).feet,
-    )
+    sides = first_is_left(measured, labelled_legs, labelled_arms, above)
+    if bent is not None:
+        sides = sides._replace(bends=first_is_left(bent, labelled_legs, labelled_arms, above).bends)
     mirrored = frozenset(j for p in pairs for j in (*p.first, *p.second))
     return Anatomy(pelvis, spine, neck, head, labelled_legs, labelled_arms, sides, mirrored)
 

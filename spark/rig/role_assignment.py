@@ -89,8 +89,8 @@ def _infer(
     skeleton: Skeleton, motion: Motion | None, hints: Sequence[NameHint], bent: Motion | None
 ) -> tuple[Found, _Sides]:
     """Joint to role, confidence and reason; and what tells the legs' sides."""
-    measured = measure(skeleton, motion)
-    anatomy = find_anatomy(measured, hints, measured if bent is None else measure(skeleton, bent))
+    bends = None if bent is None else measure(skeleton, bent)
+    anatomy = find_anatomy(measure(skeleton, motion), hints, bends)
     found: Found = {}
     pelvis = hints[anatomy.pelvis].parts.get("pelvis", 0.0) > 0.3
     found[anatomy.pelvis] = (Role.PELVIS, _confidence(pelvis, True, True), "carries the legs")
