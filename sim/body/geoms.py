@@ -21,6 +21,7 @@ _DETAIL_RADIUS = 0.006  # of fingers, face and helpers
 _HEAD_SIZE = np.array([0.055, 0.045, 0.068])  # half axes of the ellipsoid
 _NO_BONE = 1e-4  # [m] shorter ones have no shape: a toe may lie in its ankle
 _HEAD_CENTER = np.array([0.015, 0.0, 0.055])  # from the head's joint
+_AT_JOINT = np.zeros(3)
 _HIDDEN = 3  # the group of geoms that viewers don't show
 _FOOT_HEIGHT = 0.022  # of a foot's box
 
@@ -73,12 +74,19 @@ class _GeomBuilder:
         self.ends = end_positions(rig.skeleton, self.pos, rig.tpose)
 
     def bones(self, joint: int, part: str) -> None:
-        """A capsule along each of the joint's bones; a shank's ends above the sole."""
-        radius = RADII.get(part, _DETAIL_RADIUS) * self.height
-        for tip in self._tips(joint):
+        """A capsule along each of the joint's bones; a shank's ends above the sole. A chest that
+        carries an arm itself has a shoulder, from beside the neck."""
+        tips = self._tips(joint)
+        necks = [tip for end, tip in tips if end in ("neck", "head")]
+        for end, tip in tips:
+            shoulder = part == "spine" and end == "upper_arm"
+            radius = RADII.get("clavicle" if shoulder else part, _DETAIL_RADIUS) * self.height
+            start = _AT_JOINT
+            if shoulder and necks:
+                start = necks[0] * np.clip(tip @ necks[0] / (necks[0] @ necks[0]), 0, 1)
             if part == "lower_leg":
                 tip = tip * max(0.5, 1.0 - radius / float(np.linalg.norm(tip)))
-            self._capsule(joint, tip, radius, self._class(joint))
+            self._capsule(joint, tip, radius, self._class(joint), start)
 
     def hull(self, joint: int, hull: Hull) -> None:
         """A convex mesh."""
@@ -109,37 +117,45 @@ class _GeomBuilder:
         for sole in self.rig.soles:
             foot, toe = sole.foot, sole.toe
             points = sole_positions(sole, self.pos, self.rig.tpose)
+            radius = RADII["foot"] * self.height
             if toe is None:
                 self._box(foot, points, hidden=foot in hulls)
-                continue
-            self._box(foot, points[:4], hidden=foot in hulls)
-            self._box(toe, points[2:], hidden=toe in hulls)
+                ball = points.mean(axis=0) + np.array([0, 0, radius])
+            else:
+                self._box(foot, points[:4], hidden=foot in hulls)
+                self._box(toe, points[2:], hidden=toe in hulls)
+                ball = self.pos[toe]
             if foot not in hulls:
-                instep = self.pos[toe] - self.pos[foot]
-                self._capsule(foot, instep, RADII["foot"] * self.height, "visual")
+                self._capsule(foot, ball - self.pos[foot], radius, "visual")
 
-    def _tips(self, joint: int) -> list[Float[np.ndarray, "3"]]:
-        """Where the bones of a joint end: at children that carry on the body, or, at the end of a
-        limb, at all children and End Sites."""
+    def _tips(self, joint: int) -> list[tuple[str, Float[np.ndarray, "3"]]]:
+        """The bones of a joint, each with the part at its end: to children that carry on the body,
+        or, at the end of a limb, to all children and End Sites."""
         rig, skeleton = self.rig, self.rig.skeleton
         children = skeleton.children[joint]
         kept = [c for c in children if part_of(rig, c) != DETAIL]
-        tips = [self.pos[c] for c in kept or children]
+        tips = [(part_of(rig, c), self.pos[c] - self.pos[joint]) for c in kept or children]
         if not kept:
-            tips += list(self.ends[skeleton.end_parents == joint])
-        bones = [tip - self.pos[joint] for tip in tips]
-        return [bone for bone in bones if np.linalg.norm(bone) > _NO_BONE]
+            ends = self.ends[skeleton.end_parents == joint] - self.pos[joint]
+            tips += [(DETAIL, end) for end in ends]
+        return [(end, bone) for end, bone in tips if np.linalg.norm(bone) > _NO_BONE]
 
     def _capsule(
-        self, joint: int, tip: Float[np.ndarray, "3"], radius: float, default: str
+        self,
+        joint: int,
+        tip: Float[np.ndarray, "3"],
+        radius: float,
+        default: str,
+        start: Float[np.ndarray, "3"] = _AT_JOINT,
     ) -> None:
-        if float(np.linalg.norm(tip)) < _NO_BONE:
+        length = float(np.linalg.norm(tip - start))
+        if length < _NO_BONE:
             return
         self.bodies[joint].add_geom(
             self.spec.find_default(default),
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-            fromto=[0, 0, 0, *tip],
-            size=[min(radius, 0.5 * float(np.linalg.norm(tip)) + 0.004), 0, 0],
+            fromto=[*start, *tip],
+            size=[min(radius, 0.5 * length + 0.004), 0, 0],
             material=material_of(self.rig, joint),
             group=_HIDDEN if self._loose(joint) else self.spec.find_default(default).geom.group,
         )
