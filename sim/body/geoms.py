@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from sim.body.anthropometry import RADII
 from sim.body.mesh import Hull
-from sim.body.parts import DETAIL, part_of, side_of
+from sim.body.parts import DETAIL, LINK, part_of, side_of
 from spark.kinematics import end_positions, world_positions
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
@@ -21,6 +21,7 @@ _DETAIL_RADIUS = 0.006  # of fingers, face and helpers
 _HEAD_SIZE = np.array([0.055, 0.045, 0.068])  # half axes of the ellipsoid
 _NO_BONE = 1e-4  # [m] shorter ones have no shape: a toe may lie in its ankle
 _HEAD_CENTER = np.array([0.015, 0.0, 0.055])  # from the head's joint
+_INSIDE = 0.95  # of the thickness of what hangs on a link, so that it ends inside of that
 _AT_JOINT = np.zeros(3)
 _HIDDEN = 3  # the group of geoms that viewers don't show
 _FOOT_HEIGHT = 0.022  # of a foot's box
@@ -74,17 +75,20 @@ class _GeomBuilder:
         self.ends = end_positions(rig.skeleton, self.pos, rig.tpose)
 
     def bones(self, joint: int, part: str) -> None:
-        """A capsule along each of the joint's bones; a shank's ends above the sole. A chest that
-        carries an arm itself has a shoulder, from beside the neck."""
+        """A capsule along each of the joint's bones; what leads to a foot ends above the sole. A
+        chest that carries an arm itself has a shoulder, from beside the neck. A link is as thick as
+        what hangs on it, but for those between the floor and the pelvis."""
         tips = self._tips(joint)
         necks = [tip for end, tip in tips if end in ("neck", "head")]
         for end, tip in tips:
             shoulder = part == "spine" and end == "upper_arm"
-            radius = RADII.get("clavicle" if shoulder else part, _DETAIL_RADIUS) * self.height
+            inside = part == LINK and end != "pelvis"
+            flesh = "clavicle" if shoulder else end if inside else part
+            radius = RADII.get(flesh, _DETAIL_RADIUS) * self.height * (_INSIDE if inside else 1)
             start = _AT_JOINT
             if shoulder and necks:
                 start = necks[0] * np.clip(tip @ necks[0] / (necks[0] @ necks[0]), 0, 1)
-            if part == "lower_leg":
+            if part == "lower_leg" or end == "foot":
                 tip = tip * max(0.5, 1.0 - radius / float(np.linalg.norm(tip)))
             self._capsule(joint, tip, radius, self._class(joint), start)
 
@@ -129,16 +133,21 @@ class _GeomBuilder:
                 self._capsule(foot, ball - self.pos[foot], radius, "visual")
 
     def _tips(self, joint: int) -> list[tuple[str, Float[np.ndarray, "3"]]]:
-        """The bones of a joint, each with the part at its end: to children that carry on the body,
-        or, at the end of a limb, to all children and End Sites."""
+        """The bones of a joint, each with the part that it leads to: to children that carry on the
+        body, or, at the end of a limb, to all children and End Sites."""
         rig, skeleton = self.rig, self.rig.skeleton
         children = skeleton.children[joint]
         kept = [c for c in children if part_of(rig, c) != DETAIL]
-        tips = [(part_of(rig, c), self.pos[c] - self.pos[joint]) for c in kept or children]
+        tips = [(self._leads_to(c), self.pos[c] - self.pos[joint]) for c in kept or children]
         if not kept:
             ends = self.ends[skeleton.end_parents == joint] - self.pos[joint]
             tips += [(DETAIL, end) for end in ends]
         return [(end, bone) for end, bone in tips if np.linalg.norm(bone) > _NO_BONE]
+
+    def _leads_to(self, joint: int) -> str:
+        """A joint's part, or, of a link, that of what hangs on it."""
+        parts = (part_of(self.rig, k) for k in self.rig.skeleton.subtree(joint))
+        return next((part for part in parts if part != LINK), LINK)
 
     def _capsule(
         self,

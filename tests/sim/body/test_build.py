@@ -92,6 +92,31 @@ def test_mass(build: str) -> None:
         build_body(rig, mass=-1.0)
 
 
+def bones_of(model: mujoco.MjModel, body: str) -> list[float]:
+    """How thick a body's capsules are [m]."""
+    geoms = np.flatnonzero(model.geom_bodyid == model.body(body).id)
+    round_ones = geoms[model.geom_type[geoms] == mujoco.mjtGeom.mjGEOM_CAPSULE]
+    return list(model.geom_size[round_ones, 0])
+
+
+def test_a_link_is_as_thick_as_what_hangs_on_it() -> None:
+    model = scene_of(rig_of(recording("zoo/cmu_cgspeed_31j.bvh")))
+    [hip], [thigh] = bones_of(model, "LHipJoint"), bones_of(model, "LeftUpLeg")
+    assert 0.9 * thigh < hip < thigh
+
+
+def test_a_chest_that_carries_arms_has_shoulders_beside_its_neck() -> None:
+    model = scene_of(rig_of(recording("deepmimic/deepmimic_walk.bvh")))
+    data = at_key(model, "tpose")
+    trunk, *shoulders = sorted(bones_of(model, "chest"), reverse=True)
+    assert len(shoulders) == 2
+    assert max(shoulders) < 0.6 * trunk
+    for geom in np.flatnonzero(model.geom_bodyid == model.body("chest").id):
+        if model.geom_size[geom, 0] < trunk:
+            upright = abs(data.geom_xmat[geom].reshape(3, 3)[2, 2])
+            assert upright < 0.3, "they cross the chest, and don't climb from its joint"
+
+
 def test_a_static_root_is_no_body() -> None:
     model = build_body(rig_of(recording("zoo/m2m_human.bvh"))).compile()
     names = {model.body(b).name for b in range(model.nbody)}
