@@ -16,6 +16,8 @@ from robots.solver.solve import retarget
 from scripts.robot_bars import FOLDERS, clips_of, plausible
 from sim.physics.summary import summarize
 from sim.physics.tracking import track
+from sim.report.assess import assess
+from sim.trajectory import Subject
 
 
 def main() -> None:
@@ -32,9 +34,15 @@ def main() -> None:
         shares, errors = [], []
         for stem, source in clips.items():
             result = retarget(source, robot)
+            needed = assess(Subject(result.motion, robot.rig, result.body)).clip.torques
             start = time.process_time()
-            height = robot.rig.standing_height
-            tracked = track(result.body, result.frame_time, height=height, balance=True)
+            tracked = track(
+                result.body,
+                result.frame_time,
+                height=robot.rig.standing_height,
+                balance=True,
+                torques={each.joint: each.torque for each in needed},
+            )
             took = time.process_time() - start
             found = summarize(tracked)
             whole = (len(result) - 1) * result.frame_time

@@ -10,6 +10,7 @@ from sim.physics.policy_spec import read_spec
 from sim.physics.policy_tracking import PolicyRun, PolicyTracker
 from sim.physics.summary import render, summarize
 from sim.physics.tracking import Assist, TrackingResult, track
+from sim.report.assess import assess
 from sim.trajectory import Subject, model_trajectory
 from sim.view.scene import Figure
 from spark.errors import SkeletonError
@@ -66,6 +67,7 @@ def simulate(clip: AnyClip | File, *, assist: bool = False, balance: bool = Fals
     Raises `SkeletonError` where the body is no humanoid, or has no shape that collides.
     """
     clip = clip_of(clip)
+    torques = assess(clip.subject).clip.torques if balance and clip.body else ()
     tracked = track(
         clip.body or model_trajectory(clip.rig, clip.motion),
         clip.motion.frame_time,
@@ -73,6 +75,7 @@ def simulate(clip: AnyClip | File, *, assist: bool = False, balance: bool = Fals
         floor_z=clip.floor_z,
         assist=Assist() if assist else None,
         balance=balance,
+        torques={each.joint: each.torque for each in torques},
     )
     return Simulated(clip, tracked)
 

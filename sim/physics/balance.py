@@ -1,20 +1,23 @@
 """A controller that balances without training: predictive control by sampling.
 
-Servos that follow a motion do not balance. Here their targets are shifted for it. Several times a
-second the simulation is continued from where the body is, some dozens of times, each time with
-other random shifts of the servos that carry the body. The mean of the shifts, each weighed by how
-near to the motion it led, is what the servos get until the next look ahead (model predictive path
-integral control: Williams et al., Information-Theoretic Model Predictive Control, 2018, eq. 26 to
-30). Times and lengths go by the body's size.
+Servos that follow a motion do not balance. Here they get the torques that it needs beforehand, and
+their targets are shifted for balance. Several times a second the simulation is continued from where
+the body is, some dozens of times, each time with other random shifts of the servos that carry the
+body. The mean of the shifts, each weighed by how near to the motion it led, is what the servos get
+until the next look ahead (model predictive path integral control: Williams et al.,
+Information-Theoretic Model Predictive Control, 2018, eq. 26 to 30). Times and lengths go by the
+body's size.
 """
 
 import os
+from collections.abc import Mapping
 from copy import copy
 
 import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 from mujoco import rollout
+from scipy.ndimage import gaussian_filter1d
 
 from sim.interpolate import at_frames, frames_of, quaternions
 from sim.physics.servos import controls, servo_joint, torque_limit
@@ -23,9 +26,9 @@ from spark.constants import GRAVITY
 from spark.resample import values_at
 
 # In units of the time sqrt(height / g) in which a body of some height tips over, 0.37 s of a G1:
-HORIZON, PERIOD = 1.3, 0.11  # that is looked ahead, and from one look to the next
+HORIZON, PERIOD = 2.2, 0.13  # that is looked ahead, and from one look to the next
 STEP = 0.006  # [s] of the simulation that looks ahead, at most
-COURSES = 48  # that are tried in each look
+COURSES = 40  # that are tried in each look
 KNOTS = 5  # of the horizon, between which shifts are interpolated
 SPREAD = 0.05  # body weights x height of torque that are tried, more or less,
 MAX_SPREAD = 0.6  # but this share of a servo's limit
@@ -37,6 +40,7 @@ W_SHIFT = 0.02  # and of the shifts, in spreads
 W_END = 0.3  # of the horizon: how much its last moment counts more
 DROPPED = 0.2  # heights that the root is too low, where a course
 W_DROPPED = 50.0  # costs that much more
+BLUR = 0.02  # [s] over which torques go from one contact to the next
 _LOST = 1e9  # the cost of a course without finite numbers
 _LOW = 0.06  # heights above the lowest body within which one carries
 _TRUNK = 0.25  # of the mass: joints that carry more move the trunk
@@ -46,8 +50,9 @@ _ROOT = 7  # coordinates of the root: place and quaternion
 class Balancer:
     """Shifts of the servos' targets that keep a body on its motion.
 
-    `qpos` and `speeds` are the motion's, `frame_time` [s] apart; `height` [m] is that of the
-    standing body, whose root is the body `root`. The same motion gives the same shifts.
+    `qpos` and `speeds` are the motion's, `frame_time` [s] apart, `torques` [N m] what it needs of
+    joints by their names. `height` [m] is that of the standing body, whose root is the body `root`.
+    The same motion gives the same shifts.
     """
 
     def __init__(
@@ -56,6 +61,7 @@ class Balancer:
         root: int,
         qpos: Float[np.ndarray, "T nq"],
         speeds: Float[np.ndarray, "T nv"],
+        torques: Mapping[str, Float[np.ndarray, "T"]],
         frame_time: float,
         height: float,
     ) -> None:
@@ -66,6 +72,7 @@ class Balancer:
         self._ahead = _looking_ahead(model, self._stride * own)
         self._scratch = mujoco.MjData(model)
         self._data = [mujoco.MjData(self._ahead) for _ in range(len(os.sched_getaffinity(0)))]
+        self._beforehand = _beforehand(model, torques, len(qpos), frame_time)
         self._servos, self._spread = _carrying_servos(model, root, qpos, height)
         count = max(2, round(HORIZON * self._time / (self._stride * own)))
         self._steps = self._stride * own * np.arange(1, count + 1)
@@ -79,7 +86,7 @@ class Balancer:
         inside = {*range(self._root, self._root + _ROOT), *self._quaternions.ravel().tolist()}
         self._angles = np.array([k for k in range(model.nq) if k not in inside], dtype=int)
         self._rng = np.random.default_rng(0)
-        self._now = np.zeros((self._period, model.nu))
+        self._now = self._beforehand[:1]
 
     def shifts(self, data: mujoco.MjData, step: int) -> Float[np.ndarray, "nu"]:
         """Of all servos' targets in a step of the simulation, which is in `data`."""
@@ -88,7 +95,9 @@ class Balancer:
             if step:
                 self._shifts = self._between(self._knots + self._own * self._period)
             self._look_ahead(data, step * self._own)
-            self._now[:, self._servos] = self._between(self._fine)
+            frames = frames_of((step + 1) * self._own + self._fine, self._frame_time)
+            self._now = values_at(self._beforehand, frames)
+            self._now[:, self._servos] += self._between(self._fine)
         now: Float[np.ndarray, nu] = self._now[at]
         return now
 
@@ -104,7 +113,8 @@ class Balancer:
         tried = self._rng.normal(size=(COURSES, *self._shifts.shape)) * self._spread
         tried[0], tried[1] = 0.0, -self._shifts
         tried += self._shifts
-        servos = np.repeat(self._controls(wanted, speeds)[None], COURSES, axis=0)
+        own = self._controls(wanted, speeds) + values_at(self._beforehand, frames)
+        servos = np.repeat(own[None], COURSES, axis=0)
         ways = np.stack([_hats(self._steps, self._knots) @ each for each in tried])
         servos[:, :, self._servos] += ways
         kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
@@ -175,6 +185,22 @@ def _looking_ahead(model: mujoco.MjModel, timestep: float) -> mujoco.MjModel:
 def _hats(times: Float[np.ndarray, "S"], knots: Float[np.ndarray, "K"]) -> Float[np.ndarray, "S K"]:
     """How much each knot counts at some times."""
     return np.maximum(1 - np.abs(times[:, None] - knots) / (knots[1] - knots[0]), 0.0)
+
+
+def _beforehand(
+    model: mujoco.MjModel,
+    torques: Mapping[str, Float[np.ndarray, "T"]],
+    frames: int,
+    frame_time: float,
+) -> Float[np.ndarray, "T nu"]:
+    """Shifts of the servos' targets by which they give some torques where nothing is off."""
+    out = np.zeros((frames, model.nu))
+    for a in range(model.nu):
+        torque = torques.get(model.joint(max(servo_joint(model, a), 0)).name)
+        if torque is not None and servo_joint(model, a) >= 0:
+            push = gaussian_filter1d(torque, BLUR / frame_time, mode="nearest")
+            out[:, a] = push / (model.actuator_gear[a, 0] * model.actuator_gainprm[a, 0])
+    return out
 
 
 def _carrying_servos(

@@ -4,8 +4,9 @@ What comes out measures the servos as much as the motion: docs/playback.md says 
 concluded from it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import mujoco
 import numpy as np
@@ -107,12 +108,14 @@ def track(
     floor_z: float = 0.0,
     assist: Assist | None = None,
     balance: bool = False,
+    torques: Mapping[str, Float[np.ndarray, "T"]] = MappingProxyType({}),
 ) -> TrackingResult:
     """Simulate the body of `target` while its servos follow the target's coordinates.
 
     It begins in the first frame, with its velocity, or at rest where that is a jump. `height` [m]
     is that of the standing body. With `balance`, servos of ours are shifted so that it keeps its
-    balance (`sim.physics.balance`). The same input gives the same output, to the bit.
+    balance (`sim.physics.balance`); they get beforehand what is known of the `torques` [N m] that
+    the motion needs of each joint. The same input gives the same output, to the bit.
     """
     if not np.isfinite(target.qpos).all():
         raise SkeletonError("the motion has coordinates that are no finite numbers")
@@ -125,7 +128,9 @@ def track(
     if fastest > _MAX_START_SPEED:
         start = np.zeros_like(start)
         notes += (f"the first frame is left at {fastest:.0f} rad/s: the simulation begins at rest",)
-    balancer = Balancer(model, root, target.qpos, speeds, frame_time, height) if balance else None
+    balancer = None
+    if balance:
+        balancer = Balancer(model, root, target.qpos, speeds, torques, frame_time, height)
     simulation = _Simulation(model, root, height, assist, balancer)
     rollout, target_points, diverged = simulation.run(target.qpos, speeds, start, frame_time, steps)
     return TrackingResult(
