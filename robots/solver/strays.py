@@ -2,7 +2,7 @@
 
 A T-pose that a converter put before the clip, a marker that was lost, a thigh that turns the long
 way round for three frames: the solver's motions are smooth, so a pose that nothing leads to would
-bend all around it.
+bend all around it. So are frames that a recorder dropped and filled with the last one that it had.
 """
 
 from collections.abc import Callable
@@ -17,6 +17,7 @@ from spark.blocks import in_blocks
 from spark.kinematics import local_rotations, world_rotations
 from spark.resample import rotations_at, values_at
 from spark.rotation import quat_angle, quat_conj, quat_mul
+from spark.runs import true_runs
 from spark.summary import counted
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
@@ -27,25 +28,58 @@ _LEAST_STEP = 0.12  # [hip heights]
 _LEAST_SPEED = 5.0  # [hip heights/s]
 _LEAST_TURN = 1.0  # [rad] of a joint in its parent; glitches turn it by up to pi
 _LEAST_TURN_SPEED = 40.0  # [rad/s]: wrists reach 30
+_DROP_TIME = 0.2  # [s] up to which a body that stands still was not seen, and not at rest,
+_LEAST_CATCH_UP = 0.01  # [hip heights] if its joints then go so far in the mean in one frame
+_SAME = 1e-9  # [m], or of a quaternion
 
 
 def without_strays(source: CanonicalMotion) -> tuple[CanonicalMotion, tuple[str, ...]]:
-    """`source` with what jumps away and back replaced by what lies between its neighbours, or, at
-    an end of the motion, by the only one; and notes that say where. What jumps in half of the
-    frames or more is left as it is, and so are jumps to where the motion goes on."""
-    whole, note = _without_stray_frames(source)
+    """`source` with what jumps away and back, or repeats the frame before, replaced by what lies
+    between its neighbours, or, at an end of the motion, by the only one; and notes that say where.
+    What jumps in half of the frames or more is left as it is, and so are jumps to where the motion
+    goes on."""
+    moving, dropped = _without_repeats(source)
+    whole, note = _without_stray_frames(moving)
     joints, notes = _without_stray_joints(whole)
-    return joints, (*note, *notes)
+    return joints, (*dropped, *note, *notes)
+
+
+def _without_repeats(source: CanonicalMotion) -> tuple[CanonicalMotion, tuple[str, ...]]:
+    def same(block: slice) -> Bool[np.ndarray, "N"]:
+        """Whether a frame is that before it."""
+        part = source.picked(slice(max(block.start - 1, 0), block.stop))
+        turned = np.abs(np.diff(part.rotations, axis=0)).max(axis=(1, 2), initial=0.0)
+        moved = np.abs(np.diff(part.hips, axis=0)).max(axis=1, initial=0.0)
+        own = np.maximum(turned, moved) < _SAME
+        return own if block.start else np.append(False, own)
+
+    repeats = in_blocks(same, len(source))
+    for start, stop in true_runs(repeats):
+        short = start > 1 and stop < len(source) and stop - start <= _DROP_TIME / source.frame_time
+        repeats[start:stop] = short and _way(source, stop) > _LEAST_CATCH_UP
+    if not repeats.any():
+        return source, ()
+    note = f"the source repeats its last frame, as where frames were dropped,{_in(repeats)}"
+    return _passed_over(source, repeats), (note,)
+
+
+def _way(source: CanonicalMotion, frame: int) -> float:
+    """How far [hip heights] the joints have come since the frame before, in the mean."""
+    places = canonical_positions(source.frames(frame - 1, frame + 1), source.rig.roles.held)
+    return float(np.linalg.norm(places[1] - places[0], axis=1).mean() / source.rig.hip_height)
+
+
+def _passed_over(source: CanonicalMotion, frames: Bool[np.ndarray, "T"]) -> CanonicalMotion:
+    rotations = _bridged(frames, source.rotations, rotations_at)
+    return replace(source, rotations=rotations, hips=_bridged(frames, source.hips, values_at))
 
 
 def _without_stray_frames(source: CanonicalMotion) -> tuple[CanonicalMotion, tuple[str, ...]]:
     stray = _strays(_jumps(source), source.frame_time)
     if not stray.any():
         return source, ()
-    rotations = _bridged(stray, source.rotations, rotations_at)
-    hips = _bridged(stray, source.hips, values_at)
     note = f"the source jumps away from all other frames, as in a T-pose before a clip{_in(stray)}"
-    return replace(source, rotations=rotations, hips=hips), (note,)
+    return _passed_over(source, stray), (note,)
 
 
 def _without_stray_joints(source: CanonicalMotion) -> tuple[CanonicalMotion, tuple[str, ...]]:

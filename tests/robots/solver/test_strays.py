@@ -57,6 +57,30 @@ def test_a_tpose_in_the_clip_is_passed_over(frames: list[int]) -> None:
     assert "T-pose" in notes[0]
 
 
+def test_frames_that_were_dropped_are_passed_over() -> None:
+    seen = np.arange(len(WALK))
+    seen[20:24], seen[40] = 19, 39
+    held = replace(WALK, rotations=WALK.rotations[seen], hips=WALK.hips[seen])
+    found, (note,) = without_strays(held)
+    assert "in 5 frames (20, 21, 22, 23, 40)" in note
+    assert away(found).max() < 0.3 * away(held).max()
+    assert np.abs(found.hips - WALK.hips).max() < 0.3 * np.abs(held.hips - WALK.hips).max()
+
+
+def test_a_body_at_rest_is_not_taken_for_dropped_frames() -> None:
+    """It stands still for longer than frames are lost, or moves off as gently as bodies do."""
+    seen = np.arange(len(WALK))
+    seen[20:50] = 19
+    gently = np.repeat(WALK.rotations[:1], len(WALK), axis=0)
+    hips = np.repeat(WALK.hips[:1], len(WALK), axis=0)
+    hips[9:, 0] += 0.001 * np.arange(len(WALK) - 9)
+    for still in (
+        replace(WALK, rotations=WALK.rotations[seen], hips=WALK.hips[seen]),
+        replace(WALK, rotations=gently, hips=hips),
+    ):
+        assert without_strays(still) == (still, ())
+
+
 def test_what_is_passed_over_does_not_depend_on_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     sources = with_tpose([16, 17]), turned(Role.LEFT_FOOT, [31, 32, 33], [2.5, 0.0, 0.0])
     whole = [without_strays(source) for source in sources]
