@@ -2,7 +2,7 @@
 
 A heel or toe stands while it is slow and low (`spark.rig.contacts`). Recorded feet creep, so that
 this alone leaves gaps in which a walk would hang in the air; there the slowest and lowest of them
-stands, unless the whole body falls freely or lies on something else.
+stands (`robots.solver.creeping`), unless the body falls freely or lies on something else.
 """
 
 from collections.abc import Sequence
@@ -13,18 +13,13 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import uniform_filter1d
 
 from robots.solver.carrying import Points, carrying, once_down
+from robots.solver.creeping import above, creeping, lower_ends
+from robots.solver.noise import Noise, smoothed
 from sim.body.anthropometry import RADII
 from sim.report.derivatives import derivative
 from sim.report.mass import Mass, human_mass
 from spark.constants import GRAVITY
-from spark.rig.contacts import (
-    ADULT_HEIGHT,
-    PLANTED_HEIGHT,
-    PLANTED_SPEED,
-    planted_points,
-    speeds,
-    standing_heights,
-)
+from spark.rig.contacts import ADULT_HEIGHT, planted_points
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_mul
@@ -32,19 +27,16 @@ from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion
 
 MIN_DURATION = 0.08  # contacts and breaks shorter than this [s] are noise
-MAX_TILT = 0.02  # [m, of an adult] by which one end of a standing sole may be higher than the other
 STAY_REACH = 0.03  # [m, of an adult] along the floor that a point may tremble without a step,
 STAY_LIFT = 0.015  # and up from it,
 STAY_TIME = 0.4  # [s] for that long
 CREEP_TIME = 0.1  # [s] over which the slowest and lowest is told: weight goes over no sooner
-MAX_CREEP = 0.6  # [m/s, of an adult] of a foot that stands because nothing else does
 FLIGHT_PUSH = 0.35  # [body weights] of push below which nothing holds the body up
 TOUCH_HEIGHT = 0.03  # [m, of an adult] between the floor and the flesh of a part that touches,
 REST_HEIGHT = 0.05  # and of one that rests: recorded floors are off, and flesh is thick;
 WRIST_HEIGHT = 0.04  # more above a palm or a fist
 REST_SPEED = 0.2  # [m/s, of an adult] below which a part comes to rest,
 ROLL_SPEED = 0.4  # and up to which it then stays in place, though its joint rolls over it
-_NEVER = 10.0  # of the speed at which it stands: an end that is no choice
 _WINDOW = 0.05  # [s] before and after a frame over which accelerations are measured
 _TOUCHING = ("hand", "forearm", "upper_arm", "head", "spine", "pelvis", "lower_leg")
 MAY_TOUCH = tuple(role for role in Role if role.part in _TOUCHING)  # and the feet
@@ -75,9 +67,13 @@ def schedule(
     positions: Float[np.ndarray, "T J 3"],
     paths: Float[np.ndarray, "T S 2 3"],
     sides: Sequence[str],
+    noise: Noise | None = None,
 ) -> Schedule:
     """Of a source whose joints are at `positions` and heels and toes at `paths` [m, world], of the
-    feet of some `sides`; feet that it does not have are 0 all over."""
+    feet of some `sides`; feet that it does not have are 0 all over. What `noise` its recording had
+    is averaged out of these."""
+    if noise is not None:
+        paths = smoothed(paths, noise.contact_cutoff, source.frame_time)
     rig, frame_time = source.rig, source.frame_time
     mass = human_mass(rig, positions, quat_mul(source.rotations, rig.tpose))
     acceleration = derivative(mass.com, frame_time, 2, _WINDOW)
@@ -87,12 +83,16 @@ def schedule(
     stands = np.zeros(paths.shape[:-1], dtype=bool)
     if exist.any():
         own, size = paths[:, exist], rig.standing_height
-        stands[:, exist] = planted_points(own, frame_time, size) & _lower_ends(own, size)
+        slowed = own if noise is None else own * [noise.slowness, noise.slowness, 1.0]
+        stands[:, exist] = planted_points(slowed, frame_time, size) & lower_ends(own, size)
     feet = _steady(stands, frame_time)
     feet = _with_wobbles(feet, paths, rig.standing_height, frame_time)
     floating = _nothing_holds(feet, parts)
     floating[flight] = False
-    feet[floating] |= _creeping(source, paths, exist)[floating]
+    if exist.any():
+        window = _odd(CREEP_TIME, frame_time)
+        creep = creeping(paths[:, exist], rig.standing_height, frame_time, window)
+        feet[np.ix_(floating, exist)] |= creep[floating]
     feet = _steady(feet, frame_time) & ~_kneeling(parts, roles, sides)[:, :, None]
     return Schedule(feet, parts, rests, roles, flight, acceleration)
 
@@ -100,21 +100,6 @@ def schedule(
 def has_feet(paths: Float[np.ndarray, "T S 2 3"]) -> Bool[np.ndarray, "S"]:
     """Which feet the source has: the others are 0 all over."""
     return np.abs(paths).sum(axis=(0, 2, 3)) > 0
-
-
-def _lower_ends(paths: Float[np.ndarray, "T S 2 3"], height: float) -> Bool[np.ndarray, "T S 2"]:
-    """Which of heel and toe is the lower, or hardly higher than the other: who stands on the toes
-    does not stand on the heel."""
-    above = _above(paths, height)
-    lowest = above.min(axis=-1, keepdims=True)
-    lower: Bool[np.ndarray, "T S 2"] = above < lowest + MAX_TILT * height / ADULT_HEIGHT
-    return lower
-
-
-def _above(paths: Float[np.ndarray, "T S 2 3"], height: float) -> Float[np.ndarray, "T S 2"]:
-    """How high [m] heels and toes are over where they stand."""
-    above: Float[np.ndarray, "T S 2"] = paths[..., 2] - standing_heights(paths, height)
-    return above
 
 
 def _with_wobbles(
@@ -194,7 +179,7 @@ def _sole_points(feet: Float[np.ndarray, "T F 2 3"], height: float) -> Points:
     places = feet.reshape(len(feet), -1, 3)
     if not feet.size:
         return Points(places, places[..., 2])
-    return Points(places, _above(feet, height).reshape(len(feet), -1))
+    return Points(places, above(feet, height).reshape(len(feet), -1))
 
 
 def _runs_with(
@@ -205,24 +190,6 @@ def _runs_with(
     for b in range(mask.shape[1]):
         for start, stop in true_runs(mask[:, b]):
             out[start:stop, b] = seed[start:stop, b].any()
-    return out
-
-
-def _creeping(
-    source: CanonicalMotion, paths: Float[np.ndarray, "T S 2 3"], exist: Bool[np.ndarray, "S"]
-) -> Bool[np.ndarray, "T S 2"]:
-    """The slowest and lowest heel or toe, where it is slow enough."""
-    out = np.zeros(paths.shape[:-1], dtype=bool)
-    if not exist.any():
-        return out
-    own, size = paths[:, exist], source.rig.standing_height
-    slowness = speeds(own, source.frame_time) / (PLANTED_SPEED * size / ADULT_HEIGHT)
-    height = _above(own, size) / (PLANTED_HEIGHT * size / ADULT_HEIGHT)
-    slowness[~_lower_ends(own, size)] = _NEVER
-    window = _odd(CREEP_TIME, source.frame_time)
-    cost = uniform_filter1d(slowness + height, window, axis=0, mode="nearest")
-    best = cost == cost.min(axis=(1, 2), keepdims=True)
-    out[:, exist] = best & (slowness < MAX_CREEP / PLANTED_SPEED)
     return out
 
 

@@ -20,6 +20,7 @@ from robots.solver.holds import Holds, joined
 from robots.solver.marching import abrupt, calmed
 from robots.solver.motion_plan import with_dynamics
 from robots.solver.mounted import facing_ahead, on_mount
+from robots.solver.noise import without_noise
 from robots.solver.projection import project
 from robots.solver.repair import repair
 from robots.solver.resting import leans, resting
@@ -59,15 +60,17 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
 
     Recordings of more than 20 fps are solved at about 20 fps first; splines through that are then
     polished in all frames. Long ones are solved a stretch at a time. Frames of the source that
-    nothing leads to are passed over. A robot without legs stays where it is mounted.
+    nothing leads to are passed over, and one that trembles is smoothed. A robot without legs stays
+    where it is mounted.
     """
     if robot.mount is not None:
         source = facing_ahead(source)
     source, passed = without_strays(source)
-    notes = dict.fromkeys((*robot.notes, *passed))
+    source, noise, trembles = without_noise(source)
+    notes = dict.fromkeys((*robot.notes, *passed, *trembles))
 
     def solved(start: int, stop: int) -> Coordinates:
-        targets = targets_of(source.frames(start, stop), robot)
+        targets = targets_of(source.frames(start, stop), robot, noise)
         notes.update(dict.fromkeys(targets.notes))
         return _trajectory(robot, targets)
 

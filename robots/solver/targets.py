@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 from robots.model.morphology import Morphology
 from robots.model.shapes import surface
 from robots.solver.contacts import has_feet, schedule, touching_joint
+from robots.solver.noise import Noise
 from robots.solver.palms import laid, resting_palms
 from robots.solver.trunk import bowing
 from robots.tree import forward_kinematics
@@ -104,15 +105,15 @@ class Targets:
         )
 
 
-def targets_of(source: CanonicalMotion, robot: Morphology) -> Targets:
-    """The targets that `source` sets for `robot`."""
+def targets_of(source: CanonicalMotion, robot: Morphology, noise: Noise | None = None) -> Targets:
+    """The targets that `source` sets for `robot`; `noise` is what its recording trembled by."""
     positions = canonical_positions(source)
     world, hips, notes = poses_of(source, positions, robot)
     rig = source.rig
     own_chest = robot.rig.chest
     paths = source_feet(source, positions, robot)
     scale = robot.rig.hip_height / rig.hip_height
-    touches = schedule(source, positions, paths, [sole.side for sole in robot.soles])
+    touches = schedule(source, positions, paths, [sole.side for sole in robot.soles], noise)
     touching = [j for r in touches.part_roles if (j := touching_joint(rig, r)) is not None]
     palms = resting_palms(robot, touches.part_roles, touches.rests, source.frame_time)
     for role in palms:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 
-from robots.solver.contacts import MAX_TILT
+from robots.solver.creeping import MAX_TILT
 from robots.solver.foot_path import (
     MAX_UNEVEN,
     RAISED_HOLD,

@@ -1,0 +1,155 @@
+"""The white noise of estimated motion, measured and taken away.
+
+Motion estimated frame by frame, from video or by cheap trackers, trembles: each frame is off by
+itself. Feet then seem too fast to stand. How far they tremble is seen in what bodies can't do, to
+go to and fro from each frame to the next. Beyond what contacts bear, the motion is smoothed, no
+more than until what is left moves a foot no faster than one that stands may move; recordings that
+tremble less, as of markers or inertial sensors, stay as they are.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.linalg import cho_solve_banded, cholesky_banded
+
+from spark.blocks import in_blocks
+from spark.rig.contacts import (
+    ADULT_HEIGHT,
+    PLANTED_SPEED,
+    SPEED_WINDOW,
+    floor_under,
+    lowest_sole,
+)
+from spark.rotation import quat_mul
+from spark.transfer.canonical import CanonicalMotion, canonical_positions
+
+# The product of a second difference with the next is of white noise -4 times its variance an axis
+# in the mean, and of motion above 0. Its median, which no impact moves, is less far from 0:
+_MEDIAN = 0.749  # of the mean, in three axes
+_LEAST_FRAMES = 24  # that tell noise from motion
+_REST_SPEED = PLANTED_SPEED / 3  # [m/s, of an adult] of noise (RMS, an axis) that contacts bear
+_LEAST_NOISE = _REST_SPEED * SPEED_WINDOW / np.sqrt(2)  # [m, of an adult] that moves feet so fast
+_LEAST_STEP_RATE = 2.5  # [Hz] below which steps would be smoothed away: they last half a second
+_MAX_JOLT = 1.5  # [m/s², of an adult] of noise that hips are left with: walking ones reach 4
+_BEYOND = 2.0  # standard deviations of what noise is left, by which standing feet may be faster
+
+
+@dataclass(frozen=True)
+class Noise:
+    """White noise of an adult's `feet` and `hips` [m], RMS an axis, every `frame_time` [s]."""
+
+    feet: float
+    hips: float
+    frame_time: float
+
+    @property
+    def motion_cutoff(self) -> float:
+        """Up to which frequency [Hz] a motion is worth following."""
+        jolt = self.hips * np.sqrt(4 * np.pi**5 / np.sqrt(2) * self.frame_time)  # as in `_speed`
+        by_hips = np.inf if jolt == 0 else (_MAX_JOLT / jolt) ** (2 / 5)
+        return float(min(self._cutoff(PLANTED_SPEED), by_hips))
+
+    @property
+    def contact_cutoff(self) -> float:
+        """Up to which frequency [Hz] feet are followed to tell whether they stand."""
+        return max(self._cutoff(_REST_SPEED), _LEAST_STEP_RATE)
+
+    @property
+    def slowness(self) -> float:
+        """By what paths of feet, smoothed so, are scaled along the floor for their speeds to be
+        judged by limits for clean ones: noise makes up a part of them."""
+        return float(1 / np.hypot(1.0, _BEYOND * self._speed(self.contact_cutoff) / PLANTED_SPEED))
+
+    def _cutoff(self, speed: float) -> float:
+        """That leaves noise of a speed [m/s, RMS an axis]: see `_speed`."""
+        return float((speed / self._speed(1.0)) ** (2 / 3))
+
+    def _speed(self, cutoff: float) -> float:
+        """[m/s, RMS an axis] of the noise that `smoothed` leaves: the integral over frequency f
+        of its density, (2 pi f)² 2 `frame_time` `feet`², times 1 / (1 + (f / cutoff)⁴)²."""
+        return float(self.feet * np.sqrt(np.pi**3 / np.sqrt(2) * self.frame_time * cutoff**3))
+
+
+def without_noise(
+    source: CanonicalMotion,
+) -> tuple[CanonicalMotion, Noise | None, tuple[str, ...]]:
+    """`source` smoothed as far as it trembles, how far that is, and a note that says so; as it is,
+    None and no note where contacts bear it.
+
+    Everything is smoothed alike: feet that stood while hips moved still stand.
+    """
+    noise = noise_of(source)
+    if noise.feet < _LEAST_NOISE:
+        return source, None, ()
+    smoother = _Smoother(len(source), noise.motion_cutoff, source.frame_time)
+    rotations = np.empty_like(source.rotations)
+    for j in range(rotations.shape[1]):
+        turns = smoother(_continuous(source.rotations[:, j]))
+        rotations[:, j] = turns / np.linalg.norm(turns, axis=-1, keepdims=True)
+    quiet = replace(source, rotations=rotations, hips=smoother(source.hips))
+    note = (
+        f"the source's feet tremble by {1000 * noise.feet:.0f} mm of white noise (of an adult), as "
+        f"of estimated motion: it is smoothed above {noise.motion_cutoff:.1f} Hz, and whether feet "
+        f"stand is told from what is below {noise.contact_cutoff:.1f} Hz"
+    )
+    return replace(quiet, floor_z=_floor(quiet)), noise, (note,)
+
+
+def noise_of(source: CanonicalMotion) -> Noise:
+    """0 where bodies could move so."""
+    rig, size = source.rig, source.rig.standing_height / ADULT_HEIGHT
+    if len(source) < _LEAST_FRAMES or not rig.contact_joints:
+        return Noise(0.0, 0.0, source.frame_time)
+    feet = white_noise(canonical_positions(source, rig.contact_joints) / size)
+    return Noise(feet, white_noise(source.hips[:, None] / size), source.frame_time)
+
+
+def white_noise(paths: Float[np.ndarray, "T K 3"]) -> float:
+    """RMS an axis, in the paths' unit."""
+    bends = np.diff(paths, 2, axis=0)
+    to_and_fro = -np.einsum("tkc,tkc->tk", bends[1:], bends[:-1])
+    variance = np.maximum(np.median(to_and_fro, axis=0), 0.0) / (3 * 4 * _MEDIAN)
+    return float(np.sqrt(variance.mean()))
+
+
+def smoothed(
+    values: Float[np.ndarray, "T *n"], cutoff: float, frame_time: float
+) -> Float[np.ndarray, "T *n"]:
+    """By a cubic smoothing spline, which halves what swings at the cutoff [Hz]."""
+    return _Smoother(len(values), cutoff, frame_time)(values)
+
+
+class _Smoother:
+    """Least squares of what is taken away and, weighed, of second differences (Whittaker 1923,
+    Henderson 1924): the discrete cubic smoothing spline."""
+
+    def __init__(self, count: int, cutoff: float, frame_time: float) -> None:
+        weight = (2 * np.sin(np.pi * min(cutoff * frame_time, 0.5))) ** -4
+        bands = np.zeros((3, count))
+        bands[2] = 1.0
+        for k, a in enumerate((1.0, -2.0, 1.0)):
+            for m, b in enumerate((1.0, -2.0, 1.0)[: k + 1]):
+                bands[2 - k + m, k : count - 2 + k] += weight * a * b
+        self._factor = cholesky_banded(bands)
+
+    def __call__(self, values: Float[np.ndarray, "T *n"]) -> Float[np.ndarray, "T *n"]:
+        columns = values.reshape(len(values), -1)
+        return np.asarray(cho_solve_banded((self._factor, False), columns)).reshape(values.shape)
+
+
+def _continuous(rotations: Float[np.ndarray, "T 4"]) -> Float[np.ndarray, "T 4"]:
+    """The same rotations, each quaternion on the side of the one before."""
+    same = np.sum(rotations[1:] * rotations[:-1], axis=1) >= 0
+    signs = np.cumprod(np.where(same, 1.0, -1.0))
+    return rotations * np.append(1.0, signs)[:, None]
+
+
+def _floor(source: CanonicalMotion) -> float:
+    rig = source.rig
+
+    def lowest(block: slice) -> Float[np.ndarray, "T"]:
+        part = source.picked(block)
+        return lowest_sole(rig, canonical_positions(part), quat_mul(part.rotations, rig.tpose))
+
+    return floor_under(in_blocks(lowest, len(source)))
