@@ -116,6 +116,7 @@ SPELLINGS = {
     "girdle": "clavicle",
     "uparm": "upper arm",
     # of anatomy
+    "scap": "scapula",
     "sacrum": "pelvis",
     "vertebra": "spine",
     "vertebrae": "spine",
