@@ -55,7 +55,7 @@ def main(seconds: str, *paths: str) -> None:
         except SkeletonError as error:
             print(error, file=sys.stderr)
     found: dict[tuple[str, str], Float[np.ndarray, "3 6"]] = {}
-    worse: dict[tuple[str, str], float] = {}
+    more: dict[tuple[str, str], int] = {}  # frames that are implausible, where they count
     for a, b in permutations(whole, 2):
         source = sources[a]
         copied, moved = (
@@ -63,18 +63,22 @@ def main(seconds: str, *paths: str) -> None:
             for method in ("copy", "spark")
         )
         found[a, b] = rows_of(copied, moved)
-        more = found[a, b][2, 0] - found[a, b][1, 0]
-        worse[a, b] = more if abs(more) * len(source.motion) > 100 * FEW else 0.0
-    every = np.array([*worse.values()])
+        points = found[a, b][2, 0] - found[a, b][1, 0]
+        frames = round(points / 100 * len(source.motion))
+        more[a, b] = frames if abs(frames) > FEW and abs(points) > POINT else 0
+    worse, better = ([abs(n) for n in more.values() if n * sign > 0] for sign in (1, -1))
     names = ["implausible", *FLAGS]
-    print(f"{len(found)} pairs: {(every > POINT).sum()} worse, {(every < -POINT).sum()} better\n")
+    print(
+        f"{len(found)} pairs: {len(worse)} worse, by {sum(worse)} frames, {len(better)} better, by "
+        f"{sum(better)}\n"
+    )
     print(f"| % of the frames | {' | '.join(names)} | jerk |\n|{'---|' * (len(names) + 2)}")
     for name, mean in zip(ROWS, np.mean([*found.values()], axis=0), strict=True):
         print(f"| {name} | {' | '.join(f'{x:.2f}' for x in mean[:-1])} | {mean[-1]:.0f} |")
     print("\nWorst pairs, copy and retarget (source):\n")
-    for a, b in sorted(worse, key=lambda pair: -worse[pair])[:WORST]:
+    for a, b in sorted(more, key=lambda pair: -more[pair])[:WORST]:
         shares = found[a, b][:, 0]
-        print(f"- {a} onto {b}: {shares[1]:.1f}, {shares[2]:.1f} ({shares[0]:.1f})")
+        print(f"- {a} onto {b}: {shares[1]:.1f}, {shares[2]:.1f} ({shares[0]:.1f}), {more[a, b]:+}")
 
 
 def rows_of(copied: Report, moved: Report) -> Float[np.ndarray, "3 6"]:
