@@ -138,10 +138,13 @@ def quat_slerp(
 ) -> Float[Any, "*n 4"]:
     """Spherical interpolation along the shorter arc: `q0` at fraction 0, `q1` at 1."""
     xp = array_namespace(q0, q1)
-    q1 = xp.where(dot(q0, q1) < 0, -q1, q1)
-    # At most a right angle; at least one whose sine can be divided by.
-    chord = xp.clip(norm(q1 - q0), xp.finfo(q1.dtype).eps, 2**0.5)
-    angle = 2 * xp.asin(chord / 2)
+    inner = dot(q0, q1)
+    one = xp.ones_like(inner)
+    q1 = xp.where(inner < 0, -one, one) * q1
+    between = q1 - q0
+    # Of a right angle at most; of one at least whose sine can be divided by.
+    squared, least = dot(between, between), xp.finfo(q1.dtype).eps ** 2 * one
+    angle = 2 * xp.asin(xp.sqrt(xp.where(squared < least, least, squared)) / 2)
     part, sine = fraction[..., None], xp.sin(angle)
     return xp.sin((1 - part) * angle) / sine * q0 + xp.sin(part * angle) / sine * q1
 
