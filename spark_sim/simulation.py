@@ -62,7 +62,7 @@ def simulate(clip: AnyClip | File, *, assist: bool = False, balance: bool = Fals
     """Track a motion with position servos, in simulation with contacts. A robot has its own servos;
     the body of a character is built with them. With `assist`, a force and a torque on the root
     help. With `balance`, a controller looks ahead and keeps the body up by its own strength
-    (docs/playback.md): some six seconds of CPU time for each of the motion.
+    (docs/playback.md): some ten seconds of CPU time for each of the motion.
 
     Raises `SkeletonError` where the body is no humanoid, or has no shape that collides.
     """

@@ -72,7 +72,7 @@ class Balancer:
         self._ahead = _looking_ahead(model, self._stride * own)
         self._scratch = mujoco.MjData(model)
         self._data = [mujoco.MjData(self._ahead) for _ in range(len(os.sched_getaffinity(0)))]
-        self._beforehand = _beforehand(model, torques, len(qpos), frame_time)
+        self._beforehand = beforehand(model, torques, len(qpos), frame_time)
         self._servos, self._spread = _carrying_servos(model, root, qpos, height)
         count = max(2, round(HORIZON * self._time / (self._stride * own)))
         self._steps = self._stride * own * np.arange(1, count + 1)
@@ -187,7 +187,7 @@ def _hats(times: Float[np.ndarray, "S"], knots: Float[np.ndarray, "K"]) -> Float
     return np.maximum(1 - np.abs(times[:, None] - knots) / (knots[1] - knots[0]), 0.0)
 
 
-def _beforehand(
+def beforehand(
     model: mujoco.MjModel,
     torques: Mapping[str, Float[np.ndarray, "T"]],
     frames: int,

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -9,8 +10,12 @@ from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.registry import find
 from robots.solver.solve import retarget
+from sim.physics.balance import beforehand
+from sim.physics.servos import with_servos
 from sim.physics.summary import render, summarize
 from sim.physics.tracking import TrackingResult, track
+from sim.report.assess import assess
+from sim.trajectory import Subject
 from spark.demo.sample import sample_motion, sample_rig
 from spark.transfer.canonical import to_canonical
 from spark_sim.loading import load_robot
@@ -33,8 +38,11 @@ def walk(ember: Morphology) -> RobotMotion:
 
 def follow(walk: RobotMotion, *, balance: bool, frames: int | None = None) -> TrackingResult:
     part = replace(walk.body, qpos=walk.body.qpos[:frames])
-    height = walk.robot.rig.standing_height
-    return track(part, walk.frame_time, height=height, balance=balance)
+    robot = walk.robot
+    needed = assess(Subject(walk.motion, robot.rig, walk.body)).clip.torques if balance else ()
+    torques = {each.joint: each.torque[:frames] for each in needed}
+    height = robot.rig.standing_height
+    return track(part, walk.frame_time, height=height, balance=balance, torques=torques)
 
 
 def test_a_walk_that_servos_let_fall_stays_up(walk: RobotMotion) -> None:
@@ -55,6 +63,21 @@ def test_torques_keep_to_the_motors_limits(walk: RobotMotion) -> None:
         limits[int(model.actuator_trnid[a, 0])] = float(model.actuator_forcerange[a, 1])
     for joint, peak in enumerate(tracked.rollout.peak.max(axis=0)):
         assert peak <= limits[joint] * (1 + 1e-9)
+
+
+def test_servos_give_beforehand_what_the_motion_needs(walk: RobotMotion) -> None:
+    """Where nothing is off, each motor gives its torque, as far as it can; MuJoCo says so."""
+    model, _ = with_servos(walk.body, height=walk.robot.rig.standing_height, floor_z=0.0, own=True)
+    names = [model.joint(int(model.actuator_trnid[a, 0])).name for a in range(model.nu)]
+    wanted = {name: np.full(len(walk), 3.0 + k) for k, name in enumerate(names[:-1])}
+    shifts = beforehand(model, wanted, len(walk), walk.frame_time)
+    data = mujoco.MjData(model)
+    data.qpos[:] = walk.body.qpos[10]
+    mujoco.mj_forward(model, data)
+    data.ctrl[:] = data.actuator_length + shifts[10]
+    mujoco.mj_forward(model, data)
+    given = [*np.minimum(3.0 + np.arange(model.nu - 1), model.actuator_forcerange[:-1, 1]), 0.0]
+    np.testing.assert_allclose(data.actuator_force, given, atol=1e-9)
 
 
 def test_the_same_motion_is_held_the_same_way(walk: RobotMotion) -> None:
