@@ -196,8 +196,9 @@ def beforehand(
     """Shifts of the servos' targets by which they give some torques where nothing is off."""
     out = np.zeros((frames, model.nu))
     for a in range(model.nu):
-        torque = torques.get(model.joint(max(servo_joint(model, a), 0)).name)
-        if torque is not None and servo_joint(model, a) >= 0:
+        joint = servo_joint(model, a)
+        torque = torques.get(model.joint(joint).name) if joint >= 0 else None
+        if torque is not None:
             push = gaussian_filter1d(torque, BLUR / frame_time, mode="nearest")
             out[:, a] = push / (model.actuator_gear[a, 0] * model.actuator_gainprm[a, 0])
     return out
