@@ -34,14 +34,14 @@ def main() -> None:
         shares, errors = [], []
         for stem, source in clips.items():
             result = retarget(source, robot)
-            needed = assess(Subject(result.motion, robot.rig, result.body)).clip.torques
+            needed = assess(Subject(result.motion, robot.rig, result.body)).clip.torque_by_joint
             start = time.process_time()
             tracked = track(
                 result.body,
                 result.frame_time,
                 height=robot.rig.standing_height,
                 balance=True,
-                torques={each.joint: each.torque for each in needed},
+                torques=needed,
             )
             took = time.process_time() - start
             found = summarize(tracked)

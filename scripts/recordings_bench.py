@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from robots.metrics import RobotMetrics, measure
+from robots.metrics import measure
 from robots.model.known import known
 from robots.solver.solve import retarget
 from scripts.corruptions import jittering, resampled
-from scripts.robot_bars import clips_of, mean_of, plausible
+from scripts.robot_bars import cells, clips_of, mean_of, plausible
 from spark.motion import Motion
 from spark.resample import motion_at
 from spark.rig.contacts import ADULT_HEIGHT
@@ -32,19 +32,19 @@ CLIPS = (
     "animateddrawings/zombie.bvh",
     "animateddrawings/jumping.bvh",
 )
-COLUMNS = {  # title: (field, factor, format)
-    "implausible %": ("implausible", 100, ".1f"),
-    "skating %": ("skating", 100, ".1f"),
-    "wrench %": ("root_wrench", 100, ".1f"),
-    "floating %": ("floating", 100, ".1f"),
-    "contacts F1": ("contact_f1", 1, ".3f"),
-    "in air %": ("in_air", 100, ".1f"),
-    "skate cm/s": ("skate_m_s", 100, ".1f"),
-    "hips acc.": ("hips_acceleration", 1, ".2f"),
-    "clearance": ("swing_clearance", 1, ".2f"),
-    "limbs": ("limb_error_rad", 57.3, ".1f"),
-    "drift cm": ("drift_m", 100, ".1f"),
-}
+COLUMNS = (
+    "implausible %",
+    "skating %",
+    "wrench %",
+    "float %",
+    "contacts F1",
+    "in air %",
+    "skate cm/s",
+    "hips acc.",
+    "clearance",
+    "limbs",
+    "drift cm",
+)
 Spoiler = Callable[[Motion, Rig, np.random.Generator], Motion]
 
 
@@ -68,7 +68,7 @@ def main() -> None:
                 motion, rig = from_canonical(source), source.rig
                 spoilt = to_canonical(spoil(motion, rig, np.random.default_rng(k)), rig)
                 rows.append(measure(motion, rig, retarget(spoilt, robot)))
-            show(kind, mean_of(rows))
+            print(f"| {kind} | {cells(mean_of(rows), COLUMNS)} |", flush=True)
 
 
 def at_rate(source: CanonicalMotion, fps: float) -> CanonicalMotion:
@@ -114,14 +114,6 @@ def moved(motion: Motion, rig: Rig, path: Float[np.ndarray, "T 3"]) -> Motion:
     source = to_canonical(motion, rig)
     hips = source.hips + path * rig.standing_height / ADULT_HEIGHT
     return from_canonical(CanonicalMotion(rig, source.frame_time, source.rotations, hips))
-
-
-def show(label: str, metrics: RobotMetrics) -> None:
-    cells = []
-    for field, factor, shape in COLUMNS.values():
-        value = getattr(metrics, field)
-        cells.append("" if value is None else f"{factor * value:{shape}}")
-    print(f"| {label} | {' | '.join(cells)} |", flush=True)
 
 
 KINDS: dict[str, Spoiler] = {

@@ -9,7 +9,7 @@ too.
 
 import argparse
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -149,12 +149,17 @@ def misses(metrics: RobotMetrics) -> list[str]:
     return out
 
 
-def show(label: str, metrics: RobotMetrics, fps: float) -> None:
-    cells = []
-    for field, factor, shape, _ in COLUMNS.values():
+def cells(metrics: RobotMetrics, titles: Iterable[str] = COLUMNS) -> str:
+    """A row of the table, or some of its columns."""
+    out = []
+    for field, factor, shape, _ in map(COLUMNS.__getitem__, titles):
         value = getattr(metrics, field)
-        cells.append("" if value is None else f"{factor * value:{shape}}")
-    print(f"| {label} | {' | '.join(cells)} | {fps:.0f} |", flush=True)
+        out.append("" if value is None else f"{factor * value:{shape}}")
+    return " | ".join(out)
+
+
+def show(label: str, metrics: RobotMetrics, fps: float) -> None:
+    print(f"| {label} | {cells(metrics)} | {fps:.0f} |", flush=True)
 
 
 if __name__ == "__main__":

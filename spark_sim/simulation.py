@@ -67,7 +67,7 @@ def simulate(clip: AnyClip | File, *, assist: bool = False, balance: bool = Fals
     Raises `SkeletonError` where the body is no humanoid, or has no shape that collides.
     """
     clip = clip_of(clip)
-    torques = assess(clip.subject).clip.torques if balance and clip.body else ()
+    needed = assess(clip.subject).clip.torque_by_joint if balance and clip.body else {}
     tracked = track(
         clip.body or model_trajectory(clip.rig, clip.motion),
         clip.motion.frame_time,
@@ -75,7 +75,7 @@ def simulate(clip: AnyClip | File, *, assist: bool = False, balance: bool = Fals
         floor_z=clip.floor_z,
         assist=Assist() if assist else None,
         balance=balance,
-        torques={each.joint: each.torque for each in torques},
+        torques=needed,
     )
     return Simulated(clip, tracked)
 

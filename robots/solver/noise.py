@@ -21,7 +21,7 @@ from spark.rig.contacts import (
     floor_under,
     lowest_sole,
 )
-from spark.rotation import quat_mul
+from spark.rotation import quat_continuous, quat_mul, quat_normalize
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
 # The product of a second difference with the next is of white noise -4 times its variance an axis
@@ -85,8 +85,7 @@ def without_noise(
     smoother = _Smoother(len(source), noise.motion_cutoff, source.frame_time)
     rotations = np.empty_like(source.rotations)
     for j in range(rotations.shape[1]):
-        turns = smoother(_continuous(source.rotations[:, j]))
-        rotations[:, j] = turns / np.linalg.norm(turns, axis=-1, keepdims=True)
+        rotations[:, j] = quat_normalize(smoother(quat_continuous(source.rotations[:, j])))
     quiet = replace(source, rotations=rotations, hips=smoother(source.hips))
     note = (
         f"the source's feet tremble by {1000 * noise.feet:.0f} mm of white noise (of an adult), as "
@@ -101,7 +100,11 @@ def noise_of(source: CanonicalMotion) -> Noise:
     rig, size = source.rig, source.rig.standing_height / ADULT_HEIGHT
     if len(source) < _LEAST_FRAMES or not rig.contact_joints:
         return Noise(0.0, 0.0, source.frame_time)
-    feet = white_noise(canonical_positions(source, rig.contact_joints) / size)
+
+    def places(block: slice) -> Float[np.ndarray, "T K 3"]:
+        return canonical_positions(source.picked(block), rig.contact_joints)
+
+    feet = white_noise(in_blocks(places, len(source)) / size)
     return Noise(feet, white_noise(source.hips[:, None] / size), source.frame_time)
 
 
@@ -136,13 +139,6 @@ class _Smoother:
     def __call__(self, values: Float[np.ndarray, "T *n"]) -> Float[np.ndarray, "T *n"]:
         columns = values.reshape(len(values), -1)
         return np.asarray(cho_solve_banded((self._factor, False), columns)).reshape(values.shape)
-
-
-def _continuous(rotations: Float[np.ndarray, "T 4"]) -> Float[np.ndarray, "T 4"]:
-    """The same rotations, each quaternion on the side of the one before."""
-    same = np.sum(rotations[1:] * rotations[:-1], axis=1) >= 0
-    signs = np.cumprod(np.where(same, 1.0, -1.0))
-    return rotations * np.append(1.0, signs)[:, None]
 
 
 def _floor(source: CanonicalMotion) -> float:

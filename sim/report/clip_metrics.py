@@ -146,6 +146,11 @@ class ClipMetrics:
         return float(np.any(over, axis=0).mean())
 
     @property
+    def torque_by_joint(self) -> dict[str, Float[np.ndarray, "T"]]:
+        """What the motion needs [N m] of each joint of `torques`, by its name."""
+        return {each.joint: each.torque for each in self.torques}
+
+    @property
     def jerk_rms(self) -> float:
         """Over all joints and frames [rad/s³]; 0 without joints."""
         return float(np.sqrt(np.mean(self.joint_jerk**2))) if self.joint_names else 0.0

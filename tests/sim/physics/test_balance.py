@@ -39,8 +39,8 @@ def walk(ember: Morphology) -> RobotMotion:
 def follow(walk: RobotMotion, *, balance: bool, frames: int | None = None) -> TrackingResult:
     part = replace(walk.body, qpos=walk.body.qpos[:frames])
     robot = walk.robot
-    needed = assess(Subject(walk.motion, robot.rig, walk.body)).clip.torques if balance else ()
-    torques = {each.joint: each.torque[:frames] for each in needed}
+    needed = assess(Subject(walk.motion, robot.rig, walk.body)).clip.torque_by_joint
+    torques = {joint: torque[:frames] for joint, torque in needed.items()}
     height = robot.rig.standing_height
     return track(part, walk.frame_time, height=height, balance=balance, torques=torques)
 
