@@ -1,10 +1,13 @@
 """The batches of a run: step n's are the same whatever ran before, in whichever process."""
 
+import pickle
 import signal
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cached_property
 from itertools import islice
 
 import torch
+from torch import Tensor
 from torch.utils.data import DataLoader, Dataset
 
 from spark.network.t5 import NAME_CACHE, T5Names
@@ -81,6 +84,16 @@ class Blocks(Dataset[tuple[PairDraws | UnpairedDraws, ...]]):
     def __init__(self, steps: Steps) -> None:
         self.steps = steps
 
+    def __reduce__(self) -> tuple[Callable[[Tensor], "Blocks"], tuple[Tensor]]:
+        return _unpickled, (self._pickled,)
+
+    @cached_property
+    def _pickled(self) -> Tensor:
+        """This, in shared memory. Through a pipe, which holds 64 KB, workers would start one after
+        the other: each is waited for until it has imported torch, and has read."""
+        pickled = torch.frombuffer(bytearray(pickle.dumps(self.steps)), dtype=torch.uint8)
+        return pickled.share_memory_()  # type: ignore[no-untyped-call,no-any-return]
+
     def __getitem__(self, block: int) -> tuple[PairDraws | UnpairedDraws, ...]:
         return self.steps.made(block)
 
@@ -104,6 +117,10 @@ def batches_from(steps: Steps, start: int, device: torch.device) -> Iterator[Bat
     every = (draws for block in packed for draws in block.on(device))
     first = start % steps.block
     return (draws.batch() for draws in islice(every, first, first + config.steps - start))
+
+
+def _unpickled(steps: Tensor) -> Blocks:
+    return Blocks(pickle.loads(memoryview(steps.numpy())))
 
 
 def worker_count(config: TrainConfig) -> int:

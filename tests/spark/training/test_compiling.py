@@ -5,6 +5,7 @@ import pickle
 import subprocess
 import sys
 from dataclasses import replace
+from multiprocessing.reduction import ForkingPickler
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from spark.training.objective import Objective
 from spark.training.packed import Packer
 from spark.training.processes import check_shares
 from spark.training.settings import TrainConfig
-from spark.training.steps import Steps, worker_count
+from spark.training.steps import Blocks, Steps, worker_count
 from tests.helpers.training import TINY, fresh
 
 CPU, GPU = torch.device("cpu"), torch.device("cuda")
@@ -172,6 +173,16 @@ def test_a_gpu_gets_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
     monkeypatch.setattr("spark.training.steps.free_cores", lambda: 3)
     assert worker_count(TrainConfig()) == 2
+
+
+def test_workers_start_at_once(walks: list[TrainingClip]) -> None:
+    """What more than a pipe holds (64 KB) would make each wait until the one before has read it."""
+    steps = steps_of(walks, "paper", fixed=True)[1]
+    sent = ForkingPickler.dumps(Blocks(steps))
+    assert len(sent) < 4096 < len(pickle.dumps(steps))
+    again = pickle.loads(sent)
+    (drawn, *_), (expected, *_) = again[0], steps.made(0)
+    assert torch.equal(drawn.poses.local, expected.poses.local)
 
 
 def test_a_mapped_array_goes_to_another_process_as_its_place(tmp_path: Path) -> None:
