@@ -3,10 +3,10 @@
 Usage: python scripts/gpu_bench.py DATASET [BATCH...]
 (a dataset of `spark-sim prepare`; windows in a step, 16 and 64 where none are named)
 
-Each row trains for 60 steps on four batches that lie on the device: `first` is the time of the
-first step, compiling included, `step` the mean of the last 40, `memory` the most that was taken. On
-a GPU the last size is measured compiled, too. Then comes how far joints of a network's first answer
-are from those on a CPU, at most, in hip heights.
+First comes how far joints of a network's first answer are from those on a CPU, at most, in hip
+heights. Then each row trains for 60 steps on four batches that lie on the device: `first` is the
+time of the first step, compiling included, `step` the mean of the last 40, `memory` the most that
+was taken. On a GPU the last size is measured compiled, too.
 """
 
 import sys
@@ -45,6 +45,9 @@ def main(dataset: str, *batches: str) -> None:
     gpu = device.type == "cuda"
     name = torch.cuda.get_device_name() if gpu else f"the CPU, {torch.get_num_threads()} threads"
     print(f"{name}, torch {torch.__version__}\n")
+    for preset in PRESETS:
+        apart, exact = _apart(clips, TrainConfig.of(preset), device)
+        print(f"{preset}: joints are {apart:.1g} apart, {exact:.1g} without bfloat16\n", flush=True)
     print("| preset | windows | compiled | first | step | windows/s | memory |")
     print("|---|---|---|---|---|---|---|", flush=True)
     sizes = [int(batch) for batch in batches or (16, 64)]
@@ -53,9 +56,6 @@ def main(dataset: str, *batches: str) -> None:
             for batch in sizes[-1:] if compiles else sizes:
                 config = replace(TrainConfig.of(preset), batch=batch, steps=STEPS)
                 _row(clips, config, device, compiles)
-    for preset in PRESETS:
-        apart, exact = _apart(clips, TrainConfig.of(preset), device)
-        print(f"\n{preset}: joints are {apart:.1g} apart, {exact:.1g} without bfloat16", flush=True)
 
 
 def _row(

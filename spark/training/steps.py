@@ -92,7 +92,7 @@ class Blocks(Dataset[tuple[PairDraws | UnpairedDraws, ...]]):
         """This, in shared memory. Through a pipe, which holds 64 KB, workers would start one after
         the other: each is waited for until it has imported torch, and has read."""
         pickled = torch.frombuffer(bytearray(pickle.dumps(self.steps)), dtype=torch.uint8)
-        return pickled.share_memory_()  # type: ignore[no-untyped-call,no-any-return]
+        return pickled.share_memory_()  # type: ignore[no-untyped-call]
 
     def __getitem__(self, block: int) -> tuple[PairDraws | UnpairedDraws, ...]:
         return self.steps.made(block)
@@ -120,7 +120,7 @@ def batches_from(steps: Steps, start: int, device: torch.device) -> Iterator[Bat
 
 
 def _unpickled(steps: Tensor) -> Blocks:
-    return Blocks(pickle.loads(memoryview(steps.numpy())))
+    return Blocks(pickle.loads(steps.numpy().tobytes()))
 
 
 def worker_count(config: TrainConfig) -> int:
