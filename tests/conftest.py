@@ -7,6 +7,8 @@ from pathlib import Path
 # One thread a process, here and in what tests start: two workers on two cores, each with threads
 # for both, take several times as long. Before anything that reads it is imported.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+# The laws are those of a CPU, to the bit, whatever the machine has (docs/training.md on GPUs).
+os.environ.setdefault("CUDA_VISIBLE_DEVICES", "")
 
 # Compiled models are kept for the time of the tests, and not in the user's own cache.
 if "PYTEST_XDIST_WORKER" not in os.environ:
