@@ -18,7 +18,7 @@ from robots.metrics import measure
 from robots.model.known import known
 from robots.solver.solve import retarget
 from scripts.corruptions import jittering, resampled
-from scripts.robot_bars import cells, clips_of, mean_of, plausible
+from scripts.robot_bars import cells, clips_of, follow, mean_of, plausible
 from spark.motion import Motion
 from spark.resample import motion_at
 from spark.rig.contacts import ADULT_HEIGHT
@@ -55,7 +55,9 @@ def main() -> None:
     parser.add_argument("--clips", nargs="+", default=CLIPS)
     parser.add_argument("--seconds", type=float, default=8.0, help="of each clip, at most")
     parser.add_argument("--fps", type=float, default=30.0)
+    parser.add_argument("--method", choices=("solve", "stream"), default="solve")
     args = parser.parse_args()
+    method = {"solve": retarget, "stream": follow}[args.method]
     clips = clips_of(args.data, args.clips, args.seconds).values()
     clean = [at_rate(clip, args.fps) for clip in clips if plausible(clip)]
     for name in args.robots:
@@ -67,7 +69,7 @@ def main() -> None:
             for k, source in enumerate(clean):
                 motion, rig = from_canonical(source), source.rig
                 spoilt = to_canonical(spoil(motion, rig, np.random.default_rng(k)), rig)
-                rows.append(measure(motion, rig, retarget(spoilt, robot)))
+                rows.append(measure(motion, rig, method(spoilt, robot)))
             print(f"| {kind} | {cells(mean_of(rows), COLUMNS)} |", flush=True)
 
 
@@ -118,6 +120,7 @@ def moved(motion: Motion, rig: Rig, path: Float[np.ndarray, "T 3"]) -> Motion:
 
 KINDS: dict[str, Spoiler] = {
     "clean": lambda motion, rig, rng: motion,
+    "noise 0.2 cm, 0.3°": partial(noisy, root_cm=0.2, degrees=0.3),
     "noise 0.5 cm, 1°": partial(noisy, root_cm=0.5, degrees=1.0),
     "noise 1 cm, 2°": partial(noisy, root_cm=1.0, degrees=2.0),
     "noise 2 cm, 4°": partial(noisy, root_cm=2.0, degrees=4.0),

@@ -27,12 +27,12 @@ from spark.transfer.canonical import CanonicalMotion, canonical_positions
 # The product of a second difference with the next is of white noise -4 times its variance an axis
 # in the mean, and of motion above 0. Its median, which no impact moves, is less far from 0:
 _MEDIAN = 0.749  # of the mean, in three axes
-_LEAST_FRAMES = 24  # that tell noise from motion
-_REST_SPEED = PLANTED_SPEED / 3  # [m/s, of an adult] of noise (RMS, an axis) that contacts bear
-_LEAST_NOISE = _REST_SPEED * SPEED_WINDOW / np.sqrt(2)  # [m, of an adult] that moves feet so fast
+LEAST_FRAMES = 24  # that tell noise from motion
+REST_SPEED = PLANTED_SPEED / 3  # [m/s, of an adult] of noise (RMS, an axis) that contacts bear
+LEAST_NOISE = REST_SPEED * SPEED_WINDOW / np.sqrt(2)  # [m, of an adult] that moves feet so fast
 _LEAST_STEP_RATE = 2.5  # [Hz] below which steps would be smoothed away: they last half a second
 _MAX_JOLT = 1.5  # [m/s², of an adult] of noise that hips are left with: walking ones reach 4
-_BEYOND = 2.0  # standard deviations of what noise is left, by which standing feet may be faster
+BEYOND = 2.0  # standard deviations of what noise is left, by which standing feet may be faster
 
 
 @dataclass(frozen=True)
@@ -53,13 +53,13 @@ class Noise:
     @property
     def contact_cutoff(self) -> float:
         """Up to which frequency [Hz] feet are followed to tell whether they stand."""
-        return max(self._cutoff(_REST_SPEED), _LEAST_STEP_RATE)
+        return max(self._cutoff(REST_SPEED), _LEAST_STEP_RATE)
 
     @property
     def slowness(self) -> float:
         """By what paths of feet, smoothed so, are scaled along the floor for their speeds to be
         judged by limits for clean ones: noise makes up a part of them."""
-        return float(1 / np.hypot(1.0, _BEYOND * self._speed(self.contact_cutoff) / PLANTED_SPEED))
+        return float(1 / np.hypot(1.0, BEYOND * self._speed(self.contact_cutoff) / PLANTED_SPEED))
 
     def _cutoff(self, speed: float) -> float:
         """That leaves noise of a speed [m/s, RMS an axis]: see `_speed`."""
@@ -80,7 +80,7 @@ def without_noise(
     Everything is smoothed alike: feet that stood while hips moved still stand.
     """
     noise = noise_of(source)
-    if noise.feet < _LEAST_NOISE:
+    if noise.feet < LEAST_NOISE:
         return source, None, ()
     smoother = _Smoother(len(source), noise.motion_cutoff, source.frame_time)
     rotations = np.empty_like(source.rotations)
@@ -98,7 +98,7 @@ def without_noise(
 def noise_of(source: CanonicalMotion) -> Noise:
     """0 where bodies could move so."""
     rig, size = source.rig, source.rig.standing_height / ADULT_HEIGHT
-    if len(source) < _LEAST_FRAMES or not rig.contact_joints:
+    if len(source) < LEAST_FRAMES or not rig.contact_joints:
         return Noise(0.0, 0.0, source.frame_time)
 
     def places(block: slice) -> Float[np.ndarray, "T K 3"]:

@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 
 from robots.model.morphology import Morphology
 from robots.solver.contacts import MAY_TOUCH, has_feet, touching_joint
+from robots.solver.noise import Noise, without_noise
 from robots.solver.targets import (
     LIMB_SEGMENTS,
     TPOSE_DIRECTIONS,
@@ -47,10 +48,12 @@ class Frame(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Ground:
     """The floor under a clip: its height `z` [m], and the lowest heights [m] of heel and toe of the
-    feet that the robot's soles follow (1st percentile)."""
+    feet that the robot's soles follow (1st percentile); and the clip's noise, where contacts don't
+    bear it."""
 
     z: float
     low: Float[np.ndarray, "S 2"]
+    noise: Noise | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +101,12 @@ def move_on(targets: FrameTargets, newest: FrameTargets) -> None:
 
 def ground_of(source: CanonicalMotion, robot: Morphology) -> Ground:
     """The floor of a clip; of a T-pose alone, its soles' height."""
+    source, noise, _ = without_noise(source)
     feet = source_feet(source, canonical_positions(source), robot)
     exist, low = has_feet(feet), np.zeros(feet.shape[1:3])
     if exist.any():
         low[exist] = standing_heights(feet[:, exist], source.rig.standing_height)
-    return Ground(source.floor_z, low)
+    return Ground(source.floor_z, low, noise)
 
 
 def parts_of(source: Rig, robot: Morphology) -> tuple[list[Role], Int[np.ndarray, "K"]]:

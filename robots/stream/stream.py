@@ -24,6 +24,7 @@ from robots.stream.frame_targets import (
     raised,
     repeated,
 )
+from robots.stream.quiet import Quieter
 from robots.stream.resting import RestTracker, held_points
 from robots.stream.throw import Throw
 from robots.stream.window import Window
@@ -51,6 +52,7 @@ class Stream:
         self._terms = Terms(robot, self._reader.bones, self._reader.hands is not None, parts)
         self._window = Window(robot, self._terms, frame_time, fixed=_FIXED, free=LATENCY + 1)
         self._throw = Throw(self._reader.scale, source.hip_height, frame_time)
+        self._quieter = Quieter(source, frame_time, ground.noise)
         self._targets: FrameTargets  # of the window's free frames
         self.reset()
 
@@ -59,10 +61,17 @@ class Stream:
         self._count = 0
         self._window.reset()
         self._throw.reset()
+        self._quieter.reset()
         self._q = np.zeros((_FRAMES, self.robot.mjcf.model.nq))
         self._contacts = ContactTracker(self._reader, self.frame_time, LATENCY)
         self._rests = RestTracker(self._reader, self._terms, self.frame_time, LATENCY)
         self._detours = Detours(self._reader, self._terms, self.frame_time)
+
+    @property
+    def foot_noise(self) -> float:
+        """White noise of the source's feet [m, RMS an axis] that is being smoothed away; 0 where
+        frames are followed as they are."""
+        return self._quieter.foot_noise
 
     def step(self, frame: Frame) -> Float[np.ndarray, "nq"]:
         """The next frame of the source; MuJoCo's coordinates of the robot `LATENCY` frames before
@@ -76,6 +85,8 @@ class Stream:
     def _step(self, frame: Frame) -> Float[np.ndarray, "nq"]:
         try:
             targets = self._reader.targets(frame)
+            quiet = self._quieter.follow(frame, targets.feet)
+            targets = targets if quiet is None else self._reader.targets(quiet)
         except FrameError as error:
             raise FrameError(f"frame {self._count} of the stream: {error}") from error
         thrown = self._throw.follow(targets.hips[2] / self._reader.scale)
@@ -85,7 +96,8 @@ class Stream:
             move_on(self._targets, targets)
             poses = self._terms.poses(q[_FIXED:])
             next_said = poses.at(slice(1))
-            foot_targets = self._contacts.update(targets, self._terms.sole_points(next_said)[0])
+            soles = self._terms.sole_points(next_said)[0]
+            foot_targets = self._contacts.update(targets, soles, self.foot_noise)
             resting = self._rests.update(targets, next_said)
             bones, angles = self._terms.bones(next_said)[0], self._terms.hinges.angles(q)[_FIXED]
             posture = self._detours.update(self._targets, bones, angles)

@@ -55,6 +55,12 @@ class Retargeter:
         """
         return self._stream.step(Frame(*frame))
 
+    @property
+    def foot_noise(self) -> float:
+        """By how much the source's feet tremble [m, RMS an axis] where that is too much to tell
+        which of them stand: then frames are smoothed, and the robot follows later. Else 0."""
+        return self._stream.foot_noise
+
     def __repr__(self) -> str:
         return f"Retargeter({self._source!r}, {self.robot!r})"
 

@@ -63,6 +63,7 @@ class Session:
         self._looked, self._same = 0.0, np.inf
         self._began, self._told_slow = np.inf, False
         self._told: set[str] = set()
+        self._trembles = False
         self._place: Float[np.ndarray, 2] | None = None
         self._anchor = np.zeros(2)
         self.frames = 0
@@ -95,6 +96,7 @@ class Session:
             if now - self._looked > _LOOK_EVERY:
                 self._looked = now
                 self._watch(now)
+                self._say_trembling(self._retargeter.foot_noise)
             self._pace.advance()
 
     def _begin(self) -> None:
@@ -181,6 +183,13 @@ class Session:
             self._note("the window is closed; the robot goes on, Ctrl-C ends it")
             self.stopping = self._journal is None and not self._sinks
         self._say_slow()
+
+    def _say_trembling(self, noise: float) -> None:
+        """That poses are smoothed, and no more."""
+        if (noise > 0) != self._trembles:
+            self._trembles = noise > 0
+            feet = f"the sender's feet tremble by {1000 * noise:.0f} mm of white noise: poses are"
+            self._note(f"{feet} smoothed" if noise else "the sender trembles no more")
 
     def _once(self, text: str) -> None:
         if text not in self._told:

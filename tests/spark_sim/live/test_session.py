@@ -117,6 +117,25 @@ def test_a_sender_that_changes_its_body_and_jumps(tmp_path: Path) -> None:
     assert np.abs(qpos[-1, 7:] - qpos[12, 7:]).max() > 0.8
 
 
+def test_a_sender_that_trembles_is_smoothed_and_told() -> None:
+    told: list[str] = []
+    rng = np.random.default_rng(0)
+
+    def packets(step: int, clock: float) -> list[bytes]:
+        place = tuple(0.01 * rng.normal(size=2))  # [m]
+        return [mvn.numbered(mvn.quaternions(mvn.world({}, at=place)), step)]
+
+    def trembles() -> bool:
+        return any("feet tremble" in each for each in told)
+
+    listener = Listener("xsens://127.0.0.1:0")
+    with listener:
+        session = Session(listener, "robot", FPS, told.append)
+        with session, running(session):
+            send(listener.port, packets, until=trembles)
+    assert trembles()
+
+
 def test_a_solver_that_is_too_slow_leaves_steps_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
