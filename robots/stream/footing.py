@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 
-from robots.solver.creeping import MAX_TILT
 from robots.solver.foot_path import (
     MAX_UNEVEN,
     RAISED_HOLD,
@@ -24,17 +23,12 @@ from robots.solver.foot_path import (
     step_height,
 )
 from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
-from robots.solver.noise import BEYOND, REST_SPEED
 from robots.solver.window_targets import PointTargets
 from robots.stream.footprint import Footprint
 from robots.stream.frame_targets import FrameReader, FrameTargets
-from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
+from robots.stream.standing import Standing
 
 HOLD_TIME = 0.1  # [s] over which a foot is taken hold of, and let go
-_LONGEST = 0.5  # [s] over which a foot's speed is told where it trembles
-_RELEASE_FACTOR = (
-    1.5  # times the speed and height at which a foot comes to stand: there it is let go
-)
 
 
 class _Arrived(NamedTuple):
@@ -65,17 +59,11 @@ class ContactTracker:
 
     def __init__(self, reader: FrameReader, frame_time: float, ahead: int) -> None:
         self._robot, self._scale = reader.robot, reader.scale
-        self._low = reader.ground.low
+        self._standing = Standing(reader, frame_time)
         self._frame_time, self._ahead = frame_time, ahead
-        size = reader.source.standing_height / ADULT_HEIGHT
-        self._max_speed, self._max_height = PLANTED_SPEED * size, PLANTED_HEIGHT * size
-        self._max_tilt = MAX_TILT * size
-        self._reach = max(1, round(SPEED_WINDOW / 2 / frame_time))
-        self._has_foot = reader.has_feet[:, None]
         self._wobble = MAX_WOBBLE * self._robot.rig.hip_height
         self._index_points()
-        self._most = max(2 * self._reach + 1, round(_LONGEST / frame_time))
-        self._length = self._most + ahead + 1
+        self._length = self._standing.history + ahead + 1
         self._history: deque[_Arrived] = deque(maxlen=self._length)
         soles = len(self._robot.soles)
         self._planted = np.zeros((soles, 2), dtype=bool)
@@ -92,16 +80,17 @@ class ContactTracker:
         that one is settled then; of the later ones it is what can be seen so far. The source's feet
         came with so much noise [m, RMS an axis]."""
         first = not self._history
-        self._listen(noise)
+        self._standing.listen(noise)
         arrived = self._arrived(targets, targets if first else self._history[-1].targets)
         self._history.extend([arrived] * (self._length if first else 1))
         settled = len(self._history) - 1 - self._ahead
         grip = self._frame_time / HOLD_TIME
         planted, holds, footprints = self._planted, self._holds, self._footprints
         ground, seen = self._ground, []
+        frames = [arrived.targets for arrived in self._history]
         for at in range(settled, len(self._history)):
-            stood, clearance = planted.any(axis=1), self._history[at].targets.clearance
-            planted, speed = self._standing(at, planted)
+            stood, clearance = planted.any(axis=1), frames[at].clearance
+            planted, speed = self._standing.of(frames, at, planted)
             lowest = np.where(stood, np.minimum(ground, clearance), clearance)
             ground = np.where(planted.any(axis=1), lowest, ground)
             self._follow(at, planted, holds, footprints)
@@ -118,8 +107,7 @@ class ContactTracker:
             if at == settled:
                 self._planted, self._holds, self._ground = planted, holds, ground
                 footprints = [replace(footprint) for footprint in footprints]
-        pitched = [self._history[k].targets.pitched for k in range(settled, len(self._history))]
-        return self._targets(np.array(pitched), seen)
+        return self._targets(np.array([frame.pitched for frame in frames[settled:]]), seen)
 
     def _arrived(self, now: FrameTargets, last: FrameTargets) -> _Arrived:
         moved = self._scale * ((now.feet - last.feet)[..., :2] @ (1, 1j))
@@ -139,50 +127,6 @@ class ContactTracker:
             length = -float(self._flat[own][:2].real.mean())
             on_toe = bool(planted[s, 1] or not planted[s, 0])
             self._footprints[s].put(points[own], length, on_toe=on_toe)
-
-    def _standing(
-        self, at: int, planted: Bool[np.ndarray, "S 2"]
-    ) -> tuple[Bool[np.ndarray, "S 2"], Float[np.ndarray, "S 2"]]:
-        """Whether heels and toes stand that were `planted` in the frame before, and how fast they
-        are [m/s, scaled]."""
-        velocity, places = self._motion(at)
-        speed, height = np.hypot(velocity[..., 0], velocity[..., 1]), places[..., 2] - self._low
-        factor = np.where(planted, _RELEASE_FACTOR, 1.0)
-        planted = (
-            self._has_foot
-            & (speed < factor * self._leeway * self._max_speed)
-            & (height < factor * self._max_height)
-        )
-        # Who stands on the toes does not stand on the heel.
-        planted[:, 0] &= ~planted[:, 1] | (height[:, 0] < height[:, 1] + self._max_tilt)
-        return planted, self._scale * speed
-
-    def _listen(self, noise: float) -> None:
-        """Over how many frames speeds are told of feet with such noise (0: the fewest), and by how
-        much they may be faster: a slope's standard deviation is sqrt(12 / n³) that of a frame
-        (least squares)."""
-        fewest = 2 * self._reach + 1
-        borne = self._max_speed * REST_SPEED / PLANTED_SPEED * self._frame_time
-        count = int(np.ceil(np.cbrt(12 * (noise / borne) ** 2)))
-        self._window = min(max(count, fewest), self._most) if noise else 0
-        left = noise / self._frame_time * np.sqrt(12 / max(self._window, fewest) ** 3)
-        self._leeway = float(np.hypot(1.0, BEYOND * left / self._max_speed))
-
-    def _motion(self, at: int) -> tuple[Float[np.ndarray, "S 2 3"], Float[np.ndarray, "S 2 3"]]:
-        """How heels and toes move [m/s] in a frame, and where they are [m]: by the frames around
-        it, or by a line through more of them where they tremble."""
-        newest = len(self._history) - 1
-        if not self._window:
-            after = min(self._reach, newest - at)
-            before, now, later = (
-                self._history[k].targets.feet for k in (at - self._reach, at, at + after)
-            )
-            return (later - before) / ((self._reach + after) * self._frame_time), now
-        last = min(newest, at + self._window // 2)
-        feet = [self._history[k].targets.feet for k in range(last - self._window + 1, last + 1)]
-        time = np.arange(self._window) - (self._window - 1) / 2
-        slope = np.tensordot(time, feet, 1) / (time @ time)
-        return slope / self._frame_time, np.mean(feet, axis=0)
 
     def _height(
         self,

@@ -1,0 +1,116 @@
+"""Which heels and toes of a stream's source stand.
+
+They are slow and low. Of feet that tremble that is told by a line through their last places, the
+longer the more they do. Recorded feet creep: where none is slow enough and the body does not fall
+freely, the slowest and lowest one carries it. `robots.solver.contacts` sees the whole clip.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from robots.solver.contacts import CREEP_TIME, FLIGHT_PUSH
+from robots.solver.creeping import MAX_CREEP, MAX_TILT
+from robots.solver.noise import BEYOND, REST_SPEED
+from robots.stream.frame_targets import FrameReader, FrameTargets
+from spark.constants import GRAVITY
+from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
+
+_RELEASE_FACTOR = (
+    1.5  # times the speed and height at which a foot comes to stand: there it is let go
+)
+_LONGEST = 0.5  # [s] over which a foot's speed is told where it trembles
+_ON_FEET = 0.6  # hips' heights of a T-pose above which nothing but feet carries a body
+
+Ends = Bool[np.ndarray, "S 2"]
+
+
+class Standing:
+    """Of sources that `reader` reads, `frame_time` [s] apart."""
+
+    def __init__(self, reader: FrameReader, frame_time: float) -> None:
+        self._frame_time, self._scale = frame_time, reader.scale
+        self._low, self._has_foot = reader.ground.low, reader.has_feet[:, None]
+        size = reader.source.standing_height / ADULT_HEIGHT
+        self._max_speed, self._max_height = PLANTED_SPEED * size, PLANTED_HEIGHT * size
+        self._max_creep, self._max_tilt = MAX_CREEP * size, MAX_TILT * size
+        self._on_feet = _ON_FEET * reader.robot.rig.hip_height
+        self._reach = max(1, round(SPEED_WINDOW / 2 / frame_time))
+        self._creep = max(1, round(CREEP_TIME / frame_time))
+        self._most = max(2 * self._reach + 1, round(_LONGEST / frame_time))
+        self.history = max(self._most, self._creep, 2 * self._reach)
+        """How many frames before one it is told by, at most."""
+        self.listen(0.0)
+
+    def listen(self, noise: float) -> None:
+        """To feet with such noise [m, RMS an axis]: over how many frames speeds are told (0: the
+        fewest), and by how much they may be faster. A slope's standard deviation is sqrt(12 / n³)
+        that of a frame (least squares)."""
+        fewest = 2 * self._reach + 1
+        borne = self._max_speed * REST_SPEED / PLANTED_SPEED * self._frame_time
+        count = int(np.ceil(np.cbrt(12 * (noise / borne) ** 2)))
+        self._window = min(max(count, fewest), self._most) if noise else 0
+        left = noise / self._frame_time * np.sqrt(12 / max(self._window, fewest) ** 3)
+        self._leeway = float(np.hypot(1.0, BEYOND * left / self._max_speed))
+
+    def of(
+        self, frames: Sequence[FrameTargets], at: int, stood: Ends
+    ) -> tuple[Ends, Float[np.ndarray, "S 2"]]:
+        """Whether heels and toes stand in one of some frames that `stood` in the one before, and
+        how fast they are [m/s, scaled]."""
+        velocity, places = self._motion(frames, at)
+        speed, height = np.hypot(velocity[..., 0], velocity[..., 1]), places[..., 2] - self._low
+        factor = np.where(stood, _RELEASE_FACTOR, 1.0)
+        stands = (
+            self._has_foot
+            & (speed < factor * self._leeway * self._max_speed)
+            & (height < factor * self._max_height)
+        )
+        # Who stands on the toes does not stand on the heel.
+        stands[:, 0] &= ~stands[:, 1] | (height[:, 0] < height[:, 1] + self._max_tilt)
+        if not stands.any() and self._carried_by_feet(frames, at):
+            stands = self._creeping(frames[at - self._creep : at + 1])
+        return stands, self._scale * speed
+
+    def _motion(
+        self, frames: Sequence[FrameTargets], at: int
+    ) -> tuple[Float[np.ndarray, "S 2 3"], Float[np.ndarray, "S 2 3"]]:
+        """How heels and toes move [m/s], and where they are [m]."""
+        newest = len(frames) - 1
+        if not self._window:
+            after = min(self._reach, newest - at)
+            travelled = frames[at + after].feet - frames[at - self._reach].feet
+            return travelled / ((self._reach + after) * self._frame_time), frames[at].feet
+        last = min(newest, at + self._window // 2)
+        feet = [frame.feet for frame in frames[last - self._window + 1 : last + 1]]
+        time = np.arange(self._window) - (self._window - 1) / 2
+        slope = np.tensordot(time, feet, 1) / (time @ time)
+        return slope / self._frame_time, np.mean(feet, axis=0)
+
+    def _carried_by_feet(self, frames: Sequence[FrameTargets], at: int) -> bool:
+        """Whether a body is high enough to be on its feet, and does not fall freely."""
+        if not self._has_foot.any() or frames[at].hips[2] < self._on_feet:
+            return False
+        middle = min(at, len(frames) - 1 - self._reach)
+        below, here, above = (frames[middle + k * self._reach].com[2] for k in (-1, 0, 1))
+        fall = (2 * here - below - above) / (self._reach * self._frame_time) ** 2 / self._scale
+        return bool(fall <= (1 - FLIGHT_PUSH) * GRAVITY)
+
+    def _creeping(self, frames: Sequence[FrameTargets]) -> Ends:
+        """The slowest and lowest heel or toe over some frames, and those that are as low and go
+        along with it where all feet have one: a body that sways, and its feet with it."""
+        feet = np.array([frame.feet for frame in frames])
+        velocity = (feet[-1] - feet[0])[..., :2] / (self._creep * self._frame_time)
+        speed = np.hypot(velocity[..., 0], velocity[..., 1])
+        height = feet[..., 2].mean(axis=0) - self._low
+        lower = self._has_foot & (height < height.min(axis=1, keepdims=True) + self._max_tilt)
+        cost = np.where(lower, speed / self._max_speed + height / self._max_height, np.inf)
+        best = np.unravel_index(cost.argmin(), cost.shape)
+        against = np.hypot(*np.moveaxis(velocity - velocity[best], -1, 0))
+        along = lower & (against < self._max_speed)
+        along &= np.abs(height - height[best]) < self._max_tilt
+        if not along.any(axis=1).all():
+            along = np.zeros_like(along)
+            along[best] = True
+        return np.logical_and(along, speed < self._max_creep)
