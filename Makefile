@@ -1,5 +1,5 @@
 # make demo    from nothing: environment, demo motions, retargeting, report, video, page, picture
-# make test    the test suite                make quick   its quick part, in two minutes
+# make test    the test suite                make quick   its quick part, in ten minutes
 # make check   lint, format, types, rooms    make bench   benchmarks
 # make docs    the site, in site/            make wheel   build, install elsewhere, run
 # make fuzz    spoilt files against every reader, a minute each (SECURITY.md)
@@ -46,8 +46,11 @@ $(VENV)/.node: $(BIN)/python tests/node/package.json
 demo: $(VENV)/.video $(VENV)/.gl
 	bash scripts/demo.sh $(BIN)/spark-sim out
 
+# Types and shapes are checked in each call of the quick tests; in the slow ones that would take four
+# times as long.
 test: $(VENV)/.dev $(VENV)/.gl $(VENV)/.node
-	$(BIN)/pytest -n 2 -rs -m "not bench"
+	$(BIN)/pytest -n 2 -rs -m "not slow and not bench"
+	$(BIN)/pytest -n 2 -rs -m "slow and not bench" --jaxtyping-packages=
 
 quick: $(VENV)/.dev $(VENV)/.gl $(VENV)/.node
 	$(BIN)/pytest -n 2 -m "not slow and not bench"

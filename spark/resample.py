@@ -18,27 +18,14 @@ def values_at(
     values: Float[np.ndarray, "T *n"], at: Float[np.ndarray, "N"]
 ) -> Float[np.ndarray, "N *n"]:
     """Positions, angles or other numbers at fractional frames, linearly."""
-
-    def some(block: slice) -> Float[np.ndarray, "N *n"]:
-        before, after, fraction = _neighbours(at[block], len(values))
-        fraction = fraction.reshape(-1, *(1,) * (values.ndim - 1))
-        return (1 - fraction) * values[before] + fraction * values[after]
-
-    return in_blocks(some, len(at))
+    return in_blocks(lambda block: _lerp(values, at[block]), len(at))
 
 
 def rotations_at(
     rotations: Float[np.ndarray, "T *n 4"], at: Float[np.ndarray, "N"]
 ) -> Float[np.ndarray, "N *n 4"]:
     """Rotations at fractional frames, by slerp along the shorter arc."""
-
-    def some(block: slice) -> Float[np.ndarray, "N *n 4"]:
-        before, after, fraction = _neighbours(at[block], len(rotations))
-        fraction = fraction.reshape(-1, *(1,) * (rotations.ndim - 2))
-        fraction = np.broadcast_to(fraction, (len(fraction), *rotations.shape[1:-1]))
-        return quat_slerp(rotations[before], rotations[after], fraction)
-
-    return in_blocks(some, len(at))
+    return in_blocks(lambda block: _slerp(rotations, at[block]), len(at))
 
 
 def frames_of_keys(
@@ -68,6 +55,23 @@ def motion_at(motion: Motion, at: Float[np.ndarray, "N"], frame_time: float) -> 
         rotations=rotations_at(motion.rotations, at),
         translations=None if moving is None else values_at(moving, at),
     )
+
+
+def _lerp(
+    values: Float[np.ndarray, "T *n"], at: Float[np.ndarray, "N"]
+) -> Float[np.ndarray, "N *n"]:
+    before, after, fraction = _neighbours(at, len(values))
+    fraction = fraction.reshape(-1, *(1,) * (values.ndim - 1))
+    return (1 - fraction) * values[before] + fraction * values[after]
+
+
+def _slerp(
+    rotations: Float[np.ndarray, "T *n 4"], at: Float[np.ndarray, "N"]
+) -> Float[np.ndarray, "N *n 4"]:
+    before, after, fraction = _neighbours(at, len(rotations))
+    fraction = fraction.reshape(-1, *(1,) * (rotations.ndim - 2))
+    fraction = np.broadcast_to(fraction, (len(fraction), *rotations.shape[1:-1]))
+    return quat_slerp(rotations[before], rotations[after], fraction)
 
 
 def _neighbours(

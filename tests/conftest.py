@@ -10,6 +10,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 # The laws are those of a CPU, to the bit, whatever the machine has (docs/training.md on GPUs).
 os.environ.setdefault("CUDA_VISIBLE_DEVICES", "")
 
+# Bytecode is kept, or each program that tests start would compile all of ours.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 # Compiled models are kept for the time of the tests, and not in the user's own cache.
 if "PYTEST_XDIST_WORKER" not in os.environ:
     _CACHE = tempfile.TemporaryDirectory(prefix="spark-sim-tests-")

@@ -28,6 +28,7 @@ from spark.rotation import matrix_from_quat, quat_normalize
 _MAX_VALUES = 100_000_000  # frames times nodes of a file: 12 hours of a body with fingers at 30 fps
 _FPS = (15.0, 240.0)  # of keys; wider ones are of an animator's curves, closer ones of no motion
 _USUAL_FPS = 30.0
+_REST = {"rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0] * 3, "translation": [0.0] * 3}
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,22 +211,24 @@ def _local(
             np.tile(matrix[:3, 3], (len(times), 1)),
             np.tile(matrix[:3, :3], (len(times), 1, 1)),
         )
-
-    def at(what: str, rest: list[float], blend: Callable[..., Any]) -> Float[np.ndarray, "T n"]:
-        if (track := tracks.get((i, what))) is not None:
-            return _sampled(track, times, blend)
-        own = np.array(node.get(what, rest), dtype=float)
-        own = own[[3, 0, 1, 2]] if what == "rotation" else own
-        if own.shape != (len(rest),):
-            raise file.error(f"has a {what} of {own.size} numbers on {file.name_of(i)!r}")
-        return np.tile(own, (len(times), 1))
-
-    quat = at("rotation", [0.0, 0.0, 0.0, 1.0], rotations_at)
-    scale = at("scale", [1.0] * 3, values_at)
+    quat, scale, translation = (_property(file, i, what, tracks, times) for what in _REST)
     # A scale of zero hides things; as a map it would have no inverse.
     scale = np.where(np.abs(scale) < 1e-9, 1.0, scale)
-    axes = matrix_from_quat(quat_normalize(quat)) * scale[:, None, :]
-    return at("translation", [0.0] * 3, values_at), axes
+    return translation, matrix_from_quat(quat_normalize(quat)) * scale[:, None, :]
+
+
+def _property(
+    file: GltfFile, i: int, what: str, tracks: _Tracks, times: Float[np.ndarray, "T"]
+) -> Float[np.ndarray, "T n"]:
+    """A node's translation, rotation or scale at `times`."""
+    if (track := tracks.get((i, what))) is not None:
+        return _sampled(track, times, rotations_at if what == "rotation" else values_at)
+    rest = _REST[what]
+    own = np.array(file.nodes[i].get(what, rest), dtype=float)
+    own = own[[3, 0, 1, 2]] if what == "rotation" else own
+    if own.shape != (len(rest),):
+        raise file.error(f"has a {what} of {own.size} numbers on {file.name_of(i)!r}")
+    return np.tile(own, (len(times), 1))
 
 
 def _sampled(
