@@ -28,11 +28,11 @@ from spark.transfer.canonical import CanonicalMotion, canonical_positions
 # in the mean, and of motion above 0. Its median, which no impact moves, is less far from 0:
 _MEDIAN = 0.749  # of the mean, in three axes
 LEAST_FRAMES = 24  # that tell noise from motion
-REST_SPEED = PLANTED_SPEED / 3  # [m/s, of an adult] of noise (RMS, an axis) that contacts bear
-LEAST_NOISE = REST_SPEED * SPEED_WINDOW / np.sqrt(2)  # [m, of an adult] that moves feet so fast
+BORNE_SPEED = PLANTED_SPEED / 3  # [m/s, of an adult] of noise (RMS, an axis) that contacts bear
+LEAST_NOISE = BORNE_SPEED * SPEED_WINDOW / np.sqrt(2)  # [m, of an adult] that moves feet so fast
 _LEAST_STEP_RATE = 2.5  # [Hz] below which steps would be smoothed away: they last half a second
 _MAX_JOLT = 1.5  # [m/s², of an adult] of noise that hips are left with: walking ones reach 4
-BEYOND = 2.0  # standard deviations of what noise is left, by which standing feet may be faster
+LEEWAY = 2.0  # standard deviations of what noise is left, by which standing feet may be faster
 
 
 @dataclass(frozen=True)
@@ -53,13 +53,13 @@ class Noise:
     @property
     def contact_cutoff(self) -> float:
         """Up to which frequency [Hz] feet are followed to tell whether they stand."""
-        return max(self._cutoff(REST_SPEED), _LEAST_STEP_RATE)
+        return max(self._cutoff(BORNE_SPEED), _LEAST_STEP_RATE)
 
     @property
     def slowness(self) -> float:
         """By what paths of feet, smoothed so, are scaled along the floor for their speeds to be
         judged by limits for clean ones: noise makes up a part of them."""
-        return float(1 / np.hypot(1.0, BEYOND * self._speed(self.contact_cutoff) / PLANTED_SPEED))
+        return float(1 / np.hypot(1.0, LEEWAY * self._speed(self.contact_cutoff) / PLANTED_SPEED))
 
     def _cutoff(self, speed: float) -> float:
         """That leaves noise of a speed [m/s, RMS an axis]: see `_speed`."""

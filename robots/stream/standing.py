@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 
 from robots.solver.contacts import CREEP_TIME, FLIGHT_PUSH
 from robots.solver.creeping import MAX_CREEP, MAX_TILT
-from robots.solver.noise import BEYOND, REST_SPEED
+from robots.solver.noise import BORNE_SPEED, LEEWAY
 from robots.stream.frame_targets import FrameReader, FrameTargets
 from spark.constants import GRAVITY
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
@@ -48,11 +48,11 @@ class Standing:
         fewest), and by how much they may be faster. A slope's standard deviation is sqrt(12 / n³)
         that of a frame (least squares)."""
         fewest = 2 * self._reach + 1
-        borne = self._max_speed * REST_SPEED / PLANTED_SPEED * self._frame_time
+        borne = self._max_speed * BORNE_SPEED / PLANTED_SPEED * self._frame_time
         count = int(np.ceil(np.cbrt(12 * (noise / borne) ** 2)))
         self._window = min(max(count, fewest), self._most) if noise else 0
         left = noise / self._frame_time * np.sqrt(12 / max(self._window, fewest) ** 3)
-        self._leeway = float(np.hypot(1.0, BEYOND * left / self._max_speed))
+        self._leeway = float(np.hypot(1.0, LEEWAY * left / self._max_speed))
 
     def of(
         self, frames: Sequence[FrameTargets], at: int, stood: Ends
