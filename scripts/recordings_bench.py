@@ -1,6 +1,6 @@
 """Measure retargeting of recordings as people have them: clean clips spoilt, judged by clean ones.
 
-    python scripts/recordings_bench.py --data DIR --robots unitree_g1 [--fps 60] [--clips ...]
+    python scripts/recordings_bench.py --data DIR --robots unitree_g1 [--method stream] [--fps 60]
 
 A spoilt clip is retargeted, and the robot's motion judged (`robots.metrics`) by the clip as it was.
 Lengths are of an adult; noise and sway are RMS an axis.

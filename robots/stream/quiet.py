@@ -67,11 +67,11 @@ class Quieter:
 
     def _measure(self) -> None:
         """Tell the noise, and begin or end to take it away."""
-        roots = np.array([frame.root_pos for frame in self._frames])
         feet = white_noise(np.array(self._feet) / self._size) if self._feet[0].size else 0.0
         if feet < LEAST_NOISE * (1.0 if self._filter is None else _STILL):
             self._filter, self.foot_noise = None, 0.0
         else:
+            roots = np.array([frame.root_pos for frame in self._frames])
             hips = white_noise(roots[:, None] / self._size)
             self._take_away(Noise(feet, hips, self._frame_time))
 
