@@ -88,6 +88,23 @@ def test_a_quaternion_means_what_its_opposite_means() -> None:
         assert quat_angle(a.rotations, b.rotations).max() < 1e-6
 
 
+def test_a_sender_may_use_its_arrays_again() -> None:
+    motion = trembling(sample_motion("walk", RIG, 30.0), 1.0)
+    source = to_canonical(motion, RIG)
+    reader = FrameReader(RIG, EMBER, ground_of(source, EMBER))
+    quieter = Quieter(RIG, motion.frame_time, None)
+    again = Frame(np.empty(3), np.empty_like(motion.rotations[0]))
+    found = []
+    for root, rotations in zip(motion.root_pos, motion.rotations, strict=True):
+        again.root_pos[:], again.rotations[:] = root, rotations
+        found.append(quieter.follow(again, reader.targets(again).feet))
+    for a, b in zip(found, quietened(motion), strict=True):
+        assert (a is None) == (b is None)
+        if a and b:
+            np.testing.assert_array_equal(a.root_pos, b.root_pos)
+            np.testing.assert_array_equal(a.rotations, b.rotations)
+
+
 def test_a_foot_that_trembles_stands_and_one_that_steps_does_not() -> None:
     noise, frame_time = 0.02, 1 / 30
     clean = sample_motion("walk", RIG, 30.0)
