@@ -1,15 +1,20 @@
 """Clips tracked in simulation, by servos or by a policy."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from jaxtyping import Float
 
 from sim.physics import policy_summary
 from sim.physics.policy_network import PolicyNetwork
 from sim.physics.policy_spec import read_spec
 from sim.physics.policy_tracking import PolicyRun, PolicyTracker
+from sim.physics.simulation import Assist
 from sim.physics.summary import render, summarize
-from sim.physics.tracking import Assist, TrackingResult, track
+from sim.physics.tracking import TrackingResult, track
 from sim.report.assess import assess
 from sim.trajectory import Subject, model_trajectory
 from sim.view.scene import Figure
@@ -58,16 +63,25 @@ class Simulated:
         ]
 
 
-def simulate(clip: AnyClip | File, *, assist: bool = False, balance: bool = False) -> Simulated:
-    """Track a motion with position servos, in simulation with contacts. A robot has its own servos;
-    the body of a character is built with them. With `assist`, a force and a torque on the root
-    help. With `balance`, a controller looks ahead and keeps the body up by its own strength
-    (docs/playback.md): some ten seconds of CPU time for each of the motion.
+def simulate(
+    clip: AnyClip | File,
+    *,
+    assist: bool = False,
+    balance: bool = True,
+    progress: Callable[[int], None] | None = None,
+) -> Simulated:
+    """Track a motion with servos, in simulation with contacts.
+
+    A controller looks ahead and keeps the body up by its own strength (docs/playback.md): some ten
+    seconds of CPU time for each of the motion, and more where falls are taken back. With `assist` a
+    force and a torque on the root help in its place, and without `balance` nothing does: a robot
+    then has its own servos. The body of a character is built with servos. `progress` is told each
+    frame that is reached.
 
     Raises `SkeletonError` where the body is no humanoid, or has no shape that collides.
     """
+    balance = balance and not assist
     clip = clip_of(clip)
-    needed = assess(clip.subject).clip.torque_by_joint if balance and clip.body else {}
     tracked = track(
         clip.body or model_trajectory(clip.rig, clip.motion),
         clip.motion.frame_time,
@@ -75,9 +89,20 @@ def simulate(clip: AnyClip | File, *, assist: bool = False, balance: bool = Fals
         floor_z=clip.floor_z,
         assist=Assist() if assist else None,
         balance=balance,
-        torques=needed,
+        torques=_needed_torques(clip) if balance else {},
+        progress=progress,
     )
     return Simulated(clip, tracked)
+
+
+def _needed_torques(clip: AnyClip) -> Mapping[str, Float[np.ndarray, "T"]]:
+    """What a motion needs of a robot's joints [N m]; nothing is known where it has no report."""
+    if clip.body is None:
+        return {}
+    try:
+        return assess(clip.subject).clip.torque_by_joint
+    except SkeletonError:  # it has no feet
+        return {}
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,6 +46,9 @@ _LOW = 0.06  # heights above the lowest body within which one carries
 _TRUNK = 0.25  # of the mass: joints that carry more move the trunk
 _ROOT = 7  # coordinates of the root: place and quaternion
 
+Course = tuple[Float[np.ndarray, "K A"], Float[np.ndarray, "P nu"]]
+"""The shifts at the knots of the horizon, and those of all servos until the next look ahead."""
+
 
 class Balancer:
     """Shifts of the servos' targets that keep a body on its motion.
@@ -87,6 +90,16 @@ class Balancer:
         self._angles = np.array([k for k in range(model.nq) if k not in inside], dtype=int)
         self._rng = np.random.default_rng(0)
         self._now = self._beforehand[:1]
+
+    @property
+    def course(self) -> Course:
+        """What it goes by at a time."""
+        return self._shifts, self._now
+
+    def go_back(self, course: Course, seed: int) -> None:
+        """To the course of a time before, and try others from there."""
+        self._shifts, self._now = course
+        self._rng = np.random.default_rng(seed)
 
     def shifts(self, data: mujoco.MjData, step: int) -> Float[np.ndarray, "nu"]:
         """Of all servos' targets in a step of the simulation, which is in `data`."""

@@ -11,7 +11,7 @@ from sim.physics.tracking import TrackingResult
 from spark.constants import GRAVITY
 from spark.rotation import quat_relative, rotvec_from_quat
 
-SCHEMA = "spark-sim physics 2"
+SCHEMA = "spark-sim physics 3"
 CARRIED = 0.1  # of its weight, in the mean: a body that the assist lifts by more hangs on it
 LIMITS = (
     "This measures the servos as much as the motion: a fall shows that these servos don't keep "
@@ -20,7 +20,8 @@ LIMITS = (
 )
 BALANCED_LIMITS = (
     "This measures the controller as much as the motion: a fall shows that its tries found no way "
-    "to keep this motion up, not that there is none."
+    "to keep this motion up, not that there is none. It looks ahead in the simulation itself, and "
+    "falls are taken back: no machine can do that, but its motors can do what is shown."
 )
 _HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
 _LISTED = 8  # joints and bodies in the text: the most loaded ones
@@ -33,6 +34,7 @@ def summarize(tracked: TrackingResult) -> dict[str, Any]:
     `verdict` is what came of it: `stays_up`, without assist; `helped` or `carried` by an assist
     that lifts less or more than `CARRIED` of the weight; `falls`; `diverged`. `upright_s` is the
     time until the body falls, whatever holds it; `stays_up_s` the same, None where it is carried.
+    `taken_back_s` are the times of falls before which the simulation went back, and tried again.
     """
     rollout, model = tracked.rollout, tracked.model
     frames = len(rollout.fallen)
@@ -68,6 +70,7 @@ def summarize(tracked: TrackingResult) -> dict[str, Any]:
         "stays_up_s": None if verdict == "carried" else upright_s,
         "fall_frame": fall,
         "diverged_frame": tracked.diverged,
+        "taken_back_s": [round(t * tracked.frame_time, 4) for t in tracked.taken_back],
         "error": {
             "joints_deg": _rms(np.degrees(_joint_errors(tracked, upright))),
             "mpjpe_cm": _mean_norm(100 * apart),
@@ -119,6 +122,12 @@ def render(metrics: dict[str, Any], name: str) -> str:
         f"{error['mpjpe_cm']:.1f} cm away, {error['mpjpe_root_cm']:.1f} cm relative to the root"
         + ("" if metrics["fall_frame"] is None else " (until the fall)"),
     ]
+    falls = metrics["taken_back_s"]
+    if falls:
+        lines.append(
+            f"  tried     {len(falls)} falls were taken back, between {min(falls):.2f} and "
+            f"{max(falls):.2f} s: what is shown is the last try"
+        )
     if assist:
         force, torque = assist["force"], assist["torque"]
         lines += [

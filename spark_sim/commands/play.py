@@ -24,18 +24,20 @@ file, or on MuJoCo bodies made from their skeletons, robots on their own
 models. This opens a window. With --video, --html, --strip, --gif or --webp it
 writes files instead and needs no display.
 
-With --physics, position servos track each motion in simulation. A summary says
-whether the body stays up, hangs on the assist or falls, how far it is from the
-motion, and the torques. With --balance a controller looks ahead and keeps it
-up. With --policy and --spec a policy of yours follows a robot's motion."""
+With --physics, servos track each motion in simulation. A summary says whether
+the body stays up, hangs on the assist or falls, how far it is from the motion,
+and the torques. A controller looks ahead and keeps its balance, which takes
+ten seconds and more for one of the motion; with --no-balance nothing does, and
+with --assist a force on the root. With --policy and --spec a policy of yours
+follows a robot's motion."""
 EXAMPLES = """\
 examples:
   spark-sim play walk.bvh              # a window
   spark-sim play walk.bvh walk_on_mutant.bvh --html both.html
   spark-sim play walk.bvh walk_on_g1.npz --video walk.mp4 --strip walk.png
   spark-sim play theirs.csv --robot unitree_g1 --quat xyzw --fps 60
+  spark-sim play walk_on_g1.npz --physics --video physics.mp4
   spark-sim play walk_on_g1.npz --physics --assist --html physics.html
-  spark-sim play walk_on_g1.npz --physics --balance --video physics.mp4
   spark-sim play walk_on_g1.npz --physics --policy my.onnx --spec my.toml
 """
 
@@ -88,9 +90,9 @@ def configure(parser: ArgumentParser) -> None:
         help="with --physics: a force and a torque on the root help",
     )
     parser.add_argument(
-        "--balance",
+        "--no-balance",
         action="store_true",
-        help="with --physics: a controller looks ahead and keeps the body up",
+        help="with --physics: servos alone, which are quick and let walks fall",
     )
     parser.add_argument(
         "--policy", metavar="ONNX", help="with --physics: follow a robot's motion with this policy"
@@ -119,7 +121,7 @@ def run(args: Namespace) -> int:
     wanted = {name: Path(path) for name, path in outputs.items() if path is not None}
     check_given(args, args.files)
     if args.serve:
-        simulation = ("physics", "assist", "balance", "policy", "spec", "seeds")
+        simulation = ("physics", "assist", "no_balance", "policy", "spec", "seeds")
         others = (*simulation, "json", "mesh", "same_height")
         refused = [*wanted, *(name for name in others if getattr(args, name))]
         refused += ["speed"] * (args.speed != 1.0)
@@ -129,14 +131,14 @@ def run(args: Namespace) -> int:
         return _serve(args)
     if not args.files:
         raise ConventionError("no FILE is given; only --serve needs none")
-    if not args.physics and (args.assist or args.balance or args.json):
-        raise ConventionError("--assist, --balance and --json go with --physics")
+    if not args.physics and (args.assist or args.no_balance or args.json):
+        raise ConventionError("--assist, --no-balance and --json go with --physics")
     if (args.policy is None) != (args.spec is None) or (args.policy and not args.physics):
         raise ConventionError("--policy FILE.onnx goes with --physics and --spec FILE.toml")
     if args.speed != 1.0 and [*wanted] == ["strip"]:
         raise ConventionError("--speed does not go with --strip, a picture that stands still")
-    if args.assist + args.balance + bool(args.policy) > 1:
-        raise ConventionError("--assist, --balance and --policy hold the body up; give one of them")
+    if args.policy and (args.assist or args.no_balance):
+        raise ConventionError("--policy holds the body up; --assist and --no-balance go without it")
     if args.seeds and not args.policy:
         raise ConventionError("--seeds goes with --policy")
     shown: list[Any] = [load(args, path) for path in args.files]
@@ -168,11 +170,11 @@ def run(args: Namespace) -> int:
 def _simulated(args: Namespace, clips: list[Any]) -> list[Any]:
     """The clips as they come out of the simulation; the report is printed."""
     from spark_sim import console
-    from spark_sim.simulation import follow, simulate
+    from spark_sim.simulation import follow
 
     made: list[Any]
     if args.policy is None:
-        made = [simulate(each, assist=args.assist, balance=args.balance) for each in clips]
+        made = [_tracked(args, each) for each in clips]
     else:
         seeds = args.seeds or 3
         made = [follow(each, args.policy, args.spec, seeds=seeds) for each in clips]
@@ -186,6 +188,20 @@ def _simulated(args: Namespace, clips: list[Any]) -> list[Any]:
         said = [*(each.text() for each in made), *(fill(each, 79) for each in cautions)]
         console.say("\n\n".join(said))
     return made
+
+
+def _tracked(args: Namespace, clip: Any) -> Any:
+    """A clip followed by servos."""
+    from spark_sim import console
+    from spark_sim.simulation import simulate
+
+    with console.meter(len(clip.motion), 0, "simulation") as tell:
+
+        def progress(frame: int) -> None:
+            tell(frame + 1, {})
+
+        balance = not (args.assist or args.no_balance)
+        return simulate(clip, assist=args.assist, balance=balance, progress=progress)
 
 
 def _count(text: str) -> int:

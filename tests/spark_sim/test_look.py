@@ -51,7 +51,7 @@ def test_a_repr_is_one_short_line(walk: spark_sim.Clip, on_robot: spark_sim.Robo
         spark_sim.retarget(walk, walk),
         on_robot,
         spark_sim.report(on_robot, source=walk),
-        spark_sim.simulate(on_robot),
+        spark_sim.simulate(on_robot, balance=False),
         spark_sim.Retargeter(walk, on_robot),
     )
     seen: set[type] = set()

@@ -78,9 +78,9 @@ def test_a_toy_follows_a_walk(program: Program, folder: Path) -> None:
     [
         (POLICY[:5], "goes with --physics and --spec"),
         ([*POLICY[:2], *POLICY[3:]], "goes with --physics and --spec"),
-        ([*POLICY, "--assist"], "give one of them"),
-        (["play", "walk.npz", "--physics", "--balance", "--assist"], "give one of them"),
-        (["play", "walk.npz", "--balance"], "--balance and --json go with --physics"),
+        ([*POLICY, "--assist"], "go without it"),
+        ([*POLICY, "--no-balance"], "go without it"),
+        (["play", "walk.npz", "--no-balance"], "--no-balance and --json go with --physics"),
         (["play", "walk.npz", "--physics", "--seeds", "2"], "--seeds goes with --policy"),
         ([*POLICY, "--seeds", "0"], "expected 1 to 1000"),
         ([*POLICY[:-1], "gone.toml"], "gone.toml: no such file"),
