@@ -1,4 +1,4 @@
-"""Which clips `play --physics --balance` keeps up, on any robot.
+"""Which clips `play --physics` keeps up, on any robot.
 
     python -m scripts.balance_bench DATA --robots unitree_g1 [--clips 'cmu_asf/cmu_02_*.bvh']
 
@@ -50,7 +50,7 @@ def main() -> None:
             errors.append(found["error"]["mpjpe_cm"])
             print(
                 f"{name} {stem}: {shares[-1] * whole:.2f} s of {whole:.2f} s, {errors[-1]:.1f} cm "
-                f"off ({took / whole:.1f} s a second)",
+                f"off, {len(tracked.taken_back)} falls taken back ({took / whole:.1f} s a second)",
                 flush=True,
             )
         print(

@@ -11,15 +11,15 @@ body's size.
 
 import os
 from collections.abc import Mapping
-from copy import copy
 
 import mujoco
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from mujoco import rollout
 from scipy.ndimage import gaussian_filter1d
 
 from sim.interpolate import at_frames, frames_of, quaternions
+from sim.physics.ahead import looking_ahead
 from sim.physics.servos import controls, servo_joint, torque_limit
 from sim.trajectory import subtree
 from spark.constants import GRAVITY
@@ -60,6 +60,7 @@ class Balancer:
 
     def __init__(
         self,
+        spec: mujoco.MjSpec,
         model: mujoco.MjModel,
         root: int,
         qpos: Float[np.ndarray, "T nq"],
@@ -68,26 +69,30 @@ class Balancer:
         frame_time: float,
         height: float,
     ) -> None:
-        self._qpos, self._speeds, self._frame_time = qpos, speeds, frame_time
+        self._frame_time = frame_time
         self._height, self._time = height, float(np.sqrt(height / GRAVITY))
         self._own = own = float(model.opt.timestep)
         self._stride = max(1, int(STEP / own + 1e-6))
-        self._ahead = _looking_ahead(model, self._stride * own)
-        self._scratch = mujoco.MjData(model)
+        carries = _carrying(model, root, qpos, height)
+        self._whole = looking_ahead(spec, model, root, carries, self._stride * own)
+        self._ahead = ahead = self._whole.model
+        self._qpos, self._speeds = qpos[:, self._whole.qpos], speeds[:, self._whole.dofs]
+        self._scratch = mujoco.MjData(ahead)
         self._data = [mujoco.MjData(self._ahead) for _ in range(len(os.sched_getaffinity(0)))]
         self._beforehand = beforehand(model, torques, len(qpos), frame_time)
-        self._servos, self._spread = _carrying_servos(model, root, qpos, height)
+        self._servos, self._spread = _carrying_servos(model, root, carries, height)
+        self._shifted = np.searchsorted(self._whole.servos, self._servos)
         count = max(2, round(HORIZON * self._time / (self._stride * own)))
         self._steps = self._stride * own * np.arange(1, count + 1)
         self._knots = np.linspace(0.0, self._steps[-1], KNOTS)
         self._period = max(1, round(PERIOD * self._time / own))
         self._fine = own * np.arange(self._period)
         self._shifts = np.zeros((KNOTS, len(self._servos)))
-        self._root = int(model.jnt_qposadr[model.body_jntadr[root]])
-        self._root_dofs = int(model.jnt_dofadr[model.body_jntadr[root]])
-        self._quaternions = quaternions(model)
+        self._root = int(ahead.jnt_qposadr[ahead.body_jntadr[root]])
+        self._root_dofs = int(ahead.jnt_dofadr[ahead.body_jntadr[root]])
+        self._quaternions = quaternions(ahead)
         inside = {*range(self._root, self._root + _ROOT), *self._quaternions.ravel().tolist()}
-        self._angles = np.array([k for k in range(model.nq) if k not in inside], dtype=int)
+        self._angles = np.array([k for k in range(ahead.nq) if k not in inside], dtype=int)
         self._rng = np.random.default_rng(0)
         self._now = self._beforehand[:1]
 
@@ -126,14 +131,12 @@ class Balancer:
         tried = self._rng.normal(size=(COURSES, *self._shifts.shape)) * self._spread
         tried[0], tried[1] = 0.0, -self._shifts
         tried += self._shifts
-        own = self._controls(wanted, speeds) + values_at(self._beforehand, frames)
+        own = self._controls(wanted, speeds)
+        own += values_at(self._beforehand, frames)[:, self._whole.servos]
         servos = np.repeat(own[None], COURSES, axis=0)
         ways = np.stack([_hats(self._steps, self._knots) @ each for each in tried])
-        servos[:, :, self._servos] += ways
-        kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
-        state = np.zeros(mujoco.mj_stateSize(self._ahead, kind))
-        mujoco.mj_getState(self._ahead, data, state, kind)
-        start = np.repeat(state[None], COURSES, axis=0)
+        servos[:, :, self._shifted] += ways
+        start = np.repeat(self._whole.state(data)[None], COURSES, axis=0)
         states, _ = rollout.rollout(self._ahead, self._data, start, servos, persistent_pool=True)
         cost = self._cost(states[:, :, 1:], wanted, speeds)
         cost += W_SHIFT * ((tried / self._spread) ** 2).mean(axis=(1, 2))
@@ -185,16 +188,6 @@ class Balancer:
         return np.nan_to_num(total, nan=_LOST, posinf=_LOST)
 
 
-def _looking_ahead(model: mujoco.MjModel, timestep: float) -> mujoco.MjModel:
-    """The model with longer steps, whose parts touch nothing but the floor."""
-    out = copy(model)
-    out.opt.timestep = timestep
-    floors = out.geom_bodyid == 0
-    touch = ((out.geom_contype | out.geom_conaffinity) != 0).astype(out.geom_contype.dtype)
-    out.geom_contype[:], out.geom_conaffinity[:] = touch * ~floors, touch * floors
-    return out
-
-
 def _hats(times: Float[np.ndarray, "S"], knots: Float[np.ndarray, "K"]) -> Float[np.ndarray, "S K"]:
     """How much each knot counts at some times."""
     return np.maximum(1 - np.abs(times[:, None] - knots) / (knots[1] - knots[0]), 0.0)
@@ -217,11 +210,10 @@ def beforehand(
     return out
 
 
-def _carrying_servos(
+def _carrying(
     model: mujoco.MjModel, root: int, qpos: Float[np.ndarray, "T nq"], height: float
-) -> tuple[Int[np.ndarray, "A"], Float[np.ndarray, "A"]]:
-    """The servos of the trunk and of what comes near the floor, and how far their targets are
-    shifted in trials [rad]."""
+) -> Bool[np.ndarray, "nbody"]:
+    """The bodies of the trunk, and of what comes near the floor."""
     data, parents = mujoco.MjData(model), model.body_parentid
     inside = np.zeros(model.nbody, dtype=bool)
     inside[subtree(model, root)] = True
@@ -235,7 +227,14 @@ def _carrying_servos(
     carries |= model.body_subtreemass > _TRUNK * model.body_subtreemass[root]
     for body in range(model.nbody - 1, root, -1):
         carries[parents[body]] |= carries[body]
-    carries &= inside
+    out: Bool[np.ndarray, nbody] = carries & inside
+    return out
+
+
+def _carrying_servos(
+    model: mujoco.MjModel, root: int, carries: Bool[np.ndarray, "nbody"], height: float
+) -> tuple[Int[np.ndarray, "A"], Float[np.ndarray, "A"]]:
+    """The servos of what carries, and how far their targets are shifted in trials [rad]."""
     weight = GRAVITY * float(model.body_subtreemass[root]) * height
     servos, spread = [], []
     for a in range(model.nu):

@@ -20,7 +20,15 @@ _COLLISION_GROUP = 3  # by custom; viewers don't show it
 def with_servos(
     body: ModelTrajectory, *, height: float, floor_z: float, own: bool = False
 ) -> tuple[mujoco.MjModel, tuple[str, ...]]:
-    """The body's model on a floor, with a position servo where it has an actuator, and what was
+    """The model of `servo_spec`, and what was assumed on the way."""
+    spec, notes = servo_spec(body, height=height, floor_z=floor_z, own=own)
+    return servo_model(spec), notes
+
+
+def servo_spec(
+    body: ModelTrajectory, *, height: float, floor_z: float, own: bool = False
+) -> tuple[mujoco.MjSpec, tuple[str, ...]]:
+    """The body's spec on a floor, with a position servo where it has an actuator, and what was
     assumed on the way.
 
     A model's own position servos stay as they are, unless `own` asks for servos of ours in their
@@ -33,11 +41,16 @@ def with_servos(
     _replace_motors(spec, body.model, height, timestep, own, notes)
     spec.option.timestep, spec.option.gravity = timestep, [0.0, 0.0, -GRAVITY]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    return spec, tuple(notes)
+
+
+def servo_model(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """The model of a spec whose actuators are servos."""
     model = compiled(spec)
     # What a target asks for is cut off by the torque that a joint has, not by the control's range.
     model.actuator_ctrllimited[:] = 0
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    return model, tuple(notes)
+    return model
 
 
 def on_floor(body: ModelTrajectory, floor_z: float, notes: list[str]) -> mujoco.MjSpec:

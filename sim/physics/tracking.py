@@ -16,7 +16,7 @@ from sim.body.compiling import warnings_as_notes
 from sim.interpolate import at_times, velocities
 from sim.physics.balance import Balancer
 from sim.physics.retries import Retries
-from sim.physics.servos import with_servos
+from sim.physics.servos import servo_model, servo_spec
 from sim.physics.simulation import Assist, Rollout, Simulation
 from sim.trajectory import ModelTrajectory
 from spark.errors import SkeletonError
@@ -78,7 +78,8 @@ def track(
     """
     if not np.isfinite(target.qpos).all():
         raise SkeletonError("the motion has coordinates that are no finite numbers")
-    model, notes = with_servos(target, height=height, floor_z=floor_z, own=balance)
+    spec, notes = servo_spec(target, height=height, floor_z=floor_z, own=balance)
+    model = servo_model(spec)
     steps = int(np.ceil(frame_time / model.opt.timestep - 1e-6))
     model.opt.timestep = frame_time / steps
     root = int(model.body(target.model.body(target.root).name).id)
@@ -89,7 +90,7 @@ def track(
         notes += (f"the first frame is left at {fastest:.0f} rad/s: the simulation begins at rest",)
     balancer = None
     if balance:
-        balancer = Balancer(model, root, target.qpos, speeds, torques, frame_time, height)
+        balancer = Balancer(spec, model, root, target.qpos, speeds, torques, frame_time, height)
     simulation = Simulation(model, root, height, target.qpos, start, assist, balancer)
     retries = Retries(frame_time, height) if balancer else None
     with warnings_as_notes([]):  # here they are results

@@ -6,7 +6,7 @@ import pytest
 from sim.interpolate import velocities
 from sim.physics.balance import Balancer
 from sim.physics.retries import BACK, Retries
-from sim.physics.servos import with_servos
+from sim.physics.servos import servo_model, servo_spec
 from sim.physics.simulation import Simulation
 from sim.physics.summary import render, summarize
 from sim.physics.tracking import track
@@ -27,9 +27,10 @@ def stick(frames: int, lean: float = 0.0) -> ModelTrajectory:
 
 
 def balanced(body: ModelTrajectory) -> Simulation:
-    model, _ = with_servos(body, height=HEIGHT, floor_z=0.0, own=True)
+    spec, _ = servo_spec(body, height=HEIGHT, floor_z=0.0, own=True)
+    model = servo_model(spec)
     speeds = velocities(model, body.qpos, 1 / FPS)
-    balancer = Balancer(model, 1, body.qpos, speeds, {}, 1 / FPS, HEIGHT)
+    balancer = Balancer(spec, model, 1, body.qpos, speeds, {}, 1 / FPS, HEIGHT)
     return Simulation(model, 1, HEIGHT, body.qpos, speeds[0], None, balancer)
 
 
