@@ -10,10 +10,12 @@ from spark.motion import Motion
 from spark.rig.bones import SHORT, RigPose
 from spark.rig.observed import mean_rotations, nearest_right_angle
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
-from spark.rotation import quat_identity
+from spark.rotation import quat_angle, quat_identity, quat_rotate
 
 _MAX_LEAN = np.radians(35)  # of a trunk from the axis that the body was built along
 _MAX_HIP_TILT = np.radians(10)  # of the line of the hips from the axis across the body
+_MAX_ODDS = np.radians(20)  # of a limb bone from the other side's, mirrored; built bodies have 10
+_STILL = np.radians(2)  # joints that turn less than this from the rest pose show no more than it
 _ALIGNED = np.radians(10)  # of a bone from an axis of its joint that it was put along on purpose
 
 _UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
@@ -44,12 +46,20 @@ class Reference:
 
 
 def reference_of(motion: Motion, roles: RoleMap) -> Reference:
-    """The rest pose where it is a pose. Where it is none, the mean pose over the frames; on a
-    square rig rounded to right angles, with straight fingers."""
+    """The rest pose where it is one that bodies are built in. Where it is none, or a moment of a
+    movement, the mean pose over the frames; on a square rig rounded to right angles, with straight
+    fingers."""
     skeleton = motion.skeleton
     rest = RigPose(skeleton, roles, quat_identity(np.zeros((len(skeleton), 1))))
-    if _stands(rest):
+    why = _odds(rest) if _stands(rest) else "is not a pose"
+    if why is None:
         return Reference(motion, rest, True, False, ())
+    if (
+        _stands(rest)
+        and quat_angle(motion.rotations[:, 1:], rest.local[1:]).max(initial=0) < _STILL
+    ):
+        note = f"the rest pose {why}, and no other is in the file: the T-pose may be off"
+        return Reference(motion, rest, True, False, (note,))
     square = _at_right_angles(rest)
     local = mean_rotations(motion.rotations)
     if square:
@@ -59,7 +69,7 @@ def reference_of(motion: Motion, roles: RoleMap) -> Reference:
                 local[j] = turned[j]
         for hand in (j for role in _HANDS for j in roles.joints(role)):
             local[list(skeleton.subtree(hand)[1:])] = rest.local[0]
-    note = "the rest pose is not a pose: the T-pose is found from the motion"
+    note = f"the rest pose {why}: the T-pose is found from the motion"
     return Reference(motion, RigPose(skeleton, roles, local), False, square, (note,))
 
 
@@ -73,6 +83,35 @@ def _stands(rest: RigPose) -> bool:
         if limb @ wrong > 0.5 * np.linalg.norm(limb) * np.linalg.norm(wrong):
             return False
     return True
+
+
+def _odds(rest: RigPose) -> str | None:
+    """How a rest pose differs from its mirror image, as moments of movements do; None where arms
+    and legs are built alike."""
+    roles, lateral = rest.roles, _lateral(rest)
+    worst, where = _MAX_ODDS, None
+    for group in (Group.LEFT_LEG, Group.LEFT_ARM):
+        for role in LIMBS[group]:
+            pair = (roles.joint(role), roles.joint(role.mirrored))
+            bones = [None if j is None or role in _ENDS else _direction(rest, j) for j in pair]
+            if bones[0] is None or bones[1] is None:
+                continue
+            image = bones[1] - 2 * lateral * (bones[1] @ lateral)
+            odds = float(np.arccos(np.clip(bones[0] @ image, -1.0, 1.0)))
+            if odds > worst:
+                worst, where = odds, pair[0]
+    if where is None:
+        return None
+    return (
+        f"is a moment of a movement: {rest.skeleton.names[where]} points {np.degrees(worst):.0f} "
+        "degrees away from the other side's, mirrored"
+    )
+
+
+def _direction(pose: RigPose, joint: int) -> Vector | None:
+    """The unit vector along a joint's bone in the pose's world."""
+    bone = pose.bone(joint)
+    return None if bone is None else quat_rotate(pose.world[joint], bone / np.linalg.norm(bone))
 
 
 def _at_right_angles(rest: RigPose) -> bool:

@@ -9,7 +9,7 @@ import pytest
 from spark.demo.sample import BUILDS, sample_motion, sample_rig
 from spark.errors import SkeletonError
 from spark.io.recording import read_recording
-from spark.kinematics import local_rotations, world_positions
+from spark.kinematics import local_rotations, world_positions, world_rotations
 from spark.motion import Motion
 from spark.rig.rig import Rig, understand
 from spark.rig.role_assignment import assign_roles
@@ -18,6 +18,7 @@ from spark.rig.tpose import find_tpose
 from spark.rotation import (
     quat_about,
     quat_angle,
+    quat_conj,
     quat_from_rotvec,
     quat_mul,
     quat_rotate,
@@ -358,3 +359,48 @@ def test_what_a_hand_holds_does_not_turn_it() -> None:
             rest = Motion(rig, 1.0, rig.offsets[:1], np.tile([1.0, 0, 0, 0], (1, len(rig), 1)))
             tposes.append(find_tpose(rest, assign_roles(rig))[0][:end])
         assert quat_angle(*tposes).max() < 1e-6
+
+
+def resting_at(motion: Motion, frame: int) -> tuple[Motion, np.ndarray]:
+    """The motion on a file that rests in one of its frames, and how its axes are turned."""
+    axes = quat_conj(world_rotations(motion.skeleton, motion.rotations[frame]))
+    return rerig(motion, axes), axes
+
+
+STEPS = [0, 9, 18, 27]  # of the sample walk: both feet in front in turn
+
+
+@pytest.mark.parametrize("frame", STEPS)
+def test_a_rest_pose_in_the_middle_of_a_step_leads_to_the_tpose(frame: int) -> None:
+    rig = sample_rig("walker")
+    stepping, axes = resting_at(sample_motion("walk", rig, 30.0), frame)
+    tpose, notes = find_tpose(stepping, rig.roles)
+    (note,) = notes
+    assert "moment of a movement" in note
+    assert_is_t(replace(rig, skeleton=stepping.skeleton, tpose=tpose))
+    for j, error in enumerate(np.degrees(quat_angle(tpose, quat_mul(rig.tpose, axes)))):
+        role = rig.roles.roles[j]
+        assert role is None or error < LOOSE.get(role, 8.0), (role, error)
+
+
+@pytest.mark.parametrize("path", recordings("mixamo_pairs/XBot/dancing_*.bvh", "cmu_asf/*02_01*"))
+def test_all_moments_of_a_recording_lead_to_one_tpose(path: object) -> None:
+    """What a body is found to be does not hang on the moment at which a file was saved."""
+    motion = read_recording(str(path)).motion
+    roles = assign_roles(motion.skeleton, motion)
+    found = []
+    for frame in np.linspace(0, len(motion) - 1, 6).astype(int):
+        stepping, axes = resting_at(motion, frame)
+        tpose, notes = find_tpose(stepping, roles)
+        if "moment of a movement" in "".join(notes):
+            found.append(quat_mul(tpose, quat_conj(axes)))
+    assert len(found) > 2
+    assert max(np.degrees(quat_angle(found[0], each)).max() for each in found[1:]) < 1e-3
+
+
+def test_a_moment_without_a_motion_is_told() -> None:
+    """One frame and no more: nothing tells the T-pose, and the note says so."""
+    rig = sample_rig("walker")
+    stepping, _ = resting_at(sample_motion("walk", rig, 30.0), 9)
+    _, notes = find_tpose(stepping.frames(9, 10), rig.roles)
+    assert "may be off" in notes[0]
