@@ -2,16 +2,19 @@
 
 A meaning is a role's name without its side. Many words are ambiguous between rigs: "shoulder" is a
 clavicle above an "arm" and an upper arm below a "collar". They say so here, with how sure the word
-is, and the chain a joint stands in decides (`spark.rig.limb_roles`).
+is, and the chain a joint stands in decides (`spark.rig.limb_roles`). The same words of other
+languages are in `spark.rig.languages`.
 """
+
+from spark.rig import languages
 
 
 def _set(words: str) -> frozenset[str]:
     return frozenset(words.split())
 
 
-LEFT = _set("l left lft hidari 左")
-RIGHT = _set("r right rgt rt migi 右")
+LEFT = _set("l left lft hidari 左") | languages.LEFT
+RIGHT = _set("r right rgt rt migi 右") | languages.RIGHT
 
 # Which joint a word means, and how surely, by the role's name without its side.
 MEANINGS: dict[str, dict[str, float]] = {
@@ -126,45 +129,6 @@ SPELLINGS = {
     "talus": "ankle",
     "calcn": "foot",
     "phalanges": "toe",
-    # German, Spanish, French (whose "main" is left out: English names end with it)
-    "becken": "pelvis",
-    "huefte": "hip",
-    "hüfte": "hip",
-    "wirbel": "spine",
-    "hals": "neck",
-    "kopf": "head",
-    "schluesselbein": "clavicle",
-    "schlüsselbein": "clavicle",
-    "oberarm": "upper arm",
-    "unterarm": "forearm",
-    "oberschenkel": "thigh",
-    "unterschenkel": "shin",
-    "fuss": "foot",
-    "fuß": "foot",
-    "zehen": "toe",
-    "cadera": "pelvis",
-    "columna": "spine",
-    "cuello": "neck",
-    "cabeza": "head",
-    "clavicula": "clavicle",
-    "brazo": "arm",
-    "antebrazo": "forearm",
-    "mano": "hand",
-    "muslo": "thigh",
-    "pierna": "leg",
-    "pie": "foot",
-    "dedos": "toe",
-    "bassin": "pelvis",
-    "colonne": "spine",
-    "cou": "neck",
-    "tete": "head",
-    "clavicule": "clavicle",
-    "bras": "arm",
-    "avantbras": "forearm",
-    "cuisse": "thigh",
-    "jambe": "leg",
-    "pied": "foot",
-    "orteils": "toe",
     # MikuMikuDance, in Japanese and in Latin letters
     "下半身": "pelvis",
     "上半身": "spine",
@@ -213,7 +177,7 @@ HINGES = {
     }.items()
     for hinge in hinges.split()
 }
-SPELLINGS |= HINGES
+SPELLINGS |= HINGES | languages.SPELLINGS
 
 ASIDE: dict[str, str] = {
     word: kind
@@ -257,7 +221,7 @@ NOISE = _set(
     "fe aa ie angle jnt joint bn jt link def org bind skin sk rig j b bip biped valve mixamorig"
 )
 # A robot's hinge axes: "roll" is a twist bone elsewhere.
-AXES = _set("pitch roll yaw")
+AXES = _set("pitch roll yaw") | languages.AXES
 
 # These mean a part on their own, beside "leg" or "arm" too.
 SPECIFIC = _set(

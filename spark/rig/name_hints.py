@@ -26,10 +26,12 @@ from spark.rig.aliases import (
 )
 
 _ON_THE_MIDLINE = {"spine", "neck", "chest", "back", "waist"}
-_HINGED = {"pitch", "yaw", *HINGES}  # in a robot's names
+_HINGED = {*AXES - {"roll"}, *HINGES}  # in a robot's names
 _VERTEBRA = re.compile(r"([lct])(\d{1,2})")
 _HALF = re.compile(r"([ul])(arm|leg|farm)")  # upper or lower, where the name has its side already
 _PIECES = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+|[^\W\d_A-Za-z]+")
+
+_ACCENTS = re.compile("[\u0300-\u036f]")  # of Latin letters, once they are apart from these
 
 _WORDS = (
     {word for key in MEANINGS for word in key.split()}
@@ -78,8 +80,8 @@ def read_names(names: Sequence[str]) -> list[NameHint]:
 
 def split_name(name: str) -> list[str]:
     """The pieces of a name between capitals, digits and other signs, in lower case and without its
-    namespace: left, hand, index, 1 of `mixamorig:LeftHandIndex1`."""
-    name = unicodedata.normalize("NFKC", name)
+    namespace and accents: left, hand, index, 1 of `mixamorig:LeftHandIndex1`."""
+    name = unicodedata.normalize("NFKC", _ACCENTS.sub("", unicodedata.normalize("NFKD", name)))
     name = re.split(r"[:|]", name)[-1]
     return [piece.lower() for piece in _PIECES.findall(name)]
 
@@ -169,8 +171,8 @@ def _known(piece: str) -> list[str]:
 
 @lru_cache(maxsize=4096)
 def _misspelt(piece: str) -> list[str]:
-    """The only word of a joint that is `piece` but for a letter, or for two swapped. A short one
-    has to begin as that word does: few people miss the first letter."""
+    """The word that is `piece` but for a letter, or for two swapped, where only one joint has such.
+    A short one has to begin as that word does: few people miss the first letter."""
     near = [
         word
         for word in _SPELT
@@ -178,7 +180,7 @@ def _misspelt(piece: str) -> list[str]:
         and _one_off(word, piece)
         and (len(piece) > 3 or word[0] == piece[0])
     ]
-    return near if len(near) == 1 else []
+    return near[:1] if len({SPELLINGS.get(word, word) for word in near}) == 1 else []
 
 
 def _one_off(a: str, b: str) -> bool:
