@@ -1,11 +1,18 @@
 """Velocity and acceleration over a fixed time, so that the frame rate does not change them."""
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.interpolate import make_interp_spline
 
 # Sample times within the window, in halves of it: so dense that their number does not matter.
 _OFFSETS = np.linspace(-1.0, 1.0, 11)
+_ROUNDING = 1e-6  # [frames] a window is whole though it misses the clip's end by less
+
+
+def whole_windows(count: int, frame_time: float, window: float) -> Int[np.ndarray, "T"]:
+    """For each frame the nearest one whose window of derivatives lies within the clip."""
+    margin = min(int(np.ceil(window / frame_time - _ROUNDING)), (count - 1) // 2)
+    return np.clip(np.arange(count), margin, count - 1 - margin)
 
 
 def derivative(

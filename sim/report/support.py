@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from sim.report.clip_poses import ClipPoses
-from sim.report.derivatives import derivative
+from sim.report.derivatives import derivative, whole_windows
 from sim.report.measures import distance_outside_hull, horizontal_speed, windowed_min
 from sim.report.thresholds import HUMAN_HIP_HEIGHT, Thresholds
 from sim.report.wrench import required_wrench, unexplained_wrench
@@ -20,6 +20,7 @@ class Support:
     `touching` is what may push: a point that is near the floor at some time within the window, for
     `wrench`, the force and torque that the body needs, is a mean over it. `resting` points are slow
     at some time within it. `static` frames are those in which the centre of mass hardly moves.
+    `whole` are the frames whose speeds and wrench each frame has: at the clip's ends others.
     """
 
     thresholds: Thresholds
@@ -31,6 +32,7 @@ class Support:
     resting: Bool[np.ndarray, "T P"]
     wrench: Float[np.ndarray, "T 6"]
     static: Bool[np.ndarray, "T"]
+    whole: Int[np.ndarray, "T"]
     length: float
 
     def unexplained_wrench(self) -> Float[np.ndarray, "T 2"]:
@@ -62,7 +64,8 @@ class Support:
             self.length,
         )
         loaded[selected] = (missing > limits.skate_load * np.array([1.0, self.length])).any(axis=1)
-        return low_fast & (flat | loaded[:, None])
+        # Speeds of one moment say nothing of a foot that is low at another.
+        return (low_fast & (flat | loaded[:, None]))[self.whole]
 
     def standing(self) -> dict[str, Bool[np.ndarray, "T"]]:
         """When each foot stands, by its name: any corner of its sole is low and slow."""
@@ -116,5 +119,6 @@ def support_of(poses: ClipPoses, floor_z: float, thresholds: Thresholds) -> Supp
         resting=windowed_min(speeds, frame_time, window) <= thresholds.skate_speed,
         wrench=required_wrench(poses.mass, frame_time, window),
         static=windowed_min(still, frame_time, thresholds.static_time) > 0,
+        whole=whole_windows(len(heights), frame_time, window),
         length=poses.rig.hip_height / HUMAN_HIP_HEIGHT,
     )

@@ -1,6 +1,7 @@
 """A robot is the same robot in whichever language its hinges are called."""
 
 import re
+from pathlib import Path
 
 import pytest
 
@@ -37,7 +38,7 @@ def called(name: str, language: str) -> str:
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
-def test_a_robot_whose_hinges_alone_have_names(language: str, tmp_path) -> None:
+def test_a_robot_whose_hinges_alone_have_names(language: str, tmp_path: Path) -> None:
     """Bodies are numbered, so that hinges and build say which is which."""
     text = re.sub(r'(<body name=)"\w+"', lambda m: f'{m[1]}"teil"', ROBOT)
     for k in range(text.count('"teil"')):

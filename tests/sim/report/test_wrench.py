@@ -153,6 +153,7 @@ def swinging(com_y: float, heel_height: float, toe_speed: float) -> np.ndarray:
         resting=(speeds < 0.2)[None],
         wrench=np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]]),
         static=np.ones(1, dtype=bool),
+        whole=np.zeros(1, dtype=np.int64),
         length=1.0,
     )
     return support.skating()[0].reshape(2, 6).any(axis=1)
