@@ -13,7 +13,7 @@ from sim.outline import outline, solid
 from spark.rotation import quat_between
 
 _NEAR_LOWEST = 0.08  # of the foot's length: points this low belong to the sole
-_TILTED, _COPLANAR = np.radians(40), np.radians(3)
+TILTED, _COPLANAR = np.radians(40), np.radians(3)
 _LONG = 0.7  # a sole's width as a share of its length, up to which its length is known
 _RING = 12  # points on either edge of a cylinder
 
@@ -53,28 +53,27 @@ def corners(points: Float[np.ndarray, "P 3"]) -> list[int]:
     return [int(low[np.argmax(inside @ np.array(way))]) for way in product((-1.0, 1.0), repeat=2)]
 
 
-def flattening(points: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "4"]:
-    """The smallest rotation that lays the largest flat side below a foot on the floor; none where
-    no side within `_TILTED` of the floor stands out, as on a ball."""
-    still = np.array([1.0, 0.0, 0.0, 0.0])
+def flattening(points: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "4"] | None:
+    """The smallest rotation that lays the largest flat side below a foot on the floor; None where
+    no side within `TILTED` of the floor stands out, as on a ball."""
     try:
         hull = ConvexHull(points)
     except (QhullError, ValueError):  # fewer than four points, or all in a plane
-        return still
+        return None
     normals = hull.equations[:, :3]
     sides = points[hull.simplices]
     areas = (
         np.linalg.norm(np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0]), axis=1) / 2
     )
-    below = np.flatnonzero(-normals[:, 2] > np.cos(_TILTED))
+    below = np.flatnonzero(-normals[:, 2] > np.cos(TILTED))
     together = normals[below] @ normals[below].T > np.cos(_COPLANAR)
     covered = together @ areas[below]
     if not len(below):
-        return still
+        return None
     best = int(np.argmax(covered))
     others = covered[~together[best]].max(initial=0.0)
     if covered[best] < max(0.1 * hull.area, 1.5 * others):
-        return still
+        return None
     largest = below[best]
     same = normals @ normals[largest] > np.cos(_COPLANAR)
     return quat_between(areas[same] @ normals[same], np.array([0.0, 0.0, -1.0]))

@@ -6,17 +6,21 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from robots.model.shapes import corners, flattening, sole_heading
+from robots.model.shapes import TILTED, corners, flattening, sole_heading
 from spark.kinematics import world_positions
 from spark.rig.feet import FEET, Sole
 from spark.rig.roles import Role, RoleMap
 from spark.rotation import (
+    quat_angle,
     quat_conj,
     quat_from_yaw,
+    quat_identity,
     quat_mul,
     quat_rotate,
 )
 from spark.skeleton import Skeleton
+
+_FLATTER = np.radians(10)  # of a foot by one way than by another: less is how feet are drawn
 
 
 def place_feet(
@@ -31,10 +35,34 @@ def place_feet(
         below = list(skeleton.subtree(foot))
         q = ideal[roles.require(Role.PELVIS)]
         if len(points[foot]):
-            q = quat_mul(flattening(quat_rotate(q, points[foot])), q)
+            q = _flat(skeleton, foot, points[foot], q, ideal)
             reach = np.concatenate([points[j] for j in below])
             q = quat_mul(quat_from_yaw(np.array(-sole_heading(quat_rotate(q, reach)))), q)
         ideal[below] = q
+
+
+def _flat(
+    skeleton: Skeleton,
+    foot: int,
+    points: Float[np.ndarray, "P 3"],
+    upright: Float[np.ndarray, "4"],
+    ideal: Float[np.ndarray, "J 4"],
+) -> Float[np.ndarray, "4"]:
+    """The foot's rotation with its sole on the floor: as it rests, or, where the leg rests so far
+    from hanging that no foot below it stands, or it then lies clearly flatter, as its shank carries
+    it into the T-pose."""
+    shank = int(skeleton.parents[foot])
+    hangs = quat_rotate(upright, -skeleton.offsets[foot])
+    stands = hangs[2] >= np.cos(TILTED) * np.linalg.norm(hangs)
+    flats = []
+    for q in (upright, ideal[shank]):
+        turn = flattening(quat_rotate(q, points))
+        angle = np.pi if turn is None else float(quat_angle(turn, quat_identity(turn)))
+        flats.append((angle, q if turn is None else quat_mul(turn, q)))
+    (resting, as_it_rests), (carried, as_carried) = flats
+    if stands and (carried > TILTED or resting < carried + _FLATTER):
+        return as_it_rests
+    return as_carried
 
 
 def soles_of(
