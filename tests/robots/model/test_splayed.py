@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from robots.registry import find
 from spark.rotation import quat_about
 
 # The body that is turned at zero, the hinge that turns it back, the axis, and the way on each side.
-HINGES = {
+HINGES: dict[str, tuple[tuple[str, str, Literal["x", "y"], tuple[int, int]], ...]] = {
     "legs apart": (("hip_roll_link", "hip_roll", "x", (1, -1)),),
     "legs ahead": (("hip_pitch_link", "hip_pitch", "y", (-1, -1)),),
     "one leg ahead, one behind": (("hip_pitch_link", "hip_pitch", "y", (-1, 1)),),
