@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
@@ -21,12 +21,16 @@ class Posture:
 
 
 class Hinges:
-    """All hinges of a robot, by their places in `qpos` and among the tree's dofs."""
+    """Those hinges of a robot that are among some of the tree's `dofs`, by their places in `qpos`
+    and among these."""
 
-    def __init__(self, robot: Morphology) -> None:
+    def __init__(self, robot: Morphology, dofs: Int[np.ndarray, "D"]) -> None:
         model, tree = robot.mjcf.model, robot.tree
-        hinges = ~tree.balls
-        self._dofs = tree.dof_starts[hinges]
+        number = np.full(tree.nv, -1)
+        number[dofs] = np.arange(len(dofs))
+        self._numbers = number[tree.dof_starts]  # of each joint's first dof, -1 of others'
+        hinges = ~tree.balls & (self._numbers >= 0)
+        self._dofs = self._numbers[hinges]
         self._qpos = robot.addresses[hinges]
         rest = model.qpos0[self._qpos]
         lower, upper = (limit[hinges] + rest for limit in (tree.lower, tree.upper))
@@ -38,7 +42,6 @@ class Hinges:
         self._followers = robot.followers
         self._solved = [f for f in robot.followers if robot.moved >= {f.joint, f.leader}]
         self._all_qpos, self._all_rest = robot.addresses, model.qpos0[robot.addresses]
-        self._dof_starts = tree.dof_starts
         self.at_tpose = Posture(angles, np.full(len(angles), W_TPOSE))
 
     def angles(self, q: Float[np.ndarray, "T nq"]) -> Float[np.ndarray, "T H"]:
@@ -90,7 +93,8 @@ class Hinges:
             turned = self._turned(q)
             for follower in self._solved:
                 J, residual = follower.residual(turned, W_FOLLOW)
-                dofs = self._dof_starts[[follower.joint, follower.leader]]
+                dofs = self._numbers[[follower.joint, follower.leader]]
+                J, dofs = J[:, dofs >= 0], dofs[dofs >= 0]
                 H[:, dofs[:, None], dofs] += J[:, :, None] * J[:, None]
                 g[:, dofs] += J * residual[:, None]
 

@@ -155,7 +155,7 @@ def _marched(
         frames = first[:going] + k * (1 - 2 * back[:going])
         here = qpos[frames]
         here[:, columns] = last[:going]
-        here = _settled(terms, poses.at(frames), here, block, first=k == 0)
+        here = _settled(terms, poses.at(frames), here, first=k == 0)
         last = here[:, columns]
         ways[back[:going], frames] = here
     return [robot.from_qpos(way) for way in ways]
@@ -165,15 +165,13 @@ def _settled(
     terms: Terms,
     targets: PoseTargets,
     begun: Float[np.ndarray, "L nq"],
-    block: Block,
     *,
     first: bool,
 ) -> Float[np.ndarray, "L nq"]:
     """`begun` after Gauss-Newton steps in the block's dofs, each frame for itself and, but in the
     first, near where it was begun."""
-    model, dofs = terms.robot.mjcf.model, np.array(block.dofs)
-    moved = terms.mj_dofs[dofs]
-    at = np.arange(len(dofs))
+    model = terms.robot.mjcf.model
+    moved = terms.mj_dofs
     q, rows = begun.copy(), np.arange(len(begun))  # of those that still move
     for k in range(_FIRST_STEPS if first else _STEPS):
         poses = terms.poses(q[rows])
@@ -182,15 +180,15 @@ def _settled(
         holds = PointTargets(*np.zeros((2, len(rows), terms.sole_count, 3)))
         own = targets.at(rows)
         H, g = terms.linearize(q[rows], poses, own, holds, terms.hinges.at_tpose, candidates)
-        held = terms.hinges.held(q[rows], g)[:, dofs]
-        H, g = H[:, dofs[:, None], dofs], g[:, dofs]
+        held = terms.hinges.held(q[rows], g)
+        diagonal = np.einsum("tdd->td", H)
         stay, step = np.zeros((2, len(rows), model.nv))
         if not first:
             for away, row in zip(stay, rows.tolist(), strict=True):
                 mujoco.mj_differentiatePos(model, away, 1.0, begun[row], q[row])
-            H[:, at, at] += _W_STAY**2
+            diagonal += _W_STAY**2
             g += _W_STAY**2 * stay[:, moved]
-        H[:, at, at] += np.where(held, _HELD, _FIRST_DAMPING if first else _DAMPING)
+        diagonal += np.where(held, _HELD, _FIRST_DAMPING if first else _DAMPING)
         found = -np.linalg.solve(H, np.where(held, 0.0, g)[..., None])[..., 0]
         length = np.abs(found).max(axis=1, initial=1e-9)
         step[:, moved] = found * np.minimum(1.0, _MAX_STEP / length)[:, None]

@@ -1,12 +1,14 @@
 """The floor under all parts in a few frames: `robots.solver.floor` for all shapes at once."""
 
+from itertools import pairwise
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from robots.residuals import one_sided
 from robots.solver.floor import FELT, Solid
 from robots.solver.weights import FLOOR_ROUNDING, W_FLOOR
-from robots.solver.window_collision import WindowPoses
+from robots.solver.window_poses import WindowPoses
 
 
 class WindowFloor:
@@ -19,7 +21,7 @@ class WindowFloor:
         solids: tuple[Solid, ...],
         bodies: Int[np.ndarray, "K"],
         moving: Bool[np.ndarray, "K D"],
-        rest: tuple[Float[np.ndarray, "B 3 3"], Float[np.ndarray, "B 3"]],
+        rest: Float[np.ndarray, "B 3"],
         firm: float,
     ) -> None:
         self._weight, self._rounding = firm * W_FLOOR, FLOOR_ROUNDING / firm
@@ -27,43 +29,42 @@ class WindowFloor:
         self._bodies, self._moving = np.repeat(bodies, counts), np.repeat(moving, counts, axis=0)
         self._radii = np.concatenate([np.zeros(0), *(solid.radii for solid in solids)])
         spheres = np.concatenate([np.zeros((0, 3)), *(solid.spheres for solid in solids)])
-        rotations, positions = (part[self._bodies] for part in rest)
-        self._spheres = np.einsum("kji,kj->ki", rotations, spheres - positions)
+        self._arms = (spheres - rest[self._bodies]).T
 
     def depth(self, poses: WindowPoses) -> Float[np.ndarray, "T S"]:
         """How deep [m] each sphere is in the floor; below 0 over it."""
-        up = poses.rotations[:, self._bodies, 2]
-        heights = (up * self._spheres).sum(axis=2) + poses.positions[:, self._bodies, 2]
-        depth: Float[np.ndarray, "T S"] = self._radii - heights
+        up = poses.frames[:, 2].take(self._bodies, axis=2)
+        x, y, z = up[:3] * self._arms[:, None]
+        depth: Float[np.ndarray, "T S"] = self._radii - (x + y + z + up[3])
         return depth
 
     def add_to(
         self,
         poses: WindowPoses,
-        axes: Float[np.ndarray, "T D 3"],
-        anchors: Float[np.ndarray, "T D 3"],
+        twists: Float[np.ndarray, "T 6 D"],
         scale: Float[np.ndarray, "T"],
         H: Float[np.ndarray, "T D D"],
         g: Float[np.ndarray, "T D"],
     ) -> None:
-        """Add r = w one_sided(depth), w = `W_FLOOR` x `scale`, to the normal equations."""
+        """Add r = w one_sided(depth), w = `W_FLOOR` x `scale`, to the normal equations; `twists`
+        are the dofs', about the origin."""
         depth = self.depth(poses)
         frames, own = np.nonzero(depth > -FELT * self._rounding)
         if not len(own):
             return
-        rotations = poses.rotations[frames, self._bodies[own], :2]
-        point = (rotations @ self._spheres[own, :, None])[..., 0]
-        arm = (point + poses.positions[frames, self._bodies[own], :2])[:, None] - anchors[
-            frames, :, :2
-        ]
+        across = poses.frames[:, :2, frames, self._bodies[own]]
+        x, y = (across[:3] * self._arms[:, None, own]).sum(axis=0) + across[3]
+        # What lifts a point (x, y, z): the twist's product with (y, -x, 0, 0, 0, 1).
+        wrenches = np.zeros((6, len(own)))
+        wrenches[0], wrenches[1] = y, -x
+        wrenches[5] = 1.0
         residual, slope = one_sided(depth[frames, own], self._rounding)
         weight = self._weight * scale[frames]
-        # What lifts a point: the upward part of axis x arm.
-        J = axes[frames, :, 0] * arm[..., 1] - axes[frames, :, 1] * arm[..., 0]
-        J[:, 2] = 1.0
-        J *= self._moving[own] * (-weight * slope)[:, None]
+        J = self._moving[own] * (-weight * slope)[:, None]
         residual = weight * residual
-        for t in range(len(g)):
-            rows = J[frames == t]
+        ends = np.searchsorted(frames, np.arange(len(g) + 1)).tolist()
+        for t, (start, stop) in enumerate(pairwise(ends)):
+            here = slice(start, stop)
+            rows = J[here] * (wrenches[:, here].T @ twists[t])
             H[t] += rows.T @ rows
-            g[t] += residual[frames == t] @ rows
+            g[t] += residual[here] @ rows

@@ -11,13 +11,14 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
 from robots.solver.block import blocks_of
 from robots.solver.floor import Solid, carried_solids, solids_over_floor
 from robots.solver.hinges import Hinges, Posture
+from robots.solver.near_spheres import NearSpheres
 from robots.solver.weights import (
     FLOOR_ROUNDING,
     HANDS_RANGE,
@@ -30,10 +31,11 @@ from robots.solver.weights import (
     W_ROTATION,
     per_metre,
 )
-from robots.solver.window_collision import WindowCollisions, WindowPoses
+from robots.solver.window_collision import WindowCollisions
 from robots.solver.window_floor import WindowFloor
+from robots.solver.window_poses import WindowPoses
 from robots.solver.window_targets import PointTargets, PoseTargets
-from robots.tree import BASE
+from robots.tree import BASE, cross
 from spark.rig.roles import Role
 
 LinearTerms = tuple[
@@ -46,8 +48,8 @@ class Terms:
     """The residuals of a robot's poses, as normal equations. `bones` are the limbs' segments whose
     directions the source gives, `hands` says whether it gives the offset between both, and `parts`
     are points, in the rest pose [m], of links that may be held. With `later_only`, base, trunk and
-    legs are given: what collides or sinks of these is not looked at. `mj_dofs` are MuJoCo's numbers
-    of the dofs."""
+    legs are given: nothing that they alone move is looked at, and the dofs are those of the later
+    block. `mj_dofs` are MuJoCo's numbers of the dofs."""
 
     def __init__(
         self,
@@ -63,20 +65,19 @@ class Terms:
         self._model = robot.mjcf.model
         self._data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, self._data)
-        self._rest = self._data.xmat.reshape(-1, 3, 3).copy(), self._data.xpos.copy()
+        self._rest_rotations = self._data.xmat.reshape(-1, 3, 3).copy()
+        self._rest = self._data.xpos.copy()
+        first, later = blocks_of(robot)
         self._in_first_block = np.zeros(len(tree) + 1, dtype=bool)  # of the links, and -1
-        self._in_first_block[[*blocks_of(robot)[0].joints, -1]] = True
-        joints = np.array(robot.mj_joints, dtype=int)
-        sizes = np.where(tree.balls, 3, 1)
-        self._joints = np.repeat(joints, sizes)
-        base = int(self._model.jnt_dofadr[robot.mjcf.free_joint])
-        within = BASE + np.arange(len(self._joints)) - np.repeat(tree.dof_starts, sizes)
-        own = self._model.jnt_dofadr[self._joints] + within
-        self.mj_dofs = np.append(base + np.arange(BASE), own)
-        self.hinges = Hinges(robot)
+        self._in_first_block[[*first.joints, -1]] = True
+        self._dofs = np.array(later.dofs if later_only else range(tree.nv), dtype=int)
+        self.hinges = Hinges(robot, self._dofs)
+        self._index_dofs()
         bodies = np.array([self._body(link) for link in (*range(len(tree)), -1)])
-        first = np.flatnonzero(self._in_first_block[:-1])
-        self._collisions = WindowCollisions(robot, bodies, self._rest, first, later_only=later_only)
+        given = set(np.flatnonzero(self._in_first_block[:-1]).tolist())
+        self._collisions = WindowCollisions(
+            robot, bodies, self._rest, given, self._dofs, later_only=later_only
+        )
         solids = solids_over_floor(robot)
         carried = carried_solids(robot)
         if later_only:
@@ -90,7 +91,7 @@ class Terms:
         )
         self._index_rotations()
         self._index_bones(bones)
-        self._index_points(hands, parts)
+        self._index_points(hands, parts, soles_and_hips=not later_only)
 
     def poses(self, q: Float[np.ndarray, "T nq"]) -> WindowPoses:
         """The poses of all bodies and joints, by MuJoCo."""
@@ -102,7 +103,8 @@ class Terms:
             mujoco.mj_kinematics(model, data)
             rotations[t], positions[t] = data.xmat, data.xpos
             axes[t], anchors[t] = data.xaxis, data.xanchor
-        return WindowPoses(rotations.reshape(count, -1, 3, 3), positions, axes, anchors)
+        turns = rotations.reshape(count, -1, 3, 3) @ self._rest_rotations.transpose(0, 2, 1)
+        return WindowPoses(turns, positions, axes, anchors)
 
     def sole_points(self, poses: WindowPoses) -> Float[np.ndarray, "T P 3"]:
         """The points of the soles [m, world]."""
@@ -129,7 +131,7 @@ class Terms:
         deepest: Float[np.ndarray, T] = depth.max(axis=1, initial=-np.inf)
         return deepest
 
-    def candidates(self, poses: WindowPoses) -> Int[np.ndarray, "K"]:
+    def candidates(self, poses: WindowPoses) -> NearSpheres:
         """The collision candidates, in these poses and others that are not far away."""
         return self._collisions.candidates(poses)
 
@@ -140,7 +142,7 @@ class Terms:
         targets: PoseTargets,
         foot_targets: PointTargets,
         posture: Posture,
-        candidates: Int[np.ndarray, "K"],
+        candidates: NearSpheres,
         floor_scale: Float[np.ndarray, "T"] | None = None,
         resting: PointTargets | None = None,
     ) -> tuple[Float[np.ndarray, "T D D"], Float[np.ndarray, "T D"]]:
@@ -149,14 +151,12 @@ class Terms:
         the floor, `resting` says where parts are held."""
         floor_scale = np.ones(len(q)) if floor_scale is None else floor_scale
         axes, anchors = self._dof_axes(poses)
+        twists = self._twists(axes, anchors)
         # Parts that should be turned some way: an axial vector each
         # (`robots.residuals.rotation_residual`).
-        target = np.concatenate(
-            [targets.world[:, self._rotation_joints], targets.chest[:, None]], axis=1
-        )
-        M = poses.rotations[:, self._rotation_bodies] @ (target @ self._rotation_rest).transpose(
-            0, 1, 3, 2
-        )
+        target = np.concatenate([targets.world, targets.chest[:, None]], axis=1)
+        target = target[:, self._rotation_joints]
+        M = poses.rotations[:, self._rotation_bodies] @ target.transpose(0, 1, 3, 2)
         axial = np.empty((*M.shape[:2], 3))
         np.subtract(M[..., 2, 1], M[..., 1, 2], out=axial[..., 0])
         np.subtract(M[..., 0, 2], M[..., 2, 0], out=axial[..., 1])
@@ -170,8 +170,8 @@ class Terms:
         across = J_rows.transpose(0, 2, 1)
         H += across @ (J_rows * weights.reshape(len(q), -1, 1))
         g += (across @ forces.reshape(len(q), -1, 1))[..., 0]
-        self._floor.add_to(poses, axes, anchors, floor_scale, H, g)
-        self._collisions.add_to(poses, axes, anchors, candidates, H, g)
+        self._floor.add_to(poses, twists, floor_scale, H, g)
+        self._collisions.add_to(poses, twists, candidates, H, g)
         self.hinges.add_to(q, posture, H, g)
         return H, g
 
@@ -179,16 +179,32 @@ class Terms:
         self, poses: WindowPoses
     ) -> tuple[Float[np.ndarray, "T D 3"], Float[np.ndarray, "T D 3"]]:
         """The dofs' axes [world], 0 for the base's shifts, and the points they rotate about."""
-        root = self.robot.mjcf.root
-        axes, anchors = np.zeros((2, len(poses.positions), BASE + len(self._joints), 3))
-        axes[:, 3:BASE] = poses.rotations[:, root].transpose(0, 2, 1)
-        anchors[:, 3:BASE] = poses.positions[:, None, root]
-        axes[:, BASE:] = poses.axes[:, self._joints]
-        anchors[:, BASE:] = poses.anchors[:, self._joints]
-        for link in np.flatnonzero(self.robot.tree.balls).tolist():
-            at = int(self.robot.tree.dof_starts[link])
-            axes[:, at : at + 3] = poses.rotations[:, self._body(link)].transpose(0, 2, 1)
+        base, count = self._base, len(poses.positions)
+        axes, anchors = np.zeros((2, count, len(self._dofs), 3))
+        if base:
+            root = self.robot.mjcf.root
+            axes[:, 3:base] = self._body_axes(poses, root)
+            anchors[:, 3:base] = poses.positions[:, None, root]
+        axes[:, base:] = poses.axes[:, self._joints]
+        anchors[:, base:] = poses.anchors[:, self._joints]
+        for start, body in self._balls:
+            axes[:, start : start + 3] = self._body_axes(poses, body)
         return axes, anchors
+
+    def _body_axes(self, poses: WindowPoses, body: int) -> Float[np.ndarray, "T 3 3"]:
+        """A body's axes, as MuJoCo has them, as rows."""
+        return (poses.rotations[:, body] @ self._rest_rotations[body]).transpose(0, 2, 1)
+
+    def _twists(
+        self, axes: Float[np.ndarray, "T D 3"], anchors: Float[np.ndarray, "T D 3"]
+    ) -> Float[np.ndarray, "T 6 D"]:
+        """The dofs' turns, and the shifts of the world's origin if it went with them."""
+        twists = np.empty((len(axes), 6, axes.shape[1]))
+        twists[:, :3] = axes.transpose(0, 2, 1)
+        cross(anchors.transpose(2, 0, 1), axes.transpose(2, 0, 1), twists[:, 3:].swapaxes(0, 1))
+        if self._base:
+            twists[:, 3:, :3] = np.eye(3)
+        return twists
 
     def _points(self, poses: WindowPoses, which: slice) -> Float[np.ndarray, "T P 3"]:
         bodies = self._point_bodies[which]
@@ -218,24 +234,27 @@ class Terms:
         np.subtract(ay * z, az * y, out=J[:, :, 0])
         np.subtract(az * x, ax * z, out=J[:, :, 1])
         np.subtract(ax * y, ay * x, out=J[:, :, 2])
-        J[:, B:, :, :3] = np.eye(3)
+        if self._base:
+            J[:, B:, :, :3] = np.eye(3)
         J *= self._dof_mask[: B + P]
         weights, forces = np.empty((2, count, B + P, 3))
         weights[:, :B] = W_LIMB_DIRECTION**2
         forces[:, :B] = W_LIMB_DIRECTION**2 * (bones - targets.bones)
-        self._add_soles(points, foot_targets, floor_scale, weights[:, B:], forces[:, B:])
-        hips = B + self.sole_count
-        weights[:, hips] = (self._firm * W_HIPS_POSITION) ** 2
-        forces[:, hips] = weights[:, hips] * (points[:, hips - B] - targets.hips)
+        if self.sole_count:
+            self._add_soles(points, foot_targets, floor_scale, weights[:, B:], forces[:, B:])
+        at = B + self.sole_count
+        if self._hips:
+            weights[:, at] = (self._firm * W_HIPS_POSITION) ** 2
+            forces[:, at] = weights[:, at] * (points[:, at - B] - targets.hips)
+            at += 1
         if self._hands:
             # The residual is the difference of two points, so is its Jacobian.
             squared = (self._firm**2 * targets.hands**2).sum(1, keepdims=True)
             weight = (self._firm * W_HANDS * np.exp(-squared / HANDS_RANGE**2)) ** 2
-            J[:, hips + 1] -= J[:, hips + 2]
-            weights[:, hips + 1], weights[:, hips + 2] = weight, 0.0
-            left, right = hips + 1 - B, hips + 2 - B
-            between = points[:, left] - points[:, right] - targets.hands
-            forces[:, hips + 1], forces[:, hips + 2] = weight * between, 0.0
+            J[:, at] -= J[:, at + 1]
+            weights[:, at], weights[:, at + 1] = weight, 0.0
+            between = points[:, at - B] - points[:, at + 1 - B] - targets.hands
+            forces[:, at], forces[:, at + 1] = weight * between, 0.0
         if resting:
             parts, own = slice(B + self._before_parts, None), points[:, self._before_parts :]
             weights[:, parts] = (self._firm * W_HOLD * resting.holds) ** 2
@@ -276,7 +295,20 @@ class Terms:
             out[k, :BASE] = first[k]
             same = [j for j in tree.chain(link) if self._in_first_block[j] == first[k]]
             out[k, tree.dofs(tuple(same))] = True
-        return out
+        return out[:, self._dofs]
+
+    def _index_dofs(self) -> None:
+        """MuJoCo's numbers of the dofs and, of those that are not the base's, of their joints."""
+        model, tree = self._model, self.robot.tree
+        self._base = int((self._dofs < BASE).sum())
+        links = np.repeat(np.arange(len(tree)), np.where(tree.balls, 3, 1))
+        links = links[self._dofs[self._base :] - BASE]
+        self._joints = np.array(self.robot.mj_joints, dtype=int)[links]
+        within = self._dofs[self._base :] - tree.dof_starts[links]
+        base = int(model.jnt_dofadr[self.robot.mjcf.free_joint]) + self._dofs[: self._base]
+        self.mj_dofs = np.append(base, model.jnt_dofadr[self._joints] + within)
+        starts = self._base + np.flatnonzero(tree.balls[links] & (within == 0))
+        self._balls = [(int(start), self._body(int(links[start - self._base]))) for start in starts]
 
     def _index_rotations(self) -> None:
         """The parts with a target rotation, and their weights."""
@@ -287,34 +319,41 @@ class Terms:
             if role is not None and own:
                 joints.append(j)
                 weights.append(W_ROTATION.get(role.part, W_OTHER_ROTATION))
-        self._rotation_joints = np.array(joints)
-        rotated = [*(links[j] for j in joints), links[rig.chest]]
-        bodies = [self._body(link) for link in rotated]
-        self._rotation_bodies = np.array(bodies)
-        self._rotation_rest = self._rest[0][bodies]
+        joints.append(len(links))  # the chest's target comes after all joints'
+        weights.append(W_ROTATION["chest"])
+        rotated = [links[j] if j < len(links) else links[rig.chest] for j in joints]
         mask = self._mask(rotated)
-        self._rotation_weights = (mask * np.array([[*weights, W_ROTATION["chest"]]]).T ** 2).T
+        moved = mask.any(axis=1)
+        mask = mask[moved]
+        self._rotation_joints = np.array(joints)[moved]
+        self._rotation_bodies = np.array([self._body(link) for link in rotated])[moved]
+        self._rotation_weights = (mask * np.array(weights)[moved, None] ** 2).T
         self._rotation_gram = self._rotation_weights @ mask
 
     def _index_bones(self, bones: Sequence[Role]) -> None:
         robot = self.robot
         self._bone_links = [int(robot.links[robot.rig.roles.require(role)]) for role in bones]
         self._bone_bodies = np.array([self._body(link) for link in self._bone_links], dtype=int)
-        along = np.array([robot.bones[role] for role in bones]).reshape(-1, 3)
-        self._bones = np.einsum("bji,bj->bi", self._rest[0][self._bone_bodies], along)
+        self._bones = np.array([robot.bones[role] for role in bones]).reshape(-1, 3)
 
     def _index_points(
-        self, hands: bool, parts: Sequence[tuple[int, Float[np.ndarray, "3"]]]
+        self,
+        hands: bool,
+        parts: Sequence[tuple[int, Float[np.ndarray, "3"]]],
+        *,
+        soles_and_hips: bool,
     ) -> None:
         """The soles' points, the middle of the hips, both wrists where asked, and the parts that
         may be held; the dofs that move these and the bones."""
         robot = self.robot
-        soles = [robot.sole_points(sole) for sole in robot.soles]
+        soles = [robot.sole_points(sole) for sole in robot.soles if soles_and_hips]
         links = [link for own, _ in soles for link in own.tolist()]
         rest = [point for _, points in soles for point in points]
         self.sole_count = len(links)
-        links.append(int(robot.links[robot.rig.pelvis]))
-        rest.append(robot.centers[robot.rig.hips].mean(0))
+        self._hips = soles_and_hips
+        if self._hips:
+            links.append(int(robot.links[robot.rig.pelvis]))
+            rest.append(robot.centers[robot.rig.hips].mean(0))
         self._hands = hands
         if hands:
             for role in (Role.LEFT_HAND, Role.RIGHT_HAND):
@@ -324,8 +363,7 @@ class Terms:
         self._before_parts = len(links)
         links += [link for link, _ in parts]
         rest += [point for _, point in parts]
-        self._point_bodies = np.array([self._body(link) for link in links])
-        rotations, positions = (part[self._point_bodies] for part in self._rest)
-        self._arms = np.einsum("pji,pj->pi", rotations, np.array(rest) - positions)
+        self._point_bodies = np.array([self._body(link) for link in links], dtype=int)
+        self._arms = np.array(rest).reshape(-1, 3) - self._rest[self._point_bodies]
         mask = self._mask([*self._bone_links, *links])
         self._dof_mask = mask[:, None].astype(np.float64)

@@ -17,7 +17,7 @@ from robots.solver.contacts import REST_HEIGHT, REST_SPEED, ROLL_SPEED, WRIST_HE
 from robots.solver.over_feet import on_arms
 from robots.solver.resting import carrier
 from robots.solver.touching import touches_of
-from robots.solver.window_collision import WindowPoses
+from robots.solver.window_poses import WindowPoses
 from robots.solver.window_targets import PointTargets
 from robots.solver.window_terms import Terms
 from robots.stream.frame_targets import FrameReader, FrameTargets

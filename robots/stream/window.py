@@ -2,13 +2,14 @@
 
 import mujoco
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from scipy.linalg.lapack import dposv
 
 from robots.model.morphology import Morphology
 from robots.solver.hinges import Posture
+from robots.solver.near_spheres import NearSpheres
 from robots.solver.repair import MAX_SINKING
-from robots.solver.window_collision import WindowPoses
+from robots.solver.window_poses import WindowPoses
 from robots.solver.window_targets import PointTargets
 from robots.solver.window_terms import Terms
 from robots.stream.coupling import Coupling
@@ -106,7 +107,7 @@ class Window:
         foot_targets: PointTargets,
         resting: PointTargets | None,
         posture: Posture,
-        candidates: Int[np.ndarray, "K"],
+        candidates: NearSpheres,
         *,
         lone_damping: float | None = None,
     ) -> tuple[Float[np.ndarray, "T nq"], float]:
