@@ -215,12 +215,13 @@ class LinkPoses:
     def at(self, frames: Int[np.ndarray, "S"], links: Iterable[int] | None = None) -> "LinkPoses":
         """The same in some of the frames; only `links` where they are named, the rest undefined."""
         if links is None:
-            return LinkPoses(self.tree, self.rotations[..., frames], self.positions[..., frames])
+            every = (part.take(frames, axis=-1) for part in (self.rotations, self.positions))
+            return LinkPoses(self.tree, *every)
         rotations = np.empty((*self.rotations.shape[:-1], len(frames)))
         positions = np.empty((*self.positions.shape[:-1], len(frames)))
         for link in links:
-            rotations[link] = self.rotations[link][..., frames]
-            positions[link] = self.positions[link][..., frames]
+            self.rotations[link].take(frames, axis=-1, out=rotations[link], mode="clip")
+            self.positions[link].take(frames, axis=-1, out=positions[link], mode="clip")
         return LinkPoses(self.tree, rotations, positions)
 
     def point(self, link: int, rest: Float[np.ndarray, "3 *T"]) -> Float[np.ndarray, "3 T"]:
@@ -292,7 +293,8 @@ def _forward_kinematics(tree: Tree, q: Coordinates) -> LinkPoses:
     positions = np.empty((count + 1, 3, time))
     rotations[-1] = np.moveaxis(matrix_from_quat(q.quat), 0, -1)
     positions[-1] = q.pos.T
-    sin, cos = np.sin(q.angles.T), np.cos(q.angles.T)
+    angles = np.ascontiguousarray(q.angles.T)
+    sin, cos = np.sin(angles), np.cos(angles)
     for j, parent in enumerate(tree.parents.tolist()):
         above = rotations[parent]
         arm = tree.anchors[j] - tree.anchor(parent)
@@ -302,13 +304,33 @@ def _forward_kinematics(tree: Tree, q: Coordinates) -> LinkPoses:
             local = np.moveaxis(matrix_from_quat(q.ball_quats[:, j]), 0, -1)
             rotations[j] = np.einsum("ijt,jkt->ikt", above, local)
         else:
-            # Rodrigues' formula: R (1 + sin K + (1 - cos) K^2), K the axis' cross product matrix
-            K = skew(tree.axes[j])
-            rows = above.transpose(1, 0, 2).reshape(3, -1)  # columns of R, rows and time together
-            crossed = (K.T @ rows).reshape(3, 3, time)
-            twice = (K.T @ crossed.reshape(3, -1)).reshape(3, 3, time)
-            rotations[j] = above + (sin[j] * crossed + (1 - cos[j]) * twice).transpose(1, 0, 2)
+            _turn(above, tree.axes[j], sin[j], cos[j], rotations[j])
     return LinkPoses(tree, rotations, positions)
+
+
+def _turn(
+    above: Float[np.ndarray, "3 3 T"],
+    axis: Float[np.ndarray, "3"],
+    sin: Float[np.ndarray, "T"],
+    cos: Float[np.ndarray, "T"],
+    out: Float[np.ndarray, "3 3 T"],
+) -> None:
+    """Rotations R after turns about an axis, by Rodrigues' formula: R (1 + sin K + (1 - cos) K²),
+    K the axis' cross product matrix. Of an axis along x, y or z most of it is zero or one."""
+    K = skew(axis)
+    squared = K @ K
+    still = np.eye(3) + squared
+    for k in range(3):
+        parts = []
+        for i in range(3):
+            if K[i, k] or squared[i, k]:
+                turned = sin * K[i, k]
+                turned -= cos * squared[i, k]
+                turned += still[i, k]
+                parts.append(above[:, i] * turned)
+            elif still[i, k]:
+                parts.append(above[:, i])
+        out[:, k] = sum(parts[1:], parts[0])
 
 
 def _apply(

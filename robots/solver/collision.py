@@ -11,14 +11,13 @@ from jaxtyping import Float
 
 from robots.least_squares import NormalEquations
 from robots.model.morphology import Morphology
-from robots.model.shapes import DIRECTIONS
 from robots.residuals import one_sided
 from robots.solver.block import Block
 from robots.solver.candidates import Candidate, by_larges, by_moves, in_order
 from robots.solver.clusters import Cluster, clusters_of
-from robots.solver.hulls import SLABS, Shape, ShapePair, signed_distance
+from robots.solver.hulls import SLABS, Shape, ShapePair
 from robots.solver.pushes import Pushes
-from robots.solver.shape_pairs import distances, in_shape, pairs_of
+from robots.solver.shape_pairs import distances, nearest, pairs_of
 from robots.tree import LinkPoses, Tree
 
 DEPTH_ROUNDING = 0.003  # [m] over which the penalty of their depth sets in
@@ -158,28 +157,18 @@ class Collisions:
         reach = np.concatenate(
             [x.pair.clearance + x.pair.small.radii[x.spheres] for x in candidates]
         )
-        local = in_shape(self.tree, poses, link, spheres, large, at)
-        excess = reach[:, None] - signed_distance(large, local)
-        felt = excess > -FELT * DEPTH_ROUNDING
-        active = felt.any(axis=0)
-        if not active.any():
+        apart = distances(self.tree, poses, link, spheres, large, at)
+        t, s = np.nonzero((reach[:, None] - apart).T > -FELT * DEPTH_ROUNDING)
+        if not len(t):
             return
-        here, felt = at[active], felt[:, active]
-        scaled = weight * penalty_scale[here]
-        depth, slope = one_sided(excess[:, active], DEPTH_ROUNDING / penalty_scale[here])
-        residuals = np.where(felt, scaled * depth, 0.0)
-        normal.cost[here] += 0.5 * (residuals**2).sum(0)
-        if not normal.with_jacobian:
-            return
-        s, t = np.nonzero(felt)
-        beyond = DIRECTIONS @ local[:, :, active][:, s, t] - large.reach[:, None]
-        side = DIRECTIONS[beyond.argmax(0)].T
-        push = np.zeros((3, *felt.shape))
-        out = np.einsum("ijn,jn->in", poses.rotations[large.link][..., here[t]], side)
-        push[:, s, t] = (scaled * slope)[s, t] * out
-        arms = (spheres - self.tree.anchor(link)) @ poses.rotations[link][..., here]
-        points = arms + poses.positions[link][:, None, here]
-        pushes.add(here, points, push, residuals)
+        here = at[t]
+        points, apart, out = nearest(poses, link, spheres[s].T, large, here)
+        scale = penalty_scale[here]
+        depth, slope = one_sided(reach[s] - apart, DEPTH_ROUNDING / scale)
+        residuals = weight * scale * depth
+        normal.cost += np.bincount(here, 0.5 * residuals**2, len(normal.cost))
+        if normal.with_jacobian:
+            pushes.add(here, points, weight * scale * slope * out, residuals)
 
 
 def _moved(

@@ -83,8 +83,7 @@ class ExactContacts:
                 normal.cost[here] += 0.5 * (scaled * depth) ** 2
                 if normal.with_jacobian:
                     out = scaled * slope * x.out[:, active]
-                    points = x.points[:, active]
-                    pushes.add(here, points[:, None], out[:, None], (scaled * depth)[None])
+                    pushes.add(here, x.points[:, active], out, scaled * depth)
             pushes.add_to_normal(block)
 
     @cached_property

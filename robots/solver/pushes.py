@@ -22,33 +22,27 @@ class Pushes:
 
     def __init__(self, normal: NormalEquations, poses: LinkPoses, moves: Moves) -> None:
         self._normal, self._poses, self._moves = normal, poses, moves
-        frames = poses.positions.shape[2] if normal.with_jacobian else 0
-        self._squares, self._sums = np.zeros((frames, 6, 6)), np.zeros((frames, 6))
-        self._touched = np.zeros(frames, dtype=bool)
+        self._parts: list[tuple[Int[np.ndarray, N], Float[np.ndarray, "7 N"]]] = []
 
     def add(
         self,
         frames: Int[np.ndarray, "N"],
-        points: Float[np.ndarray, "3 M N"],
-        pushes: Float[np.ndarray, "3 M N"],
-        residuals: Float[np.ndarray, "M N"],
+        points: Float[np.ndarray, "3 N"],
+        pushes: Float[np.ndarray, "3 N"],
+        residuals: Float[np.ndarray, "N"],
     ) -> None:
-        """M residuals in some frames: where they push [m, world], along what vector, as long as the
-        residual changes with the way along it [1/m]."""
-        wrenches = np.empty((6, *residuals.shape))
-        base = self._poses.positions[ROOT][:, None, frames]
-        cross(points - base, pushes, wrenches[:3])
-        wrenches[3:] = pushes
-        across = wrenches.transpose(2, 0, 1)
-        self._squares[frames] += across @ wrenches.transpose(2, 1, 0)
-        self._sums[frames] += (across @ residuals.T[:, :, None])[:, :, 0]
-        self._touched[frames] = True
+        """A residual in each of some frames: where it pushes [m, world], along what vector, as long
+        as the residual changes with the way along it [1/m]."""
+        rows = np.empty((7, len(frames)))
+        cross(points - self._poses.positions[ROOT].take(frames, axis=1), pushes, rows[:3])
+        rows[3:6], rows[6] = pushes, residuals
+        self._parts.append((frames, rows))
 
     def add_to_normal(self, block: Block) -> None:
         """Into the block's normal equations; the residuals' cost is not among it."""
-        frames = np.flatnonzero(self._touched)
-        if not len(frames):
+        if not self._parts:
             return
+        frames, squares, sums = self._by_frame()
         tree, (yielding, other) = self._poses.tree, self._moves
         joints = yielding + other
         links = {ROOT, *joints, *(int(tree.parents[j]) for j in joints)}
@@ -56,4 +50,20 @@ class Pushes:
         moved = twists(poses, joints, poses.positions[ROOT], base=False)
         moved[:, : len(tree.dofs(yielding))] *= -1.0
         dofs = block.local_joint_dofs(joints)
-        self._normal.add_moved(frames, dofs, moved, self._squares[frames], self._sums[frames])
+        self._normal.add_moved(frames, dofs, moved, squares, sums)
+
+    def _by_frame(
+        self,
+    ) -> tuple[Int[np.ndarray, "S"], Float[np.ndarray, "S 6 6"], Float[np.ndarray, "S 6"]]:
+        """The frames with residuals, and the sums there of the wrenches' squares, and of these
+        times the residuals."""
+        frames = np.concatenate([frames for frames, _ in self._parts])
+        order = np.argsort(frames, kind="stable")
+        rows = np.concatenate([rows for _, rows in self._parts], axis=1).take(order, axis=1)
+        frames = frames[order]
+        starts = np.flatnonzero(np.diff(frames, prepend=-1))
+        first, second = np.triu_indices(7)
+        products = np.add.reduceat(rows[first] * rows[second], starts, axis=1)
+        whole = np.empty((len(starts), 7, 7))
+        whole[:, first, second] = whole[:, second, first] = products.T
+        return frames[starts], np.ascontiguousarray(whole[:, :6, :6]), whole[:, :6, 6]

@@ -8,7 +8,14 @@ from jaxtyping import Float, Int
 
 from robots.model.morphology import Morphology
 from robots.solver.block import carriers
-from robots.solver.hulls import Shape, ShapePair, can_collide, shapes_of, signed_distance
+from robots.solver.hulls import (
+    SLABS,
+    Shape,
+    ShapePair,
+    can_collide,
+    shapes_of,
+    signed_distance,
+)
 from robots.tree import LinkPoses, Tree, forward_kinematics
 
 _ONE_JOINT = 0.05  # hip heights between hinges that turn about one point
@@ -56,13 +63,16 @@ def in_shape(
 ) -> Float[np.ndarray, "3 S N"]:
     """Where points that a link carries are in some frames, in the rest pose of a shape [m], as
     exactly as the points are given."""
-    R = poses.rotations[shape.link][..., at]
-    relative = np.einsum("jit,jkt->ikt", R, poses.rotations[link][..., at])
-    offset = poses.positions[link][:, at] - poses.positions[shape.link][:, at]
-    offset = np.einsum("jit,jt->it", R, offset) + tree.anchor(shape.link)[:, None]
     exact = points.dtype
-    local = (points - tree.anchor(link)).astype(exact) @ relative.astype(exact, copy=False)
-    local += offset[:, None].astype(exact, copy=False)
+    outer, R = (
+        poses.rotations[x].take(at, axis=2).astype(exact, copy=False) for x in (link, shape.link)
+    )
+    offset = poses.positions[link].take(at, axis=1) - poses.positions[shape.link].take(at, axis=1)
+    offset = (R * offset.astype(exact, copy=False)[:, None]).sum(axis=0)
+    offset += tree.anchor(shape.link).astype(exact)[:, None]
+    relative = np.einsum("jit,jkt->ikt", R, outer)
+    local: Float[np.ndarray, "3 S N"] = (points - tree.anchor(link)).astype(exact) @ relative
+    local += offset[:, None]
     return local
 
 
@@ -77,6 +87,27 @@ def distances(
     """The signed distance [m] of points that a link carries from a shape in some frames, to the
     micrometre: in half the time that it takes exactly."""
     return signed_distance(shape, in_shape(tree, poses, link, points.astype(np.float32), shape, at))
+
+
+def nearest(
+    poses: LinkPoses,
+    link: int,
+    points: Float[np.ndarray, "3 N"],
+    shape: Shape,
+    frames: Int[np.ndarray, "N"],
+) -> tuple[Float[np.ndarray, "3 N"], Float[np.ndarray, "N"], Float[np.ndarray, "3 N"]]:
+    """Of points that a link carries, one in each of some frames: where they are [m, world], their
+    signed distance [m] from a shape, and the unit normal of its side there [world]."""
+    near = poses.at(frames, {link, shape.link})
+    paths = near.point(link, points)
+    away = paths - near.positions[shape.link]
+    inside = (near.rotations[shape.link] * away[:, None]).sum(axis=0)
+    middle, half = shape.slabs[:, :, None]
+    off = SLABS @ (inside + poses.tree.anchor(shape.link)[:, None]) - middle
+    over = np.abs(off) - half
+    at = over.argmax(axis=0), np.arange(len(frames))
+    side = SLABS[at[0]].T * np.sign(off[at])
+    return paths, over[at], near.direction(shape.link, side)
 
 
 def _carried_shapes(robot: Morphology) -> list[Shape]:
