@@ -131,16 +131,19 @@ def add_floor(
         frames = np.flatnonzero(shape.bottom(poses) < FELT * rounding)
         if not len(frames):
             continue
-        joints = block.free_joints(shape.link)
-        above = robot.tree.parents[list(joints)].tolist()
-        near = poses.at(frames, {ROOT, shape.link, *joints, *above})
-        depth = shape.radii[:, None] - near.heights(shape.link, shape.spheres)
+        low = poses.at(frames, {shape.link})
+        depth = shape.radii[:, None] - low.heights(shape.link, shape.spheres)
         felt = depth > -FELT * rounding[frames]
+        touching = felt.any(axis=0)
+        frames, depth, felt = frames[touching], depth[:, touching], felt[:, touching]
         sunk, slope = one_sided(depth, rounding[frames])
         residuals = np.where(felt, weight[frames] * sunk, 0.0)
         normal.cost[frames] += 0.5 * (residuals**2).sum(0)
-        if not normal.with_jacobian:
+        if not (normal.with_jacobian and len(frames)):
             continue
+        joints = block.free_joints(shape.link)
+        above = robot.tree.parents[list(joints)].tolist()
+        near = poses.at(frames, {ROOT, shape.link, *joints, *above})
         # A push down at the end of an arm (x, y): (-y, x, 0) is the arm's product with (0, 0, -1).
         x, y = (shape.spheres - robot.tree.anchor(shape.link)) @ near.rotations[shape.link][:2]
         down = np.where(felt, weight[frames] * slope, 0.0)
