@@ -124,7 +124,7 @@ def _bound(shape: Shape) -> float:
 
 def _near(
     pairs: tuple[ShapePair, ...],
-    balls: Sequence[tuple[Float[np.ndarray, "S 3"], Float[np.ndarray, "S"]]],
+    balls: Sequence[tuple[Float[np.ndarray, "_ 3"], Float[np.ndarray, "_"]]],
     apart: Float[np.ndarray, "P"],
     bodies: Int[np.ndarray, "L"],
     rest: Float[np.ndarray, "B 3"],
