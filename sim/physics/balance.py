@@ -74,14 +74,14 @@ class Balancer:
         self._own = own = float(model.opt.timestep)
         self._stride = max(1, int(STEP / own + 1e-6))
         carries = _carrying(model, root, qpos, height)
-        self._whole = looking_ahead(spec, model, root, carries, self._stride * own)
-        self._ahead = ahead = self._whole.model
-        self._qpos, self._speeds = qpos[:, self._whole.qpos], speeds[:, self._whole.dofs]
+        self._ahead = looking_ahead(spec, model, root, carries, self._stride * own)
+        self._model = ahead = self._ahead.model
+        self._qpos, self._speeds = qpos[:, self._ahead.qpos], speeds[:, self._ahead.dofs]
         self._scratch = mujoco.MjData(ahead)
-        self._data = [mujoco.MjData(self._ahead) for _ in range(len(os.sched_getaffinity(0)))]
+        self._data = [mujoco.MjData(self._model) for _ in range(len(os.sched_getaffinity(0)))]
         self._beforehand = beforehand(model, torques, len(qpos), frame_time)
         self._servos, self._spread = _carrying_servos(model, root, carries, height)
-        self._shifted = np.searchsorted(self._whole.servos, self._servos)
+        self._shifted = np.searchsorted(self._ahead.servos, self._servos)
         count = max(2, round(HORIZON * self._time / (self._stride * own)))
         self._steps = self._stride * own * np.arange(1, count + 1)
         self._knots = np.linspace(0.0, self._steps[-1], KNOTS)
@@ -126,18 +126,18 @@ class Balancer:
     def _look_ahead(self, data: mujoco.MjData, time: float) -> None:
         """Better shifts from where the body is at a time [s] of the motion."""
         frames = frames_of(time + self._steps, self._frame_time)
-        wanted = at_frames(self._ahead, self._qpos, frames)
+        wanted = at_frames(self._model, self._qpos, frames)
         speeds = values_at(self._speeds, frames)
         tried = self._rng.normal(size=(COURSES, *self._shifts.shape)) * self._spread
         tried[0], tried[1] = 0.0, -self._shifts
         tried += self._shifts
         own = self._controls(wanted, speeds)
-        own += values_at(self._beforehand, frames)[:, self._whole.servos]
+        own += values_at(self._beforehand, frames)[:, self._ahead.servos]
         servos = np.repeat(own[None], COURSES, axis=0)
         ways = np.stack([_hats(self._steps, self._knots) @ each for each in tried])
         servos[:, :, self._shifted] += ways
-        start = np.repeat(self._whole.state(data)[None], COURSES, axis=0)
-        states, _ = rollout.rollout(self._ahead, self._data, start, servos, persistent_pool=True)
+        start = np.repeat(self._ahead.state(data)[None], COURSES, axis=0)
+        states, _ = rollout.rollout(self._model, self._data, start, servos, persistent_pool=True)
         cost = self._cost(states[:, :, 1:], wanted, speeds)
         cost += W_SHIFT * ((tried / self._spread) ** 2).mean(axis=(1, 2))
         gap = max(float(np.median(cost) - cost.min()), 1e-9)
@@ -148,14 +148,14 @@ class Balancer:
         self, qpos: Float[np.ndarray, "S nq"], speeds: Float[np.ndarray, "S nv"]
     ) -> Float[np.ndarray, "S nu"]:
         """What the servos get on the motion itself."""
-        data, none = self._scratch, np.zeros(self._ahead.nv)
-        out = np.zeros((len(qpos), self._ahead.nu))
+        data, none = self._scratch, np.zeros(self._model.nv)
+        out = np.zeros((len(qpos), self._model.nu))
         for k, (pose, speed) in enumerate(zip(qpos, speeds, strict=True)):
             data.qpos[:] = pose
-            mujoco.mj_kinematics(self._ahead, data)
-            mujoco.mj_comPos(self._ahead, data)
-            mujoco.mj_transmission(self._ahead, data)
-            out[k] = controls(self._ahead, data, none, speed)
+            mujoco.mj_kinematics(self._model, data)
+            mujoco.mj_comPos(self._model, data)
+            mujoco.mj_transmission(self._model, data)
+            out[k] = controls(self._model, data, none, speed)
         return out
 
     def _cost(

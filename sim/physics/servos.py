@@ -17,14 +17,6 @@ _MAX_TIMESTEP = 0.002  # [s]
 _COLLISION_GROUP = 3  # by custom; viewers don't show it
 
 
-def with_servos(
-    body: ModelTrajectory, *, height: float, floor_z: float, own: bool = False
-) -> tuple[mujoco.MjModel, tuple[str, ...]]:
-    """The model of `servo_spec`, and what was assumed on the way."""
-    spec, notes = servo_spec(body, height=height, floor_z=floor_z, own=own)
-    return servo_model(spec), notes
-
-
 def servo_spec(
     body: ModelTrajectory, *, height: float, floor_z: float, own: bool = False
 ) -> tuple[mujoco.MjSpec, tuple[str, ...]]:

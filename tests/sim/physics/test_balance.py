@@ -11,7 +11,7 @@ from robots.model.motion import RobotMotion
 from robots.registry import find
 from robots.solver.solve import retarget
 from sim.physics.balance import beforehand
-from sim.physics.servos import with_servos
+from sim.physics.servos import servo_model, servo_spec
 from sim.physics.summary import render, summarize
 from sim.physics.tracking import TrackingResult, track
 from sim.report.assess import assess
@@ -67,7 +67,8 @@ def test_torques_keep_to_the_motors_limits(walk: RobotMotion) -> None:
 
 def test_servos_give_beforehand_what_the_motion_needs(walk: RobotMotion) -> None:
     """Where nothing is off, each motor gives its torque, as far as it can; MuJoCo says so."""
-    model, _ = with_servos(walk.body, height=walk.robot.rig.standing_height, floor_z=0.0, own=True)
+    height = walk.robot.rig.standing_height
+    model = servo_model(servo_spec(walk.body, height=height, floor_z=0.0, own=True)[0])
     names = [model.joint(int(model.actuator_trnid[a, 0])).name for a in range(model.nu)]
     wanted = {name: np.full(len(walk), 3.0 + k) for k, name in enumerate(names[:-1])}
     shifts = beforehand(model, wanted, len(walk), walk.frame_time)
