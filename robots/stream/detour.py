@@ -2,11 +2,11 @@
 
 Descent follows a limb wherever it goes, also into a local minimum: an arm that came up on the wrong
 side. The rotations projected onto its hinges (`robots.solver.projection`) may have another
-solution; then the limb is led there.
+solution; then the limb is led there, and after that solution while it moves on.
 """
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from robots.solver.hinges import Posture
 from robots.solver.projection import project
@@ -18,12 +18,12 @@ _LOST = np.radians(55)  # a bone farther from its direction is stuck,
 _ASTRAY = np.radians(30)  # one farther than this may be: it is given more time;
 _FOUND = np.radians(25)  # a nearer one is free again
 _GAIN = np.radians(15)  # by which a limb has to be nearer where it is led to
-_PATIENCE = 0.15  # [s] that a limb is stuck before it is led,
-_ASTRAY_PATIENCE = 0.5  # [s] or astray
+_PATIENCE = 0.1  # [s] that a limb is stuck before it is led,
+_ASTRAY_PATIENCE = 0.3  # [s] or astray
 _OTHER_WAY = 1.0  # [rad] of a hinge between the same way to a pose and another one
 _MAX_DURATION = 0.6  # [s] that it is led, and that it is then left alone
-_W_DETOUR = 2.0  # [1/rad] of the angles that it is led to
-_SPEED = 8.0  # [rad/s] at which it is led
+_W_DETOUR = 3.0  # [1/rad] of the angles that it is led to: firmer than its bones' directions
+_SPEED = 6.0  # [rad/s] at which it is led
 
 
 class Detours:
@@ -55,27 +55,16 @@ class Detours:
     ) -> Posture:
         """The posture that hinges are pulled to, where bones have the directions `bones` and hinges
         are at `angles` [rad] in the first frame of `targets`."""
-        wanted = targets.bones[0]
-        worst = self._away(bones, wanted)
+        worst = self._away(bones, targets.bones[0])
         patience = np.where(worst > _LOST, _PATIENCE, _ASTRAY_PATIENCE)
         self._stuck = np.where(worst > _ASTRAY, self._stuck + self._frame_time / patience, 0.0)
         led = self._led > 0
         self._led -= np.clip(self._led, -self._frame_time, self._frame_time)
-        for limb in np.flatnonzero(led & ((worst < _FOUND) | (self._led == 0))):
-            self._led[limb] = -_MAX_DURATION
-            self._goals[self._limbs[limb][1]] = np.nan
-        stuck = np.flatnonzero((self._stuck > 1.0) & (self._led == 0))
-        if len(stuck):
-            world = quat_from_matrix(targets.world[:1])
-            q = self._robot.to_qpos(project(self._robot, world, targets.hips[:1]))
-            there = self._away(self._terms.bones(self._terms.poses(q))[0], wanted)
-            goals = self._terms.hinges.angles(q)[0]
-            for limb in stuck:
-                _, hinges = self._limbs[limb]
-                other_way = np.abs(goals[hinges] - angles[hinges]).max(initial=0.0) > _OTHER_WAY
-                better = other_way and there[limb] < worst[limb] - _GAIN
-                self._led[limb] = _MAX_DURATION if better else -_MAX_DURATION
-                self._goals[hinges] = goals[hinges] if better else np.nan
+        for limb in np.flatnonzero(led & ((worst < _FOUND) | (self._led == 0))).tolist():
+            self._leave_alone(limb)
+        led, stuck = self._led > 0, (self._stuck > 1.0) & (self._led == 0)
+        if led.any() or stuck.any():
+            self._look(targets, worst, angles, led, stuck)
         at_tpose, on_the_way = self._terms.hinges.at_tpose, np.isfinite(self._goals)
         if not on_the_way.any():
             return at_tpose
@@ -86,6 +75,42 @@ class Detours:
             np.where(on_the_way, next_angles, at_tpose.angles),
             np.where(on_the_way, _W_DETOUR, at_tpose.weights),
         )
+
+    def _look(
+        self,
+        targets: FrameTargets,
+        worst: Float[np.ndarray, "L"],
+        angles: Float[np.ndarray, "H"],
+        led: Bool[np.ndarray, "L"],
+        stuck: Bool[np.ndarray, "L"],
+    ) -> None:
+        """See where the projection has the limbs that are `led`, and whether it is a way out for
+        the `stuck` ones."""
+        world = quat_from_matrix(targets.world[:1])
+        q = self._robot.to_qpos(project(self._robot, world, targets.hips[:1]))
+        there = self._away(self._terms.bones(self._terms.poses(q))[0], targets.bones[0])
+        goals = self._terms.hinges.angles(q)[0]
+
+        def other_way(hinges: list[int], than: Float[np.ndarray, "H"]) -> bool:
+            return bool(np.abs(goals[hinges] - than[hinges]).max(initial=0.0) > _OTHER_WAY)
+
+        for limb in np.flatnonzero(led).tolist():
+            _, hinges = self._limbs[limb]
+            if other_way(hinges, self._goals):
+                self._leave_alone(limb)
+            else:
+                self._goals[hinges] = goals[hinges]
+        for limb in np.flatnonzero(stuck).tolist():
+            _, hinges = self._limbs[limb]
+            if other_way(hinges, angles) and there[limb] < worst[limb] - _GAIN:
+                self._led[limb] = _MAX_DURATION
+                self._goals[hinges] = goals[hinges]
+            else:
+                self._leave_alone(limb)
+
+    def _leave_alone(self, limb: int) -> None:
+        self._led[limb] = -_MAX_DURATION
+        self._goals[self._limbs[limb][1]] = np.nan
 
     def _away(
         self, bones: Float[np.ndarray, "B 3"], wanted: Float[np.ndarray, "B 3"]
