@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 
 from sim.body.parts import kept_joints
 from sim.trajectory import ModelTrajectory, subtree
+from sim.view.bones import bones_of
 from sim.view.sides import tinted, tints
 from sim.view.simplify import Mesh, simplify_together
 from spark.rig.rig import Rig
@@ -49,7 +50,7 @@ def add_display(
     Yields the columns of `body.qpos` that move it, in the order of the spec's coordinates. A
     `ghost` is seen through, in one colour, and in the group `GHOST_GROUP`. `scale` makes all of it
     larger; of the coordinates, only the root's place changes with it; slides keep theirs. Where it
-    is `bare`, its shapes are left out, for a skin.
+    is `bare`, its shapes are left out, for a skin. Where most of them are missing, bones are seen.
     """
     model = body.model
     inside = subtree(model, body.root)
@@ -70,11 +71,17 @@ def add_display(
             if int(model.jnt_bodyid[j]) == b:
                 columns += _add_joint(bodies[b], model, j, scale)
     sides = tints(body, inside)
+
+    def paint(made: mujoco.MjsGeom, rgba: Float[np.ndarray, "4"], b: int) -> None:
+        made.rgba = GHOST_RGBA if ghost else tinted(lit(rgba), sides.get(b))
+        made.group = GHOST_GROUP if ghost else 0
+
     for g in visible or shown:
         b = int(model.geom_bodyid[g])
-        rgba = GHOST_RGBA if ghost else tinted(lit(rgba_of(model, g)), sides.get(b))
-        made = _add_geom(bodies[b], model, g, meshes, scale=scale)
-        made.rgba, made.group = rgba, GHOST_GROUP if ghost else 0
+        paint(_add_geom(bodies[b], model, g, meshes, scale=scale), rgba_of(model, g), b)
+    with_shapes = {int(model.geom_bodyid[g]) for g in shown}
+    for b, ends, radius in () if bare else bones_of(model, inside, with_shapes):
+        paint(_add_bone(bodies[b], scale * ends, scale * radius), np.array(_UNSET_RGBA), b)
     return np.array(columns)
 
 
@@ -118,6 +125,19 @@ def _add_geom(
     else:
         made.size = scale * model.geom_size[geom]
     return made
+
+
+def _add_bone(
+    body: mujoco.MjsBody, ends: Float[np.ndarray, "2 3"], radius: float
+) -> mujoco.MjsGeom:
+    return body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+        fromto=ends.ravel(),
+        size=[radius, 0.0, 0.0],
+        contype=0,
+        conaffinity=0,
+        mass=0,
+    )
 
 
 def lit(rgba: Float[np.ndarray, "4"]) -> Float[np.ndarray, "4"]:
