@@ -178,8 +178,8 @@ def _settled(
         if first or not k:
             candidates = terms.candidates(poses)
         holds = PointTargets(*np.zeros((2, len(rows), terms.sole_count, 3)))
-        own = targets.at(rows)
-        H, g = terms.linearize(q[rows], poses, own, holds, terms.hinges.at_tpose, candidates)
+        asked = terms.asked(targets.at(rows), holds)
+        H, g = terms.linearize(q[rows], poses, asked, terms.hinges.at_tpose, candidates)
         held = terms.hinges.held(q[rows], g)
         diagonal = np.einsum("tdd->td", H)
         stay, step = np.zeros((2, len(rows), model.nv))

@@ -1,7 +1,6 @@
 """Self-collision in a few frames: `robots.solver.collision` for all shapes at once."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -12,92 +11,74 @@ from robots.solver.collision import DEPTH_ROUNDING, collisions_of
 from robots.solver.hulls import SLABS, Shape, ShapePair
 from robots.solver.near_spheres import NearSpheres
 from robots.solver.weights import W_COLLISION, W_LEG_COLLISION, per_metre
+from robots.solver.window_dofs import WindowDofs
 from robots.solver.window_poses import WindowPoses
-from robots.tree import Tree, cross
+from robots.solver.window_rows import Rows
+from robots.tree import ROOT, Tree, cross
 
 _ACTIVE = 3 * DEPTH_ROUNDING  # [m] between shapes beyond which the penalty is negligible
 # [m] that parts keep between them beyond a whole clip's clearance, for how far a soft penalty gives
 # way is not repaired here; and how far apart [m] they are in the T-pose: others are always near.
 _MARGIN, _FAR = 0.005, 0.1
+_SIDES = np.ascontiguousarray(SLABS.T)
 _REACH = 0.03  # [m] that shapes may move between the searched frame and the others
 
 
 class WindowCollisions:
-    """A robot's pairs of shapes that can meet. `bodies` are those of the tree's links and, last, of
-    the base; `rest` is where all bodies are in the rest pose [m]; `first` are the links that are
-    solved for first: later ones give way to them. `dofs` are the columns. With `later_only`, first
-    links are given: what they do to each other is not looked at."""
+    """A robot's pairs of shapes that can meet. `rest` is where all bodies are in the rest pose [m].
+    The links of the first block are solved for first: later ones give way to them, and where only
+    these are solved for, what the first do to each other is not looked at."""
 
-    def __init__(
-        self,
-        robot: Morphology,
-        bodies: Int[np.ndarray, "L"],
-        rest: Float[np.ndarray, "B 3"],
-        first: set[int],
-        dofs: Int[np.ndarray, "D"],
-        *,
-        later_only: bool,
-    ) -> None:
-        tree = robot.tree
+    def __init__(self, robot: Morphology, dofs: WindowDofs, rest: Float[np.ndarray, "B 3"]) -> None:
+        tree, first = robot.tree, dofs.first_links
         pairs = collisions_of(robot).pairs
-        if later_only:
+        if dofs.later_only:
             pairs = tuple(pair for pair in pairs if not _among(pair, tree, first))
         apart = np.array([pair.clearance + _MARGIN * (pair.gap > _FAR) for pair in pairs])
+        bodies = dofs.bodies([*range(len(tree)), ROOT])
         balls = [(pair.small.center[None], np.array([_bound(pair.small)])) for pair in pairs]
         self._bounds = _near(pairs, balls, apart, bodies, rest)
         spheres = [(pair.small.spheres, pair.small.radii) for pair in pairs]
         self._spheres = _near(pairs, spheres, apart, bodies, rest)
-        self._index_dofs(per_metre(robot), tree, pairs, first, dofs)
+        self._index_dofs(per_metre(robot), tree, pairs, dofs)
 
     def candidates(self, poses: WindowPoses) -> NearSpheres:
         """The spheres that collide, or may soon."""
-        pairs = (self._bounds.depth(poses) > -_ACTIVE - _REACH).any(axis=0)
-        near = self._spheres.at(np.flatnonzero(pairs.take(self._spheres.pairs)))
-        return near.at(np.flatnonzero((near.depth(poses) > -_ACTIVE - _REACH).any(axis=0)))
+        pairs = np.logical_or.reduce(self._bounds.depth(poses) > -_ACTIVE - _REACH)
+        near = self._spheres.at(pairs.take(self._spheres.pairs).nonzero()[0])
+        return near.at(np.logical_or.reduce(near.depth(poses) > -_ACTIVE - _REACH).nonzero()[0])
 
-    def add_to(
-        self,
-        poses: WindowPoses,
-        twists: Float[np.ndarray, "T 6 D"],
-        near: NearSpheres,
-        H: Float[np.ndarray, "T D D"],
-        g: Float[np.ndarray, "T D"],
-    ) -> None:
-        """Add how deep spheres are in shapes to the normal equations, of those that are `near`;
-        `twists` are the dofs', about the origin."""
+    def rows(self, poses: WindowPoses, near: NearSpheres) -> Rows | None:
+        """How deep spheres are in shapes, of those that are `near` and felt in some frame."""
         points, off, depth = near.measured(poses)
-        frames, active = np.nonzero(depth > -_ACTIVE)
+        felt = depth > -_ACTIVE
+        (active,) = np.logical_or.reduce(felt).nonzero()
         if not len(active):
-            return
-        off = off[:, frames, active]
-        slab = (np.abs(off) - near.half[:, 0, active]).argmax(axis=0)
-        side = SLABS[slab].T * np.sign(off[slab, np.arange(len(slab))])
-        axes = poses.frames[:3, :, frames, near.large[active]]
-        wrenches = np.empty((6, len(active)))
-        wrenches[3:] = (axes * side[:, None]).sum(axis=0)
-        cross(points[:, frames, active], wrenches[3:], wrenches[:3])
-        residual, slope = one_sided(depth[frames, active], DEPTH_ROUNDING)
-        pairs = near.pairs[active]
-        weights = self._weights[pairs]
-        J = self._signs[pairs] * (slope * weights)[:, None]
-        residual *= weights
-        ends = np.searchsorted(frames, np.arange(len(g) + 1)).tolist()
-        for t, (start, stop) in enumerate(pairwise(ends)):
-            own = slice(start, stop)
-            rows = J[own] * (wrenches[:, own].T @ twists[t])
-            H[t] += rows.T @ rows
-            g[t] += residual[own] @ rows
+            return None
+        points, off, depth = (part.take(active, axis=-1) for part in (points, off, depth))
+        felt, near = felt.take(active, axis=1), near.at(active)
+        slab = (np.abs(off) - near.half).argmax(axis=0)
+        side = _SIDES.take(slab, axis=1)
+        side *= np.sign(np.take_along_axis(off, slab[None], axis=0))
+        axes = poses.frames[:3].take(near.large, axis=3)
+        axes *= side[:, None]
+        wrenches = np.empty((6, *depth.shape))
+        np.add.reduce(axes, out=wrenches[3:])
+        cross(points, wrenches[3:], wrenches[:3])
+        residual, slope = one_sided(depth, DEPTH_ROUNDING)
+        slope *= felt
+        wrenches *= slope
+        weights, moving = self._weights.take(near.pairs), self._moving.take(near.pairs, axis=0)
+        residual *= felt * weights
+        return Rows(wrenches.transpose(1, 2, 0), moving, residual)
 
     def _index_dofs(
-        self,
-        firm: float,
-        tree: Tree,
-        pairs: tuple[ShapePair, ...],
-        first: set[int],
-        dofs: Int[np.ndarray, "D"],
+        self, firm: float, tree: Tree, pairs: tuple[ShapePair, ...], dofs: WindowDofs
     ) -> None:
-        """Which columns move the pairs together (-1) and apart, of the links that give way."""
-        self._signs = np.zeros((len(pairs), tree.nv))
+        """Which columns move the pairs together (-1) and apart, of the links that give way; all
+        weighted."""
+        first = dofs.first_links
+        self._moving = np.zeros((len(pairs), tree.nv))
         self._weights = np.full(len(pairs), firm * W_COLLISION)
         for k, pair in enumerate(pairs):
             chains = [tree.chain(part.link) for part in (pair.small, pair.large)]
@@ -107,8 +88,8 @@ class WindowCollisions:
                 self._weights[k] = firm * W_LEG_COLLISION
             for sign, chain in zip((-1.0, 1.0), chains, strict=True):
                 moving = tuple(j for j in chain if j not in both and (j in first) == early)
-                self._signs[k, tree.dofs(moving)] = sign
-        self._signs = self._signs[:, dofs]
+                self._moving[k, tree.dofs(moving)] = sign
+        self._moving = self._moving[:, dofs.numbers] * self._weights[:, None]
 
 
 def _among(pair: ShapePair, tree: Tree, links: set[int]) -> bool:
@@ -138,11 +119,8 @@ def _near(
     slabs = np.array([pair.large.slabs for pair in pairs]).reshape(-1, 2, len(SLABS))[own]
     middle, half = slabs.transpose(1, 2, 0)
     return NearSpheres(
-        own,
-        small,
-        large,
-        (centers - rest[small]).T[:, None, None],
-        radii + apart[own],
-        (middle - SLABS @ rest[large].T)[:, None],
-        half[:, None],
+        np.stack([own, small, large]),
+        np.concatenate(
+            [(centers - rest[small]).T, [radii + apart[own]], middle - SLABS @ rest[large].T, half]
+        ),
     )

@@ -1,32 +1,38 @@
 """The floor under all parts in a few frames: `robots.solver.floor` for all shapes at once."""
 
-from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from robots.residuals import one_sided
 from robots.solver.floor import FELT, Solid
 from robots.solver.weights import FLOOR_ROUNDING, W_FLOOR
 from robots.solver.window_poses import WindowPoses
+from robots.solver.window_rows import Rows
+
+
+class Lifted(NamedTuple):
+    """Shapes that some dofs lift out of the floor: the shapes' `bodies`, and the dofs."""
+
+    solids: tuple[Solid, ...]
+    bodies: Int[np.ndarray, "K"]
+    moving: Float[np.ndarray, "K D"]
 
 
 class WindowFloor:
-    """Under a robot's solid shapes, but for the corners of its soles. `bodies` are those of the
-    `solids`, `moving` the dofs that move them, of the block that solves for them; `rest` is where
-    all bodies are in the rest pose; `firm` is `robots.solver.weights.per_metre`."""
+    """Under a robot's solid shapes. The first ones, `always`, are felt however high they are.
+    `rest` is where all bodies are in the rest pose; `firm` is `robots.solver.weights.per_metre`."""
 
     def __init__(
-        self,
-        solids: tuple[Solid, ...],
-        bodies: Int[np.ndarray, "K"],
-        moving: Bool[np.ndarray, "K D"],
-        rest: Float[np.ndarray, "B 3"],
-        firm: float,
+        self, lifted: Lifted, rest: Float[np.ndarray, "B 3"], firm: float, *, always: int = 0
     ) -> None:
+        solids = lifted.solids
         self._weight, self._rounding = firm * W_FLOOR, FLOOR_ROUNDING / firm
         counts = [len(solid.spheres) for solid in solids]
-        self._bodies, self._moving = np.repeat(bodies, counts), np.repeat(moving, counts, axis=0)
+        self._bodies = np.repeat(lifted.bodies, counts)
+        self._moving = np.repeat(lifted.moving, counts, axis=0)
+        self._always = slice(sum(counts[:always]))
         self._radii = np.concatenate([np.zeros(0), *(solid.radii for solid in solids)])
         spheres = np.concatenate([np.zeros((0, 3)), *(solid.spheres for solid in solids)])
         self._arms = (spheres - rest[self._bodies]).T
@@ -35,36 +41,34 @@ class WindowFloor:
         """How deep [m] each sphere is in the floor; below 0 over it."""
         up = poses.frames[:, 2].take(self._bodies, axis=2)
         x, y, z = up[:3] * self._arms[:, None]
-        depth: Float[np.ndarray, "T S"] = self._radii - (x + y + z + up[3])
+        x += y
+        x += z
+        x += up[3]
+        depth: Float[np.ndarray, "T S"] = self._radii - x
         return depth
 
-    def add_to(
+    def rows(
         self,
         poses: WindowPoses,
-        twists: Float[np.ndarray, "T 6 D"],
+        depth: Float[np.ndarray, "T S"],
         scale: Float[np.ndarray, "T"],
-        H: Float[np.ndarray, "T D D"],
-        g: Float[np.ndarray, "T D"],
-    ) -> None:
-        """Add r = w one_sided(depth), w = `W_FLOOR` x `scale`, to the normal equations; `twists`
-        are the dofs', about the origin."""
-        depth = self.depth(poses)
-        frames, own = np.nonzero(depth > -FELT * self._rounding)
-        if not len(own):
-            return
-        across = poses.frames[:, :2, frames, self._bodies[own]]
-        x, y = (across[:3] * self._arms[:, None, own]).sum(axis=0) + across[3]
+    ) -> Rows | None:
+        """r = w one_sided(depth), w = `W_FLOOR` x `scale`, of what is felt in some frame."""
+        near = depth > -FELT * self._rounding
+        near[:, self._always] = True
+        (felt,) = np.logical_or.reduce(near).nonzero()
+        if not len(felt):
+            return None
+        weight = np.where(near.take(felt, axis=1), (self._weight * scale)[:, None], 0.0)
+        across = poses.frames[:, :2].take(self._bodies.take(felt), axis=3)
+        across[:3] *= self._arms[:, None, None].take(felt, axis=3)
+        x, y = np.add.reduce(across)
+        residual, slope = one_sided(depth.take(felt, axis=1), self._rounding)
+        residual *= weight
+        slope *= weight
         # What lifts a point (x, y, z): the twist's product with (y, -x, 0, 0, 0, 1).
-        wrenches = np.zeros((6, len(own)))
-        wrenches[0], wrenches[1] = y, -x
-        wrenches[5] = 1.0
-        residual, slope = one_sided(depth[frames, own], self._rounding)
-        weight = self._weight * scale[frames]
-        J = self._moving[own] * (-weight * slope)[:, None]
-        residual = weight * residual
-        ends = np.searchsorted(frames, np.arange(len(g) + 1)).tolist()
-        for t, (start, stop) in enumerate(pairwise(ends)):
-            here = slice(start, stop)
-            rows = J[here] * (wrenches[:, here].T @ twists[t])
-            H[t] += rows.T @ rows
-            g[t] += residual[here] @ rows
+        wrenches = np.zeros((*slope.shape, 6))
+        np.multiply(-slope, y, out=wrenches[..., 0])
+        np.multiply(slope, x, out=wrenches[..., 1])
+        np.negative(slope, out=wrenches[..., 5])
+        return Rows(wrenches, self._moving.take(felt, axis=0), residual)

@@ -36,11 +36,22 @@ class PoseTargets:
 
 @dataclass(frozen=True, eq=False)
 class PointTargets:
-    """Where points are held: `positions` [m, world], and by axis the share of the weight of a
-    standing foot's with which they are (`holds`)."""
+    """Where points are held: `positions` [m, world], and by axis how firmly (`holds`): the share of
+    the weight of a standing foot's."""
 
     positions: Float[np.ndarray, "T P 3"]
     holds: Float[np.ndarray, "T P 3"]
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What is asked of some frames, as `robots.solver.window_terms` takes it: of some parts their
+    turns, inverted (`R_part_world`), and where points should be [m, world] and directions should
+    point, with their weights by axis [1/m, 1/rad]."""
+
+    turns: Float[np.ndarray, "T K 3 3"]
+    places: Float[np.ndarray, "T R 3"]
+    weights: Float[np.ndarray, "T R 3"]
 
 
 def pose_targets(targets: Targets, bones: Sequence[Role]) -> PoseTargets:

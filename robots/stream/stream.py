@@ -94,7 +94,7 @@ class Stream:
         if self._count:
             q = self._q[_SHIFTED]
             move_on(self._targets, targets)
-            poses = self._terms.poses(q[_FIXED:])
+            poses = self._window.move_on(q)
             next_said = poses.at(slice(1))
             soles = self._terms.sole_points(next_said)[0]
             foot_targets = self._contacts.update(targets, soles, self.foot_noise)

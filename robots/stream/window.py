@@ -7,7 +7,6 @@ from scipy.linalg.lapack import dposv
 
 from robots.model.morphology import Morphology
 from robots.solver.hinges import Posture
-from robots.solver.near_spheres import NearSpheres
 from robots.solver.repair import MAX_SINKING
 from robots.solver.window_poses import WindowPoses
 from robots.solver.window_targets import PointTargets
@@ -32,21 +31,29 @@ class Window:
     def __init__(
         self, robot: Morphology, terms: Terms, frame_time: float, *, fixed: int, free: int
     ) -> None:
-        self._terms, self._free = terms, free
-        self._model = robot.mjcf.model
-        self._data, self._root = mujoco.MjData(self._model), robot.mjcf.root
-        self._dofs = terms.mj_dofs
+        self._terms, self._fixed, self._free = terms, fixed, free
+        self._model, self._dofs = robot.mjcf.model, terms.mj_dofs
+        self._com: Float[np.ndarray, "fixed 3"]  # in the fixed frames [m]
         self._motion = TargetMotion(self._model, self._dofs, frame_time)
         self._coupling = Coupling(robot, frame_time, fixed=fixed, free=free)
         self._firmness = Firmness(free)
         self._max_sinking = MAX_SINKING * robot.rig.hip_height
         self._max_overspeed = MAX_OVERSPEED * frame_time
+        self.reset()
 
     def reset(self) -> None:
         """Forget what has been seen."""
+        self._com = np.zeros((0, 3))
         self._motion.reset()
         self._coupling.reset()
         self._firmness.reset()
+
+    def move_on(self, q: Float[np.ndarray, "T nq"]) -> WindowPoses:
+        """Take in that frames are one later and at `q`; the poses of the free ones."""
+        poses = self._terms.poses(q[self._fixed - 1 :], with_mass=True)
+        before = self._com[1:] if len(self._com) else poses.com[[0] * (self._fixed - 1)]
+        self._com = np.concatenate([before, poses.com[:1]])
+        return poses.at(slice(1, None))
 
     def solve(
         self,
@@ -59,17 +66,25 @@ class Window:
     ) -> Float[np.ndarray, "T nq"]:
         """`q` after at most `_MAX_ITER` steps of its free frames, which have these targets, and
         are in these poses at first."""
-        candidates = self._terms.candidates(poses.at(slice(-1, None)))
+        terms, free = self._terms, self._free
+        candidates = terms.candidates(poses.at(slice(-1, None)))
+        asked = terms.asked(targets, foot_targets, resting)
         self._coupling.follow(targets.com[-1] - targets.com[-2])
-        overspeed = np.abs(self._coupling.overspeed(self._steps(q)))[-self._free :].max(axis=1)
-        sinking = self._terms.sinking(poses)
+        depth, steps = terms.depth_in_floor(poses), self._steps(q)
+        overspeed = np.abs(self._coupling.overspeed(steps[-free:])).max(axis=1)
+        sinking = depth.max(axis=1, initial=-np.inf)
         self._firmness.move_on(
             np.maximum(sinking / self._max_sinking, overspeed / self._max_overspeed)
         )
         for k in range(_MAX_ITER):
             if k:
-                poses = self._terms.poses(q[-self._free :])
-            q, length = self._step(q, poses, targets, foot_targets, resting, posture, candidates)
+                poses = terms.poses(q[-free:], with_mass=True)
+                depth, steps = terms.depth_in_floor(poses), self._steps(q)
+            scale = self._firmness.scale
+            H, g = terms.linearize(q[-free:], poses, asked, posture, candidates, scale, depth)
+            whole = self._whole(H)
+            self._couple(q, steps, poses, H, g, whole)
+            q, length = self._moved(q, whole, g, _DAMPING)
             if length < _STEP_TOL:
                 break
         self._motion.next()
@@ -84,63 +99,60 @@ class Window:
         steps: int,
     ) -> Float[np.ndarray, "T nq"]:
         """`q` with its free frames after some steps, each frame for itself."""
+        terms, scale = self._terms, self._firmness.scale
+        asked = terms.asked(targets, foot_targets, resting)
         for _ in range(steps):
-            poses = self._terms.poses(q[-self._free :])
-            candidates = self._terms.candidates(poses.at(slice(-1, None)))
-            q, _ = self._step(
-                q,
-                poses,
-                targets,
-                foot_targets,
-                resting,
-                self._terms.hinges.at_tpose,
-                candidates,
-                lone_damping=_LONE_DAMPING,
-            )
+            free = q[-self._free :]
+            poses = terms.poses(free)
+            candidates = terms.candidates(poses.at(slice(-1, None)))
+            H, g = terms.linearize(free, poses, asked, terms.hinges.at_tpose, candidates, scale)
+            q, _ = self._moved(q, self._whole(H), g, _LONE_DAMPING)
         return q
 
-    def _step(
+    def _whole(self, H: Float[np.ndarray, "F D D"]) -> Float[np.ndarray, "F D F D"]:
+        """The normal equations of frames that nothing couples."""
+        frames, dofs, _ = H.shape
+        whole = np.zeros((frames, dofs, frames, dofs))
+        np.einsum("tdte->tde", whole)[:] = H
+        return whole
+
+    def _couple(
         self,
         q: Float[np.ndarray, "T nq"],
+        steps: Float[np.ndarray, "V D"],
         poses: WindowPoses,
-        targets: FrameTargets,
-        foot_targets: PointTargets,
-        resting: PointTargets | None,
-        posture: Posture,
-        candidates: NearSpheres,
-        *,
-        lone_damping: float | None = None,
+        H: Float[np.ndarray, "F D D"],
+        g: Float[np.ndarray, "F D"],
+        whole: Float[np.ndarray, "F D F D"],
+    ) -> None:
+        """Add what couples the free frames, in `poses` and with H and g of their own, to each other
+        and to the fixed ones; `steps` are the dofs' from frame to frame."""
+        assert poses.com_jacobian is not None
+        ahead = self._motion.of(q[-1], H[-1], g[-1])
+        com = np.concatenate([self._com, poses.com])
+        com_steps, scale = com[1:] - com[:-1], self._firmness.scale
+        self._coupling.add_to(steps, com_steps, poses.com_jacobian, ahead, scale, whole, g)
+
+    def _moved(
+        self,
+        q: Float[np.ndarray, "T nq"],
+        whole: Float[np.ndarray, "F D F D"],
+        g: Float[np.ndarray, "F D"],
+        damping: float,
     ) -> tuple[Float[np.ndarray, "T nq"], float]:
-        """One Gauss-Newton step, and its largest entry [rad, m]; with `lone_damping`, frames are
-        not coupled, and damped by so much."""
+        """`q` after one Gauss-Newton step, and the step's largest entry [rad, m]."""
         model, free = self._model, self._free
-        scale = self._firmness.scale
-        H, g = self._terms.linearize(
-            q[-free:], poses, targets, foot_targets, posture, candidates, scale, resting
-        )
-        D = g.shape[1]
-        whole = np.zeros((free * D, free * D))
-        blocks = whole.reshape(free, D, free, D)
-        for t in range(free):
-            blocks[t, :, t] = H[t]
-        if lone_damping is None:
-            ahead = self._motion.of(q[-1], H[-1], g[-1])
-            com, jacobian = self._center_of_mass(q)
-            com_steps = np.diff(com, axis=0)
-            self._coupling.add_to(self._steps(q), com_steps, jacobian, ahead, scale, blocks, g)
+        q = q.copy()
         held = self._terms.hinges.held(q[-free:], g)
         g[held] = 0.0
-        whole.reshape(-1)[:: free * D + 1] += np.where(
-            held, _HELD, lone_damping or _DAMPING
-        ).ravel()
-        _, step, _ = dposv(whole.T, g.ravel(), overwrite_a=True)
+        whole.reshape(-1)[:: g.size + 1] += np.where(held, _HELD, damping).ravel()
+        _, step, _ = dposv(whole.reshape(g.size, -1).T, g.ravel(), overwrite_a=True)
         length = float(np.abs(step).max())
         moved = np.zeros((free, model.nv))
-        moved[:, self._dofs] = -min(1.0, _MAX_STEP / max(length, 1e-9)) * step.reshape(free, D)
-        q = q.copy()
+        moved[:, self._dofs] = -min(1.0, _MAX_STEP / max(length, 1e-9)) * step.reshape(free, -1)
         for t in range(free):
             mujoco.mj_integratePos(model, q[t - free], moved[t], 1.0)
-        self._terms.hinges.clip(q)
+        self._terms.hinges.clip(q[-free:])
         return q, length
 
     def _steps(self, q: Float[np.ndarray, "T nq"]) -> Float[np.ndarray, "V D"]:
@@ -149,19 +161,3 @@ class Window:
         for t in range(len(q) - 1):
             mujoco.mj_differentiatePos(self._model, steps[t], 1.0, q[t], q[t + 1])
         return steps[:, self._dofs]
-
-    def _center_of_mass(
-        self, q: Float[np.ndarray, "T nq"]
-    ) -> tuple[Float[np.ndarray, "T 3"], Float[np.ndarray, "F 3 D"]]:
-        """Where it is [m, world], and by how much the dofs of the free frames move it."""
-        model, data, root = self._model, self._data, self._root
-        com, jacobian = np.empty((len(q), 3)), np.empty((self._free, 3, model.nv))
-        fixed = len(q) - self._free
-        for t in range(len(q)):
-            data.qpos = q[t]
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_comPos(model, data)
-            com[t] = data.subtree_com[root]
-            if t >= fixed:
-                mujoco.mj_jacSubtreeCom(model, data, jacobian[t - fixed], root)
-        return com, jacobian[:, :, self._dofs]

@@ -83,9 +83,9 @@ def test_streams_weigh_alike(robots: tuple[Morphology, Morphology]) -> None:
         poses = terms.poses(q)
         soles = terms.sole_points(poses)
         feet = PointTargets(soles + 0.01 * size, np.ones_like(soles))
-        own = pose_targets(targets, bones)
+        asked = terms.asked(pose_targets(targets, bones), feet)
         none = terms.candidates(poses).at(np.zeros(0, dtype=int))
-        H, g = terms.linearize(q, poses, own, feet, terms.hinges.at_tpose, none)
+        H, g = terms.linearize(q, poses, asked, terms.hinges.at_tpose, none)
         units = np.ones(g.shape[1])
         units[: BASE // 2] = size
         found.append((g * units, H * units[:, None] * units))

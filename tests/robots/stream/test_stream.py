@@ -123,7 +123,8 @@ def test_the_objective_is_that_of_whole_clips() -> None:
         resting = PointTargets(laid.positions[None, ..., t], laid.shares[None, ..., t])
         candidates = terms.candidates(poses)
         posture, firm = terms.hinges.at_tpose, np.ones(1)
-        H, g = terms.linearize(qpos, poses, here, foot_targets, posture, candidates, firm, resting)
+        asked = terms.asked(here, foot_targets, resting)
+        H, g = terms.linearize(qpos, poses, asked, posture, candidates, firm)
         turn = np.eye(tree.nv)
         turn[3:6, 3:6] = body_axes[t]
         H, g = turn @ H[0] @ turn.T, turn @ g[0]
