@@ -33,8 +33,8 @@ from spark.rotation import (
 from spark.vectors import dot
 
 _LEVEL = 0.5  # share of a hinge's axis along the floor from which on it bends the trunk
-_ROUNDING = 0.12  # [rad] around where a hip or waist bends no further: there the pelvis gives way
-_THIGHS = {
+ROUNDING = 0.12  # [rad] around where a hip or waist bends no further: there the pelvis gives way
+THIGHS = {
     Role.LEFT_UPPER_LEG: Role.LEFT_LOWER_LEG,
     Role.RIGHT_UPPER_LEG: Role.RIGHT_LOWER_LEG,
 }
@@ -59,7 +59,7 @@ def max_lean(robot: Morphology) -> tuple[float, float]:
     links, centers = robot.links, robot.centers
     hips, shoulders = (
         float(np.mean([poses.point(int(links[j]), centers[j])[2, 0] for j in joints]))
-        for joints in (robot.rig.hips, _shoulders(robot.rig))
+        for joints in (robot.rig.hips, shoulder_joints(robot.rig))
     )
     for j in hinges:
         across, angle = float(poses.axis(j, 0)[1, 0]), float(robot.tpose.angles[0, j])
@@ -76,7 +76,7 @@ def max_lean(robot: Morphology) -> tuple[float, float]:
 def max_flexion(robot: Morphology) -> float:
     """By how much [rad] both thighs can be raised forwards against the trunk, from straight on."""
     tree, poses, most = robot.tree, forward_kinematics(robot.tree, robot.tpose), np.pi
-    for role in _THIGHS:
+    for role in THIGHS:
         joint = robot.rig.roles.joint(role)
         trunk = set(tree.chain(int(robot.links[robot.rig.pelvis])))
         chain = [] if joint is None else tree.chain(int(robot.links[joint]))
@@ -116,7 +116,7 @@ def leaning(
     if not has_shoulders(rig):
         return pelvis
     heading = quat_from_yaw(yaw_from_quat(pelvis))
-    upright = quat_rotate(heading, _upright(rig))
+    upright = quat_rotate(heading, upright_of(rig))
     return quat_mul(quat_between(upright, hips_to_shoulders(rig, positions)), heading)
 
 
@@ -132,11 +132,11 @@ def beyond_lean(
     if not has_shoulders(rig):
         return pelvis
     forwards, left, up = _axes(pelvis)
-    upright, along = _upright(rig), hips_to_shoulders(rig, positions)
+    upright, along = upright_of(rig), hips_to_shoulders(rig, positions)
     bow = np.arctan2(dot(along, forwards), dot(along, up))
     bow -= np.arctan2(upright[:, :1], upright[:, 2:])
     beyond = bow - most[1], -bow - most[0]
-    if not (np.maximum(*beyond) > -_ROUNDING).any():
+    if not (np.maximum(*beyond) > -ROUNDING).any():
         return pelvis
     bowed = quat_mul(quat_from_rotvec((_rounded(beyond[0]) - _rounded(beyond[1])) * left), pelvis)
     # One that rolls, too, would turn away: it heads as before. Upside down there is no heading.
@@ -157,7 +157,7 @@ def within_flexion(
     over a floor at `floor_z`, while its legs carry it."""
     forwards, left, up = _axes(pelvis)
     excess = _flexion(rig, forwards, up, positions) - flexion
-    if not (excess > -_ROUNDING).any():
+    if not (excess > -ROUNDING).any():
         return pelvis
     ahead = quat_rotate(quat_from_yaw(yaw_from_quat(pelvis)), np.eye(3)[:1])
     bowed = np.arctan2(dot(up, ahead), up[:, 2:])
@@ -168,8 +168,8 @@ def within_flexion(
 
 def _rounded(excess: Float[np.ndarray, "T 1"]) -> Float[np.ndarray, "T 1"]:
     """max(excess, 0), with a parabola around the kink, and none of it where joints bend enough."""
-    near = np.clip(excess + _ROUNDING, 0.0, 2 * _ROUNDING)
-    out: Float[np.ndarray, "T 1"] = near**2 / (4 * _ROUNDING) + np.maximum(excess - _ROUNDING, 0.0)
+    near = np.clip(excess + ROUNDING, 0.0, 2 * ROUNDING)
+    out: Float[np.ndarray, "T 1"] = near**2 / (4 * ROUNDING) + np.maximum(excess - ROUNDING, 0.0)
     return out
 
 
@@ -193,7 +193,7 @@ def _flexion(
 ) -> Float[np.ndarray, "T 1"]:
     """By how much [rad] the higher thigh is raised forwards against a trunk with these axes."""
     most = np.full((len(up), 1), -np.pi)
-    for role, below in _THIGHS.items():
+    for role, below in THIGHS.items():
         hip, knee = rig.roles.joint(role), rig.roles.joint(below)
         if hip is not None and knee is not None:
             thigh = positions[:, knee] - positions[:, hip]
@@ -206,7 +206,7 @@ def _on_legs(
 ) -> Float[np.ndarray, "T 1"]:
     """How far (0 to 1) a body is carried by its legs: its mass is about where the middle of the
     trunk is."""
-    shoulders = _shoulders(rig) if has_shoulders(rig) else [rig.chest]
+    shoulders = shoulder_joints(rig) if has_shoulders(rig) else [rig.chest]
     mass = (positions[:, rig.hips].mean(1) + positions[:, shoulders].mean(1)) / 2
     feet = [j for role in Role if role.part in ("foot", "toe") for j in rig.roles.joints(role)]
     over_floor = positions[:, feet] - np.array([0.0, 0.0, floor_z])
@@ -215,7 +215,7 @@ def _on_legs(
 
 def hips_to_shoulders(rig: Rig, positions: Float[np.ndarray, "T J 3"]) -> Float[np.ndarray, "T 3"]:
     """From the middle of the hips to that of the shoulders [m], of a rig that has these."""
-    along: Float[np.ndarray, "T 3"] = positions[:, _shoulders(rig)].mean(1)
+    along: Float[np.ndarray, "T 3"] = positions[:, shoulder_joints(rig)].mean(1)
     return along - positions[:, rig.hips].mean(1)
 
 
@@ -225,9 +225,9 @@ def has_shoulders(rig: Rig) -> bool:
 
 
 @lru_cache(maxsize=16)
-def _upright(rig: Rig) -> Float[np.ndarray, "1 3"]:
+def upright_of(rig: Rig) -> Float[np.ndarray, "1 3"]:
     return hips_to_shoulders(rig, rig.tpose_positions[None])
 
 
-def _shoulders(rig: Rig) -> list[int]:
+def shoulder_joints(rig: Rig) -> list[int]:
     return [rig.roles.joints(role)[0] for role in _SHOULDERS]

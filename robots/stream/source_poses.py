@@ -17,9 +17,11 @@ class SourcePoses:
         for parent in skeleton.parents.tolist():
             above = spec.worldbody if parent < 0 else bodies[parent]
             bodies.append(above.add_body())
-        self._model = spec.compile()
-        self._data = mujoco.MjData(self._model)
+        self._model = model = spec.compile()
+        self._data = data = mujoco.MjData(self._model)
         self._bodies = np.array([body.id for body in bodies])
+        self._local = model.body_pos, model.body_quat
+        self._found = data.xmat.reshape(-1, 3, 3), data.xpos
 
     def of(
         self,
@@ -29,8 +31,9 @@ class SourcePoses:
     ) -> tuple[Float[np.ndarray, "N 3 3"], Float[np.ndarray, "N 3"]]:
         """Rotations (`R_world_joint`) and places [m, world] of the joints whose local ones are
         `rotations` (`q_parent_joint`) and `offsets` [m]; the root is at `root_pos`."""
-        model, data, own = self._model, self._data, self._bodies
-        model.body_pos[own], model.body_quat[own] = offsets, rotations
-        model.body_pos[own[0]] = root_pos
-        mujoco.mj_kinematics(model, data)
-        return data.xmat[own].reshape(-1, 3, 3), data.xpos[own]
+        own, (local_places, turns) = self._bodies, self._local
+        local_places[own], turns[own] = offsets, rotations
+        local_places[own[0]] = root_pos
+        mujoco.mj_kinematics(self._model, self._data)
+        axes, places = self._found
+        return axes.take(own, axis=0), places.take(own, axis=0)
