@@ -6,25 +6,23 @@ A foot in swing is as high as the source's, scaled, and as it is pitched; an end
 steps, as there.
 """
 
+import cmath
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float
+from jaxtyping import Complex, Float
 
 from robots.solver.foot_path import (
     MAX_UNEVEN,
     RAISED_HOLD,
-    STEP_SPEEDS,
     SWING_HOLD,
     near_floor,
     step_height,
 )
 from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
 from robots.solver.window_targets import PointTargets
-from robots.stream.footprint import Footprint
+from robots.stream.foot import Foot
 from robots.stream.frame_targets import FrameReader, FrameTargets
 from robots.stream.standing import Standing
 
@@ -32,25 +30,13 @@ HOLD_TIME = 0.1  # [s] over which a foot is taken hold of, and let go
 
 
 class _Arrived(NamedTuple):
-    """A frame of the source: how far its heels and toes have moved over the floor since the one
-    before [m, x + iy, scaled], and how far the robot's feet should have turned about the vertical
-    [rad]."""
+    """A frame of the source: how far each foot's heel and toes have moved over the floor since the
+    one before [m, x + iy, scaled], and how far the robot's feet should have turned about the
+    vertical [rad]."""
 
     targets: FrameTargets
-    moved: Complex[np.ndarray, "S 2"]
-    turned: Float[np.ndarray, "S"]
-
-
-class _Seen(NamedTuple):
-    """Of the feet in one frame: how far heels and toes are held, how high [m] soles are where not,
-    and how high heels and toes step, whether it is known where, and their footprints."""
-
-    holds: Float[np.ndarray, "S 2"]
-    height: Float[np.ndarray, "S"]
-    step: Float[np.ndarray, "S 2"]
-    known: Bool[np.ndarray, "S"]
-    pivots: tuple[complex, ...]
-    headings: tuple[float, ...]
+    moved: list[tuple[complex, complex]]
+    turned: list[float]
 
 
 class ContactTracker:
@@ -60,17 +46,14 @@ class ContactTracker:
     def __init__(self, reader: FrameReader, frame_time: float, ahead: int) -> None:
         self._robot, self._scale = reader.robot, reader.scale
         self._standing = Standing(reader, frame_time)
-        self._frame_time, self._ahead = frame_time, ahead
-        self._wobble = MAX_WOBBLE * self._robot.rig.hip_height
+        self._grip, self._ahead = frame_time / HOLD_TIME, ahead
+        hip_height = self._robot.rig.hip_height
+        self._hip_height, self._wobble = hip_height, MAX_WOBBLE * hip_height
+        self._uneven = MAX_UNEVEN * hip_height
         self._index_points()
         self._length = self._standing.history + ahead + 1
         self._history: deque[_Arrived] = deque(maxlen=self._length)
-        soles = len(self._robot.soles)
-        self._planted = np.zeros((soles, 2), dtype=bool)
-        self._holds = np.zeros((soles, 2))
-        self._ground = np.zeros(soles)
-        self._uneven = MAX_UNEVEN * self._robot.rig.hip_height
-        self._footprints = [Footprint() for _ in range(soles)]
+        self._feet = [Foot() for _ in self._robot.soles]
 
     def update(
         self, targets: FrameTargets, points: Float[np.ndarray, "P 3"], noise: float = 0.0
@@ -84,111 +67,90 @@ class ContactTracker:
         arrived = self._arrived(targets, targets if first else self._history[-1].targets)
         self._history.extend([arrived] * (self._length if first else 1))
         settled = len(self._history) - 1 - self._ahead
-        grip = self._frame_time / HOLD_TIME
-        planted, holds, footprints = self._planted, self._holds, self._footprints
-        ground, seen = self._ground, []
         frames = [arrived.targets for arrived in self._history]
-        for at in range(settled, len(self._history)):
-            stood, clearance = planted.any(axis=1), frames[at].clearance
-            planted, speed = self._standing.of(frames, at, planted)
-            lowest = np.where(stood, np.minimum(ground, clearance), clearance)
-            ground = np.where(planted.any(axis=1), lowest, ground)
-            self._follow(at, planted, holds, footprints)
-            # Where a foot will come down that is still in the air is not known yet.
-            known = np.logical_or(holds.any(axis=1), at == settled)
+        speeds, heights = self._standing.motion(frames, settled)
+        steps = step_height(self._scale * speeds, self._hip_height).tolist()
+        feet, numbers, places = self._feet, [], []
+        for at, (speed, height, step) in enumerate(
+            zip(speeds.tolist(), heights.tolist(), steps, strict=True), settled
+        ):
+            _, moved, turned = self._history[at]
+            stands = self._standing.of(frames, at, [foot.planted for foot in feet], speed, height)
+            clearances = frames[at].clearance.tolist()
+            for s, foot in enumerate(feet):
+                clearance = clearances[s]
+                foot.move_on(stands[s], clearance, moved[s], turned[s], self._wobble)
+                # Where a foot will come down that is still in the air is not known yet.
+                known = foot.is_held or at == settled
+                if at == settled and not foot.is_held:
+                    own = (points[self._points[s], :2] @ (1, 1j)).tolist()
+                    foot.footprint.put(own, self._lengths[s], on_toe=foot.on_toe)
+                foot.grip(self._grip, 1.0 if first else self._grip)
+                pace = self._scale * speed[s][1] / self._hip_height
+                up = foot.height(clearance, pace, self._uneven)
+                numbers += [*foot.holds, *step[s], up, float(known)]
+                places += [foot.footprint.pivot, cmath.rect(1.0, foot.footprint.heading)]
             if at == settled:
-                self._put(points, planted, holds)
-            holds = holds + np.clip(planted - holds, -grip, 1.0 if first else grip)
-            pivots = tuple(footprint.pivot for footprint in footprints)
-            headings = tuple(footprint.heading for footprint in footprints)
-            height = self._height(clearance, ground, speed)
-            step = step_height(speed, self._robot.rig.hip_height)
-            seen.append(_Seen(holds, height, step, known, pivots, headings))
-            if at == settled:
-                self._planted, self._holds, self._ground = planted, holds, ground
-                footprints = [replace(footprint) for footprint in footprints]
-        return self._targets(np.array([frame.pitched for frame in frames[settled:]]), seen)
+                feet = [foot.copy() for foot in feet]
+        shape = self._ahead + 1, len(feet)
+        return self._targets(
+            np.array([frame.pitched for frame in frames[settled:]]),
+            np.array(numbers).reshape(*shape, 6),
+            np.array(places, dtype=complex).reshape(*shape, 2),
+        )
 
     def _arrived(self, now: FrameTargets, last: FrameTargets) -> _Arrived:
-        moved = self._scale * ((now.feet - last.feet)[..., :2] @ (1, 1j))
-        R = now.world[self._feet] @ last.world[self._feet].transpose(0, 2, 1)
+        moved = (self._scale * ((now.feet - last.feet)[..., :2] @ (1, 1j))).tolist()
+        R = now.world.take(self._foot_joints, axis=0)
+        R = R @ last.world.take(self._foot_joints, axis=0).transpose(0, 2, 1)
         turned = np.arctan2(R[:, 1, 0] - R[:, 0, 1], R[:, 0, 0] + R[:, 1, 1])
-        return _Arrived(now, moved, turned)
+        return _Arrived(now, [(heel, toe) for heel, toe in moved], turned.tolist())
 
-    def _put(
+    def _targets(
         self,
-        points: Float[np.ndarray, "P 3"],
-        planted: Bool[np.ndarray, "S 2"],
-        holds: Float[np.ndarray, "S 2"],
-    ) -> None:
-        """The footprints of feet that are not held yet, where these are."""
-        for s in np.flatnonzero(~holds.any(axis=1)).tolist():
-            own = self._sole == s
-            length = -float(self._flat[own][:2].real.mean())
-            on_toe = bool(planted[s, 1] or not planted[s, 0])
-            self._footprints[s].put(points[own], length, on_toe=on_toe)
-
-    def _height(
-        self,
-        clearance: Float[np.ndarray, "S"],
-        ground: Float[np.ndarray, "S"],
-        speed: Float[np.ndarray, "S 2"],
-    ) -> Float[np.ndarray, "S"]:
-        """How high [m] soles are in swing: as the source's, scaled; but where a foot takes no step
-        it is put down by what it last stood over the floor."""
-        pace = speed[:, 1] / self._robot.rig.hip_height
-        slow = np.interp(pace, STEP_SPEEDS[:2], [1.0, 0.0])
-        off = np.minimum(np.minimum(ground, self._uneven), np.maximum(clearance, 0.0))
-        height: Float[np.ndarray, S] = clearance - slow * off
-        return height
-
-    def _follow(
-        self,
-        at: int,
-        planted: Bool[np.ndarray, "S 2"],
-        holds: Float[np.ndarray, "S 2"],
-        footprints: Sequence[Footprint],
-    ) -> None:
-        """Takes those along that were held by `holds` in the frame before."""
-        _, moved, turned = self._history[at]
-        for s in np.flatnonzero(holds.any(axis=1)).tolist():
-            point = int(planted[s, 1] or not planted[s, 0])
-            footprints[s].follow(
-                complex(moved[s, point]), float(turned[s]), float(holds[s].max()), self._wobble
-            )
-
-    def _targets(self, pitched: Float[np.ndarray, "T P 3"], seen: Sequence[_Seen]) -> PointTargets:
-        """Where the soles' points are held, and how firmly."""
-        feet = (np.array(part) for part in zip(*seen, strict=True))
-        holds, height, step, known, pivot, heading = (part[:, self._sole] for part in feet)
-        on = np.where(self._leaves_with, holds, 1.0)
-        held, most = np.minimum(on[..., 0], on[..., 1]), np.maximum(holds[..., 0], holds[..., 1])
-        raised = pitched[..., 0] + 1j * pitched[..., 1]
+        pitched: Float[np.ndarray, "T P 3"],
+        numbers: Float[np.ndarray, "T S 6"],
+        places: Complex[np.ndarray, "T S 2"],
+    ) -> PointTargets:
+        """Where the soles' points are held, and how firmly. Of each foot there are, in `numbers`,
+        how far heel and toes are held, how high [m] they step and the sole is where not held, and
+        whether it is known where; in `places` the middle of its toes [m, x + iy], and a unit along
+        it."""
+        of_points = numbers.take(self._sole, axis=1)
+        pivot, along = places.take(self._sole, axis=1).transpose(2, 0, 1)
+        height, known = of_points[..., 4:].transpose(2, 0, 1)
+        ends = of_points[..., :2]
+        held = np.minimum.reduce(ends, axis=2, where=self._leaves_with, initial=1.0)
+        step = np.maximum.reduce(of_points[..., 2:4], axis=2, where=self._leaves_with, initial=0.0)
+        most, free = np.maximum(ends[..., 0], ends[..., 1]), 1 - held
+        raised = pitched[..., :2] @ (1, 1j)
+        away = self._flat - raised
         # What is raised turns about what stands.
-        raised += (
-            (held * (self._flat - raised)) @ self._beside / np.maximum(held @ self._beside, 1e-9)
-        )
-        place = pivot + np.exp(1j * heading) * (held * self._flat + (1 - held) * raised)
+        shift = (held * away) @ self._beside / np.maximum(held @ self._beside, 1e-9)
+        place = pivot + along * (raised + shift + held * (away - shift))
         positions, shares = np.empty((2, *held.shape, 3))
         positions[..., 0], positions[..., 1] = place.real, place.imag
-        step = np.where(self._leaves_with, step, 0.0).max(axis=-1)
-        up = np.maximum((1 - most) * height, (1 - held) * step)
-        positions[..., 2] = (1 - held) * pitched[..., 2] + up
+        up = np.maximum((1 - most) * height, free * step)
+        positions[..., 2] = free * pitched[..., 2] + up
         shares[..., :2] = (known * np.maximum(held, RAISED_HOLD[0] * most))[..., None]
-        near = near_floor(height / self._robot.rig.hip_height)
-        shares[..., 2] = held + (1 - held) * near * SWING_HOLD[2]
+        near = near_floor(height / self._hip_height)
+        shares[..., 2] = held + SWING_HOLD[2] * free * near
         return PointTargets(positions, shares)
 
     def _index_points(self) -> None:
         """Of all points of the soles: which sole's they are, where on the floor from the middle of
         its toes, and with which of heel and toe they leave it."""
         soles = self._robot.soles
-        self._feet = [sole.foot for sole in soles]
-        self._sole = np.repeat(np.arange(len(soles)), [len(sole) for sole in soles])
+        self._foot_joints = np.array([sole.foot for sole in soles], dtype=int)
+        counts = [len(sole) for sole in soles]
+        stops = np.cumsum(counts, dtype=int).tolist()
+        self._points = [slice(n - count, n) for n, count in zip(stops, counts, strict=True)]
+        self._sole = np.repeat(np.arange(len(soles)), counts)
         self._beside = (self._sole[:, None] == self._sole).astype(np.float64)
         flat, ends = [np.zeros(0, dtype=complex)], [np.zeros((0, 2), dtype=bool)]
         for sole in soles:
             points = flat_sole(self._robot, sole) @ (1, 1j)
             flat.append(points - points[-2:].mean())
             ends.append(on_points(sole, np.array([[0.0, 1.0], [1.0, 0.0]])) == 0)
+        self._lengths = [-float(points[:2].real.mean()) for points in flat[1:]]
         self._flat, self._leaves_with = np.concatenate(flat), np.concatenate(ends)

@@ -2,10 +2,8 @@
 beyond what that one wobbles while it stands."""
 
 import cmath
+from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
-from jaxtyping import Float
 
 from robots.solver.footprints import MAX_TWIST
 
@@ -20,12 +18,12 @@ class Footprint:
     away: complex = 0j
     turned: float = 0.0
 
-    def put(self, points: Float[np.ndarray, "P 3"], length: float, *, on_toe: bool) -> None:
-        """Where the foot is that is so long; on its heel, where its toes will come down."""
-        heel, toe = points[:2, :2].mean(0), points[-2:, :2].mean(0)
-        self.heading = float(np.arctan2(*(toe - heel)[::-1]))
-        to_toe = 0.0 if on_toe else cmath.rect(length, self.heading)
-        self.pivot = complex(*(toe if on_toe else heel)) + to_toe
+    def put(self, points: Sequence[complex], length: float, *, on_toe: bool) -> None:
+        """Where the foot is that has these points on the floor [m, x + iy] and is so long; on its
+        heel, where its toes will come down."""
+        heel, toe = (points[0] + points[1]) / 2, (points[-2] + points[-1]) / 2
+        self.heading = cmath.phase(toe - heel)
+        self.pivot = toe if on_toe else heel + cmath.rect(length, self.heading)
         self.away, self.turned = 0j, 0.0
 
     def follow(self, moved: complex, turned: float, hold: float, wobble: float) -> None:

@@ -23,7 +23,8 @@ _RELEASE_FACTOR = (
 _LONGEST = 0.5  # [s] over which a foot's speed is told where it trembles
 _ON_FEET = 0.6  # hips' heights of a T-pose above which nothing but feet carries a body
 
-Ends = Bool[np.ndarray, "S 2"]
+Ends = list[tuple[bool, bool]]
+"""Of heel and toes of each foot."""
 
 
 class Standing:
@@ -31,7 +32,7 @@ class Standing:
 
     def __init__(self, reader: FrameReader, frame_time: float) -> None:
         self._frame_time, self._scale = frame_time, reader.scale
-        self._low, self._has_foot = reader.ground.low, reader.has_feet[:, None]
+        self._low, self._has_foot = reader.ground.low, reader.has_feet.tolist()
         size = reader.source.standing_height / ADULT_HEIGHT
         self._max_speed, self._max_height = PLANTED_SPEED * size, PLANTED_HEIGHT * size
         self._max_creep, self._max_tilt = MAX_CREEP * size, MAX_TILT * size
@@ -54,26 +55,43 @@ class Standing:
         left = noise / self._frame_time * np.sqrt(12 / max(self._window, fewest) ** 3)
         self._leeway = float(np.hypot(1.0, LEEWAY * left / self._max_speed))
 
-    def of(
-        self, frames: Sequence[FrameTargets], at: int, stood: Ends
-    ) -> tuple[Ends, Float[np.ndarray, "S 2"]]:
-        """Whether heels and toes stand in one of some frames that `stood` in the one before, and
-        how fast they are [m/s, scaled]."""
-        velocity, places = self._motion(frames, at)
-        speed, height = np.hypot(velocity[..., 0], velocity[..., 1]), places[..., 2] - self._low
-        factor = np.where(stood, _RELEASE_FACTOR, 1.0)
-        stands = (
-            self._has_foot
-            & (speed < factor * self._leeway * self._max_speed)
-            & (height < factor * self._max_height)
-        )
-        # Who stands on the toes does not stand on the heel.
-        stands[:, 0] &= ~stands[:, 1] | (height[:, 0] < height[:, 1] + self._max_tilt)
-        if not stands.any() and self._carried_by_feet(frames, at):
-            stands = self._creeping(frames[at - self._creep : at + 1])
-        return stands, self._scale * speed
+    def motion(
+        self, frames: Sequence[FrameTargets], first: int
+    ) -> tuple[Float[np.ndarray, "T S 2"], Float[np.ndarray, "T S 2"]]:
+        """How fast heels and toes are [m/s], and how high over where they stand [m], in some frames
+        from the first of these on."""
+        moves = [self._moved(frames, at) for at in range(first, len(frames))]
+        velocity, places = (np.array(part) for part in zip(*moves, strict=True))
+        return np.hypot(velocity[..., 0], velocity[..., 1]), places[..., 2] - self._low
 
-    def _motion(
+    def of(
+        self,
+        frames: Sequence[FrameTargets],
+        at: int,
+        stood: Ends,
+        speeds: list[list[float]],
+        heights: list[list[float]],
+    ) -> Ends:
+        """Whether heels and toes stand in one of some frames that `stood` in the one before; they
+        are so fast [m/s] and so high [m] there."""
+        stands = []
+        for has_foot, *foot in zip(self._has_foot, stood, speeds, heights, strict=True):
+            heel, toes = (has_foot and self._stands(*end) for end in zip(*foot, strict=True))
+            # Who stands on the toes does not stand on the heel.
+            heel_height, toe_height = foot[2]
+            heel = heel and (not toes or heel_height < toe_height + self._max_tilt)
+            stands.append((heel, toes))
+        if not any(map(any, stands)) and self._carried_by_feet(frames, at):
+            creeping = self._creeping(frames[at - self._creep : at + 1]).tolist()
+            return [(heel, toes) for heel, toes in creeping]
+        return stands
+
+    def _stands(self, stood: bool, speed: float, height: float) -> bool:
+        factor = _RELEASE_FACTOR if stood else 1.0
+        slow = speed < factor * self._leeway * self._max_speed
+        return slow and height < factor * self._max_height
+
+    def _moved(
         self, frames: Sequence[FrameTargets], at: int
     ) -> tuple[Float[np.ndarray, "S 2 3"], Float[np.ndarray, "S 2 3"]]:
         """How heels and toes move [m/s], and where they are [m]."""
@@ -90,21 +108,22 @@ class Standing:
 
     def _carried_by_feet(self, frames: Sequence[FrameTargets], at: int) -> bool:
         """Whether a body is high enough to be on its feet, and does not fall freely."""
-        if not self._has_foot.any() or frames[at].hips[2] < self._on_feet:
+        if not any(self._has_foot) or frames[at].hips[2] < self._on_feet:
             return False
         middle = min(at, len(frames) - 1 - self._reach)
         below, here, above = (frames[middle + k * self._reach].com[2] for k in (-1, 0, 1))
         fall = (2 * here - below - above) / (self._reach * self._frame_time) ** 2 / self._scale
         return bool(fall <= (1 - FLIGHT_PUSH) * GRAVITY)
 
-    def _creeping(self, frames: Sequence[FrameTargets]) -> Ends:
+    def _creeping(self, frames: Sequence[FrameTargets]) -> Bool[np.ndarray, "S 2"]:
         """The slowest and lowest heel or toe over some frames, and those that are as low and go
         along with it where all feet have one: a body that sways, and its feet with it."""
         feet = np.array([frame.feet for frame in frames])
         velocity = (feet[-1] - feet[0])[..., :2] / (self._creep * self._frame_time)
         speed = np.hypot(velocity[..., 0], velocity[..., 1])
         height = feet[..., 2].mean(axis=0) - self._low
-        lower = self._has_foot & (height < height.min(axis=1, keepdims=True) + self._max_tilt)
+        lower = height < height.min(axis=1, keepdims=True) + self._max_tilt
+        lower &= np.array(self._has_foot)[:, None]
         cost = np.where(lower, speed / self._max_speed + height / self._max_height, np.inf)
         best = np.unravel_index(cost.argmin(), cost.shape)
         against = np.hypot(*np.moveaxis(velocity - velocity[best], -1, 0))

@@ -33,9 +33,10 @@ def stands(
         feet[..., 2] = READER.ground.low + np.array(heights)[:, None]
         com[2] -= READER.scale * fall * 9.81 / 2 * time**2
         frames.append(replace(own, feet=feet, com=com, hips=own.hips * [1, 1, hips]))
-    found, told = standing.of(frames, standing.history, np.zeros((2, 2), dtype=bool))
-    np.testing.assert_allclose(told, READER.scale * np.abs(speeds)[:, None] * [1, 1], atol=1e-9)
-    return found
+    at, (told, over) = standing.history, standing.motion(frames, standing.history)
+    np.testing.assert_allclose(told[0], np.abs(speeds)[:, None] * [1, 1], atol=1e-9)
+    none = [(False, False)] * 2
+    return np.array(standing.of(frames, at, none, told[0].tolist(), over[0].tolist()))
 
 
 def test_the_slower_and_lower_foot_carries() -> None:

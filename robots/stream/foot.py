@@ -1,0 +1,64 @@
+"""How one foot of a stream's robot stands, frame by frame."""
+
+from dataclasses import dataclass, field, replace
+
+from robots.solver.foot_path import STEP_SPEEDS
+from robots.stream.footprint import Footprint
+
+
+@dataclass
+class Foot:
+    """Whether heel and toes of the source's foot stand, how far the robot's are held (0 to 1), over
+    what its soles last stood [m, scaled], and where it is held."""
+
+    planted: tuple[bool, bool] = (False, False)
+    holds: tuple[float, float] = (0.0, 0.0)
+    ground: float = 0.0
+    footprint: Footprint = field(default_factory=Footprint)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether heel or toes are."""
+        return max(self.holds) > 0
+
+    @property
+    def on_toe(self) -> bool:
+        """Whether it is the toes that it goes along with, and not the heel."""
+        return self.planted[1] or not self.planted[0]
+
+    def copy(self) -> "Foot":
+        """One that goes on by itself."""
+        return replace(self, footprint=replace(self.footprint))
+
+    def move_on(
+        self,
+        planted: tuple[bool, bool],
+        clearance: float,
+        moved: tuple[complex, complex],
+        turned: float,
+        wobble: float,
+    ) -> None:
+        """The next frame of the source, in which heel and toes stand or not, soles are so high [m],
+        and have moved [m] and turned [rad] since the one before. What is held goes along."""
+        lowest = min(self.ground, clearance) if any(self.planted) else clearance
+        if any(planted):
+            self.ground = lowest
+        self.planted = planted
+        if self.is_held:
+            self.footprint.follow(moved[self.on_toe], turned, max(self.holds), wobble)
+
+    def grip(self, loosens: float, tightens: float) -> None:
+        """Take hold of what stands, and let go of the rest, by so much at most."""
+        heel, toes = (
+            hold + min(max(planted - hold, -loosens), tightens)
+            for hold, planted in zip(self.holds, self.planted, strict=True)
+        )
+        self.holds = heel, toes
+
+    def height(self, clearance: float, pace: float, uneven: float) -> float:
+        """How high [m] its sole is in swing: as the source's, scaled; but where it takes no step,
+        at so much `pace` [hip heights/s], it is put down by what it last stood over the floor,
+        which may be off by `uneven` [m]."""
+        still, steps = STEP_SPEEDS[:2]
+        slow = min(max((steps - pace) / (steps - still), 0.0), 1.0)
+        return clearance - slow * min(self.ground, uneven, max(clearance, 0.0))
