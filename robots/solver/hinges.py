@@ -35,7 +35,8 @@ class Hinges:
         rest = model.qpos0[self._qpos]
         lower, upper = (limit[hinges] + rest for limit in (tree.lower, tree.upper))
         margin = np.minimum(LIMIT_MARGIN, 0.1 * (upper - lower))
-        self._soft_limits = lower + margin, upper - margin
+        self._signs = np.array([[[1.0]], [[-1.0]]])  # of angles over the upper, and below the lower
+        self._soft_limits = np.array([upper - margin, -lower - margin])[:, None]
         lower, upper = tree.limits_within(LIMIT_CLEARANCE)
         self._limits = lower[hinges] + rest, upper[hinges] + rest
         angles = robot.tpose.angles[0, hinges] + rest
@@ -46,12 +47,13 @@ class Hinges:
 
     def angles(self, q: Float[np.ndarray, "T nq"]) -> Float[np.ndarray, "T H"]:
         """Their part of a `qpos`."""
-        return q[:, self._qpos]
+        return q.take(self._qpos, axis=1)
 
     def clip(self, q: Float[np.ndarray, "T nq"]) -> None:
         """Take a `qpos` within the limits, in place, and those that follow others where these take
         them."""
-        q[:, self._qpos] = np.clip(q[:, self._qpos], *self._limits)
+        lower, upper = self._limits
+        q[:, self._qpos] = np.minimum(np.maximum(q.take(self._qpos, axis=1), lower), upper)
         if self._followers:
             turned = self._turned(q)
             for follower in self._followers:
@@ -65,7 +67,7 @@ class Hinges:
         """The dofs of hinges at their limits that the gradient would take beyond."""
         lower, upper = self._limits
         out = np.zeros(g.shape, dtype=bool)
-        angles, gradient = q[:, self._qpos], g[:, self._dofs]
+        angles, gradient = self.angles(q), g.take(self._dofs, axis=1)
         below, above = angles <= lower + 1e-9, angles >= upper - 1e-9
         out[:, self._dofs] = (above & (gradient < 0)) | (below & (gradient > 0))
         return out
@@ -80,15 +82,14 @@ class Hinges:
         """Limits, as `robots.residuals.limit_residual` has them, the pull to the posture, and
         those that follow others."""
         angles = self.angles(q)
-        lower, upper = self._soft_limits
-        above, rising = one_sided(angles - upper, LIMIT_MARGIN / 4)
-        below, falling = one_sided(lower - angles, LIMIT_MARGIN / 4)
-        pull = posture.weights**2
+        (above, below), slopes = one_sided(
+            self._signs * angles - self._soft_limits, LIMIT_MARGIN / 4
+        )
+        slope, pull = W_LIMIT**2 * (slopes[0] + slopes[1]), posture.weights**2
         diagonal = np.full(g.shape, 1e-6)
-        diagonal[:, self._dofs] = pull + (W_LIMIT * (rising + falling)) ** 2
+        diagonal[:, self._dofs] = pull + slope * (slopes[0] + slopes[1])
         H.reshape(len(q), -1)[:, :: H.shape[1] + 1] += diagonal
-        gradient = W_LIMIT**2 * (rising + falling) * (above - below)
-        g[:, self._dofs] += gradient + pull * (angles - posture.angles)
+        g[:, self._dofs] += slope * (above - below) + pull * (angles - posture.angles)
         if self._solved:
             turned = self._turned(q)
             for follower in self._solved:

@@ -62,7 +62,7 @@ class Coupling:
         """Take in how far [m] the source's centre of mass has moved with the newest frame."""
         last = self._source_steps[-1]
         change = step - last
-        size = max(float(np.linalg.norm(change)), 1e-12)
+        size = max(float(change @ change) ** 0.5, 1e-12)
         step = last + change * min(1.0, self._max_change / size)
         self._source_steps = np.concatenate([self._source_steps[1:], step[None]])
 
@@ -89,17 +89,16 @@ class Coupling:
         ahead.targets[_BASE] = com_jacobian[-1] @ ahead.targets
         ahead.speeds[_BASE] = own_speed - self._source_steps[-1] / self._frame_time
         P, p = self._to_go.of(ahead)
-        x = np.stack([-against[-1] - against[-2], -against[-1], np.zeros(g.shape[1])])
-        products, gradient = self._products.copy(), (self._to_gradient * against).sum(axis=1)
+        before = np.array([-against[-1] - against[-2], -against[-1]])
+        products = self._products.copy()
         products[-3:, -3:] += P.transpose(1, 2, 0)
-        gradient[-3:] += (P @ x.T[..., None])[..., 0].T + p.T
-        frames, dofs = g.shape
-        weights, jacobian = np.zeros((frames, 3, frames, 3)), np.zeros((frames, 3, frames, dofs))
-        np.einsum("sata->sta", weights)[:] = products[:, :, _BASE]
-        np.einsum("tatd->tad", jacobian)[:] = com_jacobian
-        J = jacobian.reshape(3 * frames, -1)
-        blocks += (J.T @ (weights.reshape(len(J), -1) @ J)).reshape(blocks.shape)
-        g += (J.T @ gradient[:, _BASE].ravel()).reshape(g.shape)
+        gradient = np.add.reduce(self._to_gradient * against, axis=1)
+        gradient[-3:] += (P[:, :, :2] @ before.T[..., None])[..., 0].T + p.T
+        # The mass's place takes that of the base.
+        pulled = products[:, :, _BASE].transpose(0, 2, 1)[..., None] * com_jacobian.swapaxes(0, 1)
+        moved = com_jacobian.transpose(0, 2, 1)
+        blocks += (moved @ pulled.reshape(len(g), 3, -1)).reshape(blocks.shape)
+        g += (moved @ gradient[:, _BASE, None])[..., 0]
         products[:, :, _BASE] = gradient[:, _BASE] = 0.0
         diagonals = np.einsum("sdtd->std", blocks)  # a view
         diagonals += products
@@ -107,7 +106,7 @@ class Coupling:
         overspeed = self.overspeed(steps)
         if overspeed.any():
             weights = np.full((len(steps), 1), self._overspeed_weight)
-            weights[-frames:] *= penalty_scale[:, None] ** 2
+            weights[-len(g) :] *= penalty_scale[:, None] ** 2
             g += self._first.T @ (weights * overspeed)
             fast = weights * (overspeed != 0)
             diagonals += np.einsum("vs,vt,vd->std", self._first, self._first, fast)

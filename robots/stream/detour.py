@@ -5,8 +5,10 @@ side. The rotations projected onto its hinges (`robots.solver.projection`) may h
 solution; then the limb is led there, and after that solution while it moves on.
 """
 
+from math import acos
+
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from robots.solver.hinges import Posture
 from robots.solver.projection import project
@@ -43,8 +45,8 @@ class Detours:
             chain = [j for j in robot.tree.chain(int(robot.links[lower])) if j not in inner]
             hinges = [int(numbers[j]) for j in chain if not robot.tree.balls[j]]
             self._limbs.append(([k, k + 1], hinges))
-        self._stuck = np.zeros(len(self._limbs))  # 1 where patience ends
-        self._led = np.zeros(len(self._limbs))  # [s] left; below 0 it is left alone
+        self._stuck = [0.0] * len(self._limbs)  # 1 where patience ends
+        self._led = [0.0] * len(self._limbs)  # [s] left; below 0 it is left alone
         self._goals = np.full(len(terms.hinges.at_tpose.angles), np.nan)
 
     def update(
@@ -55,21 +57,24 @@ class Detours:
     ) -> Posture:
         """The posture that hinges are pulled to, where bones have the directions `bones` and hinges
         are at `angles` [rad] in the first frame of `targets`."""
-        worst = self._away(bones, targets.bones[0])
-        patience = np.where(worst > _LOST, _PATIENCE, _ASTRAY_PATIENCE)
-        self._stuck = np.where(worst > _ASTRAY, self._stuck + self._frame_time / patience, 0.0)
-        led = self._led > 0
-        self._led -= np.clip(self._led, -self._frame_time, self._frame_time)
-        for limb in np.flatnonzero(led & ((worst < _FOUND) | (self._led == 0))).tolist():
-            self._leave_alone(limb)
-        led, stuck = self._led > 0, (self._stuck > 1.0) & (self._led == 0)
-        if led.any() or stuck.any():
-            self._look(targets, worst, angles, led, stuck)
-        at_tpose, on_the_way = self._terms.hinges.at_tpose, np.isfinite(self._goals)
-        if not on_the_way.any():
+        worst, time = self._away(bones, targets.bones[0]), self._frame_time
+        for limb, away in enumerate(worst):
+            patience = _PATIENCE if away > _LOST else _ASTRAY_PATIENCE
+            self._stuck[limb] = self._stuck[limb] + time / patience if away > _ASTRAY else 0.0
+            left = self._led[limb]
+            self._led[limb] = left - min(max(left, -time), time)
+            if left > 0 and (away < _FOUND or self._led[limb] == 0):
+                self._leave_alone(limb)
+        led = [k for k, left in enumerate(self._led) if left > 0]
+        stuck = [k for k, left in enumerate(self._led) if self._stuck[k] > 1 and left == 0]
+        if led or stuck:
+            self._look(led, stuck, worst, targets, angles)
+        at_tpose = self._terms.hinges.at_tpose
+        if max(self._led, default=0.0) <= 0:
             return at_tpose
+        on_the_way = np.isfinite(self._goals)
         # `LATENCY` frames lie ahead of the one at `angles`.
-        most = _SPEED * self._frame_time * (LATENCY + 1)
+        most = _SPEED * time * (LATENCY + 1)
         next_angles = angles + np.clip(self._goals - angles, -most, most)
         return Posture(
             np.where(on_the_way, next_angles, at_tpose.angles),
@@ -78,29 +83,30 @@ class Detours:
 
     def _look(
         self,
+        led: list[int],
+        stuck: list[int],
+        worst: list[float],
         targets: FrameTargets,
-        worst: Float[np.ndarray, "L"],
         angles: Float[np.ndarray, "H"],
-        led: Bool[np.ndarray, "L"],
-        stuck: Bool[np.ndarray, "L"],
     ) -> None:
         """See where the projection has the limbs that are `led`, and whether it is a way out for
         the `stuck` ones."""
+        robot, terms = self._robot, self._terms
         world = quat_from_matrix(targets.world[:1])
-        q = self._robot.to_qpos(project(self._robot, world, targets.hips[:1]))
-        there = self._away(self._terms.bones(self._terms.poses(q))[0], targets.bones[0])
-        goals = self._terms.hinges.angles(q)[0]
+        q = robot.to_qpos(project(robot, world, targets.hips[:1]))
+        there = self._away(terms.bones(terms.poses(q))[0], targets.bones[0])
+        goals = terms.hinges.angles(q)[0]
 
         def other_way(hinges: list[int], than: Float[np.ndarray, "H"]) -> bool:
             return bool(np.abs(goals[hinges] - than[hinges]).max(initial=0.0) > _OTHER_WAY)
 
-        for limb in np.flatnonzero(led).tolist():
+        for limb in led:
             _, hinges = self._limbs[limb]
             if other_way(hinges, self._goals):
                 self._leave_alone(limb)
             else:
                 self._goals[hinges] = goals[hinges]
-        for limb in np.flatnonzero(stuck).tolist():
+        for limb in stuck:
             _, hinges = self._limbs[limb]
             if other_way(hinges, angles) and there[limb] < worst[limb] - _GAIN:
                 self._led[limb] = _MAX_DURATION
@@ -114,7 +120,8 @@ class Detours:
 
     def _away(
         self, bones: Float[np.ndarray, "B 3"], wanted: Float[np.ndarray, "B 3"]
-    ) -> Float[np.ndarray, "L"]:
+    ) -> list[float]:
         """How far [rad] each limb's bones are from their directions, the farthest of them."""
-        cosines = (bones * wanted).sum(1)
-        return np.arccos(np.clip([cosines[rows].min() for rows, _ in self._limbs], -1.0, 1.0))
+        cosines = ((bones * wanted) @ np.ones(3)).tolist()
+        nearest = (min(cosines[k] for k in rows) for rows, _ in self._limbs)
+        return [acos(min(max(cosine, -1.0), 1.0)) for cosine in nearest]

@@ -41,8 +41,9 @@ class CostToGo:
     def __init__(
         self, frame_time: float, orders: Int[np.ndarray, "D"], weights: Float[np.ndarray, "D"]
     ) -> None:
-        self._tables = np.stack([_table(frame_time, order) for order in (2, 3)])
-        self._which, self._log_weights = orders - 2, np.log(weights)
+        self._tables = np.concatenate([_table(frame_time, order) for order in (2, 3)])
+        self._first = (orders - 2) * len(_LOG_RATIOS)  # of the rows of each dof's table
+        self._log_weights = np.log(weights)
 
     def of(self, ahead: Ahead) -> tuple[Float[np.ndarray, "D 3 3"], Float[np.ndarray, "D 3"]]:
         """P and p of `x P x / 2 + p x` in the last three values x of each dof, from its newest."""
@@ -51,7 +52,9 @@ class CostToGo:
         at = np.minimum(np.maximum(at, 0.0), len(_LOG_RATIOS) - 1.001)
         k = at.astype(int)
         share = (at - k)[:, None, None]
-        cost = (1 - share) * self._tables[self._which, k] + share * self._tables[self._which, k + 1]
+        row = self._first + k
+        cost = self._tables.take(row, axis=0)
+        cost += share * (self._tables.take(row + 1, axis=0) - cost)
         cost *= ahead.weights[:, None, None]
         p = cost[:, :, 3] * ahead.targets[:, None] + cost[:, :, 4] * ahead.speeds[:, None]
         return cost[:, :, :3], p
@@ -108,7 +111,7 @@ class TargetMotion:
         if self._past:
             time = len(self._past) * self._frame_time
             mujoco.mj_differentiatePos(model, speeds, time, self._past[0], self._now)
-        speeds = speeds[self._dofs].clip(-_MAX_SPEED, _MAX_SPEED)
+        speeds = np.minimum(np.maximum(speeds.take(self._dofs), -_MAX_SPEED), _MAX_SPEED)
         # Legs give way to the base where they bend: it weighs what is then left of its weight (a
         # Schur complement), over the floor alike in all directions. By H's diagonal it would be as
         # firm as if they could not bend.

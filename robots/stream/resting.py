@@ -28,6 +28,7 @@ from spark.smoothstep import smoothstep
 
 LEAD_HEIGHT = 0.2  # [m, of an adult] of the source's flesh below which the robot's is led down
 HOLD_TIME = 0.1  # [s] over which a part is taken hold of in its place, and let go
+_LEAD = LEAD_HEIGHT - REST_HEIGHT
 _MAX_ROLL = 0.1  # hip heights that the joint of a part that rests may roll over it
 _FELT = 0.01  # of the hold of what lies on the ground, below which it is not worth its time
 
@@ -44,11 +45,12 @@ class _Point(NamedTuple):
 
 class _Seen(NamedTuple):
     """Of the parts in one frame: how high [m] the robot's should reach down, and how firmly they
-    are held there and in their places."""
+    are held there and in their places; the firmest hold there."""
 
     height: Float[np.ndarray, "K"]
     up: Float[np.ndarray, "K"]
     along: Float[np.ndarray, "K"]
+    most: float
 
 
 def held_points(
@@ -102,12 +104,12 @@ class RestTracker:
         self._places.extend([targets.parts] * (self._reach + 1 if first else 1))
         seen = self._look(targets)
         self._seen.extend([seen] * (self._ahead + 1 if first else 1))
+        if all(frame.most < _FELT for frame in self._seen):
+            self._along[:] = 0.0
+            return None
         up, along = (
             np.array(part) for part in zip(*((s.up, s.along) for s in self._seen), strict=True)
         )
-        if up.max(initial=0.0) < _FELT:
-            self._along[:] = 0.0
-            return None
         points = self._terms.part_points(poses)[0]
         own = points[: len(self._along), :2] @ (1, 1j)
         self._follow(own)
@@ -125,19 +127,24 @@ class RestTracker:
         """How the source's parts are in the newest frame."""
         now, before = self._places[-1], self._places[0]
         height = (now[:, 2] - self._lying) / self._adult
+        over = np.maximum(height - REST_HEIGHT, 0.0)
+        if over.min(initial=np.inf) >= _LEAD and not self._along.any():
+            self._rests, self._free = np.zeros(len(over), bool), np.ones(len(over), bool)
+            up, self._along = np.zeros((2, len(over)))
+            return _Seen(self._scale * self._adult * over, up, self._along, 0.0)
         elapsed = (len(self._places) - 1) * self._frame_time
         speed = np.linalg.norm(now - before, axis=1) / elapsed / self._adult
         limit = np.where(self._rests, ROLL_SPEED, REST_SPEED)
         self._rests = (height < REST_HEIGHT) & (speed < limit)
-        over = np.maximum(height - REST_HEIGHT, 0.0)
-        up = smoothstep(1 - over / (LEAD_HEIGHT - REST_HEIGHT))
+        up = smoothstep(1 - over / _LEAD)
         if up[self._arms].any():
             feet = targets.feet.reshape(1, -1, 3) - np.array([0.0, 0.0, self._floor])
             up[self._arms] *= on_arms(targets.com[None, :2] / self._scale, feet, self._adult)
         grip = self._frame_time / HOLD_TIME
         self._free = self._along == 0
         self._along = self._along + np.clip(self._rests - self._along, -grip, grip)
-        return _Seen(self._scale * self._adult * over, up, self._along)
+        most = float(up.max(initial=0.0))
+        return _Seen(self._scale * self._adult * over, up, self._along, most)
 
     def _follow(self, own: Complex[np.ndarray, "K"]) -> None:
         """Parts are held where they came to rest; with the source's, where that goes on beyond what

@@ -95,11 +95,10 @@ class Stream:
             q = self._q[_SHIFTED]
             move_on(self._targets, targets)
             poses = self._window.move_on(q)
-            next_said = poses.at(slice(1))
-            soles = self._terms.sole_points(next_said)[0]
+            soles = self._terms.sole_points(poses)[0]
             foot_targets = self._contacts.update(targets, soles, self.foot_noise)
-            resting = self._rests.update(targets, next_said)
-            bones, angles = self._terms.bones(next_said)[0], self._terms.hinges.angles(q)[_FIXED]
+            resting = self._rests.update(targets, poses)
+            bones, angles = self._terms.bones(poses)[0], self._terms.hinges.angles(q)[_FIXED]
             posture = self._detours.update(self._targets, bones, angles)
             self._q = self._window.solve(q, poses, self._targets, foot_targets, resting, posture)
         else:
