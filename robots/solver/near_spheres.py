@@ -35,6 +35,11 @@ class NearSpheres:
         return self.numbers[2]
 
     @property
+    def radii(self) -> Float[np.ndarray, "K"]:
+        """Their radii, with what is kept between a pair [m]."""
+        return self.sizes[_RADIUS]
+
+    @property
     def half(self) -> Float[np.ndarray, "13 1 K"]:
         """Half the widths of the large shapes' slabs [m]."""
         return self.sizes[_HALF, None]
@@ -59,5 +64,5 @@ class NearSpheres:
         off -= self.sizes[_MIDDLE, None]
         over = np.abs(off)
         over -= self.half
-        depth: Float[np.ndarray, "T K"] = self.sizes[_RADIUS] - np.maximum.reduce(over)
+        depth: Float[np.ndarray, "T K"] = self.radii - np.maximum.reduce(over)
         return points, off, depth

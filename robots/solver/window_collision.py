@@ -9,6 +9,7 @@ from robots.model.morphology import Morphology
 from robots.residuals import one_sided
 from robots.solver.collision import DEPTH_ROUNDING, collisions_of
 from robots.solver.hulls import SLABS, Shape, ShapePair
+from robots.solver.near_pairs import NearPairs
 from robots.solver.near_spheres import NearSpheres
 from robots.solver.weights import W_COLLISION, W_LEG_COLLISION, per_metre
 from robots.solver.window_dofs import WindowDofs
@@ -22,6 +23,7 @@ _ACTIVE = 3 * DEPTH_ROUNDING  # [m] between shapes beyond which the penalty is n
 _MARGIN, _FAR = 0.005, 0.1
 _SIDES = np.ascontiguousarray(SLABS.T)
 _REACH = 0.03  # [m] that shapes may move between the searched frame and the others
+_WITHIN = _ACTIVE + _REACH
 
 
 class WindowCollisions:
@@ -37,16 +39,18 @@ class WindowCollisions:
         apart = np.array([pair.clearance + _MARGIN * (pair.gap > _FAR) for pair in pairs])
         bodies = dofs.bodies([*range(len(tree)), ROOT])
         balls = [(pair.small.center[None], np.array([_bound(pair.small)])) for pair in pairs]
-        self._bounds = _near(pairs, balls, apart, bodies, rest)
+        bounds = _near(pairs, balls, apart, bodies, rest)
+        self._pairs, self._count = NearPairs(pairs, bounds, bodies, rest, _WITHIN), len(pairs)
         spheres = [(pair.small.spheres, pair.small.radii) for pair in pairs]
         self._spheres = _near(pairs, spheres, apart, bodies, rest)
         self._index_dofs(per_metre(robot), tree, pairs, dofs)
 
     def candidates(self, poses: WindowPoses) -> NearSpheres:
         """The spheres that collide, or may soon."""
-        pairs = np.logical_or.reduce(self._bounds.depth(poses) > -_ACTIVE - _REACH)
-        near = self._spheres.at(pairs.take(self._spheres.pairs).nonzero()[0])
-        return near.at(np.logical_or.reduce(near.depth(poses) > -_ACTIVE - _REACH).nonzero()[0])
+        is_near = np.zeros(self._count, dtype=bool)
+        is_near[self._pairs.of(poses)] = True
+        near = self._spheres.at(is_near.take(self._spheres.pairs).nonzero()[0])
+        return near.at(np.logical_or.reduce(near.depth(poses) > -_WITHIN).nonzero()[0])
 
     def rows(self, poses: WindowPoses, near: NearSpheres) -> Rows | None:
         """How deep spheres are in shapes, of those that are `near` and felt in some frame."""
