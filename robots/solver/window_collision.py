@@ -63,7 +63,8 @@ class WindowCollisions:
         felt, near = felt.take(active, axis=1), near.at(active)
         slab = (np.abs(off) - near.half).argmax(axis=0)
         side = _SIDES.take(slab, axis=1)
-        side *= np.sign(np.take_along_axis(off, slab[None], axis=0))
+        across = off.reshape(len(off), -1)[slab.ravel(), np.arange(slab.size)]
+        side *= np.sign(across).reshape(slab.shape)
         axes = poses.frames[:3].take(near.large, axis=3)
         axes *= side[:, None]
         wrenches = np.empty((6, *depth.shape))
@@ -93,7 +94,7 @@ class WindowCollisions:
             for sign, chain in zip((-1.0, 1.0), chains, strict=True):
                 moving = tuple(j for j in chain if j not in both and (j in first) == early)
                 self._moving[k, tree.dofs(moving)] = sign
-        self._moving = self._moving[:, dofs.numbers] * self._weights[:, None]
+        self._moving = self._moving.take(dofs.numbers, axis=1) * self._weights[:, None]
 
 
 def _among(pair: ShapePair, tree: Tree, links: set[int]) -> bool:
@@ -122,9 +123,7 @@ def _near(
     radii = np.concatenate([np.zeros(0), *(radii for _, radii in balls)])
     slabs = np.array([pair.large.slabs for pair in pairs]).reshape(-1, 2, len(SLABS))[own]
     middle, half = slabs.transpose(1, 2, 0)
-    return NearSpheres(
-        np.stack([own, small, large]),
-        np.concatenate(
-            [(centers - rest[small]).T, [radii + apart[own]], middle - SLABS @ rest[large].T, half]
-        ),
+    sizes = np.concatenate(
+        [(centers - rest[small]).T, [radii + apart[own]], middle - SLABS @ rest[large].T, half]
     )
+    return NearSpheres(np.stack([own, small, large]), np.ascontiguousarray(sizes))

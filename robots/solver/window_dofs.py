@@ -54,4 +54,4 @@ class WindowDofs:
             out[k, :BASE] = first[k]
             same = [j for j in tree.chain(link) if self._in_first_block[j] == first[k]]
             out[k, tree.dofs(tuple(same))] = 1.0
-        return out[:, self.numbers]
+        return out.take(self.numbers, axis=1)

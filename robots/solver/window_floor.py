@@ -35,7 +35,7 @@ class WindowFloor:
         self._always = slice(sum(counts[:always]))
         self._radii = np.concatenate([np.zeros(0), *(solid.radii for solid in solids)])
         spheres = np.concatenate([np.zeros((0, 3)), *(solid.spheres for solid in solids)])
-        self._arms = (spheres - rest[self._bodies]).T
+        self._arms = (spheres - rest[self._bodies]).T.copy()
 
     def depth(self, poses: WindowPoses) -> Float[np.ndarray, "T S"]:
         """How deep [m] each sphere is in the floor; below 0 over it."""

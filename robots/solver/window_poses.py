@@ -41,8 +41,10 @@ class WindowPoses:
     def frames(self) -> Float[np.ndarray, "4 3 T B"]:
         """The bodies' axes, which in the rest pose were the world's, and their places [m]: in long
         rows."""
-        rotations, positions = self.rotations.transpose(3, 2, 0, 1), self.positions
-        return np.concatenate([rotations, positions.transpose(2, 0, 1)[None]])
+        out = np.empty((4, 3, *self.positions.shape[:2]))
+        out[:3] = self.rotations.transpose(3, 2, 0, 1)
+        out[3] = self.positions.transpose(2, 0, 1)
+        return out
 
     def points(
         self, bodies: Int[np.ndarray, "K"], arms: Float[np.ndarray, "3 1 1 K"]
