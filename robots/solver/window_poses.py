@@ -11,7 +11,7 @@ from robots.model.mjcf import Mjcf
 from robots.tree import skew
 
 # What takes a twist about (x, y, z) to the origin: the identity, and x, y, z times each of these.
-_TO_ORIGIN = np.zeros((3, 6, 6))
+_UNMOVED, _TO_ORIGIN = np.eye(6), np.zeros((3, 6, 6))
 _TO_ORIGIN[:, 3:, :3] = [skew(axis) for axis in np.eye(3)]
 
 
@@ -99,7 +99,8 @@ class Kinematics:
                 mujoco.mj_jacSubtreeCom(model, data, moved[t], self._root)
         turns = rotations.reshape(count, -1, 3, 3) @ self._to_rest
         # MuJoCo's twists are about the mass's place.
-        to_origin = (about @ _TO_ORIGIN.reshape(3, 36)).reshape(count, 6, 6) + np.eye(6)
+        to_origin = (about @ _TO_ORIGIN.reshape(3, 36)).reshape(count, 6, 6)
+        to_origin += _UNMOVED
         twists = to_origin @ motions.take(self._dofs, axis=1).transpose(0, 2, 1)
         jacobian = None if moved is None else moved.take(self._dofs, axis=2)
         return WindowPoses(turns, positions, twists, com, jacobian)

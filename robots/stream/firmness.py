@@ -30,8 +30,10 @@ class Firmness:
     def move_on(self, strain: Float[np.ndarray, "F"]) -> None:
         """The frames are one later, the newest like the one before it. How far a wall gives way in
         them, over how far it may, makes it firmer beyond 1, and softer again below `_SOUND`."""
-        scale = np.append(self.scale[1:], self.scale[-1])
-        scale *= np.where(
-            strain > 1, PENALTY_GROWTH, np.where(strain < _SOUND, 1 / PENALTY_GROWTH, 1.0)
-        )
-        self.scale = np.minimum(np.maximum(scale, 1.0), _MOST)
+        _, *later = self.scale.tolist()
+        scales = zip((*later, float(self.scale[-1])), strain.tolist(), strict=True)
+        self.scale = np.array([min(max(s * _growth(x), 1.0), _MOST) for s, x in scales])
+
+
+def _growth(strain: float) -> float:
+    return PENALTY_GROWTH if strain > 1 else 1 / PENALTY_GROWTH if strain < _SOUND else 1.0

@@ -83,7 +83,7 @@ class ContactTracker:
                 # Where a foot will come down that is still in the air is not known yet.
                 known = foot.is_held or at == settled
                 if at == settled and not foot.is_held:
-                    own = (points[self._points[s], :2] @ (1, 1j)).tolist()
+                    own = [complex(x, y) for x, y, _ in points[self._points[s]].tolist()]
                     foot.footprint.put(own, self._lengths[s], on_toe=foot.on_toe)
                 foot.grip(self._grip, 1.0 if first else self._grip)
                 pace = self._scale * speed[s][1] / self._hip_height
@@ -100,7 +100,8 @@ class ContactTracker:
         )
 
     def _arrived(self, now: FrameTargets, last: FrameTargets) -> _Arrived:
-        moved = (self._scale * ((now.feet - last.feet)[..., :2] @ (1, 1j))).tolist()
+        by = self._scale * (now.feet - last.feet)
+        moved = (by[..., 0] + 1j * by[..., 1]).tolist()
         R = now.world.take(self._foot_joints, axis=0)
         R = R @ last.world.take(self._foot_joints, axis=0).transpose(0, 2, 1)
         turned = np.arctan2(R[:, 1, 0] - R[:, 0, 1], R[:, 0, 0] + R[:, 1, 1])
@@ -120,10 +121,10 @@ class ContactTracker:
         pivot, along = places.take(self._sole, axis=1).transpose(2, 0, 1)
         height, known = of_points[..., 4:].transpose(2, 0, 1)
         ends = of_points[..., :2]
-        held = np.minimum.reduce(ends, axis=2, where=self._leaves_with, initial=1.0)
-        step = np.maximum.reduce(of_points[..., 2:4], axis=2, where=self._leaves_with, initial=0.0)
+        on, step = np.maximum(ends, self._stays_with), of_points[..., 2:4] * self._leaves_with
+        held, step = np.minimum(on[..., 0], on[..., 1]), np.maximum(step[..., 0], step[..., 1])
         most, free = np.maximum(ends[..., 0], ends[..., 1]), 1 - held
-        raised = pitched[..., :2] @ (1, 1j)
+        raised = pitched[..., 0] + 1j * pitched[..., 1]
         away = self._flat - raised
         # What is raised turns about what stands.
         shift = (held * away) @ self._beside / np.maximum(held @ self._beside, 1e-9)
@@ -153,4 +154,5 @@ class ContactTracker:
             flat.append(points - points[-2:].mean())
             ends.append(on_points(sole, np.array([[0.0, 1.0], [1.0, 0.0]])) == 0)
         self._lengths = [-float(points[:2].real.mean()) for points in flat[1:]]
-        self._flat, self._leaves_with = np.concatenate(flat), np.concatenate(ends)
+        self._flat, self._leaves_with = np.concatenate(flat), np.concatenate(ends).astype(float)
+        self._stays_with = 1 - self._leaves_with

@@ -42,13 +42,16 @@ class Standing:
         self._most = max(2 * self._reach + 1, round(_LONGEST / frame_time))
         self.history = max(self._most, self._creep, 2 * self._reach)
         """How many frames before one it is told by, at most."""
+        self._noise = -1.0
         self.listen(0.0)
 
     def listen(self, noise: float) -> None:
         """To feet with such noise [m, RMS an axis]: over how many frames speeds are told (0: the
         fewest), and by how much they may be faster. A slope's standard deviation is sqrt(12 / n³)
         that of a frame (least squares)."""
-        fewest = 2 * self._reach + 1
+        if noise == self._noise:
+            return
+        self._noise, fewest = noise, 2 * self._reach + 1
         borne = self._max_speed * BORNE_SPEED / PLANTED_SPEED * self._frame_time
         count = int(np.ceil(np.cbrt(12 * (noise / borne) ** 2)))
         self._window = min(max(count, fewest), self._most) if noise else 0
