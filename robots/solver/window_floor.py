@@ -1,5 +1,6 @@
 """The floor under all parts in a few frames: `robots.solver.floor` for all shapes at once."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,14 @@ class Lifted(NamedTuple):
     moving: Float[np.ndarray, "K D"]
 
 
+class Low(NamedTuple):
+    """The spheres that are near the floor in some frame, by their numbers, and how deep [m] they
+    are in it; below 0 over it."""
+
+    spheres: Int[np.ndarray, "S"]
+    depth: Float[np.ndarray, "T S"]
+
+
 class WindowFloor:
     """Under a robot's solid shapes. The first ones, `always`, are felt however high they are.
     `rest` is where all bodies are in the rest pose; `firm` is `robots.solver.weights.per_metre`."""
@@ -30,40 +39,36 @@ class WindowFloor:
         solids = lifted.solids
         self._weight, self._rounding = firm * W_FLOOR, FLOOR_ROUNDING / firm
         counts = [len(solid.spheres) for solid in solids]
-        self._bodies = np.repeat(lifted.bodies, counts)
-        self._moving = np.repeat(lifted.moving, counts, axis=0)
+        self._shape = np.repeat(np.arange(len(counts)), counts)
         self._always = slice(sum(counts[:always]))
-        self._radii = np.concatenate([np.zeros(0), *(solid.radii for solid in solids)])
-        spheres = np.concatenate([np.zeros((0, 3)), *(solid.spheres for solid in solids)])
-        self._arms = (spheres - rest[self._bodies]).T.copy()
+        self._moving = lifted.moving
+        spheres = [(solid.spheres, solid.radii) for solid in solids]
+        self._spheres = _Spheres(lifted.bodies.take(self._shape), rest, spheres)
+        self._balls = _Spheres(lifted.bodies, rest, [_around(*own) for own in spheres])
 
     def depth(self, poses: WindowPoses) -> Float[np.ndarray, "T S"]:
         """How deep [m] each sphere is in the floor; below 0 over it."""
-        up = poses.frames[:, 2].take(self._bodies, axis=2)
-        x, y, z = up[:3] * self._arms[:, None]
-        x += y
-        x += z
-        x += up[3]
-        depth: Float[np.ndarray, "T S"] = self._radii - x
-        return depth
+        return self._spheres.depth(poses, slice(None))
 
-    def rows(
-        self,
-        poses: WindowPoses,
-        depth: Float[np.ndarray, "T S"],
-        scale: Float[np.ndarray, "T"],
-    ) -> Rows | None:
+    def low(self, poses: WindowPoses) -> Low:
+        """The spheres of shapes that may be felt."""
+        balls = self._balls.depth(poses, slice(None))
+        near = np.logical_or.reduce(balls > -FELT * self._rounding).take(self._shape)
+        near[self._always] = True
+        spheres = near.nonzero()[0]
+        return Low(spheres, self._spheres.depth(poses, spheres))
+
+    def rows(self, poses: WindowPoses, low: Low, scale: Float[np.ndarray, "T"]) -> Rows | None:
         """r = w one_sided(depth), w = `W_FLOOR` x `scale`, of what is felt in some frame."""
-        near = depth > -FELT * self._rounding
-        near[:, self._always] = True
+        near = low.depth > -FELT * self._rounding
+        near[:, self._always] = True  # they are the first ones here, too
         (felt,) = np.logical_or.reduce(near).nonzero()
         if not len(felt):
             return None
+        own = low.spheres.take(felt)
         weight = np.where(near.take(felt, axis=1), (self._weight * scale)[:, None], 0.0)
-        across = poses.frames[:, :2].take(self._bodies.take(felt), axis=3)
-        across[:3] *= self._arms[:, None, None].take(felt, axis=3)
-        x, y = np.add.reduce(across)
-        residual, slope = one_sided(depth.take(felt, axis=1), self._rounding)
+        x, y = self._spheres.across(poses, own)
+        residual, slope = one_sided(low.depth.take(felt, axis=1), self._rounding)
         residual *= weight
         slope *= weight
         # What lifts a point (x, y, z): the twist's product with (y, -x, 0, 0, 0, 1).
@@ -71,4 +76,48 @@ class WindowFloor:
         np.multiply(-slope, y, out=wrenches[..., 0])
         np.multiply(slope, x, out=wrenches[..., 1])
         np.negative(slope, out=wrenches[..., 5])
-        return Rows(wrenches, self._moving.take(felt, axis=0), residual)
+        return Rows(wrenches, self._moving.take(self._shape.take(own), axis=0), residual)
+
+
+class _Spheres:
+    """Spheres of bodies, given in the rest pose."""
+
+    def __init__(
+        self,
+        bodies: Int[np.ndarray, "S"],
+        rest: Float[np.ndarray, "B 3"],
+        spheres: Sequence[tuple[Float[np.ndarray, "_ 3"], Float[np.ndarray, "_"]]],
+    ) -> None:
+        centers = np.concatenate([np.zeros((0, 3)), *(own for own, _ in spheres)])
+        self._bodies, self._arms = bodies, (centers - rest[bodies]).T.copy()
+        self._radii = np.concatenate([np.zeros(0), *(radii for _, radii in spheres)])
+
+    def depth(
+        self, poses: WindowPoses, which: slice | Int[np.ndarray, "S"]
+    ) -> Float[np.ndarray, "T S"]:
+        """How deep [m] some of them are in the floor; below 0 over it."""
+        up = poses.frames[:, 2].take(self._bodies[which], axis=2)
+        x, y, z = up[:3] * self._arms[:, None, which]
+        x += y
+        x += z
+        x += up[3]
+        depth: Float[np.ndarray, "T S"] = self._radii[which] - x
+        return depth
+
+    def across(self, poses: WindowPoses, which: Int[np.ndarray, "S"]) -> Float[np.ndarray, "2 T S"]:
+        """Where the centres of some are over the floor [m]."""
+        across = poses.frames[:, :2].take(self._bodies.take(which), axis=3)
+        across[:3] *= self._arms.take(which, axis=1)[:, None, None]
+        out: Float[np.ndarray, "2 T S"] = np.add.reduce(across)
+        return out
+
+
+def _around(
+    spheres: Float[np.ndarray, "S 3"], radii: Float[np.ndarray, "S"]
+) -> tuple[Float[np.ndarray, "1 3"], Float[np.ndarray, "1"]]:
+    """A ball around some spheres; nothing where there are none."""
+    if not len(spheres):
+        return np.zeros((1, 3)), np.array([-np.inf])
+    center = (spheres.max(axis=0) + spheres.min(axis=0)) / 2
+    reach = (np.linalg.norm(spheres - center, axis=1) + radii).max()
+    return center[None], np.array([reach])

@@ -19,7 +19,7 @@ from robots.solver.near_spheres import NearSpheres
 from robots.solver.weights import per_metre
 from robots.solver.window_collision import WindowCollisions
 from robots.solver.window_dofs import WindowDofs
-from robots.solver.window_floor import Lifted, WindowFloor
+from robots.solver.window_floor import Lifted, Low, WindowFloor
 from robots.solver.window_points import WindowPoints
 from robots.solver.window_poses import Kinematics, WindowPoses
 from robots.solver.window_rotations import WindowRotations
@@ -83,9 +83,9 @@ class Terms:
         lifted = Lifted(tuple(solids), self._dofs.bodies(links), self._dofs.moving(links))
         return WindowFloor(lifted, self._kinematics.rest, per_metre(self.robot))
 
-    def depth_in_floor(self, poses: WindowPoses) -> Float[np.ndarray, "T S"]:
-        """How deep [m] all that may touch the floor is in it; below 0 over it."""
-        return self._floor.depth(poses)
+    def low(self, poses: WindowPoses) -> Low:
+        """What is near the floor."""
+        return self._floor.low(poses)
 
     def candidates(self, poses: WindowPoses) -> NearSpheres:
         """The collision candidates, in these poses and others that are not far away."""
@@ -106,16 +106,15 @@ class Terms:
         posture: Posture,
         candidates: NearSpheres,
         floor_scale: Float[np.ndarray, "T"] | None = None,
-        depth: Float[np.ndarray, "T S"] | None = None,
+        low: Low | None = None,
     ) -> tuple[Float[np.ndarray, "T D D"], Float[np.ndarray, "T D"]]:
         """H and g of the normal equations `H step = -g`, each frame for itself. `poses` are those
         of `q`, `candidates` those of poses near these; `floor_scale` multiplies the weight of
-        the floor, and `depth` is how deep all is in it, where that is known."""
+        the floor, and `low` is what is near it, where that is known."""
         scale = np.ones(len(q)) if floor_scale is None else floor_scale
-        depth = self._floor.depth(poses) if depth is None else depth
         rows = [
             self._points.rows(poses, asked),
-            self._floor.rows(poses, depth, scale),
+            self._floor.rows(poses, low or self._floor.low(poses), scale),
             self._collisions.rows(poses, candidates),
         ]
         J, residuals = stacked([part for part in rows if part is not None], poses.twists)

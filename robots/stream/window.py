@@ -70,18 +70,18 @@ class Window:
         candidates = terms.candidates(poses.at(slice(-1, None)))
         asked = terms.asked(targets, foot_targets, resting)
         self._coupling.follow(targets.com[-1] - targets.com[-2])
-        depth, steps = terms.depth_in_floor(poses), self._steps(q)
+        low, steps = terms.low(poses), self._steps(q)
         overspeed = np.abs(self._coupling.overspeed(steps[-free:])).max(axis=1)
-        sinking = depth.max(axis=1, initial=-np.inf)
+        sinking = low.depth.max(axis=1, initial=-np.inf)
         self._firmness.move_on(
             np.maximum(sinking / self._max_sinking, overspeed / self._max_overspeed)
         )
         for k in range(_MAX_ITER):
             if k:
                 poses = terms.poses(q[-free:], with_mass=True)
-                depth, steps = terms.depth_in_floor(poses), self._steps(q)
+                low, steps = terms.low(poses), self._steps(q)
             scale = self._firmness.scale
-            H, g = terms.linearize(q[-free:], poses, asked, posture, candidates, scale, depth)
+            H, g = terms.linearize(q[-free:], poses, asked, posture, candidates, scale, low)
             whole = self._whole(H)
             self._couple(q, steps, poses, H, g, whole)
             q, length = self._moved(q, whole, g, _DAMPING)
