@@ -15,8 +15,10 @@ from jaxtyping import Float
 from spark.errors import ConventionError
 from spark.kinematics import end_positions, forward
 from spark.motion import Motion
+from spark.skeleton import Skeleton
 
-Up = Literal["x", "y", "z"]
+Up = Literal["x", "y", "z", "-x", "-y", "-z"]
+"""The axis that points up; with a minus one that points down, as a camera's y does."""
 UPS: tuple[Up, ...] = get_args(Up)
 
 # Metres in a unit. CMU's is 1/0.45 of an inch, from the scale line of its ASF files.
@@ -35,6 +37,10 @@ _CLOSE = 0.6  # the second is more than half as likely
 
 # The mean direction from feet to body this near to an axis tells that axis.
 _CLEARLY = 0.75
+
+# Of that evidence's weight where no name says foot. Hind legs, too, carry a trunk ahead of them.
+_BY_BUILD = 0.5
+_ALIKE = 0.1  # of a leg's length, that another's may differ by
 _STEADIER = 1.5  # a floor along an axis moves no more than this many times that of another
 _STEADY = 0.01  # of the body's height: a floor that moves less is steady
 
@@ -54,7 +60,7 @@ class Convention:
     """How a file's numbers are meant: metres in its unit, and its axis that points up.
 
     Internal X, Y, Z are the file's Z, X, Y where Y is up, its Y, Z, X where X is up, and its own
-    where Z is up.
+    where Z is up. Where the axis points down, that is turned over about Y.
     """
 
     unit_m: float
@@ -62,9 +68,19 @@ class Convention:
 
     @property
     def axes(self) -> list[int]:
-        """The file's axes that become internal X, Y, Z: `internal = file[..., axes]`."""
-        up = UPS.index(self.up)
+        """The file's axes that become internal X, Y, Z: `internal = signs * file[..., axes]`."""
+        up = axis_of(self.up)
         return [(up + 1) % 3, (up + 2) % 3, up]
+
+    @property
+    def signs(self) -> Float[np.ndarray, "3"]:
+        """-1 where an internal axis points against the file's, else 1."""
+        return np.array([-1.0, 1.0, -1.0] if points_down(self.up) else [1.0, 1.0, 1.0])
+
+    @property
+    def to_internal(self) -> Float[np.ndarray, "3 3"]:
+        """The matrix from vectors of the file to vectors [m] in internal axes."""
+        return self.signs[:, None] * np.eye(3)[self.axes] * self.unit_m
 
     @property
     def unit(self) -> str:
@@ -73,13 +89,38 @@ class Convention:
 
     def from_file(self, vectors: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
         """Vectors [m] in internal axes from vectors as a file has them."""
-        return vectors[..., self.axes] * self.unit_m
+        return vectors[..., self.axes] * (self.signs * self.unit_m)
 
     def to_file(self, vectors: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n 3"]:
         """Vectors [m] in internal axes as a file has them, rounded to 1e-8 m."""
         in_file = np.empty_like(vectors)
-        in_file[..., self.axes] = vectors / self.unit_m
+        in_file[..., self.axes] = vectors / (self.signs * self.unit_m)
         return np.round(in_file, round(8 + float(np.log10(self.unit_m)))) + 0.0  # no "-0.0"
+
+    def turns_from_file(self, q: Float[np.ndarray, "*n 4"]) -> Float[np.ndarray, "*n 4"]:
+        """Quaternions in internal axes from quaternions as a file has them."""
+        turned = q[..., [0, *(1 + axis for axis in self.axes)]]
+        if points_down(self.up):
+            turned[..., 1:] *= self.signs
+        return turned
+
+    def turns_to_file(self, q: Float[np.ndarray, "*n 4"]) -> Float[np.ndarray, "*n 4"]:
+        """Quaternions in internal axes as a file has them."""
+        in_file = np.empty_like(q)
+        in_file[..., [0, *(1 + axis for axis in self.axes)]] = q
+        if points_down(self.up):
+            in_file[..., [1 + axis for axis in self.axes]] *= self.signs
+        return in_file
+
+
+def axis_of(up: Up) -> int:
+    """0 for x, 1 for y, 2 for z, whether it points up or down."""
+    return UPS.index(up) % 3
+
+
+def points_down(up: Up) -> bool:
+    """Whether the axis has a minus."""
+    return up.startswith("-")
 
 
 def given_unit(unit: str | float) -> float:
@@ -101,7 +142,9 @@ def given_up(up: str) -> Up:
     for axis in UPS:
         if axis == up.lower():
             return axis
-    raise ConventionError(f"up axis {up!r} is not known; expected one of {', '.join(UPS)}")
+    raise ConventionError(
+        f"up axis {up!r} is not known; expected one of {', '.join(UPS)} (as --up=-y)"
+    )
 
 
 def infer_unit(motion: Motion) -> tuple[float, tuple[str, ...]]:
@@ -143,25 +186,35 @@ def infer_up(motion: Motion) -> tuple[Up, tuple[str, ...]]:
     rest = skeleton.rest_positions[None]
     points = np.concatenate([positions, end_positions(skeleton, positions, world)], axis=1)
     size = max(float(np.max(np.median(np.ptp(points, axis=1), axis=0))), 1e-300)
-    floor = np.median(np.min(points, axis=1), axis=0) / size
+    floors = np.concatenate([points.min(axis=1), points.max(axis=1)], axis=1)
+    floor = np.median(floors, axis=0) / size
 
-    standing = above_feet(motion, positions)
-    # Log-probabilities. X-up files hardly exist; bodies that lie down and odd rest poses do, but
-    # seldom straight along an axis all the time: hence the cubes. Some stand on their heads.
-    chances = np.array([-4.0, 0.0, -1.0])
-    chances += np.where(standing > 0, 5.0, -2.0) * standing**3
-    chances += 2.5 * above_feet(motion, rest) ** 3
+    standing, resting = (_both_ways(above_feet(motion, each)) for each in (positions, rest))
+    named = any(map(_is_foot, skeleton.names))
+    # Log-probabilities, of axes that point up and of those that point down. X-up files hardly
+    # exist; bodies that lie down and odd rest poses do, but seldom straight along an axis all the
+    # time: hence the cubes. Some stand on their heads.
+    chances = np.array([-4.0, 0.0, -1.0, -7.0, -3.0, -4.0])
+    seen = np.where(standing > 0, 5.0, -2.0) * standing**3 + 2.5 * resting**3
+    chances += seen if named else _BY_BUILD * seen
     chances += 2.0 * (np.abs(floor) < 0.03)
     best, second = np.argsort(-chances)[:2].tolist()
     up = UPS[best]
     notes = [f"up axis {up}, along which the body stands"]
-    if not standing.any():
-        notes = [f"up axis {up}, a guess: no joint is named as a foot; check, and give --up"]
+    if not named:
+        how = "a guess by the body's build" if standing.any() else "a guess"
+        notes = [f"up axis {up}, {how}: no joint is named as a foot; check, and give --up"]
     elif chances[best] - chances[second] < _CLOSE:
         notes = [f"up axis {up}, a guess: {UPS[second]} is nearly as likely; check, and give --up"]
     elif standing[best] < -0.5:
         notes.append(f"the body is upside down along {up}; check, and give --up")
+    if points_down(up):
+        notes.append(f"the file's {up[1:]} axis points down, as a camera's does: turned over")
     return up, tuple(notes)
+
+
+def _both_ways(up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "6"]:
+    return np.concatenate([up, -up])
 
 
 def standing_axis(motion: Motion, usual: Up) -> tuple[Up, bool, str]:
@@ -185,13 +238,44 @@ def standing_axis(motion: Motion, usual: Up) -> tuple[Up, bool, str]:
 
 
 def above_feet(motion: Motion, positions: Float[np.ndarray, "T J 3"]) -> Float[np.ndarray, "3"]:
-    """The mean direction from the feet to the rest of the body; zero where no name says foot."""
-    feet = np.array([bool(_FEET.search(name)) for name in motion.skeleton.names])
+    """The mean direction from the feet to the rest of the body; where no name says foot, from the
+    tips of its legs as it is built. Zero where these are not told either."""
+    feet = np.array([_is_foot(name) for name in motion.skeleton.names])
+    if not feet.any():
+        feet[_tips_beside_trunk(motion.skeleton)] = True
     if feet.all() or not feet.any():
         return np.zeros(3)
     up = positions[:, ~feet].mean(axis=1) - positions[:, feet].mean(axis=1)
     lengths = np.linalg.norm(up, axis=-1, keepdims=True)
     return (up / np.where(lengths > 0, lengths, 1.0)).mean(axis=0)
+
+
+def _is_foot(name: str) -> bool:
+    return bool(_FEET.search(name))
+
+
+def _tips_beside_trunk(skeleton: Skeleton) -> list[int]:
+    """The tips of the legs, by build alone: where the tree first branches, the trunk is the branch
+    with the most tips, and legs are two that are alike, or one that carries both."""
+    joint = 0
+    while len(skeleton.children[joint]) == 1:
+        joint = skeleton.children[joint][0]
+    branches = [skeleton.subtree(child) for child in skeleton.children[joint]]
+    tips = [[j for j in branch if not skeleton.children[j]] for branch in branches]
+    bones = np.linalg.norm(skeleton.offsets, axis=-1)
+    sizes = [(len(t), float(bones[[*b]].sum())) for t, b in zip(tips, branches, strict=True)]
+    legs = sorted(range(len(sizes)), key=lambda k: sizes[k])[:-1]
+
+    def alike(a: int, b: int) -> bool:
+        (count, length), (other_count, other) = sizes[a], sizes[b]
+        return count == other_count and abs(length - other) < _ALIKE * length
+
+    return [
+        tip
+        for k in legs
+        if len(tips[k]) > 1 or any(alike(k, other) for other in legs if other != k)
+        for tip in tips[k]
+    ]
 
 
 def _stature(motion: Motion) -> tuple[float, str]:

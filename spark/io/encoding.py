@@ -83,8 +83,7 @@ def _encode_rotations(
     worst = np.zeros(len(bvh.joints))
     for block in blocks(len(motion)):
         rotations = motion.picked(block).rotations
-        in_file = np.empty_like(rotations)
-        in_file[..., [0, *(1 + axis for axis in convention.axes)]] = rotations
+        in_file = convention.turns_to_file(rotations)
         lost = quat_angle(quat_identity(in_file), in_file)
         for order, (members, columns) in bvh.rotation_channels.items():
             angles = angles_of(in_file[:, members], order)

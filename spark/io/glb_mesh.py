@@ -31,7 +31,7 @@ def add_skin(
     """Add a skin's numbers to a file, and its nodes to those of the skeleton's joints; the rest of
     the JSON. `convention` is that of the skin's file."""
     # From the file's world into glTF's.
-    axes = places((np.eye(3)[convention.axes] * convention.unit_m).T).T
+    axes = places(convention.to_internal.T).T
     rest = {name: axes @ place for name, place in skin.rest.items()}
     bones = _Bones(skeleton, nodes)
     materials = _Materials(file)

@@ -11,9 +11,9 @@ from jaxtyping import Float
 
 from spark.errors import ConventionError, FileFormatError, name_list
 from spark.io.convention import (
-    UPS,
     Convention,
     above_feet,
+    axis_of,
     given_unit,
     given_up,
     infer_unit,
@@ -177,7 +177,8 @@ def _in_si(
     else:
         axis, more = infer_up(seen)
         notes += more
-        down = bool(above_feet(seen, positions)[UPS.index(axis)] < _UPSIDE_DOWN and axis != "x")
+        upward = above_feet(seen, positions)[axis_of(axis)]
+        down = bool(upward < _UPSIDE_DOWN and axis in ("y", "z"))
     if down:
         notes.append(f"the file's {axis} axis points down, as a camera's does: turned over")
         positions = positions * [1.0, -1.0, -1.0]

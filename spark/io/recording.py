@@ -60,10 +60,10 @@ def read_recording(
 ) -> Recording:
     """The recording in the BVH file at `path`.
 
-    `unit` (a name of `spark.io.convention.UNITS` or metres) and `up` (x, y or z) are inferred where
-    not given; `fps` replaces the Frame Time. A file without frames gives one frame of its rest
-    pose. Raises `FileFormatError` as `read_bvh` does, and `ConventionError` where a convention
-    isn't known or can't be inferred.
+    `unit` (a name of `spark.io.convention.UNITS` or metres) and `up` (one of its `UPS`) are
+    inferred where not given; `fps` replaces the Frame Time. A file without frames gives one frame
+    of its rest pose. Raises `FileFormatError` as `read_bvh` does, and `ConventionError` where a
+    convention isn't known or can't be inferred.
     """
     unit_m = None if unit is None else given_unit(unit)
     up_axis = None if up is None else given_up(up)
@@ -215,15 +215,17 @@ def in_si(motion: Motion, convention: Convention) -> Motion:
             end_offsets=convention.from_file(skeleton.end_offsets),
         ),
         root_pos=convention.from_file(motion.root_pos),
-        rotations=_turned(motion.rotations, [0, *(1 + axis for axis in convention.axes)]),
+        rotations=_turned(motion.rotations, convention),
         translations=None if translations is None else convention.from_file(translations),
     )
 
 
-def _turned(rotations: Float[np.ndarray, "T J 4"], order: list[int]) -> Float[np.ndarray, "T J 4"]:
+def _turned(
+    rotations: Float[np.ndarray, "T J 4"], convention: Convention
+) -> Float[np.ndarray, "T J 4"]:
     out = np.empty_like(rotations)
     for block in blocks(len(rotations)):
-        out[block] = rotations[block][..., order]
+        out[block] = convention.turns_from_file(rotations[block])
     return out
 
 

@@ -41,7 +41,7 @@ def skin_of(
     `rest` has where each joint of the recording is at rest, its topmost joint first, in the file's
     units and axes. Faces of which a vertex hangs on nothing are left out.
     """
-    axes = np.eye(3)[convention.axes] * convention.unit_m
+    axes = convention.to_internal
     order = {name: k for k, name in enumerate(rest)}
     bones: dict[tuple[str, bytes], int] = {}
     binds: list[Float[np.ndarray, "3 4"]] = []

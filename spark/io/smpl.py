@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from spark.io.arrays import read_npy, read_npz
-from spark.io.convention import UPS, Up, given_up, standing_axis
+from spark.io.convention import UPS, Up, axis_of, given_up, points_down, standing_axis
 from spark.io.foreign import foreign_recording
 from spark.io.recording import Recording
 from spark.io.smpl_body import Body, mean_body, read_body_model
@@ -34,7 +34,6 @@ _HEIGHT_RANGE = (1.3, 2.2)  # [m] of adults
 
 _LOWEST = 5  # [%] of the frames' lowest points: the floor
 
-_FLIP = np.array([0.0, 1.0, 0.0, 0.0])  # half a turn about x
 _BALLS = ("left_foot", "right_foot")
 _ANKLES = ("left_ankle", "right_ankle")
 
@@ -79,7 +78,8 @@ def read_smpl(
     if up is None:
         axis, downward, why_up = standing_axis(motion, said.usual_up)
     else:
-        axis, downward, why_up = given_up(up), False, "as given"
+        given = given_up(up)
+        axis, downward, why_up = UPS[axis_of(given)], points_down(given), "as given"
     if body_model is None:
         scale = _scale(motion, UPS.index(axis))
         if scale is not None:
@@ -92,7 +92,7 @@ def read_smpl(
     notes.append(f"metres, up axis {axis}, {why_up}")
     if downward:
         notes.append(f"the file's {axis} axis points down, as a camera's does: turned over")
-        motion = _turned_over(motion)
+        motion = _turned_over(motion, "z" if axis == "x" else "x")
     if said.trans is None:
         notes.append("no positions: the hips are moved so that the lower foot stands")
         motion = walked(motion, _joints(motion, _ANKLES + _BALLS), UPS.index(axis))
@@ -107,12 +107,14 @@ def _motion(said: SmplMotion, body: Body, frame_time: float) -> Motion:
     return Motion(body.skeleton, frame_time, trans + body.pelvis, quat_from_rotvec(said.rotvecs))
 
 
-def _turned_over(motion: Motion) -> Motion:
-    """Half a turn about x."""
-    root = quat_mul(np.broadcast_to(_FLIP, motion.rotations[:, :1].shape), motion.rotations[:, :1])
+def _turned_over(motion: Motion, about: Up) -> Motion:
+    """Half a turn about an axis."""
+    along = np.eye(3)[UPS.index(about)]
+    half_turn = np.broadcast_to([0.0, *along], motion.rotations[:, :1].shape)
+    root = quat_mul(half_turn, motion.rotations[:, :1])
     return replace(
         motion,
-        root_pos=motion.root_pos * [1.0, -1.0, -1.0],
+        root_pos=motion.root_pos * (2 * along - 1),
         rotations=np.concatenate([root, motion.rotations[:, 1:]], axis=1),
     )
 

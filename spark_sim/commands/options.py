@@ -26,7 +26,10 @@ def add_corrections(parser: ArgumentParser, file: str, prefix: str = "") -> None
         help="m, dm, cm, mm, inch, cmu (5.644 cm), or metres as a number",
     )
     group.add_argument(
-        f"--{prefix}up", dest=f"{dest}up", metavar="AXIS", help="the axis that points up: x, y or z"
+        f"--{prefix}up",
+        dest=f"{dest}up",
+        metavar="AXIS",
+        help=f"the axis that points up: x, y or z; --{prefix}up=-y where y points down",
     )
     group.add_argument(
         f"--{prefix}map",

@@ -1,5 +1,6 @@
 """Unit and up axis: inferred from what a file holds, or given."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from spark.errors import ConventionError
 from spark.io.bvh import Bvh, BvhJoint, write_bvh
 from spark.io.convention import UNITS
-from spark.io.encoding import encode_new
+from spark.io.encoding import encode, encode_new
 from spark.io.recording import read_recording
 from spark.kinematics import forward
 from spark.motion import Motion
@@ -164,3 +165,60 @@ def test_unknown_units_are_refused(tmp_path: Path, unit: str | float) -> None:
 def test_unknown_axes_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ConventionError, match="expected one of x, y, z"):
         read_recording(tmp_path / "never read", up="w")
+
+
+def _turned(bvh: Bvh, turn: Rotation) -> Bvh:
+    """The same file in turned axes: rest pose and motion."""
+
+    def vector(v: np.ndarray) -> tuple[float, float, float]:
+        x, y, z = turn.apply(v).tolist()
+        return x, y, z
+
+    joints = tuple(
+        replace(j, offset=vector(j.offset), ends=tuple(map(vector, j.ends))) for j in bvh.joints
+    )
+    values = bvh.values.copy()
+    values[:, :3] = turn.apply(values[:, :3])
+    for columns in range(3, values.shape[1], 3):
+        own = Rotation.from_euler("ZXY", values[:, columns : columns + 3], degrees=True)
+        values[:, columns : columns + 3] = zxy(turn * own * turn.inv())
+    return Bvh(joints, bvh.frame_time, values)
+
+
+@pytest.mark.parametrize("named", [True, False])
+@pytest.mark.parametrize("up", ["y", "z", "-y", "-z"])
+def test_an_axis_may_point_down(tmp_path: Path, up: str, named: bool) -> None:
+    """As a camera's y does: the body stands, and is written back as it was."""
+    turns = np.array([[10.0, -5.0, 30.0], [0.0, 4.0, 35.0], [-8.0, 2.0, 44.0]])
+    upright = human("y", turns=turns, root=(1.3, 2.2, 1.9))  # on no floor at zero
+    goal = np.eye(3)["xyz".index(up[-1])] * (-1 if up.startswith("-") else 1)
+    turn = (
+        Rotation.align_vectors([goal, [1.0, 0, 0]], [[0, 1.0, 0], [0, 0, 1.0]])[0]
+        if (up[-1] == "z")
+        else Rotation.from_euler("X", 180 if up == "-y" else 0, degrees=True)
+    )
+    bvh = _turned(upright, turn)
+    if not named:
+        bvh = replace(bvh, joints=tuple(replace(j, name=f"b{i}") for i, j in enumerate(bvh.joints)))
+        if up == "-z":
+            return  # by its build alone that is told from a body on its back in a y-up file
+    found = read_recording(save(bvh, tmp_path))
+    assert (found.convention.up, found.convention.unit) == (up, "cm")
+    assert any("points down" in note for note in found.notes) == up.startswith("-")
+    known = read_recording(save(upright, tmp_path), up="y").motion
+    (expected, _), (positions, _) = forward(known), forward(found.motion)
+    np.testing.assert_allclose(positions[..., 2], expected[..., 2], atol=1e-6)
+    spans = [np.linalg.norm(p[:, :, None] - p[:, None], axis=-1) for p in (positions, expected)]
+    np.testing.assert_allclose(*spans, atol=1e-6)
+    across = [np.cross(p[:, 8] - p[:, 12], p[:, 3] - p[:, 0]) for p in (positions, expected)]
+    ahead = [
+        np.sum(a * (p[:, 11] - p[:, 10]), -1)
+        for a, p in zip(across, (positions, expected), strict=True)
+    ]
+    np.testing.assert_allclose(*ahead, atol=1e-6)  # not mirrored
+    back, lost = encode(found.motion, found)
+    assert lost == ()
+    np.testing.assert_allclose(back.values[:, :3], found.bvh.values[:, :3], atol=1e-5)
+    np.testing.assert_allclose(
+        np.sin(np.radians(back.values[:, 3:] - found.bvh.values[:, 3:])), 0, atol=1e-6
+    )
