@@ -19,7 +19,7 @@ from spark.errors import FileFormatError, SkeletonError
 from spark.files import write_atomically
 from spark.finite import check_output
 from spark.io.bvh_rows import parse_motion
-from spark.io.charset import to_utf8
+from spark.io.charset import to_utf8, without_utf16
 from spark.io.scanner import Scanner, shown
 from spark.opening import read_bytes
 from spark.summary import counted, time_span
@@ -32,6 +32,9 @@ _MAX_JOINTS = 10_000  # the largest rigs, with faces and clothes, have a thousan
 _MAX_DEPTH = 512  # joints above a joint: no creature has as many, a deeper tree is a broken file
 
 _NAME = re.compile(r"[^\s{}]([^\r\n{}]*[^\s{}])?", re.ASCII)
+
+_POINT = re.compile(rb"(?<!\S)[-+]?\d*\.\d")
+_COMMA = re.compile(rb"(?<!\S)([-+]?\d+),(\d+(?:[eE][-+]?\d+)?)(?!\S)")
 
 _CHANNEL_OF = {name.lower().encode(): name for name in CHANNELS}
 
@@ -125,22 +128,24 @@ class Bvh:
         return groups
 
 
-def read_bvh(path: str | Path) -> Bvh:
+def read_bvh(path: str | Path, *, frame_time: float | None = None) -> Bvh:
     """The file at `path`, exactly: writing it and reading it again gives equal values.
 
     Takes tabs, any line ends, a byte order mark, keywords in any case, names with any characters
-    but braces (UTF-8, else Shift-JIS, else Latin-1), rows wrapped over several lines, and no frames
-    at all. Mends whole rows that are missing or too many, and OFFSETs of six numbers. Raises
+    but braces (UTF-8 or 16, else Shift-JIS, else Latin-1), rows wrapped over several lines, and no
+    frames at all. Mends whole rows that are missing or too many, OFFSETs of six numbers, decimal
+    commas, and a single frame that lasts no time. `frame_time` [s] replaces the file's. Raises
     `FileFormatError` with the line for anything else; memory goes with the size of the file, not
     with what it claims.
     """
     path = Path(path)
     data, encoding = to_utf8(_read(path))
+    data, commas = _with_points(data)
     scanner = Scanner(path, data)
     joints, repairs = _parse_hierarchy(scanner)
     channels = sum(len(joint.channels) for joint in joints)
-    frame_time, values, mended = parse_motion(scanner, channels)
-    return Bvh(joints, frame_time, values, path, encoding, repairs + mended)
+    frame_time, values, mended = parse_motion(scanner, channels, frame_time)
+    return Bvh(joints, frame_time, values, path, encoding, commas + repairs + mended)
 
 
 def write_bvh(bvh: Bvh, path: str | Path) -> None:
@@ -193,7 +198,7 @@ def _hierarchy_lines(joints: tuple[BvhJoint, ...]) -> list[str]:
 
 
 def _read(path: Path) -> bytes:
-    data = read_bytes(path, expected="a BVH file")
+    data = without_utf16(read_bytes(path, expected="a BVH file"))
     start = data[:4096]
     if re.match(rb"(\xef\xbb\xbf)?\s*HIERARCHY", start, re.IGNORECASE):
         return data
@@ -202,6 +207,14 @@ def _read(path: Path) -> bytes:
     raise FileFormatError(
         path, 1, f"starts with {shown(start.split()[0])}; a BVH file starts with HIERARCHY"
     )
+
+
+def _with_points(data: bytes) -> tuple[bytes, tuple[str, ...]]:
+    """The text with points for decimal commas, as programs write them in half of the world's
+    languages, where no number has a point; and a note."""
+    if b"," not in data or _POINT.search(data) or not _COMMA.search(data):
+        return data, ()
+    return _COMMA.sub(rb"\1.\2", data), ("numbers have decimal commas: read as points",)
 
 
 def _parse_hierarchy(scanner: Scanner) -> tuple[tuple[BvhJoint, ...], tuple[str, ...]]:

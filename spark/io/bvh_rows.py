@@ -22,12 +22,13 @@ _LEAST_SHARE = 0.5
 
 
 def parse_motion(
-    scanner: Scanner, channels: int
+    scanner: Scanner, channels: int, given: float | None = None
 ) -> tuple[float, Float[np.ndarray, "T C"], tuple[str, ...]]:
     """The frame time [s] and the rows, from the keyword MOTION on, and notes on what was mended.
 
     Rows of `channels` values each that are not as many as `Frames:` says are taken as they are,
-    down to half of them. Raises `FileFormatError` with the line for anything else.
+    down to half of them. A frame time that is `given` replaces the file's. Raises
+    `FileFormatError` with the line for anything else.
     """
     word = scanner.word()
     if word.lower() == b"root":
@@ -45,12 +46,21 @@ def parse_motion(
     frames = scanner.count("Frames")
     scanner.expect_label("Frame", "Time")
     frame_time = scanner.number("Frame Time")
-    if frame_time < _MIN_FRAME_TIME:
-        scanner.fail(f"Frame Time is {frame_time:g}; expected seconds a frame, such as 0.0333333")
+    notes: tuple[str, ...] = ()
+    if given is not None:
+        frame_time = given
+    elif frame_time < _MIN_FRAME_TIME and frames > 1:
+        scanner.fail(
+            f"Frame Time is {frame_time:g}; expected seconds a frame, such as 0.0333333; or give "
+            "--fps"
+        )
+    elif frame_time < _MIN_FRAME_TIME:
+        notes = (f"Frame Time is {frame_time:g}; a single frame needs none: read as 1/30 s",)
+        frame_time = 1 / 30
     text, start = scanner.data, scanner.end
     values = _parse_rows(text, start, frames, channels)
     if values is not None:
-        return frame_time, values, ()
+        return frame_time, values, notes
     lines = sum(
         not line.isspace()
         for at, stop in _blocks(text, start)
@@ -62,7 +72,7 @@ def parse_motion(
     if values is None:
         _diagnose(scanner, frames, channels)
     note = f"Frames: says {frames}, but {counted(lines, 'row')} of values follow: those are read"
-    return frame_time, values, (note,)
+    return frame_time, values, (*notes, note)
 
 
 # Bytes that a table of numbers may hold; those up to the space stand between them.

@@ -1,9 +1,21 @@
 """The characters of a file whose format does not say in which encoding its names are written."""
 
+import codecs
 import re
 import unicodedata
 
 _JAPANESE = ("CJK", "HIRAGANA", "KATAKANA", "FULLWIDTH", "HALFWIDTH KATAKANA", "IDEOGRAPHIC")
+
+
+def without_utf16(data: bytes) -> bytes:
+    """The bytes of a text as UTF-8 where a byte order mark says that they are UTF-16, as Windows'
+    shells and editors write them."""
+    if not data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data
+    try:
+        return data.decode("utf-16").encode()
+    except UnicodeError:
+        return data
 
 
 def to_utf8(data: bytes) -> tuple[bytes, str]:

@@ -67,9 +67,7 @@ def read_recording(
     """
     unit_m = None if unit is None else given_unit(unit)
     up_axis = None if up is None else given_up(up)
-    bvh = read_bvh(path)
-    if fps is not None:
-        bvh = replace(bvh, frame_time=1 / fps)
+    bvh = read_bvh(path, frame_time=None if fps is None else 1 / fps)
     try:
         check_frame_time(bvh.frame_time, "Frame Time")
     except ConventionError as error:

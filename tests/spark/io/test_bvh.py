@@ -187,6 +187,36 @@ def test_a_rig_may_have_no_frames(tmp_path: Path) -> None:
     assert_same(read_bvh(tmp_path / "b.bvh"), bvh)
 
 
+def test_decimal_commas_are_points(tmp_path: Path) -> None:
+    """Where no number has a point: else it is no decimal comma, and refused (below)."""
+    found = read_text(tmp_path, SMALL.replace(".", ",").replace("LeftFoot", "foot.01.L"))
+    assert "decimal commas" in " ".join(found.repairs)
+    assert_same(found, read_text(tmp_path, swap("LeftFoot", "foot.01.L")))
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_utf_16_reads_as_utf_8(tmp_path: Path, encoding: str) -> None:
+    text = SMALL.replace("Head", "頭")
+    marked = text if encoding == "utf-16" else "\ufeff" + text
+    assert_same(read_text(tmp_path, marked.encode(encoding)), read_text(tmp_path, text))
+
+
+@pytest.mark.parametrize("frames", [0, 1])
+def test_a_single_frame_needs_no_frame_time(tmp_path: Path, frames: int) -> None:
+    lines = SMALL_LINES[: 27 + frames]
+    lines[25:27] = [f"Frames: {frames}", "Frame Time: 0"]
+    found = read_text(tmp_path, "\n".join(lines) + "\n")
+    assert (len(found), found.frame_time) == (frames, 1 / 30)
+    assert "Frame Time is 0" in " ".join(found.repairs)
+
+
+@pytest.mark.parametrize("wrong", ["0", "-1", "30"])
+def test_a_given_frame_time_replaces_a_wrong_one(tmp_path: Path, wrong: str) -> None:
+    bvh = read_text(tmp_path, SMALL)
+    (tmp_path / "a.bvh").write_text(swap("0.0333", wrong))
+    assert_same(read_bvh(tmp_path / "a.bvh", frame_time=0.0333), bvh)
+
+
 # What is refused, where, and with which words
 
 MALFORMED = {
