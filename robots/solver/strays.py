@@ -1,8 +1,9 @@
 """Frames in which a source, or one of its joints, jumps away and back are passed over.
 
-A T-pose that a converter put before the clip, a marker that was lost, a thigh that turns the long
-way round for three frames: the solver's motions are smooth, so a pose that nothing leads to would
-bend all around it. So are frames that a recorder dropped and filled with the last one that it had.
+A T-pose that a converter put before the clip, for a frame or a second, a marker that was lost, a
+thigh that turns the long way round for three frames: the solver's motions are smooth, so a pose
+that nothing leads to would bend all around it. So are frames that a recorder dropped and filled
+with the last one that it had.
 """
 
 from collections.abc import Callable
@@ -38,29 +39,37 @@ def without_strays(source: CanonicalMotion) -> tuple[CanonicalMotion, tuple[str,
     between its neighbours, or, at an end of the motion, by the only one; and notes that say where.
     What jumps in half of the frames or more is left as it is, and so are jumps to where the motion
     goes on."""
-    moving, dropped = _without_repeats(source)
-    whole, note = _without_stray_frames(moving)
+    repeats = _repeats(source)
+    moving, dropped = _without_repeats(source, repeats)
+    whole, note = _without_stray_frames(moving, repeats)
     joints, notes = _without_stray_joints(whole)
     return joints, (*dropped, *note, *notes)
 
 
-def _without_repeats(source: CanonicalMotion) -> tuple[CanonicalMotion, tuple[str, ...]]:
+def _repeats(source: CanonicalMotion) -> Bool[np.ndarray, "T"]:
+    """Whether a frame is that before it."""
+
     def same(block: slice) -> Bool[np.ndarray, "N"]:
-        """Whether a frame is that before it."""
         part = source.picked(slice(max(block.start - 1, 0), block.stop))
         turned = np.abs(np.diff(part.rotations, axis=0)).max(axis=(1, 2), initial=0.0)
         moved = np.abs(np.diff(part.hips, axis=0)).max(axis=1, initial=0.0)
         own = np.maximum(turned, moved) < _SAME
         return own if block.start else np.append(False, own)
 
-    repeats = in_blocks(same, len(source))
+    return in_blocks(same, len(source))
+
+
+def _without_repeats(
+    source: CanonicalMotion, repeats: Bool[np.ndarray, "T"]
+) -> tuple[CanonicalMotion, tuple[str, ...]]:
+    dropped = repeats.copy()
     for start, stop in true_runs(repeats):
         short = start > 1 and stop < len(source) and stop - start <= _DROP_TIME / source.frame_time
-        repeats[start:stop] = short and _way(source, stop) > _LEAST_CATCH_UP
-    if not repeats.any():
+        dropped[start:stop] = short and _way(source, stop) > _LEAST_CATCH_UP
+    if not dropped.any():
         return source, ()
-    note = f"the source repeats its last frame, as where frames were dropped,{_in(repeats)}"
-    return _passed_over(source, repeats), (note,)
+    note = f"the source repeats its last frame, as where frames were dropped,{_in(dropped)}"
+    return _passed_over(source, dropped), (note,)
 
 
 def _way(source: CanonicalMotion, frame: int) -> float:
@@ -74,8 +83,10 @@ def _passed_over(source: CanonicalMotion, frames: Bool[np.ndarray, "T"]) -> Cano
     return replace(source, rotations=rotations, hips=_bridged(frames, source.hips, values_at))
 
 
-def _without_stray_frames(source: CanonicalMotion) -> tuple[CanonicalMotion, tuple[str, ...]]:
-    stray = _strays(_jumps(source), source.frame_time)
+def _without_stray_frames(
+    source: CanonicalMotion, repeats: Bool[np.ndarray, "T"]
+) -> tuple[CanonicalMotion, tuple[str, ...]]:
+    stray = _strays(_jumps(source), source.frame_time, repeats)
     if not stray.any():
         return source, ()
     note = f"the source jumps away from all other frames, as in a T-pose before a clip{_in(stray)}"
@@ -142,15 +153,22 @@ def _jumps(source: CanonicalMotion) -> Bool[np.ndarray, "T"]:
     return in_blocks(far, count)
 
 
-def _strays(jumps: Bool[np.ndarray, "T"], frame_time: float) -> Bool[np.ndarray, "T"]:
-    """The frames in short pieces between two jumps, or between one and an end."""
+def _strays(
+    jumps: Bool[np.ndarray, "T"],
+    frame_time: float,
+    repeats: Bool[np.ndarray, "T"] | None = None,
+) -> Bool[np.ndarray, "T"]:
+    """The frames in short pieces between two jumps, or between one and an end; there in pieces of
+    any length that `repeats` tells to stand still: a pose that was put before a clip."""
     stray = np.zeros(len(jumps), dtype=bool)
     edges = np.flatnonzero(jumps).tolist()
     if not edges:
         return stray
     most = max(1, int(_STRAY_TIME / frame_time + 1e-6))
     for start, stop in pairwise([0, *edges, len(jumps)]):
-        stray[start:stop] = stop - start <= most
+        at_end = start == 0 or stop == len(jumps)
+        still = at_end and repeats is not None and bool(repeats[start + 1 : stop].all())
+        stray[start:stop] = stop - start <= most or still
     return stray & (2 * stray.sum() < len(stray))
 
 

@@ -57,6 +57,20 @@ def test_a_tpose_in_the_clip_is_passed_over(frames: list[int]) -> None:
     assert "T-pose" in notes[0]
 
 
+@pytest.mark.parametrize("first", [True, False])
+def test_a_tpose_that_is_held_at_an_end_is_passed_over(first: bool) -> None:
+    """It stands as still as no body does, for however long, and nothing leads to it."""
+    count = len(WALK) // 2 - 1
+    frames = list(range(count) if first else range(len(WALK) - count, len(WALK)))
+    held = with_tpose(frames)
+    held.hips[frames] = held.hips[frames[0]]
+    found, (note,) = without_strays(held)
+    assert f"a T-pose before a clip in {count} frames" in note
+    nearest = count if first else len(WALK) - count - 1
+    expected = WALK.rotations[[nearest] * count]
+    assert quat_angle(found.rotations[frames], expected).max() < 1e-6
+
+
 def test_frames_that_were_dropped_are_passed_over() -> None:
     seen = np.arange(len(WALK))
     seen[20:24], seen[40] = 19, 39
