@@ -196,6 +196,7 @@ def infer_up(motion: Motion) -> tuple[Up, tuple[str, ...]]:
     # time: hence the cubes. Some stand on their heads.
     chances = np.array([-4.0, 0.0, -1.0, -7.0, -3.0, -4.0])
     seen = np.where(standing > 0, 5.0, -2.0) * standing**3 + 2.5 * resting**3
+    seen[3:] *= standing[3:] > 0  # rest poses alone, which may be collapsed, turn nothing over
     chances += seen if named else _BY_BUILD * seen
     chances += 2.0 * (np.abs(floor) < 0.03)
     best, second = np.argsort(-chances)[:2].tolist()

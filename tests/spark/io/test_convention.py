@@ -130,6 +130,26 @@ def test_a_body_that_lies_on_the_floor_does_not_turn_the_world(
     assert found.convention.up == "y"
 
 
+@pytest.mark.parametrize("frames", [0, 1, 3])
+def test_a_collapsed_rest_pose_turns_nothing_over(tmp_path: Path, frames: int) -> None:
+    """Legs point up at rest, as every bone, and may do so in a tenth of the frames."""
+    bvh = human("y", turns=np.zeros((30, 3)))
+    legs = [j for j, joint in enumerate(bvh.joints) if joint.name.endswith("UpLeg")]
+    below = [j for j, joint in enumerate(bvh.joints) if joint.parent in legs]
+    below += [j for j, joint in enumerate(bvh.joints) if joint.parent in below]
+    joints = tuple(
+        replace(joint, offset=(joint.offset[0], -joint.offset[1], joint.offset[2]))
+        if j in below
+        else joint
+        for j, joint in enumerate(bvh.joints)
+    )
+    values = bvh.values.copy()
+    values[frames:, [4 + 3 * j for j in legs]] = 180.0  # about x
+    found = read_recording(save(Bvh(joints, 0.1, values), tmp_path))
+    assert found.convention.up == "y"
+    assert not any("as likely" in note for note in found.notes)
+
+
 def test_what_cannot_be_known_is_called_a_guess(tmp_path: Path) -> None:
     bvh = human()
     joints = tuple(BvhJoint(f"b{j}", *_rest(joint)) for j, joint in enumerate(bvh.joints))
