@@ -48,7 +48,7 @@ class Reference:
 def reference_of(motion: Motion, roles: RoleMap) -> Reference:
     """The rest pose where it is one that bodies are built in. Where it is none, or a moment of a
     movement, the mean pose over the frames; on a square rig rounded to right angles, with straight
-    fingers."""
+    fingers, and joints that have no role and keep still as they are."""
     skeleton = motion.skeleton
     rest = RigPose(skeleton, roles, quat_identity(np.zeros((len(skeleton), 1))))
     why = _odds(rest) if _stands(rest) else "is not a pose"
@@ -64,8 +64,9 @@ def reference_of(motion: Motion, roles: RoleMap) -> Reference:
     local = mean_rotations(motion.rotations)
     if square:
         turned = nearest_right_angle(local)
+        built = quat_angle(motion.rotations, local).max(axis=0) < _STILL  # a hip joint's slant
         for j, role in enumerate(roles.roles):
-            if role not in GROUP_OF:
+            if role not in GROUP_OF and not (role is None and built[j]):
                 local[j] = turned[j]
         for hand in (j for role in _HANDS for j in roles.joints(role)):
             local[list(skeleton.subtree(hand)[1:])] = rest.local[0]

@@ -18,6 +18,7 @@ from spark.rig.tpose import find_tpose
 from spark.rotation import (
     quat_about,
     quat_angle,
+    quat_between,
     quat_conj,
     quat_from_rotvec,
     quat_mul,
@@ -170,6 +171,22 @@ def test_recorded_bodies_without_a_rest_pose_keep_their_twists(path: object) -> 
     motion = read_recording(str(path)).motion
     rig = understand(motion)
     axes = along_x(rig, (1, 3))
+    tpose, _ = find_tpose(rerig(motion, axes), rig.roles)
+    assert_near(rig, tpose, quat_mul(rig.tpose, axes))
+
+
+@pytest.mark.parametrize("path", recordings("cmu_asf/cmu_02_0[15].bvh"))
+def test_hip_joints_that_slant_are_as_they_were_built(path: object) -> None:
+    """A joint without a role, between pelvis and thigh, has its axes along its own bone, which is
+    at no right angle to anything: at rest both legs and the trunk lie in one line."""
+    motion = read_recording(str(path)).motion
+    rig = understand(motion)
+    axes = along_x(rig, (1, 3))
+    positions = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
+    for name, child in (("lhipjoint", "lfemur"), ("rhipjoint", "rfemur")):
+        j, below = (rig.skeleton.names.index(n) for n in (name, child))
+        bone = quat_between(np.array([1.0, 0, 0]), positions[below] - positions[j])
+        axes[j] = quat_mul(quat_conj(rig.tpose[j]), bone)
     tpose, _ = find_tpose(rerig(motion, axes), rig.roles)
     assert_near(rig, tpose, quat_mul(rig.tpose, axes))
 
