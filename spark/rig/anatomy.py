@@ -9,7 +9,7 @@ from spark.errors import SkeletonError
 from spark.rig.facing import LabelledPair, SideEvidence, first_is_left, stands_on_four
 from spark.rig.limb_roles import ARM, LEG, label_limb
 from spark.rig.measurements import Measurements, rest_measurements
-from spark.rig.name_hints import NameHint
+from spark.rig.name_hints import NameHint, split_name
 from spark.rig.topology import LimbPair, mirrored_pairs, named_pair
 from spark.rig.trunk import find_pelvis, find_trunk
 from spark.skeleton import Skeleton
@@ -55,7 +55,7 @@ def find_anatomy(
     if legs is None:
         legs = _legs_by_shape(measured, hints, pairs, arms)
     if legs is None:
-        raise NoLegsError(_no_legs(skeleton, hints, arms))
+        raise NoLegsError(_no_legs(skeleton, arms))
     others = _others(measured, skeleton, pairs, legs)
     if arms is None and others:
         arms = max(others, key=lambda pair: measured.reach[pair.first[0]])
@@ -158,10 +158,10 @@ def _called_arm(hints: Sequence[NameHint], chain: Sequence[int]) -> bool:
     return said >= _ARM_NAMES and not front and not parts.keys() & set(LEG)
 
 
-def _no_legs(skeleton: Skeleton, hints: Sequence[NameHint], arms: LimbPair | None) -> str:
+def _no_legs(skeleton: Skeleton, arms: LimbPair | None) -> str:
     if len(skeleton) < 7:
         what = f"{len(skeleton)} joints are too few for a body with two legs and a trunk"
-    elif any("fin" in name.lower() and hints[j].aside for j, name in enumerate(skeleton.names)):
+    elif any({"fin", "fins"} & {*split_name(name)} for name in skeleton.names):
         what = "it has fins and no legs"
     elif arms is not None:
         what = "it has arms but no pair of legs"

@@ -26,11 +26,13 @@ def test_other_bodies_are_refused_with_the_reason(path: Path) -> None:
     assert "map file" in str(caught.value)
 
 
-def test_arms_without_legs_are_refused() -> None:
+@pytest.mark.parametrize("fingers", ["", "> {Left}HandFingers -"])
+def test_arms_without_legs_are_refused(fingers: str) -> None:
+    """And fingers are no fins."""
     skeleton, _ = build(
-        """
+        f"""
         Spine S > Spine1 S > Neck N > Head H
-        Spine1 > {Left}Shoulder C > {Left}Arm U > {Left}ForeArm F > {Left}Hand W
+        Spine1 > {{Left}}Shoulder C > {{Left}}Arm U > {{Left}}ForeArm F > {{Left}}Hand W {fingers}
         """
     )
     with pytest.raises(SkeletonError, match="arms but no pair of legs"):
