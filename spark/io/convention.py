@@ -244,9 +244,11 @@ def above_feet(motion: Motion, positions: Float[np.ndarray, "T J 3"]) -> Float[n
     feet = np.array([_is_foot(name) for name in motion.skeleton.names])
     if not feet.any():
         feet[_tips_beside_trunk(motion.skeleton)] = True
-    if feet.all() or not feet.any():
+    body = ~feet
+    body[_above_body(motion.skeleton)] = False
+    if not body.any() or not feet.any():
         return np.zeros(3)
-    up = positions[:, ~feet].mean(axis=1) - positions[:, feet].mean(axis=1)
+    up = positions[:, body].mean(axis=1) - positions[:, feet].mean(axis=1)
     lengths = np.linalg.norm(up, axis=-1, keepdims=True)
     return (up / np.where(lengths > 0, lengths, 1.0)).mean(axis=0)
 
@@ -255,12 +257,20 @@ def _is_foot(name: str) -> bool:
     return bool(_FEET.search(name))
 
 
+def _above_body(skeleton: Skeleton) -> list[int]:
+    """The joints above the one where the tree first branches, from the root on: a scene's and a
+    reference's, which stay behind while the body moves. None where it does not branch."""
+    chain = [0]
+    while len(skeleton.children[chain[-1]]) == 1:
+        chain.append(skeleton.children[chain[-1]][0])
+    return chain[:-1] if skeleton.children[chain[-1]] else []
+
+
 def _tips_beside_trunk(skeleton: Skeleton) -> list[int]:
     """The tips of the legs, by build alone: where the tree first branches, the trunk is the branch
     with the most tips, and legs are two that are alike, or one that carries both."""
-    joint = 0
-    while len(skeleton.children[joint]) == 1:
-        joint = skeleton.children[joint][0]
+    above = _above_body(skeleton)
+    joint = skeleton.children[above[-1]][0] if above else 0
     branches = [skeleton.subtree(child) for child in skeleton.children[joint]]
     tips = [[j for j in branch if not skeleton.children[j]] for branch in branches]
     bones = np.linalg.norm(skeleton.offsets, axis=-1)
@@ -290,6 +300,7 @@ def _stature(motion: Motion) -> tuple[float, str]:
     children = np.arange(1, len(skeleton))
     spans = positions[:, children] - positions[:, skeleton.parents[children]]
     bones[1:] = np.median(np.linalg.norm(spans, axis=-1), axis=0)
+    bones[[skeleton.children[above][0] for above in _above_body(skeleton)]] = 0.0
 
     head = next((j for j, name in enumerate(skeleton.names) if _HEAD.search(name)), None)
     feet = [j for j, name in enumerate(skeleton.names) if _FEET.search(name)]

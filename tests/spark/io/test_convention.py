@@ -91,6 +91,28 @@ def test_a_foot_on_a_single_bone_shows_the_height_all_the_same(tmp_path: Path) -
     assert "from its head to its feet: 1.6" in found.notes[0]
 
 
+@pytest.mark.parametrize("named", [True, False])
+@pytest.mark.parametrize("away", [0.0, 12.0, 500.0])
+def test_a_body_far_from_its_reference_shows_unit_and_axis(
+    tmp_path: Path, away: float, named: bool
+) -> None:
+    """The way from a joint that stays at the origin to the hips is no bone of the body."""
+    bvh = human("z")
+    joints = tuple(
+        replace(j, name=j.name if named else f"b{i}", parent=j.parent + 1)
+        for i, j in enumerate(bvh.joints)
+    )
+    reference = BvhJoint("Reference", -1, (0.0, 0.0, 0.0), ("Zrotation",))
+    values = np.insert(bvh.values, 0, 0.0, axis=1)
+    values[:, 1:4] += np.array([away, -away, 1.0]) / 0.01
+    found = read_recording(save(Bvh((reference, *joints), 0.1, values), tmp_path))
+    alone = read_recording(
+        save(replace(bvh, joints=tuple(replace(j, parent=j.parent - 1) for j in joints)), tmp_path)
+    )
+    assert (found.convention.unit, found.convention.up) == ("cm", "z")
+    assert found.notes[0] == alone.notes[0]
+
+
 def test_a_size_between_two_units_is_pointed_out(tmp_path: Path) -> None:
     found = read_recording(save(human("y", 0.0375), tmp_path))
     assert {found.convention.unit, "inch"} == {"cmu", "inch"}
