@@ -22,8 +22,9 @@ _SECOND_DIFFERENCE = (1.0, -2.0, 1.0)
 class NormalEquations:
     """The normal equations `H step = -g` of weighted residuals r, a frame each, being summed up.
 
-    H = J'J [T D D] and g = J'r [T D], J the Jacobian of r by the dofs; `cost` = r'r / 2 [T]. With
-    `with_jacobian` False only the cost is summed, and H and g are empty.
+    H = J'J [T D D] and g = J'r [T D], J the Jacobian of r by the dofs; `cost` = r'r / 2 [T]. Of H
+    the upper triangle says all; nothing else of it is read. With `with_jacobian` False only the
+    cost is summed, and H and g are empty.
     """
 
     def __init__(self, frames: int, dofs: int, with_jacobian: bool = True) -> None:
@@ -44,11 +45,12 @@ class NormalEquations:
             return
         H = J @ J.transpose(0, 2, 1)
         g = (J @ residuals.T[:, :, None])[:, :, 0]
-        runs = _runs(dofs)
-        for here, there in runs:
+        slices = runs(dofs)
+        for here, there in slices:
             self.g[:, there] += g[:, here]
-            for here2, there2 in runs:
-                self.H[:, there, there2] += H[:, here, here2]
+            for here2, there2 in slices:
+                if there2.start >= there.start:
+                    self.H[:, there, there2] += H[:, here, here2]
 
     def add_moved(
         self,
@@ -63,11 +65,19 @@ class NormalEquations:
         them, the sums of w w' (`squares`) and w r. What they cost is added by who knows them."""
         H = twists @ squares @ twists.transpose(0, 2, 1)
         g = (twists @ sums[:, :, None])[:, :, 0]
-        runs = _runs(dofs)
-        for here, there in runs:
+        slices = runs(dofs)
+        for here, there in slices:
             self.g[frames, there] += g[:, here]
-            for here2, there2 in runs:
-                self.H[frames, there, there2] += H[:, here, here2]
+            for here2, there2 in slices:
+                if there2.start >= there.start:
+                    self.H[frames, there, there2] += H[:, here, here2]
+
+    def add_products(
+        self, products: Float[np.ndarray, "D D T"], gradient: Float[np.ndarray, "D T"]
+    ) -> None:
+        """To H and g, what others summed up."""
+        self.H += products.transpose(2, 0, 1)
+        self.g += gradient.T
 
     def add_diagonal(
         self, J: Float[np.ndarray, "T D"], residuals: Float[np.ndarray, "T D"]
@@ -111,7 +121,8 @@ class NormalEquations:
     def solve_per_frame(self, damping: float) -> Float[np.ndarray, "T D"]:
         """The Gauss-Newton step of each frame for itself; `damping` is added to H's diagonal."""
         D = self.g.shape[1]
-        return -np.linalg.solve(self.H + damping * np.eye(D), self.g[..., None])[..., 0]
+        H = np.triu(self.H) + np.triu(self.H, 1).transpose(0, 2, 1) + damping * np.eye(D)
+        return -np.linalg.solve(H, self.g[..., None])[..., 0]
 
     def solve_coupled(
         self,
@@ -242,7 +253,7 @@ class PointAcceleration:
         return np.einsum("tdx,tx->td", self.J, differences)
 
 
-def _runs(dofs: Sequence[int]) -> list[tuple[slice, slice]]:
+def runs(dofs: Sequence[int]) -> list[tuple[slice, slice]]:
     """Dofs that follow each other, as slices of the list and of what it indexes."""
     breaks = np.flatnonzero(np.diff(dofs) != 1) + 1
     edges = [0, *breaks.tolist(), len(dofs)]

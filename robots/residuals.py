@@ -55,6 +55,16 @@ def rotation_residual(
     return jacobian, residual * weight
 
 
+def turning_axes(
+    poses: LinkPoses, chain: tuple[int, ...], *, base: bool
+) -> Float[np.ndarray, "C 3 T"]:
+    """The axes of a chain of joints and, with `base`, the base's three before them."""
+    axes = poses.angular_jacobian(chain)
+    if not base:
+        return axes
+    return np.concatenate([np.broadcast_to(np.eye(3)[:, :, None], (3, *axes.shape[1:])), axes])
+
+
 def point_jacobian(
     poses: LinkPoses,
     chain: tuple[int, ...],
@@ -92,9 +102,7 @@ def twists(
     A point p then moves along a unit vector n as the twist's product with the wrench
     ((p - about) x n, n) says (Lynch and Park, "Modern Robotics", ch. 3).
     """
-    axes = poses.angular_jacobian(chain)
-    if base:
-        axes = np.concatenate([np.broadcast_to(np.eye(3)[:, :, None], (3, *about.shape)), axes])
+    axes = turning_axes(poses, chain, base=base)
     shifts = point_jacobian(poses, chain, axes, about, base=base)
     out = np.zeros((about.shape[1], len(shifts), 6))
     out[:, len(shifts) - len(axes) :, :3] = axes.transpose(2, 0, 1)

@@ -6,14 +6,14 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from robots.least_squares import NormalEquations
 from robots.model.hull import hull
 from robots.model.morphology import Morphology
 from robots.model.rims import rim
-from robots.residuals import one_sided, twists
+from robots.residuals import one_sided
 from robots.solver.block import Block, blocks_of
 from robots.solver.hulls import shapes_of
-from robots.tree import ROOT, LinkPoses, forward_kinematics
+from robots.solver.link_terms import LinkTerms
+from robots.tree import LinkPoses, forward_kinematics
 from spark.rig.feet import Sole
 
 _FOOT_HEIGHT = 0.02  # [m] above the sole, below which a shape is part of the foot
@@ -119,40 +119,29 @@ def sole_paths(robot: Morphology, poses: LinkPoses, sole: Sole) -> Float[np.ndar
 
 def add_floor(
     robot: Morphology,
-    poses: LinkPoses,
-    block: Block,
-    normal: NormalEquations,
+    terms: LinkTerms,
     weight: Float[np.ndarray, "T"],
     rounding: Float[np.ndarray, "T"],
 ) -> None:
     """r = w one_sided(radius - z) of the spheres of each shape that the block has to lift: w [1/m]
     is `weight`; it sets in over `rounding` [m]."""
-    for shape in _lifted_solids(robot, block):
-        frames = np.flatnonzero(shape.bottom(poses) < FELT * rounding)
+    for shape in _lifted_solids(robot, terms.block):
+        frames = np.flatnonzero(shape.bottom(terms.poses) < FELT * rounding)
         if not len(frames):
             continue
-        low = poses.at(frames, {shape.link})
+        low = terms.poses.at(frames, {shape.link})
         depth = shape.radii[:, None] - low.heights(shape.link, shape.spheres)
         felt = depth > -FELT * rounding[frames]
-        touching = felt.any(axis=0)
-        frames, depth, felt = frames[touching], depth[:, touching], felt[:, touching]
-        sunk, slope = one_sided(depth, rounding[frames])
-        residuals = np.where(felt, weight[frames] * sunk, 0.0)
-        normal.cost[frames] += 0.5 * (residuals**2).sum(0)
-        if not (normal.with_jacobian and len(frames)):
+        which, touching = felt.any(axis=1), felt.any(axis=0)
+        frames, depth, felt = frames[touching], depth[which][:, touching], felt[which][:, touching]
+        if not len(frames):
             continue
-        joints = block.free_joints(shape.link)
-        above = robot.tree.parents[list(joints)].tolist()
-        near = poses.at(frames, {ROOT, shape.link, *joints, *above})
-        # A push down at the end of an arm (x, y): (-y, x, 0) is the arm's product with (0, 0, -1).
-        x, y = (shape.spheres - robot.tree.anchor(shape.link)) @ near.rotations[shape.link][:2]
-        down = np.where(felt, weight[frames] * slope, 0.0)
-        wrenches = np.zeros((len(frames), 6, len(shape.spheres)))
-        wrenches[:, 0], wrenches[:, 1], wrenches[:, 5] = (-y * down).T, (x * down).T, -down.T
-        moved = twists(near, joints, near.positions[shape.link], base=block.base)
-        squares = wrenches @ wrenches.transpose(0, 2, 1)
-        sums = (wrenches @ residuals.T[:, :, None])[:, :, 0]
-        normal.add_moved(frames, block.local_dofs(joints), moved, squares, sums)
+        sunk, slope = one_sided(depth, rounding[frames])
+        arms = shape.spheres[which] - robot.tree.anchor(shape.link)
+        places = arms @ low.rotations[shape.link][:2][:, :, touching]
+        places += low.positions[shape.link][:2, None, touching]
+        firm = np.where(felt, weight[frames], 0.0)
+        terms.add_heights(shape.link, places, firm * sunk, -firm * slope, frames)
 
 
 def depth_in_floor(robot: Morphology, poses: LinkPoses, block: Block) -> Float[np.ndarray, "T"]:

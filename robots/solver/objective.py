@@ -10,20 +10,14 @@ from jaxtyping import Float
 
 from robots.least_squares import NormalEquations
 from robots.model.morphology import Morphology
-from robots.residuals import (
-    Linearized,
-    direction_residual,
-    limit_residual,
-    one_sided,
-    point_jacobian,
-    rotation_residual,
-)
+from robots.residuals import limit_residual, one_sided, point_jacobian, turning_axes
 from robots.solver.block import Block
 from robots.solver.candidates import Candidate
 from robots.solver.collision import collisions_of
 from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.floor import add_floor
 from robots.solver.holds import Holds
+from robots.solver.link_terms import LinkTerms
 from robots.solver.targets import Targets
 from robots.solver.weights import (
     FLOOR_ROUNDING,
@@ -45,73 +39,8 @@ from robots.solver.weights import (
     W_TPOSE,
     per_metre,
 )
-from robots.tree import Coordinates, LinkPoses, forward_kinematics
+from robots.tree import ROOT, Coordinates, LinkPoses, forward_kinematics
 from spark.rig.roles import Role
-from spark.rotation import matrix_from_quat
-
-
-class ChainTerms:
-    """The residuals of one chain of links, and their Jacobian by the block's dofs on it, collected
-    to be added to the normal equations in one product.
-
-    With `with_jacobian` False only the residuals count: then no dof is looked at.
-    """
-
-    def __init__(self, block: Block, poses: LinkPoses, link: int, with_jacobian: bool) -> None:
-        self.block, self.poses, self.link = block, poses, link
-        self.base = block.base and with_jacobian
-        self.joints = block.free_joints(link) if with_jacobian else ()
-        self.axes = poses.angular_jacobian(self.joints)
-        if self.base:
-            self.axes = np.concatenate([_base_axes(poses), self.axes])
-        self.parts: list[tuple[int, Linearized]] = []
-
-    def axes_of(self, link: int) -> Float[np.ndarray, "C 3 T"]:
-        """The angular Jacobian of a link of the chain: its free dofs' axes, the base's first."""
-        kept = len(self.poses.tree.dofs(self._joints_above(link)))
-        return self.axes[: kept + (3 if self.base else 0)]
-
-    def add_rotational(self, term: Linearized) -> None:
-        """Residuals of a direction or a rotation, made with `axes_of`."""
-        self.parts.append((3 if self.base else 0, term))  # the base's shifts turn nothing
-
-    def add_point(
-        self,
-        link: int,
-        point: Float[np.ndarray, "3 T"],
-        target: Float[np.ndarray, "3 T"],
-        weight: Float[np.ndarray, "3 T"],
-    ) -> None:
-        """A link's point p [m] should be at p*: r = w (p - p*), the weight [1/m] by axis."""
-        self.parts.append((0, (self.jacobian_of(link, point) * weight, (point - target) * weight)))
-
-    def jacobian_of(self, link: int, point: Float[np.ndarray, "3 T"]) -> Float[np.ndarray, "C 3 T"]:
-        """That of a link's point p [m], by the free dofs of `dofs_of`."""
-        chain, axes = self._joints_above(link), self.axes_of(link)
-        return point_jacobian(self.poses, chain, axes, point, base=self.base)
-
-    def dofs_of(self, link: int) -> list[int]:
-        """The block's free dofs that move a link of the chain, the base's first."""
-        joints = self._joints_above(link)
-        return self.block.local_dofs(joints) if self.base or joints else []
-
-    def add_to(self, normal: NormalEquations) -> None:
-        """Into the block's normal equations."""
-        if not self.parts:
-            return
-        residuals = np.concatenate([residual for _, (_, residual) in self.parts])
-        dofs = self.dofs_of(self.link)
-        J = np.zeros((residuals.shape[1], len(dofs), len(residuals)))
-        row = 0
-        for start, (jacobian, residual) in self.parts:
-            M = len(residual)
-            J[:, start : start + len(jacobian), row : row + M] = jacobian.transpose(2, 0, 1)
-            row += M
-        normal.add(dofs, J, residuals)
-
-    def _joints_above(self, link: int) -> tuple[int, ...]:
-        chain = self.poses.tree.chain(link)
-        return tuple(j for j in self.joints if j in chain)
 
 
 def linearize(
@@ -140,32 +69,26 @@ def linearize(
     poses = forward_kinematics(tree, q)
     normal = NormalEquations(len(q), len(block.dofs), with_jacobian)
     penalty_scale = np.ones(len(q)) if penalty_scale is None else penalty_scale
-    chains = {link: ChainTerms(block, poses, link, with_jacobian) for link in _ends(robot, block)}
+    terms, reached = LinkTerms(poses, block, normal), _reached(robot, block)
     chest = rig.chest
     for j, role in enumerate(rig.roles.roles):
         link = int(robot.links[j])
-        terms = _chain_of(chains, robot, link)
-        if role is None or terms is None:
+        if role is None or link not in reached:
             continue
         own = j == 0 or link != robot.links[int(rig.skeleton.parents[j])]
         if own and (link in block.joints or (block.base and (link < 0 or j == rig.pelvis))):
-            _add_pose(robot, targets, poses, terms, j, role)
+            _add_pose(robot, targets, terms, j, role)
         if j == chest and (block.base or link in block.joints):
-            wanted = np.moveaxis(matrix_from_quat(targets.chest), 0, -1)
-            terms.add_rotational(
-                rotation_residual(
-                    poses.rotations[link], wanted, terms.axes_of(link), W_ROTATION["chest"]
-                )
-            )
-    _add_holds(robot, holds, poses, chains, block)
+            terms.add_rotation(link, targets.chest_turn, W_ROTATION["chest"])
+    _add_holds(robot, holds, terms, reached)
     if block.base:
-        _add_hips_and_soles(robot, targets, poses, chains, penalty_scale)
+        _add_hips_and_soles(robot, targets, terms, penalty_scale)
     if targets.hands is not None:
-        _add_hands(robot, targets, poses, chains, block, normal)
-    for terms in chains.values():
-        terms.add_to(normal)
+        _add_hands(robot, targets, poses, block, normal)
     firm = per_metre(robot) * penalty_scale
-    add_floor(robot, poses, block, normal, W_FLOOR * firm, FLOOR_ROUNDING / firm)
+    add_floor(robot, terms, W_FLOOR * firm, FLOOR_ROUNDING / firm)
+    if with_jacobian:
+        terms.add_to_normal()
     weight = per_metre(robot) * (W_LEG_COLLISION if block.base else W_COLLISION)
     if exact:
         exact_contacts_of(robot).add_to(
@@ -199,38 +122,19 @@ def _add_followers(
             normal.add(dofs, J[:, free, None], residual[None])
 
 
-def _base_axes(poses: LinkPoses) -> Float[np.ndarray, "3 3 T"]:
-    return np.broadcast_to(np.eye(3)[:, :, None], (3, 3, poses.positions.shape[2]))
+def _reached(robot: Morphology, block: Block) -> set[int]:
+    """The links that the block's chains lead through, the base among them."""
+    return {ROOT}.union(*(robot.tree.chain(joint) for joint in block.joints))
 
 
-def _ends(robot: Morphology, block: Block) -> list[int]:
-    """The last links of the block's chains; the base where it has none."""
-    joints = set(block.joints)
-    inner = {int(robot.tree.parents[j]) for j in joints}
-    ends = [j for j in block.joints if j not in inner]
-    return ends or ([-1] if block.base else [])
-
-
-def _chain_of(chains: dict[int, ChainTerms], robot: Morphology, link: int) -> ChainTerms | None:
-    """The first chain that the link lies on."""
-    for end, terms in chains.items():
-        if link < 0 or link in robot.tree.chain(end):
-            return terms
-    return None
-
-
-def _add_pose(
-    robot: Morphology, targets: Targets, poses: LinkPoses, terms: ChainTerms, j: int, role: Role
-) -> None:
+def _add_pose(robot: Morphology, targets: Targets, terms: LinkTerms, j: int, role: Role) -> None:
     """The rotation of joint j's part, and the direction of its bone where it is a limb's."""
     link = int(robot.links[j])
-    axes = terms.axes_of(link)
-    wanted = np.moveaxis(matrix_from_quat(targets.world[:, j]), 0, -1)
     weight = W_ROTATION.get(role.part, W_OTHER_ROTATION) + W_PALM * targets.palms.get(role, 0.0)
-    terms.add_rotational(rotation_residual(poses.rotations[link], wanted, axes, weight))
+    terms.add_rotation(link, targets.turns[j], weight)
     if role in targets.bones and (bone := robot.bones.get(role)) is not None:
-        now = poses.direction(link, bone)
-        terms.add_rotational(direction_residual(now, targets.bones[role].T, axes, W_LIMB_DIRECTION))
+        now = terms.poses.direction(link, bone)
+        terms.add_direction(link, now, targets.bones[role].T, W_LIMB_DIRECTION)
 
 
 def _moves_alone(block: Block, link: int) -> bool:
@@ -238,14 +142,11 @@ def _moves_alone(block: Block, link: int) -> bool:
     return block.frees(link) if block.base else bool(block.free_joints(link))
 
 
-def _add_holds(
-    robot: Morphology, holds: Holds, poses: LinkPoses, chains: dict[int, ChainTerms], block: Block
-) -> None:
+def _add_holds(robot: Morphology, holds: Holds, terms: LinkTerms, reached: set[int]) -> None:
     """Each point that is held, where the block alone moves it: r = `W_HOLD` share (p - p*)."""
     for p, link in enumerate(holds.links.tolist()):
-        terms = _chain_of(chains, robot, link) if _moves_alone(block, link) else None
-        if terms is not None:
-            point = poses.point(link, holds.points[p])
+        if link in reached and _moves_alone(terms.block, link):
+            point = terms.poses.point(link, holds.points[p])
             weight = per_metre(robot) * W_HOLD[:, None] * holds.shares[p]
             terms.add_point(link, point, holds.positions[p], weight)
 
@@ -253,8 +154,7 @@ def _add_holds(
 def _add_hips_and_soles(
     robot: Morphology,
     targets: Targets,
-    poses: LinkPoses,
-    chains: dict[int, ChainTerms],
+    terms: LinkTerms,
     penalty_scale: Float[np.ndarray, "T"],
 ) -> None:
     """The middle of the hips on its path; the corners of the soles above the floor.
@@ -263,27 +163,21 @@ def _add_hips_and_soles(
     """
     count, firm = len(targets), per_metre(robot) * penalty_scale
     pelvis = int(robot.links[robot.rig.pelvis])
-    terms = _chain_of(chains, robot, pelvis)
-    assert terms is not None
     middle = robot.centers[robot.rig.hips].mean(0)
     path = np.repeat(per_metre(robot) * W_HIPS_POSITION[:, None], count, axis=1)
-    terms.add_point(pelvis, poses.point(pelvis, middle), targets.hips.T, path)
+    terms.add_point(pelvis, terms.poses.point(pelvis, middle), targets.hips.T, path)
     for sole in robot.soles:
         for link, rest in zip(*robot.sole_points(sole), strict=True):
-            foot_terms = _chain_of(chains, robot, int(link))
-            assert foot_terms is not None
-            point = poses.point(int(link), rest)
-            # As a point's residual: its weight is dr/dz, its distance what makes the product r.
-            depth, slope = one_sided(-point[2], FLOOR_ROUNDING / firm)
-            up = np.stack([np.zeros(count), np.zeros(count), -W_FLOOR * firm * slope])
-            foot_terms.add_point(int(link), point, point + depth / np.maximum(slope, 1e-9), up)
+            point = terms.poses.point(int(link), rest)
+            depth, slope = one_sided(-point[2:], FLOOR_ROUNDING / firm)
+            weight = W_FLOOR * firm
+            terms.add_heights(int(link), point[:2, None], weight * depth, -weight * slope)
 
 
 def _add_hands(
     robot: Morphology,
     targets: Targets,
     poses: LinkPoses,
-    chains: dict[int, ChainTerms],
     block: Block,
     normal: NormalEquations,
 ) -> None:
@@ -298,12 +192,14 @@ def _add_hands(
     dofs: list[int] = []
     for sign, j in zip((1.0, -1.0), hands, strict=True):
         link = int(robot.links[j])
-        terms = _chain_of(chains, robot, link) if _moves_alone(block, link) else None
-        if terms is None:
+        if not _moves_alone(block, link):
             return
         position = poses.point(link, robot.centers[j])
-        dofs += terms.dofs_of(link)
-        parts.append(sign * terms.jacobian_of(link, position) * weight)
+        joints = block.free_joints(link)
+        dofs += block.local_dofs(joints)
+        axes = turning_axes(poses, joints, base=block.base)
+        jacobian = point_jacobian(poses, joints, axes, position, base=block.base)
+        parts.append(sign * jacobian * weight)
         positions.append(position)
     residual = (positions[0] - positions[1] - targets.hands.T) * weight
     J = np.ascontiguousarray(np.concatenate(parts).transpose(2, 0, 1))

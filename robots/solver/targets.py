@@ -1,6 +1,7 @@
 """What a robot is asked to do: the source's pose, path and contacts in the robot's own measures."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -16,7 +17,7 @@ from spark.blocks import blocks
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
-from spark.rotation import quat_mul, quat_rotate
+from spark.rotation import matrix_from_quat, quat_mul, quat_rotate
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
@@ -77,6 +78,16 @@ class Targets:
 
     def __len__(self) -> int:
         return len(self.hips)
+
+    @cached_property
+    def turns(self) -> Float[np.ndarray, "J 3 3 T"]:
+        """`world` as matrices."""
+        return np.ascontiguousarray(np.moveaxis(matrix_from_quat(self.world), 0, -1))
+
+    @cached_property
+    def chest_turn(self) -> Float[np.ndarray, "3 3 T"]:
+        """`chest` as matrices."""
+        return np.ascontiguousarray(np.moveaxis(matrix_from_quat(self.chest), 0, -1))
 
     def every(self, stride: int) -> "Targets":
         """Those of every `stride`-th frame."""

@@ -113,7 +113,8 @@ def test_pushes_say_how_far_points_yield(tree: Tree, q: Coordinates) -> None:
         np.einsum("tmk,kt->tm", wrenches, residuals),
     )
     normal.add_moved(np.arange(FRAMES), dofs, moved, squares, sums)
-    np.testing.assert_allclose(normal.H, numeric @ numeric.transpose(0, 2, 1), atol=1e-6)
+    expected = numeric @ numeric.transpose(0, 2, 1)
+    np.testing.assert_allclose(np.triu(normal.H), np.triu(expected), atol=1e-6)
     np.testing.assert_allclose(normal.g, np.einsum("tdk,kt->td", numeric, residuals), atol=1e-6)
 
 

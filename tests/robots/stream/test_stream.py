@@ -132,7 +132,7 @@ def test_the_objective_is_that_of_whole_clips() -> None:
             wanted = linearize(EMBER, targets, both, q, block, near(block))
             at = np.ix_(block.dofs, block.dofs)
             np.testing.assert_allclose(g[block.dofs], wanted.g[t], atol=1e-8)
-            np.testing.assert_allclose(H[at], wanted.H[t], atol=1e-7)
+            np.testing.assert_allclose(np.triu(H[at]), np.triu(wanted.H[t]), atol=1e-7)
 
 
 def test_later_frames_change_nothing(walked: np.ndarray) -> None:
