@@ -17,6 +17,7 @@ from scipy.linalg import solveh_banded
 _HELD = 1e8  # damping that keeps a dof where it is: far above any weight squared
 COUPLED = 2  # an acceleration couples a frame to the next two
 _SECOND_DIFFERENCE = (1.0, -2.0, 1.0)
+_AT_ONCE = 16  # frames whose band fits into a processor's cache
 
 
 class NormalEquations:
@@ -138,10 +139,7 @@ class NormalEquations:
         where the step before would."""
         T, D = self.g.shape
         point = smoothness.point
-        # Column by column, as LAPACK reads it: [t, i, k] couples dof i at t to the k-th one after.
-        band = np.zeros((T, D, (COUPLED + 1) * D if point else COUPLED * D + 1))
-        for i in range(D):
-            band[:, i, : D - i] = self.H[:, i, i:]
+        band = _band(self.H, point)
         weights = smoothness.acceleration_weights**2
         for first, second in combinations_with_replacement(range(COUPLED + 1), 2):
             at = slice(first, first + len(weights))
@@ -157,7 +155,7 @@ class NormalEquations:
             g[:-1] -= squared * smoothness.overspeed
             g[1:] += squared * smoothness.overspeed
         if point:
-            g += point.add_to(band)
+            g += point.gradient
         held = at_limits * g < 0
         diagonal = band[..., 0].copy()
         for k in range(solves):
@@ -233,24 +231,50 @@ class PointAcceleration:
             residual[across], counts[across] = 0.0, False
         return PointAcceleration(self.J, residual, counts)
 
-    def add_to(self, band: Float[np.ndarray, "T D _"]) -> Float[np.ndarray, "T D"]:
-        """Add J'J to the lower band, [t, i, k] for dof i at t and the k-th one after, and give
-        J'r."""
+    @property
+    def ahead(self) -> Float[np.ndarray, "T 3 W"]:
+        """What J is multiplied by to give J'J: the transposed Jacobian of each frame and of the
+        next two, as often as they meet in a residual."""
         T, D = self.J.shape[:2]
         count = len(self.residual)
-        products = np.zeros((COUPLED + 1, T))  # how often frames t and t + m meet in a residual
+        products = np.zeros((COUPLED + 1, T))
         for first, second in combinations_with_replacement(range(COUPLED + 1), 2):
             product = _SECOND_DIFFERENCE[first] * _SECOND_DIFFERENCE[second]
             products[second - first, first : first + count] += product * self.counts
+        out = np.zeros((T, 3, (COUPLED + 1) * D))
         for m in range(COUPLED + 1):
-            here = self.J[: T - m] * products[m, : T - m, None, None]
-            H = here @ self.J[m:].transpose(0, 2, 1)
-            for i in range(D):
-                after = i if m == 0 else 0
-                start = m * D + after - i
-                band[: T - m, i, start : start + D - after] += H[:, i, after:]
-        differences = second_differences_transposed(self.residual, T)
+            later = self.J[m:] * products[m, : T - m, None, None]
+            out[: T - m, :, m * D : (m + 1) * D] = later.transpose(0, 2, 1)
+        return out
+
+    @property
+    def gradient(self) -> Float[np.ndarray, "T D"]:
+        """J'r."""
+        differences = second_differences_transposed(self.residual, len(self.J))
         return np.einsum("tdx,tx->td", self.J, differences)
+
+
+def _band(
+    H: Float[np.ndarray, "T D D"], point: PointAcceleration | None
+) -> Float[np.ndarray, "T D K"]:
+    """The lower band of each frame's H and of what a point's accelerations couple, column by
+    column, as LAPACK reads it: [t, i, k] couples dof i at t to the k-th one after. It has room for
+    what couples a dof to itself in the next two frames."""
+    T, D = H.shape[:2]
+    width = (COUPLED + 1) * D if point else COUPLED * D
+    band = np.zeros((T, D, width + 1))
+    # As each row begins with its own dof, a frame's rows are, in a line, those of a matrix that has
+    # a column less: what couples it to itself and to the frames after.
+    matrices = band.reshape(T, -1)[:, : D * width].reshape(T, D, width)
+    upper, ahead = np.triu(np.ones((D, D))), point.ahead if point else None
+    for start in range(0, T, _AT_ONCE):
+        here = slice(start, start + _AT_ONCE)
+        if point and ahead is not None:
+            np.matmul(point.J[here], ahead[here], out=matrices[here])
+        own = matrices[here, :, :D]
+        own += H[here]
+        own *= upper
+    return band
 
 
 def runs(dofs: Sequence[int]) -> list[tuple[slice, slice]]:
