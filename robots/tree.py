@@ -316,26 +316,30 @@ def _turn(
     out: Float[np.ndarray, "3 3 T"],
 ) -> None:
     """Rotations R after turns about an axis, by Rodrigues' formula: R (1 + sin K + (1 - cos) K²),
-    K the axis' cross product matrix. Of an axis along x, y or z most of it is zero or one."""
+    K the axis' cross product matrix. About x, y or z two columns turn into each other."""
+    along = np.flatnonzero(axis)
+    if len(along) == 1:
+        k = int(along[0])
+        i, j = (k + 1) % 3, (k + 2) % 3
+        sine = sin * axis[k]
+        out[:, k] = above[:, k]
+        np.multiply(above[:, i], cos, out=out[:, i])
+        out[:, i] += above[:, j] * sine
+        np.multiply(above[:, j], cos, out=out[:, j])
+        out[:, j] -= above[:, i] * sine
+        return
     K = skew(axis)
     squared = K @ K
-    still = np.eye(3) + squared
-    for k in range(3):
-        parts = []
-        for i in range(3):
-            if K[i, k] or squared[i, k]:
-                turned = sin * K[i, k]
-                turned -= cos * squared[i, k]
-                turned += still[i, k]
-                parts.append(above[:, i] * turned)
-            elif still[i, k]:
-                parts.append(above[:, i])
-        out[:, k] = sum(parts[1:], parts[0])
+    shares = np.stack([K, -squared, np.eye(3) + squared], axis=2)
+    turned = shares.reshape(9, 3) @ np.stack([sin, cos, np.ones_like(sin)])
+    np.einsum("ijt,jkt->ikt", above, turned.reshape(3, 3, len(sin)), out=out)
 
 
 def _apply(
     rotations: Float[np.ndarray, "3 3 T"], v: Float[np.ndarray, "3 *T"]
 ) -> Float[np.ndarray, "3 T"]:
+    if v.ndim == 1:
+        return v @ rotations
     return rotations[:, 0] * v[0] + rotations[:, 1] * v[1] + rotations[:, 2] * v[2]
 
 
