@@ -36,6 +36,7 @@ _AROUND = 1.0  # [s] before and after such frames that are marched through
 _FREE_SPEED = 3.0  # [rad/s] of a hinge that costs nothing where ways are compared, and what
 _W_TURN = 4.0  # [1/rad] a turn beyond that costs, from frame to frame
 _FIRST_STEPS, _STEPS = 60, 3  # in the first frame, from the T-pose, and in each that follows
+_INTERVAL = 0.1  # [s] between the frames that are marched through; the others follow in one step
 _FIRST_DAMPING, _DAMPING = 0.02, 1e-3  # [1] on the diagonal of the normal equations
 _SMOOTHING = 0.06  # [s] of the way taken: marching stops short of where each frame would be best
 _W_STAY = 0.2  # [1/rad] of how far a hinge turns from frame to frame
@@ -136,13 +137,16 @@ def _marched(
     led: Sequence[tuple[bool, bool]],
 ) -> list[Coordinates]:
     """`q` with the block's joints marched through all spells at once, forth, and back. Those that
-    something has led to their first frame go on from there; others begin at the T-pose."""
+    something has led to their first frame go on from there; others begin at the T-pose. Frames
+    between those that are marched through lie between them, and then take a step for themselves.
+    """
     bones = tuple(_limbs(robot, targets, block))
     terms = _terms_of(robot, bones, targets.hands is not None)
     poses = pose_targets(targets, bones)
     columns, tpose = _qpos_columns(robot, block), robot.to_qpos(robot.tpose)
     qpos = robot.to_qpos(q)
     ways = np.stack([qpos, qpos])
+    stride = max(1, round(_INTERVAL / targets.frame_time))
     # The longest first, so that those that still march are the first ones.
     longest = np.argsort(-spells.sizes, kind="stable")
     sizes = np.repeat(spells.sizes[longest], 2)
@@ -150,32 +154,55 @@ def _marched(
     first = np.repeat(spells.starts[longest], 2) + back * (sizes - 1)
     begun = np.array(led)[longest].ravel()[:, None]
     last = np.where(begun, qpos[first][:, columns], tpose[:, columns])
-    for k in range(sizes[0]):
+    marched = np.zeros(ways.shape[:2], dtype=bool)
+    for k in range(0, sizes[0], stride):
         going = int((sizes > k).sum())
         frames = first[:going] + k * (1 - 2 * back[:going])
         here = qpos[frames]
         here[:, columns] = last[:going]
-        here = _settled(terms, poses.at(frames), here, first=k == 0)
+        here = _settled(
+            terms, poses.at(frames), here, _FIRST_STEPS if k == 0 else _STEPS, led=k > 0
+        )
         last = here[:, columns]
         ways[back[:going], frames] = here
+        marched[back[:going], frames] = True
+    for way, known in zip(ways, marched, strict=True):
+        for own in spells.slices():
+            at = own.start + np.flatnonzero(known[own])
+            others = own.start + np.flatnonzero(~known[own])
+            way[np.ix_(others, columns)] = _between(at, way[np.ix_(at, columns)], others)
+        others = np.flatnonzero(~known)
+        for row in others.tolist():
+            mujoco.mj_normalizeQuat(robot.mjcf.model, way[row])
+        if len(others):
+            way[others] = _settled(terms, poses.at(others), way[others], 1)
     return [robot.from_qpos(way) for way in ways]
+
+
+def _between(
+    at: Int[np.ndarray, "K"], values: Float[np.ndarray, "K n"], frames: Int[np.ndarray, "S"]
+) -> Float[np.ndarray, "S n"]:
+    """Along lines between the values at some frames, and beyond them as at the nearest."""
+    columns = [np.interp(frames, at, column) for column in values.T]
+    return np.stack(columns, axis=1)
 
 
 def _settled(
     terms: Terms,
     targets: PoseTargets,
     begun: Float[np.ndarray, "L nq"],
+    steps: int,
     *,
-    first: bool,
+    led: bool = True,
 ) -> Float[np.ndarray, "L nq"]:
-    """`begun` after Gauss-Newton steps in the block's dofs, each frame for itself and, but in the
-    first, near where it was begun."""
+    """`begun` after Gauss-Newton steps in the block's dofs, each frame for itself and, where
+    something led there, near where it was begun."""
     model = terms.robot.mjcf.model
     moved = terms.mj_dofs
     q, rows = begun.copy(), np.arange(len(begun))  # of those that still move
-    for k in range(_FIRST_STEPS if first else _STEPS):
+    for k in range(steps):
         poses = terms.poses(q[rows])
-        if first or not k:
+        if not led or not k:
             candidates = terms.candidates(poses)
         holds = PointTargets(*np.zeros((2, len(rows), terms.sole_count, 3)))
         asked = terms.asked(targets.at(rows), holds)
@@ -183,12 +210,12 @@ def _settled(
         held = terms.hinges.held(q[rows], g)
         diagonal = np.einsum("tdd->td", H)
         stay, step = np.zeros((2, len(rows), model.nv))
-        if not first:
+        if led:
             for away, row in zip(stay, rows.tolist(), strict=True):
                 mujoco.mj_differentiatePos(model, away, 1.0, begun[row], q[row])
             diagonal += _W_STAY**2
             g += _W_STAY**2 * stay[:, moved]
-        diagonal += np.where(held, _HELD, _FIRST_DAMPING if first else _DAMPING)
+        diagonal += np.where(held, _HELD, _DAMPING if led else _FIRST_DAMPING)
         found = -np.linalg.solve(H, np.where(held, 0.0, g)[..., None])[..., 0]
         length = np.abs(found).max(axis=1, initial=1e-9)
         step[:, moved] = found * np.minimum(1.0, _MAX_STEP / length)[:, None]
