@@ -35,8 +35,9 @@ _MAX_EXCESS = 10.0  # [rad/s²], that is abrupt
 _AROUND = 1.0  # [s] before and after such frames that are marched through
 _FREE_SPEED = 3.0  # [rad/s] of a hinge that costs nothing where ways are compared, and what
 _W_TURN = 4.0  # [1/rad] a turn beyond that costs, from frame to frame
-_FIRST_STEPS, _STEPS = 60, 3  # in the first frame, from the T-pose, and in each that follows
-_INTERVAL = 0.1  # [s] between the frames that are marched through; the others follow in one step
+# In the first frame, from the T-pose, in each that is marched through, and in those between.
+_FIRST_STEPS, _STEPS, _BETWEEN_STEPS = 60, 3, 2
+_INTERVAL = 0.1  # [s] between the frames that are marched through; the others follow together
 _FIRST_DAMPING, _DAMPING = 0.02, 1e-3  # [1] on the diagonal of the normal equations
 _SMOOTHING = 0.06  # [s] of the way taken: marching stops short of where each frame would be best
 _W_STAY = 0.2  # [1/rad] of how far a hinge turns from frame to frame
@@ -139,7 +140,7 @@ def _marched(
 ) -> list[Coordinates]:
     """`q` with the block's joints marched through all spells at once, forth, and back. Those that
     something has led to their first frame go on from there; others begin at the T-pose. Frames
-    between those that are marched through lie between them, and then take a step for themselves.
+    between those that are marched through begin between them, and then take steps for themselves.
     """
     bones = tuple(_limbs(robot, targets, block))
     terms = _terms_of(robot, bones, targets.hands is not None)
@@ -177,7 +178,7 @@ def _marched(
             mujoco.mj_normalizeQuat(robot.mjcf.model, way[row])
         for start in range(0, len(others), _AT_ONCE):
             here = others[start : start + _AT_ONCE]
-            way[here] = _settled(terms, poses.at(here), way[here], 1)
+            way[here] = _settled(terms, poses.at(here), way[here], _BETWEEN_STEPS)
     return [robot.from_qpos(way) for way in ways]
 
 
