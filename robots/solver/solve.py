@@ -39,7 +39,7 @@ share of the frames that may reject that one."""
 
 _TRUNK, _LIMBS = (12, 0.02, 0.1), (10, 0.05, 0.1)
 _WHOLE = (8, 0.05, 0.1)  # both blocks at once, nearly solved one after the other
-_POLISH, _POLISH_WHOLE = (1, 0.0, 1.0), (2, 0.0, 1.0)  # splines through a solution
+_POLISH, _POLISH_LIMBS = (2, 0.0, 1.0), (1, 0.0, 1.0)  # splines through a solution
 _SOFT = (3, 0.05, 0.1)  # while collisions cost little:
 _SOFTNESS = 0.2  # this share of their weights, over a rounding that is wider by as much
 _COARSE_INTERVAL = 1 / 20  # [s] between the frames that are solved first
@@ -83,8 +83,7 @@ def _trajectory(robot: Morphology, targets: Targets) -> Coordinates:
     """That follows the targets: solved in few frames, then polished in all, around a centre of mass
     that physics accepts.
 
-    The trunk takes a step around that in few frames before it does in all. Arms come last, on a
-    trunk that stays: polishing moves it, and would lead hands that are done
+    Arms come last, on a trunk that stays: polishing moves it, and would lead hands that are done
     into thighs. Before, they are solved for what they weigh. A body that leans on its arms is
     polished as a whole.
     """
@@ -105,17 +104,13 @@ def _trajectory(robot: Morphology, targets: Targets) -> Coordinates:
     q = q.upsampled(stride, len(targets))
     targets, feet = with_dynamics(robot, targets, apart(reachable(robot, feet, q)), q)
     if leaning:
-        return _polished(robot, targets, feet, q, whole_of(robot), _POLISH_WHOLE)
+        return _polished(robot, targets, feet, q, whole_of(robot), _POLISH)
+    q = _polished(robot, targets, feet, q, trunk, _POLISH)
     coarse, few = targets.every(stride), [foot.every(stride) for foot in feet]
-    q = q.every(stride)
-    if trunk.dofs:
-        holds = _holds_of(robot, coarse, few, q, trunk)
-        q = _stepped(robot, coarse, holds, q, trunk, _POLISH)
-    q = _polished(robot, targets, feet, q.upsampled(stride, len(targets)), trunk, _POLISH)
     arms = _led_out(robot, coarse, q.every(stride), limbs)
     arms = _parted(robot, coarse, few, arms, limbs, _LIMBS)
     q = q.with_joints(limbs.joints, arms.upsampled(stride, len(targets)))
-    return _polished(robot, targets, feet, q, limbs, _POLISH)
+    return _polished(robot, targets, feet, q, limbs, _POLISH_LIMBS)
 
 
 def idle_at_rest(robot: Morphology, q: Coordinates) -> Coordinates:
@@ -197,16 +192,9 @@ def _polished(
         return q
     for _ in range(2 if targets.rests.any() else 1):
         holds = _holds_of(robot, targets, feet, q, block)
-        q = _stepped(robot, targets, holds, q, block, steps)
+        near = collision_candidates(robot, targets, q, block)
+        q = solve_block(robot, targets, holds, q, block, *steps, near)
     return repair(robot, targets, holds, q, block)
-
-
-def _stepped(
-    robot: Morphology, targets: Targets, holds: Holds, q: Coordinates, block: Block, steps: Steps
-) -> Coordinates:
-    """With collisions with what is near."""
-    near = collision_candidates(robot, targets, q, block)
-    return solve_block(robot, targets, holds, q, block, *steps, near)
 
 
 def _holds_of(
