@@ -37,12 +37,12 @@ _CLOSE = 0.6  # the second is more than half as likely
 
 # The mean direction from feet to body this near to an axis tells that axis.
 _CLEARLY = 0.75
-
-# Of that evidence's weight where no name says foot. Hind legs, too, carry a trunk ahead of them.
-_BY_BUILD = 0.5
-_ALIKE = 0.1  # of a leg's length, that another's may differ by
 _STEADIER = 1.5  # a floor along an axis moves no more than this many times that of another
 _STEADY = 0.01  # of the body's height: a floor that moves less is steady
+
+# Of the weight of that direction where no name says foot. Hind legs carry a trunk ahead of them.
+_BY_BUILD = 0.5
+_ALIKE = 0.1  # of a leg's length, that another's may differ by
 
 # [heights] From a fingertip or toe to the farthest other one, along the bones.
 _LONGEST_PATH = 1.5
