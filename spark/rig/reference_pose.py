@@ -10,16 +10,26 @@ from spark.motion import Motion
 from spark.rig.bones import SHORT, RigPose
 from spark.rig.observed import mean_rotations, nearest_right_angle
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
-from spark.rotation import quat_angle, quat_identity, quat_rotate
+from spark.rotation import (
+    quat_angle,
+    quat_conj,
+    quat_from_rotvec,
+    quat_identity,
+    quat_mul,
+    quat_rotate,
+    rotvec_from_quat,
+)
 
 _MAX_LEAN = np.radians(35)  # of a trunk from the axis that the body was built along
 _MAX_HIP_TILT = np.radians(10)  # of the line of the hips from the axis across the body
 _MAX_ODDS = np.radians(20)  # of a limb bone from the other side's, mirrored; built bodies have 10
 _STILL = np.radians(2)  # joints that turn less than this from the rest pose show no more than it
+_MAX_BACK = np.radians(20)  # of a joint of a spine that was built straight, in the mean pose
 _ALIGNED = np.radians(10)  # of a bone from an axis of its joint that it was put along on purpose
 
 _UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
 _UPPER_ARMS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
+_TRUNK = (Role.PELVIS, Role.SPINE, Role.NECK, Role.HEAD)
 _HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
 _ENDS = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE, Role.LEFT_TOE, Role.RIGHT_TOE)
 
@@ -28,6 +38,7 @@ GROUP_OF = {role: group for group, limb in LIMBS.items() for role in limb}
 """The limb that each limb role belongs to."""
 
 Vector = Float[np.ndarray, "3"]
+Quat = Float[np.ndarray, "4"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,43 +46,50 @@ class Reference:
     """The pose from which a T-pose is found.
 
     `posed`: it is the rest pose; else the mean pose of the motion stands in for it, and `square`
-    tells that limb bones lie along their joints' coordinate axes.
+    tells that limb bones lie along their joints' coordinate axes, `straight` that the trunk's do.
     """
 
     motion: Motion
     pose: RigPose
     posed: bool
     square: bool
+    straight: bool
     notes: tuple[str, ...]
 
 
 def reference_of(motion: Motion, roles: RoleMap) -> Reference:
     """The rest pose where it is one that bodies are built in. Where it is none, or a moment of a
     movement, the mean pose over the frames; on a square rig rounded to right angles, with straight
-    fingers, and joints that have no role and keep still as they are."""
+    fingers, but for joints that have no role and keep still, and a trunk that is built as an S."""
     skeleton = motion.skeleton
     rest = RigPose(skeleton, roles, quat_identity(np.zeros((len(skeleton), 1))))
     why = _odds(rest) if _stands(rest) else "is not a pose"
     if why is None:
-        return Reference(motion, rest, True, False, ())
+        return Reference(motion, rest, True, False, False, ())
     if (
         _stands(rest)
         and quat_angle(motion.rotations[:, 1:], rest.local[1:]).max(initial=0) < _STILL
     ):
         note = f"the rest pose {why}, and no other is in the file: the T-pose may be off"
-        return Reference(motion, rest, True, False, (note,))
-    square = _at_right_angles(rest)
-    local = mean_rotations(motion.rotations)
+        return Reference(motion, rest, True, False, False, (note,))
+    square = straight = _at_right_angles(rest)
+    mean = mean_rotations(motion.rotations)
+    local = mean.copy()
     if square:
-        turned = nearest_right_angle(local)
-        built = quat_angle(motion.rotations, local).max(axis=0) < _STILL  # a hip joint's slant
+        turned = nearest_right_angle(mean)
+        built = quat_angle(motion.rotations, mean).max(axis=0) < _STILL  # a hip joint's slant
         for j, role in enumerate(roles.roles):
             if role not in GROUP_OF and not (role is None and built[j]):
                 local[j] = turned[j]
+        bent = _bent_trunk(RigPose(skeleton, roles, turned), mean)
+        straight = not bent
+        for j, q in bent.items():
+            local[j] = q
         for hand in (j for role in _HANDS for j in roles.joints(role)):
             local[list(skeleton.subtree(hand)[1:])] = rest.local[0]
     note = f"the rest pose {why}: the T-pose is found from the motion"
-    return Reference(motion, RigPose(skeleton, roles, local), False, square, (note,))
+    pose = RigPose(skeleton, roles, local)
+    return Reference(motion, pose, False, square, straight, (note,))
 
 
 def _stands(rest: RigPose) -> bool:
@@ -121,6 +139,22 @@ def _at_right_angles(rest: RigPose) -> bool:
     return all(bone is None or tilt(bone) < _ALIGNED for bone in bones)
 
 
+def _bent_trunk(straight: RigPose, mean: Float[np.ndarray, "J 4"]) -> dict[int, Quat]:
+    """The trunk's joints bent ahead and back as in the mean pose, from where their axes lie as the
+    world's, where one of the spine bends far back: no one moves so, and it was built that way, as
+    an S has to be. Else none."""
+    roles, lateral = straight.roles, _lateral(straight)
+    bent, least = {}, 0.0
+    for j in (j for role in _TRUNK for j in roles.joints(role)):
+        above = int(straight.skeleton.parents[j])
+        world = straight.world[above] if above >= 0 else quat_identity(np.zeros(1))
+        axis = quat_rotate(quat_conj(world), lateral)
+        bend = axis @ rotvec_from_quat(quat_mul(mean[j], quat_conj(straight.local[j])))
+        bent[j] = quat_mul(quat_from_rotvec(bend * axis), straight.local[j])
+        least = min(least, bend) if roles.roles[j] is Role.SPINE else least
+    return bent if least < -_MAX_BACK else {}
+
+
 def pelvis_frame(reference: Reference) -> Float[np.ndarray, "3 3"]:
     """`R_T_pelvis`: rows forward, left and up, in the pelvis's own axes."""
     pose = reference.pose
@@ -134,7 +168,8 @@ def pelvis_frame(reference: Reference) -> Float[np.ndarray, "3 3"]:
         up = snap(body, _MAX_LEAN) if tilt(body) < _MAX_LEAN else up
     elif reference.square:
         lateral = snap(lateral, np.pi)
-        up = snap(_across(up, lateral), _MAX_LEAN)
+        up = _across(up, lateral)
+        up = snap(up, _MAX_LEAN) if reference.straight else up
     up = _across(up, lateral)
     length = np.linalg.norm(up)
     if length < SHORT:

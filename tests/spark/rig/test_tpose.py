@@ -191,6 +191,32 @@ def test_hip_joints_that_slant_are_as_they_were_built(path: object) -> None:
     assert_near(rig, tpose, quat_mul(rig.tpose, axes))
 
 
+def test_a_spine_that_is_built_as_an_s_is_no_posture() -> None:
+    """Its joints' axes slant with the bones, and at rest all lie in one line."""
+    rig = sample_rig("walker")
+    motion = sample_motion("walk", rig, 30.0)
+    axes = along_x(rig, (1, 3))
+    trunk = [rig.pelvis, *rig.roles.joints(Role.SPINE)]
+    slants = dict(zip(trunk, np.radians([20.0, 30.0, -10.0, -5.0]), strict=False))
+    for j, slant in slants.items():
+        tilted = quat_mul(quat_about("y", np.array(slant)), rig.tpose[j])
+        axes[j] = quat_mul(quat_mul(quat_conj(rig.tpose[j]), tilted), axes[j])
+    tpose, _ = find_tpose(rerig(motion, axes), rig.roles)
+    error = np.degrees(quat_angle(tpose, quat_mul(rig.tpose, axes)))
+    assert error[trunk].max() < 6  # a walk leans
+
+
+@pytest.mark.parametrize("path", recordings("cmu_dance/cmu_05_0[2-9].bvh"))
+def test_dancers_stand_upright_in_the_mean(path: object) -> None:
+    """Whose rest pose is none, and whose pelvis was taken to lean 35 to 40 degrees ahead."""
+    motion = read_recording(str(path)).motion
+    rig = understand(motion)
+    canonical = to_canonical(motion, rig)
+    for j in (rig.pelvis, rig.chest):
+        up = quat_rotate(canonical.rotations[:, j], np.array([0.0, 0.0, 1.0])).mean(axis=0)
+        assert np.degrees(np.arctan2(np.hypot(up[0], up[1]), up[2])) < 12
+
+
 CLIPS_OF_ONE_RIG = {
     "cmu subject 01": ("cmu_asf/cmu_01_*.bvh",),
     "cmu subject 02": ("cmu_asf/cmu_02_*.bvh",),
