@@ -148,4 +148,4 @@ def _floor(source: CanonicalMotion) -> float:
         part = source.picked(block)
         return lowest_sole(rig, canonical_positions(part), quat_mul(part.rotations, rig.tpose))
 
-    return floor_under(in_blocks(lowest, len(source)), source.hips)
+    return floor_under(in_blocks(lowest, len(source)))

@@ -13,6 +13,7 @@ from sim.report.measures import (
     ContactMatch,
     Drift,
     contact_match,
+    floor_height,
     floor_slope,
     root_drift,
 )
@@ -25,7 +26,7 @@ from sim.trajectory import Subject
 from spark.errors import SkeletonError
 from spark.motion import Motion
 from spark.resample import values_at
-from spark.rig.contacts import floor_under, planted_points
+from spark.rig.contacts import planted_points
 from spark.rig.rig import Rig
 from spark.transfer.leg_fit import travel_scale
 
@@ -118,7 +119,7 @@ def _about_model(course: Course) -> tuple[str, ...]:
     own = body.model.body_rootid[body.model.geom_bodyid] == body.root
     if not ((body.model.geom_contype | body.model.geom_conaffinity)[own] != 0).any():
         notes.append("none of the model's shapes collide: self-penetration is not measured")
-    height = floor_under(course.lowest[:, 2], course.hips)
+    height = floor_height(course.lowest[:, 2])
     if abs(height) > PLAUSIBILITY_V2.scaled(course.rig.hip_height).penetration:
         notes.append(
             f"the model's floor is at z = 0; the clip's own (the 5th percentile of its lowest sole "
@@ -128,7 +129,7 @@ def _about_model(course: Course) -> tuple[str, ...]:
 
 
 def _own_floor(course: Course) -> float:
-    return floor_under(course.lowest[:, 2], course.hips) if course.subject.body is None else 0.0
+    return floor_height(course.lowest[:, 2]) if course.subject.body is None else 0.0
 
 
 def _floor_from_source(
@@ -137,7 +138,7 @@ def _floor_from_source(
     scaled = source_floor * course.rig.hip_height / source_rig.hip_height
     if abs(source_floor) < _MAX_FLOOR_OFFSET * source_rig.hip_height:
         return scaled, ()
-    own = floor_under(course.lowest[:, 2], course.hips)
+    own = floor_height(course.lowest[:, 2])
     floor = min((0.0, scaled, source_floor), key=lambda z: abs(z - own))
     return floor, (
         f"the source's floor is at z = {source_floor:.2f} m; for the motion it is taken to be at "

@@ -17,6 +17,11 @@ _MIN_WIDTH, _MAX_UNEXPLAINED = 0.3, 0.5
 _BEGIN = 0.25  # [s] in which a T-pose that a converter put before a source ends
 
 
+def floor_height(lowest: Float[np.ndarray, "T"]) -> float:
+    """The floor's z [m]: the 5th percentile of the lowest sole point's height over a clip."""
+    return float(np.percentile(lowest, 5))
+
+
 def penetration_depth(heights: Float[np.ndarray, "T N"]) -> Float[np.ndarray, "T N"]:
     """How deep each point lies under the floor [m], from its height above the floor; 0 above."""
     return np.maximum(-heights, 0.0)

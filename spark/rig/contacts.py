@@ -25,7 +25,7 @@ def floor_height(
 
     A body without feet has its floor at 0.
     """
-    return floor_under(lowest_sole(rig, positions, world), positions[:, rig.hips].mean(1))
+    return floor_under(lowest_sole(rig, positions, world))
 
 
 def lowest_sole(
@@ -36,11 +36,9 @@ def lowest_sole(
     return np.concatenate(points, axis=1).min(1) if points else np.zeros(len(positions))
 
 
-def floor_under(lowest: Float[np.ndarray, "T"], hips: Float[np.ndarray, "T 3"]) -> float:
-    """The floor's height [m] from that of the lowest sole point in each frame, and from the hips'
-    path: frames that repeat the one before, as a T-pose before a clip does, count once."""
-    moved = np.any(np.diff(np.column_stack([hips, lowest]), axis=0) != 0, axis=1)
-    return float(np.percentile(lowest[np.append(True, moved)], 5))
+def floor_under(lowest: Float[np.ndarray, "T"]) -> float:
+    """The floor's height [m] from that of the lowest sole point in each frame."""
+    return float(np.percentile(lowest, 5))
 
 
 def speeds(positions: Float[np.ndarray, "T *n 3"], frame_time: float) -> Float[np.ndarray, "T *n"]:

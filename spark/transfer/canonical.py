@@ -65,8 +65,7 @@ def to_canonical(motion: Motion, rig: Rig) -> CanonicalMotion:
 
     rotations = in_blocks(turned, count)
     notes = breaks(rotations[:, rig.pelvis], hips, motion.frame_time)
-    floor_z = floor_under(lowest, hips)
-    return CanonicalMotion(rig, motion.frame_time, rotations, hips, floor_z, notes)
+    return CanonicalMotion(rig, motion.frame_time, rotations, hips, floor_under(lowest), notes)
 
 
 def canonical_positions(

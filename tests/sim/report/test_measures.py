@@ -13,6 +13,7 @@ from sim.report.measures import (
     contact_match,
     distance_outside_hull,
     floating,
+    floor_height,
     floor_slope,
     horizontal_speed,
     penetration_depth,
@@ -43,6 +44,12 @@ def test_derivatives_of_one_two_and_three_frames() -> None:
     assert derivative(np.array([5.0]), 0.1, 1, 0.05) == [0]
     np.testing.assert_allclose(derivative(np.array([5.0, 6.0]), 0.1, 1, 0.05), [10, 10])
     np.testing.assert_allclose(derivative(np.array([0.0, 1.0, 4.0]), 1.0, 2, 0.05), [2, 2, 2])
+
+
+def test_the_floor_is_the_fifth_percentile_so_a_few_deep_frames_do_not_lower_it() -> None:
+    lowest = np.full(100, 0.02)
+    lowest[:4] = -0.5
+    assert floor_height(lowest) == pytest.approx(0.02)
 
 
 def test_depth_is_how_far_a_point_is_under_the_floor() -> None:

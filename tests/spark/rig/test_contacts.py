@@ -8,7 +8,7 @@ import pytest
 from spark.demo.sample import sample_motion, sample_rig
 from spark.io.recording import read_recording
 from spark.kinematics import forward
-from spark.rig.contacts import floor_under, planted_feet, planted_points, speeds
+from spark.rig.contacts import planted_feet, planted_points, speeds
 from spark.rig.rig import understand
 from tests.helpers.recordings import recordings
 
@@ -67,23 +67,3 @@ def test_contacts_do_not_depend_on_the_frame_rate(path: object) -> None:
     every_other = planted_feet(rig, positions[::2], 2 * motion.frame_time)
     assert (all_frames[::2] == every_other).mean() > 0.99
     assert 0.1 < all_frames.mean() < 0.9
-
-
-def test_the_floor_is_the_fifth_percentile_so_a_few_deep_frames_do_not_lower_it() -> None:
-    hips = np.linspace(0.0, 1.0, 100)[:, None] * [1.0, 0.0, 0.0]
-    lowest = np.full(100, 0.02)
-    lowest[:4] = -0.5
-    assert floor_under(lowest, hips) == pytest.approx(0.02)
-
-
-@pytest.mark.parametrize("held", [1, 50, 500])
-def test_a_frame_that_is_held_counts_once_for_the_floor(held: int) -> None:
-    """A T-pose that stands lower before a clip, or any other."""
-    rng = np.random.default_rng(0)
-    hips, lowest = rng.normal(size=(100, 3)), rng.uniform(0.0, 0.1, 100)
-    expected = floor_under(lowest, hips)
-    first = floor_under(np.append(-1.0, lowest), np.concatenate([np.zeros((1, 3)), hips]))
-    for at, low, place in ((0, -1.0, np.zeros(3)), (50, lowest[50], hips[50])):
-        longer = np.insert(hips, [at] * held, place, axis=0)
-        found = floor_under(np.insert(lowest, [at] * held, low), longer)
-        assert found == (expected if at else first)
