@@ -13,6 +13,7 @@ from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, from_canonical
 from spark.transfer.foot_lock import lock_feet
 from spark.transfer.hip_sway import sway_hips
+from spark.transfer.noise import without_noise
 from spark_sim import files
 from spark_sim.choices import Method, RobotName
 from spark_sim.clips import AnyClip, Clip, File, RobotClip
@@ -73,7 +74,8 @@ def retarget(
     filled in: by a trained network (`checkpoint`, or the one that ships) on rigs like those that it
     was trained on, and by the target's own motion, where its file has one. With `refine`, each foot
     is then held where the source's foot stands, and with "spark" the hips sway so that the weight
-    moves as the source's does (`spark.transfer.hip_sway`).
+    moves as the source's does (`spark.transfer.hip_sway`). A source that trembles, as motion
+    estimated from video, is smoothed before (`spark.transfer.noise`), and a note says so.
 
     On a robot the whole trajectory is solved for, within the joints' limits, feet held. With method
     "copy" or without `refine`, each pose is only copied to the robot's hinges, as a baseline.
@@ -90,18 +92,23 @@ def retarget(
         if checkpoint is not None:
             raise ConventionError("a checkpoint is for characters; robots are solved for")
         return _onto_robot(source, target, solved=refine and method != "copy")
-    canonical = source.canonical
+    canonical, noise = source.canonical, None
+    trembles: tuple[str, ...] = ()
+    if refine:
+        canonical, noise, trembles = without_noise(canonical)
     if method == "copy":
         moved = transfer(canonical, target.rig)
     else:
         moved = _filled_in(canonical, target, _learned(checkpoint))
     if refine:
-        moved = lock_feet(canonical, moved)
+        moved = lock_feet(canonical, moved, noise)
         if method == "spark":
             moved = sway_hips(canonical, moved)
     motion = from_canonical(moved)
     bvh, notes = encode(motion, target.recording)
-    recording = replace(target.recording, bvh=bvh, motion=motion, notes=(*moved.notes, *notes))
+    recording = replace(
+        target.recording, bvh=bvh, motion=motion, notes=(*trembles, *moved.notes, *notes)
+    )
     # The rig is given: what is known of a body does not depend on the motion that it makes.
     return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig, target.path)
 

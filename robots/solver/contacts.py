@@ -14,7 +14,6 @@ from scipy.ndimage import uniform_filter1d
 
 from robots.solver.carrying import Points, carrying, once_down
 from robots.solver.creeping import above, creeping, lower_ends
-from robots.solver.noise import Noise, smoothed
 from sim.body.anthropometry import RADII
 from sim.report.derivatives import derivative
 from sim.report.mass import Mass, human_mass
@@ -25,6 +24,7 @@ from spark.rig.roles import Role
 from spark.rotation import quat_mul
 from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion
+from spark.transfer.noise import Noise, smoothed
 
 MIN_DURATION = 0.08  # contacts and breaks shorter than this [s] are noise
 STAY_REACH = 0.03  # [m, of an adult] along the floor that a point may tremble without a step,
@@ -83,7 +83,7 @@ def schedule(
     stands = np.zeros(paths.shape[:-1], dtype=bool)
     if exist.any():
         own, size = paths[:, exist], rig.standing_height
-        slowed = own if noise is None else own * [noise.slowness, noise.slowness, 1.0]
+        slowed = own if noise is None else noise.slowed(own)
         stands[:, exist] = planted_points(slowed, frame_time, size) & lower_ends(own, size)
     feet = _steady(stands, frame_time)
     feet = _with_wobbles(feet, paths, rig.standing_height, frame_time)

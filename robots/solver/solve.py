@@ -20,7 +20,6 @@ from robots.solver.holds import Holds, joined
 from robots.solver.marching import abrupt, calmed
 from robots.solver.motion_plan import with_dynamics
 from robots.solver.mounted import facing_ahead, on_mount
-from robots.solver.noise import without_noise
 from robots.solver.projection import project
 from robots.solver.repair import repair
 from robots.solver.resting import leans, resting
@@ -32,6 +31,7 @@ from robots.solver.targets import Targets, poses_of, targets_of
 from robots.tree import Coordinates
 from spark.threads import one_thread
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.noise import without_noise
 
 Steps = tuple[int, float, float]
 """How many Gauss-Newton steps at most; of the cost, what one must gain not to be the last; and the

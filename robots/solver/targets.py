@@ -9,7 +9,6 @@ from jaxtyping import Bool, Float, Int
 from robots.model.morphology import Morphology
 from robots.model.shapes import surface
 from robots.solver.contacts import has_feet, schedule, touching_joint
-from robots.solver.noise import Noise
 from robots.solver.palms import laid, resting_palms
 from robots.solver.trunk import bowing
 from robots.tree import forward_kinematics
@@ -20,6 +19,7 @@ from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import matrix_from_quat, quat_mul, quat_rotate
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.noise import Noise
 
 LIMB_SEGMENTS = (  # the limbs' segments, by the roles at their ends
     (Role.LEFT_UPPER_LEG, Role.LEFT_LOWER_LEG),

@@ -9,7 +9,6 @@ from jaxtyping import Float
 
 from robots.model.morphology import Morphology
 from robots.solver.contacts import has_feet
-from robots.solver.noise import Noise, without_noise
 from robots.solver.targets import source_feet
 from robots.solver.window_targets import PoseTargets
 from robots.stream.copied_pose import Copier
@@ -19,6 +18,7 @@ from spark.errors import FrameError
 from spark.rig.contacts import standing_heights
 from spark.rig.rig import Rig
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.noise import Noise, without_noise
 
 LATENCY = 2  # [frames] between the newest frame of a stream and its answer
 _MAX_NORM_ERROR = 0.05  # of a quaternion: beyond, it is not one that was merely rounded

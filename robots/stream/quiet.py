@@ -1,6 +1,6 @@
 """The white noise of a live source, measured and taken away while it comes.
 
-As `robots.solver.noise`, of the last seconds and by a filter that looks back alone: the Kalman
+As `spark.transfer.noise`, of the last seconds and by a filter that looks back alone: the Kalman
 filter of what goes on as it went and is pushed at random (alpha-beta, Kalata 1984). A filter that
 knows nothing of what comes must smooth more, and lags: hence `_SLOWER`. Everything is smoothed
 alike, so that feet that stand while hips move still stand.
@@ -12,11 +12,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import solve_discrete_are
 
-from robots.solver.noise import LEAST_FRAMES, LEAST_NOISE, Noise, white_noise
 from robots.stream.frame_targets import Frame
 from spark.rig.contacts import ADULT_HEIGHT
 from spark.rig.rig import Rig
 from spark.rotation import quat_normalize
+from spark.transfer.noise import LEAST_FRAMES, LEAST_NOISE, Noise, white_noise
 
 _MEMORY = 4.0  # [s] of which noise is told
 _FIRST = 0.75  # [s] before it is told at all

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from spark.rig.contacts import speeds
+from spark.rig.contacts import ADULT_HEIGHT, speeds
 from spark.rig.roles import LIMBS, Group
 from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion
@@ -24,6 +24,7 @@ from spark.transfer.footfalls import between_contacts, beyond
 from spark.transfer.hip_rise import Standing, hip_rise, hips_with_feet, lowest, standing
 from spark.transfer.hover import put_down
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
+from spark.transfer.noise import Noise
 from spark.transfer.reach import stretch, swing_gently, within_reach
 from spark.transfer.stances import stances
 
@@ -38,9 +39,11 @@ _REST_HEIGHT = 0.02
 _ENDS = [0, 1, -2, -1]  # of a sole's points: its heel and its toes' end
 
 
-def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
+def lock_feet(
+    source: CanonicalMotion, moved: CanonicalMotion, noise: Noise | None = None
+) -> CanonicalMotion:
     """`moved`, the transfer of `source`, with its feet held while the source's stand, and as high
-    as the source's; its hips go with them."""
+    as the source's; its hips go with them. `noise` is what was taken from the source."""
     size = moved.rig.hip_height
     scale = size / source.rig.hip_height
     feet: list[tuple[Leg, Standing, Standing]] = []
@@ -53,7 +56,9 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
     if not feet:
         return moved
     ends = np.stack([theirs.sole[:, _ENDS] for _, theirs, _ in feet], axis=1)
-    stands, flat = stances(ends, source.frame_time, source.rig.standing_height)
+    stands, flat = stances(ends, source.frame_time, source.rig.standing_height, noise)
+    stray = 0.0 if noise is None else noise.stray * source.rig.standing_height / ADULT_HEIGHT
+    radius = _CAPTURE_NOISE * size + scale * stray
     rolled = [_rolled(theirs.sole, own.sole, source) for _, theirs, own in feet]
     low = np.stack([lowest(theirs, source) for _, theirs, _ in feet])
     down = put_down(low, stands, [own for _, own in rolled])
@@ -65,7 +70,7 @@ def lock_feet(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
         offset = np.zeros((len(own), 2))
         for start, stop in true_runs(stance):
             here = slice(start, stop)
-            kept = beyond(scale * theirs[here], _CAPTURE_NOISE * size)
+            kept = beyond(scale * theirs[here], radius)
             offset[here] = own[here].mean(axis=0) + kept - own[here]
         along = between_contacts(offset, stance, own)
         wanted = size * np.maximum(low[k] - down[k], -_MAX_SINK)

@@ -16,6 +16,7 @@ from spark.rig.contacts import (
     standing_heights,
 )
 from spark.runs import true_runs
+from spark.transfer.noise import Noise, smoothed
 
 # [s] A shorter stance is a swinging foot that is slow and low for a moment, and between two stances
 # no foot is lifted and put down elsewhere in a shorter time.
@@ -26,14 +27,19 @@ _BEARING_SPEED = 0.4
 
 
 def stances(
-    ends: Float[np.ndarray, "T F P 3"], frame_time: float, height: float
+    ends: Float[np.ndarray, "T F P 3"],
+    frame_time: float,
+    height: float,
+    noise: Noise | None = None,
 ) -> tuple[Bool[np.ndarray, "F T"], Bool[np.ndarray, "F T"]]:
     """The frames in which each of F feet stands, by the points at the ends of its sole [m, world],
     and those of them in which it stands flat: all of its points rest.
 
     `height` [m] is the body's standing height. A stance that the motion's start or end cuts short
-    may have been longer, and counts.
+    may have been longer, and counts. What `noise` the recording had is averaged out.
     """
+    if noise is not None:
+        ends = noise.slowed(smoothed(ends, noise.contact_cutoff, frame_time))
     size = height / ADULT_HEIGHT
     rests = planted_points(ends, frame_time, height)
     low = ends[..., 2] < standing_heights(ends, height) + PLANTED_HEIGHT * size

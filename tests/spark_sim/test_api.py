@@ -2,12 +2,14 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import spark_sim
+from scripts.corruptions import jittering
 from spark.errors import ConventionError, DependencyError, OutputError, SkeletonError
 from spark.kinematics import forward
 from spark.rotation import quat_angle
@@ -54,6 +56,17 @@ def test_onto_its_own_body_a_motion_stays(samples: Path) -> None:
     held = spark_sim.retarget(walk, walk)
     # A foot that is held stands still; the source's own rolls by millimetres before it lifts.
     np.testing.assert_allclose(forward(held.motion)[0], forward(walk.motion)[0], atol=1e-2)
+
+
+def test_a_recording_that_trembles_is_smoothed_and_says_so(samples: Path) -> None:
+    walk = spark_sim.load(samples / "walker_walk.bvh")
+    shaken = jittering(walk.motion, walk.rig, np.random.default_rng(0), degrees=1.0)
+    noisy = replace(walk, recording=replace(walk.recording, motion=shaken))
+    held, plain = (spark_sim.retarget(noisy, walk, refine=on) for on in (True, False))
+    assert any("tremble" in note for note in held.recording.notes)
+    assert not any("tremble" in note for note in plain.recording.notes)
+    jerks = [np.diff(forward(own.motion)[0], 3, axis=0).std() for own in (held, plain)]
+    assert jerks[0] < jerks[1] / 4
 
 
 def test_there_and_back(samples: Path) -> None:

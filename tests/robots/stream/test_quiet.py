@@ -7,7 +7,6 @@ import pytest
 
 from robots.metrics import measure
 from robots.model.known import known
-from robots.solver.noise import Noise
 from robots.stream.footing import ContactTracker
 from robots.stream.frame_targets import LATENCY, Frame, FrameReader, ground_of
 from robots.stream.quiet import Quieter, _AlphaBeta
@@ -17,6 +16,7 @@ from spark.demo.sample import sample_motion, sample_rig
 from spark.motion import Motion
 from spark.rotation import quat_angle
 from spark.transfer.canonical import to_canonical
+from spark.transfer.noise import Noise
 
 RIG, EMBER = sample_rig("walker"), known("robot")
 

@@ -33,6 +33,7 @@ LEAST_NOISE = BORNE_SPEED * SPEED_WINDOW / np.sqrt(2)  # [m, of an adult] that m
 _LEAST_STEP_RATE = 2.5  # [Hz] below which steps would be smoothed away: they last half a second
 _MAX_JOLT = 1.5  # [m/s², of an adult] of noise that hips are left with: walking ones reach 4
 LEEWAY = 2.0  # standard deviations of what noise is left, by which standing feet may be faster
+_ALL_BUT = 3.0  # standard deviations an axis, beyond which 1 % lies in two
 
 
 @dataclass(frozen=True)
@@ -56,10 +57,18 @@ class Noise:
         return max(self._cutoff(BORNE_SPEED), _LEAST_STEP_RATE)
 
     @property
-    def slowness(self) -> float:
-        """By what paths of feet, smoothed so, are scaled along the floor for their speeds to be
-        judged by limits for clean ones: noise makes up a part of them."""
-        return float(1 / np.hypot(1.0, LEEWAY * self._speed(self.contact_cutoff) / PLANTED_SPEED))
+    def stray(self) -> float:
+        """Within what [m, of an adult] smoothed feet stray along the floor, but for a hundredth of
+        the time. Their variance is the integral over frequency f of the noise's density,
+        2 `frame_time` `feet`², times 1 / (1 + (f / cutoff)⁴)²."""
+        band = 3 * np.pi / (8 * np.sqrt(2)) * self.motion_cutoff
+        return float(_ALL_BUT * self.feet * np.sqrt(2 * self.frame_time * band))
+
+    def slowed(self, paths: Float[np.ndarray, "T *n 3"]) -> Float[np.ndarray, "T *n 3"]:
+        """Paths of feet, smoothed at `contact_cutoff`, with so much less of their way along the
+        floor that limits for clean ones judge their speeds: noise makes up a part of these."""
+        slowness = 1 / np.hypot(1.0, LEEWAY * self._speed(self.contact_cutoff) / PLANTED_SPEED)
+        return paths * np.array([slowness, slowness, 1.0])
 
     def _cutoff(self, speed: float) -> float:
         """That leaves noise of a speed [m/s, RMS an axis]: see `_speed`."""
