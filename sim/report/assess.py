@@ -28,7 +28,9 @@ from spark.motion import Motion
 from spark.resample import values_at
 from spark.rig.contacts import planted_points
 from spark.rig.rig import Rig
+from spark.transfer.canonical import to_canonical
 from spark.transfer.leg_fit import travel_scale
+from spark.transfer.noise import without_noise
 
 # Hip heights: a source whose floor is further from z = 0 than this does not stand on z = 0, and
 # what was made of it may have been put there.
@@ -65,10 +67,11 @@ def assess(
         notes += _slope(course, "the")
         return Report(clip, None, None, None, findings_of(clip), notes, known)
     source_course = _course("the source", source)
-    source_floor = _own_floor(source_course)
+    source_floor, trembles = _source_floor(source_course)
     floor = 0.0
     if subject.body is None:
         floor, notes = _floor_from_source(course, source.rig, source_floor)
+    notes += trembles
     source_clip = measure_clip(source, source_floor)
     times = np.arange(len(course)) * motion.frame_time
     scale = rig.hip_height / source.rig.hip_height
@@ -130,6 +133,21 @@ def _about_model(course: Course) -> tuple[str, ...]:
 
 def _own_floor(course: Course) -> float:
     return floor_height(course.lowest[:, 2]) if course.subject.body is None else 0.0
+
+
+def _source_floor(course: Course) -> tuple[float, tuple[str, ...]]:
+    """Of a source that trembles, that of what it trembles about: noise takes soles below it."""
+    floor, subject = _own_floor(course), course.subject
+    if subject.body is not None:
+        return floor, ()
+    quiet, noise, _ = without_noise(to_canonical(subject.motion, subject.rig))
+    if noise is None:
+        return floor, ()
+    return quiet.floor_z, (
+        f"the source's feet tremble by {1000 * noise.feet:.0f} mm of white noise (of an adult): "
+        f"its floor is that of its smoothed motion, {100 * (quiet.floor_z - floor):.1f} cm higher "
+        f"than the 5th percentile of its lowest sole point",
+    )
 
 
 def _floor_from_source(
