@@ -28,7 +28,7 @@ from spark.motion import Motion
 from spark.resample import values_at
 from spark.rig.contacts import planted_points
 from spark.rig.rig import Rig
-from spark.transfer.canonical import to_canonical
+from spark.transfer.canonical import from_canonical, to_canonical
 from spark.transfer.leg_fit import travel_scale
 from spark.transfer.noise import without_noise
 
@@ -67,23 +67,24 @@ def assess(
         notes += _slope(course, "the")
         return Report(clip, None, None, None, findings_of(clip), notes, known)
     source_course = _course("the source", source)
-    source_floor, trembles = _source_floor(source_course)
+    quiet, source_floor, trembles = _without_tremble(source_course)
     floor = 0.0
     if subject.body is None:
         floor, notes = _floor_from_source(course, source.rig, source_floor)
     notes += trembles
     source_clip = measure_clip(source, source_floor)
+    followed = source_clip if quiet is source else measure_clip(quiet, source_floor)
     times = np.arange(len(course)) * motion.frame_time
     scale = rig.hip_height / source.rig.hip_height
     clip = _beyond_source(measure_clip(subject, floor), source_clip, times, scale)
     travel = scale if subject.body is not None else travel_scale(source.rig, rig)
     drift = _drift(course, source_course, times, travel)
-    swing = swing_of(clip, source_clip, times, scale)
-    contacts = _contacts(clip, source_clip, times)
+    swing = swing_of(clip, followed, times, scale)
+    contacts = _contacts(clip, followed, times)
     notes += _slope(source_course, "the source's")
     notes += _pace(motion, source.motion)
     thrown = scale * source_clip.base_acceleration_p99
-    limbs = limbs_of(clip, source_clip, times, scale)
+    limbs = limbs_of(clip, followed, times, scale)
     findings = findings_of(clip, drift, swing, thrown, limbs)
     return Report(clip, source_clip, drift, contacts, findings, notes, known, swing, limbs, scale)
 
@@ -135,18 +136,24 @@ def _own_floor(course: Course) -> float:
     return floor_height(course.lowest[:, 2]) if course.subject.body is None else 0.0
 
 
-def _source_floor(course: Course) -> tuple[float, tuple[str, ...]]:
-    """Of a source that trembles, that of what it trembles about: noise takes soles below it."""
+def _without_tremble(course: Course) -> tuple[Subject, float, tuple[str, ...]]:
+    """What a source's feet, limbs and floor are told from: of one that trembles, from what it
+    trembles about. Noise takes soles below the floor, and no foot stands."""
     floor, subject = _own_floor(course), course.subject
     if subject.body is not None:
-        return floor, ()
+        return subject, floor, ()
     quiet, noise, _ = without_noise(to_canonical(subject.motion, subject.rig))
     if noise is None:
-        return floor, ()
-    return quiet.floor_z, (
-        f"the source's feet tremble by {1000 * noise.feet:.0f} mm of white noise (of an adult): "
-        f"its floor is that of its smoothed motion, {100 * (quiet.floor_z - floor):.1f} cm higher "
-        f"than the 5th percentile of its lowest sole point",
+        return subject, floor, ()
+    return (
+        replace(subject, motion=from_canonical(quiet)),
+        quiet.floor_z,
+        (
+            f"the source's feet tremble by {1000 * noise.feet:.0f} mm of white noise (of an adult): "
+            f"its floor is that of its smoothed motion, {100 * (quiet.floor_z - floor):.1f} cm higher "
+            f"than the 5th percentile of its lowest sole point, and so are the contacts, swings and "
+            f"limbs that the motion is compared with",
+        ),
     )
 
 

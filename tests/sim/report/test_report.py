@@ -277,6 +277,10 @@ def test_the_floor_of_a_source_that_trembles_is_what_it_trembles_about() -> None
     below = still.root_pos[0, 2] - np.percentile(shaken.root_pos[:, 2], 5)
     assert abs(report.clip.floor_z) < below / 2
     assert report.clip.shares["floating"] == 0.0
+    assert report.source is not None
+    assert report.source.implausible_share > 0.5  # as it was given
+    assert report.contacts is not None
+    assert report.contacts.f1 == pytest.approx(1.0, abs=0.05)
     assert any("tremble by" in note for note in report.notes)
 
 
