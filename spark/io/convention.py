@@ -36,7 +36,7 @@ HUMAN_HEIGHTS = (0.5, 3.0)  # [m] beyond them a note says so
 _CLOSE = 0.6  # the second is more than half as likely
 
 # The mean direction from feet to body this near to an axis tells that axis.
-_CLEARLY = 0.75
+CLEARLY = 0.75
 _STEADIER = 1.5  # a floor along an axis moves no more than this many times that of another
 _STEADY = 0.01  # of the body's height: a floor that moves less is steady
 
@@ -228,8 +228,8 @@ def standing_axis(motion: Motion, usual: Up) -> tuple[Up, bool, str]:
     standing = above_feet(motion, positions)
     best = int(np.argmax(np.abs(standing)))
     own = UPS.index(usual)
-    if best == own or abs(standing[best]) < _CLEARLY:
-        down = bool(standing[own] < -_CLEARLY and own)  # a body is turned over about x
+    if best == own or abs(standing[best]) < CLEARLY:
+        down = bool(standing[own] < -CLEARLY and own)  # a body is turned over about x
         return usual, down, "as is usual in such files"
     low = positions.min(axis=1) if standing[best] > 0 else -positions.max(axis=1)
     size = float(np.median(np.ptp(positions, axis=1).max(axis=-1)))

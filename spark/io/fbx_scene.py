@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import DependencyError, FileFormatError, name_list
-from spark.io.nodes import NodeJoint, chosen_clip, joints_of
+from spark.io.nodes import NodeJoint, chosen_clip, joints_of, varies
 from spark.resample import frames_of_keys, rotations_at, values_at
 from spark.rotation import matrix_from_quat
 
@@ -70,7 +70,8 @@ class FbxScene:
         """The animation to read, the times [s] of its frames, and notes.
 
         The one called `clip`; of several the one that moves the most nodes, the longest of those:
-        exporters leave empty ones beside it. None and one frame where nothing moves.
+        exporters leave empty ones beside it, and ones whose keys hold all nodes still. None and one
+        frame where nothing moves.
         """
         stacks = list(self._scene.anim_stacks)
         self._check_span(frame_time)
@@ -82,7 +83,7 @@ class FbxScene:
         ]
         best = max(
             range(len(stacks)),
-            key=lambda i: (len(baked[i].modified_nodes), baked[i].key_time_max),
+            key=lambda i: (*_moved(baked[i]), baked[i].key_time_max),
             default=None,
         )
         if clip is not None:
@@ -180,14 +181,30 @@ class FbxScene:
         return node.attrib_type.name not in ("MESH", "LIGHT", "CAMERA")
 
 
+def _moved(baked: Any) -> tuple[int, int]:
+    """How many nodes move, and how many have keys."""
+    moving = sum(
+        varies(_values(node.translation_keys, "xyz"))
+        or varies(_values(node.rotation_keys, "wxyz"))
+        or varies(_values(node.scale_keys, "xyz"))
+        for node in baked.modified_nodes
+    )
+    return moving, len(baked.modified_nodes)
+
+
+def _values(keys: Any, axes: str) -> Float[np.ndarray, "K n"]:
+    if not len(keys):
+        return np.zeros((0, len(axes)))
+    return np.stack([keys["value"][axis] for axis in axes], axis=-1)
+
+
 def _vectors_at(
     keys: Any, times: Float[np.ndarray, "T"], otherwise: Float[np.ndarray, "T 3"]
 ) -> Float[np.ndarray, "T 3"]:
     """Keyed vectors at `times`; the first and last key hold beyond the ends."""
     if not len(keys):
         return otherwise
-    values = np.stack([keys["value"][axis] for axis in "xyz"], axis=-1)
-    return values_at(values, frames_of_keys(keys["time"], times))
+    return values_at(_values(keys, "xyz"), frames_of_keys(keys["time"], times))
 
 
 def _quats_at(
@@ -196,5 +213,4 @@ def _quats_at(
     """Keyed rotations at `times`, between keys along the shorter arc."""
     if not len(keys):
         return otherwise
-    quats = np.stack([keys["value"][axis] for axis in "wxyz"], axis=-1)
-    return rotations_at(quats, frames_of_keys(keys["time"], times))
+    return rotations_at(_values(keys, "wxyz"), frames_of_keys(keys["time"], times))

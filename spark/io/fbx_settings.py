@@ -36,6 +36,9 @@ _RATES = {
 }
 _CUSTOM = 14
 
+# Where FBX 6 has it, which may have no time mode: as a text, in binary files after its length.
+_OLD_RATE = re.compile(rb'\bFrameRate:\s*"(\d+\.?\d*)"|FrameRateS.\0\0\0(\d+\.?\d*)', re.DOTALL)
+
 # Little-endian layouts of the number types of a binary property.
 _NUMBERS = {b"I": "<i", b"L": "<q", b"F": "<f", b"D": "<d", b"Y": "<h"}
 
@@ -51,17 +54,29 @@ class FbxSettings:
 
 def read_settings(data: bytes) -> FbxSettings:
     """The settings in the bytes of an FBX file. Raises `ConventionError` where the axes are ones
-    that no common program writes: upside down, mirrored, or none at all."""
+    that no common program writes: mirrored, or none at all."""
     unit_cm = _number(data, "UnitScaleFactor")
-    mode = int(_number(data, "TimeMode") or 0)
-    rate = _number(data, "CustomFrameRate") if mode == _CUSTOM else _RATES.get(mode)
-    if rate is None or not 1e-3 < rate < 1e5:
-        raise ConventionError(f"frame rate of time mode {mode} is {rate}; expected a known one")
+    rate = _rate(data)
     return FbxSettings(
         unit_cm / 100 if unit_cm is not None and 1e-9 < unit_cm < 1e9 else None,
         _up(data),
         1 / rate,
     )
+
+
+def _rate(data: bytes) -> float:
+    """Frames per second."""
+    said = _number(data, "TimeMode")
+    if said is None and (old := _OLD_RATE.search(data)) is not None:
+        rate: float | None = float(old[1] or old[2])
+        where = "FrameRate"
+    else:
+        mode = int(said or 0)
+        rate = _number(data, "CustomFrameRate") if mode == _CUSTOM else _RATES.get(mode)
+        where = f"time mode {mode}"
+    if rate is None or not 1e-3 < rate < 1e5:
+        raise ConventionError(f"frame rate of {where} is {rate}; expected a known one")
+    return rate
 
 
 def _up(data: bytes) -> Up | None:
@@ -71,20 +86,20 @@ def _up(data: bytes) -> Up | None:
         return None
     known = [(axis, 1.0 if sign is None else sign) for axis, sign in zip(axes, signs, strict=True)]
     right, up, front = known
-    if up[0] not in (0, 1, 2) or up[1] < 0:
+    if up[0] not in (0, 1, 2) or up[1] not in (-1, 1):
         raise ConventionError(
             f"up axis {up[0]:g} with sign {up[1]:g} is not known; expected 0, 1 or 2 (x, y, z) "
-            "with sign 1; give --up"
+            "with sign 1 or -1; export it again"
         )
     if right[0] is not None and front[0] is not None:
         turn = [right[0], up[0], front[0]]
         even = turn in ([0, 1, 2], [1, 2, 0], [2, 0, 1])
-        if sorted(turn) != [0, 1, 2] or (right[1] * front[1] > 0) != even:
+        if sorted(turn) != [0, 1, 2] or (right[1] * up[1] * front[1] > 0) != even:
             raise ConventionError(
                 f"axes {turn} with signs {[right[1], up[1], front[1]]} (right, up, front) are "
-                "left-handed or no axes; expected a right-handed file"
+                "left-handed or no axes; expected right-handed ones; export it with those"
             )
-    return UPS[int(up[0])]
+    return UPS[int(up[0]) + (3 if up[1] < 0 else 0)]
 
 
 def _number(data: bytes, name: str) -> float | None:

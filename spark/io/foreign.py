@@ -11,9 +11,13 @@ import numpy as np
 
 from spark.errors import ConventionError, FileFormatError
 from spark.io.convention import (
+    CLEARLY,
     HUMAN_HEIGHTS,
+    UPS,
     Convention,
     Up,
+    above_feet,
+    axis_of,
     given_unit,
     given_up,
     infer_unit,
@@ -22,9 +26,12 @@ from spark.io.convention import (
 from spark.io.encoding import encode_new
 from spark.io.recording import Recording, in_si
 from spark.io.scanner import LARGEST
+from spark.kinematics import forward
 from spark.motion import Motion
 
 _CREATURES = (0.05, 20.0)  # [m] sizes of creatures; of others a file's unit is not believed
+_METRES_AS_CM = 100.0  # how much too small a body is whose metres went for centimetres
+_SAMPLES = 32  # frames that are looked at for the axis along which a body stands
 
 
 def foreign_recording(
@@ -45,6 +52,7 @@ def foreign_recording(
     `FileFormatError` where numbers are not finite, or beyond any length.
     """
     found = list(notes)
+    standing: Up | None = None
     skeleton = motion.skeleton
     values = (motion.root_pos, motion.rotations, skeleton.offsets, skeleton.end_offsets)
     if not all((np.abs(value) <= LARGEST).all() for value in values):
@@ -62,14 +70,19 @@ def foreign_recording(
             up_axis = given_up(up)
         elif up_axis is not None:
             found.append(f"up axis {up_axis}, {says}")
+            if (standing := _standing_axis(motion)) not in (up_axis, None):
+                found.append(
+                    f"the body stands along {standing}, in its motion and at rest: if it doesn't "
+                    f"lie there, give --up={standing}"
+                )
         else:
             up_axis, more = infer_up(motion)
             found += more
     except ConventionError as error:
         raise ConventionError(f"{path}: {error}") from error
     convention = Convention(unit_m, up_axis)
+    tall = unit_m * float(np.ptp(skeleton.rest_positions[:, axis_of(standing or up_axis)]))
     motion = in_si(motion, convention)
-    tall = float(np.ptp(motion.skeleton.rest_positions[:, 2]))
     if unit is None and not HUMAN_HEIGHTS[0] < tall < HUMAN_HEIGHTS[1]:
         found.append(f"{tall:.3g} m is no human's height; check, and give --unit")
     bvh = replace(encode_new(motion, unit=unit_m, up=up_axis), path=path)
@@ -82,11 +95,21 @@ def _believed(motion: Motion, unit_m: float, says: str) -> tuple[float, str]:
     said = f"{100 * unit_m:.4g} cm, {says}"
     tall = unit_m * float(np.ptp(motion.skeleton.rest_positions, axis=0).max())
     if not _CREATURES[0] < tall < _CREATURES[1]:
-        factor, _ = infer_unit(in_si(motion, Convention(unit_m, "z")))
-        if factor != 1.0:
-            unit = 100 * unit_m * factor
+        largest = unit_m * (_METRES_AS_CM if tall < _CREATURES[1] else 1.0)
+        factor, _ = infer_unit(in_si(motion, Convention(largest, "z")))
+        if factor * largest != unit_m:
+            unit = 100 * largest * factor
             return (
-                unit_m * factor,
+                largest * factor,
                 f"unit {unit:.4g} cm, by its size: in {said}, it is {tall:.4g} m",
             )
     return unit_m, f"unit {said}"
+
+
+def _standing_axis(motion: Motion) -> Up | None:
+    """The axis of the file along which the body clearly stands, in its motion and at rest."""
+    some = motion.thinned(_SAMPLES)
+    rest = some.skeleton.rest_positions[None]
+    standing = [above_feet(some, places) for places in (forward(some)[0], rest)]
+    both = np.concatenate([np.minimum(*standing), np.minimum(*-np.array(standing))])
+    return UPS[int(np.argmax(both))] if both.max() > CLEARLY else None

@@ -18,7 +18,7 @@ from spark.io.foreign import foreign_recording
 from spark.io.gltf_file import GltfFile
 from spark.io.gltf_joints import joint_nodes
 from spark.io.gltf_rest import bound_maps
-from spark.io.nodes import NodeJoint, chosen_clip, joints_of, line_to, motion_of_axes
+from spark.io.nodes import NodeJoint, chosen_clip, joints_of, line_to, motion_of_axes, varies
 from spark.io.recording import Recording
 from spark.io.scanner import LARGEST
 from spark.motion import Motion
@@ -117,13 +117,21 @@ def _animation(file: GltfFile, clip: str | None) -> tuple[_Tracks, list[str]]:
         return read[chosen_clip(clip, names, file.path)], []
     if not any(read):
         return {}, []
-    sizes = [(len({node for node, _ in tracks}), _length(tracks)) for tracks in read]
+    sizes = [(*_moved(tracks), _length(tracks)) for tracks in read]
     best = sizes.index(max(sizes))
     others = [name for i, name in enumerate(names) if i != best]
     if not others:
         return read[best], []
     shown = ", ".join(map(repr, others[:8])) + (" ..." if len(others) > 8 else "")
     return read[best], [f"animation {names[best]!r} is read (--clip for others: {shown})"]
+
+
+def _moved(tracks: _Tracks) -> tuple[int, int]:
+    """How many nodes move, and how many have keys, which may hold them still."""
+    moving = {
+        node for (node, _), t in tracks.items() if varies(t.values[:, t.values.shape[1] // 2])
+    }
+    return len(moving), len({node for node, _ in tracks})
 
 
 def _length(tracks: _Tracks) -> float:

@@ -21,6 +21,7 @@ from spark.skeleton import Skeleton
 # Of the body's size: positions in the parent that vary less are constant. Files have single
 # precision.
 _CONSTANT = 1e-4
+_BLUR = 1e-5  # keys that differ by less, of their size or of one, are the same
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,13 @@ def chosen_clip(wanted: str, names: Sequence[str], path: Path) -> int:
             return i
     known = ", ".join(map(repr, names)) or "none"
     raise ConventionError(f"{path}: no animation is called {wanted!r}; it has {known}")
+
+
+def varies(keys: Float[np.ndarray, "K n"]) -> bool:
+    """Whether keyed values are not all the same, beyond what single precision blurs."""
+    size = max(1.0, float(np.abs(keys).max(initial=0.0)))
+    with np.errstate(invalid="ignore"):  # infinite ones, which are refused later
+        return len(keys) > 1 and float(np.ptp(keys, axis=0).max()) > _BLUR * size
 
 
 def joints_of(

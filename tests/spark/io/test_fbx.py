@@ -12,6 +12,7 @@ import spark_sim
 from spark.errors import ConventionError, DependencyError, FileFormatError
 from spark.io.fbx import read_fbx
 from spark.io.fbx_scene import FbxScene
+from spark.io.fbx_settings import read_settings
 from spark.kinematics import forward
 from spark.rig.rig import understand
 from spark.rotation import quat_angle, quat_identity
@@ -29,6 +30,39 @@ ARM = [
     Node("Spine", 0, translation=(10, 0, 0)),
 ]
 TURN = Take("turn", node=0, axis="Y", times=(0, 1), angles=(0, 90))
+
+# Of FBX 6.1 as programs wrote it until 2010: links by names, takes, and the rate as a text.
+SIX = """; FBX 6.1.0 project file
+FBXHeaderExtension: { FBXVersion: 6100
+}
+Objects: {
+ Model: "Model::Hips", "Limb" { Version: 232
+  Properties60: { Property: "Lcl Translation", "Lcl Translation", "A+",0,100,0
+  } }
+ Model: "Model::Spine", "Limb" { Version: 232
+  Properties60: { Property: "Lcl Translation", "Lcl Translation", "A+",0,10,0
+  } }
+ GlobalSettings: { Version: 1000
+  Properties60: { Property: "UpAxis", "int", "",1
+   Property: "UnitScaleFactor", "double", "",1
+  } } }
+Connections: {
+ Connect: "OO", "Model::Hips", "Model::Scene"
+ Connect: "OO", "Model::Spine", "Model::Hips"
+}
+Takes: { Current: "walk"
+ Take: "walk" { LocalTime: 0,46186158000
+  Model: "Model::Hips" { Version: 1.1
+   Channel: "Transform" { Channel: "R" { Channel: "X" { Default: 0
+     KeyVer: 4005
+     KeyCount: 2
+     Key: 0,0,L,46186158000,90,L
+     } LayerType: 2
+    } LayerType: 1
+   } } } }
+Version5: { Settings: { FrameRate: "24"
+ } }
+"""
 
 
 def test_pre_rotations_and_axes(tmp_path: Path) -> None:
@@ -99,6 +133,15 @@ def test_an_empty_animation_beside_the_real_one(tmp_path: Path) -> None:
     assert "animation 'turn' is read, not 'Take 001'" in read.notes
 
 
+def test_a_longer_animation_of_which_nothing_moves(tmp_path: Path) -> None:
+    """As Blender writes one for each action, also those of a camera, with keys for all bones."""
+    still = Take("camera", times=(0, 5), angles=(30, 30))
+    read = read_fbx(Fbx(ARM, [still, TURN]).write(tmp_path / "a.fbx"))
+    assert len(read.motion) == 31
+    assert "animation 'turn' is read, not 'camera'" in read.notes
+    assert len(read_fbx(tmp_path / "a.fbx", clip="camera").motion) == 151
+
+
 def test_without_animation_or_bones(tmp_path: Path) -> None:
     nulls = [replace(node, kind="Null") for node in ARM]
     read = read_fbx(Fbx(nulls).write(tmp_path / "n.fbx"))
@@ -128,6 +171,44 @@ def test_the_largest_skeleton(tmp_path: Path) -> None:
     )
     assert read.motion.skeleton.names == ("Hips", "Spine")
     assert any("'Prop'" in note for note in read.notes)
+
+
+@pytest.mark.parametrize(
+    ("up", "axes", "signs"),
+    [("-y", (0, 1, 2), (-1, -1, 1)), ("-z", (0, 2, 1), (1, -1, 1)), ("-x", (1, 0, 2), (1, -1, 1))],
+)
+def test_axes_that_point_down(
+    tmp_path: Path, up: str, axes: tuple[int, int, int], signs: tuple[int, int, int]
+) -> None:
+    """Points of a body to its side, above it and in front give the same body whatever the axes."""
+
+    def place(side: float, above: float, front: float) -> tuple[float, float, float]:
+        at = dict(zip(axes, np.array(signs) * (side, above, front), strict=True))
+        return at[0], at[1], at[2]
+
+    nodes = [
+        Node("Hips", translation=place(0, 100, 0)),
+        Node("Spine", 0, translation=place(0, 10, 0)),
+        Node("Nose", 1, translation=place(0, 5, 4)),
+        Node("Hand", 1, translation=place(3, 0, 0)),
+    ]
+    read = read_fbx(Fbx(nodes, axes=axes, signs=signs).write(tmp_path / "d.fbx"))
+    assert read.convention.up == up
+    places = read.motion.skeleton.rest_positions
+    np.testing.assert_allclose(places[:, 2], [1, 1.1, 1.15, 1.1], atol=1e-12)
+    front, side = places[2, :2], places[3, :2]
+    # Side, up and front are right-handed, as x, y and z: front x side is up.
+    assert np.cross([*front, 0], [*side, 0])[2] == pytest.approx(0.04 * 0.03)
+
+
+def test_fbx_6_says_its_frame_rate_elsewhere(tmp_path: Path) -> None:
+    (tmp_path / "six.fbx").write_text(SIX)
+    motion = read_fbx(tmp_path / "six.fbx").motion
+    assert motion.fps == pytest.approx(24)
+    assert len(motion) == 25
+    np.testing.assert_allclose(forward(motion)[0][[0, -1], 1], [[0, 0, 1.1], [0.1, 0, 1]])
+    binary = b"Kaydara FBX Binary  \0\x1a\0..\x09FrameRateS\x05\0\0\x0029.97"
+    assert read_settings(binary).frame_time == 1 / 29.97
 
 
 @pytest.mark.parametrize("data", [b"", b"HIERARCHY", b"Kaydara FBX Binary  \0\x1a\0" + bytes(40)])

@@ -107,6 +107,25 @@ def test_the_animation_that_moves_most_is_read(walking: Motion, tmp_path: Path) 
         spark_sim.load(path, clip="run")
 
 
+def test_a_longer_animation_of_which_nothing_moves_is_not_read(
+    walking: Motion, tmp_path: Path
+) -> None:
+    gltf = animated(walking)
+    held = json.loads(json.dumps(gltf.json["animations"][0]))
+    held["name"] = "held"
+    times = gltf.accessor(np.array([[0.0], [60.0]]))
+    still = {3: np.ones((2, 3)), 4: np.tile([0, 0, 0, 1.0], (2, 1))}
+    values = {width: gltf.accessor(rows) for width, rows in still.items()}
+    for channel in held["channels"]:
+        sampler = held["samplers"][channel["sampler"]]
+        sampler["input"] = times
+        sampler["output"] = values[4 if channel["target"]["path"] == "rotation" else 3]
+    gltf.json["animations"].append(held)
+    path = gltf.write(tmp_path / "a.glb")
+    assert len(read_gltf(path).motion) == len(walking)
+    assert read_gltf(path, clip="held").motion.duration == pytest.approx(60)
+
+
 def bent(how: str, keys: np.ndarray, values: np.ndarray, path: str) -> Gltf:
     """A file of two joints; the second turns or moves by keys."""
     gltf = Gltf()
