@@ -61,7 +61,8 @@ class FbxScene:
             notes += ("no node is a bone: its empty nodes are read as joints",)
         if not bones:
             raise FileFormatError(self.path, None, "holds no skeleton; expected bones")
-        joints, found = joints_of(bones, self.parents, [node.name for node in self._nodes])
+        names = [node.name for node in self._nodes]
+        joints, found = joints_of(bones, self.parents, names, self.path)
         return joints, notes + found
 
     def animation(

@@ -73,7 +73,7 @@ def _motion(file: GltfFile, clip: str | None, fps: float | None) -> tuple[Motion
     names = [file.name_of(i) for i in range(len(file.nodes))]
     tracks, notes = _animation(file, clip)
     bones = joint_nodes(file)
-    joints, found = joints_of(bones, parents, names)
+    joints, found = joints_of(bones, parents, names, file.path)
     notes += found
     inside = {node for joint in joints for node in line_to(joint.node, parents)}
     tracks = {key: track for key, track in tracks.items() if key[0] in inside}

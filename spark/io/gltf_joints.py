@@ -72,6 +72,6 @@ def skeleton_nodes(file: GltfFile) -> list[tuple[str, int]]:
     """The joints' names as a recording has them, and their nodes, in the order of its skeleton."""
     parents = file.parents()
     names = [file.name_of(i) for i in range(len(file.nodes))]
-    joints, _ = joints_of(joint_nodes(file), parents, names)
+    joints, _ = joints_of(joint_nodes(file), parents, names, file.path)
     unique, _ = unique_names([joint.name for joint in joints])
     return list(zip(unique, (joint.node for joint in joints), strict=True))

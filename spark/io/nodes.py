@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from spark.errors import ConventionError, name_list
+from spark.errors import ConventionError, FileFormatError, name_list
 from spark.io.recording import unique_names
 from spark.kinematics import local_rotations
 from spark.motion import Motion
@@ -58,16 +58,25 @@ def varies(keys: Float[np.ndarray, "K n"]) -> bool:
 
 
 def joints_of(
-    bones: Sequence[int], parents: Sequence[int], names: Sequence[str]
+    bones: Sequence[int], parents: Sequence[int], names: Sequence[str], path: Path
 ) -> tuple[list[NodeJoint], tuple[str, ...]]:
     """Bones, and other nodes that lie between them, depth-first below one root; and notes.
 
-    Of several skeletons, which have no node above them in common, the largest.
+    Of several skeletons, which have no node above them in common, the largest. Raises
+    `FileFormatError` where each bone is alone, as some exporters "flatten" them.
     """
     notes: tuple[str, ...] = ()
     lines = [line_to(i, parents) for i in bones]
     tops = [line[0] for line in lines]
     top = max(tops, key=tops.count)
+    if len(bones) > 1 and tops.count(top) == 1:
+        found = name_list([names[i] for i in bones])
+        raise FileFormatError(
+            path,
+            None,
+            f"has {len(bones)} bones of which none hangs on another ({found}); expected a "
+            "skeleton: export it with its hierarchy",
+        )
     others = sorted({names[i] for i in tops if i != top})
     if others:
         notes += (f"of several skeletons the largest is read, not {name_list(others)}",)

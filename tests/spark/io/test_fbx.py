@@ -211,6 +211,12 @@ def test_fbx_6_says_its_frame_rate_elsewhere(tmp_path: Path) -> None:
     assert read_settings(binary).frame_time == 1 / 29.97
 
 
+def test_bones_that_hang_side_by_side(tmp_path: Path) -> None:
+    apart = [replace(node, parent=-1) for node in ARM]
+    with pytest.raises(FileFormatError, match=r"a\.fbx: has 2 bones .*'Hips'.*hierarchy"):
+        read_fbx(Fbx(apart, [TURN]).write(tmp_path / "a.fbx"))
+
+
 @pytest.mark.parametrize("data", [b"", b"HIERARCHY", b"Kaydara FBX Binary  \0\x1a\0" + bytes(40)])
 def test_what_is_no_fbx(tmp_path: Path, data: bytes) -> None:
     (tmp_path / "x.fbx").write_bytes(data)
