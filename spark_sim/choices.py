@@ -11,7 +11,7 @@ __all__ = ["Format", "JointType", "Method", "Quat", "RobotName", "Unit", "Up"]
 Method = Literal["spark", "copy"]
 """How a motion is put on another body; `spark_sim.retarget` says more."""
 
-Unit = Literal["m", "dm", "cm", "mm", "inch", "cmu"]
+Unit = Literal["m", "dm", "cm", "mm", "inch", "ft", "cmu"]
 """A file's unit of length; any other is given in metres."""
 
 Quat = Literal["xyzw", "wxyz"]

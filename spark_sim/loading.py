@@ -74,8 +74,8 @@ def load(
     clip's `notes` say so.
 
     - A motion of a character or a person is a `Clip`, in any format of
-      `spark.io.reading.FORMATS`. `unit` is m, dm, cm, mm, inch, cmu or a number of metres; `up` is
-      x, y or z, or -y where y points down; `roles` is a map of joints in TOML, as
+      `spark.io.reading.FORMATS`. `unit` is m, dm, cm, mm, inch, ft, cmu or a number of metres; `up`
+      is x, y or z, or -y where y points down; `roles` is a map of joints in TOML, as
       `spark-sim inspect --save-map` writes it.
       `fps` is the rate where the file says none, or a wrong one. `body_model` is your own file of
       SMPL, SMPL-H or SMPL-X (.npz), for the exact bones of a motion of that family.

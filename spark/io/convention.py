@@ -22,10 +22,19 @@ Up = Literal["x", "y", "z", "-x", "-y", "-z"]
 UPS: tuple[Up, ...] = get_args(Up)
 
 # Metres in a unit. CMU's is 1/0.45 of an inch, from the scale line of its ASF files.
-UNITS = {"m": 1.0, "cm": 0.01, "cmu": 0.0254 / 0.45, "inch": 0.0254, "mm": 0.001, "dm": 0.1}
+UNITS = {
+    "m": 1.0,
+    "cm": 0.01,
+    "cmu": 0.0254 / 0.45,
+    "inch": 0.0254,
+    "mm": 0.001,
+    "dm": 0.1,
+    "ft": 0.3048,
+}
 
-# How much rarer than metres and centimetres a unit is: the logarithm of its probability.
-_LOG_PRIOR = {"m": 0.0, "cm": 0.0, "cmu": -1.0, "inch": -1.0, "mm": -1.0, "dm": -1.5}
+# How much rarer than metres and centimetres a unit is: the logarithm of its probability. Feet are
+# only named in a note: a human in feet is as tall as a giant of 5 m in metres.
+_LOG_PRIOR = {"m": 0.0, "cm": 0.0, "cmu": -1.0, "inch": -1.0, "mm": -1.0, "dm": -1.5, "ft": -3.0}
 
 # [m] The median height of people, and the standard deviation of its logarithm: adults, children,
 # and the error of the measures below.
@@ -162,7 +171,8 @@ def infer_unit(motion: Motion) -> tuple[float, tuple[str, ...]]:
         name: _LOG_PRIOR[name] - 0.5 * (np.log(size * metres / _HEIGHT) / _HEIGHT_SPREAD) ** 2
         for name, metres in UNITS.items()
     }
-    best, second = sorted(UNITS, key=lambda name: -chances[name])[:2]
+    feet = chances.pop("ft")
+    best, second = sorted(chances, key=lambda name: -chances[name])[:2]
     tall = size * UNITS[best]
     notes = [f"unit {best} ({100 * UNITS[best]:.4g} cm), {how}: {tall:.2f} m"]
     if chances[best] - chances[second] < _CLOSE:
@@ -172,6 +182,8 @@ def infer_unit(motion: Motion) -> tuple[float, tuple[str, ...]]:
         )
     elif not HUMAN_HEIGHTS[0] < tall < HUMAN_HEIGHTS[1]:
         notes.append(f"{tall:.2f} m is no human's height; check, and give --unit")
+    if feet > chances[best]:
+        notes.append(f"in feet it would be {size * UNITS['ft']:.2f} m: if so, give --unit ft")
     return UNITS[best], tuple(notes)
 
 

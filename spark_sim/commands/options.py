@@ -23,7 +23,7 @@ def add_corrections(parser: ArgumentParser, file: str, prefix: str = "") -> None
         f"--{prefix}unit",
         dest=f"{dest}unit",
         metavar="UNIT",
-        help="m, dm, cm, mm, inch, cmu (5.644 cm), or metres as a number",
+        help="m, dm, cm, mm, inch, ft, cmu (5.644 cm), or metres as a number",
     )
     group.add_argument(
         f"--{prefix}up",

@@ -53,12 +53,25 @@ def test_conventions_of_recordings_are_inferred(pattern: str) -> None:
         assert (found.convention.unit, found.convention.up) == CONVENTIONS[pattern], path
 
 
-@pytest.mark.parametrize("unit", UNITS)
+@pytest.mark.parametrize("unit", sorted(UNITS.keys() - {"ft"}))
 @pytest.mark.parametrize("tall", [1.3, 1.5, 1.8, 2.0])
 def test_people_of_all_sizes_show_the_unit(tmp_path: Path, unit: str, tall: float) -> None:
     found = read_recording(save(human("z", UNITS[unit], scale=tall / 1.7), tmp_path))
     assert (found.convention.unit, found.convention.up) == (unit, "z")
     assert f"unit {unit} " in found.notes[0]
+
+
+@pytest.mark.parametrize("tall", [1.3, 1.5, 1.8, 2.0])
+def test_people_in_feet_are_pointed_out(tmp_path: Path, tall: float) -> None:
+    """They may as well be giants in metres, or infants in decimetres."""
+    path = save(human("z", UNITS["ft"], scale=tall / 1.7), tmp_path)
+    assert any("--unit ft" in note for note in read_recording(path).notes)
+    given = read_recording(path, unit="ft")
+    metres = read_recording(save(human("z", 1.0, scale=tall / 1.7), tmp_path))
+    np.testing.assert_allclose(
+        given.motion.skeleton.offsets, metres.motion.skeleton.offsets, atol=1e-4
+    )
+    assert not any("--unit ft" in note for note in metres.notes)
 
 
 @pytest.mark.parametrize("name", RIGS)
@@ -200,7 +213,7 @@ def test_a_skeleton_in_one_point_needs_a_unit(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("unit", ["yard", "", "nan", "-1", "0", 0.0, float("inf")])
 def test_unknown_units_are_refused(tmp_path: Path, unit: str | float) -> None:
-    with pytest.raises(ConventionError, match="expected one of m, cm, cmu, inch, mm, dm"):
+    with pytest.raises(ConventionError, match="expected one of m, cm, cmu, inch, mm, dm, ft"):
         read_recording(tmp_path / "never read", unit=unit)
 
 
