@@ -26,6 +26,7 @@ FEET: dict[Side, tuple[Role, Role]] = {
     "left": (Role.LEFT_FOOT, Role.LEFT_TOE),
     "right": (Role.RIGHT_FOOT, Role.RIGHT_TOE),
 }
+_SHANKS = (Role.LEFT_LOWER_LEG, Role.RIGHT_LOWER_LEG)
 UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
 
 # Fractions of the standing height: Drillis and Contini 1966, as in Winter, "Biomechanics and Motor
@@ -33,6 +34,8 @@ UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
 HIP_HEIGHT = 0.530
 FOOT_LENGTH = 0.152
 FOOT_WIDTH = 0.055
+ANKLE_HEIGHT = 0.039 / 0.246  # [shanks] above the floor
+_NO_FOOT = 0.04  # [shanks] a foot that reaches no further from its ankle ends there
 # [legs] from the ankle to the farthest point of a foot: 0.25 on a human, up to 0.6 in big shoes.
 _MAX_FOOT = 0.65
 _HUMAN_FOOT = 0.24
@@ -83,6 +86,23 @@ def hip_height(skeleton: Skeleton, roles: RoleMap, tpose: Float[np.ndarray, "J 4
     feet = [j for role, _ in FEET.values() for j in roles.joints(role)]
     points = [pose.foot(j) for j in feet] or [pose.below(j) for j in pose.hips]
     return float(pose.positions[pose.hips, 2].mean() - min(each[:, 2].min() for each in points))
+
+
+def below_ankles(skeleton: Skeleton, roles: RoleMap, tpose: Float[np.ndarray, "J 4"]) -> float:
+    """How far [m] the soles lie below the ankles where the rig ends at these, without toes and End
+    Sites: judged by the shanks, as on a human. 0 where a foot goes on."""
+    pose = _TPose(skeleton, roles, tpose)
+    shanks = []
+    for (role, _), knee_role in zip(FEET.values(), _SHANKS, strict=True):
+        foot, knee = roles.joint(role), roles.joint(knee_role)
+        if foot is None or knee is None:
+            continue
+        ankle = pose.positions[foot]
+        shank = float(np.linalg.norm(ankle - pose.positions[knee]))
+        if np.linalg.norm(pose.below(foot) - ankle, axis=1).max() > _NO_FOOT * shank:
+            return 0.0
+        shanks.append(shank)
+    return ANKLE_HEIGHT * float(np.mean(shanks)) if shanks else 0.0
 
 
 def human_soles(

@@ -11,7 +11,15 @@ from spark.errors import SkeletonError
 from spark.kinematics import world_positions
 from spark.motion import Motion
 from spark.rig.doubles import doubles_of
-from spark.rig.feet import FEET, HIP_HEIGHT, UPPER_LEGS, Sole, hip_height, human_soles
+from spark.rig.feet import (
+    FEET,
+    HIP_HEIGHT,
+    UPPER_LEGS,
+    Sole,
+    below_ankles,
+    hip_height,
+    human_soles,
+)
 from spark.rig.fingers import FingerBone, finger_bones
 from spark.rig.groups import groups_of
 from spark.rig.role_assignment import Override, assign_roles
@@ -146,4 +154,10 @@ def understand(motion: Motion, override: Override | None = None) -> Rig:
             f"the hips are {height:.2g} m above the soles; expected legs with a length"
         )
     notes = (*roles.notes, *notes)
+    if lower := below_ankles(skeleton, roles, tpose):
+        height += lower
+        notes += (
+            f"the feet end at the ankles: soles are taken to be {100 * lower:.1f} cm below these, "
+            "by the shanks, as on a human",
+        )
     return Rig(skeleton, roles, groups_of(skeleton, roles), tpose, root_joint, height, notes)

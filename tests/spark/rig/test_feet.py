@@ -7,11 +7,12 @@ import pytest
 
 from spark.kinematics import forward
 from spark.motion import Motion
-from spark.rig.feet import FOOT_LENGTH, FOOT_WIDTH, hip_height, sole_positions
-from spark.rig.rig import Rig
+from spark.rig.feet import FOOT_LENGTH, FOOT_WIDTH, below_ankles, hip_height, sole_positions
+from spark.rig.rig import Rig, understand
 from spark.rig.roles import Role, RoleMap
-from spark.rotation import quat_about, quat_rotate
+from spark.rotation import quat_about, quat_identity, quat_rotate
 from spark.skeleton import Skeleton
+from tests.helpers.bvh_by_hand import HUMAN
 from tests.helpers.stick import JOINTS, joint, standing, stick_rig
 
 
@@ -147,3 +148,39 @@ def test_a_foot_has_an_upper_bound() -> None:
     left, right = soles_of(odd, standing(odd, 1))[0]
     assert left[:, 0].max() < 2 / 3 * 0.8
     np.testing.assert_allclose(left[:2, 0], right[:2, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("end", ["none", "at the ankle"])
+def test_feet_that_end_at_the_ankle(end: str) -> None:
+    """Soles lie 0.039 of the height below the ankles, whose shanks are 0.246 of it (Winter)."""
+    tall = 1.7
+    joints = {name: (parent, at) for name, parent, at in HUMAN if "Toe" not in name}
+    for side in ("Left", "Right"):
+        joints[f"{side}Leg"] = joints[f"{side}Leg"][0], (0.0, 0.0, -0.245 * tall)
+        joints[f"{side}Foot"] = joints[f"{side}Foot"][0], (0.0, 0.0, -0.246 * tall)
+    names = [name for name, _, _ in HUMAN]
+    kept = list(joints)
+    parents = [-1 if p < 0 else kept.index(names[p]) for p, _ in joints.values()]
+    feet = [] if end == "none" else [kept.index("LeftFoot"), kept.index("RightFoot")]
+    skeleton = Skeleton(
+        tuple(kept),
+        np.array(parents),
+        np.array([at for _, at in joints.values()]),
+        np.arange(len(kept)) == 0,
+        np.array(feet, dtype=np.int64),
+        np.zeros((len(feet), 3)),
+    )
+    rig = understand(
+        Motion(skeleton, 1 / 30, np.zeros((1, 3)), quat_identity(skeleton.offsets)[None])
+    )
+    assert rig.hip_height == pytest.approx(0.530 * tall)
+    assert any("below these" in note for note in rig.notes)
+    for sole in rig.soles:
+        points = sole_positions(sole, rig.tpose_positions, rig.tpose)
+        np.testing.assert_allclose(points[:, 2], -0.530 * tall, atol=1e-9)
+    on_toes = replace(
+        skeleton,
+        end_parents=np.array([skeleton.names.index("LeftFoot")]),
+        end_offsets=np.array([[0.1, 0.0, -0.05]]),
+    )
+    assert below_ankles(on_toes, rig.roles, rig.tpose) == 0.0
