@@ -36,6 +36,8 @@ _NAME = re.compile(r"[^\s{}]([^\r\n{}]*[^\s{}])?", re.ASCII)
 _POINT = re.compile(rb"(?<!\S)[-+]?\d*\.\d")
 _COMMA = re.compile(rb"(?<!\S)([-+]?\d+),(\d+(?:[eE][-+]?\d+)?)(?!\S)")
 
+_COMMENT = re.compile(rb"(?:^|(?<=[\r\n]))[ \t]*(?:#|//)[^\r\n]*")
+
 _CHANNEL_OF = {name.lower().encode(): name for name in CHANNELS}
 
 
@@ -132,20 +134,21 @@ def read_bvh(path: str | Path, *, frame_time: float | None = None) -> Bvh:
     """The file at `path`, exactly: writing it and reading it again gives equal values.
 
     Takes tabs, any line ends, a byte order mark, keywords in any case, names with any characters
-    but braces (UTF-8 or 16, else Shift-JIS, else Latin-1), rows wrapped over several lines, and no
-    frames at all. Mends whole rows that are missing or too many, OFFSETs of six numbers, decimal
-    commas, and a single frame that lasts no time. `frame_time` [s] replaces the file's. Raises
-    `FileFormatError` with the line for anything else; memory goes with the size of the file, not
-    with what it claims.
+    but braces (UTF-8 or 16, else Shift-JIS, else Latin-1), rows wrapped over several lines, lines
+    of comments (# or //), and no frames at all. Mends whole rows that are missing or too many,
+    OFFSETs of six numbers, decimal commas, and a single frame that lasts no time. `frame_time` [s]
+    replaces the file's. Raises `FileFormatError` with the line for anything else; memory goes with
+    the size of the file, not with what it claims.
     """
     path = Path(path)
     data, encoding = to_utf8(_read(path))
+    data, left_out = _without_comments(data)
     data, commas = _with_points(data)
     scanner = Scanner(path, data)
     joints, repairs = _parse_hierarchy(scanner)
     channels = sum(len(joint.channels) for joint in joints)
     frame_time, values, mended = parse_motion(scanner, channels, frame_time)
-    return Bvh(joints, frame_time, values, path, encoding, commas + repairs + mended)
+    return Bvh(joints, frame_time, values, path, encoding, left_out + commas + repairs + mended)
 
 
 def write_bvh(bvh: Bvh, path: str | Path) -> None:
@@ -199,7 +202,7 @@ def _hierarchy_lines(joints: tuple[BvhJoint, ...]) -> list[str]:
 
 def _read(path: Path) -> bytes:
     data = without_utf16(read_bytes(path, expected="a BVH file"))
-    start = data[:4096]
+    start = _COMMENT.sub(b"", data[:4096])
     if re.match(rb"(\xef\xbb\xbf)?\s*HIERARCHY", start, re.IGNORECASE):
         return data
     if not start.strip():
@@ -207,6 +210,15 @@ def _read(path: Path) -> bytes:
     raise FileFormatError(
         path, 1, f"starts with {shown(start.split()[0])}; a BVH file starts with HIERARCHY"
     )
+
+
+def _without_comments(data: bytes) -> tuple[bytes, tuple[str, ...]]:
+    """The text with empty lines for those that are comments, which the format doesn't know, and a
+    note."""
+    if b"#" not in data and b"//" not in data:
+        return data, ()
+    data, count = _COMMENT.subn(b"", data)
+    return data, (f"{counted(count, 'line')} of comments left out",) if count else ()
 
 
 def _with_points(data: bytes) -> tuple[bytes, tuple[str, ...]]:
@@ -238,7 +250,7 @@ def _parse_hierarchy(scanner: Scanner) -> tuple[tuple[BvhJoint, ...], tuple[str,
                 if len(joints) == _MAX_JOINTS:
                     scanner.fail(f"more than {_MAX_JOINTS} joints")
                 open_joints.append(_open_joint(scanner, joints, open_joints[-1]))
-            case b"end":
+            case b"end" | b"endsite" | b"end_site":
                 scanner.label()
                 scanner.expect("{")
                 scanner.expect("OFFSET")

@@ -72,11 +72,12 @@ class Scanner:
         return bool(_NUMBER_AHEAD.match(self.data, self.end))
 
     def count(self, what: str) -> int:
-        """The next word as a whole number, not negative."""
+        """The next word as a whole number, not negative; it may be written as 150.0."""
         word = self.word()
-        if not re.fullmatch(rb"\d{1,15}", word):
+        found = re.fullmatch(rb"(\d{1,15})(?:\.0*)?", word)
+        if not found:
             self.fail(f"expected a whole number for {what}, found {shown(word)}")
-        return int(word)
+        return int(found[1])
 
     def lines(self) -> Iterator[tuple[int, list[bytes]]]:
         """What follows, line by line: the line's number and its words."""

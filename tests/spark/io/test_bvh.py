@@ -104,6 +104,11 @@ def test_reads_what_is_written_there(tmp_path: Path) -> None:
         pytest.param(SMALL.replace("\n{", " {").replace("\n\t{", "{"), id="brace beside the name"),
         pytest.param(SMALL.replace("Frames: 2", "Frames:\t2"), id="tab after Frames:"),
         pytest.param(SMALL.replace("Frames: 2", "FRAMES 2"), id="no colon"),
+        pytest.param(SMALL.replace("Frames: 2", "Frames: 2.0"), id="Frames as a decimal"),
+        pytest.param(SMALL.replace("End Site", "EndSite"), id="EndSite"),
+        pytest.param(
+            SMALL.replace("End Site", "End_Site{").replace("{\n\t\t{", "{"), id="End_Site"
+        ),
         pytest.param(SMALL.replace(" 3 4 ", " 3\n4 "), id="rows wrapped"),
         pytest.param(SMALL.replace(" 3 4 ", "\n3\n\n\t4\r\n"), id="rows wrapped unevenly"),
     ],
@@ -192,6 +197,21 @@ def test_decimal_commas_are_points(tmp_path: Path) -> None:
     found = read_text(tmp_path, SMALL.replace(".", ",").replace("LeftFoot", "foot.01.L"))
     assert "decimal commas" in " ".join(found.repairs)
     assert_same(found, read_text(tmp_path, swap("LeftFoot", "foot.01.L")))
+
+
+@pytest.mark.parametrize("mark", ["#", "//"])
+def test_lines_of_comments_are_left_out(tmp_path: Path, mark: str) -> None:
+    """Of whole lines alone: joints may be called so. Lines keep their numbers in errors."""
+    plain = swap("JOINT Head", f"JOINT {mark}1 Head")
+    lines = plain.splitlines()
+    for at in (28, 27, 14, 6, 0):
+        lines.insert(at, f" \t{mark} made by hand: {{ 1 2 3")
+    for ending in ("\n", "\r\n", "\r"):
+        found = read_text(tmp_path, ending.join([*lines, ""]))
+        assert_same(found, read_text(tmp_path, plain))
+        assert "5 lines of comments left out" in found.repairs
+    with pytest.raises(FileFormatError, match=rf"a\.bvh:{len(lines)}: .*'nan'"):
+        read_text(tmp_path, "\n".join([*lines[:-1], lines[-1].replace("91", "nan")]))
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
