@@ -36,7 +36,7 @@ _NAME = re.compile(r"[^\s{}]([^\r\n{}]*[^\s{}])?", re.ASCII)
 _POINT = re.compile(rb"(?<!\S)[-+]?\d*\.\d")
 _COMMA = re.compile(rb"(?<!\S)([-+]?\d+),(\d+(?:[eE][-+]?\d+)?)(?!\S)")
 
-_COMMENT = re.compile(rb"(?:^|(?<=[\r\n]))[ \t]*(?:#|//)[^\r\n]*")
+_COMMENT = re.compile(rb"(?:^|(?<=[\r\n]))[ \t]*(?:[#;]|//)[^\r\n]*")
 
 _CHANNEL_OF = {name.lower().encode(): name for name in CHANNELS}
 
@@ -135,7 +135,7 @@ def read_bvh(path: str | Path, *, frame_time: float | None = None) -> Bvh:
 
     Takes tabs, any line ends, a byte order mark, keywords in any case, names with any characters
     but braces (UTF-8 or 16, else Shift-JIS, else Latin-1), rows wrapped over several lines, lines
-    of comments (# or //), and no frames at all. Mends whole rows that are missing or too many,
+    of comments (#, ; or //), and no frames at all. Mends whole rows that are missing or too many,
     OFFSETs of six numbers, decimal commas, and a single frame that lasts no time. `frame_time` [s]
     replaces the file's. Raises `FileFormatError` with the line for anything else; memory goes with
     the size of the file, not with what it claims.
@@ -215,7 +215,7 @@ def _read(path: Path) -> bytes:
 def _without_comments(data: bytes) -> tuple[bytes, tuple[str, ...]]:
     """The text with empty lines for those that are comments, which the format doesn't know, and a
     note."""
-    if b"#" not in data and b"//" not in data:
+    if not any(mark in data for mark in (b"#", b";", b"//")):
         return data, ()
     data, count = _COMMENT.subn(b"", data)
     return data, (f"{counted(count, 'line')} of comments left out",) if count else ()

@@ -199,7 +199,7 @@ def test_decimal_commas_are_points(tmp_path: Path) -> None:
     assert_same(found, read_text(tmp_path, swap("LeftFoot", "foot.01.L")))
 
 
-@pytest.mark.parametrize("mark", ["#", "//"])
+@pytest.mark.parametrize("mark", ["#", ";", "//"])
 def test_lines_of_comments_are_left_out(tmp_path: Path, mark: str) -> None:
     """Of whole lines alone: joints may be called so. Lines keep their numbers in errors."""
     plain = swap("JOINT Head", f"JOINT {mark}1 Head")

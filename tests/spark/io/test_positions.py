@@ -117,6 +117,18 @@ def test_layouts_of_as_many_points_are_told_apart(walking: Motion, tmp_path: Pat
         assert f"positions of {layout.name}'s 17 joints" in read.notes
 
 
+@pytest.mark.parametrize("layout", layouts(17), ids=lambda layout: layout.name)
+def test_feet_that_end_at_the_ankles_stand_on_soles(
+    walking: Motion, tmp_path: Path, layout: Layout
+) -> None:
+    """Hips are as high as those of the person whose points these are, of whom feet are known."""
+    person = as_person(walking)
+    np.save(tmp_path / "a.npy", points_of(layout, person))
+    rig = understand(read_motion(tmp_path / "a.npy", up="z").motion)
+    assert rig.hip_height == pytest.approx(understand(person).hip_height, rel=0.03)
+    assert any("below these" in note for note in rig.notes)
+
+
 def test_names_in_any_order(walking: Motion, tmp_path: Path) -> None:
     layout = layouts(53)[0]
     points = points_of(layout, as_person(walking))
