@@ -34,7 +34,7 @@ UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
 HIP_HEIGHT = 0.530
 FOOT_LENGTH = 0.152
 FOOT_WIDTH = 0.055
-ANKLE_HEIGHT = 0.039 / 0.246  # [shanks] above the floor
+_ANKLE_HEIGHT = 0.039 / 0.246  # [shanks] above the floor
 _NO_FOOT = 0.04  # [shanks] a foot that reaches no further from its ankle ends there
 # [legs] from the ankle to the farthest point of a foot: 0.25 on a human, up to 0.6 in big shoes.
 _MAX_FOOT = 0.65
@@ -102,7 +102,7 @@ def below_ankles(skeleton: Skeleton, roles: RoleMap, tpose: Float[np.ndarray, "J
         if np.linalg.norm(pose.below(foot) - ankle, axis=1).max() > _NO_FOOT * shank:
             return 0.0
         shanks.append(shank)
-    return ANKLE_HEIGHT * float(np.mean(shanks)) if shanks else 0.0
+    return _ANKLE_HEIGHT * float(np.mean(shanks)) if shanks else 0.0
 
 
 def human_soles(
