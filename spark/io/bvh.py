@@ -38,6 +38,8 @@ _COMMA = re.compile(rb"(?<!\S)([-+]?\d+),(\d+(?:[eE][-+]?\d+)?)(?!\S)")
 
 _COMMENT = re.compile(rb"(?:^|(?<=[\r\n]))[ \t]*(?:[#;]|//)[^\r\n]*")
 
+_AFTER_TEXT = b"\0\x1a"  # padding, and DOS' end of a file
+
 _CHANNEL_OF = {name.lower().encode(): name for name in CHANNELS}
 
 
@@ -201,7 +203,7 @@ def _hierarchy_lines(joints: tuple[BvhJoint, ...]) -> list[str]:
 
 
 def _read(path: Path) -> bytes:
-    data = without_utf16(read_bytes(path, expected="a BVH file"))
+    data = without_utf16(read_bytes(path, expected="a BVH file")).rstrip(_AFTER_TEXT)
     start = _COMMENT.sub(b"", data[:4096])
     if re.match(rb"(\xef\xbb\xbf)?\s*HIERARCHY", start, re.IGNORECASE):
         return data

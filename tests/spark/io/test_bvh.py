@@ -106,6 +106,7 @@ def test_reads_what_is_written_there(tmp_path: Path) -> None:
         pytest.param(SMALL.replace("Frames: 2", "FRAMES 2"), id="no colon"),
         pytest.param(SMALL.replace("Frames: 2", "Frames: 2.0"), id="Frames as a decimal"),
         pytest.param(SMALL.replace("End Site", "EndSite"), id="EndSite"),
+        pytest.param(SMALL + "\x1a\0\0", id="DOS' end of a file, padded"),
         pytest.param(
             SMALL.replace("End Site", "End_Site{").replace("{\n\t\t{", "{"), id="End_Site"
         ),
