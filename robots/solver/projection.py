@@ -4,7 +4,8 @@ baseline that `copy` is.
 A single hinge takes the twist about its axis. Two take the best pair of angles, a singular value
 problem in half angles. Three are solved exactly (Paden and Kahan's subproblems, as in Murray, Li
 and Sastry, "A Mathematical Introduction to Robotic Manipulation", ch. 3), on the branch that is
-within the limits and does not jump.
+within the limits and does not jump. Two of an upper arm or leg point its bone, as if a third turned
+that about itself: the twist, which they can't take, would else draw the arm out of its direction.
 """
 
 from collections.abc import Sequence
@@ -22,6 +23,7 @@ from spark.rotation import (
     quat_rotate,
 )
 
+_POINTED = ("upper_arm", "upper_leg")  # parts whose direction says more than their twist
 _W_BEYOND_LIMITS = 1.0  # [1/rad²] of an angle's square beyond the limits, a jump's square being 1
 # Nothing of a body is turned the long way round for seconds, though to come back takes a jump.
 _W_FROM_REST = 0.03  # [1/rad²] of an angle's square in each frame
@@ -38,6 +40,11 @@ def project(
     wanted = {int(link): world[:, j] for j, link in reversed(list(enumerate(robot.links)))}
     angles = np.zeros((count, len(tree)))
     balls = np.tile([1.0, 0, 0, 0], (count, len(tree), 1)) if tree.balls.any() else None
+    bones = {
+        int(robot.links[robot.rig.roles.require(role)]): bone
+        for role, bone in robot.bones.items()
+        if role.part in _POINTED
+    }
     links = {-1: wanted.get(-1, np.tile([1.0, 0, 0, 0], (count, 1)))}
     for group in _hinge_groups(robot):
         above = links[int(tree.parents[group[0]])]
@@ -48,7 +55,7 @@ def project(
             balls[:, group[0]] = local
             links[group[-1]] = target
             continue
-        angles[:, group] = _hinge_angles(tree, group, local)
+        angles[:, group] = _hinge_angles(tree, group, local, bones.get(group[-1]))
         turned = above
         for j in group:
             turned = quat_mul(turned, quat_from_rotvec(tree.axes[j] * angles[:, [j]]))
@@ -78,17 +85,23 @@ def _hinge_groups(robot: Morphology) -> list[tuple[int, ...]]:
 
 
 def _hinge_angles(
-    tree: Tree, group: Sequence[int], local: Float[np.ndarray, "T 4"]
+    tree: Tree,
+    group: Sequence[int],
+    local: Float[np.ndarray, "T 4"],
+    bone: Float[np.ndarray, "3"] | None = None,
 ) -> Float[np.ndarray, "T K"]:
     """Angles [rad] within the limits of a group of K hinges that rotate by `local`, as nearly as
-    they can."""
+    they can; or, of two, that turn a `bone` so."""
     axes, lower, upper = (part[list(group)] for part in (tree.axes, tree.lower, tree.upper))
     if len(group) == 1:
         return _clip_to_limits(_twist(local, axes[0])[:, None], lower, upper)[0]
-    if len(group) == 2:
+    if len(group) == 2 and bone is not None:
+        axes = np.vstack([axes, bone])
+    if len(axes) == 2:
         return _clip_to_limits(_two_hinges(local, axes), lower, upper)[0]
-    if len(group) == 3:
-        branches = [_clip_to_limits(branch, lower, upper) for branch in _three_hinges(local, axes)]
+    if len(axes) == 3:
+        found = [angles[:, : len(group)] for angles in _three_hinges(local, axes)]
+        branches = [_clip_to_limits(branch, lower, upper) for branch in found]
         return _steadiest_branches(*(np.stack(part) for part in zip(*branches, strict=True)))
     # More hinges than a rotation needs: the first ones stay at rest.
     out = np.zeros((len(local), len(group)))

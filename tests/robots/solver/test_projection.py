@@ -31,3 +31,19 @@ def test_two_seconds_are_not_spent_the_long_way_round_to_save_a_jump() -> None:
     angles = np.concatenate([swing, [1.9, 1.6, 1.7] + 0.0 * swing])
     found = _hinge_angles(HIP, (0, 1, 2), turned(angles))
     np.testing.assert_allclose(found, angles, atol=1e-6)
+
+
+def test_two_hinges_of_an_upper_arm_point_its_bone_whatever_its_twist() -> None:
+    arm = Tree(
+        parents=np.array([-1, 0]),
+        anchors=np.zeros((2, 3)),
+        axes=PITCH_ROLL_YAW[:2],
+        balls=np.zeros(2, dtype=bool),
+        lower=np.full(2, -3.14),
+        upper=np.full(2, 3.14),
+        base=np.zeros(3),
+    )
+    down = np.array([0.0, 0.0, -1.0])
+    wanted = np.stack([np.linspace(-0.6, 0.6, 30), np.full(30, 0.3), np.full(30, 1.2)], axis=1)
+    found = _hinge_angles(arm, (0, 1), turned(wanted), down)
+    np.testing.assert_allclose(found, wanted[:, :2], atol=1e-9)
