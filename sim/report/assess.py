@@ -145,16 +145,13 @@ def _without_tremble(course: Course) -> tuple[Subject, float, tuple[str, ...]]:
     quiet, noise, _ = without_noise(to_canonical(subject.motion, subject.rig))
     if noise is None:
         return subject, floor, ()
-    return (
-        replace(subject, motion=from_canonical(quiet)),
-        quiet.floor_z,
-        (
-            f"the source's feet tremble by {1000 * noise.feet:.0f} mm of white noise (of an adult): "
-            f"its floor is that of its smoothed motion, {100 * (quiet.floor_z - floor):.1f} cm higher "
-            f"than the 5th percentile of its lowest sole point, and so are the contacts, swings and "
-            f"limbs that the motion is compared with",
-        ),
+    higher = 100 * (quiet.floor_z - floor)
+    note = (
+        f"the source's feet tremble by {1000 * noise.feet:.0f} mm of white noise (of an adult): "
+        f"its floor is that of its smoothed motion, {higher:.1f} cm higher than the 5th percentile "
+        "of its lowest sole point, and so are the contacts, swings and limbs to compare with"
     )
+    return replace(subject, motion=from_canonical(quiet)), quiet.floor_z, (note,)
 
 
 def _floor_from_source(

@@ -1,37 +1,24 @@
 """A robot's feet stand where those of a trembling recording would."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from robots.model.known import known
 from robots.solver.solve import retarget
 from robots.solver.targets import targets_of
-from scripts.corruptions import jittering
 from sim.report.measures import contact_match
-from spark.demo.sample import sample_motion, sample_rig
 from spark.rotation import quat_angle
-from spark.transfer.canonical import CanonicalMotion, to_canonical
 from spark.transfer.noise import without_noise
-
-RIG = sample_rig("walker")
-
-
-def clip(name: str, fps: float, degrees: float = 0.0) -> CanonicalMotion:
-    """A demo motion; with noise on every joint, and on the root, too."""
-    motion = sample_motion(name, RIG, fps)
-    if degrees:
-        rng = np.random.default_rng(0)
-        shaken = jittering(motion, RIG, rng, degrees=degrees)
-        root = motion.root_pos + 0.005 * degrees * rng.normal(size=motion.root_pos.shape)
-        motion = replace(shaken, root_pos=root)
-    return to_canonical(motion, RIG)
+from tests.helpers.shaken import demo_clip
 
 
 @pytest.mark.parametrize(("degrees", "least"), [(1.0, 0.93), (2.0, 0.85)])
 def test_a_noisy_walk_stands_where_the_clean_one_does(degrees: float, least: float) -> None:
-    robot, clean, shaken = known("robot"), clip("walk", 30.0), clip("walk", 30.0, degrees)
+    robot, clean, shaken = (
+        known("robot"),
+        demo_clip("walk", 30.0),
+        demo_clip("walk", 30.0, degrees),
+    )
     truth = targets_of(clean, robot).contacts.reshape(len(clean), -1)
     quiet, noise, (note,) = without_noise(shaken)
     found = targets_of(quiet, robot, noise).contacts.reshape(truth.shape)
@@ -50,5 +37,5 @@ def test_a_noisy_walk_stands_where_the_clean_one_does(degrees: float, least: flo
 
 
 def test_a_robot_says_that_it_follows_a_smoothed_recording() -> None:
-    moved = retarget(clip("walk", 30.0, 1.0).frames(0, 30), known("robot"))
+    moved = retarget(demo_clip("walk", 30.0, 1.0).frames(0, 30), known("robot"))
     assert any("tremble" in note for note in moved.notes)

@@ -1,11 +1,8 @@
 """Motion that trembles is told from motion that moves, and smoothed; clean motion stays."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from scripts.corruptions import jittering
 from spark.demo.sample import sample_motion, sample_rig
 from spark.resample import motion_at
 from spark.rig.contacts import PLANTED_SPEED, planted_feet, speeds
@@ -13,20 +10,9 @@ from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.transfer.foot_lock import lock_feet
 from spark.transfer.noise import Noise, noise_of, smoothed, white_noise, without_noise
+from tests.helpers.shaken import RIG, demo_clip
 
-RIG = sample_rig("walker")
 SPREAD = 0.01  # [m]
-
-
-def clip(name: str, fps: float, degrees: float = 0.0) -> CanonicalMotion:
-    """A demo motion; with noise on every joint, and on the root, too."""
-    motion = sample_motion(name, RIG, fps)
-    if degrees:
-        rng = np.random.default_rng(0)
-        shaken = jittering(motion, RIG, rng, degrees=degrees)
-        root = motion.root_pos + 0.005 * degrees * rng.normal(size=motion.root_pos.shape)
-        motion = replace(shaken, root_pos=root)
-    return to_canonical(motion, RIG)
 
 
 @pytest.mark.parametrize("fps", [30, 60, 120])
@@ -42,7 +28,7 @@ def test_white_noise_is_measured_on_top_of_motion(fps: int) -> None:
 @pytest.mark.parametrize("name", ["walk", "squat", "wave"])
 @pytest.mark.parametrize("fps", [24.0, 30.0, 60.0, 120.0])
 def test_a_clean_motion_stays_as_it_is(name: str, fps: float) -> None:
-    motion = clip(name, fps)
+    motion = demo_clip(name, fps)
     same, noise, notes = without_noise(motion)
     assert same is motion
     assert noise is None
@@ -89,7 +75,11 @@ def test_smoothed_noise_strays_no_further_but_for_a_hundredth_of_the_time(fps: i
 
 @pytest.mark.parametrize("degrees", [1.0, 2.0])
 def test_feet_of_a_shaken_walk_stand_on_other_legs(degrees: float) -> None:
-    clean, shaken, other = clip("walk", 30.0), clip("walk", 30.0, degrees), sample_rig("dancer")
+    clean, shaken, other = (
+        demo_clip("walk", 30.0),
+        demo_clip("walk", 30.0, degrees),
+        sample_rig("dancer"),
+    )
     stands = planted_feet(RIG, canonical_positions(clean), clean.frame_time)
     quiet, noise, _ = without_noise(shaken)
 
