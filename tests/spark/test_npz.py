@@ -25,6 +25,9 @@ ARRAYS = stn.arrays(
         stn.byte_string_dtypes(min_len=1),
     ),
     stn.array_shapes(min_dims=0, max_dims=4, min_side=0, max_side=4),
+    elements={
+        "alphabet": st.characters(exclude_categories=["Cs"])
+    },  # halves of letters are refused
 )
 
 
@@ -41,6 +44,12 @@ def test_arrays_are_those_of_numpy(
         assert list(ours) == theirs.files
         np.testing.assert_array_equal(ours["a"], theirs["a"])
         assert ours["a"].dtype == theirs["a"].dtype
+
+
+def test_halves_of_letters_are_refused(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", a=np.array(["\ud800"]))
+    with pytest.raises(FileFormatError, match="no letter"):
+        Npz(tmp_path / "a.npz", expected="arrays")["a"]
 
 
 def npz(folder: Path, *, method: int = zipfile.ZIP_STORED, **members: bytes) -> Path:
