@@ -30,7 +30,7 @@ from spark.rig.contacts import planted_points
 from spark.rig.rig import Rig
 from spark.transfer.canonical import from_canonical, to_canonical
 from spark.transfer.leg_fit import travel_scale
-from spark.transfer.noise import without_noise
+from spark.transfer.noise import LEAST_NOISE, noise_in, without_noise
 
 # Hip heights: a source whose floor is further from z = 0 than this does not stand on z = 0, and
 # what was made of it may have been put there.
@@ -140,7 +140,9 @@ def _without_tremble(course: Course) -> tuple[Subject, float, tuple[str, ...]]:
     """What a source's feet, limbs and floor are told from: of one that trembles, from what it
     trembles about. Noise takes soles below the floor, and no foot stands."""
     floor, subject = _own_floor(course), course.subject
-    if subject.body is not None:
+    height, frame_time = course.rig.standing_height, course.motion.frame_time
+    trembles = noise_in(course.feet, course.hips, height, frame_time).feet >= LEAST_NOISE
+    if subject.body is not None or not trembles:
         return subject, floor, ()
     quiet, noise, _ = without_noise(to_canonical(subject.motion, subject.rig))
     if noise is None:

@@ -106,15 +106,28 @@ def without_noise(
 
 def noise_of(source: CanonicalMotion) -> Noise:
     """0 where bodies could move so."""
-    rig, size = source.rig, source.rig.standing_height / ADULT_HEIGHT
-    if len(source) < LEAST_FRAMES or not rig.contact_joints:
+    rig = source.rig
+    if not rig.contact_joints:
         return Noise(0.0, 0.0, source.frame_time)
 
     def places(block: slice) -> Float[np.ndarray, "T K 3"]:
         return canonical_positions(source.picked(block), rig.contact_joints)
 
-    feet = white_noise(in_blocks(places, len(source)) / size)
-    return Noise(feet, white_noise(source.hips[:, None] / size), source.frame_time)
+    feet = in_blocks(places, len(source))
+    return noise_in(feet, source.hips, rig.standing_height, source.frame_time)
+
+
+def noise_in(
+    feet: Float[np.ndarray, "T K 3"],
+    hips: Float[np.ndarray, "T 3"],
+    height: float,
+    frame_time: float,
+) -> Noise:
+    """That of the paths of feet and hips [m] of a body of a standing height [m]."""
+    size = height / ADULT_HEIGHT
+    if len(feet) < LEAST_FRAMES or not feet.shape[1]:
+        return Noise(0.0, 0.0, frame_time)
+    return Noise(white_noise(feet / size), white_noise(hips[:, None] / size), frame_time)
 
 
 def white_noise(paths: Float[np.ndarray, "T K 3"]) -> float:
