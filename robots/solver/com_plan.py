@@ -47,8 +47,8 @@ def plan_com(
     out = reference.copy()
     out[:, 2] = _plan_height(reference[:, 2], natural[:, 2], support.flight, frame_time)
     push = np.maximum(_accelerations(out[:, 2], frame_time) + GRAVITY, MIN_PUSH * GRAVITY)
-    # p = c - z / (z'' + g) c'' + (-L_y', L_x') / (z'' + g), for unit mass.
-    lever = out[:, 2] / push
+    # p = c - z / (z'' + g) c'' + (-L_y', L_x') / (z'' + g), for unit mass, z over the ground.
+    lever = (out[:, 2] - support.height) / push
     offset = np.stack([-momentum_rate[:, 1], momentum_rate[:, 0]], axis=1) / push[:, None]
     out[:, :2] = _plan_path(
         reference[:, :2], natural[:, :2], out[:, 2], lever, offset, support, frame_time
@@ -91,7 +91,7 @@ def _plan_path(
     frame_time: float,
 ) -> Float[np.ndarray, "T 2"]:
     T, flight = len(xy), support.flight
-    ends = np.sqrt(height[[0, -1]].clip(0.0) / GRAVITY) / frame_time
+    ends = np.sqrt((height - support.height)[[0, -1]].clip(0.0) / GRAVITY) / frame_time
     own = _accelerations(xy, frame_time)
     soft, fall = _natural_weight(T), np.where(flight, W_FREE_FALL, 0.0)
     press = np.where(flight, 0.0, W_PRESSURE)

@@ -13,12 +13,12 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import uniform_filter1d
 
 from robots.solver.carrying import Points, carrying, once_down
-from robots.solver.creeping import above, creeping, lower_ends
+from robots.solver.creeping import creeping
 from sim.body.anthropometry import RADII
 from sim.report.derivatives import derivative
 from sim.report.mass import Mass, human_mass
 from spark.constants import GRAVITY
-from spark.rig.contacts import ADULT_HEIGHT, planted_points
+from spark.rig.contacts import ADULT_HEIGHT, above, lower_ends, planted_points
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_mul

@@ -6,13 +6,14 @@ from scipy.ndimage import uniform_filter1d
 
 from spark.rig.contacts import (
     ADULT_HEIGHT,
+    MAX_TILT,
     PLANTED_HEIGHT,
     PLANTED_SPEED,
+    above,
+    lower_ends,
     speeds,
-    standing_heights,
 )
 
-MAX_TILT = 0.02  # [m, of an adult] by which one end of a standing sole may be higher than the other
 MAX_CREEP = 0.6  # [m/s, of an adult] of a foot that stands because nothing else does
 _NEVER = 10.0  # of the speed at which it stands: an end that is no choice
 
@@ -31,21 +32,6 @@ def creeping(
     best |= _together(paths, cost, height, frame_time)
     creeps: Bool[np.ndarray, "T S 2"] = best & (slowness < MAX_CREEP / PLANTED_SPEED)
     return creeps
-
-
-def lower_ends(paths: Float[np.ndarray, "T S 2 3"], height: float) -> Bool[np.ndarray, "T S 2"]:
-    """Which of heel and toe is the lower, or hardly higher than the other: who stands on the toes
-    does not stand on the heel."""
-    heights = above(paths, height)
-    lowest = heights.min(axis=-1, keepdims=True)
-    lower: Bool[np.ndarray, "T S 2"] = heights < lowest + MAX_TILT * height / ADULT_HEIGHT
-    return lower
-
-
-def above(paths: Float[np.ndarray, "T S 2 3"], height: float) -> Float[np.ndarray, "T S 2"]:
-    """How high [m] heels and toes are over where they stand."""
-    heights: Float[np.ndarray, "T S 2"] = paths[..., 2] - standing_heights(paths, height)
-    return heights
 
 
 def _together(

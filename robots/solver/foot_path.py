@@ -1,9 +1,9 @@
 """The way of each point of a sole, standing and swinging: what the whole body follows.
 
 A standing foot stays on its footprint. A swinging one keeps the copied path, carried from the
-footprint behind it to the one before it, and the source's clearance, scaled. Ground on which the
-source climbs is level under the robot. An end of the foot that is fast is lifted, in time, so that
-it steps and does not drag: who turns on the toes raises the heel.
+footprint behind it to the one before it, and the source's clearance, scaled, over the ground that
+the source climbs. An end of the foot that is fast is lifted, in time, so that it steps and does not
+drag: who turns on the toes raises the heel.
 """
 
 import numpy as np
@@ -67,7 +67,7 @@ def footing_of(robot: Morphology, plan: FootPlan) -> Holds:
     holds = np.where(on[..., None], 1.0, holds)
     up = np.minimum(lift / (STEP_HEIGHTS[1] * plan.hip_height), 1.0)
     holds[..., 2] += up * (STEP_HOLD - holds[..., 2])
-    positions = np.stack([place.real, place.imag, z], axis=-1)
+    positions = np.stack([place.real, place.imag, z + plan.ground[:, None]], axis=-1)
     over_time = (np.ascontiguousarray(x.transpose(1, 2, 0)) for x in (positions, holds))
     links, points = robot.sole_points(plan.sole)
     return Holds(links, np.repeat(points[:, :, None], len(positions), axis=2), *over_time)

@@ -29,7 +29,8 @@ class FootPlan:
     """One foot over time. `points` [m, world] are those of the copied motion's sole, `toe` [m] and
     `heading` [rad] the middle of its toes and its direction over the floor; `prints` the same of
     the footprint, where `contacts` (of heel and toe) say that it stands. `clearance` [m] is that of
-    the source's lowest sole point, scaled, and `lift` [m] what a higher flight adds to it. `flat`
+    the source's lowest sole point, scaled, over `ground` [m], and `lift` [m] what a higher flight
+    adds to it. `flat`
     [m] are the sole's points on the floor, heading along X from the middle of the toes.
     """
 
@@ -43,6 +44,7 @@ class FootPlan:
     prints: Float[np.ndarray, "T 3"]
     contacts: Bool[np.ndarray, "T 2"]
     clearance: Float[np.ndarray, "T"]
+    ground: Float[np.ndarray, "T"]
     lift: Float[np.ndarray, "T"]
 
     @property
@@ -52,7 +54,7 @@ class FootPlan:
 
     def every(self, stride: int) -> "FootPlan":
         """That of every `stride`-th frame."""
-        names = ("points", "toe", "heading", "prints", "contacts", "clearance", "lift")
+        names = ("points", "toe", "heading", "prints", "contacts", "clearance", "ground", "lift")
         parts = {name: getattr(self, name)[::stride] for name in names}
         return replace(self, frame_time=stride * self.frame_time, **parts)
 
@@ -140,6 +142,7 @@ def _plan(
         prints=prints,
         contacts=contacts,
         clearance=targets.clearance[:, s],
+        ground=targets.ground[:, s],
         lift=np.zeros(len(targets)),
     )
 

@@ -59,6 +59,10 @@ def _support(
     """Sole points that are low, and other parts where the source's touch the floor."""
     planned = [footing_of(robot, foot).positions for foot in feet]
     points = np.concatenate([p.transpose(2, 0, 1) for p in planned], axis=1)
+    ground = np.repeat(
+        np.stack([foot.ground for foot in feet], axis=1), [len(p) for p in planned], 1
+    )
+    points[..., 2] -= ground
     reach = max(1, round(TOUCH_SPAN / targets.frame_time))
     low = minimum_filter1d(points[..., 2], 2 * reach + 1, axis=0, mode="nearest")
     touching: Bool[np.ndarray, "T K"] = low < TOUCH_HEIGHT * robot.rig.hip_height
@@ -68,9 +72,12 @@ def _support(
     alone = ~touching.any(axis=1) & ~targets.flight & ~targets.parts[:, known].any(axis=1)
     lowest = points[..., 2].argsort(axis=1)[:, :_HELD_POINTS]
     touching[np.flatnonzero(alone)[:, None], lowest[alone]] = True
+    pushing = np.concatenate([touching, targets.parts[:, known]], axis=1)
+    height = (touching * ground).sum(axis=1) / np.maximum(pushing.sum(axis=1), 1)
     return Support(
         np.concatenate([points[..., :2], *(p[:, None] for p in parts)], axis=1),
-        np.concatenate([touching, targets.parts[:, known]], axis=1),
+        pushing,
+        height,
         float(feet[0].heading[0]),
     )
 

@@ -159,17 +159,17 @@ def _add_hips_and_soles(
 ) -> None:
     """The middle of the hips on its path; the corners of the soles above the floor.
 
-    With z a corner's height, r = w one_sided(-z), w = `W_FLOOR` x `penalty_scale`.
+    With z a corner's height over it, r = w one_sided(-z), w = `W_FLOOR` x `penalty_scale`.
     """
     count, firm = len(targets), per_metre(robot) * penalty_scale
     pelvis = int(robot.links[robot.rig.pelvis])
     middle = robot.centers[robot.rig.hips].mean(0)
     path = np.repeat(per_metre(robot) * W_HIPS_POSITION[:, None], count, axis=1)
     terms.add_point(pelvis, terms.poses.point(pelvis, middle), targets.hips.T, path)
-    for sole in robot.soles:
+    for s, sole in enumerate(robot.soles):
         for link, rest in zip(*robot.sole_points(sole), strict=True):
             point = terms.poses.point(int(link), rest)
-            depth, slope = one_sided(-point[2:], FLOOR_ROUNDING / firm)
+            depth, slope = one_sided(targets.floor[:, s] - point[2:], FLOOR_ROUNDING / firm)
             weight = W_FLOOR * firm
             terms.add_heights(int(link), point[:2, None], weight * depth, -weight * slope)
 

@@ -158,6 +158,7 @@ def violations(
         too_fast[spells.starts[1:] - 1] = False
     violated[1:] |= too_fast
     if block.base:
-        for sole in robot.soles:
-            violated |= points_of(robot, poses, sole)[:, 2].min(0) < -max_sinking
+        for s, sole in enumerate(robot.soles):
+            lowest = points_of(robot, poses, sole)[:, 2].min(0) - targets.floor[:, s]
+            violated |= lowest < -max_sinking
     return violated | (depth_in_floor(robot, poses, block) > max_sinking)

@@ -16,6 +16,7 @@ from robots.solver.block import Block, blocks_of, carriers, whole_of
 from robots.solver.descent import collision_candidates, solve_block
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import FootPlan, plan_feet, reachable
+from robots.solver.ground import climbs
 from robots.solver.holds import Holds, joined
 from robots.solver.marching import abrupt, calmed
 from robots.solver.motion_plan import with_dynamics
@@ -29,6 +30,7 @@ from robots.solver.strays import without_strays
 from robots.solver.stretches import by_stretches
 from robots.solver.targets import Targets, poses_of, targets_of
 from robots.tree import Coordinates
+from sim.report.treads import treads_of
 from spark.threads import one_thread
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.noise import without_noise
@@ -67,10 +69,12 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
         source = facing_ahead(source)
     source, passed = without_strays(source)
     source, noise, trembles = without_noise(source)
-    notes = dict.fromkeys((*robot.notes, *passed, *trembles))
+    treads = treads_of(source)
+    notes = dict.fromkeys((*robot.notes, *passed, *trembles, *climbs(treads, source.rig, robot)))
 
     def solved(start: int, stop: int) -> Coordinates:
-        targets = targets_of(source.frames(start, stop), robot, noise)
+        ground = None if treads.level else treads.ground[start:stop]
+        targets = targets_of(source.frames(start, stop), robot, noise, ground)
         notes.update(dict.fromkeys(targets.notes))
         return _trajectory(robot, targets)
 

@@ -11,11 +11,13 @@ _HULL_STEPS = 6  # by which a point is brought inside
 
 @dataclass(frozen=True, eq=False)
 class Support:
-    """What may push: `points` [m, x and y] while they are `touching` the floor. `heading` [rad] is
-    that of the body at first: hulls are bounded in directions that turn with it."""
+    """What may push: `points` [m, x and y] while they are `touching` the ground, which is `height`
+    [m] high there. `heading` [rad] is that of the body at first: hulls are bounded in directions
+    that turn with it."""
 
     points: Float[np.ndarray, "T K 2"]
     touching: Bool[np.ndarray, "T K"]
+    height: Float[np.ndarray, "T"]
     heading: float = 0.0
 
     @property
@@ -27,7 +29,7 @@ class Support:
         """In the first and the last frame, with a place more in each that pushes."""
         points = np.concatenate([self.points[[0, -1]], places[:, None]], axis=1)
         touching = np.concatenate([self.touching[[0, -1]], np.ones((2, 1), dtype=bool)], axis=1)
-        return Support(points, touching, self.heading)
+        return Support(points, touching, self.height[[0, -1]], self.heading)
 
 
 class Hulls:

@@ -9,11 +9,12 @@ from jaxtyping import Bool, Float, Int
 from robots.model.morphology import Morphology
 from robots.model.shapes import surface
 from robots.solver.contacts import has_feet, schedule, touching_joint
+from robots.solver.ground import under_soles
 from robots.solver.palms import laid, resting_palms
 from robots.solver.trunk import bowing
 from robots.tree import forward_kinematics
 from spark.blocks import blocks
-from spark.rig.feet import sole_positions
+from spark.rig.feet import ends_of_feet, lowest_points
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import matrix_from_quat, quat_mul, quat_rotate
@@ -52,9 +53,10 @@ class Targets:
     robot's soles stand, `parts`, whether those of `part_roles` touch the floor, `rests`, whether
     they also stay in place, `palms`, how far (0 to 1) hands lie still, `flight`, whether nothing
     holds the body; `com_acceleration`, the source's, scaled [m/s²]; `part_paths` and `feet`, the
-    paths of the source's parts, and of its heels and toes, over the floor [m], and `clearance`, how
-    high its soles are, scaled; `hands`, from the right hand to the left [m]. `com` [m] is planned
-    where it is known.
+    paths of the source's parts, and of its heels and toes, over the floor [m]; `ground` and
+    `floor`, how high those of each sole are (`GroundUnderSoles`), and `clearance`, how high the
+    source's soles are over it, scaled; `hands`, from the right hand to the left [m]. `com` [m] is
+    planned where it is known.
     """
 
     frame_time: float
@@ -72,6 +74,8 @@ class Targets:
     com_acceleration: Float[np.ndarray, "T 3"]
     feet: Float[np.ndarray, "T S 2 2"]
     clearance: Float[np.ndarray, "T S"]
+    ground: Float[np.ndarray, "T S"]
+    floor: Float[np.ndarray, "T S"]
     hands: Float[np.ndarray, "T 3"] | None
     notes: tuple[str, ...]
     com: Float[np.ndarray, "T 3"] | None = None
@@ -111,21 +115,38 @@ class Targets:
             com_acceleration=self.com_acceleration[frames],
             feet=self.feet[frames],
             clearance=self.clearance[frames],
+            ground=self.ground[frames],
+            floor=self.floor[frames],
             com=None if self.com is None else self.com[frames],
             hands=None if self.hands is None else self.hands[frames],
         )
 
 
-def targets_of(source: CanonicalMotion, robot: Morphology, noise: Noise | None = None) -> Targets:
-    """The targets that `source` sets for `robot`; `noise` is what its recording trembled by."""
+def targets_of(
+    source: CanonicalMotion,
+    robot: Morphology,
+    noise: Noise | None = None,
+    ground: Float[np.ndarray, "T F"] | None = None,
+) -> Targets:
+    """The targets that `source` sets for `robot`; `noise` is what its recording trembled by, and
+    `ground` how high [m] that under each of its feet is: level where it is not given."""
     positions = canonical_positions(source)
     world, hips, notes = poses_of(source, positions, robot)
     rig = source.rig
     own_chest = robot.rig.chest
-    paths = source_feet(source, positions, robot)
+    paths, clearance = (
+        source_feet(source, positions, robot),
+        source_clearance(source, positions, robot),
+    )
+    if ground is None:
+        under = np.zeros(clearance.shape)
+    else:
+        under = for_soles(ground, rig, robot)
+        paths[..., 2] -= under[..., None]
     scale = robot.rig.hip_height / rig.hip_height
     touches = schedule(source, positions, paths, [sole.side for sole in robot.soles], noise)
     touching = [j for r in touches.part_roles if (j := touching_joint(rig, r)) is not None]
+    own_ground = under_soles(under, touches.feet, paths[:, :, 1, :2])
     palms = resting_palms(robot, touches.part_roles, touches.rests, source.frame_time)
     for role in palms:
         j, rests = robot.rig.roles.require(role), touches.rests[:, touches.part_roles.index(role)]
@@ -145,7 +166,9 @@ def targets_of(source: CanonicalMotion, robot: Morphology, noise: Noise | None =
         flight=touches.flight,
         com_acceleration=scale * touches.com_acceleration,
         feet=scale * paths[..., :2],
-        clearance=scale * source_clearance(source, positions, robot),
+        clearance=scale * (clearance - own_ground.ground),
+        ground=scale * own_ground.ground,
+        floor=scale * own_ground.floor,
         hands=_between_hands(rig, positions, robot),
         notes=(*notes, HOVERS) if has_feet(paths).any() and touches.hovers else notes,
     )
@@ -191,17 +214,7 @@ def source_feet(
     """The source's heel and toe [m] for each of the robot's soles; 0 where it has no such foot."""
     rig = source.rig
     world = quat_mul(source.rotations, rig.tpose)
-    paths = np.zeros((len(positions), len(robot.soles), 2, 3))
-    source_soles = {sole.side: sole for sole in rig.soles}
-    for s, sole in enumerate(robot.soles):
-        side = sole.side
-        if side not in source_soles:
-            continue
-        toe = rig.roles.joint(Role(f"{side}_toe"))
-        foot = rig.roles.require(Role(f"{side}_foot"))
-        paths[:, s, 0] = sole_positions(source_soles[side], positions, world)[:, :2].mean(1)
-        paths[:, s, 1] = positions[:, foot if toe is None else toe]
-    return paths
+    return for_soles(ends_of_feet(rig.soles, rig.roles, positions, world), rig, robot)
 
 
 def source_clearance(
@@ -209,13 +222,20 @@ def source_clearance(
 ) -> Float[np.ndarray, "T S"]:
     """The height [m] over the floor of the lowest point of the source's sole, for each of the
     robot's; 0 where it has no such foot."""
-    world = quat_mul(source.rotations, source.rig.tpose)
-    source_soles = {sole.side: sole for sole in source.rig.soles}
-    out = np.zeros((len(positions), len(robot.soles)))
+    rig = source.rig
+    world = quat_mul(source.rotations, rig.tpose)
+    return for_soles(lowest_points(rig.soles, positions, world) - source.floor_z, rig, robot)
+
+
+def for_soles(
+    values: Float[np.ndarray, "T F *n"], rig: Rig, robot: Morphology
+) -> Float[np.ndarray, "T S *n"]:
+    """What each of a rig's soles has, for each of the robot's; 0 where the rig has no such foot."""
+    out = np.zeros((len(values), len(robot.soles), *values.shape[2:]))
+    sides = {sole.side: k for k, sole in enumerate(rig.soles)}
     for s, sole in enumerate(robot.soles):
-        if (own := source_soles.get(sole.side)) is not None:
-            heights = sole_positions(own, positions, world)[..., 2]
-            out[:, s] = heights.min(axis=1) - source.floor_z
+        if sole.side in sides:
+            out[:, s] = values[:, sides[sole.side]]
     return out
 
 

@@ -11,10 +11,16 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from robots.solver.contacts import CREEP_TIME, FLIGHT_PUSH
-from robots.solver.creeping import MAX_CREEP, MAX_TILT
+from robots.solver.creeping import MAX_CREEP
 from robots.stream.frame_targets import FrameReader, FrameTargets
 from spark.constants import GRAVITY
-from spark.rig.contacts import ADULT_HEIGHT, PLANTED_HEIGHT, PLANTED_SPEED, SPEED_WINDOW
+from spark.rig.contacts import (
+    ADULT_HEIGHT,
+    MAX_TILT,
+    PLANTED_HEIGHT,
+    PLANTED_SPEED,
+    SPEED_WINDOW,
+)
 from spark.transfer.noise import BORNE_SPEED, LEEWAY
 
 _RELEASE_FACTOR = (

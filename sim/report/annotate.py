@@ -67,7 +67,7 @@ def corner_states(
     clip: ClipMetrics, corners: Float[np.ndarray, "T M 3"]
 ) -> UInt8[np.ndarray, "T M"]:
     """Of each of the soles' corners: 0 in the air, else the place in `CORNER_COLORS`, from 1."""
-    heights = corners[..., 2] - clip.floor_z
+    heights = clip.ground.heights(corners, clip.corner_feet)
     states = np.zeros(heights.shape, dtype=np.uint8)
     states[heights < clip.thresholds.skate_height] = _STANDS
     states[clip.corner_skates] = _SLIDES

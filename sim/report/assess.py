@@ -8,6 +8,7 @@ from jaxtyping import Float
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.course import Course, course_of
 from sim.report.findings import findings_of
+from sim.report.ground import ground_of, level_ground
 from sim.report.limbs import limbs_of
 from sim.report.measures import (
     ContactMatch,
@@ -21,6 +22,7 @@ from sim.report.report import Report
 from sim.report.stretches import measure_clip
 from sim.report.swing import swing_of
 from sim.report.thresholds import PLAUSIBILITY_V2
+from sim.report.treads import Treads, treads_of
 from sim.report.truth import accuracy
 from sim.trajectory import Subject
 from spark.errors import SkeletonError
@@ -59,12 +61,12 @@ def assess(
     known = None if truth is None else accuracy(motion, truth, rig)
     notes = _about_model(course)
     if source is None:
-        clip = measure_clip(subject, _own_floor(course))
+        clip = measure_clip(subject, level_ground(_own_floor(course)))
         if subject.body is None:
             notes = (
                 "the floor is the clip's own: one that floats or sinks as a whole can't be told",
             )
-        notes += _slope(course, "the")
+        notes += _uneven(course, "the")
         return Report(clip, None, None, None, findings_of(clip), notes, known)
     source_course = _course("the source", source)
     quiet, source_floor, trembles = _without_tremble(source_course)
@@ -72,16 +74,19 @@ def assess(
     if subject.body is None:
         floor, notes = _floor_from_source(course, source.rig, source_floor)
     notes += trembles
-    source_clip = measure_clip(source, source_floor)
-    followed = source_clip if quiet is source else measure_clip(quiet, source_floor)
+    treads = treads_of(to_canonical(quiet.motion, quiet.rig))
+    source_ground = ground_of(source_course, source_floor, treads, source_course, 1.0)
+    source_clip = measure_clip(source, source_ground)
+    followed = source_clip if quiet is source else measure_clip(quiet, source_ground)
     times = np.arange(len(course)) * motion.frame_time
     scale = rig.hip_height / source.rig.hip_height
-    clip = _beyond_source(measure_clip(subject, floor), source_clip, times, scale)
+    ground = ground_of(course, floor, treads, source_course, scale)
+    clip = _beyond_source(measure_clip(subject, ground), source_clip, times, scale)
     travel = scale if subject.body is not None else travel_scale(source.rig, rig)
     drift = _drift(course, source_course, times, travel)
     swing = swing_of(clip, followed, times, scale)
     contacts = _contacts(clip, followed, times)
-    notes += _slope(source_course, "the source's")
+    notes += _slope(source_course, "the source's") if treads.level else (_climbs(treads, scale),)
     notes += _pace(motion, source.motion)
     thrown = scale * source_clip.base_acceleration_p99
     limbs = limbs_of(clip, followed, times, scale)
@@ -203,6 +208,26 @@ def _contacts(
     return contact_match(
         np.stack([clip.standing[foot] for foot in feet], axis=1),
         values_at(theirs, times / source.frame_time) > 0.5,
+    )
+
+
+def _uneven(course: Course, whose: str) -> tuple[str, ...]:
+    """A note where the feet of a motion without a source stand on more than a level floor."""
+    treads = treads_of(to_canonical(course.motion, course.rig))
+    if treads.level:
+        return _slope(course, whose)
+    return (
+        f"{whose} feet stand still up to {100 * treads.top:.0f} cm above the floor, and carry the "
+        "body there: all that is high up counts as floating; beside a source that stands as high "
+        "(--source) it does not",
+    )
+
+
+def _climbs(treads: Treads, scale: float) -> str:
+    """A note where the source's feet stand on more than a level floor."""
+    return (
+        f"the source's feet stand still up to {100 * treads.top:.0f} cm above its floor, and carry "
+        f"it there: that is ground, for the motion up to {100 * scale * treads.top:.0f} cm high"
     )
 
 

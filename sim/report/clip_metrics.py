@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float
 
 from sim.report.clip_poses import ClipPoses
 from sim.report.derivatives import derivative
+from sim.report.ground import Ground
 from sim.report.limb_ends import limb_ends
 from sim.report.limits import LimitExcess, limit_excess
 from sim.report.measures import floating, horizontal_speed, penetration_depth, windowed_min
@@ -22,7 +23,7 @@ from spark.summary import time_span
 
 @dataclass(frozen=True, eq=False)
 class ClipMetrics:
-    """All measures of one clip over its T frames; heights are above the floor at `floor_z` [m].
+    """All measures of one clip over its T frames; heights are above the `ground`.
 
     `flags`: the frames that are implausible, by each name of `sim.report.names.FLAGS`.
     `depth` [m]: of the parts `depth_names` (sole corners by foot, then others) under the floor.
@@ -44,7 +45,7 @@ class ClipMetrics:
     """
 
     frame_time: float
-    floor_z: float
+    ground: Ground
     thresholds: Thresholds
     flags: dict[str, Bool[np.ndarray, "T"]]
     depth: Float[np.ndarray, "T N"]
@@ -77,6 +78,11 @@ class ClipMetrics:
 
     def __len__(self) -> int:
         return len(self.clearance)
+
+    @property
+    def floor_z(self) -> float:
+        """The floor's height [m, world]."""
+        return self.ground.floor_z
 
     @property
     def implausible(self) -> Bool[np.ndarray, "T"]:
@@ -160,13 +166,13 @@ class ClipMetrics:
         return float(np.any(over, axis=0).mean()) if over else 0.0
 
 
-def measure(poses: ClipPoses, floor_z: float) -> ClipMetrics:
-    """The measures of a posed clip over a floor at `floor_z` [m]."""
+def measure(poses: ClipPoses, ground: Ground) -> ClipMetrics:
+    """The measures of a posed clip over some ground."""
     thresholds = PLAUSIBILITY_V2.scaled(poses.rig.hip_height)
     frame_time, window = poses.motion.frame_time, thresholds.window
-    support = support_of(poses, floor_z, thresholds)
+    support = support_of(poses, ground, thresholds)
     corners = len(support.feet)
-    parts = poses.part_points[..., 2] - floor_z
+    parts = ground.heights(poses.part_points)
     depth = penetration_depth(np.concatenate([support.heights[:, :corners], parts], axis=1))
     clearance = support.heights.min(axis=1)
     acceleration = derivative(poses.mass.com[:, 2], frame_time, 2, window)
@@ -203,7 +209,7 @@ def measure(poses: ClipPoses, floor_z: float) -> ClipMetrics:
     joint_names, joint_speed, joint_jerk = rates
     return ClipMetrics(
         frame_time=frame_time,
-        floor_z=floor_z,
+        ground=ground,
         thresholds=thresholds,
         flags={
             "penetration": depth.max(axis=1) > thresholds.penetration,

@@ -9,6 +9,7 @@ import numpy as np
 
 from sim.report.clip_metrics import ClipMetrics, measure
 from sim.report.clip_poses import pose_clip
+from sim.report.ground import Ground
 from sim.report.thresholds import PLAUSIBILITY_V2
 from sim.trajectory import Subject
 from spark.blocks import blocks
@@ -27,24 +28,24 @@ Name = tuple[Any, ...]
 Rows = dict[Name, np.ndarray]
 
 
-def measure_clip(subject: Subject, floor_z: float) -> ClipMetrics:
-    """The measures of a motion over a floor at `floor_z` [m]. Raises what `pose_clip` raises."""
+def measure_clip(subject: Subject, ground: Ground) -> ClipMetrics:
+    """The measures of a motion over some ground. Raises what `pose_clip` raises."""
     count = len(subject.motion)
     stretches = [*blocks(count)]
     if len(stretches) == 1:
-        return measure(pose_clip(subject), floor_z)
+        return measure(pose_clip(subject), ground)
     margin = _margin(subject.motion.frame_time)
     rows: Rows = {}
     for block in stretches:
         near = slice(max(block.start - margin, 0), min(block.stop + margin, count))
-        clip = measure(pose_clip(subject.picked(near)), floor_z)
+        clip = measure(pose_clip(subject.picked(near)), ground.picked(near))
         own = slice(block.start - near.start, block.stop - near.start)
         for name, values in _rows_of(clip):
             if name not in rows:  # pages of zeros take no memory until something is written
                 kept = _PRECISION if values.dtype == np.float64 else values.dtype
                 rows[name] = np.zeros((count, *values.shape[1:]), kept)
             rows[name][block] = values[own]
-    return _with_rows(clip, rows)
+    return replace(_with_rows(clip, rows), ground=ground)
 
 
 def _margin(frame_time: float) -> int:

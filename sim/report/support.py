@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from sim.report.clip_poses import ClipPoses
 from sim.report.derivatives import derivative, whole_windows
+from sim.report.ground import Ground
 from sim.report.measures import distance_outside_hull, horizontal_speed, windowed_min
 from sim.report.thresholds import HUMAN_HIP_HEIGHT, Thresholds
 from sim.report.wrench import required_wrench, unexplained_wrench
@@ -16,7 +17,7 @@ from sim.report.wrench import required_wrench, unexplained_wrench
 class Support:
     """The soles' corners, each of the foot in `feet`, then the lowest points of the other parts.
 
-    `heights` [m] over the floor and `speeds` [m/s] along it; `arms` [m] from the centre of mass.
+    `heights` [m] over the ground and `speeds` [m/s] along it; `arms` [m] from the centre of mass.
     `touching` is what may push: a point that is near the floor at some time within the window, for
     `wrench`, the force and torque that the body needs, is a mean over it. `resting` points are slow
     at some time within it. `static` frames are those in which the centre of mass hardly moves.
@@ -95,13 +96,13 @@ class Support:
         return outside
 
 
-def support_of(poses: ClipPoses, floor_z: float, thresholds: Thresholds) -> Support:
+def support_of(poses: ClipPoses, ground: Ground, thresholds: Thresholds) -> Support:
     """The support of a body whose soles' corners are the first points."""
     frame_time, window = poses.motion.frame_time, thresholds.window
     flesh = poses.part_points - poses.part_radii[:, None] * np.array([0.0, 0.0, 1.0])
     points = np.concatenate([poses.corners, flesh], axis=1)
     com = poses.mass.com
-    heights = points[..., 2] - floor_z
+    heights = ground.heights(points, poses.corner_feet)
     speeds = horizontal_speed(points, frame_time, window)
     com_speed = np.linalg.norm(derivative(com, frame_time, 1, window), axis=1)
     com_acceleration = np.linalg.norm(derivative(com, frame_time, 2, window), axis=1)

@@ -14,6 +14,7 @@ from spark.rig.rig import Rig
 PLANTED_SPEED = 0.15  # [m/s]
 PLANTED_HEIGHT = 0.06  # [m] over the foot's own lowest height,
 MAX_UNEVEN = 0.05  # [m] which is no higher than this over the other's: a leg may never come down
+MAX_TILT = 0.02  # [m] by which one end of a standing sole may be higher than the other
 ADULT_HEIGHT = 1.75  # [m]
 SPEED_WINDOW = 1 / 15  # [s] that a speed is measured over: two frames at 30 fps
 
@@ -65,6 +66,21 @@ def standing_heights(
     low = np.percentile(positions[..., 2], 1, axis=0)
     lowest = low.min(axis=0, initial=np.inf)
     return np.minimum(low, lowest + MAX_UNEVEN * height / ADULT_HEIGHT)
+
+
+def above(paths: Float[np.ndarray, "T S 2 3"], height: float) -> Float[np.ndarray, "T S 2"]:
+    """How high [m] heels and toes are over where they stand."""
+    heights: Float[np.ndarray, "T S 2"] = paths[..., 2] - standing_heights(paths, height)
+    return heights
+
+
+def lower_ends(paths: Float[np.ndarray, "T S 2 3"], height: float) -> Bool[np.ndarray, "T S 2"]:
+    """Which of heel and toe is the lower, or hardly higher than the other: who stands on the toes
+    does not stand on the heel."""
+    heights = above(paths, height)
+    lowest = heights.min(axis=-1, keepdims=True)
+    lower: Bool[np.ndarray, "T S 2"] = heights < lowest + MAX_TILT * height / ADULT_HEIGHT
+    return lower
 
 
 def planted_points(

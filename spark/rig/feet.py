@@ -8,6 +8,7 @@ body proportions. A body that is built on such a rig (`sim.body.geoms`) has its 
 between these very points.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -77,6 +78,33 @@ def sole_positions(
 ) -> Float[np.ndarray, "*n P 3"]:
     """The points [m, world] for joint positions and rotations as `forward` gives them."""
     return pos_world[..., sole.joints, :] + quat_rotate(q_world[..., sole.joints, :], sole.offsets)
+
+
+def ends_of_feet(
+    soles: Sequence[Sole],
+    roles: RoleMap,
+    pos_world: Float[np.ndarray, "*n J 3"],
+    q_world: Float[np.ndarray, "*n J 4"],
+) -> Float[np.ndarray, "*n S 2 3"]:
+    """The heel and the toe joint of each foot [m, world]; the ankle where there is no toe."""
+    out = np.zeros((*pos_world.shape[:-2], len(soles), 2, 3))
+    for s, sole in enumerate(soles):
+        toe = roles.joint(FEET[sole.side][1])
+        out[..., s, 0, :] = sole_positions(sole, pos_world, q_world)[..., :2, :].mean(axis=-2)
+        out[..., s, 1, :] = pos_world[..., sole.foot if toe is None else toe, :]
+    return out
+
+
+def lowest_points(
+    soles: Sequence[Sole],
+    pos_world: Float[np.ndarray, "*n J 3"],
+    q_world: Float[np.ndarray, "*n J 4"],
+) -> Float[np.ndarray, "*n S"]:
+    """The height of the lowest point of each sole [m, world]."""
+    out = np.zeros((*pos_world.shape[:-2], len(soles)))
+    for s, sole in enumerate(soles):
+        out[..., s] = sole_positions(sole, pos_world, q_world)[..., 2].min(axis=-1)
+    return out
 
 
 def hip_height(skeleton: Skeleton, roles: RoleMap, tpose: Float[np.ndarray, "J 4"]) -> float:

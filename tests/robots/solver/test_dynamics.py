@@ -75,7 +75,7 @@ def test_in_flight_the_plan_falls_freely() -> None:
     touching = np.ones((T, 4), dtype=bool)
     touching[up] = False
     reference = np.tile([0.0, 0.0, 0.8], (T, 1))
-    support = Support(square(np.zeros((T, 2))), touching)
+    support = Support(square(np.zeros((T, 2))), touching, np.zeros(T))
     still = np.zeros((T, 3))
     planned = plan_com(reference, still, still[:, :2], support, FRAME_TIME)
     acceleration = np.diff(planned, 2, axis=0) / FRAME_TIME**2
@@ -88,7 +88,7 @@ def test_a_body_over_nothing_is_planned_over_its_feet() -> None:
     """What leans 20 cm beside a still foot would tip: its pressure has to be inside."""
     T = 120
     reference = np.tile([0.3, 0.0, 0.8], (T, 1))
-    support = Support(square(np.zeros((T, 2))), np.ones((T, 4), dtype=bool))
+    support = Support(square(np.zeros((T, 2))), np.ones((T, 4), dtype=bool), np.zeros(T))
     still = np.zeros((T, 3))
     planned = plan_com(reference, still, still[:, :2], support, FRAME_TIME)
     acceleration = np.diff(planned, 2, axis=0) / FRAME_TIME**2
@@ -104,7 +104,7 @@ def test_a_plan_does_not_fall_where_nothing_follows(speed: float) -> None:
     T, time = 120, np.sqrt(0.8 / GRAVITY)
     reference = np.tile([0.1, 0.0, 0.8], (T, 1))
     reference[:, 0] += speed * FRAME_TIME * (np.arange(T) - T / 2)
-    support = Support(np.zeros((T, 1, 2)), np.ones((T, 1), dtype=bool))
+    support = Support(np.zeros((T, 1, 2)), np.ones((T, 1), dtype=bool), np.zeros(T))
     still = np.zeros((T, 3))
     planned = plan_com(reference, still, still[:, :2], support, FRAME_TIME)
     for path in (planned, planned[::-1]):
@@ -116,7 +116,7 @@ def test_a_plan_does_not_fall_where_nothing_follows(speed: float) -> None:
 def test_what_is_plausible_stays() -> None:
     T = 60
     reference = np.tile([0.02, -0.03, 0.8], (T, 1))
-    support = Support(square(np.zeros((T, 2))), np.ones((T, 4), dtype=bool))
+    support = Support(square(np.zeros((T, 2))), np.ones((T, 4), dtype=bool), np.zeros(T))
     still = np.zeros((T, 3))
     planned = plan_com(reference, still, still[:, :2], support, FRAME_TIME)
     np.testing.assert_allclose(planned, reference, atol=1e-9)

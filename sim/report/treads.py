@@ -1,0 +1,161 @@
+"""The ground that feet climb, steps, boxes and slopes: told from where they stand.
+
+No recording says what was underfoot. But a foot that is still while the ground pushes the body up
+under it (the centre of pressure; Kajita et al. 2003, eq. 3) stands on something, however high it
+is. A foot that is held up beside one that stands has no push under it, nor have those of who sits,
+lies or stands on the hands.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from sim.report.derivatives import derivative
+from sim.report.mass import human_mass
+from spark.blocks import in_blocks
+from spark.constants import GRAVITY
+from spark.rig.contacts import ADULT_HEIGHT, PLANTED_SPEED, lower_ends, speeds
+from spark.rig.feet import ends_of_feet, lowest_points
+from spark.rotation import quat_mul
+from spark.runs import true_runs
+from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.footfalls import between_contacts
+
+# All lengths [m] are of an adult.
+MIN_STEP = 0.12  # from one place to the next, once at least: floors that drift do so more slowly
+SAME_HEIGHT = 0.05  # between two feet on one thing, or between one and the floor
+SAME_PLACE = 0.6
+STAY = 0.05  # that a foot may move without having gone elsewhere
+MIN_TIME = 0.1  # [s] that a foot carries the body to stand on something
+MIN_PUSH = 0.5  # [body weights] while it does
+UNDER_FOOT = 0.15  # from the centre of pressure to the foot, or to the line between both,
+BELOW_MASS = 0.35  # and at least from there up to the centre of mass
+_WINDOW = 0.05  # [s] before and after a frame over which rates are measured
+
+
+@dataclass(frozen=True, eq=False)
+class Treads:
+    """When each of a rig's S feet `stands`, and how high [m] over the floor the `ground` under it
+    is; in swing, between the two places by as much of its way as it has gone. 0 all over where the
+    floor is level."""
+
+    stands: Bool[np.ndarray, "T S"]
+    ground: Float[np.ndarray, "T S"]
+
+    @property
+    def level(self) -> bool:
+        """Whether the feet stand on the floor alone."""
+        return not self.ground.any()
+
+    @property
+    def top(self) -> float:
+        """The highest place [m]."""
+        return float(self.ground.max(initial=0.0))
+
+
+def treads_of(source: CanonicalMotion) -> Treads:
+    """Where the feet of a motion stand, one entry for each of `rig.soles`."""
+    rig, frame_time, scale = (
+        source.rig,
+        source.frame_time,
+        source.rig.standing_height / ADULT_HEIGHT,
+    )
+    count, feet = len(source), len(rig.soles)
+    if not feet or count < 2:
+        return Treads(np.zeros((count, feet), dtype=bool), np.zeros((count, feet)))
+    found = in_blocks(lambda block: _places(source.picked(block)), count)
+    com, lowest = found[:, :3], found[:, 3 : 3 + feet]
+    paths = found[:, 3 + feet :].reshape(count, feet, 2, 3)
+    still = _still(paths, rig.standing_height, frame_time)
+    carries = still & _carry(paths, lowest, still, com, frame_time, scale)
+    runs = [(k, start, stop) for k in range(feet) for start, stop in true_runs(still[:, k])]
+    runs.sort(key=lambda run: run[1])
+    heights = np.array([np.median(lowest[start:stop, k]) for k, start, stop in runs])
+    places = np.array([paths[start:stop, k, :, :2].mean((0, 1)) for k, start, stop in runs])
+    sure = [carries[start:stop, k].sum() * frame_time > MIN_TIME for k, start, stop in runs]
+    known = np.array(sure, dtype=bool)
+    stands, ground = np.zeros_like(still), np.zeros(still.shape)
+    if not (np.abs(np.diff(heights[known])) > MIN_STEP * scale).any():
+        return Treads(stands, ground)
+    for i, (k, start, stop) in enumerate(runs):
+        beside = known & (np.abs(heights - heights[i]) < SAME_HEIGHT * scale)
+        beside &= np.linalg.norm(places - places[i], axis=1) < SAME_PLACE * scale
+        on_floor = heights[i] < SAME_HEIGHT * scale
+        stands[start:stop, k] = on_floor or beside.any()
+        ground[start:stop, k] = 0.0 if on_floor else heights[i]
+    for k in range(feet):
+        way = paths[:, k].mean(axis=1)[:, :2]
+        ground[:, k] = between_contacts(ground[:, k, None], stands[:, k], way)[:, 0]
+    return Treads(stands, ground)
+
+
+def _places(source: CanonicalMotion) -> Float[np.ndarray, "T N"]:
+    """The centre of mass, how high over the floor the lowest point of each sole is, heels and toes
+    [m]."""
+    rig, positions = source.rig, canonical_positions(source)
+    world = quat_mul(source.rotations, rig.tpose)
+    lowest = lowest_points(rig.soles, positions, world) - source.floor_z
+    ends = ends_of_feet(rig.soles, rig.roles, positions, world).reshape(len(source), -1)
+    com = human_mass(rig, positions, world).com
+    return np.column_stack([com, lowest, ends])
+
+
+def _still(
+    paths: Float[np.ndarray, "T S 2 3"], height: float, frame_time: float
+) -> Bool[np.ndarray, "T S"]:
+    """When feet don't move, heel or toe, whichever is the lower; or stay in their place."""
+    scale = height / ADULT_HEIGHT
+    limit = PLANTED_SPEED * scale
+    slow = speeds(paths, frame_time) < limit
+    slow &= np.abs(derivative(paths[..., 2], frame_time, 1, _WINDOW)) < limit
+    still = np.any(slow & lower_ends(paths, height), axis=2)
+    middles = paths.mean(axis=2)
+    for k in range(still.shape[1]):
+        for start, stop in true_runs(~still[:, k]):
+            if start > 0 and stop < len(still):
+                away = middles[start : stop + 1, k] - middles[start - 1, k]
+                near = np.linalg.norm(away[:, :2], axis=1).max() < STAY * scale
+                still[start:stop, k] = near and np.abs(away[:, 2]).max() < SAME_HEIGHT * scale
+    return still
+
+
+def _carry(
+    paths: Float[np.ndarray, "T S 2 3"],
+    lowest: Float[np.ndarray, "T S"],
+    still: Bool[np.ndarray, "T S"],
+    com: Float[np.ndarray, "T 3"],
+    frame_time: float,
+    scale: float,
+) -> Bool[np.ndarray, "T S"]:
+    """Over which still feet the centre of pressure lies: one foot, the nearest and lowest, or the
+    line between two that are as high."""
+    force = derivative(com, frame_time, 2, _WINDOW)
+    force[:, 2] += GRAVITY
+    push = np.maximum(force[:, 2], MIN_PUSH * GRAVITY)
+    over = com[:, None, 2] - paths[..., 2].min(axis=2)
+    pressure = com[:, None, :2] - (over / push[:, None])[..., None] * force[:, None, :2]
+    away = _from_line(pressure, paths[:, :, 0, :2], paths[:, :, 1, :2])
+    able = still & (over > BELOW_MASS * scale) & (force[:, None, 2] > MIN_PUSH * GRAVITY)
+    cost = np.where(able & (away < UNDER_FOOT * scale), away + lowest.clip(0.0), np.inf)
+    carries = np.isfinite(cost) & (cost == cost.min(axis=1, keepdims=True))
+    middles = paths[..., :2].mean(axis=2)
+    for one in range(paths.shape[1]):
+        for other in range(one):
+            both = able[:, one] & able[:, other]
+            both &= np.abs(lowest[:, one] - lowest[:, other]) < SAME_HEIGHT * scale
+            away = _from_line(pressure[:, one], middles[:, one], middles[:, other])
+            carries[:, [one, other]] |= (both & (away < UNDER_FOOT * scale))[:, None]
+    return carries
+
+
+def _from_line(
+    point: Float[np.ndarray, "*n 2"],
+    start: Float[np.ndarray, "*n 2"],
+    end: Float[np.ndarray, "*n 2"],
+) -> Float[np.ndarray, "*n"]:
+    """How far points are from a line between two others [m]."""
+    along = end - start
+    length = np.maximum((along**2).sum(axis=-1), 1e-12)
+    share = np.clip(((point - start) * along).sum(axis=-1) / length, 0.0, 1.0)
+    return np.linalg.norm(point - start - share[..., None] * along, axis=-1)
