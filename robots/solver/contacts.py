@@ -16,6 +16,7 @@ from robots.solver.carrying import Points, carrying, once_down
 from robots.solver.creeping import creeping
 from sim.body.anthropometry import RADII
 from sim.report.derivatives import derivative
+from sim.report.ground import Ground
 from sim.report.mass import Mass, human_mass
 from spark.constants import GRAVITY
 from spark.rig.contacts import ADULT_HEIGHT, above, lower_ends, planted_points
@@ -36,6 +37,7 @@ TOUCH_HEIGHT = 0.03  # [m, of an adult] between the floor and the flesh of a par
 REST_HEIGHT = 0.05  # and of one that rests: recorded floors are off, and flesh is thick;
 WRIST_HEIGHT = 0.04  # more above a palm or a fist
 REST_SPEED = 0.2  # [m/s, of an adult] below which a part comes to rest,
+UPRIGHT_SHANK = 0.25  # [m, of an adult] from foot to knee, over which no knee is on a step
 ROLL_SPEED = 0.4  # and up to which it then stays in place, though its joint rolls over it
 _WINDOW = 0.05  # [s] before and after a frame over which accelerations are measured
 _TOUCHING = ("hand", "forearm", "upper_arm", "head", "spine", "pelvis", "lower_leg")
@@ -67,11 +69,12 @@ def schedule(
     positions: Float[np.ndarray, "T J 3"],
     paths: Float[np.ndarray, "T S 2 3"],
     sides: Sequence[str],
+    ground: Ground,
     noise: Noise | None = None,
 ) -> Schedule:
     """Of a source whose joints are at `positions` and heels and toes at `paths` [m, world], of the
-    feet of some `sides`; feet that it does not have are 0 all over. What `noise` its recording had
-    is averaged out of these."""
+    feet of some `sides`, as over a level floor; feet that it does not have are 0 all over. Other
+    parts are over the `ground`. What `noise` its recording had is averaged out of the feet."""
     if noise is not None:
         paths = smoothed(paths, noise.contact_cutoff, source.frame_time)
     rig, frame_time = source.rig, source.frame_time
@@ -79,7 +82,7 @@ def schedule(
     acceleration = derivative(mass.com, frame_time, 2, _WINDOW)
     flight = np.less(acceleration[:, 2], (FLIGHT_PUSH - 1) * GRAVITY)
     exist = has_feet(paths)
-    roles, parts, rests = _touching_parts(source, positions, paths[:, exist], mass)
+    roles, parts, rests = _touching_parts(source, positions, paths[:, exist], mass, ground)
     stands = np.zeros(paths.shape[:-1], dtype=bool)
     if exist.any():
         own, size = paths[:, exist], rig.standing_height
@@ -145,6 +148,7 @@ def _touching_parts(
     positions: Float[np.ndarray, "T J 3"],
     feet: Float[np.ndarray, "T F 2 3"],
     mass: Mass,
+    ground: Ground,
 ) -> tuple[tuple[Role, ...], Bool[np.ndarray, "T B"], Bool[np.ndarray, "T B"]]:
     """Whether parts touch the ground: their flesh is near it, or not far and they are slow, or
     carry the body; and whether they rest there."""
@@ -153,14 +157,20 @@ def _touching_parts(
     scale = rig.standing_height / ADULT_HEIGHT
     flesh = np.array([RADII[role.part] for role in joints]) * rig.standing_height
     paths = positions[:, list(joints.values())]
-    height = (paths[..., 2] - source.floor_z - flesh) / scale
+    over_floor = (paths[..., 2] - source.floor_z - flesh) / scale
+    over_floor -= WRIST_HEIGHT * np.array([role.part == "hand" for role in joints])
+    under = ground.under(paths)
+    for b, role in enumerate(joints):
+        foot = rig.roles.joint(Role(f"{role.side}_foot")) if role.part == "lower_leg" else None
+        if foot is not None:
+            under[:, b] *= paths[:, b, 2] - positions[:, foot, 2] < UPRIGHT_SHANK * scale
+    height = over_floor - under / scale
     speed = np.linalg.norm(derivative(paths, frame_time, 1, _WINDOW), axis=-1) / scale
-    height -= WRIST_HEIGHT * np.array([role.part == "hand" for role in joints])
     slow = speed < REST_SPEED
-    near = (height < TOUCH_HEIGHT) | ((height < REST_HEIGHT) & slow)
+    near = (over_floor < TOUCH_HEIGHT) | ((height < REST_HEIGHT) & slow)
     carries = carrying(
         mass,
-        Points(paths, height * scale),
+        Points(paths, over_floor * scale),
         _sole_points(feet, rig.standing_height),
         source.floor_z,
         frame_time,

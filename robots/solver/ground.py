@@ -1,15 +1,39 @@
 """The ground under a robot's soles where its source climbs: as high as the source's, scaled."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from robots.model.morphology import Morphology
+from sim.report.ground import Ground, level_ground
 from sim.report.treads import Treads
-from spark.rig.rig import Rig
 from spark.runs import true_runs
+from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.footfalls import between_contacts
+
+
+class Climb(NamedTuple):
+    """What a source stands on: the `heights` [m] of the ground under each of its feet over time
+    (`Treads`), and the `ground` all around."""
+
+    heights: Float[np.ndarray, "T F"]
+    ground: Ground
+
+    def frames(self, start: int, stop: int) -> "Climb":
+        """That of frames `start` to `stop`, exclusive."""
+        return self._replace(heights=self.heights[start:stop])
+
+
+def climb_of(source: CanonicalMotion, treads: Treads) -> Climb:
+    """Where a source's feet stand, and so all of it may."""
+    return Climb(treads.heights, replace(treads.ground(source.floor_z), stands=()))
+
+
+def level_climb(source: CanonicalMotion) -> Climb:
+    """A floor and nothing else."""
+    return Climb(np.zeros((len(source), len(source.rig.soles))), level_ground(source.floor_z))
 
 
 class GroundUnderSoles(NamedTuple):
@@ -41,13 +65,12 @@ def under_soles(
     return GroundUnderSoles(ground, floor)
 
 
-def climbs(treads: Treads, source: Rig, robot: Morphology) -> tuple[str, ...]:
+def climbs(treads: Treads, robot: Morphology) -> tuple[str, ...]:
     """A note where the source's feet stand on more than the floor."""
     if treads.level or not robot.soles:
         return ()
-    top = robot.rig.hip_height / source.hip_height * treads.top
+    top = robot.rig.hip_height / treads.rig.hip_height * treads.top
     return (
         f"feet of the source stand on something up to {100 * treads.top:.0f} cm above its floor: "
-        f"the robot's do up to {100 * top:.0f} cm above its own, where nothing is in its model; "
-        "hands and knees are not held there",
+        f"the robot's do up to {100 * top:.0f} cm above its own, where nothing is in its model",
     )

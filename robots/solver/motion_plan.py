@@ -73,7 +73,8 @@ def _support(
     lowest = points[..., 2].argsort(axis=1)[:, :_HELD_POINTS]
     touching[np.flatnonzero(alone)[:, None], lowest[alone]] = True
     pushing = np.concatenate([touching, targets.parts[:, known]], axis=1)
-    height = (touching * ground).sum(axis=1) / np.maximum(pushing.sum(axis=1), 1)
+    heights = np.concatenate([ground, targets.part_ground[:, known]], axis=1)
+    height = (pushing * heights).sum(axis=1) / np.maximum(pushing.sum(axis=1), 1)
     return Support(
         np.concatenate([points[..., :2], *(p[:, None] for p in parts)], axis=1),
         pushing,

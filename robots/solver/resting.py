@@ -69,7 +69,7 @@ def _shift(
     way = path + between_contacts(offset[:, :2], rests, path)
     way = settled(led(way, source, rests, frame_time, APPROACH), rests, frame_time, SETTLE)
     offset[:, :2] = way - path
-    lift = -touch.lowest(poses)
+    lift = targets.part_ground[:, k] - touch.lowest(poses)
     offset[:, 2] = between_contacts(lift[:, None], touches, path)[:, 0]
     return offset.T
 

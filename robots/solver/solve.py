@@ -16,7 +16,7 @@ from robots.solver.block import Block, blocks_of, carriers, whole_of
 from robots.solver.descent import collision_candidates, solve_block
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import FootPlan, plan_feet, reachable
-from robots.solver.ground import climbs
+from robots.solver.ground import climb_of, climbs
 from robots.solver.holds import Holds, joined
 from robots.solver.marching import abrupt, calmed
 from robots.solver.motion_plan import with_dynamics
@@ -70,11 +70,11 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     source, passed = without_strays(source)
     source, noise, trembles = without_noise(source)
     treads = treads_of(source)
-    notes = dict.fromkeys((*robot.notes, *passed, *trembles, *climbs(treads, source.rig, robot)))
+    climb = climb_of(source, treads)
+    notes = dict.fromkeys((*robot.notes, *passed, *trembles, *climbs(treads, robot)))
 
     def solved(start: int, stop: int) -> Coordinates:
-        ground = None if treads.level else treads.ground[start:stop]
-        targets = targets_of(source.frames(start, stop), robot, noise, ground)
+        targets = targets_of(source.frames(start, stop), robot, noise, climb.frames(start, stop))
         notes.update(dict.fromkeys(targets.notes))
         return _trajectory(robot, targets)
 

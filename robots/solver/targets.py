@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from robots.model.morphology import Morphology
 from robots.model.shapes import surface
 from robots.solver.contacts import has_feet, schedule, touching_joint
-from robots.solver.ground import under_soles
+from robots.solver.ground import Climb, level_climb, under_soles
 from robots.solver.palms import laid, resting_palms
 from robots.solver.trunk import bowing
 from robots.tree import forward_kinematics
@@ -53,10 +53,10 @@ class Targets:
     robot's soles stand, `parts`, whether those of `part_roles` touch the floor, `rests`, whether
     they also stay in place, `palms`, how far (0 to 1) hands lie still, `flight`, whether nothing
     holds the body; `com_acceleration`, the source's, scaled [m/s²]; `part_paths` and `feet`, the
-    paths of the source's parts, and of its heels and toes, over the floor [m]; `ground` and
-    `floor`, how high those of each sole are (`GroundUnderSoles`), and `clearance`, how high the
-    source's soles are over it, scaled; `hands`, from the right hand to the left [m]. `com` [m] is
-    planned where it is known.
+    paths of the source's parts, and of its heels and toes, over the floor [m]; `part_ground`, how
+    high that under each part is, `ground` and `floor`, those of each sole (`GroundUnderSoles`), and
+    `clearance`, how high the source's soles are over it, scaled; `hands`, from the right hand to
+    the left [m]. `com` [m] is planned where it is known.
     """
 
     frame_time: float
@@ -69,6 +69,7 @@ class Targets:
     rests: Bool[np.ndarray, "T B"]
     part_roles: tuple[Role, ...]
     part_paths: Float[np.ndarray, "T B 2"]
+    part_ground: Float[np.ndarray, "T B"]
     palms: dict[Role, Float[np.ndarray, "T"]]
     flight: Bool[np.ndarray, "T"]
     com_acceleration: Float[np.ndarray, "T 3"]
@@ -110,6 +111,7 @@ class Targets:
             parts=self.parts[frames],
             rests=self.rests[frames],
             part_paths=self.part_paths[frames],
+            part_ground=self.part_ground[frames],
             palms={role: palm[frames] for role, palm in self.palms.items()},
             flight=self.flight[frames],
             com_acceleration=self.com_acceleration[frames],
@@ -126,10 +128,10 @@ def targets_of(
     source: CanonicalMotion,
     robot: Morphology,
     noise: Noise | None = None,
-    ground: Float[np.ndarray, "T F"] | None = None,
+    climb: Climb | None = None,
 ) -> Targets:
     """The targets that `source` sets for `robot`; `noise` is what its recording trembled by, and
-    `ground` how high [m] that under each of its feet is: level where it is not given."""
+    `climb` what it stands on: a level floor where it is not given."""
     positions = canonical_positions(source)
     world, hips, notes = poses_of(source, positions, robot)
     rig = source.rig
@@ -138,13 +140,12 @@ def targets_of(
         source_feet(source, positions, robot),
         source_clearance(source, positions, robot),
     )
-    if ground is None:
-        under = np.zeros(clearance.shape)
-    else:
-        under = for_soles(ground, rig, robot)
-        paths[..., 2] -= under[..., None]
+    climb = level_climb(source) if climb is None else climb
+    under = for_soles(climb.heights, rig, robot)
+    paths[..., 2] -= under[..., None]
     scale = robot.rig.hip_height / rig.hip_height
-    touches = schedule(source, positions, paths, [sole.side for sole in robot.soles], noise)
+    sides = [sole.side for sole in robot.soles]
+    touches = schedule(source, positions, paths, sides, climb.ground, noise)
     touching = [j for r in touches.part_roles if (j := touching_joint(rig, r)) is not None]
     own_ground = under_soles(under, touches.feet, paths[:, :, 1, :2])
     palms = resting_palms(robot, touches.part_roles, touches.rests, source.frame_time)
@@ -162,6 +163,7 @@ def targets_of(
         rests=touches.rests,
         part_roles=touches.part_roles,
         part_paths=scale * positions[:, touching, :2],
+        part_ground=scale * climb.ground.under(positions[:, touching]),
         palms=palms,
         flight=touches.flight,
         com_acceleration=scale * touches.com_acceleration,

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.course import Course, course_of
 from sim.report.findings import findings_of
-from sim.report.ground import ground_of, level_ground
+from sim.report.ground import level_ground
 from sim.report.limbs import limbs_of
 from sim.report.measures import (
     ContactMatch,
@@ -75,12 +75,12 @@ def assess(
         floor, notes = _floor_from_source(course, source.rig, source_floor)
     notes += trembles
     treads = treads_of(to_canonical(quiet.motion, quiet.rig))
-    source_ground = ground_of(source_course, source_floor, treads, source_course, 1.0)
+    source_ground = treads.ground(source_floor)
     source_clip = measure_clip(source, source_ground)
     followed = source_clip if quiet is source else measure_clip(quiet, source_ground)
     times = np.arange(len(course)) * motion.frame_time
     scale = rig.hip_height / source.rig.hip_height
-    ground = ground_of(course, floor, treads, source_course, scale)
+    ground = treads.under(rig, _ways(course), motion.frame_time, floor, scale)
     clip = _beyond_source(measure_clip(subject, ground), source_clip, times, scale)
     travel = scale if subject.body is not None else travel_scale(source.rig, rig)
     drift = _drift(course, source_course, times, travel)
@@ -135,6 +135,12 @@ def _about_model(course: Course) -> tuple[str, ...]:
             f"point) is {100 * abs(height):.1f} cm {'above' if height > 0 else 'below'} that"
         )
     return tuple(notes)
+
+
+def _ways(course: Course) -> dict[str, Float[np.ndarray, "T 2"]]:
+    """The ways of a motion's feet [m, world], by side."""
+    roles = [course.rig.roles.roles[j] for j in course.rig.contact_joints]
+    return {role.side: course.feet[:, k, :2] for k, role in enumerate(roles) if role is not None}
 
 
 def _own_floor(course: Course) -> float:

@@ -6,17 +6,20 @@ is. A foot that is held up beside one that stands has no push under it, nor have
 lies or stands on the hands.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from sim.report.derivatives import derivative
+from sim.report.ground import Ground, Stand, distinct, level_ground
 from sim.report.mass import human_mass
 from spark.blocks import in_blocks
 from spark.constants import GRAVITY
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_SPEED, lower_ends, speeds
 from spark.rig.feet import ends_of_feet, lowest_points
+from spark.rig.rig import Rig
 from spark.rotation import quat_mul
 from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
@@ -36,22 +39,57 @@ _WINDOW = 0.05  # [s] before and after a frame over which rates are measured
 
 @dataclass(frozen=True, eq=False)
 class Treads:
-    """When each of a rig's S feet `stands`, and how high [m] over the floor the `ground` under it
-    is; in swing, between the two places by as much of its way as it has gone. 0 all over where the
-    floor is level."""
+    """When each of a rig's S feet `stands`, and the `heights` [m] of the ground under it over the
+    floor; in swing, between the two places by as much of its way as it has gone. 0 all over where
+    the floor is level. `ways` [m, world] are those of the feet."""
 
+    rig: Rig
+    frame_time: float
+    ways: Float[np.ndarray, "T S 2"]
     stands: Bool[np.ndarray, "T S"]
-    ground: Float[np.ndarray, "T S"]
+    heights: Float[np.ndarray, "T S"]
 
     @property
     def level(self) -> bool:
         """Whether the feet stand on the floor alone."""
-        return not self.ground.any()
+        return not self.heights.any()
 
     @property
     def top(self) -> float:
         """The highest place [m]."""
-        return float(self.ground.max(initial=0.0))
+        return float(self.heights.max(initial=0.0))
+
+    def ground(self, floor_z: float) -> Ground:
+        """That under the feet, over a floor at `floor_z` [m, world]."""
+        sides = [sole.side for sole in self.rig.soles]
+        ways = dict(zip(sides, self.ways.swapaxes(0, 1), strict=True))
+        return self.under(self.rig, ways, self.frame_time, floor_z, 1.0)
+
+    def under(
+        self,
+        rig: Rig,
+        ways: Mapping[str, Float[np.ndarray, "t 2"]],
+        frame_time: float,
+        floor_z: float,
+        scale: float,
+    ) -> Ground:
+        """The ground under another motion, on `rig`, whose feet, on their `ways` [m, world] by
+        side, should stand when these do, `scale` times as high over its own floor."""
+        if self.level:
+            return level_ground(floor_z)
+        rate, tops, stands = self.frame_time / frame_time, [], []
+        for k, sole in enumerate(self.rig.soles):
+            way = ways.get(sole.side, np.zeros((0, 2)))
+            for start, stop in true_runs(self.stands[:, k]):
+                own = slice(round(start * rate), round(stop * rate))
+                if not len(way[own]):
+                    continue
+                z = floor_z + scale * float(np.median(self.heights[start:stop, k]))
+                stands.append(Stand(f"{sole.side} foot", own.start, own.stop, z))
+                if z > floor_z:
+                    tops.append([*way[own].mean(axis=0), z])
+        known = distinct(np.array(tops).reshape(-1, 3), rig.hip_height)
+        return Ground(floor_z, known, tuple(stands), rig.hip_height)
 
 
 def treads_of(source: CanonicalMotion) -> Treads:
@@ -62,22 +100,23 @@ def treads_of(source: CanonicalMotion) -> Treads:
         source.rig.standing_height / ADULT_HEIGHT,
     )
     count, feet = len(source), len(rig.soles)
+    stands, ground = np.zeros((count, feet), dtype=bool), np.zeros((count, feet))
     if not feet or count < 2:
-        return Treads(np.zeros((count, feet), dtype=bool), np.zeros((count, feet)))
+        return Treads(rig, frame_time, np.zeros((count, feet, 2)), stands, ground)
     found = in_blocks(lambda block: _places(source.picked(block)), count)
     com, lowest = found[:, :3], found[:, 3 : 3 + feet]
     paths = found[:, 3 + feet :].reshape(count, feet, 2, 3)
+    ways = paths[..., :2].mean(axis=2)
     still = _still(paths, rig.standing_height, frame_time)
     carries = still & _carry(paths, lowest, still, com, frame_time, scale)
     runs = [(k, start, stop) for k in range(feet) for start, stop in true_runs(still[:, k])]
     runs.sort(key=lambda run: run[1])
     heights = np.array([np.median(lowest[start:stop, k]) for k, start, stop in runs])
-    places = np.array([paths[start:stop, k, :, :2].mean((0, 1)) for k, start, stop in runs])
+    places = np.array([ways[start:stop, k].mean(axis=0) for k, start, stop in runs])
     sure = [carries[start:stop, k].sum() * frame_time > MIN_TIME for k, start, stop in runs]
     known = np.array(sure, dtype=bool)
-    stands, ground = np.zeros_like(still), np.zeros(still.shape)
     if not (np.abs(np.diff(heights[known])) > MIN_STEP * scale).any():
-        return Treads(stands, ground)
+        return Treads(rig, frame_time, ways, stands, ground)
     for i, (k, start, stop) in enumerate(runs):
         beside = known & (np.abs(heights - heights[i]) < SAME_HEIGHT * scale)
         beside &= np.linalg.norm(places - places[i], axis=1) < SAME_PLACE * scale
@@ -85,9 +124,8 @@ def treads_of(source: CanonicalMotion) -> Treads:
         stands[start:stop, k] = on_floor or beside.any()
         ground[start:stop, k] = 0.0 if on_floor else heights[i]
     for k in range(feet):
-        way = paths[:, k].mean(axis=1)[:, :2]
-        ground[:, k] = between_contacts(ground[:, k, None], stands[:, k], way)[:, 0]
-    return Treads(stands, ground)
+        ground[:, k] = between_contacts(ground[:, k, None], stands[:, k], ways[:, k])[:, 0]
+    return Treads(rig, frame_time, ways, stands, ground)
 
 
 def _places(source: CanonicalMotion) -> Float[np.ndarray, "T N"]:
