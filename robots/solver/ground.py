@@ -61,7 +61,7 @@ def under_soles(
         ground[:, s] = between_contacts(ground[:, s, None], stands, toes[:, s])[:, 0]
         floor[:, s] = ground[:, s]
         for start, stop in true_runs(~stands):
-            floor[start:stop, s] = ground[start:stop, s].min()
+            floor[start:stop, s] = ground[max(start - 1, 0) : stop + 1, s].min()
     return GroundUnderSoles(ground, floor)
 
 

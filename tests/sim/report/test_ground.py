@@ -1,0 +1,37 @@
+"""Heights over a floor and what stands on it."""
+
+import numpy as np
+
+from sim.report.ground import Ground, Stand, distinct, level_ground
+
+BOX = Ground(0.1, np.array([[1.0, 0.0, 0.5]]), (Stand("left foot", 2, 4, 0.5),), hip_height=1.0)
+
+
+def test_over_a_level_floor_heights_are_over_that() -> None:
+    points = np.random.default_rng(0).normal(size=(4, 3, 3))
+    np.testing.assert_array_equal(level_ground(0.2).heights(points), points[..., 2] - 0.2)
+    np.testing.assert_array_equal(level_ground(0.2).under(points), 0.0)
+
+
+def test_what_is_beside_a_box_is_over_the_floor() -> None:
+    """On it as far as it reaches, hands farther than feet; below its top beside it."""
+    place = np.array([[1.0, 0, 0.7], [1.4, 0, 0.7], [1.6, 0, 0.7], [1.0, 0, 0.45]])
+    points = np.tile(place, (1, 1, 1))
+    np.testing.assert_allclose(BOX.heights(points), [[0.2, 0.2, 0.6, 0.35]])
+    feet = ["right foot"] * 4
+    np.testing.assert_allclose(BOX.heights(points, feet), [[0.2, 0.6, 0.6, 0.35]])
+
+
+def test_a_foot_that_stands_on_a_box_sinks_into_it() -> None:
+    points = np.tile([1.0, 0.0, 0.45], (6, 2, 1))
+    heights = BOX.heights(points, ["left foot", "right foot"])
+    np.testing.assert_allclose(heights[:, 1], 0.35)
+    np.testing.assert_allclose(heights[:, 0], [0.35, 0.35, -0.05, -0.05, 0.35, 0.35])
+    later = BOX.picked(slice(3, 6)).heights(points[3:], ["left foot", "right foot"])
+    np.testing.assert_array_equal(later, heights[3:])
+
+
+def test_places_that_are_one_are_kept_once() -> None:
+    tops = np.array([[0.0, 0, 0.5], [0.05, 0, 0.51], [0.05, 0, 0.6], [0.5, 0, 0.5]])
+    np.testing.assert_array_equal(distinct(tops, 1.0), tops[[0, 2, 3]])
+    assert distinct(np.zeros((0, 3)), 1.0).shape == (0, 3)
