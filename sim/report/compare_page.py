@@ -49,7 +49,9 @@ def compare_page(
     theirs = next((r.source for r in reports.values() if r.source is not None), None)
     if source is not None and theirs is not None:
         shown.append((f"{source[0]} (source)", source[1], theirs))
-    figures = [Figure(subject, name, clip.floor_z) for name, subject, clip in shown]
+    figures = [
+        Figure(subject, name, clip.floor_z, tops=clip.ground.tops) for name, subject, clip in shown
+    ]
     found = [*(report.findings for report in reports.values()), ()]
     known = [
         annotate(clip, subject, findings)

@@ -56,7 +56,10 @@ def report_page(
     shown = [(subject, result.clip, names[0])]
     if source is not None and result.source is not None:
         shown.append((source, result.source, names[1]))
-    figures = [Figure(each, name, metrics.floor_z) for each, metrics, name in shown]
+    figures = [
+        Figure(each, name, metrics.floor_z, tops=metrics.ground.tops)
+        for each, metrics, name in shown
+    ]
     clip, frame_time = result.clip, result.clip.frame_time
     duration = (len(clip) - 1) * frame_time
     source_duration = (subject if source is None else source).motion.duration

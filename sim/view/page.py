@@ -108,7 +108,7 @@ def _figure(
     meshes: dict[bytes, dict[str, Any]],
 ) -> dict[str, Any]:
     """A figure's tree of bodies, what they look like, and its coordinates in every frame."""
-    model, bodies = scene.model, placement.bodies
+    model, bodies = scene.model, [*placement.bodies, *placement.pillars]
     qpos = scene.qpos[:, placement.columns]
     lost = scene.lost_from(placement)
     most = float(np.abs(qpos[: max(lost, 1), 3:]).max(initial=1.0))
@@ -142,8 +142,9 @@ def _figure(
 def _body(model: mujoco.MjModel, body: int, root: int, column: int) -> dict[str, Any]:
     """A body in its parent, -1 for the world, and the joints that move it; `at` counts the figure's
     own coordinates."""
+    parent = int(model.body_parentid[body])
     return {
-        "parent": int(model.body_parentid[body]) - root if body > root else -1,
+        "parent": parent - root if parent else -1,
         "pos": short(model.body_pos[body]),
         "quat": short(model.body_quat[body]),
         "joints": [

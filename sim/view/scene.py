@@ -1,7 +1,7 @@
 """Several moving bodies on one floor, side by side, in one MuJoCo model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import mujoco
@@ -13,7 +13,7 @@ from sim.trajectory import Subject, coordinates_at, model_trajectory
 from sim.view.display import add_display, body_names
 from sim.view.skin import WornSkin, add_skin, worn_by
 from sim.view.text import shortened
-from sim.view.world import empty_world
+from sim.view.world import add_pillars, empty_world
 from spark.errors import SkeletonError
 from spark.kinematics import forward
 from spark.motion import Motion
@@ -29,6 +29,7 @@ _LOST_SPEED, _LOST_HEIGHT, _LOST_DISTANCE = 15.0, 3.0, 5.0
 _FLOWN = 10.0  # standing heights
 _SAME_FPS = 1.005  # of frames a second: a file's 0.016666 s means 60, and 0.004166 s means 240
 _HEAD = 0.12  # of the standing height: from the head's joint to the crown
+_PILLAR = 0.09  # of the standing height: the radius of what a foot stands on above the floor
 _SPACING = 0.8  # of two neighbours' mean standing height, between their roots: arms do not meet
 
 
@@ -39,7 +40,8 @@ class Figure:
     Where the subject has no model, one is built from its rig. A `ghost` is seen through, and stands
     where the figure before it stands: in the same world, or, where it is `aligned`, so that both
     begin in one place. With a `height` [m], the body and its way are scaled to stand as tall. A
-    `skin` on the rig's joints is shown instead of the body that is built from the rig.
+    `skin` on the rig's joints is shown instead of the body that is built from the rig. It stands
+    on pillars up to `tops` [m] in its own world.
     """
 
     subject: Subject
@@ -49,6 +51,7 @@ class Figure:
     aligned: bool = False
     height: float | None = None
     skin: Skin | None = None
+    tops: Float[np.ndarray, "K 3"] = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property
     def motion(self) -> Motion:
@@ -84,7 +87,8 @@ class Placement:
     Of the scene's model it has the coordinates `columns` and the bodies `bodies`, its root first;
     `own` are the coordinates of its subject's model that these are.
     Its standing `height` in the scene is in metres; `lane` [m] is where it stands beside the
-    others, along Y. `ahead` is where it faces, in its root body's axes.
+    others, along Y. `ahead` is where it faces, in its root body's axes. `pillars` is the body of
+    what it stands on, where there is any.
     """
 
     label: str
@@ -99,6 +103,7 @@ class Placement:
     lane: float
     ahead: Float[np.ndarray, "3"]
     skin: WornSkin | None = None
+    pillars: range = range(0)
 
     def to_scene(self, points: Float[np.ndarray, "*N 3"]) -> Float[np.ndarray, "*N 3"]:
         """Points of the figure's own world in the scene's."""
@@ -224,22 +229,24 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0, blend: bool
         following = column + len(columns)
         bodies = range(first_body, len(list(world.bodies)))
         ahead = quat_rotate(turn, _ahead(figure))
-        placements.append(
-            Placement(
-                label=shortened(figure.label),
-                ghost=figure.ghost,
-                turn=turn,
-                translation=translation,
-                scale=figure.scale,
-                columns=slice(column, following),
-                own=columns,
-                bodies=bodies,
-                height=heights[k],
-                lane=float(lanes[k]),
-                ahead=quat_rotate(quat_conj(qpos[0, 3:7]), ahead),
-                skin=worn,
-            )
+        placement = Placement(
+            label=shortened(figure.label),
+            ghost=figure.ghost,
+            turn=turn,
+            translation=translation,
+            scale=figure.scale,
+            columns=slice(column, following),
+            own=columns,
+            bodies=bodies,
+            height=heights[k],
+            lane=float(lanes[k]),
+            ahead=quat_rotate(quat_conj(qpos[0, 3:7]), ahead),
+            skin=worn,
         )
+        if len(figure.tops) and not figure.ghost:
+            add_pillars(world, placement.to_scene(figure.tops), _PILLAR * heights[k])
+            placement = replace(placement, pillars=range(bodies.stop, bodies.stop + 1))
+        placements.append(placement)
         column = following
     qpos = np.concatenate(coordinates, axis=1)
     return Scene(compiled(world), qpos, frame_time, tuple(placements))

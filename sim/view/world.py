@@ -1,6 +1,10 @@
 """The floor, the sky and the lights of a scene."""
 
 import mujoco
+import numpy as np
+from jaxtyping import Float
+
+_PILLAR_RGBA = (0.80, 0.79, 0.76, 1.0)
 
 
 def empty_world() -> mujoco.MjSpec:
@@ -49,3 +53,18 @@ def empty_world() -> mujoco.MjSpec:
             castshadow=False,
         )
     return spec
+
+
+def add_pillars(
+    spec: mujoco.MjSpec, tops: Float[np.ndarray, "K 3"], radius: float
+) -> mujoco.MjsBody:
+    """A body of pillars from the floor at z = 0 up to `tops` [m]: what feet stand on there."""
+    body = spec.worldbody.add_body()
+    for x, y, z in tops.tolist():
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+            size=[radius, max(z / 2, 1e-3), 0.0],
+            pos=[x, y, z / 2],
+            rgba=_PILLAR_RGBA,
+        )
+    return body
