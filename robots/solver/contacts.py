@@ -167,7 +167,9 @@ def _touching_parts(
     height = over_floor - under / scale
     speed = np.linalg.norm(derivative(paths, frame_time, 1, _WINDOW), axis=-1) / scale
     slow = speed < REST_SPEED
-    near = (over_floor < TOUCH_HEIGHT) | ((height < REST_HEIGHT) & slow)
+    near = (over_floor < TOUCH_HEIGHT) | ((over_floor < REST_HEIGHT) & slow)
+    above_floor = (under > 0) & (height < REST_HEIGHT) & (speed < ROLL_SPEED)
+    near |= _runs_with(above_floor, slow)
     carries = carrying(
         mass,
         Points(paths, over_floor * scale),
