@@ -142,8 +142,8 @@ class ClipBase(ABC):
 
     def figures(self) -> "list[Figure]":
         """What a picture or a video shows of the clip."""
-        from sim.report.treads import treads_of
         from sim.view.scene import Figure
+        from spark.transfer.treads import treads_of
 
         skin, tops = self.surface[0], treads_of(self.canonical).ground(self.floor_z).tops
         return [Figure(self.subject, self.name, self.floor_z, skin=skin, tops=tops)]

@@ -16,7 +16,6 @@ from robots.solver.carrying import Points, carrying, once_down
 from robots.solver.creeping import creeping
 from sim.body.anthropometry import RADII
 from sim.report.derivatives import derivative
-from sim.report.ground import Ground
 from sim.report.mass import Mass, human_mass
 from spark.constants import GRAVITY
 from spark.rig.contacts import ADULT_HEIGHT, above, lower_ends, planted_points
@@ -25,6 +24,7 @@ from spark.rig.roles import Role
 from spark.rotation import quat_mul
 from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion
+from spark.transfer.ground import Ground
 from spark.transfer.noise import Noise, smoothed
 
 MIN_DURATION = 0.08  # contacts and breaks shorter than this [s] are noise

@@ -7,11 +7,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from robots.model.morphology import Morphology
-from sim.report.ground import Ground, level_ground
-from sim.report.treads import Treads
 from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.footfalls import between_contacts
+from spark.transfer.ground import Ground, level_ground
+from spark.transfer.treads import Treads
 
 
 class Climb(NamedTuple):

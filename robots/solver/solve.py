@@ -30,10 +30,10 @@ from robots.solver.strays import without_strays
 from robots.solver.stretches import by_stretches
 from robots.solver.targets import Targets, poses_of, targets_of
 from robots.tree import Coordinates
-from sim.report.treads import treads_of
 from spark.threads import one_thread
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.noise import without_noise
+from spark.transfer.treads import treads_of
 
 Steps = tuple[int, float, float]
 """How many Gauss-Newton steps at most; of the cost, what one must gain not to be the last; and the

@@ -8,7 +8,6 @@ from jaxtyping import Float
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.course import Course, course_of
 from sim.report.findings import findings_of
-from sim.report.ground import level_ground
 from sim.report.limbs import limbs_of
 from sim.report.measures import (
     ContactMatch,
@@ -22,7 +21,6 @@ from sim.report.report import Report
 from sim.report.stretches import measure_clip
 from sim.report.swing import swing_of
 from sim.report.thresholds import PLAUSIBILITY_V2
-from sim.report.treads import Treads, treads_of
 from sim.report.truth import accuracy
 from sim.trajectory import Subject
 from spark.errors import SkeletonError
@@ -31,8 +29,10 @@ from spark.resample import values_at
 from spark.rig.contacts import planted_points
 from spark.rig.rig import Rig
 from spark.transfer.canonical import from_canonical, to_canonical
+from spark.transfer.ground import level_ground
 from spark.transfer.leg_fit import travel_scale
 from spark.transfer.noise import LEAST_NOISE, noise_in, without_noise
+from spark.transfer.treads import Treads, treads_of
 
 # Hip heights: a source whose floor is further from z = 0 than this does not stand on z = 0, and
 # what was made of it may have been put there.

@@ -7,7 +7,6 @@ from jaxtyping import Bool, Float
 
 from sim.report.clip_poses import ClipPoses
 from sim.report.derivatives import derivative
-from sim.report.ground import Ground
 from sim.report.limb_ends import limb_ends
 from sim.report.limits import LimitExcess, limit_excess
 from sim.report.measures import floating, horizontal_speed, penetration_depth, windowed_min
@@ -19,6 +18,7 @@ from sim.report.thresholds import PLAUSIBILITY_V2, Thresholds
 from sim.report.torque import JointTorque, joint_torques
 from spark.constants import GRAVITY
 from spark.summary import time_span
+from spark.transfer.ground import Ground
 
 
 @dataclass(frozen=True, eq=False)

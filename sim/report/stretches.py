@@ -9,10 +9,10 @@ import numpy as np
 
 from sim.report.clip_metrics import ClipMetrics, measure
 from sim.report.clip_poses import pose_clip
-from sim.report.ground import Ground
 from sim.report.thresholds import PLAUSIBILITY_V2
 from sim.trajectory import Subject
 from spark.blocks import blocks
+from spark.transfer.ground import Ground
 
 # Velocities are taken over a window, of cubic splines, which frames bend less and less: one so far
 # away by less than rounding does (0.27 to this power).

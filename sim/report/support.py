@@ -7,10 +7,10 @@ from jaxtyping import Bool, Float, Int
 
 from sim.report.clip_poses import ClipPoses
 from sim.report.derivatives import derivative, whole_windows
-from sim.report.ground import Ground
 from sim.report.measures import distance_outside_hull, horizontal_speed, windowed_min
 from sim.report.thresholds import HUMAN_HIP_HEIGHT, Thresholds
 from sim.report.wrench import required_wrench, unexplained_wrench
+from spark.transfer.ground import Ground
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,12 +47,27 @@ def speeds(positions: Float[np.ndarray, "T *n 3"], frame_time: float) -> Float[n
 
     One-sided at the ends; a single frame stands still.
     """
+    moves, time = _moves(positions, frame_time)
+    return np.linalg.norm(moves[..., :2], axis=-1) / time
+
+
+def climbing_speeds(
+    positions: Float[np.ndarray, "T *n 3"], frame_time: float
+) -> Float[np.ndarray, "T *n"]:
+    """Vertical speed [m/s], up or down, as `speeds` has the horizontal one."""
+    moves, time = _moves(positions, frame_time)
+    return np.abs(moves[..., 2]) / time
+
+
+def _moves(
+    positions: Float[np.ndarray, "T *n 3"], frame_time: float
+) -> tuple[Float[np.ndarray, "T *n 3"], Float[np.ndarray, "T *one"]]:
+    """How far positions move around each frame [m], and in what time [s]."""
     reach = max(1, round(SPEED_WINDOW / 2 / frame_time))
     frames = np.arange(len(positions))
     before, after = np.maximum(frames - reach, 0), np.minimum(frames + reach, len(positions) - 1)
-    way = np.linalg.norm(positions[after, ..., :2] - positions[before, ..., :2], axis=-1)
     time = np.maximum(after - before, 1) * frame_time
-    return way / time.reshape(-1, *[1] * (way.ndim - 1))
+    return positions[after] - positions[before], time.reshape(-1, *[1] * (positions.ndim - 2))
 
 
 def standing_heights(

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from spark.rotation import quat_rotate
 from spark.transfer.canonical import CanonicalMotion
-from spark.transfer.hip_rise import Standing, hip_rise
+from spark.transfer.hip_rise import Standing, hip_rise, lowest
 from spark.transfer.leg_fit import from_sole, leg_fit
 
 _WEAKEST = 1e-3  # [hip heights²] of movement; a scale that less depends on stays as it is
@@ -43,7 +43,8 @@ def measured_scales(
     A = np.stack([lift, np.ones_like(lift)], -1)
     # Hips beyond what they rise with the leg that stands, and ankles by what stands under them: the
     # soles. Where `retarget` holds feet, it adds the one and keeps the other.
-    heights = own.hips[:, 2] - size - hip_rise(theirs, own, legs)
+    low = np.stack([lowest(leg, theirs) for leg, _ in legs])
+    heights = own.hips[:, 2] - size - hip_rise(theirs, own, legs, low)
     hips_rise, hips_up = _drawn(A, heights, rise, _WEAKEST * len(A) * other**2)
     floor = theirs.floor_z
     lifted = np.concatenate([leg.sole[..., 2].min(axis=1) - floor for leg, _ in legs])

@@ -6,9 +6,10 @@ sole, be it the heel, the toes' end or all of it, moves as far on the other sole
 foot that turns on its toes turns on them, too. Where what rests moves, the first `_CAPTURE_NOISE`
 from its mean position is taken for noise and removed; what goes beyond is motion and kept. A stance
 (`spark.transfer.stances`) is at its own mean position, and a foot is carried from one footprint to
-the next (`spark.transfer.footfalls`). The lowest point of the sole is as high above the floor as
-the source's is, scaled: while it stands and while it swings, whatever the length of the foot; the
-hips rise with it (`spark.transfer.hip_rise`). What hovers comes down (`spark.transfer.hover`).
+the next (`spark.transfer.footfalls`). The lowest point of the sole is as high above the floor, or
+what the source climbs (`spark.transfer.treads`), as the source's is, scaled: while it stands and
+while it swings, whatever the length of the foot; the hips rise with it (`spark.transfer.hip_rise`).
+What hovers comes down (`spark.transfer.hover`).
 """
 
 from dataclasses import replace
@@ -27,6 +28,7 @@ from spark.transfer.leg_ik import Leg, leg_of, move_ankles
 from spark.transfer.noise import Noise
 from spark.transfer.reach import stretch, swing_gently, within_reach
 from spark.transfer.stances import stances
+from spark.transfer.treads import treads_of
 
 _CAPTURE_NOISE = 0.02  # [hip heights] 2 cm of an adult
 # [hip heights] that a sole may sink: half a centimetre of an adult. A foot that sinks further in
@@ -46,23 +48,29 @@ def lock_feet(
     as the source's; its hips go with them. `noise` is what was taken from the source."""
     size = moved.rig.hip_height
     scale = size / source.rig.hip_height
+    treads = treads_of(source)
     feet: list[tuple[Leg, Standing, Standing]] = []
+    columns = []
     stretches: list[Float[np.ndarray, T]] = []
     for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
         leg = leg_of(moved.rig, group)
         if leg is not None and source.rig.roles.joint(LIMBS[group][2]) is not None:
             feet.append((leg, standing(source, group), standing(moved, group)))
             stretches.append(stretch(source, group))
+            columns += [k for k, s in enumerate(source.rig.soles) if s.side == group.side]
     if not feet:
         return moved
+    ground = treads.heights.T[columns]
     ends = np.stack([theirs.sole[:, _ENDS] for _, theirs, _ in feet], axis=1)
+    ends[..., 2] -= ground.T[..., None]
     stands, flat = stances(ends, source.frame_time, source.rig.standing_height, noise)
     stray = 0.0 if noise is None else noise.stray * source.rig.standing_height / ADULT_HEIGHT
     radius = _CAPTURE_NOISE * size + scale * stray
     rolled = [_rolled(theirs.sole, own.sole, source) for _, theirs, own in feet]
     low = np.stack([lowest(theirs, source) for _, theirs, _ in feet])
+    low -= ground / source.rig.hip_height
     down = put_down(low, stands, [own for _, own in rolled])
-    rise = hip_rise(source, moved, [(theirs, own) for _, theirs, own in feet])
+    rise = hip_rise(source, moved, [(theirs, own) for _, theirs, own in feet], low)
     rise -= size * hips_with_feet(down, low, moved.frame_time)
     moves: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
     for k, (leg, _, (_, _, own_sole)) in enumerate(feet):
@@ -73,7 +81,7 @@ def lock_feet(
             kept = beyond(scale * theirs[here], radius)
             offset[here] = own[here].mean(axis=0) + kept - own[here]
         along = between_contacts(offset, stance, own)
-        wanted = size * np.maximum(low[k] - down[k], -_MAX_SINK)
+        wanted = size * np.maximum(low[k] - down[k], -_MAX_SINK) + scale * ground[k]
         height = own_sole[..., 2].min(axis=1) + rise - moved.floor_z
         moves.append((leg, np.column_stack([along, wanted - height])))
     risen = replace(moved, hips=moved.hips + rise[:, None] * np.array([0.0, 0.0, 1.0]))

@@ -57,12 +57,13 @@ def hip_rise(
     source: CanonicalMotion,
     moved: CanonicalMotion,
     legs: Sequence[tuple[Standing, Standing]],
+    low: Float[np.ndarray, "L T"],
 ) -> Float[np.ndarray, "T"]:
     """How much higher [m] the hips of `moved`, the transfer of `source`, are for what foot, leg and
     pelvis are more than the source's, scaled; `legs` are the same ones on both.
 
-    Each leg counts by how low the source's sole is, and of its rise as much is made as it is
-    upright, from 0 (level, as on the ground) to 1: sum(w u rise) / sum(w).
+    Each leg counts by how `low` the source's sole is over the ground [hip heights], and of its rise
+    as much is made as it is upright, from 0 (level, as on the ground) to 1: sum(w u rise) / sum(w).
     """
     scale = moved.rig.hip_height / source.rig.hip_height
     rises = [
@@ -72,7 +73,6 @@ def hip_rise(
         for theirs, own in legs
     ]
     upright = [_upright(source, theirs) for theirs, _ in legs]
-    low = np.stack([lowest(theirs, source) for theirs, _ in legs])
     return hips_with_feet(np.multiply(upright, rises), low, moved.frame_time)
 
 

@@ -8,12 +8,16 @@ import numpy as np
 import pytest
 
 import spark_sim
-from sim.report.treads import treads_of
 from spark.demo.sample import sample_motion, sample_rig
+from spark.rig.feet import lowest_points
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_mul
-from spark.transfer.canonical import CanonicalMotion, to_canonical
+from spark.transfer.analytic import transfer
+from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
+from spark.transfer.foot_lock import lock_feet
+from spark.transfer.treads import treads_of
 from tests.helpers.recordings import recordings
+from tests.helpers.stick import joint, stick_rig
 
 FRAME_TIME = 1 / 60
 RIG = sample_rig("walker")
@@ -65,8 +69,8 @@ def test_a_foot_that_is_held_up_stands_nowhere() -> None:
     raised = quat_from_rotvec(np.column_stack([0 * share, -np.radians(60) * share, 0 * share]))
     rotations = clip.rotations.copy()
     hip = RIG.roles.require(Role.LEFT_UPPER_LEG)
-    for joint in RIG.skeleton.subtree(hip):
-        rotations[:, joint] = quat_mul(raised, rotations[:, joint])
+    for j in RIG.skeleton.subtree(hip):
+        rotations[:, j] = quat_mul(raised, rotations[:, j])
     hips = clip.hips - [[0.0, RIG.tpose_positions[RIG.hips, 1].max(), 0.0]]
     balanced = replace(clip, rotations=rotations, hips=hips)
     assert treads_of(balanced).level
@@ -121,3 +125,32 @@ def test_boxes_are_found_where_they_were(path: Path) -> None:
     told, boxes = np.concatenate(found), np.concatenate(true)
     assert (boxes > 0.1).mean() > 0.3
     assert (np.abs(told - boxes) < 0.05).mean() > 0.95
+
+
+def test_a_character_stands_still_on_the_box() -> None:
+    """Who squats on a box with still feet, on legs with longer thighs and shorter shanks: copied
+    feet slide there, held ones don't, and are as high, scaled."""
+    still, rig = onto_box(), stick_rig()
+    offsets = rig.skeleton.offsets.copy()
+    for side in ("left", "right"):
+        offsets[joint(Role(f"{side}_lower_leg"))] = [0.0, 0.0, -0.5]
+        offsets[joint(Role(f"{side}_foot"))] = [0.0, 0.0, -0.3]
+    rig = replace(rig, skeleton=replace(rig.skeleton, offsets=offsets))
+    bend = 0.8 * np.sin(np.pi * np.clip((np.arange(240) - 95) / 50, 0.0, 1.0)) ** 2
+    rotations = still.rotations.copy()
+    for role, sign in (("upper_leg", -1.0), ("lower_leg", 1.0)):
+        turn = quat_from_rotvec(np.column_stack([0 * bend, sign * bend, 0 * bend]))
+        for side in ("left", "right"):
+            rotations[:, RIG.roles.require(Role(f"{side}_{role}"))] = turn
+    ankle = [RIG.roles.require(Role.LEFT_FOOT)]
+    bent = replace(still, rotations=rotations)
+    sunk = canonical_positions(still, ankle)[:, 0] - canonical_positions(bent, ankle)[:, 0]
+    source = replace(bent, hips=bent.hips + sunk)
+    scale, held = rig.hip_height / RIG.hip_height, lock_feet(source, transfer(source, rig))
+    toes = canonical_positions(held, rig.contact_joints)[95:145]
+    assert np.ptp(toes[..., :2], axis=0).max() < 0.005
+    copied = canonical_positions(transfer(source, rig), rig.contact_joints)[95:145]
+    assert np.ptp(copied[..., :2], axis=0).max() > 0.01
+    world = quat_mul(held.rotations, rig.tpose)
+    low = lowest_points(rig.soles, canonical_positions(held), world)[95:145]
+    np.testing.assert_allclose(low, scale * BOX, atol=0.006)

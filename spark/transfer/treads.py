@@ -11,19 +11,26 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
+from scipy.ndimage import gaussian_filter1d
 
-from sim.report.derivatives import derivative
-from sim.report.ground import Ground, Stand, distinct, level_ground
-from sim.report.mass import human_mass
 from spark.blocks import in_blocks
 from spark.constants import GRAVITY
-from spark.rig.contacts import ADULT_HEIGHT, PLANTED_SPEED, lower_ends, speeds
+from spark.rig.contacts import (
+    ADULT_HEIGHT,
+    PLANTED_SPEED,
+    climbing_speeds,
+    lower_ends,
+    speeds,
+)
 from spark.rig.feet import ends_of_feet, lowest_points
 from spark.rig.rig import Rig
 from spark.rotation import quat_mul
 from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.footfalls import between_contacts
+from spark.transfer.ground import Ground, Stand, distinct, level_ground
+from spark.transfer.hip_sway import center_of_mass
+from spark.transfer.pressure import acceleration
 
 # All lengths [m] are of an adult.
 MIN_STEP = 0.12  # from one place to the next, once at least: floors that drift do so more slowly
@@ -34,7 +41,7 @@ MIN_TIME = 0.1  # [s] that a foot carries the body to stand on something
 MIN_PUSH = 0.5  # [body weights] while it does
 UNDER_FOOT = 0.15  # from the centre of pressure to the foot, or to the line between both,
 BELOW_MASS = 0.35  # and at least from there up to the centre of mass
-_WINDOW = 0.05  # [s] before and after a frame over which rates are measured
+_NOISE = 1 / 30  # [s] of the Gaussian that smooths the centre of mass
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +142,7 @@ def _places(source: CanonicalMotion) -> Float[np.ndarray, "T N"]:
     world = quat_mul(source.rotations, rig.tpose)
     lowest = lowest_points(rig.soles, positions, world) - source.floor_z
     ends = ends_of_feet(rig.soles, rig.roles, positions, world).reshape(len(source), -1)
-    com = human_mass(rig, positions, world).com
-    return np.column_stack([com, lowest, ends])
+    return np.column_stack([center_of_mass(source), lowest, ends])
 
 
 def _still(
@@ -146,7 +152,7 @@ def _still(
     scale = height / ADULT_HEIGHT
     limit = PLANTED_SPEED * scale
     slow = speeds(paths, frame_time) < limit
-    slow &= np.abs(derivative(paths[..., 2], frame_time, 1, _WINDOW)) < limit
+    slow &= climbing_speeds(paths, frame_time) < limit
     still = np.any(slow & lower_ends(paths, height), axis=2)
     middles = paths.mean(axis=2)
     for k in range(still.shape[1]):
@@ -168,7 +174,8 @@ def _carry(
 ) -> Bool[np.ndarray, "T S"]:
     """Over which still feet the centre of pressure lies: one foot, the nearest and lowest, or the
     line between two that are as high."""
-    force = derivative(com, frame_time, 2, _WINDOW)
+    smooth = gaussian_filter1d(com, _NOISE / frame_time, axis=0, mode="nearest")
+    force = acceleration(smooth, frame_time)
     force[:, 2] += GRAVITY
     push = np.maximum(force[:, 2], MIN_PUSH * GRAVITY)
     over = com[:, None, 2] - paths[..., 2].min(axis=2)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sim.report.ground import Ground, Stand, distinct, level_ground
+from spark.transfer.ground import Ground, Stand, distinct, level_ground
 
 BOX = Ground(0.1, np.array([[1.0, 0.0, 0.5]]), (Stand("left foot", 2, 4, 0.5),), hip_height=1.0)
 
