@@ -19,6 +19,7 @@ from sim.report.assess import assess
 from sim.trajectory import Subject, model_trajectory
 from sim.view.scene import Figure
 from spark.errors import SkeletonError
+from spark.transfer.treads import treads_of
 from spark_sim.clips import AnyClip, File, RobotClip
 from spark_sim.loading import clip_of
 
@@ -42,8 +43,8 @@ class Simulated:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was assumed of the servos."""
-        return self.tracked.notes
+        """What was assumed of the servos and the floor."""
+        return (*self.tracked.notes, *_climbs(self.clip))
 
     def json(self) -> dict[str, Any]:
         """The measures (docs/playback.md), with a schema version."""
@@ -95,6 +96,17 @@ def simulate(
     return Simulated(clip, tracked)
 
 
+def _climbs(clip: AnyClip) -> tuple[str, ...]:
+    """A note where a motion stands on what is not in the simulation."""
+    top = treads_of(clip.canonical).top
+    if not top:
+        return ()
+    return (
+        f"the motion's feet stand up to {100 * top:.0f} cm above the floor, on what is not there "
+        "in simulation: it is as if they were in the air",
+    )
+
+
 def _needed_torques(clip: AnyClip) -> Mapping[str, Float[np.ndarray, "T"]]:
     """What a motion needs of a robot's joints [N m]; nothing is known where it has no report."""
     if clip.body is None:
@@ -125,8 +137,8 @@ class Followed:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was assumed of the model."""
-        return self.tracker.notes
+        """What was assumed of the model and the floor."""
+        return (*self.tracker.notes, *_climbs(self.clip))
 
     def json(self) -> dict[str, Any]:
         """The measures (docs/policies.md), with a schema version."""
