@@ -4,6 +4,7 @@ What the plausibility report measures is taken from it, on the robot's own model
 what no report of one motion can see: what became of the source's swings, path and accelerations.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,9 +22,10 @@ from sim.report.derivatives import derivative
 from sim.trajectory import Subject
 from spark.kinematics import forward
 from spark.motion import Motion
-from spark.rig.feet import sole_positions
+from spark.rig.feet import Side, sole_positions
 from spark.rig.rig import Rig
 from spark.transfer.canonical import CanonicalMotion, to_canonical
+from spark.transfer.ground import Ground
 
 DRAG_SPEED, DRAG_HEIGHT = 0.5, 0.01  # [m/s], [m] of a sole that is fast, and low: it drags
 # [m/s], [m] of a standing toe of the source, whatever its size: the figures that other tools are
@@ -86,9 +88,9 @@ def measure(motion: Motion, rig: Rig, result: RobotMotion) -> RobotMetrics:
     assert report.contacts is not None
     scale = robot.rig.hip_height / rig.hip_height
     positions, world = forward(motion)
-    soles = [sole_positions(sole, positions, world) for sole in rig.soles]
-    theirs = _Soles(soles, report.source.floor_z, frame_time)
-    ours = _Soles(_robot_soles(result), 0.0, frame_time)
+    soles = {sole.side: sole_positions(sole, positions, world) for sole in rig.soles}
+    theirs = _Soles(soles, report.source.ground, frame_time)
+    ours = _Soles(_robot_soles(result), report.clip.ground, frame_time)
     planted = _planted(positions[:, rig.contact_joints], frame_time)[:, : len(robot.soles)]
     count = max(int(planted.sum()), 1)
     toes = positions[:, rig.contact_joints][:, : len(robot.soles)]
@@ -134,13 +136,13 @@ def measure(motion: Motion, rig: Rig, result: RobotMotion) -> RobotMetrics:
 
 
 class _Soles:
-    """Points of each foot's sole over time, above a floor."""
+    """Points of each foot's sole over time, by side, above the ground."""
 
     def __init__(
-        self, points: list[Float[np.ndarray, "T _ 3"]], floor_z: float, frame_time: float
+        self, points: Mapping[Side, Float[np.ndarray, "T _ 3"]], ground: Ground, frame_time: float
     ) -> None:
-        speeds = [_speed(p, frame_time) for p in points]
-        heights = [p[..., 2] - floor_z for p in points]
+        speeds = [_speed(p, frame_time) for p in points.values()]
+        heights = [ground.heights(p, [f"{side} foot"] * p.shape[1]) for side, p in points.items()]
         self.lowest = np.stack([h.min(axis=1) for h in heights], axis=1)
         at = [h.argmin(axis=1)[:, None] for h in heights]
         self.lowest_speed = np.stack(
@@ -153,9 +155,9 @@ class _Soles:
         self.dragging = float(np.mean(drags))
 
 
-def _robot_soles(result: RobotMotion) -> list[Float[np.ndarray, "T _ 3"]]:
+def _robot_soles(result: RobotMotion) -> dict[Side, Float[np.ndarray, "T _ 3"]]:
     poses = forward_kinematics(result.robot.tree, result.coordinates)
-    return [sole_paths(result.robot, poses, sole) for sole in result.robot.soles]
+    return {sole.side: sole_paths(result.robot, poses, sole) for sole in result.robot.soles}
 
 
 def _resting(source: CanonicalMotion, result: RobotMotion) -> dict[str, float | None]:
