@@ -24,6 +24,7 @@ from spark.transfer.canonical import (
     from_canonical,
     to_canonical,
 )
+from spark.transfer.ground import level_ground
 from tests.helpers.ember import changed_ember
 
 FRAME_TIME = 1 / 60
@@ -39,7 +40,8 @@ def standing(moves: np.ndarray, frame_time: float = FRAME_TIME) -> np.ndarray:
     places = np.zeros((2, 2, 3))
     places[:, 1, 0] = 0.2
     places[0, :, 1], places[1, :, 1] = 0.1, -0.1
-    return schedule(source, canonical_positions(source), places + moves, ("left", "right")).feet
+    sides, ground = ("left", "right"), level_ground(0.0)
+    return schedule(source, canonical_positions(source), places + moves, sides, ground).feet
 
 
 def stands(path: np.ndarray, frame_time: float = FRAME_TIME) -> np.ndarray:
