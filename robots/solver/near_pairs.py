@@ -6,26 +6,29 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from robots.solver.hulls import SLABS, ShapePair
-from robots.solver.near_spheres import NearSpheres
+from robots.solver.polytopes import Polytopes
 from robots.solver.window_poses import WindowPoses
 
 _ACROSS = np.flatnonzero(np.abs(SLABS).max(axis=1) == 1.0)  # the slabs along x, y and z
 
 
 class NearPairs:
-    """Of some pairs, as `balls` around the small shapes have them, one a pair. `bodies` are those
-    of the links, `rest` is where they are in the rest pose [m], and `within` how near [m] counts.
-    """
+    """Of some pairs, whose small shapes are within `radii` [m] of their centers, with what the pair
+    keeps between it, and whose `large` shapes are among the `polytopes`. `bodies` are those of the
+    links, `rest` is where they are in the rest pose [m], and `within` how near [m] counts."""
 
     def __init__(
         self,
         pairs: Sequence[ShapePair],
-        balls: NearSpheres,
+        radii: Float[np.ndarray, "P"],
+        polytopes: Polytopes,
+        large: Int[np.ndarray, "P"],
         bodies: Int[np.ndarray, "L"],
         rest: Float[np.ndarray, "B 3"],
         within: float,
     ) -> None:
-        self._balls, self._within = balls, within
+        self._radii, self._within = radii, within
+        self._polytopes, self._polytope = polytopes, large
         shapes = {shape.geom: shape for pair in pairs for shape in (pair.small, pair.large)}
         number = {geom: k for k, geom in enumerate(shapes)}
         links = [shape.link for shape in shapes.values()]
@@ -39,7 +42,7 @@ class NearPairs:
         self._large = np.array([number[pair.large.geom] for pair in pairs], dtype=int) + len(shapes)
         # A shape is within its box, which a ball that is near can't be beyond the corners of.
         half = np.array([pair.large.slabs[1, _ACROSS] for pair in pairs]).reshape(-1, 3)
-        corners = half + (balls.radii + within)[:, None]
+        corners = half + (radii + within)[:, None]
         self._reach = (corners**2).sum(axis=1)
 
     def of(self, poses: WindowPoses) -> Int[np.ndarray, "N"]:
@@ -48,5 +51,8 @@ class NearPairs:
         between = middles.take(self._small, axis=2) - middles.take(self._large, axis=2)
         between *= between
         may = np.logical_or.reduce(np.add.reduce(between) < self._reach).nonzero()[0]
-        near = np.logical_or.reduce(self._balls.at(may).depth(poses) > -self._within)
-        return np.compress(near, may)
+        centers = middles.take(self._small.take(may), axis=2)
+        beyond = self._polytopes.beyond(poses, self._polytope.take(may), centers)
+        apart = np.maximum.reduce(beyond) - self._radii.take(may)
+        near: Int[np.ndarray, N] = may[np.logical_or.reduce(apart < self._within)]
+        return near

@@ -1,16 +1,15 @@
 """Self-collision in a few frames: `robots.solver.collision` for all shapes at once."""
 
-from collections.abc import Sequence
-
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
 from robots.solver.collision import DEPTH_ROUNDING, collisions_of
-from robots.solver.hulls import SLABS, Shape, ShapePair
+from robots.solver.hulls import Shape, ShapePair
 from robots.solver.near_pairs import NearPairs
 from robots.solver.near_spheres import NearSpheres
+from robots.solver.polytopes import Polytopes
 from robots.solver.weights import W_COLLISION, W_LEG_COLLISION, per_metre
 from robots.solver.window_dofs import WindowDofs
 from robots.solver.window_poses import WindowPoses
@@ -21,7 +20,6 @@ _ACTIVE = 3 * DEPTH_ROUNDING  # [m] between shapes beyond which the penalty is n
 # [m] that parts keep between them beyond a whole clip's clearance, for how far a soft penalty gives
 # way is not repaired here; and how far apart [m] they are in the T-pose: others are always near.
 _MARGIN, _FAR = 0.005, 0.1
-_SIDES = np.ascontiguousarray(SLABS.T)
 _REACH = 0.03  # [m] that shapes may move between the searched frame and the others
 _WITHIN = _ACTIVE + _REACH
 
@@ -38,11 +36,19 @@ class WindowCollisions:
             pairs = tuple(pair for pair in pairs if not _among(pair, tree, first))
         apart = np.array([pair.clearance + _MARGIN * (pair.gap > _FAR) for pair in pairs])
         bodies = dofs.bodies([*range(len(tree)), ROOT])
-        balls = [(pair.small.center[None], np.array([_bound(pair.small)])) for pair in pairs]
-        bounds = _near(pairs, balls, apart, bodies, rest)
-        self._pairs, self._count = NearPairs(pairs, bounds, bodies, rest, _WITHIN), len(pairs)
-        spheres = [(pair.small.spheres, pair.small.radii) for pair in pairs]
-        self._spheres = _near(pairs, spheres, apart, bodies, rest)
+        shapes = list({pair.large.geom: pair.large for pair in pairs}.values())
+        number = {shape.geom: k for k, shape in enumerate(shapes)}
+        large = np.array([number[pair.large.geom] for pair in pairs], dtype=int)
+        polytopes = Polytopes(shapes, bodies[[shape.link for shape in shapes]], rest)
+        radii = apart + [_bound(pair.small) for pair in pairs]
+        self._pairs = NearPairs(pairs, radii, polytopes, large, bodies, rest, _WITHIN)
+        self._count = len(pairs)
+        own = np.repeat(np.arange(len(pairs)), [len(pair.small.radii) for pair in pairs])
+        small = bodies[[pair.small.link for pair in pairs]][own]
+        centers = np.concatenate([np.zeros((0, 3)), *(pair.small.spheres for pair in pairs)])
+        radii = np.concatenate([np.zeros(0), *(pair.small.radii for pair in pairs)])
+        sizes = np.stack([*(centers - rest[small]).T, radii + apart[own]])
+        self._spheres = NearSpheres(polytopes, np.stack([own, small, large[own]]), sizes)
         self._index_dofs(per_metre(robot), tree, pairs, dofs)
 
     def candidates(self, poses: WindowPoses) -> NearSpheres:
@@ -54,22 +60,18 @@ class WindowCollisions:
 
     def rows(self, poses: WindowPoses, near: NearSpheres) -> Rows | None:
         """How deep spheres are in shapes, of those that are `near` and felt in some frame."""
-        points, off, depth = near.measured(poses)
+        centers = near.centers(poses)
+        beyond = near.beyond(poses, centers)
+        depth = near.radii - np.maximum.reduce(beyond)
         felt = depth > -_ACTIVE
         (active,) = np.logical_or.reduce(felt).nonzero()
         if not len(active):
             return None
-        points, off, depth = (part.take(active, axis=-1) for part in (points, off, depth))
-        felt, near = felt.take(active, axis=1), near.at(active)
-        slab = (np.abs(off) - near.half).argmax(axis=0)
-        side = _SIDES.take(slab, axis=1)
-        across = off.reshape(len(off), -1)[slab.ravel(), np.arange(slab.size)]
-        side *= np.sign(across).reshape(slab.shape)
-        axes = poses.frames[:3].take(near.large, axis=3)
-        axes *= side[:, None]
+        depth, felt, near = depth.take(active, axis=1), felt.take(active, axis=1), near.at(active)
         wrenches = np.empty((6, *depth.shape))
-        np.add.reduce(axes, out=wrenches[3:])
-        cross(points, wrenches[3:], wrenches[:3])
+        sides = beyond.take(active, axis=2).argmax(axis=0)
+        near.polytopes.normals(poses, near.large, sides, out=wrenches[3:])
+        cross(centers.take(active, axis=2), wrenches[3:], wrenches[:3])
         residual, slope = one_sided(depth, DEPTH_ROUNDING)
         slope *= felt
         wrenches *= slope
@@ -106,24 +108,3 @@ def _bound(shape: Shape) -> float:
     """How far [m] the spheres of a shape reach from its center."""
     away = np.linalg.norm(shape.spheres - shape.center, axis=1)
     return float((away + shape.radii).max())
-
-
-def _near(
-    pairs: tuple[ShapePair, ...],
-    balls: Sequence[tuple[Float[np.ndarray, "_ 3"], Float[np.ndarray, "_"]]],
-    apart: Float[np.ndarray, "P"],
-    bodies: Int[np.ndarray, "L"],
-    rest: Float[np.ndarray, "B 3"],
-) -> NearSpheres:
-    """Some balls of the small shapes of all pairs, which are kept so far `apart` [m]."""
-    own = np.repeat(np.arange(len(pairs)), [len(radii) for _, radii in balls])
-    small = bodies[[pair.small.link for pair in pairs]][own]
-    large = bodies[[pair.large.link for pair in pairs]][own]
-    centers = np.concatenate([np.zeros((0, 3)), *(centers for centers, _ in balls)])
-    radii = np.concatenate([np.zeros(0), *(radii for _, radii in balls)])
-    slabs = np.array([pair.large.slabs for pair in pairs]).reshape(-1, 2, len(SLABS))[own]
-    middle, half = slabs.transpose(1, 2, 0)
-    sizes = np.concatenate(
-        [(centers - rest[small]).T, [radii + apart[own]], middle - SLABS @ rest[large].T, half]
-    )
-    return NearSpheres(np.stack([own, small, large]), np.ascontiguousarray(sizes))

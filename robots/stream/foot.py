@@ -1,6 +1,6 @@
 """How one foot of a stream's robot stands, frame by frame."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from robots.solver.foot_path import STEP_SPEEDS
 from robots.stream.footprint import Footprint
@@ -28,7 +28,7 @@ class Foot:
 
     def copy(self) -> "Foot":
         """One that goes on by itself."""
-        return replace(self, footprint=replace(self.footprint))
+        return Foot(self.planted, self.holds, self.ground, self.footprint.copy())
 
     def move_on(
         self,
@@ -40,9 +40,8 @@ class Foot:
     ) -> None:
         """The next frame of the source, in which heel and toes stand or not, soles are so high [m],
         and have moved [m] and turned [rad] since the one before. What is held goes along."""
-        lowest = min(self.ground, clearance) if any(self.planted) else clearance
-        if any(planted):
-            self.ground = lowest
+        if True in planted:
+            self.ground = min(self.ground, clearance) if True in self.planted else clearance
         self.planted = planted
         if self.is_held:
             self.footprint.follow(moved[self.on_toe], turned, max(self.holds), wobble)

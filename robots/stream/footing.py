@@ -24,17 +24,18 @@ from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
 from robots.solver.window_targets import PointTargets
 from robots.stream.foot import Foot
 from robots.stream.frame_targets import FrameReader, FrameTargets
-from robots.stream.standing import Standing
+from robots.stream.standing import SourceFeet, Standing
 
 HOLD_TIME = 0.1  # [s] over which a foot is taken hold of, and let go
 
 
 class _Arrived(NamedTuple):
-    """A frame of the source: how far each foot's heel and toes have moved over the floor since the
-    one before [m, x + iy, scaled], and how far the robot's feet should have turned about the
-    vertical [rad]."""
+    """A frame of the source: how high the robot's soles should be and where their points from each
+    other, how far each foot's heel and toes have moved over the floor since the frame before [m,
+    x + iy, scaled], and how far the robot's feet should have turned about the vertical [rad]."""
 
-    targets: FrameTargets
+    clearance: list[float]
+    pitched: Float[np.ndarray, "P 3"]
     moved: list[tuple[complex, complex]]
     turned: list[float]
 
@@ -51,8 +52,8 @@ class ContactTracker:
         self._hip_height, self._wobble = hip_height, MAX_WOBBLE * hip_height
         self._uneven = MAX_UNEVEN * hip_height
         self._index_points()
-        self._length = self._standing.history + ahead + 1
-        self._history: deque[_Arrived] = deque(maxlen=self._length)
+        self._arrived: deque[_Arrived] = deque(maxlen=ahead + 1)
+        self._source: deque[SourceFeet] = deque(maxlen=self._standing.history + ahead + 1)
         self._feet = [Foot() for _ in self._robot.soles]
 
     def update(
@@ -62,24 +63,24 @@ class ContactTracker:
         the points of the robot's soles are at `points` in the first of these. How they stand in
         that one is settled then; of the later ones it is what can be seen so far. The source's feet
         came with so much noise [m, RMS an axis]."""
-        first = not self._history
+        first = not self._source
         self._standing.listen(noise)
-        arrived = self._arrived(targets, targets if first else self._history[-1].targets)
-        self._history.extend([arrived] * (self._length if first else 1))
-        settled = len(self._history) - 1 - self._ahead
-        frames = [arrived.targets for arrived in self._history]
-        speeds, heights = self._standing.motion(frames, settled)
-        steps = step_height(self._scale * speeds, self._hip_height).tolist()
+        self._take_in(targets)
+        frames = list(self._source)
+        settled = len(frames) - 1 - self._ahead
+        motion = [self._standing.motion(frames, at) for at in range(settled, len(frames))]
+        speeds = self._scale * np.array([speeds for speeds, _ in motion])
+        steps = step_height(speeds, self._hip_height).tolist()
         feet, numbers, places = self._feet, [], []
-        for at, (speed, height, step) in enumerate(
-            zip(speeds.tolist(), heights.tolist(), steps, strict=True), settled
+        for at, (arrived, (speed, height), step) in enumerate(
+            zip(self._arrived, motion, steps, strict=True), settled
         ):
-            _, moved, turned = self._history[at]
-            stands = self._standing.of(frames, at, [foot.planted for foot in feet], speed, height)
-            clearances = frames[at].clearance.tolist()
+            stood = [foot.planted for foot in feet]
+            stands = self._standing.of(frames, at, stood, speed, height)
             for s, foot in enumerate(feet):
-                clearance = clearances[s]
-                foot.move_on(stands[s], clearance, moved[s], turned[s], self._wobble)
+                clearance = arrived.clearance[s]
+                moved, turned = arrived.moved[s], arrived.turned[s]
+                foot.move_on(stands[s], clearance, moved, turned, self._wobble)
                 # Where a foot will come down that is still in the air is not known yet.
                 known = foot.is_held or at == settled
                 if at == settled and not foot.is_held:
@@ -88,24 +89,39 @@ class ContactTracker:
                 foot.grip(self._grip, 1.0 if first else self._grip)
                 pace = self._scale * speed[s][1] / self._hip_height
                 up = foot.height(clearance, pace, self._uneven)
-                numbers += [*foot.holds, *step[s], up, float(known)]
-                places += [foot.footprint.pivot, cmath.rect(1.0, foot.footprint.heading)]
+                numbers.append((*foot.holds, *step[s], up, float(known)))
+                places.append((foot.footprint.pivot, cmath.rect(1.0, foot.footprint.heading)))
             if at == settled:
                 feet = [foot.copy() for foot in feet]
         shape = self._ahead + 1, len(feet)
         return self._targets(
-            np.array([frame.pitched for frame in frames[settled:]]),
+            np.array([arrived.pitched for arrived in self._arrived]),
             np.array(numbers).reshape(*shape, 6),
             np.array(places, dtype=complex).reshape(*shape, 2),
         )
 
-    def _arrived(self, now: FrameTargets, last: FrameTargets) -> _Arrived:
-        by = self._scale * (now.feet - last.feet)
-        moved = (by[..., 0] + 1j * by[..., 1]).tolist()
-        R = now.world.take(self._foot_joints, axis=0)
-        R = R @ last.world.take(self._foot_joints, axis=0).transpose(0, 2, 1)
-        turned = np.arctan2(R[:, 1, 0] - R[:, 0, 1], R[:, 0, 0] + R[:, 1, 1])
-        return _Arrived(now, [(heel, toe) for heel, toe in moved], turned.tolist())
+    def _take_in(self, targets: FrameTargets) -> None:
+        """The newest frame; before a first one, the source has stood still."""
+        own, axes = self._standing.feet(targets), self._axes_over_floor(targets)
+        first = not self._source
+        last, last_axes = (own, axes) if first else (self._source[-1], self._last_axes)
+        moved = [
+            (self._scale * (heel - last_heel), self._scale * (toe - last_toe))
+            for (heel, toe), (last_heel, last_toe) in zip(own.places, last.places, strict=True)
+        ]
+        turns = zip(last_axes, axes, strict=True)
+        turned = [cmath.phase(np.vdot(before, now)) for before, now in turns]
+        arrived = _Arrived(targets.clearance.tolist(), targets.pitched, moved, turned)
+        self._arrived.extend([arrived] * (self._ahead + 1 if first else 1))
+        self._source.extend([own] * (self._standing.history + self._ahead + 1 if first else 1))
+        self._last_axes = axes
+
+    def _axes_over_floor(self, targets: FrameTargets) -> Complex[np.ndarray, "S 3"]:
+        """The axes of the robot's feet, seen from above: x + iy. Of a turn between two such triples
+        about the vertical their product says the angle."""
+        world = targets.world.take(self._foot_joints, axis=0)
+        axes: Complex[np.ndarray, "S 3"] = world[:, 0] + 1j * world[:, 1]
+        return axes
 
     def _targets(
         self,
@@ -117,22 +133,22 @@ class ContactTracker:
         how far heel and toes are held, how high [m] they step and the sole is where not held, and
         whether it is known where; in `places` the middle of its toes [m, x + iy], and a unit along
         it."""
-        of_points = numbers.take(self._sole, axis=1)
-        pivot, along = places.take(self._sole, axis=1).transpose(2, 0, 1)
-        height, known = of_points[..., 4:].transpose(2, 0, 1)
-        ends = of_points[..., :2]
-        on, step = np.maximum(ends, self._stays_with), of_points[..., 2:4] * self._leaves_with
-        held, step = np.minimum(on[..., 0], on[..., 1]), np.maximum(step[..., 0], step[..., 1])
-        most, free = np.maximum(ends[..., 0], ends[..., 1]), 1 - held
-        raised = pitched[..., 0] + 1j * pitched[..., 1]
+        heel, toes, heel_step, toe_step, height, known = numbers.transpose(2, 0, 1).take(
+            self._sole, axis=2
+        )
+        pivot, along = places.transpose(2, 0, 1).take(self._sole, axis=2)
+        held = np.minimum(np.maximum(heel, self._stays[0]), np.maximum(toes, self._stays[1]))
+        step = np.maximum(heel_step * self._leaves[0], toe_step * self._leaves[1])
+        most, free = np.maximum(heel, toes), 1 - held
+        raised = pitched[..., :2].view(np.complex128)[..., 0]
         away = self._flat - raised
         # What is raised turns about what stands.
         shift = (held * away) @ self._beside / np.maximum(held @ self._beside, 1e-9)
-        place = pivot + along * (raised + shift + held * (away - shift))
         positions, shares = np.empty((2, *held.shape, 3))
-        positions[..., 0], positions[..., 1] = place.real, place.imag
-        up = np.maximum((1 - most) * height, free * step)
-        positions[..., 2] = free * pitched[..., 2] + up
+        over_floor = positions[..., :2].view(np.complex128)[..., 0]
+        over_floor[:] = pivot + along * (raised + shift + held * (away - shift))
+        positions[..., 2] = free * pitched[..., 2]
+        positions[..., 2] += np.maximum((1 - most) * height, free * step)
         shares[..., :2] = (known * np.maximum(held, RAISED_HOLD[0] * most))[..., None]
         near = near_floor(height / self._hip_height)
         shares[..., 2] = held + SWING_HOLD[2] * free * near
@@ -154,5 +170,5 @@ class ContactTracker:
             flat.append(points - points[-2:].mean())
             ends.append(on_points(sole, np.array([[0.0, 1.0], [1.0, 0.0]])) == 0)
         self._lengths = [-float(points[:2].real.mean()) for points in flat[1:]]
-        self._flat, self._leaves_with = np.concatenate(flat), np.concatenate(ends).astype(float)
-        self._stays_with = 1 - self._leaves_with
+        self._flat, self._leaves = np.concatenate(flat), np.concatenate(ends).T.astype(float)
+        self._stays = 1 - self._leaves

@@ -18,6 +18,10 @@ class Footprint:
     away: complex = 0j
     turned: float = 0.0
 
+    def copy(self) -> "Footprint":
+        """One that goes on by itself."""
+        return Footprint(self.pivot, self.heading, self.away, self.turned)
+
     def put(self, points: Sequence[complex], length: float, *, on_toe: bool) -> None:
         """Where the foot is that has these points on the floor [m, x + iy] and is so long; on its
         heel, where its toes will come down."""

@@ -6,6 +6,7 @@ freely, the slowest and lowest one carries it. `robots.solver.contacts` sees the
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -31,6 +32,17 @@ _ON_FEET = 0.6  # hips' heights of a T-pose above which nothing but feet carries
 
 Ends = list[tuple[bool, bool]]
 """Of heel and toes of each foot."""
+
+
+class SourceFeet(NamedTuple):
+    """The heel and toes of each of a source's feet in one frame, in plain numbers: their places
+    over the floor [m, x + iy] and heights over where they stand [m], both the source's own; and
+    how high its hips and its centre of mass are [m], scaled."""
+
+    places: list[list[complex]]
+    heights: list[list[float]]
+    hips: float
+    com: float
 
 
 class Standing:
@@ -64,18 +76,32 @@ class Standing:
         left = noise / self._frame_time * np.sqrt(12 / max(self._window, fewest) ** 3)
         self._leeway = float(np.hypot(1.0, LEEWAY * left / self._max_speed))
 
+    def feet(self, targets: FrameTargets) -> SourceFeet:
+        """Those of a frame."""
+        places = targets.feet[..., :2].view(np.complex128)[..., 0].tolist()
+        heights = (targets.feet[..., 2] - self._low).tolist()
+        return SourceFeet(places, heights, float(targets.hips[2]), float(targets.com[2]))
+
     def motion(
-        self, frames: Sequence[FrameTargets], first: int
-    ) -> tuple[Float[np.ndarray, "T S 2"], Float[np.ndarray, "T S 2"]]:
-        """How fast heels and toes are [m/s], and how high over where they stand [m], in some frames
-        from the first of these on."""
-        moves = [self._moved(frames, at) for at in range(first, len(frames))]
-        velocity, places = (np.array(part) for part in zip(*moves, strict=True))
-        return np.hypot(velocity[..., 0], velocity[..., 1]), places[..., 2] - self._low
+        self, frames: Sequence[SourceFeet], at: int
+    ) -> tuple[list[list[float]], list[list[float]]]:
+        """How fast heels and toes are [m/s], and how high over where they stand [m], in one of some
+        frames."""
+        newest = len(frames) - 1
+        if self._window:
+            last = min(newest, at + self._window // 2)
+            return self._smooth_motion(frames[last - self._window + 1 : last + 1])
+        after = min(self._reach, newest - at)
+        time = (self._reach + after) * self._frame_time
+        ends = zip(frames[at + after].places, frames[at - self._reach].places, strict=True)
+        speeds = [
+            [abs(b - a) / time for b, a in zip(now, before, strict=True)] for now, before in ends
+        ]
+        return speeds, frames[at].heights
 
     def of(
         self,
-        frames: Sequence[FrameTargets],
+        frames: Sequence[SourceFeet],
         at: int,
         stood: Ends,
         speeds: list[list[float]],
@@ -100,43 +126,36 @@ class Standing:
         slow = speed < factor * self._leeway * self._max_speed
         return slow and height < factor * self._max_height
 
-    def _moved(
-        self, frames: Sequence[FrameTargets], at: int
-    ) -> tuple[Float[np.ndarray, "S 2 3"], Float[np.ndarray, "S 2 3"]]:
-        """How heels and toes move [m/s], and where they are [m]."""
-        newest = len(frames) - 1
-        if not self._window:
-            after = min(self._reach, newest - at)
-            travelled = frames[at + after].feet - frames[at - self._reach].feet
-            return travelled / ((self._reach + after) * self._frame_time), frames[at].feet
-        last = min(newest, at + self._window // 2)
-        feet = [frame.feet for frame in frames[last - self._window + 1 : last + 1]]
+    def _smooth_motion(
+        self, frames: Sequence[SourceFeet]
+    ) -> tuple[list[list[float]], list[list[float]]]:
+        """How heels and toes move in the middle of some frames, through which they tremble."""
         time = np.arange(self._window) - (self._window - 1) / 2
-        slope = np.tensordot(time, feet, 1) / (time @ time)
-        return slope / self._frame_time, np.mean(feet, axis=0)
+        slope = np.tensordot(time, [feet.places for feet in frames], 1) / (time @ time)
+        heights = np.mean([feet.heights for feet in frames], axis=0)
+        return (np.abs(slope) / self._frame_time).tolist(), heights.tolist()
 
-    def _carried_by_feet(self, frames: Sequence[FrameTargets], at: int) -> bool:
+    def _carried_by_feet(self, frames: Sequence[SourceFeet], at: int) -> bool:
         """Whether a body is high enough to be on its feet, and does not fall freely."""
-        if not any(self._has_foot) or frames[at].hips[2] < self._on_feet:
+        if not any(self._has_foot) or frames[at].hips < self._on_feet:
             return False
         middle = min(at, len(frames) - 1 - self._reach)
-        below, here, above = (frames[middle + k * self._reach].com[2] for k in (-1, 0, 1))
+        below, here, above = (frames[middle + k * self._reach].com for k in (-1, 0, 1))
         fall = (2 * here - below - above) / (self._reach * self._frame_time) ** 2 / self._scale
-        return bool(fall <= (1 - FLIGHT_PUSH) * GRAVITY)
+        return fall <= (1 - FLIGHT_PUSH) * GRAVITY
 
-    def _creeping(self, frames: Sequence[FrameTargets]) -> Bool[np.ndarray, "S 2"]:
+    def _creeping(self, frames: Sequence[SourceFeet]) -> Bool[np.ndarray, "S 2"]:
         """The slowest and lowest heel or toe over some frames, and those that are as low and go
         along with it where all feet have one: a body that sways, and its feet with it."""
-        feet = np.array([frame.feet for frame in frames])
-        velocity = (feet[-1] - feet[0])[..., :2] / (self._creep * self._frame_time)
-        speed = np.hypot(velocity[..., 0], velocity[..., 1])
-        height = feet[..., 2].mean(axis=0) - self._low
+        first, last = np.array([frames[0].places, frames[-1].places])
+        velocity = (last - first) / (self._creep * self._frame_time)
+        speed = np.abs(velocity)
+        height: Float[np.ndarray, "S 2"] = np.mean([feet.heights for feet in frames], axis=0)
         lower = height < height.min(axis=1, keepdims=True) + self._max_tilt
         lower &= np.array(self._has_foot)[:, None]
         cost = np.where(lower, speed / self._max_speed + height / self._max_height, np.inf)
         best = np.unravel_index(cost.argmin(), cost.shape)
-        against = np.hypot(*np.moveaxis(velocity - velocity[best], -1, 0))
-        along = lower & (against < self._max_speed)
+        along = lower & (np.abs(velocity - velocity[best]) < self._max_speed)
         along &= np.abs(height - height[best]) < self._max_tilt
         if not along.any(axis=1).all():
             along = np.zeros_like(along)

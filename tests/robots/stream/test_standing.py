@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from robots.model.known import known
-from robots.stream.frame_targets import Frame, FrameReader, FrameTargets, ground_of
-from robots.stream.standing import Standing
+from robots.stream.frame_targets import Frame, FrameReader, ground_of
+from robots.stream.standing import SourceFeet, Standing
 from spark.demo.sample import sample_motion, sample_rig
 from spark.transfer.canonical import to_canonical
 
@@ -26,17 +26,18 @@ def stands(
     standing = Standing(READER, 1 / FPS)
     rotations = np.tile([1.0, 0, 0, 0], (len(RIG.skeleton), 1))
     own = READER.targets(Frame(np.array([0.0, 0, RIG.hip_height]), rotations))
-    frames: list[FrameTargets] = []
+    frames: list[SourceFeet] = []
     for k in range(standing.history + 3):
         time, feet, com = k / FPS, own.feet.copy(), own.com.copy()
         feet[..., 0] += np.array(speeds)[:, None] * time
         feet[..., 2] = READER.ground.low + np.array(heights)[:, None]
         com[2] -= READER.scale * fall * 9.81 / 2 * time**2
-        frames.append(replace(own, feet=feet, com=com, hips=own.hips * [1, 1, hips]))
+        targets = replace(own, feet=feet, com=com, hips=own.hips * [1, 1, hips])
+        frames.append(standing.feet(targets))
     at, (told, over) = standing.history, standing.motion(frames, standing.history)
-    np.testing.assert_allclose(told[0], np.abs(speeds)[:, None] * [1, 1], atol=1e-9)
+    np.testing.assert_allclose(told, np.abs(speeds)[:, None] * [1, 1], atol=1e-9)
     none = [(False, False)] * 2
-    return np.array(standing.of(frames, at, none, told[0].tolist(), over[0].tolist()))
+    return np.array(standing.of(frames, at, none, told, over))
 
 
 def test_the_slower_and_lower_foot_carries() -> None:
