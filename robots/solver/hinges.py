@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from robots.model.morphology import Morphology
-from robots.residuals import one_sided
 from robots.solver.weights import LIMIT_MARGIN, W_FOLLOW, W_LIMIT, W_TPOSE
+from robots.solver.window_dofs import as_slice
 
 LIMIT_CLEARANCE = np.radians(0.75)  # that hinges keep from their limits: hard, by clipping
 
@@ -30,13 +30,14 @@ class Hinges:
         number[dofs] = np.arange(len(dofs))
         self._numbers = number[tree.dof_starts]  # of each joint's first dof, -1 of others'
         hinges = ~tree.balls & (self._numbers >= 0)
-        self._dofs = self._numbers[hinges]
-        self._qpos = robot.addresses[hinges]
+        self._dofs = as_slice(self._numbers[hinges])
+        self._qpos = as_slice(robot.addresses[hinges])
+        self._damping = np.full(len(dofs), 1e-6)  # of what has no limits and no posture
+        self._damping[self._dofs] = 0.0
         rest = model.qpos0[self._qpos]
         lower, upper = (limit[hinges] + rest for limit in (tree.lower, tree.upper))
         margin = np.minimum(LIMIT_MARGIN, 0.1 * (upper - lower))
-        self._signs = np.array([[[1.0]], [[-1.0]]])  # of angles over the upper, and below the lower
-        self._soft_limits = np.array([upper - margin, -lower - margin])[:, None]
+        self._soft_limits = np.array([upper - margin, lower + margin])[:, None]
         lower, upper = tree.limits_within(LIMIT_CLEARANCE)
         self._limits = lower[hinges] + rest, upper[hinges] + rest
         angles = robot.tpose.angles[0, hinges] + rest
@@ -47,13 +48,13 @@ class Hinges:
 
     def angles(self, q: Float[np.ndarray, "T nq"]) -> Float[np.ndarray, "T H"]:
         """Their part of a `qpos`."""
-        return q.take(self._qpos, axis=1)
+        return q[:, self._qpos]
 
     def clip(self, q: Float[np.ndarray, "T nq"]) -> None:
         """Take a `qpos` within the limits, in place, and those that follow others where these take
         them."""
         lower, upper = self._limits
-        q[:, self._qpos] = np.minimum(np.maximum(q.take(self._qpos, axis=1), lower), upper)
+        q[:, self._qpos] = np.minimum(np.maximum(self.angles(q), lower), upper)
         if self._followers:
             turned = self._turned(q)
             for follower in self._followers:
@@ -67,7 +68,7 @@ class Hinges:
         """The dofs of hinges at their limits that the gradient would take beyond."""
         lower, upper = self._limits
         out = np.zeros(g.shape, dtype=bool)
-        angles, gradient = self.angles(q), g.take(self._dofs, axis=1)
+        angles, gradient = self.angles(q), g[:, self._dofs]
         below, above = angles <= lower + 1e-9, angles >= upper - 1e-9
         out[:, self._dofs] = (above & (gradient < 0)) | (below & (gradient > 0))
         return out
@@ -82,14 +83,17 @@ class Hinges:
         """Limits, as `robots.residuals.limit_residual` has them, the pull to the posture, and
         those that follow others."""
         angles = self.angles(q)
-        (above, below), slopes = one_sided(
-            self._signs * angles - self._soft_limits, LIMIT_MARGIN / 4
-        )
-        slope, pull = W_LIMIT**2 * (slopes[0] + slopes[1]), posture.weights**2
-        diagonal = np.full(g.shape, 1e-6)
-        diagonal[:, self._dofs] = pull + slope * (slopes[0] + slopes[1])
-        H.reshape(len(q), -1)[:, :: H.shape[1] + 1] += diagonal
-        g[:, self._dofs] += slope * (above - below) + pull * (angles - posture.angles)
+        # `robots.residuals.one_sided` of both limits, twice.
+        over = angles - self._soft_limits
+        root = np.sqrt(over * over + (LIMIT_MARGIN / 4) ** 2)
+        over_upper, over_lower = over / root
+        slope = 2.0 + over_upper - over_lower
+        residual = (root[0] + over[0]) - (root[1] - over[1])
+        firm, pull = W_LIMIT**2 / 4 * slope, posture.weights * posture.weights
+        g[:, self._dofs] += firm * residual + pull * (angles - posture.angles)
+        diagonal = H.reshape(len(q), -1)[:, :: H.shape[1] + 1]
+        diagonal += self._damping
+        diagonal[:, self._dofs] += firm * slope + pull
         if self._solved:
             turned = self._turned(q)
             for follower in self._solved:

@@ -55,3 +55,11 @@ class WindowDofs:
             same = [j for j in tree.chain(link) if self._in_first_block[j] == first[k]]
             out[k, tree.dofs(tuple(same))] = 1.0
         return out.take(self.numbers, axis=1)
+
+
+def as_slice(numbers: Int[np.ndarray, "K"]) -> slice | Int[np.ndarray, "K"]:
+    """The same as a slice where they follow each other: a view is picked in a fraction of a
+    microsecond, a copy in three."""
+    start = int(numbers[0]) if len(numbers) else 0
+    found = slice(start, start + len(numbers))
+    return found if (numbers == np.arange(found.start, found.stop)).all() else numbers

@@ -23,6 +23,7 @@ COM_CUTOFF = np.array([0.7, 0.7, 1.0])
 JERK_CUTOFF = 2.45  # and that of hinges, by their jerk
 MAX_ACCELERATION = 40.0  # [m/s²] of the source that the mass goes along with: more is a glitch
 _BASE = slice(0, 3)  # dofs of the base's position, in whose place the centre of mass is coupled
+_OTHERS = slice(3, None)
 
 
 class Coupling:
@@ -67,46 +68,58 @@ class Coupling:
         self._source_steps = np.concatenate([self._source_steps[1:], step[None]])
 
     def overspeed(self, steps: Float[np.ndarray, "V D"]) -> Float[np.ndarray, "V D"]:
-        """By how much [rad] hinges turn farther from frame to frame than `MAX_HINGE_SPEED` lets."""
-        return steps - np.minimum(np.maximum(steps, -self._max_steps), self._max_steps)
+        """By how much [rad] hinges turn farther from frame to frame than `MAX_HINGE_SPEED` lets;
+        below 0 where they don't."""
+        return np.abs(steps) - self._max_steps
 
-    def add_to(
+    def normal_equations(
         self,
         steps: Float[np.ndarray, "V D"],
         com_steps: Float[np.ndarray, "V 3"],
         com_jacobian: Float[np.ndarray, "F 3 D"],
         ahead: Ahead,
         penalty_scale: Float[np.ndarray, "F"],
-        blocks: Float[np.ndarray, "F D F D"],
-        g: Float[np.ndarray, "F D"],
-    ) -> None:
-        """Add to the normal equations: `steps` are the dofs' from frame to frame, `com_steps` [m]
-        those of the centre of mass, and `ahead` is what is expected of the dofs; `penalty_scale`
-        multiplies the weights of overspeed."""
+    ) -> tuple[Float[np.ndarray, "F D F D"], Float[np.ndarray, "F D"]]:
+        """H and g: `steps` are the dofs' from frame to frame, `com_steps` [m] those of the centre
+        of mass, and `ahead` is what is expected of the dofs; `penalty_scale` multiplies the weights
+        of overspeed."""
         against = steps.copy()
         against[:, _BASE] = com_steps - self._source_steps
-        own_speed = com_jacobian[-1] @ ahead.speeds
-        ahead.targets[_BASE] = com_jacobian[-1] @ ahead.targets
-        ahead.speeds[_BASE] = own_speed - self._source_steps[-1] / self._frame_time
-        P, p = self._to_go.of(ahead)
-        before = np.array([-against[-1] - against[-2], -against[-1]])
+        cost = self._to_go.of(ahead.weights)
         products = self._products.copy()
-        products[-3:, -3:] += P.transpose(1, 2, 0)
+        products[-3:, -3:] += cost[:, :3]
         gradient = np.add.reduce(self._to_gradient * against, axis=1)
-        gradient[-3:] += (P[:, :, :2] @ before.T[..., None])[..., 0].T + p.T
+        gradient[-3:] += np.add.reduce(cost * self._expected(against, com_jacobian[-1], ahead), 1)
         # The mass's place takes that of the base.
-        pulled = products[:, :, _BASE].transpose(0, 2, 1)[..., None] * com_jacobian.swapaxes(0, 1)
         moved = com_jacobian.transpose(0, 2, 1)
-        blocks += (moved @ pulled.reshape(len(g), 3, -1)).reshape(blocks.shape)
-        g += (moved @ gradient[:, _BASE, None])[..., 0]
-        products[:, :, _BASE] = gradient[:, _BASE] = 0.0
+        pulled = products[:, :, _BASE].transpose(0, 2, 1)[..., None] * com_jacobian.swapaxes(0, 1)
+        shape = (*gradient.shape, *gradient.shape)
+        blocks = (moved @ pulled.reshape(len(gradient), 3, -1)).reshape(shape)
+        g: Float[np.ndarray, "F D"] = (moved @ gradient[:, _BASE, None])[..., 0]
         diagonals = np.einsum("sdtd->std", blocks)  # a view
-        diagonals += products
-        g += gradient
+        diagonals[..., _OTHERS] += products[..., _OTHERS]
+        g[:, _OTHERS] += gradient[:, _OTHERS]
         overspeed = self.overspeed(steps)
-        if overspeed.any():
+        if np.maximum.reduce(overspeed, axis=None) > 0:
             weights = np.full((len(steps), 1), self._overspeed_weight)
             weights[-len(g) :] *= penalty_scale[:, None] ** 2
-            g += self._first.T @ (weights * overspeed)
-            fast = weights * (overspeed != 0)
+            beyond = np.copysign(np.maximum(overspeed, 0.0), steps)
+            g += self._first.T @ (weights * beyond)
+            fast = weights * (overspeed > 0)
             diagonals += np.einsum("vs,vt,vd->std", self._first, self._first, fast)
+        return blocks, g
+
+    def _expected(
+        self,
+        against: Float[np.ndarray, "V D"],
+        com_jacobian: Float[np.ndarray, "3 D"],
+        ahead: Ahead,
+    ) -> Float[np.ndarray, "5 D"]:
+        """The last three values, from the newest, and where the target is and how fast it moves."""
+        out = np.zeros((5, against.shape[1]))
+        np.negative(against[-1], out=out[1])
+        np.subtract(out[1], against[-2], out=out[0])
+        out[3], out[4] = ahead.targets, ahead.speeds
+        out[3:, _BASE] = out[3:] @ com_jacobian.T
+        out[4, _BASE] -= self._source_steps[-1] / self._frame_time
+        return out

@@ -16,6 +16,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg.lapack import dposv
 
+from robots.solver.window_dofs import as_slice
+
 HORIZON = 0.3  # [s] that is looked beyond the newest frame
 SLOWING = 0.1  # [s] in which a target loses most of its speed
 _SPEED_WINDOW = 0.05  # [s] before the newest frame over which that speed is measured
@@ -41,23 +43,24 @@ class CostToGo:
     def __init__(
         self, frame_time: float, orders: Int[np.ndarray, "D"], weights: Float[np.ndarray, "D"]
     ) -> None:
-        self._tables = np.concatenate([_table(frame_time, order) for order in (2, 3)])
+        tables = np.stack([_table(frame_time, order) for order in (2, 3)])
+        changes = np.diff(tables, axis=1, append=tables[:, -1:])
+        self._rows = np.stack([tables, changes], axis=2).reshape(2 * len(_LOG_RATIOS), -1)
         self._first = (orders - 2) * len(_LOG_RATIOS)  # of the rows of each dof's table
-        self._log_weights = np.log(weights)
+        self._per_row = 1 / (_LOG_RATIOS[1] - _LOG_RATIOS[0])
+        self._at_one = self._per_row * (np.log(weights) - _LOG_RATIOS[0])
 
-    def of(self, ahead: Ahead) -> tuple[Float[np.ndarray, "D 3 3"], Float[np.ndarray, "D 3"]]:
-        """P and p of `x P x / 2 + p x` in the last three values x of each dof, from its newest."""
-        ratio = self._log_weights - np.log(np.maximum(ahead.weights, 1e-12))
-        at = (ratio - _LOG_RATIOS[0]) / (_LOG_RATIOS[1] - _LOG_RATIOS[0])
+    def of(self, weights: Float[np.ndarray, "D"]) -> Float[np.ndarray, "3 5 D"]:
+        """P, and p by where the target is and how fast it moves, of `x P x / 2 + p x` in the last
+        three values x of each dof, from its newest; targets weigh so much, squared."""
+        at = self._at_one - self._per_row * np.log(np.maximum(weights, 1e-12))
         at = np.minimum(np.maximum(at, 0.0), len(_LOG_RATIOS) - 1.001)
-        k = at.astype(int)
-        share = (at - k)[:, None, None]
-        row = self._first + k
-        cost = self._tables.take(row, axis=0)
-        cost += share * (self._tables.take(row + 1, axis=0) - cost)
-        cost *= ahead.weights[:, None, None]
-        p = cost[:, :, 3] * ahead.targets[:, None] + cost[:, :, 4] * ahead.speeds[:, None]
-        return cost[:, :, :3], p
+        row = at.astype(int)
+        share = at - row
+        row += self._first
+        cost, change = self._rows.take(row, axis=0).T.reshape(2, 15, -1)
+        out: Float[np.ndarray, "15 D"] = (cost + share * change) * weights
+        return out.reshape(3, 5, -1)
 
 
 def _table(frame_time: float, order: int) -> Float[np.ndarray, "R 3 5"]:
@@ -82,7 +85,8 @@ class TargetMotion:
     def __init__(
         self, model: mujoco.MjModel, dofs: Int[np.ndarray, "D"], frame_time: float
     ) -> None:
-        self._model, self._dofs, self._frame_time = model, dofs, frame_time
+        self._model, self._dofs, self._frame_time = model, as_slice(dofs), frame_time
+        self._sides = np.eye(len(dofs), 4, 1)  # the negative gradient's place, and the base's dofs
         self._past: deque[Float[np.ndarray, nq]] = deque(
             maxlen=max(1, round(_SPEED_WINDOW / frame_time))
         )
@@ -99,24 +103,23 @@ class TargetMotion:
         model = self._model
         damped = H.copy()
         damped.reshape(-1)[:: len(g) + 1] += _DAMPING
-        sides = np.zeros((len(g), 4), order="F")
-        sides[:, 0], sides[_BASE, 1:] = -g, np.eye(3)
+        sides = self._sides.copy("F")
+        np.negative(g, out=sides[:, 0])
         _, solved, _ = dposv(damped.T, sides, overwrite_a=True, overwrite_b=True)
         target = np.minimum(np.maximum(solved[:, 0], -_MAX_STEP), _MAX_STEP)
-        step = np.zeros(model.nv)
+        step, speeds = np.zeros((2, model.nv))
         step[self._dofs] = target
         self._now = q.copy()
         mujoco.mj_integratePos(model, self._now, step, 1.0)
-        speeds = np.zeros(model.nv)
         if self._past:
             time = len(self._past) * self._frame_time
             mujoco.mj_differentiatePos(model, speeds, time, self._past[0], self._now)
-        speeds = np.minimum(np.maximum(speeds.take(self._dofs), -_MAX_SPEED), _MAX_SPEED)
+        speeds = np.minimum(np.maximum(speeds[self._dofs], -_MAX_SPEED), _MAX_SPEED)
         # Legs give way to the base where they bend: it weighs what is then left of its weight (a
         # Schur complement), over the floor alike in all directions. By H's diagonal it would be as
         # firm as if they could not bend.
-        weights = np.diagonal(H).copy()
-        x, y, z = np.diagonal(solved[_BASE, 1:])
+        weights = H.reshape(-1)[:: len(g) + 1].copy()
+        x, y, z = solved[0, 1], solved[1, 2], solved[2, 3]
         weights[_BASE] = 2 / (x + y), 2 / (x + y), 1 / z
         return Ahead(target, speeds, weights)
 

@@ -8,6 +8,7 @@ from scipy.linalg.lapack import dposv
 from robots.model.morphology import Morphology
 from robots.solver.hinges import Posture
 from robots.solver.repair import MAX_SINKING
+from robots.solver.window_dofs import as_slice
 from robots.solver.window_poses import WindowPoses
 from robots.solver.window_targets import PointTargets
 from robots.solver.window_terms import Terms
@@ -32,9 +33,9 @@ class Window:
         self, robot: Morphology, terms: Terms, frame_time: float, *, fixed: int, free: int
     ) -> None:
         self._terms, self._fixed, self._free = terms, fixed, free
-        self._model, self._dofs = robot.mjcf.model, terms.mj_dofs
+        self._model, self._dofs = robot.mjcf.model, as_slice(terms.mj_dofs)
         self._com: Float[np.ndarray, "fixed 3"]  # in the fixed frames [m]
-        self._motion = TargetMotion(self._model, self._dofs, frame_time)
+        self._motion = TargetMotion(self._model, terms.mj_dofs, frame_time)
         self._coupling = Coupling(robot, frame_time, fixed=fixed, free=free)
         self._firmness = Firmness(free)
         self._max_sinking = MAX_SINKING * robot.rig.hip_height
@@ -71,8 +72,8 @@ class Window:
         asked = terms.asked(targets, foot_targets, resting)
         self._coupling.follow(targets.com[-1] - targets.com[-2])
         low, steps = terms.low(poses), self._steps(q)
-        overspeed = np.abs(self._coupling.overspeed(steps[-free:])).max(axis=1)
-        sinking = low.depth.max(axis=1, initial=-np.inf)
+        overspeed = np.maximum.reduce(self._coupling.overspeed(steps[-free:]), axis=1)
+        sinking = np.maximum.reduce(low.depth, axis=1, initial=-np.inf)
         self._firmness.move_on(
             np.maximum(sinking / self._max_sinking, overspeed / self._max_overspeed)
         )
@@ -82,8 +83,7 @@ class Window:
                 low, steps = terms.low(poses), self._steps(q)
             scale = self._firmness.scale
             H, g = terms.linearize(q[-free:], poses, asked, posture, candidates, scale, low)
-            whole = self._whole(H)
-            self._couple(q, steps, poses, H, g, whole)
+            whole, g = self._coupled(q, steps, poses, H, g)
             q, length = self._moved(q, whole, g, _DAMPING)
             if length < _STEP_TOL:
                 break
@@ -116,22 +116,28 @@ class Window:
         np.einsum("tdte->tde", whole)[:] = H
         return whole
 
-    def _couple(
+    def _coupled(
         self,
         q: Float[np.ndarray, "T nq"],
         steps: Float[np.ndarray, "V D"],
         poses: WindowPoses,
         H: Float[np.ndarray, "F D D"],
         g: Float[np.ndarray, "F D"],
-        whole: Float[np.ndarray, "F D F D"],
-    ) -> None:
-        """Add what couples the free frames, in `poses` and with H and g of their own, to each other
-        and to the fixed ones; `steps` are the dofs' from frame to frame."""
+    ) -> tuple[Float[np.ndarray, "F D F D"], Float[np.ndarray, "F D"]]:
+        """The normal equations of the free frames, in `poses` and with H and g of their own, with
+        what couples them to each other and to the fixed ones; `steps` are the dofs' from frame to
+        frame."""
         assert poses.com_jacobian is not None
         ahead = self._motion.of(q[-1], H[-1], g[-1])
         com = np.concatenate([self._com, poses.com])
         com_steps, scale = com[1:] - com[:-1], self._firmness.scale
-        self._coupling.add_to(steps, com_steps, poses.com_jacobian, ahead, scale, whole, g)
+        whole, coupled = self._coupling.normal_equations(
+            steps, com_steps, poses.com_jacobian, ahead, scale
+        )
+        own = np.einsum("tdte->tde", whole)  # a view
+        own += H
+        coupled += g
+        return whole, coupled
 
     def _moved(
         self,
@@ -141,17 +147,20 @@ class Window:
         damping: float,
     ) -> tuple[Float[np.ndarray, "T nq"], float]:
         """`q` after one Gauss-Newton step, and the step's largest entry [rad, m]."""
-        model, free = self._model, self._free
-        q = q.copy()
-        held = self._terms.hinges.held(q[-free:], g)
+        free = self._free
+        q, g = q.copy(), g.ravel()
+        diagonal = whole.reshape(-1)[:: g.size + 1]
+        diagonal += damping
+        (held,) = self._terms.hinges.held(q[-free:], g.reshape(free, -1)).ravel().nonzero()
         g[held] = 0.0
-        whole.reshape(-1)[:: g.size + 1] += np.where(held, _HELD, damping).ravel()
-        _, step, _ = dposv(whole.reshape(g.size, -1).T, g.ravel(), overwrite_a=True)
-        length = float(np.abs(step).max())
-        moved = np.zeros((free, model.nv))
-        moved[:, self._dofs] = -min(1.0, _MAX_STEP / max(length, 1e-9)) * step.reshape(free, -1)
+        diagonal[held] += _HELD
+        _, step, _ = dposv(whole.reshape(g.size, -1).T, g, lower=True, overwrite_a=True)
+        length = max(float(np.maximum.reduce(step)), -float(np.minimum.reduce(step)))
+        moved = np.zeros((free, self._model.nv))
+        step *= -min(1.0, _MAX_STEP / max(length, 1e-9))
+        moved[:, self._dofs] = step.reshape(free, -1)
         for t in range(free):
-            mujoco.mj_integratePos(model, q[t - free], moved[t], 1.0)
+            mujoco.mj_integratePos(self._model, q[t - free], moved[t], 1.0)
         self._terms.hinges.clip(q[-free:])
         return q, length
 

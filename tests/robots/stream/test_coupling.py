@@ -27,9 +27,8 @@ def pull(
     speeds[:3], steps[:, :3] = target, own * FRAME_TIME
     jacobian = np.zeros((FRAMES, 3, dofs))
     jacobian[:, :, :3] = np.eye(3)
-    blocks, g = np.zeros((FRAMES, dofs, FRAMES, dofs)), np.zeros((FRAMES, dofs))
     ahead = Ahead(np.zeros(dofs), speeds, np.full(dofs, 100.0))
-    coupling.add_to(steps, steps[:, :3], jacobian, ahead, np.ones(FRAMES), blocks, g)
+    _, g = coupling.normal_equations(steps, steps[:, :3], jacobian, ahead, np.ones(FRAMES))
     return -g[:, :3]
 
 
