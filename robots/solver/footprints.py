@@ -21,7 +21,7 @@ from spark.transfer.footfalls import beyond
 
 # Hip heights that a standing foot may stray from its mean place without having moved,
 MAX_WOBBLE = 0.05
-MAX_TWIST = np.radians(12)  # and how far it may turn
+MAX_TWIST = float(np.radians(12))  # and how far it may turn
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,10 +48,9 @@ class Foot:
 
     def grip(self, loosens: float, tightens: float) -> None:
         """Take hold of what stands, and let go of the rest, by so much at most."""
-        heel, toes = (
-            hold + min(max(planted - hold, -loosens), tightens)
-            for hold, planted in zip(self.holds, self.planted, strict=True)
-        )
+        (heel, toes), (heel_stands, toes_stand) = self.holds, self.planted
+        heel = min(heel + tightens, 1.0) if heel_stands else max(heel - loosens, 0.0)
+        toes = min(toes + tightens, 1.0) if toes_stand else max(toes - loosens, 0.0)
         self.holds = heel, toes
 
     def height(self, clearance: float, pace: float, uneven: float) -> float:

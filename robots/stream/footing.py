@@ -17,7 +17,7 @@ from robots.solver.foot_path import (
     MAX_UNEVEN,
     RAISED_HOLD,
     SWING_HOLD,
-    near_floor,
+    SWING_REACH,
     step_height,
 )
 from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
@@ -27,6 +27,8 @@ from robots.stream.frame_targets import FrameReader, FrameTargets
 from robots.stream.standing import SourceFeet, Standing
 
 HOLD_TIME = 0.1  # [s] over which a foot is taken hold of, and let go
+
+_RAISED, _SWING = float(RAISED_HOLD[0]), float(SWING_HOLD[2])
 
 
 class _Arrived(NamedTuple):
@@ -45,15 +47,17 @@ class ContactTracker:
     frames."""
 
     def __init__(self, reader: FrameReader, frame_time: float, ahead: int) -> None:
-        self._robot, self._scale = reader.robot, reader.scale
+        # Plain numbers: numpy's take three times as long.
+        self._robot, self._scale = reader.robot, float(reader.scale)
         self._standing = Standing(reader, frame_time)
         self._grip, self._ahead = frame_time / HOLD_TIME, ahead
-        hip_height = self._robot.rig.hip_height
+        hip_height = float(self._robot.rig.hip_height)
         self._hip_height, self._wobble = hip_height, MAX_WOBBLE * hip_height
-        self._uneven = MAX_UNEVEN * hip_height
+        self._uneven, self._kick = MAX_UNEVEN * hip_height, SWING_REACH * hip_height
         self._index_points()
         self._arrived: deque[_Arrived] = deque(maxlen=ahead + 1)
         self._source: deque[SourceFeet] = deque(maxlen=self._standing.history + ahead + 1)
+        self._last_axes: Complex[np.ndarray, "S 3"] = np.zeros((0, 3), dtype=complex)
         self._feet = [Foot() for _ in self._robot.soles]
 
     def update(
@@ -89,14 +93,14 @@ class ContactTracker:
                 foot.grip(self._grip, 1.0 if first else self._grip)
                 pace = self._scale * speed[s][1] / self._hip_height
                 up = foot.height(clearance, pace, self._uneven)
-                numbers.append((*foot.holds, *step[s], up, float(known)))
+                numbers += self._held(foot.holds, step[s], up, known=known)
                 places.append((foot.footprint.pivot, cmath.rect(1.0, foot.footprint.heading)))
             if at == settled:
                 feet = [foot.copy() for foot in feet]
         shape = self._ahead + 1, len(feet)
         return self._targets(
             np.array([arrived.pitched for arrived in self._arrived]),
-            np.array(numbers).reshape(*shape, 6),
+            np.array(numbers).reshape(shape[0], -1, 4),
             np.array(places, dtype=complex).reshape(*shape, 2),
         )
 
@@ -123,35 +127,53 @@ class ContactTracker:
         axes: Complex[np.ndarray, "S 3"] = world[:, 0] + 1j * world[:, 1]
         return axes
 
+    def _held(
+        self, holds: tuple[float, float], steps: list[float], up: float, *, known: bool
+    ) -> list[tuple[float, float, float, float]]:
+        """Of a foot's heel, ball and toes, where heel and toes are held so far and step so high
+        [m], and the sole is so high [m] where not held: how far each is held, how high its lowest
+        point is [m], and how firmly that is asked for along the floor, if it is `known` where, and
+        in height. The ball leaves the floor with either end."""
+        (heel, toes), (heel_step, toe_step) = holds, steps
+        most = max(heel, toes)
+        sole, turning = (1 - most) * up, _RAISED * most
+        near = _SWING / (1 + (up / self._kick) ** 2)
+        ends = (
+            (heel, heel_step),
+            (min(heel, toes), max(heel_step, toe_step)),
+            (toes, toe_step),
+        )
+        return [
+            (
+                hold,
+                max(sole, (1 - hold) * step),
+                max(hold, turning) if known else 0.0,
+                hold + near * (1 - hold),
+            )
+            for hold, step in ends
+        ]
+
     def _targets(
         self,
         pitched: Float[np.ndarray, "T P 3"],
-        numbers: Float[np.ndarray, "T S 6"],
+        held: Float[np.ndarray, "T E 4"],
         places: Complex[np.ndarray, "T S 2"],
     ) -> PointTargets:
-        """Where the soles' points are held, and how firmly. Of each foot there are, in `numbers`,
-        how far heel and toes are held, how high [m] they step and the sole is where not held, and
-        whether it is known where; in `places` the middle of its toes [m, x + iy], and a unit along
-        it."""
-        heel, toes, heel_step, toe_step, height, known = numbers.transpose(2, 0, 1).take(
-            self._sole, axis=2
-        )
+        """Where the soles' points are held, and how firmly: `held` is that of the ends of the feet,
+        as `_held` has it, and in `places` are the middle of its toes [m, x + iy], and a unit along
+        it, of each foot."""
+        hold, low, along_floor, in_height = held.transpose(2, 0, 1).take(self._end, axis=2)
         pivot, along = places.transpose(2, 0, 1).take(self._sole, axis=2)
-        held = np.minimum(np.maximum(heel, self._stays[0]), np.maximum(toes, self._stays[1]))
-        step = np.maximum(heel_step * self._leaves[0], toe_step * self._leaves[1])
-        most, free = np.maximum(heel, toes), 1 - held
         raised = pitched[..., :2].view(np.complex128)[..., 0]
         away = self._flat - raised
         # What is raised turns about what stands.
-        shift = (held * away) @ self._beside / np.maximum(held @ self._beside, 1e-9)
-        positions, shares = np.empty((2, *held.shape, 3))
+        shift = (hold * away) @ self._beside / np.maximum(hold @ self._beside, 1e-9)
+        positions, shares = np.empty((2, *hold.shape, 3))
         over_floor = positions[..., :2].view(np.complex128)[..., 0]
-        over_floor[:] = pivot + along * (raised + shift + held * (away - shift))
-        positions[..., 2] = free * pitched[..., 2]
-        positions[..., 2] += np.maximum((1 - most) * height, free * step)
-        shares[..., :2] = (known * np.maximum(held, RAISED_HOLD[0] * most))[..., None]
-        near = near_floor(height / self._hip_height)
-        shares[..., 2] = held + SWING_HOLD[2] * free * near
+        over_floor[:] = pivot + along * (raised + shift + hold * (away - shift))
+        positions[..., 2] = (1 - hold) * pitched[..., 2] + low
+        shares[..., :2] = along_floor[..., None]
+        shares[..., 2] = in_height
         return PointTargets(positions, shares)
 
     def _index_points(self) -> None:
@@ -164,11 +186,11 @@ class ContactTracker:
         self._points = [slice(n - count, n) for n, count in zip(stops, counts, strict=True)]
         self._sole = np.repeat(np.arange(len(soles)), counts)
         self._beside = (self._sole[:, None] == self._sole).astype(np.float64)
-        flat, ends = [np.zeros(0, dtype=complex)], [np.zeros((0, 2), dtype=bool)]
-        for sole in soles:
+        flat, ends = [np.zeros(0, dtype=complex)], [np.zeros(0, dtype=int)]
+        for k, sole in enumerate(soles):
             points = flat_sole(self._robot, sole) @ (1, 1j)
             flat.append(points - points[-2:].mean())
-            ends.append(on_points(sole, np.array([[0.0, 1.0], [1.0, 0.0]])) == 0)
+            heel, toes = on_points(sole, np.eye(2)).T
+            ends.append(3 * k + 1 + (toes - heel).astype(int))
         self._lengths = [-float(points[:2].real.mean()) for points in flat[1:]]
-        self._flat, self._leaves = np.concatenate(flat), np.concatenate(ends).T.astype(float)
-        self._stays = 1 - self._leaves
+        self._flat, self._end = np.concatenate(flat), np.concatenate(ends)

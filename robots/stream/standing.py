@@ -49,12 +49,12 @@ class Standing:
     """Of sources that `reader` reads, `frame_time` [s] apart."""
 
     def __init__(self, reader: FrameReader, frame_time: float) -> None:
-        self._frame_time, self._scale = frame_time, reader.scale
+        self._frame_time, self._scale = frame_time, float(reader.scale)
         self._low, self._has_foot = reader.ground.low, reader.has_feet.tolist()
-        size = reader.source.standing_height / ADULT_HEIGHT
+        size = float(reader.source.standing_height / ADULT_HEIGHT)
         self._max_speed, self._max_height = PLANTED_SPEED * size, PLANTED_HEIGHT * size
         self._max_creep, self._max_tilt = MAX_CREEP * size, MAX_TILT * size
-        self._on_feet = _ON_FEET * reader.robot.rig.hip_height
+        self._on_feet = _ON_FEET * float(reader.robot.rig.hip_height)
         self._reach = max(1, round(SPEED_WINDOW / 2 / frame_time))
         self._creep = max(1, round(CREEP_TIME / frame_time))
         self._most = max(2 * self._reach + 1, round(_LONGEST / frame_time))
