@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 from robots.solver.hulls import SLABS, ShapePair
 from robots.solver.polytopes import Polytopes
-from robots.solver.window_poses import WindowPoses
+from robots.solver.window_poses import WindowPoses, arms_of
 
 _ACROSS = np.flatnonzero(np.abs(SLABS).max(axis=1) == 1.0)  # the slabs along x, y and z
 
@@ -37,7 +37,7 @@ class NearPairs:
         middles = [shape.center for shape in shapes.values()]
         middles += [shape.slabs[0, _ACROSS] @ SLABS[_ACROSS] for shape in shapes.values()]
         places = np.array(middles).reshape(-1, 3) - rest[self._bodies]
-        self._middles = places.T[:, None, None].copy()
+        self._middles = arms_of(places)[:, None, None]
         self._small = np.array([number[pair.small.geom] for pair in pairs], dtype=int)
         self._large = np.array([number[pair.large.geom] for pair in pairs], dtype=int) + len(shapes)
         # A shape is within its box, which a ball that is near can't be beyond the corners of.

@@ -12,12 +12,12 @@ from robots.solver.window_poses import WindowPoses
 @dataclass(frozen=True, eq=False)
 class NearSpheres:
     """Of K spheres the numbers of the pairs of shapes, of the small one's body and of the large one
-    among the `polytopes`; and where the centre is from that body in the rest pose, and the radius
-    with what the pair keeps between it [m]."""
+    among the `polytopes`; where the centre is from that body in the rest pose [m], and 1; and the
+    radius with what the pair keeps between it [m]."""
 
     polytopes: Polytopes
     numbers: Int[np.ndarray, "3 K"]
-    sizes: Float[np.ndarray, "4 K"]
+    sizes: Float[np.ndarray, "5 K"]
 
     def __len__(self) -> int:
         return self.numbers.shape[1]
@@ -35,7 +35,7 @@ class NearSpheres:
     @property
     def radii(self) -> Float[np.ndarray, "K"]:
         """Their radii, with what is kept between a pair [m]."""
-        return self.sizes[3]
+        return self.sizes[4]
 
     def at(self, which: Int[np.ndarray, "S"]) -> "NearSpheres":
         """Some of them."""
@@ -44,7 +44,7 @@ class NearSpheres:
 
     def centers(self, poses: WindowPoses) -> Float[np.ndarray, "3 T K"]:
         """Where they are [m, world]."""
-        return poses.points(self.numbers[1], self.sizes[:3, None, None])
+        return poses.points(self.numbers[1], self.sizes[:4, None, None])
 
     def beyond(
         self, poses: WindowPoses, centers: Float[np.ndarray, "3 T K"]

@@ -12,7 +12,7 @@ from robots.solver.near_spheres import NearSpheres
 from robots.solver.polytopes import Polytopes
 from robots.solver.weights import W_COLLISION, W_LEG_COLLISION, per_metre
 from robots.solver.window_dofs import WindowDofs
-from robots.solver.window_poses import WindowPoses
+from robots.solver.window_poses import WindowPoses, arms_of
 from robots.solver.window_rows import Rows
 from robots.tree import ROOT, Tree, cross
 
@@ -47,7 +47,7 @@ class WindowCollisions:
         small = bodies[[pair.small.link for pair in pairs]][own]
         centers = np.concatenate([np.zeros((0, 3)), *(pair.small.spheres for pair in pairs)])
         radii = np.concatenate([np.zeros(0), *(pair.small.radii for pair in pairs)])
-        sizes = np.stack([*(centers - rest[small]).T, radii + apart[own]])
+        sizes = np.concatenate([arms_of(centers - rest[small]), [radii + apart[own]]])
         self._spheres = NearSpheres(polytopes, np.stack([own, small, large[own]]), sizes)
         self._index_dofs(per_metre(robot), tree, pairs, dofs)
 
@@ -71,7 +71,7 @@ class WindowCollisions:
         wrenches = np.empty((6, *depth.shape))
         sides = beyond.take(active, axis=2).argmax(axis=0)
         near.polytopes.normals(poses, near.large, sides, out=wrenches[3:])
-        cross(centers.take(active, axis=2), wrenches[3:], wrenches[:3])
+        cross(centers.take(active, axis=2), wrenches[3:], out=wrenches[:3])
         residual, slope = one_sided(depth, DEPTH_ROUNDING)
         slope *= felt
         wrenches *= slope

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from robots.residuals import one_sided
 from robots.solver.floor import FELT, Solid
 from robots.solver.weights import FLOOR_ROUNDING, W_FLOOR
-from robots.solver.window_poses import WindowPoses
+from robots.solver.window_poses import WindowPoses, arms_of
 from robots.solver.window_rows import Rows
 
 
@@ -38,6 +38,7 @@ class WindowFloor:
     ) -> None:
         solids = lifted.solids
         self._weight, self._rounding = firm * W_FLOOR, FLOOR_ROUNDING / firm
+        self._felt = -FELT * self._rounding
         counts = [len(solid.spheres) for solid in solids]
         self._shape = np.repeat(np.arange(len(counts)), counts)
         self._always = slice(sum(counts[:always]))
@@ -48,19 +49,19 @@ class WindowFloor:
 
     def depth(self, poses: WindowPoses) -> Float[np.ndarray, "T S"]:
         """How deep [m] each sphere is in the floor; below 0 over it."""
-        return self._spheres.depth(poses, slice(None))
+        return self._spheres.depth(poses)
 
     def low(self, poses: WindowPoses) -> Low:
         """The spheres of shapes that may be felt."""
-        balls = self._balls.depth(poses, slice(None))
-        near = np.logical_or.reduce(balls > -FELT * self._rounding).take(self._shape)
+        balls = self._balls.depth(poses)
+        near = np.logical_or.reduce(balls > self._felt).take(self._shape)
         near[self._always] = True
         spheres = near.nonzero()[0]
         return Low(spheres, self._spheres.depth(poses, spheres))
 
     def rows(self, poses: WindowPoses, low: Low, scale: Float[np.ndarray, "T"]) -> Rows | None:
         """r = w one_sided(depth), w = `W_FLOOR` x `scale`, of what is felt in some frame."""
-        near = low.depth > -FELT * self._rounding
+        near = low.depth > self._felt
         near[:, self._always] = True  # they are the first ones here, too
         (felt,) = np.logical_or.reduce(near).nonzero()
         if not len(felt):
@@ -89,25 +90,22 @@ class _Spheres:
         spheres: Sequence[tuple[Float[np.ndarray, "_ 3"], Float[np.ndarray, "_"]]],
     ) -> None:
         centers = np.concatenate([np.zeros((0, 3)), *(own for own, _ in spheres)])
-        self._bodies, self._arms = bodies, (centers - rest[bodies]).T.copy()
+        self._bodies, self._arms = bodies, arms_of(centers - rest[bodies])
         self._radii = np.concatenate([np.zeros(0), *(radii for _, radii in spheres)])
 
     def depth(
-        self, poses: WindowPoses, which: slice | Int[np.ndarray, "S"]
+        self, poses: WindowPoses, which: Int[np.ndarray, "S"] | None = None
     ) -> Float[np.ndarray, "T S"]:
-        """How deep [m] some of them are in the floor; below 0 over it."""
-        up = poses.frames[:, 2].take(self._bodies[which], axis=2)
-        x, y, z = up[:3] * self._arms[:, None, which]
-        x += y
-        x += z
-        x += up[3]
-        depth: Float[np.ndarray, "T S"] = self._radii[which] - x
-        return depth
+        """How deep [m] they, or some of them, are in the floor; below 0 over it."""
+        if which is None:
+            return self._radii - poses.heights(self._bodies, self._arms[:, None])
+        bodies, arms = self._bodies.take(which), self._arms.take(which, axis=1)
+        return self._radii.take(which) - poses.heights(bodies, arms[:, None])
 
     def across(self, poses: WindowPoses, which: Int[np.ndarray, "S"]) -> Float[np.ndarray, "2 T S"]:
         """Where the centres of some are over the floor [m]."""
         across = poses.frames[:, :2].take(self._bodies.take(which), axis=3)
-        across[:3] *= self._arms.take(which, axis=1)[:, None, None]
+        across *= self._arms.take(which, axis=1)[:, None, None]
         out: Float[np.ndarray, "2 T S"] = np.add.reduce(across)
         return out
 

@@ -126,7 +126,4 @@ class WindowPoints:
                 rows[:, right:end] = 0.0
 
     def _places(self, poses: WindowPoses, which: slice) -> Float[np.ndarray, "3 T R"]:
-        frames = poses.frames.take(self._bodies[which], axis=3)
-        frames *= self._arms[..., which]
-        out: Float[np.ndarray, "3 T R"] = np.add.reduce(frames)
-        return out
+        return poses.points(self._bodies[which], self._arms[..., which])

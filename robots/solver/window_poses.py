@@ -47,14 +47,13 @@ class WindowPoses:
         return out
 
     def points(
-        self, bodies: Int[np.ndarray, "K"], arms: Float[np.ndarray, "3 1 1 K"]
+        self, bodies: Int[np.ndarray, "K"], arms: Float[np.ndarray, "4 1 1 K"]
     ) -> Float[np.ndarray, "3 T K"]:
-        """Where points of bodies are [m], given as in the rest pose from the bodies' places."""
+        """Where points of bodies are [m], given as in the rest pose from the bodies' places, and 1;
+        or directions, and 0."""
         frames = self.frames.take(bodies, axis=3)
-        x, y, z = frames[:3] * arms
-        out: Float[np.ndarray, "3 T K"] = x + y
-        out += z
-        out += frames[3]
+        frames *= arms
+        out: Float[np.ndarray, "3 T K"] = np.add.reduce(frames)
         return out
 
     def from_bodies(
@@ -62,10 +61,24 @@ class WindowPoses:
     ) -> Float[np.ndarray, "3 T K"]:
         """The reverse: where points [m] are from the places of bodies, as in the rest pose."""
         frames = self.frames.take(bodies, axis=3)
-        x, y, z = (frames[:3] * (points - frames[3])).swapaxes(0, 1)
-        out: Float[np.ndarray, "3 T K"] = x + y
-        out += z
+        axes = frames[:3]
+        axes *= points - frames[3]
+        out: Float[np.ndarray, "3 T K"] = np.add.reduce(axes, axis=1)
         return out
+
+    def heights(
+        self, bodies: Int[np.ndarray, "K"], arms: Float[np.ndarray, "4 1 K"]
+    ) -> Float[np.ndarray, "T K"]:
+        """How high points of bodies are [m], given as for `points`."""
+        up = self.frames[:, 2].take(bodies, axis=2)
+        up *= arms
+        out: Float[np.ndarray, "T K"] = np.add.reduce(up)
+        return out
+
+
+def arms_of(places: Float[np.ndarray, "K 3"]) -> Float[np.ndarray, "4 K"]:
+    """What `WindowPoses.points` takes: places from those of bodies [m], and 1."""
+    return np.concatenate([places.T, np.ones((1, len(places)))])
 
 
 class Kinematics:

@@ -8,9 +8,9 @@ from robots.solver.weights import W_OTHER_ROTATION, W_ROTATION
 from robots.solver.window_dofs import WindowDofs
 from robots.solver.window_poses import WindowPoses
 
-_AXIAL = np.zeros((3, 3, 3))  # what the axial vector of a matrix sums up
+_AXIAL = np.zeros((9, 3))  # what the axial vector of a matrix sums up
 for _i, _j, _k in ((2, 1, 0), (0, 2, 1), (1, 0, 2)):
-    _AXIAL[_i, _j, _k], _AXIAL[_j, _i, _k] = 1.0, -1.0
+    _AXIAL[3 * _i + _j, _k], _AXIAL[3 * _j + _i, _k] = 1.0, -1.0
 
 
 class WindowRotations:
@@ -33,7 +33,7 @@ class WindowRotations:
         moved = moving.any(axis=1)
         self._joints, self._bodies = np.array(joints)[moved], dofs.bodies(turned)[moved]
         weighted = moving[moved] * np.array(weights)[moved, None] ** 2
-        self._weights = 0.5 * weighted.T
+        self._weights = 0.5 * weighted
         self._gram = weighted.T @ moving[moved]
 
     def asked(
@@ -47,8 +47,8 @@ class WindowRotations:
         self, poses: WindowPoses, asked: Float[np.ndarray, "T K 3 3"]
     ) -> tuple[Float[np.ndarray, "T D D"], Float[np.ndarray, "T D"]]:
         """H and g."""
-        M = poses.rotations.take(self._bodies, axis=1) @ asked
-        axial = M.reshape(*M.shape[:2], 9) @ _AXIAL.reshape(9, 3)
-        axes = poses.twists[:, :3].transpose(0, 2, 1)
-        g = (axes * (self._weights @ axial)).sum(2)
-        return self._gram * (axes @ poses.twists[:, :3]), g
+        turned = (poses.rotations.take(self._bodies, axis=1) @ asked).reshape(-1, 9)
+        axial = (turned @ _AXIAL).reshape(len(asked), -1, 3)
+        axes = poses.twists[:, :3]
+        pulls = axes * (axial.transpose(0, 2, 1) @ self._weights)
+        return self._gram * (axes.transpose(0, 2, 1) @ axes), np.add.reduce(pulls, axis=1)

@@ -120,7 +120,8 @@ class Terms:
         J, residuals = stacked([part for part in rows if part is not None], poses.twists)
         self._points.join_hands(J, residuals)
         H, g = self._rotations.normal_equations(poses, asked.turns)
-        across = J.transpose(0, 2, 1)
+        # A copy: numpy takes twice as long over what it sees is a matrix times itself.
+        across = J.transpose(0, 2, 1).copy()
         H += across @ J
         g += (across @ residuals[..., None])[..., 0]
         self.hinges.add_to(q, posture, H, g)
