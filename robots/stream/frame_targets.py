@@ -21,6 +21,7 @@ from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.noise import Noise, without_noise
 
 LATENCY = 2  # [frames] between the newest frame of a stream and its answer
+_ONES = np.ones((4, 1))
 _MAX_NORM_ERROR = 0.05  # of a quaternion: beyond, it is not one that was merely rounded
 
 
@@ -85,9 +86,10 @@ def repeated(targets: FrameTargets, count: int) -> FrameTargets:
 
 def move_on(targets: FrameTargets, newest: FrameTargets) -> None:
     """Take the targets of some frames on by one, in place."""
+    new = vars(newest)
     for name, part in vars(targets).items():
         part[:-1] = part[1:]
-        part[-1] = getattr(newest, name)
+        part[-1] = new[name]
 
 
 def ground_of(source: CanonicalMotion, robot: Morphology) -> Ground:
@@ -107,7 +109,7 @@ class FrameReader:
         self.source, self.robot, self.ground = source, robot, ground
         self.scale = robot.rig.hip_height / source.hip_height
         self._poses = SourcePoses(source.skeleton)
-        offsets = source.skeleton.offsets
+        self._offsets = offsets = source.skeleton.offsets
         self._shapes = offsets[0].shape, source.tpose.shape, offsets.shape
         self._follower = SourceFollower(source, robot, self.scale, ground.z)
         self._copier = Copier(source, robot, ground.z)
@@ -137,16 +139,16 @@ class FrameReader:
 
     def _world(self, frame: Frame) -> tuple[Float[np.ndarray, "N 3 3"], Float[np.ndarray, "N 3"]]:
         """Rotations and places [m] of the source's joints."""
-        root, rotations, translations = Frame(*frame)
-        offsets = self.source.skeleton.offsets
-        local = offsets if translations is None else translations
-        shapes = tuple(map(np.shape, (root, rotations, local)))
-        if shapes != self._shapes or not (np.isfinite(root).all() and np.isfinite(local).all()):
+        root, rotations, translations = frame
+        local = self._offsets if translations is None else translations
+        shapes = np.shape(root), np.shape(rotations), np.shape(local)
+        moved = root if translations is None else np.append(root, local)
+        if shapes != self._shapes or not np.isfinite(moved).all():
             self._refuse(root, rotations, local)
-        length = np.sqrt((rotations * rotations) @ np.ones(4))
+        length = np.sqrt(np.square(rotations) @ _ONES)
         if not np.abs(length - 1).max() <= _MAX_NORM_ERROR:  # nor where it is not a number
             self._refuse(root, rotations, local)
-        return self._poses.of(root, rotations / length[:, None], local)
+        return self._poses.of(root, rotations / length, local)
 
     def _refuse(
         self,

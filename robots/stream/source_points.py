@@ -16,6 +16,8 @@ from spark.rig.roles import Role
 from spark.rig.segments import segments
 from spark.rotation import quat_conj, quat_rotate
 
+_ONES = np.ones((3, 1))
+
 
 class SourcePoints(NamedTuple):
     """Of one frame, scaled to the robot and over the floor where not said otherwise: unit
@@ -69,8 +71,7 @@ class SourceFollower:
         """Of a source with these rotations and places [m] of its joints."""
         found = self._all_rows @ carriers(world, joints)
         bones, hips = found[self._bones], found[self._hips.start]
-        squared = bones * bones
-        bones /= np.maximum(np.sqrt(squared @ np.ones((3, 1))), 1e-12)
+        bones /= np.maximum(np.sqrt(np.square(bones) @ _ONES), 1e-12)
         hips[2] -= self._scale * self._floor
         return SourcePoints(
             bones=bones,

@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from robots.solver.window_dofs import as_slice
 from spark.skeleton import Skeleton
 
 
@@ -19,7 +20,8 @@ class SourcePoses:
             bodies.append(above.add_body())
         self._model = model = spec.compile()
         self._data = data = mujoco.MjData(self._model)
-        self._bodies = np.array([body.id for body in bodies])
+        self._bodies = as_slice(np.array([body.id for body in bodies]))
+        self._root = bodies[0].id
         self._local = model.body_pos, model.body_quat
         self._found = data.xmat.reshape(-1, 3, 3), data.xpos
 
@@ -30,10 +32,11 @@ class SourcePoses:
         offsets: Float[np.ndarray, "N 3"],
     ) -> tuple[Float[np.ndarray, "N 3 3"], Float[np.ndarray, "N 3"]]:
         """Rotations (`R_world_joint`) and places [m, world] of the joints whose local ones are
-        `rotations` (`q_parent_joint`) and `offsets` [m]; the root is at `root_pos`."""
+        `rotations` (`q_parent_joint`) and `offsets` [m]; the root is at `root_pos`. Both are views,
+        until the next frame."""
         own, (local_places, turns) = self._bodies, self._local
         local_places[own], turns[own] = offsets, rotations
-        local_places[own[0]] = root_pos
+        local_places[self._root] = root_pos
         mujoco.mj_kinematics(self._model, self._data)
         axes, places = self._found
-        return axes.take(own, axis=0), places.take(own, axis=0)
+        return axes[own], places[own]
