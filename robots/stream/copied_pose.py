@@ -14,6 +14,8 @@ from spark.rig.rig import Rig
 from spark.rotation import matrix_from_quat, quat_conj
 from spark.transfer.analytic import correspond
 
+_UNTURNED = np.eye(3)
+
 
 class Copied(NamedTuple):
     """Rotations (`R_world_joint`) of the joints of a robot's rig and of its chest, and where the
@@ -54,7 +56,7 @@ class Copier:
         own = world.take(self._first, axis=0) @ self._to_own
         for j, first, second, mix, tpose in self._between:
             own[j] = self._mixed(world, first, second, mix) @ tpose
-        own[self._at_rest] = np.eye(3)
+        own[self._at_rest] = _UNTURNED
         pelvis = own[self._pelvis] @ self._pelvis_tpose.T
         bowed = self._bowing.of(pelvis, points.trunk, points.thighs, joints)
         if bowed is not pelvis:
@@ -77,12 +79,11 @@ class Copier:
         if not len(self._sole):
             return np.zeros((0, 3))
         arms = self._sole_rows @ world.transpose(0, 2, 1).reshape(-1, 3)
-        over, feet = arms[: len(self._sole)], arms[len(self._sole) :, :2] @ (1, 1j)
+        over_floor = arms[:, :2].view(np.complex128)[:, 0]
+        over, feet = arms[: len(self._sole)], over_floor[len(self._sole) :]
         headings = feet.conj() / np.maximum(np.abs(feet), 1e-9)
-        along = (over[:, :2] @ (1, 1j)) * headings.take(self._sole)
-        lowest = np.minimum.reduceat(over[:, 2], self._sole_starts)
-        over[:, 0], over[:, 1] = along.real, along.imag
-        over[:, 2] -= lowest.take(self._sole)
+        over_floor[: len(over)] *= headings.take(self._sole)
+        over[:, 2] -= np.minimum.reduceat(over[:, 2], self._sole_starts).take(self._sole)
         return over
 
     def _index_soles(self, robot: Morphology) -> None:

@@ -19,7 +19,8 @@ class Foot:
     @property
     def is_held(self) -> bool:
         """Whether heel or toes are."""
-        return max(self.holds) > 0
+        heel, toes = self.holds
+        return heel > 0 or toes > 0
 
     @property
     def on_toe(self) -> bool:

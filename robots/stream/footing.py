@@ -17,7 +17,7 @@ from robots.solver.foot_path import (
     MAX_UNEVEN,
     RAISED_HOLD,
     SWING_HOLD,
-    SWING_REACH,
+    near_floor,
     step_height,
 )
 from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
@@ -27,8 +27,6 @@ from robots.stream.frame_targets import FrameReader, FrameTargets
 from robots.stream.standing import SourceFeet, Standing
 
 HOLD_TIME = 0.1  # [s] over which a foot is taken hold of, and let go
-
-_RAISED, _SWING = float(RAISED_HOLD[0]), float(SWING_HOLD[2])
 
 
 class _Arrived(NamedTuple):
@@ -53,7 +51,7 @@ class ContactTracker:
         self._grip, self._ahead = frame_time / HOLD_TIME, ahead
         hip_height = float(self._robot.rig.hip_height)
         self._hip_height, self._wobble = hip_height, MAX_WOBBLE * hip_height
-        self._uneven, self._kick = MAX_UNEVEN * hip_height, SWING_REACH * hip_height
+        self._uneven = MAX_UNEVEN * hip_height
         self._index_points()
         self._arrived: deque[_Arrived] = deque(maxlen=ahead + 1)
         self._source: deque[SourceFeet] = deque(maxlen=self._standing.history + ahead + 1)
@@ -93,15 +91,17 @@ class ContactTracker:
                 foot.grip(self._grip, 1.0 if first else self._grip)
                 pace = self._scale * speed[s][1] / self._hip_height
                 up = foot.height(clearance, pace, self._uneven)
-                numbers += self._held(foot.holds, step[s], up, known=known)
-                places.append((foot.footprint.pivot, cmath.rect(1.0, foot.footprint.heading)))
+                (heel, toes), (heel_step, toe_step) = foot.holds, step[s]
+                # The ball leaves the floor with either end.
+                numbers += (heel, min(heel, toes), toes)
+                numbers += (heel_step, max(heel_step, toe_step), toe_step, up, float(known))
+                places += (foot.footprint.pivot, cmath.rect(1.0, foot.footprint.heading))
             if at == settled:
                 feet = [foot.copy() for foot in feet]
-        shape = self._ahead + 1, len(feet)
         return self._targets(
             np.array([arrived.pitched for arrived in self._arrived]),
-            np.array(numbers).reshape(shape[0], -1, 4),
-            np.array(places, dtype=complex).reshape(*shape, 2),
+            np.array(numbers).reshape(-1, 8).T,
+            np.array(places, dtype=complex).reshape(-1, 2).T,
         )
 
     def _take_in(self, targets: FrameTargets) -> None:
@@ -127,43 +127,25 @@ class ContactTracker:
         axes: Complex[np.ndarray, "S 3"] = world[:, 0] + 1j * world[:, 1]
         return axes
 
-    def _held(
-        self, holds: tuple[float, float], steps: list[float], up: float, *, known: bool
-    ) -> list[tuple[float, float, float, float]]:
-        """Of a foot's heel, ball and toes, where heel and toes are held so far and step so high
-        [m], and the sole is so high [m] where not held: how far each is held, how high its lowest
-        point is [m], and how firmly that is asked for along the floor, if it is `known` where, and
-        in height. The ball leaves the floor with either end."""
-        (heel, toes), (heel_step, toe_step) = holds, steps
-        most = max(heel, toes)
-        sole, turning = (1 - most) * up, _RAISED * most
-        near = _SWING / (1 + (up / self._kick) ** 2)
-        ends = (
-            (heel, heel_step),
-            (min(heel, toes), max(heel_step, toe_step)),
-            (toes, toe_step),
-        )
-        return [
-            (
-                hold,
-                max(sole, (1 - hold) * step),
-                max(hold, turning) if known else 0.0,
-                hold + near * (1 - hold),
-            )
-            for hold, step in ends
-        ]
-
     def _targets(
         self,
         pitched: Float[np.ndarray, "T P 3"],
-        held: Float[np.ndarray, "T E 4"],
-        places: Complex[np.ndarray, "T S 2"],
+        feet: Float[np.ndarray, "8 F"],
+        places: Complex[np.ndarray, "2 F"],
     ) -> PointTargets:
-        """Where the soles' points are held, and how firmly: `held` is that of the ends of the feet,
-        as `_held` has it, and in `places` are the middle of its toes [m, x + iy], and a unit along
-        it, of each foot."""
-        hold, low, along_floor, in_height = held.transpose(2, 0, 1).take(self._end, axis=2)
-        pivot, along = places.transpose(2, 0, 1).take(self._sole, axis=2)
+        """Where the soles' points are held, and how firmly. Of each foot in each frame there are,
+        in `feet`, how far its heel, ball and toes are held, and how high they step [m], how high
+        the sole is where not held [m], and whether it is known where; in `places` the middle of its
+        toes [m, x + iy], and a unit along it."""
+        held, step, up, known = feet[:3], feet[3:6], feet[6], feet[7]
+        most, free = np.maximum(held[0], held[2]), 1 - held
+        ends = np.empty((4, *held.shape))
+        ends[0] = held
+        np.maximum((1 - most) * up, free * step, out=ends[1])
+        np.multiply(known, np.maximum(held, RAISED_HOLD[0] * most), out=ends[2])
+        np.add(held, SWING_HOLD[2] * near_floor(up / self._hip_height) * free, out=ends[3])
+        hold, low, along_floor, in_height = ends.reshape(4, -1).take(self._end, axis=1)
+        pivot, along = places.take(self._foot, axis=1)
         raised = pitched[..., :2].view(np.complex128)[..., 0]
         away = self._flat - raised
         # What is raised turns about what stands.
@@ -177,20 +159,22 @@ class ContactTracker:
         return PointTargets(positions, shares)
 
     def _index_points(self) -> None:
-        """Of all points of the soles: which sole's they are, where on the floor from the middle of
-        its toes, and with which of heel and toe they leave it."""
+        """Of all points of the soles: where on the floor they are from the middle of the toes; and
+        in all frames, among all feet, which foot's and which end's they are."""
         soles = self._robot.soles
         self._foot_joints = np.array([sole.foot for sole in soles], dtype=int)
         counts = [len(sole) for sole in soles]
         stops = np.cumsum(counts, dtype=int).tolist()
         self._points = [slice(n - count, n) for n, count in zip(stops, counts, strict=True)]
-        self._sole = np.repeat(np.arange(len(soles)), counts)
-        self._beside = (self._sole[:, None] == self._sole).astype(np.float64)
+        sole_of = np.repeat(np.arange(len(soles)), counts)
+        self._beside = (sole_of[:, None] == sole_of).astype(np.float64)
         flat, ends = [np.zeros(0, dtype=complex)], [np.zeros(0, dtype=int)]
-        for k, sole in enumerate(soles):
+        for sole in soles:
             points = flat_sole(self._robot, sole) @ (1, 1j)
             flat.append(points - points[-2:].mean())
             heel, toes = on_points(sole, np.eye(2)).T
-            ends.append(3 * k + 1 + (toes - heel).astype(int))
+            ends.append(1 + (toes - heel).astype(int))
         self._lengths = [-float(points[:2].real.mean()) for points in flat[1:]]
-        self._flat, self._end = np.concatenate(flat), np.concatenate(ends)
+        self._flat = np.concatenate(flat)
+        self._foot = len(soles) * np.arange(self._ahead + 1)[:, None] + sole_of
+        self._end = len(soles) * (self._ahead + 1) * np.concatenate(ends) + self._foot

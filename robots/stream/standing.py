@@ -74,7 +74,7 @@ class Standing:
         count = int(np.ceil(np.cbrt(12 * (noise / borne) ** 2)))
         self._window = min(max(count, fewest), self._most) if noise else 0
         left = noise / self._frame_time * np.sqrt(12 / max(self._window, fewest) ** 3)
-        self._leeway = float(np.hypot(1.0, LEEWAY * left / self._max_speed))
+        self._slow = self._max_speed * float(np.hypot(1.0, LEEWAY * left / self._max_speed))
 
     def feet(self, targets: FrameTargets) -> SourceFeet:
         """Those of a frame."""
@@ -110,10 +110,11 @@ class Standing:
         """Whether heels and toes stand in one of some frames that `stood` in the one before; they
         are so fast [m/s] and so high [m] there."""
         stands = []
-        for has_foot, *foot in zip(self._has_foot, stood, speeds, heights, strict=True):
-            heel, toes = (has_foot and self._stands(*end) for end in zip(*foot, strict=True))
+        feet = zip(self._has_foot, stood, speeds, heights, strict=True)
+        for has_foot, (heel_stood, toes_stood), speed, (heel_height, toe_height) in feet:
+            heel = has_foot and self._stands(heel_stood, speed[0], heel_height)
+            toes = has_foot and self._stands(toes_stood, speed[1], toe_height)
             # Who stands on the toes does not stand on the heel.
-            heel_height, toe_height = foot[2]
             heel = heel and (not toes or heel_height < toe_height + self._max_tilt)
             stands.append((heel, toes))
         if not any(map(any, stands)) and self._carried_by_feet(frames, at):
@@ -123,8 +124,7 @@ class Standing:
 
     def _stands(self, stood: bool, speed: float, height: float) -> bool:
         factor = _RELEASE_FACTOR if stood else 1.0
-        slow = speed < factor * self._leeway * self._max_speed
-        return slow and height < factor * self._max_height
+        return speed < factor * self._slow and height < factor * self._max_height
 
     def _smooth_motion(
         self, frames: Sequence[SourceFeet]
