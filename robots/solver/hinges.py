@@ -39,7 +39,8 @@ class Hinges:
         margin = np.minimum(LIMIT_MARGIN, 0.1 * (upper - lower))
         self._soft_limits = np.array([upper - margin, lower + margin])[:, None]
         lower, upper = tree.limits_within(LIMIT_CLEARANCE)
-        self._limits = lower[hinges] + rest, upper[hinges] + rest
+        lower, upper = lower[hinges] + rest, upper[hinges] + rest
+        self._limits, self._at_limits = (lower, upper), (lower + 1e-9, upper - 1e-9)
         angles = robot.tpose.angles[0, hinges] + rest
         self._followers = robot.followers
         self._solved = [f for f in robot.followers if robot.moved >= {f.joint, f.leader}]
@@ -66,10 +67,10 @@ class Hinges:
         self, q: Float[np.ndarray, "T nq"], g: Float[np.ndarray, "T D"]
     ) -> Bool[np.ndarray, "T D"]:
         """The dofs of hinges at their limits that the gradient would take beyond."""
-        lower, upper = self._limits
+        lowest, highest = self._at_limits
         out = np.zeros(g.shape, dtype=bool)
         angles, gradient = self.angles(q), g[:, self._dofs]
-        below, above = angles <= lower + 1e-9, angles >= upper - 1e-9
+        below, above = angles <= lowest, angles >= highest
         out[:, self._dofs] = (above & (gradient < 0)) | (below & (gradient > 0))
         return out
 

@@ -14,7 +14,7 @@ from robots.solver.weights import W_COLLISION, W_LEG_COLLISION, per_metre
 from robots.solver.window_dofs import WindowDofs
 from robots.solver.window_poses import WindowPoses, arms_of
 from robots.solver.window_rows import Rows
-from robots.tree import ROOT, Tree, cross
+from robots.tree import ROOT, Tree
 
 _ACTIVE = 3 * DEPTH_ROUNDING  # [m] between shapes beyond which the penalty is negligible
 # [m] that parts keep between them beyond a whole clip's clearance, for how far a soft penalty gives
@@ -71,7 +71,10 @@ class WindowCollisions:
         wrenches = np.empty((6, *depth.shape))
         sides = beyond.take(active, axis=2).argmax(axis=0)
         near.polytopes.normals(poses, near.large, sides, out=wrenches[3:])
-        cross(centers.take(active, axis=2), wrenches[3:], out=wrenches[:3])
+        # The cross product: x, y and z of both twice, in turn.
+        p, n = centers.take(active, axis=2), wrenches[3:]
+        p, n = np.concatenate([p, p[:2]]), np.concatenate([n, n[:2]])
+        np.subtract(p[1:4] * n[2:], p[2:] * n[1:4], out=wrenches[:3])
         residual, slope = one_sided(depth, DEPTH_ROUNDING)
         slope *= felt
         wrenches *= slope

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from robots.model.mjcf import Mjcf
+from robots.solver.window_dofs import as_slice
 from robots.tree import skew
 
 # What takes a twist about (x, y, z) to the origin: the identity, and x, y, z times each of these.
@@ -87,7 +88,8 @@ class Kinematics:
 
     def __init__(self, mjcf: Mjcf, dofs: Int[np.ndarray, "D"]) -> None:
         model, data = mjcf.model, mujoco.MjData(mjcf.model)
-        self._model, self._data, self._dofs, self._root = model, data, dofs, mjcf.root
+        self._model, self._data, self._root = model, data, mjcf.root
+        self._dofs = as_slice(dofs)
         mujoco.mj_kinematics(model, data)
         self.rest = data.xpos.copy()
         self._to_rest = data.xmat.reshape(-1, 3, 3).transpose(0, 2, 1).copy()
@@ -114,6 +116,6 @@ class Kinematics:
         # MuJoCo's twists are about the mass's place.
         to_origin = (about @ _TO_ORIGIN.reshape(3, 36)).reshape(count, 6, 6)
         to_origin += _UNMOVED
-        twists = to_origin @ motions.take(self._dofs, axis=1).transpose(0, 2, 1)
-        jacobian = None if moved is None else moved.take(self._dofs, axis=2)
+        twists = to_origin @ motions[:, self._dofs].transpose(0, 2, 1)
+        jacobian = None if moved is None else moved[:, :, self._dofs]
         return WindowPoses(turns, positions, twists, com, jacobian)
