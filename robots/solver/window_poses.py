@@ -98,6 +98,13 @@ class Kinematics:
         self._com = data.subtree_com[mjcf.root]
         self._about = data.subtree_com[model.body_rootid[mjcf.root]]
 
+    def com(self, q: Float[np.ndarray, "nq"]) -> Float[np.ndarray, "3"]:
+        """The place of the centre of mass at a qpos [m]."""
+        self._qpos[:] = q
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+        return self._com.copy()
+
     def poses(self, q: Float[np.ndarray, "T nq"], *, with_mass: bool = False) -> WindowPoses:
         """All bodies' at some qpos; how the mass is moved is asked for by `with_mass`."""
         model, data, count = self._model, self._data, len(q)

@@ -65,6 +65,10 @@ class Terms:
         """The poses of all bodies; how the mass is moved is asked for by `with_mass`."""
         return self._kinematics.poses(q, with_mass=with_mass)
 
+    def com(self, q: Float[np.ndarray, "nq"]) -> Float[np.ndarray, "3"]:
+        """The place of the centre of mass [m]."""
+        return self._kinematics.com(q)
+
     def sole_points(self, poses: WindowPoses) -> Float[np.ndarray, "T P 3"]:
         """The points of the soles [m, world]."""
         return self._points.places(poses, self._points.soles)

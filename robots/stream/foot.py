@@ -5,8 +5,10 @@ from dataclasses import dataclass, field
 from robots.solver.foot_path import STEP_SPEEDS
 from robots.stream.footprint import Footprint
 
+_STILL, _STEPS = STEP_SPEEDS[:2]
 
-@dataclass
+
+@dataclass(slots=True)
 class Foot:
     """Whether heel and toes of the source's foot stand, how far the robot's are held (0 to 1), over
     what its soles last stood [m, scaled], and where it is held."""
@@ -44,8 +46,9 @@ class Foot:
         if True in planted:
             self.ground = min(self.ground, clearance) if True in self.planted else clearance
         self.planted = planted
-        if self.is_held:
-            self.footprint.follow(moved[self.on_toe], turned, max(self.holds), wobble)
+        hold = max(self.holds)
+        if hold > 0:
+            self.footprint.follow(moved[self.on_toe], turned, hold, wobble)
 
     def grip(self, loosens: float, tightens: float) -> None:
         """Take hold of what stands, and let go of the rest, by so much at most."""
@@ -58,6 +61,7 @@ class Foot:
         """How high [m] its sole is in swing: as the source's, scaled; but where it takes no step,
         at so much `pace` [hip heights/s], it is put down by what it last stood over the floor,
         which may be off by `uneven` [m]."""
-        still, steps = STEP_SPEEDS[:2]
-        slow = min(max((steps - pace) / (steps - still), 0.0), 1.0)
+        if pace >= _STEPS:
+            return clearance
+        slow = min((_STEPS - pace) / (_STEPS - _STILL), 1.0)
         return clearance - slow * min(self.ground, uneven, max(clearance, 0.0))

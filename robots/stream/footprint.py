@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from robots.solver.footprints import MAX_TWIST
 
 
-@dataclass
+@dataclass(slots=True)
 class Footprint:
     """The middle of a foot's toes' edge on the floor [m, x + iy] and its heading [rad]; how far the
     source's foot has moved and turned away from there since."""
@@ -32,9 +32,13 @@ class Footprint:
 
     def follow(self, moved: complex, turned: float, hold: float, wobble: float) -> None:
         """Go along with the source's foot where it is not firmly held, and beyond its wobble."""
+        if hold < 1:
+            self.pivot += (1 - hold) * moved
+            self.heading += (1 - hold) * turned
         away = self.away + hold * moved
-        self.away = away * min(1.0, wobble / max(abs(away), 1e-12))
-        self.pivot += (1 - hold) * moved + (away - self.away)
+        far = abs(away)
+        self.away = away * (wobble / far) if far > wobble else away
+        self.pivot += away - self.away
         turn = self.turned + hold * turned
         self.turned = min(max(turn, -MAX_TWIST), MAX_TWIST)
-        self.heading += (1 - hold) * turned + (turn - self.turned)
+        self.heading += turn - self.turned

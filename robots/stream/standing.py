@@ -94,9 +94,7 @@ class Standing:
         after = min(self._reach, newest - at)
         time = (self._reach + after) * self._frame_time
         ends = zip(frames[at + after].places, frames[at - self._reach].places, strict=True)
-        speeds = [
-            [abs(b - a) / time for b, a in zip(now, before, strict=True)] for now, before in ends
-        ]
+        speeds = [[abs(a - b) / time, abs(c - d) / time] for (a, c), (b, d) in ends]
         return speeds, frames[at].heights
 
     def of(

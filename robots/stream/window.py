@@ -51,10 +51,10 @@ class Window:
 
     def move_on(self, q: Float[np.ndarray, "T nq"]) -> WindowPoses:
         """Take in that frames are one later and at `q`; the poses of the free ones."""
-        poses = self._terms.poses(q[self._fixed - 1 :], with_mass=True)
-        before = self._com[1:] if len(self._com) else poses.com[[0] * (self._fixed - 1)]
-        self._com = np.concatenate([before, poses.com[:1]])
-        return poses.at(slice(1, None))
+        com = self._terms.com(q[self._fixed - 1])[None]
+        before = self._com[1:] if len(self._com) else com.repeat(self._fixed - 1, axis=0)
+        self._com = np.concatenate([before, com])
+        return self._terms.poses(q[self._fixed :], with_mass=True)
 
     def solve(
         self,
