@@ -28,6 +28,8 @@ _WRENCHES = np.zeros((4, 3, 6))
 _WRENCHES[:3, :, :3] = np.array([skew(axis).T for axis in np.eye(3)])
 _WRENCHES[3, :, 3:] = np.eye(3)
 
+_ONES = np.ones((3, 1))
+
 
 class WindowPoints:
     """Of the `bones`, which are directions, of the soles' points and the middle of the hips, which
@@ -68,6 +70,14 @@ class WindowPoints:
         arms[self._bones.stop :, :3] -= rest[self._bodies[self._bones.stop :]]
         arms[self._bones, 3] = 0.0
         self._arms = arms.T[:, None, None].copy()
+        self._weights = np.full((len(links), 3), W_LIMB_DIRECTION)
+        for points, weight in (
+            (self.soles, W_HOLD),
+            (self._hips, W_HIPS_POSITION),
+            (self._hands, W_HANDS),
+            (self.parts, W_HOLD),
+        ):
+            self._weights[points] = self._firm * weight
         self._moving = np.repeat(dofs.moving(links), 3, axis=0)
 
     def places(self, poses: WindowPoses, which: slice) -> Float[np.ndarray, "T R 3"]:
@@ -84,20 +94,18 @@ class WindowPoints:
         """Where all should be [m], and their weights by axis [1/m, 1/rad]; parts only where some
         are `resting`."""
         frames, count = len(targets.hips), (self.parts if resting else self._hands).stop
-        wanted, weights = np.empty((2, frames, count, 3))
-        wanted[:, self._bones], weights[:, self._bones] = targets.bones, W_LIMB_DIRECTION
-        wanted[:, self.soles] = feet.positions
-        weights[:, self.soles] = self._firm * W_HOLD * feet.holds
+        wanted, weights = np.zeros((2, frames, count, 3))
+        weights[:] = self._weights[:count]
+        wanted[:, self._bones], wanted[:, self.soles] = targets.bones, feet.positions
+        weights[:, self.soles] *= feet.holds
         wanted[:, self._hips] = targets.hips[:, None]
-        weights[:, self._hips] = self._firm * W_HIPS_POSITION
         if self._hands.stop > self._hands.start:
-            between = targets.hands[:, None]
-            squared = (between * between).sum(axis=2, keepdims=True) * self._firm**2
-            wanted[:, self._hands] = between * [[1.0], [0.0]]  # of both their difference is asked
-            weights[:, self._hands] = self._firm * W_HANDS * np.exp(-squared / HANDS_RANGE**2)
+            wanted[:, self._hands.start] = targets.hands  # of both their difference is asked
+            far = np.square(targets.hands) @ _ONES * (self._firm / HANDS_RANGE) ** 2
+            weights[:, self._hands] *= np.exp(-far)[..., None]
         if resting:
             wanted[:, self.parts] = resting.positions
-            weights[:, self.parts] = self._firm * W_HOLD * resting.holds
+            weights[:, self.parts] *= resting.holds
         return wanted, weights
 
     def rows(self, poses: WindowPoses, asked: Asked) -> Rows:

@@ -16,16 +16,17 @@ from robots.solver.window_terms import Terms
 from robots.stream.frame_targets import LATENCY, FrameReader, FrameTargets
 from spark.rotation import quat_from_matrix
 
-_LOST = np.radians(55)  # a bone farther from its direction is stuck,
-_ASTRAY = np.radians(30)  # one farther than this may be: it is given more time;
-_FOUND = np.radians(25)  # a nearer one is free again
-_GAIN = np.radians(15)  # by which a limb has to be nearer where it is led to
+_LOST = float(np.radians(55))  # a bone farther from its direction is stuck,
+_ASTRAY = float(np.radians(30))  # one farther than this may be: it is given more time;
+_FOUND = float(np.radians(25))  # a nearer one is free again
+_GAIN = float(np.radians(15))  # by which a limb has to be nearer where it is led to
 _PATIENCE = 0.1  # [s] that a limb is stuck before it is led,
 _ASTRAY_PATIENCE = 0.3  # [s] or astray
 _OTHER_WAY = 1.0  # [rad] of a hinge between the same way to a pose and another one
 _MAX_DURATION = 0.6  # [s] that it is led, and that it is then left alone
 _W_DETOUR = 3.0  # [1/rad] of the angles that it is led to: firmer than its bones' directions
 _SPEED = 6.0  # [rad/s] at which it is led
+_ONES = np.ones(3)
 
 
 class Detours:
@@ -37,14 +38,14 @@ class Detours:
         trunk = robot.rig.pelvis, robot.rig.chest
         inner = {k for j in trunk for k in robot.tree.chain(int(robot.links[j]))}
         numbers = np.cumsum(~robot.tree.balls) - 1  # of the tree's hinges
-        self._limbs = []
+        self._limbs = []  # the number of the upper one's bone, the lower one's is next; and hinges
         for k in range(len(reader.bones) - 1):
             upper, lower = (robot.rig.roles.require(role) for role in reader.bones[k : k + 2])
             if int(robot.rig.skeleton.parents[lower]) != upper:
                 continue
             chain = [j for j in robot.tree.chain(int(robot.links[lower])) if j not in inner]
             hinges = [int(numbers[j]) for j in chain if not robot.tree.balls[j]]
-            self._limbs.append(([k, k + 1], hinges))
+            self._limbs.append((k, hinges))
         self._stuck = [0.0] * len(self._limbs)  # 1 where patience ends
         self._led = [0.0] * len(self._limbs)  # [s] left; below 0 it is left alone
         self._goals = np.full(len(terms.hinges.at_tpose.angles), np.nan)
@@ -58,6 +59,9 @@ class Detours:
         """The posture that hinges are pulled to, where bones have the directions `bones` and hinges
         are at `angles` [rad] in the first frame of `targets`."""
         worst, time = self._away(bones, targets.bones[0]), self._frame_time
+        if not any(self._led) and max(worst, default=0.0) <= _ASTRAY:
+            self._stuck = [0.0] * len(self._limbs)
+            return self._terms.hinges.at_tpose
         for limb, away in enumerate(worst):
             patience = _PATIENCE if away > _LOST else _ASTRAY_PATIENCE
             self._stuck[limb] = self._stuck[limb] + time / patience if away > _ASTRAY else 0.0
@@ -122,6 +126,6 @@ class Detours:
         self, bones: Float[np.ndarray, "B 3"], wanted: Float[np.ndarray, "B 3"]
     ) -> list[float]:
         """How far [rad] each limb's bones are from their directions, the farthest of them."""
-        cosines = ((bones * wanted) @ np.ones(3)).tolist()
-        nearest = (min(cosines[k] for k in rows) for rows, _ in self._limbs)
+        cosines = ((bones * wanted) @ _ONES).tolist()
+        nearest = [min(cosines[k], cosines[k + 1]) for k, _ in self._limbs]
         return [acos(min(max(cosine, -1.0), 1.0)) for cosine in nearest]

@@ -73,7 +73,8 @@ class ContactTracker:
         motion = [self._standing.motion(frames, at) for at in range(settled, len(frames))]
         speeds = self._scale * np.array([speeds for speeds, _ in motion])
         steps = step_height(speeds, self._hip_height).tolist()
-        feet, numbers, places = self._feet, [], []
+        feet, numbers = self._feet, list[float]()
+        places: list[complex] = []
         for at, (arrived, (speed, height), step) in enumerate(
             zip(self._arrived, motion, steps, strict=True), settled
         ):
