@@ -8,7 +8,7 @@ within the limits and does not jump. Two of an upper arm or leg point its bone, 
 that about itself: the twist, which they can't take, would else draw the arm out of its direction.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -35,8 +35,20 @@ def project(
     """Coordinates within the limits whose links have the rotations `world` (`q_world_joint` of the
     rig's joints), as nearly as their hinges can; the middle of the hips is on the path `hips`
     [m]."""
+    tree, count = robot.tree, len(world)
+    q = turned(robot, world, range(len(tree)))
+    own = in_blocks(lambda block: hips_of(robot, forward_kinematics(tree, q.at(block))), count)
+    return Coordinates(q.pos + hips - own, q.quat, q.angles, q.ball_quats)
+
+
+def turned(
+    robot: Morphology, world: Float[np.ndarray, "T J 4"], links: Iterable[int]
+) -> Coordinates:
+    """The same of a base that stays in its place, and of the joints that carry some `links`; the
+    others are at rest."""
     tree = robot.tree
     count = len(world)
+    carrying = {joint for link in links for joint in tree.chain(link)}
     wanted = {int(link): world[:, j] for j, link in reversed(list(enumerate(robot.links)))}
     angles = np.zeros((count, len(tree)))
     balls = np.tile([1.0, 0, 0, 0], (count, len(tree), 1)) if tree.balls.any() else None
@@ -45,24 +57,24 @@ def project(
         for role, bone in robot.bones.items()
         if role.part in _POINTED
     }
-    links = {-1: wanted.get(-1, np.tile([1.0, 0, 0, 0], (count, 1)))}
+    rotations = {-1: wanted.get(-1, np.tile([1.0, 0, 0, 0], (count, 1)))}
     for group in _hinge_groups(robot):
-        above = links[int(tree.parents[group[0]])]
+        if group[-1] not in carrying:
+            continue
+        above = rotations[int(tree.parents[group[0]])]
         target = wanted[group[-1]]
         local = quat_relative(above, target)
         if tree.balls[group[0]]:
             assert balls is not None
             balls[:, group[0]] = local
-            links[group[-1]] = target
+            rotations[group[-1]] = target
             continue
         angles[:, group] = _hinge_angles(tree, group, local, bones.get(group[-1]))
-        turned = above
+        reached = above
         for j in group:
-            turned = quat_mul(turned, quat_from_rotvec(tree.axes[j] * angles[:, [j]]))
-        links[group[-1]] = turned
-    q = Coordinates(np.tile(tree.base, (count, 1)), links[-1], angles, balls)
-    own = in_blocks(lambda block: hips_of(robot, forward_kinematics(tree, q.at(block))), count)
-    return Coordinates(q.pos + hips - own, q.quat, angles, balls)
+            reached = quat_mul(reached, quat_from_rotvec(tree.axes[j] * angles[:, [j]]))
+        rotations[group[-1]] = reached
+    return Coordinates(np.tile(tree.base, (count, 1)), rotations[-1], angles, balls)
 
 
 def hips_of(robot: Morphology, frames: LinkPoses) -> Float[np.ndarray, "T 3"]:

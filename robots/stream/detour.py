@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from robots.solver.hinges import Posture
-from robots.solver.projection import project
+from robots.solver.projection import turned
 from robots.solver.window_terms import Terms
 from robots.stream.frame_targets import LATENCY, FrameReader, FrameTargets
 from spark.rotation import quat_from_matrix
@@ -38,6 +38,7 @@ class Detours:
         trunk = robot.rig.pelvis, robot.rig.chest
         inner = {k for j in trunk for k in robot.tree.chain(int(robot.links[j]))}
         numbers = np.cumsum(~robot.tree.balls) - 1  # of the tree's hinges
+        self._links: list[int] = []  # of the limbs' lower bones
         self._limbs = []  # the number of the upper one's bone, the lower one's is next; and hinges
         for k in range(len(reader.bones) - 1):
             upper, lower = (robot.rig.roles.require(role) for role in reader.bones[k : k + 2])
@@ -46,6 +47,7 @@ class Detours:
             chain = [j for j in robot.tree.chain(int(robot.links[lower])) if j not in inner]
             hinges = [int(numbers[j]) for j in chain if not robot.tree.balls[j]]
             self._limbs.append((k, hinges))
+            self._links.append(int(robot.links[lower]))
         self._stuck = [0.0] * len(self._limbs)  # 1 where patience ends
         self._led = [0.0] * len(self._limbs)  # [s] left; below 0 it is left alone
         self._goals = np.full(len(terms.hinges.at_tpose.angles), np.nan)
@@ -97,7 +99,8 @@ class Detours:
         the `stuck` ones."""
         robot, terms = self._robot, self._terms
         world = quat_from_matrix(targets.world[:1])
-        q = robot.to_qpos(project(robot, world, targets.hips[:1]))
+        links = [self._links[limb] for limb in led + stuck]
+        q = robot.to_qpos(turned(robot, world, links))
         there = self._away(terms.bones(terms.poses(q))[0], targets.bones[0])
         goals = terms.hinges.angles(q)[0]
 

@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from robots.model.known import known
+from robots.solver import projection
 from robots.solver.projection import _hinge_angles
 from robots.tree import Tree
-from spark.rotation import quat_from_rotvec, quat_mul
+from spark.rotation import quat_from_rotvec, quat_mul, quat_normalize
 
 PITCH_ROLL_YAW = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, 1]])
 HIP = Tree(
@@ -47,3 +49,17 @@ def test_two_hinges_of_an_upper_arm_point_its_bone_whatever_its_twist() -> None:
     wanted = np.stack([np.linspace(-0.6, 0.6, 30), np.full(30, 0.3), np.full(30, 1.2)], axis=1)
     found = _hinge_angles(arm, (0, 1), turned(wanted), down)
     np.testing.assert_allclose(found, wanted[:, :2], atol=1e-9)
+
+
+def test_what_carries_some_links_is_turned_as_where_all_are() -> None:
+    robot = known("robot")
+    tree, rng = robot.tree, np.random.default_rng(0)
+    world = quat_normalize(rng.normal(size=(2, len(robot.links), 4)))
+    hand = len(tree) - 1
+    whole = projection.project(robot, world, np.zeros((2, 3)))
+    some = projection.turned(robot, world, [hand])
+    chain = list(tree.chain(hand))
+    np.testing.assert_array_equal(some.quat, whole.quat)
+    np.testing.assert_array_equal(some.angles[:, chain], whole.angles[:, chain])
+    assert np.abs(whole.angles[:, chain]).max() > 0.1
+    assert not np.delete(some.angles, chain, axis=1).any()

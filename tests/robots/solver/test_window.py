@@ -1,9 +1,14 @@
 """What is near in a few frames, against a look at everything."""
 
+import mujoco
 import numpy as np
+import pytest
 
 from robots.model.known import known
+from robots.model.shapes import surface_of
+from robots.solver.collision import collisions_of
 from robots.solver.near_spheres import NearSpheres
+from robots.solver.window_dofs import as_slice
 from robots.solver.window_poses import WindowPoses
 from robots.solver.window_terms import Terms
 
@@ -18,6 +23,14 @@ def tangled(count: int) -> WindowPoses:
     q[:, 2] -= rng.uniform(0.0, 0.4, count)
     q[:, EMBER.addresses] += rng.normal(0.0, 0.7, (count, len(EMBER.addresses)))
     return TERMS.poses(q)
+
+
+def rolled() -> np.ndarray:
+    """One of them, on its side."""
+    q: np.ndarray = EMBER.to_qpos(EMBER.tpose)[0]
+    q[3:7] = np.sqrt([0.3, 0.4, 0.2, 0.1])
+    q[EMBER.addresses] += np.random.default_rng(5).normal(0.0, 0.5, len(EMBER.addresses))
+    return q
 
 
 def columns(spheres: NearSpheres) -> set[tuple[float, ...]]:
@@ -43,3 +56,35 @@ def test_nothing_that_touches_the_floor_is_missed() -> None:
     ]
     np.testing.assert_allclose(low.depth, depth[:, low.spheres], atol=1e-12)
     assert len(low.spheres) < depth.shape[1]
+
+
+def test_a_shape_that_moves_is_inside_its_sides_and_touches_them() -> None:
+    """Against the points of its surface where MuJoCo puts them."""
+    model, data = EMBER.mjcf.model, mujoco.MjData(EMBER.mjcf.model)
+    data.qpos[:] = rolled()
+    mujoco.mj_kinematics(model, data)
+    poses, polytopes = TERMS.poses(data.qpos[None]), TERMS._collisions._spheres.polytopes
+    shapes = list({pair.large.geom: pair.large for pair in collisions_of(EMBER).pairs}.values())
+    for k, shape in enumerate(shapes):
+        points = surface_of(model, data, shape.geom)
+        which = np.full(len(points), k)
+        beyond = polytopes.beyond(poses, which, points.T[:, None])[:, 0]
+        np.testing.assert_allclose(beyond.max(axis=1), 0.0, atol=1e-9)
+        side = int(beyond[:, 0].argmax())
+        normal, sides = np.empty((3, 1, 1)), np.array([[side]])
+        polytopes.normals(poses, which[:1], sides, out=normal)
+        out = points[:1].T[:, None] + 0.01 * normal
+        farther = polytopes.beyond(poses, which[:1], out)[side, 0, 0]
+        assert farther == pytest.approx(beyond[side, 0] + 0.01)
+
+
+def test_numbers_that_follow_each_other_pick_the_same_as_a_slice() -> None:
+    values = np.arange(10)
+    for numbers in (np.array([3, 4, 5]), np.array([3, 5, 4]), np.zeros(0, dtype=int)):
+        np.testing.assert_array_equal(values[as_slice(numbers)], values[numbers])
+    assert isinstance(as_slice(np.array([3, 4, 5])), slice)
+
+
+def test_the_mass_of_one_pose_is_where_it_is_among_others() -> None:
+    poses = TERMS.poses(np.array([rolled(), EMBER.to_qpos(EMBER.tpose)[0]]))
+    np.testing.assert_array_equal(TERMS.com(rolled()), poses.com[0])
