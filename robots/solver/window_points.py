@@ -84,9 +84,12 @@ class WindowPoints:
         """Where some of them are [m, world]; the unit directions of bones."""
         return self._places(poses, which).transpose(1, 2, 0)
 
-    def bones(self, poses: WindowPoses) -> Float[np.ndarray, "T B 3"]:
-        """The unit directions of the bones [world]."""
-        return self.places(poses, self._bones)
+    def bones_and_soles(
+        self, poses: WindowPoses
+    ) -> tuple[Float[np.ndarray, "T B 3"], Float[np.ndarray, "T P 3"]]:
+        """The unit directions of the bones [world], and the soles' points [m, world]."""
+        both = self.places(poses, slice(self.soles.stop))
+        return both[:, self._bones], both[:, self.soles]
 
     def asked(
         self, targets: PoseTargets, feet: PointTargets, resting: PointTargets | None

@@ -79,7 +79,13 @@ class Terms:
 
     def bones(self, poses: WindowPoses) -> Float[np.ndarray, "T B 3"]:
         """The unit directions of the bones [world]."""
-        return self._points.bones(poses)
+        return self._points.bones_and_soles(poses)[0]
+
+    def bones_and_soles(
+        self, poses: WindowPoses
+    ) -> tuple[Float[np.ndarray, "T B 3"], Float[np.ndarray, "T P 3"]]:
+        """Both in a little more than the time of one."""
+        return self._points.bones_and_soles(poses)
 
     def under(self, solids: Sequence[Solid]) -> WindowFloor:
         """The floor under some shapes."""

@@ -51,8 +51,8 @@ class Quieter:
         """The newest frame, whose heels and toes are at `feet` [m], without noise; None where
         contacts bear what there is of it."""
         root, rotations, translations = frame
-        places = self._offsets if translations is None else translations
-        whole = Frame(*(np.array(part) for part in (root, rotations, places)))  # kept: a copy
+        places = self._offsets if translations is None else np.array(translations)
+        whole = Frame(np.array(root), np.array(rotations), places)  # kept: copies
         self._feet.append(feet.reshape(-1, 3))
         self._frames.append(whole)
         self._unmeasured += 1

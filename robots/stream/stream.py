@@ -95,11 +95,11 @@ class Stream:
             q = self._q[_SHIFTED]
             move_on(self._targets, targets)
             poses = self._window.move_on(q)
-            soles = self._terms.sole_points(poses)[0]
-            foot_targets = self._contacts.update(targets, soles, self.foot_noise)
+            bones, soles = self._terms.bones_and_soles(poses)
+            foot_targets = self._contacts.update(targets, soles[0], self.foot_noise)
             resting = self._rests.update(targets, poses)
-            bones, angles = self._terms.bones(poses)[0], self._terms.hinges.angles(q)[_FIXED]
-            posture = self._detours.update(self._targets, bones, angles)
+            angles = self._terms.hinges.angles(q)[_FIXED]
+            posture = self._detours.update(self._targets, bones[0], angles)
             self._q = self._window.solve(q, poses, self._targets, foot_targets, resting, posture)
         else:
             self._targets = repeated(targets, LATENCY + 1)
