@@ -10,7 +10,7 @@ from jaxtyping import Float
 # and knees: things end somewhere, and feet swing by.
 FOOT_REACH, REACH = 0.3, 0.5
 _BELOW = 0.01  # hip heights below its top at which a point is still on it, and not beside it
-_SAME_PLACE, _SAME_HEIGHT = 0.1, 0.02  # hip heights: places that are one
+_SAME_PLACE, _SAME_HEIGHT = 0.2, 0.02  # hip heights: places that are one
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,13 @@ class Ground:
         """How high [m] points are over the ground below them; the first ones, corners of `feet`,
         over what these stand on while they do."""
         out = points[..., 2] - self.floor_z
+        if not len(self.tops) or not points.size:
+            return out
+        across = points[..., :2].reshape(-1, 2)
+        away = np.maximum(across.min(0) - self.tops[:, :2], self.tops[:, :2] - across.max(0))
         reach = np.full(points.shape[1], REACH * self.hip_height)
         reach[: len(feet)] = FOOT_REACH * self.hip_height
-        for top in self.tops:
+        for top in self.tops[away.max(axis=1) < REACH * self.hip_height]:
             away = points - top
             on = np.linalg.norm(away[..., :2], axis=-1) < reach
             on &= away[..., 2] > -_BELOW * self.hip_height

@@ -101,11 +101,8 @@ class Treads:
 
 def treads_of(source: CanonicalMotion) -> Treads:
     """Where the feet of a motion stand, one entry for each of `rig.soles`."""
-    rig, frame_time, scale = (
-        source.rig,
-        source.frame_time,
-        source.rig.standing_height / ADULT_HEIGHT,
-    )
+    rig, frame_time = source.rig, source.frame_time
+    scale = rig.standing_height / ADULT_HEIGHT
     count, feet = len(source), len(rig.soles)
     stands, ground = np.zeros((count, feet), dtype=bool), np.zeros((count, feet))
     if not feet or count < 2:

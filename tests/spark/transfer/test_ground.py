@@ -32,6 +32,6 @@ def test_a_foot_that_stands_on_a_box_sinks_into_it() -> None:
 
 
 def test_places_that_are_one_are_kept_once() -> None:
-    tops = np.array([[0.0, 0, 0.5], [0.05, 0, 0.51], [0.05, 0, 0.6], [0.5, 0, 0.5]])
+    tops = np.array([[0.0, 0, 0.5], [0.15, 0, 0.51], [0.15, 0, 0.6], [0.5, 0, 0.5]])
     np.testing.assert_array_equal(distinct(tops, 1.0), tops[[0, 2, 3]])
     assert distinct(np.zeros((0, 3)), 1.0).shape == (0, 3)
