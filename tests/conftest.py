@@ -4,6 +4,8 @@ import os
 import tempfile
 from pathlib import Path
 
+import tests.helpers.typecheck  # noqa: F401  (what pyproject.toml names, before it is asked for)
+
 # One thread a process, here and in what tests start: two workers on two cores, each with threads
 # for both, take several times as long. Before anything that reads it is imported.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
