@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import termios
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import mujoco
@@ -16,6 +16,7 @@ import pytest
 
 import spark_sim
 from spark_sim import cli
+from tests.helpers.program import Program
 from tests.helpers.skins import write_character
 
 GOLDENS = Path(__file__).parent / "goldens"
@@ -56,9 +57,14 @@ def bad(*args: object, cwd: Path) -> str:
     """The error of a command that must fail as users' mistakes do: in words, with exit code 2."""
     done = run(*args, cwd=cwd)
     assert done.returncode == 2, done.stderr
-    errors = [line for line in done.stderr.splitlines() if "spark-sim: note:" not in line]
+    return error_of(done.stderr)
+
+
+def error_of(stderr: str) -> str:
+    """What is said beside notes: a mistake, in words."""
+    errors = [line for line in stderr.splitlines() if "spark-sim: note:" not in line]
     assert errors[0].startswith("spark-sim: error: ")
-    assert "Traceback" not in done.stderr
+    assert "Traceback" not in stderr
     return "\n".join([*errors, ""])
 
 
@@ -102,6 +108,27 @@ def here(tmp_path: Path, samples: Path) -> Path:
     for name in (WALK, TARGET):
         (tmp_path / name).write_bytes((samples / name).read_bytes())
     return tmp_path
+
+
+@pytest.fixture(scope="module")
+def erring(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Program]:
+    """The program among files that are none, in one process for all mistakes: none writes."""
+    here = tmp_path_factory.mktemp("erring")
+    for name in (WALK, TARGET):
+        (here / name).write_bytes((samples / name).read_bytes())
+    (here / "empty.bvh").touch()
+    (here / "empty").mkdir()
+    (here / "broken.toml").write_text('pelvis = "mixamorig:Hips"\nhead = \n')
+    (here / "role.toml").write_text('\ntail = "mixamorig:Hips"\n')
+    (here / "joint.toml").write_text('head = "mixamorig:Hed"\n')
+    (here / "twice.toml").write_text('head = "mixamorig:Head"\nneck = ["mixamorig:Head"]\n')
+    (here / "snake.bvh").write_text(SNAKE)
+    before = {path.name for path in here.iterdir()}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("COLUMNS", "80")
+        with Program(here) as program:
+            yield program
+    assert {path.name for path in here.iterdir()} == before
 
 
 @pytest.mark.parametrize("name", ["", *COMMANDS])
@@ -268,15 +295,10 @@ def test_corrections_are_believed(here: Path) -> None:
         ("snake", ("report", "snake.bvh")),
     ],
 )
-def test_errors(name: str, args: tuple[str, ...], here: Path) -> None:
-    (here / "empty.bvh").touch()
-    (here / "empty").mkdir()
-    (here / "broken.toml").write_text('pelvis = "mixamorig:Hips"\nhead = \n')
-    (here / "role.toml").write_text('\ntail = "mixamorig:Hips"\n')
-    (here / "joint.toml").write_text('head = "mixamorig:Hed"\n')
-    (here / "twice.toml").write_text('head = "mixamorig:Head"\nneck = ["mixamorig:Head"]\n')
-    (here / "snake.bvh").write_text(SNAKE)
-    golden(f"error_{name}", bad(*args, cwd=here))
+def test_errors(name: str, args: tuple[str, ...], erring: Program) -> None:
+    done = erring(*args)
+    assert done.code == 2, done.stderr
+    golden(f"error_{name}", error_of(done.stderr))
 
 
 SNAKE = """\
