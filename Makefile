@@ -49,11 +49,11 @@ demo: $(VENV)/.video $(VENV)/.gl
 # Types and shapes are checked in each call of the quick tests; in the slow ones that would take four
 # times as long.
 test: $(VENV)/.dev $(VENV)/.gl $(VENV)/.node
-	$(BIN)/pytest -n 2 -rs -m "not slow and not bench"
-	$(BIN)/pytest -n 2 -rs -m "slow and not bench" --jaxtyping-packages=
+	$(BIN)/pytest -n 2 --dist worksteal -rs -m "not slow and not bench"
+	$(BIN)/pytest -n 2 --dist worksteal -rs -m "slow and not bench" --jaxtyping-packages=
 
 quick: $(VENV)/.dev $(VENV)/.gl $(VENV)/.node
-	$(BIN)/pytest -n 2 -m "not slow and not bench"
+	$(BIN)/pytest -n 2 --dist worksteal -m "not slow and not bench"
 
 check: $(VENV)/.dev
 	$(BIN)/ruff check
