@@ -8,13 +8,15 @@ from jaxtyping import Float
 
 from spark.kinematics import end_positions, world_positions, world_rotations
 from spark.rig.fingers import fingers_below
-from spark.rig.roles import LIMBS, Role, RoleMap
+from spark.rig.roles import LIMBS, Group, Role, RoleMap
+from spark.rig.toes import SHORT, astray, toe_points, toes_ahead
 from spark.rotation import quat_conj, quat_rotate
 from spark.skeleton import Skeleton
 
 _HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
-SHORT = 1e-6  # [m] shorter vectors have no direction
+_LEG_OF = {LIMBS[leg][-1]: LIMBS[leg] for leg in (Group.LEFT_LEG, Group.RIGHT_LEG)}  # by its toe
 _COS_HELD = np.cos(np.radians(60))  # of what a hand holds to the forearm; fingers lie along it
+_STUB = 0.03  # of the way from ankle to toe joint: a shorter toe is none, toes have 0.13 or more
 _THUMB_DROOP = np.radians(20)  # of a thumb below the plane of the palm, about, in artists' rigs
 
 Vector = Float[np.ndarray, "3"]
@@ -49,8 +51,8 @@ class RigPose:
 
     def bone(self, joint: int) -> Vector | None:
         """The vector [m] from `joint` to the next joint of its limb or, at the limb's end, to the
-        middle of what hangs there, but for thumbs and what a hand holds. None where nothing shows a
-        direction."""
+        middle of what hangs there, but for thumbs, what a hand holds and what no toe is. None where
+        nothing shows a direction."""
         role = self.roles.roles[joint]
         below = self.skeleton.subtree(joint)
         for limb in LIMBS.values():
@@ -58,10 +60,26 @@ class RigPose:
                 for j in self.roles.joints(after):
                     if j in below and (vector := self._vector(joint, [j], [])) is not None:
                         return vector
+        if role in _LEG_OF:
+            return self._toe(joint, role)
         aside = {*self._finger(joint, "thumb"), *self._held(joint)}
         aside |= {k for j in aside for k in self.skeleton.subtree(j)}
         fingers = [j for j in below if j not in aside]
         return self._vector(joint, fingers[1:], fingers)
+
+    def _toe(self, toe: int, role: Role) -> Vector | None:
+        """To the middle of what is the toe's own; None where that is too short to show a direction
+        or points astray of its foot."""
+        _, knee, ankle, _ = (self.roles.joint(above) for above in _LEG_OF[role])
+        foot = ahead = np.zeros(3)
+        if knee is not None and ankle is not None:
+            foot = self.positions[toe] - self.positions[ankle]
+            ahead = toes_ahead(foot, self.positions[ankle] - self.positions[knee])
+        joints, ends = toe_points(self.skeleton, toe, self.positions, self.tips, ahead)
+        vector = self._middle(toe, np.concatenate([self.positions[joints], self.tips[ends]]))
+        if vector is None or np.linalg.norm(vector) < _STUB * np.linalg.norm(foot):
+            return None
+        return None if astray(quat_rotate(self.world[toe], vector), ahead) else vector
 
     def _held(self, hand: int) -> list[int]:
         """What hangs on a hand and points away from its forearm, as swords and trays do: no wrist
@@ -100,7 +118,10 @@ class RigPose:
     def _vector(self, joint: int, joints: list[int], tipped: list[int]) -> Vector | None:
         """From `joint` to the middle of other joints and of the End Sites on `tipped`."""
         tips = self.tips[np.isin(self.skeleton.end_parents, tipped)]
-        points = np.concatenate([self.positions[joints], tips])
+        return self._middle(joint, np.concatenate([self.positions[joints], tips]))
+
+    def _middle(self, joint: int, points: Float[np.ndarray, "N 3"]) -> Vector | None:
+        """From `joint` to the middle of points."""
         if not len(points):
             return None
         vector = points.mean(0) - self.positions[joint]

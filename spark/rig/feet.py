@@ -17,6 +17,7 @@ from jaxtyping import Float, Int
 
 from spark.kinematics import end_positions, world_positions
 from spark.rig.roles import Role, RoleMap
+from spark.rig.toes import astray, toe_points
 from spark.rotation import quat_conj, quat_rotate
 from spark.skeleton import Skeleton
 from spark.summary import brief
@@ -41,6 +42,7 @@ _NO_FOOT = 0.04  # [shanks] a foot that reaches no further from its ankle ends t
 _MAX_FOOT = 0.65
 _HUMAN_FOOT = 0.24
 _ODD_TIP = 0.05, 0.5  # shorter or longer, an ankle's own End Site is in other units
+_AHEAD = np.array([1.0, 0.0, 0.0])  # where feet point in the T-pose
 _HEEL, _BALL, _TIP = -0.25 * FOOT_LENGTH, 0.5 * FOOT_LENGTH, 0.75 * FOOT_LENGTH
 
 
@@ -178,7 +180,7 @@ class _TPose:
     """Where joints and End Sites are in the T-pose [m, the root at the origin]."""
 
     def __init__(self, skeleton: Skeleton, roles: RoleMap, tpose: Float[np.ndarray, "J 4"]) -> None:
-        self.skeleton = skeleton
+        self.skeleton, self.roles = skeleton, roles
         self.positions = world_positions(skeleton, tpose, np.zeros(3))
         self.ends = end_positions(skeleton, self.positions, tpose)
         self.hips = [j for role in UPPER_LEGS for j in roles.joints(role)[:1]]
@@ -197,17 +199,34 @@ class _TPose:
         the foot is from the ankle; the ankle's own keeps its direction, with a human foot's length
         if it is much shorter or longer.
         """
-        joints = list(self.skeleton.subtree(joint))
+        joints, ends = self._own(joint)
         ankle = self.positions[joint]
         leg = float(np.linalg.norm(self.positions[self.hips].mean(axis=0) - ankle))
-        held = np.isin(self.skeleton.end_parents, joints)
-        own = self.skeleton.end_parents[held] == joint
-        lengths = np.linalg.norm(self.skeleton.end_offsets[held], axis=1)
+        own = self.skeleton.end_parents[ends] == joint
+        lengths = np.linalg.norm(self.skeleton.end_offsets[ends], axis=1)
         balls = self.positions[list(self.skeleton.children[joint])]
         ball = np.linalg.norm(balls - ankle, axis=1).max(initial=0.0)
-        tips, beyond = self.ends[held][own], self.ends[held][~own & (lengths <= ball)]
+        tips, beyond = self.ends[ends][own], self.ends[ends][~own & (lengths <= ball)]
         size = lengths[own] / leg
         odd = (size > _ODD_TIP[1]) | ((size < _ODD_TIP[0]) & (size > 0))
         tips[odd] = ankle + (tips - ankle)[odd] * (_HUMAN_FOOT / size[odd])[:, None]
         points = np.concatenate([self.positions[joints], tips, beyond])
         return points[np.linalg.norm(points - ankle, axis=1) <= _MAX_FOOT * leg]
+
+    def _own(self, foot: int) -> tuple[list[int], list[int]]:
+        """The joints and the End Sites of a foot, without those beyond it that point astray."""
+        joints = set(self.skeleton.subtree(foot))
+        ends = {
+            e
+            for e, parent in enumerate(self.skeleton.end_parents.tolist())
+            if parent == foot
+            or (parent in joints and not astray(self.ends[e] - self.positions[parent], _AHEAD))
+        }
+        for toe in (j for _, role in FEET.values() for j in self.roles.joints(role) if j in joints):
+            below = self.skeleton.subtree(toe)
+            joints -= set(below[1:])
+            ends -= {e for e in ends if int(self.skeleton.end_parents[e]) in below}
+            toes, tips = toe_points(self.skeleton, toe, self.positions, self.ends, _AHEAD)
+            joints |= set(toes)
+            ends |= set(tips.tolist())
+        return sorted(joints), sorted(ends)

@@ -7,9 +7,10 @@ from jaxtyping import Float
 
 from spark.errors import SkeletonError
 from spark.motion import Motion
-from spark.rig.bones import SHORT, RigPose
+from spark.rig.bones import RigPose
 from spark.rig.observed import mean_rotations, nearest_right_angle
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
+from spark.rig.toes import SHORT
 from spark.rotation import (
     quat_angle,
     quat_conj,
