@@ -17,6 +17,7 @@ from spark.rig.rig import Rig
 from spark.skin import Skin
 from spark.summary import counted, html_table, time_span
 from spark.transfer.canonical import CanonicalMotion, to_canonical
+from spark.transfer.held_floor import on_one_floor
 from spark_sim import files
 
 if TYPE_CHECKING:  # these load MuJoCo, which a character's clip can do without
@@ -115,7 +116,7 @@ class ClipBase(ABC):
     @cached_property
     def canonical(self) -> CanonicalMotion:
         """The motion in canonical form. Raises what `rig` raises."""
-        return to_canonical(self.motion, self.rig)
+        return on_one_floor(to_canonical(self.motion, self.rig))
 
     @cached_property
     def contacts(self) -> dict[str, Bool[np.ndarray, "T"]]:

@@ -8,7 +8,6 @@ with the last one that it had.
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -21,17 +20,12 @@ from spark.rotation import quat_angle, quat_conj, quat_mul
 from spark.runs import true_runs
 from spark.summary import counted
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.stray_frames import jumps_of, repeats_of, strays_of
 
-_STRAY_TIME = 0.1  # [s] up to which frames between jumps belong to nothing
-# A joint's step in the mean: from a T-pose into the motion 0.2 to 0.5 hip heights, at the quickest
-# turn of a flip 0.15, but within 1/16 s.
-_LEAST_STEP = 0.12  # [hip heights]
-_LEAST_SPEED = 5.0  # [hip heights/s]
 _LEAST_TURN = 1.0  # [rad] of a joint in its parent; glitches turn it by up to pi
 _LEAST_TURN_SPEED = 40.0  # [rad/s]: wrists reach 30
 _DROP_TIME = 0.2  # [s] up to which a body that stands still was not seen, and not at rest,
 _LEAST_CATCH_UP = 0.01  # [hip heights] if its joints then go so far in the mean in one frame
-_SAME = 1e-9  # [m], or of a quaternion
 
 
 def without_strays(source: CanonicalMotion) -> tuple[CanonicalMotion, tuple[str, ...]]:
@@ -39,24 +33,11 @@ def without_strays(source: CanonicalMotion) -> tuple[CanonicalMotion, tuple[str,
     between its neighbours, or, at an end of the motion, by the only one; and notes that say where.
     What jumps in half of the frames or more is left as it is, and so are jumps to where the motion
     goes on."""
-    repeats = _repeats(source)
+    repeats = repeats_of(source)
     moving, dropped = _without_repeats(source, repeats)
     whole, note = _without_stray_frames(moving, repeats)
     joints, notes = _without_stray_joints(whole)
     return joints, (*dropped, *note, *notes)
-
-
-def _repeats(source: CanonicalMotion) -> Bool[np.ndarray, "T"]:
-    """Whether a frame is that before it."""
-
-    def same(block: slice) -> Bool[np.ndarray, "N"]:
-        part = source.picked(slice(max(block.start - 1, 0), block.stop))
-        turned = np.abs(np.diff(part.rotations, axis=0)).max(axis=(1, 2), initial=0.0)
-        moved = np.abs(np.diff(part.hips, axis=0)).max(axis=1, initial=0.0)
-        own = np.maximum(turned, moved) < _SAME
-        return own if block.start else np.append(False, own)
-
-    return in_blocks(same, len(source))
 
 
 def _without_repeats(
@@ -86,7 +67,7 @@ def _passed_over(source: CanonicalMotion, frames: Bool[np.ndarray, "T"]) -> Cano
 def _without_stray_frames(
     source: CanonicalMotion, repeats: Bool[np.ndarray, "T"]
 ) -> tuple[CanonicalMotion, tuple[str, ...]]:
-    stray = _strays(_jumps(source), source.frame_time, repeats)
+    stray = strays_of(jumps_of(source), source.frame_time, repeats)
     if not stray.any():
         return source, ()
     note = f"the source jumps away from all other frames, as in a T-pose before a clip{_in(stray)}"
@@ -112,7 +93,7 @@ def _without_stray_joints(source: CanonicalMotion) -> tuple[CanonicalMotion, tup
     strays = {
         j: stray
         for k, j in enumerate(joints)
-        if (stray := _strays(jumped[:, k], source.frame_time)).any()
+        if (stray := strays_of(jumped[:, k], source.frame_time)).any()
     }
     if not strays:
         return source, ()
@@ -129,47 +110,6 @@ def _without_stray_joints(source: CanonicalMotion) -> tuple[CanonicalMotion, tup
         for j, stray in strays.items()
     ]
     return replace(source, rotations=rotations), tuple(notes)
-
-
-def _jumps(source: CanonicalMotion) -> Bool[np.ndarray, "T"]:
-    """Whether a source jumps to a frame: its joints come there by a step that is long, and like
-    neither the one before nor the one after."""
-    rig, count = source.rig, len(source)
-    if count < 3:
-        return np.zeros(count, dtype=bool)
-    least = max(_LEAST_STEP, _LEAST_SPEED * source.frame_time)
-
-    def length(step: Float[np.ndarray, "N J 3"]) -> Float[np.ndarray, "N"]:
-        return np.linalg.norm(step, axis=-1).mean(axis=-1) / rig.hip_height
-
-    def far(block: slice) -> Bool[np.ndarray, "N"]:
-        start, stop = max(block.start - 2, 0), min(block.stop + 1, count)
-        steps = np.diff(canonical_positions(source.frames(start, stop), rig.roles.held), axis=0)
-        changes = length(np.diff(steps, axis=0))
-        nearest = np.minimum(np.append(np.inf, changes), np.append(changes, np.inf))
-        own = np.append(0.0, np.minimum(nearest, length(steps)))
-        return np.greater(own[block.start - start : block.stop - start], least)
-
-    return in_blocks(far, count)
-
-
-def _strays(
-    jumps: Bool[np.ndarray, "T"],
-    frame_time: float,
-    repeats: Bool[np.ndarray, "T"] | None = None,
-) -> Bool[np.ndarray, "T"]:
-    """The frames in short pieces between two jumps, or between one and an end; there in pieces of
-    any length that `repeats` tells to stand still: a pose that was put before a clip."""
-    stray = np.zeros(len(jumps), dtype=bool)
-    edges = np.flatnonzero(jumps).tolist()
-    if not edges:
-        return stray
-    most = max(1, int(_STRAY_TIME / frame_time + 1e-6))
-    for start, stop in pairwise([0, *edges, len(jumps)]):
-        at_end = start == 0 or stop == len(jumps)
-        still = at_end and repeats is not None and bool(repeats[start + 1 : stop].all())
-        stray[start:stop] = stop - start <= most or still
-    return stray & (2 * stray.sum() < len(stray))
 
 
 def _bridged(
