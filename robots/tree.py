@@ -338,8 +338,7 @@ def _turn(
 def _apply(
     rotations: Float[np.ndarray, "3 3 T"], v: Float[np.ndarray, "3 *T"]
 ) -> Float[np.ndarray, "3 T"]:
-    if v.ndim == 1:
-        return v @ rotations
+    # Not by BLAS, whose last bits depend on how many frames there are.
     return rotations[:, 0] * v[0] + rotations[:, 1] * v[1] + rotations[:, 2] * v[2]
 
 
