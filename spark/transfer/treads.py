@@ -107,16 +107,17 @@ def treads_of(source: CanonicalMotion) -> Treads:
     stands, ground = np.zeros((count, feet), dtype=bool), np.zeros((count, feet))
     if not feet or count < 2:
         return Treads(rig, frame_time, np.zeros((count, feet, 2)), stands, ground)
-    found = in_blocks(lambda block: _places(source.picked(block)), count)
-    com, lowest = found[:, :3], found[:, 3 : 3 + feet]
-    paths = found[:, 3 + feet :].reshape(count, feet, 2, 3)
+    found = in_blocks(lambda block: _feet(source.picked(block)), count)
+    lowest, paths = found[:, :feet], found[:, feet:].reshape(count, feet, 2, 3)
     ways = paths[..., :2].mean(axis=2)
     still = _still(paths, rig.standing_height, frame_time)
-    carries = still & _carry(paths, lowest, still, com, frame_time, scale)
     runs = [(k, start, stop) for k in range(feet) for start, stop in true_runs(still[:, k])]
     runs.sort(key=lambda run: run[1])
     heights = np.array([np.median(lowest[start:stop, k]) for k, start, stop in runs])
+    if not len(runs) or np.ptp(heights) <= MIN_STEP * scale:
+        return Treads(rig, frame_time, ways, stands, ground)
     places = np.array([ways[start:stop, k].mean(axis=0) for k, start, stop in runs])
+    carries = _carry(paths, lowest, still, center_of_mass(source), frame_time, scale)
     sure = [carries[start:stop, k].sum() * frame_time > MIN_TIME for k, start, stop in runs]
     known = np.array(sure, dtype=bool)
     if not (np.abs(np.diff(heights[known])) > MIN_STEP * scale).any():
@@ -132,14 +133,17 @@ def treads_of(source: CanonicalMotion) -> Treads:
     return Treads(rig, frame_time, ways, stands, ground)
 
 
-def _places(source: CanonicalMotion) -> Float[np.ndarray, "T N"]:
-    """The centre of mass, how high over the floor the lowest point of each sole is, heels and toes
-    [m]."""
-    rig, positions = source.rig, canonical_positions(source)
-    world = quat_mul(source.rotations, rig.tpose)
+def _feet(source: CanonicalMotion) -> Float[np.ndarray, "T N"]:
+    """How high over the floor the lowest point of each sole is, and heels and toes [m]."""
+    rig, count = source.rig, len(source)
+    joints = sorted({*rig.contact_joints, *(j for sole in rig.soles for j in sole.joints.tolist())})
+    positions = np.zeros((count, len(rig.skeleton), 3))
+    world = np.zeros((count, len(rig.skeleton), 4))
+    positions[:, joints] = canonical_positions(source, joints)
+    world[:, joints] = quat_mul(source.rotations[:, joints], rig.tpose[joints])
     lowest = lowest_points(rig.soles, positions, world) - source.floor_z
-    ends = ends_of_feet(rig.soles, rig.roles, positions, world).reshape(len(source), -1)
-    return np.column_stack([center_of_mass(source), lowest, ends])
+    ends = ends_of_feet(rig.soles, rig.roles, positions, world).reshape(count, -1)
+    return np.column_stack([lowest, ends])
 
 
 def _still(
