@@ -1,22 +1,26 @@
 """How one foot of a stream's robot stands, frame by frame."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from robots.solver.foot_path import STEP_SPEEDS
 from robots.stream.footprint import Footprint
 
 _STILL, _STEPS = STEP_SPEEDS[:2]
+_SETTLES = 0.1  # of what soles are off, in a frame
 
 
 @dataclass(slots=True)
 class Foot:
     """Whether heel and toes of the source's foot stand, how far the robot's are held (0 to 1), over
-    what its soles last stood [m, scaled], and where it is held."""
+    what its soles last stood [m, scaled], and where it is held. On what climbs over the floor, that
+    is at `top` [m, the source's own], its soles are at `rise` [m, scaled]."""
 
     planted: tuple[bool, bool] = (False, False)
     holds: tuple[float, float] = (0.0, 0.0)
     ground: float = 0.0
     footprint: Footprint = field(default_factory=Footprint)
+    top: float = 0.0
+    rise: float = 0.0
 
     @property
     def is_held(self) -> bool:
@@ -31,7 +35,7 @@ class Foot:
 
     def copy(self) -> "Foot":
         """One that goes on by itself."""
-        return Foot(self.planted, self.holds, self.ground, self.footprint.copy())
+        return replace(self, footprint=self.footprint.copy())
 
     def move_on(
         self,
@@ -49,6 +53,13 @@ class Foot:
         hold = max(self.holds)
         if hold > 0:
             self.footprint.follow(moved[self.on_toe], turned, hold, wobble)
+
+    def stand_on(self, top: float, clearance: float) -> None:
+        """What so high a ground [m, the source's own] over the floor its soles are on, so high [m,
+        scaled] there: the mean of some frames, as feet come down with their heels."""
+        known = top > 0 and True in self.planted and abs(top - self.top) < 1e-9
+        self.rise = self.rise + _SETTLES * (clearance - self.rise) if known else clearance
+        self.rise, self.top = (self.rise, top) if top > 0 else (0.0, 0.0)
 
     def grip(self, loosens: float, tightens: float) -> None:
         """Take hold of what stands, and let go of the rest, by so much at most."""

@@ -79,9 +79,13 @@ class ContactTracker:
             zip(self._arrived, motion, steps, strict=True), settled
         ):
             stood = [foot.planted for foot in feet]
-            stands = self._standing.of(frames, at, stood, speed, height)
+            ground = self._standing.below(height, [foot.top for foot in feet])
+            stands = self._standing.of(frames, at, stood, speed, height, ground)
             for s, foot in enumerate(feet):
-                clearance = arrived.clearance[s]
+                if True in stands[s]:
+                    foot.stand_on(ground[s], arrived.clearance[s])
+                top = foot.rise if ground[s] == foot.top else self._scale * ground[s]
+                clearance = arrived.clearance[s] - top
                 moved, turned = arrived.moved[s], arrived.turned[s]
                 foot.move_on(stands[s], clearance, moved, turned, self._wobble)
                 # Where a foot will come down that is still in the air is not known yet.
@@ -95,13 +99,13 @@ class ContactTracker:
                 (heel, toes), (heel_step, toe_step) = foot.holds, step[s]
                 # The ball leaves the floor with either end.
                 numbers += (heel, min(heel, toes), toes)
-                numbers += (heel_step, max(heel_step, toe_step), toe_step, up, float(known))
+                numbers += (heel_step, max(heel_step, toe_step), toe_step, up, float(known), top)
                 places += (foot.footprint.pivot, cmath.rect(1.0, foot.footprint.heading))
             if at == settled:
                 feet = [foot.copy() for foot in feet]
         return self._targets(
             np.array([arrived.pitched for arrived in self._arrived]),
-            np.array(numbers).reshape(-1, 8).T,
+            np.array(numbers).reshape(-1, 9).T,
             np.array(places, dtype=complex).reshape(-1, 2).T,
         )
 
@@ -131,18 +135,19 @@ class ContactTracker:
     def _targets(
         self,
         pitched: Float[np.ndarray, "T P 3"],
-        feet: Float[np.ndarray, "8 F"],
+        feet: Float[np.ndarray, "9 F"],
         places: Complex[np.ndarray, "2 F"],
     ) -> PointTargets:
         """Where the soles' points are held, and how firmly. Of each foot in each frame there are,
         in `feet`, how far its heel, ball and toes are held, and how high they step [m], how high
-        the sole is where not held [m], and whether it is known where; in `places` the middle of its
-        toes [m, x + iy], and a unit along it."""
-        held, step, up, known = feet[:3], feet[3:6], feet[6], feet[7]
+        the sole is where not held [m], whether it is known where, and how high the ground is [m];
+        in `places` the middle of its toes [m, x + iy], and a unit along it."""
+        held, step, up, known, top = feet[:3], feet[3:6], feet[6], feet[7], feet[8]
         most, free = np.maximum(held[0], held[2]), 1 - held
         ends = np.empty((4, *held.shape))
         ends[0] = held
         np.maximum((1 - most) * up, free * step, out=ends[1])
+        ends[1] += top
         np.multiply(known, np.maximum(held, RAISED_HOLD[0] * most), out=ends[2])
         np.add(held, SWING_HOLD[2] * near_floor(up / self._hip_height) * free, out=ends[3])
         hold, low, along_floor, in_height = ends.reshape(4, -1).take(self._end, axis=1)

@@ -23,10 +23,12 @@ from spark.rig.contacts import (
     SPEED_WINDOW,
 )
 from spark.transfer.noise import BORNE_SPEED, LEEWAY
+from spark.transfer.treads import MIN_PUSH, MIN_STEP, SAME_HEIGHT
 
 _RELEASE_FACTOR = (
     1.5  # times the speed and height at which a foot comes to stand: there it is let go
 )
+_UNDER_MASS = 0.3  # [m, of an adult] from a foot that steps up to below the centre of mass
 _LONGEST = 0.5  # [s] over which a foot's speed is told where it trembles
 _ON_FEET = 0.6  # hips' heights of a T-pose above which nothing but feet carries a body
 
@@ -36,11 +38,13 @@ Ends = list[tuple[bool, bool]]
 
 class SourceFeet(NamedTuple):
     """The heel and toes of each of a source's feet in one frame, in plain numbers: their places
-    over the floor [m, x + iy] and heights over where they stand [m], both the source's own; and
-    how high its hips and its centre of mass are [m], scaled."""
+    over the floor [m, x + iy] and heights over where they stand on it [m], both the source's own;
+    where its centre of mass is over the floor [m], too; and how high this and its hips are [m],
+    scaled."""
 
     places: list[list[complex]]
     heights: list[list[float]]
+    middle: complex
     hips: float
     com: float
 
@@ -54,6 +58,8 @@ class Standing:
         size = float(reader.source.standing_height / ADULT_HEIGHT)
         self._max_speed, self._max_height = PLANTED_SPEED * size, PLANTED_HEIGHT * size
         self._max_creep, self._max_tilt = MAX_CREEP * size, MAX_TILT * size
+        self._least_step, self._under_mass = MIN_STEP * size, _UNDER_MASS * size
+        self._off = SAME_HEIGHT * size
         self._on_feet = _ON_FEET * float(reader.robot.rig.hip_height)
         self._reach = max(1, round(SPEED_WINDOW / 2 / frame_time))
         self._creep = max(1, round(CREEP_TIME / frame_time))
@@ -80,7 +86,9 @@ class Standing:
         """Those of a frame."""
         places = targets.feet[..., :2].view(np.complex128)[..., 0].tolist()
         heights = (targets.feet[..., 2] - self._low).tolist()
-        return SourceFeet(places, heights, float(targets.hips[2]), float(targets.com[2]))
+        x, y, com = targets.com.tolist()
+        middle = complex(x, y) / self._scale
+        return SourceFeet(places, heights, middle, float(targets.hips[2]), com)
 
     def motion(
         self, frames: Sequence[SourceFeet], at: int
@@ -104,21 +112,57 @@ class Standing:
         stood: Ends,
         speeds: list[list[float]],
         heights: list[list[float]],
+        ground: list[float],
     ) -> Ends:
         """Whether heels and toes stand in one of some frames that `stood` in the one before; they
-        are so fast [m/s] and so high [m] there."""
+        are so fast [m/s] and so high [m] there, over a floor above which the `ground` is so high
+        [m] under each foot. It changes where one stands on something else."""
         stands = []
-        feet = zip(self._has_foot, stood, speeds, heights, strict=True)
-        for has_foot, (heel_stood, toes_stood), speed, (heel_height, toe_height) in feet:
-            heel = has_foot and self._stands(heel_stood, speed[0], heel_height)
-            toes = has_foot and self._stands(toes_stood, speed[1], toe_height)
+        feet = zip(self._has_foot, stood, speeds, heights, ground, strict=True)
+        for has_foot, (heel_stood, toes_stood), speed, (heel_height, toe_height), under in feet:
+            heel = has_foot and self._stands(heel_stood, speed[0], heel_height - under)
+            toes = has_foot and self._stands(toes_stood, speed[1], toe_height - under)
             # Who stands on the toes does not stand on the heel.
             heel = heel and (not toes or heel_height < toe_height + self._max_tilt)
             stands.append((heel, toes))
-        if not any(map(any, stands)) and self._carried_by_feet(frames, at):
-            creeping = self._creeping(frames[at - self._creep : at + 1]).tolist()
+        if not any(map(any, stands)) and self._carried_by_feet(frames, at, FLIGHT_PUSH):
+            passed = frames[at - self._creep : at + 1]
+            s = self._steps_up(passed, ground)
+            if s is not None and self._carried_by_feet(frames, at, MIN_PUSH):
+                heel_height, toe_height = heights[s]
+                ground[s] = min(heel_height, toe_height)
+                stands[s] = (heel_height < ground[s] + self._max_tilt, toe_height <= ground[s])
+                return stands
+            creeping = self._creeping(passed, ground).tolist()
             return [(heel, toes) for heel, toes in creeping]
         return stands
+
+    def below(self, heights: list[list[float]], known: Sequence[float]) -> list[float]:
+        """What feet that are so high are over [m]: the highest ground that any is known to have
+        stood on."""
+        return [
+            max((top for top in known if top < min(ends) + self._off), default=0.0)
+            for ends in heights
+        ]
+
+    def _steps_up(self, frames: Sequence[SourceFeet], ground: list[float]) -> int | None:
+        """Which foot, nearer to the mass than any other and still all through some frames, is a
+        step higher than the ground that is known."""
+        if self._window:
+            return None
+        first, last = frames[0], frames[-1]
+        away = [
+            min(abs(place - last.middle) for place in ends) if has_foot else np.inf
+            for ends, has_foot in zip(last.places, self._has_foot, strict=True)
+        ]
+        s = int(np.argmin(away))
+        heights = [min(feet.heights[s]) for feet in frames]
+        low = int(np.argmin(last.heights[s]))
+        moved = abs(last.places[s][low] - first.places[s][low])
+        still = moved < self._max_speed * self._creep * self._frame_time
+        still &= max(heights) - min(heights) < self._max_tilt
+        up = heights[-1] > ground[s] + self._least_step
+        return s if up and still and away[s] < self._under_mass else None
 
     def _stands(self, stood: bool, speed: float, height: float) -> bool:
         factor = _RELEASE_FACTOR if stood else 1.0
@@ -133,22 +177,26 @@ class Standing:
         heights = np.mean([feet.heights for feet in frames], axis=0)
         return (np.abs(slope) / self._frame_time).tolist(), heights.tolist()
 
-    def _carried_by_feet(self, frames: Sequence[SourceFeet], at: int) -> bool:
-        """Whether a body is high enough to be on its feet, and does not fall freely."""
+    def _carried_by_feet(self, frames: Sequence[SourceFeet], at: int, push: float) -> bool:
+        """Whether a body is high enough to be on its feet, and is given so much `push` [body
+        weights] at least: it does not fall freely."""
         if not any(self._has_foot) or frames[at].hips < self._on_feet:
             return False
         middle = min(at, len(frames) - 1 - self._reach)
         below, here, above = (frames[middle + k * self._reach].com for k in (-1, 0, 1))
         fall = (2 * here - below - above) / (self._reach * self._frame_time) ** 2 / self._scale
-        return fall <= (1 - FLIGHT_PUSH) * GRAVITY
+        return fall <= (1 - push) * GRAVITY
 
-    def _creeping(self, frames: Sequence[SourceFeet]) -> Bool[np.ndarray, "S 2"]:
+    def _creeping(
+        self, frames: Sequence[SourceFeet], ground: list[float]
+    ) -> Bool[np.ndarray, "S 2"]:
         """The slowest and lowest heel or toe over some frames, and those that are as low and go
         along with it where all feet have one: a body that sways, and its feet with it."""
         first, last = np.array([frames[0].places, frames[-1].places])
         velocity = (last - first) / (self._creep * self._frame_time)
         speed = np.abs(velocity)
         height: Float[np.ndarray, "S 2"] = np.mean([feet.heights for feet in frames], axis=0)
+        height = height - np.array(ground)[:, None]
         lower = height < height.min(axis=1, keepdims=True) + self._max_tilt
         lower &= np.array(self._has_foot)[:, None]
         cost = np.where(lower, speed / self._max_speed + height / self._max_height, np.inf)

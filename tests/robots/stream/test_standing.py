@@ -19,10 +19,17 @@ LEFT, RIGHT = 0, 1
 
 
 def stands(
-    speeds: tuple[float, float], heights: tuple[float, float], *, fall: float = 0.0, hips: float = 1
+    speeds: tuple[float, float],
+    heights: tuple[float, float],
+    *,
+    fall: float = 0.0,
+    hips: float = 1,
+    aside: float = 0.0,
+    ground: list[float] | None = None,
 ) -> np.ndarray:
-    """Of a body whose feet go forwards so fast [m/s] and so high [m, over where they stand], which
-    falls by so much [g], whose hips are so high [of a T-pose's]."""
+    """Of a body whose feet go forwards so fast [m/s] and so high [m, over where they stand],
+    `aside` [m] of it, which falls by so much [g], whose hips are so high [of a T-pose's]. It knows
+    `ground` [m] under them, which is changed where it stands on other one."""
     standing = Standing(READER, 1 / FPS)
     rotations = np.tile([1.0, 0, 0, 0], (len(RIG.skeleton), 1))
     own = READER.targets(Frame(np.array([0.0, 0, RIG.hip_height]), rotations))
@@ -30,6 +37,7 @@ def stands(
     for k in range(standing.history + 3):
         time, feet, com = k / FPS, own.feet.copy(), own.com.copy()
         feet[..., 0] += np.array(speeds)[:, None] * time
+        feet[..., 1] += aside
         feet[..., 2] = READER.ground.low + np.array(heights)[:, None]
         com[2] -= READER.scale * fall * 9.81 / 2 * time**2
         targets = replace(own, feet=feet, com=com, hips=own.hips * [1, 1, hips])
@@ -37,7 +45,8 @@ def stands(
     at, (told, over) = standing.history, standing.motion(frames, standing.history)
     np.testing.assert_allclose(told, np.abs(speeds)[:, None] * [1, 1], atol=1e-9)
     none = [(False, False)] * 2
-    return np.array(standing.of(frames, at, none, told, over))
+    ground = [0.0, 0.0] if ground is None else ground
+    return np.array(standing.of(frames, at, none, told, over, ground))
 
 
 def test_the_slower_and_lower_foot_carries() -> None:
@@ -66,3 +75,40 @@ def test_who_stands_on_one_foot_does_not_creep_on_the_other() -> None:
     found = stands((0.0, 0.4), (0.0, 0.0))
     assert found[LEFT].all()
     assert not found[RIGHT].any()
+
+
+def test_a_foot_that_is_still_on_a_step_stands_there() -> None:
+    """While the other swings higher, and nothing else carries the body, which does not fall."""
+    ground = [0.0, 0.0]
+    found = stands((0.0, 1.5), (0.3, 0.5), ground=ground)
+    assert found[LEFT].any()
+    assert not found[RIGHT].any()
+    assert ground == pytest.approx([0.3, 0.0])
+    again = [0.3, 0.3]  # from then on, both feet stand there
+    assert stands((0.0, 0.0), (0.3, 0.3), ground=again).all()
+    assert again == [0.3, 0.3]
+
+
+@pytest.mark.parametrize(
+    ("speeds", "heights", "fall", "aside"),
+    [
+        ((0.0, 1.5), (0.3, 0.5), 0.9, 0.0),
+        ((0.0, 0.0), (0.3, 0.0), 0.0, 0.0),
+        ((0.0, 1.5), (0.08, 0.5), 0.0, 0.0),
+        ((0.0, 1.5), (0.3, 0.5), 0.0, 1.0),
+    ],
+    ids=["in a jump", "held up beside one that stands", "as high as floors are off", "far away"],
+)
+def test_ground_is_not_told_from_feet(
+    speeds: tuple[float, float], heights: tuple[float, float], fall: float, aside: float
+) -> None:
+    ground = [0.0, 0.0]
+    stands(speeds, heights, fall=fall, aside=aside, ground=ground)
+    assert ground == [0.0, 0.0]
+
+
+def test_feet_are_over_the_highest_ground_that_is_known() -> None:
+    below = Standing(READER, 1 / FPS).below
+    high = [[0.5, 0.62], [0.2, 0.3]]
+    assert below(high, [0.0, 0.5]) == [0.5, 0.0]
+    assert below(high, [0.23, 0.7]) == [0.23, 0.23]

@@ -46,6 +46,7 @@ from spark.runs import true_runs
 from spark.transfer.canonical import at_frame_time, from_canonical, to_canonical
 from spark_sim.loading import load_robot
 from tests.helpers.recordings import recording
+from tests.spark.transfer.test_treads import BOX, onto_box
 
 RIG = sample_rig("walker")
 WALK = sample_motion("walk", RIG, 60.0).frames(0, 90)
@@ -227,6 +228,17 @@ def test_the_bars_hold_on_real_clips(clip: str) -> None:
     assert found.limb_error_rad <= np.radians(6.5)  # dab hides its face, where hands give way
     assert found.at_limit == 0
     assert found.fastest_rad_s <= 20
+
+
+def test_soles_stand_on_the_box_that_the_source_stands_on() -> None:
+    """And on the floor before and after, each 0.3 s after the source has come there."""
+    source = onto_box()
+    made = follow(source, EMBER)
+    poses = forward_kinematics(EMBER.tree, made.coordinates)
+    lowest = np.stack([points_of(EMBER, poses, sole)[:, 2].min(axis=0) for sole in EMBER.soles])
+    scale = EMBER.rig.hip_height / source.rig.hip_height
+    for frames, height in ((slice(10, 55), 0.0), (slice(112, 145), BOX), (slice(202, 235), 0.0)):
+        np.testing.assert_allclose(lowest[:, frames], scale * height, atol=0.012)
 
 
 def test_hands_and_knees_of_one_who_crawls_are_not_in_the_floor() -> None:
