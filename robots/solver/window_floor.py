@@ -51,13 +51,16 @@ class WindowFloor:
         """How deep [m] each sphere is in the floor; below 0 over it."""
         return self._spheres.depth(poses)
 
-    def low(self, poses: WindowPoses) -> Low:
-        """The spheres of shapes that may be felt."""
+    def low(self, poses: WindowPoses, ground: Float[np.ndarray, "T A"] | None = None) -> Low:
+        """The spheres of shapes that may be felt; those that always are stand on `ground` [m]."""
         balls = self._balls.depth(poses)
         near = np.logical_or.reduce(balls > self._felt).take(self._shape)
         near[self._always] = True
         spheres = near.nonzero()[0]
-        return Low(spheres, self._spheres.depth(poses, spheres))
+        depth = self._spheres.depth(poses, spheres)
+        if ground is not None:
+            depth[:, self._always] += ground
+        return Low(spheres, depth)
 
     def rows(self, poses: WindowPoses, low: Low, scale: Float[np.ndarray, "T"]) -> Rows | None:
         """r = w one_sided(depth), w = `W_FLOOR` x `scale`, of what is felt in some frame."""

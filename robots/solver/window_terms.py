@@ -93,9 +93,9 @@ class Terms:
         lifted = Lifted(tuple(solids), self._dofs.bodies(links), self._dofs.moving(links))
         return WindowFloor(lifted, self._kinematics.rest, per_metre(self.robot))
 
-    def low(self, poses: WindowPoses) -> Low:
-        """What is near the floor."""
-        return self._floor.low(poses)
+    def low(self, poses: WindowPoses, ground: Float[np.ndarray, "T P"] | None = None) -> Low:
+        """What is near the floor, or above the `ground` [m] under the points of the soles."""
+        return self._floor.low(poses, ground)
 
     def candidates(self, poses: WindowPoses) -> NearSpheres:
         """The collision candidates, in these poses and others that are not far away."""

@@ -55,6 +55,8 @@ class ContactTracker:
         self._index_points()
         self._arrived: deque[_Arrived] = deque(maxlen=ahead + 1)
         self._source: deque[SourceFeet] = deque(maxlen=self._standing.history + ahead + 1)
+        self.ground: Float[np.ndarray, "T P"] = np.zeros((ahead + 1, len(self._foot)))
+        """Of the last frames, how high [m] what each of the soles' points stands on is."""
         self._last_axes: Complex[np.ndarray, "S 3"] = np.zeros((0, 3), dtype=complex)
         self._feet = [Foot() for _ in self._robot.soles]
 
@@ -148,6 +150,7 @@ class ContactTracker:
         ends[0] = held
         np.maximum((1 - most) * up, free * step, out=ends[1])
         ends[1] += top
+        self.ground = (most * top).take(self._foot)
         np.multiply(known, np.maximum(held, RAISED_HOLD[0] * most), out=ends[2])
         np.add(held, SWING_HOLD[2] * near_floor(up / self._hip_height) * free, out=ends[3])
         hold, low, along_floor, in_height = ends.reshape(4, -1).take(self._end, axis=1)

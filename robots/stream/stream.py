@@ -100,7 +100,8 @@ class Stream:
             resting = self._rests.update(targets, poses)
             angles = self._terms.hinges.angles(q)[_FIXED]
             posture = self._detours.update(self._targets, bones[0], angles)
-            self._q = self._window.solve(q, poses, self._targets, foot_targets, resting, posture)
+            asked = self._targets, foot_targets, resting, posture
+            self._q = self._window.solve(q, poses, *asked, self._contacts.ground)
         else:
             self._targets = repeated(targets, LATENCY + 1)
             self._q = self._first(targets)

@@ -64,14 +64,15 @@ class Window:
         foot_targets: PointTargets,
         resting: PointTargets | None,
         posture: Posture,
+        ground: Float[np.ndarray, "F P"],
     ) -> Float[np.ndarray, "T nq"]:
         """`q` after at most `_MAX_ITER` steps of its free frames, which have these targets, and
-        are in these poses at first."""
+        are in these poses at first; soles are over `ground` [m]."""
         terms, free = self._terms, self._free
         candidates = terms.candidates(poses.at(slice(-1, None)))
         asked = terms.asked(targets, foot_targets, resting)
         self._coupling.follow(targets.com[-1] - targets.com[-2])
-        low, steps = terms.low(poses), self._steps(q)
+        low, steps = terms.low(poses, ground), self._steps(q)
         overspeed = np.maximum.reduce(self._coupling.overspeed(steps[-free:]), axis=1)
         sinking = np.maximum.reduce(low.depth, axis=1, initial=-np.inf)
         self._firmness.move_on(
@@ -80,7 +81,7 @@ class Window:
         for k in range(_MAX_ITER):
             if k:
                 poses = terms.poses(q[-free:], with_mass=True)
-                low, steps = terms.low(poses), self._steps(q)
+                low, steps = terms.low(poses, ground), self._steps(q)
             scale = self._firmness.scale
             H, g = terms.linearize(q[-free:], poses, asked, posture, candidates, scale, low)
             whole, g = self._coupled(q, steps, poses, H, g)
