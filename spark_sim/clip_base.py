@@ -12,12 +12,12 @@ from jaxtyping import Bool, Float
 from spark.errors import ConventionError, SkeletonError, SparkSimError, name_list
 from spark.motion import Motion
 from spark.resample import frames_at_rate
-from spark.rig.contacts import feet_by_side
 from spark.rig.rig import Rig
 from spark.skin import Skin
 from spark.summary import counted, html_table, time_span
 from spark.transfer.canonical import CanonicalMotion, to_canonical
 from spark.transfer.held_floor import on_one_floor
+from spark.transfer.treads import feet_by_side, treads_of
 from spark_sim import files
 
 if TYPE_CHECKING:  # these load MuJoCo, which a character's clip can do without
@@ -144,7 +144,6 @@ class ClipBase(ABC):
     def figures(self) -> "list[Figure]":
         """What a picture or a video shows of the clip."""
         from sim.view.scene import Figure
-        from spark.transfer.treads import treads_of
 
         skin, tops = self.surface[0], treads_of(self.canonical).ground(self.floor_z).tops
         return [Figure(self.subject, self.name, self.floor_z, skin=skin, tops=tops)]

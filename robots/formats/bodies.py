@@ -10,8 +10,8 @@ from jaxtyping import Bool, Float, Int
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.tree import Tree
-from spark.rig.contacts import feet_by_side
 from spark.rotation import quat_conj, quat_mul, quat_rotate, rotvec_from_quat
+from spark.transfer.treads import feet_by_side
 
 
 @dataclass(frozen=True, eq=False)

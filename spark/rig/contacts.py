@@ -3,8 +3,6 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from spark.kinematics import joint_paths
-from spark.motion import Motion
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
 
@@ -115,11 +113,3 @@ def planted_feet(
 ) -> Bool[np.ndarray, "T F"]:
     """For each of the rig's feet, whether its toe stands (the ankle where there is no toe)."""
     return planted_points(positions[:, rig.contact_joints], frame_time, rig.standing_height)
-
-
-def feet_by_side(rig: Rig, motion: Motion) -> dict[str, Bool[np.ndarray, "T"]]:
-    """In which frames each foot stands, by side: "left", "right"; empty for a body without feet."""
-    feet = joint_paths(motion, rig.contact_joints)
-    standing = planted_points(feet, motion.frame_time, rig.standing_height)
-    roles = [rig.roles.roles[j] for j in rig.contact_joints]
-    return {role.side: standing[:, k] for k, role in enumerate(roles) if role is not None}

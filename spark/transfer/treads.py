@@ -15,18 +15,21 @@ from scipy.ndimage import gaussian_filter1d
 
 from spark.blocks import in_blocks
 from spark.constants import GRAVITY
+from spark.kinematics import joint_paths
+from spark.motion import Motion
 from spark.rig.contacts import (
     ADULT_HEIGHT,
     PLANTED_SPEED,
     climbing_speeds,
     lower_ends,
+    planted_points,
     speeds,
 )
 from spark.rig.feet import ends_of_feet, lowest_points
 from spark.rig.rig import Rig
 from spark.rotation import quat_mul
 from spark.runs import true_runs
-from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.transfer.footfalls import between_contacts
 from spark.transfer.ground import Ground, Stand, distinct, level_ground
 from spark.transfer.hip_sway import center_of_mass
@@ -131,6 +134,20 @@ def treads_of(source: CanonicalMotion) -> Treads:
     for k in range(feet):
         ground[:, k] = between_contacts(ground[:, k, None], stands[:, k], ways[:, k])[:, 0]
     return Treads(rig, frame_time, ways, stands, ground)
+
+
+def feet_by_side(rig: Rig, motion: Motion) -> dict[str, Bool[np.ndarray, "T"]]:
+    """In which frames each foot stands, on the floor or on what is climbed, by side: "left",
+    "right"; empty for a body without feet."""
+    treads = treads_of(to_canonical(motion, rig))
+    ground = dict(zip((sole.side for sole in rig.soles), treads.heights.T, strict=True))
+    roles = [rig.roles.roles[j] for j in rig.contact_joints]
+    feet = joint_paths(motion, rig.contact_joints)
+    for k, role in enumerate(roles):
+        if role is not None and role.side in ground:
+            feet[:, k, 2] -= ground[role.side]
+    standing = planted_points(feet, motion.frame_time, rig.standing_height)
+    return {role.side: standing[:, k] for k, role in enumerate(roles) if role is not None}
 
 
 def _feet(source: CanonicalMotion) -> Float[np.ndarray, "T N"]:

@@ -13,9 +13,15 @@ from spark.rig.feet import lowest_points
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_mul
 from spark.transfer.analytic import transfer
-from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
+from spark.transfer.canonical import (
+    CanonicalMotion,
+    at_frame_time,
+    canonical_positions,
+    from_canonical,
+    to_canonical,
+)
 from spark.transfer.foot_lock import lock_feet
-from spark.transfer.treads import treads_of
+from spark.transfer.treads import feet_by_side, treads_of
 from tests.helpers.recordings import recordings
 from tests.helpers.stick import joint, stick_rig
 
@@ -154,3 +160,21 @@ def test_a_character_stands_still_on_the_box() -> None:
     world = quat_mul(held.rotations, rig.tpose)
     low = lowest_points(rig.soles, canonical_positions(held), world)[95:145]
     np.testing.assert_allclose(low, scale * BOX, atol=0.006)
+
+
+@pytest.mark.parametrize("fps", [24.0, 120.0])
+def test_the_rate_does_not_matter(fps: float) -> None:
+    clip = onto_box()
+    times = np.arange(0, 3.9, 0.05)
+    there = [
+        treads.heights[np.round(times / treads.frame_time).astype(int)]
+        for treads in (treads_of(clip), treads_of(at_frame_time(clip, 1 / fps)))
+    ]
+    np.testing.assert_allclose(there[1], there[0], atol=0.03)
+
+
+def test_contacts_are_on_the_box_as_well() -> None:
+    stands = feet_by_side(RIG, from_canonical(onto_box()))
+    for side in ("left", "right"):
+        assert stands[side][[*range(5, 55), *range(95, 145), *range(185, 235)]].all()
+        assert not stands[side][[75, 165]].any()
