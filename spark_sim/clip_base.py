@@ -120,8 +120,8 @@ class ClipBase(ABC):
 
     @cached_property
     def contacts(self) -> dict[str, Bool[np.ndarray, "T"]]:
-        """In which frames each foot stands (slow, and near its lowest height), by side: "left",
-        "right"."""
+        """In which frames each foot stands (slow, and near its lowest height over the floor or what
+        is climbed), by side: "left", "right"."""
         return feet_by_side(self.rig, self.motion)
 
     @property

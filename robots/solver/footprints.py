@@ -30,8 +30,8 @@ class FootPlan:
     `heading` [rad] the middle of its toes and its direction over the floor; `prints` the same of
     the footprint, where `contacts` (of heel and toe) say that it stands. `clearance` [m] is that of
     the source's lowest sole point, scaled, over `ground` [m], and `lift` [m] what a higher flight
-    adds to it. `flat`
-    [m] are the sole's points on the floor, heading along X from the middle of the toes.
+    adds to it. `flat` [m] are the sole's points on the floor, heading along X from the middle of
+    the toes.
     """
 
     frame_time: float

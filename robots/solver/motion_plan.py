@@ -59,9 +59,8 @@ def _support(
     """Sole points that are low, and other parts where the source's touch the floor."""
     planned = [footing_of(robot, foot).positions for foot in feet]
     points = np.concatenate([p.transpose(2, 0, 1) for p in planned], axis=1)
-    ground = np.repeat(
-        np.stack([foot.ground for foot in feet], axis=1), [len(p) for p in planned], 1
-    )
+    under = np.stack([foot.ground for foot in feet], axis=1)
+    ground = np.repeat(under, [len(p) for p in planned], axis=1)
     points[..., 2] -= ground
     reach = max(1, round(TOUCH_SPAN / targets.frame_time))
     low = minimum_filter1d(points[..., 2], 2 * reach + 1, axis=0, mode="nearest")

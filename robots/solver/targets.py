@@ -136,10 +136,8 @@ def targets_of(
     world, hips, notes = poses_of(source, positions, robot)
     rig = source.rig
     own_chest = robot.rig.chest
-    paths, clearance = (
-        source_feet(source, positions, robot),
-        source_clearance(source, positions, robot),
-    )
+    paths = source_feet(source, positions, robot)
+    clearance = source_clearance(source, positions, robot)
     climb = level_climb(source) if climb is None else climb
     under = for_soles(climb.heights, rig, robot)
     paths[..., 2] -= under[..., None]

@@ -57,9 +57,9 @@ class Foot:
     def stand_on(self, top: float, clearance: float) -> None:
         """What so high a ground [m, the source's own] over the floor its soles are on, so high [m,
         scaled] there: the mean of some frames, as feet come down with their heels."""
-        known = top > 0 and True in self.planted and abs(top - self.top) < 1e-9
-        self.rise = self.rise + _SETTLES * (clearance - self.rise) if known else clearance
-        self.rise, self.top = (self.rise, top) if top > 0 else (0.0, 0.0)
+        stays = True in self.planted and top == self.top
+        rise = self.rise + _SETTLES * (clearance - self.rise) if stays else clearance
+        self.top, self.rise = top, rise if top > 0 else 0.0
 
     def grip(self, loosens: float, tightens: float) -> None:
         """Take hold of what stands, and let go of the rest, by so much at most."""

@@ -18,6 +18,8 @@ from spark.transfer.stray_frames import jumps_of, repeats_of, strays_of
 def on_one_floor(source: CanonicalMotion) -> CanonicalMotion:
     """`source` over the floor of the clip alone, and on it a pose that is held at an end and that
     nothing leads to; a note says how far it was away. Itself where that is not far."""
+    if not any(repeats_of(source.picked(end))[-1] for end in (slice(2), slice(-2, None))):
+        return source  # nothing is held: what follows takes a pose of each frame
     repeats, count = repeats_of(source), len(source)
     stray = strays_of(jumps_of(source), source.frame_time, repeats)
     ends = [

@@ -15,7 +15,7 @@ from spark.rotation import quat_mul, quat_rotate
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
 # [s] Standard deviation of a Gaussian: what a recording shakes within less is noise.
-_NOISE = 1 / 30
+NOISE = 1 / 30
 _LIGHTEST = 0.3  # of gravity: a body that falls is pushed nowhere
 # A sole's point that is higher than the lowest one reaches less far, by so many times as much.
 _TAPER = 5.0
@@ -32,7 +32,7 @@ def beyond_feet(
         return np.zeros(len(motion))
     smooth = gaussian_filter1d(
         acceleration(weight, motion.frame_time),
-        _NOISE / motion.frame_time,
+        NOISE / motion.frame_time,
         axis=0,
         mode="nearest",
     )

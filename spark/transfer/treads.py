@@ -33,7 +33,7 @@ from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_ca
 from spark.transfer.footfalls import between_contacts
 from spark.transfer.ground import Ground, Stand, distinct, level_ground
 from spark.transfer.hip_sway import center_of_mass
-from spark.transfer.pressure import acceleration
+from spark.transfer.pressure import NOISE, acceleration
 
 # All lengths [m] are of an adult.
 MIN_STEP = 0.12  # from one place to the next, once at least: floors that drift do so more slowly
@@ -44,7 +44,6 @@ MIN_TIME = 0.1  # [s] that a foot carries the body to stand on something
 MIN_PUSH = 0.5  # [body weights] while it does
 UNDER_FOOT = 0.15  # from the centre of pressure to the foot, or to the line between both,
 BELOW_MASS = 0.35  # and at least from there up to the centre of mass
-_NOISE = 1 / 30  # [s] of the Gaussian that smooths the centre of mass
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +191,7 @@ def _carry(
 ) -> Bool[np.ndarray, "T S"]:
     """Over which still feet the centre of pressure lies: one foot, the nearest and lowest, or the
     line between two that are as high."""
-    smooth = gaussian_filter1d(com, _NOISE / frame_time, axis=0, mode="nearest")
+    smooth = gaussian_filter1d(com, NOISE / frame_time, axis=0, mode="nearest")
     force = acceleration(smooth, frame_time)
     force[:, 2] += GRAVITY
     push = np.maximum(force[:, 2], MIN_PUSH * GRAVITY)
