@@ -20,6 +20,7 @@ from robots.solver.weights import (
     W_COM_ACCELERATION,
     W_HIPS_POSITION,
     W_OVERSPEED,
+    W_ROTATION,
     per_metre,
 )
 from robots.tree import Coordinates, forward_kinematics
@@ -117,10 +118,12 @@ def limit_speed(robot: Morphology, q: Coordinates, frame_time: float) -> Coordin
 
 def acceleration_weights(robot: Morphology) -> Float[np.ndarray, "D"]:
     """The weight w of each dof's acceleration [s²/rad]: 1 / (2 pi `SMOOTH_CUTOFF`)², at which a
-    sine of that frequency costs as much as its own absence from a residual of weight 1. The base's
-    position [s²/m] is weighed as the hips' is, legs less."""
+    sine of that frequency costs as much as its own absence from a residual of weight 1. The base is
+    weighed as what it follows, its position [s²/m] as the hips' and its rotation as the pelvis's;
+    legs less."""
     weights = np.full(robot.tree.nv, 1.0 / (2 * np.pi * SMOOTH_CUTOFF) ** 2)
     weights[:3] *= per_metre(robot) * W_HIPS_POSITION
+    weights[3:6] *= W_ROTATION["pelvis"]
     tree = robot.tree
     for sole in robot.soles:
         leg = robot.rig.roles.require(Role(f"{sole.side}_upper_leg"))

@@ -23,6 +23,7 @@ COM_CUTOFF = np.array([0.7, 0.7, 1.0])
 JERK_CUTOFF = 2.45  # and that of hinges, by their jerk
 MAX_ACCELERATION = 40.0  # [m/s²] of the source that the mass goes along with: more is a glitch
 _BASE = slice(0, 3)  # dofs of the base's position, in whose place the centre of mass is coupled
+_TURN = slice(3, 6)  # those of its rotation: held back as in whole clips, it would lag, and feet slide
 _OTHERS = slice(3, None)
 
 
@@ -31,6 +32,7 @@ class Coupling:
 
     def __init__(self, robot: Morphology, frame_time: float, *, fixed: int, free: int) -> None:
         whole = acceleration_weights(robot) * (2 * np.pi * WHOLE_CLIP_CUTOFF) ** 2
+        whole[_TURN] = 1.0
         mass, hinges = (2 * np.pi * cutoff * frame_time for cutoff in (COM_CUTOFF, JERK_CUTOFF))
         weights = (whole / hinges**3) ** 2
         weights[_BASE] = (whole[_BASE] / mass**2) ** 2
