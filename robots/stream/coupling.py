@@ -61,6 +61,10 @@ class Coupling:
         """The source has stood still."""
         self._source_steps = np.zeros((len(self._first), 3))
 
+    def set_in_motion(self, step: Float[np.ndarray, "3"]) -> None:
+        """The source's centre of mass has moved so far [m] in each frame."""
+        self._source_steps[:] = step
+
     def follow(self, step: Float[np.ndarray, "3"]) -> None:
         """Take in how far [m] the source's centre of mass has moved with the newest frame."""
         last = self._source_steps[-1]

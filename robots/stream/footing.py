@@ -57,8 +57,28 @@ class ContactTracker:
         self._source: deque[SourceFeet] = deque(maxlen=self._standing.history + ahead + 1)
         self.ground: Float[np.ndarray, "T P"] = np.zeros((ahead + 1, len(self._foot)))
         """Of the last frames, how high [m] what each of the soles' points stands on is."""
-        self._last_axes: Complex[np.ndarray, "S 3"] = np.zeros((0, 3), dtype=complex)
+        self._last_axes: Complex[np.ndarray, "S 3"]
         self._feet = [Foot() for _ in self._robot.soles]
+        self._fresh = True
+
+    def begin(self, first: FrameTargets, later: FrameTargets, frames: int) -> None:
+        """Before its first frame, which comes next, the source has moved evenly: as from that to
+        a `later` one, so many frames on. If that is the first one, too, it has stood still."""
+        own, then = self._standing.feet(first), self._standing.feet(later)
+        axes, later_axes = self._axes_over_floor(first), self._axes_over_floor(later)
+        turned = [
+            cmath.phase(np.vdot(before, now)) / frames
+            for before, now in zip(axes, later_axes, strict=True)
+        ]
+        before = [
+            own.before(then, k / frames)
+            for k in range(self._standing.history + self._ahead + 1, -1, -1)
+        ]
+        moved = self._moved(before[-2], own)
+        arrived = _Arrived(first.clearance.tolist(), first.pitched, moved, turned)
+        self._arrived.extend([arrived] * (self._ahead + 1))
+        self._source.extend(before[:-1])
+        self._last_axes = axes * np.exp(-1j * np.array(turned))[:, None]
 
     def update(
         self, targets: FrameTargets, points: Float[np.ndarray, "P 3"], noise: float = 0.0
@@ -67,7 +87,8 @@ class ContactTracker:
         the points of the robot's soles are at `points` in the first of these. How they stand in
         that one is settled then; of the later ones it is what can be seen so far. The source's feet
         came with so much noise [m, RMS an axis]."""
-        first = not self._source
+        tightens = 1.0 if self._fresh else self._grip
+        self._fresh = False
         self._standing.listen(noise)
         self._take_in(targets)
         frames = list(self._source)
@@ -95,7 +116,7 @@ class ContactTracker:
                 if at == settled and not foot.is_held:
                     own = [complex(x, y) for x, y, _ in points[self._points[s]].tolist()]
                     foot.footprint.put(own, self._lengths[s], on_toe=foot.on_toe)
-                foot.grip(self._grip, 1.0 if first else self._grip)
+                foot.grip(self._grip, tightens)
                 pace = self._scale * speed[s][1] / self._hip_height
                 up = foot.height(clearance, pace, self._uneven)
                 (heel, toes), (heel_step, toe_step) = foot.holds, step[s]
@@ -112,20 +133,21 @@ class ContactTracker:
         )
 
     def _take_in(self, targets: FrameTargets) -> None:
-        """The newest frame; before a first one, the source has stood still."""
+        """The newest frame."""
         own, axes = self._standing.feet(targets), self._axes_over_floor(targets)
-        first = not self._source
-        last, last_axes = (own, axes) if first else (self._source[-1], self._last_axes)
-        moved = [
+        moved = self._moved(self._source[-1], own)
+        turns = zip(self._last_axes, axes, strict=True)
+        turned = [cmath.phase(np.vdot(before, now)) for before, now in turns]
+        self._arrived.append(_Arrived(targets.clearance.tolist(), targets.pitched, moved, turned))
+        self._source.append(own)
+        self._last_axes = axes
+
+    def _moved(self, last: SourceFeet, own: SourceFeet) -> list[tuple[complex, complex]]:
+        """How far heels and toes have moved [m, x + iy, scaled]."""
+        return [
             (self._scale * (heel - last_heel), self._scale * (toe - last_toe))
             for (heel, toe), (last_heel, last_toe) in zip(own.places, last.places, strict=True)
         ]
-        turns = zip(last_axes, axes, strict=True)
-        turned = [cmath.phase(np.vdot(before, now)) for before, now in turns]
-        arrived = _Arrived(targets.clearance.tolist(), targets.pitched, moved, turned)
-        self._arrived.extend([arrived] * (self._ahead + 1 if first else 1))
-        self._source.extend([own] * (self._standing.history + self._ahead + 1 if first else 1))
-        self._last_axes = axes
 
     def _axes_over_floor(self, targets: FrameTargets) -> Complex[np.ndarray, "S 3"]:
         """The axes of the robot's feet, seen from above: x + iy. Of a turn between two such triples

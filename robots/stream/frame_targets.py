@@ -1,6 +1,7 @@
 """One frame of a source as a robot's targets: what `robots.solver.targets` makes of a clip, without
 what needs the whole clip, in a tenth of its time."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import NamedTuple
 
@@ -78,10 +79,10 @@ def raised(targets: FrameTargets, by: float) -> FrameTargets:
     )
 
 
-def repeated(targets: FrameTargets, count: int) -> FrameTargets:
-    """Those of one frame, of so many frames like it."""
-    parts = (getattr(targets, field.name) for field in fields(FrameTargets))
-    return FrameTargets(*(np.repeat(part[None], count, axis=0) for part in parts))
+def joined(frames: Sequence[FrameTargets]) -> FrameTargets:
+    """Those of some frames."""
+    names = [field.name for field in fields(FrameTargets)]
+    return FrameTargets(*(np.stack([getattr(frame, name) for frame in frames]) for name in names))
 
 
 def move_on(targets: FrameTargets, newest: FrameTargets) -> None:

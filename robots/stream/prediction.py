@@ -123,6 +123,10 @@ class TargetMotion:
         weights[_BASE] = 2 / (x + y), 2 / (x + y), 1 / z
         return Ahead(target, speeds, weights)
 
+    def set_in_motion(self, past: Float[np.ndarray, "T nq"]) -> None:
+        """Where the targets have been, in all frames before the newest."""
+        self._past.extend(past)
+
     def next(self) -> None:
         """The newest frame is not the newest any more."""
         self._past.append(self._now)

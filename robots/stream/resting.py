@@ -97,13 +97,17 @@ class RestTracker:
         self._along = np.zeros(len(parts))
         self._held, self._rolled = np.zeros((2, len(parts)), dtype=complex)
 
+    def begin(self, first: FrameTargets, later: FrameTargets, frames: int) -> None:
+        """How the source has moved before its first frame (`ContactTracker.begin`)."""
+        step = (later.parts - first.parts) / frames
+        self._places.extend(first.parts - k * step for k in range(self._reach + 1, 0, -1))
+
     def update(self, targets: FrameTargets, poses: WindowPoses) -> PointTargets | None:
         """Takes in the newest frame. Where the parts are held in the last frames, the robot being
         in `poses` in the first of these; None where nothing is near the ground."""
-        first = not self._places
-        self._places.extend([targets.parts] * (self._reach + 1 if first else 1))
+        self._places.append(targets.parts)
         seen = self._look(targets)
-        self._seen.extend([seen] * (self._ahead + 1 if first else 1))
+        self._seen.extend([seen] * (1 if self._seen else self._ahead + 1))
         if all(frame.most < _FELT for frame in self._seen):
             self._along[:] = 0.0
             return None

@@ -48,6 +48,21 @@ class SourceFeet(NamedTuple):
     hips: float
     com: float
 
+    def before(self, later: "SourceFeet", times: float) -> "SourceFeet":
+        """So many times as far before these as `later` ones are after them. None is under the floor
+        that was not."""
+        places, heights, later_places, later_heights = map(
+            np.array, (self.places, self.heights, later.places, later.heights)
+        )
+        lowered = heights - times * (later_heights - heights)
+        return SourceFeet(
+            (places - times * (later_places - places)).tolist(),
+            np.maximum(lowered, np.minimum(heights, 0.0)).tolist(),
+            self.middle - times * (later.middle - self.middle),
+            self.hips - times * (later.hips - self.hips),
+            self.com - times * (later.com - self.com),
+        )
+
 
 class Standing:
     """Of sources that `reader` reads, `frame_time` [s] apart."""

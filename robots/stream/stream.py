@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from robots.model.morphology import Morphology
 from robots.solver.projection import project
+from robots.solver.window_poses import WindowPoses
 from robots.solver.window_targets import PointTargets
 from robots.solver.window_terms import Terms
 from robots.stream.detour import Detours
@@ -20,9 +21,9 @@ from robots.stream.frame_targets import (
     FrameReader,
     FrameTargets,
     Ground,
+    joined,
     move_on,
     raised,
-    repeated,
 )
 from robots.stream.quiet import Quieter
 from robots.stream.resting import RestTracker, held_points
@@ -54,6 +55,8 @@ class Stream:
         self._throw = Throw(self._reader.scale, source.hip_height, frame_time)
         self._quieter = Quieter(source, frame_time, ground.noise)
         self._targets: FrameTargets  # of the window's free frames
+        self._contacts: ContactTracker
+        self._rests: RestTracker
         self.reset()
 
     def reset(self) -> None:
@@ -63,8 +66,7 @@ class Stream:
         self._throw.reset()
         self._quieter.reset()
         self._q = np.zeros((_FRAMES, self.robot.mjcf.model.nq))
-        self._contacts = ContactTracker(self._reader, self.frame_time, LATENCY)
-        self._rests = RestTracker(self._reader, self._terms, self.frame_time, LATENCY)
+        self._begun: list[FrameTargets] = []
         self._detours = Detours(self._reader, self._terms, self.frame_time)
 
     @property
@@ -75,7 +77,7 @@ class Stream:
 
     def step(self, frame: Frame) -> Float[np.ndarray, "nq"]:
         """The next frame of the source; MuJoCo's coordinates of the robot `LATENCY` frames before
-        it. Before its first frame, a source is taken to have stood still.
+        it. Before its first frame, a source is taken to have moved as it does at first.
 
         Raises `FrameError` where the frame is broken; it is then as if it had not been there.
         """
@@ -91,22 +93,64 @@ class Stream:
             raise FrameError(f"frame {self._count} of the stream: {error}") from error
         thrown = self._throw.follow(targets.hips[2] / self._reader.scale)
         targets = raised(targets, thrown)
-        if self._count:
-            q = self._q[_SHIFTED]
+        if self._count > LATENCY:
             move_on(self._targets, targets)
+            q = self._q[_SHIFTED]
             poses = self._window.move_on(q)
             bones, soles = self._terms.bones_and_soles(poses)
             foot_targets = self._contacts.update(targets, soles[0], self.foot_noise)
             resting = self._rests.update(targets, poses)
-            angles = self._terms.hinges.angles(q)[_FIXED]
-            posture = self._detours.update(self._targets, bones[0], angles)
-            asked = self._targets, foot_targets, resting, posture
-            self._q = self._window.solve(q, poses, *asked, self._contacts.ground)
+            self._q = self._solved(q, poses, bones[0], foot_targets, resting)
         else:
-            self._targets = repeated(targets, LATENCY + 1)
-            self._q = self._first(targets)
+            self._begun.append(targets)
+            if not self._count:
+                self._q = self._first(targets)
+            if self._count == LATENCY:
+                self._q = self._set_off()
         self._count += 1
         return self._q[_FIXED].copy()
+
+    def _solved(
+        self,
+        q: Float[np.ndarray, "W nq"],
+        poses: WindowPoses,
+        bones: Float[np.ndarray, "B 3"],
+        foot_targets: PointTargets,
+        resting: PointTargets | None,
+    ) -> Float[np.ndarray, "W nq"]:
+        """`q` after steps of its free frames; the bones of the first have these directions."""
+        angles = self._terms.hinges.angles(q)[_FIXED]
+        posture = self._detours.update(self._targets, bones, angles)
+        asked = self._targets, foot_targets, resting, posture
+        return self._window.solve(q, poses, *asked, self._contacts.ground)
+
+    def _set_off(self) -> Float[np.ndarray, "W nq"]:
+        """The first frames that are free, as if all had moved before as it does in them."""
+        first, *_, last = self._begun
+        self._targets = joined(self._begun)
+        at_rest = self._terms.poses(self._q[-1:])
+        held = self._tracked(last, at_rest)
+        q = self._window.set_in_motion(self._q, self._targets, *held)
+        if q is None:
+            q, held = self._q, self._tracked(first, at_rest)
+        poses = self._window.move_on(q)
+        return self._solved(q, poses, self._terms.bones(poses)[0], *held)
+
+    def _tracked(
+        self, later: FrameTargets, poses: WindowPoses
+    ) -> tuple[PointTargets, PointTargets | None]:
+        """How feet and parts stand in the first frames of a robot in `poses`, where before them
+        the source has moved as from the first to a `later` one."""
+        frames = self._begun
+        self._contacts = ContactTracker(self._reader, self.frame_time, LATENCY)
+        self._rests = RestTracker(self._reader, self._terms, self.frame_time, LATENCY)
+        for tracker in (self._contacts, self._rests):
+            tracker.begin(frames[0], later, max(1, len(frames) - 1))
+        soles = self._terms.sole_points(poses)[0]
+        for frame in frames:
+            foot_targets = self._contacts.update(frame, soles, self.foot_noise)
+            resting = self._rests.update(frame, poses)
+        return foot_targets, resting
 
     def _first(self, targets: FrameTargets) -> Float[np.ndarray, "W nq"]:
         """A pose at rest: first as it comes, then with what stands or lies where it is in it."""
@@ -114,13 +158,11 @@ class Stream:
         projected = project(robot, quat_from_matrix(targets.world)[None], targets.hips[None])
         q = robot.to_qpos(projected)[np.zeros(_FRAMES, dtype=int)]
         points = sum(map(len, robot.soles))
-        foot_targets = PointTargets(*np.zeros((2, LATENCY + 1, points, 3)))
-        resting = None
-        for held in (False, True):
-            if held:
-                poses = self._terms.poses(q[-1:])
-                foot_targets = self._contacts.update(targets, self._terms.sole_points(poses)[0])
-                resting = self._rests.update(targets, poses)
-            q = self._window.settle(q, self._targets, foot_targets, resting, _FIRST_ITERATIONS)
+        held = PointTargets(*np.zeros((2, LATENCY + 1, points, 3))), None
+        alike = joined([targets] * (LATENCY + 1))
+        for as_it_comes in (True, False):
+            if not as_it_comes:
+                held = self._tracked(targets, self._terms.poses(q[-1:]))
+            q = self._window.settle(q, alike, *held, _FIRST_ITERATIONS)
             q[:] = q[-1]
         return q

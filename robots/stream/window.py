@@ -22,6 +22,8 @@ _LONE_DAMPING = 0.02  # where frames are not coupled,
 _HELD = 1e8  # and at a limit
 _MAX_STEP = 0.2  # [rad, m] of a dof in one step
 _MAX_ITER = 2  # steps a frame, at most
+MAX_FIRST_SPEED = 12.0  # [rad/s, m/s] of a dof with which a stream begins
+_FIRST_STEPS = 5  # of each of a stream's first frames, to where its targets have it
 _STEP_TOL = 0.1  # [rad, m] after a shorter step there is no further one
 
 
@@ -39,6 +41,7 @@ class Window:
         self._coupling = Coupling(robot, frame_time, fixed=fixed, free=free)
         self._firmness = Firmness(free)
         self._max_sinking = MAX_SINKING * robot.rig.hip_height
+        self._frame_time = frame_time
         self._max_overspeed = MAX_OVERSPEED * frame_time
         self.reset()
 
@@ -109,6 +112,31 @@ class Window:
             H, g = terms.linearize(free, poses, asked, terms.hinges.at_tpose, candidates, scale)
             q, _ = self._moved(q, self._whole(H), g, _LONE_DAMPING)
         return q
+
+    def set_in_motion(
+        self,
+        q: Float[np.ndarray, "T nq"],
+        targets: FrameTargets,
+        foot_targets: PointTargets,
+        resting: PointTargets | None,
+    ) -> Float[np.ndarray, "T nq"] | None:
+        """`q` of a stream whose first frames are the free ones: these where their targets have
+        them, and the fixed ones as if all had gone on evenly before. None where the first frames
+        are too far apart for a motion: from a T-pose, maybe, it jumps."""
+        lone = self.settle(q, targets, foot_targets, resting, _FIRST_STEPS)
+        step, free = np.empty(self._model.nv), self._free
+        mujoco.mj_differentiatePos(self._model, step, free - 1, lone[-free], lone[-1])
+        if np.abs(step).max() > MAX_FIRST_SPEED * self._frame_time:
+            return None
+        for t in range(self._fixed):
+            lone[t] = lone[self._fixed]
+            mujoco.mj_integratePos(self._model, lone[t], step, t - self._fixed)
+        self._terms.hinges.clip(lone[: self._fixed])
+        before = lone[[0, *range(self._fixed - 1)]]
+        self._com = np.array([self._terms.com(q) for q in before])
+        self._motion.set_in_motion(lone[:-1])
+        self._coupling.set_in_motion((targets.com[-1] - targets.com[0]) / (free - 1))
+        return lone
 
     def _whole(self, H: Float[np.ndarray, "F D D"]) -> Float[np.ndarray, "F D F D"]:
         """The normal equations of frames that nothing couples."""

@@ -65,5 +65,5 @@ class Retargeter:
         return f"Retargeter({self._source!r}, {self.robot!r})"
 
     def reset(self) -> None:
-        """Start again: the next frame is the first, and the source stood still before it."""
+        """Start again: the next frame is the first."""
         self._stream.reset()

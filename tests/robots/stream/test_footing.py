@@ -31,6 +31,7 @@ def after(heel_speed: float, heel_height: float) -> PointTargets:
     """A foot that stood, and of which the heel has so far moved for a fifth of a second: so fast
     [m/s] to the side, so high [m] over the toes."""
     tracker, begun = ContactTracker(READER, FRAME_TIME, LATENCY), standing()
+    tracker.begin(begun, begun, 1)
     points = np.zeros((sum(map(len, EMBER.soles)), 3))
     for k in range(12):
         feet = begun.feet.copy()
@@ -62,6 +63,7 @@ def test_who_stands_on_the_toes_does_not_stand_on_the_heel() -> None:
 
 def test_a_foot_that_stood_over_the_floor_is_put_down_on_it() -> None:
     tracker, begun = ContactTracker(READER, FRAME_TIME, LATENCY), standing()
+    tracker.begin(begun, begun, 1)
     points = np.zeros((sum(map(len, EMBER.soles)), 3))
     over = 0.04 * EMBER.rig.hip_height  # of which a recorded floor is off
     for moved in [0.0] * 12 + [0.02] * 12 + [0.0] * 3:  # [m] a frame: it stands, steps, and comes

@@ -116,6 +116,7 @@ def test_a_foot_that_trembles_stands_and_one_that_steps_does_not() -> None:
     held: dict[float, list[float]] = {}
     for told in (0.0, noise):
         tracker = ContactTracker(reader, frame_time, LATENCY)
+        tracker.begin(own, own, 1)
         for k in range(90):
             feet = still + noise * rng.normal(size=still.shape)
             feet[0, :, 0] += max(0, k - 60) * frame_time  # steps, 1 m/s

@@ -35,6 +35,10 @@ def tracked(paths: Float[np.ndarray, "T 3"], part: int, shift: float = 0.0) -> P
     """Of one who stands but for a part that goes along a path, the mass being so far [m] ahead of
     the feet."""
     tracker, begun = RestTracker(READER, TERMS, FRAME_TIME, LATENCY), standing()
+    parts = begun.parts.copy()
+    parts[part] = paths[0]
+    at_first = replace(begun, parts=parts)
+    tracker.begin(at_first, at_first, 1)
     held = None
     for place in paths:
         parts = begun.parts.copy()
