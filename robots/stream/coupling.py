@@ -23,7 +23,7 @@ COM_CUTOFF = np.array([0.7, 0.7, 1.0])
 JERK_CUTOFF = 2.45  # and that of hinges, by their jerk
 MAX_ACCELERATION = 40.0  # [m/s²] of the source that the mass goes along with: more is a glitch
 _BASE = slice(0, 3)  # dofs of the base's position, in whose place the centre of mass is coupled
-_TURN = slice(3, 6)  # those of its rotation: held back as in whole clips, it would lag, and feet slide
+_TURN = slice(3, 6)  # of its rotation: smoothed as in whole clips it would lag, and feet slide
 _OTHERS = slice(3, None)
 
 
