@@ -28,7 +28,7 @@ from robots.stream.frame_targets import (
 from robots.stream.quiet import Quieter
 from robots.stream.resting import RestTracker, held_points
 from robots.stream.throw import Throw
-from robots.stream.window import Window
+from robots.stream.window import MAX_FIRST_SPEED, Window
 from spark.errors import FrameError
 from spark.rig.rig import Rig
 from spark.rotation import quat_from_matrix
@@ -127,12 +127,10 @@ class Stream:
     def _set_off(self) -> Float[np.ndarray, "W nq"]:
         """The first frames that are free, as if all had moved before as it does in them."""
         first, *_, last = self._begun
+        jump = np.abs(last.hips - first.hips).max() > MAX_FIRST_SPEED * LATENCY * self.frame_time
+        held = self._tracked(first if jump else last, self._terms.poses(self._q[-1:]))
         self._targets = joined(self._begun)
-        at_rest = self._terms.poses(self._q[-1:])
-        held = self._tracked(last, at_rest)
         q = self._window.set_in_motion(self._q, self._targets, *held)
-        if q is None:
-            q, held = self._q, self._tracked(first, at_rest)
         poses = self._window.move_on(q)
         return self._solved(q, poses, self._terms.bones(poses)[0], *held)
 

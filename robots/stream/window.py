@@ -119,24 +119,26 @@ class Window:
         targets: FrameTargets,
         foot_targets: PointTargets,
         resting: PointTargets | None,
-    ) -> Float[np.ndarray, "T nq"] | None:
-        """`q` of a stream whose first frames are the free ones: these where their targets have
-        them, and the fixed ones as if all had gone on evenly before. None where the first frames
-        are too far apart for a motion: from a T-pose, maybe, it jumps."""
+    ) -> Float[np.ndarray, "T nq"]:
+        """`q` of a stream whose first frames are the free ones: all dofs move evenly from before
+        these on, as their targets do, or not at all where they would be too fast for a motion:
+        from a T-pose, maybe, a source jumps."""
         lone = self.settle(q, targets, foot_targets, resting, _FIRST_STEPS)
-        step, free = np.empty(self._model.nv), self._free
-        mujoco.mj_differentiatePos(self._model, step, free - 1, lone[-free], lone[-1])
-        if np.abs(step).max() > MAX_FIRST_SPEED * self._frame_time:
-            return None
-        for t in range(self._fixed):
-            lone[t] = lone[self._fixed]
-            mujoco.mj_integratePos(self._model, lone[t], step, t - self._fixed)
-        self._terms.hinges.clip(lone[: self._fixed])
+        step, last = np.empty(self._model.nv), self._free - 1
+        mujoco.mj_differentiatePos(self._model, step, last, lone[-self._free], lone[-1])
+        step = self._possible(step)
+        lone[:] = lone[self._fixed]
+        for t, frame in enumerate(lone):
+            mujoco.mj_integratePos(self._model, frame, step, t - self._fixed)
+        self._terms.hinges.clip(lone)
         before = lone[[0, *range(self._fixed - 1)]]
         self._com = np.array([self._terms.com(q) for q in before])
         self._motion.set_in_motion(lone[:-1])
-        self._coupling.set_in_motion((targets.com[-1] - targets.com[0]) / (free - 1))
+        self._coupling.set_in_motion(self._possible((targets.com[-1] - targets.com[0]) / last))
         return lone
+
+    def _possible(self, step: Float[np.ndarray, "N"]) -> Float[np.ndarray, "N"]:
+        return np.where(np.abs(step) > MAX_FIRST_SPEED * self._frame_time, 0.0, step)
 
     def _whole(self, H: Float[np.ndarray, "F D D"]) -> Float[np.ndarray, "F D F D"]:
         """The normal equations of frames that nothing couples."""
