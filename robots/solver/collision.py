@@ -18,29 +18,34 @@ from robots.solver.clusters import Cluster, clusters_of
 from robots.solver.hulls import SLABS, Shape, ShapePair
 from robots.solver.pushes import Pushes
 from robots.solver.shape_pairs import distances, nearest, pairs_of
+from robots.solver.weights import per_metre
 from robots.tree import LinkPoses, Tree
 
-DEPTH_ROUNDING = 0.003  # [m] over which the penalty of their depth sets in
+DEPTH_ROUNDING = 0.003  # [m], or less for a small robot, over which the penalty of depth sets in
 FELT = 3  # roundings of distance beyond which a residual is not worth its time
-SEARCH_DISTANCE = 0.02  # [m] between shapes within which a pair is a candidate
+SEARCH = 7  # roundings of distance between shapes within which a pair is a candidate
 
 
 @dataclass(frozen=True, eq=False)
 class Collisions:
-    """The pairs of a robot's shapes that can collide."""
+    """The pairs of a robot's shapes that can collide. The penalty of their depth sets in over a
+    length, `rounding` [m]."""
 
     tree: Tree
     pairs: tuple[ShapePair, ...]
+    rounding: float
     _by_block: dict[Block, list[Cluster]] = field(default_factory=dict)
 
     def candidates(
-        self, poses: LinkPoses, block: Block, stride: int, within: float = SEARCH_DISTANCE
+        self, poses: LinkPoses, block: Block, stride: int, within: float | None = None
     ) -> list[Candidate]:
         """The pairs that the block moves against each other, where they are nearer than `within`
-        [m] beyond their clearance: a broad phase by bounding spheres, then by the small shapes'.
+        [m], or `SEARCH`, beyond their clearance: a broad phase by bounding spheres, then by the
+        small shapes'.
 
         Every `stride`-th frame and the last are searched; a candidate's frames are those around.
         """
+        within = SEARCH * self.rounding if within is None else within
         count = poses.positions.shape[2]
         times = np.unique(np.append(np.arange(0, count, stride), count - 1))
         searched = poses.at(times)
@@ -158,13 +163,13 @@ class Collisions:
             [x.pair.clearance + x.pair.small.radii[x.spheres] for x in candidates]
         )
         apart = distances(self.tree, poses, link, spheres, large, at)
-        t, s = np.nonzero((reach[:, None] - apart).T > -FELT * DEPTH_ROUNDING)
+        t, s = np.nonzero(-FELT * self.rounding < (reach[:, None] - apart).T)
         if not len(t):
             return
         here = at[t]
         points, apart, out = nearest(poses, link, spheres[s].T, large, here)
         scale = penalty_scale[here]
-        depth, slope = one_sided(reach[s] - apart, DEPTH_ROUNDING / scale)
+        depth, slope = one_sided(reach[s] - apart, self.rounding / scale)
         residuals = weight * scale * depth
         normal.cost += np.bincount(here, 0.5 * residuals**2, len(normal.cost))
         if normal.with_jacobian:
@@ -186,7 +191,12 @@ def _moved(
     return moved
 
 
+def depth_rounding(robot: Morphology) -> float:
+    """Over how much depth [m] its penalty sets in: on a small robot a few millimetres are a lot."""
+    return DEPTH_ROUNDING / max(1.0, per_metre(robot))
+
+
 @lru_cache(maxsize=16)
 def collisions_of(robot: Morphology) -> Collisions:
     """The robot's pairs that can collide, found once."""
-    return Collisions(robot.tree, pairs_of(robot))
+    return Collisions(robot.tree, pairs_of(robot), depth_rounding(robot))

@@ -14,7 +14,6 @@ from robots.residuals import one_sided
 from robots.solver.block import Block
 from robots.solver.candidates import Candidate, by_moves
 from robots.solver.collision import (
-    DEPTH_ROUNDING,
     FELT,
     Collisions,
     collisions_of,
@@ -69,17 +68,17 @@ class ExactContacts:
         penalty_scale: Float[np.ndarray, "T"],
     ) -> None:
         """Add one residual for each candidate, as `Collisions.add_to` does for each sphere."""
-        measured = self._measure(qpos, candidates)
+        measured, rounding = self._measure(qpos, candidates), self.collisions.rounding
         for moves in by_moves([x.candidate for x in measured]):
             pushes = Pushes(normal, poses, moves)
             for x in (x for x in measured if x.candidate.moves == moves):
                 excess = self._clearances[x.candidate.pair.geoms] - x.distance
-                active = excess > -FELT * DEPTH_ROUNDING
+                active = excess > -FELT * rounding
                 if not active.any():
                     continue
                 here = x.frames[active]
                 scaled = weight * penalty_scale[here]
-                depth, slope = one_sided(excess[active], DEPTH_ROUNDING / penalty_scale[here])
+                depth, slope = one_sided(excess[active], rounding / penalty_scale[here])
                 normal.cost[here] += 0.5 * (scaled * depth) ** 2
                 if normal.with_jacobian:
                     out = scaled * slope * x.out[:, active]
@@ -112,13 +111,13 @@ class ExactContacts:
         frames, numbers = np.nonzero(measured)
         geoms = [(candidate.pair.large.geom, candidate.pair.small.geom) for candidate in candidates]
         distance, ends = np.empty(len(frames)), np.empty((len(frames), 6))
-        placed = -1
+        placed, most = -1, FELT * self.collisions.rounding + CLEARANCE
         for i, (t, k) in enumerate(zip(frames.tolist(), numbers.tolist(), strict=True)):
             if t != placed:
                 placed, data.qpos = t, qpos[t]
                 mujoco.mj_kinematics(model, data)
-            distance[i] = mujoco.mj_geomDistance(model, data, *geoms[k], _MAX_DISTANCE, ends[i])
-        known = (distance < _MAX_DISTANCE) & (np.abs(distance) > 1e-9)
+            distance[i] = mujoco.mj_geomDistance(model, data, *geoms[k], most, ends[i])
+        known = (distance < most) & (np.abs(distance) > 1e-9)
         found = []
         for k, candidate in enumerate(candidates):
             at = np.flatnonzero(known & (numbers == k))

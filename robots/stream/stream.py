@@ -156,7 +156,8 @@ class Stream:
         projected = project(robot, quat_from_matrix(targets.world)[None], targets.hips[None])
         q = robot.to_qpos(projected)[np.zeros(_FRAMES, dtype=int)]
         points = sum(map(len, robot.soles))
-        held = PointTargets(*np.zeros((2, LATENCY + 1, points, 3))), None
+        nowhere = PointTargets(*np.zeros((2, LATENCY + 1, points, 3)))
+        held: tuple[PointTargets, PointTargets | None] = nowhere, None
         alike = joined([targets] * (LATENCY + 1))
         for as_it_comes in (True, False):
             if not as_it_comes:

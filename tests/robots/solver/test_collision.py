@@ -1,5 +1,6 @@
 """Which parts of a robot can collide."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -9,7 +10,7 @@ import pytest
 from robots.model.morphology import Morphology
 from robots.solver.block import blocks_of, carriers
 from robots.solver.candidates import in_order
-from robots.solver.collision import Collisions, collisions_of
+from robots.solver.collision import collisions_of
 from robots.solver.hulls import signed_distance
 from robots.solver.shape_pairs import in_shape
 from robots.tree import Coordinates, forward_kinematics
@@ -99,7 +100,7 @@ def test_shapes_of_one_hand_are_searched_together_and_found_one_by_one(tmp_path:
     together = {x.pair.geoms: x for x in whole.candidates(poses, arms, 4)}
     found = 0
     for pair in whole.pairs:
-        for alone in Collisions(tree, (pair,)).candidates(poses, arms, 4):
+        for alone in replace(whole, pairs=(pair,), _by_block={}).candidates(poses, arms, 4):
             joint = together[pair.geoms]
             assert set(alone.spheres) <= set(joint.spheres)
             assert set(alone.frames) <= set(joint.frames)
