@@ -44,7 +44,7 @@ class Simulated:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was assumed of the servos and the floor."""
-        return (*self.tracked.notes, *_climbs(self.clip))
+        return (*self.tracked.notes, *_not_there(self.clip))
 
     def json(self) -> dict[str, Any]:
         """The measures (docs/playback.md), with a schema version."""
@@ -96,15 +96,18 @@ def simulate(
     return Simulated(clip, tracked)
 
 
-def _climbs(clip: AnyClip) -> tuple[str, ...]:
-    """A note where a motion stands on what is not in the simulation."""
-    top = treads_of(clip.canonical).top
-    if not top:
-        return ()
-    return (
-        f"the motion's feet stand up to {100 * top:.0f} cm above the floor, on what is not there "
-        "in simulation: it is as if they were in the air",
-    )
+def _not_there(clip: AnyClip) -> tuple[str, ...]:
+    """Notes where a motion stands or sits on what is not in the simulation."""
+    treads = treads_of(clip.canonical)
+    notes = []
+    if treads.top:
+        notes.append(
+            f"the motion's feet stand up to {100 * treads.top:.0f} cm above the floor, on what is "
+            "not there in simulation: it is as if they were in the air"
+        )
+    if treads.seats:
+        notes.append("the motion sits on what is not there in simulation")
+    return tuple(notes)
 
 
 def _needed_torques(clip: AnyClip) -> Mapping[str, Float[np.ndarray, "T"]]:
@@ -138,7 +141,7 @@ class Followed:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was assumed of the model and the floor."""
-        return (*self.tracker.notes, *_climbs(self.clip))
+        return (*self.tracker.notes, *_not_there(self.clip))
 
     def json(self) -> dict[str, Any]:
         """The measures (docs/policies.md), with a schema version."""

@@ -16,24 +16,30 @@ from spark.transfer.treads import Treads
 
 class Climb(NamedTuple):
     """What a source stands on: the `heights` [m] of the ground under each of its feet over time
-    (`Treads`), and the `ground` all around."""
+    (`Treads`), the `ground` all around; and how high
+    [m] its hips are over the floor where it sits on something, 0 where it does not (`seats`)."""
 
     heights: Float[np.ndarray, "T F"]
     ground: Ground
+    seats: Float[np.ndarray, "T"]
 
     def frames(self, start: int, stop: int) -> "Climb":
         """That of frames `start` to `stop`, exclusive."""
-        return self._replace(heights=self.heights[start:stop])
+        return self._replace(heights=self.heights[start:stop], seats=self.seats[start:stop])
 
 
 def climb_of(source: CanonicalMotion, treads: Treads) -> Climb:
-    """Where a source's feet stand, and so all of it may."""
-    return Climb(treads.heights, replace(treads.ground(source.floor_z), stands=()))
+    """Where a source's feet stand, and so all of it may; and where it sits."""
+    seats, ground = np.zeros(len(source)), replace(treads, seats=()).ground(source.floor_z)
+    for seat in treads.seats:
+        seats[seat.start : seat.stop] = seat.high
+    return Climb(treads.heights, replace(ground, stands=()), seats)
 
 
 def level_climb(source: CanonicalMotion) -> Climb:
     """A floor and nothing else."""
-    return Climb(np.zeros((len(source), len(source.rig.soles))), level_ground(source.floor_z))
+    heights = np.zeros((len(source), len(source.rig.soles)))
+    return Climb(heights, level_ground(source.floor_z), np.zeros(len(source)))
 
 
 class GroundUnderSoles(NamedTuple):
@@ -66,11 +72,19 @@ def under_soles(
 
 
 def climbs(treads: Treads, robot: Morphology) -> tuple[str, ...]:
-    """A note where the source's feet stand on more than the floor."""
-    if treads.level or not robot.soles:
-        return ()
-    top = robot.rig.hip_height / treads.rig.hip_height * treads.top
-    return (
-        f"feet of the source stand on something up to {100 * treads.top:.0f} cm above its floor: "
-        f"the robot's do up to {100 * top:.0f} cm above its own, where nothing is in its model",
+    """Notes where the source's feet stand, or it sits, on more than the floor."""
+    scale, notes = robot.rig.hip_height / treads.rig.hip_height, []
+    if not treads.level and robot.soles:
+        notes.append(
+            f"feet of the source stand on something up to {100 * treads.top:.0f} cm above its "
+            f"floor: the robot's do up to {100 * scale * treads.top:.0f} cm above its own, where "
+            "nothing is in its model"
+        )
+    highs = dict.fromkeys(round(100 * seat.high) for seat in treads.seats)
+    seats = (
+        f"the source sits, with its hips {high} cm above its floor, and its feet can't hold it "
+        f"there: the robot's are {scale * high:.0f} cm above its own, and nothing is below them in "
+        "its model"
+        for high in highs
     )
+    return (*notes, *seats)

@@ -56,7 +56,7 @@ def with_dynamics(
 def _support(
     robot: Morphology, targets: Targets, feet: Sequence[FootPlan], poses: LinkPoses
 ) -> Support:
-    """Sole points that are low, and other parts where the source's touch the floor."""
+    """Sole points that are low, other parts where the source's touch the floor, and the seat."""
     planned = [footing_of(robot, foot).positions for foot in feet]
     points = np.concatenate([p.transpose(2, 0, 1) for p in planned], axis=1)
     under = np.stack([foot.ground for foot in feet], axis=1)
@@ -68,14 +68,16 @@ def _support(
     touches = [touches_of(robot).get(role) for role in targets.part_roles]
     known = [k for k, touch in enumerate(touches) if touch is not None]
     parts = [touch.path(poses)[:2].T for touch in touches if touch is not None]
-    alone = ~touching.any(axis=1) & ~targets.flight & ~targets.parts[:, known].any(axis=1)
+    others = np.column_stack([targets.parts[:, known], targets.seats > 0])
+    alone = ~touching.any(axis=1) & ~targets.flight & ~others.any(axis=1)
     lowest = points[..., 2].argsort(axis=1)[:, :_HELD_POINTS]
     touching[np.flatnonzero(alone)[:, None], lowest[alone]] = True
-    pushing = np.concatenate([touching, targets.parts[:, known]], axis=1)
-    heights = np.concatenate([ground, targets.part_ground[:, known]], axis=1)
+    pushing = np.concatenate([touching, others], axis=1)
+    heights = np.column_stack([ground, targets.part_ground[:, known], targets.seats])
     height = (pushing * heights).sum(axis=1) / np.maximum(pushing.sum(axis=1), 1)
+    places = [*parts, hips_of(robot, poses)[:, :2]]
     return Support(
-        np.concatenate([points[..., :2], *(p[:, None] for p in parts)], axis=1),
+        np.concatenate([points[..., :2], *(p[:, None] for p in places)], axis=1),
         pushing,
         height,
         float(feet[0].heading[0]),

@@ -55,7 +55,8 @@ class Targets:
     holds the body; `com_acceleration`, the source's, scaled [m/s²]; `part_paths` and `feet`, the
     paths of the source's parts, and of its heels and toes, over the floor [m]; `part_ground`, how
     high that under each part is, `ground` and `floor`, those of each sole (`GroundUnderSoles`), and
-    `clearance`, how high the source's soles are over it, scaled; `hands`, from the right hand to
+    `clearance`, how high the source's soles are over it, scaled; `seats`, how high the hips are
+    where the body sits on something, else 0 [m]; `hands`, from the right hand to
     the left [m]. `com` [m] is planned where it is known.
     """
 
@@ -77,6 +78,7 @@ class Targets:
     clearance: Float[np.ndarray, "T S"]
     ground: Float[np.ndarray, "T S"]
     floor: Float[np.ndarray, "T S"]
+    seats: Float[np.ndarray, "T"]
     hands: Float[np.ndarray, "T 3"] | None
     notes: tuple[str, ...]
     com: Float[np.ndarray, "T 3"] | None = None
@@ -119,6 +121,7 @@ class Targets:
             clearance=self.clearance[frames],
             ground=self.ground[frames],
             floor=self.floor[frames],
+            seats=self.seats[frames],
             com=None if self.com is None else self.com[frames],
             hands=None if self.hands is None else self.hands[frames],
         )
@@ -169,6 +172,7 @@ def targets_of(
         clearance=scale * (clearance - own_ground.ground),
         ground=scale * own_ground.ground,
         floor=scale * own_ground.floor,
+        seats=scale * climb.seats,
         hands=_between_hands(rig, positions, robot),
         notes=(*notes, HOVERS) if has_feet(paths).any() and touches.hovers else notes,
     )

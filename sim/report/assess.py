@@ -8,13 +8,13 @@ from jaxtyping import Float
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.course import Course, course_of
 from sim.report.findings import findings_of
+from sim.report.ground import ground_under, own_ground_notes, source_ground_notes
 from sim.report.limbs import limbs_of
 from sim.report.measures import (
     ContactMatch,
     Drift,
     contact_match,
     floor_height,
-    floor_slope,
     root_drift,
 )
 from sim.report.report import Report
@@ -26,18 +26,16 @@ from sim.trajectory import Subject
 from spark.errors import SkeletonError
 from spark.motion import Motion
 from spark.resample import values_at
-from spark.rig.contacts import planted_points
 from spark.rig.rig import Rig
 from spark.transfer.canonical import from_canonical, to_canonical
 from spark.transfer.ground import level_ground
 from spark.transfer.leg_fit import travel_scale
 from spark.transfer.noise import LEAST_NOISE, noise_in, without_noise
-from spark.transfer.treads import Treads, treads_of
+from spark.transfer.treads import treads_of
 
 # Hip heights: a source whose floor is further from z = 0 than this does not stand on z = 0, and
 # what was made of it may have been put there.
 _MAX_FLOOR_OFFSET = 0.1
-_STEEPEST = np.radians(15)  # of a floor that is walked on; feet whose places rise more climb
 _ROUND_RATE = 0.005  # share by which a rate may miss a whole number: 29.97 fps, or a frame in 200
 
 
@@ -66,7 +64,7 @@ def assess(
             notes = (
                 "the floor is the clip's own: one that floats or sinks as a whole can't be told",
             )
-        notes += _uneven(course, "the")
+        notes += own_ground_notes(course)
         return Report(clip, None, None, None, findings_of(clip), notes, known)
     source_course = _course("the source", source)
     quiet, source_floor, trembles = _without_tremble(source_course)
@@ -80,13 +78,13 @@ def assess(
     followed = source_clip if quiet is source else measure_clip(quiet, source_ground)
     times = np.arange(len(course)) * motion.frame_time
     scale = rig.hip_height / source.rig.hip_height
-    ground = treads.under(rig, _ways(course), motion.frame_time, floor, scale)
+    ground = ground_under(course, treads, floor, scale)
     clip = _beyond_source(measure_clip(subject, ground), source_clip, times, scale)
     travel = scale if subject.body is not None else travel_scale(source.rig, rig)
     drift = _drift(course, source_course, times, travel)
     swing = swing_of(clip, followed, times, scale)
     contacts = _contacts(clip, followed, times)
-    notes += _slope(source_course, "the source's") if treads.level else (_climbs(treads, scale),)
+    notes += source_ground_notes(source_course, treads, scale)
     notes += _pace(motion, source.motion)
     thrown = scale * source_clip.base_acceleration_p99
     limbs = limbs_of(clip, followed, times, scale)
@@ -135,12 +133,6 @@ def _about_model(course: Course) -> tuple[str, ...]:
             f"point) is {100 * abs(height):.1f} cm {'above' if height > 0 else 'below'} that"
         )
     return tuple(notes)
-
-
-def _ways(course: Course) -> dict[str, Float[np.ndarray, "T 2"]]:
-    """The ways of a motion's feet [m, world], by side."""
-    roles = [course.rig.roles.roles[j] for j in course.rig.contact_joints]
-    return {role.side: course.feet[:, k, :2] for k, role in enumerate(roles) if role is not None}
 
 
 def _own_floor(course: Course) -> float:
@@ -214,42 +206,4 @@ def _contacts(
     return contact_match(
         np.stack([clip.standing[foot] for foot in feet], axis=1),
         values_at(theirs, times / source.frame_time) > 0.5,
-    )
-
-
-def _uneven(course: Course, whose: str) -> tuple[str, ...]:
-    """A note where the feet of a motion without a source stand on more than a level floor."""
-    treads = treads_of(to_canonical(course.motion, course.rig))
-    if treads.level:
-        return _slope(course, whose)
-    return (
-        f"{whose} feet stand still up to {100 * treads.top:.0f} cm above the floor, and carry the "
-        "body there: all that is high up counts as floating; beside a source that stands as high "
-        "(--source) it does not",
-    )
-
-
-def _climbs(treads: Treads, scale: float) -> str:
-    """A note where the source's feet stand on more than a level floor."""
-    return (
-        f"the source's feet stand still up to {100 * treads.top:.0f} cm above its floor, and carry "
-        f"it there: that is ground, for the motion up to {100 * scale * treads.top:.0f} cm high"
-    )
-
-
-def _slope(course: Course, whose: str) -> tuple[str, ...]:
-    """A note where the feet stand on a slope: recorded floors are off level by a degree or two."""
-    rig, step = course.rig, course.motion.frame_time
-    planted = planted_points(course.feet, step, rig.standing_height).any(axis=1)
-    angle, rise = floor_slope(course.lowest[planted])
-    if rise < PLAUSIBILITY_V2.scaled(rig.hip_height).floating / 2:
-        return ()
-    if angle > _STEEPEST:
-        return (
-            f"{whose} feet stand higher step by step: it climbs, and all that is high up counts as "
-            "floating",
-        )
-    return (
-        f"{whose} floor slopes by {np.degrees(angle):.1f}°: the feet stand {100 * rise:.0f} cm "
-        "higher at one end of it, and there count as floating",
     )

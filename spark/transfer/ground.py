@@ -41,6 +41,13 @@ class Ground:
         ]
         return replace(self, stands=tuple(each for each in shifted if each.stop > 0))
 
+    def with_tops(self, tops: Sequence[Sequence[float]], hip_height: float) -> "Ground":
+        """With more of them [m, world], for a body of that size."""
+        if not len(tops):
+            return self
+        known = distinct(np.concatenate([self.tops, np.array(tops)]), hip_height)
+        return replace(self, tops=known, hip_height=hip_height)
+
     def heights(
         self, points: Float[np.ndarray, "T P 3"], feet: Sequence[str] = ()
     ) -> Float[np.ndarray, "T P"]:

@@ -1,4 +1,4 @@
-"""The ground that feet climb, steps, boxes and slopes: told from where they stand.
+"""The ground that is there: steps, boxes and slopes, told from where feet stand, and seats.
 
 No recording says what was underfoot. But a foot that is still while the ground pushes the body up
 under it (the centre of pressure; Kajita et al. 2003, eq. 3) stands on something, however high it
@@ -34,6 +34,7 @@ from spark.transfer.footfalls import between_contacts
 from spark.transfer.ground import Ground, Stand, distinct, level_ground
 from spark.transfer.hip_sway import center_of_mass
 from spark.transfer.pressure import NOISE, acceleration
+from spark.transfer.seats import FLESH, Seat, seats_of
 
 # All lengths [m] are of an adult.
 MIN_STEP = 0.12  # from one place to the next, once at least: floors that drift do so more slowly
@@ -50,13 +51,16 @@ BELOW_MASS = 0.35  # and at least from there up to the centre of mass
 class Treads:
     """When each of a rig's S feet `stands`, and the `heights` [m] of the ground under it over the
     floor; in swing, between the two places by as much of its way as it has gone. 0 all over where
-    the floor is level. `ways` [m, world] are those of the feet."""
+    the floor is level. `ways` [m, world] are those of
+    the feet, `hips` that of the hips; `seats` are what the body sits on."""
 
     rig: Rig
     frame_time: float
     ways: Float[np.ndarray, "T S 2"]
     stands: Bool[np.ndarray, "T S"]
     heights: Float[np.ndarray, "T S"]
+    hips: Float[np.ndarray, "T 2"]
+    seats: tuple[Seat, ...]
 
     @property
     def level(self) -> bool:
@@ -69,10 +73,16 @@ class Treads:
         return float(self.heights.max(initial=0.0))
 
     def ground(self, floor_z: float) -> Ground:
-        """That under the feet, over a floor at `floor_z` [m, world]."""
+        """That under the body, over a floor at `floor_z` [m, world]."""
         sides = [sole.side for sole in self.rig.soles]
         ways = dict(zip(sides, self.ways.swapaxes(0, 1), strict=True))
-        return self.under(self.rig, ways, self.frame_time, floor_z, 1.0)
+        ground = self.under(self.rig, ways, self.frame_time, floor_z, 1.0)
+        below = floor_z - FLESH * self.rig.standing_height
+        seats = [
+            [*self.hips[seat.start : seat.stop].mean(axis=0), below + seat.high]
+            for seat in self.seats
+        ]
+        return ground.with_tops(seats, self.rig.hip_height)
 
     def under(
         self,
@@ -82,8 +92,8 @@ class Treads:
         floor_z: float,
         scale: float,
     ) -> Ground:
-        """The ground under another motion, on `rig`, whose feet, on their `ways` [m, world] by
-        side, should stand when these do, `scale` times as high over its own floor."""
+        """The ground under the feet of another motion, on `rig`, which on their `ways` [m, world]
+        by side should stand when these do, `scale` times as high over its own floor."""
         if self.level:
             return level_ground(floor_z)
         rate, tops, stands = self.frame_time / frame_time, [], []
@@ -102,13 +112,22 @@ class Treads:
 
 
 def treads_of(source: CanonicalMotion) -> Treads:
-    """Where the feet of a motion stand, one entry for each of `rig.soles`."""
+    """What a motion stands and sits on; the feet are those of `rig.soles`."""
+    ways, stands, ground = _ground_under(source)
+    hips, seats = source.hips[:, :2], seats_of(source)
+    return Treads(source.rig, source.frame_time, ways, stands, ground, hips, seats)
+
+
+def _ground_under(
+    source: CanonicalMotion,
+) -> tuple[Float[np.ndarray, "T S 2"], Bool[np.ndarray, "T S"], Float[np.ndarray, "T S"]]:
+    """`ways`, `stands` and `heights` of `Treads`."""
     rig, frame_time = source.rig, source.frame_time
     scale = rig.standing_height / ADULT_HEIGHT
     count, feet = len(source), len(rig.soles)
     stands, ground = np.zeros((count, feet), dtype=bool), np.zeros((count, feet))
     if not feet or count < 2:
-        return Treads(rig, frame_time, np.zeros((count, feet, 2)), stands, ground)
+        return np.zeros((count, feet, 2)), stands, ground
     found = in_blocks(lambda block: _feet(source.picked(block)), count)
     lowest, paths = found[:, :feet], found[:, feet:].reshape(count, feet, 2, 3)
     ways = paths[..., :2].mean(axis=2)
@@ -117,13 +136,13 @@ def treads_of(source: CanonicalMotion) -> Treads:
     runs.sort(key=lambda run: run[1])
     heights = np.array([np.median(lowest[start:stop, k]) for k, start, stop in runs])
     if not len(runs) or np.ptp(heights) <= MIN_STEP * scale:
-        return Treads(rig, frame_time, ways, stands, ground)
+        return ways, stands, ground
     places = np.array([ways[start:stop, k].mean(axis=0) for k, start, stop in runs])
     carries = _carry(paths, lowest, still, center_of_mass(source), frame_time, scale)
     sure = [carries[start:stop, k].sum() * frame_time > MIN_TIME for k, start, stop in runs]
     known = np.array(sure, dtype=bool)
     if not (np.abs(np.diff(heights[known])) > MIN_STEP * scale).any():
-        return Treads(rig, frame_time, ways, stands, ground)
+        return ways, stands, ground
     for i, (k, start, stop) in enumerate(runs):
         beside = known & (np.abs(heights - heights[i]) < SAME_HEIGHT * scale)
         beside &= np.linalg.norm(places - places[i], axis=1) < SAME_PLACE * scale
@@ -132,7 +151,7 @@ def treads_of(source: CanonicalMotion) -> Treads:
         ground[start:stop, k] = 0.0 if on_floor else heights[i]
     for k in range(feet):
         ground[:, k] = between_contacts(ground[:, k, None], stands[:, k], ways[:, k])[:, 0]
-    return Treads(rig, frame_time, ways, stands, ground)
+    return ways, stands, ground
 
 
 def feet_by_side(rig: Rig, motion: Motion) -> dict[str, Bool[np.ndarray, "T"]]:
