@@ -1,12 +1,18 @@
 """How one foot of a stream's robot stands, frame by frame."""
 
+import math
 from dataclasses import dataclass, field, replace
 
 from robots.solver.foot_path import STEP_SPEEDS
 from robots.stream.footprint import Footprint
 
 _STILL, _STEPS = STEP_SPEEDS[:2]
-_SETTLES = 0.1  # of what soles are off, in a frame
+_SETTLE_TIME = 1.0  # [s] in which a foot on a step comes down most of the way to its source's
+
+
+def settling(frame_time: float) -> float:
+    """The share of what a foot on a step is too high that is lost in a frame."""
+    return 1 - math.exp(-frame_time / _SETTLE_TIME)
 
 
 @dataclass(slots=True)
@@ -54,11 +60,12 @@ class Foot:
         if hold > 0:
             self.footprint.follow(moved[self.on_toe], turned, hold, wobble)
 
-    def stand_on(self, top: float, clearance: float) -> None:
+    def stand_on(self, top: float, clearance: float, settles: float) -> None:
         """What so high a ground [m, the source's own] over the floor its soles are on, so high [m,
-        scaled] there: the mean of some frames, as feet come down with their heels."""
+        scaled] there: it rises with the highest frame, and settles on the others by a share of what
+        it is over them. Who stands a little too high sinks into nothing."""
         stays = True in self.planted and top == self.top
-        rise = self.rise + _SETTLES * (clearance - self.rise) if stays else clearance
+        rise = max(clearance, self.rise + settles * (clearance - self.rise)) if stays else clearance
         self.top, self.rise = top, rise if top > 0 else 0.0
 
     def grip(self, loosens: float, tightens: float) -> None:

@@ -22,7 +22,7 @@ from robots.solver.foot_path import (
 )
 from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
 from robots.solver.window_targets import PointTargets
-from robots.stream.foot import Foot
+from robots.stream.foot import Foot, settling
 from robots.stream.frame_targets import FrameReader, FrameTargets
 from robots.stream.standing import SourceFeet, Standing
 
@@ -49,6 +49,7 @@ class ContactTracker:
         self._robot, self._scale = reader.robot, float(reader.scale)
         self._standing = Standing(reader, frame_time)
         self._grip, self._ahead = frame_time / HOLD_TIME, ahead
+        self._settles = settling(frame_time)
         hip_height = float(self._robot.rig.hip_height)
         self._hip_height, self._wobble = hip_height, MAX_WOBBLE * hip_height
         self._uneven = MAX_UNEVEN * hip_height
@@ -106,7 +107,7 @@ class ContactTracker:
             stands = self._standing.of(frames, at, stood, speed, height, ground)
             for s, foot in enumerate(feet):
                 if True in stands[s]:
-                    foot.stand_on(ground[s], arrived.clearance[s])
+                    foot.stand_on(ground[s], arrived.clearance[s], self._settles)
                 top = foot.rise if ground[s] == foot.top else self._scale * ground[s]
                 clearance = arrived.clearance[s] - top
                 moved, turned = arrived.moved[s], arrived.turned[s]

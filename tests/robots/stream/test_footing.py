@@ -3,9 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from robots.model.known import known
 from robots.solver.window_targets import PointTargets
+from robots.stream.foot import Foot, settling
 from robots.stream.footing import ContactTracker
 from robots.stream.frame_targets import LATENCY, Frame, FrameReader, FrameTargets, ground_of
 from spark.demo.sample import sample_motion, sample_rig
@@ -75,3 +77,17 @@ def test_a_foot_that_stood_over_the_floor_is_put_down_on_it() -> None:
             swing = held.positions[-1, :, 2]
     np.testing.assert_allclose(swing, over, atol=1e-9)
     assert (held.positions[-1, :, 2] < over / 10).all()
+
+
+def test_a_foot_on_a_step_settles_at_any_rate_and_never_sinks() -> None:
+    rises = []
+    for frame_time in (1 / 24, 1 / 120):
+        foot, share = Foot(planted=(True, True)), settling(frame_time)
+        foot.stand_on(0.3, 0.34, share)
+        for _ in range(round(0.5 / frame_time)):
+            foot.stand_on(0.3, 0.30, share)
+        rises.append(foot.rise)
+        foot.stand_on(0.3, 0.33, share)
+        assert foot.rise == 0.33
+    assert rises[0] == pytest.approx(rises[1], abs=1e-9)
+    assert 0.31 < rises[0] < 0.33
