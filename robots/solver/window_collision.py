@@ -5,7 +5,7 @@ from jaxtyping import Float
 
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
-from robots.solver.collision import FELT, collisions_of
+from robots.solver.collision import DEPTH_ROUNDING, collisions_of
 from robots.solver.hulls import Shape, ShapePair
 from robots.solver.near_pairs import NearPairs
 from robots.solver.near_spheres import NearSpheres
@@ -16,11 +16,12 @@ from robots.solver.window_poses import WindowPoses, arms_of
 from robots.solver.window_rows import Rows
 from robots.tree import ROOT, Tree
 
-# Lengths in roundings of the penalty: 3 mm, or less for a small robot. What parts keep between them
-# beyond a whole clip's clearance, for how far a soft penalty gives way is not repaired here; and
-# how far apart they are in the T-pose: others are always near.
-_MARGIN, _FAR = 5 / 3, 100 / 3
-_REACH = 10  # that shapes may move between the searched frame and the others
+_ACTIVE = 3 * DEPTH_ROUNDING  # [m] between shapes beyond which the penalty is negligible
+# [m] that parts keep between them beyond a whole clip's clearance, for how far a soft penalty gives
+# way is not repaired here; and how far apart [m] they are in the T-pose: others are always near.
+_MARGIN, _FAR = 0.005, 0.1
+_REACH = 0.03  # [m] that shapes may move between the searched frame and the others
+_WITHIN = _ACTIVE + _REACH
 
 
 class WindowCollisions:
@@ -30,19 +31,17 @@ class WindowCollisions:
 
     def __init__(self, robot: Morphology, dofs: WindowDofs, rest: Float[np.ndarray, "B 3"]) -> None:
         tree, first = robot.tree, dofs.first_links
-        pairs, rounding = collisions_of(robot).pairs, collisions_of(robot).rounding
+        pairs = collisions_of(robot).pairs
         if dofs.later_only:
             pairs = tuple(pair for pair in pairs if not _among(pair, tree, first))
-        apart = np.array([pair.clearance for pair in pairs])
-        apart += _MARGIN * rounding * np.array([pair.gap > _FAR * rounding for pair in pairs])
-        self._rounding, self._within = rounding, (FELT + _REACH) * rounding
+        apart = np.array([pair.clearance + _MARGIN * (pair.gap > _FAR) for pair in pairs])
         bodies = dofs.bodies([*range(len(tree)), ROOT])
         shapes = list({pair.large.geom: pair.large for pair in pairs}.values())
         number = {shape.geom: k for k, shape in enumerate(shapes)}
         large = np.array([number[pair.large.geom] for pair in pairs], dtype=int)
         polytopes = Polytopes(shapes, bodies[[shape.link for shape in shapes]], rest)
         radii = apart + [_bound(pair.small) for pair in pairs]
-        self._pairs = NearPairs(pairs, radii, polytopes, large, bodies, rest, self._within)
+        self._pairs = NearPairs(pairs, radii, polytopes, large, bodies, rest, _WITHIN)
         self._count = len(pairs)
         own = np.repeat(np.arange(len(pairs)), [len(pair.small.radii) for pair in pairs])
         small = bodies[[pair.small.link for pair in pairs]][own]
@@ -57,14 +56,14 @@ class WindowCollisions:
         is_near = np.zeros(self._count, dtype=bool)
         is_near[self._pairs.of(poses)] = True
         near = self._spheres.at(is_near.take(self._spheres.pairs).nonzero()[0])
-        return near.at(np.logical_or.reduce(near.depth(poses) > -self._within).nonzero()[0])
+        return near.at(np.logical_or.reduce(near.depth(poses) > -_WITHIN).nonzero()[0])
 
     def rows(self, poses: WindowPoses, near: NearSpheres) -> Rows | None:
         """How deep spheres are in shapes, of those that are `near` and felt in some frame."""
         centers = near.centers(poses)
         beyond = near.beyond(poses, centers)
         depth = near.radii - np.maximum.reduce(beyond)
-        felt = depth > -FELT * self._rounding
+        felt = depth > -_ACTIVE
         (active,) = np.logical_or.reduce(felt).nonzero()
         if not len(active):
             return None
@@ -76,7 +75,7 @@ class WindowCollisions:
         p, n = centers.take(active, axis=2), wrenches[3:]
         p, n = np.concatenate([p, p[:2]]), np.concatenate([n, n[:2]])
         np.subtract(p[1:4] * n[2:], p[2:] * n[1:4], out=wrenches[:3])
-        residual, slope = one_sided(depth, self._rounding)
+        residual, slope = one_sided(depth, DEPTH_ROUNDING)
         slope *= felt
         wrenches *= slope
         weights, moving = self._weights.take(near.pairs), self._moving.take(near.pairs, axis=0)
