@@ -12,16 +12,21 @@ from sim.physics import policy_summary
 from sim.physics.policy_network import PolicyNetwork
 from sim.physics.policy_spec import read_spec
 from sim.physics.policy_tracking import PolicyRun, PolicyTracker
+from sim.physics.servos import NO_STOOLS, Stools
 from sim.physics.simulation import Assist
 from sim.physics.summary import render, summarize
 from sim.physics.tracking import TrackingResult, track
 from sim.report.assess import assess
+from sim.report.course import course_of
+from sim.report.ground import ground_under
 from sim.trajectory import Subject, model_trajectory
 from sim.view.scene import Figure
 from spark.errors import SkeletonError
 from spark.transfer.treads import treads_of
 from spark_sim.clips import AnyClip, File, RobotClip
 from spark_sim.loading import clip_of
+
+_STOOL = 0.1  # standing heights: the radius of what a body sits on
 
 __all__ = ["Followed", "Simulated", "follow", "simulate"]
 
@@ -44,7 +49,7 @@ class Simulated:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was assumed of the servos and the floor."""
-        return (*self.tracked.notes, *_not_there(self.clip))
+        return (*self.tracked.notes, *_on_the_ground(self.clip))
 
     def json(self) -> dict[str, Any]:
         """The measures (docs/playback.md), with a schema version."""
@@ -59,7 +64,7 @@ class Simulated:
         clip, tracked = self.clip, self.tracked
         made, wanted = (Subject(clip.motion, clip.rig, b) for b in (tracked.body, tracked.target))
         return [
-            Figure(made, self.name, clip.floor_z, skin=clip.surface[0]),
+            Figure(made, self.name, clip.floor_z, skin=clip.surface[0], tops=_stools(clip).seats),
             Figure(wanted, "target", clip.floor_z, ghost=True),
         ]
 
@@ -88,6 +93,7 @@ def simulate(
         clip.motion.frame_time,
         height=clip.rig.standing_height,
         floor_z=clip.floor_z,
+        stools=_stools(clip),
         assist=Assist() if assist else None,
         balance=balance,
         torques=_needed_torques(clip) if balance else {},
@@ -96,8 +102,18 @@ def simulate(
     return Simulated(clip, tracked)
 
 
-def _not_there(clip: AnyClip) -> tuple[str, ...]:
-    """Notes where a motion stands or sits on what is not in the simulation."""
+def _stools(clip: AnyClip) -> Stools:
+    """What a motion sits on, below where it reaches lowest while it does."""
+    treads = treads_of(clip.canonical)
+    if not treads.seats:
+        return NO_STOOLS
+    floor = replace(treads, heights=np.zeros_like(treads.heights))
+    ground = ground_under(course_of(clip.subject), floor, clip.floor_z, 1.0)
+    return Stools(ground.tops, _STOOL * clip.rig.standing_height)
+
+
+def _on_the_ground(clip: AnyClip) -> tuple[str, ...]:
+    """Notes where a motion sits, or stands on what is not in the simulation."""
     treads = treads_of(clip.canonical)
     notes = []
     if treads.top:
@@ -106,7 +122,7 @@ def _not_there(clip: AnyClip) -> tuple[str, ...]:
             "not there in simulation: it is as if they were in the air"
         )
     if treads.seats:
-        notes.append("the motion sits on what is not there in simulation")
+        notes.append("the motion sits: a stool is there in simulation, as high as it does")
     return tuple(notes)
 
 
@@ -141,7 +157,7 @@ class Followed:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was assumed of the model and the floor."""
-        return (*self.tracker.notes, *_not_there(self.clip))
+        return (*self.tracker.notes, *_on_the_ground(self.clip))
 
     def json(self) -> dict[str, Any]:
         """The measures (docs/policies.md), with a schema version."""
@@ -156,9 +172,9 @@ class Followed:
         clip, target = self.clip, self.tracker.body
         robot, dt = clip.on_robot.robot, self.tracker.frame_time
         motion = robot.motion(robot.from_qpos(target.qpos), dt)
-        made = replace(target, qpos=self.runs[0].qpos)
+        made, tops = replace(target, qpos=self.runs[0].qpos), _stools(clip).seats
         return [
-            Figure(Subject(motion, clip.rig, made), self.name, clip.floor_z),
+            Figure(Subject(motion, clip.rig, made), self.name, clip.floor_z, tops=tops),
             Figure(Subject(motion, clip.rig, target), "target", clip.floor_z, ghost=True),
         ]
 
@@ -183,6 +199,7 @@ def follow(clip: RobotClip | File, policy: File, spec: File, *, seeds: int = 3) 
         settings,
         PolicyNetwork(Path(policy), settings),
         height=loaded.rig.standing_height,
+        stools=_stools(loaded),
     )
     runs = tuple(tracker.run(seed) for seed in range(1, seeds + 1))
     return Followed(loaded, Path(policy).stem, tracker, runs)

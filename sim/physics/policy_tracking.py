@@ -17,7 +17,7 @@ from sim.physics.policy_network import PolicyNetwork
 from sim.physics.policy_observation import Observer
 from sim.physics.policy_spec import PolicySpec
 from sim.physics.policy_terms import State
-from sim.physics.servos import on_floor, torque_limit
+from sim.physics.servos import NO_STOOLS, Stools, on_floor, torque_limit
 from sim.trajectory import ModelTrajectory
 from spark.constants import GRAVITY
 from spark.errors import SkeletonError, name_list
@@ -72,10 +72,11 @@ class PolicyTracker:
         network: PolicyNetwork,
         *,
         height: float,
+        stools: Stools = NO_STOOLS,
     ) -> None:
         self.spec, self.network, self.height, self.target = spec, network, height, target
         notes: list[str] = []
-        mujoco_spec = on_floor(target, 0.0, notes)
+        mujoco_spec = on_floor(target, 0.0, notes, stools)
         mujoco_spec.option.timestep, mujoco_spec.option.gravity = spec.timestep, [0, 0, -GRAVITY]
         self.model = compiled(mujoco_spec)
         # The policy's torques are applied to the joints, and nothing else drives them.

@@ -1,5 +1,7 @@
 """The model that a motion is simulated on: a floor, and servos that follow joint positions."""
 
+from typing import NamedTuple
+
 import mujoco
 import numpy as np
 from jaxtyping import Float
@@ -17,18 +19,34 @@ _MAX_TIMESTEP = 0.002  # [s]
 _COLLISION_GROUP = 3  # by custom; viewers don't show it
 
 
+class Stools(NamedTuple):
+    """What a body sits on: the middle of the seat of each [m, world], as wide as its `radius` [m]
+    says."""
+
+    seats: Float[np.ndarray, "K 3"] = np.zeros((0, 3))
+    radius: float = 0.0
+
+
+NO_STOOLS = Stools()
+
+
 def servo_spec(
-    body: ModelTrajectory, *, height: float, floor_z: float, own: bool = False
+    body: ModelTrajectory,
+    *,
+    height: float,
+    floor_z: float,
+    own: bool = False,
+    stools: Stools = NO_STOOLS,
 ) -> tuple[mujoco.MjSpec, tuple[str, ...]]:
-    """The body's spec on a floor, with a position servo where it has an actuator, and what was
-    assumed on the way.
+    """The body's spec on a floor, beside stools, with a position servo where it has an actuator,
+    and what was assumed on the way.
 
     A model's own position servos stay as they are, unless `own` asks for servos of ours in their
     place. Motors are replaced by servos with the torque limits of the motors, and a model without
     actuators gets servos on all its joints.
     """
     notes: list[str] = []
-    spec = on_floor(body, floor_z, notes)
+    spec = on_floor(body, floor_z, notes, stools)
     timestep = min(float(body.model.opt.timestep), _MAX_TIMESTEP)
     _replace_motors(spec, body.model, height, timestep, own, notes)
     spec.option.timestep, spec.option.gravity = timestep, [0.0, 0.0, -GRAVITY]
@@ -45,19 +63,25 @@ def servo_model(spec: mujoco.MjSpec) -> mujoco.MjModel:
     return model
 
 
-def on_floor(body: ModelTrajectory, floor_z: float, notes: list[str]) -> mujoco.MjSpec:
-    """A copy of the body's spec with something that collides, and a floor; what was assumed is
-    added to `notes`."""
+def on_floor(
+    body: ModelTrajectory, floor_z: float, notes: list[str], stools: Stools = NO_STOOLS
+) -> mujoco.MjSpec:
+    """A copy of the body's spec with something that collides, a floor, and stools on it; what was
+    assumed is added to `notes`."""
     spec = body.spec.copy()
     _let_something_collide(spec, notes)
+    meets = {
+        "contype": 1 | _bits(body.model, "conaffinity"),
+        "conaffinity": 1 | _bits(body.model, "contype"),
+    }
     if not any(g.type == mujoco.mjtGeom.mjGEOM_PLANE for g in spec.worldbody.geoms):
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_PLANE,
-            size=[0, 0, 1],
-            pos=[0, 0, floor_z],
-            contype=1 | _bits(body.model, "conaffinity"),
-            conaffinity=1 | _bits(body.model, "contype"),
-        )
+        plane = mujoco.mjtGeom.mjGEOM_PLANE
+        spec.worldbody.add_geom(type=plane, size=[0, 0, 1], pos=[0, 0, floor_z], **meets)
+    for x, y, z in stools.seats.tolist():
+        half, middle = (z - floor_z) / 2, (z + floor_z) / 2
+        if half > 0:
+            size, cylinder = [stools.radius, half, 0], mujoco.mjtGeom.mjGEOM_CYLINDER
+            spec.worldbody.add_geom(type=cylinder, size=size, pos=[x, y, middle], **meets)
     return spec
 
 

@@ -14,8 +14,6 @@ from sim.report.ground import ground_under
 from spark.kinematics import forward
 from spark.transfer.canonical import from_canonical
 from spark.transfer.treads import treads_of
-from spark_sim.clips import RobotClip
-from spark_sim.simulation import simulate
 from tests.helpers.sitting import RIG, SITS, sitting
 
 SOURCE = sitting()
@@ -59,10 +57,3 @@ def test_a_seat_is_as_high_as_a_motion_sits_but_not_anywhere(up: float, told: fl
         for motion in (SOURCE, lifted)
     ]
     np.testing.assert_allclose(tops[1] - tops[0], [0.0, 0.0, told], atol=2e-3)
-
-
-def test_a_simulation_says_that_there_is_no_seat(ember: Morphology) -> None:
-    clip = RobotClip(retarget(SOURCE, ember), "robot")
-    for start, end, sits in ((0.0, 0.1, False), (2.0, 3.0, True)):
-        seen = simulate(clip.part(start=start, end=end), balance=False)
-        assert any("sits" in note for note in seen.notes) == sits
