@@ -22,7 +22,7 @@ from robots.solver.hulls import CLEARANCE
 from robots.solver.pushes import Pushes
 from robots.tree import LinkPoses
 
-_MAX_DISTANCE = 0.02  # [m] beyond which MuJoCo need not measure
+_MAX_DISTANCE = 0.02  # [m] of the T-pose beyond which MuJoCo need not measure
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class ExactContacts:
     def _measure(
         self, qpos: Float[np.ndarray, "T nq"], candidates: Sequence[Candidate]
     ) -> list[PairDistance]:
-        """The candidates in their frames, where nearer than `_MAX_DISTANCE`."""
+        """The candidates in their frames, where they are near enough to be felt."""
         model, data = self.model, mujoco.MjData(self.model)
         measured: Bool[np.ndarray, "T K"] = np.zeros((len(qpos), len(candidates)), dtype=bool)
         for k, candidate in enumerate(candidates):

@@ -16,8 +16,8 @@ from spark.transfer.treads import Treads
 
 class Climb(NamedTuple):
     """What a source stands on: the `heights` [m] of the ground under each of its feet over time
-    (`Treads`), the `ground` all around; and how high
-    [m] its hips are over the floor where it sits on something, 0 where it does not (`seats`)."""
+    (`Treads`), the `ground` all around, and how high [m] its hips are over the floor where it sits
+    on something (`seats`), 0 where it does not."""
 
     heights: Float[np.ndarray, "T F"]
     ground: Ground

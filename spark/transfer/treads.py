@@ -51,8 +51,8 @@ BELOW_MASS = 0.35  # and at least from there up to the centre of mass
 class Treads:
     """When each of a rig's S feet `stands`, and the `heights` [m] of the ground under it over the
     floor; in swing, between the two places by as much of its way as it has gone. 0 all over where
-    the floor is level. `ways` [m, world] are those of
-    the feet, `hips` that of the hips; `seats` are what the body sits on."""
+    the floor is level. `ways` [m, world] are those of the feet, `hips` that of the hips; `seats`
+    are what the body sits on."""
 
     rig: Rig
     frame_time: float
