@@ -80,11 +80,10 @@ def climbs(treads: Treads, robot: Morphology) -> tuple[str, ...]:
             f"floor: the robot's do up to {100 * scale * treads.top:.0f} cm above its own, where "
             "nothing is in its model"
         )
-    highs = dict.fromkeys(round(100 * seat.high) for seat in treads.seats)
     seats = (
         f"the source sits, with its hips {high} cm above its floor, and its feet can't hold it "
         f"there: the robot's are {scale * high:.0f} cm above its own, and nothing is below them in "
         "its model"
-        for high in highs
+        for high in treads.seat_heights
     )
     return (*notes, *seats)

@@ -157,11 +157,8 @@ class Stream:
         q = robot.to_qpos(projected)[np.zeros(_FRAMES, dtype=int)]
         points = sum(map(len, robot.soles))
         nowhere = PointTargets(*np.zeros((2, LATENCY + 1, points, 3)))
-        held: tuple[PointTargets, PointTargets | None] = nowhere, None
         alike = joined([targets] * (LATENCY + 1))
-        for as_it_comes in (True, False):
-            if not as_it_comes:
-                held = self._tracked(targets, self._terms.poses(q[-1:]))
-            q = self._window.settle(q, alike, *held, _FIRST_ITERATIONS)
-            q[:] = q[-1]
+        q[:] = self._window.settle(q, alike, nowhere, None, _FIRST_ITERATIONS)[-1]
+        held = self._tracked(targets, self._terms.poses(q[-1:]))
+        q[:] = self._window.settle(q, alike, *held, _FIRST_ITERATIONS)[-1]
         return q

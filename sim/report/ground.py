@@ -57,7 +57,7 @@ def own_ground_notes(course: Course) -> tuple[str, ...]:
     seats = tuple(
         f"the body sits, with its hips {high} cm above the floor, and its feet can't hold it "
         "there: it counts as out of balance; beside a source that sits (--source) it does not"
-        for high in _heights(treads)
+        for high in treads.seat_heights
     )
     if treads.level:
         return _slope(course, "the") + seats
@@ -74,7 +74,7 @@ def source_ground_notes(course: Course, treads: Treads, scale: float) -> tuple[s
     seats = tuple(
         f"the source sits, with its hips {high} cm above its floor, and its feet can't hold it "
         "there: a seat is below them, and below the motion's"
-        for high in _heights(treads)
+        for high in treads.seat_heights
     )
     if treads.level:
         return _slope(course, "the source's") + seats
@@ -83,11 +83,6 @@ def source_ground_notes(course: Course, treads: Treads, scale: float) -> tuple[s
         f"it there: that is ground, for the motion up to {100 * scale * treads.top:.0f} cm high",
         *seats,
     )
-
-
-def _heights(treads: Treads) -> list[int]:
-    """Those of different seats [cm]."""
-    return [*dict.fromkeys(round(100 * seat.high) for seat in treads.seats)]
 
 
 def _slope(course: Course, whose: str) -> tuple[str, ...]:

@@ -72,6 +72,11 @@ class Treads:
         """The highest place [m]."""
         return float(self.heights.max(initial=0.0))
 
+    @property
+    def seat_heights(self) -> list[int]:
+        """How high the hips are over the floor [cm] on each seat of another height, for notes."""
+        return [*dict.fromkeys(round(100 * seat.high) for seat in self.seats)]
+
     def ground(self, floor_z: float) -> Ground:
         """That under the body, over a floor at `floor_z` [m, world]."""
         sides = [sole.side for sole in self.rig.soles]
