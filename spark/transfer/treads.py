@@ -223,8 +223,8 @@ def _carry(
     pressure = com[:, None, :2] - (over / push[:, None])[..., None] * force[:, None, :2]
     away = _from_line(pressure, paths[:, :, 0, :2], paths[:, :, 1, :2])
     able = still & (over > BELOW_MASS * scale) & (force[:, None, 2] > MIN_PUSH * GRAVITY)
-    cost = np.where(able & (away < UNDER_FOOT * scale), away + lowest.clip(0.0), np.inf)
-    carries = np.isfinite(cost) & (cost == cost.min(axis=1, keepdims=True))
+    cost = np.where(able, away + lowest.clip(0.0), np.inf)
+    carries = able & (away < UNDER_FOOT * scale) & (cost == cost.min(axis=1, keepdims=True))
     middles = paths[..., :2].mean(axis=2)
     for one in range(paths.shape[1]):
         for other in range(one):

@@ -82,6 +82,24 @@ def test_a_foot_that_is_held_up_stands_nowhere() -> None:
     assert treads_of(balanced).level
 
 
+def test_a_foot_that_is_held_beside_the_other_stands_nowhere() -> None:
+    """Two seconds on the right leg, the left foot still beside its shank, and the trunk bent so far
+    that, weighing as people do, the body would rather be over the left: robots weigh otherwise."""
+    clip = at(np.zeros(300), np.zeros(300))
+    share = np.interp(np.arange(300) / 60, [1.0, 1.5, 3.5, 4.0], [0.0, 1.0, 1.0, 0.0])
+    rotations = clip.rotations.copy()
+    turns = {
+        Role.LEFT_UPPER_LEG: [0.0, -45, 0],
+        Role.LEFT_LOWER_LEG: [0.0, 90, 0],
+        Role.SPINE: [-27, 0.0, 0],
+    }
+    for role, degrees in turns.items():
+        bent = quat_from_rotvec(np.outer(share, np.radians(degrees)))
+        for j in RIG.skeleton.subtree(RIG.roles.require(role)):
+            rotations[:, j] = quat_mul(bent, rotations[:, j])
+    assert treads_of(replace(clip, rotations=rotations)).level
+
+
 def test_a_floor_that_drifts_is_no_stair() -> None:
     """Ten steps, each 3 cm higher than the last, as of a camera that loses its height."""
     time = np.arange(1200) / 60
