@@ -32,7 +32,8 @@ from spark.runs import true_runs
 _WINDOW = 0.15  # [s] before and after a frame over which angular accelerations are averaged
 _MAX_RATIO = 2.0  # of a limb's to the source's, and beyond that
 _MAX_EXCESS = 10.0  # [rad/s²], that is abrupt
-_AROUND = 1.0  # [s] before and after such frames that are marched through
+_AROUND = 1.0  # [s] before and after such frames that are marched through,
+_BETWEEN = 4.0  # [s] and between: what throws arms onto another way may hide until they return
 _FREE_SPEED = 3.0  # [rad/s] of a hinge that costs nothing where ways are compared, and what
 _W_TURN = 4.0  # [1/rad] a turn beyond that costs, from frame to frame
 # In the first frame, from the T-pose, in each that is marched through, and in those between.
@@ -80,13 +81,15 @@ def calmed(
 ) -> Coordinates:
     """`q`, calmed around the frames in which limbs are thrown.
 
-    In each spell of such frames the cheapest way is taken through three: `q`, and the block's
+    In each spell of such frames, which goes on between two that are less than `_BETWEEN` apart, the
+    cheapest way is taken through three: `q`, and the block's
     joints marched forth and back. What it costs to be in a frame says the solver's objective; from
     frame to frame a turn by d [rad] beyond what is free costs (`_W_TURN` d)² / 2, also from way to
     way. A spell begins and ends with `q` where frames before lead in, or others out.
     """
     around = max(1, round(_AROUND / targets.frame_time))
-    runs = true_runs(binary_dilation(thrown, np.ones(2 * around + 1, dtype=bool)))
+    near = binary_dilation(thrown, np.ones(2 * around + 1, dtype=bool))
+    runs = true_runs(near, round(_BETWEEN / targets.frame_time))
     spells = Spells(np.array([stop - start for start, stop in runs], dtype=int))
     frames = np.concatenate([np.arange(start, stop) for start, stop in runs])
     led = [(start > 0, stop < len(q)) for start, stop in runs]

@@ -49,6 +49,12 @@ def folded() -> CanonicalMotion:
     return CanonicalMotion(rig, FRAME_TIME, rotations, hips, 0.0)
 
 
+def repeated(source: CanonicalMotion, times: int) -> CanonicalMotion:
+    """One motion after another, each of 4 s."""
+    rotations, hips = np.tile(source.rotations, (times, 1, 1)), np.tile(source.hips, (times, 1))
+    return CanonicalMotion(source.rig, source.frame_time, rotations, hips, source.floor_z)
+
+
 def left_shoulder(robot: Morphology) -> tuple[Block, int]:
     """The arms, and the first joint of the left one."""
     arms = blocks_of(robot)[1]
@@ -126,13 +132,29 @@ def test_marching_begins_and_ends_with_what_leads_there(
 def test_spells_are_marched_through_as_each_alone(
     folded: CanonicalMotion, ember: Morphology
 ) -> None:
-    arms, q, thrown = jerked(folded, ember, slice(16, 20), slice(96, 98))
-    targets, holds = targets_of(folded, ember), Holds.none(len(q))
+    source = repeated(folded, 3)
+    arms, q, thrown = jerked(source, ember, slice(46, 50), slice(236, 238))
+    targets, holds = targets_of(source, ember), Holds.none(len(q))
     both = calmed(ember, targets, holds, q, arms, thrown.any(axis=0)).angles
     first, second = (calmed(ember, targets, holds, q, arms, own).angles for own in thrown)
-    assert (both != q.angles).any(axis=1)[[18, 96]].all()
-    np.testing.assert_allclose(both[:60], first[:60], atol=1e-6)
-    np.testing.assert_allclose(both[60:], second[60:], atol=1e-6)
+    assert (both != q.angles).any(axis=1)[[48, 236]].all()
+    np.testing.assert_allclose(both[:140], first[:140], atol=1e-6)
+    np.testing.assert_allclose(both[140:], second[140:], atol=1e-6)
+
+
+def test_an_arm_that_is_thrown_onto_another_way_and_back_stays_on_the_first(
+    folded: CanonicalMotion, ember: Morphology
+) -> None:
+    source = repeated(folded, 2)
+    arms, joint = left_shoulder(ember)
+    solved = retarget(source, ember).coordinates
+    angles, thrown = solved.angles.copy(), np.zeros(len(source), dtype=bool)
+    angles[60:180, joint] += 0.8
+    thrown[[60, 180]] = True
+    q = Coordinates(solved.pos, solved.quat, angles)
+    targets, holds = targets_of(source, ember), Holds.none(len(q))
+    marched = calmed(ember, targets, holds, q, arms, thrown).angles[:, joint]
+    assert np.abs(marched - solved.angles[:, joint]).max() < 0.2
 
 
 @pytest.mark.parametrize("frames", [1, 2, 3])
