@@ -86,9 +86,9 @@ def lock_feet(
         moves.append((leg, np.column_stack([along, wanted - height])))
     risen = replace(moved, hips=moved.hips + rise[:, None] * np.array([0.0, 0.0, 1.0]))
     # A foot that rolls off has let go with its heel: if the hips came down for it, the other knee
-    # would bend where the source's is straight.
+    # would bend where the source's is straight; and if it stayed, its own would snap straight.
     lower, moves_from_there = within_reach(risen, moves, flat)
-    return move_ankles(lower, swing_gently(lower, moves_from_there, stretches, stands))
+    return move_ankles(lower, swing_gently(lower, moves_from_there, stretches, flat))
 
 
 def _rolled(

@@ -4,8 +4,8 @@ A broad body on short legs takes longer steps than its legs alone would (`travel
 some of its feet stand where a leg does not reach: they would be pulled along, and lifted. People
 lower their hips in a wide stance, and so does this. A foot that swings or rolls off is let go of:
 the other leg would bend. But a knee that is bent in the source would snap straight on its way to a
-place out of reach, and stay so until the foot is back. So in the air a leg stretches further than
-the source's by a part of what is left of it only: its knee straightens as the source's does.
+place out of reach, and stay so until the foot is back. So but where its sole stands a leg stretches
+further than the source's by a part of what is left of it only: its knee straightens as that does.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from spark.transfer.leg_ik import Leg, leg_of
 
 MAX_REACH = 0.999  # of a leg's length
 _AHEAD = 0.15  # [s] before a foot is out of reach the hips begin to come down
-_AIRBORNE = 0.05  # [s] after a foot has left the ground, or before it is put down, it swings
+_AIRBORNE = 0.05  # [s] after a sole has left the ground, or before it is put down, it swings
 _MAX_DROP = 0.1  # [hip heights] of a wide stance; a foot further away is let go of
 
 Moves = Sequence[tuple[Leg, Float[np.ndarray, "T 3"]]]
@@ -63,7 +63,8 @@ def swing_gently(
     stretches: Sequence[Float[np.ndarray, "T"]],
     stands: Bool[np.ndarray, "L T"],
 ) -> Moves:
-    """The `moves` [m] of feet that do not stand, as far as their legs stretch for them gently.
+    """The `moves` [m] of feet that swing or roll off, as far as their legs stretch for them gently:
+    all but those of soles that stand.
 
     `stretches` are those of the source's legs. What a leg is to stretch further than that takes
     from what is left to its full length, left' = left exp(-further / left): nearly all of a little,

@@ -169,6 +169,21 @@ def test_held_feet_leave_a_raised_knee_bent() -> None:
     assert knee(straight, leg).max() < 0.1 < 0.4 < knee(held, leg).min()
 
 
+def test_a_foot_that_rolls_off_far_behind_leaves_the_knee_bent() -> None:
+    """A squat over the right sole and the left toes, the leg at .85 of its length; the target's
+    foot is 0.3 m further behind, and would ask for .95 of it."""
+    motion = standing(stick_rig(), 121, FPS)
+    bends = {"right": (-0.5, 1.0, -0.5), "left": (-0.1, 1.1, -0.5)}
+    for side, angles in bends.items():
+        for part, bend in zip(("upper_leg", "lower_leg", "foot"), angles, strict=True):
+            turn = quat_from_rotvec(np.array([0.0, bend, 0.0]))
+            motion.rotations[:, joint(Role(f"{side}_{part}"))] = turn
+    source, leg = to_canonical(motion, stick_rig()), stick()[1]
+    assert stretch(source, Group.LEFT_LEG)[0] == pytest.approx(0.853, abs=0.001)
+    held = lock_feet(source, move_ankles(source, [(leg, np.tile([-0.3, 0, 0], (121, 1)))]))
+    assert 0.7 < knee(held, leg).min() < knee(source, leg).min()
+
+
 def test_a_foot_that_stands_is_not_let_go_of() -> None:
     motion, leg = stick()
     stands = NEVER.copy()
