@@ -1,5 +1,7 @@
 """How alike the poses of a robot and of its source are: angles between the parts of both."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float
 
@@ -19,6 +21,7 @@ _LOWER = {
     "forearm": "hand",
 }
 _FEET = (Role.LEFT_FOOT, Role.RIGHT_FOOT)
+_HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
 
 
 def limb_error(motion: Motion, rig: Rig, result: RobotMotion) -> float:
@@ -37,11 +40,24 @@ def limb_error(motion: Motion, rig: Rig, result: RobotMotion) -> float:
 def foot_error(motion: Motion, rig: Rig, result: RobotMotion) -> float | None:
     """The mean angle [rad] between where the feet of both point, that point ahead in the T-pose;
     None without feet."""
-    wanted, found = _feet(motion, rig), _feet(result.motion, result.robot.rig)
-    roles = [role for role in wanted if role in found]
-    if not roles:
+    ahead = np.eye(3)[:1]
+    pairs = _turns_of(_FEET, motion, rig, result)
+    if not pairs:
         return None
-    return _mean_angle([wanted[role] for role in roles], [found[role] for role in roles])
+    wanted, found = (
+        [quat_rotate(turn, ahead) for turn in turns] for turns in zip(*pairs, strict=True)
+    )
+    return _mean_angle(wanted, found)
+
+
+def hand_error(motion: Motion, rig: Rig, result: RobotMotion) -> float | None:
+    """The mean angle [rad] by which the hands of both are turned against each other, as they are
+    from the T-pose; None without hands."""
+    pairs = _turns_of(_HANDS, motion, rig, result)
+    if not pairs:
+        return None
+    away = np.stack([quat_mul(quat_conj(wanted), found) for wanted, found in pairs])
+    return float((2 * np.arccos(np.clip(np.abs(away[..., 0]), 0.0, 1.0))).mean())
 
 
 def trunk_error(motion: Motion, rig: Rig, result: RobotMotion) -> float | None:
@@ -63,11 +79,20 @@ def _limbs(motion: Motion, rig: Rig) -> dict[Role, Float[np.ndarray, "T 3"]]:
     return bone_directions(rig, positions, quat_mul(world, quat_conj(rig.tpose)))
 
 
-def _feet(motion: Motion, rig: Rig) -> dict[Role, Float[np.ndarray, "T 3"]]:
+def _turns_of(
+    roles: Sequence[Role], motion: Motion, rig: Rig, result: RobotMotion
+) -> list[tuple[Float[np.ndarray, "T 4"], Float[np.ndarray, "T 4"]]]:
+    """How the parts that both have are turned from the T-pose, in world axes: the source's, and
+    the robot's."""
+    both = [_turns(roles, motion, rig), _turns(roles, result.motion, result.robot.rig)]
+    return [(both[0][role], both[1][role]) for role in roles if all(role in own for own in both)]
+
+
+def _turns(roles: Sequence[Role], motion: Motion, rig: Rig) -> dict[Role, Float[np.ndarray, "T 4"]]:
     _, world = forward(motion)
-    joints = {role: rig.roles.joint(role) for role in _FEET}
+    joints = {role: rig.roles.joint(role) for role in roles}
     return {
-        role: quat_rotate(quat_mul(world[:, j], quat_conj(rig.tpose[j])), np.eye(3)[:1])
+        role: quat_mul(world[:, j], quat_conj(rig.tpose[j]))
         for role, j in joints.items()
         if j is not None
     }

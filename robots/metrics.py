@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from robots.likeness import foot_error, limb_error, trunk_error
+from robots.likeness import foot_error, hand_error, limb_error, trunk_error
 from robots.model.motion import RobotMotion
 from robots.solver.floor import sole_paths
 from robots.solver.targets import targets_of
@@ -71,6 +71,7 @@ class RobotMetrics:
     rests_slide_m_s: float | None
     limb_error_rad: float
     foot_error_rad: float | None
+    hand_error_rad: float | None
     trunk_error_rad: float | None
     at_limit: float
     fastest_rad_s: float
@@ -127,6 +128,7 @@ def measure(motion: Motion, rig: Rig, result: RobotMotion) -> RobotMetrics:
         **_resting(to_canonical(motion, rig), result),
         limb_error_rad=limb_error(motion, rig, result),
         foot_error_rad=foot_error(motion, rig, result),
+        hand_error_rad=hand_error(motion, rig, result),
         trunk_error_rad=trunk_error(motion, rig, result),
         at_limit=float(near.any(axis=1).mean()),
         fastest_rad_s=float(np.abs(np.diff(angles, axis=0)).max(initial=0.0) / frame_time),

@@ -25,7 +25,7 @@ W_ROTATION = {  # [1/rad] of a part by its role; low where the directions of lim
     "chest": 0.8,
     "head": 0.5,  # what looks somewhere,
     "neck": 0.1,
-    "hand": 0.25,
+    "hand": 0.8,  # what holds, and where axes of a wrist lie apart would turn to aim the forearm,
     "foot": 1.0,  # and what stands on the floor, as a limb's direction by its length
     "spine": 0.1,
     "clavicle": 0.2,

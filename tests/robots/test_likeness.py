@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robots.likeness import foot_error, limb_error, trunk_error
+from robots.likeness import foot_error, hand_error, limb_error, trunk_error
 from robots.model.known import known
 from robots.model.motion import RobotMotion
 from spark.motion import Motion
@@ -30,7 +30,7 @@ def turned(motion: Motion, role: Role, rotvec: list[float]) -> Motion:
 
 def test_a_motion_is_like_itself() -> None:
     still = standing()
-    for error in (limb_error, foot_error, trunk_error):
+    for error in (limb_error, foot_error, hand_error, trunk_error):
         assert error(still.motion, ROBOT.rig, still) == pytest.approx(0.0, abs=1e-6)
 
 
@@ -40,6 +40,14 @@ def test_one_foot_that_points_aside_is_half_of_both() -> None:
     assert foot_error(aside, ROBOT.rig, still) == pytest.approx(0.25)
     assert limb_error(aside, ROBOT.rig, still) == pytest.approx(0.0, abs=1e-6)
     assert trunk_error(aside, ROBOT.rig, still) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_hand_that_is_turned_about_itself_is_turned() -> None:
+    """Half of both, and no limb is: a hand's twist shows in no direction."""
+    still = standing()
+    twisted = turned(still.motion, Role.LEFT_HAND, [0.0, 1.2, 0.0])
+    assert hand_error(twisted, ROBOT.rig, still) == pytest.approx(0.6)
+    assert limb_error(twisted, ROBOT.rig, still) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_thigh_that_is_raised_takes_three_parts_of_eight_along() -> None:
@@ -66,4 +74,5 @@ def test_what_one_body_lacks_has_no_error() -> None:
     none = replace(roles, roles=tuple(r if r in (Role.PELVIS, None) else None for r in roles.roles))
     bare = replace(ROBOT.rig, roles=none)
     assert foot_error(still.motion, bare, still) is None
+    assert hand_error(still.motion, bare, still) is None
     assert trunk_error(still.motion, bare, still) is None
