@@ -29,8 +29,8 @@ from spark.training.same_motion import same_motion
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.foot_lock import lock_feet
-from spark.transfer.hip_sway import sway_hips
 from spark.transfer.leg_fit import fit_legs
+from spark.transfer.refine import refined
 
 SWING_SPEED, SWING_HEIGHT, MIN_SWINGS = 0.5, 0.02, 30  # [m/s], [m] of a truth's swinging sole
 SUNK = 0.01  # [m]
@@ -41,7 +41,7 @@ METHODS: dict[str, Callable[[CanonicalMotion, Rig], CanonicalMotion]] = {
     "copy, feet held": lambda s, rig: lock_feet(s, transfer(s, rig)),
     "legs fitted": lambda s, rig: fit_legs(s, transfer(s, rig)),
     "legs fitted, feet held": lambda s, rig: lock_feet(s, fit_legs(s, transfer(s, rig))),
-    "`retarget`": lambda s, rig: sway_hips(s, lock_feet(s, fit_legs(s, transfer(s, rig)))),
+    "`retarget`": lambda s, rig: refined(s, fit_legs(s, transfer(s, rig))),
 }
 
 

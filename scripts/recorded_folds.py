@@ -30,8 +30,7 @@ from spark.training.recorded_ridge import Ridge, fit_ridge
 from spark.training.same_motion import same_motion
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion
-from spark.transfer.foot_lock import lock_feet
-from spark.transfer.hip_sway import sway_hips
+from spark.transfer.refine import refined
 
 FOLDS, SEED = 6, 0
 Method = Callable[[CanonicalMotion, Rig], CanonicalMotion]
@@ -106,7 +105,7 @@ def recorded_method(learned: Recorded, habits: HabitsOf) -> Method:
 def _both(name: str, plain: Method) -> dict[str, Method]:
     return {
         name: plain,
-        f"{name}, as `retarget`": lambda s, rig: sway_hips(s, lock_feet(s, plain(s, rig))),
+        f"{name}, as `retarget`": lambda s, rig: refined(s, plain(s, rig)),
     }
 
 

@@ -11,9 +11,8 @@ from spark.io.bvh import write_bvh
 from spark.io.encoding import encode, encode_new
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, from_canonical
-from spark.transfer.foot_lock import lock_feet
-from spark.transfer.hip_sway import sway_hips
 from spark.transfer.noise import without_noise
+from spark.transfer.refine import grounded, refined
 from spark_sim import files
 from spark_sim.choices import Method, RobotName
 from spark_sim.clips import AnyClip, Clip, File, RobotClip
@@ -73,9 +72,10 @@ def retarget(
     (`spark.transfer.leg_fit`), and joints of spine, neck or shoulders without a counterpart are
     filled in: by a trained network (`checkpoint`, or the one that ships) on rigs like those that it
     was trained on, and by the target's own motion, where its file has one. With `refine`, each foot
-    is then held where the source's foot stands, and with "spark" the hips sway so that the weight
-    moves as the source's does (`spark.transfer.hip_sway`). A source that trembles, as motion
-    estimated from video, is smoothed before (`spark.transfer.noise`), and a note says so.
+    is then held where the source's foot stands, what else would be in the floor comes up
+    (`spark.transfer.over_floor`), and with "spark" the hips sway so that the weight moves as the
+    source's does (`spark.transfer.hip_sway`). A source that trembles, as motion estimated from
+    video, is smoothed before (`spark.transfer.noise`), and a note says so.
 
     On a robot the whole trajectory is solved for, within the joints' limits, feet held. With method
     "copy" or without `refine`, each pose is only copied to the robot's hinges, as a baseline.
@@ -101,9 +101,8 @@ def retarget(
     else:
         moved = _filled_in(canonical, target, _learned(checkpoint))
     if refine:
-        moved = lock_feet(canonical, moved, noise)
-        if method == "spark":
-            moved = sway_hips(canonical, moved)
+        finish = refined if method == "spark" else grounded
+        moved = finish(canonical, moved, noise)
     motion = from_canonical(moved)
     bvh, notes = encode(motion, target.recording)
     recording = replace(

@@ -27,9 +27,8 @@ from spark.transfer.canonical import (
     canonical_positions,
     to_canonical,
 )
-from spark.transfer.foot_lock import lock_feet
-from spark.transfer.hip_sway import sway_hips
 from spark.transfer.leg_fit import fit_legs
+from spark.transfer.refine import grounded, refined
 from spark.transfer.target_prior import RetargetMethod, with_target_prior
 
 Positions = Float[np.ndarray, "_ _ 3"]  # frames, joints
@@ -131,9 +130,7 @@ def as_method(
         if legs_fitted:
             moved = legs(case.source, moved)
         if feet_held:
-            moved = lock_feet(case.source, moved)
-            if legs_fitted:
-                moved = sway_hips(case.source, moved)
+            moved = (refined if legs_fitted else grounded)(case.source, moved)
         return canonical_positions(moved)
 
     return run

@@ -1,9 +1,10 @@
-"""Two-bone inverse kinematics of legs, and the corrections that hold planted feet.
+"""Two-bone inverse kinematics of legs and arms, and the corrections that hold planted feet.
 
 Works on rotations since the T-pose in world axes, for any leading batch axes. A foot's contact
 point (its toe, or its ankle where there is no toe) is held in one position over each stance;
 between stances the correction is eased from one to the next. The leg bends in its own plane; the
-foot keeps its rotation in the world.
+foot keeps its rotation in the world. So it is of an arm: what is said of thigh, shank and ankle
+holds of upper arm, forearm and wrist.
 """
 
 from collections.abc import Sequence
@@ -23,10 +24,14 @@ from spark.vectors import cross, dot, joined
 
 _STRAIGHT = 0.15  # sine of the knee's angle; the further below, the less the bones show its plane
 _SOFT = 0.05  # [rad] 3 degrees: a knee that bends by less makes a leg .3 thousandths shorter
+# About which a limb bends in the T-pose: knees to the back, elbows to the front.
+KNEES = (0.0, 1.0, 0.0)
+ELBOWS = {Group.LEFT_ARM: (0.0, 0.0, -1.0), Group.RIGHT_ARM: (0.0, 0.0, 1.0)}
 
 
 class Leg(NamedTuple):
-    """Joints of one leg, thigh to contact point, and the joints that turn with thigh and shank."""
+    """Joints of one leg, thigh to contact point, the joints that turn with thigh and shank, and the
+    axis that the knee bends about, of the thigh in the T-pose."""
 
     upper_leg: int
     lower_leg: int
@@ -34,11 +39,30 @@ class Leg(NamedTuple):
     contact: int
     with_thigh: tuple[int, ...]
     with_shank: tuple[int, ...]
+    bends_about: tuple[float, float, float] = KNEES
 
 
 def leg_of(rig: Rig, limb: Group) -> Leg | None:
     """The leg `limb` of a rig; None without a knee or an ankle."""
     upper, lower, foot, toe = (rig.roles.joint(role) for role in LIMBS[limb])
+    return _limb_of(rig, upper, lower, foot, toe, KNEES)
+
+
+def arm_of(rig: Rig, limb: Group) -> Leg | None:
+    """The arm `limb` of a rig as a leg, its contact point the wrist; None without an elbow or a
+    wrist."""
+    _, upper, lower, hand = (rig.roles.joint(role) for role in LIMBS[limb])
+    return _limb_of(rig, upper, lower, hand, hand, ELBOWS[limb])
+
+
+def _limb_of(
+    rig: Rig,
+    upper: int | None,
+    lower: int | None,
+    foot: int | None,
+    contact: int | None,
+    bends_about: tuple[float, float, float],
+) -> Leg | None:
     if upper is None or lower is None or foot is None:
         return None
     below_hip, below_knee, below_ankle = (
@@ -53,9 +77,10 @@ def leg_of(rig: Rig, limb: Group) -> Leg | None:
         upper,
         lower,
         foot,
-        foot if toe is None else toe,
+        foot if contact is None else contact,
         tuple(sorted(below_hip - below_knee)),
         tuple(sorted(below_knee - below_ankle)),
+        bends_about,
     )
 
 
@@ -109,7 +134,8 @@ def bend_leg(
 ) -> Float[np.ndarray, "*n J 4"]:
     """Rotations with the ankle moved by `move`, or as near to it as the leg reaches."""
     hip, knee, ankle = (positions[..., j, :] for j in leg[:3])
-    both = leg_rotations(knee - hip, ankle - knee, rotations[..., leg.upper_leg, :], move)
+    upper_leg = rotations[..., leg.upper_leg, :]
+    both = leg_rotations(knee - hip, ankle - knee, upper_leg, move, leg.bends_about)
     out = rotations.copy()
     for joints, turned in zip((leg.with_thigh, leg.with_shank), both, strict=True):
         out[..., list(joints), :] = quat_mul(turned[..., None, :], rotations[..., list(joints), :])
@@ -135,15 +161,18 @@ def leg_rotations(
     shank: Float[np.ndarray, "*n 3"],
     upper_leg: Float[np.ndarray, "*n 4"],
     move: Float[np.ndarray, "*n 3"],
+    bends_about: tuple[float, float, float] = KNEES,
 ) -> tuple[Float[np.ndarray, "*n 4"], Float[np.ndarray, "*n 4"]]:
     """By which thigh and shank are turned, in world axes, so that the ankle moves by `move` or as
     near to it as the leg reaches. `thigh` and `shank` are the bones [m, world], `upper_leg` is the
-    thigh's rotation since the T-pose. A leg that is not moved stays as it is."""
+    thigh's rotation since the T-pose, where the knee bends about `bends_about`. A leg that is not
+    moved stays as it is."""
     a, b = _length(thigh), _length(shank)
     goal = thigh + shank + move
     reach = np.maximum(_length(goal), abs(a - b) * 1.01 + 1e-9)
     normal = cross(thigh, shank)
-    axis = _bend_axis(normal, a * b, upper_leg)
+    lateral = quat_rotate(upper_leg, np.array(bends_about, normal.dtype))
+    axis = _bend_axis(normal, a * b, lateral)
     # Of the bones' product, what a turn about the axis leaves as it is, and what it changes.
     fixed = dot(thigh, axis) * dot(shank, axis)
     along, across = dot(thigh, shank) - fixed, dot(normal, axis)
@@ -167,12 +196,11 @@ def _turn_about(
 def _bend_axis(
     normal: Float[np.ndarray, "*n 3"],
     product: Float[np.ndarray, "*n 1"],
-    upper_leg: Float[np.ndarray, "*n 4"],
+    lateral: Float[np.ndarray, "*n 3"],
 ) -> Float[np.ndarray, "*n 3"]:
     """The axis that a knee bends about, forwards: `normal` to the bones, whose lengths have this
-    `product`, on the thigh's left; the thigh's lateral axis the more, the straighter the leg, and
+    `product`, on the thigh's left; the thigh's `lateral` axis the more, the straighter the leg, and
     the more it bends sideways: there neither side of its plane is the left."""
-    lateral = quat_rotate(upper_leg, np.array([0, 1, 0], normal.dtype))
     size = np.maximum(_length(normal), 1e-12)
     along = dot(normal, lateral) / size
     sine = size / np.maximum(product, 1e-12)

@@ -1,0 +1,149 @@
+"""What touches the ground beside the feet stays over it: hands, head, trunk and knees.
+
+Copied onto arms and a trunk of other proportions, a body goes through the floor that the source's
+rests on: in a cartwheel by its hands, if its arms are long for its legs. Where its feet are in the
+air the body then rises as a whole, as it stands on its arms; and so it does where the trunk, the
+head or a knee is too low, but for feet that stay where they are. A hand turns up at the wrist until
+its fingers lie on the floor, and what is still too low is raised with the elbow.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+
+from spark.blocks import in_blocks
+from spark.rig.roles import LIMBS, Group, Role
+from spark.rotation import quat_from_rotvec, quat_mul
+from spark.smoothstep import smoothstep
+from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.leg_ik import ELBOWS, Leg, arm_of, leg_of, move_ankles
+
+_FLESH = 0.005  # [hip heights] of a joint's centre over the floor, at least: half a cm of an adult
+_EASE = 0.1  # [s] before something would be in the floor it begins to rise
+_ALOFT = 0.15  # [hip heights] over where it stands at which a foot is in the air
+_LEGS = (Group.LEFT_LEG, Group.RIGHT_LEG)
+_BODY = (
+    *(Role.PELVIS, Role.HEAD, Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM),
+    *(role for leg in _LEGS for role in LIMBS[leg][:2]),
+)
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+def over_floor(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
+    """`moved`, the transfer of `source`, with nothing in the floor that is not in the source's, but
+    for its feet. Itself where that is so already."""
+    arms = {LIMBS[g][-1]: arm for g in ELBOWS if (arm := arm_of(moved.rig, g)) is not None}
+    body = {role: [j] for role in _BODY if (j := moved.rig.roles.joint(role)) is not None}
+    hands = {role: list(moved.rig.skeleton.subtree(arm.foot)) for role, arm in arms.items()}
+    allowed = _allowed(source, moved)
+    if not max(_sunk(moved, {**body, **hands}, allowed).values(), key=np.max).any():
+        return moved
+    wrists = {role: joints[:1] for role, joints in hands.items()}
+    moved = _risen(moved, _sunk(moved, body, allowed), _sunk(moved, wrists, allowed))
+    moved = _turned_up(moved, hands, allowed)
+    deep = _sunk(moved, hands, allowed)
+    raised = [(arm, _eased(deep[role], moved)[:, None] * _UP) for role, arm in arms.items()]
+    return move_ankles(moved, raised)
+
+
+def _allowed(source: CanonicalMotion, moved: CanonicalMotion) -> dict[Role, Float[np.ndarray, "T"]]:
+    """How low [m] over the floor each part of `moved` may be: as low as the source's, scaled, where
+    that is in the floor."""
+    rig = source.rig
+    scale = moved.rig.hip_height / rig.hip_height
+    joints = {role: j for role in Role if (j := rig.roles.joint(role)) is not None}
+    parts = {
+        r: list(rig.skeleton.subtree(j)) if r.part == "hand" else [j] for r, j in joints.items()
+    }
+    least = _FLESH * moved.rig.hip_height
+    return {r: np.minimum(scale * low, least) for r, low in _lowest(source, parts).items()}
+
+
+def _sunk(
+    moved: CanonicalMotion,
+    parts: Mapping[Role, Sequence[int]],
+    allowed: Mapping[Role, Float[np.ndarray, "T"]],
+) -> dict[Role, Float[np.ndarray, "T"]]:
+    """How much too low [m] parts are; those that the source lacks are not."""
+    return {
+        role: np.maximum(allowed[role] - low, 0.0) if role in allowed else np.zeros(len(low))
+        for role, low in _lowest(moved, parts).items()
+    }
+
+
+def _lowest(
+    motion: CanonicalMotion, parts: Mapping[Role, Sequence[int]]
+) -> dict[Role, Float[np.ndarray, "T"]]:
+    """The height over the floor [m] of the lowest of each part's joints."""
+    joints = [j for part in parts.values() for j in part]
+    heights = in_blocks(
+        lambda block: canonical_positions(motion.picked(block), joints)[..., 2], len(motion)
+    )
+    ends = np.cumsum([len(part) for part in parts.values()])[:-1]
+    columns = np.split(heights - motion.floor_z, ends, axis=1)
+    return {role: own.min(axis=1) for role, own in zip(parts, columns, strict=True)}
+
+
+def _risen(
+    moved: CanonicalMotion,
+    body: Mapping[Role, Float[np.ndarray, "T"]],
+    wrists: Mapping[Role, Float[np.ndarray, "T"]],
+) -> CanonicalMotion:
+    """The whole body as high as its parts ask for, the wrists while no foot is near the floor; feet
+    that are near it stay."""
+    legs = [leg for group in _LEGS if (leg := leg_of(moved.rig, group)) is not None]
+    aloft = [_aloft(moved, leg) for leg in legs]
+    on_hands = np.min([np.ones(len(moved)), *aloft], axis=0)
+    asked = [*body.values(), *(on_hands * deep for deep in wrists.values())]
+    rise = _eased(np.max([np.zeros(len(moved)), *asked], axis=0), moved)
+    higher = replace(moved, hips=moved.hips + rise[:, None] * _UP)
+    stay = [(1 - own) * rise for own in aloft]
+    return move_ankles(
+        higher, [(leg, -down[:, None] * _UP) for leg, down in zip(legs, stay, strict=True)]
+    )
+
+
+def _aloft(moved: CanonicalMotion, leg: Leg) -> Float[np.ndarray, "T"]:
+    """How far a foot is in the air: 0 where it stands, 1 at `_ALOFT` over that and more."""
+    rig, foot = moved.rig, [leg.foot, leg.contact]
+    high = canonical_positions(moved, foot)[..., 2].min(axis=1) - moved.floor_z
+    hips = rig.tpose_positions[rig.hips, 2].mean()
+    standing = rig.tpose_positions[foot, 2].min() - hips + rig.hip_height
+    return smoothstep((high - standing) / (_ALOFT * rig.hip_height))
+
+
+def _turned_up(
+    moved: CanonicalMotion,
+    hands: Mapping[Role, Sequence[int]],
+    allowed: Mapping[Role, Float[np.ndarray, "T"]],
+) -> CanonicalMotion:
+    """Hands turned up about a level axis across them, until no finger is lower than it may be, once
+    the wrist is as high as it has to be."""
+    rotations = moved.rotations.copy()
+    for role, joints in hands.items():
+        if len(joints) < 2 or role not in allowed:
+            continue
+        at = canonical_positions(moved, joints)
+        fingers = at[:, 1:] - at[:, :1]
+        wrist = np.maximum(at[:, 0, 2] - moved.floor_z, allowed[role])
+        least = np.minimum(allowed[role] - wrist, 0.0)[:, None]
+        length = np.maximum(np.linalg.norm(fingers, axis=-1), 1e-9)
+        up, wanted = (np.arcsin(np.clip(z / length, -1, 1)) for z in (fingers[..., 2], least))
+        turn = _eased(np.maximum(wanted - up, 0.0).max(axis=1), moved)
+        along = fingers.mean(axis=1)
+        across = np.stack([along[:, 1], -along[:, 0], 0 * turn], axis=1)
+        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
+        turned = quat_from_rotvec(turn[:, None] * across)[:, None]
+        rotations[:, list(joints)] = quat_mul(turned, rotations[:, list(joints)])
+    return replace(moved, rotations=rotations)
+
+
+def _eased(need: Float[np.ndarray, "T"], moved: CanonicalMotion) -> Float[np.ndarray, "T"]:
+    """No less than what is needed, and there in time: the mean of the largest near each frame."""
+    size = 2 * round(_EASE / moved.frame_time) + 1
+    largest = maximum_filter1d(need, size, mode="nearest")
+    eased: Float[np.ndarray, T] = uniform_filter1d(largest, size, mode="nearest")
+    return eased

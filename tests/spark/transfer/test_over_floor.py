@@ -1,0 +1,173 @@
+"""What touches the ground beside the feet stays over it, on longer arms too."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spark.demo.sample import MOTIONS, sample_motion, sample_rig
+from spark.rig.rig import Rig
+from spark.rig.roles import Role, RoleMap
+from spark.rotation import quat_from_rotvec
+from spark.skeleton import Skeleton
+from spark.transfer.analytic import transfer
+from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
+from spark.transfer.foot_lock import lock_feet
+from spark.transfer.over_floor import over_floor
+from tests.helpers.stick import joint, standing, stick_rig
+
+FPS, FRAMES = 60.0, 121
+FEET = [joint(Role.LEFT_FOOT), joint(Role.RIGHT_FOOT)]
+HANDS = [joint(Role.LEFT_HAND), joint(Role.RIGHT_HAND)]
+ARMS = [joint(Role(f"{side}_{part}")) for side in ("left", "right") for part in ("forearm", "hand")]
+
+
+def long_armed(by: float) -> Rig:
+    """The stick man with longer arms."""
+    rig = stick_rig()
+    offsets = rig.skeleton.offsets.copy()
+    offsets[ARMS] *= by
+    return replace(rig, skeleton=replace(rig.skeleton, offsets=offsets))
+
+
+def with_fingers(rig: Rig) -> Rig:
+    """With a straight finger of 0.15 m at the left hand."""
+    s, hand = rig.skeleton, joint(Role.LEFT_HAND)
+    skeleton = Skeleton(
+        names=(*s.names, "finger"),
+        parents=np.append(s.parents, hand),
+        offsets=np.concatenate([s.offsets, [[0.0, 0.15, 0.0]]]),
+        translating=np.append(s.translating, False),
+        end_parents=s.end_parents,
+        end_offsets=s.end_offsets,
+    )
+    roles = RoleMap((*rig.roles.roles, None), (1.0,) * len(skeleton), ("by hand",) * len(skeleton))
+    return replace(
+        rig,
+        skeleton=skeleton,
+        roles=roles,
+        groups=(*rig.groups, frozenset()),
+        tpose=np.concatenate([rig.tpose, [[1.0, 0, 0, 0]]]),
+    )
+
+
+def posed(rig: Rig, share: np.ndarray, turns: dict[Role, list[float]]) -> CanonicalMotion:
+    """The stick man, whose joints are turned from the T-pose [rad, in their own axes] by a share in
+    each frame."""
+    motion = standing(rig, len(share), FPS)
+    for role, turn in turns.items():
+        motion.rotations[:, joint(role)] = quat_from_rotvec(np.outer(share, turn))
+    return to_canonical(motion, rig)
+
+
+def bowed() -> CanonicalMotion:
+    """Squats on level thighs, bows by 100 degrees within a second and rises again, arms hanging
+    down all the while: the wrists end 11 cm over the floor, and 5 cm in it on arms of 1.3."""
+    share = np.sin(np.pi * np.arange(FRAMES) / (FRAMES - 1)) ** 2
+    squat = {
+        Role.LEFT_UPPER_ARM: [-1.4, 0.0, 0.0],
+        Role.RIGHT_UPPER_ARM: [1.4, 0.0, 0.0],
+        **{Role(f"{side}_upper_leg"): [0.0, -1.57, 0.0] for side in ("left", "right")},
+        **{Role(f"{side}_lower_leg"): [0.0, 1.57, 0.0] for side in ("left", "right")},
+    }
+    motion = posed(stick_rig(), np.ones(FRAMES), squat)
+    bow = posed(stick_rig(), share, {Role.SPINE: [0.0, 1.75, 0.0]})
+    rotations = motion.rotations.copy()
+    for role in (Role.SPINE, Role.NECK, Role.HEAD):
+        rotations[:, joint(role)] = bow.rotations[:, joint(role)]
+    return replace(motion, rotations=rotations, hips=motion.hips - [0.0, 0.0, 0.4], floor_z=0.0)
+
+
+def lowest(motion: CanonicalMotion, joints: list[int]) -> float:
+    return float(canonical_positions(motion, joints)[..., 2].min() - motion.floor_z)
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_a_motion_with_nothing_in_the_floor_stays_itself(name: str) -> None:
+    source, rig = sample_rig("walker"), sample_rig("dancer")
+    canonical = to_canonical(sample_motion(name, source, 60.0), source)
+    held = lock_feet(canonical, transfer(canonical, rig))
+    assert over_floor(canonical, held) is held
+
+
+def test_longer_arms_bend_over_the_floor_and_all_else_stays() -> None:
+    source = bowed()
+    moved = transfer(source, long_armed(1.3))
+    assert lowest(source, HANDS) > 0
+    assert lowest(moved, HANDS) < -0.03
+    raised = over_floor(source, moved)
+    assert 0.0 < lowest(raised, HANDS) < 0.03
+    before, after = canonical_positions(moved), canonical_positions(raised)
+    others = [j for j in range(before.shape[1]) if j not in ARMS]
+    np.testing.assert_allclose(after[:, others], before[:, others], atol=1e-9)
+    left, right = (after[:, HANDS[k]] for k in (0, 1))
+    np.testing.assert_allclose(left * [1, -1, 1], right, atol=1e-9)
+    quickest = [np.abs(np.diff(p[:, HANDS[0]], 2, axis=0)).max() * FPS**2 for p in (before, after)]
+    assert quickest[1] < quickest[0] + 3.0  # [m/s²]
+
+
+def test_what_is_in_the_source_s_floor_may_be_as_deep() -> None:
+    source = bowed()
+    deep = replace(source, hips=source.hips - [0.0, 0.0, 0.2])
+    assert over_floor(deep, deep) is deep
+    raised = over_floor(deep, transfer(deep, long_armed(1.3)))
+    assert lowest(raised, HANDS) == pytest.approx(lowest(deep, HANDS), abs=0.02)
+
+
+def test_a_body_on_its_hands_rises_as_a_whole() -> None:
+    """A handstand, upside down about the pelvis, arms beside the head."""
+    arms = {Role.LEFT_UPPER_ARM: [1.57, 0.0, 0.0], Role.RIGHT_UPPER_ARM: [-1.57, 0.0, 0.0]}
+    up = posed(stick_rig(), np.ones(FRAMES), arms)
+    over = quat_from_rotvec(np.array([np.pi, 0.0, 0.0]))
+    motion = standing(stick_rig(), FRAMES, FPS)
+    motion.rotations[:] = up.rotations
+    motion.rotations[:, 0] = over
+    for role, turn in arms.items():
+        motion.rotations[:, joint(role)] = quat_from_rotvec(np.array(turn))
+    stands = to_canonical(motion, stick_rig())
+    up = np.array([0.0, 0.0, 0.02 - lowest(stands, HANDS)])
+    stands = replace(stands, hips=stands.hips + up)
+    moved = transfer(stands, long_armed(1.3))
+    risen = over_floor(stands, moved)
+    shift = canonical_positions(risen) - canonical_positions(moved)
+    assert lowest(moved, HANDS) < -0.05
+    assert 0.0 < lowest(risen, HANDS) < 0.02
+    np.testing.assert_allclose(
+        shift, shift[:1, :1].repeat(FRAMES, 0).repeat(len(shift[0]), 1), atol=1e-9
+    )
+
+
+def test_a_knee_is_raised_with_the_hips_while_feet_stay() -> None:
+    """Kneeling deeper than the source: hips 10 cm too low, shanks level on the floor."""
+    turns = {Role(f"{s}_lower_leg"): [0.0, 1.57, 0.0] for s in ("left", "right")}
+    kneels = posed(stick_rig(), np.ones(FRAMES), turns)
+    knees = [joint(Role(f"{s}_lower_leg")) for s in ("left", "right")]
+    up = np.array([0.0, 0.0, 0.05 - lowest(kneels, knees)])
+    kneels = replace(kneels, hips=kneels.hips + up)
+    low = replace(kneels, hips=kneels.hips - [0.0, 0.0, 0.1])
+    assert lowest(low, knees) == pytest.approx(-0.05)
+    assert lowest(over_floor(kneels, low), knees) > -1e-3
+
+
+def test_fingers_turn_up_at_the_wrist() -> None:
+    source = bowed()
+    rig = with_fingers(stick_rig())
+    moved = transfer(source, rig)
+    finger, wrist = len(rig.skeleton) - 1, joint(Role.LEFT_HAND)
+    assert lowest(moved, [finger]) < -0.03
+    raised = over_floor(source, moved)
+    assert lowest(raised, [finger]) > -1e-6
+    before, after = canonical_positions(moved), canonical_positions(raised)
+    np.testing.assert_allclose(after[:, wrist], before[:, wrist], atol=1e-9)
+    length = np.linalg.norm(after[:, finger] - after[:, wrist], axis=1)
+    np.testing.assert_allclose(length, 0.15)
+
+
+def test_limbs_that_a_rig_lacks_are_not_missed() -> None:
+    source = bowed()
+    rig = stick_rig()
+    roles = tuple(None if r in (Role.LEFT_HAND, Role.HEAD) else r for r in rig.roles.roles)
+    bare = replace(rig, roles=replace(rig.roles, roles=roles))
+    for a, b in ((rig, bare), (bare, rig)):
+        moved = replace(source, rig=b, hips=source.hips - [0.0, 0.0, 0.1])
+        assert lowest(over_floor(replace(source, rig=a), moved), HANDS[1:]) > 0.0
