@@ -38,8 +38,11 @@ def over_floor(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMoti
     arms = {LIMBS[g][-1]: arm for g in ELBOWS if (arm := arm_of(moved.rig, g)) is not None}
     body = {role: [j] for role in _BODY if (j := moved.rig.roles.joint(role)) is not None}
     hands = {role: list(moved.rig.skeleton.subtree(arm.foot)) for role, arm in arms.items()}
-    allowed = _allowed(source, moved)
-    if not max(_sunk(moved, {**body, **hands}, allowed).values(), key=np.max).any():
+    least = _FLESH * moved.rig.hip_height
+    if min(map(np.min, _lowest(moved, {**body, **hands}).values())) >= least:
+        return moved
+    allowed = _allowed(source, moved, [*body, *hands], least)
+    if not any(map(np.any, _sunk(moved, {**body, **hands}, allowed).values())):
         return moved
     wrists = {role: joints[:1] for role, joints in hands.items()}
     moved = _risen(moved, _sunk(moved, body, allowed), _sunk(moved, wrists, allowed))
@@ -49,16 +52,15 @@ def over_floor(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMoti
     return move_ankles(moved, raised)
 
 
-def _allowed(source: CanonicalMotion, moved: CanonicalMotion) -> dict[Role, Float[np.ndarray, "T"]]:
-    """How low [m] over the floor each part of `moved` may be: as low as the source's, scaled, where
-    that is in the floor."""
+def _allowed(
+    source: CanonicalMotion, moved: CanonicalMotion, roles: Sequence[Role], least: float
+) -> dict[Role, Float[np.ndarray, "T"]]:
+    """How low [m] over the floor parts of `moved` may be: `least`, or as low as the source's,
+    scaled, where that is lower."""
     rig = source.rig
     scale = moved.rig.hip_height / rig.hip_height
-    joints = {role: j for role in Role if (j := rig.roles.joint(role)) is not None}
-    parts = {
-        r: list(rig.skeleton.subtree(j)) if r.part == "hand" else [j] for r, j in joints.items()
-    }
-    least = _FLESH * moved.rig.hip_height
+    joints = {role: j for role in roles if (j := rig.roles.joint(role)) is not None}
+    parts = {r: rig.skeleton.subtree(j) if r.part == "hand" else [j] for r, j in joints.items()}
     return {r: np.minimum(scale * low, least) for r, low in _lowest(source, parts).items()}
 
 
