@@ -13,6 +13,11 @@ from spark.blocks import in_blocks
 from spark.motion import Motion
 from spark.rotation import quat_slerp
 
+# A frame time is written with few digits: 0.0333333, 0.016666, .03333. So much of a clip's length
+# they leave open, but no more than the share of a new frame by which its last step may be short.
+_ROUNDED = 1.5e-4
+_SHORT_STEP = 0.1
+
 
 def values_at(
     values: Float[np.ndarray, "T *n"], at: Float[np.ndarray, "N"]
@@ -37,12 +42,15 @@ def frames_of_keys(
 
 def frames_at_rate(count: int, frame_time: float, wanted: float) -> Float[np.ndarray, "N"]:
     """`count` frames of `frame_time` [s] looked up every `wanted` seconds: the first frame stays,
-    and no time beyond the last is asked for."""
+    and no time beyond the last is asked for. A time that misses the last frame by no more than its
+    frame time is rounded is that frame's."""
     last = (count - 1) * frame_time / wanted
-    at = np.arange(int(last + 1e-6) + 1) * (wanted / frame_time)
+    rounded = max(1e-6, min(_ROUNDED * last, _SHORT_STEP))
+    at = np.arange(int(last + rounded) + 1) * (wanted / frame_time)
     near = np.round(at)
-    # A time that misses its frame by less than rounding does is that frame's.
-    return np.where(np.abs(at - near) < 1e-6, near, at)
+    # So close to a frame is what dividing leaves.
+    at = np.where(np.abs(at - near) < 1e-6, near, at)
+    return np.minimum(at, count - 1)
 
 
 def motion_at(motion: Motion, at: Float[np.ndarray, "N"], frame_time: float) -> Motion:
