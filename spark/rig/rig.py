@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from spark.errors import SkeletonError
+from spark.errors import SkeletonError, name_list
 from spark.kinematics import world_positions
 from spark.motion import Motion
 from spark.rig.doubles import doubles_of
@@ -22,6 +22,7 @@ from spark.rig.feet import (
 )
 from spark.rig.fingers import FingerBone, finger_bones
 from spark.rig.groups import groups_of
+from spark.rig.other_bodies import other_bodies
 from spark.rig.role_assignment import Override, assign_roles
 from spark.rig.roles import Group, Role, RoleMap
 from spark.rig.tpose import find_tpose, root_joint_of
@@ -159,5 +160,11 @@ def understand(motion: Motion, override: Override | None = None) -> Rig:
         notes += (
             f"the feet end at the ankles: soles are taken to be {100 * lower:.1f} cm below these, "
             "by the shanks, as on a human",
+        )
+    if others := other_bodies(motion, roles):
+        notes += (
+            f"the file holds several bodies: the one of {skeleton.names[pelvis]!r} is used, and "
+            f"not {name_list([skeleton.names[j] for j in others])}, which in a result stands "
+            "still; to use another, split the file",
         )
     return Rig(skeleton, roles, groups_of(skeleton, roles), tpose, root_joint, height, notes)

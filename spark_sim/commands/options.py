@@ -140,16 +140,19 @@ def load(args: Namespace, path: str, prefix: str = "", *, humanoid: bool = True)
     `check_given` comes first. Raises `SkeletonError` where the body is no `humanoid` and must be
     one.
     """
+    from spark.errors import SkeletonError
     from spark_sim import console, loading
     from spark_sim.clips import Clip
 
     taken = loading.takes(path)
     wanted = {name: value for name, value in given(args, prefix).items() if name in taken}
     loaded = loading.load(path, **wanted)
-    if isinstance(loaded, Clip) and not humanoid:
-        console.notes(path, loaded.recording.notes)
-    else:
+    try:
         console.notes(path, loaded.notes)
+    except SkeletonError:
+        if humanoid or not isinstance(loaded, Clip):
+            raise
+        console.notes(path, loaded.recording.notes)
     return loaded
 
 
