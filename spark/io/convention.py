@@ -32,9 +32,13 @@ UNITS = {
     "ft": 0.3048,
 }
 
-# How much rarer than metres and centimetres a unit is: the logarithm of its probability. Feet are
-# only named in a note: a human in feet is as tall as a giant of 5 m in metres.
-_LOG_PRIOR = {"m": 0.0, "cm": 0.0, "cmu": -1.0, "inch": -1.0, "mm": -1.0, "dm": -1.5, "ft": -3.0}
+# How common a unit is beside metres: the logarithm of the ratio. A body of 0.8 m in centimetres, a
+# child or a mouse, is as probable as one of 2 m in inches. Feet are only named in a note: a human
+# in feet is as tall as a giant of 5 m in metres.
+_LOG_PRIOR = {"m": 0.0, "cm": 2.5, "cmu": -1.0, "inch": -1.0, "mm": -1.0, "dm": -1.5, "ft": -3.0}
+# Names that add to that of centimetres: bodies of these programs are in no other small unit.
+_CENTIMETRES = re.compile("mixamorig|CC_Base_")
+_BY_NAMES = 6.0
 
 # [m] The median height of people, and the standard deviation of its logarithm: adults, children,
 # and the error of the measures below.
@@ -171,6 +175,7 @@ def infer_unit(motion: Motion) -> tuple[float, tuple[str, ...]]:
         name: _LOG_PRIOR[name] - 0.5 * (np.log(size * metres / _HEIGHT) / _HEIGHT_SPREAD) ** 2
         for name, metres in UNITS.items()
     }
+    chances["cm"] += _BY_NAMES * any(map(_CENTIMETRES.match, motion.skeleton.names))
     feet = chances.pop("ft")
     best, second = sorted(chances, key=lambda name: -chances[name])[:2]
     tall = size * UNITS[best]

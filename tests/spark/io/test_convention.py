@@ -1,5 +1,6 @@
 """Unit and up axis: inferred from what a file holds, or given."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -130,6 +131,33 @@ def test_a_size_between_two_units_is_pointed_out(tmp_path: Path) -> None:
     found = read_recording(save(human("y", 0.0375), tmp_path))
     assert {found.convention.unit, "inch"} == {"cmu", "inch"}
     assert "unit inch (1.10 m) is nearly as likely" in " ".join(found.notes)
+
+
+@pytest.mark.parametrize("tall", [0.85, 0.95, 1.1])
+def test_children_are_in_centimetres_not_giants_in_inches(tmp_path: Path, tall: float) -> None:
+    found = read_recording(save(human("y", 0.01, scale=tall / 1.7), tmp_path))
+    assert found.convention.unit == "cm"
+
+
+def test_a_child_that_may_be_an_adult_in_inches_is_pointed_out(tmp_path: Path) -> None:
+    found = read_recording(save(human("y", 0.01, scale=0.8 / 1.7), tmp_path))
+    assert found.convention.unit in ("cm", "inch")
+    said = re.search(r"unit (\w+) \(\d\.\d+ m\) is nearly as likely", " ".join(found.notes))
+    assert said is not None
+    assert {found.convention.unit, said[1]} == {"cm", "inch"}
+
+
+@pytest.mark.parametrize("tall", [0.5, 0.7, 1.7])
+def test_programs_that_know_centimetres_alone_are_told_by_their_names(
+    tmp_path: Path, tall: float
+) -> None:
+    body = human("y", 0.01, scale=tall / 1.7)
+    named = tuple(replace(j, name=f"mixamorig:{j.name}") for j in body.joints)
+    found = read_recording(save(replace(body, joints=named), tmp_path))
+    assert found.convention.unit == "cm"
+    metres = human("y", 1.0, scale=tall / 1.7)  # as Blender writes it
+    named = tuple(replace(j, name=f"mixamorig:{j.name}") for j in metres.joints)
+    assert read_recording(save(replace(metres, joints=named), tmp_path)).convention.unit == "m"
 
 
 def test_a_height_no_human_has_is_pointed_out(tmp_path: Path) -> None:
