@@ -41,6 +41,7 @@ def describe(clip: "AnyClip") -> dict[str, Any]:
         }
     turned = np.degrees(quat_angle(quat_identity(rig.tpose), rig.tpose))
     roles = rig.roles
+    fingers = {j: f"{bone.side} {bone.finger}" for bone, j in rig.fingers.items()}
     joints = [
         {
             "joint": name,
@@ -49,6 +50,7 @@ def describe(clip: "AnyClip") -> dict[str, Any]:
             "reason": roles.reasons[j],
             "groups": sorted(map(str, rig.groups[j])),
             "tpose_angle": round(float(turned[j]), 1),
+            "finger": fingers.get(j),
             "doubles": rig.skeleton.names[rig.doubles[j]] if j in rig.doubles else None,
         }
         for j, name in enumerate(rig.skeleton.names)
@@ -74,10 +76,14 @@ def text(facts: dict[str, Any]) -> str:
         return "\n".join([*head, f"  {facts['refused']}"])
     held = [joint for joint in body["joints"] if joint["role"] is not None]
     doubles = [joint for joint in body["joints"] if joint["doubles"] is not None]
+    fingers: dict[str, list[str]] = {}
+    for joint in body["joints"]:
+        if joint["finger"] is not None:
+            fingers.setdefault(joint["finger"], []).append(joint["joint"])
     others = [
         joint["joint"]
         for joint in body["joints"]
-        if joint["role"] is None and joint["doubles"] is None
+        if joint["role"] is None and joint["doubles"] is None and joint["finger"] is None
     ]
     rows = [("role", "joint", "sure", "rest to T", "parts", "because")]
     rows += [
@@ -100,6 +106,9 @@ def text(facts: dict[str, Any]) -> str:
     if doubles:
         each = ", ".join(f"{joint['joint']} ({joint['doubles']})" for joint in doubles)
         lines += ["", f"  turn with the joint that they double: {each}"]
+    if fingers:
+        each = "; ".join(f"{finger} {', '.join(chain)}" for finger, chain in fingers.items())
+        lines += ["", f"  fingers: {each}"]
     if others:
         lines += ["", f"  follow their parents: {', '.join(others)}"]
     return "\n".join(lines)

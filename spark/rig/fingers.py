@@ -2,7 +2,7 @@
 
 Names tell the finger, and the order below the hand tells the bone. Conventions name fingers
 (`LeftHandIndex1`, `f_index.01.L`, `CC_Base_L_Mid1`) or count them from the thumb on (`finger2-1.L`,
-`Bip01 L Finger01`, `LeftFinger1Proximal`).
+`Bip01 L Finger01`, `LeftFinger1Proximal`). Of a hand without such names its build tells them.
 """
 
 import re
@@ -11,6 +11,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from spark.rig.aliases import FINGER_TIP, FINGERS, METACARPAL
+from spark.rig.finger_build import fingers_by_build, metacarpals
 from spark.rig.name_hints import split_name
 from spark.rig.roles import Role, RoleMap
 from spark.skeleton import Skeleton
@@ -39,28 +40,52 @@ class FingerBone(NamedTuple):
 
 
 def finger_bones(skeleton: Skeleton, roles: RoleMap) -> dict[FingerBone, int]:
-    """The joints of a rig's fingers. Tips, which have no bone below them, are left out."""
+    """The joints of a rig's fingers. Tips, which have no bone below them, are left out; so are
+    hands without names that aren't built alike."""
+    hands = {role.side: roles.joint(role) for role in (Role.LEFT_HAND, Role.RIGHT_HAND)}
+    of_side = {
+        side: {} if hand is None else _bones_of(skeleton, hand, side)
+        for side, hand in hands.items()
+    }
+    left, right = ({bone[1:] for bone in bones} for bones in of_side.values())
+    return {
+        bone: joint
+        for side, hand in hands.items()
+        for bone, joint in of_side[side].items()
+        if left == right or (hand is not None and _named_below(skeleton, hand))
+    }
+
+
+def _bones_of(skeleton: Skeleton, hand: int, side: str) -> dict[FingerBone, int]:
     found: dict[FingerBone, int] = {}
-    for hand_role in (Role.LEFT_HAND, Role.RIGHT_HAND):
-        hand = roles.joint(hand_role)
-        if hand is None:
-            continue
-        chains: dict[str, list[int]] = {}
-        for joint, finger in fingers_below(skeleton, hand).items():
-            chain = chains.setdefault(finger, [])
-            tip = FINGER_TIP.intersection(split_name(skeleton.names[joint]))
-            if not tip and (not chain or chain[-1] in skeleton.ancestors(joint)):
-                chain.append(joint)
-        for finger, chain in chains.items():
-            palm = _in_palm([split_name(skeleton.names[j]) for j in chain], finger)
-            for joint in chain[palm - 1 : palm]:
-                found[FingerBone(hand_role.side, finger, 0)] = joint
-            for number, joint in enumerate(chain[palm:][:_PHALANGES], start=1):
-                found[FingerBone(hand_role.side, finger, number)] = joint
+    built = not _named_below(skeleton, hand)
+    chains: dict[str, list[int]] = {}
+    for joint, finger in fingers_below(skeleton, hand).items():
+        chain = chains.setdefault(finger, [])
+        tip = FINGER_TIP.intersection(split_name(skeleton.names[joint]))
+        if not tip and (not chain or chain[-1] in skeleton.ancestors(joint)):
+            chain.append(joint)
+    for finger, chain in chains.items():
+        palm = _in_palm([split_name(skeleton.names[j]) for j in chain], finger)
+        if built:
+            palm = 0 if finger == "thumb" else metacarpals(skeleton, chain)
+        for joint in chain[palm - 1 : palm]:
+            found[FingerBone(side, finger, 0)] = joint
+        for number, joint in enumerate(chain[palm:][:_PHALANGES], start=1):
+            found[FingerBone(side, finger, number)] = joint
     return found
 
 
 def fingers_below(skeleton: Skeleton, hand: int) -> dict[int, str]:
+    """The joints of fingers below a hand, parents first, and the finger: by name or, where no name
+    tells one, by build."""
+    if named := _named_below(skeleton, hand):
+        return named
+    built = zip(FINGER_NAMES, fingers_by_build(skeleton, hand), strict=False)
+    return dict(sorted((j, finger) for finger, chain in built for j in chain))
+
+
+def _named_below(skeleton: Skeleton, hand: int) -> dict[int, str]:
     """The joints below a hand whose names tell a finger, parents first, and the finger."""
     pieces = {j: split_name(skeleton.names[j]) for j in skeleton.subtree(hand)[1:]}
     named = {j: finger for j, words in pieces.items() if (finger := _named(words))}

@@ -1,11 +1,18 @@
 """Fingers are told on any rig: by side, finger and bone, from names as the field writes them."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from spark.io.recording import read_recording
 from spark.rig.fingers import ALL_FINGERS, FINGER_NAMES, FingerBone, finger_bones
+from spark.rig.role_assignment import assign_roles
 from spark.rig.roles import Role, RoleMap
 from spark.skeleton import Skeleton
+from tests.helpers.recordings import recordings
 
 THREE_TIMES_FIVE = {
     "mixamo": ("mixamorig:{Left}Hand{Thumb}{n}", "Thumb Index Middle Ring Pinky"),
@@ -124,3 +131,105 @@ def test_one_chain_for_all_fingers_is_no_single_finger(names: tuple[str, ...]) -
 
 def test_what_hangs_on_a_hand_and_is_no_finger_is_left_alone() -> None:
     assert found(("sword", "left hand"), ("String_L", "left hand"), ("index_l", "pelvis")) == {}
+
+
+# [m] A left hand along X, its thumb to Y: where fingers begin from the wrist, and their bones.
+KNUCKLES = {
+    "thumb": (0.03, 0.03, -0.01),
+    "index": (0.09, 0.025, 0.0),
+    "middle": (0.092, 0.003, 0.002),
+    "ring": (0.087, -0.017, 0.0),
+    "little": (0.079, -0.035, -0.004),
+}
+BONES = (0.038, 0.026, 0.022)
+
+
+def built(
+    order: tuple[str, ...] = FINGER_NAMES,
+    *,
+    left_out: tuple[str, ...] = (),
+    in_palm: float = 0.0,
+    mirrored: bool = True,
+    turn: Rotation | None = None,
+) -> tuple[Skeleton, RoleMap, dict[FingerBone, int]]:
+    """Two hands whose joints have numbers for names, their fingers in this order, and the bones.
+    Fingers end in a tip; with `in_palm` a metacarpal begins at so much of the way to the knuckle.
+    The left hand lacks what is `left_out`, the right one too where it is `mirrored`."""
+    parents, offsets = [-1, 0, 0], [(0.0, 0, 1), (0.0, 0.7, 0), (0.0, -0.7, 0)]
+    expected: dict[FingerBone, int] = {}
+    for hand, side in enumerate(("left", "right"), start=1):
+        across = np.array([1.0, 1.0 if side == "left" else -1.0, 1.0])
+        for finger in order:
+            if finger in left_out and (side == "left" or mirrored):
+                continue
+            steps = [np.array(KNUCKLES[finger]), *([b, 0.0, 0.0] for b in BONES)]
+            first = 1
+            if in_palm and finger != "thumb":
+                steps[:1] = [in_palm * steps[0], (1 - in_palm) * steps[0]]
+                first = 0
+            above = hand
+            for number, step in enumerate(steps, start=first):
+                parents.append(above)
+                above = len(parents) - 1
+                placed = across * step
+                offsets.append(tuple(placed if turn is None else turn.apply(placed)))
+                if number <= 3:
+                    expected[FingerBone(side, finger, number)] = above
+    count = len(parents)
+    skeleton = Skeleton(
+        tuple(f"j{j}" for j in range(count)),
+        np.array(parents),
+        np.array(offsets, dtype=float),
+        np.arange(count) == 0,
+    )
+    roles = (Role.PELVIS, Role.LEFT_HAND, Role.RIGHT_HAND, *[None] * (count - 3))
+    return skeleton, RoleMap(roles, (1.0,) * count, ("",) * count), expected
+
+
+@pytest.mark.parametrize("in_palm", [0.0, 0.3])
+@pytest.mark.parametrize("seed", range(4))
+def test_fingers_without_names_are_told_by_where_they_begin(seed: int, in_palm: float) -> None:
+    """In any order, and however the hand's own axes lie."""
+    order = tuple(np.random.default_rng(seed).permutation(FINGER_NAMES).tolist())
+    turn = Rotation.random(random_state=seed)
+    skeleton, roles, expected = built(order, in_palm=in_palm, turn=turn)
+    assert len(expected) == 2 * (15 + 4 * bool(in_palm))
+    assert finger_bones(skeleton, roles) == expected
+
+
+def test_names_stand_above_build() -> None:
+    skeleton, roles, _ = built()
+    names = list(skeleton.names)
+    names[3] = "little"  # which begins as a thumb does
+    bones = finger_bones(replace(skeleton, names=tuple(names)), roles)
+    assert {bone: j for bone, j in bones.items() if bone.side == "left"} == {
+        FingerBone("left", "little", 1): 3
+    }
+
+
+@pytest.mark.parametrize("left_out", [("thumb",), ("ring",), ("thumb", "little")])
+def test_what_is_not_built_as_a_hand_is_left_alone(left_out: tuple[str, ...]) -> None:
+    for mirrored in (True, False):
+        skeleton, roles, _ = built(left_out=left_out, mirrored=mirrored)
+        assert finger_bones(skeleton, roles) == {}
+
+
+@pytest.mark.parametrize(
+    "path",
+    recordings(
+        "mixamo_pairs/_tposes/Mousey.bvh",
+        "mixamo_pairs/*/*_64f.bvh",
+        "zoo/m2m_human.bvh",
+        "zoo/makehuman_*.bvh",
+        "zoo/ad_rokoko*.bvh",
+    ),
+)
+def test_build_tells_fingers_of_rigs_as_their_names_do_or_not_at_all(path: Path) -> None:
+    motion = read_recording(path).motion
+    skeleton = motion.skeleton
+    roles = assign_roles(skeleton, motion)
+    named = finger_bones(skeleton, roles)
+    assert named
+    bare = replace(skeleton, names=tuple(f"j{j}" for j in range(len(skeleton))))
+    found = finger_bones(bare, roles)
+    assert {bone: j for bone, j in found.items() if bone.number == 1}.items() <= named.items()
