@@ -26,7 +26,8 @@ class ClipMetrics:
     """All measures of one clip over its T frames; heights are above the `ground`.
 
     `flags`: the frames that are implausible, by each name of `sim.report.names.FLAGS`.
-    `depth` [m]: of the parts `depth_names` (sole corners by foot, then others) under the floor.
+    `depth` [m]: of the parts `depth_names` (sole corners by foot, others, fingers by hand) under
+    the floor.
     `clearance` [m]: the height of the body's lowest point.
     `corner_skates`, `corner_speeds` [m/s]: whether each sole corner skates, and how fast it moves
     along the floor, on the feet `corner_feet`.
@@ -172,8 +173,9 @@ def measure(poses: ClipPoses, ground: Ground) -> ClipMetrics:
     frame_time, window = poses.motion.frame_time, thresholds.window
     support = support_of(poses, ground, thresholds)
     corners = len(support.feet)
-    parts = ground.heights(poses.part_points)
-    depth = penetration_depth(np.concatenate([support.heights[:, :corners], parts], axis=1))
+    inside = np.concatenate([poses.part_points, poses.finger_points], axis=1)
+    heights = [support.heights[:, :corners], ground.heights(inside)]
+    depth = penetration_depth(np.concatenate(heights, axis=1))
     clearance = support.heights.min(axis=1)
     acceleration = derivative(poses.mass.com[:, 2], frame_time, 2, window)
     # The window smears take-off and landing over itself.
@@ -219,7 +221,7 @@ def measure(poses: ClipPoses, ground: Ground) -> ClipMetrics:
             | (wrench[:, 1] > thresholds.wrench_torque),
         },
         depth=depth,
-        depth_names=(*poses.corner_feet, *poses.part_names),
+        depth_names=(*poses.corner_feet, *poses.part_names, *poses.finger_hands),
         clearance=clearance,
         corner_skates=skates,
         corner_speeds=support.speeds[:, :corners],

@@ -28,6 +28,8 @@ class ClipPoses:
     `corners` are those of the soles, on the feet `corner_feet` ("left foot"). `part_points` are
     what else may touch the floor, of the parts `part_names`: the other joints with a role, inside
     spheres of flesh of `part_radii` [m], or the lowest points of a model's own geoms (radius 0).
+    `finger_points` are the joints of fingers, of the hands `finger_hands` ("left hand"): they may
+    not be under the floor, and carry nothing. A model's are among its parts.
     `carriers` are the model's bodies that corners and parts belong to; none without a model.
     `hips` is the middle of the hip joints. `positions` and `rotations` are those of the joints as
     `forward` gives them, `since_tpose` their rotations G since the T-pose in world axes.
@@ -41,6 +43,8 @@ class ClipPoses:
     part_points: Float[np.ndarray, "T B 3"]
     part_names: tuple[str, ...]
     part_radii: Float[np.ndarray, "B"]
+    finger_points: Float[np.ndarray, "T F 3"]
+    finger_hands: tuple[str, ...]
     carriers: Int[np.ndarray, "N"]
     mass: Mass
     hips: Float[np.ndarray, "T 3"]
@@ -64,6 +68,7 @@ def pose_clip(subject: Subject) -> ClipPoses:
     check_frames(subject)
     positions, rotations = forward(motion)
     since_tpose = quat_mul(rotations, quat_conj(rig.tpose))
+    fingers = rig.fingers if body is None else {}
     if body is None:
         model_poses, mass = None, human_mass(rig, positions, rotations)
         part_names, part_points, part_radii = _flesh(rig, positions)
@@ -85,6 +90,8 @@ def pose_clip(subject: Subject) -> ClipPoses:
         part_points=part_points,
         part_names=part_names,
         part_radii=part_radii,
+        finger_points=positions[:, [*fingers.values()]],
+        finger_hands=tuple(f"{bone.side} hand" for bone in fingers),
         carriers=np.array([*corner_bodies, *part_bodies], dtype=int),
         mass=mass,
         hips=positions[:, rig.hips].mean(axis=1),

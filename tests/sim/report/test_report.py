@@ -14,8 +14,9 @@ from spark.io.recording import read_recording
 from spark.motion import Motion
 from spark.rig.feet import FOOT_LENGTH
 from spark.rig.rig import Rig, understand
-from spark.rig.roles import Role, RoleMap
+from spark.rig.roles import Group, Role, RoleMap
 from spark.rotation import quat_about, quat_from_yaw, quat_mul, quat_rotate
+from spark.skeleton import Skeleton
 from tests.helpers.recordings import recordings
 from tests.helpers.stick import joint, standing, stick_rig
 
@@ -171,6 +172,39 @@ def test_a_hand_under_the_floor_is_named_and_a_man_lying_down_does_not_float() -
         for text in texts(assess(Subject(sunk, rig)))
         + texts(assess(Subject(sunk, rig), source=Subject(standing(rig, 60), rig)))
     )
+
+
+def with_one_more(name: str, high: float) -> Rig:
+    """The stick man with a joint below his left hand, at this height [m] where he stands."""
+    rig = stick_rig()
+    hand, count = joint(Role.LEFT_HAND), len(rig.skeleton)
+    down = high - float(rig.tpose_positions[hand, 2]) - 0.9
+    skeleton = Skeleton(
+        (*rig.skeleton.names, name),
+        np.append(rig.skeleton.parents, hand),
+        np.concatenate([rig.skeleton.offsets, [[0.0, 0.1, down]]]),
+        np.append(rig.skeleton.translating, False),
+        rig.skeleton.end_parents,
+        rig.skeleton.end_offsets,
+    )
+    roles = RoleMap((*rig.roles.roles, None), (1.0,) * (count + 1), ("by hand",) * (count + 1))
+    tpose = np.tile([1.0, 0.0, 0.0, 0.0], (count + 1, 1))
+    groups = (*rig.groups, frozenset[Group]())
+    return replace(rig, skeleton=skeleton, roles=roles, tpose=tpose, groups=groups)
+
+
+def test_fingers_are_part_of_their_hand_under_the_floor_and_nowhere_else() -> None:
+    sunk = with_one_more("left_index", -0.2)
+    report = assess(Subject(standing(sunk, 60), sunk))
+    assert shares(report) == {"penetration": 1, "floating": 0, "skating": 0, "root_wrench": 0}
+    assert texts(report) == ["left hand sinks 20.0 cm under the floor in frames 0-59 (0.0-1.0 s)"]
+    sword = with_one_more("left_sword", -0.2)
+    assert shares(assess(Subject(standing(sword, 60), sword)))["penetration"] == 0
+    # Held up, it floats as it does without a finger on the floor.
+    touching = with_one_more("left_index", -0.05)
+    up = along(standing(touching, 60), 2, 0.05)
+    ground = Subject(standing(touching, 60), touching)
+    assert shares(assess(Subject(up, touching), source=ground))["floating"] == 1
 
 
 def test_a_body_that_leans_as_no_one_can_stand_needs_a_hand() -> None:
