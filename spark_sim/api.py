@@ -13,6 +13,7 @@ from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, from_canonical
 from spark.transfer.noise import without_noise
 from spark.transfer.refine import grounded, refined
+from spark.transfer.twists import spread_twists
 from spark_sim import files
 from spark_sim.choices import Method, RobotName
 from spark_sim.clips import AnyClip, Clip, File, RobotClip
@@ -103,6 +104,7 @@ def retarget(
     if refine:
         finish = refined if method == "spark" else grounded
         moved = finish(canonical, moved, noise)
+    moved = spread_twists(canonical.rig, moved)
     motion = from_canonical(moved)
     bvh, notes = encode(motion, target.recording)
     recording = replace(

@@ -26,6 +26,7 @@ from spark.rig.other_bodies import other_bodies
 from spark.rig.role_assignment import Override, assign_roles
 from spark.rig.roles import Group, Role, RoleMap
 from spark.rig.tpose import find_tpose, root_joint_of
+from spark.rig.twist_bones import TwistBone, twist_bones
 from spark.skeleton import Skeleton
 from spark.summary import counted
 
@@ -130,6 +131,11 @@ class Rig:
     def fingers(self) -> dict[FingerBone, int]:
         """The joints of the fingers, as far as names tell them."""
         return finger_bones(self.skeleton, self.roles)
+
+    @cached_property
+    def twist_bones(self) -> dict[int, TwistBone]:
+        """The joints that spread a limb's twist along its segments, and how they turn."""
+        return twist_bones(self.skeleton, self.roles, self.tpose_positions)
 
     @cached_property
     def contact_joints(self) -> list[int]:
