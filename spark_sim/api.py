@@ -76,7 +76,8 @@ def retarget(
     is then held where the source's foot stands, what else would be in the floor comes up
     (`spark.transfer.over_floor`), and with "spark" the hips sway so that the weight moves as the
     source's does (`spark.transfer.hip_sway`). A source that trembles, as motion estimated from
-    video, is smoothed before (`spark.transfer.noise`), and a note says so.
+    video, is smoothed before (`spark.transfer.noise`), and a note says so. Twist bones that the
+    source lacks take their share at the end (`spark.transfer.twists`).
 
     On a robot the whole trajectory is solved for, within the joints' limits, feet held. With method
     "copy" or without `refine`, each pose is only copied to the robot's hinges, as a baseline.

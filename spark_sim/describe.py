@@ -52,6 +52,9 @@ def describe(clip: "AnyClip") -> dict[str, Any]:
             "tpose_angle": round(float(turned[j]), 1),
             "finger": fingers.get(j),
             "doubles": rig.skeleton.names[rig.doubles[j]] if j in rig.doubles else None,
+            "twists": (
+                rig.skeleton.names[rig.twist_bones[j].segment] if j in rig.twist_bones else None
+            ),
         }
         for j, name in enumerate(rig.skeleton.names)
     ]
@@ -75,7 +78,6 @@ def text(facts: dict[str, Any]) -> str:
     if body is None:
         return "\n".join([*head, f"  {facts['refused']}"])
     held = [joint for joint in body["joints"] if joint["role"] is not None]
-    doubles = [joint for joint in body["joints"] if joint["doubles"] is not None]
     fingers: dict[str, list[str]] = {}
     for joint in body["joints"]:
         if joint["finger"] is not None:
@@ -83,7 +85,7 @@ def text(facts: dict[str, Any]) -> str:
     others = [
         joint["joint"]
         for joint in body["joints"]
-        if joint["role"] is None and joint["doubles"] is None and joint["finger"] is None
+        if all(joint[kind] is None for kind in ("role", "doubles", "twists", "finger"))
     ]
     rows = [("role", "joint", "sure", "rest to T", "parts", "because")]
     rows += [
@@ -103,12 +105,16 @@ def text(facts: dict[str, Any]) -> str:
         "",
         *columns(rows),
     ]
-    if doubles:
-        each = ", ".join(f"{joint['joint']} ({joint['doubles']})" for joint in doubles)
-        lines += ["", f"  turn with the joint that they double: {each}"]
+    for kind, what in (
+        ("doubles", "turn with the joint that they double"),
+        ("twists", "take their share of a limb's twist or bend"),
+    ):
+        each = [f"{joint['joint']} ({joint[kind]})" for joint in body["joints"] if joint[kind]]
+        if each:
+            lines += ["", f"  {what}: {', '.join(each)}"]
     if fingers:
-        each = "; ".join(f"{finger} {', '.join(chain)}" for finger, chain in fingers.items())
-        lines += ["", f"  fingers: {each}"]
+        chains = "; ".join(f"{finger} {', '.join(chain)}" for finger, chain in fingers.items())
+        lines += ["", f"  fingers: {chains}"]
     if others:
         lines += ["", f"  follow their parents: {', '.join(others)}"]
     return "\n".join(lines)

@@ -55,11 +55,14 @@ def twist_bones(
     """The joints of a rig that are called twist bones and lie along a segment of a limb, parents
     first. Those that carry a joint with a role are left out.
 
-    The fractions are those of the dances that were recorded on Character Creator's rig
-    (`tests/spark/transfer/test_twists.py` has the regression). At a hinge, elbow or knee, bones
-    twist as the segment does, so that the hinge keeps its axis. From there to the end a bone takes
-    as much of the end's twist as it is far along. At the ball joint a bone takes half of the
-    segment's own twist, and from its middle on all of it.
+    At a hinge, elbow or knee, bones twist as the segment does, so that the hinge keeps its axis.
+    From there to the end a bone takes as much of the end's twist as it is far along. At the ball
+    joint a bone takes half of the segment's own twist, and from its middle on all of it.
+
+    So do the bones of Character Creator's rig in eight dances (CMU 05). Regression of what they do
+    there on what this makes, slope and R², medians over dances and sides: upper arm 0.94 and 0.99,
+    thigh 0.94 and 0.96, forearm 1.10 and 0.98, knee 1.00 and 1.00, elbow 1.02 and 0.57. Shanks say
+    little: half-way the bone takes 0.17 of the foot's twist, R² 0.2.
     """
     below = _named_below(skeleton, roles)
     parents, places = skeleton.parents.tolist(), tpose_positions

@@ -4,8 +4,8 @@ Joints of the same role turn alike. Where spine or neck have other joints, or th
 other places, rotations are interpolated by normalised arc length, with the pelvis at 0 and the
 topmost spine joint at 1 (for the neck: topmost spine joint and head). Joints without a role copy
 those of the same name in the same place; doubles turn with their originals; fingers as the same
-bone of the same finger, whatever its name; all others follow their parent. This is the row "copy"
-of every table.
+bone of the same finger, whatever its name; all others follow their parent (twist bones until
+`spark.transfer.twists` turns them). This is the row "copy" of every table.
 """
 
 from bisect import bisect_right

@@ -44,7 +44,7 @@ def spread_twists(source: Rig, moved: CanonicalMotion) -> CanonicalMotion:
         return moved
     note = (
         f"{name_list([names[j] for j in lacking])}: twist bones that the source lacks, they take "
-        "their share of the limb's twist"
+        "their share of their limb's twist or bend"
     )
     return replace(turn_bones(moved, lacking), notes=(*moved.notes, note))
 

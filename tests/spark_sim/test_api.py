@@ -11,9 +11,12 @@ import pytest
 import spark_sim
 from scripts.corruptions import jittering
 from spark.errors import ConventionError, DependencyError, OutputError, SkeletonError
+from spark.io.bvh import write_bvh
+from spark.io.encoding import encode_new
 from spark.kinematics import forward
 from spark.rotation import quat_angle
 from tests.helpers.fbx_text import Fbx, Node
+from tests.helpers.twisting import plain, turning, with_bones
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +59,31 @@ def test_onto_its_own_body_a_motion_stays(samples: Path) -> None:
     held = spark_sim.retarget(walk, walk)
     # A foot that is held stands still; the source's own rolls by millimetres before it lifts.
     np.testing.assert_allclose(forward(held.motion)[0], forward(walk.motion)[0], atol=1e-2)
+
+
+@pytest.mark.parametrize("ending", ["bvh", "fbx"])
+def test_twist_bones_of_a_character_turn(ending: str, tmp_path: Path) -> None:
+    """A hand that twists by 120 degrees: the forearm's bone, 0.6 along it, takes 72 of them."""
+    skeleton, axis = with_bones(), np.array([0.0, 1.0, 0.0])
+    character = tmp_path / f"character.{ending}"
+    if ending == "bvh":
+        write_bvh(encode_new(turning(skeleton, {"Hips": np.zeros((2, 3))})), character)
+    else:
+        Fbx(
+            [
+                Node(name, int(parent), (100 * y, 100 * z, 100 * x))
+                for name, parent, (x, y, z) in zip(
+                    skeleton.names, skeleton.parents, skeleton.offsets.tolist(), strict=True
+                )
+            ]
+        ).write(character)
+    twist = turning(plain(), {"LeftHand": np.radians(np.linspace(0, 120, 30))[:, None] * axis})
+    write_bvh(encode_new(twist), tmp_path / "twist.bvh")
+    out = spark_sim.retarget(tmp_path / "twist.bvh", character)
+    assert any("twist bones that the source lacks" in note for note in out.notes)
+    back = spark_sim.load(out.save(tmp_path / "out.bvh"), unit="cm", up="y")
+    bone = back.motion.rotations[:, back.joint_names.index("LeftForeArmTwist02")]
+    assert np.degrees(quat_angle(bone[0], bone[-1])) == pytest.approx(72, abs=0.1)
 
 
 def test_a_recording_that_trembles_is_smoothed_and_says_so(samples: Path) -> None:
