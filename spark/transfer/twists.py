@@ -70,7 +70,8 @@ def turn_bones(motion: CanonicalMotion, joints: Collection[int]) -> CanonicalMot
         out[:, j] = quat_mul(rotations[:, bone.above], against)
         turned = quat_mul(out[:, j], quat_conj(rotations[:, j]))
         for k in rig.skeleton.subtree(j)[1:]:
-            out[:, k] = quat_mul(turned, rotations[:, k])
+            if k not in rig.twist_bones:
+                out[:, k] = quat_mul(turned, rotations[:, k])
     return replace(motion, rotations=out)
 
 

@@ -129,6 +129,20 @@ def test_what_the_source_has_is_carried_over() -> None:
     assert quat_angle(onto(target(), onto(target(), source)).rotations, out.rotations).max() < 1e-7
 
 
+def test_of_two_bones_the_source_may_have_one() -> None:
+    """That is carried over, though it hangs on one that is made."""
+    outer = ("ForeArm", "Hand", 0.6, "ForeArmTwist02")
+    chain = (("ForeArm", "Hand", 0.3, "Twist"), ("Twist", "Hand", 0.3, "ForeArmTwist02"))
+    source = turning(
+        with_bones((outer,)),
+        {name: about(LEFT, TWISTS).as_rotvec() for name in ("LeftHand", "LeftForeArmTwist02")},
+    )
+    out = onto(target(with_bones(chain)), source)
+    for bone, share in (("Twist", 0.3), ("ForeArmTwist02", 1.0)):
+        wanted = share * np.multiply.outer(TWISTS, LEFT)
+        np.testing.assert_allclose(turn_of(out, bone, "ForeArm"), wanted, atol=1e-6)
+
+
 def test_a_note_names_the_bones_that_are_made() -> None:
     rig = target()
     for source, told in ((plain(), True), (with_bones(), False)):
