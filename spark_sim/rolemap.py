@@ -35,7 +35,7 @@ def write(skeleton: Skeleton, roles: RoleMap | None, path: str | Path) -> None:
         lines.append(f"{'' if roles else '# '}{role} = {_quoted(value)}")
     free = [name for j, name in enumerate(skeleton.names) if not roles or roles.roles[j] is None]
     if free:
-        lines += ["", "# The other joints follow their parents:"]
+        lines += ["", "# The other joints hold no role:"]
         lines += [f"#   {_quoted(name)}" for name in free]
     write_atomically(Path(path), "\n".join([*lines, ""]).encode())
 

@@ -45,6 +45,6 @@ function mapText() {
     lines.push(`${DATA.inferred && !held.length ? "# " : ""}${role} = ${value}`);
   }
   const free = DATA.joints.filter((_, j) => !roles[j]).map(joint => quoted(joint.name));
-  if (free.length) lines.push("", "# The other joints follow their parents:", ...free.map(name => `#   ${name}`));
+  if (free.length) lines.push("", "# The other joints hold no role:", ...free.map(name => `#   ${name}`));
   return [...lines, ""].join("\n");
 }
