@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import ConventionError
+from spark.io.upright import above_body, above_feet, is_built_upright, is_foot
 from spark.kinematics import end_positions, forward
 from spark.motion import Motion
-from spark.skeleton import Skeleton
 
 Up = Literal["x", "y", "z", "-x", "-y", "-z"]
 """The axis that points up; with a minus one that points down, as a camera's y does."""
@@ -53,9 +53,11 @@ CLEARLY = 0.75
 _STEADIER = 1.5  # a floor along an axis moves no more than this many times that of another
 _STEADY = 0.01  # of the body's height: a floor that moves less is steady
 
+_STEADY_FLOOR = 0.05  # [heights] between the quartiles; a floor moves less, a body's side more
+_BUILT = 0.9  # the direction from feet to body at rest, of a body that was built along an axis
+
 # Of the weight of that direction where no name says foot. Hind legs carry a trunk ahead of them.
 _BY_BUILD = 0.5
-_ALIKE = 0.1  # of a leg's length, that another's may differ by
 
 # [heights] From a fingertip or toe to the farthest other one, along the bones.
 _LONGEST_PATH = 1.5
@@ -64,7 +66,6 @@ _LONGEST_PATH = 1.5
 # carry its name, as goals of inverse kinematics and footsteps, hang beside the legs.
 _BONE_SHARE = 0.03
 
-_FEET = re.compile(r"foot|feet|toe|ankle|hoof|paw|足首|つま先", re.IGNORECASE)
 _HEAD = re.compile(r"head|skull|頭", re.IGNORECASE)
 
 
@@ -203,19 +204,23 @@ def infer_up(motion: Motion) -> tuple[Up, tuple[str, ...]]:
     rest = skeleton.rest_positions[None]
     points = np.concatenate([positions, end_positions(skeleton, positions, world)], axis=1)
     size = max(float(np.max(np.median(np.ptp(points, axis=1), axis=0))), 1e-300)
-    floors = np.concatenate([points.min(axis=1), points.max(axis=1)], axis=1)
-    floor = np.median(floors, axis=0) / size
+    floors = np.concatenate([points.min(axis=1), points.max(axis=1)], axis=1) / size
+    low, floor, high = np.percentile(floors, [25, 50, 75], axis=0)
 
     standing, resting = (_both_ways(above_feet(motion, each)) for each in (positions, rest))
-    named = any(map(_is_foot, skeleton.names))
+    built = is_built_upright(skeleton, resting[:3])
+    named = any(map(is_foot, skeleton.names))
     # Log-probabilities, of axes that point up and of those that point down. X-up files hardly
     # exist; bodies that lie down and odd rest poses do, but seldom straight along an axis all the
     # time: hence the cubes. Some stand on their heads.
     chances = np.array([-4.0, 0.0, -1.0, -7.0, -3.0, -4.0])
-    seen = np.where(standing > 0, 5.0, -2.0) * standing**3 + 2.5 * resting**3
-    seen[3:] *= standing[3:] > 0  # rest poses alone, which may be collapsed, turn nothing over
+    seen = np.where(standing > 0, 5.0, -2.0) * standing**3 + 2.5 * built * resting**3
+    seen[3:] *= standing[3:] > 0  # rest poses alone turn nothing over
+    if built:  # along an axis, and not as a camera sees it: then a body along another one lies
+        seen[3:] -= 3.0 * (resting.max() > _BUILT) * (resting[3:] < _BUILT)
     chances += seen if named else _BY_BUILD * seen
-    chances += 2.0 * (np.abs(floor) < 0.03)
+    steady = high - low < _STEADY_FLOOR if standing.any() else True  # else a floor is all there is
+    chances += 2.0 * ((np.abs(floor) < 0.03) & steady)
     best, second = np.argsort(-chances)[:2].tolist()
     up = UPS[best]
     notes = [f"up axis {up}, along which the body stands"]
@@ -255,57 +260,6 @@ def standing_axis(motion: Motion, usual: Up) -> tuple[Up, bool, str]:
     return UPS[best], bool(standing[best] < 0 and best), "along which the body stands"
 
 
-def above_feet(motion: Motion, positions: Float[np.ndarray, "T J 3"]) -> Float[np.ndarray, "3"]:
-    """The mean direction from the feet to the rest of the body; where no name says foot, from the
-    tips of its legs as it is built. Zero where these are not told either."""
-    feet = np.array([_is_foot(name) for name in motion.skeleton.names])
-    if not feet.any():
-        feet[_tips_beside_trunk(motion.skeleton)] = True
-    body = ~feet
-    body[_above_body(motion.skeleton)] = False
-    if not body.any() or not feet.any():
-        return np.zeros(3)
-    up = positions[:, body].mean(axis=1) - positions[:, feet].mean(axis=1)
-    lengths = np.linalg.norm(up, axis=-1, keepdims=True)
-    return (up / np.where(lengths > 0, lengths, 1.0)).mean(axis=0)
-
-
-def _is_foot(name: str) -> bool:
-    return bool(_FEET.search(name))
-
-
-def _above_body(skeleton: Skeleton) -> list[int]:
-    """The joints above the one where the tree first branches, from the root on: a scene's and a
-    reference's, which stay behind while the body moves. None where it does not branch."""
-    chain = [0]
-    while len(skeleton.children[chain[-1]]) == 1:
-        chain.append(skeleton.children[chain[-1]][0])
-    return chain[:-1] if skeleton.children[chain[-1]] else []
-
-
-def _tips_beside_trunk(skeleton: Skeleton) -> list[int]:
-    """The tips of the legs, by build alone: where the tree first branches, the trunk is the branch
-    with the most tips, and legs are two that are alike, or one that carries both."""
-    above = _above_body(skeleton)
-    joint = skeleton.children[above[-1]][0] if above else 0
-    branches = [skeleton.subtree(child) for child in skeleton.children[joint]]
-    tips = [[j for j in branch if not skeleton.children[j]] for branch in branches]
-    bones = np.linalg.norm(skeleton.offsets, axis=-1)
-    sizes = [(len(t), float(bones[[*b]].sum())) for t, b in zip(tips, branches, strict=True)]
-    legs = sorted(range(len(sizes)), key=lambda k: sizes[k])[:-1]
-
-    def alike(a: int, b: int) -> bool:
-        (count, length), (other_count, other) = sizes[a], sizes[b]
-        return count == other_count and abs(length - other) < _ALIKE * length
-
-    return [
-        tip
-        for k in legs
-        if len(tips[k]) > 1 or any(alike(k, other) for other in legs if other != k)
-        for tip in tips[k]
-    ]
-
-
 def _stature(motion: Motion) -> tuple[float, str]:
     """The body's height along its bones, whatever its pose, and how it was measured.
 
@@ -317,10 +271,10 @@ def _stature(motion: Motion) -> tuple[float, str]:
     children = np.arange(1, len(skeleton))
     spans = positions[:, children] - positions[:, skeleton.parents[children]]
     bones[1:] = np.median(np.linalg.norm(spans, axis=-1), axis=0)
-    bones[[skeleton.children[above][0] for above in _above_body(skeleton)]] = 0.0
+    bones[[skeleton.children[above][0] for above in above_body(skeleton)]] = 0.0
 
     head = next((j for j, name in enumerate(skeleton.names) if _HEAD.search(name)), None)
-    feet = [j for j, name in enumerate(skeleton.names) if _FEET.search(name)]
+    feet = [j for j, name in enumerate(skeleton.names) if is_foot(name)]
     if head is not None and feet:
         above = set(skeleton.ancestors(head))
         ways: dict[bool, list[float]] = {True: [], False: []}

@@ -16,7 +16,6 @@ from spark.io.convention import (
     UPS,
     Convention,
     Up,
-    above_feet,
     axis_of,
     given_unit,
     given_up,
@@ -26,6 +25,7 @@ from spark.io.convention import (
 from spark.io.encoding import encode_new
 from spark.io.recording import Recording, in_si
 from spark.io.scanner import LARGEST
+from spark.io.upright import above_feet
 from spark.kinematics import forward
 from spark.motion import Motion
 

@@ -12,7 +12,6 @@ from jaxtyping import Float
 from spark.errors import ConventionError, FileFormatError, name_list
 from spark.io.convention import (
     Convention,
-    above_feet,
     axis_of,
     given_unit,
     given_up,
@@ -27,6 +26,7 @@ from spark.io.position_layouts import KNOWN, Layout, layouts
 from spark.io.position_tree import parents_first, rigid_tree, still
 from spark.io.recording import Recording, unique_names
 from spark.io.stance import walked
+from spark.io.upright import above_feet
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark.skeleton import Skeleton

@@ -183,20 +183,39 @@ def test_the_motion_and_not_the_rest_pose_shows_what_is_up(
     assert positions[0, 3, 2] - positions[0, 10, 2] == pytest.approx(1.52)  # head above foot
 
 
-@pytest.mark.parametrize("heading", [0.0, 30.0, 45.0, 90.0])
+@pytest.mark.parametrize("heading", [0.0, 30.0, 45.0, 90.0, 180.0])
 def test_a_body_that_lies_on_the_floor_does_not_turn_the_world(
     tmp_path: Path, heading: float
 ) -> None:
-    lying = Rotation.from_euler("Y", heading, degrees=True) * Rotation.from_euler("X", np.pi / 2)
+    lying = Rotation.from_euler("YX", [heading, 90.0], degrees=True)
     turns = np.tile(zxy(lying), (4, 1))
     found = read_recording(save(human("y", turns=turns, root=(1.3, 2.2, 0.15)), tmp_path))
     assert found.convention.up == "y"
 
 
-@pytest.mark.parametrize("frames", [0, 1, 3])
-def test_a_collapsed_rest_pose_turns_nothing_over(tmp_path: Path, frames: int) -> None:
-    """Legs point up at rest, as every bone, and may do so in a tenth of the frames."""
-    bvh = human("y", turns=np.zeros((30, 3)))
+def test_a_body_that_lies_against_z_does_not_turn_the_world_over(tmp_path: Path) -> None:
+    """On a bed, with its soles at zero. Its rest pose stands along y, and cameras' do as well as
+    their frames do."""
+    turns = np.tile([0.0, -90.0, 0.0], (4, 1))
+    found = read_recording(save(human("y", turns=turns, root=(-0.93, 2.2, 0.4)), tmp_path))
+    assert found.convention.up == "y"
+    assert not any("as likely" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_cartwheel_on_a_collapsed_rig_does_not_turn_the_world(
+    tmp_path: Path, side: float
+) -> None:
+    """Upside down half of the time, while its side passes through zero."""
+    angles = np.linspace(0.0, 360.0, 30)
+    turns = zxy(Rotation.from_euler("Z", side * angles[:, None], degrees=True))
+    bvh = _folded(human("y", turns=turns, root=(1.0, 2.0, 1.1)))
+    found = read_recording(save(bvh, tmp_path))
+    assert found.convention.up == "y"
+
+
+def _folded(bvh: Bvh) -> Bvh:
+    """The same motion on a rig whose legs point up at rest, as every bone."""
     legs = [j for j, joint in enumerate(bvh.joints) if joint.name.endswith("UpLeg")]
     below = [j for j, joint in enumerate(bvh.joints) if joint.parent in legs]
     below += [j for j, joint in enumerate(bvh.joints) if joint.parent in below]
@@ -207,8 +226,17 @@ def test_a_collapsed_rest_pose_turns_nothing_over(tmp_path: Path, frames: int) -
         for j, joint in enumerate(bvh.joints)
     )
     values = bvh.values.copy()
-    values[frames:, [4 + 3 * j for j in legs]] = 180.0  # about x
-    found = read_recording(save(Bvh(joints, 0.1, values), tmp_path))
+    values[:, [4 + 3 * j for j in legs]] = 180.0  # about x
+    return Bvh(joints, bvh.frame_time, values)
+
+
+@pytest.mark.parametrize("frames", [0, 1, 3])
+def test_a_collapsed_rest_pose_turns_nothing_over(tmp_path: Path, frames: int) -> None:
+    """Legs point up at rest, and may do so in a tenth of the frames."""
+    bvh = _folded(human("y", turns=np.zeros((30, 3))))
+    legs = [j for j, joint in enumerate(bvh.joints) if joint.name.endswith("UpLeg")]
+    bvh.values[:frames, [4 + 3 * j for j in legs]] = 0.0
+    found = read_recording(save(bvh, tmp_path))
     assert found.convention.up == "y"
     assert not any("as likely" in note for note in found.notes)
 
