@@ -31,9 +31,11 @@ _RIGHT_ANGLES = quat_normalize(
 )
 
 
-def mean_rotations(rotations: Float[np.ndarray, "T *n 4"]) -> Float[np.ndarray, "*n 4"]:
+def mean_rotations(
+    rotations: Float[np.ndarray, "T *n 4"], weights: Float[np.ndarray, "T"]
+) -> Float[np.ndarray, "*n 4"]:
     """The mean over time, blind to the signs of quaternions (Markley et al. 2007)."""
-    moments = np.einsum("t...i,t...k->...ik", rotations, rotations)
+    moments = np.einsum("t,t...i,t...k->...ik", weights, rotations, rotations)
     return np.linalg.eigh(moments)[1][..., -1]
 
 

@@ -6,10 +6,12 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import SkeletonError
+from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig.bones import RigPose
-from spark.rig.observed import mean_rotations, nearest_right_angle
+from spark.rig.observed import bend_axis, mean_rotations, nearest_right_angle
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
+from spark.rig.straight_fingers import stretch_fingers
 from spark.rig.toes import SHORT
 from spark.rotation import (
     quat_angle,
@@ -27,8 +29,11 @@ _MAX_ODDS = np.radians(20)  # of a limb bone from the other side's, mirrored; bu
 _STILL = np.radians(2)  # joints that turn less than this from the rest pose show no more than it
 _MAX_BACK = np.radians(20)  # of a joint of a spine that was built straight, in the mean pose
 _ALIGNED = np.radians(10)  # of a bone from an axis of its joint that it was put along on purpose
+_SLANTED = np.radians(25)  # of both knees' axes from joints' axes; found ones are off by up to 20
+_UPRIGHT = 20  # the power of the cosine of a trunk's lean that a frame is weighed by
 
 _UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
+_LOWER_LEGS = (Role.LEFT_LOWER_LEG, Role.RIGHT_LOWER_LEG)
 _UPPER_ARMS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
 _TRUNK = (Role.PELVIS, Role.SPINE, Role.NECK, Role.HEAD)
 _HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
@@ -47,35 +52,38 @@ class Reference:
     """The pose from which a T-pose is found.
 
     `posed`: it is the rest pose; else the mean pose of the motion stands in for it, and `square`
-    tells that limb bones lie along their joints' coordinate axes, `straight` that the trunk's do.
+    tells that limb bones lie along their joints' coordinate axes, `square_legs` that knees bend
+    about them as well, `straight` that the trunk's bones lie along them.
     """
 
     motion: Motion
     pose: RigPose
     posed: bool
     square: bool
+    square_legs: bool
     straight: bool
     notes: tuple[str, ...]
 
 
 def reference_of(motion: Motion, roles: RoleMap) -> Reference:
     """The rest pose where it is one that bodies are built in. Where it is none, or a moment of a
-    movement, the mean pose over the frames; on a square rig rounded to right angles, with straight
-    fingers, but for joints that have no role and keep still, and a trunk that is built as an S."""
+    movement, the mean pose of upright frames with straight fingers; on a square rig rounded to
+    right angles, but for joints that have no role and keep still, and a trunk built as an S."""
     skeleton = motion.skeleton
     rest = RigPose(skeleton, roles, quat_identity(np.zeros((len(skeleton), 1))))
     why = _odds(rest) if _stands(rest) else "is not a pose"
     if why is None:
-        return Reference(motion, rest, True, False, False, ())
+        return Reference(motion, rest, True, False, False, False, ())
     if (
         _stands(rest)
         and quat_angle(motion.rotations[:, 1:], rest.local[1:]).max(initial=0) < _STILL
     ):
         note = f"the rest pose {why}, and no other is in the file: the T-pose may be off"
-        return Reference(motion, rest, True, False, False, (note,))
+        return Reference(motion, rest, True, False, False, False, (note,))
     square = straight = _at_right_angles(rest)
-    mean = mean_rotations(motion.rotations)
+    mean = mean_rotations(motion.rotations, _uprightness(motion, roles))
     local = mean.copy()
+    hands = [j for role in _HANDS for j in roles.joints(role)]
     if square:
         turned = nearest_right_angle(mean)
         built = quat_angle(motion.rotations, mean).max(axis=0) < _STILL  # a hip joint's slant
@@ -86,11 +94,26 @@ def reference_of(motion: Motion, roles: RoleMap) -> Reference:
         straight = not bent
         for j, q in bent.items():
             local[j] = q
-        for hand in (j for role in _HANDS for j in roles.joints(role)):
+        for hand in hands:
             local[list(skeleton.subtree(hand)[1:])] = rest.local[0]
+    else:
+        for hand in hands:
+            stretch_fingers(skeleton, hand, local)
     note = f"the rest pose {why}: the T-pose is found from the motion"
     pose = RigPose(skeleton, roles, local)
-    return Reference(motion, pose, False, square, straight, (note,))
+    square_legs = square and _knees_at_right_angles(motion, pose)
+    return Reference(motion, pose, False, square, square_legs, straight, (note,))
+
+
+def _uprightness(motion: Motion, roles: RoleMap) -> Float[np.ndarray, "T"]:
+    """How much each frame tells of how the body was built: half where the trunk leans by 15
+    degrees. All frames tell the same where it lies in all."""
+    positions, _ = forward(motion)
+    *_, below, top = _landmarks(roles, positions.swapaxes(0, 1))
+    trunk = top - below
+    up = trunk[:, 2] / np.maximum(np.linalg.norm(trunk, axis=-1), SHORT)
+    weights = np.maximum(up, 0.0) ** _UPRIGHT
+    return weights / weights.max() if weights.max() > 0 else np.ones(len(motion))
 
 
 def _stands(rest: RigPose) -> bool:
@@ -140,6 +163,20 @@ def _at_right_angles(rest: RigPose) -> bool:
     return all(bone is None or tilt(bone) < _ALIGNED for bone in bones)
 
 
+def _knees_at_right_angles(motion: Motion, pose: RigPose) -> bool:
+    """Whether a knee bends about a coordinate axis, as far as the motion shows one."""
+    tilts = []
+    for upper, lower in zip(_UPPER_LEGS, _LOWER_LEGS, strict=True):
+        thigh, shank = pose.roles.joint(upper), pose.roles.joint(lower)
+        if thigh is None or shank is None:
+            continue
+        bones = pose.bone(thigh), pose.bone(shank)
+        if bones[0] is not None and bones[1] is not None:
+            axis = bend_axis(motion, thigh, shank, bones[0], bones[1])
+            tilts.append(0.0 if axis is None else tilt(axis))
+    return bool(min(tilts, default=0.0) < _SLANTED)
+
+
 def _bent_trunk(straight: RigPose, mean: Float[np.ndarray, "J 4"]) -> dict[int, Quat]:
     """The trunk's joints bent ahead and back as in the mean pose, from where their axes lie as the
     world's, where one of the spine bends far back: no one moves so, and it was built that way, as
@@ -164,7 +201,7 @@ def pelvis_frame(reference: Reference) -> Float[np.ndarray, "3 3"]:
     # Artists build along the axes, whichever way the trunk leans; so do motion capture systems.
     if reference.posed:
         lateral = snap(lateral, _MAX_HIP_TILT)
-        feet, *higher = _landmarks(pose)
+        feet, *higher = _landmarks(pose.roles, pose.positions)
         body = min((_across(pose.seen_from(pelvis, v - feet), lateral) for v in higher), key=tilt)
         up = snap(body, _MAX_LEAN) if tilt(body) < _MAX_LEAN else up
     elif reference.square:
@@ -192,13 +229,13 @@ def _lateral(pose: RigPose) -> Vector:
 
 def _trunk(pose: RigPose) -> Vector:
     """The vector [m] from the hips to the head; without a trunk, from the feet to the hips."""
-    *_, below, top = _landmarks(pose)
+    *_, below, top = _landmarks(pose.roles, pose.positions)
     return top - below
 
 
-def _landmarks(pose: RigPose) -> list[Vector]:
-    """The feet's middle, the hips' middle, and the head or the trunk's topmost joint if any."""
-    at, roles = pose.positions, pose.roles
+def _landmarks(roles: RoleMap, at: Float[np.ndarray, "J *T 3"]) -> list[Float[np.ndarray, "*T 3"]]:
+    """The feet's middle, the hips' middle, and the head or the trunk's topmost joint if any, from
+    where the joints are."""
     hips = np.mean([at[roles.require(role)] for role in _UPPER_LEGS], axis=0)
     feet = np.mean([at[_limb(roles, GROUP_OF[role])[-1]] for role in _UPPER_LEGS], axis=0)
     tops = [j for role in (Role.HEAD, Role.NECK, Role.SPINE) for j in roles.joints(role)[-1:]]

@@ -17,14 +17,15 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.motion import Motion
-from spark.rig.bones import RigPose
 from spark.rig.doubles import doubles_of
-from spark.rig.observed import bend_axis, resting_slope, standing_slope
+from spark.rig.moving_feet import feet_ahead, feet_slope
+from spark.rig.observed import bend_axis, nearest_right_angle
 from spark.rig.reference_pose import GROUP_OF, Reference, pelvis_frame, reference_of, snap
 from spark.rig.roles import Group, Role, RoleMap
 from spark.rotation import (
     quat_angle,
     quat_between,
+    quat_between_about,
     quat_conj,
     quat_from_matrix,
     quat_from_rotvec,
@@ -36,6 +37,7 @@ from spark.rotation import (
 from spark.skeleton import Skeleton
 
 _MAX_ROLL = np.radians(100)  # of a forearm from its middle: pronation and supination reach 85 each
+_MAX_NOD = np.radians(60)  # of a head in the mean
 _MAX_FINGER_SPREAD = np.radians(35)  # of the fingers' middle from the hand's axis they lie along
 _BESIDE = np.sin(np.radians(5))  # of a thumb to its hand's axis; nearer to it it tells no side
 _STEEPEST_FOOT = np.radians(-75)  # a foot that points further down at rest is not standing
@@ -77,7 +79,8 @@ def find_tpose(motion: Motion, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"]
             tpose[j] = quat_mul(tpose[child], quat_conj(reference.pose.local[child]))
     notes = list(reference.notes)
     doubles = doubles_of(skeleton, roles.roles)
-    for j in _originals_first(skeleton, doubles):
+    feet: dict[int, Quat] | None = {} if reference.posed else None
+    for j in _in_order(skeleton, roles, doubles):
         if j in above:
             continue
         if j in doubles:  # at rest all axes lie as the world's
@@ -86,21 +89,29 @@ def find_tpose(motion: Motion, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"]
         parent = tpose[int(skeleton.parents[j])]
         q = quat_mul(parent, reference.pose.local[j])
         role = roles.roles[j]
-        if role in _FEET or role in _TOES:
+        if feet is None and role in _FEET:
+            feet, more = feet_ahead(reference, tpose)
+            notes += more
+        if feet and j in feet:
+            q = feet[j]
+        elif role in _FEET or role in _TOES:
             q = _place_foot(reference, j, role, q, tpose[pelvis])
         elif role is not None and role in GROUP_OF:
             q = _place(reference, j, role, q, parent)
+        elif role is Role.HEAD and reference.square:
+            q = _skull(q, tpose[(pelvis, *roles.joints(Role.SPINE))[-1]])
         if role in _HANDS:
-            q, note = _palm_down(reference.pose, j, q)
+            q, note = _palm_down(reference, j, q)
             notes += note
         tpose[j] = q
     return tpose, tuple(notes)
 
 
-def _originals_first(skeleton: Skeleton, doubles: dict[int, int]) -> list[int]:
-    """All joints, parents before children, those of doubles' chains after all others."""
+def _in_order(skeleton: Skeleton, roles: RoleMap, doubles: dict[int, int]) -> list[int]:
+    """All joints, parents before children, feet after both legs, doubles' chains after all."""
+    feet = {k for role in _FEET for j in roles.joints(role) for k in skeleton.subtree(j)}
     later = {k for j in doubles for k in skeleton.subtree(j)}
-    return sorted(range(len(skeleton)), key=lambda j: j in later)
+    return sorted(range(len(skeleton)), key=lambda j: (j in later, j in feet))
 
 
 def root_joint_of(skeleton: Skeleton, pelvis: int) -> int:
@@ -114,6 +125,7 @@ def _place(reference: Reference, joint: int, role: Role, q: Quat, q_parent: Quat
     bone = reference.pose.bone(joint)
     if bone is None or (role in _CLAVICLES and reference.posed):
         return q
+    arm = GROUP_OF[role] in _OUT
     goal = _OUT.get(GROUP_OF[role], -_UP)
     if reference.square and role in _HANDS:
         bone = snap(bone, _MAX_FINGER_SPREAD)
@@ -124,8 +136,16 @@ def _place(reference: Reference, joint: int, role: Role, q: Quat, q_parent: Quat
         straight = quat_mul(quat_between(quat_rotate(q_parent, bone), goal), q_parent)
         if role in _ROLLING and quat_angle(q, straight) < _MAX_ROLL:
             q = straight
-        q = _square(q, goal, _UP if GROUP_OF[role] in _OUT else _LEFT)
+        if arm or reference.square_legs:
+            q = _square(q, goal, _UP if arm else _LEFT)
     return q
+
+
+def _skull(q: Quat, chest: Quat) -> Quat:
+    """A head's rotation by right angles: a skull has no curve, as the spine below it may have. Rigs
+    turn its axes as the chest's, as a rule, and dancers look down."""
+    as_chest = nearest_right_angle(chest)
+    return as_chest if quat_angle(q, as_chest) < _MAX_NOD else nearest_right_angle(q)
 
 
 def _place_foot(reference: Reference, joint: int, role: Role, q: Quat, q_pelvis: Quat) -> Quat:
@@ -142,24 +162,10 @@ def _place_foot(reference: Reference, joint: int, role: Role, q: Quat, q_pelvis:
             return quat_mul(quat_from_yaw(-np.arctan2(y, x)), q)
     if bone is None:
         return q
-    slope = _slope(reference) if role in _FEET else 0.0
+    slope = feet_slope(reference)[0] if role in _FEET else 0.0
     goal = np.array([np.cos(slope), 0.0, np.sin(slope)])
     q = quat_mul(quat_between(quat_rotate(q, bone), goal), q)
-    return _square(q, goal, _LEFT) if reference.square else q
-
-
-def _slope(reference: Reference) -> float:
-    """The slope [rad] of the feet: of ankles at rest, else of standing feet; both are alike."""
-    pose, motion = reference.pose, reference.motion
-    feet = [j for role in _FEET for j in pose.roles.joints(role)]
-    bones = {j: bone for j in feet if (bone := pose.bone(j)) is not None}
-    resting = []
-    for j, bone in bones.items():
-        shank = pose.bone(int(motion.skeleton.parents[j]))
-        if shank is not None:
-            resting.append(resting_slope(motion, j, bone, shank))
-    found = [slope for slope in resting if slope is not None]
-    return float(np.mean(found)) if found else standing_slope(motion, bones)
+    return _square(q, goal, _LEFT) if reference.square_legs else q
 
 
 def _twist_to_bend(
@@ -173,7 +179,9 @@ def _twist_to_bend(
         return quat_identity(goal)
     bent = bend_axis(reference.motion, upper, lower, bone, lower_bone)
     return (
-        quat_identity(goal) if bent is None else _rotation_about(quat_rotate(q, bent), axis, goal)
+        quat_identity(goal)
+        if bent is None
+        else quat_between_about(quat_rotate(q, bent), axis, goal)
     )
 
 
@@ -182,11 +190,13 @@ def _square(q: Quat, about: Vector, side: Vector) -> Quat:
     axes = quat_rotate(q, np.concatenate([np.eye(3), -np.eye(3)]))
     across = axes - np.outer(axes @ about, about)
     nearest = across[np.argmax(across @ side)]
-    return quat_mul(_rotation_about(nearest, side, about), q)
+    return quat_mul(quat_between_about(nearest, side, about), q)
 
 
-def _palm_down(pose: RigPose, hand: int, q: Quat) -> tuple[Quat, tuple[str, ...]]:
-    """`q`, turned by right angles where thumb or fingers say that the palm faces elsewhere."""
+def _palm_down(reference: Reference, hand: int, q: Quat) -> tuple[Quat, tuple[str, ...]]:
+    """`q`, turned by right angles where thumb or fingers say that the palm faces elsewhere; by as
+    much as a row of fingers says where a mean pose stands in for the rest pose."""
+    pose = reference.pose
     found = pose.thumb_side(hand)
     if found is None:
         return q, ()
@@ -194,14 +204,12 @@ def _palm_down(pose: RigPose, hand: int, q: Quat) -> tuple[Quat, tuple[str, ...]
     seen = quat_rotate(q, side)
     if np.hypot(seen[0], seen[2]) < _BESIDE * np.linalg.norm(seen):
         return q, ()
-    quarter_turns = round((np.arctan2(-seen[2], seen[0]) - droop) / (np.pi / 2))
+    turn = np.arctan2(-seen[2], seen[0]) - droop
+    quarter_turns = round(turn / (np.pi / 2))
+    if reference.posed or reference.square or droop:
+        turn = quarter_turns * (np.pi / 2)
+    q = quat_mul(quat_from_rotvec(-_LEFT * turn), q)
     if quarter_turns == 0:
         return q, ()
     note = f"{pose.skeleton.names[hand]} is turned by {90 * quarter_turns} degrees: palms face down"
-    return quat_mul(quat_from_rotvec(-_LEFT * (quarter_turns * np.pi / 2)), q), (note,)
-
-
-def _rotation_about(start: Vector, end: Vector, about: Vector) -> Quat:
-    """The rotation about a unit vector that brings `start` as near to `end` as it can."""
-    start = start - about * (start @ about)
-    return quat_from_rotvec(about * np.arctan2(np.cross(start, end) @ about, start @ end))
+    return q, (note,)

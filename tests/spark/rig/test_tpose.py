@@ -22,6 +22,7 @@ from spark.rotation import (
     quat_conj,
     quat_from_rotvec,
     quat_mul,
+    quat_normalize,
     quat_rotate,
     rotvec_from_quat,
 )
@@ -204,6 +205,42 @@ def test_a_spine_that_is_built_as_an_s_is_no_posture() -> None:
     tpose, _ = find_tpose(rerig(motion, axes), rig.roles)
     error = np.degrees(quat_angle(tpose, quat_mul(rig.tpose, axes)))
     assert error[trunk].max() < 6  # a walk leans
+
+
+@pytest.mark.parametrize("nod", [-0.5, 0.0, 0.5, 0.9])
+def test_a_head_that_nods_throughout_is_upright(nod: float) -> None:
+    """On a spine that is built as an S, whose posture the motion shows, a skull has no posture."""
+    rig = sample_rig("walker")
+    motion = sample_motion("walk", rig, 30.0)
+    axes = along_x(rig, (1, 3))
+    trunk, slants = [rig.pelvis, *rig.roles.joints(Role.SPINE)], (0.35, 0.5, -0.2, -0.1)
+    for j, slant in zip(trunk, slants, strict=False):
+        tilted = quat_mul(quat_about("y", np.array(slant)), rig.tpose[j])
+        axes[j] = quat_mul(quat_mul(quat_conj(rig.tpose[j]), tilted), axes[j])
+    head = rig.roles.require(Role.HEAD)
+    turn = quat_mul(quat_conj(rig.tpose[head]), quat_about("y", np.array(nod)))
+    turned = quat_mul(motion.rotations[:, head], quat_mul(turn, rig.tpose[head]))
+    motion.rotations[:, head] = turned
+    tpose, _ = find_tpose(rerig(motion, axes), rig.roles)
+    assert np.degrees(quat_angle(tpose, quat_mul(rig.tpose, axes)))[head] < 1e-3
+
+
+def test_frames_in_which_the_body_stands_tell_how_it_was_built() -> None:
+    """And not those in which it crawls with its hips tilted, as many as they are."""
+    rig = sample_rig("walker")
+    motion = sample_motion("walk", rig, 30.0)
+    axes = quat_normalize(np.random.default_rng(0).normal(size=rig.tpose.shape))
+    standing_only, _ = find_tpose(rerig(motion, axes), rig.roles)
+    rotations = np.concatenate([motion.rotations] * 3)
+    crawling = slice(len(motion), None)
+    trunk = [rig.pelvis, *rig.roles.joints(Role.SPINE)[:1]]
+    for j, pitch in zip(trunk, (1.2, 0.5), strict=True):
+        turn = quat_mul(quat_conj(rig.tpose[j]), quat_about("y", np.array(pitch)))
+        rotations[crawling, j] = quat_mul(rotations[crawling, j], quat_mul(turn, rig.tpose[j]))
+    both = Motion(rig.skeleton, motion.frame_time, np.concatenate([motion.root_pos] * 3), rotations)
+    tpose, _ = find_tpose(rerig(both, axes), rig.roles)
+    off = np.degrees(quat_angle(tpose, standing_only))
+    assert off[[rig.pelvis, rig.chest, rig.roles.require(Role.HEAD)]].max() < 3.0
 
 
 @pytest.mark.parametrize("path", recordings("cmu_dance/cmu_05_0[2-9].bvh"))
