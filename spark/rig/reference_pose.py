@@ -9,8 +9,9 @@ from spark.errors import SkeletonError
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig.bones import RigPose
-from spark.rig.observed import bend_axis, mean_rotations, nearest_right_angle
-from spark.rig.roles import LIMBS, Group, Role, RoleMap
+from spark.rig.joint_axes import bones_at_right_angles, knees_at_right_angles, snap, tilt
+from spark.rig.observed import mean_rotations, nearest_right_angle
+from spark.rig.roles import ENDS, LIMBS, Group, Role, RoleMap, limb_joints
 from spark.rig.straight_fingers import stretch_fingers
 from spark.rig.toes import SHORT
 from spark.rotation import (
@@ -28,16 +29,12 @@ _MAX_HIP_TILT = np.radians(10)  # of the line of the hips from the axis across t
 _MAX_ODDS = np.radians(20)  # of a limb bone from the other side's, mirrored; built bodies have 10
 _STILL = np.radians(2)  # joints that turn less than this from the rest pose show no more than it
 _MAX_BACK = np.radians(20)  # of a joint of a spine that was built straight, in the mean pose
-_ALIGNED = np.radians(10)  # of a bone from an axis of its joint that it was put along on purpose
-_SLANTED = np.radians(25)  # of both knees' axes from joints' axes; found ones are off by up to 20
 _UPRIGHT = 20  # the power of the cosine of a trunk's lean that a frame is weighed by
 
 _UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
-_LOWER_LEGS = (Role.LEFT_LOWER_LEG, Role.RIGHT_LOWER_LEG)
 _UPPER_ARMS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
 _TRUNK = (Role.PELVIS, Role.SPINE, Role.NECK, Role.HEAD)
 _HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
-_ENDS = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE, Role.LEFT_TOE, Role.RIGHT_TOE)
 
 _SIDES = {Group.LEFT_ARM: 1.0, Group.RIGHT_ARM: -1.0}
 GROUP_OF = {role: group for group, limb in LIMBS.items() for role in limb}
@@ -80,7 +77,7 @@ def reference_of(motion: Motion, roles: RoleMap) -> Reference:
     ):
         note = f"the rest pose {why}, and no other is in the file: the T-pose may be off"
         return Reference(motion, rest, True, False, False, False, (note,))
-    square = straight = _at_right_angles(rest)
+    square = straight = bones_at_right_angles(rest)
     mean = mean_rotations(motion.rotations, _uprightness(motion, roles))
     local = mean.copy()
     hands = [j for role in _HANDS for j in roles.joints(role)]
@@ -101,7 +98,7 @@ def reference_of(motion: Motion, roles: RoleMap) -> Reference:
             stretch_fingers(skeleton, hand, local)
     note = f"the rest pose {why}: the T-pose is found from the motion"
     pose = RigPose(skeleton, roles, local)
-    square_legs = square and _knees_at_right_angles(motion, pose)
+    square_legs = square and knees_at_right_angles(motion, pose)
     return Reference(motion, pose, False, square, square_legs, straight, (note,))
 
 
@@ -120,7 +117,7 @@ def _stands(rest: RigPose) -> bool:
     """Whether the rest pose is a pose: legs don't point up along the trunk, arms don't cross it."""
     lateral, up = _lateral(rest), _trunk(rest)
     for group in LIMBS:
-        chain = _limb(rest.roles, group)
+        chain = limb_joints(rest.roles, group)
         limb = rest.positions[chain[-1]] - rest.positions[chain[0]] if chain else np.zeros(3)
         wrong = up if group not in _SIDES else -_SIDES[group] * lateral
         if limb @ wrong > 0.5 * np.linalg.norm(limb) * np.linalg.norm(wrong):
@@ -136,7 +133,7 @@ def _odds(rest: RigPose) -> str | None:
     for group in (Group.LEFT_LEG, Group.LEFT_ARM):
         for role in LIMBS[group]:
             pair = (roles.joint(role), roles.joint(role.mirrored))
-            bones = [None if j is None or role in _ENDS else _direction(rest, j) for j in pair]
+            bones = [None if j is None or role in ENDS else _direction(rest, j) for j in pair]
             if bones[0] is None or bones[1] is None:
                 continue
             image = bones[1] - 2 * lateral * (bones[1] @ lateral)
@@ -155,26 +152,6 @@ def _direction(pose: RigPose, joint: int) -> Vector | None:
     """The unit vector along a joint's bone in the pose's world."""
     bone = pose.bone(joint)
     return None if bone is None else quat_rotate(pose.world[joint], bone / np.linalg.norm(bone))
-
-
-def _at_right_angles(rest: RigPose) -> bool:
-    """Whether all limb bones lie along coordinate axes of their joints."""
-    bones = (rest.bone(j) for group in LIMBS for j in _limb(rest.roles, group)[:-1])
-    return all(bone is None or tilt(bone) < _ALIGNED for bone in bones)
-
-
-def _knees_at_right_angles(motion: Motion, pose: RigPose) -> bool:
-    """Whether a knee bends about a coordinate axis, as far as the motion shows one."""
-    tilts = []
-    for upper, lower in zip(_UPPER_LEGS, _LOWER_LEGS, strict=True):
-        thigh, shank = pose.roles.joint(upper), pose.roles.joint(lower)
-        if thigh is None or shank is None:
-            continue
-        bones = pose.bone(thigh), pose.bone(shank)
-        if bones[0] is not None and bones[1] is not None:
-            axis = bend_axis(motion, thigh, shank, bones[0], bones[1])
-            tilts.append(0.0 if axis is None else tilt(axis))
-    return bool(min(tilts, default=0.0) < _SLANTED)
 
 
 def _bent_trunk(straight: RigPose, mean: Float[np.ndarray, "J 4"]) -> dict[int, Quat]:
@@ -237,26 +214,10 @@ def _landmarks(roles: RoleMap, at: Float[np.ndarray, "J *T 3"]) -> list[Float[np
     """The feet's middle, the hips' middle, and the head or the trunk's topmost joint if any, from
     where the joints are."""
     hips = np.mean([at[roles.require(role)] for role in _UPPER_LEGS], axis=0)
-    feet = np.mean([at[_limb(roles, GROUP_OF[role])[-1]] for role in _UPPER_LEGS], axis=0)
+    feet = np.mean([at[limb_joints(roles, GROUP_OF[role])[-1]] for role in _UPPER_LEGS], axis=0)
     tops = [j for role in (Role.HEAD, Role.NECK, Role.SPINE) for j in roles.joints(role)[-1:]]
     return [feet, hips, *(at[j] for j in tops[:1])]
 
 
 def _across(v: Vector, lateral: Vector) -> Vector:
     return v - lateral * (v @ lateral)
-
-
-def _limb(roles: RoleMap, group: Group) -> list[int]:
-    """The joints of a limb from hip or shoulder to ankle or wrist."""
-    return [j for role in LIMBS[group] if role not in _ENDS for j in roles.joints(role)]
-
-
-def snap(v: Vector, tolerance: float) -> Vector:
-    """The coordinate axis that is nearest to `v`, or `v` itself where none is that near."""
-    k = int(np.argmax(np.abs(v)))
-    return np.eye(3)[k] * np.sign(v[k]) if tilt(v) < tolerance else v
-
-
-def tilt(v: Vector) -> float:
-    """The angle [rad] between a vector and the nearest coordinate axis."""
-    return float(np.arccos(min(np.abs(v).max() / max(np.linalg.norm(v), SHORT), 1.0)))

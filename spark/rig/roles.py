@@ -84,6 +84,9 @@ LIMBS: dict[Group, tuple[Role, ...]] = {
 }
 """The four limbs, each from the body outwards."""
 
+ENDS = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE, Role.LEFT_TOE, Role.RIGHT_TOE)
+"""What lies before a limb's shoulder and after its ankle."""
+
 
 @dataclass(frozen=True)
 class RoleMap:
@@ -127,3 +130,8 @@ class RoleMap:
                 f"no joint is the {role.value.replace('_', ' ')}; name it in a map file"
             )
         return joint
+
+
+def limb_joints(roles: RoleMap, group: Group) -> list[int]:
+    """The joints of a limb from hip or shoulder to ankle or wrist."""
+    return [j for role in LIMBS[group] if role not in ENDS for j in roles.joints(role)]

@@ -18,10 +18,11 @@ from jaxtyping import Float
 
 from spark.motion import Motion
 from spark.rig.doubles import doubles_of
+from spark.rig.joint_axes import snap
 from spark.rig.moving_feet import feet_ahead, feet_slope
 from spark.rig.observed import bend_axis, nearest_right_angle
-from spark.rig.reference_pose import GROUP_OF, Reference, pelvis_frame, reference_of, snap
-from spark.rig.roles import Group, Role, RoleMap
+from spark.rig.reference_pose import GROUP_OF, Reference, pelvis_frame, reference_of
+from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import (
     quat_angle,
     quat_between,
@@ -39,6 +40,7 @@ from spark.skeleton import Skeleton
 _MAX_ROLL = np.radians(100)  # of a forearm from its middle: pronation and supination reach 85 each
 _MAX_NOD = np.radians(60)  # of a head in the mean
 _MAX_FINGER_SPREAD = np.radians(35)  # of the fingers' middle from the hand's axis they lie along
+_MAX_SKEW = np.radians(20)  # of a palm from right angles, on an arm that was built with its turn
 _BESIDE = np.sin(np.radians(5))  # of a thumb to its hand's axis; nearer to it it tells no side
 _STEEPEST_FOOT = np.radians(-75)  # a foot that points further down at rest is not standing
 
@@ -101,8 +103,11 @@ def find_tpose(motion: Motion, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"]
         elif role is Role.HEAD and reference.square:
             q = _skull(q, tpose[(pelvis, *roles.joints(Role.SPINE))[-1]])
         if role in _HANDS:
-            q, note = _palm_down(reference, j, q)
+            q, turn, note = _palm_down(reference, j, q)
             notes += note
+            if turn is not None:
+                arm = _turned_with_hand(reference, j, role, turn, tpose)
+                tpose[arm] = quat_mul(turn, tpose[arm])
         tpose[j] = q
     return tpose, tuple(notes)
 
@@ -193,23 +198,50 @@ def _square(q: Quat, about: Vector, side: Vector) -> Quat:
     return quat_mul(quat_between_about(nearest, side, about), q)
 
 
-def _palm_down(reference: Reference, hand: int, q: Quat) -> tuple[Quat, tuple[str, ...]]:
+def _palm_down(
+    reference: Reference, hand: int, q: Quat
+) -> tuple[Quat, Quat | None, tuple[str, ...]]:
     """`q`, turned by right angles where thumb or fingers say that the palm faces elsewhere; by as
-    much as a row of fingers says where a mean pose stands in for the rest pose."""
+    much as a row of fingers says where a mean pose stands in for the rest pose. And that turn,
+    where the arm was built with it: clearly by right angles."""
     pose = reference.pose
     found = pose.thumb_side(hand)
     if found is None:
-        return q, ()
+        return q, None, ()
     side, droop = found
     seen = quat_rotate(q, side)
     if np.hypot(seen[0], seen[2]) < _BESIDE * np.linalg.norm(seen):
-        return q, ()
-    turn = np.arctan2(-seen[2], seen[0]) - droop
-    quarter_turns = round(turn / (np.pi / 2))
+        return q, None, ()
+    angle = np.arctan2(-seen[2], seen[0]) - droop
+    quarter_turns = round(angle / (np.pi / 2))
+    right_angle = quarter_turns * (np.pi / 2)
+    built = reference.posed and abs(angle - right_angle) < _MAX_SKEW
     if reference.posed or reference.square or droop:
-        turn = quarter_turns * (np.pi / 2)
-    q = quat_mul(quat_from_rotvec(-_LEFT * turn), q)
+        angle = right_angle
+    turn = quat_from_rotvec(-_LEFT * angle)
+    q = quat_mul(turn, q)
     if quarter_turns == 0:
-        return q, ()
+        return q, None, ()
     note = f"{pose.skeleton.names[hand]} is turned by {90 * quarter_turns} degrees: palms face down"
-    return q, (note,)
+    return q, turn if built else None, (note,)
+
+
+def _turned_with_hand(
+    reference: Reference, hand: int, role: Role, turn: Quat, tpose: Float[np.ndarray, "J 4"]
+) -> list[int]:
+    """The joints of an arm that turn as its palm does: the forearm, as no wrist rolls, and the
+    upper arm where the elbow bends about a better axis then."""
+    skeleton, roles = reference.motion.skeleton, reference.pose.roles
+    upper_role, forearm_role = LIMBS[GROUP_OF[role]][1:3]
+    top = roles.joint(forearm_role)
+    upper = roles.joint(upper_role)
+    if top is None:
+        return []
+    bones = None if upper is None else reference.pose.bone(upper), reference.pose.bone(top)
+    if upper is not None and bones[0] is not None and bones[1] is not None:
+        bent = bend_axis(reference.motion, upper, top, bones[0], bones[1])
+        if bent is not None:
+            before = quat_rotate(tpose[upper], bent)
+            goal = _BENT[upper_role][1]
+            top = upper if quat_rotate(turn, before) @ goal > before @ goal else top
+    return list(skeleton.subtree(top))

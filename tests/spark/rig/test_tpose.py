@@ -21,6 +21,7 @@ from spark.rotation import (
     quat_between,
     quat_conj,
     quat_from_rotvec,
+    quat_identity,
     quat_mul,
     quat_normalize,
     quat_rotate,
@@ -364,6 +365,25 @@ def test_palms_turn_down_where_thumbs_say_so(roll: float, turned: bool) -> None:
         hand = motion.skeleton.parents[thumb]
         side = quat_rotate(tpose[hand], motion.skeleton.offsets[thumb])
         assert side[0] > 0.8 * np.hypot(side[0], side[2])
+
+
+@pytest.mark.parametrize("rolled", ["UPPER_ARM", "FOREARM"])
+def test_the_quarter_turn_of_a_palm_goes_up_the_arm(rolled: str) -> None:
+    """A T-pose with palms ahead: built so from the shoulders, which the elbows' axes show, or from
+    the elbows. Wrists don't roll."""
+    rig = with_thumbs(stick_rig())
+    motion = standing(rig, 20)
+    for side, sign in (("LEFT", -1.0), ("RIGHT", 1.0)):
+        forearm = rig.roles.require(Role[f"{side}_FOREARM"])
+        bend = np.linspace(0.0, sign * 1.5, 20)
+        motion.rotations[:, forearm] = quat_about("z", bend)
+    axes = quat_identity(rig.tpose)
+    for side in ("LEFT", "RIGHT"):
+        arm = list(rig.skeleton.subtree(rig.roles.require(Role[f"{side}_{rolled}"])))
+        axes[arm] = quat_about("y", np.array(np.pi / 2))
+    tpose, notes = find_tpose(rerig(motion, axes), rig.roles)
+    assert len(notes) == 2
+    assert np.degrees(quat_angle(tpose, axes)).max() < 1e-3
 
 
 @pytest.mark.parametrize("way", [[0, 0, 1], [0, 0, -1], [-1, 0, 0]])
