@@ -8,7 +8,8 @@ neck and head keep the posture that the rig's artist gave them.
 Some files' rest pose is no pose at all (LAFAN1, Rokoko: every bone along one local axis), and some
 files rest in the middle of a step. There the mean pose of the motion stands in for it, and the axes
 that knees and elbows bend about settle the twist. Rigs of the first kind are built with their joint
-axes at right angles, so twists are rounded to them: all clips of a rig give the same T-pose.
+axes at right angles as a rule, so twists are rounded to them, but for legs whose knees bend about
+none of their axes: all clips of a rig give the same T-pose, but for the posture of a curved spine.
 """
 
 from itertools import pairwise
