@@ -11,6 +11,7 @@ from spark.motion import Motion
 from spark.skeleton import Skeleton
 
 RESTART = 0.5  # [s]: a sender that went back in time, and says nothing newer, began anew
+_ROUNDED_MS = 2.0  # [ms]: two roundings off; a clock that is off by more counts otherwise now
 _CHANGED = 0.03  # [m]: bones whose ends lie further from where they were are another body's
 
 Places = dict[str, Float[np.ndarray, "3"]]
@@ -43,13 +44,37 @@ class Order:
 
 
 @dataclass
+class SampleClock:
+    """A sender's clock that tells more than its milliseconds, by what it counts evenly."""
+
+    _time: float = 0.0
+    _first: tuple[int, int] | None = None
+    _last: tuple[int, int] = (0, 0)
+
+    def at(self, sample: int, time_ms: int) -> float | None:
+        """When a sample was made [s]; None while that is not known, and where time stands still."""
+        if self._first is None:
+            self._first = self._last = sample, time_ms
+        samples, passed = sample - self._first[0], time_ms - self._first[1]
+        more, later = sample - self._last[0], time_ms - self._last[1]
+        self._last = sample, time_ms
+        if samples <= 0 or passed <= 0 or abs(more * passed / samples - later) > _ROUNDED_MS:
+            self._first = sample, time_ms
+            self._time += 0.001 * later
+            return None
+        self._time += 0.001 * more * passed / samples
+        return self._time
+
+
+@dataclass
 class LivePose(ABC):
     """The newest pose of a sender, put together from its packets. What it keeps does not grow
     with what is sent.
 
     `dropped` counts packets that are broken, `reordered` those that came later than newer ones,
     `repeated` those that came before, `frames` those that told of the pose. `heard` says when each
-    bone was last heard of [s].
+    bone was last heard of [s], `clock` when the newest pose was made by the sender's clock [s],
+    where it says so.
     """
 
     dropped: int = 0
@@ -57,6 +82,7 @@ class LivePose(ABC):
     repeated: int = 0
     frames: int = 0
     heard: dict[str, float] = field(default_factory=dict)
+    clock: float | None = None
 
     @abstractmethod
     def take(self, packet: bytes, now: float) -> bool:

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from spark.errors import ConventionError
 from spark.io import mvn
-from spark.io.live_pose import LivePose, Order, Places, Pose, tpose_of
+from spark.io.live_pose import LivePose, Order, Places, Pose, SampleClock, tpose_of
 from spark.io.mvn_body import (
     LIMBS,
     NEEDED,
@@ -27,7 +27,6 @@ _BEST = (mvn.QUATERNION, mvn.UNITY, mvn.EULER)  # of the types that hold a pose
 _ROUNDS = 2**32  # the sample counter
 Rows = Float[np.ndarray, "23 7"]
 Mask = Bool[np.ndarray, "23"]
-
 _SIZE = len(mvn.SEGMENTS)
 _NEEDED = np.array([name in NEEDED for name in mvn.SEGMENTS])
 _ALL_NEEDED = np.flatnonzero(_NEEDED)
@@ -45,6 +44,7 @@ class MvnPose(LivePose):
     """
 
     _order: Order = field(default_factory=lambda: Order(_ROUNDS))
+    _samples: SampleClock = field(default_factory=SampleClock)
     _character: int | None = None
     _others: set[int] = field(default_factory=set)
     _kind: int | None = None
@@ -127,6 +127,7 @@ class MvnPose(LivePose):
         self._known |= self._told
         self.heard.update(dict.fromkeys(np.array(mvn.SEGMENTS)[self._told].tolist(), now))
         self.frames += 1
+        self.clock = self._samples.at(datagram.sample, datagram.time_ms)
         return True
 
     def _settle(self) -> None:
@@ -175,8 +176,7 @@ class MvnPose(LivePose):
     def missing(self) -> tuple[str, ...]:
         if not (_NEEDED & ~self._known).any():
             return ()
-        known = {mvn.SEGMENTS[j] for j in np.flatnonzero(self._known).tolist()}
-        return tuple(name for name in NEEDED if name not in known)
+        return tuple(n for n in NEEDED if not self._known[mvn.SEGMENTS.index(n)])
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -199,7 +199,7 @@ class MvnPose(LivePose):
         return tuple(out)
 
     def bones(self) -> Places:
-        known = [name for name, is_known in zip(mvn.SEGMENTS, self._known, strict=True) if is_known]
+        known = [mvn.SEGMENTS[j] for j in np.flatnonzero(self._known).tolist()]
         told, local, reads = self._scaled, self._raw_places(), self._read()
         if not self._has_places and not told:
             mean = mean_body()

@@ -42,6 +42,7 @@ for _side in ("Left", "Right"):
     }
 _LIMBS = ("UpperLeg", "LowerLeg", "Foot", "UpperArm", "LowerArm", "Hand")
 _MOST_PACKETS = 256  # of one clock that are remembered
+_COARSE = 4096.0  # [s]: clocks are single floats, which from here on leave out half milliseconds
 NEEDED = ("Hips", "Spine", "Head", *(f"{s}{bone}" for s in ("Left", "Right") for bone in _LIMBS))
 
 
@@ -74,6 +75,8 @@ class VmcPose(LivePose):
         if times and self._is_repeated(packet, times[-1]):
             self.repeated += 1
             return False
+        if times:
+            self.clock = times[-1] if abs(times[-1]) < _COARSE else None
         told = False
         for name, arguments in parts:
             if name not in ("/VMC/Ext/Bone/Pos", "/VMC/Ext/Root/Pos"):
