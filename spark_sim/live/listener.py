@@ -5,7 +5,7 @@ import struct
 import sys
 import time
 from collections import deque
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,9 +27,20 @@ _POSES: dict[str, type[LivePose]] = {"vmc": VmcPose, "xsens": MvnPose}
 _PACKET = 65535  # bytes, the most of UDP
 _MOST_WAITING = 256  # packets that are read at once: of a flood, the newest
 _MOST_LATE = 32  # packets that are read though it is late
+_KEPT = 256  # poses that nobody asks for
 _SETTLE = 0.2  # [s] from the first whole pose on: optional bones may come in packets of their own
 _STAMP = 35  # SO_TIMESTAMPNS of Linux: when a packet came to the machine, not to this program
 _STAMP_FORM = struct.Struct("@ll")  # [s, ns]
+
+
+@dataclass(frozen=True, eq=False)
+class Arrival:
+    """A pose, when it came [s, `time.monotonic`], and when it was made by the sender's clock [s],
+    where that is told."""
+
+    frame: Frame
+    came: float
+    clock: float | None
 
 
 class Listener:
@@ -58,6 +69,7 @@ class Listener:
         self.flooded = 0
         """Packets that were thrown away, because too many came at once."""
         self._whole = np.inf
+        self._arrivals: deque[Arrival] = deque(maxlen=_KEPT)
         self._skeleton: Motion | None = None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         if sys.platform == "linux":
@@ -133,8 +145,15 @@ class Listener:
         if self.pose.take(packet, now):
             self.skipped += self.fresh
             self.arrived, self.fresh = came, True
+            self._keep(time.monotonic() - max(time.time() - came, 0.0))
         if self._whole == np.inf and self.pose.frames and not self.pose.missing:
             self._whole = now
+
+    def _keep(self, came: float) -> None:
+        """Keep the newest pose for `arrivals`."""
+        if self._skeleton is not None:
+            frame = Frame(*self.pose.frame(self._skeleton.skeleton))
+            self._arrivals.append(Arrival(frame, came, self.pose.clock))
 
     def wait(self, fps: float = 60.0, timeout: float | None = None) -> Clip:
         """Wait until the whole person was heard of; one frame of them in their T-pose, which a
@@ -161,6 +180,8 @@ class Listener:
         )
         motion = replace(motion, root_pos=np.array([[0.0, 0.0, -lowest]]))
         self._skeleton = motion
+        self._arrivals.clear()
+        self._keep(time.monotonic())
         convention = Convention(given_unit("cm"), given_up("y"))
         recording = Recording(encode_new(motion), motion, convention)
         return Clip(recording, "the sender", given_rig=rig)
@@ -171,6 +192,14 @@ class Listener:
             raise ConventionError("no person is known yet; call wait() first")
         self.fresh = False
         return Frame(*self.pose.frame(self._skeleton.skeleton))
+
+    def arrivals(self) -> list[Arrival]:
+        """The poses that came since this was called last, in their order; the first is the one that
+        the person had when `wait` or `person` gave them."""
+        self.fresh = False
+        arrivals = list(self._arrivals)
+        self._arrivals.clear()
+        return arrivals
 
     @property
     def changed(self) -> bool:

@@ -24,6 +24,11 @@ class Pace:
         self._due = time.monotonic()
 
     @property
+    def due(self) -> float:
+        """When the next step is due [s, `time.monotonic`]."""
+        return self._due
+
+    @property
     def left(self) -> float:
         """How long it is until the next step [s]."""
         return max(self._due - time.monotonic(), 0.0)

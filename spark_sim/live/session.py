@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
-from robots.stream.frame_targets import Frame
 from spark.errors import FrameError, SparkSimError
+from spark_sim.live.anchor import Anchor
 from spark_sim.live.handover import Handover
+from spark_sim.live.jitter_buffer import JitterBuffer
 from spark_sim.live.journal import Journal
 from spark_sim.live.listener import Listener
 from spark_sim.live.pace import Pace
@@ -24,14 +24,14 @@ Note = Callable[[str], None]
 _SILENT = 0.5  # [s] without news: a tracker has vanished
 _LOOK_EVERY = 0.1  # [s] at silent bones, and at the sender's body
 _CHANGED_FOR = 0.3  # [s] that another body is sent for until it is believed
-_FASTEST = 12.0  # [m/s]: a person who is faster was put somewhere else
 _COUNTED = 100_000  # latencies, the last ones
 _SLOW_AFTER, _SLOW_SHARE = 120, 0.1  # steps, and how many of them were left out: it is said
+_SURE_AFTER = 120  # steps: what the sender's rate is
 
 
 class Session:
-    """Steps the robot `fps` times a second with the newest pose of a listener. A context manager;
-    what was recorded is a motion when it ends.
+    """Steps the robot `fps` times a second with the poses of a listener, made steady by a jitter
+    buffer. A context manager; what was recorded is a motion when it ends.
 
     `note` is told what is amiss. Sinks get every step's coordinates, a view shows them.
     """
@@ -64,8 +64,9 @@ class Session:
         self._began, self._told_slow = np.inf, False
         self._told: set[str] = set()
         self._trembles = False
-        self._place: Float[np.ndarray, 2] | None = None
-        self._anchor = np.zeros(2)
+        self._buffer = JitterBuffer()
+        self._anchor = Anchor(1.0 / fps, note)
+        self._told_wait = 0.0
         self.frames = 0
         """How many steps the robot took."""
         self.stopping = False
@@ -97,6 +98,7 @@ class Session:
                 self._looked = now
                 self._watch(now)
                 self._say_trembling(self._retargeter.foot_noise)
+                self._say_waiting()
             self._pace.advance()
 
     def _begin(self) -> None:
@@ -109,8 +111,8 @@ class Session:
             self._same = np.inf
             return
         self._handover.begin()
-        self._anchor[:] = 0.0
-        self._place, self._same = None, np.inf
+        self._anchor = Anchor(self._pace.frame_time, self._note)
+        self._buffer, self._same = JitterBuffer(), np.inf
         self._began = min(self._began, time.monotonic())
         for note in self._listener.pose.notes:
             self._note(note)
@@ -124,7 +126,9 @@ class Session:
         listener = self._listener
         fresh, arrived = listener.fresh, listener.arrived
         age = time.time() - arrived
-        frame = self._anchored(listener.frame())
+        for arrival in listener.arrivals():
+            self._buffer.put(self._anchor.hold(arrival), arrival.came, arrival.clock)
+        frame = self._buffer.get(self._pace.due)
         try:
             qpos = self._handover.follow(retargeter.step(frame))
         except FrameError as error:
@@ -141,21 +145,6 @@ class Session:
         if self._view is not None:
             self._view.show(frame, qpos, self._words())
         self.frames += 1
-
-    def _anchored(self, frame: Frame) -> Frame:
-        """The frame where the person would be if nothing had put them elsewhere."""
-        place = frame.root_pos[:2] + self._anchor
-        if self._place is not None:
-            jump = place - self._place
-            far = float(np.hypot(*jump))
-            if far > _FASTEST * self._pace.frame_time * (1 + self._pace.just_missed):
-                self._note(f"the sender jumped by {far:.2f} m: the robot goes on where it is")
-                self._anchor -= jump
-                place -= jump
-        self._place = place
-        moved = frame.root_pos.copy()
-        moved[:2] = place
-        return frame._replace(root_pos=moved)
 
     def _watch(self, now: float) -> None:
         """Say which bones are heard of no more, and which again; notice another body."""
@@ -190,6 +179,18 @@ class Session:
             self._trembles = noise > 0
             feet = f"the sender's feet tremble by {1000 * noise:.0f} mm of white noise: poses are"
             self._note(f"{feet} smoothed" if noise else "the sender trembles no more")
+
+    def _say_waiting(self) -> None:
+        """By how much poses are played later, so that they are as steady as the steps."""
+        wait, told = self._buffer.wait, self._told_wait
+        if self.frames < _SURE_AFTER:
+            return
+        if abs(wait - told) > max(self._pace.frame_time / 2, told / 2):
+            self._told_wait = wait
+            self._note(f"{self._waiting()}; the robot follows {1000 * wait:.0f} ms later for that")
+
+    def _waiting(self) -> str:
+        return f"{self._buffer.rate:.0f} poses a second arrive, {self._fps:g} steps are made"
 
     def _once(self, text: str) -> None:
         if text not in self._told:
@@ -235,6 +236,7 @@ class Session:
             lines.append(
                 f"latency from a pose's packet in to its coordinates out: p50 {half:.1f} ms, p95 "
                 f"{most:.1f} ms;\n  beside it the solver looks {ahead} frames ahead "
-                f"({1000 * ahead * self._pace.frame_time:.0f} ms)"
+                f"({1000 * ahead * self._pace.frame_time:.0f} ms), and poses wait for "
+                f"{1000 * self._buffer.wait:.0f} ms to be steady"
             )
         return "\n".join(lines)

@@ -39,6 +39,30 @@ def test_the_newest_of_several_poses_counts(out: socket.socket) -> None:
         assert np.isfinite(live.step(frame)).all()
 
 
+def test_poses_come_with_their_times(out: socket.socket) -> None:
+    """Each of them, in their order: also those that a newer one followed."""
+    with out, Listener("vmc://127.0.0.1:0") as person:
+        out.sendto(vmc.packet({}, 5.0), ("127.0.0.1", person.port))
+        person.wait(fps=60.0, timeout=10.0)
+        assert [arrival.clock for arrival in person.arrivals()] == [5.0]
+        began = time.monotonic()
+        for k in range(3):
+            out.sendto(
+                vmc.packet({}, 6.0 + k, hips=(0.0, 0.9, 0.1 * k)), ("127.0.0.1", person.port)
+            )
+            time.sleep(0.02)
+        person.listen(0.1)
+        came = person.arrivals()
+        assert [arrival.clock for arrival in came] == [6.0, 7.0, 8.0]
+        x = [arrival.frame.root_pos[0] for arrival in came]
+        np.testing.assert_allclose(x, [0.0, 0.1, 0.2], atol=1e-6)
+        waited = np.diff([began, *(arrival.came for arrival in came)])
+        assert waited[0] > -0.001
+        assert waited[1:].min() > 0.019  # not when they were read
+        assert person.arrivals() == []
+        assert not person.fresh
+
+
 def test_of_a_flood_the_newest_are_taken(
     out: socket.socket, monkeypatch: pytest.MonkeyPatch
 ) -> None:

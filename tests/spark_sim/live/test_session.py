@@ -1,6 +1,7 @@
 """A robot follows senders on the loopback that lose, repeat, shuffle, vanish and change."""
 
 import json
+import re
 import socket
 import subprocess
 import sys
@@ -134,6 +135,30 @@ def test_a_sender_that_trembles_is_smoothed_and_told() -> None:
         with session, running(session):
             send(listener.port, packets, until=trembles)
     assert trembles()
+
+
+def test_a_sender_slower_than_the_steps_is_told_with_what_it_costs() -> None:
+    told: list[str] = []
+    pose = mvn.quaternions(mvn.world({}))
+
+    def is_told() -> bool:
+        return any("poses a second arrive, 60 steps are made" in each for each in told)
+
+    listener = Listener("xsens://127.0.0.1:0")
+    with listener:
+        session = Session(listener, "robot", 60.0, told.append)
+        with session, running(session):
+            send(
+                listener.port,
+                lambda step, clock: [mvn.numbered(pose, step)],
+                until=is_told,
+                every=0.05,
+            )
+    note = next(each for each in told if "poses a second arrive" in each)
+    rate, later = (float(n) for n in re.findall(r"(\d+) (?:poses|ms)", note))
+    assert 5 < rate <= 20
+    assert 20 < later < 250  # [ms]
+    assert re.search(r"poses wait for \d+ ms to be steady", session.summary())
 
 
 def test_a_solver_that_is_too_slow_leaves_steps_out(
