@@ -6,6 +6,8 @@ import numpy as np
 
 _TOGETHER = 0.002  # [s]: packets that come this close, and are not told apart, are one pose
 _COUNTED = 64  # arrivals that tell the sender's interval
+_COMPARED = 256  # arrivals by which the sender's clock is judged
+_OFF, _DELAYED = 0.1, 0.1  # of what has passed, and [s]: a clock that is off by more errs
 _LOW = 40.0  # percentile of the intervals: of poses that are not lost, and not biased by jitter
 _REFINED = 4  # times
 _PULL = 0.02  # of how far an arrival is from where it is expected: delays vary, clocks drift
@@ -22,34 +24,43 @@ class SenderClock:
 
     def __init__(self) -> None:
         self._intervals: deque[float] = deque(maxlen=_COUNTED)
+        self._stamps: deque[tuple[float, float]] = deque(maxlen=_COMPARED)
         self._arrived = self._time = -np.inf
-        self._stamp: float | None = None
 
     def date(self, arrived: float, stamp: float | None) -> float:
         """When a pose was made that arrived at a time, with the sender's time in it. The same as
         of the pose before where it is a further packet of that one."""
-        stamped = stamp is not None and self._stamp is not None and stamp != self._stamp
-        interval = arrived - self._arrived
-        if np.isinf(interval):
-            self._arrived, self._time, self._stamp = arrived, arrived, stamp
-            return arrived
-        if interval < _TOGETHER and not stamped:
+        passed, interval = self._told(arrived, stamp), arrived - self._arrived
+        if passed is None and interval < _TOGETHER:
             return self._time
         if interval < _PAUSE:
             self._intervals.append(interval)
-        if stamped and stamp is not None and self._stamp is not None:
-            passed = stamp - self._stamp
-        else:
+        if passed is None:
             passed = self._whole(arrived - self._time)
-        off = arrived - self._time - passed
-        anew = passed < 0 or not abs(off) < _ANEW
-        self._time = arrived if anew else self._time + passed + _PULL * off
-        self._arrived, self._stamp = arrived, stamp
+        expected = self._time + passed
+        anew = not abs(arrived - expected) < _ANEW
+        self._time = arrived if anew else expected + _PULL * (arrived - expected)
+        self._arrived = arrived
         return self._time
+
+    def _told(self, arrived: float, stamp: float | None) -> float | None:
+        """What has passed by the sender's clock, where it goes as ours does."""
+        last = self._stamps[-1][1] if self._stamps else None
+        if stamp is None or stamp == last:
+            return None
+        if last is None or stamp < last:
+            self._stamps.clear()
+        self._stamps.append((arrived, stamp))
+        ours, theirs = (
+            new - old for new, old in zip((arrived, stamp), self._stamps[0], strict=True)
+        )
+        if last is None or len(self._stamps) == 1 or abs(theirs - ours) > _OFF * ours + _DELAYED:
+            return None
+        return stamp - last
 
     def _whole(self, passed: float) -> float:
         """The whole number of intervals, one at least, that is nearest to what has passed."""
-        if not self._intervals:
+        if not self._intervals or np.isinf(passed):
             return passed
         intervals = np.array(self._intervals)
         each = np.percentile(intervals, _LOW)
