@@ -20,8 +20,9 @@ network streamer (xsens://). Coordinates go as JSON, or with ?bytes at the end
 of the address as bytes (docs/live.md), in UDP datagrams (udp://) or ZeroMQ
 messages (zmq:// is PUB, zmq+push:// is PUSH).
 
-The newest pose counts at every step. Late, repeated and lost packets, and
-trackers that vanish, leave the last pose standing. Ctrl-C ends it, makes a
+Poses that come less often than steps are taken, late or not at all are made
+steady, and the robot follows later by what that takes. Trackers that vanish,
+and a sender that does, leave the last pose standing. Ctrl-C ends it, makes a
 motion of what was recorded, and tells the latency.
 
 Without hardware: --from FILE --send vmc://HOST:PORT (or xsens://) plays a

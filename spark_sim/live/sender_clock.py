@@ -31,6 +31,9 @@ class SenderClock:
         """When a pose was made that arrived at a time, with the sender's time in it. The same as
         of the pose before where it is a further packet of that one."""
         passed, interval = self._told(arrived, stamp), arrived - self._arrived
+        if np.isinf(interval):
+            self._arrived = self._time = arrived
+            return arrived
         if passed is None and interval < _TOGETHER:
             return self._time
         if interval < _PAUSE:
@@ -60,7 +63,7 @@ class SenderClock:
 
     def _whole(self, passed: float) -> float:
         """The whole number of intervals, one at least, that is nearest to what has passed."""
-        if not self._intervals or np.isinf(passed):
+        if not self._intervals:
             return passed
         intervals = np.array(self._intervals)
         each = np.percentile(intervals, _LOW)
