@@ -103,16 +103,17 @@ class Session:
 
     def _begin(self) -> None:
         """Follow the person who is heard of now, from the pose that the robot has."""
+        self._same = np.inf
         try:
             person = self._listener.person(self._fps)
+            # Poses are of another skeleton now, whether it can be followed or not.
+            self._buffer = JitterBuffer()
+            self._anchor = Anchor(self._pace.frame_time, self._note)
             self._retargeter = Retargeter(person, self._robot, fps=self._fps)
         except SparkSimError as error:  # the next poses may be better
             self._once(f"who is sent can't be followed: {error}")
-            self._same = np.inf
             return
         self._handover.begin()
-        self._anchor = Anchor(self._pace.frame_time, self._note)
-        self._buffer, self._same = JitterBuffer(), np.inf
         self._began = min(self._began, time.monotonic())
         for note in self._listener.pose.notes:
             self._note(note)

@@ -7,12 +7,14 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import spark_sim
+from spark.errors import SkeletonError
 from spark_sim.live import session as module
 from spark_sim.live.journal import ENDING, Journal, recover
 from spark_sim.live.listener import Listener
@@ -116,6 +118,37 @@ def test_a_sender_that_changes_its_body_and_jumps(tmp_path: Path) -> None:
     moved = np.abs(np.diff(qpos[:, 7:], axis=0)).max(1)
     assert moved.max() < 0.6  # [rad a step]: no faster than hinges may be
     assert np.abs(qpos[-1, 7:] - qpos[12, 7:]).max() > 0.8
+
+
+def test_another_body_that_cannot_be_followed_ends_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It has a bone more: its poses are left out, and the robot stands."""
+    told: list[str] = []
+
+    class Choosy(Retargeter):
+        def __init__(self, source: spark_sim.Clip, *args: Any, **options: Any) -> None:
+            if "UpperChest" in source.joint_names:
+                raise SkeletonError("not this one")
+            super().__init__(source, *args, **options)
+
+    monkeypatch.setattr(module, "Retargeter", Choosy)
+
+    def packets(step: int, clock: float) -> list[bytes]:
+        if session.frames > 15:
+            monkeypatch.setitem(vmc.BODY, "UpperChest", ("Chest", (0.0, 0.05, 0.0)))
+        return [vmc.packet({}, clock)]
+
+    listener = Listener("vmc://127.0.0.1:0")
+    with listener:
+        session = Session(listener, "robot", FPS, told.append)
+        with session, running(session):
+            send(
+                listener.port,
+                packets,
+                until=lambda: any("a pose is left out" in each for each in told),
+            )
+    assert any("can't be followed: not this one" in each for each in told)
 
 
 def test_a_sender_that_trembles_is_smoothed_and_told() -> None:
