@@ -24,8 +24,9 @@ from robots.model.motion import RobotMotion
 from robots.solver.solve import retarget
 from scripts.robot_bars import FOLDERS, clips_of, plausible
 from sim.interpolate import at_times
+from sim.physics.floor import on_floor
 from sim.physics.policy_tracking import FALL_DROP, FALL_TILT
-from sim.physics.servos import on_floor, torque_limit
+from sim.physics.servos import torque_limit
 from sim.report.clip_poses import pose_clip
 from sim.report.torque import rates
 from sim.report.wrench import friction_edges

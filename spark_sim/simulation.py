@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.physics import policy_summary
+from sim.physics.floor import NO_STOOLS, Stools
 from sim.physics.policy_network import PolicyNetwork
 from sim.physics.policy_spec import read_spec
 from sim.physics.policy_tracking import PolicyRun, PolicyTracker
-from sim.physics.servos import NO_STOOLS, Stools
 from sim.physics.simulation import Assist
 from sim.physics.summary import render, summarize
 from sim.physics.tracking import TrackingResult, track

@@ -13,11 +13,12 @@ from scipy.ndimage import uniform_filter1d
 
 from sim.body.compiling import compiled, warnings_as_notes
 from sim.interpolate import at_times
+from sim.physics.floor import NO_STOOLS, Stools, on_floor
 from sim.physics.policy_network import PolicyNetwork
 from sim.physics.policy_observation import Observer
 from sim.physics.policy_spec import PolicySpec
 from sim.physics.policy_terms import State
-from sim.physics.servos import NO_STOOLS, Stools, on_floor, torque_limit
+from sim.physics.servos import torque_limit
 from sim.trajectory import ModelTrajectory
 from spark.constants import GRAVITY
 from spark.errors import SkeletonError, name_list

@@ -1,33 +1,19 @@
-"""The model that a motion is simulated on: a floor, and servos that follow joint positions."""
-
-from typing import NamedTuple
+"""The model that a motion is simulated on: servos that follow joint positions, on a floor."""
 
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from sim.body.compiling import compiled
+from sim.physics.floor import NO_STOOLS, Stools, on_floor
 from sim.trajectory import ModelTrajectory
 from spark.constants import GRAVITY
-from spark.errors import SkeletonError
 
 FULL_TORQUE_ERROR = 0.1  # [rad] from its target: a servo of ours gives its full torque there
 DEFAULT_TORQUE = 0.1  # [body weights x height] of a joint whose file tells no limit
 _MAX_PHASE = 0.5  # [rad] of its own oscillation that a servo of ours runs through in one step
 _HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
 _MAX_TIMESTEP = 0.002  # [s]
-_COLLISION_GROUP = 3  # by custom; viewers don't show it
-
-
-class Stools(NamedTuple):
-    """What a body sits on: the middle of the seat of each [m, world], as wide as its `radius` [m]
-    says."""
-
-    seats: Float[np.ndarray, "K 3"] = np.zeros((0, 3))
-    radius: float = 0.0
-
-
-NO_STOOLS = Stools()
 
 
 def servo_spec(
@@ -61,46 +47,6 @@ def servo_model(spec: mujoco.MjSpec) -> mujoco.MjModel:
     model.actuator_ctrllimited[:] = 0
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return model
-
-
-def on_floor(
-    body: ModelTrajectory, floor_z: float, notes: list[str], stools: Stools = NO_STOOLS
-) -> mujoco.MjSpec:
-    """A copy of the body's spec with something that collides, a floor, and stools on it; what was
-    assumed is added to `notes`."""
-    spec = body.spec.copy()
-    _let_something_collide(spec, notes)
-    meets = {
-        "contype": 1 | _bits(body.model, "conaffinity"),
-        "conaffinity": 1 | _bits(body.model, "contype"),
-    }
-    if not any(g.type == mujoco.mjtGeom.mjGEOM_PLANE for g in spec.worldbody.geoms):
-        plane = mujoco.mjtGeom.mjGEOM_PLANE
-        spec.worldbody.add_geom(type=plane, size=[0, 0, 1], pos=[0, 0, floor_z], **meets)
-    for x, y, z in stools.seats.tolist():
-        half, middle = (z - floor_z) / 2, (z + floor_z) / 2
-        if half > 0:
-            size, cylinder = [stools.radius, half, 0], mujoco.mjtGeom.mjGEOM_CYLINDER
-            spec.worldbody.add_geom(type=cylinder, size=size, pos=[x, y, middle], **meets)
-    return spec
-
-
-def _let_something_collide(spec: mujoco.MjSpec, notes: list[str]) -> None:
-    """Some files leave contacts to the scene that includes them: with the floor at least."""
-    shapes = [geom for body in spec.bodies if body.name != "world" for geom in body.geoms]
-    if any(int(geom.contype) | int(geom.conaffinity) for geom in shapes):
-        return
-    if not shapes:
-        raise SkeletonError("the model has no shapes: it would fall through the floor")
-    meant = [geom for geom in shapes if int(geom.group) >= _COLLISION_GROUP]
-    for geom in meant or shapes:
-        geom.conaffinity = 1
-    what = f"those of group {_COLLISION_GROUP} and above" if meant else "all of them"
-    notes.append(f"no shape of the model is set to collide: {what} do here, with the floor alone")
-
-
-def _bits(model: mujoco.MjModel, field: str) -> int:
-    return int(np.bitwise_or.reduce(getattr(model, f"geom_{field}"), initial=0))
 
 
 def controls(

@@ -15,8 +15,9 @@ from jaxtyping import Float
 from sim.body.compiling import warnings_as_notes
 from sim.interpolate import at_times, velocities
 from sim.physics.balance import Balancer
+from sim.physics.floor import NO_STOOLS, Stools
 from sim.physics.retries import Retries
-from sim.physics.servos import NO_STOOLS, Stools, servo_model, servo_spec
+from sim.physics.servos import servo_model, servo_spec
 from sim.physics.simulation import Assist, Rollout, Simulation
 from sim.trajectory import ModelTrajectory
 from spark.errors import SkeletonError

@@ -7,7 +7,7 @@ import pytest
 import spark_sim
 from robots.model.known import known
 from robots.solver.solve import retarget
-from sim.physics.servos import NO_STOOLS, Stools, on_floor
+from sim.physics.floor import NO_STOOLS, Stools, on_floor
 from spark_sim import simulation
 from spark_sim.clips import RobotClip
 from tests.helpers.sitting import FRAME_TIME, SITS, sitting

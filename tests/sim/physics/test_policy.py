@@ -239,6 +239,21 @@ def test_a_toy_that_holds_the_pose_stands(robot: Morphology, tmp_path: Path) -> 
     assert "stays up for all 1.00 s in 1 run" in render(metrics, "still", "toy")
 
 
+def test_a_plane_of_the_model_that_is_not_at_zero_is_not_stood_on(
+    robot: Morphology, tmp_path: Path
+) -> None:
+    text = registry.find("robot").read_text()
+    model = tmp_path / "pit.xml"
+    pit = '<worldbody><geom type="plane" size="9 9 1" pos="0 0 -1"/>'
+    model.write_text(text.replace("<worldbody>", pit, 1))
+    over = understand_robot(model)
+    follower = tracker(over, tmp_path, standing(over))
+    assert any("at z = -1 m" in note for note in follower.notes)
+    np.testing.assert_allclose(
+        follower.run(1).qpos, tracker(robot, tmp_path, standing(robot)).run(1).qpos, atol=1e-6
+    )
+
+
 def test_a_limp_robot_falls_and_is_put_back(robot: Morphology, tmp_path: Path) -> None:
     follower = tracker(robot, tmp_path, standing(robot, 3.0), kp=0.0, kd=1.0)
     run = follower.run(1)

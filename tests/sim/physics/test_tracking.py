@@ -293,3 +293,51 @@ def test_a_model_that_leaves_contacts_to_its_scene_stands() -> None:
     tracked = follow(ModelTrajectory(spec, model, 1, np.tile(model.qpos0, (61, 1))))
     assert tracked.rollout.loads[-1].sum() == pytest.approx(tracked.mass * G, rel=0.02)
     assert any("set to collide" in note for note in tracked.notes)
+
+
+def on_plane(plane: str, contact: str = "") -> TrackingResult:
+    """A box that is told to rest on z = 0, in a world with a plane."""
+    text = MACHINE.format(actuator="", joint=HINGE)
+    text = text.replace("<geom ", '<geom name="box" ').replace("<actuator>", f"{contact}<actuator>")
+    text = text.replace("<worldbody>", f"<worldbody>{plane}")
+    spec = mujoco.MjSpec.from_string(text)
+    model = spec.compile()
+    base = int(model.body("base").id)
+    return follow(ModelTrajectory(spec, model, base, np.tile(model.qpos0, (61, 1))))
+
+
+@pytest.mark.parametrize(
+    ("plane", "where"),
+    [
+        ('<geom type="plane" size="1 1 1" pos="0 0 -1"/>', "z = -1 m"),
+        ('<geom type="plane" size="1 1 1" pos="0 0 0.3"/>', "z = 0.3 m"),
+        ('<geom type="plane" size="1 1 1" euler="0.2 0 0"/>', "tilted by 11.5 degrees"),
+        ('<body euler="0 1.57 0"><geom type="plane" size="1 1 1"/></body>', "tilted by 90 degrees"),
+    ],
+)
+def test_a_plane_that_is_not_the_motions_floor_is_not_stood_on(plane: str, where: str) -> None:
+    tracked = on_plane(plane)
+    assert tracked.rollout.points[-1, 0, 2] == pytest.approx(0.1, abs=0.01)
+    assert tracked.rollout.loads[-1].sum() == pytest.approx(tracked.mass * G, rel=0.02)
+    (note,) = [note for note in tracked.notes if "plane" in note]
+    assert where in note
+    assert "a floor at z = 0 m" in note
+
+
+def test_a_plane_that_a_contact_pair_names_is_put_away_too() -> None:
+    pair = '<contact><pair geom1="ground" geom2="box"/></contact>'
+    tracked = on_plane('<geom name="ground" type="plane" size="1 1 1" pos="0 0 0.3"/>', pair)
+    assert tracked.rollout.points[-1, 0, 2] == pytest.approx(0.1, abs=0.01)
+
+
+def test_a_plane_at_the_motions_floor_is_the_floor() -> None:
+    """Ice stays ice: its friction is the model's."""
+    ice = '<geom type="plane" size="1 1 1" friction="0.01 0 0" priority="1"/>'
+    tracked = on_plane(ice)
+    assert tracked.model.ngeom == 2
+    assert not any("plane" in note for note in tracked.notes)
+
+
+def test_a_plane_that_touches_nothing_is_no_floor() -> None:
+    tracked = on_plane('<geom type="plane" size="1 1 1" contype="0" conaffinity="0"/>')
+    assert tracked.rollout.points[-1, 0, 2] == pytest.approx(0.1, abs=0.01)
