@@ -112,7 +112,7 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    from spark.errors import ConventionError
+    from spark.errors import ConventionError, DependencyError
     from spark_sim import api, console
 
     if args.address and not args.serve:
@@ -153,14 +153,23 @@ def run(args: Namespace) -> int:
         shown = _simulated(args, shown)
     if wanted or not args.json:
         progress = partial(console.progress, label="video")
-        api.play(
-            *shown,
-            **wanted,
-            same_height=args.same_height,
-            speed=args.speed,
-            force=args.force,
-            progress=progress,
-        )
+        try:
+            api.play(
+                *shown,
+                **wanted,
+                same_height=args.same_height,
+                speed=args.speed,
+                force=args.force,
+                progress=progress,
+            )
+        except DependencyError:
+            if wanted or not args.physics:
+                raise
+            # The report is the result, and is printed: that no window opens is no failure.
+            console.note(
+                "there is no display to show it on; --html out.html or --video out.mp4 writes what "
+                "there is to see"
+            )
     for out in wanted.values():
         size = f"{out}: {out.stat().st_size / 1000:.0f} kB"
         console.note(size) if args.json else console.say(size)

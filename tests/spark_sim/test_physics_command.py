@@ -54,3 +54,13 @@ def test_python_balances_likewise(folder: Path) -> None:
     assert reached == list(range(1, found.json()["frames"]))
     again = spark_sim.simulate(folder / "walk.npz")
     np.testing.assert_array_equal(found.tracked.body.qpos, again.tracked.body.qpos)
+
+
+def test_without_a_display_the_report_is_the_result(program: Program) -> None:
+    """As in CI and on servers; without --physics there is nothing but the window."""
+    done = program("play", "walk.npz", "--physics", "--no-balance")
+    assert done.code == 0, done.stderr
+    assert "stays up" in done.stdout
+    assert "note: there is no display" in done.stderr
+    assert "--html" in done.stderr
+    assert program("play", "walk.npz").code == 2
