@@ -127,7 +127,7 @@ def _onto_robot(source: AnyClip, target: RobotClip, *, solved: bool) -> RobotCli
     else:
         moved = copy(source.canonical, robot)
         moved = replace(moved, notes=(*moved.notes, COPIED))
-    return RobotClip(moved, f"{source.name} on {target.name}", source.path)
+    return RobotClip(moved, f"{source.name} on {target.name}", source.path, source.span)
 
 
 def _filled_in(

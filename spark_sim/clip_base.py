@@ -28,6 +28,7 @@ if TYPE_CHECKING:  # these load MuJoCo, which a character's clip can do without
 File: TypeAlias = str | Path
 MAX_FPS = 10_000
 AnyBase = TypeVar("AnyBase", bound="ClipBase")
+_MICROSECONDS = 6  # decimals: a span is no more exact than the times of frames are written
 _NEAR = 0.01  # of a frame: files round their frame times, 0.016667 s
 
 
@@ -36,6 +37,8 @@ class ClipBase(ABC):
 
     name: str
     """What pictures and messages call the clip."""
+    span: tuple[float, float] | None
+    """The part of its file that it is, as first and last time [s]; None where it is all."""
 
     @property
     @abstractmethod
@@ -67,8 +70,14 @@ class ClipBase(ABC):
         """Write the motion to a file. Raises `OutputError` where it exists, unless forced."""
 
     @abstractmethod
-    def _at(self: AnyBase, frames: Float[np.ndarray, "N"], frame_time: float) -> AnyBase:
-        """The clip at fractional frames that lie `frame_time` [s] apart."""
+    def _at(
+        self: AnyBase,
+        frames: Float[np.ndarray, "N"],
+        frame_time: float,
+        span: tuple[float, float] | None,
+    ) -> AnyBase:
+        """The clip at fractional frames that lie `frame_time` [s] apart, and are a `span` of its
+        file."""
 
     def part(self: AnyBase, start: float | None = None, end: float | None = None) -> AnyBase:
         """The frames from `start` to `end` [s], both inclusive, by default to the clip's own ends.
@@ -87,7 +96,11 @@ class ClipBase(ABC):
                 f"{self.name}: there is nothing from {start or 0:.4g} to {stop:.4g} s; it runs "
                 f"from 0 to {self.duration:.4g} s"
             )
-        return self._at(frames, self.frame_time)
+        if len(frames) == len(self):
+            return self._at(frames, self.frame_time, self.span)
+        begin = 0.0 if self.span is None else self.span[0]
+        first, last = (round(begin + t * self.frame_time, _MICROSECONDS) for t in frames[[0, -1]])
+        return self._at(frames, self.frame_time, (float(first), float(last)))
 
     def resampled(self: AnyBase, fps: float) -> AnyBase:
         """The clip at another rate, positions and angles interpolated linearly, rotations on the
@@ -96,7 +109,7 @@ class ClipBase(ABC):
             raise ConventionError(f"fps is {fps:g}; expected a number above 0, up to {MAX_FPS}")
         if abs(self.frame_time * fps - 1) < 1e-6:
             return self
-        return self._at(frames_at_rate(len(self), self.frame_time, 1 / fps), 1 / fps)
+        return self._at(frames_at_rate(len(self), self.frame_time, 1 / fps), 1 / fps, self.span)
 
     @property
     def frame_time(self) -> float:

@@ -39,7 +39,8 @@ class Clip(ClipBase):
 
     `roles` is the user's own map of joints (`spark_sim.rolemap`), where one was given. `given_rig`
     is the rig, where it is known already, and `target` the file of the body of a result. `worn` is
-    a skin of another file, on these joints, and notes on it.
+    a skin of another file, on these joints, and notes on it. `span` is the part [s] of its file
+    that it is, where it is not all of it.
     """
 
     recording: Recording
@@ -48,6 +49,7 @@ class Clip(ClipBase):
     given_rig: Rig | None = None
     target: Path | None = None
     worn: tuple[Skin, tuple[str, ...]] | None = None
+    span: tuple[float, float] | None = None
 
     @property
     def body_file(self) -> Path | None:
@@ -130,12 +132,15 @@ class Clip(ClipBase):
             character_files.write(self.recording, self.body_file, path, self.name)
         return path
 
-    def _at(self, frames: Float[np.ndarray, "N"], frame_time: float) -> "Clip":
+    def _at(
+        self, frames: Float[np.ndarray, "N"], frame_time: float, span: tuple[float, float] | None
+    ) -> "Clip":
         motion = motion_at(self.motion, frames, frame_time)
         bvh, notes = encode(motion, self.recording)
         bvh = replace(bvh, path=self.recording.bvh.path)
         notes = (*self.recording.notes, *notes)
-        return replace(self, recording=replace(self.recording, bvh=bvh, motion=motion, notes=notes))
+        recording = replace(self.recording, bvh=bvh, motion=motion, notes=notes)
+        return replace(self, recording=recording, span=span)
 
     def _facts(self) -> list[tuple[str, str]]:
         convention = self.recording.convention
@@ -147,11 +152,13 @@ class Clip(ClipBase):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RobotClip(ClipBase):
-    """A motion on a robot. `path` is the file that the motion comes from."""
+    """A motion on a robot. `path` is the file that the motion comes from, and `span` the part of
+    that [s], where it is not all of it."""
 
     on_robot: "RobotMotion"
     name: str
     path: Path | None = None
+    span: tuple[float, float] | None = None
 
     @property
     def motion(self) -> Motion:
@@ -211,13 +218,15 @@ class RobotClip(ClipBase):
             return figures
         return [replace(each, subject=replace(each.subject, body=None)) for each in figures]
 
-    def _at(self, frames: Float[np.ndarray, "N"], frame_time: float) -> "RobotClip":
+    def _at(
+        self, frames: Float[np.ndarray, "N"], frame_time: float, span: tuple[float, float] | None
+    ) -> "RobotClip":
         from sim.interpolate import at_times
 
         robot = self.on_robot.robot
         qpos = at_times(robot.mjcf.model, self.qpos, 1.0, frames)
         moved = replace(self.on_robot, coordinates=robot.from_qpos(qpos), frame_time=frame_time)
-        return replace(self, on_robot=moved)
+        return replace(self, on_robot=moved, span=span)
 
     def save(self, path: File, *, force: bool = False, format: Format | None = None) -> Path:
         """Write the motion in one of `robots.formats.FORMATS`, by default the one of the ending.
@@ -226,13 +235,15 @@ class RobotClip(ClipBase):
         a file exists, unless forced, or `path` has an ending of none of the formats.
         """
         from robots.formats import dispatch, written_files
+        from robots.formats.made_from import Source
 
         path = Path(path)
         for file in written_files(path, format):
             files.check_free(file, force=force)
         if not path.is_dir():
             files.claim(path, force=force)
-        dispatch.write(self.on_robot, path, format=format, source=self.path)
+        source = None if self.path is None else Source(self.path, self.span)
+        dispatch.write(self.on_robot, path, format=format, source=source)
         return path
 
 

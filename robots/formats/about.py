@@ -1,7 +1,6 @@
 """What a file of a robot's motion says of itself as JSON: inside our npz, and beside files of
 formats that have no room for it."""
 
-import hashlib
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,25 +8,28 @@ from typing import Any
 
 from robots import registry
 from robots.formats.bodies import foot_spans
+from robots.formats.made_from import Source, record_of
 from robots.formats.sidecar import SIDECAR, sidecar_of
 from robots.model.known import model_sha256
 from robots.model.motion import RobotMotion
-from spark.errors import FileFormatError
+from spark.errors import FileFormatError, SparkSimError
 from spark.files import write_atomically
 from spark.opening import real
 
 
-def about(motion: RobotMotion, path: Path, source: Path | None = None) -> dict[str, Any]:
+def about(motion: RobotMotion, path: Path, source: Source | None = None) -> dict[str, Any]:
     """The robot's name, the names of its model and of `source` with their SHA-256, the conventions
-    that all formats share, and what was assumed. No folder of this machine: the model's is its path
-    from `path`'s folder where it lies in that, and its bare name where not."""
+    that all formats share, and what was assumed. The model is told by its path from `path`'s folder
+    where it lies in that, and by its bare name where not; where it has no name of a robot's, also
+    by where it lies on this machine. No other folder of the machine is told."""
     model = motion.robot.mjcf.path
+    name = registry.name_of(model)
     return {
-        "robot": registry.name_of(model),
+        "robot": name,
         "model": _portable(model, path),
+        "model_path": str(real(model)) if name is None else None,
         "model_sha256": model_sha256(model),
-        "source": None if source is None else source.name,
-        "source_sha256": None if source is None else _sha256(source),
+        **record_of(source),
         "up_axis": "z",
         "notes": [_without_folder(note, model) for note in motion.notes],
     }
@@ -40,7 +42,7 @@ def write_sidecar(
     format: str,
     columns: Sequence[str],
     conventions: dict[str, str],
-    source: Path | None = None,
+    source: Source | None = None,
 ) -> None:
     """Write `sidecar_of(path)`: rate, frames, order of the joints, what the `columns` are, and in
     which frames each foot stands, as [first, last] of each contact."""
@@ -60,11 +62,15 @@ def write_sidecar(
 
 
 def robot_of(facts: dict[str, Any], path: Path) -> str | Path:
-    """The robot that a motion was made for: its name, or its model, looked for from the folder of
-    `path`, then from the working directory. Older files hold an absolute path."""
+    """The robot that a motion was made for: its name, or its model. That is where it lay, if it is
+    still the same there; or else it is looked for from the folder of `path`, and from the working
+    directory. Older files hold an absolute path."""
     name, model = facts.get("robot"), facts.get("model")
     if isinstance(name, str):
         return name
+    lay = facts.get("model_path")
+    if isinstance(lay, str) and _is_model(Path(lay), facts.get("model_sha256")):
+        return Path(lay)
     tried = [] if not isinstance(model, str) else [path.parent / model, Path(model)]
     for candidate in tried:
         if candidate.is_file():
@@ -72,8 +78,8 @@ def robot_of(facts: dict[str, Any], path: Path) -> str | Path:
     raise FileFormatError(
         path,
         None,
-        f"was made for the robot {model!r}, which is neither beside it nor here; name it with "
-        "--robot",
+        f"was made for the robot {model!r}, which is neither beside it nor here, nor where it lay "
+        "as it was; name it with --robot",
     )
 
 
@@ -83,8 +89,11 @@ def _rate(motion: RobotMotion) -> float:
     return float(round(fps)) if abs(fps - round(fps)) < 1e-6 else fps
 
 
-def _sha256(path: Path) -> str | None:
-    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None
+def _is_model(path: Path, sha256: object) -> bool:
+    try:
+        return path.is_file() and model_sha256(path) == sha256
+    except (SparkSimError, OSError, ValueError):
+        return False
 
 
 def _portable(model: Path, path: Path) -> str:

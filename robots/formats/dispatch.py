@@ -12,13 +12,14 @@ from robots.formats.gmr import read_pkl, write_pkl
 from robots.formats.holomotion import is_holomotion, read_holomotion, write_holomotion
 from robots.formats.holosoma import is_holosoma, read_holosoma, write_holosoma
 from robots.formats.locomujoco import is_locomujoco, read_locomujoco, write_locomujoco
+from robots.formats.made_from import Source
 from robots.formats.mjlab import read_mjlab, write_beyondmimic, write_mjlab
 from robots.formats.native import is_native, read_npz, write_npz
 from robots.formats.plain import is_plain, read_plain
 from robots.formats.protomotions import read_protomotions, write_protomotions
 from robots.formats.seed import is_seed, read_seed, write_seed
-from robots.formats.sidecar import read_sidecar, sidecar_of
-from robots.formats.sonic import info_of, read_sonic, write_sonic
+from robots.formats.sidecar import facts_beside, sidecar_of
+from robots.formats.sonic import read_sonic, write_sonic
 from robots.formats.unitree import ORDERS, likely_order, read_csv, write_csv
 from robots.model.known import known
 from robots.model.morphology import Morphology
@@ -31,7 +32,7 @@ from spark.summary import counted
 
 
 def write(
-    motion: RobotMotion, path: Path, *, format: str | None = None, source: Path | None = None
+    motion: RobotMotion, path: Path, *, format: str | None = None, source: Source | None = None
 ) -> None:
     """Write a motion in `format`, or in the one that the ending says.
 
@@ -81,7 +82,7 @@ def read(
     folder = is_sonic(path)
     if not folder:
         check_regular(path, expected="the motion of a robot")
-    facts = (info_of(path) if folder else read_sidecar(path)) or {}
+    facts = facts_beside(path)
     if suffix == ".csv":
         return _read_csv(path, robot, quat, fps, facts)
     arrays = Npz(path, expected="the motion of a robot") if suffix == ".npz" else {}

@@ -12,6 +12,7 @@ import numpy as np
 from robots.formats.about import write_sidecar
 from robots.formats.arrays import number_array, scalar
 from robots.formats.bodies import body_poses
+from robots.formats.made_from import Source
 from robots.formats.qpos import Columns, columns_of, frame_time_of, motion_of
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
@@ -22,7 +23,7 @@ from spark.plain_pickle import read_plain_pickle
 _PROTOCOL = 4  # the newest that stores arrays in a way that all of numpy's versions read
 
 
-def write_pkl(motion: RobotMotion, path: Path, source: Path | None = None) -> None:
+def write_pkl(motion: RobotMotion, path: Path, source: Source | None = None) -> None:
     """Write the six entries that GMR writes, bodies included, and beside it what they don't say."""
     columns = columns_of(motion, path)
     mjcf = motion.robot.mjcf

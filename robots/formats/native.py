@@ -10,6 +10,7 @@ import numpy as np
 from robots.formats.about import about, robot_of
 from robots.formats.arrays import number_array, scalar, write_arrays
 from robots.formats.bodies import body_names, contact_array
+from robots.formats.made_from import Source
 from robots.formats.qpos import check_finite, of_qpos, unit
 from robots.model.known import known, model_sha256
 from robots.model.morphology import Morphology
@@ -22,24 +23,27 @@ from spark.opening import parse_json
 SCHEMA = "spark-sim qpos 1"
 
 
-def write_npz(motion: RobotMotion, path: Path, *, source: Path | None = None) -> None:
+def write_npz(motion: RobotMotion, path: Path, *, source: Source | None = None) -> None:
     """Write MuJoCo's coordinates and what they mean; no pickle.
 
-    `qpos` [T, nq] is position [m], quaternion wxyz, then joints [rad] in `joint_names`' order;
+    `qpos` [T, nq] is position [m], quaternion wxyz, then joints [rad] in `joint_names`' order,
+    unless the model has other bodies that move: `about` says in which columns each begins;
     `qvel` [T, nv] is the base's linear velocity in world axes, its angular one in its own, then the
     joints', by central differences; `frame_time` [s] is the step. `foot_contacts` [T, F] tells
     which of `foot_names` stand. `about` is JSON, what `robots.formats.about` says and conventions.
     Raises `OutputError` where `path` can't be written.
     """
+    mjcf = motion.robot.mjcf
     facts = {
         "schema": SCHEMA,
         "quaternion": "wxyz",
         "length_unit": "m",
         "angle_unit": "rad",
+        "base_qposadr": int(mjcf.model.jnt_qposadr[mjcf.free_joint]),
+        "joint_qposadr": motion.robot.addresses.tolist(),
         "qvel": "linear velocity in world axes, angular velocity in the body's",
         **about(motion, path, source),
     }
-    mjcf = motion.robot.mjcf
     arrays = {
         "qpos": motion.qpos,
         "qvel": velocities(mjcf.model, motion.qpos, motion.frame_time),

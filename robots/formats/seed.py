@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from robots.formats.about import write_sidecar
+from robots.formats.made_from import Source
 from robots.formats.qpos import Columns, columns_of, frame_time_of, motion_of
 from robots.formats.table import read_table
 from robots.model.morphology import Morphology
@@ -25,7 +26,7 @@ _LONGEST = 1 << 16  # bytes of a header
 _ORDER = "zyx"  # about fixed x, y, z is about moving z, y, x
 
 
-def write_seed(motion: RobotMotion, path: Path, source: Path | None = None) -> None:
+def write_seed(motion: RobotMotion, path: Path, source: Source | None = None) -> None:
     """Write the header and a row a frame, with 6 decimals."""
     columns = columns_of(motion, path)
     turned = np.degrees(euler_over_time(columns.quat, _ORDER)[:, ::-1])

@@ -22,18 +22,19 @@ from robots.formats.bodies import (
     gradient,
     isaac_bodies,
 )
+from robots.formats.made_from import Source
 from robots.formats.qpos import Columns, columns_of, motion_of
 from robots.formats.table import read_table
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from spark.errors import FileFormatError, OutputError
 from spark.files import write_atomically
-from spark.opening import LARGEST_TEXT, parse_json, read_bytes, read_text
+from spark.opening import read_text
 
 _SAME_RATE = 1e-3  # of the rate
 
 
-def write_sonic(motion: RobotMotion, path: Path, source: Path | None = None) -> None:
+def write_sonic(motion: RobotMotion, path: Path, source: Source | None = None) -> None:
     """Write the files into the folder `path`. Raises `OutputError` at another rate than 50 Hz."""
     if abs(motion.frame_time * SONIC_FPS - 1) > _SAME_RATE:
         raise OutputError(
@@ -108,16 +109,6 @@ def read_sonic(path: Path, robot: Morphology) -> RobotMotion:
     columns = Columns(pos[:, :3], quat[:, :4], angles, 1 / SONIC_FPS)
     said = "joints are read in Isaac Lab's order, at 50 fps, as SONIC has them"
     return motion_of(columns, robot, path, (said,))
-
-
-def info_of(path: Path) -> dict[str, object]:
-    """What `info.txt` says, where it is ours."""
-    info = path / "info.txt"
-    try:
-        facts = parse_json(info, read_bytes(info, limit=LARGEST_TEXT), "all of it")
-    except FileFormatError:
-        return {}
-    return facts if isinstance(facts, dict) else {}
 
 
 def _first_body(path: Path) -> int:

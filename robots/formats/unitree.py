@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from robots.formats.about import write_sidecar
+from robots.formats.made_from import Source
 from robots.formats.qpos import Columns, columns_of, frame_time_of, motion_of
 from robots.formats.table import read_table
 from robots.model.morphology import Morphology
@@ -24,7 +25,7 @@ _CLEARLY = 0.3  # how much less it is where quaternions are read in the wrong or
 
 
 def write_csv(
-    motion: RobotMotion, path: Path, *, quat: str = "xyzw", source: Path | None = None
+    motion: RobotMotion, path: Path, *, quat: str = "xyzw", source: Source | None = None
 ) -> None:
     """Write a row a frame, with 9 decimals, and beside it what the rows don't say."""
     columns = columns_of(motion, path)

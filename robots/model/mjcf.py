@@ -118,11 +118,12 @@ def read_mjcf(path: str | Path, *, visuals: bool = True) -> Mjcf:
         spec, text = _parse(path, notes, visuals=visuals)
         if not visuals:
             _drop_visuals(spec)
-        root = _find_root(spec, path, notes)
+        root = _find_root(spec, path)
         _free_root(spec, root, path, notes)
         model = compiled(spec, path, notes, partial(model_cache.key, spec, text, visuals))
     if is_urdf(path):
         _stand(spec, model, root)
+    _note_others(model, root, notes)
     _note_ignored(model, notes)
     _check_numbers(model, path)
     return Mjcf(model, spec, int(model.body(root).id), path, tuple(notes))
@@ -176,7 +177,7 @@ def _drop_visuals(spec: mujoco.MjSpec) -> None:
             spec.delete(mesh)
 
 
-def _find_root(spec: mujoco.MjSpec, path: Path, notes: list[str]) -> str:
+def _find_root(spec: mujoco.MjSpec, path: Path) -> str:
     """The name of the world's child that carries the humanoid; unnamed bodies get names."""
     for number, body in enumerate(spec.bodies):
         if not body.name:
@@ -194,8 +195,6 @@ def _find_root(spec: mujoco.MjSpec, path: Path, notes: list[str]) -> str:
         else:
             what = "has limbs that hang on the world itself; give the trunk a body that holds them"
         raise SkeletonError(f"{path}: the model {what} (bodies {both})")
-    if others:
-        notes.append(f"beside the robot {first!r}, other moving bodies stay where they are")
     return first
 
 
@@ -233,7 +232,7 @@ def _free_root(spec: mujoco.MjSpec, root: str, path: Path, notes: list[str]) -> 
     else:
         for key in list(spec.keys):
             spec.delete(key)
-        notes.append(f"no free joint: one was given to {root!r}, the first 7 numbers of qpos")
+        notes.append(f"no free joint: one was given to {root!r}, its first 7 numbers in qpos")
     body.add_freejoint(name=f"{root}_free")
 
 
@@ -251,6 +250,18 @@ def _stand(spec: mujoco.MjSpec, model: mujoco.MjModel, root: str) -> None:
     model.body_pos[body, 2] -= low
     model.qpos0[int(model.jnt_qposadr[model.body_jntadr[body]]) + 2] -= low
     spec.body(root).pos = model.body_pos[body]
+
+
+def _note_others(model: mujoco.MjModel, root: str, notes: list[str]) -> None:
+    """What else moves in the world, and where the base is in qpos where that begins with others."""
+    body = int(model.body(root).id)
+    roots = {int(model.body_rootid[int(b)]) for b in model.jnt_bodyid} - {body}
+    if not roots:
+        return
+    names = name_list([model.body(b).name for b in sorted(roots)])
+    base = int(model.jnt_qposadr[model.body_jntadr[body]])
+    where = f"; the base is in columns {base} to {base + 6} of qpos, after theirs" if base else ""
+    notes.append(f"beside the robot {root!r}, {names} can move, and stay where they are{where}")
 
 
 def _note_ignored(model: mujoco.MjModel, notes: list[str]) -> None:

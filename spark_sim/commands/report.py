@@ -14,6 +14,7 @@ from spark_sim.commands.options import (
     check_given,
     load,
 )
+from spark_sim.commands.source_part import part_of
 
 if TYPE_CHECKING:
     from spark_sim.clips import AnyClip
@@ -108,6 +109,8 @@ def run(args: Namespace) -> int:
     if len(paths) > 1:
         return _verdict(args, _compared(args, paths, source))
     judged = load(args, paths[0])
+    if source is not None:
+        source = part_of(source, paths[0])
     truth = None if args.truth is None else load(args, args.truth)
     report = api.report(judged, source=source, truth=truth, html=args.html, force=args.force)
     if args.json:
@@ -129,11 +132,18 @@ def _compared(args: Namespace, paths: list[str], source: "AnyClip | None") -> fl
     stems = [Path(path).stem for path in paths]
     names = stems if len({*stems}) == len(stems) else paths
     clips = {name: load(args, path) for name, path in zip(names, paths, strict=True)}
-    reports = {name: api.report(clip, source=source, truth=truth) for name, clip in clips.items()}
+    sources = {
+        name: None if source is None else part_of(source, path)
+        for name, path in zip(names, paths, strict=True)
+    }
+    reports = {
+        name: api.report(clip, source=sources[name], truth=truth) for name, clip in clips.items()
+    }
     if args.html is not None:
         from sim.report.compare_page import write_compare_page
 
-        origin = None if source is None else (source.name, source.subject)
+        shown = sources[names[0]]
+        origin = None if shown is None else (shown.name, shown.subject)
         subjects = {name: clip.subject for name, clip in clips.items()}
         listed = ", ".join([*names][:-1]) + f" and {names[-1]}"
         title = listed + ("" if source is None else f", of {source.name}")

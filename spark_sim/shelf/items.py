@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from robots.formats import SUFFIXES
+from robots.formats.made_from import made_from
 from robots.registry import is_robot
 from spark.errors import FileFormatError
 from spark.io.arrays import npz_names
@@ -66,7 +67,7 @@ def items(
         origin = sources if sources is not None and sources.is_file() else None
         for stem in (below.stem, below.stem.partition("_on_")[0]):
             origin = origin or by_name.get(below.with_name(stem))
-        known_origin = None if origin is None else Origin(origin, source_reading)
+        known_origin = None if origin is None else _part_of(origin, source_reading, path)
         found[path] = Item(path, below.as_posix(), reading, known_origin)
     if not found:
         raise FileFormatError(
@@ -102,6 +103,15 @@ def _origin_of(entry: Entry, folder: Path) -> Origin | None:
     if path is None:
         return None
     return Origin(path, options["reading"], entry["start_s"], options["mirrored"])
+
+
+def _part_of(source: Path, reading: Mapping[str, Any], path: Path) -> Origin:
+    """The part of a source that the motion at `path` says it was made from, where it names that
+    source; or else all of it."""
+    found = made_from(path)
+    if found is None or found.part is None or not found.is_of(source):
+        return Origin(source, reading)
+    return Origin(source, reading, found.part[0])
 
 
 def _by_name(sources: Path | None) -> dict[Path, Path]:

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 import spark_sim
 from robots import registry
 from robots.formats import FORMATS
+from robots.formats.made_from import Source
 from robots.formats.native import write_npz
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
@@ -422,25 +423,61 @@ def test_a_changed_model_is_said_and_another_refused(clip: RobotClip, tmp_path: 
     assert spark_sim.load(written, robot="robot").motion.frame_time == pytest.approx(1 / FPS)
 
 
-def test_our_npz_names_no_folder_of_the_machine(clip: RobotClip, tmp_path: Path) -> None:
-    """Its model is found beside it or where one works, and by the absolute path of older files."""
+def test_a_model_is_found_where_it_lay_while_it_is_the_same(
+    clip: RobotClip, tmp_path: Path
+) -> None:
+    """Beside the place of a model without a name, no folder of the machine is told."""
     elsewhere = tmp_path / "at_home"
     elsewhere.mkdir()
-    (elsewhere / "own.xml").write_text(registry.find("robot").read_text())
+    model = elsewhere / "own.xml"
+    model.write_text(registry.find("robot").read_text())
     for place in (elsewhere, tmp_path / "out", elsewhere / "takes"):
         place.mkdir(exist_ok=True)
-        own = understand_robot(elsewhere / "own.xml")
+        own = understand_robot(model)
         notes = (f"no mesh '{elsewhere}/hand.stl'",)
-        coordinates = own.from_qpos(clip.on_robot.qpos)
         written = place / "clip.npz"
-        write_npz(RobotMotion(own, coordinates, 1 / FPS, notes), written, source=tmp_path / "a.bvh")
+        moved = RobotMotion(own, own.from_qpos(clip.on_robot.qpos), 1 / FPS, notes)
+        write_npz(moved, written, source=Source(tmp_path / "a.bvh"))
         with np.load(written) as stored:
-            assert str(tmp_path) not in str(stored["about"])
-            assert json.loads(str(stored["about"]))["model"] == "own.xml"
-            assert json.loads(str(stored["about"]))["notes"] == ["no mesh 'hand.stl'"]
-    assert spark_sim.load(elsewhere / "clip.npz").frame_time == pytest.approx(1 / FPS)
+            about = json.loads(str(stored["about"]))
+        assert about.pop("model_path") == str(model)
+        assert str(tmp_path) not in json.dumps(about)
+        assert (about["model"], about["notes"]) == ("own.xml", ["no mesh 'hand.stl'"])
+        assert spark_sim.load(written).frame_time == pytest.approx(1 / FPS)
+    model.write_text(model.read_text().replace('pos="0 0 0.74"', 'pos="0 0 0.75"'))
+    assert any("has changed" in n for n in spark_sim.load(elsewhere / "clip.npz").notes)
     with pytest.raises(FileFormatError, match=r"'own.xml', which is neither beside it nor here"):
         spark_sim.load(tmp_path / "out" / "clip.npz")
+
+
+def test_a_robot_with_a_name_is_told_by_it_alone(clip: RobotClip, tmp_path: Path) -> None:
+    with np.load(clip.save(tmp_path / "clip.npz")) as stored:
+        about = json.loads(str(stored["about"]))
+    assert (about["robot"], about["model_path"]) == ("robot", None)
+
+
+def test_our_npz_says_where_base_and_joints_are_in_qpos(
+    clip: RobotClip, qpos: Float[np.ndarray, "T nq"], tmp_path: Path
+) -> None:
+    """A ball and a door before the robot take the first columns."""
+    beside = (
+        '<body name="ball" pos="2 0 1"><freejoint/><geom size="0.1"/></body>'
+        '<body name="door" pos="3 0 1"><joint/><geom size="0.1"/></body>'
+    )
+    text = registry.find("robot").read_text()
+    (tmp_path / "own.xml").write_text(text.replace("<worldbody>", f"<worldbody>{beside}", 1))
+    own = understand_robot(tmp_path / "own.xml")
+    (note,) = [note for note in own.notes if "beside the robot" in note]
+    assert "'ball', 'door' can move" in note
+    assert "columns 8 to 14 of qpos" in note
+    wide = np.hstack([np.tile(own.mjcf.model.qpos0[:8], (FRAMES, 1)), qpos])
+    write_npz(RobotMotion(own, own.from_qpos(wide), 1 / FPS), tmp_path / "clip.npz")
+    with np.load(tmp_path / "clip.npz") as stored:
+        about = json.loads(str(stored["about"]))
+        base, joints = about["base_qposadr"], about["joint_qposadr"]
+        np.testing.assert_allclose(stored["qpos"][:, base : base + 3], qpos[:, :3])
+        for name, column in zip(stored["joint_names"], joints, strict=True):
+            np.testing.assert_allclose(stored["qpos"][:, column], clip.joints[str(name)])
 
 
 def test_a_model_is_found_where_one_works_and_where_older_files_say(
