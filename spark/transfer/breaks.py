@@ -23,14 +23,38 @@ def breaks(
 ) -> tuple[str, ...]:
     """Sentences on where the pelvis turns faster than bodies do, and where the hips [m] move so;
     none for a motion in which neither does."""
-    reach = max(1, round(_SPAN / frame_time))
-    turned = quat_angle(pelvis[:-reach], pelvis[reach:])
-    moved = np.linalg.norm(hips[reach:] - hips[:-reach], axis=1)
+    reach = _reach(frame_time)
+    turned, moved = _ways(pelvis, hips, reach)
     span = reach * frame_time
     return (
         *_said(turned > MAX_TURN * span, np.degrees(turned), "turn by {:.0f}°", reach, frame_time),
         *_said(moved > MAX_SPEED * span, moved, "move by {:.2f} m", reach, frame_time),
     )
+
+
+def anew(
+    pelvis: Float[np.ndarray, "T 4"], hips: Float[np.ndarray, "T 3"], frame_time: float
+) -> list[int]:
+    """The first frame after each break."""
+    reach = _reach(frame_time)
+    turned, moved = _ways(pelvis, hips, reach)
+    span = reach * frame_time
+    broken = (turned > MAX_TURN * span) | (moved > MAX_SPEED * span)
+    return [stop for _, stop in true_runs(broken, gap=round(_APART / frame_time))]
+
+
+def _reach(frame_time: float) -> int:
+    """How many frames apart poses are compared."""
+    return max(1, round(_SPAN / frame_time))
+
+
+def _ways(
+    pelvis: Float[np.ndarray, "T 4"], hips: Float[np.ndarray, "T 3"], reach: int
+) -> tuple[Float[np.ndarray, "N"], Float[np.ndarray, "N"]]:
+    """How far the pelvis turns [rad] and the hips move [m] from each frame to the one `reach`
+    after it."""
+    turned = quat_angle(pelvis[:-reach], pelvis[reach:])
+    return turned, np.linalg.norm(hips[reach:] - hips[:-reach], axis=1)
 
 
 def _said(

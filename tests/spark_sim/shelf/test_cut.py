@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from spark.motion import Motion
 from spark.rig.roles import Role
-from spark.rotation import quat_from_rotvec
+from spark.rotation import quat_from_rotvec, quat_mul
 from spark_sim.shelf.cut import pieces
 from tests.helpers.stick import joint, standing, stick_rig
 
@@ -55,3 +55,35 @@ def test_pieces_cover_the_motion_and_are_no_longer(frames: int, fps: float, long
     sizes = [stop - start for start, stop in found]
     assert max(sizes) <= most
     assert min(sizes) >= (1 if most < 8 else most // 4 if len(sizes) > 1 else 1)
+
+
+@pytest.mark.parametrize("fps", [24.0, 60.0, 120.0])
+def test_a_broken_recording_is_cut_where_it_breaks(fps: float) -> None:
+    """Rests or not, and though a piece might go on beyond it."""
+    motion = waving(30.0, fps, [7.0, 15.5, 23.0])
+    jump, flip = round(4.0 * fps), round(18.0 * fps)
+    motion.root_pos[jump:, 0] += 1.7
+    motion.rotations[flip:, 0] = quat_mul(
+        quat_from_rotvec(np.array([0.0, 0.0, np.pi])), motion.rotations[flip:, 0]
+    )
+    found = pieces(motion, stick_rig(), 10.0)
+    assert {jump, flip} < {start for start, _ in found}
+    assert max(stop - start for start, stop in found) <= 10.0 * fps
+
+
+def test_a_short_recording_is_cut_where_it_breaks_too() -> None:
+    motion = waving(8.0, 60.0, [])
+    assert pieces(motion, stick_rig(), 10.0) == [(0, 480)]
+    motion.root_pos[200:, 1] -= 1.0
+    assert pieces(motion, stick_rig(), 10.0) == [(0, 200), (200, 480)]
+
+
+def test_a_break_near_an_end_makes_no_scrap() -> None:
+    """Of zeros for a third of a second, too, it is not cut twice."""
+    motion = waving(8.0, 60.0, [])
+    motion.root_pos[30:] += 1.0
+    assert pieces(motion, stick_rig(), 10.0) == [(0, 480)]
+    gone = waving(8.0, 60.0, [])
+    gone.root_pos[:, :2] += 3.0
+    gone.root_pos[240:260] = 0.0
+    assert pieces(gone, stick_rig(), 10.0) == [(0, 260), (260, 480)]
