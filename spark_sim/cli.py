@@ -52,6 +52,10 @@ DIVERGED = 1
 FAILED, INTERNAL_ERROR, INTERRUPTED, BROKEN_PIPE = 2, 70, 130, 141
 
 
+_MEANT = {"--jobs": "--workers", "-j": "--workers"}
+"""Options as other programs call them, which the spelling alone would not find."""
+
+
 class _Formatter(RawDescriptionHelpFormatter):
     """Help of one look on every Python, whatever the terminal."""
 
@@ -174,7 +178,8 @@ def _refuse_empty(command: ArgumentParser, args: Namespace) -> None:
 
 
 def _nearest(name: str, known: Iterable[str]) -> str:
-    near = get_close_matches(name, known, n=1)
+    meant = [option for option in known if option == _MEANT.get(name)]
+    near = meant or get_close_matches(name, known, n=1)
     return f"; did you mean {near[0]}?" if near else ""
 
 

@@ -49,6 +49,13 @@ def lines(out: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in (out / "manifest.jsonl").read_text().splitlines()]
 
 
+@pytest.mark.parametrize("option", ["--jobs", "-j"])
+def test_workers_are_found_by_the_name_that_others_have(option: str, program: Program) -> None:
+    done = program("batch", "in", "--to", "robot", "-o", "out", option, "4")
+    assert f"no option is called {option}; did you mean --workers?" in done.stderr
+    assert "--workers" not in program("inspect", "mutant.bvh", option, "4").stderr
+
+
 def test_a_shelf_onto_two_bodies(shelf: Path, program: Program) -> None:
     """Files as `retarget` writes them, a line for each, and one bad file that stops nothing."""
     arguments = ("batch", "in", "--to", "robot", "--to", "mutant.bvh", "-o", "out")
