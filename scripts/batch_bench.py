@@ -49,7 +49,7 @@ def cost(source: Path, workers: int) -> Cost:
     start, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
     with locked(out):
         batch = Batch(out)
-        jobs = plan([str(source)], [TARGET], out, Options())
+        jobs = plan([str(source)], [TARGET], out, Options()).jobs
         list(batch.run(jobs, partial(in_processes, workers=workers)))
     assert batch.tally.failed == 0, batch.tally.sentence()
     forkserver._forkserver._stop()  # type: ignore[attr-defined]  # it has its workers' CPU time

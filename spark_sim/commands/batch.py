@@ -76,7 +76,8 @@ def configure(parser: ArgumentParser) -> None:
         "--cut",
         metavar="SECONDS",
         type=_seconds,
-        help="cut each motion at moments of rest, into pieces that are no longer (10s)",
+        help="cut each motion at moments of rest, and where it is broken, into pieces that are no "
+        "longer (10s)",
     )
     add_workers(parser)
     parser.add_argument(
@@ -101,12 +102,14 @@ def configure(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     from spark.errors import ConventionError
+    from spark.summary import counted
     from spark_sim import console
     from spark_sim.clip_base import MAX_FPS
     from spark_sim.shelf.batch import Batch, locked
     from spark_sim.shelf.keep import parse
     from spark_sim.shelf.plan import Options, plan
     from spark_sim.shelf.work import target_clip
+    from spark_sim.sources import sentences
 
     out = Path(args.output)
     reading = given(args, fps="source-fps")
@@ -115,7 +118,9 @@ def run(args: Namespace) -> int:
     fps = SONIC_FPS if args.fps is None and args.format == "sonic" else args.fps
     options = Options(args.method, args.format, fps, args.cut, reading)
     keep = None if args.keep is None else parse(args.keep)
-    jobs = plan(args.sources, args.to, out, options, mirror=args.mirror)
+    jobs, left_out = plan(args.sources, args.to, out, options, mirror=args.mirror)
+    for sentence in sentences(left_out):
+        console.note(sentence)
     check_given(args, list(dict.fromkeys(job.source for job in jobs)), fps="source-fps")
     backend = _backend(args)
     for target in args.to:
@@ -145,13 +150,15 @@ def run(args: Namespace) -> int:
                 "left_out": tally.left_out,
                 "failed": tally.failed,
                 "reasons": [{"source": s, "error": error} for s, error in tally.reasons],
+                "no_sources": [{"file": str(f), "reason": reason} for f, reason in left_out],
                 "near_duplicates": duplicates.groups,
                 "parts": duplicates.records(),
                 "seconds": time.perf_counter() - start,
             }
         )
     else:
-        console.say(f"{out}: {tally.sentence()}")
+        others = f"; {counted(len(left_out), 'file')} left out" if left_out else ""
+        console.say(f"{out}: {tally.sentence()}{others}")
     return 2 if tally.failed else 0
 
 

@@ -1,7 +1,6 @@
 """`spark-sim retarget`: motions onto another body."""
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -117,16 +116,20 @@ def run(args: Namespace) -> int:
     from robots.formats import SUFFIXES, written_files
     from robots.registry import is_robot
     from spark.errors import OutputError, SparkSimError
-    from spark.io.reading import SUFFIXES as CHARACTERS
     from spark.summary import counted
     from spark_sim import character_files, console, files
+    from spark_sim.commands.retarget_jobs import retarget_jobs
+    from spark_sim.sources import sentences
 
     robot = is_robot(args.to) or Path(args.to).suffix.lower() in SUFFIXES or is_sonic(Path(args.to))
     if args.format is not None and not robot:
         raise OutputError(f"--format is for robots; {args.to} is a character")
-    suffixes = CHARACTERS if args.robot is None else (*CHARACTERS, *SUFFIXES)
     ending = FORMATS[args.format or "npz"] if robot else ".bvh"
-    jobs = _jobs(args.sources, Path(args.to), args.output, ending, suffixes)
+    jobs, left_out = retarget_jobs(
+        args.sources, Path(args.to), args.output, ending, robot=args.robot is not None
+    )
+    for sentence in sentences(left_out):
+        console.note(sentence)
     written: list[Path] = []
     for _, out in jobs:
         written += written_files(out, args.format) if robot else [out]
@@ -229,48 +232,3 @@ def _joints(clip: "AnyClip") -> int:
     if isinstance(clip, Clip):
         return len(clip.motion.skeleton)
     return len(clip.on_robot.robot.joint_names)
-
-
-def _jobs(
-    sources: Sequence[str],
-    target: Path,
-    output: str | None,
-    ending: str,
-    suffixes: tuple[str, ...],
-) -> list[tuple[Path, Path]]:
-    """Pairs of a file to read and the file to write. Raises `OutputError` where two would collide.
-
-    Below a folder given as a source the tree of folders is kept, of files with these endings.
-    """
-    from spark.errors import OutputError
-    from spark.io.reading import motion_files
-
-    found: list[tuple[Path, Path]] = []
-    for source in map(Path, sources):
-        if source.is_dir() and not is_sonic(source):
-            found += [
-                (path, path.parent.relative_to(source)) for path in motion_files(source, suffixes)
-            ]
-        else:
-            found.append((source, Path()))
-    folders = any(Path(source).is_dir() and not is_sonic(Path(source)) for source in sources)
-    several = len(found) > 1 or folders
-    if output is not None and not several and not _names_folder(output):
-        return [(found[0][0], Path(output))]
-    folder = Path(output or ".")
-    if folder.is_file():
-        raise OutputError(f"{folder}: is a file; expected a folder for {len(found)} motions")
-    made = f"_on_{target.stem}{ending}"
-    jobs = [(path, folder / below / f"{path.stem}{made}") for path, below in found]
-    outputs: dict[Path, Path] = {}
-    for path, out in jobs:
-        if (other := outputs.setdefault(out, path)) != path:
-            raise OutputError(f"{path} and {other} would both be written to {out}; rename one")
-    if len(outputs) < len(jobs):
-        twice = next(path for path, _ in jobs if [job[0] for job in jobs].count(path) > 1)
-        raise OutputError(f"{twice} is given twice; give each motion once")
-    return jobs
-
-
-def _names_folder(output: str) -> bool:
-    return output.endswith("/") or Path(output).is_dir()

@@ -5,16 +5,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from robots.formats import FORMATS, SUFFIXES
+from robots.formats import FORMATS
 from robots.registry import is_robot
 from spark.errors import ConventionError, FileFormatError, OutputError
-from spark.io.reading import SUFFIXES as CHARACTERS
-from spark.io.reading import motion_files
 from spark.opening import real
 from spark_sim.choices import Format, Method
 from spark_sim.shelf.made_of import reading_sha256
+from spark_sim.sources import LeftOut, find_motions, sentences
 
 
 @dataclass(frozen=True)
@@ -66,6 +65,13 @@ class Job:
         }
 
 
+class Plan(NamedTuple):
+    """What there is to do, and the files below the sources that are no motions to read."""
+
+    jobs: list[Job]
+    left_out: list[LeftOut]
+
+
 def plan(
     sources: Sequence[str],
     targets: Sequence[str],
@@ -73,14 +79,13 @@ def plan(
     options: Options,
     *,
     mirror: bool = False,
-) -> list[Job]:
+) -> Plan:
     """Every motion below the sources onto every target: `OUT/TARGET/` holds the tree of folders.
 
     Below several sources each tree stands in a folder of the source's own name. What lies in `out`
     is no source. Raises `OutputError` where two results would have one name.
     """
-    suffixes = CHARACTERS if "robot" not in options.reading else (*CHARACTERS, *SUFFIXES)
-    found = _found(sources, out, suffixes)
+    found, left_out = _found(sources, out, robot="robot" in options.reading)
     folders = _folders(targets)
     jobs: list[Job] = []
     for source, below in found:
@@ -91,7 +96,7 @@ def plan(
                 for side in (("", "_mirrored") if mirror else ("",))
             ]
     _refuse_clashes(jobs)
-    return jobs
+    return Plan(jobs, left_out)
 
 
 def _ending(target: str, format: Format | None) -> str:
@@ -103,10 +108,13 @@ def _ending(target: str, format: Format | None) -> str:
     return ".bvh"
 
 
-def _found(sources: Sequence[str], out: Path, suffixes: tuple[str, ...]) -> list[tuple[Path, str]]:
-    """The files to read, and the name of each result without its ending."""
+def _found(
+    sources: Sequence[str], out: Path, *, robot: bool
+) -> tuple[list[tuple[Path, str]], list[LeftOut]]:
+    """The files to read, each with the name of its result without ending; and those left out."""
     folders = [Path(source) for source in sources if Path(source).is_dir()]
     made, found = real(out), []
+    left_out: list[LeftOut] = []
     for source in map(Path, sources):
         own = Path(real(source).name) if len(folders) > 1 else Path()
         if not source.is_dir():
@@ -114,13 +122,12 @@ def _found(sources: Sequence[str], out: Path, suffixes: tuple[str, ...]) -> list
                 raise FileFormatError(source, None, "no such file or folder")
             found.append((source, Path()))
             continue
-        paths = [
-            path for path in motion_files(source, suffixes) if not real(path).is_relative_to(made)
-        ]
+        motions, others = find_motions(source, robot=robot)
+        paths = [path for path in motions if not real(path).is_relative_to(made)]
+        left_out += [each for each in others if not real(each.path).is_relative_to(made)]
         if not paths:
-            raise FileFormatError(
-                source, None, f"holds no motion to read outside {out}; expected {suffixes}"
-            )
+            why = "; ".join(sentences(left_out)) or "expected one or more"
+            raise FileFormatError(source, None, f"holds no motion to read outside {out}; {why}")
         found += [(path, own / path.parent.relative_to(source)) for path in paths]
     named: list[tuple[Path, str]] = []
     taken: set[str] = set()
@@ -130,7 +137,7 @@ def _found(sources: Sequence[str], out: Path, suffixes: tuple[str, ...]) -> list
         name = str(below / path.name) if stem in taken else stem
         taken.add(stem)
         named.append((path, name))
-    return named
+    return named, left_out
 
 
 def _folders(targets: Sequence[str]) -> list[str]:

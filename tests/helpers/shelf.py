@@ -61,7 +61,7 @@ def made(job: Job, folder: Path) -> Done:
 def run(folder: Path, out: Path, **settings: object) -> Tally:
     """A batch of all files in a folder."""
     batch.work = made
-    jobs = plan([str(folder)], ["robot"], out, Options())
+    jobs = plan([str(folder)], ["robot"], out, Options()).jobs
     with batch.locked(out):
         made_now = batch.Batch(out, **settings)  # type: ignore[arg-type]
         list(made_now.run(jobs, serially))

@@ -16,7 +16,7 @@ def touch(folder: Path, *names: str) -> None:
 
 def outputs(*sources: Path, to: tuple[str, ...] = ("robot",), mirror: bool = False) -> list[str]:
     out = sources[0].parent / "out"
-    jobs = plan([str(s) for s in sources], to, out, Options(), mirror=mirror)
+    jobs = plan([str(s) for s in sources], to, out, Options(), mirror=mirror).jobs
     return [job.output.as_posix() for job in jobs]
 
 
@@ -49,7 +49,7 @@ def test_the_second_of_two_endings_keeps_it(tmp_path: Path) -> None:
 
 def test_results_are_no_sources(tmp_path: Path) -> None:
     touch(tmp_path, "in/walk.bvh", "in/out/mutant/walk.bvh")
-    jobs = plan([str(tmp_path / "in")], ["mutant.bvh"], tmp_path / "in" / "out", Options())
+    jobs = plan([str(tmp_path / "in")], ["mutant.bvh"], tmp_path / "in" / "out", Options()).jobs
     assert [job.source.name for job in jobs] == ["walk.bvh"]
     with pytest.raises(FileFormatError, match="outside"):
         plan([str(tmp_path / "in" / "out")], ["robot"], tmp_path / "in" / "out", Options())
