@@ -1,12 +1,12 @@
 """The motions of a folder, and what has to be known to read and judge each."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from robots.formats import SUFFIXES
+from robots.formats import FORMATS, SUFFIXES
 from robots.formats.made_from import made_from
 from robots.registry import is_robot
 from spark.errors import FileFormatError
@@ -46,22 +46,26 @@ def items(
 ) -> list[Item]:
     """The motions below a folder, in the order of their names.
 
-    What a batch wrote is known from its manifest: robot, source, piece. Of other motions the source
-    is the file of `sources` with the same name, before `_on_TARGET`; or `sources` itself, where
-    that is a file. Raises `FileFormatError` where there is no motion.
+    What a batch wrote is known from its manifest: robot, source, piece. Of a motion that it wrote
+    in several formats, the files that it made last are taken. Of other motions the source is the
+    file of `sources` with the same name, before `_on_TARGET`; or `sources` itself, where that is a
+    file. Raises `FileFormatError` where there is no motion.
     """
     found: dict[Path, Item] = {}
+    written: set[Path] = set()
     for manifest in sorted({path.parent for path in folder.rglob("manifest*.jsonl")}):
-        for entry in Manifest(manifest):
-            path = manifest / str(entry["output"])
-            if entry["status"] == "written" and path.exists():
+        results = _results(manifest)
+        written |= results.keys()
+        made_last = {_motion_of(entry): entry["finished"] for entry in _by_time(results.values())}
+        for path, entry in results.items():
+            if entry["finished"] == made_last[_motion_of(entry)]:
                 name = path.relative_to(folder).as_posix()
                 robot = {"robot": entry["target"]} if is_robot(entry["target"]) else {}
                 known = {**robot, **reading}
                 found[path] = Item(path, name, known, _origin_of(entry, manifest), entry["target"])
     by_name = _by_name(sources)
     for path in _motions(folder, "robot" in reading):
-        if path in found:
+        if path in written:
             continue
         below = path.relative_to(folder)
         origin = sources if sources is not None and sources.is_file() else None
@@ -74,6 +78,24 @@ def items(
             folder, None, "holds no motion; expected one or more (a robot's needs --robot)"
         )
     return sorted(found.values(), key=lambda item: item.name)
+
+
+def _results(folder: Path) -> dict[Path, Entry]:
+    """What a batch wrote into a folder and is still there."""
+    entries = (entry for entry in Manifest(folder) if entry["status"] == "written")
+    paths = {folder / str(entry["output"]): entry for entry in entries}
+    return {path: entry for path, entry in paths.items() if path.exists()}
+
+
+def _by_time(entries: Iterable[Entry]) -> list[Entry]:
+    return sorted(entries, key=lambda entry: str(entry["finished"]))
+
+
+def _motion_of(entry: Entry) -> str:
+    """What the jobs of one motion have in common that write it in several formats: the name of the
+    result, without the ending."""
+    ending = FORMATS[entry["options"]["format"] or "npz"] if is_robot(entry["target"]) else ".bvh"
+    return str(entry["job"]).removesuffix(ending)
 
 
 def _motions(folder: Path, robot: bool) -> Iterator[Path]:

@@ -222,6 +222,21 @@ def test_bars_stand_for_every_value() -> None:
     assert histogram([])["bars"] == []
 
 
+def test_a_motion_in_several_formats_is_counted_once(folder: Path, tmp_path: Path) -> None:
+    """By the files that were made last."""
+    shutil.copytree(folder / "in", tmp_path / "in")
+    with Program(tmp_path) as program:
+        batch = ("batch", "in", "--to", "robot", "-o", "out", "--method", "copy", "--workers", "1")
+        assert program(*batch, "--format", "csv").code == 0
+        assert program(*batch, "--format", "mjlab", "--cut", "2s").code == 0
+        done = program("report", "out", "--json", "--workers", "1")
+    files = [clip["file"] for clip in json.loads(done.stdout)["clips"]]
+    cut = {f"robot/{path.name}" for path in (tmp_path / "out" / "robot").glob("*_cut*.npz")}
+    assert len(cut) > 2
+    assert sorted(files) == sorted(cut)
+    assert len(list((tmp_path / "out" / "robot").glob("*.csv"))) == 2
+
+
 def test_a_name_that_is_no_text_is_found(tmp_path: Path) -> None:
     """The link to the page of a motion leads to its file, whatever bytes its name has."""
     name = os.fsdecode(b"w\xffalk #1?%.bvh")
