@@ -33,7 +33,7 @@ SLOW = (
     "tests/robots/formats/test_formats.py::test_a_changed_model_is_said_and_another_refused",
     "tests/robots/formats/test_formats.py::test_a_model_is_found_where_one_works_and_where_older_files_say",
     "tests/robots/formats/test_formats.py::test_an_included_model_that_changed_is_seen",
-    "tests/robots/formats/test_formats.py::test_our_npz_names_no_folder_of_the_machine",
+    "tests/robots/formats/test_formats.py::test_a_model_is_found_where_it_lay_while_it_is_the_same",
     "tests/robots/formats/test_trackers.py::test_spoilt_files_end_in_an_error_that_says_so",
     "tests/robots/model/test_followers.py::test_followers_are_where_their_leaders_take_them",
     "tests/robots/model/test_followers.py::test_what_follows_is_solved_for_and_not_overwritten",
