@@ -173,9 +173,9 @@ def _leg(body: BodyFeatures, limb: Group) -> Leg:
     leg = leg_of(body.rig, limb)
     assert leg is not None  # clips are of bodies with two feet (`spark.training.clips`)
     number = {j: k for k, j in enumerate(body.joints.tolist())}
-    turned = (
+    with_thigh, with_shank = (
         tuple(sorted(number[j] for j in joints if j in number))
         for joints in (leg.with_thigh, leg.with_shank)
     )
     upper, lower, foot, contact = (number[j] for j in leg[:4])
-    return Leg(upper, lower, foot, contact, *turned)
+    return Leg(upper, lower, foot, contact, with_thigh, with_shank)
