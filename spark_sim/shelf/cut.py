@@ -36,6 +36,10 @@ def pieces(motion: Motion, rig: Rig, longest: float) -> list[tuple[int, int]]:
         if ends:
             cuts.append(ends[0])
         elif left > most:
+            # A break soon after is cut next: what lies before it must be long enough.
+            reached = min(last + least, left - least)
+            soon = [frame - here for frame in broken if last < frame - here <= reached]
+            last = min([last, *(after - least for after in soon)])
             first = min(most // 2, last)
             window = moving[here + first : here + last + 1]
             cuts.append(here + first + int(window.argmin()))

@@ -71,6 +71,15 @@ def test_a_broken_recording_is_cut_where_it_breaks(fps: float) -> None:
     assert max(stop - start for start, stop in found) <= 10.0 * fps
 
 
+def test_a_break_that_a_piece_does_not_reach_is_cut_next() -> None:
+    """Though the body rests right before it."""
+    motion = waving(20.0, 60.0, [9.9])
+    motion.root_pos[610:, 0] += 1.7
+    found = pieces(motion, stick_rig(), 10.0)
+    assert 610 in {start for start, _ in found}
+    assert min(stop - start for start, stop in found) >= 150
+
+
 def test_a_short_recording_is_cut_where_it_breaks_too() -> None:
     motion = waving(8.0, 60.0, [])
     assert pieces(motion, stick_rig(), 10.0) == [(0, 480)]
