@@ -173,15 +173,6 @@ def quat_between(u: Float[Any, "*#n 3"], v: Float[Any, "*#n 3"]) -> Float[Any, "
     return q / xp.sqrt(dot(q, q))
 
 
-def quat_between_about(
-    u: Float[Any, "*#n 3"], v: Float[Any, "*#n 3"], axis: Float[Any, "*#n 3"]
-) -> Float[Any, "*n 4"]:
-    """The rotation about the unit `axis` that brings `u` as near to `v` as it can."""
-    xp = array_namespace(u, v, axis)
-    u = u - axis * dot(u, axis)
-    return quat_from_rotvec(axis * xp.atan2(dot(cross(u, v), axis), dot(u, v)))
-
-
 def quat_swing_twist(
     q: Float[Any, "*#n 4"], axis: Float[Any, "*#n 3"]
 ) -> tuple[Float[Any, "*n 4"], Float[Any, "*n 4"]]:

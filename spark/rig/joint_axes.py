@@ -8,6 +8,7 @@ from spark.rig.bones import RigPose
 from spark.rig.observed import bend_axis
 from spark.rig.roles import LIMBS, Role, limb_joints
 from spark.rig.toes import SHORT
+from spark.rotation import quat_from_rotvec
 
 _ALIGNED = np.radians(10)  # of a bone from an axis of its joint that it was put along on purpose
 _SLANTED = np.radians(25)  # of both knees' axes from joints' axes; found ones are off by up to 20
@@ -47,3 +48,9 @@ def snap(v: Vector, tolerance: float) -> Vector:
 def tilt(v: Vector) -> float:
     """The angle [rad] between a vector and the nearest coordinate axis."""
     return float(np.arccos(min(np.abs(v).max() / max(np.linalg.norm(v), SHORT), 1.0)))
+
+
+def turn_about(u: Vector, v: Vector, axis: Vector) -> Float[np.ndarray, "4"]:
+    """The rotation about the unit `axis` that brings `u` as near to `v` as it can."""
+    u = u - axis * (u @ axis)
+    return quat_from_rotvec(axis * np.arctan2(np.cross(u, v) @ axis, u @ v))

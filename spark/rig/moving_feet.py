@@ -9,12 +9,12 @@ from jaxtyping import Float
 
 from spark.motion import Motion
 from spark.rig.bones import RigPose
+from spark.rig.joint_axes import turn_about
 from spark.rig.observed import resting_slope, standing_slope
 from spark.rig.reference_pose import Reference
 from spark.rig.roles import Role
 from spark.rotation import (
     quat_between,
-    quat_between_about,
     quat_conj,
     quat_from_rotvec,
     quat_mul,
@@ -107,7 +107,7 @@ def _hinged(q: Quat, shank: Quat, bone: Vector, goal: Vector) -> Quat:
     across = axes[np.argmax(quat_rotate(shank, axes) @ _LEFT)]
     if abs(across @ bone) > _ALONG * np.linalg.norm(bone):
         across = axes[np.argmax(quat_rotate(q, axes) @ _LEFT)]
-    return quat_mul(quat_between_about(quat_rotate(q, across), _LEFT, goal), q)
+    return quat_mul(turn_about(quat_rotate(q, across), _LEFT, goal), q)
 
 
 def _votes(

@@ -19,7 +19,7 @@ from jaxtyping import Float
 
 from spark.motion import Motion
 from spark.rig.doubles import doubles_of
-from spark.rig.joint_axes import snap
+from spark.rig.joint_axes import snap, turn_about
 from spark.rig.moving_feet import feet_ahead, feet_slope
 from spark.rig.observed import bend_axis, nearest_right_angle
 from spark.rig.reference_pose import GROUP_OF, Reference, pelvis_frame, reference_of
@@ -27,7 +27,6 @@ from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import (
     quat_angle,
     quat_between,
-    quat_between_about,
     quat_conj,
     quat_from_matrix,
     quat_from_rotvec,
@@ -184,11 +183,7 @@ def _twist_to_bend(
     if lower is None or lower_bone is None:
         return quat_identity(goal)
     bent = bend_axis(reference.motion, upper, lower, bone, lower_bone)
-    return (
-        quat_identity(goal)
-        if bent is None
-        else quat_between_about(quat_rotate(q, bent), axis, goal)
-    )
+    return quat_identity(goal) if bent is None else turn_about(quat_rotate(q, bent), axis, goal)
 
 
 def _square(q: Quat, about: Vector, side: Vector) -> Quat:
@@ -196,7 +191,7 @@ def _square(q: Quat, about: Vector, side: Vector) -> Quat:
     axes = quat_rotate(q, np.concatenate([np.eye(3), -np.eye(3)]))
     across = axes - np.outer(axes @ about, about)
     nearest = across[np.argmax(across @ side)]
-    return quat_mul(quat_between_about(nearest, side, about), q)
+    return quat_mul(turn_about(nearest, side, about), q)
 
 
 def _palm_down(
