@@ -28,7 +28,7 @@ from robots.solver.smoothness import limit_speed
 from robots.solver.stance import apart
 from robots.solver.strays import without_strays
 from robots.solver.stretches import by_stretches
-from robots.solver.targets import Targets, poses_of, targets_of
+from robots.solver.targets import Targets, poses_of, targets_of, with_firm_hands
 from robots.tree import Coordinates
 from spark.threads import one_thread
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
@@ -114,7 +114,7 @@ def _trajectory(robot: Morphology, targets: Targets) -> Coordinates:
     arms = _led_out(robot, coarse, q.every(stride), limbs)
     arms = _parted(robot, coarse, few, arms, limbs, _LIMBS)
     q = q.with_joints(limbs.joints, arms.upsampled(stride, len(targets)))
-    return _polished(robot, targets, feet, q, limbs, _POLISH_LIMBS)
+    return _polished(robot, with_firm_hands(robot, targets), feet, q, limbs, _POLISH_LIMBS)
 
 
 def idle_at_rest(robot: Morphology, q: Coordinates) -> Coordinates:

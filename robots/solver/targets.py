@@ -51,7 +51,7 @@ class Targets:
     that of the topmost part of the trunk; `hips`, the path of the hips' middle [m]; `bones`, unit
     directions by the role at a segment's upper end; `contacts`, whether heel and toe of each of the
     robot's soles stand, `parts`, whether those of `part_roles` touch the floor, `rests`, whether
-    they also stay in place, `palms`, how far (0 to 1) hands lie still, `flight`, whether nothing
+    they also stay in place, `palms`, how far (0 to 1) hands are firm, `flight`, whether nothing
     holds the body; `com_acceleration`, the source's, scaled [m/s²]; `part_paths` and `feet`, the
     paths of the source's parts, and of its heels and toes, over the floor [m]; `part_ground`, how
     high that under each part is, `ground` and `floor`, those of each sole (`GroundUnderSoles`), and
@@ -275,3 +275,12 @@ def arm_length(rig: Rig) -> float:
     rest = rig.skeleton.rest_positions
     chain = [rest[j] for j in joints if j is not None]
     return float(np.linalg.norm(np.diff(chain, axis=0), axis=1).sum())
+
+
+def with_firm_hands(robot: Morphology, targets: Targets) -> Targets:
+    """The same with all hands followed as firmly as those that lie on the ground."""
+    hands = (Role.LEFT_HAND, Role.RIGHT_HAND)
+    firm = {
+        role: np.ones(len(targets)) for role in hands if robot.rig.roles.joint(role) is not None
+    }
+    return replace(targets, palms=firm)

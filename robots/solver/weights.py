@@ -25,12 +25,13 @@ W_ROTATION = {  # [1/rad] of a part by its role; low where the directions of lim
     "chest": 0.8,
     "head": 0.5,  # what looks somewhere,
     "neck": 0.1,
-    "hand": 0.8,  # what holds, and where axes of a wrist lie apart would turn to aim the forearm,
+    "hand": 0.25,  # light, so that arms that are in each other find a way out,
     "foot": 1.0,  # and what stands on the floor, as a limb's direction by its length
     "spine": 0.1,
     "clavicle": 0.2,
 }
-W_PALM = 0.8  # [1/rad] more of a hand that lies on the ground: one that turns there slides
+W_PALM = 0.8  # [1/rad] more of a hand that lies on the ground, where one that turns slides; and of
+# all hands in the last steps: where a wrist's axes lie apart, its turns would aim the forearm
 W_OTHER_ROTATION = 0.08  # [1/rad] of the rest: the twist of limbs
 W_HIPS_POSITION = np.array([6.0, 6.0, 6.0])  # [1/m] of their path: 1 cm is 2 degrees of a limb
 W_COM_ACCELERATION = 0.42  # [s²/m] of the planned centre of mass: 1 m/s² is 12 degrees of a limb
