@@ -12,14 +12,15 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from spark.blocks import in_blocks
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_from_rotvec, quat_mul
 from spark.smoothstep import smoothstep
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.leg_fit import from_sole
 from spark.transfer.leg_ik import ELBOWS, Leg, arm_of, leg_of, move_ankles
+from spark.transfer.reach import in_time
 
 _FLESH = 0.005  # [hip heights] of a joint's centre over the floor, at least: half a cm of an adult
 _EASE = 0.1  # [s] before something would be in the floor it begins to rise
@@ -48,7 +49,10 @@ def over_floor(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMoti
     moved = _risen(moved, _sunk(moved, body, allowed), _sunk(moved, wrists, allowed))
     moved = _turned_up(moved, hands, allowed)
     deep = _sunk(moved, hands, allowed)
-    raised = [(arm, _eased(deep[role], moved)[:, None] * _UP) for role, arm in arms.items()]
+    raised = [
+        (arm, in_time(deep[role], _EASE, moved.frame_time)[:, None] * _UP)
+        for role, arm in arms.items()
+    ]
     return move_ankles(moved, raised)
 
 
@@ -100,7 +104,8 @@ def _risen(
     aloft = [_aloft(moved, leg) for leg in legs]
     on_hands = np.min([np.ones(len(moved)), *aloft], axis=0)
     asked = [*body.values(), *(on_hands * deep for deep in wrists.values())]
-    rise = _eased(np.max([np.zeros(len(moved)), *asked], axis=0), moved)
+    most = np.max([np.zeros(len(moved)), *asked], axis=0)
+    rise = in_time(most, _EASE, moved.frame_time)
     higher = replace(moved, hips=moved.hips + rise[:, None] * _UP)
     stay = [(1 - own) * rise for own in aloft]
     return move_ankles(
@@ -112,8 +117,7 @@ def _aloft(moved: CanonicalMotion, leg: Leg) -> Float[np.ndarray, "T"]:
     """How far a foot is in the air: 0 where it stands, 1 at `_ALOFT` over that and more."""
     rig, foot = moved.rig, [leg.foot, leg.contact]
     high = canonical_positions(moved, foot)[..., 2].min(axis=1) - moved.floor_z
-    hips = rig.tpose_positions[rig.hips, 2].mean()
-    standing = rig.tpose_positions[foot, 2].min() - hips + rig.hip_height
+    standing = min(from_sole(rig, joint)[2] for joint in foot)
     return smoothstep((high - standing) / (_ALOFT * rig.hip_height))
 
 
@@ -134,18 +138,11 @@ def _turned_up(
         least = np.minimum(allowed[role] - wrist, 0.0)[:, None]
         length = np.maximum(np.linalg.norm(fingers, axis=-1), 1e-9)
         up, wanted = (np.arcsin(np.clip(z / length, -1, 1)) for z in (fingers[..., 2], least))
-        turn = _eased(np.maximum(wanted - up, 0.0).max(axis=1), moved)
+        most = np.maximum(wanted - up, 0.0).max(axis=1)
+        turn = in_time(most, _EASE, moved.frame_time)
         along = fingers.mean(axis=1)
         across = np.stack([along[:, 1], -along[:, 0], 0 * turn], axis=1)
         across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
         turned = quat_from_rotvec(turn[:, None] * across)[:, None]
         rotations[:, list(joints)] = quat_mul(turned, rotations[:, list(joints)])
     return replace(moved, rotations=rotations)
-
-
-def _eased(need: Float[np.ndarray, "T"], moved: CanonicalMotion) -> Float[np.ndarray, "T"]:
-    """No less than what is needed, and there in time: the mean of the largest near each frame."""
-    size = 2 * round(_EASE / moved.frame_time) + 1
-    largest = maximum_filter1d(need, size, mode="nearest")
-    eased: Float[np.ndarray, T] = uniform_filter1d(largest, size, mode="nearest")
-    return eased

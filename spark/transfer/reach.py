@@ -38,9 +38,7 @@ def within_reach(
     )
     if not drop.any():
         return motion, moves
-    size = 2 * round(_AHEAD / motion.frame_time) + 1
-    # Of the largest drop near each frame the mean is no less than the frame's own.
-    drop = uniform_filter1d(maximum_filter1d(drop, size, mode="nearest"), size, mode="nearest")
+    drop = in_time(drop, _AHEAD, motion.frame_time)
     down = drop[:, None] * np.array([0.0, 0.0, 1.0])
     lower = replace(motion, hips=motion.hips - down)
     return lower, [(leg, move + down) for leg, move in moves]
@@ -70,7 +68,6 @@ def swing_gently(
     from what is left to its full length, left' = left exp(-further / left): nearly all of a little,
     and never all that is left.
     """
-    size = 2 * round(_AIRBORNE / motion.frame_time) + 1
     gentle: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
     for (leg, move), theirs, here in zip(moves, stretches, stands, strict=True):
         length, away = _length_and_ankle(motion, leg)
@@ -79,11 +76,21 @@ def swing_gently(
         left = np.maximum(1.0 - theirs, 1e-9)
         further = np.maximum(wanted - theirs, 0.0)
         spared = np.maximum(further + left * np.expm1(-further / left), 0.0)
-        ground = maximum_filter1d(here.astype(float), size, mode="nearest")
-        airborne = 1.0 - uniform_filter1d(ground, size, mode="nearest")
+        airborne = 1.0 - in_time(here.astype(float), _AIRBORNE, motion.frame_time)
         shorter = airborne * spared / np.maximum(wanted, 1e-9)
         gentle.append((leg, move - shorter[:, None] * goal))
     return gentle
+
+
+def in_time(
+    need: Float[np.ndarray, "T"], ahead: float, frame_time: float
+) -> Float[np.ndarray, "T"]:
+    """No less than what is needed in each frame, and begun `ahead` [s] of it: the mean of the
+    largest need near each frame."""
+    size = 2 * round(ahead / frame_time) + 1
+    largest = maximum_filter1d(need, size, mode="nearest")
+    eased: Float[np.ndarray, T] = uniform_filter1d(largest, size, mode="nearest")
+    return eased
 
 
 def _drop(
