@@ -43,46 +43,44 @@ def finger_bones(skeleton: Skeleton, roles: RoleMap) -> dict[FingerBone, int]:
     """The joints of a rig's fingers. Tips, which have no bone below them, are left out; so are
     hands without names that aren't built alike."""
     hands = {role.side: roles.joint(role) for role in (Role.LEFT_HAND, Role.RIGHT_HAND)}
-    of_side = {
-        side: {} if hand is None else _bones_of(skeleton, hand, side)
-        for side, hand in hands.items()
-    }
-    left, right = ({bone[1:] for bone in bones} for bones in of_side.values())
-    return {
-        bone: joint
-        for side, hand in hands.items()
-        for bone, joint in of_side[side].items()
-        if left == right or (hand is not None and _named_below(skeleton, hand))
-    }
+    found = [_bones_of(skeleton, hand, side) for side, hand in hands.items() if hand is not None]
+    alike = len(found) == 2 and len({frozenset(b[1:] for b in bones) for bones, _ in found}) == 1
+    return {b: j for bones, named in found if named or alike for b, j in bones.items()}
 
 
-def _bones_of(skeleton: Skeleton, hand: int, side: str) -> dict[FingerBone, int]:
+def _bones_of(skeleton: Skeleton, hand: int, side: str) -> tuple[dict[FingerBone, int], bool]:
+    """The joints of a hand's fingers, and whether names tell them."""
     found: dict[FingerBone, int] = {}
-    built = not _named_below(skeleton, hand)
+    fingers, named = _told_below(skeleton, hand)
     chains: dict[str, list[int]] = {}
-    for joint, finger in fingers_below(skeleton, hand).items():
+    for joint, finger in fingers.items():
         chain = chains.setdefault(finger, [])
         tip = FINGER_TIP.intersection(split_name(skeleton.names[joint]))
         if not tip and (not chain or chain[-1] in skeleton.ancestors(joint)):
             chain.append(joint)
     for finger, chain in chains.items():
         palm = _in_palm([split_name(skeleton.names[j]) for j in chain], finger)
-        if built:
+        if not named:
             palm = 0 if finger == "thumb" else metacarpals(skeleton, chain)
         for joint in chain[palm - 1 : palm]:
             found[FingerBone(side, finger, 0)] = joint
         for number, joint in enumerate(chain[palm:][:_PHALANGES], start=1):
             found[FingerBone(side, finger, number)] = joint
-    return found
+    return found, named
 
 
 def fingers_below(skeleton: Skeleton, hand: int) -> dict[int, str]:
     """The joints of fingers below a hand, parents first, and the finger: by name or, where no name
     tells one, by build."""
+    return _told_below(skeleton, hand)[0]
+
+
+def _told_below(skeleton: Skeleton, hand: int) -> tuple[dict[int, str], bool]:
+    """The same, and whether names tell them."""
     if named := _named_below(skeleton, hand):
-        return named
+        return named, True
     built = zip(FINGER_NAMES, fingers_by_build(skeleton, hand), strict=False)
-    return dict(sorted((j, finger) for finger, chain in built for j in chain))
+    return dict(sorted((j, finger) for finger, chain in built for j in chain)), False
 
 
 def _named_below(skeleton: Skeleton, hand: int) -> dict[int, str]:
