@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from robots.likeness import foot_error, hand_error, limb_error, trunk_error
 from robots.model.motion import RobotMotion
 from robots.solver.floor import sole_paths
 from robots.solver.targets import targets_of
@@ -87,6 +86,10 @@ def measure(motion: Motion, rig: Rig, result: RobotMotion) -> RobotMetrics:
     assert report.source is not None
     assert report.drift is not None
     assert report.contacts is not None
+    pose = report.pose
+    limbs = None if pose is None else pose.mean_of("limb")
+    assert pose is not None
+    assert limbs is not None
     scale = robot.rig.hip_height / rig.hip_height
     positions, world = forward(motion)
     soles = {sole.side: sole_positions(sole, positions, world) for sole in rig.soles}
@@ -126,10 +129,10 @@ def measure(motion: Motion, rig: Rig, result: RobotMotion) -> RobotMetrics:
         skate_m_s=float(ours.lowest_speed[planted].sum() / count),
         skate_source_m_s=float(_speed(toes, frame_time)[planted].sum() / count),
         **_resting(to_canonical(motion, rig), result),
-        limb_error_rad=limb_error(motion, rig, result),
-        foot_error_rad=foot_error(motion, rig, result),
-        hand_error_rad=hand_error(motion, rig, result),
-        trunk_error_rad=trunk_error(motion, rig, result),
+        limb_error_rad=limbs,
+        foot_error_rad=pose.mean_of("foot"),
+        hand_error_rad=pose.mean_of("hand"),
+        trunk_error_rad=pose.mean_of("trunk"),
         at_limit=float(near.any(axis=1).mean()),
         fastest_rad_s=float(np.abs(np.diff(angles, axis=0)).max(initial=0.0) / frame_time),
         jerk_rad_s3=float(np.sqrt(np.mean(jerk**2))) if len(jerk) else 0.0,

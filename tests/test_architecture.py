@@ -25,7 +25,6 @@ ROOMS = (
     ("robots.model",),
     ("robots.formats", "robots.solver"),
     ("robots.stream",),
-    ("robots.likeness",),
     ("robots.metrics",),  # files of their own
     ("spark_sim",),  # its own files: choices, files, rolemap, console, clip_base
     ("spark_sim.clips",),

@@ -14,31 +14,15 @@ from robots.solver.palms import laid, resting_palms
 from robots.solver.trunk import bowing
 from robots.tree import forward_kinematics
 from spark.blocks import blocks
+from spark.rig.directions import bone_directions
 from spark.rig.feet import ends_of_feet, lowest_points
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
-from spark.rotation import matrix_from_quat, quat_mul, quat_rotate
+from spark.rotation import matrix_from_quat, quat_mul
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.noise import Noise
 
-LIMB_SEGMENTS = (  # the limbs' segments, by the roles at their ends
-    (Role.LEFT_UPPER_LEG, Role.LEFT_LOWER_LEG),
-    (Role.LEFT_LOWER_LEG, Role.LEFT_FOOT),
-    (Role.RIGHT_UPPER_LEG, Role.RIGHT_LOWER_LEG),
-    (Role.RIGHT_LOWER_LEG, Role.RIGHT_FOOT),
-    (Role.LEFT_UPPER_ARM, Role.LEFT_FOREARM),
-    (Role.LEFT_FOREARM, Role.LEFT_HAND),
-    (Role.RIGHT_UPPER_ARM, Role.RIGHT_FOREARM),
-    (Role.RIGHT_FOREARM, Role.RIGHT_HAND),
-)
-TPOSE_DIRECTIONS = {
-    **{
-        role: np.array([0.0, 0, -1]) for g in (Group.LEFT_LEG, Group.RIGHT_LEG) for role in LIMBS[g]
-    },
-    **{role: np.array([0.0, 1, 0]) for role in LIMBS[Group.LEFT_ARM]},
-    **{role: np.array([0.0, -1, 0]) for role in LIMBS[Group.RIGHT_ARM]},
-}
 HOVERS = (
     "in most frames nothing of the source stands on the floor, though it does not fall: does it "
     "walk in place, as on a treadmill? The robot's feet pass over the floor and carry nothing there"
@@ -190,26 +174,6 @@ def poses_of(
     for block in blocks(len(turns)):
         turns[block] = quat_mul(turns[block], robot.rig.tpose)
     return turns, moved.hips - np.array([0.0, 0.0, moved.floor_z]), moved.notes
-
-
-def bone_directions(
-    rig: Rig, positions: Float[np.ndarray, "T J 3"], rotations: Float[np.ndarray, "T J 4"]
-) -> dict[Role, Float[np.ndarray, "T 3"]]:
-    """Where the segments of arms and legs point: from joint to joint, or, where the joint at the
-    far end is missing, as its rotation since the T-pose says."""
-    out = {}
-    for upper, lower in LIMB_SEGMENTS:
-        a, b = rig.roles.joint(upper), rig.roles.joint(lower)
-        if a is None:
-            continue
-        if b is not None:
-            bone = positions[:, b] - positions[:, a]
-            length = np.linalg.norm(bone, axis=-1, keepdims=True)
-            if length.min() > 1e-6:
-                out[upper] = bone / length
-                continue
-        out[upper] = quat_rotate(rotations[:, a], TPOSE_DIRECTIONS[upper])
-    return out
 
 
 def source_feet(

@@ -19,6 +19,7 @@ from robots.model.morphology import Morphology
 from robots.solver.over_feet import on_arms
 from robots.tree import forward_kinematics
 from spark.rig.contacts import ADULT_HEIGHT
+from spark.rig.directions import has_shoulders, hips_to_shoulders, shoulder_joints
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import (
@@ -38,7 +39,6 @@ THIGHS = {
     Role.LEFT_UPPER_LEG: Role.LEFT_LOWER_LEG,
     Role.RIGHT_UPPER_LEG: Role.RIGHT_LOWER_LEG,
 }
-_SHOULDERS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
 
 
 @lru_cache(maxsize=16)
@@ -213,21 +213,6 @@ def _on_legs(
     return 1 - on_arms(mass[:, :2], over_floor, rig.standing_height / ADULT_HEIGHT)[:, None]
 
 
-def hips_to_shoulders(rig: Rig, positions: Float[np.ndarray, "T J 3"]) -> Float[np.ndarray, "T 3"]:
-    """From the middle of the hips to that of the shoulders [m], of a rig that has these."""
-    along: Float[np.ndarray, "T 3"] = positions[:, shoulder_joints(rig)].mean(1)
-    return along - positions[:, rig.hips].mean(1)
-
-
-def has_shoulders(rig: Rig) -> bool:
-    """Whether there is an upper arm on both sides."""
-    return all(rig.roles.joints(role) for role in _SHOULDERS)
-
-
 @lru_cache(maxsize=16)
 def upright_of(rig: Rig) -> Float[np.ndarray, "1 3"]:
     return hips_to_shoulders(rig, rig.tpose_positions[None])
-
-
-def shoulder_joints(rig: Rig) -> list[int]:
-    return [rig.roles.joints(role)[0] for role in _SHOULDERS]

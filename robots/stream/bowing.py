@@ -15,11 +15,11 @@ from robots.solver.trunk import (
     ROUNDING,
     bends,
     bowing,
-    has_shoulders,
     max_flexion,
     max_lean,
     upright_of,
 )
+from spark.rig.directions import has_shoulders
 from spark.rig.rig import Rig
 
 _LEAST = 1e-6  # of a length and of the half of two directions: below, they have no turn between

@@ -7,10 +7,11 @@ from jaxtyping import Float, Int
 
 from robots.model.morphology import Morphology
 from robots.solver.contacts import MAY_TOUCH, touching_joint
-from robots.solver.targets import LIMB_SEGMENTS, TPOSE_DIRECTIONS, arm_length, palm_thickness
+from robots.solver.targets import arm_length, palm_thickness
 from robots.solver.touching import touches_of
-from robots.solver.trunk import THIGHS, has_shoulders, shoulder_joints
+from robots.solver.trunk import THIGHS
 from robots.stream.carried_points import carriers, place, row
+from spark.rig.directions import LIMB_SEGMENTS, TPOSE_DIRECTIONS, has_shoulders, shoulder_joints
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rig.segments import segments

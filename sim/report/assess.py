@@ -17,6 +17,7 @@ from sim.report.measures import (
     floor_height,
     root_drift,
 )
+from sim.report.pose_error import pose_error
 from sim.report.report import Report
 from sim.report.stretches import measure_clip
 from sim.report.swing import swing_of
@@ -88,8 +89,20 @@ def assess(
     notes += _pace(motion, source.motion)
     thrown = scale * source_clip.base_acceleration_p99
     limbs = limbs_of(clip, followed, times, scale)
-    findings = findings_of(clip, drift, swing, thrown, limbs)
-    return Report(clip, source_clip, drift, contacts, findings, notes, known, swing, limbs, scale)
+    pose = pose_error(subject, source, times)
+    return Report(
+        clip,
+        source_clip,
+        drift,
+        contacts,
+        findings_of(clip, drift, swing, thrown, limbs, pose),
+        notes,
+        truth=known,
+        swing=swing,
+        limbs=limbs,
+        pose=pose,
+        scale=scale,
+    )
 
 
 def _pace(motion: Motion, source: Motion) -> tuple[str, ...]:

@@ -25,6 +25,9 @@ MEANINGS = {
     "swing_clearance": "How high the feet pass over the floor in swing, where 1 is as high as the "
     "source's for the body's size. Feet that are pressed down to the floor stumble; feet that are "
     "lifted too high stamp.",
+    "pose": "By what angles limbs, trunk, feet, head and hands point away from the source's. It "
+    "comes from joints that can't reach, limbs that are in each other's way, a wrong T-pose, or a "
+    "body that stands still while its source moves.",
     "root_drift": "How far the body strays from the source's path, scaled to its size. It comes "
     "from steps that slide, or from a root that is scaled by other lengths than the legs.",
     "base_acceleration": "How hard the hips are thrown about, in all but the worst 1 % of the "

@@ -7,6 +7,7 @@ import numpy as np
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.limbs import Limbs
 from sim.report.measures import Drift
+from sim.report.pose_error import PoseError
 from sim.report.result import Finding
 from sim.report.swing import Swing
 from spark.constants import GRAVITY
@@ -23,6 +24,8 @@ _MAX_DRIFT, _MAX_HEADING = 0.05, np.radians(10)
 # thrown where its acceleration is more than this many times the source's: in both, what captured
 # people differ by between two takes of one motion is within.
 _CLEARANCE, _MAX_THROW = (0.7, 1.4), 1.5
+# A part points elsewhere where it does for so long [s]: a fast one passes by a little late.
+_LASTS = 0.2
 
 
 def findings_of(
@@ -31,6 +34,7 @@ def findings_of(
     swing: Swing | None = None,
     thrown: float | None = None,
     limbs: Limbs | None = None,
+    pose: PoseError | None = None,
 ) -> tuple[Finding, ...]:
     """All events of a clip, the gravest of each measure first.
 
@@ -55,6 +59,7 @@ def findings_of(
         *(_swing(swing) if swing else ()),
         *(_base(clip, thrown) if thrown is not None else ()),
         *(_limbs(clip, limbs, gap) if limbs else ()),
+        *(_pose(pose, clip.frame_time, gap) if pose else ()),
         *(_root_drift(drift) if drift else ()),
     )
 
@@ -171,6 +176,19 @@ def _limbs(clip: ClipMetrics, limbs: Limbs, gap: int) -> list[Finding]:
             findings.append(
                 Finding("limb_acceleration", name, start, stop, amount, "m_s2", sentence)
             )
+    return sorted(findings, key=lambda found: -found.amount)
+
+
+def _pose(pose: PoseError, frame_time: float, gap: int) -> list[Finding]:
+    findings = []
+    for part, angles, far in zip(pose.parts, pose.angles.T, pose.far.T, strict=True):
+        for start, stop in true_runs(far, gap):
+            if (stop - start) * frame_time < _LASTS:
+                continue
+            amount = float(angles[start:stop].max())
+            turned = "is turned" if part.kind == "hand" else "points"
+            sentence = f"{part.name} {turned} {np.degrees(amount):.0f}° away from the source's"
+            findings.append(Finding("pose", part.name, start, stop, amount, "rad", sentence))
     return sorted(findings, key=lambda found: -found.amount)
 
 

@@ -17,6 +17,7 @@ LABELS = {
     "missed_contact": "contacts missed",
     "invented_contact": "contacts invented",
     "swing_clearance": "swing clearance off",
+    "pose": "pose",
     "root_drift": "root drift",
     "base_acceleration": "base acceleration",
     "limb_acceleration": "limb acceleration",
@@ -28,6 +29,7 @@ LABELS = {
 
 UNITS = {
     **dict.fromkeys(LABELS, "%"),  # shares of frames, contacts or height
+    "pose": "°",
     "root_drift": "cm",
     "base_acceleration": "m/s²",
     "limb_acceleration": "x",  # times the source's

@@ -9,6 +9,7 @@ from markupsafe import Markup
 
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.names import FLAGS, LABELS
+from sim.report.pose_error import FAR
 from sim.report.result import Result
 from spark.runs import true_runs
 
@@ -99,6 +100,12 @@ def plots(result: Result) -> list[Plot]:
         load = np.max([each.load for each in clip.torques], axis=0)
         name, most = "highest torque", limits.torque
         shown.append(Plot(name, "of the motor's", load, load > most, most))
+    if result.pose is not None:
+        away = np.degrees(result.pose.angles).max(axis=1)
+        far = np.any(result.pose.far, axis=1)
+        shown.append(
+            Plot("farthest part off the source's pose", "°", away, far, float(np.degrees(FAR)))
+        )
     if result.drift is not None:
         shown.append(Plot("root drift", "cm", 100 * result.drift.distance, never, None))
     if result.truth is not None:

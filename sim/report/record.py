@@ -9,6 +9,7 @@ from sim.report.clip_metrics import ClipMetrics
 from sim.report.joints import joint_rows
 from sim.report.limbs import Limbs
 from sim.report.measures import Drift
+from sim.report.pose_error import PoseError
 from sim.report.result import Finding, Result
 from sim.report.swing import Swing
 from sim.report.truth import Accuracy
@@ -30,6 +31,7 @@ def record(result: Result) -> dict[str, Any]:
         "clip": _clip(clip),
         "source": None if result.source is None else _clip(result.source),
         "difference_to_source": None if result.source is None else _difference(result),
+        "pose_error": None if result.pose is None else _pose(result.pose),
         "root_drift": None if result.drift is None else _drift(result.drift),
         "foot_contacts": None if result.contacts is None else asdict(result.contacts),
         "swing": None if result.swing is None else _swing(result.swing),
@@ -163,6 +165,17 @@ def _limbs(limbs: Limbs, frame_time: float) -> dict[str, Any]:
         "worst_s": limbs.worst_frame * frame_time,
         "of_source": dict(zip(limbs.names, limbs.ratios.tolist(), strict=True)),
         "scaled_source_p99_m_s2": dict(zip(limbs.names, limbs.source_peaks.tolist(), strict=True)),
+    }
+
+
+def _pose(pose: PoseError) -> dict[str, Any]:
+    largest = pose.angles.max(axis=0)
+    return {
+        "mean_rad": pose.mean,
+        "parts": {
+            part.name: {"mean_rad": float(mean), "largest_rad": float(most)}
+            for part, mean, most in zip(pose.parts, pose.means, largest, strict=True)
+        },
     }
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.limbs import Limbs
 from sim.report.measures import ContactMatch, Drift
+from sim.report.pose_error import PoseError
 from sim.report.swing import Swing
 from sim.report.truth import Accuracy
 
@@ -41,8 +42,8 @@ class Result:
     far from the ground truth where that is known.
 
     `clip.self_depth` is then what goes beyond the source's own self-penetration, and `scale` is the
-    hip height over the source's. `swing` is None where the source's feet hardly swing, `limbs` is
-    what both have.
+    hip height over the source's. `swing` is None where the source's feet hardly swing, `limbs` and
+    `pose` are of what both have.
     """
 
     clip: ClipMetrics
@@ -54,6 +55,7 @@ class Result:
     truth: Accuracy | None = None
     swing: Swing | None = None
     limbs: Limbs | None = None
+    pose: PoseError | None = None
     scale: float = 1.0
 
     @property

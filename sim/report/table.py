@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import TypedDict
 
+import numpy as np
+
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.names import FLAGS, UNITS
 from sim.report.result import Result
@@ -65,6 +67,7 @@ def rows(result: Result) -> list[Row]:
         _row("missed_contact", None if recall is None else 100 * (1 - recall)),
         _row("invented_contact", None if precision is None else 100 * (1 - precision)),
         _row("swing_clearance", None if swing is None else 100 * abs(1 - swing.clearance)),
+        _row("pose", None if result.pose is None else float(np.degrees(result.pose.mean))),
         _row("root_drift", None if drift is None else 100 * float(drift.distance.max())),
         *rates[:1],
         _row("limb_acceleration", None if result.limbs is None else result.limbs.ratio),

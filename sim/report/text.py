@@ -8,6 +8,7 @@ import numpy as np
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.names import LABELS, UNITS
 from sim.report.palette import BOLD, DIM, TERMINAL, grade
+from sim.report.pose_error import PoseError
 from sim.report.result import Finding, Result
 from sim.report.table import RATES, shares, source_rate
 from spark.summary import counted
@@ -111,6 +112,8 @@ def details(result: Result) -> Iterator[Detail]:
             f"{swing.clearance:>6.2f}          of the source's: {100 * swing.height:.1f} cm where "
             f"its feet pass {100 * swing.source_height:.1f} cm above the floor, scaled",
         )
+    if result.pose is not None:
+        yield Detail("pose", LABELS["pose"], _pose(result.pose))
     if drift is not None:
         yield Detail(
             "root_drift",
@@ -136,6 +139,17 @@ def details(result: Result) -> Iterator[Detail]:
         yield Detail(measure, LABELS[measure], words)
         if measure == "base_acceleration" and clip.limb_names:
             yield Detail("limb_acceleration", LABELS["limb_acceleration"], _limbs(result))
+
+
+def _pose(pose: PoseError) -> str:
+    """The mean of all parts, and the part that is off most."""
+    means = np.degrees(pose.means)
+    worst = int(means.argmax())
+    most = float(np.degrees(pose.angles[:, worst].max()))
+    return (
+        f"{np.degrees(pose.mean):>6.1f}°         off the source's in the mean; most the "
+        f"{pose.parts[worst].name}, {means[worst]:.0f}°, {most:.0f}° at most"
+    )
 
 
 def _limbs(result: Result) -> str:

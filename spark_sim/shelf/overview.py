@@ -1,6 +1,7 @@
 """The page of a folder: histograms, targets, and a table that its script fills, so that a hundred
 thousand motions are no burden on a browser."""
 
+import math
 from collections.abc import Sequence
 from statistics import median
 from typing import Any
@@ -17,7 +18,7 @@ from spark_sim.shelf.remembered import Measured
 from spark_sim.shelf.thumbnail import LAYOUT
 
 _PAGE = Template("spark_sim.shelf", "page.html", ("page.js",))
-_SI = {"%": 100.0, "cm": 100.0}  # of a unit, in its SI unit
+_SI = {"%": 100.0, "cm": 100.0, "°": math.degrees(1)}  # of a unit, in its SI unit
 _GRADED = ("implausible", *FLAGS)
 
 

@@ -17,7 +17,6 @@ from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.model.understand import understand_robot
 from robots.solver.solve import copy, retarget
-from robots.solver.targets import bone_directions
 from sim.body.build import build_body
 from sim.body.joints import JointType
 from sim.body.mjcf import write_mjcf
@@ -26,6 +25,7 @@ from spark.demo.sample import sample_motion, sample_rig
 from spark.io.reading import read_motion
 from spark.kinematics import forward
 from spark.motion import Motion
+from spark.rig.directions import bone_directions
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig, understand
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.likeness import limb_error
 from robots.metrics import measure
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
@@ -22,6 +21,7 @@ from spark.rotation import quat_from_rotvec, quat_mul
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, from_canonical
 from spark_sim.loading import load_robot
 from tests.helpers.ember import changed_ember
+from tests.helpers.poses import limb_error
 
 KNEES = (Role.LEFT_LOWER_LEG, Role.RIGHT_LOWER_LEG)
 HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)

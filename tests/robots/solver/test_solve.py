@@ -13,7 +13,6 @@ from robots.least_squares import (
     Smoothness,
     second_differences,
 )
-from robots.likeness import limb_error
 from robots.metrics import RobotMetrics, measure
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
@@ -49,6 +48,7 @@ from spark.transfer.canonical import (
     to_canonical,
 )
 from spark_sim.loading import load_robot
+from tests.helpers.poses import limb_error
 from tests.helpers.recordings import recording
 
 

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from robots.model.known import known
-from robots.solver.trunk import THIGHS, bends, bowing, hips_to_shoulders
+from robots.solver.trunk import THIGHS, bends, bowing
 from robots.stream.bowing import Bowing
 from spark.demo.sample import sample_rig
 from spark.kinematics import world_positions
+from spark.rig.directions import hips_to_shoulders
 from spark.rotation import matrix_from_quat, quat_conj, quat_from_rotvec, quat_mul
 
 RIG = sample_rig("walker")

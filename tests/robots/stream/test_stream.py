@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import spark_sim
-from robots.likeness import limb_error
 from robots.metrics import measure
 from robots.model.known import known
 from robots.model.morphology import Morphology
@@ -20,7 +19,7 @@ from robots.solver.footprints import plan_feet, points_of
 from robots.solver.holds import Holds, joined
 from robots.solver.objective import linearize
 from robots.solver.projection import project
-from robots.solver.targets import bone_directions, targets_of
+from robots.solver.targets import targets_of
 from robots.solver.window_targets import PointTargets, pose_targets
 from robots.solver.window_terms import Terms
 from robots.stream.frame_targets import LATENCY, Frame, FrameReader, ground_of
@@ -33,6 +32,7 @@ from spark.errors import ConventionError, FrameError
 from spark.io.recording import read_recording
 from spark.kinematics import forward
 from spark.motion import Motion
+from spark.rig.directions import bone_directions
 from spark.rig.rig import Rig, understand
 from spark.rotation import (
     matrix_from_quat,
@@ -45,6 +45,7 @@ from spark.rotation import (
 from spark.runs import true_runs
 from spark.transfer.canonical import at_frame_time, from_canonical, to_canonical
 from spark_sim.loading import load_robot
+from tests.helpers.poses import limb_error
 from tests.helpers.recordings import recording
 from tests.spark.transfer.test_treads import BOX, onto_box
 

@@ -1,6 +1,7 @@
 """What `--keep` understands, and what it refuses."""
 
 import itertools
+import math
 
 import pytest
 from hypothesis import given
@@ -27,14 +28,16 @@ TRUTHS = {
     "NOT NOT implausible > 5.0%": "i > .05",
     "joint_speed < 15 and joint_speed < 15 rad/s or root_drift <= 0.3m": "v < 15 or d <= .3",
     "root-drift <= 30cm": "d <= .3",
+    "pose < 0.1 rad or pose > 6°": "p < .1 or p > math.radians(6)",
+    "not pose < 6 deg": "not p < math.radians(6)",
 }
 
 
 @pytest.mark.parametrize("text", TRUTHS)
 def test_a_condition_means_what_python_means_by_it(text: str) -> None:
     keep = parse(text)
-    for i, w, s, v, d in itertools.product(
-        (0.01, 0.05, 0.5), (0.0, 0.02, 0.3), (0.0, 0.02), (3, 15), (0.2, 0.3)
+    for i, w, s, v, d, p in itertools.product(
+        (0.01, 0.05, 0.5), (0.0, 0.02, 0.3), (0.0, 0.02), (3, 15), (0.2, 0.3), (0.09, 0.102, 0.3)
     ):
         values = {
             "implausible": i,
@@ -42,9 +45,11 @@ def test_a_condition_means_what_python_means_by_it(text: str) -> None:
             "skating": s,
             "joint_speed": v,
             "root_drift": d,
+            "pose": p,
         }
         measures = {key(name): value for name, value in values.items()}
-        assert keep(measures) is eval(TRUTHS[text], {"i": i, "w": w, "s": s, "v": v, "d": d})
+        known = {"i": i, "w": w, "s": s, "v": v, "d": d, "p": p, "math": math}
+        assert keep(measures) is eval(TRUTHS[text], known)
 
 
 def test_what_is_not_measured_is_no_reason_to_leave_out() -> None:
