@@ -24,7 +24,7 @@ from spark.rotation import (
 )
 
 _POINTED = ("upper_arm", "upper_leg")  # parts whose direction says more than their twist
-_W_BEYOND_LIMITS = 1.0  # [1/rad²] of an angle's square beyond the limits, a jump's square being 1
+_W_BEYOND_LIMITS = 3.0  # [1/rad²] of an angle's square beyond the limits, a jump's square being 1
 # Nothing of a body is turned the long way round for seconds, though to come back takes a jump.
 _W_FROM_REST = 0.03  # [1/rad²] of an angle's square in each frame
 

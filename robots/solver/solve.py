@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.solver.block import Block, blocks_of, carriers, whole_of
+from robots.solver.crouch import less_deep
 from robots.solver.descent import collision_candidates, solve_block
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import FootPlan, plan_feet, reachable
@@ -70,6 +71,7 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     source, passed = without_strays(source)
     source, noise, trembles = without_noise(source)
     treads = treads_of(source)
+    source = less_deep(source, robot, treads.seats)
     climb = climb_of(source, treads)
     notes = dict.fromkeys((*robot.notes, *passed, *trembles, *climbs(treads, robot)))
 

@@ -31,6 +31,7 @@ from spark.rotation import (
     quat_rotate,
     yaw_from_quat,
 )
+from spark.transfer.canonical import CanonicalMotion
 from spark.vectors import dot
 
 _LEVEL = 0.5  # share of a hinge's axis along the floor from which on it bends the trunk
@@ -101,11 +102,34 @@ def bowing(
     """How far a robot's pelvis turns, since the T-pose, where that of a source turns by `pelvis`,
     with joints at `positions` [m] over a floor at `floor_z`: as the robot's waist and hips allow.
     """
+    bowed = _bowed(rig, robot, pelvis, positions)
+    return within_flexion(rig, bowed, positions, floor_z, max_flexion(robot))
+
+
+def beyond_flexion(
+    source: CanonicalMotion, positions: Float[np.ndarray, "T J 3"], robot: Morphology
+) -> Float[np.ndarray, "T 1"]:
+    """By how much [rad] the hips of a source, whose joints are at `positions` [m], flex further
+    than a robot's can, while its legs carry it."""
+    rig = source.rig
+    forwards, _, up = _axes(_bowed(rig, robot, source.rotations[:, rig.pelvis], positions))
+    excess = _flexion(rig, forwards, up, positions) - max_flexion(robot)
+    if not (excess > -ROUNDING).any():
+        return np.zeros_like(excess)
+    beyond: Float[np.ndarray, "T 1"] = _rounded(excess)
+    return beyond * _on_legs(rig, positions, source.floor_z)
+
+
+def _bowed(
+    rig: Rig,
+    robot: Morphology,
+    pelvis: Float[np.ndarray, "T 4"],
+    positions: Float[np.ndarray, "T J 3"],
+) -> Float[np.ndarray, "T 4"]:
+    """As a robot's waist asks for, whatever its hips allow."""
     if bends(robot):
-        pelvis = beyond_lean(rig, pelvis, positions, max_lean(robot))
-    else:
-        pelvis = leaning(rig, pelvis, positions)
-    return within_flexion(rig, pelvis, positions, floor_z, max_flexion(robot))
+        return beyond_lean(rig, pelvis, positions, max_lean(robot))
+    return leaning(rig, pelvis, positions)
 
 
 def leaning(

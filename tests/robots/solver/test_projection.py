@@ -1,12 +1,14 @@
 """Angles of hinges for given rotations, each joint for itself."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from robots.model.known import known
 from robots.solver import projection
 from robots.solver.projection import _hinge_angles
 from robots.tree import Tree
-from spark.rotation import quat_from_rotvec, quat_mul, quat_normalize
+from spark.rotation import quat_angle, quat_from_rotvec, quat_mul, quat_normalize
 
 PITCH_ROLL_YAW = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, 1]])
 HIP = Tree(
@@ -63,3 +65,14 @@ def test_what_carries_some_links_is_turned_as_where_all_are() -> None:
     np.testing.assert_array_equal(some.angles[:, chain], whole.angles[:, chain])
     assert np.abs(whole.angles[:, chain]).max() > 0.1
     assert not np.delete(some.angles, chain, axis=1).any()
+
+
+def test_an_arm_goes_over_to_the_way_that_reaches_though_that_takes_a_jump() -> None:
+    """It hangs aside, and is then raised ahead for half a second: on the way that it is on, its
+    second hinge would be 0.8 rad beyond its limit, and so would the arm be from where it points."""
+    shoulder = replace(HIP, lower=np.array([-3.1, -1.6, -3.1]), upper=np.array([2.7, 2.2, 2.6]))
+    raised = np.concatenate([np.zeros(20), np.linspace(0, 1, 4), np.ones(10)])[:, None]
+    wanted = turned((1 - raised) * [0.9, 1.4, 0.0] + raised * [1.2, 3.0, 0.3])
+    away = quat_angle(wanted, turned(_hinge_angles(shoulder, (0, 1, 2), wanted)))
+    assert away[:20].max() < 1e-6
+    assert away[-10:].max() < 1e-6
