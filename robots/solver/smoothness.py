@@ -11,8 +11,11 @@ from robots.least_squares import PointAcceleration, Smoothness, second_differenc
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.dynamics import center_of_mass, com_jacobian
+from robots.solver.haste import WINDOW, limb_dofs
+from robots.solver.targets import Targets
 from robots.solver.weights import (
     AVOIDANCE_CUTOFF,
+    JERK_SHARE,
     LEG_SHARE,
     MAX_HINGE_SPEED,
     MAX_JERK,
@@ -26,8 +29,6 @@ from robots.solver.weights import (
 from robots.tree import Coordinates, forward_kinematics
 from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
-
-_JERK_WINDOW = 0.15  # [s] before and after a frame over which its jerk is averaged
 
 
 def smoothness_of(
@@ -85,20 +86,24 @@ def com_acceleration(
 
 
 def jerk_stiffening(
-    robot: Morphology, q: Coordinates, frame_time: float
+    robot: Morphology, targets: Targets, q: Coordinates
 ) -> Float[np.ndarray, "A D"]:
     """By what the acceleration weights of hinges are multiplied where these are too jerky: the RMS
-    jerk around, over `MAX_JERK`; at least 1."""
-    tree = robot.tree
+    jerk around, over `MAX_JERK` or, of a limb, over a share of the source's where that is more; at
+    least 1."""
+    tree, frame_time = robot.tree, targets.frame_time
     out = np.ones((max(len(q) - 2, 0), tree.nv))
     hinges = ~tree.balls
     if len(q) > 3:
         jerk = np.diff(q.angles[:, hinges], 3, axis=0) / frame_time**3
-        window = max(1, 2 * round(_JERK_WINDOW / frame_time) + 1)
+        window = max(1, 2 * round(WINDOW / frame_time) + 1)
         mean = uniform_filter1d(jerk**2, window, axis=0, mode="nearest")
         rms = np.sqrt(np.maximum(mean, 0.0))
         rms = np.concatenate([rms[:1], rms])
-        out[:, tree.dof_starts[hinges]] = np.maximum(rms / MAX_JERK, 1.0)
+        most = np.full((len(q) - 2, tree.nv), MAX_JERK)
+        for dofs, jerk_of_source in zip(limb_dofs(robot), targets.jerks[1:-1].T, strict=True):
+            most[:, dofs] = np.maximum(MAX_JERK, JERK_SHARE * jerk_of_source)[:, None]
+        out[:, tree.dof_starts[hinges]] = np.maximum(rms / most[:, tree.dof_starts[hinges]], 1.0)
     return out
 
 

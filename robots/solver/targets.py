@@ -10,6 +10,7 @@ from robots.model.morphology import Morphology
 from robots.model.shapes import surface
 from robots.solver.contacts import has_feet, schedule, touching_joint
 from robots.solver.ground import Climb, level_climb, under_soles
+from robots.solver.haste import limb_jerks
 from robots.solver.palms import laid, resting_palms
 from robots.solver.trunk import bowing
 from robots.tree import forward_kinematics
@@ -39,9 +40,10 @@ class Targets:
     holds the body; `com_acceleration`, the source's, scaled [m/s²]; `part_paths` and `feet`, the
     paths of the source's parts, and of its heels and toes, over the floor [m]; `part_ground`, how
     high that under each part is, `ground` and `floor`, those of each sole (`GroundUnderSoles`), and
-    `clearance`, how high the source's soles are over it, scaled; `seats`, how high the hips are
-    where the body sits on something, else 0 [m]; `hands`, from the right hand to
-    the left [m]. `com` [m] is planned where it is known.
+    `clearance`, how high the source's soles are over it, scaled; `jerks`, how jerky the source's
+    limbs are (`robots.solver.haste`); `seats`, how high the hips are where the body sits on
+    something, else 0 [m]; `hands`, from the right hand to the left [m]. `com` [m] is planned where
+    it is known.
     """
 
     frame_time: float
@@ -60,6 +62,7 @@ class Targets:
     com_acceleration: Float[np.ndarray, "T 3"]
     feet: Float[np.ndarray, "T S 2 2"]
     clearance: Float[np.ndarray, "T S"]
+    jerks: Float[np.ndarray, "T 4"]
     ground: Float[np.ndarray, "T S"]
     floor: Float[np.ndarray, "T S"]
     seats: Float[np.ndarray, "T"]
@@ -103,6 +106,7 @@ class Targets:
             com_acceleration=self.com_acceleration[frames],
             feet=self.feet[frames],
             clearance=self.clearance[frames],
+            jerks=self.jerks[frames],
             ground=self.ground[frames],
             floor=self.floor[frames],
             seats=self.seats[frames],
@@ -123,6 +127,7 @@ def targets_of(
     world, hips, notes = poses_of(source, positions, robot)
     rig = source.rig
     own_chest = robot.rig.chest
+    bones = bone_directions(rig, positions, source.rotations)
     paths = source_feet(source, positions, robot)
     clearance = source_clearance(source, positions, robot)
     climb = level_climb(source) if climb is None else climb
@@ -142,7 +147,8 @@ def targets_of(
         world=world,
         chest=quat_mul(source.rotations[:, rig.chest], robot.rig.tpose[own_chest]),
         hips=hips,
-        bones=bone_directions(rig, positions, source.rotations),
+        bones=bones,
+        jerks=limb_jerks(bones, source.frame_time),
         contacts=touches.feet,
         parts=touches.parts,
         rests=touches.rests,
