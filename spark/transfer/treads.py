@@ -154,9 +154,31 @@ def _ground_under(
         on_floor = heights[i] < SAME_HEIGHT * scale
         stands[start:stop, k] = on_floor or beside.any()
         ground[start:stop, k] = 0.0 if on_floor else heights[i]
+    levels = np.array([0.0, *heights[known]])
     for k in range(feet):
-        ground[:, k] = between_contacts(ground[:, k, None], stands[:, k], ways[:, k])[:, 0]
+        told = _with_ends(stands[:, k], ground[:, k], lowest[:, k], levels, SAME_HEIGHT * scale)
+        ground[:, k] = between_contacts(ground[:, k, None], told, ways[:, k])[:, 0]
     return ways, stands, ground
+
+
+def _with_ends(
+    stands: Bool[np.ndarray, "T"],
+    ground: Float[np.ndarray, "T"],
+    lowest: Float[np.ndarray, "T"],
+    levels: Float[np.ndarray, "L"],
+    margin: float,
+) -> Bool[np.ndarray, "T"]:
+    """When the ground under a foot is known: where it stands, and at an end of the clip that it
+    comes from, or goes to, lower than where it stands next to that, by more than `margin` [m].
+    What is below it there, the highest of the known `levels` [m], is written into `ground`."""
+    told, at = stands.copy(), np.flatnonzero(stands)
+    if not len(at):
+        return told
+    for end, swing, nearest in ((0, slice(at[0]), at[0]), (-1, slice(at[-1] + 1, None), at[-1])):
+        low = lowest[swing].min(initial=np.inf)
+        if low < ground[nearest] - margin:
+            told[end], ground[end] = True, levels[levels <= low].max(initial=0.0)
+    return told
 
 
 def feet_by_side(rig: Rig, motion: Motion) -> dict[str, Bool[np.ndarray, "T"]]:

@@ -57,6 +57,19 @@ def test_who_stands_on_a_box_does_so_at_its_height() -> None:
     np.testing.assert_allclose(treads.heights[t], BOX / 2, atol=0.05)
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_clip_that_ends_on_the_way_down_has_the_floor_below(turned: bool) -> None:
+    """Or begins on the way up: no foot steps there on the air."""
+    down = onto_box().frames(0, 172)  # 0.13 s before it lands
+    if turned:
+        down = replace(down, hips=down.hips[::-1])
+    treads = treads_of(down)
+    end = 0 if turned else -1
+    np.testing.assert_allclose(treads.heights[end], 0.0, atol=1e-9)
+    np.testing.assert_allclose(treads.heights.max(), BOX, atol=1e-9)
+    assert not treads.stands[end].any()
+
+
 def test_what_is_no_higher_than_floors_are_off_is_no_step() -> None:
     assert treads_of(onto_box(0.08)).level
     assert not treads_of(onto_box(0.15)).level
