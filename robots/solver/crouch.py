@@ -16,6 +16,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from robots.model.morphology import Morphology
 from robots.solver.trunk import beyond_flexion
+from spark.blocks import in_blocks
 from spark.rig.roles import Group
 from spark.rotation import quat_rotate
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
@@ -25,51 +26,68 @@ from spark.transfer.seats import Seat
 _SHARE = 0.5  # of what hips can't flex, that the thighs give back
 _EASE = 0.1  # [s] standard deviation of the Gaussian that the hips' rise is smoothed by
 _STRAIGHT = 0.98  # of the leg's length up to which it is stretched
-_HALVINGS = 12  # of the stretch that the rise is searched in
+_HALVINGS = 8  # of the stretch that the rise is searched in
 _UP = np.array([0.0, 0.0, 1.0])
 
 
 def less_deep(source: CanonicalMotion, robot: Morphology, seats: Sequence[Seat]) -> CanonicalMotion:
     """`source` with its hips as much higher as the robot's own allow less; as it is where they flex
     far enough, without legs, and where it sits on something."""
-    legs = [leg for side in (Group.LEFT_LEG, Group.RIGHT_LEG) if (leg := leg_of(source.rig, side))]
-    positions = canonical_positions(source)
-    excess = beyond_flexion(source, positions, robot)
+    sides = (leg_of(source.rig, side) for side in (Group.LEFT_LEG, Group.RIGHT_LEG))
+    legs = [leg for leg in sides if leg is not None]
+    seated = np.zeros((len(source), 1), dtype=bool)
     for seat in seats:
-        excess[seat.start : seat.stop] = 0.0
-    if not legs or not excess.any():
+        seated[seat.start : seat.stop] = True
+
+    def risen(block: slice) -> Float[np.ndarray, "T 1"]:
+        part = source.picked(block)
+        positions = canonical_positions(part)
+        excess = np.where(seated[block], 0.0, beyond_flexion(part, positions, robot))
+        if not legs or not excess.any():
+            return np.zeros_like(excess)
+        lowered = _SHARE * excess
+        return np.max([_rise(leg, part.rotations, positions, lowered) for leg in legs], axis=0)
+
+    rise = in_blocks(risen, len(source))
+    if not rise.any():
         return source
-    rise = np.max([_rise(source, positions, leg, _SHARE * excess) for leg in legs], axis=0)
     rise = gaussian_filter1d(rise, _EASE / source.frame_time, axis=0, mode="nearest")
     raised = replace(source, hips=source.hips + rise * _UP)
     return move_ankles(raised, [(leg, -rise * _UP) for leg in legs])
 
 
 def _rise(
-    source: CanonicalMotion,
-    positions: Float[np.ndarray, "T J 3"],
     leg: Leg,
+    rotations: Float[np.ndarray, "T J 4"],
+    positions: Float[np.ndarray, "T J 3"],
     lowered: Float[np.ndarray, "T 1"],
 ) -> Float[np.ndarray, "T 1"]:
-    """By how much [m] hips are raised over an ankle that stays, so that the thigh is raised less by
-    an angle [rad], or until the leg is straight."""
+    """By how much [m] hips come up over an ankle that stays, so that the thigh is raised less by an
+    angle [rad], or until the leg is straight. Joints are at `positions` [m] and turned by
+    `rotations` since the T-pose."""
     hip, knee, ankle = (positions[:, j] for j in leg[:3])
     thigh, shank = knee - hip, ankle - knee
-    upper_leg = source.rotations[:, leg.upper_leg]
+    upper_leg = rotations[:, leg.upper_leg]
     length = np.linalg.norm(thigh, axis=1, keepdims=True)
     longest = _STRAIGHT * (length + np.linalg.norm(shank, axis=1, keepdims=True))
     away = ankle - hip
     # How far the ankle may sink under the hip until the leg is as long.
     across = (away[:, :2] ** 2).sum(axis=1, keepdims=True)
     most = np.sqrt(np.maximum(longest**2 - across, 0.0)) + away[:, 2:]
+
+    def raised(rise: Float[np.ndarray, "T 1"]) -> Float[np.ndarray, "T 1"]:
+        swing, _ = leg_rotations(thigh, shank, upper_leg, -rise * _UP, leg.bends_about)
+        return np.arccos(np.clip(-quat_rotate(swing, thigh)[:, 2:] / length, -1.0, 1.0))
+
     least, most = np.zeros_like(most), np.maximum(most, 0.0)
-    wanted = np.arccos(np.clip(-thigh[:, 2:] / length, -1.0, 1.0)) - lowered
+    high, low = raised(least), raised(most)
+    wanted = np.maximum(high - lowered, low)
     for _ in range(_HALVINGS):
         middle = (least + most) / 2
-        swing, _ = leg_rotations(thigh, shank, upper_leg, -middle * _UP, leg.bends_about)
-        raised = np.arccos(np.clip(-quat_rotate(swing, thigh)[:, 2:] / length, -1.0, 1.0))
-        least, most = (
-            np.where(raised > wanted, middle, least),
-            np.where(raised > wanted, most, middle),
-        )
-    return np.where(lowered > 0, least, 0.0)
+        between = raised(middle)
+        above = between > wanted
+        least, high = np.where(above, middle, least), np.where(above, between, high)
+        most, low = np.where(above, most, middle), np.where(above, low, between)
+    # Halves alone would leave steps of a fraction of a millimetre from frame to frame.
+    share = (high - wanted) / np.maximum(high - low, 1e-12)
+    return np.where(lowered > 0, least + np.clip(share, 0.0, 1.0) * (most - least), 0.0)
