@@ -4,19 +4,21 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from robots.model.mjcf import Mjcf
+from robots.model.morphology import Morphology
+from spark.kinematics import forward
+from spark.rig.feet import sole_positions
 
 _TIME = 0.5  # [s] that the robot takes from the one pose to the other
 
 
 class Handover:
     """Keeps a robot's coordinates going where what they follow begins anew: the robot stays where
-    it stands, and takes half a second to its new pose."""
+    it stands, on its soles, and takes half a second to its new pose."""
 
-    def __init__(self, robot: Mjcf, fps: float) -> None:
-        self._model = robot.model
-        base = int(robot.model.jnt_qposadr[robot.free_joint])
-        self._place = slice(base, base + 2)
+    def __init__(self, robot: Morphology, fps: float) -> None:
+        self._robot, self._model = robot, robot.mjcf.model
+        base = int(self._model.jnt_qposadr[robot.mjcf.free_joint])
+        self._place, self._height = slice(base, base + 2), base + 2
         self._steps = max(round(_TIME * fps), 1)
         self._last: Float[np.ndarray, nq] | None = None
         self._before: Float[np.ndarray, nq] | None = None
@@ -50,4 +52,12 @@ class Handover:
         out, way = a.copy(), np.zeros(self._model.nv)
         mujoco.mj_differentiatePos(self._model, way, 1.0, a, b)
         mujoco.mj_integratePos(self._model, out, way, share)
+        begin, now, end = (self._lowest(qpos) for qpos in (a, out, b))
+        out[self._height] += begin + share * (end - begin) - now
         return out
+
+    def _lowest(self, qpos: Float[np.ndarray, "nq"]) -> float:
+        """The height of the lowest point of the soles [m]."""
+        pose = forward(self._robot.motion(self._robot.from_qpos(qpos[None]), 1.0))
+        soles = (sole_positions(sole, *pose)[..., 2].min() for sole in self._robot.soles)
+        return float(min(soles, default=qpos[self._height]))

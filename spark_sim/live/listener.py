@@ -29,6 +29,7 @@ _MOST_WAITING = 256  # packets that are read at once: of a flood, the newest
 _MOST_LATE = 32  # packets that are read though it is late
 _KEPT = 256  # poses that nobody asks for
 _SETTLE = 0.2  # [s] from the first whole pose on: optional bones may come in packets of their own
+_HIPS = 0.05, 5.0  # [m] over the floor, of who stands: dolls and giants
 _STAMP = 35  # SO_TIMESTAMPNS of Linux: when a packet came to the machine, not to this program
 _STAMP_FORM = struct.Struct("@ll")  # [s, ns]
 
@@ -71,6 +72,7 @@ class Listener:
         self._whole = np.inf
         self._arrivals: deque[Arrival] = deque(maxlen=_KEPT)
         self._skeleton: Motion | None = None
+        self._newest: Frame
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         if sys.platform == "linux":
             self._socket.setsockopt(socket.SOL_SOCKET, _STAMP, 1)
@@ -150,10 +152,10 @@ class Listener:
             self._whole = now
 
     def _keep(self, came: float) -> None:
-        """Keep the newest pose for `arrivals`."""
-        if self._skeleton is not None:
-            frame = Frame(*self.pose.frame(self._skeleton.skeleton))
-            self._arrivals.append(Arrival(frame, came, self.pose.clock))
+        """Keep the newest pose, unless it is another body's."""
+        if self._skeleton is not None and not self.changed:
+            self._newest = Frame(*self.pose.frame(self._skeleton.skeleton))
+            self._arrivals.append(Arrival(self._newest, came, self.pose.clock))
 
     def wait(self, fps: float = 60.0, timeout: float | None = None) -> Clip:
         """Wait until the whole person was heard of; one frame of them in their T-pose, which a
@@ -170,9 +172,10 @@ class Listener:
 
     def person(self, fps: float) -> Clip:
         """The person as they are now, in their T-pose on the floor: the source of the frames that
-        follow."""
+        follow. Raises `ConventionError` where no person is of that size."""
         check_frame_time(1.0 / fps if fps > 0 else np.inf)
         motion = self.pose.tpose(1.0 / fps)
+        _check_size(float(motion.root_pos[0, 2]))
         rig = understand(motion)
         lowest = min(
             float(sole_positions(sole, rig.tpose_positions, rig.tpose)[:, 2].min())
@@ -187,11 +190,12 @@ class Listener:
         return Clip(recording, "the sender", given_rig=rig)
 
     def frame(self) -> Frame:
-        """The newest pose of the person that `wait` or `person` gave."""
+        """The newest pose of the person that `wait` or `person` gave; where another body is sent,
+        the last one of theirs."""
         if self._skeleton is None:
             raise ConventionError("no person is known yet; call wait() first")
         self.fresh = False
-        return Frame(*self.pose.frame(self._skeleton.skeleton))
+        return self._newest
 
     def arrivals(self) -> list[Arrival]:
         """The poses that came since this was called last, in their order; the first is the one that
@@ -215,3 +219,13 @@ class Listener:
         if self.pose.dropped:
             return f"; {self.pose.dropped} packets were none of this protocol"
         return "".join(f"; {note}" for note in self.pose.notes if "no pose" in note)
+
+
+def _check_size(hips: float) -> None:
+    """Hips at such a height [m] in the T-pose are someone's."""
+    low, high = _HIPS
+    if not low < hips < high:
+        raise ConventionError(
+            f"in its T-pose the sender's hips are {hips:.3g} m high; expected metres, {low:g} to "
+            f"{high:g}, of an adult 0.9: set the sender to metres"
+        )

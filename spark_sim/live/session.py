@@ -57,7 +57,7 @@ class Session:
         if record is not None:
             self._journal = Journal(record, self._robot, name, 1.0 / fps)
         self._retargeter: Retargeter | None = None
-        self._handover = Handover(self._robot.on_robot.robot.mjcf, fps)
+        self._handover = Handover(self._robot.on_robot.robot, fps)
         self._latencies: deque[float] = deque(maxlen=_COUNTED)
         self._silent: set[str] = set()
         self._looked, self._same = 0.0, np.inf
@@ -113,6 +113,8 @@ class Session:
         except SparkSimError as error:  # the next poses may be better
             self._once(f"who is sent can't be followed: {error}")
             return
+        if self.frames:
+            self._note("the sender's body is another now")
         self._handover.begin()
         self._began = min(self._began, time.monotonic())
         for note in self._listener.pose.notes:
@@ -162,7 +164,6 @@ class Session:
         if not self._listener.changed:
             self._same = now
         elif now - min(self._same, now) > _CHANGED_FOR:
-            self._note("the sender's body is another now")
             self._begin()
         else:
             self._same = min(self._same, now)

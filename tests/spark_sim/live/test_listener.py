@@ -63,6 +63,31 @@ def test_poses_come_with_their_times(out: socket.socket) -> None:
         assert not person.fresh
 
 
+def test_the_poses_of_another_body_are_not_those_of_this_person(out: socket.socket) -> None:
+    with out, Listener("vmc://127.0.0.1:0") as person:
+        out.sendto(vmc.packet({}, 1.0), ("127.0.0.1", person.port))
+        person.wait(fps=60.0, timeout=10.0)
+        person.arrivals()
+        for k, size in enumerate((0.6, 0.6, 1.0)):
+            out.sendto(vmc.packet({}, 2.0 + k, size=size), ("127.0.0.1", person.port))
+            person.listen(0.1)
+            assert person.changed == (size != 1.0)
+            assert person.frame().root_pos[2] == pytest.approx(0.95, abs=1e-6)
+        assert len(person.arrivals()) == 1
+        out.sendto(vmc.packet({}, 5.0, size=0.6), ("127.0.0.1", person.port))
+        person.listen(0.1)
+        person.person(60.0)
+        assert person.frame().root_pos[2] == pytest.approx(0.57, abs=1e-6)
+
+
+@pytest.mark.parametrize("unit", [100.0, 1000.0, 0.01])
+def test_nobody_is_so_tall(out: socket.socket, unit: float) -> None:
+    with out, Listener("vmc://127.0.0.1:0") as person:
+        out.sendto(vmc.packet({}, 1.0, size=unit), ("127.0.0.1", person.port))
+        with pytest.raises(ConventionError, match="hips are .* m high; .* to metres"):
+            person.wait(fps=60.0, timeout=10.0)
+
+
 def test_of_a_flood_the_newest_are_taken(
     out: socket.socket, monkeypatch: pytest.MonkeyPatch
 ) -> None:

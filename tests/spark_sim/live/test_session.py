@@ -15,6 +15,8 @@ from scipy.spatial.transform import Rotation
 
 import spark_sim
 from spark.errors import SkeletonError
+from spark.kinematics import forward
+from spark.rig.feet import sole_positions
 from spark_sim.live import session as module
 from spark_sim.live.journal import ENDING, Journal, recover
 from spark_sim.live.listener import Listener
@@ -118,6 +120,37 @@ def test_a_sender_that_changes_its_body_and_jumps(tmp_path: Path) -> None:
     moved = np.abs(np.diff(qpos[:, 7:], axis=0)).max(1)
     assert moved.max() < 0.6  # [rad a step]: no faster than hinges may be
     assert np.abs(qpos[-1, 7:] - qpos[12, 7:]).max() > 0.8
+
+
+@pytest.mark.parametrize("sizes", [(0.6, 1.0), (1.15, 0.9), (1.0, 100.0)])
+def test_a_body_of_another_size_leaves_the_robot_on_the_floor(
+    tmp_path: Path, sizes: tuple[float, float]
+) -> None:
+    """Who stands goes on standing, whatever their size; a sender that goes over to centimetres is
+    left out and told, and its person followed again in metres."""
+    out, told = tmp_path / "out.npz", list[str]()
+    arms = {
+        "LeftUpperArm": Rotation.from_euler("z", 70, degrees=True),
+        "RightUpperArm": Rotation.from_euler("z", -70, degrees=True),
+    }
+
+    def packets(step: int, clock: float) -> list[bytes]:
+        return [vmc.packet(arms, clock, size=sizes[15 < session.frames < 45])]
+
+    listener = Listener("vmc://127.0.0.1:0")
+    session = Session(listener, "robot", FPS, told.append, record=out)
+    with listener, session, running(session):
+        send(listener.port, packets, until=lambda: session.frames > 75)
+    clip = spark_sim.load(out, robot="robot")
+    assert isinstance(clip, spark_sim.RobotClip)
+    positions, world = forward(clip.motion)
+    low = np.array([sole_positions(s, positions, world)[..., 2].min(1) for s in clip.rig.soles])
+    assert np.abs(low).max() < 0.02  # [m]
+    assert np.abs(np.diff(clip.qpos[:, :3], axis=0)).max() < 0.01  # [m a step]
+    assert np.abs(np.diff(clip.qpos[:, 7:], axis=0)).max() < 0.4  # [rad a step]
+    refused = [each for each in told if "set the sender to metres" in each]
+    changed = [each for each in told if "body is another now" in each]
+    assert (len(refused), len(changed)) == ((1, 0) if max(sizes) > 10 else (0, 2))
 
 
 def test_another_body_that_cannot_be_followed_ends_nothing(
