@@ -25,6 +25,7 @@ from robots.stream.frame_targets import (
     move_on,
     raised,
 )
+from robots.stream.possible import Possible
 from robots.stream.quiet import Quieter
 from robots.stream.resting import RestTracker, held_points
 from robots.stream.throw import Throw
@@ -54,6 +55,7 @@ class Stream:
         self._window = Window(robot, self._terms, frame_time, fixed=_FIXED, free=LATENCY + 1)
         self._throw = Throw(self._reader.scale, source.hip_height, frame_time)
         self._quieter = Quieter(source, frame_time, ground.noise)
+        self._possible = Possible(self._reader)
         self._targets: FrameTargets  # of the window's free frames
         self._contacts: ContactTracker
         self._rests: RestTracker
@@ -65,6 +67,7 @@ class Stream:
         self._window.reset()
         self._throw.reset()
         self._quieter.reset()
+        self._possible.reset()
         self._q = np.zeros((_FRAMES, self.robot.mjcf.model.nq))
         self._begun: list[FrameTargets] = []
         self._detours = Detours(self._reader, self._terms, self.frame_time)
@@ -87,6 +90,7 @@ class Stream:
     def _step(self, frame: Frame) -> Float[np.ndarray, "nq"]:
         try:
             targets = self._reader.targets(frame)
+            self._possible.check(frame, targets)
             quiet = self._quieter.follow(frame, targets.feet)
             targets = targets if quiet is None else self._reader.targets(quiet)
         except FrameError as error:

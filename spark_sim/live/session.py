@@ -1,5 +1,6 @@
 """A person's pose from the network on a robot, step by step: what `spark-sim live` runs."""
 
+import re
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -26,6 +27,7 @@ _LOOK_EVERY = 0.1  # [s] at silent bones, and at the sender's body
 _CHANGED_FOR = 0.3  # [s] that another body is sent for until it is believed
 _COUNTED = 100_000  # latencies, the last ones
 _SLOW_AFTER, _SLOW_SHARE = 120, 0.1  # steps, and how many of them were left out: it is said
+_NUMBER = re.compile(r"\d[\d.e+]*")
 _SURE_AFTER = 120  # steps: what the sender's rate is
 
 
@@ -195,8 +197,10 @@ class Session:
         return f"{self._buffer.rate:.0f} poses a second arrive, {self._fps:g} steps are made"
 
     def _once(self, text: str) -> None:
-        if text not in self._told:
-            self._told.add(text)
+        """Say what was not said before, be it with other numbers."""
+        kind = _NUMBER.sub("", text)
+        if kind not in self._told:
+            self._told.add(kind)
             self._note(text)
 
     def _say_slow(self) -> None:

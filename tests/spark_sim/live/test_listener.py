@@ -84,7 +84,7 @@ def test_the_poses_of_another_body_are_not_those_of_this_person(out: socket.sock
 def test_nobody_is_so_tall(out: socket.socket, unit: float) -> None:
     with out, Listener("vmc://127.0.0.1:0") as person:
         out.sendto(vmc.packet({}, 1.0, size=unit), ("127.0.0.1", person.port))
-        with pytest.raises(ConventionError, match="hips are .* m high; .* to metres"):
+        with pytest.raises(ConventionError, match=r"hips are .* m high; .* to metres"):
             person.wait(fps=60.0, timeout=10.0)
 
 

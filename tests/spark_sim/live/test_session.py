@@ -153,6 +153,25 @@ def test_a_body_of_another_size_leaves_the_robot_on_the_floor(
     assert (len(refused), len(changed)) == ((1, 0) if max(sizes) > 10 else (0, 2))
 
 
+def test_a_root_in_another_unit_is_left_out_and_told_once() -> None:
+    """Its bones are in metres: nothing but the heights tells."""
+    told = list[str]()
+
+    def packets(step: int, clock: float) -> list[bytes]:
+        unit = 100.0 if session.frames > 15 else 1.0
+        return [vmc.packet({}, clock, hips=(0.0, (0.95 + 0.1 * np.sin(9 * clock)) * unit, 0.0))]
+
+    def passed() -> bool:
+        return bool(told) and time.monotonic() > began + 4.0
+
+    listener, began = Listener("vmc://127.0.0.1:0"), time.monotonic()
+    session = Session(listener, "robot", FPS, told.append)
+    with listener, session, running(session):
+        send(listener.port, packets, until=passed)
+    (left_out,) = (each for each in told if "left out" in each)
+    assert "it seems to be in centimetres: divide it by 100" in left_out
+
+
 def test_another_body_that_cannot_be_followed_ends_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
