@@ -1,4 +1,4 @@
-"""What frames of a person can't be: in another unit, with another axis up, quaternions turned round.
+"""What frames of a person can't be: in another unit, with another axis up, quaternions as xyzw.
 
 A source says how tall it is and where its floor is. Who lies, leaps, squats, stands on a box or far
 away is none of this; heights that no one comes to are.

@@ -13,6 +13,8 @@ from robots.solver.projection import project
 from robots.solver.window_poses import WindowPoses
 from robots.solver.window_targets import PointTargets
 from robots.solver.window_terms import Terms
+from robots.stream.beginning import Beginning
+from robots.stream.coupling import MAX_ACCELERATION
 from robots.stream.detour import Detours
 from robots.stream.footing import ContactTracker
 from robots.stream.frame_targets import (
@@ -39,6 +41,8 @@ _FIXED = 3  # frames before the free ones
 _FRAMES = _FIXED + LATENCY + 1
 _SHIFTED = np.array([*range(1, _FRAMES), _FRAMES - 1])
 _FIRST_ITERATIONS = 20
+_FEW_ITERATIONS = 5  # where it was posed nearly alike before
+_ABOUT, _SETTLED = 0.02, 1e-4  # [rad, m] after a shorter step: nearly at rest, and at rest
 
 
 class Stream:
@@ -55,6 +59,7 @@ class Stream:
         self._window = Window(robot, self._terms, frame_time, fixed=_FIXED, free=LATENCY + 1)
         self._throw = Throw(self._reader.scale, source.hip_height, frame_time)
         self._quieter = Quieter(source, frame_time, ground.noise)
+        self._beginning = Beginning(robot.mjcf.model, self._terms, frame_time)
         self._possible = Possible(self._reader)
         self._targets: FrameTargets  # of the window's free frames
         self._contacts: ContactTracker
@@ -63,11 +68,12 @@ class Stream:
 
     def reset(self) -> None:
         """Forget what has been seen: the next frame is a first one."""
-        self._count = 0
+        self._count, self._moves = 0, False
         self._window.reset()
         self._throw.reset()
         self._quieter.reset()
         self._possible.reset()
+        self._beginning.reset()
         self._q = np.zeros((_FRAMES, self.robot.mjcf.model.nq))
         self._begun: list[FrameTargets] = []
         self._detours = Detours(self._reader, self._terms, self.frame_time)
@@ -97,22 +103,43 @@ class Stream:
             raise FrameError(f"frame {self._count} of the stream: {error}") from error
         thrown = self._throw.follow(targets.hips[2] / self._reader.scale)
         targets = raised(targets, thrown)
-        if self._count > LATENCY:
-            move_on(self._targets, targets)
-            q = self._q[_SHIFTED]
-            poses = self._window.move_on(q)
-            bones, soles = self._terms.bones_and_soles(poses)
-            foot_targets = self._contacts.update(targets, soles[0], self.foot_noise)
-            resting = self._rests.update(targets, poses)
-            self._q = self._solved(q, poses, bones[0], foot_targets, resting)
-        else:
-            self._begun.append(targets)
-            if not self._count:
-                self._q = self._first(targets)
-            if self._count == LATENCY:
-                self._q = self._set_off()
         self._count += 1
-        return self._q[_FIXED].copy()
+        if not self._moves:
+            return self._begin(targets)
+        move_on(self._targets, targets)
+        q = self._q[_SHIFTED]
+        poses = self._window.move_on(q)
+        bones, soles = self._terms.bones_and_soles(poses)
+        foot_targets = self._contacts.update(targets, soles[0], self.foot_noise)
+        resting = self._rests.update(targets, poses)
+        self._q = self._solved(q, poses, bones[0], foot_targets, resting)
+        return self._beginning.follow(self._q[_FIXED])
+
+    def _begin(self, targets: FrameTargets) -> Float[np.ndarray, "nq"]:
+        """The answer to one of the first frames: the robot waits until there are enough to set
+        off, or one more where the first of them was long ago."""
+        self._begun.append(targets)
+        if self._count == 1:
+            self._q = self._first(targets)
+            self._beginning.wait(self._q[_FIXED])
+        if self._count == LATENCY + 1 and self._is_late():
+            first, second, *_ = self._begun
+            self._q[:, :3] += second.hips - first.hips
+            self._q = self._posed(self._q, second, _FEW_ITERATIONS)
+            del self._begun[0]
+        if len(self._begun) <= LATENCY:
+            return self._beginning.waits
+        self._moves = True
+        self._q = self._set_off()
+        self._beginning.set_off(self._q[_FIXED])
+        return self._beginning.follow(self._q[_FIXED])
+
+    def _is_late(self) -> bool:
+        """Whether the source moved so much farther before its second frame than after it that it
+        can't have been one frame's time."""
+        first, second, third = (frame.hips for frame in self._begun)
+        change = float(np.linalg.norm(third - 2 * second + first))
+        return change > MAX_ACCELERATION * self.frame_time**2
 
     def _solved(
         self,
@@ -159,10 +186,18 @@ class Stream:
         robot = self.robot
         projected = project(robot, quat_from_matrix(targets.world)[None], targets.hips[None])
         q = robot.to_qpos(projected)[np.zeros(_FRAMES, dtype=int)]
-        points = sum(map(len, robot.soles))
+        q = self._posed(q, targets, _FIRST_ITERATIONS)
+        held = self._tracked(targets, self._terms.poses(q[-1:]))
+        alike = joined([targets] * (LATENCY + 1))
+        q[:] = self._window.settle(q, alike, *held, _FIRST_ITERATIONS, until=_SETTLED)[-1]
+        return q
+
+    def _posed(
+        self, q: Float[np.ndarray, "W nq"], targets: FrameTargets, steps: int
+    ) -> Float[np.ndarray, "W nq"]:
+        """All frames in one pose as it comes, wherever its feet are."""
+        points = sum(map(len, self.robot.soles))
         nowhere = PointTargets(*np.zeros((2, LATENCY + 1, points, 3)))
         alike = joined([targets] * (LATENCY + 1))
-        q[:] = self._window.settle(q, alike, nowhere, None, _FIRST_ITERATIONS)[-1]
-        held = self._tracked(targets, self._terms.poses(q[-1:]))
-        q[:] = self._window.settle(q, alike, *held, _FIRST_ITERATIONS)[-1]
-        return q
+        settled = self._window.settle(q, alike, nowhere, None, steps, until=_ABOUT)
+        return settled[np.full(_FRAMES, -1)]

@@ -101,8 +101,11 @@ class Window:
         foot_targets: PointTargets,
         resting: PointTargets | None,
         steps: int,
+        *,
+        until: float = 0.0,
     ) -> Float[np.ndarray, "T nq"]:
-        """`q` with its free frames after some steps, each frame for itself."""
+        """`q` with its free frames after so many steps, or a step shorter than `until` [rad, m],
+        each frame for itself."""
         terms, scale = self._terms, self._firmness.scale
         asked = terms.asked(targets, foot_targets, resting)
         for _ in range(steps):
@@ -110,7 +113,9 @@ class Window:
             poses = terms.poses(free)
             candidates = terms.candidates(poses.at(slice(-1, None)))
             H, g = terms.linearize(free, poses, asked, terms.hinges.at_tpose, candidates, scale)
-            q, _ = self._moved(q, self._whole(H), g, _LONE_DAMPING)
+            q, length = self._moved(q, self._whole(H), g, _LONE_DAMPING)
+            if length < until:
+                break
         return q
 
     def set_in_motion(

@@ -1,0 +1,65 @@
+"""From a robot that waits in a source's first pose to one that moves as the source does.
+
+Of one frame it can't be told which feet stand: the pose in which a robot waits for the next frames
+differs from the one in which it sets off, by a centimetre in height. Where the next frame is late,
+the source is elsewhere by then. On the way from one to the other its soles stay on the floor.
+"""
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from robots.solver.window_terms import Terms
+
+_TIME = 0.3  # [s] that it takes, and
+_SPEED = 0.5  # [m/s] with which a robot is moved where that is farther,
+_LONGEST = 1.0  # [s] at most
+
+
+_HEIGHT = 2  # of the base, in qpos
+
+
+class Beginning:
+    """Of a robot of a model, frames `frame_time` [s] apart."""
+
+    def __init__(self, model: mujoco.MjModel, terms: Terms, frame_time: float) -> None:
+        self._model, self._terms, self._frame_time = model, terms, frame_time
+        self.reset()
+
+    def reset(self) -> None:
+        """The robot is where it should be."""
+        self._left, self._steps = 0, 1
+
+    def wait(self, pose: Float[np.ndarray, "nq"]) -> None:
+        """The robot waits in a pose."""
+        self._waits = pose.copy()
+
+    def set_off(self, moves: Float[np.ndarray, "nq"]) -> None:
+        """It should be in another, and moves from now on."""
+        self._away = np.zeros(self._model.nv)
+        mujoco.mj_differentiatePos(self._model, self._away, 1.0, moves, self._waits)
+        time = min(max(_TIME, float(np.linalg.norm(self._away[:3])) / _SPEED), _LONGEST)
+        self._left = self._steps = max(round(time / self._frame_time), 1)
+
+    def follow(self, moves: Float[np.ndarray, "nq"]) -> Float[np.ndarray, "nq"]:
+        """Where it is, on its way to where it should be."""
+        out = moves.copy()
+        if self._left:
+            share = self._left / self._steps
+            share *= share * (3 - 2 * share)
+            mujoco.mj_integratePos(self._model, out, share * self._away, 1.0)
+            self._terms.hinges.clip(out[None])
+            waits, moved, now = map(self._lowest, (self._waits, moves, out))
+            out[_HEIGHT] += moved + share * (waits - moved) - now
+            self._left -= 1
+        return out
+
+    def _lowest(self, qpos: Float[np.ndarray, "nq"]) -> float:
+        """The height of the lowest point of the soles [m]."""
+        heights = self._terms.sole_points(self._terms.poses(qpos[None]))[0, :, 2]
+        return float(heights.min()) if len(heights) else float(qpos[_HEIGHT])
+
+    @property
+    def waits(self) -> Float[np.ndarray, "nq"]:
+        """The pose in which it waits, or did."""
+        return self._waits.copy()
