@@ -42,6 +42,11 @@ class PointTargets:
     positions: Float[np.ndarray, "T P 3"]
     holds: Float[np.ndarray, "T P 3"]
 
+    @property
+    def last(self) -> "PointTargets":
+        """Those of the last frame."""
+        return PointTargets(self.positions[-1:], self.holds[-1:])
+
 
 @dataclass(frozen=True, eq=False)
 class Asked:

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from robots.solver.window_terms import Terms
 
 _TIME = 0.3  # [s] that it takes, and
-_SPEED = 0.5  # [m/s] with which a robot is moved where that is farther,
+_SPEED = 0.3  # [m/s] with which a robot is moved where that is farther,
 _LONGEST = 1.0  # [s] at most
 
 

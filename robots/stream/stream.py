@@ -185,19 +185,17 @@ class Stream:
         """A pose at rest: first as it comes, then with what stands or lies where it is in it."""
         robot = self.robot
         projected = project(robot, quat_from_matrix(targets.world)[None], targets.hips[None])
-        q = robot.to_qpos(projected)[np.zeros(_FRAMES, dtype=int)]
-        q = self._posed(q, targets, _FIRST_ITERATIONS)
-        held = self._tracked(targets, self._terms.poses(q[-1:]))
-        alike = joined([targets] * (LATENCY + 1))
-        q[:] = self._window.settle(q, alike, *held, _FIRST_ITERATIONS, until=_SETTLED)[-1]
-        return q
+        q = self._posed(robot.to_qpos(projected), targets, _FIRST_ITERATIONS)
+        feet, resting = self._tracked(targets, self._terms.poses(q[-1:]))
+        last = feet.last, None if resting is None else resting.last
+        q = self._window.settle(q[-1:], joined([targets]), *last, _FIRST_ITERATIONS, until=_SETTLED)
+        return q[np.zeros(_FRAMES, dtype=int)]
 
     def _posed(
-        self, q: Float[np.ndarray, "W nq"], targets: FrameTargets, steps: int
+        self, q: Float[np.ndarray, "T nq"], targets: FrameTargets, steps: int
     ) -> Float[np.ndarray, "W nq"]:
-        """All frames in one pose as it comes, wherever its feet are."""
-        points = sum(map(len, self.robot.soles))
-        nowhere = PointTargets(*np.zeros((2, LATENCY + 1, points, 3)))
-        alike = joined([targets] * (LATENCY + 1))
-        settled = self._window.settle(q, alike, nowhere, None, steps, until=_ABOUT)
-        return settled[np.full(_FRAMES, -1)]
+        """All frames in one pose as it comes, wherever its feet are; the last of `q` is near it."""
+        nowhere = PointTargets(*np.zeros((2, 1, sum(map(len, self.robot.soles)), 3)))
+        alike = joined([targets]), nowhere, None
+        settled = self._window.settle(q[-1:], *alike, steps, until=_ABOUT)
+        return settled[np.zeros(_FRAMES, dtype=int)]

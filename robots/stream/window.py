@@ -104,12 +104,13 @@ class Window:
         *,
         until: float = 0.0,
     ) -> Float[np.ndarray, "T nq"]:
-        """`q` with its free frames after so many steps, or a step shorter than `until` [rad, m],
-        each frame for itself."""
-        terms, scale = self._terms, self._firmness.scale
+        """`q` with its last frames, those that have targets, after so many steps, or a step shorter
+        than `until` [rad, m], each frame for itself."""
+        terms, count = self._terms, len(targets.hips)
+        scale = self._firmness.scale[-count:]
         asked = terms.asked(targets, foot_targets, resting)
         for _ in range(steps):
-            free = q[-self._free :]
+            free = q[-count:]
             poses = terms.poses(free)
             candidates = terms.candidates(poses.at(slice(-1, None)))
             H, g = terms.linearize(free, poses, asked, terms.hinges.at_tpose, candidates, scale)
@@ -183,7 +184,7 @@ class Window:
         damping: float,
     ) -> tuple[Float[np.ndarray, "T nq"], float]:
         """`q` after one Gauss-Newton step, and the step's largest entry [rad, m]."""
-        free = self._free
+        free = len(g)
         q, g = q.copy(), g.ravel()
         diagonal = whole.reshape(-1)[:: g.size + 1]
         diagonal += damping

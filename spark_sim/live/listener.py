@@ -5,6 +5,7 @@ import struct
 import sys
 import time
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +23,7 @@ from spark.rig.feet import sole_positions
 from spark.rig.rig import understand
 from spark_sim.clips import Clip
 from spark_sim.live.address import SOURCES, parse
+from spark_sim.live.pace import Pace
 
 _POSES: dict[str, type[LivePose]] = {"vmc": VmcPose, "xsens": MvnPose}
 _PACKET = 65535  # bytes, the most of UDP
@@ -29,6 +31,7 @@ _MOST_WAITING = 256  # packets that are read at once: of a flood, the newest
 _MOST_LATE = 32  # packets that are read though it is late
 _KEPT = 256  # poses that nobody asks for
 _SETTLE = 0.2  # [s] from the first whole pose on: optional bones may come in packets of their own
+_PAUSE, _SOON = 0.1, 0.002  # [s] in which nobody listens; and until a pose that is waited for
 _HIPS = 0.05, 5.0  # [m] over the floor, of who stands: dolls and giants
 _STAMP = 35  # SO_TIMESTAMPNS of Linux: when a packet came to the machine, not to this program
 _STAMP_FORM = struct.Struct("@ll")  # [s, ns]
@@ -50,9 +53,8 @@ class Listener:
 
         with spark_sim.Listener("xsens://:9763") as person:
             live = spark_sim.Retargeter(person.wait(fps=60), "unitree_g1")
-            while True:
-                person.listen(1 / 60)
-                qpos = live.step(person.frame())
+            for frame in person.frames(fps=60):
+                qpos = live.step(frame)
 
     Of several poses that come between two steps, the newest counts. A bone that is not heard of
     any more stays as it was. Raises `ConventionError` where the address can't be listened on.
@@ -69,7 +71,7 @@ class Listener:
         """Poses that a newer one followed before `frame` was called."""
         self.flooded = 0
         """Packets that were thrown away, because too many came at once."""
-        self._whole = np.inf
+        self._whole, self._listened = np.inf, time.monotonic()
         self._arrivals: deque[Arrival] = deque(maxlen=_KEPT)
         self._skeleton: Motion | None = None
         self._newest: Frame
@@ -101,7 +103,18 @@ class Listener:
         return time.monotonic() - self._whole >= _SETTLE
 
     def listen(self, seconds: float) -> None:
-        """Take what has come, and what comes within so many seconds."""
+        """Take what has come, and what comes within so many seconds. Where nobody has listened for
+        a while, poses that waited are old, and newer ones found no room: the next one is waited
+        for."""
+        began, last = time.time(), self.arrived
+        self._listen(seconds)
+        if time.monotonic() - self._listened - seconds > _PAUSE:
+            until = time.monotonic() + _PAUSE
+            while last < self.arrived < began and time.monotonic() < until:
+                self._listen(_SOON)
+        self._listened = time.monotonic()
+
+    def _listen(self, seconds: float) -> None:
         until = time.monotonic() + seconds
         waiting: deque[tuple[bytes, float]] = deque(maxlen=_MOST_WAITING)
         while True:
@@ -196,6 +209,15 @@ class Listener:
             raise ConventionError("no person is known yet; call wait() first")
         self.fresh = False
         return self._newest
+
+    def frames(self, fps: float) -> Iterator[Frame]:
+        """The newest pose `fps` times a second, without end; what is over before it is asked for is
+        left out."""
+        pace = Pace(1.0 / fps)
+        while True:
+            self.listen(pace.left)
+            yield self.frame()
+            pace.advance()
 
     def arrivals(self) -> list[Arrival]:
         """The poses that came since this was called last, in their order; the first is the one that

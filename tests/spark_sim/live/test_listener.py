@@ -1,6 +1,7 @@
 """Poses as they come to a port."""
 
 import socket
+import threading
 import time
 
 import numpy as np
@@ -86,6 +87,52 @@ def test_nobody_is_so_tall(out: socket.socket, unit: float) -> None:
         out.sendto(vmc.packet({}, 1.0, size=unit), ("127.0.0.1", person.port))
         with pytest.raises(ConventionError, match=r"hips are .* m high; .* to metres"):
             person.wait(fps=60.0, timeout=10.0)
+
+
+def walking(port: int, seconds: float) -> threading.Thread:
+    """Sends the time as a place, a hundred times a second, meanwhile."""
+    began = time.monotonic()
+
+    def send() -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+            while (now := time.monotonic() - began) < seconds:
+                out.sendto(vmc.packet({}, now, hips=(0.0, 0.95, now)), ("127.0.0.1", port))
+                time.sleep(0.01)
+
+    thread = threading.Thread(target=send)
+    thread.start()
+    return thread
+
+
+def test_after_a_pause_the_pose_is_not_an_old_one() -> None:
+    """While a `Retargeter` is made nobody listens, and a few poses fill the socket."""
+    with Listener("vmc://127.0.0.1:0") as person:
+        person._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 8192)
+        began, sender = time.monotonic(), walking(person.port, 2.5)
+        person.wait(fps=60.0, timeout=10.0)
+        time.sleep(1.0)
+        person.listen(0.0)
+        late = time.monotonic() - began - person.frame().root_pos[0]
+        sender.join()
+    assert late < 0.15
+
+
+def test_frames_come_as_often_as_they_are_asked_for() -> None:
+    """However long a step takes; and one that took too long is not made up for."""
+    with Listener("vmc://127.0.0.1:0") as person:
+        sender = walking(person.port, 3.0)
+        person.wait(fps=30.0, timeout=10.0)
+        places = []
+        for frame in person.frames(fps=30.0):
+            places.append(frame.root_pos[0])
+            time.sleep(0.2 if len(places) == 10 else 0.01)
+            if len(places) == 30:
+                break
+        sender.join()
+    steps = np.diff(places)
+    assert np.median(steps) == pytest.approx(1 / 30, abs=0.006)
+    assert 0.15 < steps[9] < 0.3
+    assert len(steps[steps < 0.015]) < 4
 
 
 def test_of_a_flood_the_newest_are_taken(
