@@ -36,7 +36,7 @@ def parse(text: str, known: dict[str, str], *, layouts: tuple[str, ...] = ()) ->
     """An address of one of the `known` schemes. Raises `ConventionError` where it is none, and says
     what is."""
     try:
-        parts = urlsplit(text)
+        parts = urlsplit(text if isinstance(text, str) else "")
         host, port = parts.hostname or "", parts.port
     except ValueError:
         port = None

@@ -18,12 +18,12 @@ from spark.io.live_pose import LivePose
 from spark.io.mvn_pose import MvnPose
 from spark.io.recording import Recording
 from spark.io.vmc import VmcPose
-from spark.motion import Motion, check_frame_time
+from spark.motion import Motion
 from spark.rig.feet import sole_positions
 from spark.rig.rig import understand
 from spark_sim.clips import Clip
 from spark_sim.live.address import SOURCES, parse
-from spark_sim.live.pace import Pace
+from spark_sim.live.pace import Pace, frame_time_of
 
 _POSES: dict[str, type[LivePose]] = {"vmc": VmcPose, "xsens": MvnPose}
 _PACKET = 65535  # bytes, the most of UDP
@@ -33,6 +33,7 @@ _KEPT = 256  # poses that nobody asks for
 _SETTLE = 0.2  # [s] from the first whole pose on: optional bones may come in packets of their own
 _PAUSE, _SOON = 0.1, 0.002  # [s] in which nobody listens; and until a pose that is waited for
 _HIPS = 0.05, 5.0  # [m] over the floor, of who stands: dolls and giants
+_NOBODY = "no person is known yet; call wait() first"
 _STAMP = 35  # SO_TIMESTAMPNS of Linux: when a packet came to the machine, not to this program
 _STAMP_FORM = struct.Struct("@ll")  # [s, ns]
 
@@ -106,6 +107,8 @@ class Listener:
         """Take what has come, and what comes within so many seconds. Where nobody has listened for
         a while, poses that waited are old, and newer ones found no room: the next one is waited
         for."""
+        if not hasattr(seconds, "__float__"):
+            raise ConventionError(f"seconds to listen are {seconds!r}; expected a number")
         began, last = time.time(), self.arrived
         self._listen(seconds)
         if time.monotonic() - self._listened - seconds > _PAUSE:
@@ -176,6 +179,7 @@ class Listener:
 
         Raises `ConventionError` after `timeout` seconds.
         """
+        frame_time_of(fps)
         began = time.monotonic()
         while not self.ready:
             self.listen(0.05)
@@ -186,8 +190,10 @@ class Listener:
     def person(self, fps: float) -> Clip:
         """The person as they are now, in their T-pose on the floor: the source of the frames that
         follow. Raises `ConventionError` where no person is of that size."""
-        check_frame_time(1.0 / fps if fps > 0 else np.inf)
-        motion = self.pose.tpose(1.0 / fps)
+        frame_time = frame_time_of(fps)
+        if self.pose.missing:
+            raise ConventionError(f"{_NOBODY}{self.lacking}")
+        motion = self.pose.tpose(frame_time)
         _check_size(float(motion.root_pos[0, 2]))
         rig = understand(motion)
         lowest = min(
@@ -206,14 +212,14 @@ class Listener:
         """The newest pose of the person that `wait` or `person` gave; where another body is sent,
         the last one of theirs."""
         if self._skeleton is None:
-            raise ConventionError("no person is known yet; call wait() first")
+            raise ConventionError(_NOBODY)
         self.fresh = False
         return self._newest
 
     def frames(self, fps: float) -> Iterator[Frame]:
         """The newest pose `fps` times a second, without end; what is over before it is asked for is
         left out."""
-        pace = Pace(1.0 / fps)
+        pace = Pace(frame_time_of(fps))
         while True:
             self.listen(pace.left)
             yield self.frame()

@@ -2,9 +2,21 @@
 
 import time
 
+from spark.errors import ConventionError
+from spark.motion import check_frame_time
+
 _LATE = 1.0  # [s]: after a pause this long the machine slept, and steps are not made up for
 _LEAD = 0.002  # [s] from a pose to the step that takes it
 _PULL = 0.01  # of a step, the most by which it is shifted
+
+
+def frame_time_of(fps: float) -> float:
+    """The time between steps [s], so many a second. Raises `ConventionError` where there are none
+    such."""
+    if isinstance(fps, str | bool) or not hasattr(fps, "__float__") or not fps > 0:
+        raise ConventionError(f"fps is {fps!r}; expected a positive number, such as 60")
+    check_frame_time(1.0 / fps)
+    return 1.0 / fps
 
 
 class Pace:

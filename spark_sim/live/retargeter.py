@@ -1,13 +1,15 @@
 """Robots that follow a source while it moves."""
 
+from typing import Any
+
 import numpy as np
 from jaxtyping import Float
 
 from robots.stream.frame_targets import LATENCY, Frame, ground_of
 from robots.stream.stream import Stream
-from spark.errors import ConventionError
-from spark.motion import check_frame_time
+from spark.errors import ConventionError, FrameError
 from spark_sim.clips import AnyClip, File, RobotClip
+from spark_sim.live.pace import frame_time_of
 from spark_sim.loading import clip_of
 
 
@@ -26,18 +28,17 @@ class Retargeter:
     def __init__(
         self, source: AnyClip | File, target: AnyClip | File, *, fps: float | None = None
     ) -> None:
+        for clip in (source, target):
+            if not isinstance(clip, AnyClip | File):
+                raise ConventionError(f"{clip!r:.80} is no clip; expected a clip, a path or a name")
         source, target = clip_of(source), clip_of(target)
         if not isinstance(target, RobotClip):
             raise ConventionError(f"{target.name} is no robot; only robots follow frame by frame")
-        if fps is not None:
-            if not fps > 0:
-                raise ConventionError(f"fps is {fps}; expected a positive number")
-            check_frame_time(1.0 / fps)
         self.robot = target.on_robot.robot
         if self.robot.mount is not None:
             raise ConventionError(f"{target.name} has no legs; only walking robots follow live")
         self._source = source.name
-        frame_time = source.motion.frame_time if fps is None else 1.0 / fps
+        frame_time = source.motion.frame_time if fps is None else frame_time_of(fps)
         ground = ground_of(source.canonical, self.robot)
         self._stream = Stream(source.rig, self.robot, frame_time, ground)
 
@@ -53,7 +54,12 @@ class Retargeter:
         Answers given before stay as they are. Raises `FrameError` where the frame is broken; the
         stream then goes on without it.
         """
-        return self._stream.step(Frame(*frame))
+        if not isinstance(frame, tuple | list) or len(frame) not in (2, 3):
+            raise FrameError(
+                f"a frame is {_words(frame)}; expected a tuple of root_pos (3), rotations (N 4) "
+                "and, where bones stretch, translations (N 3), as Motion has them"
+            )
+        return self._stream.step(Frame(*map(_numbers, frame, Frame._fields)))
 
     @property
     def foot_noise(self) -> float:
@@ -67,3 +73,23 @@ class Retargeter:
     def reset(self) -> None:
         """Start again: the next frame is the first."""
         self._stream.reset()
+
+
+def _words(frame: object) -> str:
+    """What is not a frame."""
+    if isinstance(frame, np.ndarray):
+        return f"an array of shape {frame.shape}"
+    return f"{len(frame)} values" if isinstance(frame, tuple | list) else f"{frame!r:.80}"
+
+
+def _numbers(values: Any, what: str) -> Any:
+    """An array of what a frame has, None where it may be left out."""
+    if values is None and what == "translations":
+        return None
+    try:
+        array = np.asarray(values)
+    except ValueError:  # rows of several lengths
+        array = np.array(None)
+    if array.dtype.kind not in "fiu":
+        raise FrameError(f"{what} is {values!r:.80}; expected an array of numbers")
+    return array.astype(np.float64, copy=False)
