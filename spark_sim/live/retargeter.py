@@ -23,7 +23,8 @@ class Retargeter:
     """
 
     latency = LATENCY
-    """By how many frames an answer lags behind."""
+    """How many frames before the newest the one is that an answer is for. Smoothness adds to that:
+    at 60 steps a second and more, hands follow 50 to 65 ms later in all, feet about 40 ms."""
 
     def __init__(
         self, source: AnyClip | File, target: AnyClip | File, *, fps: float | None = None
