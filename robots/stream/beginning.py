@@ -16,14 +16,15 @@ _SPEED = 0.3  # [m/s] with which a robot is moved where that is farther,
 _LONGEST = 1.0  # [s] at most
 
 
-_HEIGHT = 2  # of the base, in qpos
-
-
 class Beginning:
-    """Of a robot of a model, frames `frame_time` [s] apart."""
+    """Of the robot of `terms`, frames `frame_time` [s] apart."""
 
-    def __init__(self, model: mujoco.MjModel, terms: Terms, frame_time: float) -> None:
-        self._model, self._terms, self._frame_time = model, terms, frame_time
+    def __init__(self, terms: Terms, frame_time: float) -> None:
+        mjcf = terms.robot.mjcf
+        self._model, self._terms, self._frame_time = mjcf.model, terms, frame_time
+        base = int(self._model.jnt_dofadr[mjcf.free_joint])
+        self._place = slice(base, base + 3)
+        self._height = int(self._model.jnt_qposadr[mjcf.free_joint]) + 2
         self.reset()
 
     def reset(self) -> None:
@@ -38,7 +39,7 @@ class Beginning:
         """It should be in another, and moves from now on."""
         self._away = np.zeros(self._model.nv)
         mujoco.mj_differentiatePos(self._model, self._away, 1.0, moves, self._waits)
-        time = min(max(_TIME, float(np.linalg.norm(self._away[:3])) / _SPEED), _LONGEST)
+        time = min(max(_TIME, float(np.linalg.norm(self._away[self._place])) / _SPEED), _LONGEST)
         self._left = self._steps = max(round(time / self._frame_time), 1)
 
     def follow(self, moves: Float[np.ndarray, "nq"]) -> Float[np.ndarray, "nq"]:
@@ -50,14 +51,14 @@ class Beginning:
             mujoco.mj_integratePos(self._model, out, share * self._away, 1.0)
             self._terms.hinges.clip(out[None])
             waits, moved, now = map(self._lowest, (self._waits, moves, out))
-            out[_HEIGHT] += moved + share * (waits - moved) - now
+            out[self._height] += moved + share * (waits - moved) - now
             self._left -= 1
         return out
 
     def _lowest(self, qpos: Float[np.ndarray, "nq"]) -> float:
         """The height of the lowest point of the soles [m]."""
         heights = self._terms.sole_points(self._terms.poses(qpos[None]))[0, :, 2]
-        return float(heights.min()) if len(heights) else float(qpos[_HEIGHT])
+        return float(heights.min()) if len(heights) else float(qpos[self._height])
 
     @property
     def waits(self) -> Float[np.ndarray, "nq"]:

@@ -59,7 +59,7 @@ class Stream:
         self._window = Window(robot, self._terms, frame_time, fixed=_FIXED, free=LATENCY + 1)
         self._throw = Throw(self._reader.scale, source.hip_height, frame_time)
         self._quieter = Quieter(source, frame_time, ground.noise)
-        self._beginning = Beginning(robot.mjcf.model, self._terms, frame_time)
+        self._beginning = Beginning(self._terms, frame_time)
         self._possible = Possible(self._reader)
         self._targets: FrameTargets  # of the window's free frames
         self._contacts: ContactTracker
@@ -124,7 +124,8 @@ class Stream:
             self._beginning.wait(self._q[_FIXED])
         if self._count == LATENCY + 1 and self._is_late():
             first, second, *_ = self._begun
-            self._q[:, :3] += second.hips - first.hips
+            base = int(self.robot.mjcf.model.jnt_qposadr[self.robot.mjcf.free_joint])
+            self._q[:, base : base + 3] += second.hips - first.hips
             self._q = self._posed(self._q, second, _FEW_ITERATIONS)
             del self._begun[0]
         if len(self._begun) <= LATENCY:
