@@ -24,6 +24,7 @@ from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.footfalls import between_contacts, beyond
 from spark.transfer.hip_rise import Standing, hip_rise, hips_with_feet, lowest, standing
 from spark.transfer.hover import put_down
+from spark.transfer.knee_ease import ease_knees
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
 from spark.transfer.noise import Noise
 from spark.transfer.reach import stretch, swing_gently, within_reach
@@ -88,7 +89,8 @@ def lock_feet(
     # A foot that rolls off has let go with its heel: if the hips came down for it, the other knee
     # would bend where the source's is straight; and if it stayed, its own would snap straight.
     lower, moves_from_there = within_reach(risen, moves, flat)
-    return move_ankles(lower, swing_gently(lower, moves_from_there, stretches, flat))
+    gentle = swing_gently(lower, moves_from_there, stretches, flat)
+    return move_ankles(lower, ease_knees(lower, gentle, stretches, stands))
 
 
 def _rolled(

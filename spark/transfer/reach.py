@@ -50,7 +50,7 @@ def stretch(motion: CanonicalMotion, group: Group) -> Float[np.ndarray, "T"]:
     leg = leg_of(motion.rig, group)
     if leg is None:
         return np.ones(len(motion))
-    length, away = _length_and_ankle(motion, leg)
+    length, away = length_and_ankle(motion, leg)
     distance = np.linalg.norm(away, axis=1)
     return np.divide(distance, length, out=np.ones(len(motion)), where=length > 0)
 
@@ -70,16 +70,20 @@ def swing_gently(
     """
     gentle: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
     for (leg, move), theirs, here in zip(moves, stretches, stands, strict=True):
-        length, away = _length_and_ankle(motion, leg)
+        length, away = length_and_ankle(motion, leg)
         goal = away + move
         wanted = np.linalg.norm(goal, axis=1) / np.maximum(length, 1e-9)
         left = np.maximum(1.0 - theirs, 1e-9)
         further = np.maximum(wanted - theirs, 0.0)
         spared = np.maximum(further + left * np.expm1(-further / left), 0.0)
-        airborne = 1.0 - in_time(here.astype(float), _AIRBORNE, motion.frame_time)
-        shorter = airborne * spared / np.maximum(wanted, 1e-9)
+        shorter = airborne(here, motion.frame_time) * spared / np.maximum(wanted, 1e-9)
         gentle.append((leg, move - shorter[:, None] * goal))
     return gentle
+
+
+def airborne(stands: Bool[np.ndarray, "T"], frame_time: float) -> Float[np.ndarray, "T"]:
+    """How far a foot swings or rolls off, 0 to 1: 0 where its sole stands."""
+    return 1.0 - in_time(stands.astype(float), _AIRBORNE, frame_time)
 
 
 def in_time(
@@ -97,7 +101,7 @@ def _drop(
     motion: CanonicalMotion, leg: Leg, move: Float[np.ndarray, "T 3"]
 ) -> Float[np.ndarray, "T"]:
     """How far the hip has to come down for the leg to reach [m]."""
-    length, away = _length_and_ankle(motion, leg)
+    length, away = length_and_ankle(motion, leg)
     # A leg that was stretched out as it was copied may stay so.
     reach = np.maximum(MAX_REACH * length, np.linalg.norm(away, axis=1))
     goal = away + move
@@ -105,7 +109,7 @@ def _drop(
     return np.clip(-goal[:, 2] - below, 0.0, _MAX_DROP * motion.rig.hip_height)
 
 
-def _length_and_ankle(
+def length_and_ankle(
     motion: CanonicalMotion, leg: Leg
 ) -> tuple[Float[np.ndarray, "T"], Float[np.ndarray, "T 3"]]:
     """A leg's length, and its ankle from its hip joint [m, world]."""
