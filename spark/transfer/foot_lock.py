@@ -28,6 +28,7 @@ from spark.transfer.knee_ease import ease_knees
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
 from spark.transfer.noise import Noise
 from spark.transfer.reach import stretch, swing_gently, within_reach
+from spark.transfer.sole_turn import turn_up, turned
 from spark.transfer.stances import stances
 from spark.transfer.treads import treads_of
 
@@ -52,10 +53,12 @@ def lock_feet(
     treads = treads_of(source)
     feet: list[tuple[Leg, Standing, Standing]] = []
     columns = []
+    groups, leasts = [], []
     stretches: list[Float[np.ndarray, T]] = []
     for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
         leg = leg_of(moved.rig, group)
         if leg is not None and source.rig.roles.joint(LIMBS[group][2]) is not None:
+            groups.append(group)
             feet.append((leg, standing(source, group), standing(moved, group)))
             stretches.append(stretch(source, group))
             columns += [k for k, s in enumerate(source.rig.soles) if s.side == group.side]
@@ -85,12 +88,16 @@ def lock_feet(
         wanted = size * np.maximum(low[k] - down[k], -_MAX_SINK) + scale * ground[k]
         height = own_sole[..., 2].min(axis=1) + rise - moved.floor_z
         moves.append((leg, np.column_stack([along, wanted - height])))
+        leasts.append(np.minimum(wanted, scale * ground[k]))
     risen = replace(moved, hips=moved.hips + rise[:, None] * np.array([0.0, 0.0, 1.0]))
     # A foot that rolls off has let go with its heel: if the hips came down for it, the other knee
     # would bend where the source's is straight; and if it stayed, its own would snap straight.
     lower, moves_from_there = within_reach(risen, moves, flat)
     gentle = swing_gently(lower, moves_from_there, stretches, flat)
-    return move_ankles(lower, ease_knees(lower, gentle, stretches, stands))
+    held = move_ankles(lower, ease_knees(lower, gentle, stretches, stands))
+    for (leg, *_), group, least in zip(feet, groups, leasts, strict=True):
+        held = turned(held, leg, turn_up(held, group, held.floor_z + least))
+    return held
 
 
 def _rolled(

@@ -1,0 +1,47 @@
+"""Feet that turn up at the ankle where they would be in the floor.
+
+A foot that is seen to point into the floor, or whose leg does not lift it at once, is turned about
+a level axis across it, no further than until neither its toes nor its heel are too low. So the knee
+has nothing to do with it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from spark.rig.roles import Group
+from spark.rotation import quat_from_rotvec, quat_mul, quat_rotate
+from spark.transfer.canonical import CanonicalMotion
+from spark.transfer.hip_rise import standing
+from spark.transfer.leg_ik import Leg
+
+
+def turn_up(
+    motion: CanonicalMotion, group: Group, least: Float[np.ndarray, "T"]
+) -> Float[np.ndarray, "T 4"]:
+    """By which a foot is turned, in world axes, so that no point of its sole is lower than `least`
+    [m, world]; where it is too low as a whole, so that its heel and its toes are as low."""
+    leg = standing(motion, group)
+    points = leg.sole - leg.ends[:, 1:]
+    left = quat_rotate(motion.rotations[:, leg.joints[1]], np.array([0.0, 1.0, 0.0]))
+    left[:, 2] = 0.0
+    left /= np.maximum(np.linalg.norm(left, axis=1, keepdims=True), 1e-9)
+    ahead = np.einsum("tpx,tx->tp", points[..., :2], left[:, 1::-1] * np.array([1.0, -1.0]))
+    up = points[..., 2]
+    away = np.maximum(np.hypot(ahead, up), 1e-9)
+    free = np.arcsin(np.clip((least - leg.ends[:, 1, 2])[:, None] / away, -1.0, 1.0))
+    at = np.arctan2(up, abs(ahead))
+    toes = np.where(ahead > 0, free - at, -np.inf).max(axis=1)
+    heel = np.where(ahead < 0, at - free, np.inf).min(axis=1)
+    both = np.where(np.isfinite(toes + heel), (toes + heel) / 2, 0.0)
+    angle = np.where(toes > heel, both, np.clip(0.0, toes, heel))
+    return quat_from_rotvec(-angle[:, None] * left)
+
+
+def turned(motion: CanonicalMotion, leg: Leg, turn: Float[np.ndarray, "T 4"]) -> CanonicalMotion:
+    """`motion` with a foot, and what hangs on it, turned in world axes."""
+    foot = list(motion.rig.skeleton.subtree(leg.foot))
+    rotations = motion.rotations.copy()
+    rotations[:, foot] = quat_mul(turn[:, None], rotations[:, foot])
+    return replace(motion, rotations=rotations)
