@@ -51,6 +51,13 @@ def lock_feet(
     size = moved.rig.hip_height
     scale = size / source.rig.hip_height
     treads = treads_of(source)
+    for k, sole in enumerate(source.rig.soles):
+        group = Group.LEFT_LEG if sole.side == 'left' else Group.RIGHT_LEG
+        leg = leg_of(moved.rig, group)
+        if leg is None or source.rig.roles.joint(LIMBS[group][2]) is None: continue
+        turn = turn_up(source, group, source.floor_z + treads.heights[:, k] - _MAX_SINK * source.rig.hip_height)
+        source = turned(source, source.rig.roles.joint(LIMBS[group][2]), turn)
+        moved = turned(moved, leg.foot, turn)
     feet: list[tuple[Leg, Standing, Standing]] = []
     columns = []
     groups, leasts = [], []
@@ -96,7 +103,7 @@ def lock_feet(
     gentle = swing_gently(lower, moves_from_there, stretches, flat)
     held = move_ankles(lower, ease_knees(lower, gentle, stretches, stands))
     for (leg, *_), group, least in zip(feet, groups, leasts, strict=True):
-        held = turned(held, leg, turn_up(held, group, held.floor_z + least))
+        held = turned(held, leg.foot, turn_up(held, group, held.floor_z + least))
     return held
 
 

@@ -14,7 +14,6 @@ from spark.rig.roles import Group
 from spark.rotation import quat_from_rotvec, quat_mul, quat_rotate
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.hip_rise import standing
-from spark.transfer.leg_ik import Leg
 
 
 def turn_up(
@@ -39,9 +38,9 @@ def turn_up(
     return quat_from_rotvec(-angle[:, None] * left)
 
 
-def turned(motion: CanonicalMotion, leg: Leg, turn: Float[np.ndarray, "T 4"]) -> CanonicalMotion:
+def turned(motion: CanonicalMotion, foot: int, turn: Float[np.ndarray, "T 4"]) -> CanonicalMotion:
     """`motion` with a foot, and what hangs on it, turned in world axes."""
-    foot = list(motion.rig.skeleton.subtree(leg.foot))
+    joints = list(motion.rig.skeleton.subtree(foot))
     rotations = motion.rotations.copy()
-    rotations[:, foot] = quat_mul(turn[:, None], rotations[:, foot])
+    rotations[:, joints] = quat_mul(turn[:, None], rotations[:, joints])
     return replace(motion, rotations=rotations)
