@@ -72,7 +72,7 @@ def lock_feet(
     if not feet:
         return moved
     ground = treads.heights.T[columns]
-    ends = np.stack([theirs.sole[:, _ENDS] for _, theirs, _ in feet], axis=1)
+    ends = np.stack([_resting(theirs.sole) for _, theirs, _ in feet], axis=1)
     ends[..., 2] -= ground.T[..., None]
     stands, flat = stances(ends, source.frame_time, source.rig.standing_height, noise)
     stray = 0.0 if noise is None else noise.stray * source.rig.standing_height / ADULT_HEIGHT
@@ -105,6 +105,13 @@ def lock_feet(
     for (leg, *_), group, least in zip(feet, groups, leasts, strict=True):
         held = turned(held, leg.foot, turn_up(held, group, held.floor_z + least))
     return held
+
+
+def _resting(sole: Float[np.ndarray, "T P 3"]) -> Float[np.ndarray, "T 5 3"]:
+    """The points of a sole that tell whether it stands: its ends, and what it turns on, the middle
+    of its ball; that of its toes' end where it has no ball."""
+    ball = sole[:, -4:-2] if sole.shape[1] > len(_ENDS) else sole[:, -2:]
+    return np.concatenate([sole[:, _ENDS], ball.mean(axis=1, keepdims=True)], axis=1)
 
 
 def _rolled(
