@@ -12,6 +12,7 @@ while it swings, whatever the length of the foot; the hips rise with it (`spark.
 What hovers comes down (`spark.transfer.hover`).
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,13 +23,13 @@ from spark.rig.roles import LIMBS, Group
 from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.footfalls import between_contacts, beyond
-from spark.transfer.hip_rise import Standing, hip_rise, hips_with_feet, lowest, standing
+from spark.transfer.hip_rise import hip_rise, hips_with_feet, lowest, standing
 from spark.transfer.hover import put_down
 from spark.transfer.knee_ease import ease_knees
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
 from spark.transfer.noise import Noise
 from spark.transfer.reach import stretch, swing_gently, within_reach
-from spark.transfer.sole_turn import turn_up, turned
+from spark.transfer.sole_turn import turn_foot, turn_up
 from spark.transfer.stances import stances
 from spark.transfer.treads import treads_of
 
@@ -40,6 +41,7 @@ _MAX_SINK = 0.005
 # point rests half as much as one that stays on the ground.
 _REST_SPEED = 0.05
 _REST_HEIGHT = 0.02
+_UP = np.array([0.0, 0.0, 1.0])
 _ENDS = [0, 1, -2, -1]  # of a sole's points: its heel and its toes' end
 
 
@@ -48,43 +50,35 @@ def lock_feet(
 ) -> CanonicalMotion:
     """`moved`, the transfer of `source`, with its feet held while the source's stand, and as high
     as the source's; its hips go with them. `noise` is what was taken from the source."""
-    size = moved.rig.hip_height
-    scale = size / source.rig.hip_height
-    treads = treads_of(source)
-    for k, sole in enumerate(source.rig.soles):
-        group = Group.LEFT_LEG if sole.side == 'left' else Group.RIGHT_LEG
-        leg = leg_of(moved.rig, group)
-        if leg is None or source.rig.roles.joint(LIMBS[group][2]) is None: continue
-        turn = turn_up(source, group, source.floor_z + treads.heights[:, k] - _MAX_SINK * source.rig.hip_height)
-        source = turned(source, source.rig.roles.joint(LIMBS[group][2]), turn)
-        moved = turned(moved, leg.foot, turn)
-    feet: list[tuple[Leg, Standing, Standing]] = []
-    columns = []
-    groups, leasts = [], []
-    stretches: list[Float[np.ndarray, T]] = []
-    for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
-        leg = leg_of(moved.rig, group)
-        if leg is not None and source.rig.roles.joint(LIMBS[group][2]) is not None:
-            groups.append(group)
-            feet.append((leg, standing(source, group), standing(moved, group)))
-            stretches.append(stretch(source, group))
-            columns += [k for k, s in enumerate(source.rig.soles) if s.side == group.side]
-    if not feet:
+    legs = {
+        group: leg
+        for group in (Group.LEFT_LEG, Group.RIGHT_LEG)
+        if (leg := leg_of(moved.rig, group)) is not None
+        and source.rig.roles.joint(LIMBS[group][2]) is not None
+    }
+    if not legs:
         return moved
-    ground = treads.heights.T[columns]
-    ends = np.stack([_resting(theirs.sole) for _, theirs, _ in feet], axis=1)
-    ends[..., 2] -= ground.T[..., None]
-    stands, flat = stances(ends, source.frame_time, source.rig.standing_height, noise)
+    size, their_size = moved.rig.hip_height, source.rig.hip_height
+    scale = size / their_size
+    columns = [k for g in legs for k, s in enumerate(source.rig.soles) if s.side == g.side]
+    ground = treads_of(source).heights.T[columns]
+    # What the source points into the floor would be lifted by the knee.
+    for group, under in zip(legs, ground, strict=True):
+        turn = turn_up(source, group, source.floor_z + under - _MAX_SINK * their_size)
+        source, moved = (turn_foot(motion, group, turn) for motion in (source, moved))
+    feet = [(standing(source, group), standing(moved, group)) for group in legs]
+    ends, balls = _resting([theirs.sole for theirs, _ in feet], ground)
+    stands, flat = stances(ends, source.frame_time, source.rig.standing_height, noise, balls)
     stray = 0.0 if noise is None else noise.stray * source.rig.standing_height / ADULT_HEIGHT
     radius = _CAPTURE_NOISE * size + scale * stray
-    rolled = [_rolled(theirs.sole, own.sole, source) for _, theirs, own in feet]
-    low = np.stack([lowest(theirs, source) for _, theirs, _ in feet])
-    low -= ground / source.rig.hip_height
+    rolled = [_rolled(theirs.sole, own.sole, source) for theirs, own in feet]
+    low = np.stack([lowest(theirs, source) for theirs, _ in feet]) - ground / their_size
     down = put_down(low, stands, [own for _, own in rolled])
-    rise = hip_rise(source, moved, [(theirs, own) for _, theirs, own in feet], low)
+    rise = hip_rise(source, moved, feet, low)
     rise -= size * hips_with_feet(down, low, moved.frame_time)
     moves: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
-    for k, (leg, _, (_, _, own_sole)) in enumerate(feet):
+    highs = size * np.maximum(low - down, -_MAX_SINK) + scale * ground
+    for k, leg in enumerate(legs.values()):
         (theirs, own), stance = rolled[k], stands[k]
         offset = np.zeros((len(own), 2))
         for start, stop in true_runs(stance):
@@ -92,26 +86,29 @@ def lock_feet(
             kept = beyond(scale * theirs[here], radius)
             offset[here] = own[here].mean(axis=0) + kept - own[here]
         along = between_contacts(offset, stance, own)
-        wanted = size * np.maximum(low[k] - down[k], -_MAX_SINK) + scale * ground[k]
-        height = own_sole[..., 2].min(axis=1) + rise - moved.floor_z
-        moves.append((leg, np.column_stack([along, wanted - height])))
-        leasts.append(np.minimum(wanted, scale * ground[k]))
-    risen = replace(moved, hips=moved.hips + rise[:, None] * np.array([0.0, 0.0, 1.0]))
+        height = feet[k][1].sole[..., 2].min(axis=1) + rise - moved.floor_z
+        moves.append((leg, np.column_stack([along, highs[k] - height])))
+    risen = replace(moved, hips=moved.hips + rise[:, None] * _UP)
     # A foot that rolls off has let go with its heel: if the hips came down for it, the other knee
     # would bend where the source's is straight; and if it stayed, its own would snap straight.
     lower, moves_from_there = within_reach(risen, moves, flat)
+    stretches = [stretch(source, group) for group in legs]
     gentle = swing_gently(lower, moves_from_there, stretches, flat)
     held = move_ankles(lower, ease_knees(lower, gentle, stretches, stands))
-    for (leg, *_), group, least in zip(feet, groups, leasts, strict=True):
-        held = turned(held, leg.foot, turn_up(held, group, held.floor_z + least))
+    for group, high in zip(legs, np.minimum(highs, scale * ground), strict=True):
+        held = turn_foot(held, group, turn_up(held, group, held.floor_z + high))
     return held
 
 
-def _resting(sole: Float[np.ndarray, "T P 3"]) -> Float[np.ndarray, "T 5 3"]:
-    """The points of a sole that tell whether it stands: its ends, and what it turns on, the middle
-    of its ball; that of its toes' end where it has no ball."""
-    ball = sole[:, -4:-2] if sole.shape[1] > len(_ENDS) else sole[:, -2:]
-    return np.concatenate([sole[:, _ENDS], ball.mean(axis=1, keepdims=True)], axis=1)
+def _resting(
+    soles: Sequence[Float[np.ndarray, "T P 3"]], ground: Float[np.ndarray, "F T"]
+) -> tuple[Float[np.ndarray, "T F 4 3"], Float[np.ndarray, "T F 3"]]:
+    """The points of soles that tell whether these stand, from the ground under them [m]: their
+    ends, and the middles of their balls; of the toes' ends where there is no ball."""
+    level = [sole - under[:, None, None] * _UP for sole, under in zip(soles, ground, strict=True)]
+    ends = np.stack([sole[:, _ENDS] for sole in level], axis=1)
+    balls = [sole[:, 2:4].mean(axis=1) for sole in level]
+    return ends, np.stack(balls, axis=1)
 
 
 def _rolled(

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from spark.rig.roles import Group
+from spark.rig.roles import LIMBS, Group
 from spark.rotation import quat_from_rotvec, quat_mul, quat_rotate
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.hip_rise import standing
@@ -38,8 +38,11 @@ def turn_up(
     return quat_from_rotvec(-angle[:, None] * left)
 
 
-def turned(motion: CanonicalMotion, foot: int, turn: Float[np.ndarray, "T 4"]) -> CanonicalMotion:
+def turn_foot(
+    motion: CanonicalMotion, group: Group, turn: Float[np.ndarray, "T 4"]
+) -> CanonicalMotion:
     """`motion` with a foot, and what hangs on it, turned in world axes."""
+    foot = motion.rig.roles.require(LIMBS[group][2])
     joints = list(motion.rig.skeleton.subtree(foot))
     rotations = motion.rotations.copy()
     rotations[:, joints] = quat_mul(turn[:, None], rotations[:, joints])
