@@ -19,8 +19,8 @@ from spark.transfer.leg_ik import Leg
 from spark.transfer.reach import Moves, airborne, length_and_ankle
 
 # [s] in which a knee follows that is bent by a right angle
-_QUICK = 0.02
-_LEAST = 0.1  # of that one's way for each degree, of a straight one
+_QUICK = 0.018
+_LEAST = 0.05  # of that one's way for each degree, of a straight one
 
 
 def ease_knees(
