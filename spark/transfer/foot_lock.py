@@ -9,14 +9,16 @@ from its mean position is taken for noise and removed; what goes beyond is motio
 the next (`spark.transfer.footfalls`). The lowest point of the sole is as high above the floor, or
 what the source climbs (`spark.transfer.treads`), as the source's is, scaled: while it stands and
 while it swings, whatever the length of the foot; the hips rise with it (`spark.transfer.hip_rise`).
-What hovers comes down (`spark.transfer.hover`).
+What hovers comes down (`spark.transfer.hover`). What a knee cannot do smoothly is not asked of it
+(`spark.transfer.knee_ease`): a foot turns up where it would be in the floor
+(`spark.transfer.sole_turn`).
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from spark.rig.contacts import ADULT_HEIGHT, speeds
 from spark.rig.roles import LIMBS, Group
@@ -35,7 +37,7 @@ from spark.transfer.treads import treads_of
 
 _CAPTURE_NOISE = 0.02  # [hip heights] 2 cm of an adult
 # [hip heights] that a sole may sink: half a centimetre of an adult. A foot that sinks further in
-# the source is lifted.
+# the source turns up, and is lifted as far as that does not do.
 _MAX_SINK = 0.005
 # At this speed [hip heights/s], and this high above the lowest point of its sole [hip heights], a
 # point rests half as much as one that stays on the ground.
@@ -76,16 +78,11 @@ def lock_feet(
     down = put_down(low, stands, [own for _, own in rolled])
     rise = hip_rise(source, moved, feet, low)
     rise -= size * hips_with_feet(down, low, moved.frame_time)
-    moves: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
     highs = size * np.maximum(low - down, -_MAX_SINK) + scale * ground
+    moves: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
     for k, leg in enumerate(legs.values()):
-        (theirs, own), stance = rolled[k], stands[k]
-        offset = np.zeros((len(own), 2))
-        for start, stop in true_runs(stance):
-            here = slice(start, stop)
-            kept = beyond(scale * theirs[here], radius)
-            offset[here] = own[here].mean(axis=0) + kept - own[here]
-        along = between_contacts(offset, stance, own)
+        theirs, own = rolled[k]
+        along = _held(scale * theirs, own, stands[k], radius)
         height = feet[k][1].sole[..., 2].min(axis=1) + rise - moved.floor_z
         moves.append((leg, np.column_stack([along, highs[k] - height])))
     risen = replace(moved, hips=moved.hips + rise[:, None] * _UP)
@@ -103,8 +100,8 @@ def lock_feet(
 def _resting(
     soles: Sequence[Float[np.ndarray, "T P 3"]], ground: Float[np.ndarray, "F T"]
 ) -> tuple[Float[np.ndarray, "T F 4 3"], Float[np.ndarray, "T F 3"]]:
-    """The points of soles that tell whether these stand, from the ground under them [m]: their
-    ends, and the middles of their balls; of the toes' ends where there is no ball."""
+    """The points of soles that tell whether these stand [m], their heights over the ground under
+    them: their ends, and the middles of their balls; of the toes' ends where there is no ball."""
     level = [sole - under[:, None, None] * _UP for sole, under in zip(soles, ground, strict=True)]
     ends = np.stack([sole[:, _ENDS] for sole in level], axis=1)
     balls = [sole[:, 2:4].mean(axis=1) for sole in level]
@@ -124,6 +121,21 @@ def _rolled(
     rests /= rests.sum(axis=1, keepdims=True)
     steps = (rests[1:] + rests[:-1])[..., None] / 2
     return _way(theirs, steps), _way(own, steps)
+
+
+def _held(
+    theirs: Float[np.ndarray, "T 2"],
+    own: Float[np.ndarray, "T 2"],
+    stands: Bool[np.ndarray, "T"],
+    radius: float,
+) -> Float[np.ndarray, "T 2"]:
+    """What moves a foot's `own` way so that in each stance it strays from its middle as `theirs`
+    does beyond `radius`, all in m."""
+    offset = np.zeros_like(own)
+    for start, stop in true_runs(stands):
+        here = slice(start, stop)
+        offset[here] = own[here].mean(axis=0) + beyond(theirs[here], radius) - own[here]
+    return between_contacts(offset, stands, own)
 
 
 def _way(

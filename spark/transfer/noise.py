@@ -22,6 +22,7 @@ from spark.rig.contacts import (
     lowest_sole,
 )
 from spark.rotation import quat_continuous, quat_mul, quat_normalize
+from spark.second_differences import second_differences
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
 # The product of a second difference with the next is of white noise -4 times its variance an axis
@@ -151,11 +152,8 @@ class _Smoother:
 
     def __init__(self, count: int, cutoff: float, frame_time: float) -> None:
         weight = (2 * np.sin(np.pi * min(cutoff * frame_time, 0.5))) ** -4
-        bands = np.zeros((3, count))
-        bands[2] = 1.0
-        for k, a in enumerate((1.0, -2.0, 1.0)):
-            for m, b in enumerate((1.0, -2.0, 1.0)[: k + 1]):
-                bands[2 - k + m, k : count - 2 + k] += weight * a * b
+        bands = weight * second_differences(count)
+        bands[2] += 1.0
         self._factor = cholesky_banded(bands)
 
     def __call__(self, values: Float[np.ndarray, "T *n"]) -> Float[np.ndarray, "T *n"]:

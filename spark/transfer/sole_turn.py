@@ -15,12 +15,15 @@ from spark.rotation import quat_from_rotvec, quat_mul, quat_rotate
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.hip_rise import standing
 
+_MOST = 0.6  # [rad] 34 degrees: the foot of who lies on the floor is not turned over
+
 
 def turn_up(
     motion: CanonicalMotion, group: Group, least: Float[np.ndarray, "T"]
 ) -> Float[np.ndarray, "T 4"]:
     """By which a foot is turned, in world axes, so that no point of its sole is lower than `least`
-    [m, world]; where it is too low as a whole, so that its heel and its toes are as low."""
+    [m, world], but for `_MOST`; where it is too low as a whole, so that its heel and its toes are
+    about as low."""
     leg = standing(motion, group)
     points = leg.sole - leg.ends[:, 1:]
     left = quat_rotate(motion.rotations[:, leg.joints[1]], np.array([0.0, 1.0, 0.0]))
@@ -28,20 +31,22 @@ def turn_up(
     left /= np.maximum(np.linalg.norm(left, axis=1, keepdims=True), 1e-9)
     ahead = np.einsum("tpx,tx->tp", points[..., :2], left[:, 1::-1] * np.array([1.0, -1.0]))
     up = points[..., 2]
+    # By how much the toes have to be turned up at least, and the heel allows them to be at most.
     away = np.maximum(np.hypot(ahead, up), 1e-9)
     free = np.arcsin(np.clip((least - leg.ends[:, 1, 2])[:, None] / away, -1.0, 1.0))
     at = np.arctan2(up, abs(ahead))
-    toes = np.where(ahead > 0, free - at, -np.inf).max(axis=1)
-    heel = np.where(ahead < 0, at - free, np.inf).min(axis=1)
-    both = np.where(np.isfinite(toes + heel), (toes + heel) / 2, 0.0)
-    angle = np.where(toes > heel, both, np.clip(0.0, toes, heel))
-    return quat_from_rotvec(-angle[:, None] * left)
+    toes = np.where(ahead > 0, free - at, -np.pi).max(axis=1)
+    heel = np.where(ahead < 0, at - free, np.pi).min(axis=1)
+    angle = np.where(toes > heel, (toes + heel) / 2, np.clip(0.0, toes, heel))
+    return quat_from_rotvec(-np.clip(angle, -_MOST, _MOST)[:, None] * left)
 
 
 def turn_foot(
     motion: CanonicalMotion, group: Group, turn: Float[np.ndarray, "T 4"]
 ) -> CanonicalMotion:
-    """`motion` with a foot, and what hangs on it, turned in world axes."""
+    """`motion` with a foot, and what hangs on it, turned in world axes; itself without a turn."""
+    if not turn[:, 1:].any():
+        return motion
     foot = motion.rig.roles.require(LIMBS[group][2])
     joints = list(motion.rig.skeleton.subtree(foot))
     rotations = motion.rotations.copy()
