@@ -18,8 +18,9 @@ from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.leg_ik import Leg
 from spark.transfer.reach import Moves, airborne, length_and_ankle
 
-_QUICK = 0.018  # [s] within which a knee follows that is bent at a right angle
+_QUICK = 0.0175  # [s] within which a knee follows that is bent at a right angle
 _LEAST = 0.05  # of its way for each degree, that of a knee which counts as straight
+_UPRIGHT = 0.5  # of a leg's length that its ankle is below the hip joint: then it stands on it
 
 _DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -45,7 +46,7 @@ def ease_knees(
         more = smoothest(bend - their_bend, np.maximum(moved, _LEAST), _QUICK / motion.frame_time)
         reach = length * np.cos(np.clip(their_bend + more, 0.0, np.pi) / 2)
         along = goal / np.maximum(far, 1e-9)[:, None]
-        held = (1 - airborne(here, motion.frame_time)) * np.maximum(along @ _DOWN, 0.0)
+        held = (1 - airborne(here, motion.frame_time)) * np.clip(along @ _DOWN / _UPRIGHT, 0.0, 1.0)
         way = along + held[:, None] * (_DOWN - along)
         eased.append((leg, move + _to_reach(goal, way, reach)))
     return eased

@@ -37,7 +37,9 @@ def turn_up(
     at = np.arctan2(up, abs(ahead))
     toes = np.where(ahead > 0, free - at, -np.pi).max(axis=1)
     heel = np.where(ahead < 0, at - free, np.pi).min(axis=1)
-    angle = np.where(toes > heel, (toes + heel) / 2, np.clip(0.0, toes, heel))
+    front, back = np.maximum(ahead.max(axis=1), 0.0), np.maximum(-ahead.min(axis=1), 0.0)
+    level = (front * toes + back * heel) / np.maximum(front + back, 1e-9)
+    angle = np.where(toes > heel, level, np.clip(0.0, toes, heel))
     return quat_from_rotvec(-np.clip(angle, -_MOST, _MOST)[:, None] * left)
 
 

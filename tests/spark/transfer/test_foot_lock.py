@@ -189,6 +189,25 @@ def test_a_longer_foot_turns_on_the_corner_that_the_source_turns_on() -> None:
     assert held < 0.3 * slid
 
 
+def test_a_foot_that_turns_on_its_ball_stays_where_it_is() -> None:
+    """At 5 rad/s, too fast for heel and toes to stand, and longer ones are carried along.
+    They stay, but for what counts as noise."""
+    rig = stick_rig()
+    source = to_canonical(standing(rig, 60), rig)
+    pivot = sole_paths(source)[0, 0, 2:4].mean(axis=0) * (1, 1, 0)
+    turn = quat_from_yaw(5.0 * np.clip(np.arange(60) - 20, 0, 20) * source.frame_time)
+    source = replace(
+        source,
+        rotations=quat_mul(turn[:, None], source.rotations),
+        hips=pivot + quat_rotate(turn, source.hips - pivot),
+    )
+    copied = transfer(source, with_long_feet(rig))
+    both = copied, lock_feet(source, copied)
+    balls = [sole_paths(one)[:, 0, 2:4, :2].mean(axis=1) for one in both]
+    slid, held = (np.ptp(path[18:42], axis=0).max() for path in balls)
+    assert held < 0.2 * slid
+
+
 def test_a_foot_that_slips_within_a_stance_goes_no_further_on_another_body() -> None:
     """Fast for 3 frames at 60 fps: no swing, in which a foot would go from one place to another
     that other proportions give it."""

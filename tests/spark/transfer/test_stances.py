@@ -73,3 +73,16 @@ def test_a_foot_held_still_in_the_air_does_not_stand() -> None:
     assert not stands[0][(t > 1.05) & (t < 1.95)].any()
     assert stands[0][(t < 0.9) | (t > 2.1)].all()
     assert stands[1].all()
+
+
+def test_a_foot_that_turns_on_its_ball_stands() -> None:
+    """Both ends go round at 1 m/s; a ball that slides at 0.3 m/s holds nothing."""
+    t = timed(60)
+    ends = walked(np.where((t > 1) & (t < 2), 1.0, 0.0), 1 / 60)
+    for speed, expected in ((0.05, True), (0.3, False)):
+        ball = walked(np.where((t > 1) & (t < 2), speed, 0.0), 1 / 60)[:, :, 0]
+        stands, flat = stances(ends, 1 / 60, HEIGHT, balls=ball)
+        turns = (t > 1.1) & (t < 1.9)
+        assert (stands[0][turns] == expected).all()
+        assert not flat[0][turns].any()
+        assert stands[0][~turns & ((t < 0.9) | (t > 2.1))].all()
