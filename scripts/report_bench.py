@@ -70,7 +70,7 @@ def scores(report: Report) -> dict[str, float]:
         "clearance": np.nan if swing is None else coarse(abs(1 - swing.clearance), CLEARANCE),
         "base": coarse(clip.base_acceleration_p99 / max(thrown, 0.5 * GRAVITY), BASE),
         "limb": 0.0 if report.limbs is None else coarse(report.limbs.ratio, LIMB),
-        "speed": float(clip.joint_speed.max()),
+        "speed": float(clip.joint_pace.max()),
         "jerk": clip.jerk_rms,
         "balance": clip.unbalanced_share or 0.0,
     }

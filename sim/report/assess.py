@@ -22,6 +22,7 @@ from sim.report.report import Report
 from sim.report.stretches import measure_clip
 from sim.report.swing import swing_of
 from sim.report.thresholds import PLAUSIBILITY_V2
+from sim.report.tremble import tremble_beside
 from sim.report.truth import accuracy
 from sim.trajectory import Subject
 from spark.errors import SkeletonError
@@ -66,7 +67,10 @@ def assess(
                 "the floor is the clip's own: one that floats or sinks as a whole can't be told",
             )
         notes += own_ground_notes(course)
-        return Report(clip, None, None, None, findings_of(clip), notes, known)
+        tremble = tremble_beside(subject)
+        return Report(
+            clip, None, None, None, findings_of(clip, tremble), notes, tremble, truth=known
+        )
     source_course = _course("the source", source)
     quiet, source_floor, trembles = _without_tremble(source_course)
     floor = 0.0
@@ -90,13 +94,15 @@ def assess(
     thrown = scale * source_clip.base_acceleration_p99
     limbs = limbs_of(clip, followed, times, scale)
     pose = pose_error(subject, source, times)
+    tremble = tremble_beside(subject, source, times)
     return Report(
         clip,
         source_clip,
         drift,
         contacts,
-        findings_of(clip, drift, swing, thrown, limbs, pose),
+        findings_of(clip, tremble, drift, swing, thrown, limbs, pose),
         notes,
+        tremble,
         truth=known,
         swing=swing,
         limbs=limbs,

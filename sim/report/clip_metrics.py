@@ -5,18 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sim.report.clip_poses import ClipPoses
-from sim.report.derivatives import derivative
-from sim.report.limb_ends import limb_ends
-from sim.report.limits import LimitExcess, limit_excess
-from sim.report.measures import floating, horizontal_speed, penetration_depth, windowed_min
-from sim.report.model_joints import model_joint_rates, model_limit_excess
-from sim.report.self_penetration import capsules, self_penetration
-from sim.report.smoothness import joint_rates
-from sim.report.support import support_of
-from sim.report.thresholds import PLAUSIBILITY_V2, Thresholds
-from sim.report.torque import JointTorque, joint_torques
-from spark.constants import GRAVITY
+from sim.report.limits import LimitExcess
+from sim.report.thresholds import Thresholds
+from sim.report.torque import JointTorque
 from spark.summary import time_span
 from spark.transfer.ground import Ground
 
@@ -42,7 +33,8 @@ class ClipMetrics:
     `imbalance` [m]: how far the centre of mass lies outside the support; nan in frames that move.
     `self_depth` [m]: how deep the parts of each of `self_pairs` are in each other; more than
     `self_bound` is too deep. Pairs that never are have no column.
-    `joint_speed` [rad/s], `joint_jerk` [rad/s³]: of the joints `joint_names`.
+    `joint_speed` [rad/s], `joint_jerk` [rad/s³]: of the joints `joint_names`; `joint_turns` [rad]
+    is how far they turn from the frame before, which a window smooths away.
     """
 
     frame_time: float
@@ -72,6 +64,7 @@ class ClipMetrics:
     joint_names: tuple[str, ...]
     joint_speed: Float[np.ndarray, "T B"]
     joint_jerk: Float[np.ndarray, "T B"]
+    joint_turns: Float[np.ndarray, "T B"]
 
     def __repr__(self) -> str:
         span = time_span(len(self), self.frame_time)
@@ -158,6 +151,11 @@ class ClipMetrics:
         return {each.joint: each.torque for each in self.torques}
 
     @property
+    def joint_pace(self) -> Float[np.ndarray, "T B"]:
+        """How fast the joints are [rad/s]: over the window, or from the frame before."""
+        return np.maximum(self.joint_speed, self.joint_turns / self.frame_time)
+
+    @property
     def jerk_rms(self) -> float:
         """Over all joints and frames [rad/s³]; 0 without joints."""
         return float(np.sqrt(np.mean(self.joint_jerk**2))) if self.joint_names else 0.0
@@ -165,84 +163,3 @@ class ClipMetrics:
     def _limits_over(self, bound: float) -> float:
         over = [(each.beyond > bound).any(axis=1) for each in self.limits]
         return float(np.any(over, axis=0).mean()) if over else 0.0
-
-
-def measure(poses: ClipPoses, ground: Ground) -> ClipMetrics:
-    """The measures of a posed clip over some ground."""
-    thresholds = PLAUSIBILITY_V2.scaled(poses.rig.hip_height)
-    frame_time, window = poses.motion.frame_time, thresholds.window
-    support = support_of(poses, ground, thresholds)
-    corners = len(support.feet)
-    inside = np.concatenate([poses.part_points, poses.finger_points], axis=1)
-    heights = [support.heights[:, :corners], ground.heights(inside)]
-    depth = penetration_depth(np.concatenate(heights, axis=1))
-    clearance = support.heights.min(axis=1)
-    acceleration = derivative(poses.mass.com[:, 2], frame_time, 2, window)
-    # The window smears take-off and landing over itself.
-    fall_error = windowed_min(np.abs(acceleration + GRAVITY), frame_time, window)
-    limbs = limb_ends(poses)
-    bodies = np.concatenate([poses.hips[:, None], limbs.places], axis=1)
-    thrown = np.linalg.norm(derivative(bodies, frame_time, 2, window), axis=-1)
-    feet = support.corners_of
-    middles = np.stack([poses.corners[:, own].mean(axis=1) for own in feet.values()], axis=1)
-    skates = support.skating()
-    wrench = support.unexplained_wrench()
-    if poses.body is None or poses.model_poses is None:
-        limits = limit_excess(poses.since_tpose, poses.rig)
-        pairs, self_depth = self_penetration(capsules(poses))
-        rates = joint_rates(poses.rotations, poses.rig, frame_time, window)
-        torques: tuple[JointTorque, ...] = ()
-        self_bound = thresholds.self_penetration
-    else:
-        limits = model_limit_excess(poses.body)
-        pairs, self_depth = poses.model_poses.pairs, poses.model_poses.depth
-        rates = model_joint_rates(poses.body, frame_time, window)
-        self_bound = thresholds.shape_penetration
-        torques = joint_torques(
-            poses.body,
-            frame_time,
-            window,
-            support.arms + poses.mass.com[:, None],
-            poses.carriers,
-            support.touching,
-            thresholds.friction,
-            support.length,
-        )
-    joint_names, joint_speed, joint_jerk = rates
-    return ClipMetrics(
-        frame_time=frame_time,
-        ground=ground,
-        thresholds=thresholds,
-        flags={
-            "penetration": depth.max(axis=1) > thresholds.penetration,
-            "floating": floating(clearance, fall_error, thresholds.floating, thresholds.free_fall),
-            "skating": np.any(skates, axis=1),
-            "root_wrench": (wrench[:, 0] > thresholds.wrench_force)
-            | (wrench[:, 1] > thresholds.wrench_torque),
-        },
-        depth=depth,
-        depth_names=(*poses.corner_feet, *poses.part_names, *poses.finger_hands),
-        clearance=clearance,
-        corner_skates=skates,
-        corner_speeds=support.speeds[:, :corners],
-        corner_feet=poses.corner_feet,
-        standing=support.standing(),
-        sole_heights=np.stack(
-            [support.heights[:, own].min(axis=1) for own in feet.values()], axis=1
-        ),
-        sole_speeds=horizontal_speed(middles, frame_time, window),
-        base_acceleration=thrown[:, 0],
-        limb_names=limbs.names,
-        limb_lengths=limbs.lengths,
-        limb_acceleration=thrown[:, 1:],
-        torques=torques,
-        unexplained_wrench=wrench,
-        imbalance=support.imbalance(),
-        limits=limits,
-        self_pairs=pairs,
-        self_depth=self_depth,
-        self_bound=self_bound,
-        joint_names=joint_names,
-        joint_speed=joint_speed,
-        joint_jerk=joint_jerk,
-    )

@@ -18,7 +18,8 @@ def whole_windows(count: int, frame_time: float, window: float) -> Int[np.ndarra
 def derivative(
     values: Float[np.ndarray, "T *n"], frame_time: float, order: int, window: float
 ) -> Float[np.ndarray, "T *n"]:
-    """The first or second time derivative of `values`, per second or per second squared.
+    """The first or second time derivative of `values`, per second or per second squared; of order 0
+    the values of the fit itself.
 
     At each frame a parabola is fitted to the `window` seconds before and after it, with Gaussian
     weights (Savitzky and Golay 1964, weighted); between frames the values are those of a cubic

@@ -28,6 +28,9 @@ MEANINGS = {
     "pose": "By what angles limbs, trunk, feet, head and hands point away from the source's. It "
     "comes from joints that can't reach, limbs that are in each other's way, a wrong T-pose, or a "
     "body that stands still while its source moves.",
+    "tremble": "How far the base or a limb's end goes to and fro from frame to frame, in the worst "
+    "half second. Accelerations and torques are means over 0.1 s, and don't show it. It comes from "
+    "corrections that undo each other, or from noise that is copied.",
     "root_drift": "How far the body strays from the source's path, scaled to its size. It comes "
     "from steps that slide, or from a root that is scaled by other lengths than the legs.",
     "base_acceleration": "How hard the hips are thrown about, in all but the worst 1 % of the "

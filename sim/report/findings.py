@@ -10,6 +10,7 @@ from sim.report.measures import Drift
 from sim.report.pose_error import PoseError
 from sim.report.result import Finding
 from sim.report.swing import Swing
+from sim.report.tremble import Tremble
 from spark.constants import GRAVITY
 from spark.runs import true_runs
 
@@ -30,6 +31,7 @@ _LASTS = 0.2
 
 def findings_of(
     clip: ClipMetrics,
+    tremble: Tremble,
     drift: Drift | None = None,
     swing: Swing | None = None,
     thrown: float | None = None,
@@ -60,6 +62,8 @@ def findings_of(
         *(_base(clip, thrown) if thrown is not None else ()),
         *(_limbs(clip, limbs, gap) if limbs else ()),
         *(_pose(pose, clip.frame_time, gap) if pose else ()),
+        *_tremble(tremble, gap),
+        *_pops(tremble),
         *(_root_drift(drift) if drift else ()),
     )
 
@@ -190,6 +194,31 @@ def _pose(pose: PoseError, frame_time: float, gap: int) -> list[Finding]:
             sentence = f"{part.name} {turned} {np.degrees(amount):.0f}° away from the source's"
             findings.append(Finding("pose", part.name, start, stop, amount, "rad", sentence))
     return sorted(findings, key=lambda found: -found.amount)
+
+
+def _tremble(tremble: Tremble, gap: int) -> Iterator[Finding]:
+    """Of points, in the order of their names, then of joints, the gravest first."""
+    parts = (
+        (tremble.point_names, tremble.points, tremble.source_points, tremble.points_far, "m"),
+        (tremble.joint_names, tremble.joints, tremble.source_joints, tremble.joints_far, "rad"),
+    )
+    for names, values, theirs, far, unit in parts:
+        factor, shown = (1000.0, " mm") if unit == "m" else (float(np.degrees(1.0)), "°")
+        findings = []
+        for k, name in enumerate(names):
+            for start, stop in true_runs(far[:, k], gap):
+                amount = float(values[start:stop, k].max())
+                sentence = f"{name} trembles by {factor * amount:.1f}{shown}"
+                if theirs is not None:
+                    sentence += f", the source's by {factor * theirs[start:stop, k].max():.1f}"
+                findings.append(Finding("tremble", name, start, stop, amount, unit, sentence))
+        yield from sorted(findings, key=lambda found: -found.amount)
+
+
+def _pops(tremble: Tremble) -> Iterator[Finding]:
+    for joint, frame, turn in tremble.pops:
+        sentence = f"{joint} turns {np.degrees(turn):.0f}° in one frame"
+        yield Finding("joint_speed", joint, frame, frame + 1, turn, "rad", sentence)
 
 
 def _root_drift(drift: Drift) -> Iterator[Finding]:

@@ -35,7 +35,7 @@ def joint_rows(clip: ClipMetrics) -> list[JointRow]:
     counts = Counter(clip.joint_names)
     seen: Counter[str] = Counter()
     torques = {each.joint: each for each in clip.torques}
-    rows = []
+    paces, rows = clip.joint_pace.max(axis=0), []
     for k, name in enumerate(clip.joint_names):
         # A rig's spine may have several joints of one name; its limit is that of the outermost.
         limit = limits.get(name) if name not in clip.joint_names[k + 1 :] else None
@@ -46,7 +46,7 @@ def joint_rows(clip: ClipMetrics) -> list[JointRow]:
                 name=name if counts[name] == 1 else f"{name} {seen[name]}",
                 room=None if limit is None else -float(limit.beyond.max()),
                 at_limit=None if limit is None else limit.share(-clip.thresholds.limit_margin),
-                speed=float(clip.joint_speed[:, k].max()),
+                speed=float(paces[k]),
                 jerk=float(np.sqrt(np.mean(clip.joint_jerk[:, k] ** 2))),
                 torque=None if torque is None else float(np.abs(torque.torque).max()),
                 rms=None if torque is None else float(np.sqrt(np.mean(torque.torque**2))),

@@ -5,7 +5,6 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from sim.report.clip_poses import ClipPoses
 from spark.kinematics import end_positions
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
@@ -27,29 +26,31 @@ _ARMS = {
 _OTHERS = {"left foot": Role.LEFT_FOOT, "right foot": Role.RIGHT_FOOT, "head": Role.HEAD}
 
 
-def limb_ends(poses: ClipPoses) -> LimbEnds:
-    """Where the limbs end in every frame.
+def limb_ends(
+    rig: Rig, positions: Float[np.ndarray, "T J 3"], rotations: Float[np.ndarray, "T J 4"]
+) -> LimbEnds:
+    """Where the limbs end in every frame, whose joints are where `forward` puts them.
 
     Of a forearm without a wrist, as many robots have, the End Site is the hand.
     """
-    rig, found = poses.rig, dict[str, tuple[Float[np.ndarray, "T 3"], float]]()
+    found = dict[str, tuple[Float[np.ndarray, "T 3"], float]]()
     for side, roles in _ARMS.items():
         shoulder, elbow, hand = (rig.roles.joint(role) for role in roles)
         if elbow is None:
             continue
         upper = rig.hip_height if shoulder is None else _distance(rig, shoulder, elbow)
-        found[f"{side} elbow"] = poses.positions[:, elbow], upper
+        found[f"{side} elbow"] = positions[:, elbow], upper
         if hand is not None:
-            found[f"{side} hand"] = poses.positions[:, hand], upper + _distance(rig, elbow, hand)
+            found[f"{side} hand"] = positions[:, hand], upper + _distance(rig, elbow, hand)
         elif elbow in rig.skeleton.end_parents:
             end = rig.skeleton.end_parents.tolist().index(elbow)
             length = float(np.linalg.norm(rig.skeleton.end_offsets[end]))
-            ends = end_positions(rig.skeleton, poses.positions, poses.rotations)
+            ends = end_positions(rig.skeleton, positions, rotations)
             found[f"{side} hand"] = ends[:, end], upper + length
     for name, role in _OTHERS.items():
         if (joint := rig.roles.joint(role)) is not None:
-            found[name] = poses.positions[:, joint], rig.hip_height
-    places = [np.zeros((len(poses), 3)), *(place for place, _ in found.values())]
+            found[name] = positions[:, joint], rig.hip_height
+    places = [np.zeros((len(positions), 3)), *(place for place, _ in found.values())]
     lengths = np.array([length for _, length in found.values()])
     return LimbEnds(tuple(found), np.stack(places, axis=1)[:, 1:], lengths)
 

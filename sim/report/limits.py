@@ -181,6 +181,13 @@ def _beyond(
     return np.stack([ranges[:, 0] - angles, angles - ranges[:, 1]], axis=-1).reshape(-1, 6)
 
 
+def joint_of_bone(bone: str) -> str:
+    """What the joint is called that moves a bone with a role ("left lower leg": "left knee")."""
+    side, _, part = bone.partition(" ")
+    joints = {limit.role.replace("_", " "): limit.name for limit in LIMITS if limit.paired}
+    return f"{side} {joints[part]}" if part in joints else bone
+
+
 def limited_joint(rig: Rig, name: str) -> int | None:
     """The joint that a `LimitExcess` calls `name`."""
     for limit in LIMITS:

@@ -2,11 +2,10 @@
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
 
 from sim.report.derivatives import derivative
 from sim.report.limits import LimitExcess
-from sim.report.smoothness import angular_rates
+from sim.report.smoothness import Rates, angular_rates, turns_between
 from sim.trajectory import ModelTrajectory
 from spark.rotation import quat_normalize, rotvec_from_quat
 
@@ -38,21 +37,22 @@ def model_limit_excess(body: ModelTrajectory) -> tuple[LimitExcess, ...]:
     return tuple(excesses)
 
 
-def model_joint_rates(
-    body: ModelTrajectory, frame_time: float, window: float
-) -> tuple[tuple[str, ...], Float[np.ndarray, "T B"], Float[np.ndarray, "T B"]]:
-    """Names, angular speeds [rad/s] and jerks [rad/s³] of the model's joints."""
+def model_joint_rates(body: ModelTrajectory, frame_time: float, window: float) -> Rates:
+    """The rates of the model's own hinges and balls."""
     model, joints = body.model, _joints(body)
     hinges = [j for j in joints if int(model.jnt_type[j]) == _HINGE]
     balls = [j for j in joints if int(model.jnt_type[j]) == _BALL]
-    velocity = derivative(body.qpos[:, model.jnt_qposadr[hinges]], frame_time, 1, window)
+    angles = body.qpos[:, model.jnt_qposadr[hinges]]
+    velocity = derivative(angles, frame_time, 1, window)
     jerk = derivative(velocity, frame_time, 2, window)
-    rotations = body.qpos[:, model.jnt_qposadr[balls][:, None] + np.arange(4)]
-    ball_speed, ball_jerk = angular_rates(quat_normalize(rotations), frame_time, window)
-    return (
+    rotations = quat_normalize(body.qpos[:, model.jnt_qposadr[balls][:, None] + np.arange(4)])
+    ball_speed, ball_jerk = angular_rates(rotations, frame_time, window)
+    turns = np.abs(np.diff(angles, axis=0, prepend=angles[:1]))
+    return Rates(
         tuple(_name(model, joint) for joint in (*hinges, *balls)),
         np.concatenate([np.abs(velocity), ball_speed], axis=1),
         np.concatenate([np.abs(jerk), ball_jerk], axis=1),
+        np.concatenate([turns, turns_between(rotations)], axis=1),
     )
 
 

@@ -18,6 +18,7 @@ LABELS = {
     "invented_contact": "contacts invented",
     "swing_clearance": "swing clearance off",
     "pose": "pose",
+    "tremble": "tremble",
     "root_drift": "root drift",
     "base_acceleration": "base acceleration",
     "limb_acceleration": "limb acceleration",
@@ -30,6 +31,7 @@ LABELS = {
 UNITS = {
     **dict.fromkeys(LABELS, "%"),  # shares of frames, contacts or height
     "pose": "°",
+    "tremble": "mm",
     "root_drift": "cm",
     "base_acceleration": "m/s²",
     "limb_acceleration": "x",  # times the source's

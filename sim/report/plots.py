@@ -90,12 +90,24 @@ def plots(result: Result) -> list[Plot]:
         Plot(
             "fastest joint",
             "rad/s",
-            clip.joint_speed.max(axis=1, initial=0.0),
+            clip.joint_pace.max(axis=1, initial=0.0),
             never,
             None,
-            None if source is None else source.joint_speed.max(axis=1, initial=0.0),
+            None if source is None else source.joint_pace.max(axis=1, initial=0.0),
         ),
     ]
+    tremble = result.tremble
+    beside = tremble.source_points
+    shown.append(
+        Plot(
+            "tremble",
+            "mm",
+            1000 * tremble.points.max(axis=1),
+            np.any(tremble.points_far, axis=1),
+            None,
+            None if beside is None else 1000 * beside.max(axis=1),
+        )
+    )
     if clip.torques:
         load = np.max([each.load for each in clip.torques], axis=0)
         name, most = "highest torque", limits.torque

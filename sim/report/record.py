@@ -12,6 +12,7 @@ from sim.report.measures import Drift
 from sim.report.pose_error import PoseError
 from sim.report.result import Finding, Result
 from sim.report.swing import Swing
+from sim.report.tremble import Tremble
 from sim.report.truth import Accuracy
 from spark.runs import true_runs
 
@@ -32,6 +33,7 @@ def record(result: Result) -> dict[str, Any]:
         "source": None if result.source is None else _clip(result.source),
         "difference_to_source": None if result.source is None else _difference(result),
         "pose_error": None if result.pose is None else _pose(result.pose),
+        "tremble": _tremble(result.tremble),
         "root_drift": None if result.drift is None else _drift(result.drift),
         "foot_contacts": None if result.contacts is None else asdict(result.contacts),
         "swing": None if result.swing is None else _swing(result.swing),
@@ -103,7 +105,7 @@ def _clip(clip: ClipMetrics) -> dict[str, Any]:
         "limb_acceleration_p99_m_s2": dict(
             zip(clip.limb_names, clip.limb_peaks.tolist(), strict=True)
         ),
-        "largest_joint_speed_rad_s": float(clip.joint_speed.max(initial=0.0)),
+        "largest_joint_speed_rad_s": float(clip.joint_pace.max(initial=0.0)),
         "joint_jerk_rms_rad_s3": clip.jerk_rms,
         "joint_limits": {
             limit.joint: {
@@ -177,6 +179,20 @@ def _pose(pose: PoseError) -> dict[str, Any]:
             for part, mean, most in zip(pose.parts, pose.means, largest, strict=True)
         },
     }
+
+
+def _tremble(tremble: Tremble) -> dict[str, Any]:
+    kept = (
+        ("points_m", tremble.point_names, tremble.points),
+        ("scaled_source_points_m", tremble.point_names, tremble.source_points),
+        ("joints_rad", tremble.joint_names, tremble.joints),
+        ("source_joints_rad", tremble.joint_names, tremble.source_joints),
+    )
+    largest = {
+        key: None if each is None else dict(zip(names, each.max(axis=0).tolist(), strict=True))
+        for key, names, each in kept
+    }
+    return {"largest_m": tremble.largest, **largest}
 
 
 def _truth(truth: Accuracy) -> dict[str, float]:

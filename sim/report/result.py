@@ -7,6 +7,7 @@ from sim.report.limbs import Limbs
 from sim.report.measures import ContactMatch, Drift
 from sim.report.pose_error import PoseError
 from sim.report.swing import Swing
+from sim.report.tremble import Tremble
 from sim.report.truth import Accuracy
 
 
@@ -52,6 +53,7 @@ class Result:
     contacts: ContactMatch | None
     findings: tuple[Finding, ...]
     notes: tuple[str, ...]
+    tremble: Tremble
     truth: Accuracy | None = None
     swing: Swing | None = None
     limbs: Limbs | None = None

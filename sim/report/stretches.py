@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from sim.report.clip_metrics import ClipMetrics, measure
+from sim.report.clip_metrics import ClipMetrics
 from sim.report.clip_poses import pose_clip
+from sim.report.measuring import measure
 from sim.report.thresholds import PLAUSIBILITY_V2
 from sim.trajectory import Subject
 from spark.blocks import blocks
@@ -21,7 +22,7 @@ _PRECISION = np.float32  # of what is kept of each frame: seven digits, half of 
 _ROWS = (
     *("depth", "clearance", "corner_skates", "corner_speeds", "sole_heights", "sole_speeds"),
     *("base_acceleration", "limb_acceleration", "unexplained_wrench", "imbalance"),
-    *("joint_speed", "joint_jerk"),
+    *("joint_speed", "joint_jerk", "joint_turns"),
 )
 
 Name = tuple[Any, ...]

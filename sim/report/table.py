@@ -35,7 +35,7 @@ def shares(clip: ClipMetrics) -> dict[str, float | None]:
 
 RATES: dict[str, Callable[[ClipMetrics], float]] = {
     "base_acceleration": lambda clip: clip.base_acceleration_p99,
-    "joint_speed": lambda clip: float(clip.joint_speed.max(initial=0.0)),
+    "joint_speed": lambda clip: float(clip.joint_pace.max(initial=0.0)),
     "joint_jerk": lambda clip: clip.jerk_rms,
 }
 """The measures of how fast the base and the joints move."""
@@ -54,6 +54,7 @@ def rows(result: Result) -> list[Row]:
     clip, source = result.clip, result.source
     contacts, drift, truth = result.contacts, result.drift, result.truth
     swing = result.swing
+    trembles = (result.tremble.largest, result.tremble.source_largest)
     theirs = {} if source is None else shares(source)
     rates = [_row(name, value(clip), source_rate(result, name)) for name, value in RATES.items()]
     recall, precision = (None, None) if contacts is None else (contacts.recall, contacts.precision)
@@ -68,6 +69,7 @@ def rows(result: Result) -> list[Row]:
         _row("invented_contact", None if precision is None else 100 * (1 - precision)),
         _row("swing_clearance", None if swing is None else 100 * abs(1 - swing.clearance)),
         _row("pose", None if result.pose is None else float(np.degrees(result.pose.mean))),
+        _row("tremble", *(None if value is None else 1000 * value for value in trembles)),
         _row("root_drift", None if drift is None else 100 * float(drift.distance.max())),
         *rates[:1],
         _row("limb_acceleration", None if result.limbs is None else result.limbs.ratio),

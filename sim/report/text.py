@@ -11,6 +11,7 @@ from sim.report.palette import BOLD, DIM, TERMINAL, grade
 from sim.report.pose_error import PoseError
 from sim.report.result import Finding, Result
 from sim.report.table import RATES, shares, source_rate
+from sim.report.tremble import Tremble
 from spark.summary import counted
 
 _SHOWN = 3  # findings of one measure
@@ -114,6 +115,7 @@ def details(result: Result) -> Iterator[Detail]:
         )
     if result.pose is not None:
         yield Detail("pose", LABELS["pose"], _pose(result.pose))
+    yield Detail("tremble", LABELS["tremble"], _tremble(result.tremble))
     if drift is not None:
         yield Detail(
             "root_drift",
@@ -149,6 +151,20 @@ def _pose(pose: PoseError) -> str:
     return (
         f"{np.degrees(pose.mean):>6.1f}°         off the source's in the mean; most the "
         f"{pose.parts[worst].name}, {means[worst]:.0f}°, {most:.0f}° at most"
+    )
+
+
+def _tremble(tremble: Tremble) -> str:
+    """The point and the joint that tremble most, in their worst half seconds."""
+    point, joint = (int(each.max(axis=0).argmax()) for each in (tremble.points, tremble.joints))
+    theirs = their_turn = ""
+    if tremble.source_points is not None and tremble.source_joints is not None:
+        theirs = f", the source's {1000 * tremble.source_points.max():.1f}, scaled"
+        their_turn = f", the source's {np.degrees(tremble.source_joints.max()):.1f}"
+    return (
+        f"{1000 * tremble.largest:>6.1f} mm       {tremble.point_names[point]}, in the worst half "
+        f"second{theirs}; of joints the {tremble.joint_names[joint]}, by "
+        f"{np.degrees(tremble.joints.max()):.1f}°{their_turn}"
     )
 
 

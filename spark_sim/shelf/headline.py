@@ -14,6 +14,7 @@ MEASURES: Final = tuple(name for name in UNITS if not name.startswith("ground_tr
 _SI: Final = {
     "%": ("share", 0.01),
     "cm": ("m", 0.01),
+    "mm": ("m", 0.001),
     "°": ("rad", math.radians(1)),
     "m/s²": ("m_s2", 1.0),
     "x": ("of_source", 1.0),

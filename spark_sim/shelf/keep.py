@@ -28,6 +28,7 @@ _COMPARISONS: Final[dict[str, Callable[[float, float], bool]]] = {
 _SCALES: Final = {
     "%": {"%": 0.01},
     "cm": {"cm": 0.01, "m": 1.0},
+    "mm": {"mm": 0.001, "cm": 0.01, "m": 1.0},
     "°": {"°": math.radians(1), "deg": math.radians(1), "rad": 1.0},
     "m/s²": {"m/s²": 1.0, "m/s2": 1.0, "": 1.0},
     "x": {"x": 1.0, "": 1.0},
@@ -36,7 +37,7 @@ _SCALES: Final = {
 }
 """How a measure of a unit may be given, and how many of its SI unit (`headline`) that is."""
 _TOKEN = re.compile(
-    r"\s*(?:(?P<number>\d+(?:\.\d*)?|\.\d+)\s*(?P<unit>%|x|°|deg|rad(?:/s[³3]?)?|cm|m(?:/s[²2])?)?"
+    r"\s*(?:(?P<number>\d+(?:\.\d*)?|\.\d+)\s*(?P<unit>%|x|°|deg|rad(?:/s[³3]?)?|[cm]m|m(?:/s[²2])?)?"
     r"|(?P<word>[a-z_][\w-]*)|(?P<mark><=|>=|<|>|\(|\)))",
     re.IGNORECASE,
 )
@@ -136,7 +137,7 @@ class _Parser:
         token = self.peek()
         scales = _SCALES[UNITS[measure]]
         if token is None or not token["number"] or (token["unit"] or "").lower() not in scales:
-            example = {"%": "5%", "cm": "30cm", "°": "10deg"}.get(UNITS[measure], "20")
+            example = {"%": "5%", "cm": "30cm", "mm": "5mm", "°": "10deg"}.get(UNITS[measure], "20")
             self.fail(f"{measure} is compared with a number such as {example}")
         self.at = token.end()
         return float(token["number"]) * scales[(token["unit"] or "").lower()]

@@ -18,7 +18,7 @@ from spark_sim.shelf.remembered import Measured
 from spark_sim.shelf.thumbnail import LAYOUT
 
 _PAGE = Template("spark_sim.shelf", "page.html", ("page.js",))
-_SI = {"%": 100.0, "cm": 100.0, "°": math.degrees(1)}  # of a unit, in its SI unit
+_SI = {"%": 100.0, "cm": 100.0, "mm": 1000.0, "°": math.degrees(1)}  # of a unit, in its SI unit
 _GRADED = ("implausible", *FLAGS)
 
 

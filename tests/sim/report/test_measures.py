@@ -176,13 +176,15 @@ def test_speed_and_jerk_of_a_swinging_elbow(fps: float) -> None:
     motion = standing(rig, int(4 * fps), fps)
     times = np.arange(len(motion)) / fps
     motion.rotations[:, joint(Role.LEFT_FOREARM)] = quat_about("z", 0.5 * np.sin(6 * times))
-    names, speed, jerk = joint_rates(forward(motion)[1], rig, 1 / fps, 0.05)
+    names, speed, jerk, turns = joint_rates(forward(motion)[1], rig, 1 / fps, 0.05)
     elbow = names.index("left forearm")
     inside = slice(len(times) // 10, -len(times) // 10)
     # The window damps 6 rad/s by a percent or two, in both derivatives.
     cosine = np.abs(np.cos(6 * times))[inside]
     np.testing.assert_allclose(speed[inside, elbow], 3 * cosine, atol=0.06)
     np.testing.assert_allclose(jerk[inside, elbow], 108 * cosine, atol=4)
+    between = 0.5 * np.abs(np.diff(np.sin(6 * times)))
+    np.testing.assert_allclose(turns[:, elbow], [0, *between], atol=1e-9)
     assert speed[:, [k for k in range(len(names)) if k != elbow]].max() < 1e-9
 
 

@@ -52,6 +52,12 @@ def test_a_condition_means_what_python_means_by_it(text: str) -> None:
         assert keep(measures) is eval(TRUTHS[text], known)
 
 
+def test_tremble_is_given_in_millimetres() -> None:
+    """1000 of them are a metre, in which measures are kept."""
+    for text in ("tremble <= 3mm", "tremble <= 0.3 cm", "tremble <= 0.003 m"):
+        assert [parse(text)({key("tremble"): value}) for value in (0.0029, 0.0031)] == [True, False]
+
+
 def test_what_is_not_measured_is_no_reason_to_leave_out() -> None:
     measures = {key(name): None for name in MEASURES} | {key("implausible"): 0.5}
     assert parse("balance < 5%")(measures)
