@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sim.report.clip_metrics import ClipMetrics
+from sim.report.contact_timing import Discord
 from sim.report.limbs import Limbs
 from sim.report.measures import Drift
 from sim.report.pose_error import PoseError
@@ -37,6 +38,7 @@ def findings_of(
     thrown: float | None = None,
     limbs: Limbs | None = None,
     pose: PoseError | None = None,
+    discord: Discord | None = None,
 ) -> tuple[Finding, ...]:
     """All events of a clip, the gravest of each measure first.
 
@@ -58,7 +60,9 @@ def findings_of(
     )
     return (
         *findings,
-        *(_swing(swing) if swing else ()),
+        *(_contacts(discord) if discord else ()),
+        # Where feet swing at other times, how high they are when the source's do says nothing.
+        *(_swing(swing) if swing and not discord else ()),
         *(_base(clip, thrown) if thrown is not None else ()),
         *(_limbs(clip, limbs, gap) if limbs else ()),
         *(_pose(pose, clip.frame_time, gap) if pose else ()),
@@ -140,6 +144,16 @@ def _torque(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
             amount = float(np.abs(each.torque[start:stop]).max())
             sentence = f"{each.joint} needs {amount:.0f} N m, its motor gives {each.limit:.0f}"
             yield Finding("torque", each.joint, start, stop, amount, "n_m", sentence)
+
+
+def _contacts(discord: Discord) -> Iterator[Finding]:
+    precision, recall, f1 = (
+        discord.match.precision or 0.0,
+        discord.match.recall or 0.0,
+        discord.match.f1 or 0.0,
+    )
+    measure = "missed_contact" if recall < precision else "invented_contact"
+    yield Finding(measure, "feet", discord.start, discord.stop, f1, "f1", discord.words)
 
 
 def _swing(swing: Swing) -> Iterator[Finding]:

@@ -347,6 +347,10 @@ def test_a_part_of_the_source_is_told_from_a_wrong_rate() -> None:
     fast = replace(source, frame_time=source.frame_time / 2)
     (note,) = assess(Subject(fast, rig), source=Subject(source, rig)).notes
     assert note.endswith("Is its rate 60 fps, and not 120?")
+    # At 13.9 frames a second it would last as long, and no file has that rate.
+    (note,) = assess(Subject(standing(rig, 56), rig), source=Subject(source, rig)).notes
+    assert "rate" not in note
+    assert "Is it another motion?" in note
 
 
 def test_json_is_json_and_says_what_it_is() -> None:
