@@ -25,7 +25,7 @@ def annotate(clip: ClipMetrics, subject: Subject, findings: Sequence[Finding] = 
     limits = [
         (limit, joint, at_limit)
         for limit in clip.limits
-        if (at_limit := (limit.beyond > -clip.thresholds.limit_margin).any(axis=1)).any()
+        if (at_limit := limit.at_limit).any()
         and (joint := _joint(subject, limit.joint)) is not None
     ]
     joints = [joint for _, joint, _ in limits]

@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float
 from sim.report.limits import LimitExcess
 from sim.report.thresholds import Thresholds
 from sim.report.torque import JointTorque
+from spark.runs import true_runs
 from spark.summary import time_span
 from spark.transfer.ground import Ground
 
@@ -96,17 +97,22 @@ class ClipMetrics:
     @property
     def at_limit_shares(self) -> dict[str, float]:
         """The share of frames at a limit or beyond, by joint."""
-        return {each.joint: each.share(-self.thresholds.limit_margin) for each in self.limits}
+        return {each.joint: each.at_limit_share for each in self.limits}
+
+    def longest_at_limit(self, joint: str) -> float:
+        """The longest time [s] for which a joint is at a limit or beyond without a break."""
+        flags = next(each.at_limit for each in self.limits if each.joint == joint)
+        return max((stop - start for start, stop in true_runs(flags)), default=0) * self.frame_time
 
     @property
     def limit_share(self) -> float:
         """The share of frames in which any joint is beyond its limits."""
-        return self._limits_over(0.0)
+        return _share_of([np.any(each.beyond > 0, axis=1) for each in self.limits])
 
     @property
     def at_limit_share(self) -> float:
         """The share of frames in which any joint is at a limit or beyond."""
-        return self._limits_over(-self.thresholds.limit_margin)
+        return _share_of([each.at_limit for each in self.limits])
 
     @property
     def self_penetration(self) -> Bool[np.ndarray, "T"]:
@@ -160,6 +166,7 @@ class ClipMetrics:
         """Over all joints and frames [rad/s³]; 0 without joints."""
         return float(np.sqrt(np.mean(self.joint_jerk**2))) if self.joint_names else 0.0
 
-    def _limits_over(self, bound: float) -> float:
-        over = [(each.beyond > bound).any(axis=1) for each in self.limits]
-        return float(np.any(over, axis=0).mean()) if over else 0.0
+
+def _share_of(flags: list[Bool[np.ndarray, "T"]]) -> float:
+    """Of the frames with any of the flags; 0 without flags."""
+    return float(np.any(flags, axis=0).mean()) if flags else 0.0

@@ -5,7 +5,7 @@ import numpy as np
 from sim.report.clip_poses import ClipPoses, pose_clip
 from sim.report.course import Course
 from sim.report.measures import floor_slope
-from sim.report.thresholds import PLAUSIBILITY_V2
+from sim.report.thresholds import PLAUSIBILITY_V3
 from spark.rig.contacts import planted_points
 from spark.transfer.canonical import to_canonical
 from spark.transfer.ground import Ground
@@ -90,7 +90,7 @@ def _slope(course: Course, whose: str) -> tuple[str, ...]:
     rig, step = course.rig, course.motion.frame_time
     planted = planted_points(course.feet, step, rig.standing_height).any(axis=1)
     angle, rise = floor_slope(course.lowest[planted])
-    if rise < PLAUSIBILITY_V2.scaled(rig.hip_height).floating / 2:
+    if rise < PLAUSIBILITY_V3.scaled(rig.hip_height).floating / 2:
         return ()
     if angle > _STEEPEST:
         return (

@@ -45,7 +45,7 @@ def joint_rows(clip: ClipMetrics) -> list[JointRow]:
             JointRow(
                 name=name if counts[name] == 1 else f"{name} {seen[name]}",
                 room=None if limit is None else -float(limit.beyond.max()),
-                at_limit=None if limit is None else limit.share(-clip.thresholds.limit_margin),
+                at_limit=None if limit is None else limit.at_limit_share,
                 speed=float(paces[k]),
                 jerk=float(np.sqrt(np.mean(clip.joint_jerk[:, k] ** 2))),
                 torque=None if torque is None else float(np.abs(torque.torque).max()),

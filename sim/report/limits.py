@@ -13,8 +13,9 @@ captured people is worth nothing. They tell a knee that bends backwards, not a s
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
+from sim.report.thresholds import PLAUSIBILITY_V3
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_relative, quat_swing_twist, rotvec_from_quat
@@ -124,11 +125,13 @@ LIMITS: tuple[JointLimit, ...] = (
 @dataclass(frozen=True, eq=False)
 class LimitExcess:
     """How far one joint ("left knee") is beyond the ends of its ranges [rad]: `beyond[t, e]` is
-    negative inside; `movements[e]` says what a turn beyond end e is called."""
+    negative inside; `movements[e]` says what a turn beyond end e is called. It is at a limit where
+    it is nearer to an end than `margin` [rad]."""
 
     joint: str
     beyond: Float[np.ndarray, "T E"]
     movements: tuple[str, ...]
+    margin: float
 
     __repr__ = brief
 
@@ -137,9 +140,20 @@ class LimitExcess:
         """How far outside its ranges the joint is [rad]; 0 inside."""
         return np.maximum(self.beyond, 0.0)
 
-    def share(self, bound: float) -> float:
-        """The share of frames in which the joint is further beyond an end than `bound` [rad]."""
-        return float((self.beyond > bound).any(axis=1).mean())
+    @property
+    def at_limit(self) -> Bool[np.ndarray, "T"]:
+        """The frames in which the joint is at a limit or beyond."""
+        return np.any(self.beyond > -self.margin, axis=1)
+
+    @property
+    def share(self) -> float:
+        """The share of frames in which the joint is beyond a limit."""
+        return float(np.any(self.beyond > 0, axis=1).mean())
+
+    @property
+    def at_limit_share(self) -> float:
+        """The share of frames in which the joint is at a limit or beyond."""
+        return float(self.at_limit.mean())
 
 
 def limit_excess(since_tpose: Float[np.ndarray, "T J 4"], rig: Rig) -> tuple[LimitExcess, ...]:
@@ -164,6 +178,7 @@ def limit_excess(since_tpose: Float[np.ndarray, "T J 4"], rig: Rig) -> tuple[Lim
                     f"{side} {limit.name}".strip(),
                     _beyond(swing_and_twist(rotation, limit.axis), np.radians(limit.ranges)),
                     tuple(word for words in limit.movements for word in words),
+                    PLAUSIBILITY_V3.limit_margin,
                 )
             )
     return tuple(excesses)

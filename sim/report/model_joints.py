@@ -6,6 +6,7 @@ import numpy as np
 from sim.report.derivatives import derivative
 from sim.report.limits import LimitExcess
 from sim.report.smoothness import Rates, angular_rates, turns_between
+from sim.report.thresholds import PLAUSIBILITY_V3
 from sim.trajectory import ModelTrajectory
 from spark.rotation import quat_normalize, rotvec_from_quat
 
@@ -19,7 +20,7 @@ def model_limit_excess(body: ModelTrajectory) -> tuple[LimitExcess, ...]:
 
     Joints without limits are left out.
     """
-    model, excesses = body.model, []
+    model, limits, excesses = body.model, PLAUSIBILITY_V3, []
     for joint in _joints(body):
         if not model.jnt_limited[joint]:
             continue
@@ -27,13 +28,14 @@ def model_limit_excess(body: ModelTrajectory) -> tuple[LimitExcess, ...]:
         name, address = _name(model, joint), int(model.jnt_qposadr[joint])
         if int(model.jnt_type[joint]) == _HINGE:
             angle = body.qpos[:, address]
-            beyond = np.stack([low - angle, angle - high], axis=1)
+            beyond, width = np.stack([low - angle, angle - high], axis=1), high - low
             movements: tuple[str, ...] = ("turns back", "turns on")
         else:
             rotvec = rotvec_from_quat(quat_normalize(body.qpos[:, address : address + 4]))
-            beyond = np.linalg.norm(rotvec, axis=1, keepdims=True) - high
+            beyond, width = np.linalg.norm(rotvec, axis=1, keepdims=True) - high, 2 * high
             movements = ("turns",)
-        excesses.append(LimitExcess(name, beyond - _FILE_ROUNDING, movements))
+        margin = min(limits.limit_margin, limits.limit_margin_share * float(width))
+        excesses.append(LimitExcess(name, beyond - _FILE_ROUNDING, movements, margin))
     return tuple(excesses)
 
 

@@ -65,6 +65,7 @@ _UNITS = {
     "limb_least": "m_s2",
     "torque": "",
     "limit_margin": "rad",
+    "limit_margin_share": "",
     "static_speed": "m_s",
     "static_acceleration": "m_s2",
     "static_time": "s",
@@ -109,8 +110,8 @@ def _clip(clip: ClipMetrics) -> dict[str, Any]:
         "joint_jerk_rms_rad_s3": clip.jerk_rms,
         "joint_limits": {
             limit.joint: {
-                "share": limit.share(0.0),
-                "at_limit_share": limit.share(-clip.thresholds.limit_margin),
+                "share": limit.share,
+                "at_limit_share": limit.at_limit_share,
                 "largest_excess_rad": float(limit.excess.max()),
             }
             for limit in clip.limits

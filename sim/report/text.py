@@ -98,7 +98,10 @@ def details(result: Result) -> Iterator[Detail]:
     often = sorted(clip.at_limit_shares.items(), key=lambda item: -item[1])[:_SHOWN]
     if often and often[0][1] > 0:
         others = "".join(f"; {joint} {100 * share:.1f} %" for joint, share in often[1:] if share)
-        words = f"{100 * often[0][1]:>6.1f} %        {often[0][0]}{others}"
+        longest = clip.longest_at_limit(often[0][0])
+        words = (
+            f"{100 * often[0][1]:>6.1f} %        {often[0][0]}, for {longest:.1f} s on end{others}"
+        )
         yield Detail("at_limit", "most at a limit", words)
     if contacts is not None and contacts.f1 is not None:
         parts = (("precision", contacts.precision), ("recall", contacts.recall))

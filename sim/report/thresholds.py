@@ -7,14 +7,14 @@ HUMAN_HIP_HEIGHT = 0.9  # [m] of an adult: the size that the thresholds are give
 
 @dataclass(frozen=True)
 class Thresholds:
-    """`plausibility v2`: what counts as implausible, for a body whose hips stand 0.9 m high.
+    """`plausibility v3`: what counts as implausible, for a body whose hips stand 0.9 m high.
 
     Those of skating were chosen on clean recordings of people, which must show little of it; the
     others were set beforehand. `scripts/report_bench.py` measures on spoilt recordings what they
     tell apart: docs/report.md has its table.
     """
 
-    version: str = "plausibility v2"
+    version: str = "plausibility v3"
 
     # Penetration: the lowest point lies deeper than this under the floor [m].
     penetration: float = 0.01
@@ -68,8 +68,10 @@ class Thresholds:
     # Torque: a joint needs more than this share of what its motor gives.
     torque: float = 1.0
 
-    # At its limit: a joint is within this [rad] of its limit, or beyond: half a degree.
-    limit_margin: float = 0.0087
+    # At its limit: a joint is within this [rad] of its limit, or within this share of its range, or
+    # beyond: 2 degrees. Solvers keep clear of limits by half a degree or so.
+    limit_margin: float = 0.0349
+    limit_margin_share: float = 0.05
 
     # Balance, where the centre of mass is slower than this [m/s] and accelerates less than this
     # [m/s²] for this time [s] before and after: it lies further outside the points near the floor
@@ -111,4 +113,4 @@ class Thresholds:
         )
 
 
-PLAUSIBILITY_V2 = Thresholds()
+PLAUSIBILITY_V3 = Thresholds()

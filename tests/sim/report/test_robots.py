@@ -23,6 +23,7 @@ from sim.report import Report, Subject, assess
 from sim.report.clip_poses import pose_clip
 from sim.report.lowest import lowest_points
 from sim.report.mass import model_mass
+from sim.report.model_joints import model_limit_excess
 from sim.report.model_poses import pose_model
 from sim.report.wrench import required_wrench
 from sim.trajectory import ModelTrajectory
@@ -167,7 +168,8 @@ def test_a_hinge_beyond_its_range_is_named_with_the_excess(robot: Morphology) ->
     high = robot.mjcf.model.joint("left_knee").range[1]
     qpos = standing(robot, 60)
     qpos[20:40, column(robot, "left_knee")] = high + np.radians(10)
-    qpos[40:50, column(robot, "left_knee")] = high - np.radians(0.4)
+    qpos[40:50, column(robot, "left_knee")] = high - np.radians(1.9)
+    qpos[50:55, column(robot, "left_knee")] = high - np.radians(2.1)
     report = judged(moving(robot, qpos))
     found = report.json()["clip"]["joint_limits"]
     knee = found.pop("left_knee")
@@ -179,6 +181,20 @@ def test_a_hinge_beyond_its_range_is_named_with_the_excess(robot: Morphology) ->
     bent = [f for f in report.findings if f.measure == "joint_limit"]
     assert [(f.where, f.start, f.stop) for f in bent] == [("left_knee", 20, 40)]
     assert "10° beyond its limit" in bent[0].sentence
+
+
+def test_a_hinge_of_little_range_is_at_its_limit_within_a_twentieth_of_it() -> None:
+    """Of 20 degrees: within 1."""
+    spec = mujoco.MjSpec.from_string(
+        """<mujoco><worldbody><body name="base"><freejoint/><geom size=".1"/>
+        <body name="toe"><joint name="toe" range="-10 10"/><geom size=".1"/></body>
+        </body></worldbody></mujoco>"""
+    )
+    model = spec.compile()
+    qpos = np.zeros((4, 8))
+    qpos[:, 3], qpos[:, 7] = 1.0, np.radians([8.9, 9.1, -9.1, -8.9])
+    (toe,) = model_limit_excess(ModelTrajectory(spec, model, 1, qpos))
+    assert toe.at_limit.tolist() == [False, True, True, False]
 
 
 def test_speed_and_jerk_are_those_of_the_hinges(robot: Morphology) -> None:
