@@ -6,7 +6,7 @@ from sim.report.clip_poses import ClipPoses, pose_clip
 from sim.report.course import Course
 from sim.report.measures import floor_slope
 from sim.report.thresholds import PLAUSIBILITY_V3
-from spark.rig.contacts import planted_points
+from spark.rig.contacts import ADULT_HEIGHT, PLANTED_SPEED, speeds
 from spark.transfer.canonical import to_canonical
 from spark.transfer.ground import Ground
 from spark.transfer.seats import FLESH
@@ -88,8 +88,10 @@ def source_ground_notes(course: Course, treads: Treads, scale: float) -> tuple[s
 def _slope(course: Course, whose: str) -> tuple[str, ...]:
     """A note where the feet stand on a slope: recorded floors are off level by a degree or two."""
     rig, step = course.rig, course.motion.frame_time
-    planted = planted_points(course.feet, step, rig.standing_height).any(axis=1)
-    angle, rise = floor_slope(course.lowest[planted])
+    # However high they are: on a slope those that stand low would be taken for all that stand.
+    limit = PLANTED_SPEED * rig.standing_height / ADULT_HEIGHT
+    still = (speeds(course.feet, step) < limit).any(axis=1)
+    angle, rise = floor_slope(course.lowest[still])
     if rise < PLAUSIBILITY_V3.scaled(rig.hip_height).floating / 2:
         return ()
     if angle > _STEEPEST:

@@ -348,6 +348,16 @@ def test_a_floor_that_slopes_is_told_from_a_climb(step: tuple[float, float], tol
     assert any(note.startswith(told) for note in notes) if told else not notes
 
 
+def test_all_of_a_long_slope_is_told() -> None:
+    """Five stands, each 0.5 m ahead of the last and 5 cm above it."""
+    rig = stick_rig()
+    steps = np.repeat(np.arange(5), 60)
+    stands = along(along(standing(rig, 300), 0, 0.5 * steps), 2, 0.05 * steps)
+    notes = assess(Subject(stands, rig)).notes
+    told = "the floor slopes by 5.7°: the feet stand 20 cm higher at one end of it"
+    assert any(note.startswith(told) for note in notes)
+
+
 def test_a_part_of_the_source_is_told_from_a_wrong_rate() -> None:
     rig = stick_rig()
     source = standing(rig, 241)
