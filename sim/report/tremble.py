@@ -18,7 +18,7 @@ from spark.summary import brief
 # Twice as much as the source, and so much at least, is tremble: [m, of an adult] and [rad]. Without
 # a source, what no recording of 140 keeps to: climbers' hands and hips reach 7 mm, joints 3.5°.
 _TIMES_SOURCE = 2.0
-_LEAST, _LEAST_ALONE = 0.0015, 0.008
+_LEAST, _LEAST_ALONE = 0.0025, 0.008
 _LEAST_TURN, _LEAST_TURN_ALONE = np.radians(0.5), np.radians(4.0)
 # What trembles with the whole body does so no more than this many times as far as the base.
 _OF_BASE = 1.5
