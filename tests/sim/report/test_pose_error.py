@@ -114,6 +114,15 @@ def test_a_head_that_looks_elsewhere_is_told_with_its_frames() -> None:
     assert row["value"] == pytest.approx(np.degrees(report.pose.mean))
 
 
+@pytest.mark.parametrize(("degrees", "told"), [(15, False), (20, True)])
+def test_a_head_that_is_off_throughout_is_told_though_never_far(degrees: int, told: bool) -> None:
+    aside = turning_head(30.0, by=0.0)
+    aside.motion.rotations[:, joint(Role.HEAD)] = quat_about("z", np.radians(float(degrees)))
+    found = assess(aside, source=turning_head(30.0, by=0.0)).findings
+    sentences = [finding.sentence for finding in found if finding.measure == "pose"]
+    assert sentences == ["head points 20° away from the source's in the mean"] * told
+
+
 def test_a_part_that_is_late_for_a_moment_is_no_finding() -> None:
     source = turning_head(30.0, by=0.0)
     jerked = turning_head(30.0, by=0.0)
