@@ -12,9 +12,11 @@ from jaxtyping import Float
 
 from spark.rig.roles import LIMBS, Group
 from spark.rotation import quat_from_rotvec, quat_mul, quat_rotate
+from spark.smoothstep import smoothstep
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.hip_rise import standing
 
+_LEVER = 0.4  # of the way from the ankle to the lowest point, that is level: less turns less
 _MOST = 0.6  # [rad] 34 degrees: the foot of who lies on the floor is not turned over
 
 
@@ -22,8 +24,8 @@ def turn_up(
     motion: CanonicalMotion, group: Group, least: Float[np.ndarray, "T"]
 ) -> Float[np.ndarray, "T 4"]:
     """By which a foot is turned, in world axes, so that no point of its sole is lower than `least`
-    [m, world], but for `_MOST`; where it is too low as a whole, so that its heel and its toes are
-    about as low."""
+    [m, world], but for `_MOST`, and less where it hangs; where it is too low as a whole, so that
+    its heel and its toes are about as low."""
     leg = standing(motion, group)
     points = leg.sole - leg.ends[:, 1:]
     left = quat_rotate(motion.rotations[:, leg.joints[1]], np.array([0.0, 1.0, 0.0]))
@@ -39,8 +41,11 @@ def turn_up(
     heel = np.where(ahead < 0, at - free, np.pi).min(axis=1)
     front, back = np.maximum(ahead.max(axis=1), 0.0), np.maximum(-ahead.min(axis=1), 0.0)
     level = (front * toes + back * heel) / np.maximum(front + back, 1e-9)
-    angle = np.where(toes > heel, level, np.clip(0.0, toes, heel))
-    return quat_from_rotvec(-np.clip(angle, -_MOST, _MOST)[:, None] * left)
+    angle = np.clip(np.where(toes > heel, level, np.clip(0.0, toes, heel)), -_MOST, _MOST)
+    # The lowest point of a foot that hangs would go far to rise little.
+    lever = np.take_along_axis(np.abs(ahead) / away, up.argmin(axis=1)[:, None], axis=1)[:, 0]
+    angle *= smoothstep(lever / _LEVER)
+    return quat_from_rotvec(-angle[:, None] * left)
 
 
 def turn_foot(

@@ -47,7 +47,7 @@ def up(motion: CanonicalMotion, least: float) -> CanonicalMotion:
 
 
 @pytest.mark.parametrize("yaw", [0.0, 2.0])
-@pytest.mark.parametrize("angle", [-0.3, -0.1, 0.1, 0.3])
+@pytest.mark.parametrize("angle", [-0.1, 0.1, 0.3])
 def test_the_lowest_point_comes_up_to_the_floor(angle: float, yaw: float) -> None:
     """Of toes that point into it, and of heels."""
     motion = pitched(angle, yaw)
@@ -70,6 +70,15 @@ def test_a_foot_that_is_too_low_as_a_whole_comes_to_lie_level() -> None:
     turned = up(pitched(0.2, sunk=0.03), 0.0)
     assert np.ptp(heights(turned), axis=1).max() < 0.01
     assert np.ptp(heights(pitched(0.2))) > 0.04
+
+
+def test_a_foot_that_hangs_is_not_turned_far_to_rise_little() -> None:
+    """Its toes are nearly under its ankle: 3 mm would take 6 degrees and more."""
+    angles = np.linspace(0.9, 1.3, FRAMES)
+    hanging = pitched(angles)
+    low = heights(hanging).min(axis=1)
+    turn = turn_up(hanging, LEFT, low + 0.003)
+    assert np.degrees(quat_angle(turn, quat_identity(turn))).max() < 3
 
 
 def test_a_foot_is_not_turned_over() -> None:
