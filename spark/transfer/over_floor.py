@@ -88,9 +88,9 @@ def _lowest(
     heights = in_blocks(
         lambda block: canonical_positions(motion.picked(block), joints)[..., 2], len(motion)
     )
-    ends = np.cumsum([len(part) for part in parts.values()])[:-1]
-    columns = np.split(heights - motion.floor_z, ends, axis=1)
-    return {role: own.min(axis=1) for role, own in zip(parts, columns, strict=True)}
+    starts = np.cumsum([0, *map(len, parts.values())])[:-1]
+    lowest = np.minimum.reduceat(heights - motion.floor_z, starts, axis=1)
+    return dict(zip(parts, lowest.T, strict=True))
 
 
 def _risen(

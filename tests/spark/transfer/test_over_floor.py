@@ -163,11 +163,17 @@ def test_fingers_turn_up_at_the_wrist() -> None:
     np.testing.assert_allclose(length, 0.15)
 
 
-def test_limbs_that_a_rig_lacks_are_not_missed() -> None:
+@pytest.mark.parametrize("part", ["hand", "forearm", "head", "clavicle", "upper_arm"])
+def test_limbs_that_a_rig_lacks_are_not_missed(part: str) -> None:
     source = bowed()
     rig = stick_rig()
-    roles = tuple(None if r in (Role.LEFT_HAND, Role.HEAD) else r for r in rig.roles.roles)
-    bare = replace(rig, roles=replace(rig.roles, roles=roles))
-    for a, b in ((rig, bare), (bare, rig)):
-        moved = replace(source, rig=b, hips=source.hips - [0.0, 0.0, 0.1])
-        assert lowest(over_floor(replace(source, rig=a), moved), HANDS[1:]) > 0.0
+    legs = [joint(Role(f"{side}_lower_leg")) for side in ("left", "right")]
+    for sides in (("left_", ""), ("left_", "right_", "")):
+        lacking = {f"{side}{part}" for side in sides}
+        roles = tuple(None if r in lacking else r for r in rig.roles.roles)
+        bare = replace(rig, roles=replace(rig.roles, roles=roles))
+        left = [j for j in HANDS if bare.roles.roles[j] and part == "hand"]
+        for a, b in ((rig, bare), (bare, rig)):
+            moved = replace(source, rig=b, hips=source.hips - [0.0, 0.0, 0.1])
+            over = over_floor(replace(source, rig=a), moved)
+            assert lowest(over, [*left, *legs]) > 0.0
