@@ -3,7 +3,7 @@
 Copied onto arms and a trunk of other proportions, a body goes through the floor that the source's
 rests on: in a cartwheel by its hands, if its arms are long for its legs. Where its feet are in the
 air the body then rises as a whole, as it stands on its arms; and so it does where the trunk, the
-head or a knee is too low, but for feet that stay where they are. A hand turns up at the wrist until
+head or a knee is too low, but for feet that stay where they are. A hand bends up at the wrist until
 its fingers lie on the floor, and what is still too low is raised with the elbow.
 """
 
@@ -15,9 +15,10 @@ from jaxtyping import Float
 
 from spark.blocks import in_blocks
 from spark.rig.roles import LIMBS, Group, Role
-from spark.rotation import quat_from_rotvec, quat_mul
+from spark.rotation import quat_conj, quat_mul
 from spark.smoothstep import smoothstep
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.hands_up import bent_up
 from spark.transfer.leg_fit import from_sole
 from spark.transfer.leg_ik import ELBOWS, Leg, arm_of, leg_of, move_ankles
 from spark.transfer.reach import in_time
@@ -126,23 +127,12 @@ def _turned_up(
     hands: Mapping[Role, Sequence[int]],
     allowed: Mapping[Role, Float[np.ndarray, "T"]],
 ) -> CanonicalMotion:
-    """Hands turned up about a level axis across them, until no finger is lower than it may be, once
-    the wrist is as high as it has to be."""
+    """Hands bent up at the wrist until no finger is lower than it may be."""
     rotations = moved.rotations.copy()
     for role, joints in hands.items():
-        if len(joints) < 2 or role not in allowed:
-            continue
-        at = canonical_positions(moved, joints)
-        fingers = at[:, 1:] - at[:, :1]
-        wrist = np.maximum(at[:, 0, 2] - moved.floor_z, allowed[role])
-        least = np.minimum(allowed[role] - wrist, 0.0)[:, None]
-        length = np.maximum(np.linalg.norm(fingers, axis=-1), 1e-9)
-        up, wanted = (np.arcsin(np.clip(z / length, -1, 1)) for z in (fingers[..., 2], least))
-        most = np.maximum(wanted - up, 0.0).max(axis=1)
-        turn = in_time(most, _EASE, moved.frame_time)
-        along = fingers.mean(axis=1)
-        across = np.stack([along[:, 1], -along[:, 0], 0 * turn], axis=1)
-        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
-        turned = quat_from_rotvec(turn[:, None] * across)[:, None]
-        rotations[:, list(joints)] = quat_mul(turned, rotations[:, list(joints)])
+        if len(joints) > 1 and role in allowed:
+            turned = bent_up(moved, joints, allowed[role])[:, None]
+            own = rotations[:, joints[:1]]
+            turned = quat_mul(quat_mul(own, turned), quat_conj(own))
+            rotations[:, joints] = quat_mul(turned, rotations[:, joints])
     return replace(moved, rotations=rotations)

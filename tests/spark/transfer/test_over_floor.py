@@ -8,7 +8,7 @@ import pytest
 from spark.demo.sample import MOTIONS, sample_motion, sample_rig
 from spark.rig.rig import Rig
 from spark.rig.roles import Role, RoleMap
-from spark.rotation import quat_from_rotvec
+from spark.rotation import quat_angle, quat_conj, quat_from_rotvec, quat_mul
 from spark.skeleton import Skeleton
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
@@ -161,6 +161,26 @@ def test_fingers_turn_up_at_the_wrist() -> None:
     np.testing.assert_allclose(after[:, wrist], before[:, wrist], atol=1e-9)
     length = np.linalg.norm(after[:, finger] - after[:, wrist], axis=1)
     np.testing.assert_allclose(length, 0.15)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_hand_that_swings_through_the_vertical_keeps_its_side_and_its_time(side: int) -> None:
+    """Fingers that hang into the floor swing through the vertical, mostly on the side of the hand's
+    back (1) or palm (-1). By the shortest way the hand would turn by 180 degrees in a frame."""
+    source, rig = bowed(), with_fingers(long_armed(1.3))
+    wrist, finger = joint(Role.LEFT_HAND), len(rig.skeleton) - 1
+    swing = side * (0.5 - 0.6 * np.cos(np.linspace(-4 * np.pi, 4 * np.pi, FRAMES)))
+    source.rotations[:, wrist] = quat_from_rotvec(np.outer(swing - np.pi / 2, [1.0, 0.0, 0.0]))
+    moved = transfer(source, rig)
+    raised = over_floor(source, moved)
+    assert lowest(moved, [finger]) < -0.03
+    assert lowest(raised, [finger]) > -1e-6
+    bend = quat_mul(quat_conj(moved.rotations[:, wrist]), raised.rotations[:, wrist])
+    over = side * bend[:, 1] * np.sign(bend[:, 0])  # about X, in the T-pose from palm to back
+    assert over.min() > -1e-9
+    assert over.max() > np.sin(np.radians(30))
+    quickest = np.degrees(quat_angle(bend[1:], bend[:-1])).max() * FPS
+    assert quickest < 400  # [degrees/s]
 
 
 @pytest.mark.parametrize("part", ["hand", "forearm", "head", "clavicle", "upper_arm"])
