@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from spark.errors import SkeletonError
+from spark.errors import SkeletonError, name_list
 from spark.motion import Motion
 from spark.rig.anatomy import Anatomy, find_anatomy
 from spark.rig.facing import LabelledPair
@@ -12,7 +12,7 @@ from spark.rig.measurements import measure
 from spark.rig.name_hints import NameHint, read_names
 from spark.rig.name_votes import with_votes
 from spark.rig.override import Override, check_chains, check_override
-from spark.rig.roles import Role, RoleMap
+from spark.rig.roles import SURE, Role, RoleMap
 from spark.skeleton import Skeleton
 
 __all__ = ["Override", "assign_roles"]
@@ -60,6 +60,9 @@ def assign_roles(
         roles = replace(roles, notes=(f"{sides.note} ({left!r} is taken for the left thigh)",))
     if override:
         check_chains(skeleton, roles)
+    if unsure := [skeleton.names[j] for j in roles.held if roles.confidence[j] < SURE]:
+        note = f"less than {SURE:.0%} sure what {name_list(unsure)} is; see spark-sim inspect"
+        roles = replace(roles, notes=(*roles.notes, note))
     return roles
 
 

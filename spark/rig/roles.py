@@ -88,6 +88,10 @@ ENDS = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE, Role.LEFT_TOE, Role.RIGHT_TOE)
 """What lies before a limb's shoulder and after its ankle."""
 
 
+SURE = 0.8
+"""Of a role's confidence: below it, one kind of evidence alone says it, or two disagree."""
+
+
 @dataclass(frozen=True)
 class RoleMap:
     """The role of each joint (None: it follows its parent), the confidence in [0, 1], and why; and

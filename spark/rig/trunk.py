@@ -11,6 +11,10 @@ from spark.rig.topology import LimbPair, chain_below, common_ancestor, path_betw
 from spark.skeleton import Skeleton
 
 _SURE = 0.8  # of a name that means a head; a face's is less
+# A head's bone over its neck's: 1.25 and more of Mixamo's, 1.04 and less where it is a neck's too.
+_LONGER = 1.1
+_LITTLE = 0.6  # of the head's length: a crown's End Site is half as far at most, a head's as far
+_STIFF = 0.01  # [rad]
 _HERE = 0.1  # of the bone above: a face that begins so near to a joint is carried by the head
 
 
@@ -104,10 +108,24 @@ def _head(
     for j in chain:
         if len(skeleton.children[j]) > 1:
             return j
-    # The crown is no joint: a leaf called an end, or without an End Site where others have one.
-    unlike = not measured.end_reach[chain[-1]] and len(skeleton.end_parents) > 0
-    crown = len(chain) > 1 and (bool(hints[chain[-1]].aside) or unlike)
-    return chain[-2] if crown else chain[-1]
+    return chain[-2] if _ends_at_crown(measured, hints, chain) else chain[-1]
+
+
+def _ends_at_crown(measured: Measurements, hints: Sequence[NameHint], chain: Sequence[int]) -> bool:
+    """Whether the last joint of a neck's chain is the crown, which is no head.
+
+    It is called an end, or has no End Site where others have one. Or, above two others, it lies a
+    head's length over the last one, longer than a neck's bone, with little above it, and is stiff.
+    """
+    if len(chain) < 2:
+        return False
+    below, top = chain[-2:]
+    beyond = measured.end_reach[top]
+    if hints[top].aside or (not beyond and len(measured.skeleton.end_parents) > 0):
+        return True
+    head, neck = measured.bones[[top, below]]
+    tall = head > _LONGER * neck and beyond < _LITTLE * head
+    return bool(len(chain) > 2 and tall and not measured.bending(chain)[-1] > _STIFF)
 
 
 def _up(

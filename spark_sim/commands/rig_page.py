@@ -18,13 +18,12 @@ from spark.rig.groups import GROUP_OF_ROLE
 from spark.rig.override import SEVERAL
 from spark.rig.rig import Rig
 from spark.rig.role_assignment import REQUIRED
-from spark.rig.roles import LIMBS, Group, Role
+from spark.rig.roles import LIMBS, SURE, Group, Role
 from spark.rotation import quat_about, quat_conj, quat_rotate
 from spark_sim import rolemap
 from spark_sim.clips import AnyClip
 
 _PAGE = Template("spark_sim.commands", "rig_page.html", ("rig_map.js", "rig_page.js"))
-_SURE = 0.8  # of a role's confidence: below it, one kind of evidence alone says it, or two disagree
 
 
 def write_rig_page(clip: AnyClip, facts: dict[str, Any], path: Path, file: str) -> None:
@@ -46,7 +45,7 @@ def rig_page(clip: AnyClip, facts: dict[str, Any], file: str) -> str:
         facts=facts,
         joints=joints,
         missing=_missing(joints) if body else [],
-        unsure=[joint for joint in joints if joint["role"] and joint["confidence"] < _SURE],
+        unsure=[joint for joint in joints if joint["role"] and joint["confidence"] < SURE],
         saved=saved,
         command=again,
         groups=[(group.value, group.value.replace("_", " ")) for group in Group],

@@ -63,6 +63,31 @@ def test_roles_without_names_are_the_same(path: Path) -> None:
 
 
 @pytest.mark.parametrize("ends", [True, False], ids=["ends", "no-ends"])
+@pytest.mark.parametrize("spelling", ["bone_{:03d}", "{:x}q"])
+def test_without_names_a_head_lies_below_its_crown(spelling: str, ends: bool) -> None:
+    """And no head is a crown: of two joints of a neck the upper one is not taken for it."""
+    for crowned in (True, False):
+        chains = RIGS["mixamo"].replace("mixamorig:Head > mixamorig:LeftEye -", "")
+        chains = chains.replace("mixamorig:Head > mixamorig:RightEye -", "")
+        if not crowned:
+            chains = chains.replace(" > mixamorig:HeadTop_End -", "")
+            chains = chains.replace("mixamorig:Neck N", "mixamorig:Neck N > mixamorig:Neck1 N")
+        skeleton, right = build(chains, ends=ends)
+        if crowned:  # the builder's neck is as long as a head [m]
+            head = right.index(Role.HEAD)
+            skeleton.offsets[[head, head + 1]] = [[0.02, 0.0, 0.08], [0.0, 0.0, 0.18]]
+        names = tuple(spelling.format(97 * j) for j in range(len(skeleton)))
+        bare = replace(skeleton, names=names)
+        roles = assign_roles(bare, walk(bare, right, turn=1.0))
+        for role in (Role.NECK, Role.HEAD):
+            assert [skeleton.names[j] for j in roles.joints(role)] == [
+                name for name, own in zip(skeleton.names, right, strict=True) if own is role
+            ]
+        [note] = roles.notes
+        assert f"sure what {names[right.index(Role.HEAD)]!r} is" in note
+
+
+@pytest.mark.parametrize("ends", [True, False], ids=["ends", "no-ends"])
 @pytest.mark.parametrize("convention", RIGS)
 def test_roles_of_the_ecosystems_rigs(convention: str, ends: bool) -> None:
     skeleton, right = build(RIGS[convention], ends=ends)
