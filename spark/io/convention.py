@@ -187,7 +187,7 @@ def infer_unit(motion: Motion) -> tuple[float, tuple[str, ...]]:
             "--unit"
         )
     elif not HUMAN_HEIGHTS[0] < tall < HUMAN_HEIGHTS[1]:
-        notes.append(f"{tall:.2f} m is no human's height; check, and give --unit")
+        notes[0] += ", no human's height; check, and give --unit"
     if feet > chances[best]:
         notes.append(f"in feet it would be {size * UNITS['ft']:.2f} m: if so, give --unit ft")
     return UNITS[best], tuple(notes)

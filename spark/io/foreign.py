@@ -53,6 +53,7 @@ def foreign_recording(
     """
     found = list(notes)
     standing: Up | None = None
+    said = unit is None and unit_m is not None
     skeleton = motion.skeleton
     values = (motion.root_pos, motion.rotations, skeleton.offsets, skeleton.end_offsets)
     if not all((np.abs(value) <= LARGEST).all() for value in values):
@@ -83,7 +84,7 @@ def foreign_recording(
     convention = Convention(unit_m, up_axis)
     tall = unit_m * float(np.ptp(skeleton.rest_positions[:, axis_of(standing or up_axis)]))
     motion = in_si(motion, convention)
-    if unit is None and not HUMAN_HEIGHTS[0] < tall < HUMAN_HEIGHTS[1]:
+    if said and not HUMAN_HEIGHTS[0] < tall < HUMAN_HEIGHTS[1]:
         found.append(f"{tall:.3g} m is no human's height; check, and give --unit")
     bvh = replace(encode_new(motion, unit=unit_m, up=up_axis), path=path)
     return Recording(bvh, motion, convention, tuple(found))

@@ -55,6 +55,7 @@ _ROBOTS = frozenset({"qpos", "joint_pos", "dof_pos"})
 """An npz with one of these arrays is a robot's motion."""
 
 SUFFIXES = tuple(dict.fromkeys(ending for known in FORMATS for ending in known.endings))
+_ALL_ENDINGS = f"{', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
 
 
 def read_motion(
@@ -72,6 +73,8 @@ def read_motion(
     reader raises, and `ConventionError` where an option does not go with the format.
     """
     path = Path(path)
+    if _is_missing(path):
+        raise FileFormatError(path, None, f"no such file; expected a motion: {_ALL_ENDINGS}")
     known = format_of(path)
     if known is BVH and (why := _NOT_READ.get(path.suffix.lower())) and path.is_file():
         raise FileFormatError(path, None, why)
@@ -84,6 +87,17 @@ def read_motion(
     if fps is not None and not 1 <= fps <= 10000:
         raise ConventionError(f"{fps:g} fps is no frame rate; expected 1 to 10000")
     return _reader(known)(path, **given)
+
+
+def _is_missing(path: Path) -> bool:
+    """Whether there is no such file; not where the system does not say."""
+    try:
+        path.stat()
+    except FileNotFoundError:
+        return True
+    except (OSError, ValueError):
+        pass
+    return False
 
 
 def format_of(path: Path) -> Format:
