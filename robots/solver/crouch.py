@@ -68,7 +68,7 @@ def _rise(
     hip, knee, ankle = (positions[:, j] for j in leg[:3])
     thigh, shank = knee - hip, ankle - knee
     upper_leg = rotations[:, leg.upper_leg]
-    length = np.linalg.norm(thigh, axis=1, keepdims=True)
+    length = np.maximum(np.linalg.norm(thigh, axis=1, keepdims=True), 1e-9)
     longest = _STRAIGHT * (length + np.linalg.norm(shank, axis=1, keepdims=True))
     away = ankle - hip
     # How far the ankle may sink under the hip until the leg is as long.
