@@ -11,8 +11,10 @@ from spark.io.bvh import write_bvh
 from spark.io.encoding import encode, encode_new
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, from_canonical
+from spark.transfer.leg_fit import travel_scale
 from spark.transfer.noise import without_noise
 from spark.transfer.refine import grounded, refined
+from spark.transfer.root_motion import with_root_motion
 from spark.transfer.twists import spread_twists
 from spark_sim import files
 from spark_sim.choices import Method, RobotName
@@ -106,10 +108,15 @@ def retarget(
         finish = refined if method == "spark" else grounded
         moved = finish(canonical, moved, noise)
     moved = spread_twists(canonical.rig, moved)
-    motion = from_canonical(moved)
+    travel = target.rig.hip_height / source.rig.hip_height
+    if method == "spark":
+        travel = travel_scale(source.rig, target.rig)
+    motion, carried = with_root_motion(
+        from_canonical(moved), target.rig, source.motion, source.rig, travel
+    )
     bvh, notes = encode(motion, target.recording)
     recording = replace(
-        target.recording, bvh=bvh, motion=motion, notes=(*trembles, *moved.notes, *notes)
+        target.recording, bvh=bvh, motion=motion, notes=(*trembles, *moved.notes, *carried, *notes)
     )
     # The rig is given: what is known of a body does not depend on the motion that it makes.
     return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig, target.path)
