@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, get_args, overload
 from spark.errors import ConventionError
 from spark.io.bvh import write_bvh
 from spark.io.encoding import encode, encode_new
+from spark.motion import Motion
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, from_canonical
 from spark.transfer.leg_fit import travel_scale
@@ -108,18 +109,26 @@ def retarget(
         finish = refined if method == "spark" else grounded
         moved = finish(canonical, moved, noise)
     moved = spread_twists(canonical.rig, moved)
-    travel = target.rig.hip_height / source.rig.hip_height
-    if method == "spark":
-        travel = travel_scale(source.rig, target.rig)
-    motion, carried = with_root_motion(
-        from_canonical(moved), target.rig, source.motion, source.rig, travel
-    )
+    motion, carried = _carried(from_canonical(moved), source, target, fitted=method == "spark")
     bvh, notes = encode(motion, target.recording)
     recording = replace(
         target.recording, bvh=bvh, motion=motion, notes=(*trembles, *moved.notes, *carried, *notes)
     )
     # The rig is given: what is known of a body does not depend on the motion that it makes.
     return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig, target.path)
+
+
+def _carried(
+    motion: Motion, source: AnyClip, target: Clip, *, fitted: bool
+) -> tuple[Motion, tuple[str, ...]]:
+    """`motion` on the target, with root motion where its file can say where its root is; its path
+    is scaled with the legs, which may be `fitted`."""
+    if not (target.recording.bvh.position_channels[:, 0] == 0).any():
+        return motion, ()
+    travel = target.rig.hip_height / source.rig.hip_height
+    if fitted:
+        travel = travel_scale(source.rig, target.rig)
+    return with_root_motion(motion, target.rig, source.motion, source.rig, travel)
 
 
 def _onto_robot(source: AnyClip, target: RobotClip, *, solved: bool) -> RobotClip:

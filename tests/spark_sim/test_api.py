@@ -175,3 +175,44 @@ def test_errors_of_a_body_name_its_file(tmp_path: Path) -> None:
     clip = spark_sim.load(path)
     with pytest.raises(SkeletonError, match=r"stick\.bvh: not a humanoid"):
         _ = clip.rig
+
+
+def carried(walk: Path, path: Path, *, movable: bool = True) -> Path:
+    """A walk whose hips a root carries over the ground; it is not `movable` without channels for
+    its place, and then at rest."""
+    head, _, rows = walk.read_text().partition("MOTION")
+    channels = "6 Xposition Yposition Zposition" if movable else "3"
+    head = head.replace("HIERARCHY\nROOT", "JOINT")
+    frames, time, *values = rows.strip().splitlines()
+    table = np.array([line.split() for line in values], dtype=float)
+    if movable:
+        root = np.column_stack([table[:, 0], 0 * table[:, 0], table[:, 2]])
+        table[:, [0, 2]] = 0.0
+        table = np.column_stack([root, np.zeros((len(table), 3)), table])
+    else:
+        table = np.column_stack([np.zeros((len(table), 3)), table])
+    body = "\n".join(" ".join(f"{x:.6f}" for x in row) for row in table)
+    path.write_text(
+        f"HIERARCHY\nROOT root\n{{\nOFFSET 0 0 0\n"
+        f"CHANNELS {channels} Zrotation Xrotation Yrotation\n"
+        f"{head}}}\nMOTION\n{frames}\n{time}\n{body}\n"
+    )
+    return path
+
+
+def test_root_motion_goes_over_where_the_target_s_root_can_move(
+    samples: Path, tmp_path: Path
+) -> None:
+    source = spark_sim.load(carried(samples / "walker_walk.bvh", tmp_path / "source.bvh"))
+    still = carried(samples / "walker_walk.bvh", tmp_path / "still.bvh", movable=False)
+    way = source.motion.root_pos
+    assert np.linalg.norm(way[-1] - way[0]) > 1
+    one = spark_sim.retarget(source, tmp_path / "source.bvh", refine=False)
+    np.testing.assert_allclose(one.motion.root_pos[:, :2], way[:, :2], atol=1e-6)
+    assert any("root motion" in note for note in one.recording.notes)
+    other = spark_sim.retarget(source, still, refine=False)
+    np.testing.assert_allclose(other.motion.root_pos, 0.0, atol=1e-9)
+    assert not any("root motion" in note or "lost" in note for note in other.recording.notes)
+    for made in (one, other):
+        places = [forward(clip.motion)[0][:, clip.rig.pelvis] for clip in (source, made)]
+        np.testing.assert_allclose(*places, atol=2e-3)
