@@ -105,7 +105,7 @@ def solve_block(
 
     normal, stalled = linearize_at(q), 0
     for k in range(max_iter):
-        jerky = jerk_stiffening(robot, targets, q)[:, block.dofs]
+        jerky = jerk_stiffening(robot, q, targets.frame_time, targets.jerks)[:, block.dofs]
         stiffening = np.maximum(stiffening, jerky)
         coupling = smoothness_at(q, True)
         cost = uniform_filter1d(normal.cost + coupling.cost(len(q)), window)

@@ -130,7 +130,8 @@ def too_jerky(
     """The frames in which the block's hinges are too jerky, in spite of what smooths them."""
     out = np.zeros(len(q), dtype=bool)
     for own in spells.slices():
-        ratio = jerk_stiffening(robot, targets.at(own), q.at(own))[:, block.dofs]
+        ratio = jerk_stiffening(robot, q.at(own), targets.frame_time, targets.jerks[own])
+        ratio = ratio[:, block.dofs]
         out[own][1:-1] = ratio.max(1, initial=1.0) > _MAX_JERK_RATIO
     return out
 

@@ -68,7 +68,9 @@ class Repair:
         they are too jerky (`robots.solver.smoothness.jerk_stiffening`)."""
         out = np.ones((len(q), len(self.block.dofs)))
         for own in self.spells.slices():
-            jerky = jerk_stiffening(self.robot, self.targets.at(own), q.at(own))
+            jerky = jerk_stiffening(
+                self.robot, q.at(own), self.targets.frame_time, self.targets.jerks[own]
+            )
             out[own][: len(jerky)] = jerky[:, self.block.dofs]
         return out
 

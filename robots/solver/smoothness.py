@@ -12,7 +12,6 @@ from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.dynamics import center_of_mass, com_jacobian
 from robots.solver.haste import WINDOW, limb_dofs
-from robots.solver.targets import Targets
 from robots.solver.weights import (
     AVOIDANCE_CUTOFF,
     JERK_SHARE,
@@ -86,12 +85,12 @@ def com_acceleration(
 
 
 def jerk_stiffening(
-    robot: Morphology, targets: Targets, q: Coordinates
+    robot: Morphology, q: Coordinates, frame_time: float, source_jerks: Float[np.ndarray, "T 4"]
 ) -> Float[np.ndarray, "A D"]:
     """By what the acceleration weights of hinges are multiplied where these are too jerky: the RMS
-    jerk around, over `MAX_JERK` or, of a limb, over a share of the source's where that is more; at
-    least 1."""
-    tree, frame_time = robot.tree, targets.frame_time
+    jerk around, over `MAX_JERK` or, of a limb, over a share of the source's (`limb_jerks`
+    [rad/s³]) where that is more; at least 1."""
+    tree = robot.tree
     out = np.ones((max(len(q) - 2, 0), tree.nv))
     hinges = ~tree.balls
     if len(q) > 3:
@@ -101,7 +100,7 @@ def jerk_stiffening(
         rms = np.sqrt(np.maximum(mean, 0.0))
         rms = np.concatenate([rms[:1], rms])
         most = np.full((len(q) - 2, tree.nv), MAX_JERK)
-        for dofs, jerk_of_source in zip(limb_dofs(robot), targets.jerks[1:-1].T, strict=True):
+        for dofs, jerk_of_source in zip(limb_dofs(robot), source_jerks[1:-1].T, strict=True):
             most[:, dofs] = np.maximum(MAX_JERK, JERK_SHARE * jerk_of_source)[:, None]
         out[:, tree.dof_starts[hinges]] = np.maximum(rms / most[:, tree.dof_starts[hinges]], 1.0)
     return out

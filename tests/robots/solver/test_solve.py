@@ -23,6 +23,7 @@ from robots.solver.descent import smooth_lower_envelope
 from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.foot_path import STEP_HEIGHTS, footing_of
 from robots.solver.footprints import plan_feet
+from robots.solver.haste import limb_dofs
 from robots.solver.holds import Holds, joined
 from robots.solver.objective import linearize
 from robots.solver.projection import project
@@ -225,11 +226,25 @@ def test_only_hinges_that_jolt_are_made_stiffer(ember: Morphology) -> None:
     angles[:, 0] = np.sin(2 * np.pi * np.arange(90) / 60)  # 248 rad/s³ at most
     angles[45:, 1] = 0.2
     still = np.tile([1.0, 0, 0, 0], (90, 1))
-    stiffening = jerk_stiffening(ember, Coordinates(np.zeros((90, 3)), still, angles), 1 / 60)
+    q, at_rest = Coordinates(np.zeros((90, 3)), still, angles), np.zeros((90, 4))
+    stiffening = jerk_stiffening(ember, q, 1 / 60, at_rest)
     first, second = ember.tree.dof_starts[:2]
     assert (stiffening[:, first] == 1).all()
     assert stiffening[43, second] > 5
     assert (stiffening[:30, second] == 1).all()
+
+
+def test_a_limb_may_be_as_jerky_as_half_of_its_source_s(ember: Morphology) -> None:
+    leg, other, *_ = (dofs[-1] for dofs in limb_dofs(ember))
+    hinges = [ember.tree.dof_starts.tolist().index(dof) for dof in (leg, other)]
+    angles = np.zeros((90, len(ember.tree)))
+    angles[:, hinges] = 8 * np.sin(2 * np.pi * np.arange(90) / 60)[:, None]  # 1400 rad/s³, RMS
+    still = np.tile([1.0, 0, 0, 0], (90, 1))
+    q, jerks = Coordinates(np.zeros((90, 3)), still, angles), np.zeros((90, 4))
+    jerks[:, 0] = 4200.0
+    stiffening = jerk_stiffening(ember, q, 1 / 60, jerks)
+    assert (stiffening[:, leg] == 1).all()
+    assert stiffening[:, other].max() > 3
 
 
 def test_arms_in_the_body_are_led_out_and_the_rest_stays(
