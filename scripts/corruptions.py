@@ -32,6 +32,8 @@ from spark.transfer.canonical import (
 )
 from spark.transfer.leg_ik import bend_leg, leg_of
 
+_ARMS = tuple(role for role in Role if role.part in ("upper_arm", "forearm"))
+
 Corruption = Callable[[Motion, Rig, np.random.Generator], Motion]
 
 
@@ -187,6 +189,25 @@ def arm_thrown(motion: Motion, rig: Rig, rng: np.random.Generator, *, degrees: f
     return _turned(motion, rig, world, {shoulder: wanted})
 
 
+def arms_frozen(motion: Motion, rig: Rig, rng: np.random.Generator) -> Motion:
+    """Both upper arms and forearms stay against the chest as they are in the first frame."""
+    world = forward(motion)[1]
+    chest = world[:, rig.chest]
+    since = quat_mul(chest, quat_conj(chest[:1]))
+    joints = sorted(joint for role in _ARMS for joint in rig.roles.joints(role))
+    return _turned(motion, rig, world, {j: quat_mul(since, world[:1, j]) for j in joints})
+
+
+def shaken(
+    motion: Motion, rig: Rig, rng: np.random.Generator, *, distance: float, rate: float
+) -> Motion:
+    """The root goes to and fro by `distance` [m] in a direction drawn by lot, at `rate` [Hz]."""
+    angle = rng.uniform(0, 2 * np.pi)
+    times = np.arange(len(motion)) * motion.frame_time
+    way = distance * np.sin(2 * np.pi * rate * times)
+    return _displaced(motion, np.outer(way, [np.cos(angle), np.sin(angle), 0.0]))
+
+
 def to_and_fro(times: Float[np.ndarray, "T"]) -> Float[np.ndarray, "T"]:
     """From 0 to 1 and back within 0.2 s at the beginning of each second, then 0."""
     return np.where(times % 1.0 < 0.2, 0.5 - 0.5 * np.cos(2 * np.pi * times / 0.2), 0.0)
@@ -211,6 +232,8 @@ CORRUPTIONS: dict[str, Corruption] = {
     "base thrown 6 cm": partial(thrown, distance=0.06),
     "arm thrown 15°": partial(arm_thrown, degrees=15.0),
     "drift 10 cm/s": partial(sliding, speed=0.1),
+    "arms frozen": arms_frozen,
+    "shake 1 cm, 25 Hz": partial(shaken, distance=0.01, rate=25.0),
 }
 """What the test-bench does to clips; the frame rates and the mirror change nothing that matters."""
 

@@ -34,6 +34,7 @@ TRAVEL = 2.0  # [m] that a clip must go for "in place" to change it
 DRIFT, HEADING, CONTACTS, CLEARANCE = 0.02, np.radians(5), 0.1, 0.05
 BASE = 1.05  # times the source's acceleration, or half of gravity where that is more
 LIMB = 1.2  # times the source's acceleration
+POSE, TREMBLE = np.radians(1), 1.5  # in the mean; times the source's, or a millimetre
 
 MEASURES = (
     "any",
@@ -49,6 +50,8 @@ MEASURES = (
     "speed",
     "jerk",
     "balance",
+    "pose",
+    "tremble",
 )
 
 
@@ -73,7 +76,15 @@ def scores(report: Report) -> dict[str, float]:
         "speed": float(clip.joint_pace.max()),
         "jerk": clip.jerk_rms,
         "balance": clip.unbalanced_share or 0.0,
+        "pose": 0.0 if report.pose is None else coarse(report.pose.mean, POSE),
+        "tremble": _tremble(report),
     }
+
+
+def _tremble(report: Report) -> float:
+    """Over the source's, or over a millimetre where that is more."""
+    theirs = report.tremble.source_largest or 0.0
+    return coarse(report.tremble.largest / max(theirs, 1e-3), TREMBLE)
 
 
 def coarse(value: float, least: float) -> float:

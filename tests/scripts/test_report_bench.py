@@ -51,6 +51,24 @@ def test_the_root_moves_as_told() -> None:
     np.testing.assert_allclose(np.ptp(hips[:, :2], axis=0), 0, atol=1e-12)
 
 
+def test_frozen_arms_stay_against_the_chest() -> None:
+    motion, rig = pacing()
+    motion.rotations[:, joint(Role.LEFT_FOREARM)] = quat_about("z", np.linspace(0, 1, 120))
+    motion.rotations[:, joint(Role.SPINE)] = quat_about("y", np.linspace(0, 0.5, 120))
+    frozen = spoilt("arms frozen", motion, rig)
+    moved = [
+        j for j in range(len(rig.skeleton)) if np.ptp(frozen.rotations[:, j], axis=0).max() > 1e-9
+    ]
+    assert moved == sorted([joint(Role.LEFT_LOWER_LEG), joint(Role.SPINE)])
+
+
+def test_a_shake_has_its_size() -> None:
+    motion, rig = pacing()
+    way = spoilt("shake 1 cm, 25 Hz", motion, rig).root_pos - motion.root_pos
+    assert np.linalg.norm(way, axis=1).max() == pytest.approx(0.01, rel=0.05)
+    np.testing.assert_allclose(way[::12], 0.0, atol=1e-9)  # five waves of 25 Hz in 0.2 s
+
+
 def test_jitter_has_the_size_it_says() -> None:
     motion, rig = pacing()
     angle = quat_angle(spoilt("jitter 2°", motion, rig).rotations, motion.rotations)
