@@ -86,9 +86,8 @@ def measure(motion: Motion, rig: Rig, result: RobotMotion) -> RobotMetrics:
     assert report.source is not None
     assert report.drift is not None
     assert report.contacts is not None
-    pose = report.pose
-    limbs = None if pose is None else pose.mean_of("limb")
-    assert pose is not None
+    assert report.pose is not None
+    pose, limbs = report.pose, report.pose.mean_of("limb")
     assert limbs is not None
     scale = robot.rig.hip_height / rig.hip_height
     positions, world = forward(motion)

@@ -12,7 +12,7 @@ from spark.resample import values_at
 from spark.rig.roles import LIMBS, Group, Role
 
 _INTERVAL = 0.05  # [s] over which directions are differenced: noise of single frames is no haste
-WINDOW = 0.15  # [s] before and after a frame over which jerk is averaged
+JERK_WINDOW = 0.15  # [s] before and after a frame over which jerk is averaged
 _GROUPS = (Group.LEFT_LEG, Group.RIGHT_LEG, Group.LEFT_ARM, Group.RIGHT_ARM)
 
 
@@ -23,7 +23,7 @@ def limb_jerks(
     the left and the right arm: of the segment of each that has most; 0 without one."""
     count = max(map(len, bones.values()), default=0)
     out = np.zeros((count, len(_GROUPS)))
-    window = 2 * max(1, round(WINDOW / frame_time)) + 1
+    window = 2 * max(1, round(JERK_WINDOW / frame_time)) + 1
     for k, group in enumerate(_GROUPS):
         for bone in (bones[role] for role in LIMBS[group] if role in bones):
             squared = uniform_filter1d((_jerk(bone, frame_time) ** 2).sum(axis=1), window)

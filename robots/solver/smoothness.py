@@ -11,7 +11,7 @@ from robots.least_squares import PointAcceleration, Smoothness, second_differenc
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.dynamics import center_of_mass, com_jacobian
-from robots.solver.haste import WINDOW, limb_dofs
+from robots.solver.haste import JERK_WINDOW, limb_dofs
 from robots.solver.weights import (
     AVOIDANCE_CUTOFF,
     JERK_SHARE,
@@ -26,7 +26,6 @@ from robots.solver.weights import (
     per_metre,
 )
 from robots.tree import Coordinates, forward_kinematics
-from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 
 
@@ -95,7 +94,7 @@ def jerk_stiffening(
     hinges = ~tree.balls
     if len(q) > 3:
         jerk = np.diff(q.angles[:, hinges], 3, axis=0) / frame_time**3
-        window = max(1, 2 * round(WINDOW / frame_time) + 1)
+        window = max(1, 2 * round(JERK_WINDOW / frame_time) + 1)
         mean = uniform_filter1d(jerk**2, window, axis=0, mode="nearest")
         rms = np.sqrt(np.maximum(mean, 0.0))
         rms = np.concatenate([rms[:1], rms])
@@ -128,12 +127,8 @@ def acceleration_weights(robot: Morphology) -> Float[np.ndarray, "D"]:
     weights = np.full(robot.tree.nv, 1.0 / (2 * np.pi * SMOOTH_CUTOFF) ** 2)
     weights[:3] *= per_metre(robot) * W_HIPS_POSITION
     weights[3:6] *= W_ROTATION["pelvis"]
-    tree = robot.tree
-    for sole in robot.soles:
-        leg = robot.rig.roles.require(Role(f"{sole.side}_upper_leg"))
-        trunk = tree.chain(int(robot.links[int(robot.rig.skeleton.parents[leg])]))
-        toes = tree.chain(int(robot.links[sole.joints[-1]]))
-        weights[tree.dofs(tuple(j for j in toes if j not in trunk))] *= LEG_SHARE
+    left_leg, right_leg, *_ = limb_dofs(robot)
+    weights[[*left_leg, *right_leg]] *= LEG_SHARE
     return weights
 
 

@@ -12,6 +12,7 @@ from sim.report.findings import findings_of
 from sim.report.ground import ground_under, own_ground_notes, source_ground_notes
 from sim.report.limbs import limbs_of
 from sim.report.measures import Drift, floor_height, root_drift
+from sim.report.pace import other_rate, pace_notes
 from sim.report.pose_error import pose_error
 from sim.report.report import Report
 from sim.report.stretches import measure_clip
@@ -33,31 +34,6 @@ from spark.transfer.treads import treads_of
 # Hip heights: a source whose floor is further from z = 0 than this does not stand on z = 0, and
 # what was made of it may have been put there.
 _MAX_FLOOR_OFFSET = 0.1
-# Frame rates that files have [fps], and by which share one may be missed: a frame in 100.
-_RATES = (
-    8,
-    10,
-    12,
-    12.5,
-    15,
-    20,
-    24,
-    25,
-    30,
-    48,
-    50,
-    60,
-    72,
-    90,
-    100,
-    120,
-    144,
-    150,
-    180,
-    200,
-    240,
-)
-_RATE_LEEWAY = 0.01
 
 
 def assess(
@@ -109,7 +85,7 @@ def assess(
     swing = swing_of(clip, followed, times, scale)
     standing = standing_beside(clip, followed, times)
     notes += source_ground_notes(source_course, treads, scale)
-    notes += _pace(motion, source.motion)
+    notes += pace_notes(motion, source.motion)
     thrown = scale * source_clip.base_acceleration_p99
     limbs = limbs_of(clip, followed, times, scale)
     pose = pose_error(subject, source, times)
@@ -119,8 +95,8 @@ def assess(
         earlier = pose_error(subject, source, np.clip(times - lag, 0.0, source.motion.duration))
         return None if earlier is None else earlier.mean
 
-    other_rate = _other_rate(motion, source.motion)
-    question = "is it another motion?" if other_rate is None else "is its rate right?"
+    same_rate = other_rate(motion, source.motion) is None
+    question = "is it another motion?" if same_rate else "is its rate right?"
     discord = discord_of(standing, None if pose is None else pose.mean, pose_at, question)
     return Report(
         clip,
@@ -136,38 +112,6 @@ def assess(
         pose=pose,
         scale=scale,
     )
-
-
-def _pace(motion: Motion, source: Motion) -> tuple[str, ...]:
-    """A note where the motion does not last as long as its source."""
-    difference = abs(source.duration - motion.duration)
-    if difference <= _same_duration(motion):
-        return ()
-    note = (
-        f"the source's duration differs by {difference:.1f} s: it lasts {source.duration:.4g} s, "
-        f"the motion {motion.duration:.4g} s, and frames may not match. "
-    )
-    if (rate := _other_rate(motion, source)) is not None:
-        return (f"{note}Is its rate {rate:g} fps, and not {motion.fps:.4g}?",)
-    return (
-        f"{note}Is it another motion? If it was made from a part of the source, give that part: "
-        "`clip.part(start, end)`",
-    )
-
-
-def _other_rate(motion: Motion, source: Motion) -> float | None:
-    """The frame rate at which the motion lasts as long as its source, if files have that: a CSV
-    that is read at another rate than its own runs too fast or too slowly, and nothing else shows
-    it. None where it lasts as long anyway."""
-    if source.duration <= 0 or abs(source.duration - motion.duration) <= _same_duration(motion):
-        return None
-    rate = (len(motion) - 1) / source.duration
-    nearest = min(_RATES, key=lambda known: abs(rate - known))
-    return float(nearest) if abs(rate - nearest) < _RATE_LEEWAY * nearest else None
-
-
-def _same_duration(motion: Motion) -> float:
-    return max(0.1, 2 * motion.frame_time)
 
 
 def _course(name: str, subject: Subject) -> Course:

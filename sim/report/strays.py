@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import median_filter
 
-from sim.report.derivatives import derivative, whole_windows
+from sim.report.derivatives import SPLINE, derivative, whole_windows
 from sim.report.limb_ends import limb_ends
 from sim.report.limits import joint_of_bone
 from sim.report.smoothness import bone_pairs, turns_between
@@ -20,7 +20,6 @@ from spark.rotation import quat_angle, quat_continuous, quat_normalize, quat_rel
 from spark.summary import brief
 
 _LASTS = 0.25  # [s] before and after, for most of which it trembles that trembles
-_SPLINE = 32  # frames, as far as splines reach: `sim.report.stretches`
 _LEAST_FRAMES = 3  # in half a window that tells pops: in less a fit follows whatever joints do
 
 
@@ -69,7 +68,7 @@ def strays_of(rig: Rig, picked: Callable[[slice], Motion], count: int, frame_tim
     """
     window = PLAUSIBILITY_V3.window
     pop_window = max(window, _LEAST_FRAMES * frame_time)
-    margin = int(np.ceil(pop_window / frame_time)) + _SPLINE
+    margin = int(np.ceil(pop_window / frame_time)) + SPLINE
     bones = {joint_of_bone(n): pair for n, *pair in bone_pairs(rig) if "toe" not in n}
     joints, parents = [j for j, _ in bones.values()], [above for _, above in bones.values()]
     found = []

@@ -9,15 +9,13 @@ import numpy as np
 
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.clip_poses import pose_clip
+from sim.report.derivatives import SPLINE
 from sim.report.measuring import measure
 from sim.report.thresholds import PLAUSIBILITY_V3
 from sim.trajectory import Subject
 from spark.blocks import blocks
 from spark.transfer.ground import Ground
 
-# Velocities are taken over a window, of cubic splines, which frames bend less and less: one so far
-# away by less than rounding does (0.27 to this power).
-_SPLINE = 32  # frames
 _PRECISION = np.float32  # of what is kept of each frame: seven digits, half of an hour's memory
 _ROWS = (
     *("depth", "clearance", "corner_skates", "corner_speeds", "sole_heights", "sole_speeds"),
@@ -54,7 +52,7 @@ def _margin(frame_time: float) -> int:
     first one, and of the least of a first one over `static_time`."""
     limits = PLAUSIBILITY_V3
     seconds = max(2 * limits.window, limits.window + limits.static_time)
-    return int(np.ceil(seconds / frame_time)) + 2 * _SPLINE
+    return int(np.ceil(seconds / frame_time)) + 2 * SPLINE
 
 
 def _rows_of(clip: ClipMetrics) -> Iterator[tuple[Name, np.ndarray]]:

@@ -28,3 +28,23 @@ def between_contacts(
     step = np.linalg.norm(np.diff(path, axis=0, prepend=path[:1]), axis=1)
     way = np.cumsum(step + 1e-4)  # a tenth of a millimetre a frame, for feet that stay in place
     return np.stack([np.interp(way, way[at], column[at]) for column in values.T], axis=1)
+
+
+def with_ends(
+    stands: Bool[np.ndarray, "T"],
+    ground: Float[np.ndarray, "T"],
+    lowest: Float[np.ndarray, "T"],
+    levels: Float[np.ndarray, "L"],
+    margin: float,
+) -> Bool[np.ndarray, "T"]:
+    """When the ground under a foot is known: where it stands, and at an end of the clip that it
+    comes from, or goes to, lower than where it stands next to that, by more than `margin` [m].
+    What is below it there, the highest of the known `levels` [m], is written into `ground`."""
+    told, at = stands.copy(), np.flatnonzero(stands)
+    if not len(at):
+        return told
+    for end, swing, nearest in ((0, slice(at[0]), at[0]), (-1, slice(at[-1] + 1, None), at[-1])):
+        low = lowest[swing].min(initial=np.inf)
+        if low < ground[nearest] - margin:
+            told[end], ground[end] = True, levels[levels <= low].max(initial=0.0)
+    return told

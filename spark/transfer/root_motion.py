@@ -30,10 +30,9 @@ def with_root_motion(
     rest, own_rest = (each.offsets[0, :2] for each in (source.skeleton, motion.skeleton))
     shift = np.zeros((len(motion), 3))
     shift[:, :2] = own_rest + travel * (way - rest) - motion.root_pos[:, :2]
-    names = source.skeleton.names[0], motion.skeleton.names[0]
-    return lazy_motion(lambda span: _carried(motion.picked(span), rig, shift[span]), len(motion)), (
-        "{!r} goes over the ground as the source's {!r} does: root motion".format(*names[::-1]),
-    )
+    carried = lazy_motion(lambda span: _carried(motion.picked(span), rig, shift[span]), len(motion))
+    own, theirs = motion.skeleton.names[0], source.skeleton.names[0]
+    return carried, (f"{own!r} goes over the ground as the source's {theirs!r} does: root motion",)
 
 
 def _carried(motion: Motion, rig: Rig, shift: Float[np.ndarray, "T 3"]) -> Motion:

@@ -30,7 +30,7 @@ from spark.rig.rig import Rig
 from spark.rotation import quat_mul
 from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
-from spark.transfer.footfalls import between_contacts
+from spark.transfer.footfalls import between_contacts, with_ends
 from spark.transfer.ground import Ground, Stand, distinct, level_ground
 from spark.transfer.hip_sway import center_of_mass
 from spark.transfer.pressure import NOISE, acceleration
@@ -156,29 +156,9 @@ def _ground_under(
         ground[start:stop, k] = 0.0 if on_floor else heights[i]
     levels = np.array([0.0, *heights[known]])
     for k in range(feet):
-        told = _with_ends(stands[:, k], ground[:, k], lowest[:, k], levels, SAME_HEIGHT * scale)
+        told = with_ends(stands[:, k], ground[:, k], lowest[:, k], levels, SAME_HEIGHT * scale)
         ground[:, k] = between_contacts(ground[:, k, None], told, ways[:, k])[:, 0]
     return ways, stands, ground
-
-
-def _with_ends(
-    stands: Bool[np.ndarray, "T"],
-    ground: Float[np.ndarray, "T"],
-    lowest: Float[np.ndarray, "T"],
-    levels: Float[np.ndarray, "L"],
-    margin: float,
-) -> Bool[np.ndarray, "T"]:
-    """When the ground under a foot is known: where it stands, and at an end of the clip that it
-    comes from, or goes to, lower than where it stands next to that, by more than `margin` [m].
-    What is below it there, the highest of the known `levels` [m], is written into `ground`."""
-    told, at = stands.copy(), np.flatnonzero(stands)
-    if not len(at):
-        return told
-    for end, swing, nearest in ((0, slice(at[0]), at[0]), (-1, slice(at[-1] + 1, None), at[-1])):
-        low = lowest[swing].min(initial=np.inf)
-        if low < ground[nearest] - margin:
-            told[end], ground[end] = True, levels[levels <= low].max(initial=0.0)
-    return told
 
 
 def feet_by_side(rig: Rig, motion: Motion) -> dict[str, Bool[np.ndarray, "T"]]:
