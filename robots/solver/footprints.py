@@ -22,6 +22,7 @@ from spark.transfer.footfalls import beyond
 # Hip heights that a standing foot may stray from its mean place without having moved,
 MAX_WOBBLE = 0.05
 MAX_TWIST = float(np.radians(12))  # and how far it may turn
+_SPIN = np.radians(45)  # in one contact: feet turn on their toes, but spin on what carries them
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,19 +119,23 @@ def _plan(
     heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
     flat = flat_sole(robot, sole)
     length = float(np.linalg.norm(flat[-2:].mean(0) - flat[:2].mean(0)))
-    ahead = np.stack([np.cos(heading), np.sin(heading)], axis=1)
     prints = np.column_stack([toe, heading])
     radius = MAX_WOBBLE * robot.rig.hip_height
     for start, stop in true_runs(contacts[:, 0] | contacts[:, 1]):
-        # The toe is the pivot; where only the heel stands, it is where the toe will come down.
+        # Where only the heel stands, the toe is where it will come down.
         on_toe = np.flatnonzero(contacts[start:stop, 1]) + start
         frames = on_toe if len(on_toe) else np.arange(start, stop)
-        own = toe[frames] if len(on_toe) else (heel + length * ahead)[frames]
-        place = own.mean(0) + beyond(targets.feet[frames, s, int(len(on_toe) > 0)], radius)
+        own = toe[frames] if len(on_toe) else heel[frames] + length * _ahead(heading[frames])
+        behind = _pivot(own, heading[frames], radius, 0.0 if len(on_toe) else length, length)
+        pivot = own - behind * _ahead(heading[frames])
+        share = behind / max(length, 1e-9)
+        their_toe, their_heel = targets.feet[frames, s, 1], targets.feet[frames, s, 0]
+        place = pivot.mean(0) + beyond(their_toe + share * (their_heel - their_toe), radius)
         turned = heading[frames].mean() + beyond(heading[frames, None], MAX_TWIST)[:, 0]
         time = np.arange(start, stop)
-        for column, values in enumerate((*place.T, turned)):
-            prints[start:stop, column] = np.interp(time, frames, values)
+        x, y, turn = (np.interp(time, frames, values) for values in (*place.T, turned))
+        prints[start:stop, :2] = np.column_stack([x, y]) + behind * _ahead(turn)
+        prints[start:stop, 2] = turn
     return FootPlan(
         frame_time=targets.frame_time,
         hip_height=robot.rig.hip_height,
@@ -145,6 +150,30 @@ def _plan(
         ground=targets.ground[:, s],
         lift=np.zeros(len(targets)),
     )
+
+
+def _pivot(
+    toe: Float[np.ndarray, "T 2"],
+    heading: Float[np.ndarray, "T"],
+    radius: float,
+    stands: float,
+    length: float,
+) -> float:
+    """How far behind the toe [m] is what a foot turns about while it stands, from 0 to its length:
+    `stands`, unless in a spin that strays by more than a wobble, and some point of the sole by less
+    than half as much."""
+    if np.ptp(heading) < _SPIN:
+        return stands
+    ahead = _ahead(heading)
+    turns, moves = ahead - ahead.mean(0), toe - toe.mean(0)
+    behind = (turns * moves).sum() / np.square(turns).sum()
+    behind = float(np.clip(behind, 0.0, length))
+    strays, least = (np.sqrt(np.square(moves - x * turns).sum(1).mean()) for x in (stands, behind))
+    return behind if strays > max(radius, 2 * least) else stands
+
+
+def _ahead(heading: Float[np.ndarray, "T"]) -> Float[np.ndarray, "T 2"]:
+    return np.stack([np.cos(heading), np.sin(heading)], axis=1)
 
 
 def _moved(plan: FootPlan, points: Float[np.ndarray, "P 3 T"]) -> FootPlan:

@@ -1,12 +1,16 @@
 """Where feet stand, and how: as far as the robot can."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from robots.registry import find
-from robots.solver.footprints import plan_feet, reachable
+from robots.solver.footprints import on_prints, plan_feet, reachable
 from robots.solver.targets import targets_of
 from spark.demo.sample import sample_motion, sample_rig
-from spark.transfer.canonical import to_canonical
+from spark.rig.roles import Role
+from spark.rotation import quat_from_yaw, quat_mul, quat_rotate
+from spark.transfer.canonical import canonical_positions, to_canonical
 from spark_sim.loading import load_robot
 
 
@@ -29,3 +33,26 @@ def test_soles_roll_as_far_as_the_robots_do() -> None:
         np.testing.assert_allclose(np.ptp(ends, axis=2), 0.0, atol=1e-6)
         np.testing.assert_allclose(ends.mean(axis=2), wanted.mean(axis=2), atol=1e-9)
         np.testing.assert_array_equal(found.points[..., :2], plan.points[..., :2])
+
+
+def test_a_foot_spins_on_what_carries_it() -> None:
+    """A body that stands, and turns by half a turn about its left ankle: the footprint goes
+    with the copied sole."""
+    rig = sample_rig("walker")
+    ember = load_robot(find("robot")).on_robot.robot
+    still = to_canonical(sample_motion("walk", rig, 60.0), rig).frames(0, 40)
+    first = still.frames(0, 1)
+    ankle = canonical_positions(first)[0, rig.roles.require(Role.LEFT_FOOT)] * [1, 1, 0]
+    turn = quat_from_yaw(np.linspace(0, np.pi, len(still)))
+    spin = replace(
+        still,
+        rotations=quat_mul(turn[:, None], np.broadcast_to(first.rotations, still.rotations.shape)),
+        hips=ankle + quat_rotate(turn, first.hips - ankle),
+    )
+    plan = plan_feet(ember, targets_of(spin, ember))[0]
+    assert plan.stands.all()
+    assert np.ptp(plan.prints[:, 2]) > 0.8 * np.pi
+    pivot, heading = plan.prints[:, 0] + 1j * plan.prints[:, 1], plan.prints[:, 2]
+    copied = plan.points[..., 0] + 1j * plan.points[..., 1]
+    away = np.abs(on_prints(plan.flat, pivot, heading) - copied)
+    assert away.max() < 0.06  # within a wobble and MAX_TWIST; a spin on the toes is 0.2 m away
