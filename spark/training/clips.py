@@ -57,7 +57,8 @@ def why_left_out(path: Path, error: SparkSimError) -> str:
 
 
 def clip_of(name: str, canonical: CanonicalMotion, body: BodyFeatures) -> TrainingClip:
-    """A motion on `body`'s rig as a clip. Raises `SkeletonError` without two feet or two frames."""
+    """A motion on `body`'s rig as a clip, in single precision as datasets have it. Raises
+    `SkeletonError` without two feet or two frames."""
     rig = canonical.rig
     if len(canonical) < 2:
         raise SkeletonError("holds a single frame; expected a motion")
@@ -66,8 +67,9 @@ def clip_of(name: str, canonical: CanonicalMotion, body: BodyFeatures) -> Traini
     planted = planted_feet(rig, canonical_positions(canonical), FRAME_TIME)
     if planted.shape[1] != 2:
         raise SkeletonError("has no two feet; pairs for training need them")
-    rotations = canonical.rotations[:, body.joints]
-    return TrainingClip(name, body, rotations, hips / rig.hip_height, planted, FRAME_TIME)
+    rotations = np.ascontiguousarray(canonical.rotations[:, body.joints], np.float32)
+    path = (hips / rig.hip_height).astype(np.float32)
+    return TrainingClip(name, body, rotations, path, planted, FRAME_TIME)
 
 
 def _key(skeleton: Skeleton) -> tuple[object, ...]:

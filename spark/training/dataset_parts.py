@@ -116,14 +116,7 @@ def _understood(path: Path) -> Part | Rejected:
         return Rejected(why_left_out(path, error))
     except Exception as error:  # one bad file does not end the work on thousands
         return Rejected(unforeseen(error), again=True)
-    return Part(
-        rig,
-        clip.rotations.astype(np.float32),
-        clip.hips.astype(np.float32),
-        clip.planted,
-        motion.fps,
-        canonical.floor_z,
-    )
+    return Part(rig, clip.rotations, clip.hips, clip.planted, motion.fps, canonical.floor_z)
 
 
 def _encoded(part: Part | Rejected) -> bytes:

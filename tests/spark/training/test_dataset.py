@@ -141,7 +141,7 @@ def test_clips_are_counted_from_their_bodys_tpose(tree: Path) -> None:
     turn = quat_about("x", np.linspace(-0.3, 0.3, len(rig.skeleton)))
     other = replace(rig, tpose=quat_mul(turn, rig.tpose), hip_height=1.1 * rig.hip_height)
     clip = clip_of("", to_canonical(motion, other), body_features(other))
-    part = Part(other, clip.rotations, clip.hips, clip.planted, motion.fps, 0.0)
+    part = Part(other, clip.rotations, clip.hips.astype(np.float64), clip.planted, motion.fps, 0.0)
     frames, joints = clip.rotations.shape[:2]
     numbers = _on_body(part, rig)
     rotations = numbers[: frames * joints * 4].reshape(frames, joints, 4)
