@@ -11,6 +11,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from spark.rotation import quat_relative
 from spark.sixd import sixd_from_quat
 from spark.training.tensors import Body, PoseTensors, Start
 
@@ -39,26 +40,28 @@ class Batch(NamedTuple):
 
 
 class Poses(NamedTuple):
-    """P poses of each of D draws of W windows. Joint j of a pose turns as row `rows[p, d, j]` of
-    the local rotations of all; a padding joint's row is the one behind the last."""
+    """P poses of each of D draws of W windows. Joint j of a pose turns as bone `at[p, d, j]` of
+    all, which is row `bones[1]` of the world rotations as seen from row `bones[0]`; a padding
+    joint's bone is the one behind the last."""
 
-    local: Float[Tensor, "4 L W T"]
-    rows: Int[Tensor, "P D J"]
+    rows: Float[Tensor, "4 R W T"]
+    bones: Int[Tensor, "2 L"]
+    at: Int[Tensor, "P D J"]
     root: Float[Tensor, "D W T 3"]
 
     def spread(self, *bodies: Body) -> list[PoseTensors]:
         """Each pose of all windows, B = D W, on its bodies."""
-        sixd = sixd_from_quat(self.local.permute(1, 2, 3, 0))
+        parents, children = (self.rows[:, of].permute(1, 2, 3, 0) for of in self.bones)
+        sixd = sixd_from_quat(quat_relative(parents, children))
         none = sixd.new_zeros(1, *sixd.shape[1:])
         none[..., _ONES] = (
             1  # without a tensor made of numbers, for which a GPU would be waited for
         )
         sixd, root = torch.cat([sixd, none]), self.root.flatten(0, 1)
-        rows = (
-            of_pose[:, : body.valid.shape[1]]
-            for of_pose, body in zip(self.rows, bodies, strict=True)
+        at = (
+            of_pose[:, : body.valid.shape[1]] for of_pose, body in zip(self.at, bodies, strict=True)
         )
-        return [PoseTensors(sixd[at].permute(0, 2, 3, 1, 4).flatten(0, 1), root) for at in rows]
+        return [PoseTensors(sixd[of].permute(0, 2, 3, 1, 4).flatten(0, 1), root) for of in at]
 
 
 class UnpairedDraws(NamedTuple):

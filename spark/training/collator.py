@@ -15,7 +15,9 @@ from spark.training.batch import PairDraws, Poses, UnpairedDraws
 from spark.training.pairs import Pairs
 from spark.training.posing import Drawn
 from spark.training.sizes import Sizes
+from spark.training.staging import starts_of
 from spark.training.tensors import Body
+from spark.vectors import planes
 
 Names = Callable[[Sequence[str]], Float[Tensor, "S E"]]
 
@@ -63,16 +65,20 @@ class Collator:
         )
 
     def _poses(self, draws: Sequence[Sequence[Drawn]]) -> Poses:
-        J = max(self._sizes.joints, *(len(pose.rows) for draw in draws for pose in draw))
-        *starts, end = np.cumsum([0, *(draw[0].local.shape[1] for draw in draws)]).tolist()
-        rows = np.full((len(draws[0]), len(draws), J), end)
+        J = max(self._sizes.joints, *(len(pose.at) for draw in draws for pose in draw))
+        firsts = [draw[0] for draw in draws]
+        rows = starts_of([first.rows for first in firsts])
+        *starts, end = np.cumsum([0, *(first.bones.shape[1] for first in firsts)]).tolist()
+        at = np.full((len(draws[0]), len(draws), J), end)
         for d, (draw, start) in enumerate(zip(draws, starts, strict=True)):
             for p, pose in enumerate(draw):
-                rows[p, d, : len(pose.rows)] = pose.rows + start
+                at[p, d, : len(pose.at)] = pose.at + start
+        bones = [first.bones + row for first, row in zip(firsts, rows, strict=True)]
         return Poses(
-            torch.from_numpy(np.concatenate([draw[0].local for draw in draws], 1)),
-            torch.from_numpy(rows),
-            torch.from_numpy(np.stack([draw[0].root for draw in draws])),
+            torch.from_numpy(np.concatenate([planes(first.rows) for first in firsts], 1)),
+            torch.from_numpy(np.concatenate(bones, 1)),
+            torch.from_numpy(at),
+            torch.from_numpy(np.stack([first.root for first in firsts])),
         )
 
     def bodies(self, bodies: Sequence[BodyFeatures]) -> Body:

@@ -17,11 +17,11 @@ from jaxtyping import Bool, Float, Int
 
 from spark.errors import SkeletonError
 from spark.network.features import BodyFeatures
-from spark.rotation import quat_angle, quat_from_yaw, quat_rotate, yaw_from_quat
+from spark.rotation import quat_angle
 from spark.training.cuts import Cut, TrainingClip, cut_rotations, frames_of, ground_of
 from spark.training.mirror import mirrored_body, mirrored_motion
 from spark.training.plan import Plan, plan_of_pair
-from spark.training.posing import Drawn, local_rotations, turn_between, turn_legs
+from spark.training.posing import Drawn, seen_from_start, turn_between, turn_legs
 from spark.training.sizes import Sizes, sizes_of_variants
 from spark.training.staging import StagedBody, empty_rows, in_concatenation, leg_turns
 from spark.training.variants import random_variant, same_body, split_body
@@ -127,19 +127,14 @@ class PairMaker:
         )
         turn_legs(rows, turns, [plan.legs for plan in plans], starts)
         turn_between(rows, [plan.copied for plan in plans], starts)
-        # Windows are seen from their first frames, as `spark.network.features.pose_features` sees
-        # one. The pelvis turns alike on all bodies.
-        from_heading = quat_from_yaw(-yaw_from_quat(rows[starts, :, :1]))
-        hips = ground.hips
-        roots = quat_rotate(from_heading, hips - hips[:, :, :1] * np.array([1, 1, 0], hips.dtype))
-        local = local_rotations(rows, plans, starts, from_heading)
+        roots = seen_from_start(rows, ground.hips, plans, starts)
         pairs = []
-        for k, one in enumerate(drawn):
+        for k, (one, plan, first) in enumerate(zip(drawn, plans, starts, strict=True)):
             to, of_target = one.bodies, one.bodies.target.variant.body
-            ends = (to.source.variant.body, of_target, of_target)
+            ends, own = (to.source.variant.body, of_target, of_target), rows[first:][: plan.rows]
             source, target, start = (
-                Drawn(body, local[k], pose, roots[k])
-                for body, pose in zip(ends, to.plan.poses, strict=True)
+                Drawn(body, own, plan.bones, at, roots[k])
+                for body, at in zip(ends, plan.poses, strict=True)
             )
             frame_time = one.cuts[0].clip.frame_time
             pairs.append(

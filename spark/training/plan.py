@@ -38,17 +38,17 @@ class LegPlan(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """A draw's rows: first those of the recorded body, then those that are worked out from them.
-    `parents` and `children` are the pairs of rows whose local rotations the `poses` consist of; the
-    first is the pelvis, which has no parent."""
+    """A draw's rows: first those of the recorded body, then the heading of each window's first
+    frame, then those that are worked out from the recorded ones. `bones` are the pairs of rows,
+    parent and child, whose local rotations the `poses` consist of; the pelvis's parent is the
+    heading."""
 
     recorded: int
     rows: int
     between: Between
     legs: LegPlan
     copied: Between
-    parents: Int[np.ndarray, "L"]
-    children: Int[np.ndarray, "L"]
+    bones: Int[np.ndarray, "2 L"]
     poses: tuple[Int[np.ndarray, "_"], ...]
 
 
@@ -75,7 +75,7 @@ def plan_of_pair(source: StagedBody, target: StagedBody, link: Correspondence) -
     start = made.between(placed[0], link.first, link.second, link.mix)
     copied = made.taken()
     bodies = [body.variant.body for body in (source, target, target)]
-    poses = _locals([*placed, start], bodies)
+    poses = made.poses([*placed, start], bodies)
     return Plan(made.recorded, made.rows, between, legs, copied, *poses)
 
 
@@ -85,16 +85,15 @@ def plan_of_body(variant: Variant) -> Plan:
     own = made.variant(variant)
     none = np.zeros(0, int)
     legs = LegPlan(none, none, none, none, none)
-    return Plan(
-        made.recorded, made.rows, made.taken(), legs, made.taken(), *_locals([own], [variant.body])
-    )
+    poses = made.poses([own], [variant.body])
+    return Plan(made.recorded, made.rows, made.taken(), legs, made.taken(), *poses)
 
 
 class _Made:
-    """Rows beyond those of the recorded body, numbered as they are made."""
+    """Rows beyond those of the recorded body and the heading, numbered as they are made."""
 
     def __init__(self, recorded: int) -> None:
-        self.recorded = self.rows = recorded
+        self.recorded, self.rows = recorded, recorded + 1
         self._base = np.arange(recorded)
         self._between: list[Between] = []
 
@@ -127,16 +126,15 @@ class _Made:
             return Between(none, none, none, np.zeros(0))
         return Between(*map(np.concatenate, zip(*found, strict=True)))
 
-
-def _locals(
-    placed: Sequence[Int[np.ndarray, "_"]], bodies: Sequence[BodyFeatures]
-) -> tuple[Int[np.ndarray, "L"], Int[np.ndarray, "L"], tuple[Int[np.ndarray, "_"], ...]]:
-    """The different pairs of parent and child rows, and those of each pose."""
-    numbers: dict[tuple[int, int], int] = {}
-    poses = []
-    for rows, body in zip(placed, bodies, strict=True):
-        above = np.where(body.skeleton.parents < 0, -1, rows[body.skeleton.parents])
-        pairs = zip(above.tolist(), rows.tolist(), strict=True)
-        poses.append(np.array([numbers.setdefault(pair, len(numbers)) for pair in pairs]))
-    parents, children = np.array(list(numbers)).T
-    return np.maximum(parents, 0), children, tuple(poses)
+    def poses(
+        self, placed: Sequence[Int[np.ndarray, "_"]], bodies: Sequence[BodyFeatures]
+    ) -> tuple[Int[np.ndarray, "2 L"], tuple[Int[np.ndarray, "_"], ...]]:
+        """The different pairs of parent and child rows, and those of each pose."""
+        numbers: dict[tuple[int, int], int] = {}
+        poses = []
+        for rows, body in zip(placed, bodies, strict=True):
+            parents = body.skeleton.parents
+            above = np.where(parents < 0, self.recorded, rows[parents])
+            pairs = zip(above.tolist(), rows.tolist(), strict=True)
+            poses.append(np.array([numbers.setdefault(pair, len(numbers)) for pair in pairs]))
+        return np.array(list(numbers)).T, tuple(poses)

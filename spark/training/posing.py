@@ -8,11 +8,18 @@ from jaxtyping import Float, Int
 
 from spark.network.features import BodyFeatures
 from spark.network.windows import Windows
-from spark.rotation import quat_mul, quat_relative, quat_slerp
+from spark.rotation import (
+    quat_conj,
+    quat_from_yaw,
+    quat_mul,
+    quat_relative,
+    quat_rotate,
+    quat_slerp,
+    yaw_from_quat,
+)
 from spark.sixd import sixd_from_quat
 from spark.training.plan import Between, LegPlan, Plan
 from spark.training.staging import in_concatenation, taken
-from spark.vectors import planes
 
 
 def turn_between(
@@ -39,17 +46,20 @@ def turn_legs(
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """`windows` whose local rotations are those of `rows` among L that several bodies share."""
+    """`windows` in which joint k turns as bone `bones[:, at[k]]`: a row, seen from its parent row.
+    Several bodies share the rows, which lie in planes."""
 
     body: BodyFeatures
-    local: Float[np.ndarray, "4 L W T"]
-    rows: Int[np.ndarray, "K"]
+    rows: Float[np.ndarray, "R W T 4"]
+    bones: Int[np.ndarray, "2 L"]
+    at: Int[np.ndarray, "K"]
     root: Float[np.ndarray, "W T 3"]
 
     @property
     def rotations(self) -> Float[np.ndarray, "W T K 6"]:
         """Local 6D rotations."""
-        return sixd_from_quat(self.local.take(self.rows, axis=1).transpose(2, 3, 1, 0))
+        parents, children = (taken(self.rows, of[self.at]) for of in self.bones)
+        return np.moveaxis(sixd_from_quat(quat_relative(parents, children)), 0, 2)
 
     @property
     def windows(self) -> Windows:
@@ -57,19 +67,15 @@ class Drawn:
         return Windows(self.body, self.rotations, self.root)
 
 
-def local_rotations(
+def seen_from_start(
     rows: Float[np.ndarray, "R W T 4"],
+    hips: Float[np.ndarray, "D W T 3"],
     plans: Sequence[Plan],
     starts: Sequence[int],
-    from_heading: Float[np.ndarray, "D W 1 4"],
-) -> list[Float[np.ndarray, "4 _ W T"]]:
-    """The local rotations of each draw, each pelvis first turned by `from_heading`."""
-    made = []
-    headed = quat_mul(from_heading, taken(rows, np.asarray(starts)))
-    for plan, start, pelvis in zip(plans, starts, headed, strict=True):
-        # Draw by draw, so that what is at work stays in the processor's cache.
-        parents, children = (taken(rows, at + start) for at in (plan.parents, plan.children))
-        local = quat_relative(parents, children)
-        local[0] = pelvis
-        made.append(planes(local))
-    return made
+) -> Float[np.ndarray, "D W T 3"]:
+    """Work out the rows of headings, and the hips' paths as seen from windows' first frames, as
+    `spark.network.features.pose_features` sees one. The pelvis turns alike on all bodies."""
+    heading = quat_from_yaw(yaw_from_quat(rows[starts, :, :1]))
+    rows[[start + plan.recorded for plan, start in zip(plans, starts, strict=True)]] = heading
+    from_start = hips - hips[:, :, :1] * np.array([1, 1, 0], hips.dtype)
+    return quat_rotate(quat_conj(heading), from_start)

@@ -16,10 +16,9 @@ from jaxtyping import Float
 
 from spark.errors import SkeletonError
 from spark.network.features import BodyFeatures
-from spark.rotation import quat_from_yaw, quat_rotate, yaw_from_quat
 from spark.training.cuts import Cut, TrainingClip, cut_rotations, frames_of
 from spark.training.plan import plan_of_body
-from spark.training.posing import Drawn, local_rotations, turn_between
+from spark.training.posing import Drawn, seen_from_start, turn_between
 from spark.training.sizes import Sizes, sizes_of
 from spark.training.staging import empty_rows
 from spark.training.variants import Variant, same_body, split_body, split_joints
@@ -90,15 +89,12 @@ class UnpairedMaker:
             ],
         )
         turn_between(rows, [plan.between for plan in plans], starts)
-        # As `spark.network.features.pose_features` sees a window: from its own first frame.
-        from_heading = quat_from_yaw(-yaw_from_quat(rows[starts, :, :1]))
-        hips = np.stack([one.hips for one in drawn])
-        roots = quat_rotate(from_heading, hips - hips[:, :, :1] * np.array([1, 1, 0], hips.dtype))
-        local = local_rotations(rows, plans, starts, from_heading)
-        return [
-            (Drawn(self.characters[one.who].variant.body, own, plan.poses[0], root), one.target)
-            for one, plan, own, root in zip(drawn, plans, local, roots, strict=True)
-        ]
+        roots = seen_from_start(rows, np.stack([one.hips for one in drawn]), plans, starts)
+        made = []
+        for one, plan, start, root in zip(drawn, plans, starts, roots, strict=True):
+            body, own = self.characters[one.who].variant.body, rows[start:][: plan.rows]
+            made.append((Drawn(body, own, plan.bones, plan.poses[0], root), one.target))
+        return made
 
     def _sample(self, n: int, windows: int) -> "_Draw":
         rng = np.random.default_rng((self.seed, n))

@@ -50,6 +50,19 @@ def test_varied_draws_have_unmatched_joints(maker: PairMaker) -> None:
     assert len(np.unique(np.round(paces, 6))) > 10
 
 
+def test_a_batch_turns_as_its_draws_do(maker: PairMaker) -> None:
+    """Though rotations travel in world axes; padding joints do not turn."""
+    draws = maker.draws(range(4), 2)
+    made = Collator(NameEncoder().encode).pairs(draws).batch()
+    none = torch.tensor([1.0, 0, 0, 0, 1, 0])
+    for name, pose in (("source", made.pose), ("target", made.truth), ("start", made.start)):
+        for draw, rotations in zip(draws, torch.split(pose.rotations, 2), strict=True):
+            expected = torch.as_tensor(getattr(draw, name).rotations)
+            K = expected.shape[2]
+            torch.testing.assert_close(rotations[:, :, :K], expected, atol=5e-6, rtol=0)
+            assert (rotations[:, :, K:] == none).all()
+
+
 def test_rotations_of_pairs_are_rotations(batch: Batch) -> None:
     for pose in (batch.pose, batch.truth, batch.start):
         R = matrix_from_sixd(pose.rotations)
