@@ -139,14 +139,13 @@ def quat_slerp(
     """Spherical interpolation along the shorter arc: `q0` at fraction 0, `q1` at 1."""
     xp = array_namespace(q0, q1)
     inner = dot(q0, q1)
-    one = xp.ones_like(inner)
-    q1 = xp.where(inner < 0, -one, one) * q1
-    between = q1 - q0
-    # Of a right angle at most; of one at least whose sine can be divided by.
-    squared, least = dot(between, between), xp.finfo(q1.dtype).eps ** 2 * one
-    angle = 2 * xp.asin(xp.sqrt(xp.where(squared < least, least, squared)) / 2)
+    # What is divided by must not be 0. That the cosine of a small angle tells its square only to
+    # the last bit does no harm: the shares depend on nothing else, and hardly on that.
+    most = (1 - xp.finfo(q1.dtype).eps) * xp.ones_like(inner)
+    angle = xp.acos(xp.minimum(xp.abs(inner), most))
     part, sine = fraction[..., None], xp.sin(angle)
-    return xp.sin((1 - part) * angle) / sine * q0 + xp.sin(part * angle) / sine * q1
+    second = xp.copysign(xp.sin(part * angle) / sine, inner)
+    return xp.sin((1 - part) * angle) / sine * q0 + second * q1
 
 
 def quat_between(u: Float[Any, "*#n 3"], v: Float[Any, "*#n 3"]) -> Float[Any, "*n 4"]:
