@@ -116,10 +116,12 @@ def leg_turns(
     offsets = np.concatenate([body.leg_bones.offsets for body in bodies]).astype(rows.dtype)
     parts = in_concatenation([body.leg_bones.parts for body in bodies], range(0, 8 * S, 8))
     along = quat_rotate(taken(rows, bones), offsets[:, None, None])
+    rest = np.arange(len(parts))
     first = np.unique(parts, return_index=True)[1]
     limbs = taken(along, first)
-    for bone in np.setdiff1d(np.arange(len(parts)), first).tolist():
-        limbs[parts[bone]] += along[bone]
+    while len(rest := np.setdiff1d(rest, first)):  # the next bone of each part that has more
+        first = rest[np.unique(parts[rest], return_index=True)[1]]
+        limbs[parts[first]] += taken(along, first)
     to_hip, thigh, shank, foot = (taken(limbs, np.arange(k, 8 * S, 4)) for k in range(4))
     paths = np.repeat(hips, 2, 0)
     contact = to_hip + thigh + shank + foot + paths
@@ -165,7 +167,7 @@ def in_concatenation(
     indices: Sequence[Int[np.ndarray, "_"]], starts: Sequence[int]
 ) -> Int[np.ndarray, "N"]:
     """Indices into parts as indices into their concatenation."""
-    return np.concatenate([part + start for part, start in zip(indices, starts, strict=True)])
+    return np.concatenate(indices) + np.repeat(starts, [*map(len, indices)])
 
 
 def _leg(body: BodyFeatures, limb: Group) -> Leg:

@@ -20,7 +20,7 @@ from spark.rig.roles import LIMBS, Group
 from spark.rotation import quat_between, quat_mul, quat_rotate
 from spark.smoothstep import smoothstep
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
-from spark.vectors import cross, dot, joined
+from spark.vectors import cross, dot, joined, planes, seen
 
 _STRAIGHT = 0.15  # sine of the knee's angle; the further below, the less the bones show its plane
 _SOFT = 0.05  # [rad] 3 degrees: a knee that bends by less makes a leg .3 thousandths shorter
@@ -91,21 +91,20 @@ def stance_correction(
 ) -> Float[np.ndarray, "*n T 3"]:
     """What must be added to contact points' paths so that over each stance they rest at the mean of
     the wanted path [same unit]; eased from one to the next in between, held at both ends."""
-    move = np.zeros_like(contact_pos)
     frames = np.flatnonzero(planted)  # of all paths, one after the other
     if not len(frames):
-        return move
-    before = np.concatenate([np.zeros_like(planted[..., :1]), planted[..., :-1]], -1)
-    stance = np.cumsum(before.reshape(-1)[frames] == 0) - 1
-    counts = np.bincount(stance)
+        return np.zeros_like(contact_pos)
+    goes_on = np.concatenate([np.zeros_like(planted[..., :1]), planted[..., :-1]], -1)
+    starts = np.flatnonzero(~goes_on.reshape(-1)[frames])
+    counts = np.diff(starts, append=len(frames))
     before, after, ease = _neighbours(frames, planted)
-    ease, some = ease.astype(move.dtype), planted.any(-1, keepdims=True)
-    for axis in range(3):
-        wanted, at = (pos[..., axis].reshape(-1)[frames] for pos in (wanted_pos, contact_pos))
-        held = (np.bincount(stance, wanted) / counts)[stance].astype(move.dtype) - at
-        last = held[before]
-        move[..., axis] = some * (last + ease * (held[after] - last)).reshape(planted.shape)
-    return move
+    wanted, at = (planes(pos).reshape(3, -1).take(frames, 1) for pos in (wanted_pos, contact_pos))
+    means = np.add.reduceat(wanted, starts, 1, dtype=np.float64) / counts
+    held = means.repeat(counts, 1).astype(at.dtype) - at
+    last = held.take(before, 1)
+    some, ease = planted.any(-1, keepdims=True), ease.astype(at.dtype)
+    eased = (last + ease * (held.take(after, 1) - last)).reshape(3, *planted.shape)
+    return seen(eased * some)
 
 
 def _neighbours(
