@@ -9,6 +9,7 @@ from sim.report.clip_metrics import ClipMetrics
 from sim.report.contact_timing import discord_of, standing_beside
 from sim.report.course import Course, course_of
 from sim.report.findings import findings_of
+from sim.report.floor import own_floor
 from sim.report.ground import ground_under, own_ground_notes, source_ground_notes
 from sim.report.limbs import limbs_of
 from sim.report.measures import Drift, floor_height, root_drift
@@ -26,7 +27,6 @@ from spark.motion import Motion
 from spark.resample import values_at
 from spark.rig.rig import Rig
 from spark.transfer.canonical import from_canonical, to_canonical
-from spark.transfer.ground import level_ground
 from spark.transfer.leg_fit import travel_scale
 from spark.transfer.noise import LEAST_NOISE, noise_in, without_noise
 from spark.transfer.treads import treads_of
@@ -56,7 +56,7 @@ def assess(
     known = None if truth is None else accuracy(motion, truth, rig)
     notes = _about_model(course)
     if source is None:
-        clip = measure_clip(subject, level_ground(_own_floor(course)))
+        clip = measure_clip(subject, own_floor(course))
         if subject.body is None:
             notes = (
                 "the floor is the clip's own: one that floats or sinks as a whole can't be told",
@@ -137,14 +137,11 @@ def _about_model(course: Course) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _own_floor(course: Course) -> float:
-    return floor_height(course.lowest[:, 2]) if course.subject.body is None else 0.0
-
-
 def _without_tremble(course: Course) -> tuple[Subject, float, tuple[str, ...]]:
     """What a source's feet, limbs and floor are told from: of one that trembles, from what it
     trembles about. Noise takes soles below the floor, and no foot stands."""
-    floor, subject = _own_floor(course), course.subject
+    subject = course.subject
+    floor = floor_height(course.lowest[:, 2]) if subject.body is None else 0.0
     height, frame_time = course.rig.standing_height, course.motion.frame_time
     trembles = noise_in(course.feet, course.hips, height, frame_time).feet >= LEAST_NOISE
     if subject.body is not None or not trembles:

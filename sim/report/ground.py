@@ -4,9 +4,8 @@ import numpy as np
 
 from sim.report.clip_poses import ClipPoses, pose_clip
 from sim.report.course import Course
-from sim.report.measures import floor_slope
+from sim.report.floor import MAX_SLOPE, slope_under
 from sim.report.thresholds import PLAUSIBILITY_V3
-from spark.rig.contacts import ADULT_HEIGHT, PLANTED_SPEED, speeds
 from spark.transfer.canonical import to_canonical
 from spark.transfer.ground import Ground
 from spark.transfer.seats import FLESH
@@ -87,19 +86,18 @@ def source_ground_notes(course: Course, treads: Treads, scale: float) -> tuple[s
 
 def _slope(course: Course, whose: str) -> tuple[str, ...]:
     """A note where the feet stand on a slope: recorded floors are off level by a degree or two."""
-    rig, step = course.rig, course.motion.frame_time
-    # However high they are: on a slope those that stand low would be taken for all that stand.
-    limit = PLANTED_SPEED * rig.standing_height / ADULT_HEIGHT
-    still = (speeds(course.feet, step) < limit).any(axis=1)
-    angle, rise = floor_slope(course.lowest[still])
-    if rise < PLAUSIBILITY_V3.scaled(rig.hip_height).floating / 2:
+    slope = slope_under(course)
+    if slope.rise < PLAUSIBILITY_V3.scaled(course.rig.hip_height).floating / 2:
         return ()
-    if angle > _STEEPEST:
+    if slope.angle > _STEEPEST:
         return (
             f"{whose} feet stand higher step by step: it climbs, and all that is high up counts as "
             "floating",
         )
+    there = "and there count as floating"
+    if whose == "the" and slope.angle <= MAX_SLOPE:
+        there = "and the floor is taken to be that slope"
     return (
-        f"{whose} floor slopes by {np.degrees(angle):.1f}°: the feet stand {100 * rise:.0f} cm "
-        "higher at one end of it, and there count as floating",
+        f"{whose} floor slopes by {np.degrees(slope.angle):.1f}°: the feet stand "
+        f"{100 * slope.rise:.0f} cm higher at one end of it, {there}",
     )

@@ -1,6 +1,7 @@
 """The report's measures: pure functions of arrays."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -144,19 +145,37 @@ def contact_match(
     )
 
 
-def floor_slope(places: Float[np.ndarray, "N 3"]) -> tuple[float, float]:
-    """Slope [rad] and rise [m] of the floor on which feet stood at `places`.
+class Slope(NamedTuple):
+    """A floor that slopes: how much higher it is [m] a metre further along X and Y, a place [m]
+    that is as high as its mean, and the `rise` [m] between the lowest of the places and the
+    highest."""
 
-    The plane of least squares, level across the path where the feet keep to a line; its rise is
-    that between its lowest place and its highest. Both are 0 where a plane does not explain the
-    heights much better than a level does.
+    gradient: Float[np.ndarray, "2"]
+    middle: Float[np.ndarray, "2"]
+    rise: float
+
+    @property
+    def angle(self) -> float:
+        """How steep it is [rad]."""
+        return float(np.arctan(np.linalg.norm(self.gradient)))
+
+
+LEVEL = Slope(np.zeros(2), np.zeros(2), 0.0)
+
+
+def floor_slope(places: Float[np.ndarray, "N 3"]) -> Slope:
+    """The slope of the floor on which feet stood at `places`.
+
+    The plane of least squares, level across the path where the feet keep to a line. It is level
+    where a plane does not explain the heights much better than a level does.
     """
     if len(places) < 3:
-        return 0.0, 0.0
-    horizontal = places[:, :2] - places[:, :2].mean(axis=0)
+        return LEVEL
+    middle = places[:, :2].mean(axis=0)
+    horizontal = places[:, :2] - middle
     heights = places[:, 2] - places[:, 2].mean()
     gradient, *_ = np.linalg.lstsq(horizontal, heights, rcond=_MIN_WIDTH)
     plane = horizontal @ gradient
     if np.std(heights - plane) > _MAX_UNEXPLAINED * np.std(heights):
-        return 0.0, 0.0
-    return float(np.arctan(np.linalg.norm(gradient))), float(np.ptp(plane))
+        return LEVEL
+    return Slope(gradient, middle, float(np.ptp(plane)))

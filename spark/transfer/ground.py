@@ -26,12 +26,18 @@ class Stand:
 @dataclass(frozen=True, eq=False)
 class Ground:
     """The floor at `floor_z` [m, world], and what is above it: `tops` [m], around each of which it
-    reaches as far as for a body with hips at `hip_height` [m], and when feet stand there."""
+    reaches as far as for a body with hips at `hip_height` [m], and when feet stand there.
+
+    A floor that slopes is `gradient` [m] higher a metre further along X and Y, and at `floor_z` at
+    the place `middle` [m].
+    """
 
     floor_z: float
     tops: Float[np.ndarray, "K 3"]
     stands: tuple[Stand, ...] = ()
     hip_height: float = 0.0
+    gradient: tuple[float, float] = (0.0, 0.0)
+    middle: tuple[float, float] = (0.0, 0.0)
 
     def picked(self, span: slice) -> "Ground":
         """In the frames of a slice."""
@@ -54,6 +60,8 @@ class Ground:
         """How high [m] points are over the ground below them; the first ones, corners of `feet`,
         over what these stand on while they do."""
         out = points[..., 2] - self.floor_z
+        if any(self.gradient):
+            out = out - (points[..., :2] - np.array(self.middle)) @ np.array(self.gradient)
         if not len(self.tops) or not points.size:
             return out
         across = points[..., :2].reshape(-1, 2)

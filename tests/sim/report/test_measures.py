@@ -120,13 +120,14 @@ def test_the_slope_of_the_floor_and_how_far_it_rises() -> None:
     ground = np.random.default_rng(2).uniform(0, [3.0, 1.0], (50, 2))
     ground[:2] = [[0, 0], [3, 1]]
     height = 0.02 * ground[:, 0]  # 2 cm a metre along X, from 0 to 6 cm
-    angle, rise = floor_slope(np.column_stack([ground, height]))
-    assert angle == pytest.approx(np.arctan(0.02))
-    assert rise == pytest.approx(0.06)
+    slope = floor_slope(np.column_stack([ground, height]))
+    np.testing.assert_allclose(slope.gradient, [0.02, 0.0], atol=1e-12)
+    assert slope.angle == pytest.approx(np.arctan(0.02))
+    assert slope.rise == pytest.approx(0.06)
     stairs = np.column_stack([ground, 0.1 * (np.arange(50) % 2)])
-    assert floor_slope(stairs) == (0, 0)
-    assert floor_slope(np.zeros((2, 3))) == (0, 0)
-    assert floor_slope(np.ones((9, 3))) == (0, 0)
+    for places in (stairs, np.zeros((2, 3)), np.ones((9, 3))):
+        level = floor_slope(places)
+        assert (level.angle, level.rise) == (0, 0)
 
 
 def test_contacts_precision_recall_and_f1() -> None:

@@ -1,5 +1,7 @@
 """Heights over a floor and what stands on it."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from spark.transfer.ground import Ground, Stand, distinct, level_ground
@@ -11,6 +13,13 @@ def test_over_a_level_floor_heights_are_over_that() -> None:
     points = np.random.default_rng(0).normal(size=(4, 3, 3))
     np.testing.assert_array_equal(level_ground(0.2).heights(points), points[..., 2] - 0.2)
     np.testing.assert_array_equal(level_ground(0.2).under(points), 0.0)
+
+
+def test_over_a_slope_heights_are_over_what_is_below() -> None:
+    slope = replace(level_ground(0.2), gradient=(0.02, -0.01), middle=(1.0, 2.0))
+    points = np.array([[[1.0, 2.0, 0.5], [3.0, 2.0, 0.5], [1.0, 4.0, 0.5]]])
+    np.testing.assert_allclose(slope.heights(points), [[0.3, 0.26, 0.32]])
+    np.testing.assert_allclose(slope.under(points), [[0.0, 0.04, -0.02]])
 
 
 def test_what_is_beside_a_box_is_over_the_floor() -> None:

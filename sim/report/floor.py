@@ -1,0 +1,78 @@
+"""The floor of a motion by itself: where its feet stand.
+
+The lowest points of soles alone are none. A toe that dips at each step is lower than all feet that
+stand; and where the vertical of a recording is off by a degree, its floor is higher at one end.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from sim.report.course import Course
+from sim.report.measures import LEVEL, Slope, floor_height, floor_slope
+from sim.report.thresholds import HUMAN_HIP_HEIGHT, PLAUSIBILITY_V3
+from spark.rig.contacts import ADULT_HEIGHT, PLANTED_SPEED, climbing_speeds, speeds
+from spark.transfer.ground import Ground, level_ground
+
+# [rad] Recordings' verticals are off by a degree or so: feet on a steeper slope walk up a ramp.
+MAX_SLOPE = np.radians(2.5)
+_MOST, _FINE = 0.08, 0.001  # [m, of an adult] by which toes dip below those that stand, at most
+_LEAST_TIME = 0.5  # [s] that feet stand, to tell a floor by them
+# Floors are as good that explain this share of what the best does: the lowest points keep theirs
+# unless it is clearly worse, and of the better ones the share may differ by a frame or two.
+_CLEARLY, _ABOUT = 0.95, 0.98
+
+
+def own_floor(course: Course) -> Ground:
+    """The floor under a motion of which nothing else is known; a model's is its simulator's.
+
+    It is at the 5th percentile of the lowest sole point, or higher by up to `_MOST` where that
+    explains clearly more of the frames in which a foot stands, so that it neither sinks nor floats.
+    Where the feet stand on a slope of a degree or two, the floor is that slope.
+    """
+    if course.subject.body is not None:
+        return level_ground(0.0)
+    slope = slope_under(course)
+    if slope.angle > MAX_SLOPE:
+        slope = LEVEL
+    over = course.lowest[:, 2] - (course.lowest[:, :2] - slope.middle) @ slope.gradient
+    (along_x, along_y), (x, y) = slope.gradient.tolist(), slope.middle.tolist()
+    level = level_ground(_height(over, course))
+    return replace(level, gradient=(along_x, along_y), middle=(x, y))
+
+
+def slope_under(course: Course) -> Slope:
+    """That of the places where feet stand, however high they are: on a slope those that stand low
+    would be taken for all that stand."""
+    return floor_slope(course.lowest[_slow(course, speeds).any(axis=1)])
+
+
+def _height(lowest: Float[np.ndarray, "T"], course: Course) -> float:
+    """The floor's height [m] under soles whose lowest points are so high."""
+    hip_height, frame_time = course.rig.hip_height, course.motion.frame_time
+    limits, size = PLAUSIBILITY_V3.scaled(hip_height), hip_height / HUMAN_HIP_HEIGHT
+    least = floor_height(lowest)
+    still = (_slow(course, speeds) & _slow(course, climbing_speeds)).any(axis=1)
+    heights = np.sort(lowest[still])
+    if len(heights) * frame_time < _LEAST_TIME:
+        return least
+    floors = least + size * np.arange(0.0, _MOST, _FINE)
+    explained = np.searchsorted(heights, floors + limits.floating, "right")
+    explained -= np.searchsorted(heights, floors - limits.penetration, "left")
+    if explained[0] >= _CLEARLY * explained.max():
+        return least
+    best = floors[explained.argmax()]
+    stand = heights[(heights >= best - limits.penetration) & (heights <= best + limits.floating)]
+    good = floors[explained >= _ABOUT * explained.max()]
+    return float(good[np.abs(good - floor_height(stand)).argmin()])
+
+
+def _slow(
+    course: Course, pace: Callable[[Float[np.ndarray, "T F 3"], float], Float[np.ndarray, "T F"]]
+) -> Bool[np.ndarray, "T F"]:
+    """Which feet are slow by a measure of their pace [m/s]."""
+    limit = PLANTED_SPEED * course.rig.standing_height / ADULT_HEIGHT
+    slow: Bool[np.ndarray, "T F"] = pace(course.feet, course.motion.frame_time) < limit
+    return slow
