@@ -9,7 +9,7 @@ from sim.report.clip_metrics import ClipMetrics
 from sim.report.contact_timing import discord_of, standing_beside
 from sim.report.course import Course, course_of
 from sim.report.findings import findings_of
-from sim.report.floor import own_floor
+from sim.report.floor import copied_floor, on_floor, over_level, own_floor
 from sim.report.ground import ground_under, own_ground_notes, source_ground_notes
 from sim.report.limbs import limbs_of
 from sim.report.measures import Drift, floor_height, root_drift
@@ -27,6 +27,7 @@ from spark.motion import Motion
 from spark.resample import values_at
 from spark.rig.rig import Rig
 from spark.transfer.canonical import from_canonical, to_canonical
+from spark.transfer.ground import level_ground
 from spark.transfer.leg_fit import travel_scale
 from spark.transfer.noise import LEAST_NOISE, noise_in, without_noise
 from spark.transfer.treads import treads_of
@@ -73,16 +74,26 @@ def assess(
         floor, notes = _floor_from_source(course, source.rig, source_floor)
     notes += trembles
     treads = treads_of(to_canonical(quiet.motion, quiet.rig))
+    own = own_floor(source_course) if quiet is source else level_ground(source_floor)
     source_ground = treads.ground(source_floor)
+    if treads.level:
+        source_ground = on_floor(source_ground, own)
     source_clip = measure_clip(source, source_ground)
     followed = source_clip if quiet is source else measure_clip(quiet, source_ground)
     times = np.arange(len(course)) * motion.frame_time
     scale = rig.hip_height / source.rig.hip_height
     ground = ground_under(course, treads, floor, scale)
+    swung = followed
+    if treads.level:
+        copied = copied_floor(course, floor, source_course, source_floor, own, scale)
+        if copied is None:
+            swung = over_level(followed, source_course, own, source_floor)
+        else:
+            ground = on_floor(ground, copied)
     clip = _beyond_source(measure_clip(subject, ground), source_clip, times, scale)
     travel = scale if subject.body is not None else travel_scale(source.rig, rig)
     drift = _drift(course, source_course, times, travel)
-    swing = swing_of(clip, followed, times, scale)
+    swing = swing_of(clip, swung, times, scale)
     standing = standing_beside(clip, followed, times)
     notes += source_ground_notes(source_course, treads, scale)
     notes += pace_notes(motion, source.motion)

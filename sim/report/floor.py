@@ -10,9 +10,10 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float
 
+from sim.report.clip_metrics import ClipMetrics
 from sim.report.course import Course
 from sim.report.measures import LEVEL, Slope, floor_height, floor_slope
-from sim.report.thresholds import HUMAN_HIP_HEIGHT, PLAUSIBILITY_V3
+from sim.report.thresholds import HUMAN_HIP_HEIGHT, PLAUSIBILITY_V3, Thresholds
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_SPEED, climbing_speeds, speeds
 from spark.transfer.ground import Ground, level_ground
 
@@ -43,6 +44,40 @@ def own_floor(course: Course) -> Ground:
     return replace(level, gradient=(along_x, along_y), middle=(x, y))
 
 
+def copied_floor(
+    course: Course, floor_z: float, source: Course, source_floor_z: float, own: Ground, scale: float
+) -> Ground | None:
+    """The floor that a motion copies from its source's `own` one, scaled, from where both begin.
+
+    None where a level floor at `floor_z`, where the source's lowest points at `source_floor_z` come
+    to lie, explains as many of the frames in which a foot stands: feet that hovered were let down
+    to it. That of a model is level, too.
+    """
+    if course.subject.body is not None:
+        return None
+    level = level_ground(floor_z)
+    higher = scale * float(_over(own, source.hips[:1], source_floor_z)[0])
+    x, y = course.hips[0, :2].tolist()
+    copied = replace(level, floor_z=floor_z + higher, gradient=own.gradient, middle=(x, y))
+    return copied if _explained(course, copied) > _explained(course, level) else None
+
+
+def over_level(clip: ClipMetrics, course: Course, own: Ground, floor_z: float) -> ClipMetrics:
+    """A clip with its soles' heights over a level floor instead of its own."""
+    higher = _over(own, course.hips, floor_z)
+    return replace(clip, sole_heights=clip.sole_heights + higher[:, None])
+
+
+def _over(ground: Ground, hips: Float[np.ndarray, "T 3"], floor_z: float) -> Float[np.ndarray, "T"]:
+    """How high [m] a floor is below the hips over a level one."""
+    return np.asarray(hips[:, 2] - ground.heights(hips[:, None])[:, 0] - floor_z)
+
+
+def on_floor(ground: Ground, floor: Ground) -> Ground:
+    """What is above a floor, over another one."""
+    return replace(ground, floor_z=floor.floor_z, gradient=floor.gradient, middle=floor.middle)
+
+
 def slope_under(course: Course) -> Slope:
     """That of the places where feet stand, however high they are: on a slope those that stand low
     would be taken for all that stand."""
@@ -51,12 +86,9 @@ def slope_under(course: Course) -> Slope:
 
 def _height(lowest: Float[np.ndarray, "T"], course: Course) -> float:
     """The floor's height [m] under soles whose lowest points are so high."""
-    hip_height, frame_time = course.rig.hip_height, course.motion.frame_time
-    limits, size = PLAUSIBILITY_V3.scaled(hip_height), hip_height / HUMAN_HIP_HEIGHT
-    least = floor_height(lowest)
-    still = (_slow(course, speeds) & _slow(course, climbing_speeds)).any(axis=1)
-    heights = np.sort(lowest[still])
-    if len(heights) * frame_time < _LEAST_TIME:
+    limits, size = _limits(course), course.rig.hip_height / HUMAN_HIP_HEIGHT
+    least, heights = floor_height(lowest), np.sort(lowest[_still(course)])
+    if len(heights) * course.motion.frame_time < _LEAST_TIME:
         return least
     floors = least + size * np.arange(0.0, _MOST, _FINE)
     explained = np.searchsorted(heights, floors + limits.floating, "right")
@@ -67,6 +99,21 @@ def _height(lowest: Float[np.ndarray, "T"], course: Course) -> float:
     stand = heights[(heights >= best - limits.penetration) & (heights <= best + limits.floating)]
     good = floors[explained >= _ABOUT * explained.max()]
     return float(good[np.abs(good - floor_height(stand)).argmin()])
+
+
+def _explained(course: Course, ground: Ground) -> int:
+    """In how many frames a foot stands on some ground."""
+    heights, limits = ground.heights(course.lowest[_still(course), None])[:, 0], _limits(course)
+    return int(((heights >= -limits.penetration) & (heights <= limits.floating)).sum())
+
+
+def _limits(course: Course) -> Thresholds:
+    return PLAUSIBILITY_V3.scaled(course.rig.hip_height)
+
+
+def _still(course: Course) -> Bool[np.ndarray, "T"]:
+    """The frames in which a foot is still, however high."""
+    return (_slow(course, speeds) & _slow(course, climbing_speeds)).any(axis=1)
 
 
 def _slow(

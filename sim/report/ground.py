@@ -95,7 +95,7 @@ def _slope(course: Course, whose: str) -> tuple[str, ...]:
             "floating",
         )
     there = "and there count as floating"
-    if whose == "the" and slope.angle <= MAX_SLOPE:
+    if slope.angle <= MAX_SLOPE:
         there = "and the floor is taken to be that slope"
     return (
         f"{whose} floor slopes by {np.degrees(slope.angle):.1f}°: the feet stand "

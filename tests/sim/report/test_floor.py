@@ -66,3 +66,33 @@ def test_a_ramp_is_not() -> None:
     report = assess(Subject(lifted(0.07 * place, 1.0 * place), RIG))
     assert report.clip.ground.gradient == (0.0, 0.0)
     assert report.clip.shares["floating"] > 0.5
+
+
+@pytest.mark.parametrize("rise", [0.02, 0.0])
+def test_beside_its_source_a_copy_is_on_its_slope_and_what_was_let_down_on_a_level(
+    rise: float,
+) -> None:
+    place = np.repeat(np.arange(5), 60)
+    source = Subject(lifted(0.02 * place, 1.0 * place), RIG)
+    report = assess(Subject(lifted(rise * place, 1.0 * place), RIG), source=source)
+    stands = np.arange(300) % 60 % 55 > 5
+    assert report.source is not None
+    for clip in (report.clip, report.source):
+        np.testing.assert_allclose(clip.clearance[stands], 0.0, atol=2e-3)
+    assert report.contacts is not None
+    assert report.contacts.f1 == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_copy_that_floats_over_the_slope_of_its_source_is_told() -> None:
+    place = np.repeat(np.arange(5), 60)
+    source = Subject(lifted(0.02 * place, 1.0 * place), RIG)
+    up = assess(Subject(lifted(0.06 + 0.02 * place, 1.0 * place), RIG), source=source)
+    assert up.clip.flags["floating"][np.arange(300) % 60 % 55 > 5].all()
+
+
+def test_who_copies_feet_that_stand_higher_than_they_dip_stands_as_its_source_does() -> None:
+    dips = -0.06 * (np.arange(300) % 60 < 6)
+    source = Subject(lifted(dips), RIG)
+    report = assess(source, source=source)
+    assert report.clip.shares["floating"] == 0.0
+    assert report.clip.shares["penetration"] == pytest.approx(0.1, abs=0.01)
