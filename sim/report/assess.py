@@ -97,7 +97,7 @@ def assess(
     standing = standing_beside(clip, followed, times)
     notes += source_ground_notes(source_course, treads, scale)
     notes += pace_notes(motion, source.motion)
-    thrown = scale * source_clip.base_acceleration_p99
+    thrown, hover = scale * source_clip.base_acceleration_p99, scale * source_clip.hover
     limbs = limbs_of(clip, followed, times, scale)
     pose = pose_error(subject, source, times)
     tremble = tremble_beside(subject, source, times)
@@ -114,7 +114,7 @@ def assess(
         source_clip,
         drift,
         standing.match,
-        findings_of(clip, tremble, drift, swing, thrown, limbs, pose, discord),
+        findings_of(clip, tremble, drift, swing, thrown, limbs, pose, discord, hover),
         notes,
         tremble,
         truth=known,

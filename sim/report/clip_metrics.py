@@ -128,6 +128,11 @@ class ClipMetrics:
         return float((self.imbalance[static] > self.thresholds.balance).mean())
 
     @property
+    def hover(self) -> float:
+        """How high [m] the lowest point keeps above the floor, in 95 % of the frames; 0 under it."""
+        return max(float(np.percentile(self.clearance, 5)), 0.0)
+
+    @property
     def feet(self) -> tuple[str, ...]:
         """The feet that have soles."""
         return tuple(self.standing)

@@ -19,11 +19,18 @@ from sim.report.measures import Drift
 from sim.report.pose_error import PoseError
 from sim.report.result import Finding
 from sim.report.swing import Swing
+from sim.report.thresholds import PLAUSIBILITY_V3
 from sim.report.tremble import Tremble
 from spark.runs import true_runs
 
 # Flagged frames of one measure that are no further apart than this [s] are one event to a viewer.
 _MERGE_GAP = 0.1
+# A foot that lands or leaves is faster for a moment than at rest, within the window of speeds. What
+# slides no longer than that, and by less than this [m, of an adult], is nothing to mend.
+_MIN_SLIDE = 0.015
+# A body hovers whose lowest point keeps further from the floor than this [m, of an adult]: flesh
+# under soles is no thicker, and recordings on robots keep 0.6 cm at most.
+_HOVERS = 0.02
 # A joint beyond its limit by less than this [rad] is nothing to mend: the ranges are no finer.
 _MIN_EXCESS = np.radians(1.0)
 
@@ -37,10 +44,12 @@ def findings_of(
     limbs: Limbs | None = None,
     pose: PoseError | None = None,
     discord: Discord | None = None,
+    hover: float = 0.0,
 ) -> tuple[Finding, ...]:
     """All events of a clip, the gravest of each measure first.
 
-    `thrown` [m/s²] is the 99th percentile of the source's base acceleration, scaled.
+    `thrown` [m/s²] is the 99th percentile of the source's base acceleration, `hover` [m] the height
+    that its lowest point keeps, both scaled.
     """
     gap = int(_MERGE_GAP / clip.frame_time)
     measures = (
@@ -58,6 +67,7 @@ def findings_of(
     )
     return (
         *findings,
+        *_hovering(clip, hover),
         *(contact_findings(discord) if discord else ()),
         # Where feet swing at other times, how high they are when the source's do says nothing.
         *(swing_findings(swing) if swing and not discord else ()),
@@ -87,12 +97,24 @@ def _floating(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
         yield Finding("floating", "body", start, stop, amount, "m", sentence)
 
 
+def _hovering(clip: ClipMetrics, source: float) -> Iterator[Finding]:
+    """A body that is a little too high throughout, which no single frame shows."""
+    height, limits = clip.hover, clip.thresholds
+    if source + _HOVERS * limits.floating / PLAUSIBILITY_V3.floating < height <= limits.floating:
+        sentence = f"the body hovers: it keeps {100 * height:.1f} cm above the floor"
+        yield Finding("floating", "body", 0, len(clip), height, "m", sentence)
+
+
 def _skating(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
+    least = _MIN_SLIDE * clip.thresholds.skate_height / PLAUSIBILITY_V3.skate_height
+    moment = round(clip.thresholds.window / clip.frame_time)
     for foot in dict.fromkeys(clip.corner_feet):
         columns = [f == foot for f in clip.corner_feet]
         speed = np.where(clip.corner_skates, clip.corner_speeds, 0.0)[:, columns].max(axis=1)
         for start, stop in true_runs(speed > 0, gap):
             amount = float(speed[start:stop].sum()) * clip.frame_time
+            if amount < least and stop - start <= moment:
+                continue
             sentence = f"{foot} slides {100 * amount:.1f} cm"
             yield Finding("skating", foot, start, stop, amount, "m", sentence)
 

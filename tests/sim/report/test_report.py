@@ -63,6 +63,17 @@ def test_a_body_held_five_centimetres_up_floats_in_all_frames() -> None:
     assert texts(report) == ["the body floats 5.0 cm above the floor in frames 0-119 (0.0-2.0 s)"]
 
 
+@pytest.mark.parametrize(("height", "told"), [(0.025, True), (0.015, False)])
+def test_a_body_that_hovers_a_little_throughout_is_told(height: float, told: bool) -> None:
+    rig = stick_rig()
+    still = standing(rig, 120)
+    source, up = Subject(still, rig), Subject(along(still, 2, height), rig)
+    report = assess(up, source=source)
+    assert report.implausible == 0
+    hovers = "the body hovers: it keeps 2.5 cm above the floor in frames 0-119 (0.0-2.0 s)"
+    assert texts(report) == ([hovers] if told else [])
+
+
 def test_a_jump_is_no_floating() -> None:
     rig = stick_rig()
     still = standing(rig, 120)
@@ -106,6 +117,17 @@ def test_a_foot_that_slides_at_0_4_metres_a_second_is_reported_at_that() -> None
     assert shares(report)["skating"] == pytest.approx(0.5, abs=0.02)
     slid = [f.amount for f in report.findings if f.measure == "skating"]
     np.testing.assert_allclose(slid, 0.4, atol=0.02)
+
+
+@pytest.mark.parametrize(("distance", "told"), [(0.016, False), (0.04, True)])
+def test_a_foot_that_is_fast_for_a_moment_is_nothing_to_mend(distance: float, told: bool) -> None:
+    """As one that lands or leaves: it moves for 0.05 s."""
+    rig = stick_rig()
+    still = standing(rig, 120)
+    way = distance * np.clip((seconds(still) - 1.0) / 0.05, 0.0, 1.0)
+    report = assess(Subject(along(still, 0, way), rig), source=Subject(still, rig))
+    assert bool(shares(report)["skating"])
+    assert any("slides" in text for text in texts(report)) == told
 
 
 def test_one_foot_that_slides_flat_is_named_though_the_other_could_carry_the_body() -> None:
