@@ -57,12 +57,13 @@ def assess(
     known = None if truth is None else accuracy(motion, truth, rig)
     notes = _about_model(course)
     if source is None:
-        clip = measure_clip(subject, own_floor(course))
+        ground = own_floor(course)
+        clip = measure_clip(subject, ground)
         if subject.body is None:
             notes = (
                 "the floor is the clip's own: one that floats or sinks as a whole can't be told",
             )
-        notes += own_ground_notes(course)
+        notes += own_ground_notes(course, ground)
         tremble = tremble_beside(subject)
         return Report(
             clip, None, None, None, findings_of(clip, tremble), notes, tremble, truth=known
@@ -95,7 +96,7 @@ def assess(
     drift = _drift(course, source_course, times, travel)
     swing = swing_of(clip, swung, times, scale)
     standing = standing_beside(clip, followed, times)
-    notes += source_ground_notes(source_course, treads, scale)
+    notes += source_ground_notes(source_course, own, treads, scale)
     notes += pace_notes(motion, source.motion)
     thrown, hover = scale * source_clip.base_acceleration_p99, scale * source_clip.hover
     limbs = limbs_of(clip, followed, times, scale)

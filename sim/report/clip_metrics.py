@@ -129,7 +129,7 @@ class ClipMetrics:
 
     @property
     def hover(self) -> float:
-        """How high [m] the lowest point keeps above the floor, in 95 % of the frames; 0 under it."""
+        """How high [m] the lowest point keeps above the floor in 95 % of the frames, at least 0."""
         return max(float(np.percentile(self.clearance, 5)), 0.0)
 
     @property

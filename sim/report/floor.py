@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.course import Course
-from sim.report.measures import LEVEL, Slope, floor_height, floor_slope
+from sim.report.measures import LEVEL, Slope, fitted_slope, floor_height
 from sim.report.thresholds import HUMAN_HIP_HEIGHT, PLAUSIBILITY_V3, Thresholds
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_SPEED, climbing_speeds, speeds
 from spark.transfer.ground import Ground, level_ground
@@ -31,13 +31,20 @@ def own_floor(course: Course) -> Ground:
 
     It is at the 5th percentile of the lowest sole point, or higher by up to `_MOST` where that
     explains clearly more of the frames in which a foot stands, so that it neither sinks nor floats.
-    Where the feet stand on a slope of a degree or two, the floor is that slope.
+    Where a slope of a degree or two explains clearly more of them than a level, it is that slope.
     """
     if course.subject.body is not None:
         return level_ground(0.0)
-    slope = slope_under(course)
+    level = _floor(course, LEVEL)
+    slope = fitted_slope(course.lowest[_still(course)])
     if slope.angle > MAX_SLOPE:
-        slope = LEVEL
+        return level
+    sloping = _floor(course, slope)
+    better = _CLEARLY * _explained(course, sloping) > _explained(course, level)
+    return sloping if better else level
+
+
+def _floor(course: Course, slope: Slope) -> Ground:
     over = course.lowest[:, 2] - (course.lowest[:, :2] - slope.middle) @ slope.gradient
     (along_x, along_y), (x, y) = slope.gradient.tolist(), slope.middle.tolist()
     level = level_ground(_height(over, course))
@@ -78,10 +85,10 @@ def on_floor(ground: Ground, floor: Ground) -> Ground:
     return replace(ground, floor_z=floor.floor_z, gradient=floor.gradient, middle=floor.middle)
 
 
-def slope_under(course: Course) -> Slope:
-    """That of the places where feet stand, however high they are: on a slope those that stand low
-    would be taken for all that stand."""
-    return floor_slope(course.lowest[_slow(course, speeds).any(axis=1)])
+def standing_places(course: Course) -> Float[np.ndarray, "N 3"]:
+    """The lowest sole points while a foot stands, however high it is: on a slope those that stand
+    low would be taken for all that stand."""
+    return course.lowest[_slow(course, speeds).any(axis=1)]
 
 
 def _height(lowest: Float[np.ndarray, "T"], course: Course) -> float:

@@ -4,7 +4,8 @@ import numpy as np
 
 from sim.report.clip_poses import ClipPoses, pose_clip
 from sim.report.course import Course
-from sim.report.floor import MAX_SLOPE, slope_under
+from sim.report.floor import standing_places
+from sim.report.measures import Slope, floor_slope
 from sim.report.thresholds import PLAUSIBILITY_V3
 from spark.transfer.canonical import to_canonical
 from spark.transfer.ground import Ground
@@ -50,7 +51,7 @@ def _depth(poses: ClipPoses) -> float:
     return depth if np.isfinite(depth) else FLESH * poses.rig.standing_height
 
 
-def own_ground_notes(course: Course) -> tuple[str, ...]:
+def own_ground_notes(course: Course, floor: Ground) -> tuple[str, ...]:
     """Notes where a motion without a source is on more than a level floor."""
     treads = treads_of(to_canonical(course.motion, course.rig))
     seats = tuple(
@@ -59,7 +60,7 @@ def own_ground_notes(course: Course) -> tuple[str, ...]:
         for high in treads.seat_heights
     )
     if treads.level:
-        return _slope(course, "the") + seats
+        return _slope(course, floor, "the") + seats
     return (
         f"the feet stand still up to {100 * treads.top:.0f} cm above the floor, and carry the body "
         "there: all that is high up counts as floating; beside a source that stands as high "
@@ -68,7 +69,9 @@ def own_ground_notes(course: Course) -> tuple[str, ...]:
     )
 
 
-def source_ground_notes(course: Course, treads: Treads, scale: float) -> tuple[str, ...]:
+def source_ground_notes(
+    course: Course, floor: Ground, treads: Treads, scale: float
+) -> tuple[str, ...]:
     """Notes where a source is on more than a level floor."""
     seats = tuple(
         f"the source sits, with its hips {high} cm above its floor, and its feet can't hold it "
@@ -76,7 +79,7 @@ def source_ground_notes(course: Course, treads: Treads, scale: float) -> tuple[s
         for high in treads.seat_heights
     )
     if treads.level:
-        return _slope(course, "the source's") + seats
+        return _slope(course, floor, "the source's") + seats
     return (
         f"the source's feet stand still up to {100 * treads.top:.0f} cm above its floor, and carry "
         f"it there: that is ground, for the motion up to {100 * scale * treads.top:.0f} cm high",
@@ -84,9 +87,14 @@ def source_ground_notes(course: Course, treads: Treads, scale: float) -> tuple[s
     )
 
 
-def _slope(course: Course, whose: str) -> tuple[str, ...]:
+def _slope(course: Course, floor: Ground, whose: str) -> tuple[str, ...]:
     """A note where the feet stand on a slope: recorded floors are off level by a degree or two."""
-    slope = slope_under(course)
+    places = standing_places(course)
+    slope, there = floor_slope(places), "and there count as floating"
+    if any(floor.gradient):
+        gradient, middle = np.array(floor.gradient), np.array(floor.middle)
+        slope = Slope(gradient, middle, float(np.ptp(places[:, :2] @ gradient)))
+        there = "and the floor is taken to be that slope"
     if slope.rise < PLAUSIBILITY_V3.scaled(course.rig.hip_height).floating / 2:
         return ()
     if slope.angle > _STEEPEST:
@@ -94,9 +102,6 @@ def _slope(course: Course, whose: str) -> tuple[str, ...]:
             f"{whose} feet stand higher step by step: it climbs, and all that is high up counts as "
             "floating",
         )
-    there = "and there count as floating"
-    if slope.angle <= MAX_SLOPE:
-        there = "and the floor is taken to be that slope"
     return (
         f"{whose} floor slopes by {np.degrees(slope.angle):.1f}°: the feet stand "
         f"{100 * slope.rise:.0f} cm higher at one end of it, {there}",

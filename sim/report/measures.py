@@ -163,19 +163,23 @@ class Slope(NamedTuple):
 LEVEL = Slope(np.zeros(2), np.zeros(2), 0.0)
 
 
-def floor_slope(places: Float[np.ndarray, "N 3"]) -> Slope:
-    """The slope of the floor on which feet stood at `places`.
-
-    The plane of least squares, level across the path where the feet keep to a line. It is level
-    where a plane does not explain the heights much better than a level does.
-    """
+def fitted_slope(places: Float[np.ndarray, "N 3"]) -> Slope:
+    """The slope of the plane of least squares through `places`, level across the path where the
+    feet keep to a line."""
     if len(places) < 3:
         return LEVEL
     middle = places[:, :2].mean(axis=0)
     horizontal = places[:, :2] - middle
     heights = places[:, 2] - places[:, 2].mean()
     gradient, *_ = np.linalg.lstsq(horizontal, heights, rcond=_MIN_WIDTH)
-    plane = horizontal @ gradient
-    if np.std(heights - plane) > _MAX_UNEXPLAINED * np.std(heights):
+    return Slope(gradient, middle, float(np.ptp(horizontal @ gradient)))
+
+
+def floor_slope(places: Float[np.ndarray, "N 3"]) -> Slope:
+    """The slope of the floor on which feet stood at `places`; level where a plane does not explain
+    the heights much better than a level does."""
+    slope, heights = fitted_slope(places), places[:, 2]
+    if slope is LEVEL:
         return LEVEL
-    return Slope(gradient, middle, float(np.ptp(plane)))
+    over = heights - (places[:, :2] - slope.middle) @ slope.gradient
+    return LEVEL if np.std(over) > _MAX_UNEXPLAINED * np.std(heights) else slope
