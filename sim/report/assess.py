@@ -18,7 +18,7 @@ from sim.report.pose_error import pose_error
 from sim.report.report import Report
 from sim.report.stretches import measure_clip
 from sim.report.swing import swing_of
-from sim.report.thresholds import PLAUSIBILITY_V3
+from sim.report.thresholds import PLAUSIBILITY_V4
 from sim.report.tremble import tremble_beside
 from sim.report.truth import accuracy
 from sim.trajectory import Subject
@@ -141,7 +141,7 @@ def _about_model(course: Course) -> tuple[str, ...]:
     if not ((body.model.geom_contype | body.model.geom_conaffinity)[own] != 0).any():
         notes.append("none of the model's shapes collide: self-penetration is not measured")
     height = floor_height(course.lowest[:, 2])
-    if abs(height) > PLAUSIBILITY_V3.scaled(course.rig.hip_height).penetration:
+    if abs(height) > PLAUSIBILITY_V4.scaled(course.rig.hip_height).penetration:
         notes.append(
             f"the model's floor is at z = 0; the clip's own (the 5th percentile of its lowest sole "
             f"point) is {100 * abs(height):.1f} cm {'above' if height > 0 else 'below'} that"

@@ -19,7 +19,7 @@ from sim.report.measures import Drift
 from sim.report.pose_error import PoseError
 from sim.report.result import Finding
 from sim.report.swing import Swing
-from sim.report.thresholds import PLAUSIBILITY_V3
+from sim.report.thresholds import PLAUSIBILITY_V4
 from sim.report.tremble import Tremble
 from spark.runs import true_runs
 
@@ -100,13 +100,13 @@ def _floating(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
 def _hovering(clip: ClipMetrics, source: float) -> Iterator[Finding]:
     """A body that is a little too high throughout, which no single frame shows."""
     height, limits = clip.hover, clip.thresholds
-    if source + _HOVERS * limits.floating / PLAUSIBILITY_V3.floating < height <= limits.floating:
+    if source + _HOVERS * limits.floating / PLAUSIBILITY_V4.floating < height <= limits.floating:
         sentence = f"the body hovers: it keeps {100 * height:.1f} cm above the floor"
         yield Finding("floating", "body", 0, len(clip), height, "m", sentence)
 
 
 def _skating(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
-    least = _MIN_SLIDE * clip.thresholds.skate_height / PLAUSIBILITY_V3.skate_height
+    least = _MIN_SLIDE * clip.thresholds.skate_height / PLAUSIBILITY_V4.skate_height
     moment = round(clip.thresholds.window / clip.frame_time)
     for foot in dict.fromkeys(clip.corner_feet):
         columns = [f == foot for f in clip.corner_feet]

@@ -12,7 +12,7 @@ from sim.report.model_joints import model_joint_rates, model_limit_excess
 from sim.report.self_penetration import capsules, self_penetration
 from sim.report.smoothness import joint_rates
 from sim.report.support import support_of
-from sim.report.thresholds import PLAUSIBILITY_V3
+from sim.report.thresholds import PLAUSIBILITY_V4
 from sim.report.torque import JointTorque, joint_torques
 from spark.constants import GRAVITY
 from spark.transfer.ground import Ground
@@ -20,7 +20,7 @@ from spark.transfer.ground import Ground
 
 def measure(poses: ClipPoses, ground: Ground) -> ClipMetrics:
     """The measures of a posed clip over some ground."""
-    thresholds = PLAUSIBILITY_V3.scaled(poses.rig.hip_height)
+    thresholds = PLAUSIBILITY_V4.scaled(poses.rig.hip_height)
     frame_time, window = poses.motion.frame_time, thresholds.window
     support = support_of(poses, ground, thresholds)
     corners = len(support.feet)

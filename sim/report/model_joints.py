@@ -6,7 +6,7 @@ import numpy as np
 from sim.report.derivatives import derivative
 from sim.report.limits import LimitExcess
 from sim.report.smoothness import Rates, angular_rates, turns_between
-from sim.report.thresholds import PLAUSIBILITY_V3
+from sim.report.thresholds import PLAUSIBILITY_V4
 from sim.trajectory import ModelTrajectory
 from spark.rotation import quat_normalize, rotvec_from_quat
 
@@ -20,7 +20,7 @@ def model_limit_excess(body: ModelTrajectory) -> tuple[LimitExcess, ...]:
 
     Joints without limits are left out.
     """
-    model, limits, excesses = body.model, PLAUSIBILITY_V3, []
+    model, limits, excesses = body.model, PLAUSIBILITY_V4, []
     for joint in _joints(body):
         if not model.jnt_limited[joint]:
             continue

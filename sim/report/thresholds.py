@@ -7,14 +7,14 @@ HUMAN_HIP_HEIGHT = 0.9  # [m] of an adult: the size that the thresholds are give
 
 @dataclass(frozen=True)
 class Thresholds:
-    """`plausibility v3`: what counts as implausible, for a body whose hips stand 0.9 m high.
+    """`plausibility v4`: what counts as implausible, for a body whose hips stand 0.9 m high.
 
     Those of skating were chosen on clean recordings of people, which must show little of it; the
     others were set beforehand. `scripts/report_bench.py` measures on spoilt recordings what they
     tell apart: docs/report.md has its table.
     """
 
-    version: str = "plausibility v3"
+    version: str = "plausibility v4"
 
     # Penetration: the lowest point lies deeper than this under the floor [m].
     penetration: float = 0.01
@@ -113,4 +113,4 @@ class Thresholds:
         )
 
 
-PLAUSIBILITY_V3 = Thresholds()
+PLAUSIBILITY_V4 = Thresholds()
