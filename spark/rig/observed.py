@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from itertools import product
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from spark.motion import Motion
 from spark.rotation import (
@@ -90,8 +90,13 @@ def _resting(q: Float[np.ndarray, "T 4"]) -> tuple[Float[np.ndarray, "4"], float
     return median, float(np.mean(quat_angle(q, median) < np.radians(1)))
 
 
-def standing_slope(motion: Motion, feet: Mapping[int, Float[np.ndarray, "3"]]) -> float:
-    """The angle [rad] of the feet over the floor where they stand: low and slow.
+def standing_slope(
+    motion: Motion,
+    feet: Mapping[int, Float[np.ndarray, "3"]],
+    among: Bool[np.ndarray, "T"] | None = None,
+) -> float:
+    """The angle [rad] of the feet over the floor where they stand: low and slow, `among` some
+    frames at least.
 
     `feet` holds each foot's bone, in the axes of its joint; both are taken to be alike.
     """
@@ -102,7 +107,10 @@ def standing_slope(motion: Motion, feet: Mapping[int, Float[np.ndarray, "3"]]) -
         heights.append(position[:, 2])
         speeds.append(_speed(position))
         slopes.append(np.arctan2(along[:, 2], np.linalg.norm(along[:, :2], axis=-1)))
-    height, speed, slope = (np.concatenate(x) for x in (heights, speeds, slopes))
+    height, speed, slope = (
+        np.concatenate([each if among is None else each[among] for each in x])
+        for x in (heights, speeds, slopes)
+    )
     low = height <= np.percentile(height, 30)
     return float(np.median(slope[low & (speed <= np.median(speed[low]))]))
 

@@ -22,6 +22,7 @@ from spark.rig.doubles import doubles_of
 from spark.rig.joint_axes import snap, turn_about
 from spark.rig.moving_feet import feet_ahead, feet_slope
 from spark.rig.observed import bend_axis, nearest_right_angle
+from spark.rig.pitched_feet import flat_feet
 from spark.rig.reference_pose import GROUP_OF, Reference, pelvis_frame, reference_of
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import (
@@ -81,7 +82,10 @@ def find_tpose(motion: Motion, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"]
             tpose[j] = quat_mul(tpose[child], quat_conj(reference.pose.local[child]))
     notes = list(reference.notes)
     doubles = doubles_of(skeleton, roles.roles)
-    feet: dict[int, Quat] | None = {} if reference.posed else None
+    feet: dict[int, Quat] | None = None
+    if reference.posed:
+        feet, more = flat_feet(reference, tpose[pelvis])
+        notes += more
     for j in _in_order(skeleton, roles, doubles):
         if j in above:
             continue
