@@ -30,7 +30,7 @@ from spark.transfer.hover import put_down
 from spark.transfer.knee_ease import ease_knees
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
 from spark.transfer.noise import Noise
-from spark.transfer.reach import stretch, swing_gently, within_reach
+from spark.transfer.reach import stretch, swing_gently, unfolded, within_reach
 from spark.transfer.sole_turn import turn_foot, turn_up
 from spark.transfer.stances import stances
 from spark.transfer.treads import treads_of
@@ -86,10 +86,11 @@ def lock_feet(
         height = feet[k][1].sole[..., 2].min(axis=1) + rise - moved.floor_z
         moves.append((leg, np.column_stack([along, highs[k] - height])))
     risen = replace(moved, hips=moved.hips + rise[:, None] * _UP)
+    stretches = [stretch(source, group) for group in legs]
+    risen, moves = unfolded(risen, moves, stretches, stands)
     # A foot that rolls off has let go with its heel: if the hips came down for it, the other knee
     # would bend where the source's is straight; and if it stayed, its own would snap straight.
     lower, moves_from_there = within_reach(risen, moves, flat)
-    stretches = [stretch(source, group) for group in legs]
     gentle = swing_gently(lower, moves_from_there, stretches, flat)
     held = move_ankles(lower, ease_knees(lower, gentle, stretches, stands))
     for group, high in zip(legs, np.minimum(highs, scale * ground), strict=True):

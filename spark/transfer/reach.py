@@ -1,4 +1,4 @@
-"""Hips that come down to feet out of reach, and legs that stretch gently for feet that swing.
+"""Hips that come down to feet out of reach, and legs that stretch and fold gently.
 
 A broad body on short legs takes longer steps than its legs alone would (`travel_scale`), and then
 some of its feet stand where a leg does not reach: they would be pulled along, and lifted. People
@@ -22,6 +22,8 @@ from spark.transfer.leg_ik import Leg, leg_of
 MAX_REACH = 0.999  # of a leg's length
 _AHEAD = 0.15  # [s] before a foot is out of reach the hips begin to come down
 _AIRBORNE = 0.05  # [s] after a sole has left the ground, or before it is put down, it swings
+# Of a leg's length: its knee is bent by 120 degrees, and by 150, when the thigh lies on the calf.
+_DEEP, _FOLDED = 0.5, 0.25
 _MAX_DROP = 0.1  # [hip heights] of a wide stance; a foot further away is let go of
 
 Moves = Sequence[tuple[Leg, Float[np.ndarray, "T 3"]]]
@@ -79,6 +81,34 @@ def swing_gently(
         shorter = airborne(here, motion.frame_time) * spared / np.maximum(wanted, 1e-9)
         gentle.append((leg, move - shorter[:, None] * goal))
     return gentle
+
+
+def unfolded(
+    motion: CanonicalMotion,
+    moves: Moves,
+    stretches: Sequence[Float[np.ndarray, "T"]],
+    stands: Bool[np.ndarray, "L #T"],
+) -> tuple[CanonicalMotion, Moves]:
+    """`motion` with its hips so high that legs fold gently which stand with their ankles moved by
+    `moves` [m], and the moves from there: big feet on short legs leave little between them.
+
+    `stretches` are those of the source's legs. What a leg is to fold further than that, and than a
+    deep bend, takes from what is left until its thigh lies on its calf, as in `swing_gently` at the
+    other end.
+    """
+    rises = []
+    for (leg, move), theirs, here in zip(moves, stretches, stands, strict=True):
+        length, away = length_and_ankle(motion, leg)
+        wanted = np.linalg.norm(away + move, axis=1) / np.maximum(length, 1e-9)
+        deep = np.minimum(theirs, _DEEP)
+        left = np.maximum(deep - _FOLDED, 1e-9)
+        further = np.maximum(deep - wanted, 0.0)
+        rises.append(here * length * np.maximum(further + left * np.expm1(-further / left), 0.0))
+    rise = np.max(rises, axis=0)
+    if not rise.any():
+        return motion, moves
+    up = in_time(rise, _AHEAD, motion.frame_time)[:, None] * np.array([0.0, 0.0, 1.0])
+    return replace(motion, hips=motion.hips + up), [(leg, move - up) for leg, move in moves]
 
 
 def airborne(stands: Bool[np.ndarray, "T"], frame_time: float) -> Float[np.ndarray, "T"]:

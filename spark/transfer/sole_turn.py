@@ -15,8 +15,12 @@ from spark.rotation import quat_from_rotvec, quat_mul, quat_rotate
 from spark.smoothstep import smoothstep
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.hip_rise import standing
+from spark.transfer.reach import in_time
 
 _LEVER = 0.4  # of the way from the ankle to the lowest point, that is level: less turns less
+_EASE = (
+    0.05  # [s] before the foot has to be turned it begins to: toes that push off dip for a frame
+)
 _MOST = 0.6  # [rad] 34 degrees: the foot of who lies on the floor is not turned over
 
 
@@ -45,6 +49,11 @@ def turn_up(
     # The lowest point of a foot that hangs would go far to rise little.
     lever = np.take_along_axis(np.abs(ahead) / away, up.argmin(axis=1)[:, None], axis=1)[:, 0]
     angle *= smoothstep(lever / _LEVER)
+    # Begun in time, as far as the other end of the sole is free to.
+    up, down = (in_time(np.maximum(way * angle, 0.0), _EASE, motion.frame_time) for way in (1, -1))
+    angle = np.clip(
+        up - down, np.minimum(angle, np.minimum(toes, 0)), np.maximum(angle, np.maximum(heel, 0))
+    )
     return quat_from_rotvec(-angle[:, None] * left)
 
 

@@ -12,7 +12,7 @@ from spark.rotation import quat_from_rotvec
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.transfer.foot_lock import lock_feet
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
-from spark.transfer.reach import MAX_REACH, stretch, swing_gently, within_reach
+from spark.transfer.reach import MAX_REACH, stretch, swing_gently, unfolded, within_reach
 from tests.helpers.stick import joint, standing, stick_rig, without
 
 LEG = 0.8  # [m] of the stick man, stretched out as he stands
@@ -51,6 +51,47 @@ def test_the_hips_come_down_to_a_wide_step(wide: float) -> None:
     ankle = canonical_positions(move_ankles(lower, moves))[:, leg.foot]
     wanted = canonical_positions(motion)[:, leg.foot] + stepping(wide)
     assert np.linalg.norm(ankle - wanted, axis=1).max() < 2 * (1 - MAX_REACH) * LEG
+
+
+def crouched(stretched: float) -> tuple[CanonicalMotion, Leg]:
+    """The stick man with his left ankle so near to the hip joint [legs], at about 1 s."""
+    motion, leg = stick()
+    move = np.zeros((121, 3))
+    move[54:67, 2] = LEG * (1 - stretched)
+    return move_ankles(motion, [(leg, move)]), leg
+
+
+def raised(up: float) -> np.ndarray:
+    """An ankle's move [m], from 0.9 to 1.1 s."""
+    move = np.zeros((121, 3))
+    move[54:67, 2] = up
+    return move
+
+
+@pytest.mark.parametrize(("theirs", "nearer"), [(0.5, 0.2), (0.4, 0.3), (0.25, 0.2), (0.2, 0.15)])
+def test_the_hips_rise_where_a_leg_would_fold_flat(theirs: float, nearer: float) -> None:
+    """It folds further than the source's, and no further than until its thigh lies on its calf."""
+    motion, leg = crouched(theirs)
+    stretches = [stretch(motion, Group.LEFT_LEG)]
+    higher, moves = unfolded(motion, [(leg, raised(nearer * LEG))], stretches, ALWAYS)
+    folded = stretch(move_ankles(higher, moves), Group.LEFT_LEG)[54:67]
+    assert folded.min() > min(0.25, theirs) - 1e-3
+    assert folded.max() < theirs + 1e-3
+    up = higher.hips - motion.hips
+    assert np.abs(up[:, :2]).max() == up[:36].max() == up[86:].max() == 0
+    assert np.abs(np.diff(up[:, 2])).max() * FPS < 1.01 * nearer * LEG / 0.3
+    ankle = canonical_positions(move_ankles(higher, moves))[:, leg.foot]
+    wanted = canonical_positions(motion)[:, leg.foot] + raised(nearer * LEG)
+    assert np.linalg.norm(ankle - wanted, axis=1)[54:67].max() < 1e-3
+
+
+def test_a_leg_that_folds_little_or_swings_raises_no_hips() -> None:
+    motion, leg = crouched(0.8)
+    stretches = [stretch(motion, Group.LEFT_LEG)]
+    higher, _ = unfolded(motion, [(leg, raised(0.05 * LEG))], stretches, ALWAYS)
+    assert np.abs(higher.hips - motion.hips).max() < 0.003 * LEG
+    higher, _ = unfolded(motion, [(leg, raised(0.5 * LEG))], stretches, NEVER)
+    assert higher is motion
 
 
 def test_a_foot_that_swings_is_let_go_of() -> None:

@@ -66,6 +66,20 @@ def test_a_foot_over_the_floor_is_not_turned() -> None:
         assert up(motion, least) is motion
 
 
+def test_a_foot_that_dips_for_a_frame_turns_up_in_time() -> None:
+    """Of toes that push off one frame may be in the floor, by 2 cm: the foot is there as far as it
+    has to be, and no quicker than 0.1 s let it."""
+    motion = pitched(0.3)
+    motion.hips[:, 2] -= heights(motion).min()
+    motion.hips[15, 2] -= 0.02
+    turned = up(motion, 0.0)
+    assert heights(turned).min() > -1e-9
+    by = quat_angle(*(each.rotations[:, joint(Role.LEFT_FOOT)] for each in (motion, turned)))
+    assert by.max() > np.radians(4)
+    assert max(by[:9].max(), by[22:].max()) < 1e-9
+    assert np.abs(np.diff(by)).max() < 1.1 * by.max() * motion.frame_time / 0.1
+
+
 def test_a_foot_that_is_too_low_as_a_whole_comes_to_lie_level() -> None:
     turned = up(pitched(0.2, sunk=0.03), 0.0)
     assert np.ptp(heights(turned), axis=1).max() < 0.01
