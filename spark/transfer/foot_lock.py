@@ -87,10 +87,10 @@ def lock_feet(
         moves.append((leg, np.column_stack([along, highs[k] - height])))
     risen = replace(moved, hips=moved.hips + rise[:, None] * _UP)
     stretches = [stretch(source, group) for group in legs]
-    risen, moves = unfolded(risen, moves, stretches, stands)
+    risen, moves_as_risen = unfolded(risen, moves, stretches, stands)
     # A foot that rolls off has let go with its heel: if the hips came down for it, the other knee
     # would bend where the source's is straight; and if it stayed, its own would snap straight.
-    lower, moves_from_there = within_reach(risen, moves, flat)
+    lower, moves_from_there = within_reach(risen, moves_as_risen, flat)
     gentle = swing_gently(lower, moves_from_there, stretches, flat)
     held = move_ankles(lower, ease_knees(lower, gentle, stretches, stands))
     for group, high in zip(legs, np.minimum(highs, scale * ground), strict=True):
