@@ -20,6 +20,7 @@ _SHARER = "share"
 _WORDS = {"twist", "roll", _SHARER}
 # Of a segment's length: a helper further from its line, or beyond its ends, does not lie along it.
 _ASIDE = 0.1
+_IN_LINE = 0.01  # the same of a part that carries the hand, which it would move
 # Each limb's ball joint, its hinge, its end, and how far a bone at the end would take the end's
 # twist. A shank's bones do not roll about each other, as a forearm's do.
 _LIMBS = [
@@ -53,7 +54,8 @@ def twist_bones(
     skeleton: Skeleton, roles: RoleMap, tpose_positions: Float[np.ndarray, "J 3"]
 ) -> dict[int, TwistBone]:
     """The joints of a rig that are called twist bones and lie along a segment of a limb, parents
-    first. Those that carry a joint with a role are left out.
+    first. Those that carry a joint with a role are left out, but for the further parts of a forearm
+    or shank that is built in several, in line: whatever they are called, they turn as such bones.
 
     At a hinge, elbow or knee, bones twist as the segment does, so that the hinge keeps its axis.
     From there to the end a bone takes as much of the end's twist as it is far along. At the ball
@@ -87,7 +89,19 @@ def twist_bones(
                 else:
                     turn = (segment, until, axis, taken * along, 0.0)
                 found[j] = TwistBone(segment, *turn)
+            if segment == lower:
+                for j in _between(skeleton, segment, until):
+                    away = (places[j] - places[segment]) / length
+                    along = float(away @ axis)
+                    if along > _ASIDE and np.linalg.norm(away - along * axis) < _IN_LINE:
+                        found[j] = TwistBone(segment, segment, until, axis, taken * along, 0.0)
     return dict(sorted(found.items()))
+
+
+def _between(skeleton: Skeleton, segment: int, until: int) -> tuple[int, ...]:
+    """The joints that a segment's end hangs on, below the one at its start."""
+    above = skeleton.ancestors(until)[1:]
+    return above[: above.index(segment)] if segment in above else ()
 
 
 def _named_below(skeleton: Skeleton, roles: RoleMap) -> dict[int, list[int]]:

@@ -50,9 +50,11 @@ def spread_twists(source: Rig, moved: CanonicalMotion) -> CanonicalMotion:
 
 
 def turn_bones(motion: CanonicalMotion, joints: Collection[int]) -> CanonicalMotion:
-    """The motion with these twist bones of its rig turned, and with them what hangs on them."""
+    """The motion with these twist bones of its rig turned, and with them what hangs on them, but
+    for joints with a role and what these carry."""
     rig, rotations = motion.rig, motion.rotations
     out = rotations.copy()
+    held = {j for j, role in enumerate(rig.roles.roles) if role is not None}
     parts: dict[tuple[int, int], tuple[np.ndarray, np.ndarray]] = {}
     for j in sorted(joints):
         bone = rig.twist_bones[j]
@@ -69,8 +71,13 @@ def turn_bones(motion: CanonicalMotion, joints: Collection[int]) -> CanonicalMot
         )
         out[:, j] = quat_mul(rotations[:, bone.above], against)
         turned = quat_mul(out[:, j], quat_conj(rotations[:, j]))
+        carried = {
+            k
+            for top in held.intersection(rig.skeleton.subtree(j))
+            for k in rig.skeleton.subtree(top)
+        }
         for k in rig.skeleton.subtree(j)[1:]:
-            if k not in rig.twist_bones:
+            if k not in rig.twist_bones and k not in carried:
                 out[:, k] = quat_mul(turned, rotations[:, k])
     return replace(motion, rotations=out)
 

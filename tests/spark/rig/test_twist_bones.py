@@ -54,11 +54,27 @@ def test_what_lies_elsewhere_is_none() -> None:
     assert rig_of(("Shoulder", "Arm", 0.5, "RibsTwist")).twist_bones == {}
 
 
-def test_what_carries_a_limb_is_none() -> None:
-    """Daz's forearm has its twist in the chain: the hand hangs on it."""
-    skeleton, roles = build(RIGS["daz genesis 3"])
-    assert "lForearmTwist" in skeleton.names
-    assert understand(walk(skeleton, roles)).twist_bones == {}
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [
+        ("daz genesis 3", {"ForearmTwist": 0.5}),
+        ("humanik", {"ForeArmRoll": 0.5, "LegRoll": 1 / 6}),
+        ("rigify", {"forearm.001": 0.5, "shin.001": 1 / 6}),
+    ],
+)
+def test_forearms_and_shanks_in_several_parts_twist_along_them(
+    name: str, parts: dict[str, float]
+) -> None:
+    """Whatever the parts are called that carry hand and foot; those of upper arm and thigh turn
+    with the first, which holds the role."""
+    rig = understand(walk(*build(RIGS[name])))
+    carrying = {above for held in rig.roles.held for above in rig.skeleton.ancestors(held)}
+    found = {j: bone for j, bone in rig.twist_bones.items() if j in carrying}
+    assert len(found) == 2 * len(parts)
+    for j, bone in found.items():
+        called = rig.skeleton.names[j].replace(".L", "").replace(".R", "")
+        assert bone.twist == pytest.approx(next(v for k, v in parts.items() if k in called))
+        assert (bone.above, bone.swing) == (bone.segment, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -119,6 +119,50 @@ def test_what_hangs_on_a_bone_turns_with_it() -> None:
     assert abs(turn_of(out, "Bracelet", "ForeArm")).max() > 90
 
 
+def in_parts() -> Skeleton:
+    """The body without twist bones, each forearm of two parts in line: the second carries the
+    hand."""
+    body = with_bones((("ForeArm", "Hand", 0.6, "Lower2"),))
+    names = list(body.names)
+    parents, offsets = body.parents.copy(), body.offsets.copy()
+    order = sorted(range(len(names)), key=lambda j: _place(names[j], names))
+    at = {j: k for k, j in enumerate(order)}
+    for side in ("Left", "Right"):
+        hand, part = names.index(f"{side}Hand"), names.index(f"{side}Lower2")
+        parents[hand] = part
+        offsets[hand] -= offsets[part]
+    return Skeleton(
+        tuple(names[j] for j in order),
+        np.array([at[parents[j]] if parents[j] >= 0 else -1 for j in order]),
+        offsets[order],
+        body.translating[order],
+        np.array([at[j] for j in body.end_parents.tolist()], dtype=int),
+        body.end_offsets,
+    )
+
+
+def _place(name: str, names: list[str]) -> float:
+    """Parts of a forearm after it, all else in its order."""
+    return names.index(name.replace("Lower2", "ForeArm")) + 0.5 * ("Lower2" in name)
+
+
+@pytest.mark.parametrize("bend", [0.0, 35.0])
+def test_a_part_that_carries_the_hand_twists_below_it(bend: float) -> None:
+    """As far as it is along, and never bends; hand and all places stay."""
+    rig = target(in_parts())
+    turns = about(SIDEWAYS, bend) * about(LEFT, TWISTS)
+    out, plainly = onto(rig, moved("Hand", turns)), moved("Hand", turns)
+    np.testing.assert_allclose(
+        turn_of(out, "Lower2", "ForeArm"), 0.6 * np.multiply.outer(TWISTS, LEFT), atol=1e-6
+    )
+    np.testing.assert_allclose(
+        turn_of(out, "Hand", "ForeArm"), turn_of(plainly, "Hand", "ForeArm"), atol=1e-6
+    )
+    canonical = to_canonical(plainly, understand(plainly))
+    before, _ = forward(from_canonical(transfer(canonical, rig)))
+    np.testing.assert_allclose(forward(out)[0], before, atol=1e-9)
+
+
 def test_what_the_source_has_is_carried_over() -> None:
     """Whatever it does: bones of the same name in the same place are not made."""
     turns = np.random.default_rng(0).normal(size=(len(BONES), 5, 3))
