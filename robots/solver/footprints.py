@@ -21,7 +21,7 @@ from spark.transfer.footfalls import beyond
 
 # Hip heights that a standing foot may stray from its mean place without having moved,
 MAX_WOBBLE = 0.05
-MAX_TWIST = float(np.radians(12))  # and how far it may turn
+_MAX_TWIST = np.radians(6)  # and how far it may turn
 _SPIN = np.radians(45)  # in one contact: feet turn on their toes, but spin on what carries them
 
 
@@ -131,7 +131,7 @@ def _plan(
         share = behind / max(length, 1e-9)
         their_toe, their_heel = targets.feet[frames, s, 1], targets.feet[frames, s, 0]
         place = pivot.mean(0) + beyond(their_toe + share * (their_heel - their_toe), radius)
-        turned = heading[frames].mean() + beyond(heading[frames, None], MAX_TWIST)[:, 0]
+        turned = heading[frames].mean() + beyond(heading[frames, None], _MAX_TWIST)[:, 0]
         time = np.arange(start, stop)
         x, y, turn = (np.interp(time, frames, values) for values in (*place.T, turned))
         prints[start:stop, :2] = np.column_stack([x, y]) + behind * _ahead(turn)

@@ -11,7 +11,7 @@ from robots.least_squares import PointAcceleration, Smoothness, second_differenc
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.dynamics import center_of_mass, com_jacobian
-from robots.solver.haste import JERK_WINDOW, limb_dofs
+from robots.solver.haste import JERK_WINDOW, jerk, limb_dofs
 from robots.solver.weights import (
     AVOIDANCE_CUTOFF,
     JERK_SHARE,
@@ -93,11 +93,9 @@ def jerk_stiffening(
     out = np.ones((max(len(q) - 2, 0), tree.nv))
     hinges = ~tree.balls
     if len(q) > 3:
-        jerk = np.diff(q.angles[:, hinges], 3, axis=0) / frame_time**3
         window = max(1, 2 * round(JERK_WINDOW / frame_time) + 1)
-        mean = uniform_filter1d(jerk**2, window, axis=0, mode="nearest")
-        rms = np.sqrt(np.maximum(mean, 0.0))
-        rms = np.concatenate([rms[:1], rms])
+        squared = np.square(jerk(q.angles[:, hinges], frame_time))
+        rms = np.sqrt(np.maximum(uniform_filter1d(squared, window, axis=0), 0.0))[1:-1]
         most = np.full((len(q) - 2, tree.nv), MAX_JERK)
         for dofs, jerk_of_source in zip(limb_dofs(robot), source_jerks[1:-1].T, strict=True):
             most[:, dofs] = np.maximum(MAX_JERK, JERK_SHARE * jerk_of_source)[:, None]

@@ -2,10 +2,13 @@
 beyond what that one wobbles while it stands."""
 
 import cmath
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from robots.solver.footprints import MAX_TWIST
+_MAX_TWIST = math.radians(
+    12
+)  # of a wobble; a whole clip lifts the heel of a foot that turns farther
 
 
 @dataclass(slots=True)
@@ -40,5 +43,5 @@ class Footprint:
         self.away = away * (wobble / far) if far > wobble else away
         self.pivot += away - self.away
         turn = self.turned + hold * turned
-        self.turned = min(max(turn, -MAX_TWIST), MAX_TWIST)
+        self.turned = min(max(turn, -_MAX_TWIST), _MAX_TWIST)
         self.heading += turn - self.turned

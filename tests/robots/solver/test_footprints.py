@@ -55,4 +55,26 @@ def test_a_foot_spins_on_what_carries_it() -> None:
     pivot, heading = plan.prints[:, 0] + 1j * plan.prints[:, 1], plan.prints[:, 2]
     copied = plan.points[..., 0] + 1j * plan.points[..., 1]
     away = np.abs(on_prints(plan.flat, pivot, heading) - copied)
-    assert away.max() < 0.06  # within a wobble and MAX_TWIST; a spin on the toes is 0.2 m away
+    assert away.max() < 0.06  # within a wobble; a spin on the toes is 0.2 m away
+
+
+def test_a_planted_foot_pivots_but_does_not_wobble() -> None:
+    """A foot that turns while all else stands still, slowly, about its joint."""
+    rig = sample_rig("walker")
+    ember = load_robot(find("robot")).on_robot.robot
+    still = to_canonical(sample_motion("walk", rig, 60.0), rig).frames(0, 40)
+    foot = rig.roles.require(Role.LEFT_FOOT)
+
+    def printed(degrees: float) -> float:
+        turn = quat_from_yaw(np.radians(degrees) * np.linspace(-0.5, 0.5, len(still)))
+        rotations = np.broadcast_to(still.rotations[0], still.rotations.shape).copy()
+        for j in rig.skeleton.subtree(foot):
+            rotations[:, j] = quat_mul(turn, rotations[:, j])
+        hips = np.broadcast_to(still.hips[0], still.hips.shape)
+        turned = replace(still, rotations=rotations, hips=hips)
+        plan = plan_feet(ember, targets_of(turned, ember))[0]
+        assert plan.stands.all()
+        return float(np.degrees(np.ptp(plan.prints[:, 2])))
+
+    assert printed(30.0) > 15.0
+    assert printed(10.0) < 1e-6

@@ -518,3 +518,17 @@ def test_the_bars_hold_on_real_clips(robot: str) -> None:
         source = to_canonical(motion, understand(motion))
         rows.append(metrics(source, retarget(source, load_robot(find(robot)).on_robot.robot)))
     assert set(misses(mean_of(rows))) <= FALLS_SHORT[robot]
+
+
+def test_jerk_does_not_depend_on_the_frame_rate(ember: Morphology) -> None:
+    def most(fps: int) -> float:
+        time = np.arange(3 * fps) / fps
+        angles = np.zeros((len(time), len(ember.tree)))
+        angles[:, 0] = 0.5 * np.tanh((time - 1.5) / 0.02)
+        still = np.tile([1.0, 0, 0, 0], (len(time), 1))
+        q = Coordinates(np.zeros((len(time), 3)), still, angles)
+        found = jerk_stiffening(ember, q, 1 / fps, np.zeros((len(time), 4)))
+        return float(found[:, ember.tree.dof_starts[0]].max())
+
+    assert most(60) > 3
+    assert most(240) == pytest.approx(most(60), rel=0.15)
