@@ -22,7 +22,7 @@ from spark.transfer.footfalls import beyond
 # Hip heights that a standing foot may stray from its mean place without having moved,
 MAX_WOBBLE = 0.05
 _MAX_TWIST = np.radians(6)  # and how far it may turn
-_SPIN = np.radians(45)  # in one contact: feet turn on their toes, but spin on what carries them
+_SPIN = np.radians(60)  # in one contact: feet turn on their toes, but spin on what carries them
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,14 +109,25 @@ def flat_sole(robot: Morphology, sole: Sole) -> Float[np.ndarray, "P 2"]:
     return at @ np.array([[cos, -sin], [sin, cos]])
 
 
+def headings(points: Float[np.ndarray, "T P 3"]) -> Float[np.ndarray, "T"]:
+    """The directions of soles over the floor [rad]: the twist about the vertical of the turn from
+    one that lies flat and heads along X, as a sole that stands on end, or tips over, still has it.
+    """
+    ahead = points[:, -2:].mean(1) - points[:, :2].mean(1)
+    ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-9)
+    left = (points[:, 1::2] - points[:, 0::2]).mean(1)
+    left -= (left * ahead).sum(1, keepdims=True) * ahead
+    left /= np.maximum(np.linalg.norm(left, axis=1, keepdims=True), 1e-9)
+    return np.arctan2(ahead[:, 1] - left[:, 0], ahead[:, 0] + left[:, 1])
+
+
 def _plan(
     robot: Morphology, targets: Targets, positions: Float[np.ndarray, "T J 3"], s: int
 ) -> FootPlan:
     sole, contacts = robot.soles[s], targets.contacts[:, s]
     points = sole_positions(sole, positions, targets.world)
     heel, toe = points[:, :2, :2].mean(1), points[:, -2:, :2].mean(1)
-    along = toe - heel
-    heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
+    heading = np.unwrap(headings(points))
     flat = flat_sole(robot, sole)
     length = float(np.linalg.norm(flat[-2:].mean(0) - flat[:2].mean(0)))
     prints = np.column_stack([toe, heading])

@@ -6,9 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-_MAX_TWIST = math.radians(
-    12
-)  # of a wobble; a whole clip lifts the heel of a foot that turns farther
+_MAX_TWIST = math.radians(12)  # of a wobble; only whole clips lift the heel of what turns farther
 
 
 @dataclass(slots=True)

@@ -3,9 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
 
 from robots.registry import find
-from robots.solver.footprints import on_prints, plan_feet, reachable
+from robots.solver.footprints import headings, on_prints, plan_feet, reachable
 from robots.solver.targets import targets_of
 from spark.demo.sample import sample_motion, sample_rig
 from spark.rig.roles import Role
@@ -78,3 +80,12 @@ def test_a_planted_foot_pivots_but_does_not_wobble() -> None:
 
     assert printed(30.0) > 15.0
     assert printed(10.0) < 1e-6
+
+
+def test_a_sole_on_end_heads_where_it_would_if_it_lay_flat() -> None:
+    """A foot that heads by 0.3 rad and is pitched to and beyond the vertical, and rolled."""
+    flat = np.array([[0, -0.04, 0], [0, 0.04, 0], [0.2, -0.05, 0], [0.2, 0.05, 0]])
+    for pitch, roll in ((0, 0), (-70, 0), (-89, 10), (-100, 0), (0, 30)):
+        tipped = Rotation.from_euler("zyx", [0.3, np.radians(-pitch), np.radians(roll)])
+        heading = headings(tipped.apply(flat)[None])
+        assert heading == pytest.approx(0.3, abs=0.2 if roll and pitch else 1e-6)
