@@ -33,6 +33,7 @@ PLANTED_SPEED, PLANTED_HEIGHT = 0.15, 0.06
 MAX_UNEVEN = 0.05  # [m] between the lowest heights of both feet: one may never come down
 IN_AIR = 0.02  # [m] that a planted foot may be above the floor
 AT_LIMIT = np.radians(0.5)
+_STILL = 0.3  # [m/s²] of hips that don't move, against which all that do are thrown
 _WINDOW = 0.05  # [s] before and after a frame over which accelerations are measured
 
 
@@ -116,7 +117,7 @@ def measure(motion: Motion, rig: Rig, result: RobotMotion) -> RobotMetrics:
         swing_clearance=None if swing is None else swing.clearance,
         dragging=ours.dragging,
         dragging_source=theirs.dragging,
-        hips_acceleration=report.clip.base_acceleration_p99 / thrown if thrown > 0 else None,
+        hips_acceleration=report.clip.base_acceleration_p99 / thrown if thrown > _STILL else None,
         com_acceleration=_over(own_poses.mass.com, source_poses.mass.com, scale, frame_time),
         limb_acceleration=None if report.limbs is None else report.limbs.ratio,
         heading_rad=float(np.abs(report.drift.heading).max()),
