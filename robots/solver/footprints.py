@@ -17,11 +17,13 @@ from robots.tree import Coordinates, LinkPoses, forward_kinematics
 from spark.kinematics import world_positions
 from spark.rig.feet import Sole, sole_positions
 from spark.runs import true_runs
+from spark.smoothstep import smoothstep
 from spark.transfer.footfalls import beyond
 
 # Hip heights that a standing foot may stray from its mean place without having moved,
 MAX_WOBBLE = 0.05
-_MAX_TWIST = np.radians(6)  # and how far it may turn
+MAX_TWIST = float(np.radians(12))  # and how far it may turn
+_ON_END = (0.3, 0.6)  # of a sole's length, that it reaches over the floor: at 73 degrees, and at 53
 _SPIN = np.radians(60)  # in one contact: feet turn on their toes, but spin on what carries them
 
 
@@ -110,15 +112,20 @@ def flat_sole(robot: Morphology, sole: Sole) -> Float[np.ndarray, "P 2"]:
 
 
 def headings(points: Float[np.ndarray, "T P 3"]) -> Float[np.ndarray, "T"]:
-    """The directions of soles over the floor [rad]: the twist about the vertical of the turn from
-    one that lies flat and heads along X, as a sole that stands on end, or tips over, still has it.
+    """The directions of soles over the floor [rad]: where they point, and of those that stand on
+    end, or have tipped over, the twist about the vertical of their turn from one that lies flat.
     """
     ahead = points[:, -2:].mean(1) - points[:, :2].mean(1)
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-9)
     left = (points[:, 1::2] - points[:, 0::2]).mean(1)
     left -= (left * ahead).sum(1, keepdims=True) * ahead
     left /= np.maximum(np.linalg.norm(left, axis=1, keepdims=True), 1e-9)
-    return np.arctan2(ahead[:, 1] - left[:, 0], ahead[:, 0] + left[:, 1])
+    pointing = ahead[:, 0] + 1j * ahead[:, 1]
+    twist = ahead[:, 0] + left[:, 1] + 1j * (ahead[:, 1] - left[:, 0])
+    low, high = _ON_END
+    known = smoothstep((np.abs(pointing) - low) / (high - low))
+    unit = [each / np.maximum(np.abs(each), 1e-9) for each in (pointing, twist)]
+    return np.angle(known * unit[0] + (1.0 - known) * unit[1])
 
 
 def _plan(
@@ -142,7 +149,7 @@ def _plan(
         share = behind / max(length, 1e-9)
         their_toe, their_heel = targets.feet[frames, s, 1], targets.feet[frames, s, 0]
         place = pivot.mean(0) + beyond(their_toe + share * (their_heel - their_toe), radius)
-        turned = heading[frames].mean() + beyond(heading[frames, None], _MAX_TWIST)[:, 0]
+        turned = heading[frames].mean() + beyond(heading[frames, None], MAX_TWIST)[:, 0]
         time = np.arange(start, stop)
         x, y, turn = (np.interp(time, frames, values) for values in (*place.T, turned))
         prints[start:stop, :2] = np.column_stack([x, y]) + behind * _ahead(turn)

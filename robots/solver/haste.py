@@ -26,14 +26,13 @@ def limb_jerks(
     window = 2 * max(1, round(JERK_WINDOW / frame_time)) + 1
     for k, group in enumerate(_GROUPS):
         for bone in (bones[role] for role in LIMBS[group] if role in bones):
-            squared = uniform_filter1d((jerk(bone, frame_time) ** 2).sum(axis=1), window)
+            squared = uniform_filter1d((_jerk(bone, frame_time) ** 2).sum(axis=1), window)
             out[:, k] = np.maximum(out[:, k], np.sqrt(np.maximum(squared, 0.0)))
     return out
 
 
-def jerk(values: Float[np.ndarray, "T D"], frame_time: float) -> Float[np.ndarray, "T D"]:
-    """Third differences over `_INTERVAL`, the same at any frame rate; near the ends those of the
-    nearest whole one, and 0 where there is none."""
+def _jerk(values: Float[np.ndarray, "T 3"], frame_time: float) -> Float[np.ndarray, "T 3"]:
+    """Third differences over `_INTERVAL`; near the ends those of the nearest whole one."""
     step = _INTERVAL / frame_time
     reach, last = 1.5 * step, len(values) - 1
     if last < 2 * reach:

@@ -11,7 +11,7 @@ from robots.least_squares import PointAcceleration, Smoothness, second_differenc
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.dynamics import center_of_mass, com_jacobian
-from robots.solver.haste import JERK_WINDOW, jerk, limb_dofs
+from robots.solver.haste import JERK_WINDOW, limb_dofs
 from robots.solver.weights import (
     AVOIDANCE_CUTOFF,
     JERK_SHARE,
@@ -27,6 +27,8 @@ from robots.solver.weights import (
 )
 from robots.tree import Coordinates, forward_kinematics
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
+
+_JERK_INTERVAL = 1 / 60  # [s] at least, over which hinges' jerk is told
 
 
 def smoothness_of(
@@ -88,14 +90,21 @@ def jerk_stiffening(
 ) -> Float[np.ndarray, "A D"]:
     """By what the acceleration weights of hinges are multiplied where these are too jerky: the RMS
     jerk around, over `MAX_JERK` or, of a limb, over a share of the source's (`limb_jerks`
-    [rad/s³]) where that is more; at least 1."""
+    [rad/s³]) where that is more; at least 1. Jerk is told over `_JERK_INTERVAL`, or more frames a
+    second would make a motion jerkier."""
     tree = robot.tree
     out = np.ones((max(len(q) - 2, 0), tree.nv))
     hinges = ~tree.balls
-    if len(q) > 3:
+    step = max(1, round(_JERK_INTERVAL / frame_time))
+    if len(q) > 3 * step:
+        angles = q.angles[:, hinges]
+        for _ in range(3):
+            angles = angles[step:] - angles[:-step]
         window = max(1, 2 * round(JERK_WINDOW / frame_time) + 1)
-        squared = np.square(jerk(q.angles[:, hinges], frame_time))
-        rms = np.sqrt(np.maximum(uniform_filter1d(squared, window, axis=0), 0.0))[1:-1]
+        mean = uniform_filter1d(angles**2, window, axis=0, mode="nearest")
+        rms = np.sqrt(np.maximum(mean, 0.0)) / (step * frame_time) ** 3
+        before = (3 * step - 1) // 2
+        rms = np.pad(rms, ((before, 3 * step - 2 - before), (0, 0)), "edge")
         most = np.full((len(q) - 2, tree.nv), MAX_JERK)
         for dofs, jerk_of_source in zip(limb_dofs(robot), source_jerks[1:-1].T, strict=True):
             most[:, dofs] = np.maximum(MAX_JERK, JERK_SHARE * jerk_of_source)[:, None]

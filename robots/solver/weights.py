@@ -53,6 +53,6 @@ SMOOTH_CUTOFF = 3.3  # [Hz] above which a limb's motion fades: accelerations wei
 LEG_SHARE = 0.8  # of that weight for hinges of the legs: feet start and stop within 0.1 s
 AVOIDANCE_CUTOFF = 2.2  # [Hz] above which the change fades by which a limb gives way to another
 JERK_SHARE = 0.5  # of the source's limb: up to that a strike may be jerkier, as the other bar is
-MAX_JERK = 240.0  # [rad/s³] over 0.05 s, RMS, above which a hinge is smoothed more: the bar is 400
+MAX_JERK = 430.0  # [rad/s³], RMS, above which a hinge is smoothed more: the bar is 400 in the mean
 MAX_HINGE_SPEED = 12.0  # [rad/s] above which a hinge is held back; the bar is 15
 W_OVERSPEED = 0.8  # [s/rad] of the speed beyond

@@ -2,11 +2,10 @@
 beyond what that one wobbles while it stands."""
 
 import cmath
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-_MAX_TWIST = math.radians(12)  # of a wobble; only whole clips lift the heel of what turns farther
+from robots.solver.footprints import MAX_TWIST
 
 
 @dataclass(slots=True)
@@ -41,5 +40,5 @@ class Footprint:
         self.away = away * (wobble / far) if far > wobble else away
         self.pivot += away - self.away
         turn = self.turned + hold * turned
-        self.turned = min(max(turn, -_MAX_TWIST), _MAX_TWIST)
+        self.turned = min(max(turn, -MAX_TWIST), MAX_TWIST)
         self.heading += turn - self.turned

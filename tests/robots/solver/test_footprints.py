@@ -60,32 +60,10 @@ def test_a_foot_spins_on_what_carries_it() -> None:
     assert away.max() < 0.06  # within a wobble; a spin on the toes is 0.2 m away
 
 
-def test_a_planted_foot_pivots_but_does_not_wobble() -> None:
-    """A foot that turns while all else stands still, slowly, about its joint."""
-    rig = sample_rig("walker")
-    ember = load_robot(find("robot")).on_robot.robot
-    still = to_canonical(sample_motion("walk", rig, 60.0), rig).frames(0, 40)
-    foot = rig.roles.require(Role.LEFT_FOOT)
-
-    def printed(degrees: float) -> float:
-        turn = quat_from_yaw(np.radians(degrees) * np.linspace(-0.5, 0.5, len(still)))
-        rotations = np.broadcast_to(still.rotations[0], still.rotations.shape).copy()
-        for j in rig.skeleton.subtree(foot):
-            rotations[:, j] = quat_mul(turn, rotations[:, j])
-        hips = np.broadcast_to(still.hips[0], still.hips.shape)
-        turned = replace(still, rotations=rotations, hips=hips)
-        plan = plan_feet(ember, targets_of(turned, ember))[0]
-        assert plan.stands.all()
-        return float(np.degrees(np.ptp(plan.prints[:, 2])))
-
-    assert printed(30.0) > 15.0
-    assert printed(10.0) < 1e-6
-
-
 def test_a_sole_on_end_heads_where_it_would_if_it_lay_flat() -> None:
-    """A foot that heads by 0.3 rad and is pitched to and beyond the vertical, and rolled."""
+    """A foot that heads by 0.3 rad and is pitched to and beyond the vertical, or rolled."""
     flat = np.array([[0, -0.04, 0], [0, 0.04, 0], [0.2, -0.05, 0], [0.2, 0.05, 0]])
-    for pitch, roll in ((0, 0), (-70, 0), (-89, 10), (-100, 0), (0, 30)):
-        tipped = Rotation.from_euler("zyx", [0.3, np.radians(-pitch), np.radians(roll)])
+    for pitch, roll in ((0, 0), (-50, 0), (-89, 0), (-100, 0), (0, 30)):
+        tipped = Rotation.from_euler("ZYX", [0.3, np.radians(-pitch), np.radians(roll)])
         heading = headings(tipped.apply(flat)[None])
-        assert heading == pytest.approx(0.3, abs=0.2 if roll and pitch else 1e-6)
+        assert heading == pytest.approx(0.3, abs=1e-6)
