@@ -25,6 +25,7 @@ from robots.solver.mounted import facing_ahead, on_mount
 from robots.solver.projection import project
 from robots.solver.repair import repair
 from robots.solver.resting import leans, resting
+from robots.solver.self_touch import on_itself
 from robots.solver.smoothness import limit_speed
 from robots.solver.stance import apart
 from robots.solver.strays import without_strays
@@ -208,4 +209,5 @@ def _holds_of(
 ) -> Holds:
     """Of the feet, where the block moves them, and of what else of `q` touches the ground."""
     footings = [footing_of(robot, foot) for foot in feet] if block.base else []
-    return joined([*footings, resting(robot, targets, q)])
+    own = on_itself(robot, targets.self_touches, q, targets.frame_time)
+    return joined([*footings, resting(robot, targets, q), own])

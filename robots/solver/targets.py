@@ -12,6 +12,7 @@ from robots.solver.contacts import has_feet, schedule, touching_joint
 from robots.solver.ground import Climb, level_climb, under_soles
 from robots.solver.haste import limb_jerks
 from robots.solver.palms import laid, resting_palms
+from robots.solver.self_touch import SelfTouch, self_touches
 from robots.solver.trunk import bowing
 from robots.tree import forward_kinematics
 from spark.blocks import blocks
@@ -42,8 +43,8 @@ class Targets:
     high that under each part is, `ground` and `floor`, those of each sole (`GroundUnderSoles`), and
     `clearance`, how high the source's soles are over it, scaled; `jerks`, how jerky the source's
     limbs are (`robots.solver.haste`); `seats`, how high the hips are where the body sits on
-    something, else 0 [m]; `hands`, from the right hand to the left [m]. `com` [m] is planned where
-    it is known.
+    something, else 0 [m]; `hands`, from the right hand to the left [m]; `self_touches`, what hands
+    touch of their own body. `com` [m] is planned where it is known.
     """
 
     frame_time: float
@@ -67,6 +68,7 @@ class Targets:
     floor: Float[np.ndarray, "T S"]
     seats: Float[np.ndarray, "T"]
     hands: Float[np.ndarray, "T 3"] | None
+    self_touches: tuple[SelfTouch, ...]
     notes: tuple[str, ...]
     com: Float[np.ndarray, "T 3"] | None = None
 
@@ -112,6 +114,7 @@ class Targets:
             seats=self.seats[frames],
             com=None if self.com is None else self.com[frames],
             hands=None if self.hands is None else self.hands[frames],
+            self_touches=tuple(touch.at(frames) for touch in self.self_touches),
         )
 
 
@@ -164,6 +167,7 @@ def targets_of(
         floor=scale * own_ground.floor,
         seats=scale * climb.seats,
         hands=_between_hands(rig, positions, robot),
+        self_touches=self_touches(source, positions, robot),
         notes=(*notes, HOVERS) if has_feet(paths).any() and touches.hovers else notes,
     )
 
