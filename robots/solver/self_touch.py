@@ -181,8 +181,7 @@ def _beside(
 ) -> Float[np.ndarray, "T"]:
     """How near (0 to 1) a hand is to a line [m] with flesh around it, `thick` standing heights."""
     gap = np.maximum(distance / source.rig.standing_height - thick, 0.0)
-    near: Float[np.ndarray, T] = np.exp(-((gap / _RANGE) ** 2))
-    return near
+    return np.asarray(np.exp(-((gap / _RANGE) ** 2)))
 
 
 def _slow(source: CanonicalMotion, away: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T"]:
