@@ -6,6 +6,7 @@ from html import escape
 from typing import Any
 
 import numpy as np
+from jaxtyping import Bool
 
 _LONG = 40  # characters of a field; beyond, its type stands for it
 
@@ -18,6 +19,13 @@ def counted(number: int, noun: str) -> str:
 def time_span(frames: int, frame_time: float) -> str:
     """`124 frames, 30 fps`."""
     return f"{counted(frames, 'frame')}, {1 / frame_time:.4g} fps"
+
+
+def in_frames(mask: Bool[np.ndarray, "T"]) -> str:
+    """`in 2 frames (7, 8)`, counted from 0; the first five of more."""
+    frames = np.flatnonzero(mask).tolist()
+    which = ", ".join(map(str, frames[:5])) + (", ..." if len(frames) > 5 else "")
+    return f"in {counted(len(frames), 'frame')} ({which})"
 
 
 def html_table(title: str, rows: Sequence[tuple[str, ...]], notes: Sequence[str] = ()) -> str:

@@ -30,9 +30,9 @@ MIN_DAMPING = 1e-3  # [1] on the diagonal of the normal equations
 REJECTED_DAMPING = 0.1  # at least, where a step was rejected
 
 
-def collision_stride(targets: Targets) -> int:
+def collision_stride(frame_time: float) -> int:
     """The number of frames from one that is searched for collisions to the next."""
-    return max(1, round(_COLLISION_INTERVAL / targets.frame_time))
+    return max(1, round(_COLLISION_INTERVAL / frame_time))
 
 
 def collision_candidates(
@@ -40,7 +40,7 @@ def collision_candidates(
 ) -> list[Candidate]:
     """The parts that are near each other at `q`, or between the frames that are searched."""
     poses = forward_kinematics(robot.tree, q)
-    return collisions_of(robot).candidates(poses, block, collision_stride(targets))
+    return collisions_of(robot).candidates(poses, block, collision_stride(targets.frame_time))
 
 
 def solve_block(

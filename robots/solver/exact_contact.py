@@ -57,6 +57,19 @@ class ExactContacts:
             )
         return out
 
+    def depth_by_bodies(
+        self, qpos: Float[np.ndarray, "T nq"], candidates: Sequence[Candidate]
+    ) -> dict[tuple[int, int], Float[np.ndarray, "T"]]:
+        """The same for each pair of bodies that is near, the smaller part's first."""
+        out: dict[tuple[int, int], Float[np.ndarray, T]] = {}
+        for x in self._measure(qpos, candidates):
+            pair = x.candidate.pair
+            bodies = pair.small.body, pair.large.body
+            depth = out.setdefault(bodies, np.full(len(qpos), -np.inf))
+            under = self._clearances[pair.geoms] - x.distance
+            depth[x.frames] = np.maximum(depth[x.frames], under)
+        return out
+
     def add_to(
         self,
         normal: NormalEquations,

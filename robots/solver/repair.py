@@ -36,8 +36,8 @@ PENALTY_GROWTH = 3.0  # from round to round, of the penalties' weights
 _LEAD_OUT_ROUND = 3  # the round before which arms are led out of what they are stuck in
 _AROUND = 0.4  # [s] before and after a violation that are solved again
 _MAX_JERK_RATIO = 5.0  # jerk, over the one from which hinges are smoothed, that is a violation
-_SEARCH_DISTANCE = 0.01  # [m] between approximate shapes within which the exact ones are measured
-_MAX_DEPTH = 0.009  # hip heights of parts in each other, beyond their clearance,
+SEARCH_DISTANCE = 0.01  # [m] between approximate shapes within which the exact ones are measured
+MAX_DEPTH = 0.009  # hip heights of parts in each other, beyond their clearance,
 MAX_SINKING = 0.009  # and of a sole's corner, or another part, below the floor
 _W_VIOLATION = 20.0  # what a frame with a violation costs: as four limbs that are 90 degrees off
 _MAX_OVERSPEED = 0.5  # [rad/s] of a hinge beyond the speed at which it is held back
@@ -53,7 +53,7 @@ def repair(
     """`q` with the block's dofs solved again around the frames with violations."""
     around = max(2, round(_AROUND / targets.frame_time))
     neighbours = np.ones(2 * around + 1, dtype=bool)
-    violated = violations(robot, targets, q, block, collision_stride(targets))
+    violated = violations(robot, targets, q, block, collision_stride(targets.frame_time))
     violated |= too_jerky(robot, targets, q, block, Spells(np.array([len(q)])))
     runs = true_runs(binary_dilation(violated, neighbours))
     if not runs:
@@ -67,7 +67,7 @@ def repair(
         fixed[own][-2:] |= stop < len(q)
     part = targets.at(frames), holds.at(frames), q.at(frames)
     # What is rougher than the violations can't mend them.
-    exact = _MAX_DEPTH * robot.rig.hip_height < MAX_PROTRUSION
+    exact = MAX_DEPTH * robot.rig.hip_height < MAX_PROTRUSION
     broken = Repair(robot, block, spells, *part, np.ones(len(frames)), fixed, exact)
     return q.replaced(frames, _repaired(broken))
 
@@ -149,9 +149,9 @@ def violations(
     nothing is too fast."""
     poses = forward_kinematics(robot.tree, q)
     collisions = collisions_of(robot)
-    candidates = collisions.candidates(poses, block, stride, _SEARCH_DISTANCE)
-    candidates = collisions.nearer(candidates, poses, _SEARCH_DISTANCE)
-    max_depth, max_sinking = (x * robot.rig.hip_height for x in (_MAX_DEPTH, MAX_SINKING))
+    candidates = collisions.candidates(poses, block, stride, SEARCH_DISTANCE)
+    candidates = collisions.nearer(candidates, poses, SEARCH_DISTANCE)
+    max_depth, max_sinking = (x * robot.rig.hip_height for x in (MAX_DEPTH, MAX_SINKING))
     violated = exact_contacts_of(robot).depth(robot.to_qpos(q), candidates) > max_depth
     fast = np.abs(overspeed(robot, q, targets.frame_time)[:, block.dofs]).max(1, initial=0.0)
     too_fast = fast > _MAX_OVERSPEED * targets.frame_time

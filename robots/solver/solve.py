@@ -14,7 +14,7 @@ from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.solver.block import Block, blocks_of, carriers, whole_of
 from robots.solver.crouch import less_deep
-from robots.solver.descent import collision_candidates, solve_block
+from robots.solver.descent import collision_candidates, collision_stride, solve_block
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import FootPlan, plan_feet, reachable
 from robots.solver.ground import climb_of, climbs
@@ -31,6 +31,7 @@ from robots.solver.stance import apart
 from robots.solver.strays import without_strays
 from robots.solver.stretches import by_stretches
 from robots.solver.targets import Targets, poses_of, targets_of, with_firm_hands
+from robots.solver.unparted import unparted
 from robots.tree import Coordinates
 from spark.threads import one_thread
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
@@ -83,6 +84,7 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
 
     with one_thread():
         q = robot.following(by_stretches(solved, len(source), source.frame_time))
+        notes.update(dict.fromkeys(unparted(robot, q, collision_stride(source.frame_time))))
     return RobotMotion(robot, q, source.frame_time, tuple(notes))
 
 

@@ -18,7 +18,7 @@ from spark.kinematics import local_rotations, world_rotations
 from spark.resample import rotations_at, values_at
 from spark.rotation import quat_angle, quat_conj, quat_mul
 from spark.runs import true_runs
-from spark.summary import counted
+from spark.summary import in_frames
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.stray_frames import jumps_of, repeats_of, strays_of
 
@@ -127,6 +127,4 @@ def _bridged(
 
 def _in(stray: Bool[np.ndarray, "T"]) -> str:
     """` in 2 frames (7, 8): ...`."""
-    frames = np.flatnonzero(stray).tolist()
-    which = ", ".join(map(str, frames[:5])) + (", ..." if len(frames) > 5 else "")
-    return f" in {counted(len(frames), 'frame')} ({which}): the robot passes over that"
+    return f" {in_frames(stray)}: the robot passes over that"
