@@ -18,9 +18,7 @@ from spark.transfer.hip_rise import standing
 from spark.transfer.reach import in_time
 
 _LEVER = 0.4  # of the way from the ankle to the lowest point, that is level: less turns less
-_EASE = (
-    0.05  # [s] before the foot has to be turned it begins to: toes that push off dip for a frame
-)
+_EASE = 0.05  # [s] before the foot has to be turned it begins to: toes dip for a single frame
 _MOST = 0.6  # [rad] 34 degrees: the foot of who lies on the floor is not turned over
 
 
