@@ -31,6 +31,7 @@ from spark.rotation import (
     quat_rotate,
     yaw_from_quat,
 )
+from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion
 from spark.vectors import dot
 
@@ -110,14 +111,18 @@ def beyond_flexion(
     source: CanonicalMotion, positions: Float[np.ndarray, "T J 3"], robot: Morphology
 ) -> Float[np.ndarray, "T 1"]:
     """By how much [rad] the hips of a source, whose joints are at `positions` [m], flex further
-    than a robot's can, while its legs carry it."""
+    than a robot's can, while its legs carry it all the while: who rises from hands to feet
+    keeps his hands on the ground by how deep he crouches."""
     rig = source.rig
     forwards, _, up = _axes(_bowed(rig, robot, source.rotations[:, rig.pelvis], positions))
     excess = _flexion(rig, forwards, up, positions) - max_flexion(robot)
     if not (excess > -ROUNDING).any():
         return np.zeros_like(excess)
     beyond: Float[np.ndarray, "T 1"] = _rounded(excess)
-    return beyond * _on_legs(rig, positions, source.floor_z)
+    legs = _on_legs(rig, positions, source.floor_z)
+    for start, stop in true_runs(beyond[:, 0] > 0):
+        beyond[start:stop] *= legs[start:stop].min()
+    return beyond
 
 
 def _bowed(

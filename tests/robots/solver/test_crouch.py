@@ -1,5 +1,7 @@
 """Crouching less deep, for hips that flex less than a person's."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from robots.solver.crouch import less_deep
 from robots.solver.trunk import beyond_flexion
 from spark.demo.sample import sample_motion
 from spark.rig.roles import Role
+from spark.rotation import quat_from_rotvec, quat_mul
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.transfer.seats import Seat
 from tests.helpers.sitting import RIG, SITS, sitting
@@ -70,3 +73,14 @@ def test_hips_that_flex_far_enough_follow_the_source_itself() -> None:
     lower = sitting(knees=60.0, lean=60.0)
     assert less_deep(lower, T1, ()) is not lower
     assert less_deep(lower, known("unitree_g1"), ()) is lower
+
+
+def test_who_falls_forwards_out_of_a_crouch_stays_as_deep() -> None:
+    """From the middle on the whole body is pitched by 60 degrees, and no longer over its feet."""
+    falls = BOWED.rotations.copy()
+    falls[DEEPEST:] = quat_mul(
+        quat_from_rotvec(np.array([0.0, np.radians(60), 0.0])), falls[DEEPEST:]
+    )
+    fallen = replace(BOWED, rotations=falls)
+    np.testing.assert_allclose(excess(fallen), 0.0, atol=1e-6)
+    assert less_deep(fallen, T1, ()) is fallen
