@@ -19,6 +19,7 @@ from spark.rig.feet import Sole, sole_positions
 from spark.runs import true_runs
 from spark.smoothstep import smoothstep
 from spark.transfer.footfalls import beyond
+from spark.vectors import dot, unit
 
 # Hip heights that a standing foot may stray from its mean place without having moved,
 MAX_WOBBLE = 0.05
@@ -115,17 +116,15 @@ def headings(points: Float[np.ndarray, "T P 3"]) -> Float[np.ndarray, "T"]:
     """The directions of soles over the floor [rad]: where they point, and of those that stand on
     end, or have tipped over, the twist about the vertical of their turn from one that lies flat.
     """
-    ahead = points[:, -2:].mean(1) - points[:, :2].mean(1)
-    ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-9)
-    left = (points[:, 1::2] - points[:, 0::2]).mean(1)
-    left -= (left * ahead).sum(1, keepdims=True) * ahead
-    left /= np.maximum(np.linalg.norm(left, axis=1, keepdims=True), 1e-9)
+    ahead = unit(points[:, -2:].mean(1) - points[:, :2].mean(1))
+    across = (points[:, 1::2] - points[:, 0::2]).mean(1)
+    left = unit(across - dot(across, ahead) * ahead)
     pointing = ahead[:, 0] + 1j * ahead[:, 1]
     twist = ahead[:, 0] + left[:, 1] + 1j * (ahead[:, 1] - left[:, 0])
     low, high = _ON_END
     known = smoothstep((np.abs(pointing) - low) / (high - low))
-    unit = [each / np.maximum(np.abs(each), 1e-9) for each in (pointing, twist)]
-    return np.angle(known * unit[0] + (1.0 - known) * unit[1])
+    ways = [each / np.maximum(np.abs(each), 1e-9) for each in (pointing, twist)]
+    return np.angle(known * ways[0] + (1.0 - known) * ways[1])
 
 
 def _plan(

@@ -24,6 +24,7 @@ from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_rotate
 from spark.smoothstep import smoothstep
 from spark.transfer.canonical import CanonicalMotion
+from spark.vectors import unit
 
 _SIDES = {"left": 1.0, "right": -1.0}  # and where the hand points in the T-pose, along y
 # What hands touch: lines between two joints, and whose flesh is around them.
@@ -87,7 +88,7 @@ def self_touches(
         wrist, above = (source.rig.roles.joint(role) for role in (hand, elbow))
         if wrist is None or above is None or palm_of(robot, hand) is None:
             continue
-        forearm = _unit(positions[:, wrist] - positions[:, above])
+        forearm = unit(positions[:, wrist] - positions[:, above])
         ahead = np.array([0.0, _SIDES[side] * _knuckles(source.rig, side, wrist), 0.0])
         knuckles = positions[:, wrist] + quat_rotate(source.rotations[:, wrist], ahead)
         middle, touched = (positions[:, wrist] + knuckles) / 2, []
@@ -100,12 +101,12 @@ def self_touches(
             along, away = _from_line(middle, a, b)
             _, ahead_away = _from_line(knuckles, a, b)
             distance = np.linalg.norm([away, ahead_away], axis=2).min(axis=0)
-            across = 1.0 - np.einsum("ti,ti->t", forearm, _unit(b - a)) ** 2
+            across = 1.0 - np.einsum("ti,ti->t", forearm, unit(b - a)) ** 2
             thick = flesh + RADII["hand"]
             share = free * across * _beside(source, distance, thick) * _slow(source, away)
             share = smoothstep((_over_time(source.frame_time)(share) - _DOUBT) / (_SURE - _DOUBT))
             if share.any():
-                offset = thick * robot.rig.standing_height * _unit(away)
+                offset = thick * robot.rig.standing_height * unit(away)
                 touched.append(((upper, lower), along, offset, share))
         if touched:
             parts, *values = zip(*touched, strict=True)
@@ -226,10 +227,6 @@ def _within(
     away = np.linalg.norm(first + nearest * line, axis=0)
     most = np.sqrt(np.maximum(reach**2 - away**2, 0.0) / square)
     return np.clip(nearest + np.clip(along - nearest, -most, most), 0.0, 1.0)
-
-
-def _unit(vectors: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T 3"]:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9)
 
 
 def _center(robot: Morphology, poses: LinkPoses, role: Role) -> Float[np.ndarray, "3 T"]:
