@@ -11,7 +11,7 @@ from pathlib import Path
 
 import spark_sim
 from sim.view.render import frames
-from sim.view.scene import build_scene
+from sim.view.staging import build_scene
 from sim.view.video import write_video
 
 

@@ -229,7 +229,7 @@ def play(
     where there is no display, or nothing to draw or encode with, and `OutputError` where a file
     exists, unless forced.
     """
-    from sim.view.scene import build_scene
+    from sim.view.staging import build_scene
     from sim.view.timeline import SPEEDS
 
     if speed not in SPEEDS:

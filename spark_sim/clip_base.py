@@ -23,7 +23,7 @@ from spark_sim import files
 if TYPE_CHECKING:  # these load MuJoCo, which a character's clip can do without
     from sim.body.joints import JointType
     from sim.trajectory import ModelTrajectory, Subject
-    from sim.view.scene import Figure
+    from sim.view.figure import Figure
 
 File: TypeAlias = str | Path
 MAX_FPS = 10_000
@@ -156,7 +156,7 @@ class ClipBase(ABC):
 
     def figures(self) -> "list[Figure]":
         """What a picture or a video shows of the clip."""
-        from sim.view.scene import Figure
+        from sim.view.figure import Figure
 
         skin, tops = self.surface[0], treads_of(self.canonical).ground(self.floor_z).tops
         return [Figure(self.subject, self.name, self.floor_z, skin=skin, tops=tops)]

@@ -25,7 +25,7 @@ from spark_sim.clip_base import ClipBase, File
 if TYPE_CHECKING:  # these load MuJoCo, which a character's clip can do without
     from robots.model.motion import RobotMotion
     from sim.trajectory import ModelTrajectory
-    from sim.view.scene import Figure
+    from sim.view.figure import Figure
 
 __all__ = ["AnyClip", "Clip", "File", "RobotClip"]
 

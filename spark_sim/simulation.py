@@ -20,7 +20,7 @@ from sim.report.assess import assess
 from sim.report.course import course_of
 from sim.report.ground import ground_under
 from sim.trajectory import Subject, model_trajectory
-from sim.view.scene import Figure
+from sim.view.figure import Figure
 from spark.errors import SkeletonError
 from spark.transfer.treads import treads_of
 from spark_sim.clips import AnyClip, File, RobotClip

@@ -112,7 +112,7 @@ def test_imports_run_one_way() -> None:
         ("spark.io.bvh", "from spark.rig.roles import Role", {"spark.rig.roles.Role"}),
         ("spark.network.forward", "import spark.training.pairs", {"spark.training.pairs"}),
         ("sim.body.build", "from sim import interpolate", {"sim.interpolate"}),
-        ("sim.view.scene", "import numpy, robots.model.mjcf as m", {"robots.model.mjcf"}),
+        ("sim.view.staging", "import numpy, robots.model.mjcf as m", {"robots.model.mjcf"}),
         ("robots.solver.solve", "if 1:\n    import spark_sim", {"spark_sim"}),
         ("spark_sim.api", "import spark, sim, robots, scripts.train", {"scripts.train"}),
         ("spark_sim.clips", "from spark_sim import files, loading", {"spark_sim.loading"}),

@@ -15,8 +15,8 @@ from sim.report.palette import CORNER_COLORS, css, grade
 from sim.report.result import Result
 from sim.template import Template
 from sim.trajectory import Subject
+from sim.view.figure import Figure
 from sim.view.page import REPLAY, page
-from sim.view.scene import Figure
 from spark.files import write_atomically
 
 _PAGE = Template("sim.report", "compare.html", ("compare.js",), frames=(REPLAY,))

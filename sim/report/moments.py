@@ -8,8 +8,9 @@ import numpy as np
 from jaxtyping import UInt8
 
 from sim.report.result import Finding, Result
+from sim.view.figure import Figure
 from sim.view.render import stills
-from sim.view.scene import Figure, build_scene
+from sim.view.staging import build_scene
 from spark.errors import DependencyError
 
 _MOST = 6  # pictures

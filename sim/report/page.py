@@ -20,8 +20,8 @@ from sim.report.table import shares
 from sim.report.text import details, share_base
 from sim.template import Template
 from sim.trajectory import Subject
+from sim.view.figure import Figure
 from sim.view.page import REPLAY, page
-from sim.view.scene import Figure
 from spark.files import write_atomically
 from spark.summary import counted
 

@@ -7,9 +7,10 @@ from pathlib import Path
 from sim.report.annotate import annotate
 from sim.report.assess import assess
 from sim.view.annotations import Annotations
+from sim.view.figure import Figure
 from sim.view.page import write_page
 from sim.view.player import Player
-from sim.view.scene import Figure, build_scene
+from sim.view.staging import build_scene
 from sim.view.window import open_window
 from spark.errors import SparkSimError
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from sim.view.figure import Figure
 from sim.view.player import Player
-from sim.view.scene import Figure, build_scene
+from sim.view.staging import build_scene
 from spark.rotation import quat_mul
 
 _TOO_FAR = 1.2  # of the figures' heights together: further apart they are brought together again

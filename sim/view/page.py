@@ -14,11 +14,13 @@ from sim.template import Template
 from sim.view.annotations import Annotations
 from sim.view.camera import distances
 from sim.view.controls import TOGGLES, help_rows
+from sim.view.figure import Figure
 from sim.view.packing import STEPS, in_base64, packed, short
 from sim.view.page_marks import page_marks
 from sim.view.page_skin import page_skin
-from sim.view.scene import Figure, Placement, Scene, build_scene
+from sim.view.scene import Placement, Scene
 from sim.view.skin import FRAME_GROUP
+from sim.view.staging import build_scene
 from sim.view.timeline import SPEEDS
 from spark.files import write_atomically
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from sim.view.camera import fitting_aspect
 from sim.view.render import frames, stills
-from sim.view.scene import Scene, thinned
+from sim.view.scene import Scene
+from sim.view.staging import thinned
 from spark.errors import DependencyError, OutputError
 from spark.files import replacing, write_atomically
 

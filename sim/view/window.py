@@ -13,7 +13,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
 
 from sim import has_display
 from sim.view.annotations import Annotations
@@ -21,24 +20,16 @@ from sim.view.camera import AZIMUTH, ELEVATION, FIELD_OF_VIEW, shot
 from sim.view.controls import press
 from sim.view.display import GHOST_GROUP
 from sim.view.hud import Hud
-from sim.view.marks import Dot, Label, Line, Mark, marks
+from sim.view.mark_geoms import add_mark
+from sim.view.marks import marks
 from sim.view.player import Player
-from sim.view.text import plain
 from spark.errors import DependencyError
 
 Annotate = Callable[[], tuple[Annotations | None, ...]]
 
 _SIZE = (1280, 800)
 _MAX_MARKS = 3000
-_UPRIGHT = np.eye(3).ravel()
-_LINES = {  # by whether they are arrows, and thin
-    (False, False): mujoco.mjtGeom.mjGEOM_CAPSULE,
-    (False, True): mujoco.mjtGeom.mjGEOM_LINE,
-    (True, False): mujoco.mjtGeom.mjGEOM_ARROW,
-}
-_LONGEST = 99  # letters of a label, as MuJoCo has it
 _MESSAGE_TIME = 2.0  # [s]
-_HIGHEST = 0.95  # of the way from the picture's middle to its upper edge: where words end
 _NAMES = 1.12  # of the distance: room for the names over the heads
 
 
@@ -90,9 +81,7 @@ class Window:
         model = self.player.scene.model
         model.vis.global_.fovy = FIELD_OF_VIEW
         scale = glfw.get_window_content_scale(self._window)[0]
-        font = (
-            min(max(round(2 * scale), 2), 6) * 50
-        )  # mjtFontScale: percent, from 50 in steps of 50
+        font = min(max(round(2 * scale), 2), 6) * 50  # mjtFontScale: percent, in steps of 50
         self._context = mujoco.MjrContext(model, font)
         self._hud = Hud(self._context)
         self._data = mujoco.MjData(model)
@@ -173,7 +162,7 @@ class Window:
             self._scene,
         )
         for mark in marks(player):
-            self._add(mark)
+            add_mark(self._scene, mark)
         viewport = mujoco.MjrRect(0, 0, width, height)
         mujoco.mjr_render(room, self._scene, self._context)
         self._hud.draw(player, viewport, message=self._current_message(), waiting=waiting)
@@ -195,33 +184,6 @@ class Window:
             player.view_is_new = False
         if target is not None:
             camera.lookat[:] = target + self._offset
-
-    def _add(self, mark: Mark) -> None:
-        scene = self._scene
-        if scene.ngeom >= scene.maxgeom:
-            return
-        geom = scene.geoms[scene.ngeom]
-        scene.ngeom += 1
-        kind, size, at = mujoco.mjtGeom.mjGEOM_SPHERE, np.zeros(3), np.zeros(3)
-        if isinstance(mark, Dot):
-            size, at = np.full(3, mark.radius), mark.at
-        elif isinstance(mark, Label):
-            kind, at = mujoco.mjtGeom.mjGEOM_LABEL, self._below_edge(mark.at)
-        else:
-            kind = _LINES[mark.arrow, mark.thin]
-        mujoco.mjv_initGeom(geom, int(kind), size, at, _UPRIGHT, np.array(mark.rgba, np.float32))
-        if isinstance(mark, Line):
-            mujoco.mjv_connector(geom, int(kind), mark.width, mark.start, mark.end)
-        elif isinstance(mark, Label):
-            geom.label = plain(mark.text)[:_LONGEST]
-
-    def _below_edge(self, at: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
-        """The place [m], or, where it is seen above the picture's upper edge, that below it."""
-        camera = self._scene.camera[0]
-        away = at - camera.pos
-        depth, over = float(away @ camera.forward), float(away @ camera.up)
-        highest = _HIGHEST * depth * camera.frustum_top / camera.frustum_near
-        return at + min(highest - over, 0.0) * camera.up if depth > 0 else at
 
     def _current_message(self) -> str:
         if self.player.message:

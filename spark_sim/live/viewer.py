@@ -16,8 +16,8 @@ from robots.stream.frame_targets import Frame
 from sim import has_display
 from sim.body.qpos import qpos_from_motion
 from sim.trajectory import Subject, model_trajectory
+from sim.view.figure import Figure
 from sim.view.live import LivePlayer, Now
-from sim.view.scene import Figure
 from spark.errors import ConventionError, DependencyError
 from spark.motion import Motion
 from spark.rig.rig import understand

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from sim.view.figure import Figure
 from sim.view.page import REPLAY, page
-from sim.view.scene import Figure
 from spark.errors import OutputError
 from spark_sim import sample
 from spark_sim.loading import load

@@ -16,8 +16,8 @@ from sim.report import Report, Subject, assess
 from sim.report.page import report_page, write_report_page
 from sim.report.plots import Plot, svg
 from sim.view.annotations import Annotations
+from sim.view.figure import Figure
 from sim.view.page import page
-from sim.view.scene import Figure
 from sim.view.timeline import Event
 from spark.errors import OutputError
 from spark.rig.feet import sole_positions

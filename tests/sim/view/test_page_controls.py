@@ -11,8 +11,9 @@ from sim.report import Subject
 from sim.report.watch import known_of
 from sim.view.camera import shot
 from sim.view.controls import CONTROLS, TOGGLES
+from sim.view.figure import Figure
 from sim.view.page import page
-from sim.view.scene import Figure, build_scene
+from sim.view.staging import build_scene
 from spark.rig.roles import Role
 from spark.rotation import quat_about
 from tests.helpers.browser import opened, with_probe

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 import spark_sim
-from sim.view.scene import Figure, build_scene
+from sim.view.figure import Figure
 from sim.view.sides import LEFT, RIGHT, tinted, tints
+from sim.view.staging import build_scene
 
 
 def test_limbs_are_tinted_by_their_side_and_the_trunk_is_not() -> None:

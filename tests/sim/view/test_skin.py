@@ -9,12 +9,14 @@ import pytest
 
 import spark_sim
 from sim.report import assess
+from sim.view.figure import Figure
 from sim.view.page import page
 from sim.view.page_skin import smooth_normals
 from sim.view.render import stills
-from sim.view.scene import Figure, Scene, build_scene
+from sim.view.scene import Scene
 from sim.view.simplify import simplify_skin
 from sim.view.skin import FRAME_GROUP
+from sim.view.staging import build_scene
 from spark.kinematics import forward
 from spark.skin import Skin, skinned
 from spark_sim.clips import Clip

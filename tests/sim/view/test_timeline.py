@@ -12,9 +12,10 @@ from sim.trajectory import Subject
 from sim.view.bar import Bar
 from sim.view.camera import shot
 from sim.view.controls import CONTROLS, help_rows, press
+from sim.view.figure import Figure
 from sim.view.marks import Dot, Label, Line, marks
 from sim.view.player import Player
-from sim.view.scene import Figure, build_scene
+from sim.view.staging import build_scene
 from sim.view.text import plain, shortened
 from sim.view.timeline import Event, Timeline
 from spark.demo.sample import sample_motion, sample_rig

@@ -16,11 +16,13 @@ from sim.interpolate import at_times
 from sim.trajectory import ModelTrajectory, Subject
 from sim.view.camera import extents, shot
 from sim.view.display import lit
+from sim.view.figure import Figure
 from sim.view.page import page, write_page
 from sim.view.painter import Painter
 from sim.view.render import frames, stills
-from sim.view.scene import Figure, Scene, build_scene, thinned
+from sim.view.scene import Scene
 from sim.view.simplify import area, simplify_together
+from sim.view.staging import build_scene, thinned
 from sim.view.video import write_animation, write_strip, write_video
 from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import ConventionError, DependencyError, OutputError

@@ -121,11 +121,11 @@ def test_keys_and_clicks_reach_the_replay(display: str, pair: list[str]) -> None
         strip = self._hud.bar.strip
         assert abs(self._hud.bar.click(strip.left + strip.width / 4, strip.bottom) - 0.25
             * (self.player.timeline.duration + self.player.timeline.frame_time)) < 1e-6
-        import numpy as np
+        from sim.view.mark_geoms import below_edge
         camera = self._scene.camera[0]
         ahead = camera.pos + 5 * camera.forward
-        assert (self._below_edge(ahead) == ahead).all()
-        over = (self._below_edge(ahead + 50 * camera.up) - camera.pos) @ camera.up
+        assert (below_edge(camera, ahead) == ahead).all()
+        over = (below_edge(camera, ahead + 50 * camera.up) - camera.pos) @ camera.up
         assert 0 < over < 5 * camera.frustum_top / camera.frustum_near
         picture = self.pixels()
         assert picture.std() > 10 and len(set(picture[-20].ravel())) > 3
