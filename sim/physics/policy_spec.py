@@ -5,13 +5,13 @@ docs/policies.md has the keys, and a whole spec as an example.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from sim.physics.policy_terms import TERMS
-from spark.errors import FileFormatError, name_list
+from sim.physics.toml_table import Table
+from spark.errors import name_list
 from spark.opening import parse_toml, read_text
 
 _EXPECTED = "a policy's spec (docs/policies.md)"
@@ -97,7 +97,9 @@ class PolicySpec:
 def read_spec(path: Path) -> PolicySpec:
     """Read a spec. Raises `FileFormatError` with the key for what it lacks, doesn't know, or has in
     another number than that of the joints."""
-    top = _Table(path, "", parse_toml(path, read_text(path, expected=_EXPECTED), _EXPECTED))
+    top = Table(
+        path, "", parse_toml(path, read_text(path, expected=_EXPECTED), _EXPECTED), _EXPECTED
+    )
     joints, action = top.table("joints"), top.table("action")
     reference, groups = top.table("reference", {}), top.table("groups")
     names = joints.names("names")
@@ -106,10 +108,7 @@ def read_spec(path: Path) -> PolicySpec:
     count = len(names)
     ahead = reference.number("ahead", 1.0)
     uses = {
-        name: tuple(
-            _term(_Table(path, f"groups.{name}[{k}].", item), count, names, ahead)
-            for k, item in enumerate(groups.items(name))
-        )
+        name: tuple(_term(each, count, names, ahead) for each in groups.tables(name))
         for name in groups.content
     }
     spec = PolicySpec(
@@ -124,10 +123,7 @@ def read_spec(path: Path) -> PolicySpec:
         scale=action.numbers("scale", count, 1.0),
         action_clip=action.number("clip", float("inf"), least=0.0),
         smoothing=reference.number("smooth_s", 0.0, least=0.0),
-        blocks=tuple(
-            _block(_Table(path, f"observation[{k}].", item), uses)
-            for k, item in enumerate(top.items("observation"))
-        ),
+        blocks=tuple(_block(each, uses) for each in top.tables("observation")),
     )
     for table in (top, joints, action, reference):
         table.finish()
@@ -139,7 +135,7 @@ def read_spec(path: Path) -> PolicySpec:
     return spec
 
 
-def _term(table: "_Table", count: int, joints: tuple[str, ...], ahead: float) -> TermUse:
+def _term(table: Table, count: int, joints: tuple[str, ...], ahead: float) -> TermUse:
     name = table.word("term")
     if name not in TERMS:
         raise table.error("term", f"is {name!r}; available: {', '.join(sorted(TERMS))}")
@@ -171,7 +167,7 @@ def _term(table: "_Table", count: int, joints: tuple[str, ...], ahead: float) ->
     return use
 
 
-def _block(table: "_Table", groups: dict[str, tuple[TermUse, ...]]) -> Block:
+def _block(table: Table, groups: dict[str, tuple[TermUse, ...]]) -> Block:
     names = table.names("groups")
     if unknown := [name for name in names if name not in groups]:
         raise table.error(
@@ -192,88 +188,3 @@ def _block(table: "_Table", groups: dict[str, tuple[TermUse, ...]]) -> Block:
     )
     table.finish()
     return block
-
-
-class _Table:
-    """A TOML table that says where it is, and what in it nobody asked for."""
-
-    def __init__(self, path: Path, place: str, content: Any) -> None:
-        self.path, self.place, self.content = path, place, content
-        self.asked: set[str] = set()
-        if not isinstance(content, dict):
-            raise FileFormatError(path, None, f"{place.rstrip('.')} is no table; {_EXPECTED}")
-
-    def error(self, key: str, message: str) -> FileFormatError:
-        return FileFormatError(self.path, None, f"{self.place}{key} {message}")
-
-    def finish(self) -> None:
-        """Raise where a key was given that isn't known: it would be thought to do something."""
-        if unknown := sorted(set(self.content) - self.asked):
-            known = ", ".join(sorted(self.asked))
-            raise self.error(unknown[0], f"is not known here; available: {known}")
-
-    def get(self, key: str, default: Any = None) -> Any:
-        self.asked.add(key)
-        value = self.content.get(key, default)
-        if value is None:
-            raise self.error(key, f"is missing; expected {_EXPECTED}")
-        return value
-
-    def table(self, key: str, default: Any = None) -> "_Table":
-        return _Table(self.path, f"{self.place}{key}.", self.get(key, default))
-
-    def items(self, key: str) -> list[Any]:
-        value = self.get(key)
-        if not isinstance(value, list) or not value:
-            raise self.error(key, "is no list of tables, or an empty one")
-        return value
-
-    def word(self, key: str, default: str | None = None) -> str:
-        value = self.get(key, default)
-        if not isinstance(value, str):
-            raise self.error(key, f"is {value!r}; expected a word")
-        return value
-
-    def names(self, key: str, default: tuple[str, ...] | None = None) -> tuple[str, ...]:
-        value = self.get(key, default)
-        if not isinstance(value, list | tuple) or not all(isinstance(v, str) for v in value):
-            raise self.error(key, "is no list of names")
-        if len({*value}) < len(value):
-            raise self.error(key, "has a name twice")
-        return tuple(value)
-
-    def choice(self, key: str, choices: tuple[Any, Any]) -> Any:
-        """One of two, the first where it isn't given."""
-        value = self.get(key, choices[0])
-        if not any(value is each or (value == each and value not in (0, 1)) for each in choices):
-            raise self.error(key, f"is {value!r}; expected {choices[0]!r} or {choices[1]!r}")
-        return value
-
-    def number(
-        self, key: str, default: float | None = None, *, least: float | None = None
-    ) -> float:
-        return float(self.numbers(key, 1, default, least=least)[0])
-
-    def numbers(
-        self,
-        key: str,
-        count: int | None,
-        default: float | None = None,
-        *,
-        least: float | None = None,
-    ) -> Float[np.ndarray, "N"]:
-        """`count` numbers (any number of them for None); a single one stands for all."""
-        value = self.get(key, default)
-        values = value if isinstance(value, list) else [value]
-        if not values or not all(isinstance(v, int | float) and v is not True for v in values):
-            raise self.error(key, f"is {value!r}; expected numbers")
-        given = np.array(values, dtype=float)
-        if key in self.content and not np.isfinite(given).all():
-            raise self.error(key, "has a number that is not finite")
-        if least is not None and (given < least).any():
-            raise self.error(key, f"has {given.min():g}; expected {least:g} or more")
-        if count is None or len(given) == count:
-            return given
-        if isinstance(value, list):
-            raise self.error(key, f"has {len(given)} numbers; expected {count}, or a single one")
-        return np.full(count, given[0])
