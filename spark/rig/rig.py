@@ -56,7 +56,7 @@ class Rig:
     `tpose` holds each joint's `q_world_joint` in the T-pose: pelvis upright facing +X, legs down,
     arms out along +-Y, palms down. `groups[j]` are the body parts of joint j; the hip joint and the
     topmost spine joint belong to several. `root_joint` is the joint that takes the body's motion
-    through the world: the pelvis, or the joint above it that the file can move.
+    through the world: the lowest joint that the file can move and that carries all of the body.
     `hip_height` [m] is the height of the hips' middle above the sole in the T-pose. `shaped_soles`
     are those that the shapes of a model's feet show, left before right.
     """
@@ -154,7 +154,7 @@ def understand(motion: Motion, override: Override | None = None) -> Rig:
     roles = assign_roles(skeleton, motion, override)
     tpose, notes = find_tpose(motion, roles)
     pelvis = roles.require(Role.PELVIS)
-    root_joint = root_joint_of(skeleton, pelvis)
+    root_joint = root_joint_of(skeleton, roles)
     height = hip_height(skeleton, roles, tpose)
     if height < _LOWEST_HIPS:
         raise SkeletonError(

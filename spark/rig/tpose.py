@@ -76,7 +76,7 @@ def find_tpose(motion: Motion, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"]
     pelvis = roles.require(Role.PELVIS)
     tpose[pelvis] = quat_from_matrix(pelvis_frame(reference))
     above = skeleton.ancestors(pelvis)
-    root_joint = root_joint_of(skeleton, pelvis)
+    root_joint = root_joint_of(skeleton, roles)
     for child, j in pairwise(above):
         if j >= root_joint:
             tpose[j] = quat_mul(tpose[child], quat_conj(reference.pose.local[child]))
@@ -123,10 +123,19 @@ def _in_order(skeleton: Skeleton, roles: RoleMap, doubles: dict[int, int]) -> li
     return sorted(range(len(skeleton)), key=lambda j: (j in later, j in feet))
 
 
-def root_joint_of(skeleton: Skeleton, pelvis: int) -> int:
-    """The joint that takes the body through the world: the pelvis, or the nearest joint above it
-    whose position the file animates."""
-    return next((j for j in skeleton.ancestors(pelvis) if skeleton.translating[j]), 0)
+def root_joint_of(skeleton: Skeleton, roles: RoleMap) -> int:
+    """The joint that takes the body through the world: the lowest one whose position the file
+    animates that carries all of it. That is the pelvis, or a joint above that carries the trunk
+    beside it, as MakeHuman's and Character Creator's, or that alone can move."""
+    held = {*roles.held}
+    return next(
+        (
+            j
+            for j in skeleton.ancestors(roles.require(Role.PELVIS))
+            if skeleton.translating[j] and held.issubset(skeleton.subtree(j))
+        ),
+        0,
+    )
 
 
 def _place(reference: Reference, joint: int, role: Role, q: Quat, q_parent: Quat) -> Quat:

@@ -504,3 +504,17 @@ def test_a_moment_without_a_motion_is_told() -> None:
     stepping, _ = resting_at(sample_motion("walk", rig, 30.0), 9)
     _, notes = find_tpose(stepping.frames(9, 10), rig.roles)
     assert "may be off" in notes[0]
+
+
+@pytest.mark.parametrize("convention", RIGS)
+def test_what_carries_the_body_carries_all_of_it(convention: str) -> None:
+    """A file may give every joint a position, as Blender's exporter does: legs alone, beside a
+    trunk that hangs on the joint above, are still not what goes through the world."""
+    skeleton, _ = build(RIGS[convention])
+    free = replace(skeleton, translating=np.ones(len(skeleton), dtype=bool))
+    rest = np.tile([1.0, 0, 0, 0], (1, len(skeleton), 1))
+    rig = understand(Motion(free, 1 / 30, skeleton.offsets[:1], rest))
+    body = list(rig.skeleton.subtree(rig.root_joint))
+    assert set(rig.roles.held) <= set(body)
+    bound = understand(Motion(skeleton, 1 / 30, skeleton.offsets[:1], rest))
+    assert quat_angle(rig.tpose, bound.tpose)[body].max() < 1e-6
