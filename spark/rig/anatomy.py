@@ -75,14 +75,15 @@ def find_anatomy(
         if all("forearm" in label.index for label in arm_labels):
             labelled_arms = LabelledPair(arms, (arm_labels[0], arm_labels[-1]))
     pelvis = find_pelvis(skeleton, hints, legs)
-    spine, neck, head = find_trunk(measured, hints, pelvis, legs, arms if labelled_arms else None)
+    mirrored = frozenset(j for p in pairs for j in (*p.first, *p.second))
+    with_arms = arms if labelled_arms else None
+    spine, neck, head = find_trunk(measured, hints, pelvis, legs, with_arms, mirrored)
     if labelled_arms is not None:
         labelled_legs, labelled_arms = _align(measured, labelled_legs, labelled_arms)
     above = next((j for j in (head, *reversed(neck), *reversed(spine)) if j is not None), None)
     sides = first_is_left(measured, labelled_legs, labelled_arms, above)
     if bent is not None:
         sides = sides._replace(bends=first_is_left(bent, labelled_legs, labelled_arms, above).bends)
-    mirrored = frozenset(j for p in pairs for j in (*p.first, *p.second))
     return Anatomy(pelvis, spine, neck, head, labelled_legs, labelled_arms, sides, mirrored)
 
 

@@ -33,12 +33,14 @@ def find_trunk(
     pelvis: int,
     legs: LimbPair,
     arms: LimbPair | None,
+    mirrored: frozenset[int],
 ) -> tuple[tuple[int, ...], tuple[int, ...], int | None]:
-    """Spine and neck from the pelvis upwards, and the head."""
+    """Spine and neck from the pelvis upwards, and the head. `mirrored` are the joints of all pairs
+    of chains, wings' too, of which no head is one unless its name says so."""
     skeleton = measured.skeleton
     limbs = {j for p in (legs, arms) if p is not None for r in p.roots for j in skeleton.subtree(r)}
     top = pelvis if arms is None else arms.root_joint
-    head = _head(measured, hints, pelvis, top, legs, arms, limbs)
+    head = _head(measured, hints, pelvis, top, legs, arms, limbs, mirrored)
     spine = list(_between(measured, pelvis, top))
     if top != pelvis:
         spine.append(top)
@@ -81,6 +83,7 @@ def _head(
     legs: LimbPair,
     arms: LimbPair | None,
     limbs: set[int],
+    mirrored: frozenset[int],
 ) -> int | None:
     """The joint named head, or the end of the chain that leaves the joint of the arms upwards."""
     skeleton = measured.skeleton
@@ -102,6 +105,8 @@ def _head(
     starts = [c for c in skeleton.children[top] if c not in limbs and c not in trunk]
     up = _up(measured, pelvis, top, legs, arms)
     starts = [c for c in starts if not hints[c].aside and _rises(measured, c, top, up)]
+    called = [c for c in starts if hints[c].parts.keys() & {"neck", "head"}]
+    starts = called or [c for c in starts if c not in mirrored]
     if not starts:
         return None
     chain = chain_below(measured, max(starts, key=lambda c: measured.reach[c] + measured.bones[c]))

@@ -320,3 +320,22 @@ def test_what_carries_the_arms_is_hardly_a_head(chest: str) -> None:
         """
     )
     assert wrong(skeleton, assign_roles(skeleton), right) == {}
+
+
+@pytest.mark.parametrize("wing", ["wing", "bone"])
+@pytest.mark.parametrize("top", ["Neck", "top"])
+def test_a_head_is_no_wing(wing: str, top: str) -> None:
+    """Where no joint is named head, it is the one on the trunk that has no twin, or that is named
+    as a neck, however much further wings reach and rise."""
+    skeleton, right = build(
+        f"""
+        Hips P > Spine S > {top} H
+        Spine > {{Left}}Arm U > {{Left}}ForeArm F > {{Left}}Hand W
+        Hips > {{Left}}UpLeg T > {{Left}}Leg K > {{Left}}Foot A
+        Spine > {wing}_{{L}} - > {wing}1_{{L}} - > {wing}2_{{L}} -
+        """
+    )
+    wings = [j for j, role in enumerate(right) if role is None]
+    sides = np.sign(skeleton.rest_positions[wings, 1])
+    skeleton.offsets[wings] = np.stack([0 * sides - 0.05, 0.2 * sides, 0 * sides + 0.1], axis=-1)
+    assert wrong(skeleton, assign_roles(skeleton, walk(skeleton, right)), right) == {}
