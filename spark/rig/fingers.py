@@ -13,6 +13,7 @@ from typing import NamedTuple
 from spark.rig.aliases import FINGER_TIP, FINGERS, METACARPAL
 from spark.rig.finger_build import fingers_by_build, metacarpals
 from spark.rig.name_hints import split_name
+from spark.rig.nulls import nulls_of
 from spark.rig.roles import Role, RoleMap
 from spark.skeleton import Skeleton
 
@@ -52,11 +53,12 @@ def _bones_of(skeleton: Skeleton, hand: int, side: str) -> tuple[dict[FingerBone
     """The joints of a hand's fingers, and whether names tell them."""
     found: dict[FingerBone, int] = {}
     fingers, named = _told_below(skeleton, hand)
+    nulls = nulls_of(skeleton)
     chains: dict[str, list[int]] = {}
     for joint, finger in fingers.items():
         chain = chains.setdefault(finger, [])
         tip = FINGER_TIP.intersection(split_name(skeleton.names[joint]))
-        if not tip and (not chain or chain[-1] in skeleton.ancestors(joint)):
+        if not tip and joint not in nulls and (not chain or chain[-1] in skeleton.ancestors(joint)):
             chain.append(joint)
     for finger, chain in chains.items():
         palm = _in_palm([split_name(skeleton.names[j]) for j in chain], finger)

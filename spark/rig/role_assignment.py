@@ -8,9 +8,10 @@ from spark.errors import SkeletonError, name_list
 from spark.motion import Motion
 from spark.rig.anatomy import Anatomy, find_anatomy
 from spark.rig.facing import LabelledPair
-from spark.rig.measurements import measure
+from spark.rig.measurements import MAX_FRAMES, measure
 from spark.rig.name_hints import NameHint, read_names
 from spark.rig.name_votes import with_votes
+from spark.rig.nulls import all_but, motion_of, nulls_of, skeleton_of
 from spark.rig.override import Override, check_chains, check_override
 from spark.rig.roles import SURE, Role, RoleMap
 from spark.skeleton import Skeleton
@@ -43,11 +44,17 @@ def assign_roles(
     """
     override = override or {}
     check_override(skeleton, override)
-    hints = with_votes(skeleton, read_names(skeleton.names))
+    hints = read_names(skeleton.names)
+    kept = all_but(_said_by_others(skeleton, hints), skeleton)
     found: Found = {}
     sides = _Sides(True)
     try:
-        found, sides = _infer(skeleton, motion, hints, bent)
+        found, sides = _infer(
+            skeleton_of(skeleton, kept),
+            None if motion is None else motion_of(motion.thinned(MAX_FRAMES), kept),
+            None if bent is None else motion_of(bent, kept),
+        )
+        found = {int(kept[j]): role for j, role in found.items()}
     except SkeletonError as error:
         missing = [role.value for role in REQUIRED if not override.get(role)]
         if override and missing:
@@ -64,6 +71,14 @@ def assign_roles(
         note = f"less than {SURE:.0%} sure what {name_list(unsure)} is; see spark-sim inspect"
         roles = replace(roles, notes=(*roles.notes, note))
     return roles
+
+
+def _said_by_others(skeleton: Skeleton, hints: Sequence[NameHint]) -> list[int]:
+    """The nulls but for those whose names say what that of the joint in their place does not: a
+    foot before its toe."""
+    return [
+        j for j, k in nulls_of(skeleton).items() if hints[j].parts.keys() <= hints[k].parts.keys()
+    ]
 
 
 REQUIRED = (
@@ -88,10 +103,9 @@ class _Sides(NamedTuple):
     note: str = ""
 
 
-def _infer(
-    skeleton: Skeleton, motion: Motion | None, hints: Sequence[NameHint], bent: Motion | None
-) -> tuple[Found, _Sides]:
+def _infer(skeleton: Skeleton, motion: Motion | None, bent: Motion | None) -> tuple[Found, _Sides]:
     """Joint to role, confidence and reason; and what tells the legs' sides."""
+    hints = with_votes(skeleton, read_names(skeleton.names))
     bends = None if bent is None else measure(skeleton, bent)
     anatomy = find_anatomy(measure(skeleton, motion), hints, bends)
     found: Found = {}

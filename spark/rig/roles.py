@@ -1,6 +1,7 @@
 """What each joint of a skeleton is: its role on a human body, and the body part it belongs to."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 
@@ -117,6 +118,15 @@ class RoleMap:
             if role is not None:
                 found.setdefault(role, []).append(j)
         return {role: tuple(joints) for role, joints in found.items()}
+
+    def of(self, joints: Sequence[int]) -> "RoleMap":
+        """The map of some joints alone."""
+        return replace(
+            self,
+            roles=tuple(self.roles[j] for j in joints),
+            confidence=tuple(self.confidence[j] for j in joints),
+            reasons=tuple(self.reasons[j] for j in joints),
+        )
 
     def joints(self, role: Role) -> tuple[int, ...]:
         """The joints that hold `role`, from the pelvis outwards; empty where there is none."""

@@ -101,3 +101,35 @@ def _frame(x: np.ndarray, z: np.ndarray, quarters: int) -> np.ndarray:
     z = z / np.linalg.norm(z)
     R = np.stack([x, np.cross(z, x), z], axis=1)
     return quat_mul(quat_from_matrix(R), quat_from_rotvec(np.array([quarters * np.pi / 2, 0, 0])))
+
+
+def with_nulls(motion: Motion, turns: np.ndarray) -> tuple[Motion, np.ndarray]:
+    """`motion` with a null before each joint but the root, named as the joint with more behind it
+    and turned by `turns[j]` against the joint above; and where the joints are now."""
+    skeleton, count = motion.skeleton, len(motion.skeleton)
+    at = np.array([0, *(2 * np.arange(1, count))])  # the null of joint at[j] is at[j] - 1
+    size = 2 * count - 1
+    names, parents = [""] * size, np.full(size, -1)
+    offsets, translating = np.zeros((size, 3)), np.zeros(size, dtype=bool)
+    rotations = quat_identity(np.zeros((len(motion), size, 1)))
+    for j in range(count):
+        names[at[j]], translating[at[j]] = skeleton.names[j], j == 0
+        rotations[:, at[j]] = motion.rotations[:, j]
+        if j == 0:
+            offsets[0] = skeleton.offsets[0]
+            continue
+        null = at[j] - 1
+        names[null] = f"{skeleton.names[j]}_$AssimpFbx$_PreRotation"
+        parents[null], parents[at[j]] = at[skeleton.parents[j]], null
+        offsets[null] = skeleton.offsets[j]
+        rotations[:, null] = turns[j]
+        rotations[:, at[j]] = quat_mul(quat_conj(turns[j]), motion.rotations[:, j])
+    with_them = Skeleton(
+        tuple(names),
+        parents,
+        offsets,
+        translating,
+        at[skeleton.end_parents],
+        skeleton.end_offsets,
+    )
+    return Motion(with_them, motion.frame_time, motion.root_pos, rotations), at
