@@ -10,6 +10,8 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
+import numpy as np
+
 from spark.rig.aliases import FINGER_TIP, FINGERS, METACARPAL
 from spark.rig.finger_build import fingers_by_build, metacarpals
 from spark.rig.name_hints import split_name
@@ -22,10 +24,12 @@ FINGER_NAMES = tuple(dict.fromkeys(FINGERS.values()))
 ALL_FINGERS = "fingers"
 """One joint for all of them, or for all but the thumb."""
 
+_HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
 _PREFIX = "(?:l|r|left|right|左|右)?(?:hand)?"
 _NAMED = re.compile(rf"{_PREFIX}({'|'.join(FINGERS)})(?:finger)?s?")
 _COUNTED = re.compile(rf"{_PREFIX}(?:fingers?|指)")
 _PHALANGES = 3  # of a finger; a fourth joint is a tip
+_SAME_PLACE = 1e-3  # [m] files round their numbers
 
 
 class FingerBone(NamedTuple):
@@ -43,10 +47,35 @@ class FingerBone(NamedTuple):
 def finger_bones(skeleton: Skeleton, roles: RoleMap) -> dict[FingerBone, int]:
     """The joints of a rig's fingers. Tips, which have no bone below them, are left out; so are
     hands without names that aren't built alike."""
-    hands = {role.side: roles.joint(role) for role in (Role.LEFT_HAND, Role.RIGHT_HAND)}
+    hands = {role.side: roles.joint(role) for role in _HANDS}
     found = [_bones_of(skeleton, hand, side) for side, hand in hands.items() if hand is not None]
     alike = len(found) == 2 and len({frozenset(b[1:] for b in bones) for bones, _ in found}) == 1
     return {b: j for bones, named in found if named or alike for b, j in bones.items()}
+
+
+def palms_of(skeleton: Skeleton, roles: RoleMap) -> dict[int, int]:
+    """For each hand, the joint that its fingers turn with: the hand or, where it bends in a joint
+    of its own, the last one that carries all of them but the thumb.
+
+    In recordings of CMU `lwrist` twists and `lhand` below it bends; their best-known conversion to
+    BVH has `LeftFingerBase` for it, in the same place as the hand.
+    """
+    return {hand: _palm_of(skeleton, hand) for role in _HANDS for hand in roles.joints(role)}
+
+
+def _palm_of(skeleton: Skeleton, hand: int) -> int:
+    fingers = {j for j, finger in fingers_below(skeleton, hand).items() if finger != "thumb"}
+    palm = hand
+    while True:
+        carrying = [j for j in skeleton.children[palm] if fingers.intersection(skeleton.subtree(j))]
+        if len(carrying) != 1:
+            return palm
+        below = carrying[0]
+        if below in fingers:
+            fingers.remove(below)
+            if not fingers or np.linalg.norm(skeleton.offsets[below]) > _SAME_PLACE:
+                return palm
+        palm = below
 
 
 def _bones_of(skeleton: Skeleton, hand: int, side: str) -> tuple[dict[FingerBone, int], bool]:
@@ -54,6 +83,7 @@ def _bones_of(skeleton: Skeleton, hand: int, side: str) -> tuple[dict[FingerBone
     found: dict[FingerBone, int] = {}
     fingers, named = _told_below(skeleton, hand)
     nulls = nulls_of(skeleton)
+    fingers.pop(_palm_of(skeleton, hand), None)
     chains: dict[str, list[int]] = {}
     for joint, finger in fingers.items():
         chain = chains.setdefault(finger, [])

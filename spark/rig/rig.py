@@ -20,7 +20,7 @@ from spark.rig.feet import (
     hip_height,
     human_soles,
 )
-from spark.rig.fingers import FingerBone, finger_bones
+from spark.rig.fingers import FingerBone, finger_bones, palms_of
 from spark.rig.groups import groups_of
 from spark.rig.other_bodies import other_bodies
 from spark.rig.role_assignment import Override, assign_roles
@@ -131,6 +131,11 @@ class Rig:
     def fingers(self) -> dict[FingerBone, int]:
         """The joints of the fingers, as far as names tell them."""
         return finger_bones(self.skeleton, self.roles)
+
+    @cached_property
+    def palms(self) -> dict[int, int]:
+        """For each hand, the joint that its fingers turn with: itself, as a rule."""
+        return palms_of(self.skeleton, self.roles)
 
     @cached_property
     def twist_bones(self) -> dict[int, TwistBone]:

@@ -1,11 +1,12 @@
 """Analytic transfer: a motion in canonical form onto another rig, without learning.
 
-Joints of the same role turn alike. Where spine or neck have other joints, or the same number in
-other places, rotations are interpolated by normalised arc length, with the pelvis at 0 and the
-topmost spine joint at 1 (for the neck: topmost spine joint and head). Joints without a role copy
-those of the same name in the same place; doubles turn with their originals; fingers as the same
-bone of the same finger, whatever its name; all others follow their parent (twist bones until
-`spark.transfer.twists` turns them). This is the row "copy" of every table.
+Joints of the same role turn alike, hands as the joint that their fingers turn with. Where spine or
+neck have other joints, or the same number in other places, rotations are interpolated by normalised
+arc length, with the pelvis at 0 and the topmost spine joint at 1 (for the neck: topmost spine joint
+and head). Joints without a role copy those of the same name in the same place; doubles turn with
+their originals; fingers as the same bone of the same finger, whatever its name; all others follow
+their parent (twist bones until `spark.transfer.twists` turns them). This is the row "copy" of every
+table.
 """
 
 from bisect import bisect_right
@@ -83,6 +84,8 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
             theirs, own = source.roles.joints(role), target.roles.joints(role)
             for from_joint, j in zip(theirs, own, strict=False):
                 copy(j, from_joint)
+                if j in target.palms:
+                    copy(target.palms[j], source.palms[from_joint])
     for role, (joints, at) in source.chains.items():
         theirs, own = source.roles.joints(role), target.roles.joints(role)
         positions = dict(zip(*target.chains[role], strict=True))
@@ -174,7 +177,8 @@ def _without_fingers(source: CanonicalMotion, target: Rig) -> tuple[str, ...]:
     notes: tuple[str, ...] = ()
     lost = [j for bone, j in theirs.items() if bone not in own]
     hands = [source.rig.roles.require(Role(f"{b.side}_hand")) for b in theirs if b not in own]
-    bends = quat_angle(source.rotations[:, hands], source.rotations[:, lost])
+    palms = [source.rig.palms[hand] for hand in hands]
+    bends = quat_angle(source.rotations[:, palms], source.rotations[:, lost])
     bent = [j for j, angle in zip(lost, bends.T, strict=True) if angle.max() > _MIN_FINGER_BEND]
     if bent:
         notes += (

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from spark.io.recording import read_recording
-from spark.rig.fingers import ALL_FINGERS, FINGER_NAMES, FingerBone, finger_bones
+from spark.rig.fingers import ALL_FINGERS, FINGER_NAMES, FingerBone, finger_bones, palms_of
 from spark.rig.role_assignment import assign_roles
 from spark.rig.roles import Role, RoleMap
 from spark.skeleton import Skeleton
@@ -127,6 +127,28 @@ def test_one_chain_for_all_fingers_is_no_single_finger(names: tuple[str, ...]) -
         **{(ALL_FINGERS, n): name for n, name in enumerate(names, start=1)},
         ("thumb", 1): "lthumb",
     }
+
+
+@pytest.mark.parametrize(
+    ("palm", "rows"),
+    [
+        ("lhand", [("lhand", "left hand"), ("lfingers", "lhand"), ("lthumb", "left hand")]),
+        ("FingerBase", [("FingerBase", "left hand"), ("LeftHandIndex1", "FingerBase")]),
+        ("left hand", [("finger_01_l", "left hand"), ("finger_02_l", "finger_01_l")]),
+        ("left hand", [("LeftHandThumb1", "left hand"), ("LeftHandIndex1", "left hand")]),
+        ("left hand", [("index_metacarpal_l", "left hand"), ("index_01_l", "index_metacarpal_l")]),
+        ("left hand", [("lthumb", "left hand"), ("lthumb2", "lthumb")]),
+        ("left hand", [("hold_l", "left hand")]),
+    ],
+)
+def test_the_palm_is_what_carries_all_fingers(palm: str, rows: list[tuple[str, str]]) -> None:
+    """Beyond the hand it is no finger, but for one that begins where the hand does."""
+    skeleton, roles = hands(*rows)
+    skeleton.offsets[[name == "FingerBase" for name in skeleton.names]] = 0
+    palms = palms_of(skeleton, roles)
+    left, right = roles.require(Role.LEFT_HAND), roles.require(Role.RIGHT_HAND)
+    assert [skeleton.names[palms[left]], palms[right]] == [palm, right]
+    assert palms[left] not in finger_bones(skeleton, roles).values()
 
 
 def test_what_hangs_on_a_hand_and_is_no_finger_is_left_alone() -> None:

@@ -238,6 +238,23 @@ def test_fingers_without_a_counterpart_are_named_and_follow() -> None:
     assert transfer(still, target).notes == (follow,)
 
 
+def test_a_hand_turns_as_what_carries_the_fingers() -> None:
+    """CMU's recordings bend the hand in a joint below the one that twists it."""
+    split = with_fingers(*on_hands("lhand", "rhand"), ("lfingers", "lhand"), ("rfingers", "rhand"))
+    at = {name: j for j, name in enumerate(split.skeleton.names)}
+    source, whole = turning(split), hands("{L}{f}{n}", "fingers", bones=1)
+    wrists = [split.roles.require(role) for role in (Role.LEFT_HAND, Role.RIGHT_HAND)]
+    palms = [at["lhand"], at["rhand"]]
+    moved = transfer(source, whole)
+    np.testing.assert_array_equal(moved.rotations[:, wrists], source.rotations[:, palms])
+    assert moved.notes == ()
+    other = turning(whole)
+    back = transfer(other, split)
+    for joints in (wrists, palms):
+        np.testing.assert_array_equal(back.rotations[:, joints], other.rotations[:, wrists])
+    np.testing.assert_array_equal(transfer(source, split).rotations, source.rotations)
+
+
 def bends(motion: Motion, rig: Rig) -> dict[FingerBone, np.ndarray]:
     """How far [rad] each finger's second bone is bent against its first."""
     at, out = forward(motion)[0], {}
