@@ -26,6 +26,7 @@ from spark.training.dataset import Performance, is_dataset, read_performances
 from spark.training.grounded import on_ground
 from spark.training.prepare import prepare
 from spark.training.same_motion import SPARE_FRAMES, same_motion
+from spark.training.splits import motions_of
 from spark.training.staging import StagedBody
 from spark.training.variants import Variant, random_variant, same_body, scaled_body, split_body
 from spark.transfer.analytic import correspond
@@ -85,12 +86,14 @@ def recorded_cases(
 
     Raises `SkeletonError` where there is none.
     """
+    motions = motions_of(one.clip.name for one in found)
     by_motion: dict[str, list[Performance]] = defaultdict(list)
     for one in found:
-        by_motion[one.clip.name].append(one)
+        by_motion[motions[one.clip.name]].append(one)
     pairs: list[tuple[str, list[Case]]] = []
     notes: list[str] = []
     for motion, ones in sorted(by_motion.items()):
+        longer: list[str] = []
         namesakes: list[str] = []
         for source in ones:
             for target in ones:
@@ -98,18 +101,23 @@ def recorded_cases(
                 if source.character == target.character:
                     continue
                 if abs(lengths[0] - lengths[1]) > SPARE_FRAMES:
-                    notes.append(
-                        f"{motion}: {source.character} and {target.character} differ by "
-                        f"{counted(abs(lengths[0] - lengths[1]), 'frame')}: not taken as one motion"
+                    longer.append(
+                        f"{source.character} and {target.character}, which differ by "
+                        f"{counted(abs(lengths[0] - lengths[1]), 'frame')}"
                     )
                     continue
                 if not same_motion(on_ground(source), on_ground(target)):
                     namesakes.append(f"{source.character} and {target.character}")
                     continue
                 others = [p.clip for p in found if p.clip.body is target.clip.body]
-                own = _longest([clip for clip in others if clip.name != motion])
-                of_pair = _recorded(motion, source, target, min(lengths), own)
+                own = _longest([clip for clip in others if motions[clip.name] != motion])
+                of_pair = _recorded(source, target, min(lengths), own)
                 pairs.append((target.cell, of_pair))
+        if longer:
+            notes.append(
+                f"{motion}: {counted(len(longer), 'pair')} with this name, but not as long "
+                f"({longer[0]}{', for one' * (len(longer) > 1)}): left out"
+            )
         if namesakes:
             notes.append(
                 f"{motion}: {counted(len(namesakes), 'pair')} ({namesakes[0]}, for one) with this "
@@ -207,7 +215,7 @@ def lacking_body(body: BodyFeatures, rng: np.random.Generator) -> Variant:
 
 
 def _recorded(
-    motion: str, source: Performance, target: Performance, frames: int, own: TrainingClip | None
+    source: Performance, target: Performance, frames: int, own: TrainingClip | None
 ) -> list[Case]:
     source_body, target_body = source.clip.body, target.clip.body
     height = san_height(target_body.rig) / target_body.rig.hip_height
@@ -217,7 +225,14 @@ def _recorded(
         targets = {"intra": same_body(target_body), "cross": split_body(target_body)}
     return [
         Case(
-            *(motion, source.character, target.character, target.cell, structure, source_motion),
+            *(
+                source.clip.name,
+                source.character,
+                target.character,
+                target.cell,
+                structure,
+                source_motion,
+            ),
             truth := on_ground(target, variant, frames),
             height,
             target if variant.body.skeleton.names == target_body.skeleton.names else None,

@@ -33,6 +33,7 @@ from spark.transfer.target_prior import RetargetMethod, with_target_prior
 
 Positions = Float[np.ndarray, "_ _ 3"]  # frames, joints
 Method = Callable[[Case], Positions]
+_Pair = tuple[Structure, str, str, tuple[str, ...]]  # target, performer, the target's joints
 LegFitter = Callable[[CanonicalMotion, CanonicalMotion], CanonicalMotion]
 
 # Cells in the paper's order; a dataset without a split has one without a name.
@@ -80,9 +81,8 @@ def evaluate(
     scores: dict[tuple[Structure, str], dict[str, list[Score]]] = defaultdict(
         lambda: defaultdict(list)
     )
-    positions_by_pair: dict[tuple[Structure, str, str], list[tuple[Positions, Positions]]] = (
-        defaultdict(list)
-    )
+    # Of a character with several bodies, clips with the same joints go together.
+    positions_by_pair: dict[_Pair, list[tuple[Positions, Positions]]] = defaultdict(list)
     each: list[Score] = []
     for case in progress(cases):
         truth = canonical_positions(case.truth)
@@ -91,9 +91,8 @@ def evaluate(
         scored = score_positions(own, truth, rig, case.truth.frame_time, case.height)
         scores[case.structure, case.cell][case.target].append(scored)
         each.append(scored)
-        positions_by_pair[case.structure, case.target, case.performer].append(
-            (_relative(own), _relative(truth))
-        )
+        pair = case.structure, case.target, case.performer, rig.skeleton.names
+        positions_by_pair[pair].append((_relative(own), _relative(truth)))
     return MethodScores(
         name,
         {
@@ -211,11 +210,11 @@ def _relative(positions: Positions) -> Positions:
 
 def _sensitivity(
     structure: Structure,
-    positions_by_pair: Mapping[tuple[Structure, str, str], Sequence[tuple[Positions, Positions]]],
+    positions_by_pair: Mapping[_Pair, Sequence[tuple[Positions, Positions]]],
 ) -> float:
     found = [
         source_sensitivity(*zip(*pairs, strict=True))
-        for (kind, _, _), pairs in positions_by_pair.items()
+        for (kind, *_), pairs in positions_by_pair.items()
         if kind == structure and len(pairs) > 1
     ]
     return sum(found) / len(found) if found else float("nan")

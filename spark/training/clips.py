@@ -12,7 +12,7 @@ from spark.rig.contacts import planted_feet
 from spark.rig.rig import understand
 from spark.skeleton import Skeleton
 from spark.training.cuts import TrainingClip
-from spark.training.splits import character_and_motion
+from spark.training.splits import characters_and_motions
 from spark.transfer.canonical import (
     FRAME_TIME,
     CanonicalMotion,
@@ -33,14 +33,17 @@ def read_clips(
     bodies: dict[tuple[object, ...], BodyFeatures] = {}
     clips: list[TrainingClip] = []
     notes: list[str] = []
-    for path in progress([file for given in paths for file in motion_files(given)]):
+    files = [file for given in paths for file in motion_files(given)]
+    names = {
+        file: name for file, (_, name) in zip(files, characters_and_motions(files), strict=True)
+    }
+    for path in progress(files):
         try:
             motion = read_motion(path).motion
             key = _key(motion.skeleton)
             if key not in bodies:
                 bodies[key] = body_features(understand(motion))
-            name = character_and_motion(path.stem, path.parent.name)[1]
-            clips.append(clip_of(name, to_canonical(motion, bodies[key].rig), bodies[key]))
+            clips.append(clip_of(names[path], to_canonical(motion, bodies[key].rig), bodies[key]))
         except SparkSimError as error:
             notes.append(f"{path}: left out: {why_left_out(path, error)}")
     if not clips:

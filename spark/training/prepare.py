@@ -25,15 +25,13 @@ from spark.opening import loads_json
 from spark.rig.rig import Rig
 from spark.rig.rig_json import rig_from_json, rig_to_json
 from spark.rotation import quat_conj, quat_mul
+from spark.training.characters import body_of
 from spark.training.dataset import ARRAYS, FORMAT, VERSION, Index
 from spark.training.dataset_parts import Part, make_part, read_part
 from spark.training.part_workers import parts_in_processes
-from spark.training.splits import cells, character_and_motion, seen_characters, seen_motions
+from spark.training.splits import cells, characters_and_motions, seen_characters, seen_motions
 from spark.training.variants import split_joints
 from spark.transfer.canonical import FRAME_TIME
-
-# Skeletons whose bones differ by less than this, in hip heights, are one body.
-_SAME_BODY = 1e-3
 
 Progress = Callable[[Iterable[tuple[Path, str]], int], Iterable[tuple[Path, str]]]
 
@@ -50,8 +48,8 @@ def prepare(
     """Write the dataset of the motion files in and below `sources` into the folder `out`; gives its
     index.
 
-    A motion is a file's name. A body is a skeleton, named after the folder of its first file, or
-    after its files where they name a character (`Mousey@Gangnam Style.bvh`).
+    A motion is a file's name. A body is a skeleton; its character is named after its folder, or
+    after its files where they name one (`Mousey@Gangnam Style.bvh`).
     Files are read in `workers` processes; without a number in this one, which a fault in a library
     then ends. The same files and seed give the same bytes. A dataset that is there takes more
     files; it loses one, or gets another seed, only with `force`. Raises `OutputError` there, and
@@ -127,7 +125,8 @@ def _index(digests: dict[Path, str], parts: Path, seed: int) -> Index:
     clips: list[dict[str, Any]] = []
     left_out: list[dict[str, str]] = []
     at = first_frame = 0
-    for path, digest in digests.items():
+    told = characters_and_motions(list(digests))
+    for (path, digest), (who, motion) in zip(digests.items(), told, strict=True):
         file = path.relative_to(top).as_posix()
         part = read_part(parts, digest)
         if digest in seen:
@@ -139,8 +138,7 @@ def _index(digests: dict[Path, str], parts: Path, seed: int) -> Index:
             continue
         seen[digest] = file
         frames, joints = part.rotations.shape[:2]
-        who, motion = character_and_motion(path.stem, path.parent.name)
-        body = _body_of(part.rig, bodies, path.parent.name, who)
+        body = body_of(part.rig, bodies, path.parent.name, who)
         if frames > bodies[body]["frames"]:
             # What a longer clip tells of a T-pose is better founded.
             bodies[body] |= {"rig": part.rig, "frames": frames}
@@ -181,31 +179,6 @@ def _index(digests: dict[Path, str], parts: Path, seed: int) -> Index:
         "clips": clips,
         "left_out": left_out,
     }
-
-
-def _body_of(rig: Rig, bodies: list[dict[str, Any]], folder: str, who: str | None) -> int:
-    """The place of this rig's body among `bodies`, which it joins where it is new. A character whom
-    files name (`who`) is no other, and the same one on every skeleton."""
-    own = folder if who is None else who
-    skeleton = rig.skeleton
-    for i, body in enumerate(bodies):
-        other: Rig = body["rig"]
-        if (
-            (body["own"] == own or (who is None and not body["named"]))
-            and other.skeleton.names == skeleton.names
-            and np.array_equal(other.skeleton.parents, skeleton.parents)
-            and other.roles.roles == rig.roles.roles
-            and np.allclose(
-                other.skeleton.offsets[1:], skeleton.offsets[1:], 0.0, _SAME_BODY * rig.hip_height
-            )
-        ):
-            return i
-    taken = {body["character"] for body in bodies}
-    names = (own if n == 1 else f"{own} {n}" for n in range(1, len(bodies) + 2))
-    named = who is not None
-    character = own if named else next(name for name in names if name not in taken)
-    bodies.append({"character": character, "own": own, "named": named, "rig": rig, "frames": 0})
-    return len(bodies) - 1
 
 
 def _write_arrays(out: Path, index: Index, parts: Path) -> dict[str, str]:

@@ -20,6 +20,7 @@ from spark.training.dataset import Performance
 from spark.training.grounded import on_ground
 from spark.training.recorded_scales import measured_scales
 from spark.training.same_motion import SPARE_FRAMES, same_motion
+from spark.training.splits import motions_of
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.hip_rise import standing
 
@@ -86,9 +87,10 @@ class RecordedPairs:
 def recorded_pairs(found: Sequence[Performance], seed: int = 0) -> RecordedPairs:
     """All that the motions shared by two characters say; of more than `MAX_PAIRS`, as many drawn.
     Clips that share a name alone are left out (`same_motion`)."""
+    motions = motions_of(one.clip.name for one in found)
     by_motion: dict[str, list[int]] = defaultdict(list)
     for k, one in enumerate(found):
-        by_motion[one.clip.name].append(k)
+        by_motion[motions[one.clip.name]].append(k)
     drawn = [
         (a, b)
         for same in by_motion.values()

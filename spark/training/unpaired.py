@@ -20,6 +20,7 @@ from spark.training.cuts import Cut, TrainingClip, cut_rotations, frames_of
 from spark.training.plan import plan_of_body
 from spark.training.posing import Drawn, seen_from_start, turn_between
 from spark.training.sizes import Sizes, sizes_of
+from spark.training.splits import motions_of
 from spark.training.staging import empty_rows
 from spark.training.variants import Variant, same_body, split_body, split_joints
 
@@ -128,9 +129,10 @@ def assign(clips: Sequence[TrainingClip], seed: int, shared: int) -> list[Charac
         forms = [same_body(body), *([split_body(body)] if split_joints(body) else [])]
         of_body[id(body)] = list(range(len(characters), len(characters) + len(forms)))
         characters += [Character(form) for form in forms]
+    motions = motions_of(clip.name for clip in clips)
     by_motion: dict[str, list[TrainingClip]] = defaultdict(list)
     for clip in clips:
-        by_motion[clip.name].append(clip)
+        by_motion[motions[clip.name]].append(clip)
     together: Counter[tuple[int, int]] = Counter()
     for motion in sorted(by_motion, key=lambda name: _rank(seed, name)):
         performances: dict[int, list[TrainingClip]] = defaultdict(list)
