@@ -46,6 +46,12 @@ def similarity(body: BodyFeatures, trunks: Sequence[Trunk]) -> float:
     return max([0.0, *(1.0 - _distance(own, other) / _MAX_DISTANCE for other in trunks)])
 
 
+def is_known(body: BodyFeatures, trunks: Sequence[Trunk]) -> bool:
+    """Whether one of these trunks is this body's."""
+    own = trunk_of(body)
+    return any(_distance(own, other) <= _SAME_BODY for other in trunks)
+
+
 def _distance(one: Trunk, other: Trunk) -> float:
     if one.keys() != other.keys():
         return math.inf

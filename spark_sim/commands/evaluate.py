@@ -94,10 +94,11 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    from spark.errors import ConventionError
+    from spark.errors import ConventionError, name_list
     from spark.evaluation.cases import made_cases, performances, recorded_cases
     from spark.evaluation.equal import Why, equal_rows, why_no_prior, why_silent, why_unfamiliar
     from spark.evaluation.evaluate import CELLS, as_method, evaluate, results_in
+    from spark.evaluation.met import met_unseen
     from spark.evaluation.tables import markdown
     from spark.files import write_atomically
     from spark.network.recorded import as_recorded
@@ -183,6 +184,12 @@ def run(args: Namespace) -> int:
     console.say(markdown(rows).rstrip("\n"))
     for sentence in equal:
         console.note(sentence)
+    for name, weights in checkpoints.items():
+        if met := met_unseen(found, weights.bodies):
+            console.note(
+                f"{name} was trained on bodies of {name_list(met)}, unseen in this split: its "
+                "cells uc say nothing of unseen characters; train it on this dataset"
+            )
     about = {"data": args.data, "made": args.made, "seed": args.seed, "limit": args.limit}
     for path in outputs:
         write_atomically(path, _text(path, rows, about).encode())

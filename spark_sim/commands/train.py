@@ -152,6 +152,10 @@ def _run(args: Namespace, held: ExitStack) -> int:
         )
     if start:
         _check_same_network(path, start.settings, config)
+        if start.step > config.steps:
+            raise ConventionError(
+                f"--steps {config.steps}: the run in {out} is at step {start.step} already"
+            )
     clips, notes = training_clips(
         [Path(p) for p in config.data],
         lambda files: console.progress(files, "reading", lines=is_first()),

@@ -84,6 +84,7 @@ def test_the_command_line_trains_resumes_and_retargets(tmp_path: Path) -> None:
             (("run", "--resume", "--preset", "paper"), "trained with preset = 'tiny', not 'paper'"),
             (("run", "--resume", "--config", "tiny.toml"), "not from --config"),
             (("none", "--resume"), "no run to resume"),
+            (("run", "--resume", "--steps", "1"), "is at step 2 already"),
         ):
             done = command("train", "-o", *given)
             assert done.code == 2
