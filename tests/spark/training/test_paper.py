@@ -150,6 +150,26 @@ def test_noise(batch: UnpairedBatch) -> None:
     assert network(PAPER, 8).noise
 
 
+def test_position() -> None:
+    """A table that is learned, a row for each place in each group."""
+    table = small().embedding.position
+    assert (table.requires_grad, table.shape[:2]) == (True, (6, 16))
+
+
+def test_decoder(batch: UnpairedBatch) -> None:
+    """Joints of a frame hear of one another; frames do only through H."""
+    model = small(name_width=130).eval()
+    latent = model.encode(batch.pose, batch.source).detach()
+    noise = torch.zeros(*latent.shape[:2], batch.target.valid.shape[1], latent.shape[-1])
+    other = noise.clone()
+    other[:, 5, 1] += 1
+    a, b = (model.decode(latent, batch.target, noise=x).rotations for x in (noise, other))
+    moved = ((a - b).abs().amax((0, 3)) > 1e-7).tolist()
+    assert [any(frame) for frame in moved] == [t == 5 for t in range(latent.shape[1])]
+    assert sum(moved[5]) > 1
+    assert len(model.decoder.blocks) == model.config.decoder_blocks
+
+
 def test_keys(batch: UnpairedBatch) -> None:
     """A frame's decoder sees the tokens of that frame."""
     model = small(name_width=130, noise=False).eval()
