@@ -81,7 +81,7 @@ class Motion:
 
     def thinned(self, count: int) -> "Motion":
         """Every frame of a motion of at most `count` frames; else every second, third, ..."""
-        step = -(-len(self) // count)
+        step = max(1, -(-len(self) // count))
         return self if step == 1 else self.picked(slice(None, None, step))
 
     def picked(self, span: slice) -> "Motion":

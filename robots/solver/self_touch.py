@@ -90,7 +90,8 @@ def self_touches(
             continue
         forearm = unit(positions[:, wrist] - positions[:, above])
         ahead = np.array([0.0, _SIDES[side] * _knuckles(source.rig, side, wrist), 0.0])
-        knuckles = positions[:, wrist] + quat_rotate(source.rotations[:, wrist], ahead)
+        turns = source.rotations[:, source.rig.palms[wrist]]
+        knuckles = positions[:, wrist] + quat_rotate(turns, ahead)
         middle, touched = (positions[:, wrist] + knuckles) / 2, []
         free = 1.0 - _on_other_arm(source, positions, middle, side)
         for upper, lower, flesh in _TOUCHED:

@@ -99,7 +99,7 @@ def _pointing(motion: Motion, rig: Rig) -> dict[Part, Float[np.ndarray, "T n"]]:
         found[Part("trunk", "trunk")] = along / np.maximum(length, 1e-12)
     for role in (*_LOOKING, *_HANDS):
         if (joint := rig.roles.joint(role)) is not None:
-            turn = turns[:, joint]
+            turn = turns[:, rig.palms.get(joint, joint)]
             found[_part(role, role.part)] = turn if role in _HANDS else quat_rotate(turn, _AHEAD)
     return found
 

@@ -56,6 +56,27 @@ def stick_rig() -> Rig:
     )
 
 
+def stick_with(*rows: tuple[str, Role | str]) -> Rig:
+    """The stick man with joints, each by its name and what it hangs on: a hand, or a name."""
+    rig = stick_rig()
+    skeleton, size = rig.skeleton, len(rig.skeleton) + len(rows)
+    names = [*skeleton.names, *(name for name, _ in rows)]
+    outwards = [[0.0, 0.1 if names.index(str(on)) < 15 else -0.1, 0] for _, on in rows]
+    return replace(
+        rig,
+        skeleton=Skeleton(
+            tuple(names),
+            np.append(skeleton.parents, [names.index(str(on)) for _, on in rows]),
+            np.concatenate([skeleton.offsets, outwards]),
+            np.append(skeleton.translating, [False] * len(rows)),
+            skeleton.end_parents,
+            skeleton.end_offsets,
+        ),
+        roles=RoleMap((*rig.roles.roles, *[None] * len(rows)), (1.0,) * size, ("",) * size),
+        tpose=np.tile([1.0, 0, 0, 0], (size, 1)),
+    )
+
+
 def joint(role: Role) -> int:
     """The stick man's joint with this role."""
     return [r for r, _, _ in JOINTS].index(role)

@@ -8,12 +8,13 @@ import pytest
 from robots.model.known import known
 from robots.model.motion import RobotMotion
 from sim.report import assess
+from sim.report.pose_error import pose_error
 from sim.trajectory import Subject
 from spark.motion import Motion
 from spark.rig.roles import Role
 from spark.rotation import quat_about, quat_conj, quat_from_rotvec, quat_mul, quat_rotate
 from tests.helpers.poses import error_of
-from tests.helpers.stick import joint, stick_rig
+from tests.helpers.stick import joint, stick_rig, stick_with
 from tests.helpers.stick import standing as still_stick
 
 ROBOT = known("ember")
@@ -52,6 +53,17 @@ def test_a_hand_that_is_turned_about_itself_is_turned() -> None:
     twisted = turned(still.motion, Role.LEFT_HAND, [0.0, 1.2, 0.0])
     assert error_of("hand", twisted, ROBOT.rig, still) == pytest.approx(0.6)
     assert error_of("limb", twisted, ROBOT.rig, still) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_hand_is_what_carries_the_fingers() -> None:
+    """One that bends in a joint below its own points as one that bends there, but for fingers."""
+    split = stick_with(("lhand", Role.LEFT_HAND), ("lfingers", "lhand"), ("lthumb", Role.LEFT_HAND))
+    rotations = np.tile([1.0, 0, 0, 0], (3, len(split.skeleton), 1))
+    rotations[:, split.skeleton.names.index("lhand")] = quat_about("x", np.full(3, 0.5))
+    bent = Motion(split.skeleton, 1 / 30, np.tile([0.0, 0, 0.9], (3, 1)), rotations)
+    still, times = Subject(still_stick(3), stick_rig()), np.arange(3) / 30
+    found = pose_error(still, Subject(bent, split), times)
+    assert found is not None and found.mean_of("hand") == pytest.approx(0.25)
 
 
 def test_a_thigh_that_is_raised_takes_three_parts_of_eight_along() -> None:

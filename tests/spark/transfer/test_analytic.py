@@ -152,27 +152,6 @@ def test_planted_feet_of_a_walk() -> None:
     assert planted.any(1).mean() > 0.9, "one foot stands at all times"
 
 
-def with_fingers(*rows: tuple[str, Role | str]) -> Rig:
-    """The stick man with joints, each by its name and what it hangs on: a hand, or a name."""
-    rig = stick_rig()
-    skeleton, size = rig.skeleton, len(rig.skeleton) + len(rows)
-    names = [*skeleton.names, *(name for name, _ in rows)]
-    outwards = [[0.0, 0.1 if names.index(str(on)) < 15 else -0.1, 0] for _, on in rows]
-    return replace(
-        rig,
-        skeleton=Skeleton(
-            tuple(names),
-            np.append(skeleton.parents, [names.index(str(on)) for _, on in rows]),
-            np.concatenate([skeleton.offsets, outwards]),
-            np.append(skeleton.translating, [False] * len(rows)),
-            skeleton.end_parents,
-            skeleton.end_offsets,
-        ),
-        roles=RoleMap((*rig.roles.roles, *[None] * len(rows)), (1.0,) * size, ("",) * size),
-        tpose=np.tile([1.0, 0, 0, 0], (size, 1)),
-    )
-
-
 def on_hands(left: str, right: str) -> list[tuple[str, Role | str]]:
     return [(left, Role.LEFT_HAND), (right, Role.RIGHT_HAND)]
 
@@ -189,7 +168,7 @@ def hands(template: str, *fingers: str, bones: int = 3) -> Rig:
                 )
                 rows.append((name, on))
                 on = name
-    return with_fingers(*rows)
+    return stick_with(*rows)
 
 
 MIXAMO = ("mixamorig:{Left}Hand{f}{n}", "Thumb", "Index", "Middle", "Ring", "Pinky")
@@ -240,7 +219,7 @@ def test_fingers_without_a_counterpart_are_named_and_follow() -> None:
 
 def test_a_hand_turns_as_what_carries_the_fingers() -> None:
     """CMU's recordings bend the hand in a joint below the one that twists it."""
-    split = with_fingers(*on_hands("lhand", "rhand"), ("lfingers", "lhand"), ("rfingers", "rhand"))
+    split = stick_with(*on_hands("lhand", "rhand"), ("lfingers", "lhand"), ("rfingers", "rhand"))
     at = {name: j for j, name in enumerate(split.skeleton.names)}
     source, whole = turning(split), hands("{L}{f}{n}", "fingers", bones=1)
     wrists = [split.roles.require(role) for role in (Role.LEFT_HAND, Role.RIGHT_HAND)]
@@ -283,14 +262,14 @@ def test_a_recorded_hand_bends_on_another_makers_rig_as_it_did() -> None:
 
 
 def test_joints_without_a_role_copy_their_namesakes_or_follow() -> None:
-    source = with_fingers(*on_hands("LeftTail", "RightTail"))
+    source = stick_with(*on_hands("LeftTail", "RightTail"))
     rotations = np.tile([1.0, 0, 0, 0], (4, 20, 1))
     rotations[:, 18] = quat_about("x", np.array(0.7))
     canonical = to_canonical(
         replace(standing(source, 4), rotations=rotations, skeleton=source.skeleton), source
     )
-    same = transfer(canonical, with_fingers(*on_hands("LeftTail", "Tail")))
-    other = transfer(canonical, with_fingers(*on_hands("Strap", "Tail")))
+    same = transfer(canonical, stick_with(*on_hands("LeftTail", "Tail")))
+    other = transfer(canonical, stick_with(*on_hands("Strap", "Tail")))
     assert np.allclose(same.rotations[:, 18], rotations[:, 18])
     assert np.allclose(same.rotations[:, 19], [1, 0, 0, 0])
     assert np.allclose(other.rotations[:, 18], [1, 0, 0, 0])
