@@ -56,14 +56,15 @@ def test_a_hand_that_is_turned_about_itself_is_turned() -> None:
 
 
 def test_a_hand_is_what_carries_the_fingers() -> None:
-    """One that bends in a joint below its own points as one that bends there, but for fingers."""
+    """Of two, one bends by half a radian, in a joint below the one that has the role."""
     split = stick_with(("lhand", Role.LEFT_HAND), ("lfingers", "lhand"), ("lthumb", Role.LEFT_HAND))
     rotations = np.tile([1.0, 0, 0, 0], (3, len(split.skeleton), 1))
     rotations[:, split.skeleton.names.index("lhand")] = quat_about("x", np.full(3, 0.5))
     bent = Motion(split.skeleton, 1 / 30, np.tile([0.0, 0, 0.9], (3, 1)), rotations)
-    still, times = Subject(still_stick(3), stick_rig()), np.arange(3) / 30
-    found = pose_error(still, Subject(bent, split), times)
-    assert found is not None and found.mean_of("hand") == pytest.approx(0.25)
+    rig, times = stick_rig(), np.arange(3) / 30
+    found = pose_error(Subject(still_stick(rig, 3), rig), Subject(bent, split), times)
+    assert found is not None
+    assert found.mean_of("hand") == pytest.approx(0.25)
 
 
 def test_a_thigh_that_is_raised_takes_three_parts_of_eight_along() -> None:

@@ -20,7 +20,7 @@ from spark.transfer.analytic import correspond, transfer
 from spark.transfer.canonical import CanonicalMotion, from_canonical, to_canonical
 from tests.helpers.humanoids import ONE_A_RIG
 from tests.helpers.recordings import DATA, recording, recordings
-from tests.helpers.stick import joint, standing, stick_rig, without
+from tests.helpers.stick import joint, standing, stick_rig, stick_with, without
 
 
 def read(path: object, frames: int = 60) -> tuple[Motion, Rig]:
