@@ -22,7 +22,7 @@ from spark.rig.doubles import doubles_of
 from spark.rig.joint_axes import snap, turn_about
 from spark.rig.moving_feet import feet_ahead, feet_slope
 from spark.rig.nulls import all_but, motion_of, nulls_of
-from spark.rig.observed import bend_axis, nearest_right_angle
+from spark.rig.observed import bend_axis, mean_rotations, nearest_right_angle
 from spark.rig.pitched_feet import flat_feet
 from spark.rig.reference_pose import GROUP_OF, Reference, pelvis_frame, reference_of
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
@@ -71,19 +71,27 @@ def find_tpose(motion: Motion, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"]
     towards +X with their soles flat. Joints above the root joint stay as they rest.
     Raises SkeletonError where the rig has no lateral axis or no legs.
     """
-    nulls = {j: k for j, k in nulls_of(motion.skeleton).items() if roles.roles[j] is None}
+    first = root_joint_of(motion.skeleton, roles)
+    nulls = {
+        j: k for j, k in nulls_of(motion.skeleton).items() if j >= first and roles.roles[j] is None
+    }
     kept = all_but([*nulls], motion.skeleton)
     tpose = quat_identity(np.zeros((len(motion.skeleton), 1)))
-    tpose[kept], notes = _find(motion_of(motion, kept), roles.of(kept.tolist()))
+    bare, of_bare = motion_of(motion, kept), roles.of(kept.tolist())
+    reference = reference_of(bare, of_bare)
+    tpose[kept], notes = _find(reference, of_bare)
     for null in sorted(nulls, reverse=True):
-        tpose[null] = tpose[nulls[null]]  # at rest all axes lie as the world's
+        carried = nulls[null]
+        in_null = quat_identity(tpose[null])
+        if not reference.posed:
+            in_null = mean_rotations(motion.rotations[:, carried], np.ones(len(motion)))
+        tpose[null] = quat_mul(tpose[carried], quat_conj(in_null))
     return tpose, notes
 
 
-def _find(motion: Motion, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"], tuple[str, ...]]:
+def _find(reference: Reference, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"], tuple[str, ...]]:
     """The same, of a skeleton without nulls."""
-    skeleton = motion.skeleton
-    reference = reference_of(motion, roles)
+    skeleton = reference.motion.skeleton
     tpose = quat_identity(np.zeros((len(skeleton), 1)))
     pelvis = roles.require(Role.PELVIS)
     tpose[pelvis] = quat_from_matrix(pelvis_frame(reference))

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.rig.name_hints import read_names, split_name
+from spark.rig.nulls import nulls_of
 from spark.rig.roles import Role, RoleMap
 from spark.skeleton import Skeleton
 
@@ -67,7 +68,7 @@ def twist_bones(
     little: half-way the bone takes 0.17 of the foot's twist, R² 0.2.
     """
     below = _named_below(skeleton, roles)
-    parents, places = skeleton.parents.tolist(), tpose_positions
+    places, nulls = tpose_positions, nulls_of(skeleton)
     found: dict[int, TwistBone] = {}
     for ball, hinge, end, taken in _LIMBS:
         upper, lower, tip = (roles.joint(role) for role in (ball, hinge, end))
@@ -77,15 +78,16 @@ def twist_bones(
             bone = places[until] - places[segment]
             length = max(float(np.linalg.norm(bone)), 1e-9)
             axis = bone / length
+            above = next((j for j in skeleton.ancestors(segment)[1:] if j not in nulls), -1)
             for j in below.get(segment, ()):
                 away = (places[j] - places[segment]) / length
                 along = float(np.clip(away @ axis, 0.0, 1.0))
                 if np.linalg.norm(away - along * axis) > _ASIDE:
                     continue
                 if segment == upper:
-                    turn = (parents[upper], upper, axis, min(0.5 + along, 1.0), 1.0)
+                    turn = (above, upper, axis, min(0.5 + along, 1.0), 1.0)
                 elif along < _ASIDE and _SHARER in split_name(skeleton.names[j]):
-                    turn = (parents[segment], segment, axis, 0.5, 0.5)
+                    turn = (above, segment, axis, 0.5, 0.5)
                 else:
                     turn = (segment, until, axis, taken * along, 0.0)
                 found[j] = TwistBone(segment, *turn)
@@ -98,10 +100,11 @@ def twist_bones(
     return dict(sorted(found.items()))
 
 
-def _between(skeleton: Skeleton, segment: int, until: int) -> tuple[int, ...]:
-    """The joints that a segment's end hangs on, below the one at its start."""
-    above = skeleton.ancestors(until)[1:]
-    return above[: above.index(segment)] if segment in above else ()
+def _between(skeleton: Skeleton, segment: int, until: int) -> list[int]:
+    """The joints that a segment's end hangs on, below the one at its start, without nulls."""
+    above, nulls = skeleton.ancestors(until)[1:], nulls_of(skeleton)
+    between = above[: above.index(segment)] if segment in above else ()
+    return [j for j in between if j not in nulls]
 
 
 def _named_below(skeleton: Skeleton, roles: RoleMap) -> dict[int, list[int]]:
