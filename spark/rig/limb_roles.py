@@ -24,6 +24,10 @@ _BELOW_A_WRIST = 4.0  # of a hand below such a joint, in the same units
 _NOT_THE_LAST = 0.01
 _LONG = ("upper_leg", "lower_leg", "upper_arm", "forearm")
 _ONE_PLACE = 0.01  # of the limb's length
+# Shares of the bend of the joint of a chain that bends most: a joint that bends less is stiff, and
+# one that bends more lies in no bone of an arm. Beasts' legs have a joint more than ours.
+_STIFF, _BENDS = 0.05, 0.2
+_BENT_BONE = 2.0  # of a bone with such a joint in it, in the same units
 _MIN_BEND = 0.2  # [rad] in a motion; of a chain that bends less, no joint is called stiff
 _MAX_CHAIN = 10  # joints of a chain that are tried as a limb's: more would be a hand's fingers
 
@@ -63,7 +67,9 @@ def _best_labels(
         for i in free
     }
     along = [_arc_lengths(measured, chain) for chain in chains]
-    stiff = np.mean([_stiffness(measured, chain) for chain in chains], axis=0)
+    bending = [_bending(measured, chain) for chain in chains]
+    stiff = np.mean([share < _STIFF for share in bending], axis=0)
+    bends = np.mean([share > _BENDS for share in bending], axis=0)
     shape = _leg_shape if parts is LEG else _arm_shape
     carried = np.bincount(measured.skeleton.parents[1:], minlength=len(measured.skeleton))
     branching = {i for i in range(length) if min(carried[c[i]] for c in chains) >= _FINGERS}
@@ -90,6 +96,9 @@ def _best_labels(
         )
         score += sum(shape(index, at) for at in along) / len(chains)
         score -= stiff[index["lower_leg" if parts is LEG else "forearm"]]
+        if parts is ARM:
+            within = range(index["upper_arm"] + 1, index.get("hand", index["forearm"]))
+            score -= _BENT_BONE * sum(bends[i] for i in within if i in left_out)
         if "hand" in index:
             between = range(index["forearm"] + 1, index["hand"])
             score -= _BELOW_A_WRIST * any(i in branching for i in between)
@@ -120,11 +129,12 @@ def _arc_lengths(measured: Measurements, chain: tuple[int, ...]) -> list[float]:
     return [*at, at[-1] + float(measured.end_reach[chain[-1]])]
 
 
-def _stiffness(measured: Measurements, chain: tuple[int, ...]) -> Float[np.ndarray, "_"]:
-    """1 for joints that never bend in a motion in which others of the chain do, 0 otherwise."""
+def _bending(measured: Measurements, chain: tuple[int, ...]) -> Float[np.ndarray, "_"]:
+    """How much each joint bends in a motion, over the one that bends most; NaN where that does not
+    bend either, and where joints lie in one place."""
     bending = measured.bending(chain)
     most = np.nanmax(bending, initial=0.0)
-    return np.where((most > _MIN_BEND) & (bending < 0.05 * most), 1.0, 0.0)
+    return bending / most if most > _MIN_BEND else np.full_like(bending, np.nan)
 
 
 def _leg_shape(index: Mapping[str, int], at: list[float]) -> float:

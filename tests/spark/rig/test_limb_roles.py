@@ -9,6 +9,7 @@ import pytest
 from spark.rig.rig import understand
 from spark.rig.role_assignment import assign_roles
 from spark.rig.roles import Role
+from spark.rotation import quat_from_rotvec, quat_mul
 from tests.helpers.rigs import RIGS, build, walk
 from tests.helpers.role_tables import mirrored, wrong
 
@@ -140,3 +141,18 @@ def test_a_face_that_begins_where_its_joint_does_is_the_head_s() -> None:
     offsets[skeleton.names.index("face")] = 0.0
     odd = replace(skeleton, offsets=offsets)
     assert wrong(odd, assign_roles(odd), right) == {}
+
+
+def test_no_bone_of_an_arm_bends() -> None:
+    """A cartoon's upper arm may be half as long as its forearm: the joint at its shoulder, which
+    bends, lies in no upper arm that would begin at the clavicle."""
+    skeleton, right = build(RIGS["lafan1"], names="joint{}")
+    for role, along in (("clavicle", 0.16), ("upper_arm", 0.10), ("forearm", 0.22), ("hand", 0.34)):
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            skeleton.offsets[right.index(Role(f"{side}_{role}"))] = [0.0, sign * along, 0.0]
+    motion = walk(skeleton, right)
+    swing = np.sin(np.linspace(0, 4 * np.pi, len(motion)))[:, None] * [0.4, 0.0, 0.0]
+    for role in (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM):
+        j = right.index(role)
+        motion.rotations[:, j] = quat_mul(quat_from_rotvec(swing), motion.rotations[:, j])
+    assert wrong(skeleton, assign_roles(skeleton, motion), right) == {}
