@@ -65,7 +65,8 @@ class RigPose:
         aside = {*self._finger(joint, "thumb"), *self._held(joint)}
         aside |= {k for j in aside for k in self.skeleton.subtree(j)}
         fingers = [j for j in below if j not in aside]
-        return self._vector(joint, fingers[1:], fingers)
+        tipped = self._pointing(fingers) if role in _HANDS else fingers
+        return self._vector(joint, fingers[1:], tipped)
 
     def _toe(self, toe: int, role: Role) -> Vector | None:
         """To the middle of what is the toe's own; None where that is too short to show a direction
@@ -84,18 +85,26 @@ class RigPose:
     def _held(self, hand: int) -> list[int]:
         """What hangs on a hand and points away from its forearm, as swords and trays do: no wrist
         rests so far bent that these are fingers."""
-        forearm = int(self.skeleton.parents[hand])
-        if self.roles.roles[hand] not in _HANDS or forearm < 0:
+        if self.roles.roles[hand] not in _HANDS:
             return []
-        along = self.positions[hand] - self.positions[forearm]
-        held = []
-        for joint in self.skeleton.children[hand]:
-            below = list(self.skeleton.subtree(joint))
-            points = self._vector(hand, below, below)
-            away = np.zeros(3) if points is None else quat_rotate(self.world[hand], points)
-            if away @ along < _COS_HELD * np.linalg.norm(away) * np.linalg.norm(along):
-                held.append(joint)
-        return held
+        below = {j: list(self.skeleton.subtree(j)) for j in self.skeleton.children[hand]}
+        return [j for j, joints in below.items() if self._away(hand, joints, joints)]
+
+    def _pointing(self, fingers: list[int]) -> list[int]:
+        """Those joints of a hand whose End Sites do not point away from the bones to them: some
+        exporters write one along a coordinate axis."""
+        return [j for j in fingers if not self._away(j, [], [j])]
+
+    def _away(self, joint: int, joints: list[int], tipped: list[int]) -> bool:
+        """Whether the middle of joints and of End Sites lies away from the line of the bone to
+        `joint`; not where there is none."""
+        above = int(self.skeleton.parents[joint])
+        points = self._vector(joint, joints, tipped)
+        if above < 0 or points is None:
+            return False
+        along = self.positions[joint] - self.positions[above]
+        away = quat_rotate(self.world[joint], points)
+        return bool(away @ along < _COS_HELD * np.linalg.norm(away) * np.linalg.norm(along))
 
     def thumb_side(self, hand: int) -> tuple[Vector, float] | None:
         """The vector towards the thumb's side of a hand, and how far [rad] it points below the
@@ -108,7 +117,7 @@ class RigPose:
                 return self.seen_from(hand, across), 0.0
         thumb = self._finger(hand, "thumb")
         joints = list(self.skeleton.subtree(thumb[0])) if thumb else []
-        vector = self._vector(hand, joints, joints) if joints else None
+        vector = self._vector(hand, joints, self._pointing(joints)) if joints else None
         return None if vector is None else (vector, _THUMB_DROOP)
 
     def _finger(self, hand: int, name: str) -> list[int]:

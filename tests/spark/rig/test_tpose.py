@@ -461,6 +461,28 @@ def test_what_a_hand_holds_does_not_turn_it() -> None:
         assert quat_angle(*tposes).max() < 1e-6
 
 
+@pytest.mark.parametrize("convention", ["lafan1", "unreal"])
+def test_an_end_site_beside_the_line_of_its_bone_turns_no_hand(convention: str) -> None:
+    """Blender gives a bone without a child an End Site along one of its axes, whichever that is."""
+    skeleton, _ = build(RIGS[convention])
+    roles = assign_roles(skeleton)
+    hand = skeleton.subtree(roles.require(Role.LEFT_HAND))
+    last = [j for j in hand if not skeleton.children[j]]
+    kept = ~np.isin(skeleton.end_parents, last)
+    aside = [w for w in (*np.eye(3), *-np.eye(3)) if (skeleton.offsets[last] @ w < 1e-9).all()]
+    tposes = []
+    for tips in ([], *([0.03 * way] * len(last) for way in aside)):
+        rig = replace(
+            skeleton,
+            end_parents=np.array([*skeleton.end_parents[kept], *last[: len(tips)]]),
+            end_offsets=np.array([*skeleton.end_offsets[kept], *tips]),
+        )
+        rest = Motion(rig, 1.0, rig.offsets[:1], np.tile([1.0, 0, 0, 0], (1, len(rig), 1)))
+        tposes.append(find_tpose(rest, roles)[0])
+    assert len(tposes) > 3
+    assert max(quat_angle(tposes[0], tpose).max() for tpose in tposes) < 1e-6
+
+
 def resting_at(motion: Motion, frame: int) -> tuple[Motion, np.ndarray]:
     """The motion on a file that rests in one of its frames, and how its axes are turned."""
     axes = quat_conj(world_rotations(motion.skeleton, motion.rotations[frame]))
