@@ -16,11 +16,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.blocks import in_blocks
-from spark.errors import name_list
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
-from spark.rotation import quat_angle, quat_conj, quat_slerp
+from spark.rotation import quat_conj, quat_slerp
 from spark.transfer.canonical import CanonicalMotion
+from spark.transfer.finger_pairs import finger_notes, finger_pairs
 
 # Normalised arc length along a chain, 0 to 1. Joints of two chains of equal length are taken one by
 # one where none lies further than this from its counterpart.
@@ -28,8 +28,6 @@ _MAX_OFFSET = 0.3
 # A joint further than this from all of the source's joints of its chain is unmatched: a little more
 # than the step between the joints of a spine of four.
 _MAX_GAP = 0.26
-
-_MIN_FINGER_BEND = np.radians(5)  # a finger that bends less against its hand is at rest
 
 # [hip heights] A floor further than this from z = 0 is moved to 0.
 FLOOR_TOLERANCE = 0.1
@@ -108,9 +106,7 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
             unmatched[j] = j if alone and len(joints) > 1 else -1
 
     names = {name: j for j, name in enumerate(source.skeleton.names)}
-    fingers = {
-        j: source.fingers[bone] for bone, j in target.fingers.items() if bone in source.fingers
-    }
+    fingers = finger_pairs(source, target)
     above = target.skeleton.ancestors(target.pelvis)[1:]
     for j in range(size):
         if known[j]:
@@ -146,7 +142,7 @@ def transfer(source: CanonicalMotion, target: Rig) -> CanonicalMotion:
         lambda block: link.rotations(source.rotations[block], target), len(source)
     )
     scale = target.hip_height / source.rig.hip_height
-    notes = (*source.notes, *_without_arms(source.rig, target), *_without_fingers(source, target))
+    notes = (*source.notes, *_without_arms(source.rig, target), *finger_notes(source, target))
     lift = 0.0
     if abs(source.floor_z) > FLOOR_TOLERANCE * source.rig.hip_height:
         lift = source.floor_z
@@ -167,28 +163,6 @@ def _without_arms(source: Rig, target: Rig) -> tuple[str, ...]:
     if own and not theirs:
         return ("the source has no arms: the target's stay out to the sides, as in the T-pose",)
     return ()
-
-
-def _without_fingers(source: CanonicalMotion, target: Rig) -> tuple[str, ...]:
-    """Which fingers of the source are left out, where they bend, and which of the target follow
-    their hands."""
-    theirs = {bone: j for bone, j in source.rig.fingers.items() if bone.number}
-    own = {bone: j for bone, j in target.fingers.items() if bone.number}
-    notes: tuple[str, ...] = ()
-    lost = [j for bone, j in theirs.items() if bone not in own]
-    hands = [source.rig.roles.require(Role(f"{b.side}_hand")) for b in theirs if b not in own]
-    palms = [source.rig.palms[hand] for hand in hands]
-    bends = quat_angle(source.rotations[:, palms], source.rotations[:, lost])
-    bent = [j for j, angle in zip(lost, bends.T, strict=True) if angle.max() > _MIN_FINGER_BEND]
-    if bent:
-        notes += (
-            f"{name_list([source.rig.skeleton.names[j] for j in bent])}: left out, fingers that "
-            f"the target lacks (they bend by up to {np.degrees(bends.max()):.0f} degrees)",
-        )
-    still = [target.skeleton.names[j] for bone, j in own.items() if bone not in theirs]
-    if still:
-        notes += (f"{name_list(still)}: fingers that the source lacks, they follow their hands",)
-    return notes
 
 
 def _hangs(rig: Rig, joint: int, ancestor: int) -> bool:

@@ -193,28 +193,57 @@ def test_fingers_turn_alike_under_other_names_and_in_another_order() -> None:
 
 
 def test_fingers_without_a_counterpart_are_named_and_follow() -> None:
-    """A third phalanx goes with the second, a finger with its hand; what is left out is said, if
-    it does anything."""
-    source, target = turning(hands(*MIXAMO[:3], bones=2)), hands(RIGIFY[0], "thumb", "f_ring")
+    """A third phalanx goes with the second, a thumb with its hand; what is left out is said, if it
+    does anything."""
+    mixamo, rigify = MIXAMO[0], RIGIFY[0]
+    source, target = turning(hands(mixamo, "Index", bones=2)), hands(rigify, "thumb", "f_index")
     moved = transfer(source, target)
     at = {name: j for j, name in enumerate(target.skeleton.names)}
     for joint_name, goes_with in (
-        ("DEF-thumb.03.L", at["DEF-thumb.02.L"]),
-        ("DEF-f_ring.01.R", joint(Role.RIGHT_HAND)),
-        ("DEF-f_ring.02.R", joint(Role.RIGHT_HAND)),
+        ("DEF-f_index.03.L", at["DEF-f_index.02.L"]),
+        ("DEF-thumb.01.R", joint(Role.RIGHT_HAND)),
+        ("DEF-thumb.02.R", joint(Role.RIGHT_HAND)),
     ):
         np.testing.assert_array_equal(
             moved.rotations[:, at[joint_name]], moved.rotations[:, goes_with]
         )
-    left_out, follow = moved.notes
-    assert left_out.startswith(
-        "'mixamorig:LeftHandIndex1', 'mixamorig:LeftHandIndex2', 'mixamorig:RightHandIndex1', "
-        "'mixamorig:RightHandIndex2': left out, fingers that the target lacks"
-    )
-    assert "'DEF-thumb.03.L', 'DEF-f_ring.01.L'" in follow
+    (follow,) = moved.notes
+    assert "'DEF-thumb.03.L', 'DEF-f_index.03.L'" in follow
     assert "they follow their hands" in follow
+    source, target = turning(hands(mixamo, "Thumb", "Index", bones=2)), hands(rigify, "f_index")
+    left_out = transfer(source, target).notes[0]
+    assert left_out.startswith(
+        "'mixamorig:LeftHandThumb1', 'mixamorig:LeftHandThumb2', 'mixamorig:RightHandThumb1', "
+        "'mixamorig:RightHandThumb2': left out, fingers that the target lacks"
+    )
     still = to_canonical(replace(standing(source.rig, 2)), source.rig)
-    assert transfer(still, target).notes == (follow,)
+    assert len(transfer(still, target).notes) == 1
+
+
+@pytest.mark.parametrize(
+    ("theirs", "own", "bends_as"),
+    [
+        ("f_index", "f_middle f_ring f_pinky", "f_index f_index f_index"),
+        ("f_index f_middle f_pinky", "f_ring", "f_middle"),
+        ("f_index f_ring", "f_middle f_pinky", "f_ring f_ring"),
+        ("f_index f_middle f_ring f_pinky", "fingers", "f_middle"),
+        ("fingers", "f_index f_ring", "fingers fingers"),
+    ],
+)
+def test_fingers_that_the_source_lacks_bend_as_the_nearest(
+    theirs: str, own: str, bends_as: str
+) -> None:
+    """Straight beside fingers that bend they would seem to point. The thumb shows no other one."""
+    source = turning(hands(RIGIFY[0], "thumb", *theirs.split()))
+    target = hands(RIGIFY[0], *own.split())
+    moved = transfer(source, target)
+    at = {name: j for j, name in enumerate(source.rig.skeleton.names)}
+    for finger, nearest in zip(own.split(), bends_as.split(), strict=True):
+        for end in ("01.L", "02.L", "03.L", "01.R", "02.R", "03.R"):
+            j = target.skeleton.names.index(f"DEF-{finger}.{end}")
+            theirs_at = at[f"DEF-{nearest}.{end}"]
+            np.testing.assert_array_equal(moved.rotations[:, j], source.rotations[:, theirs_at])
+    assert "bend as those beside them" in moved.notes[-1]
 
 
 def test_a_hand_turns_as_what_carries_the_fingers() -> None:
