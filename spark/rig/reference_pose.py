@@ -178,8 +178,9 @@ def pelvis_frame(reference: Reference) -> Float[np.ndarray, "3 3"]:
     # Artists build along the axes, whichever way the trunk leans; so do motion capture systems.
     if reference.posed:
         lateral = snap(lateral, _MAX_HIP_TILT)
-        feet, *higher = _landmarks(pose.roles, pose.positions)
-        body = min((_across(pose.seen_from(pelvis, v - feet), lateral) for v in higher), key=tilt)
+        body = min(
+            (_across(pose.seen_from(pelvis, line), lateral) for line in _lines(pose)), key=tilt
+        )
         up = snap(body, _MAX_LEAN) if tilt(body) < _MAX_LEAN else up
     elif reference.square:
         lateral = snap(lateral, np.pi)
@@ -191,6 +192,16 @@ def pelvis_frame(reference: Reference) -> Float[np.ndarray, "3 3"]:
         raise SkeletonError("the trunk lies along the line of the hips: no direction is up")
     up = up / length
     return np.stack([np.cross(lateral, up), lateral, up])
+
+
+def _lines(pose: RigPose) -> list[Vector]:
+    """Lines [m] that a body may have been built along: from the feet to the hips and to its top, or
+    along the trunk. Those that stand in the file, if any does: of one that squats in it the legs
+    point elsewhere, of one that bends over the trunk does."""
+    feet, hips, *top = _landmarks(pose.roles, pose.positions)
+    legs = [hips - feet, *(v - feet for v in top)]
+    lines = [*legs, *(v - hips for v in top)]
+    return [v for v in lines if v[2] > np.cos(_MAX_LEAN) * np.linalg.norm(v)] or legs
 
 
 def _lateral(pose: RigPose) -> Vector:
