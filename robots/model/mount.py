@@ -7,7 +7,7 @@ or joints, welded to the base below head and shoulders, give them that; nothing 
 import numpy as np
 from jaxtyping import Float
 
-from robots.model.parts import skeleton_of, telling_names
+from robots.model.parts import Points, skeleton_of, telling_names
 from robots.model.posing import half_bent
 from robots.model.segments import Segment
 from robots.tree import ROOT, Tree
@@ -15,8 +15,6 @@ from spark.errors import SkeletonError
 from spark.rig.anatomy import NoLegsError
 from spark.rig.role_assignment import Override, assign_roles
 from spark.rig.roles import Role, RoleMap
-
-Points = list[Float[np.ndarray, "_ 3"]]
 
 _NAMES = ("virtual_left_thigh", "virtual_left_shank", "virtual_right_thigh", "virtual_right_shank")
 _HIP_HEIGHT, _KNEE_HEIGHT = 0.53, 0.285  # of the height of a human: Drillis and Contini 1966

@@ -1,6 +1,7 @@
 """A robot's rigid parts as the joints of a skeleton, and what they are called."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
@@ -9,8 +10,11 @@ from robots.model.mjcf import Mjcf
 from robots.model.segments import Segment
 from robots.model.shapes import surface
 from spark.rig.name_hints import read_names
-from spark.rig.roles import RoleMap
+from spark.rig.roles import Role, RoleMap
 from spark.skeleton import Skeleton
+
+Points = list[Float[np.ndarray, "_ 3"]]
+_HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
 
 
 def telling_names(segments: Sequence[Segment]) -> tuple[str, ...]:
@@ -40,9 +44,47 @@ def _without_kind(name: str) -> str:
     return name
 
 
-def surface_points(mjcf: Mjcf, segments: Sequence[Segment]) -> list[Float[np.ndarray, "_ 3"]]:
-    """Points on the surface of each part, in the rest pose's world [m]."""
-    return [surface(mjcf, _welded_to(mjcf, segment.body, segments)) for segment in segments]
+def shaped_parts(mjcf: Mjcf, segments: Sequence[Segment]) -> tuple[list[Segment], Points, Points]:
+    """The parts, points on the surface of each [m, rest pose's world], and the same with those of
+    what is welded to it. That is no part of its own where it does not reach beyond what carries
+    it, as heads and hands do, and cameras and guards don't."""
+    points = [surface(mjcf, _welded_to(mjcf, segment.body, segments)) for segment in segments]
+    inside = {
+        i
+        for i, segment in enumerate(segments)
+        if _is_welded(segments, i)
+        and _reach(points[i], segments[segment.parent])
+        <= _reach(points[segment.parent], segments[segment.parent])
+    }
+    shapes = list(points)
+    for i in sorted(inside):
+        above = segments[i].parent
+        shapes[above] = np.concatenate([shapes[above], points[i]])
+    segments, kept = without(segments, inside)
+    return segments, [points[k] for k in kept], [shapes[k] for k in kept]
+
+
+def without(segments: Sequence[Segment], left_out: set[int]) -> tuple[list[Segment], list[int]]:
+    """The parts but for some that carry nothing, and the old number of each."""
+    kept = [k for k in range(len(segments)) if k not in left_out]
+    new = {-1: -1} | {k: i for i, k in enumerate(kept)}
+    return [replace(segments[k], parent=new[segments[k].parent]) for k in kept], kept
+
+
+def _is_welded(segments: Sequence[Segment], i: int) -> bool:
+    """Whether a part is fixed to the one that carries it, and carries nothing itself."""
+    own, above = segments[i], segments[i].parent
+    return (
+        above >= 0
+        and not own.joints
+        and own.link == segments[above].link
+        and all(segment.parent != i for segment in segments)
+    )
+
+
+def _reach(points: Float[np.ndarray, "P 3"], carrier: Segment) -> float:
+    """How far [m] points are from where their carrier turns."""
+    return float(np.linalg.norm(points - carrier.center, axis=1).max(initial=0.0))
 
 
 def _welded_to(mjcf: Mjcf, body: int, segments: Sequence[Segment]) -> list[int]:
@@ -69,6 +111,18 @@ def rigid_points(
             joined[above] = np.concatenate([joined[above], joined[i]])
             joined[i] = joined[i][:0]
     return joined
+
+
+def fixtures_of(segments: Sequence[Segment], roles: RoleMap) -> set[int]:
+    """The welded parts without a role, such as tools: they don't show where a limb points, but for
+    what hands have, which may be fingers."""
+    return {
+        i
+        for i, segment in enumerate(segments)
+        if _is_welded(segments, i)
+        and roles.roles[i] is None
+        and roles.roles[segment.parent] not in _HANDS
+    }
 
 
 def skeleton_of(

@@ -16,7 +16,7 @@ from robots.model.mirrored import unmirrored_limits
 from robots.model.mjcf import Mjcf, read_mjcf
 from robots.model.morphology import Morphology
 from robots.model.mount import roles_and_parts, standing_height
-from robots.model.parts import rigid_points, skeleton_of, surface_points
+from robots.model.parts import fixtures_of, rigid_points, shaped_parts, skeleton_of, without
 from robots.model.segments import Segment, segments_of, tree_of
 from robots.model.soles import place_feet, soles_of, with_soles
 from robots.model.tpose import TPose, search_tpose
@@ -56,29 +56,27 @@ def understand_robot(source: Mjcf | str | Path, override: Override | None = None
 def parts_of(mjcf: Mjcf) -> Skeleton:
     """The robot's parts, called as their bodies are: the joints that an `override` names."""
     tree, joints = tree_of(mjcf)
-    segments = segments_of(mjcf, tree, joints)
-    points = surface_points(mjcf, segments)
+    segments, points, _ = shaped_parts(mjcf, segments_of(mjcf, tree, joints))
     return skeleton_of(segments, points, tuple(segment.names[0] for segment in segments))
 
 
 def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | None) -> Morphology:
-    segments = segments_of(mjcf, tree, joints)
-    points = surface_points(mjcf, segments)
-    standing = standing_height(points, tree.base)
+    segments, points, shapes = shaped_parts(mjcf, segments_of(mjcf, tree, joints))
+    standing = standing_height(shapes, tree.base)
     found, segments, points, mounted = roles_and_parts(tree, segments, points, override)
     segments, order = _rerooted(segments, found)
-    points = [points[k] for k in order]
-    roles = RoleMap(
-        tuple(found.roles[k] for k in order),
-        tuple(found.confidence[k] for k in order),
-        tuple(found.reasons[k] for k in order),
-    )
+    shapes += points[len(shapes) :]  # virtual legs
+    roles = _ordered(found, order)
+    shapes = rigid_points(segments, roles, [shapes[k] for k in order])
+    segments, kept = without(segments, fixtures_of(segments, roles))
+    roles, shapes = _ordered(roles, kept), [shapes[k] for k in kept]
+    points = [points[order[k]] for k in kept]
+    points = [own if len(own) else shape for own, shape in zip(points, shapes, strict=True)]
     skeleton = skeleton_of(segments, points, tuple(segment.names[0] for segment in segments))
     rest = Motion(skeleton, 1.0, skeleton.offsets[:1], _identity(len(skeleton)))
     ideal, _ = find_tpose(rest, roles)  # as if joints had no limits
 
     links = np.array([segment.link for segment in segments])
-    shapes = rigid_points(segments, roles, points)
     place_feet(skeleton, roles, shapes, ideal)
     soles = soles_of(skeleton, roles, shapes, ideal, links)
     skeleton = with_soles(skeleton, soles)
@@ -148,6 +146,14 @@ def _rerooted(segments: list[Segment], roles: RoleMap) -> tuple[list[Segment], l
     return [
         replace(segments[k], parent=new.get(parents[k], -1), center=centers[k]) for k in order
     ], order
+
+
+def _ordered(roles: RoleMap, order: Sequence[int]) -> RoleMap:
+    return RoleMap(
+        tuple(roles.roles[k] for k in order),
+        tuple(roles.confidence[k] for k in order),
+        tuple(roles.reasons[k] for k in order),
+    )
 
 
 def _assume_limits(

@@ -186,14 +186,15 @@ ASIDE: dict[str, str] = {
         "人指 中指 薬指 小指",
         "a twist bone": "twist roll share",
         "a helper": "ik fk pole ctrl control target helper nub end tip leaf null dummy socket "
-        "attach attachment marker imu camera sec sub adj mch spring physics jiggle offset effector "
-        "site corrective muscle headtop sensor",
+        "attach attachment marker imu camera cam wheel sec sub adj mch spring physics jiggle "
+        "offset effector site corrective muscle headtop sensor",
         "part of the face": "eye jaw ear teeth tooth tongue brow eyebrow eyelid lid cheek lip lips "
         "nose nostril mouth chin beard oculi oris orbicularis risorius levator temporalis special",
         "hair": "hair bang bangs ponytail pigtail braid",
         "clothes": "skirt cloth cape coat sleeve belt strap scarf hood robe dress ribbon tie",
         "soft tissue": "breast bust boob pec pectoral glute butt buttock belly stomach genital",
-        "a prop": "weapon sword shield gun prop holster bag hat helmet cap quiver bow item staff",
+        "a prop": "weapon sword shield gun prop holster bag hat helmet cap quiver bow item staff "
+        "backpack",
         "an animal's part": "tail feather horn fin mane",
         "a foot bone": "metatarsal metatarsals heel sole",
     }.items()

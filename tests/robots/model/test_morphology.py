@@ -597,3 +597,27 @@ def test_a_tool_in_a_hand_turns_no_hand(tmp_path: Path) -> None:
     robots = [understand_robot(written(tmp_path, x)) for x in (held, text)]
     tpose, expected = (robot.to_qpos(robot.tpose)[0, 7:] for robot in robots)
     np.testing.assert_allclose(tpose, expected, atol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["menagerie/unitree_g1/g1.xml", "menagerie/unitree_h1/h1.xml"])
+def test_what_is_welded_on_turns_no_limb(name: str) -> None:
+    """A box at the side of each part, as a camera. The H1's arms end in forearms: they pointed to
+    such boxes, too far off for a T-pose."""
+    robot = understood(name)
+    spec = robot.mjcf.spec.copy()
+    for k, body in enumerate(spec.bodies[1:]):
+        box = body.add_body(name=f"box_{k}", pos=[0.01, 0.03, 0.01])
+        box.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.01] * 3, contype=0, conaffinity=0)
+    boxed = understand_robot(replace(robot.mjcf, spec=spec, model=spec.compile()))
+    np.testing.assert_allclose(boxed.tpose.angles, robot.tpose.angles, atol=1e-6)
+    assert boxed.rig.hip_height == pytest.approx(robot.rig.hip_height)
+
+
+def test_a_tool_on_a_forearm_turns_no_arm() -> None:
+    """The H1 has no hands: a rod across the end of its arm is no more of it than one in a hand."""
+    robot = understood("menagerie/unitree_h1/h1.xml")
+    spec = robot.mjcf.spec.copy()
+    rod = spec.body("left_elbow_link").add_body(name="rod", pos=[0.28, 0, -0.015])
+    rod.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0, 0, 0.4], size=[0.01, 0.01, 0.4])
+    armed = understand_robot(replace(robot.mjcf, spec=spec, model=spec.compile()))
+    np.testing.assert_allclose(armed.tpose.angles, robot.tpose.angles, atol=1e-6)
