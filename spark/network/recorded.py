@@ -150,7 +150,7 @@ class KnownBodies:
         if not self.reach:
             return "recorded pairs helped no character left out of the training: not used"
         share = self.nearness(source) * self.nearness(target)
-        far = f"source {self.distance(source):.2g}, target {self.distance(target):.2g}"
+        far = f"source {self.distance(source):.1f}, target {self.distance(target):.1f}"
         if not share:
             return (
                 f"unlike the characters of the training's recorded pairs ({far} from the nearest, "

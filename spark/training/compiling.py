@@ -9,7 +9,7 @@ from spark.training.objective import Objective
 from spark.training.settings import TrainConfig
 
 _PAYS_FROM = 30 * 60.0  # [s]: compiling takes minutes
-_STEP = 0.05  # [s], of a step on a GPU that is not compiled: a guess, no GPU was at hand
+_STEP = 0.05  # [s], of a step on a GPU that is not compiled: at least (docs/training.md)
 
 
 def compiles(config: TrainConfig, device: torch.device) -> bool:
