@@ -28,6 +28,7 @@ from spark.rotation import matrix_from_quat, quat_normalize
 _MAX_VALUES = 100_000_000  # frames times nodes of a file: 12 hours of a body with fingers at 30 fps
 _FPS = (15.0, 240.0)  # of keys; wider ones are of an animator's curves, closer ones of no motion
 _USUAL_FPS = 30.0
+_ROUNDED = 2e-5  # of a rate: one as near to a whole number is that, as files write times in digits
 _REST = {"rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0] * 3, "translation": [0.0] * 3}
 
 
@@ -173,7 +174,7 @@ def _frame_time(tracks: _Tracks) -> tuple[float, tuple[str, ...]]:
         length = float(np.ptp(longest.times))
         # Single precision blurs one step; their number over the whole length is exact.
         fps = round(length / float(np.percentile(steps, 10))) / max(length, 1e-9)
-        fps = float(np.round(fps)) if abs(fps - np.round(fps)) < 2e-5 * fps else fps
+        fps = float(np.round(fps)) if abs(fps - np.round(fps)) < _ROUNDED * fps else fps
         if _FPS[0] <= fps <= _FPS[1]:
             return 1 / fps, (f"{fps:.4g} fps, as its keys lie",)
     return 1 / _USUAL_FPS, (f"sampled at {_USUAL_FPS:g} fps: its keys lie at odd times",)
@@ -246,8 +247,9 @@ def _sampled(
     keys, values = track.times, track.values
     rotates = blend is rotations_at
     if len(keys) == 1 or track.interpolation == "STEP":
-        # A key at a frame's own time counts, whatever the rounding.
-        at = np.clip(np.searchsorted(keys, times + 1e-6, side="right") - 1, 0, len(keys) - 1)
+        # A key at a frame's own time counts, whatever the rounding, of the rate too.
+        late = 1e-6 + _ROUNDED * (times - times[0])
+        at = np.clip(np.searchsorted(keys, times + late, side="right") - 1, 0, len(keys) - 1)
         return values[at, values.shape[1] // 2]
     if track.interpolation != "CUBICSPLINE":
         rows = quat_normalize(values[:, 0]) if rotates else values[:, 0]

@@ -169,6 +169,17 @@ def test_rotations_between_keys(tmp_path: Path, how: str) -> None:
     )
 
 
+@pytest.mark.parametrize("step", [0.033333, 0.0333334, 0.041667])
+def test_stepped_keys_of_a_rate_in_few_digits_are_a_frame_each(tmp_path: Path, step: float) -> None:
+    """None is held for two, and none left out, wherever the rate that is read drifts to."""
+    turns = Rotation.from_rotvec(np.linspace(0, 2, 900)[:, None] * [0, 0, 1])
+    keys, quats = np.arange(900) * step, turns.as_quat()
+    found = read_gltf(bent("STEP", keys, quats, "rotation").write(tmp_path / "a.glb")).motion
+    assert len(found) == 900
+    apart = np.diff(found.rotations[:, 1], axis=0)
+    assert np.linalg.norm(apart, axis=-1).min() > 1e-4
+
+
 @pytest.mark.parametrize("path", ["translation", "scale"])
 def test_places_and_scales_between_keys(tmp_path: Path, path: str) -> None:
     values = np.array([[0.25, 0.5, 0.5], [0.5, 0.5, 0.5], [1, 2, 0.5]])
