@@ -114,8 +114,11 @@ def _uprightness(motion: Motion, roles: RoleMap) -> Float[np.ndarray, "T"]:
 
 
 def _stands(rest: RigPose) -> bool:
-    """Whether the rest pose is a pose: legs don't point up along the trunk, arms don't cross it."""
-    lateral, up = _lateral(rest), _trunk(rest)
+    """Whether the rest pose is a pose: hips or shoulders lie apart, legs don't point up along the
+    trunk, and arms don't cross it."""
+    lateral, up = _apart(rest), _trunk(rest)
+    if lateral is None:
+        return False
     for group in LIMBS:
         chain = limb_joints(rest.roles, group)
         limb = rest.positions[chain[-1]] - rest.positions[chain[0]] if chain else np.zeros(3)
@@ -206,13 +209,21 @@ def _lines(pose: RigPose) -> list[Vector]:
 
 def _lateral(pose: RigPose) -> Vector:
     """The unit vector from the right hip to the left one, or between the shoulders."""
+    lateral = _apart(pose)
+    if lateral is None:
+        raise SkeletonError("hips and shoulders lie in one point each: no direction is left")
+    return lateral
+
+
+def _apart(pose: RigPose) -> Vector | None:
+    """The same; None where hips lie in one point, and shoulders too."""
     for pair in (_UPPER_LEGS, _UPPER_ARMS):
         left, right = (pose.roles.joint(role) for role in pair)
         if left is not None and right is not None:
             across = pose.positions[left] - pose.positions[right]
             if np.linalg.norm(across) > SHORT:
                 return across / np.linalg.norm(across)
-    raise SkeletonError("hips and shoulders lie in one point each: no direction is left")
+    return None
 
 
 def _trunk(pose: RigPose) -> Vector:

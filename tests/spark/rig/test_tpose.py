@@ -32,7 +32,7 @@ from spark.transfer.canonical import to_canonical
 from tests.helpers.humanoids import EVERY_BODY, ONE_A_RIG
 from tests.helpers.recordings import DATA, recording, recordings
 from tests.helpers.rerig import along_x, rerig, rest_in
-from tests.helpers.rigs import RIGS, build
+from tests.helpers.rigs import RIGS, build, walk
 from tests.helpers.stick import joint, standing, stick_rig
 
 DOWN, LEFT, RIGHT = np.array([0.0, 0, -1]), np.array([0.0, 1, 0]), np.array([0.0, -1, 0])
@@ -540,3 +540,29 @@ def test_what_carries_the_body_carries_all_of_it(convention: str) -> None:
     assert set(rig.roles.held) <= set(body)
     bound = understand(Motion(skeleton, 1 / 30, skeleton.offsets[:1], rest))
     assert quat_angle(rig.tpose, bound.tpose)[body].max() < 1e-6
+
+
+def test_a_rest_pose_whose_sides_lie_in_one_point_is_no_hindrance() -> None:
+    """Where each bone lies along its joint's own axis, those of both hips are one line at rest."""
+    skeleton, right = build(
+        """
+        Hips P > Spine S > Neck N > Head H
+        Spine > {Left}Shoulder C > {Left}Arm U > {Left}ForeArm F > {Left}Hand W
+        Hips > {Left}HipJoint - > {Left}UpLeg T > {Left}Leg K > {Left}Foot A > {Left}Toe B
+        """
+    )
+    names = list(skeleton.names)
+    for side in ("Left", "Right"):
+        for carrier, carried in (("HipJoint", "UpLeg"), ("Shoulder", "Arm")):
+            above, below = names.index(side + carrier), names.index(side + carried)
+            skeleton.offsets[below] += skeleton.offsets[above]
+            skeleton.offsets[above] = 0
+    axes = np.tile([1.0, 0, 0, 0], (len(names), 1))
+    for j, name in enumerate(names):
+        if name.endswith(("HipJoint", "Shoulder")):
+            bone = skeleton.offsets[skeleton.children[j][0]]
+            axes[j] = quat_between(np.array([1.0, 0, 0]), bone)
+    collapsed = rerig(walk(skeleton, right), axes)
+    rest = collapsed.skeleton.rest_positions
+    assert np.ptp(rest[[names.index("LeftUpLeg"), names.index("RightUpLeg")]], axis=0).max() < 1e-9
+    assert_is_t(understand(collapsed))
