@@ -5,7 +5,8 @@ own toes, and a body with longer shanks squats. Animators keep the steps and let
 and so does this:
 
 - over the ground, the hips' path and the ankles about it are scaled alike (`travel_scale`), and
-  each ankle is moved out by as much as its hip joint is farther out than the source's, scaled;
+  each ankle is moved out by as much as its hip joint is farther out than the source's, scaled; of
+  who lies, ankles are scaled about the hips as legs are long, which then reach along the ground;
 - in height, the ankles' way above where they stand in the T-pose is scaled as the hips' is;
 - the feet keep their rotations, and the knees bend by two-bone inverse kinematics.
 
@@ -22,13 +23,16 @@ from spark.blocks import blocks
 from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_rotate
+from spark.smoothstep import smoothstep
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
 
 # Of the shoulders' height in `travel_scale`, against the hips'. On retargeted characters of an
 # animation library the scale over the ground lay between the two (docs/evaluation.md).
 _SHOULDER_WEIGHT = 0.5
+_LYING, _STANDING = 0.15, 0.6  # standing heights of the hips, between which legs come to lie
 _SHOULDERS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
+_FEET = (Role.LEFT_FOOT, Role.RIGHT_FOOT)
 
 
 @dataclass(frozen=True)
@@ -90,6 +94,7 @@ def _fitted(source: CanonicalMotion, moved: CanonicalMotion, fit: LegFit) -> Can
     copied_rise = standing / start.hip_height
     height = standing + fit.hips_up + (moved.hips[:, 2] - standing) * (fit.hips_rise / copied_rise)
     moved = replace(moved, hips=np.column_stack([source.hips[:, :2] * fit.travel, height]))
+    lying = _lying(source)
     outwards = quat_rotate(source.rotations[:, start.pelvis], np.array([0.0, 1.0, 0.0]))[:, :2]
     moves: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
     for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
@@ -100,13 +105,32 @@ def _fitted(source: CanonicalMotion, moved: CanonicalMotion, fit: LegFit) -> Can
         rest, own_rest = from_sole(start, ankle), from_sole(target, leg.foot)
         theirs = canonical_positions(source, [ankle])[:, 0]
         own = canonical_positions(moved, [leg.foot])[:, 0]
-        along = moved.hips[:, :2] + fit.travel * (theirs[:, :2] - source.hips[:, :2])
+        ratio = _reach(target, group) / _reach(start, group)
+        scale = (fit.travel + (ratio - fit.travel) * lying)[:, None]
+        along = moved.hips[:, :2] + scale * (theirs[:, :2] - source.hips[:, :2])
         side = 1.0 if group is Group.LEFT_LEG else -1.0
-        along += (own_rest[1] - fit.travel * rest[1] + side * fit.out) * outwards
+        along += (own_rest[1] - scale * rest[1] + side * fit.out) * outwards
         above = moved.floor_z + own_rest[2] + fit.ankles_up
         above = above + fit.ankles_rise * (theirs[:, 2] - source.floor_z - rest[2])
         moves.append((leg, np.column_stack([along, above]) - own))
     return move_ankles(moved, moves)
+
+
+def _lying(source: CanonicalMotion) -> Float[np.ndarray, "T"]:
+    """How much a body lies, 0 to 1: how low its hips are over the floor, or over an ankle that is
+    lower, as down a flight of stairs."""
+    rig = source.rig
+    ankles = [j for role in _FEET for j in rig.roles.joints(role)]
+    lowest = canonical_positions(source, ankles)[..., 2].min(axis=1, initial=source.floor_z)
+    high = (source.hips[:, 2] - lowest) / rig.hip_height
+    return smoothstep((_STANDING - high) / (_STANDING - _LYING))
+
+
+def _reach(rig: Rig, leg: Group) -> float:
+    """From the hip joint to the ankle in the T-pose [m], as far as a leg reaches."""
+    ends = [rig.roles.require(role) for role in (LIMBS[leg][0], foot_role(leg))]
+    hip, ankle = rig.tpose_positions[ends]
+    return max(float(np.linalg.norm(ankle - hip)), 1e-9)
 
 
 def foot_role(leg: Group) -> Role:

@@ -164,3 +164,38 @@ def test_nearer_to_what_an_animation_library_makes() -> None:
     before, after = (mean_score({"all": scores}) for scores in (copied, ours))
     assert after.mse < 0.5 * before.mse
     assert after.relative_mse < 0.5 * before.relative_mse
+
+
+@pytest.mark.parametrize("bend", [0.1, 0.6])
+@pytest.mark.parametrize("shoulders", [-0.2, 0.3])
+def test_who_lies_has_knees_as_bent_as_the_source(bend: float, shoulders: float) -> None:
+    """On his back, legs too long or too short for his shoulders: steps would fold or stretch
+    them."""
+    source, target = lying(stick_rig(), bend), stick_rig()
+    target.skeleton.offsets[[joint(Role.LEFT_UPPER_ARM), joint(Role.RIGHT_UPPER_ARM)], 2] += (
+        shoulders
+    )
+    assert abs(travel_scale(source.rig, target) - 1) > 0.07
+    moved = fit_legs(source, transfer(source, target))
+    for side in ("left", "right"):
+        joints = [joint(Role(f"{side}_{part}")) for part in ("upper_leg", "lower_leg", "foot")]
+        np.testing.assert_allclose(
+            np.diff(canonical_positions(moved, joints), axis=1),
+            np.diff(canonical_positions(source, joints), axis=1),
+            atol=1e-6,
+        )
+
+
+def lying(rig: Rig, bend: float) -> CanonicalMotion:
+    """On the back, 0.1 m over the floor, knees bent [rad] and ankles at the hips' height."""
+    still = standing(rig, 3)
+    pitch = {Role.PELVIS: -np.pi / 2}
+    for side in ("left", "right"):
+        pitch[Role(f"{side}_upper_leg")] = -bend / 2
+        pitch[Role(f"{side}_lower_leg")] = bend
+    rotations = still.rotations.copy()
+    for role, angle in pitch.items():
+        rotations[:, joint(role)] = quat_from_rotvec(np.array([0.0, angle, 0.0]))
+    root = np.tile([0.0, 0.0, 0.1], (3, 1))
+    motion = replace(still, rotations=rotations, root_pos=root)
+    return replace(to_canonical(motion, rig), floor_z=0.0)
