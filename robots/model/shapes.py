@@ -53,9 +53,9 @@ def corners(points: Float[np.ndarray, "P 3"]) -> list[int]:
     return [int(low[np.argmax(inside @ np.array(way))]) for way in product((-1.0, 1.0), repeat=2)]
 
 
-def flattening(points: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "4"] | None:
-    """The smallest rotation that lays the largest flat side below a foot on the floor; None where
-    no side within `TILTED` of the floor stands out, as on a ball."""
+def flattening(points: Float[np.ndarray, "P 3"]) -> tuple[Float[np.ndarray, "4"], float] | None:
+    """The smallest rotation that lays the largest flat side below a foot on the floor, and that
+    side's area [m²]; None where no side within `TILTED` of the floor stands out, as on a ball."""
     try:
         hull = ConvexHull(points)
     except (QhullError, ValueError):  # fewer than four points, or all in a plane
@@ -76,7 +76,7 @@ def flattening(points: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "4"] | Non
         return None
     largest = below[best]
     same = normals @ normals[largest] > np.cos(_COPLANAR)
-    return quat_between(areas[same] @ normals[same], np.array([0.0, 0.0, -1.0]))
+    return quat_between(areas[same] @ normals[same], np.array([0.0, 0.0, -1.0])), covered[best]
 
 
 def sole_heading(points: Float[np.ndarray, "P 3"]) -> float:

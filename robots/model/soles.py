@@ -20,6 +20,7 @@ from spark.rotation import (
 )
 from spark.skeleton import Skeleton
 
+_LARGER = 1.5  # of the area of a foot's sole to that of its other sides
 _FLATTER = np.radians(10)  # of a foot by one way than by another: less is how feet are drawn
 
 
@@ -48,18 +49,21 @@ def _flat(
     upright: Float[np.ndarray, "4"],
     ideal: Float[np.ndarray, "J 4"],
 ) -> Float[np.ndarray, "4"]:
-    """The foot's rotation with its sole on the floor: as it rests, or, where the leg rests so far
-    from hanging that no foot below it stands, or it then lies clearly flatter, as its shank carries
-    it into the T-pose."""
+    """The foot's rotation with its sole on the floor: as it rests, or as its shank carries it into
+    the T-pose. Of two sides the sole is the larger one by far; or else the one that is flatter
+    there by far where the leg rests so far from hanging that no foot below it stands, and where it
+    hangs the one that rests on the floor."""
     shank = int(skeleton.parents[foot])
     hangs = quat_rotate(upright, -skeleton.offsets[foot])
     stands = hangs[2] >= np.cos(TILTED) * np.linalg.norm(hangs)
     flats = []
     for q in (upright, ideal[shank]):
-        turn = flattening(quat_rotate(q, points))
+        turn, area = flattening(quat_rotate(q, points)) or (None, 0.0)
         angle = np.pi if turn is None else float(quat_angle(turn, quat_identity(turn)))
-        flats.append((angle, q if turn is None else quat_mul(turn, q)))
-    (resting, as_it_rests), (carried, as_carried) = flats
+        flats.append((angle, area, q if turn is None else quat_mul(turn, q)))
+    (resting, lower, as_it_rests), (carried, sole, as_carried) = flats
+    if lower > _LARGER * sole:
+        return as_it_rests
     if stands and (carried > TILTED or resting < carried + _FLATTER):
         return as_it_rests
     return as_carried

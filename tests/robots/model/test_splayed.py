@@ -19,6 +19,11 @@ HINGES: dict[str, tuple[tuple[str, str, Literal["x", "y"], tuple[int, int]], ...
     "one leg ahead, one behind": (("hip_pitch_link", "hip_pitch", "y", (-1, 1)),),
     "knees bent": (("shin", "knee", "y", (1, 1)),),
     "arms up": (("shoulder_roll_link", "shoulder_roll", "x", (1, -1)),),
+    "crouching": (
+        ("hip_pitch_link", "hip_pitch", "y", (-1, -1)),
+        ("shin", "knee", "y", (2, 2)),
+        ("ankle_pitch_link", "ankle_pitch", "y", (-1, -1)),
+    ),
     "sitting": (
         ("hip_pitch_link", "hip_pitch", "y", (-1, -1)),
         ("shin", "knee", "y", (1, 1)),
