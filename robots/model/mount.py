@@ -7,9 +7,10 @@ or joints, welded to the base below head and shoulders, give them that; nothing 
 import numpy as np
 from jaxtyping import Float
 
-from robots.model.parts import Points, skeleton_of, telling_names
+from robots.model.parts import skeleton_of, telling_names
 from robots.model.posing import half_bent
 from robots.model.segments import Segment
+from robots.model.welded import Points
 from robots.tree import ROOT, Tree
 from spark.errors import SkeletonError
 from spark.rig.anatomy import NoLegsError

@@ -1,20 +1,19 @@
 """A robot's rigid parts as the joints of a skeleton, and what they are called."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
+import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from robots.model.mjcf import Mjcf
 from robots.model.segments import Segment
 from robots.model.shapes import surface
+from robots.model.welded import Points, within, without
 from spark.rig.name_hints import read_names
-from spark.rig.roles import Role, RoleMap
 from spark.skeleton import Skeleton
 
-Points = list[Float[np.ndarray, "_ 3"]]
-_HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
+_LEAST_MASS = 1e-3  # [kg] less is what bodies without a mass are given
 
 
 def telling_names(segments: Sequence[Segment]) -> tuple[str, ...]:
@@ -47,44 +46,35 @@ def _without_kind(name: str) -> str:
 def shaped_parts(mjcf: Mjcf, segments: Sequence[Segment]) -> tuple[list[Segment], Points, Points]:
     """The parts, points on the surface of each [m, rest pose's world], and the same with those of
     what is welded to it. That is no part of its own where it does not reach beyond what carries
-    it, as heads and hands do, and cameras and guards don't."""
+    it, as heads and hands do, and cameras and guards don't. The first of a part without shapes are
+    where it ends by its masses."""
     points = [surface(mjcf, _welded_to(mjcf, segment.body, segments)) for segment in segments]
-    inside = {
-        i
-        for i, segment in enumerate(segments)
-        if _is_welded(segments, i)
-        and _reach(points[i], segments[segment.parent])
-        <= _reach(points[segment.parent], segments[segment.parent])
-    }
+    inside = within(segments, points)
     shapes = list(points)
     for i in sorted(inside):
         above = segments[i].parent
         shapes[above] = np.concatenate([shapes[above], points[i]])
+    ends = [
+        own if len(own) else _mass_end(mjcf, segment, segments)
+        for own, segment in zip(points, segments, strict=True)
+    ]
     segments, kept = without(segments, inside)
-    return segments, [points[k] for k in kept], [shapes[k] for k in kept]
+    return segments, [ends[k] for k in kept], [shapes[k] for k in kept]
 
 
-def without(segments: Sequence[Segment], left_out: set[int]) -> tuple[list[Segment], list[int]]:
-    """The parts but for some that carry nothing, and the old number of each."""
-    kept = [k for k in range(len(segments)) if k not in left_out]
-    new = {-1: -1} | {k: i for i, k in enumerate(kept)}
-    return [replace(segments[k], parent=new[segments[k].parent]) for k in kept], kept
-
-
-def _is_welded(segments: Sequence[Segment], i: int) -> bool:
-    """Whether a part is fixed to the one that carries it, and carries nothing itself."""
-    own, above = segments[i], segments[i].parent
-    return (
-        above >= 0
-        and not own.joints
-        and own.link == segments[above].link
-        and all(segment.parent != i for segment in segments)
-    )
-
-
-def _reach(points: Float[np.ndarray, "P 3"], carrier: Segment) -> float:
-    """How far [m] points are from where their carrier turns."""
-    return float(np.linalg.norm(points - carrier.center, axis=1).max(initial=0.0))
+def _mass_end(
+    mjcf: Mjcf, segment: Segment, segments: Sequence[Segment]
+) -> Float[np.ndarray, "_ 3"]:
+    """The point [m] of which a part's centre of mass is halfway from its joint, as of a rod; none
+    without a mass."""
+    bodies = _welded_to(mjcf, segment.body, segments)
+    masses = mjcf.model.body_mass[bodies]
+    if masses.sum() < _LEAST_MASS or not mjcf.model.body_ipos[bodies].any():  # not filled in
+        return np.zeros((0, 3))
+    data = mujoco.MjData(mjcf.model)
+    mujoco.mj_kinematics(mjcf.model, data)
+    mujoco.mj_comPos(mjcf.model, data)
+    return (2 * np.average(data.xipos[bodies], axis=0, weights=masses) - segment.center)[None]
 
 
 def _welded_to(mjcf: Mjcf, body: int, segments: Sequence[Segment]) -> list[int]:
@@ -97,32 +87,6 @@ def _welded_to(mjcf: Mjcf, body: int, segments: Sequence[Segment]) -> list[int]:
         if above in inside and other not in own and not model.body_jntnum[other]:
             inside.add(other)
     return sorted(inside)
-
-
-def rigid_points(
-    segments: Sequence[Segment], roles: RoleMap, points: Sequence[Float[np.ndarray, "_ 3"]]
-) -> list[Float[np.ndarray, "_ 3"]]:
-    """`points`, with those of welded parts that have no role at the parts that carry them: a sole
-    that is welded to an ankle is the foot's."""
-    joined = list(points)
-    for i in reversed(range(len(segments))):
-        above = segments[i].parent
-        if above >= 0 and roles.roles[i] is None and not segments[i].joints:
-            joined[above] = np.concatenate([joined[above], joined[i]])
-            joined[i] = joined[i][:0]
-    return joined
-
-
-def fixtures_of(segments: Sequence[Segment], roles: RoleMap) -> set[int]:
-    """The welded parts without a role, such as tools: they don't show where a limb points, but for
-    what hands have, which may be fingers."""
-    return {
-        i
-        for i, segment in enumerate(segments)
-        if _is_welded(segments, i)
-        and roles.roles[i] is None
-        and roles.roles[segment.parent] not in _HANDS
-    }
 
 
 def skeleton_of(

@@ -16,12 +16,13 @@ from robots.model.mirrored import unmirrored_limits
 from robots.model.mjcf import Mjcf, read_mjcf
 from robots.model.morphology import Morphology
 from robots.model.mount import roles_and_parts, standing_height
-from robots.model.parts import fixtures_of, rigid_points, shaped_parts, skeleton_of, without
+from robots.model.parts import shaped_parts, skeleton_of
 from robots.model.segments import Segment, segments_of, tree_of
 from robots.model.soles import place_feet, soles_of, with_soles
-from robots.model.tpose import TPose, search_tpose
+from robots.model.tpose import TPose, rest_pose, search_tpose
+from robots.model.welded import fixtures, joined, without
 from robots.tree import Coordinates, Tree
-from spark.errors import SkeletonError
+from spark.errors import SkeletonError, name_list
 from spark.motion import Motion
 from spark.rig.feet import hip_height
 from spark.rig.groups import groups_of
@@ -67,11 +68,11 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
     segments, order = _rerooted(segments, found)
     shapes += points[len(shapes) :]  # virtual legs
     roles = _ordered(found, order)
-    shapes = rigid_points(segments, roles, [shapes[k] for k in order])
-    segments, kept = without(segments, fixtures_of(segments, roles))
-    roles, shapes = _ordered(roles, kept), [shapes[k] for k in kept]
-    points = [points[order[k]] for k in kept]
-    points = [own if len(own) else shape for own, shape in zip(points, shapes, strict=True)]
+    points, shapes = [points[k] for k in order], [shapes[k] for k in order]
+    points, shapes = joined(segments, roles, points, shapes)
+    segments, kept = without(segments, fixtures(segments, roles))
+    roles = _ordered(roles, kept)
+    points, shapes = [points[k] for k in kept], [shapes[k] for k in kept]
     skeleton = skeleton_of(segments, points, tuple(segment.names[0] for segment in segments))
     rest = Motion(skeleton, 1.0, skeleton.offsets[:1], _identity(len(skeleton)))
     ideal, _ = find_tpose(rest, roles)  # as if joints had no limits
@@ -83,7 +84,8 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
     tree, assumed = _assume_limits(tree, segments, roles)
     tpose = search_tpose(tree, skeleton, roles, links, ideal, followers_of(mjcf, joints))
     odd = unmirrored_limits(mjcf.model, tree, joints, roles, links, tpose.coordinates)
-    notes = (*mjcf.notes, *assumed, *_check_tpose(tpose, skeleton), *odd)
+    blind = _check_ends(skeleton, roles)
+    notes = (*mjcf.notes, *assumed, *blind, *_check_tpose(tpose, skeleton), *odd)
     if mounted:
         notes = (*notes, "no legs: it stays on its base; arms, waist and head follow")
     rig = Rig(
@@ -167,6 +169,21 @@ def _assume_limits(
     upper = np.where(unlimited, np.pi, tree.upper)
     note = f"{int(unlimited.sum())} hinges have no limits: taken as 180 degrees to either side"
     return replace(tree, lower=lower, upper=upper), (note,)
+
+
+def _check_ends(skeleton: Skeleton, roles: RoleMap) -> tuple[str, ...]:
+    """A note that names the forearms and shanks of which nothing shows where they end."""
+    pose = rest_pose(skeleton, roles)
+    ends = [
+        skeleton.names[j]
+        for j, role in enumerate(roles.roles)
+        if role is not None and role.part in ("forearm", "lower_leg") and pose.bone(j) is None
+    ]
+    if not ends:
+        return ()
+    return (
+        f"no shape, joint or mass shows where {name_list(ends)} ends: where it points is a guess",
+    )
 
 
 def _check_tpose(tpose: TPose, skeleton: Skeleton) -> tuple[str, ...]:

@@ -621,3 +621,18 @@ def test_a_tool_on_a_forearm_turns_no_arm() -> None:
     rod.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, pos=[0, 0, 0.4], size=[0.01, 0.01, 0.4])
     armed = understand_robot(replace(robot.mjcf, spec=spec, model=spec.compile()))
     np.testing.assert_allclose(armed.tpose.angles, robot.tpose.angles, atol=1e-6)
+
+
+def test_masses_show_where_a_part_without_shapes_ends() -> None:
+    """As of a URDF whose meshes are missing: an H1 folded its arms for a T-pose."""
+    robot = understood("menagerie/unitree_h1/h1.xml")
+    spec = robot.mjcf.spec.copy()
+    for geom in list(spec.geoms):
+        spec.delete(geom)
+    bare = understand_robot(replace(robot.mjcf, spec=spec, model=spec.compile()))
+    np.testing.assert_allclose(bare.tpose.angles, robot.tpose.angles, atol=np.radians(3))
+    assert bare.notes == robot.notes
+    for body in spec.bodies[1:]:
+        body.mass, body.ipos = 1.0, [0, 0, 0]
+    blind = understand_robot(replace(robot.mjcf, spec=spec, model=spec.compile()))
+    assert any("'left_elbow_link'" in note and "guess" in note for note in blind.notes)
