@@ -15,6 +15,7 @@ from jaxtyping import Float
 
 from robots.model import model_cache
 from robots.model.compiling import compiled, one_line
+from robots.model.finite import check_finite, nan_in
 from robots.model.mjcf_source import read_source
 from robots.model.urdf import is_urdf, read_urdf
 from sim.body.compiling import warnings_as_notes
@@ -32,12 +33,7 @@ FREE, BALL, SLIDE, HINGE = (
 )
 _EQ_JOINT = int(mujoco.mjtEq.mjEQ_JOINT)
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
-_MAX_OFFSET = 1e4  # [m] of a body from its parent: beyond, floats lose millimetres; it is a mistake
-_NUMBERS = (
-    *("qpos0", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat"),
-    *("jnt_pos", "jnt_axis", "jnt_range", "geom_pos", "geom_quat", "geom_size"),
-    *("site_pos", "site_quat", "mesh_vert"),
-)
+_BASE_DOFS = 6  # of a body in the world
 _RIVAL_SHARE = 0.5  # a second tree with this share of the first one's joints is another robot
 
 
@@ -125,22 +121,8 @@ def read_mjcf(path: str | Path, *, visuals: bool = True) -> Mjcf:
         _stand(spec, model, root)
     _note_others(model, root, notes)
     _note_ignored(model, notes)
-    _check_numbers(model, path)
+    check_finite(model, path)
     return Mjcf(model, spec, int(model.body(root).id), path, tuple(notes))
-
-
-def _check_numbers(model: mujoco.MjModel, path: Path) -> None:
-    """Raise FileFormatError where a number of the model is none, or no length or mass that is."""
-    for what in ("body", "jnt", "geom"):
-        if not (np.abs(getattr(model, f"{what}_pos")) < _MAX_OFFSET).all():
-            name = {"jnt": "joint"}.get(what, what)
-            raise FileFormatError(
-                path, None, f"a {name}'s place is no number of metres below {_MAX_OFFSET:g}"
-            )
-    for name in _NUMBERS:
-        values = getattr(model, name)
-        if not np.isfinite(values).all():
-            raise FileFormatError(path, None, f"has numbers that are not finite ({name})")
 
 
 def _parse(path: Path, notes: list[str], *, visuals: bool) -> tuple[mujoco.MjSpec, str]:
@@ -154,7 +136,7 @@ def _parse(path: Path, notes: list[str], *, visuals: bool) -> tuple[mujoco.MjSpe
         message = one_line(error) if source.whole else re.sub(r",? line \d+", "", one_line(error))
         raise FileFormatError(path, None, f"MuJoCo can't read it: {message}") from error
     if any("'NaN'" in note for note in notes):
-        raise FileFormatError(path, None, "holds NaN where MuJoCo expects a number")
+        raise FileFormatError(path, None, f"{nan_in(path, source.text)} is no number")
     spec.modelfiledir = str(path.parent)
     return spec, source.text
 
@@ -210,7 +192,7 @@ def _is_free(joint: mujoco.MjsJoint) -> bool:
 def _free_root(spec: mujoco.MjSpec, root: str, path: Path, notes: list[str]) -> None:
     """Give the root a free joint: it has none, or moves by a chain of slides and hinges."""
     body = spec.body(root)
-    joints = list(body.joints)
+    joints = _base_joints(body)
     if any(_is_free(joint) for joint in joints):
         return
     if joints and not any(int(joint.type) == SLIDE for joint in joints):
@@ -234,6 +216,21 @@ def _free_root(spec: mujoco.MjSpec, root: str, path: Path, notes: list[str]) -> 
             spec.delete(key)
         notes.append(f"no free joint: one was given to {root!r}, its first 7 numbers in qpos")
     body.add_freejoint(name=f"{root}_free")
+
+
+def _base_joints(root: mujoco.MjsBody) -> list[mujoco.MjsJoint]:
+    """The joints that take the root through the world: its own, and where it slides those of the
+    bodies below it, as long as nothing else hangs on them and no shape."""
+    joints, body = list(root.joints), root
+    while (
+        any(int(joint.type) == SLIDE for joint in joints)
+        and len(list(body.bodies)) == 1
+        and not list(body.geoms)
+        and len(joints) + len(list(body.bodies[0].joints)) <= _BASE_DOFS
+    ):
+        body = body.bodies[0]
+        joints += list(body.joints)
+    return joints
 
 
 def _stand(spec: mujoco.MjSpec, model: mujoco.MjModel, root: str) -> None:

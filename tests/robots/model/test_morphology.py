@@ -364,6 +364,32 @@ def test_a_planar_root_is_replaced_and_said(tmp_path: Path) -> None:
     assert any("'x', 'z'" in note for note in robot.notes)
 
 
+@pytest.mark.parametrize("joints", ["xyzZYX", "xzY", "xyZ"])
+def test_a_root_that_a_chain_of_bodies_moves_is_free(joints: str, tmp_path: Path) -> None:
+    """As a floating base is written in a URDF: a body for each of its slides and hinges."""
+    text = registry.find("ember").read_text()
+    root = ElementTree.fromstring(text)
+    world, pelvis = root.find("worldbody"), root.find("worldbody/body")
+    assert world is not None
+    assert pelvis is not None
+    pelvis.remove(pelvis.find("freejoint"))
+    world.remove(pelvis)
+    above = world
+    for k, joint in enumerate(joints):
+        axis = " ".join("1" if x == joint.lower() else "0" for x in "xyz")
+        body = pelvis if k + 1 == len(joints) else ElementTree.Element("body", name=f"base_{k}")
+        kind = "slide" if joint.islower() else "hinge"
+        moves = ElementTree.Element("joint", name=f"base_{joint}", type=kind, axis=axis)
+        body.insert(0, moves)
+        above.append(body)
+        above = body
+    robot = understand_robot(written(tmp_path, ElementTree.tostring(root, encoding="unicode")))
+    expected = understand_robot(written(tmp_path, text))
+    assert robot.joint_names == expected.joint_names
+    np.testing.assert_allclose(robot.tpose.angles, expected.tpose.angles, atol=1e-6)
+    assert any(f"base_{joints[-1]}" in note and "free joint" in note for note in robot.notes)
+
+
 def test_hinges_without_limits_are_said(tmp_path: Path) -> None:
     robot = understand_robot(humanoid(tmp_path, limits=""))
     assert any("2 hinges have no limits" in note for note in robot.notes)

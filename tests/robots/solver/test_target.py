@@ -175,13 +175,17 @@ BAD = {
     ),
     "no number": (
         ROBOT.replace('pos="0 0 0.7"', 'pos="0 0 nan"'),
-        "holds NaN where MuJoCo expects a number",
+        "body 'pelvis': pos='0 0 nan' is no number",
     ),
     "no number beside": (
         ROBOT.replace('name="waist_yaw" axis', 'name="waist_yaw" damping="nan" axis'),
-        "holds NaN where MuJoCo expects a number",
+        "joint 'waist_yaw': damping='nan' is no number",
     ),
-    "too far": (ROBOT.replace('pos="0 0 0.7"', 'pos="0 0 1e30"'), "a body's place is no number"),
+    "too far": (ROBOT.replace('pos="0 0 0.7"', 'pos="0 0 1e30"'), "body 'pelvis': its place is"),
+    "no end": (
+        ROBOT.replace('name="waist_yaw" axis="0 0 1"', 'name="waist_yaw" axis="0 0 inf"'),
+        "joint 'waist_yaw': has numbers that are not finite (axis)",
+    ),
 }
 
 
