@@ -8,21 +8,20 @@ entangled arms may be led out from one side alone.
 """
 
 from collections.abc import Sequence
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.ndimage import binary_dilation, gaussian_filter1d, uniform_filter1d
+from scipy.ndimage import binary_dilation, uniform_filter1d
 
 from robots.least_squares import second_differences
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
-from robots.solver.collision import collisions_of
 from robots.solver.holds import Holds
-from robots.solver.objective import linearize
 from robots.solver.spells import Spells
 from robots.solver.targets import Targets
+from robots.solver.ways import along, taken
 from robots.solver.window_targets import PointTargets, PoseTargets, pose_targets
 from robots.solver.window_terms import Terms
 from robots.tree import Coordinates, forward_kinematics
@@ -34,13 +33,10 @@ _MAX_RATIO = 2.0  # of a limb's to the source's, and beyond that
 _MAX_EXCESS = 10.0  # [rad/s²], that is abrupt
 _AROUND = 1.0  # [s] before and after such frames that are marched through,
 _BETWEEN = 4.0  # [s] and between: what throws arms onto another way may hide until they return
-_FREE_SPEED = 3.0  # [rad/s] of a hinge that costs nothing where ways are compared, and what
-_W_TURN = 4.0  # [1/rad] a turn beyond that costs, from frame to frame
 # In the first frame, from the T-pose, in each that is marched through, and in those between.
 _FIRST_STEPS, _STEPS, _BETWEEN_STEPS = 60, 3, 2
 _INTERVAL = 0.1  # [s] between the frames that are marched through; the others follow together
 _FIRST_DAMPING, _DAMPING = 0.02, 1e-3  # [1] on the diagonal of the normal equations
-_SMOOTHING = 0.06  # [s] of the way taken: marching stops short of where each frame would be best
 _W_STAY = 0.2  # [1/rad] of how far a hinge turns from frame to frame
 _MAX_STEP = 0.3  # [rad] of a dof in one step
 _STEP_TOL = 0.03  # [rad] after a shorter step there is no further one
@@ -64,7 +60,7 @@ def abrupt(
         mean = uniform_filter1d(squared, window, mode="nearest")
         return np.sqrt(np.maximum(np.asarray(mean), 0.0)) / targets.frame_time**2
 
-    for role in _limbs(robot, targets, block):
+    for role in limbs_of(robot, targets, block):
         link = int(robot.links[robot.rig.roles.require(role)])
         own = acceleration(poses.direction(link, robot.bones[role]).T)
         out[1:-1] |= own > _MAX_RATIO * acceleration(targets.bones[role]) + _MAX_EXCESS
@@ -82,10 +78,7 @@ def calmed(
     """`q`, calmed around the frames in which limbs are thrown.
 
     In each spell of such frames, which goes on between two that are less than `_BETWEEN` apart, the
-    cheapest way is taken through three: `q`, and the block's
-    joints marched forth and back. What it costs to be in a frame says the solver's objective; from
-    frame to frame a turn by d [rad] beyond what is free costs (`_W_TURN` d)² / 2, also from way to
-    way. A spell begins and ends with `q` where frames before lead in, or others out.
+    cheapest path is taken through three ways: `q`, and the block's joints marched forth and back.
     """
     around = max(1, round(_AROUND / targets.frame_time))
     near = binary_dilation(thrown, np.ones(2 * around + 1, dtype=bool))
@@ -95,42 +88,8 @@ def calmed(
     led = [(start > 0, stop < len(q)) for start, stop in runs]
     part, targets, holds = q.at(frames), targets.at(frames), holds.at(frames)
     ways = [part, *_marched(robot, targets, part, block, spells, led)]
-    costs = np.stack([_cost(robot, targets, holds, way, block) for way in ways], axis=1)
-    hinges = [j for j in block.joints if not robot.tree.balls[j]]
-    angles = np.stack([way.angles[:, hinges] for way in ways])
-    turns = angles[:, None, 1:] - angles[None, :, :-1]
-    turns = np.maximum(np.abs(turns) - _FREE_SPEED * targets.frame_time, 0.0)
-    turned = 0.5 * _W_TURN**2 * np.einsum("abtn,abtn->tab", turns, turns)
-    taken = np.zeros(len(frames), dtype=int)
-    for own, (led_in, led_out) in zip(spells.slices(), led, strict=True):
-        costs[own.start, 1:] += np.inf if led_in else 0.0
-        costs[own.stop - 1, 1:] += np.inf if led_out else 0.0
-        taken[own] = cheapest(costs[own], turned[own.start : own.stop - 1])
-    for k, way in enumerate(ways):
-        at = np.flatnonzero(taken == k)
-        part = part.replaced(at, way.at(at))
-    smooth = partial(
-        gaussian_filter1d, sigma=_SMOOTHING / targets.frame_time, axis=0, mode="nearest"
-    )
-    angles = part.angles.copy()
-    angles[:, hinges] = spells.each(smooth, angles[:, hinges])
-    return q.replaced(frames, Coordinates(part.pos, part.quat, angles, part.ball_quats))
-
-
-def cheapest(
-    costs: Float[np.ndarray, "T W"], turned: Float[np.ndarray, "T-1 W W"]
-) -> Int[np.ndarray, "T"]:
-    """Which of W ways to take in each frame, by dynamic programming; `turned` [t, a, b] is what it
-    costs to be on way a in frame t + 1 after way b in frame t."""
-    total, came = costs[0], []
-    for cost, turn in zip(costs[1:], turned, strict=True):
-        through = turn + total
-        came.append(through.argmin(axis=1))
-        total = cost + through.min(axis=1)
-    taken = [int(total.argmin())]
-    for before in reversed(came):
-        taken.append(int(before[taken[-1]]))
-    return np.array(taken[::-1])
+    on = taken(robot, targets, holds, ways, block, spells, led)
+    return q.replaced(frames, along(robot, ways, on, block, spells, targets.frame_time))
 
 
 def _marched(
@@ -145,8 +104,8 @@ def _marched(
     something has led to their first frame go on from there; others begin at the T-pose. Frames
     between those that are marched through begin between them, and then take steps for themselves.
     """
-    bones = tuple(_limbs(robot, targets, block))
-    terms = _terms_of(robot, bones, targets.hands is not None)
+    bones = tuple(limbs_of(robot, targets, block))
+    terms = terms_of(robot, bones, targets.hands is not None)
     poses = pose_targets(targets, bones)
     columns, tpose = _qpos_columns(robot, block), robot.to_qpos(robot.tpose)
     qpos = robot.to_qpos(q)
@@ -165,9 +124,7 @@ def _marched(
         frames = first[:going] + k * (1 - 2 * back[:going])
         here = qpos[frames]
         here[:, columns] = last[:going]
-        here = _settled(
-            terms, poses.at(frames), here, _FIRST_STEPS if k == 0 else _STEPS, led=k > 0
-        )
+        here = settled(terms, poses.at(frames), here, _FIRST_STEPS if k == 0 else _STEPS, led=k > 0)
         last = here[:, columns]
         ways[back[:going], frames] = here
         marched[back[:going], frames] = True
@@ -181,7 +138,7 @@ def _marched(
             mujoco.mj_normalizeQuat(robot.mjcf.model, way[row])
         for start in range(0, len(others), _AT_ONCE):
             here = others[start : start + _AT_ONCE]
-            way[here] = _settled(terms, poses.at(here), way[here], _BETWEEN_STEPS)
+            way[here] = settled(terms, poses.at(here), way[here], _BETWEEN_STEPS)
     return [robot.from_qpos(way) for way in ways]
 
 
@@ -193,7 +150,7 @@ def _between(
     return np.stack(columns, axis=1)
 
 
-def _settled(
+def settled(
     terms: Terms,
     targets: PoseTargets,
     begun: Float[np.ndarray, "L nq"],
@@ -234,15 +191,7 @@ def _settled(
     return q
 
 
-def _cost(
-    robot: Morphology, targets: Targets, holds: Holds, q: Coordinates, block: Block
-) -> Float[np.ndarray, "T"]:
-    """The solver's objective, each frame for itself."""
-    candidates = collisions_of(robot).candidates(forward_kinematics(robot.tree, q), block, 1)
-    return linearize(robot, targets, holds, q, block, candidates, with_jacobian=False).cost
-
-
-def _limbs(robot: Morphology, targets: Targets, block: Block) -> list[Role]:
+def limbs_of(robot: Morphology, targets: Targets, block: Block) -> list[Role]:
     """The limbs' segments that the block moves, by the roles at their upper ends."""
     roles = [role for role in targets.bones if role in robot.bones]
     return [r for r in roles if int(robot.links[robot.rig.roles.require(r)]) in block.joints]
@@ -255,5 +204,5 @@ def _qpos_columns(robot: Morphology, block: Block) -> Int[np.ndarray, "n"]:
 
 
 @lru_cache(maxsize=16)
-def _terms_of(robot: Morphology, bones: tuple[Role, ...], hands: bool) -> Terms:
+def terms_of(robot: Morphology, bones: tuple[Role, ...], hands: bool) -> Terms:
     return Terms(robot, bones, hands, later_only=True)

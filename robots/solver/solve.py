@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
+from robots.solver.astray import led_back
 from robots.solver.block import Block, blocks_of, carriers, whole_of
 from robots.solver.crouch import less_deep
 from robots.solver.descent import collision_candidates, collision_stride, solve_block
@@ -180,10 +181,14 @@ def _parted(
     near = collision_candidates(robot, targets, q, block)
     if near:
         q = solve_block(robot, targets, holds, q, block, *steps, near)
-    if not block.base and (thrown := abrupt(robot, targets, q, block)).any():
-        q = calmed(robot, targets, holds, q, block, thrown)
-        near = collision_candidates(robot, targets, q, block)
-        q = solve_block(robot, targets, holds, q, block, *steps, near)
+    if not block.base:
+        solved = q
+        if (thrown := abrupt(robot, targets, q, block)).any():
+            q = calmed(robot, targets, holds, q, block, thrown)
+        q = led_back(robot, targets, holds, q, block)
+        if q is not solved:
+            near = collision_candidates(robot, targets, q, block)
+            q = solve_block(robot, targets, holds, q, block, *steps, near)
     return repair(robot, targets, holds, q, block)
 
 

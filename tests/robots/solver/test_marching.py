@@ -9,9 +9,10 @@ from robots.model.morphology import Morphology
 from robots.registry import find
 from robots.solver.block import Block, blocks_of
 from robots.solver.holds import Holds
-from robots.solver.marching import abrupt, calmed, cheapest
+from robots.solver.marching import abrupt, calmed
 from robots.solver.solve import retarget
 from robots.solver.targets import targets_of
+from robots.solver.ways import cheapest
 from robots.tree import Coordinates
 from sim.report.derivatives import derivative
 from spark.demo.sample import sample_rig
