@@ -51,8 +51,8 @@ def assign_roles(
     try:
         found, sides = _infer(
             skeleton_of(skeleton, kept),
-            None if motion is None else motion_of(motion.thinned(MAX_FRAMES), kept),
-            None if bent is None else motion_of(bent, kept),
+            motion_of(motion.thinned(MAX_FRAMES), kept) if motion else None,
+            motion_of(bent, kept) if bent else None,
         )
         found = {int(kept[j]): role for j, role in found.items()}
     except SkeletonError as error:
