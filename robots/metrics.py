@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from robots.kinematics import forward_kinematics
 from robots.model.motion import RobotMotion
 from robots.solver.floor import sole_paths
 from robots.solver.targets import targets_of
 from robots.solver.touching import touches_of
-from robots.tree import forward_kinematics
 from sim.report.assess import assess
 from sim.report.clip_poses import pose_clip
 from sim.report.derivatives import derivative

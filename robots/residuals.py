@@ -11,7 +11,8 @@ C degrees of freedom (dofs; `robots.tree.Tree`) in T frames, weighted as the res
 import numpy as np
 from jaxtyping import Float
 
-from robots.tree import Coordinates, LinkPoses, Tree, cross
+from robots.kinematics import LinkPoses, cross
+from robots.tree import Coordinates, Tree
 
 Linearized = tuple[Float[np.ndarray, "C M T"], Float[np.ndarray, "M T"]]
 """The transposed Jacobian of some residuals, and these."""

@@ -4,7 +4,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
-from robots.tree import Coordinates, Tree, forward_kinematics
+from robots.kinematics import forward_kinematics
+from robots.tree import Coordinates, Tree
 from spark.rig.roles import LIMBS, RoleMap
 
 _MIRROR = np.array([-1.0, 1.0, -1.0])  # of an axis of rotation, left to right (Y)

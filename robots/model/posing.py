@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float, Int
 
+from robots.kinematics import forward_kinematics
 from robots.model.segments import Segment
-from robots.tree import Coordinates, Tree, forward_kinematics
+from robots.tree import Coordinates, Tree
 from spark.motion import Motion
 from spark.rotation import matrix_from_quat, quat_conj, quat_from_matrix, quat_relative
 from spark.skeleton import Skeleton

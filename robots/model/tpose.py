@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from robots.kinematics import forward_kinematics
 from robots.least_squares import NormalEquations
 from robots.model.followers import Follower, following
 from robots.residuals import Linearized, direction_residual, limit_residual, rotation_residual
-from robots.tree import BASE, Coordinates, Tree, forward_kinematics
+from robots.tree import BASE, Coordinates, Tree
 from spark.rig.bones import RigPose
 from spark.rig.roles import LIMBS, Group, Role, RoleMap
 from spark.rotation import (

@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import binary_dilation
 from scipy.stats import qmc
 
+from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.holds import Holds
@@ -22,7 +23,7 @@ from robots.solver.spells import Spells
 from robots.solver.targets import Targets
 from robots.solver.ways import along, taken
 from robots.solver.window_targets import pose_targets
-from robots.tree import Coordinates, forward_kinematics
+from robots.tree import Coordinates
 from spark.rig.roles import LIMBS, Role
 from spark.runs import true_runs
 

@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Float
 
+from robots.kinematics import LinkPoses
 from robots.least_squares import NormalEquations
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
@@ -19,7 +20,7 @@ from robots.solver.hulls import SLABS, Shape, ShapePair
 from robots.solver.pushes import Pushes
 from robots.solver.shape_pairs import distances, nearest, pairs_of
 from robots.solver.weights import per_metre
-from robots.tree import LinkPoses, Tree
+from robots.tree import Tree
 
 DEPTH_ROUNDING = 0.003  # [m], or less for a small robot, over which the penalty of depth sets in
 FELT = 3  # roundings of distance beyond which a residual is not worth its time

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
+from robots.kinematics import forward_kinematics
 from robots.least_squares import NormalEquations, Smoothness
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
@@ -16,7 +17,7 @@ from robots.solver.holds import Holds
 from robots.solver.objective import linearize
 from robots.solver.smoothness import com_acceleration, jerk_stiffening, smoothness_of
 from robots.solver.targets import Targets
-from robots.tree import Coordinates, forward_kinematics
+from robots.tree import Coordinates
 
 WINDOW = 0.15  # [s] before and after a frame over which its cost is averaged to judge a step
 _WIDE_WINDOW = 0.5  # [s] the same for what is gained nearby,

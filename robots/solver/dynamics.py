@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from robots.kinematics import LinkPoses, cross
 from robots.model.morphology import Morphology
-from robots.tree import LinkPoses, cross
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from robots.kinematics import LinkPoses
 from robots.least_squares import NormalEquations
 from robots.model.morphology import Morphology
 from robots.residuals import one_sided
@@ -20,7 +21,6 @@ from robots.solver.collision import (
 )
 from robots.solver.hulls import CLEARANCE
 from robots.solver.pushes import Pushes
-from robots.tree import LinkPoses
 
 _MAX_DISTANCE = 0.02  # [m] of the T-pose beyond which MuJoCo need not measure
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
+from robots.kinematics import LinkPoses, forward_kinematics
 from robots.model.hull import hull
 from robots.model.morphology import Morphology
 from robots.model.rims import rim
@@ -13,7 +14,6 @@ from robots.residuals import one_sided
 from robots.solver.block import Block, blocks_of
 from robots.solver.hulls import shapes_of
 from robots.solver.link_terms import LinkTerms
-from robots.tree import LinkPoses, forward_kinematics
 from spark.rig.feet import Sole
 
 _FOOT_HEIGHT = 0.02  # [m] above the sole, below which a shape is part of the foot

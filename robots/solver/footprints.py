@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Complex, Float
 
+from robots.kinematics import LinkPoses, forward_kinematics
 from robots.model.morphology import Morphology
 from robots.solver.targets import Targets
-from robots.tree import Coordinates, LinkPoses, forward_kinematics
+from robots.tree import Coordinates
 from spark.kinematics import world_positions
 from spark.rig.feet import Sole, sole_positions
 from spark.runs import true_runs

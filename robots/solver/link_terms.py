@@ -11,9 +11,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float, Int
 
+from robots.kinematics import LinkPoses, cross
 from robots.least_squares import NormalEquations, runs
 from robots.solver.block import Block
-from robots.tree import ROOT, LinkPoses, cross
+from robots.tree import ROOT
 
 
 @dataclass(eq=False)

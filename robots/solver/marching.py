@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.ndimage import binary_dilation, uniform_filter1d
 
+from robots.kinematics import forward_kinematics
 from robots.least_squares import second_differences
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
@@ -24,7 +25,7 @@ from robots.solver.targets import Targets
 from robots.solver.ways import along, taken
 from robots.solver.window_targets import PointTargets, PoseTargets, pose_targets
 from robots.solver.window_terms import Terms
-from robots.tree import Coordinates, forward_kinematics
+from robots.tree import Coordinates
 from spark.rig.roles import Role
 from spark.runs import true_runs
 

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
+from robots.kinematics import LinkPoses, forward_kinematics
 from robots.model.morphology import Morphology
 from robots.solver.com_plan import plan_com
 from robots.solver.dynamics import angular_momentum, center_of_mass
@@ -20,7 +21,7 @@ from robots.solver.projection import hips_of
 from robots.solver.support import Support
 from robots.solver.targets import Targets
 from robots.solver.touching import touches_of
-from robots.tree import Coordinates, LinkPoses, forward_kinematics
+from robots.tree import Coordinates
 
 TOUCH_HEIGHT = 0.03  # hip heights below which a sole's point pushes; the report counts 0.044
 TOUCH_SPAN = 0.04  # [s] before and after a touch in which it pushes, too: the report counts 0.05

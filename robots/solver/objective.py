@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from robots.kinematics import LinkPoses, forward_kinematics
 from robots.least_squares import NormalEquations
 from robots.model.morphology import Morphology
 from robots.residuals import limit_residual, one_sided, point_jacobian, turning_axes
@@ -39,7 +40,7 @@ from robots.solver.weights import (
     W_TPOSE,
     per_metre,
 )
-from robots.tree import ROOT, Coordinates, LinkPoses, forward_kinematics
+from robots.tree import ROOT, Coordinates
 from spark.rig.roles import Role
 
 

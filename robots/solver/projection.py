@@ -13,8 +13,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from robots.kinematics import LinkPoses, forward_kinematics
 from robots.model.morphology import Morphology
-from robots.tree import Coordinates, LinkPoses, Tree, forward_kinematics
+from robots.tree import Coordinates, Tree
 from spark.blocks import in_blocks
 from spark.rotation import (
     quat_from_rotvec,

@@ -3,10 +3,11 @@
 import numpy as np
 from jaxtyping import Float, Int
 
+from robots.kinematics import LinkPoses, cross
 from robots.least_squares import NormalEquations
 from robots.residuals import twists
 from robots.solver.block import Block
-from robots.tree import ROOT, LinkPoses, cross
+from robots.tree import ROOT
 
 Moves = tuple[tuple[int, ...], tuple[int, ...]]
 """The free joints that move one part but not the other, and the reverse."""

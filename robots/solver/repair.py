@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool
 from scipy.ndimage import binary_dilation, maximum_filter1d
 
+from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.collision import collisions_of
@@ -28,7 +29,7 @@ from robots.solver.repair_descent import Repair, solve_spells
 from robots.solver.smoothness import jerk_stiffening, overspeed
 from robots.solver.spells import Spells
 from robots.solver.targets import Targets
-from robots.tree import Coordinates, forward_kinematics
+from robots.tree import Coordinates
 from spark.runs import true_runs
 
 _MAX_ROUNDS = 6

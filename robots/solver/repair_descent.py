@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
+from robots.kinematics import forward_kinematics
 from robots.least_squares import NormalEquations, Smoothness
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
@@ -24,7 +25,7 @@ from robots.solver.objective import linearize
 from robots.solver.smoothness import com_acceleration, jerk_stiffening, smoothness_of
 from robots.solver.spells import Spells
 from robots.solver.targets import Targets
-from robots.tree import Coordinates, forward_kinematics
+from robots.tree import Coordinates
 
 _MAX_ITER, _REL_TOL = 12, 0.01  # steps; of the cost that a step gains, below which it is the last
 _MAX_SOLVES = 4  # for which hinges stay at their limits, of a step

@@ -12,12 +12,13 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from robots.kinematics import LinkPoses, forward_kinematics
 from robots.model.morphology import Morphology
 from robots.solver.holds import Holds, joined
 from robots.solver.settling import APPROACH, around, led, settled
 from robots.solver.targets import Targets
 from robots.solver.touching import Touch, touches_of
-from robots.tree import Coordinates, LinkPoses, forward_kinematics
+from robots.tree import Coordinates
 from spark.rig.roles import Role
 from spark.runs import true_runs
 from spark.transfer.footfalls import between_contacts, beyond

@@ -13,10 +13,11 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.ndimage import gaussian_filter1d
 
+from robots.kinematics import LinkPoses, forward_kinematics
 from robots.model.morphology import Morphology
 from robots.solver.holds import Holds, joined
 from robots.solver.touching import touches_of
-from robots.tree import Coordinates, LinkPoses, forward_kinematics
+from robots.tree import Coordinates
 from sim.body.anthropometry import RADII
 from spark.rig.contacts import ADULT_HEIGHT
 from spark.rig.rig import Rig

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from robots.kinematics import LinkPoses, forward_kinematics
 from robots.model.morphology import Morphology
 from robots.solver.block import carriers
 from robots.solver.hulls import (
@@ -16,7 +17,7 @@ from robots.solver.hulls import (
     shapes_of,
     signed_distance,
 )
-from robots.tree import LinkPoses, Tree, forward_kinematics
+from robots.tree import Tree
 
 _ONE_JOINT = 0.05  # hip heights between hinges that turn about one point
 

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import uniform_filter1d
 
+from robots.kinematics import forward_kinematics
 from robots.least_squares import PointAcceleration, Smoothness, second_differences
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
@@ -25,7 +26,7 @@ from robots.solver.weights import (
     W_ROTATION,
     per_metre,
 )
-from robots.tree import Coordinates, forward_kinematics
+from robots.tree import Coordinates
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 
 _JERK_INTERVAL = 1 / 60  # [s] at least, over which hinges' jerk is told

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
 from robots.model.shapes import surface
 from robots.solver.contacts import has_feet, schedule, touching_joint
@@ -14,7 +15,6 @@ from robots.solver.haste import limb_jerks
 from robots.solver.palms import laid, resting_palms
 from robots.solver.self_touch import SelfTouch, self_touches
 from robots.solver.trunk import bowing
-from robots.tree import forward_kinematics
 from spark.blocks import blocks
 from spark.rig.directions import bone_directions
 from spark.rig.feet import ends_of_feet, lowest_points

@@ -6,11 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from robots.kinematics import LinkPoses
 from robots.model.hull import part_of_hull
 from robots.model.morphology import Morphology
 from robots.solver.contacts import touching_joint
 from robots.solver.floor import SPARED, Solid, solids_over_floor
-from robots.tree import LinkPoses
 from spark.rig.roles import Role
 
 # Hip heights, beyond the nearest of its own, within which shapes around a part touch for it,

@@ -15,9 +15,9 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Float
 
+from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
 from robots.solver.over_feet import on_arms
-from robots.tree import forward_kinematics
 from spark.rig.contacts import ADULT_HEIGHT
 from spark.rig.directions import has_shoulders, hips_to_shoulders, shoulder_joints
 from spark.rig.rig import Rig

@@ -3,12 +3,13 @@
 import numpy as np
 from jaxtyping import Float
 
+from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
 from robots.solver.block import whole_of
 from robots.solver.collision import collisions_of
 from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.repair import MAX_DEPTH, SEARCH_DISTANCE
-from robots.tree import Coordinates, forward_kinematics
+from robots.tree import Coordinates
 from spark.blocks import blocks
 from spark.summary import in_frames
 

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.ndimage import gaussian_filter1d
 
+from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.collision import collisions_of
@@ -14,7 +15,7 @@ from robots.solver.holds import Holds
 from robots.solver.objective import linearize
 from robots.solver.spells import Spells
 from robots.solver.targets import Targets
-from robots.tree import Coordinates, forward_kinematics
+from robots.tree import Coordinates
 
 _FREE_SPEED = 3.0  # [rad/s] of a hinge that costs nothing where ways are compared, and what
 _W_TURN = 4.0  # [1/rad] a turn beyond that costs, from frame to frame

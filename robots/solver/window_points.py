@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from robots.kinematics import skew
 from robots.model.morphology import Morphology
 from robots.solver.weights import (
     HANDS_RANGE,
@@ -19,7 +20,6 @@ from robots.solver.window_dofs import WindowDofs
 from robots.solver.window_poses import WindowPoses
 from robots.solver.window_rows import Rows
 from robots.solver.window_targets import Asked, PointTargets, PoseTargets
-from robots.tree import skew
 from spark.rig.roles import Role
 
 # What (x, y, z, 1) of a point's place, or (x, y, z, 0) of a direction, has to do with the wrenches

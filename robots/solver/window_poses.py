@@ -7,9 +7,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from robots.kinematics import skew
 from robots.model.mjcf import Mjcf
 from robots.solver.window_dofs import as_slice
-from robots.tree import skew
 
 # What takes a twist about (x, y, z) to the origin: the identity, and x, y, z times each of these.
 _UNMOVED, _TO_ORIGIN = np.eye(6), np.zeros((3, 6, 6))

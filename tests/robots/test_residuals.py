@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from jaxtyping import Float
 
+from robots.kinematics import LinkPoses, forward_kinematics
 from robots.least_squares import NormalEquations
 from robots.residuals import (
     direction_residual,
@@ -13,7 +14,7 @@ from robots.residuals import (
     rotation_residual,
     twists,
 )
-from robots.tree import BASE, Coordinates, LinkPoses, Tree, forward_kinematics
+from robots.tree import BASE, Coordinates, Tree
 from spark.rotation import matrix_from_quat, quat_normalize
 
 FRAMES, STEP = 3, 1e-6

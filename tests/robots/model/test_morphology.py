@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from robots import registry
+from robots.kinematics import forward_kinematics
 from robots.model.mjcf import read_mjcf
 from robots.model.morphology import Morphology
 from robots.model.parts import telling_names
 from robots.model.segments import Segment
 from robots.model.understand import understand_robot
-from robots.tree import forward_kinematics
 from spark.errors import FileFormatError, SkeletonError
 from spark.kinematics import forward as skeleton_forward
 from spark.rig.name_hints import read_names

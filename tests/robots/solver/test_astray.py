@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
 from robots.registry import find
 from robots.solver.astray import led_back
@@ -12,7 +13,7 @@ from robots.solver.block import blocks_of
 from robots.solver.holds import Holds
 from robots.solver.solve import retarget
 from robots.solver.targets import Targets, targets_of
-from robots.tree import Coordinates, forward_kinematics
+from robots.tree import Coordinates
 from spark.demo.sample import sample_rig
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec

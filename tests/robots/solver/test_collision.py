@@ -7,13 +7,14 @@ import mujoco
 import numpy as np
 import pytest
 
+from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
 from robots.solver.block import blocks_of, carriers
 from robots.solver.candidates import in_order
 from robots.solver.collision import collisions_of
 from robots.solver.hulls import signed_distance
 from robots.solver.shape_pairs import in_shape
-from robots.tree import Coordinates, forward_kinematics
+from robots.tree import Coordinates
 from spark.rig.roles import Role
 from tests.helpers.ember import changed_ember
 

@@ -4,6 +4,7 @@ where walls are firm."""
 import numpy as np
 import pytest
 
+from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
 from robots.registry import find
 from robots.solver.block import blocks_of
@@ -14,7 +15,7 @@ from robots.solver.objective import linearize
 from robots.solver.repair_descent import Repair, solve_spells
 from robots.solver.spells import Spells
 from robots.solver.targets import targets_of
-from robots.tree import Coordinates, forward_kinematics
+from robots.tree import Coordinates
 from spark.demo.sample import sample_rig
 from spark.transfer.canonical import CanonicalMotion
 from spark_sim.loading import load_robot

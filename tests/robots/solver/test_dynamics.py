@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from robots.kinematics import forward_kinematics
 from robots.model.known import known
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
@@ -11,7 +12,7 @@ from robots.solver.com_plan import plan_com
 from robots.solver.dynamics import angular_momentum, center_of_mass, com_jacobian
 from robots.solver.solve import copy
 from robots.solver.support import Support
-from robots.tree import Coordinates, forward_kinematics
+from robots.tree import Coordinates
 from sim.report.clip_poses import pose_clip
 from sim.report.wrench import angular_momentum as momentum_of_the_model
 from sim.trajectory import Subject

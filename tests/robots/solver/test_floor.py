@@ -6,12 +6,12 @@ import mujoco
 import numpy as np
 import pytest
 
+from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
 from robots.registry import find
 from robots.solver.block import blocks_of, whole_of
 from robots.solver.floor import depth_in_floor, sole_paths, solids_over_floor
 from robots.solver.solve import retarget
-from robots.tree import forward_kinematics
 from scripts.robot_bars import follow
 from sim.outline import outline, solid
 from sim.report.clip_poses import pose_clip

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from robots.kinematics import LinkPoses, forward_kinematics
 from robots.least_squares import NormalEquations
 from robots.residuals import direction_residual, point_jacobian, rotation_residual
 from robots.solver.block import Block
 from robots.solver.link_terms import LinkTerms
-from robots.tree import ROOT, Coordinates, LinkPoses, Tree, forward_kinematics
+from robots.tree import ROOT, Coordinates, Tree
 
 FRAMES, WEIGHT = 3, 1.7
 BONE = np.array([0.0, 0.6, -0.8])

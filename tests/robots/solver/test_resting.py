@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from robots.kinematics import forward_kinematics
 from robots.metrics import measure
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
@@ -14,7 +15,6 @@ from robots.solver.resting import leans, resting
 from robots.solver.solve import copy, retarget
 from robots.solver.targets import targets_of
 from robots.solver.touching import touches_of
-from robots.tree import forward_kinematics
 from spark.demo.sample import sample_rig
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_mul

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
+from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
 from robots.registry import find
 from robots.solver import solve
 from robots.solver.holds import Holds
 from robots.solver.self_touch import on_itself, palm_of, self_touches
 from robots.solver.targets import targets_of
-from robots.tree import Coordinates, forward_kinematics
+from robots.tree import Coordinates
 from sim.body.anthropometry import RADII
 from spark.demo.sample import sample_rig
 from spark.rig.roles import Role

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from jaxtyping import Float
 
+from robots.kinematics import forward_kinematics
 from robots.least_squares import (
     NormalEquations,
     PointAcceleration,
@@ -32,7 +33,7 @@ from robots.solver.repair_descent import Repair
 from robots.solver.smoothness import jerk_stiffening, limit_speed
 from robots.solver.solve import copy, retarget
 from robots.solver.targets import Targets, targets_of
-from robots.tree import Coordinates, forward_kinematics
+from robots.tree import Coordinates
 from scripts.robot_bars import mean_of, misses
 from sim.report.assess import assess
 from sim.trajectory import Subject

@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
 from robots.registry import find
 from robots.solver.floor import solids_over_floor
 from robots.solver.touching import touches_of
-from robots.tree import Coordinates, forward_kinematics
+from robots.tree import Coordinates
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_mul, quat_rotate
 from spark_sim.loading import load_robot

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from robots.kinematics import forward_kinematics
 from robots.model.known import known
 from robots.solver.footprints import points_of
 from robots.stream.frame_targets import LATENCY, Frame, ground_of
 from robots.stream.stream import Stream
-from robots.tree import forward_kinematics
 from spark.demo.sample import sample_motion, sample_rig
 from spark.transfer.canonical import to_canonical
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from jaxtyping import Float
 
+from robots.kinematics import forward_kinematics
 from robots.model.known import known
 from robots.solver.touching import touches_of
 from robots.solver.window_targets import PointTargets
 from robots.solver.window_terms import Terms
 from robots.stream.frame_targets import LATENCY, Frame, FrameReader, FrameTargets, ground_of
 from robots.stream.resting import RestTracker, held_points
-from robots.tree import forward_kinematics
 from spark.demo.sample import sample_motion, sample_rig
 from spark.rig.roles import Role
 from spark.transfer.canonical import to_canonical

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import spark_sim
+from robots.kinematics import forward_kinematics
 from robots.metrics import measure
 from robots.model.known import known
 from robots.model.morphology import Morphology
@@ -25,7 +26,6 @@ from robots.solver.window_terms import Terms
 from robots.stream.frame_targets import LATENCY, Frame, FrameReader, ground_of
 from robots.stream.resting import held_points
 from robots.stream.stream import Stream
-from robots.tree import forward_kinematics
 from scripts.robot_bars import follow
 from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import ConventionError, FrameError
