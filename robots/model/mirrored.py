@@ -1,4 +1,4 @@
-"""Whether a robot's left and right limbs may turn alike, which says much of the file's limits."""
+"""Whether a robot's left and right limbs are mirror images: where not, its file is likely wrong."""
 
 import mujoco
 import numpy as np
@@ -7,10 +7,12 @@ from jaxtyping import Float, Int
 from robots.kinematics import forward_kinematics
 from robots.tree import Coordinates, Tree
 from spark.rig.roles import LIMBS, RoleMap
+from spark.skeleton import Skeleton
 
 _MIRROR = np.array([-1.0, 1.0, -1.0])  # of an axis of rotation, left to right (Y)
 _PARALLEL = 0.9  # cosine between two hinges' axes that may be compared
 _ALLOWED = np.radians(20)  # by which ranges, and angles in the T-pose, may differ
+_UNEVEN = 0.03  # of a limb's length, by which a bone and the other side's may differ
 
 
 def unmirrored_limits(
@@ -41,6 +43,35 @@ def unmirrored_limits(
     return (
         f"left and right do not turn alike: {named} have limits that are no mirror images; check "
         "their ranges and axes in the file",
+    )
+
+
+def uneven_bones(skeleton: Skeleton, roles: RoleMap) -> tuple[str, ...]:
+    """A note that names the bones of arms and legs, from joint to joint, that are clearly longer
+    or shorter than the other side's. Without such bones, none."""
+    odd: list[str] = []
+    for limb in LIMBS.values():
+        sides = [
+            (left, right)
+            for role in limb
+            if role.side == "left"
+            and (left := roles.joint(role)) is not None
+            and (right := roles.joint(role.mirrored)) is not None
+        ]
+        bones = np.diff(skeleton.rest_positions[np.array(sides, dtype=int).reshape(-1, 2)], axis=0)
+        lengths = np.linalg.norm(bones, axis=-1)  # (joints - 1, 2)
+        allowed = _UNEVEN * lengths.sum(0).max()
+        for joints, below, pair in zip(sides, sides[1:], lengths, strict=False):
+            if abs(pair[0] - pair[1]) > allowed:
+                odd += (
+                    f"from {skeleton.names[j]!r} to {skeleton.names[end]!r} {length:.3g} m"
+                    for j, end, length in zip(joints, below, pair, strict=True)
+                )
+    if not odd:
+        return ()
+    return (
+        f"left and right are not equally long: {', '.join(odd)}; check the places of these bodies "
+        "in the file",
     )
 
 

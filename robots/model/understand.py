@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from robots.model.angle_units import doubtful_units
 from robots.model.followers import followers_of
-from robots.model.mirrored import unmirrored_limits
+from robots.model.mirrored import uneven_bones, unmirrored_limits
 from robots.model.mjcf import Mjcf, read_mjcf
 from robots.model.morphology import Morphology
 from robots.model.mount import roles_and_parts, standing_height
@@ -81,11 +82,13 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
     place_feet(skeleton, roles, shapes, ideal)
     soles = soles_of(skeleton, roles, shapes, ideal, links)
     skeleton = with_soles(skeleton, soles)
+    units = doubtful_units(mjcf, tree, joints, roles, links)
     tree, assumed = _assume_limits(tree, segments, roles)
     tpose = search_tpose(tree, skeleton, roles, links, ideal, followers_of(mjcf, joints))
     odd = unmirrored_limits(mjcf.model, tree, joints, roles, links, tpose.coordinates)
+    odd += uneven_bones(skeleton, roles)
     blind = _check_ends(skeleton, roles)
-    notes = (*mjcf.notes, *assumed, *blind, *_check_tpose(tpose, skeleton), *odd)
+    notes = (*mjcf.notes, *assumed, *units, *blind, *_check_tpose(tpose, skeleton, units), *odd)
     if mounted:
         notes = (*notes, "no legs: it stays on its base; arms, waist and head follow")
     rig = Rig(
@@ -186,17 +189,18 @@ def _check_ends(skeleton: Skeleton, roles: RoleMap) -> tuple[str, ...]:
     )
 
 
-def _check_tpose(tpose: TPose, skeleton: Skeleton) -> tuple[str, ...]:
-    """A note where the limits keep a limb from the T-pose. Raises SkeletonError where by much."""
+def _check_tpose(tpose: TPose, skeleton: Skeleton, units: tuple[str, ...]) -> tuple[str, ...]:
+    """A note where the limits keep a limb from the T-pose. Raises SkeletonError where by much, with
+    what is known of the limits' `units`."""
     errors = tpose.direction_errors
     worst = max(errors, key=lambda j: errors[j], default=None)
     if worst is None or errors[worst] < _NOTED:
         return ()
     what = f"{skeleton.names[worst]!r} stays {np.degrees(errors[worst]):.0f} degrees from it"
     if errors[worst] > _REFUSED:
+        advice = "".join(units) or "check the ranges of the joints above it"
         raise SkeletonError(
-            f"the joint limits forbid a T-pose (legs down, arms out): {what}; check the ranges of "
-            "the joints above it"
+            f"the joint limits forbid a T-pose (legs down, arms out): {what}; {advice}"
         )
     return (f"the limits allow no exact T-pose: {what}",)
 
