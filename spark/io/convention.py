@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import ConventionError
-from spark.io.upright import above_body, above_feet, is_built_upright, is_foot
+from spark.io.upright import above_body, above_feet, is_built_upright, is_foot, walked_across
 from spark.kinematics import end_positions, forward
 from spark.motion import Motion
 
@@ -54,6 +54,8 @@ _STEADIER = 1.5  # a floor along an axis moves no more than this many times that
 _STEADY = 0.01  # of the body's height: a floor that moves less is steady
 
 _STEADY_FLOOR = 0.05  # [heights] between the quartiles; a floor moves less, a body's side more
+# Who goes this far [heights] across an axis, above the feet along it by this much, walks upright.
+_WALK, _WALKS_ABOVE_FEET = 0.3, 0.6
 _BUILT = 0.9  # the direction from feet to body at rest, of a body that was built along an axis
 
 # Of the weight of that direction where no name says foot. Hind legs carry a trunk ahead of them.
@@ -196,8 +198,8 @@ def infer_unit(motion: Motion) -> tuple[float, tuple[str, ...]]:
 def infer_up(motion: Motion) -> tuple[Up, tuple[str, ...]]:
     """The up axis of `motion`, which is in file axes, and the notes on it.
 
-    Weighs where the body is above its feet, in the frames and at rest, where a floor lies at zero,
-    and how common each axis is.
+    Weighs where the body is above its feet, in the frames and, unless it walks, at rest, where a
+    floor lies at zero, and how common each axis is.
     """
     skeleton = motion.skeleton
     positions, world = forward(motion)
@@ -208,7 +210,11 @@ def infer_up(motion: Motion) -> tuple[Up, tuple[str, ...]]:
     low, floor, high = np.percentile(floors, [25, 50, 75], axis=0)
 
     standing, resting = (_both_ways(above_feet(motion, each)) for each in (positions, rest))
-    built = is_built_upright(skeleton, resting[:3])
+    steady = high - low < _STEADY_FLOOR if standing.any() else np.full(6, True)  # all there is
+    far = np.tile(walked_across(motion, positions, world) > _WALK * size, 2)
+    # Who walks stands, however the rest pose is built. Who lies still may be told by it alone.
+    walks = bool(np.any(far & steady & (standing > _WALKS_ABOVE_FEET)))
+    built = is_built_upright(skeleton, resting[:3]) and not walks
     named = any(map(is_foot, skeleton.names))
     # Log-probabilities, of axes that point up and of those that point down. X-up files hardly
     # exist; bodies that lie down and odd rest poses do, but seldom straight along an axis all the
@@ -219,7 +225,6 @@ def infer_up(motion: Motion) -> tuple[Up, tuple[str, ...]]:
     if built:  # along an axis, and not as a camera sees it: then a body along another one lies
         seen[3:] -= 3.0 * (resting.max() > _BUILT) * (resting[3:] < _BUILT)
     chances += seen if named else _BY_BUILD * seen
-    steady = high - low < _STEADY_FLOOR if standing.any() else True  # else a floor is all there is
     chances += 2.0 * ((np.abs(floor) < 0.03) & steady)
     best, second = np.argsort(-chances)[:2].tolist()
     up = UPS[best]

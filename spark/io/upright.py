@@ -6,9 +6,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from spark.motion import Motion
+from spark.rotation import matrix_from_quat
 from spark.skeleton import Skeleton
 
 _BETWEEN = 0.2  # of the height at rest, that hips lie above the feet and below the head at least
+_FACING = 0.8  # of the length of the body's axes, that their means over the frames keep at least
 _ALIKE = 0.1  # of a leg's length, that another's may differ by
 
 _FEET = re.compile(r"foot|feet|toe|ankle|hoof|paw|足首|つま先", re.IGNORECASE)
@@ -33,6 +35,19 @@ def feet_of(skeleton: Skeleton) -> Bool[np.ndarray, "J"]:
     if not feet.any():
         feet[_tips_beside_trunk(skeleton)] = True
     return feet
+
+
+def walked_across(
+    motion: Motion, positions: Float[np.ndarray, "T J 3"], world: Float[np.ndarray, "T J 4"]
+) -> Float[np.ndarray, "3"]:
+    """How far the feet get away across each axis, in the file's unit, while the body faces one way:
+    what crawls goes along itself, and what rolls turns. Zero where it turns or no feet are told."""
+    feet = feet_of(motion.skeleton)
+    facing = matrix_from_quat(world[:, _fork(motion.skeleton)]).mean(axis=0)
+    if not feet.any() or np.linalg.norm(facing, axis=1).min() < _FACING:
+        return np.zeros(3)
+    way = np.ptp(positions[:, feet].mean(axis=1), axis=0)
+    return np.maximum(np.roll(way, 1), np.roll(way, 2))
 
 
 def is_foot(name: str) -> bool:

@@ -17,7 +17,7 @@ from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rotation import quat_identity
 from spark.skeleton import Skeleton
-from tests.helpers.bvh_by_hand import human, save, to_file, zxy
+from tests.helpers.bvh_by_hand import by_hand, human, save, to_file, zxy
 from tests.helpers.recordings import recording
 from tests.helpers.rigs import RIGS, build, walk
 
@@ -181,6 +181,44 @@ def test_the_motion_and_not_the_rest_pose_shows_what_is_up(
     assert found.convention.up == up
     positions, _ = forward(found.motion)
     assert positions[0, 3, 2] - positions[0, 10, 2] == pytest.approx(1.52)  # head above foot
+
+
+@pytest.mark.parametrize("heading", [90.0, -90.0])
+@pytest.mark.parametrize("bent", [0.0, 30.0])
+def test_a_walk_shows_what_is_up_however_the_rest_pose_is_built(
+    tmp_path: Path, heading: float, bent: float
+) -> None:
+    """Of SMPL's rest pose, y up, in AMASS's world, z up: straight along x, so that one side of the
+    body keeps to y = 0, on a floor that isn't at zero."""
+    upright = Rotation.from_euler("z", heading, degrees=True) * Rotation.from_euler(
+        "x", 90.0 + bent, degrees=True
+    )
+    bvh = human("y", turns=np.tile(zxy(upright), (30, 1)))
+    bvh.values[:, 0] = np.linspace(-60.0, 60.0, 30)
+    bvh.values[:, 1:3] = 75.0, 120.0
+    found = read_recording(save(bvh, tmp_path))
+    assert found.convention.up == "z"
+    assert not any("as likely" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_body_that_rolls_does_not_turn_the_world(tmp_path: Path, side: float) -> None:
+    """Over and over along x, stretched along z: it travels across itself as who walks does."""
+    angles = np.linspace(0.0, side * 4.0 * np.pi, 30)
+    turns = Rotation.from_euler("z", angles[:, None]) * Rotation.from_euler("x", np.pi / 2)
+    bvh = _arms_down(human("y", turns=zxy(turns)))
+    bvh.values[:, 0], bvh.values[:, 1:3] = -15.0 * angles, (0.0, 200.0)
+    lowest = np.array([by_hand(bvh, t)[:, 1].min() for t in range(30)])
+    bvh.values[:, 1] -= lowest
+    assert read_recording(save(bvh, tmp_path)).convention.up == "y"
+
+
+def _arms_down(bvh: Bvh) -> Bvh:
+    values = bvh.values.copy()
+    for j, joint in enumerate(bvh.joints):
+        if joint.name.endswith("Arm"):
+            values[:, 3 + 3 * j] = -90.0 if joint.name.startswith("Left") else 90.0  # about z
+    return Bvh(bvh.joints, bvh.frame_time, values)
 
 
 @pytest.mark.parametrize("heading", [0.0, 30.0, 45.0, 90.0, 180.0])
