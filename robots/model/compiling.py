@@ -4,9 +4,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
+import numpy as np
 
 from robots.model import model_cache
-from spark.errors import FileFormatError
+from spark.errors import FileFormatError, name_list
 
 _MIN_MASS, _MIN_INERTIA = 1e-4, 1e-8  # [kg], [kg m²] of bodies whose mass went with their meshes
 
@@ -18,8 +19,9 @@ def compiled(
     from files that may change.
 
     What had to be changed in the spec is added to `notes`; such a model is not stored. Raises
-    FileFormatError where MuJoCo can't compile it.
+    FileFormatError where MuJoCo can't compile it, or a body's mass is below 0.
     """
+    _check_masses(spec, path)
     name = key()
     stored = None if name is None else model_cache.load(name)
     if stored is not None:
@@ -40,8 +42,10 @@ def _compile(spec: mujoco.MjSpec, path: Path, notes: list[str]) -> mujoco.MjMode
         message = one_line(error)
     if "mjMINVAL" in message and not spec.compiler.boundmass:
         spec.compiler.boundmass, spec.compiler.boundinertia = _MIN_MASS, _MIN_INERTIA
-        notes.append("some moving bodies have no mass: they get next to none")
-        return _compile(spec, path, notes)
+        at = len(notes)
+        model = _compile(spec, path, notes)
+        notes.insert(at, f"some bodies move without mass, and get next to none: {_least(model)}")
+        return model
     dropped: list[str] = []
     meshes, last, lost = bool(list(spec.meshes)), "", ""
     first = _drop_extras if _compiles_without_extras(spec) else _drop_assets
@@ -65,6 +69,25 @@ def _compile(spec: mujoco.MjSpec, path: Path, notes: list[str]) -> mujoco.MjMode
         f"MuJoCo can't compile it: {message}"
         + (f"; nor without {', '.join(dropped)}: {last}" if last != message else ""),
     )
+
+
+def _check_masses(spec: mujoco.MjSpec, path: Path) -> None:
+    """Raise where a mass or a moment that is given for a body is below 0. MuJoCo says it is too
+    small, or lifts it to the least that the file allows."""
+    for body in spec.bodies[1:]:
+        least = min(body.mass, *body.inertia)
+        if body.explicitinertial and least < 0:
+            what = f"mass={body.mass:g}" if body.mass < 0 else f"moments of {least:g} kg m²"
+            raise FileFormatError(
+                path, None, f"body {body.name!r}: its <inertial> has {what}; expected more than 0"
+            )
+
+
+def _least(model: mujoco.MjModel) -> str:
+    """The names of the moving bodies that have the mass or a moment of those without one."""
+    light = model.body_mass <= _MIN_MASS
+    light |= (model.body_inertia <= _MIN_INERTIA).any(axis=1)
+    return name_list([model.body(b).name for b in np.flatnonzero(light & (model.body_dofnum > 0))])
 
 
 def _compiles_without_extras(spec: mujoco.MjSpec) -> bool:

@@ -73,6 +73,12 @@ def read_urdf(path: Path, notes: list[str], *, visuals: bool = True) -> tuple[mu
     _drop_points(robot)
     for joint in robot.findall("joint"):
         _keep_locked(joint)
+    weightless = [name for link in robot.findall("link") if (name := _weightless(link))]
+    if weightless:
+        notes.append(
+            "links whose <mass> is not above 0 kg get that of their shapes as if of water: "
+            f"{name_list(weightless)}"
+        )
     mended = [link.get("name", "") for link in robot.findall("link") if _mend_inertia(link)]
     if mended:
         notes.append(
@@ -116,6 +122,16 @@ def _check_tree(robot: ET.Element, path: Path) -> None:
             seen.add(above)
         if len(seen) > DEPTH:
             raise FileFormatError(path, None, f"nests links deeper than {DEPTH}")
+
+
+def _weightless(link: ET.Element) -> str:
+    """The name of a link that has a shape to collide with, and a mass that it can't have; or else
+    nothing: frames that only mark a place are given a mass of 0."""
+    mass = link.find("inertial/mass")
+    value = "" if mass is None else mass.get("value", "")
+    if link.find("collision") is None or not _is_number(value) or float(value) > 0:
+        return ""
+    return link.get("name", "")
 
 
 def _mend_inertia(link: ET.Element) -> bool:

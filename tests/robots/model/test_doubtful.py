@@ -11,10 +11,10 @@ import pytest
 from robots import registry
 from robots.model.known import known
 from robots.model.understand import understand_robot
-from spark.errors import SkeletonError
+from spark.errors import FileFormatError, SkeletonError
 from tests.helpers.urdf import twins
 
-DOUBTS = "beyond two turns|hardly turn|equally long"
+DOUBTS = "beyond two turns|hardly turn|equally long|not above 0 kg"
 
 
 @pytest.fixture
@@ -104,6 +104,43 @@ def test_a_bone_that_is_shorter_than_the_other_side_s_is_said(
     )
     (note,) = doubts(tmp_path, short)
     assert said in note
+
+
+KNEE = '<joint class="leg" name="left_knee"'
+
+
+@pytest.mark.parametrize("bound", ["", 'boundmass="0.001" boundinertia="0.001"'])
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ('mass="-2" diaginertia=".1 .1 .1"', "has mass=-2; expected more than 0"),
+        ('mass="2" diaginertia="-.1 .1 .1"', "has moments of -0.1 kg m²; expected more than 0"),
+    ],
+)
+def test_a_mass_below_zero_is_refused(
+    given: str, said: str, bound: str, ember: str, tmp_path: Path
+) -> None:
+    """Also where the file has MuJoCo lift it."""
+    text = ember.replace(KNEE, f'<inertial pos="0 0 0" {given}/>{KNEE}')
+    with pytest.raises(FileFormatError, match=f"body 'left_shin': its <inertial> {said}"):
+        doubts(tmp_path, text.replace("<compiler ", f"<compiler {bound} "))
+
+
+def test_bodies_that_move_without_mass_are_named(ember: str, tmp_path: Path) -> None:
+    text = ember.replace(KNEE, f'<inertial pos="0 0 0" mass="0" diaginertia="0 0 0"/>{KNEE}')
+    (tmp_path / "robot.xml").write_text(text)
+    (note,) = understand_robot(tmp_path / "robot.xml").notes
+    assert note == "some bodies move without mass, and get next to none: 'left_shin'"
+
+
+@pytest.mark.parametrize("mass", ["0", "-1.5"])
+def test_a_link_with_a_shape_and_no_mass_is_named(mass: str, tmp_path: Path) -> None:
+    _, urdf = twins(mujoco.MjSpec.from_file(str(registry.find("robot"))))
+    start = urdf.index('<link name="left_shin">')
+    light = urdf[:start] + urdf[start:].replace('<mass value="1.6"/>', f'<mass value="{mass}"/>', 1)
+    assert light != urdf
+    (note,) = doubts(tmp_path, light, "robot.urdf")
+    assert note.endswith("as if of water: 'left_shin'")
 
 
 @pytest.mark.parametrize("entry", registry.ENTRIES, ids=lambda entry: entry.name)
