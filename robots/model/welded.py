@@ -45,15 +45,19 @@ def joined(
 
 
 def fixtures(segments: Sequence[Segment], roles: RoleMap) -> set[int]:
-    """The welded parts without a role, such as tools: they don't show where a limb points, but for
-    what hands have, which may be fingers."""
+    """The welded parts without a role, such as tools, or that are the only hand of two arms: they
+    don't show where a limb points, but for what hands have, which may be fingers."""
     return {
         i
         for i, segment in enumerate(segments)
         if _is_welded(segments, i)
-        and roles.roles[i] is None
+        and (roles.roles[i] is None or _is_only_hand(roles, roles.roles[i]))
         and roles.roles[segment.parent] not in _HANDS
     }
+
+
+def _is_only_hand(roles: RoleMap, role: Role | None) -> bool:
+    return role in _HANDS and roles.joint(role.mirrored) is None
 
 
 def without(segments: Sequence[Segment], left_out: set[int]) -> tuple[list[Segment], list[int]]:
