@@ -168,7 +168,7 @@ def test_a_root_in_another_unit_is_left_out_and_told_once() -> None:
     session = Session(listener, "robot", FPS, told.append)
     with listener, session, running(session):
         send(listener.port, packets, until=passed)
-    (left_out,) = (each for each in told if "left out" in each)
+    (left_out,) = (each for each in told if "a pose is left out" in each)
     assert "it seems to be in centimetres: divide it by 100" in left_out
 
 
