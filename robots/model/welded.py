@@ -8,11 +8,9 @@ import numpy as np
 from jaxtyping import Float
 
 from robots.model.segments import Segment
-from spark.rig.roles import Role, RoleMap
+from spark.rig.roles import HANDS, Role, RoleMap
 
 Points = list[Float[np.ndarray, "_ 3"]]
-
-_HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
 
 
 def within(segments: Sequence[Segment], points: Points) -> set[int]:
@@ -52,12 +50,12 @@ def fixtures(segments: Sequence[Segment], roles: RoleMap) -> set[int]:
         for i, segment in enumerate(segments)
         if _is_welded(segments, i)
         and (roles.roles[i] is None or _is_only_hand(roles, roles.roles[i]))
-        and roles.roles[segment.parent] not in _HANDS
+        and roles.roles[segment.parent] not in HANDS
     }
 
 
 def _is_only_hand(roles: RoleMap, role: Role | None) -> bool:
-    return role in _HANDS and roles.joint(role.mirrored) is None
+    return role in HANDS and roles.joint(role.mirrored) is None
 
 
 def without(segments: Sequence[Segment], left_out: set[int]) -> tuple[list[Segment], list[int]]:

@@ -41,7 +41,7 @@ from robots.solver.weights import (
     per_metre,
 )
 from robots.tree import ROOT, Coordinates
-from spark.rig.roles import Role
+from spark.rig.roles import HANDS, Role
 
 
 def linearize(
@@ -185,7 +185,7 @@ def _add_hands(
     """The offset d [m] from the right wrist to the left one should be d*: r = w (d - d*), where
     w = `W_HANDS` exp(-(|d*| / `HANDS_RANGE`)²): only hands that are near each other are held."""
     assert targets.hands is not None
-    hands = [robot.rig.roles.require(role) for role in (Role.LEFT_HAND, Role.RIGHT_HAND)]
+    hands = [robot.rig.roles.require(role) for role in HANDS]
     firm = per_metre(robot)
     away = np.linalg.norm(targets.hands, axis=1)
     weight = firm * W_HANDS * np.exp(-((firm * away / HANDS_RANGE) ** 2))

@@ -19,7 +19,7 @@ from spark.blocks import blocks
 from spark.rig.directions import bone_directions
 from spark.rig.feet import ends_of_feet, lowest_points
 from spark.rig.rig import Rig
-from spark.rig.roles import LIMBS, Group, Role
+from spark.rig.roles import HANDS, LIMBS, Group, Role
 from spark.rotation import matrix_from_quat, quat_mul
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
@@ -222,14 +222,13 @@ def _between_hands(
 ) -> Float[np.ndarray, "T 3"] | None:
     """From the right hand to the left, in the robot's arm lengths, and no nearer than its palms
     allow; None where a hand is missing."""
-    roles = (Role.LEFT_HAND, Role.RIGHT_HAND)
-    hands = [rig.roles.joint(role) for role in roles]
-    if None in hands or None in [robot.rig.roles.joint(role) for role in roles]:
+    hands = [rig.roles.joint(role) for role in HANDS]
+    if None in hands or None in [robot.rig.roles.joint(role) for role in HANDS]:
         return None
     scale = arm_length(robot.rig) / arm_length(rig)
     between = scale * (positions[:, hands[0]] - positions[:, hands[1]])
     distance = np.linalg.norm(between, axis=1, keepdims=True)
-    least = sum(palm_thickness(robot, role) for role in roles)
+    least = sum(palm_thickness(robot, role) for role in HANDS)
     return between * (np.maximum(distance, least) / np.maximum(distance, 1e-9))
 
 
@@ -253,8 +252,7 @@ def arm_length(rig: Rig) -> float:
 
 def with_firm_hands(robot: Morphology, targets: Targets) -> Targets:
     """The same with all hands followed as firmly as those that lie on the ground."""
-    hands = (Role.LEFT_HAND, Role.RIGHT_HAND)
     firm = {
-        role: np.ones(len(targets)) for role in hands if robot.rig.roles.joint(role) is not None
+        role: np.ones(len(targets)) for role in HANDS if robot.rig.roles.joint(role) is not None
     }
     return replace(targets, palms=firm)

@@ -20,7 +20,7 @@ from robots.solver.window_dofs import WindowDofs
 from robots.solver.window_poses import WindowPoses
 from robots.solver.window_rows import Rows
 from robots.solver.window_targets import Asked, PointTargets, PoseTargets
-from spark.rig.roles import Role
+from spark.rig.roles import HANDS, Role
 
 # What (x, y, z, 1) of a point's place, or (x, y, z, 0) of a direction, has to do with the wrenches
 # along x, y and z.
@@ -57,7 +57,7 @@ class WindowPoints:
             links.append(int(robot.links[rig.pelvis]))
             places.append(robot.centers[rig.hips].mean(0))
         self._hips = slice(self.soles.stop, len(links))
-        wrists = [rig.roles.require(r) for r in (Role.LEFT_HAND, Role.RIGHT_HAND) if hands]
+        wrists = [rig.roles.require(r) for r in HANDS if hands]
         links += [int(robot.links[j]) for j in wrists]
         places += [robot.centers[j] for j in wrists]
         self._hands = slice(self._hips.stop, len(links))

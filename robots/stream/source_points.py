@@ -13,7 +13,7 @@ from robots.solver.trunk import THIGHS
 from robots.stream.carried_points import carriers, place, row
 from spark.rig.directions import LIMB_SEGMENTS, TPOSE_DIRECTIONS, has_shoulders, shoulder_joints
 from spark.rig.rig import Rig
-from spark.rig.roles import Role
+from spark.rig.roles import HANDS, Role
 from spark.rig.segments import segments
 from spark.rotation import quat_conj, quat_rotate
 
@@ -125,7 +125,7 @@ class SourceFollower:
 
     def _hand_rows(self) -> slice:
         """The offset of the wrists of a source and a robot that have both, in the scale of arms."""
-        source, robot, roles = self._source, self._robot, (Role.LEFT_HAND, Role.RIGHT_HAND)
+        source, robot, roles = self._source, self._robot, HANDS
         left, right = (source.roles.joint(role) for role in roles)
         own = [robot.rig.roles.joint(role) for role in roles]
         self.hands = left is not None and right is not None and None not in own

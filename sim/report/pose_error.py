@@ -13,13 +13,12 @@ from spark.motion import Motion
 from spark.resample import motion_at
 from spark.rig.directions import bone_directions, has_shoulders, hips_to_shoulders
 from spark.rig.rig import Rig
-from spark.rig.roles import Role
+from spark.rig.roles import HANDS, Role
 from spark.rotation import quat_conj, quat_mul, quat_rotate
 from spark.summary import brief
 
 FAR = np.radians(45)  # of a part: it points elsewhere
 _AHEAD = np.array([1.0, 0.0, 0.0])
-_HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
 _LOOKING = (Role.LEFT_FOOT, Role.RIGHT_FOOT, Role.HEAD)
 
 
@@ -97,10 +96,10 @@ def _pointing(motion: Motion, rig: Rig) -> dict[Part, Float[np.ndarray, "T n"]]:
         along = hips_to_shoulders(rig, positions)
         length = np.linalg.norm(along, axis=1, keepdims=True)
         found[Part("trunk", "trunk")] = along / np.maximum(length, 1e-12)
-    for role in (*_LOOKING, *_HANDS):
+    for role in (*_LOOKING, *HANDS):
         if (joint := rig.roles.joint(role)) is not None:
             turn = turns[:, rig.palms.get(joint, joint)]
-            found[_part(role, role.part)] = turn if role in _HANDS else quat_rotate(turn, _AHEAD)
+            found[_part(role, role.part)] = turn if role in HANDS else quat_rotate(turn, _AHEAD)
     return found
 
 

@@ -8,12 +8,11 @@ from jaxtyping import Float
 
 from spark.kinematics import end_positions, world_positions, world_rotations
 from spark.rig.fingers import fingers_below
-from spark.rig.roles import LIMBS, Group, Role, RoleMap
+from spark.rig.roles import HANDS, LIMBS, Group, Role, RoleMap
 from spark.rig.toes import SHORT, astray, toe_points, toes_ahead
 from spark.rotation import quat_conj, quat_rotate
 from spark.skeleton import Skeleton
 
-_HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
 _LEG_OF = {LIMBS[leg][-1]: LIMBS[leg] for leg in (Group.LEFT_LEG, Group.RIGHT_LEG)}  # by its toe
 _COS_HELD = np.cos(np.radians(60))  # of what a hand holds to the forearm; fingers lie along it
 _STUB = 0.03  # of the way from ankle to toe joint: a shorter toe is none, toes have 0.13 or more
@@ -65,7 +64,7 @@ class RigPose:
         aside = {*self._finger(joint, "thumb"), *self._held(joint)}
         aside |= {k for j in aside for k in self.skeleton.subtree(j)}
         fingers = [j for j in below if j not in aside]
-        tipped = self._pointing(fingers) if role in _HANDS else fingers
+        tipped = self._pointing(fingers) if role in HANDS else fingers
         return self._vector(joint, fingers[1:], tipped)
 
     def _toe(self, toe: int, role: Role) -> Vector | None:
@@ -85,7 +84,7 @@ class RigPose:
     def _held(self, hand: int) -> list[int]:
         """What hangs on a hand and points away from its forearm, as swords and trays do: no wrist
         rests so far bent that these are fingers."""
-        if self.roles.roles[hand] not in _HANDS:
+        if self.roles.roles[hand] not in HANDS:
             return []
         below = {j: list(self.skeleton.subtree(j)) for j in self.skeleton.children[hand]}
         return [j for j, joints in below.items() if self._away(hand, joints, joints)]

@@ -16,7 +16,7 @@ from spark.rig.aliases import FINGER_TIP, FINGERS, METACARPAL
 from spark.rig.finger_build import fingers_by_build, metacarpals
 from spark.rig.name_hints import split_name
 from spark.rig.nulls import nulls_of
-from spark.rig.roles import Role, RoleMap
+from spark.rig.roles import HANDS, RoleMap
 from spark.skeleton import Skeleton
 
 FINGER_NAMES = tuple(dict.fromkeys(FINGERS.values()))
@@ -24,7 +24,6 @@ FINGER_NAMES = tuple(dict.fromkeys(FINGERS.values()))
 ALL_FINGERS = "fingers"
 """One joint for all of them, or for all but the thumb."""
 
-_HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
 _PREFIX = "(?:l|r|left|right|左|右)?(?:hand)?"
 _NAMED = re.compile(rf"{_PREFIX}({'|'.join(FINGERS)})(?:finger)?s?")
 _COUNTED = re.compile(rf"{_PREFIX}(?:fingers?|指)")
@@ -47,7 +46,7 @@ class FingerBone(NamedTuple):
 def finger_bones(skeleton: Skeleton, roles: RoleMap) -> dict[FingerBone, int]:
     """The joints of a rig's fingers. Tips, which have no bone below them, are left out; so are
     hands without names that aren't built alike."""
-    hands = {role.side: roles.joint(role) for role in _HANDS}
+    hands = {role.side: roles.joint(role) for role in HANDS}
     found = [_bones_of(skeleton, hand, side) for side, hand in hands.items() if hand is not None]
     alike = len(found) == 2 and len({frozenset(b[1:] for b in bones) for bones, _ in found}) == 1
     return {b: j for bones, named in found if named or alike for b, j in bones.items()}
@@ -60,7 +59,7 @@ def palms_of(skeleton: Skeleton, roles: RoleMap) -> dict[int, int]:
     In recordings of CMU `lwrist` twists and `lhand` below it bends; their best-known conversion to
     BVH has `LeftFingerBase` for it, in the same place as the hand.
     """
-    return {hand: _palm_of(skeleton, hand) for role in _HANDS for hand in roles.joints(role)}
+    return {hand: _palm_of(skeleton, hand) for role in HANDS for hand in roles.joints(role)}
 
 
 def _palm_of(skeleton: Skeleton, hand: int) -> int:

@@ -11,7 +11,7 @@ from spark.motion import Motion
 from spark.rig.bones import RigPose
 from spark.rig.joint_axes import bones_at_right_angles, knees_at_right_angles, snap, tilt
 from spark.rig.observed import mean_rotations, nearest_right_angle
-from spark.rig.roles import ENDS, LIMBS, Group, Role, RoleMap, limb_joints
+from spark.rig.roles import ENDS, HANDS, LIMBS, Group, Role, RoleMap, limb_joints
 from spark.rig.straight_fingers import stretch_fingers
 from spark.rig.toes import SHORT
 from spark.rotation import (
@@ -34,7 +34,6 @@ _UPRIGHT = 20  # the power of the cosine of a trunk's lean that a frame is weigh
 _UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
 _UPPER_ARMS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
 _TRUNK = (Role.PELVIS, Role.SPINE, Role.NECK, Role.HEAD)
-_HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
 
 _SIDES = {Group.LEFT_ARM: 1.0, Group.RIGHT_ARM: -1.0}
 GROUP_OF = {role: group for group, limb in LIMBS.items() for role in limb}
@@ -80,7 +79,7 @@ def reference_of(motion: Motion, roles: RoleMap) -> Reference:
     square = straight = bones_at_right_angles(rest)
     mean = mean_rotations(motion.rotations, _uprightness(motion, roles))
     local = mean.copy()
-    hands = [j for role in _HANDS for j in roles.joints(role)]
+    hands = [j for role in HANDS for j in roles.joints(role)]
     if square:
         turned = nearest_right_angle(mean)
         built = quat_angle(motion.rotations, mean).max(axis=0) < _STILL  # a hip joint's slant

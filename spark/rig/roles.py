@@ -88,6 +88,7 @@ LIMBS: dict[Group, tuple[Role, ...]] = {
 ENDS = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE, Role.LEFT_TOE, Role.RIGHT_TOE)
 """What lies before a limb's shoulder and after its ankle."""
 
+HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
 
 SURE = 0.8
 """Of a role's confidence: below it, one kind of evidence alone says it, or two disagree."""

@@ -14,7 +14,7 @@ from spark.errors import SkeletonError
 from spark.kinematics import world_positions
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
-from spark.rig.roles import LIMBS, Group, Role
+from spark.rig.roles import HANDS, LIMBS, Group, Role
 from spark.rotation import matrix_from_quat, quat_conj, quat_rotate
 
 _Vector = Float[np.ndarray, "3"]
@@ -180,7 +180,7 @@ class _Builder:
             inertia = transverse**2 * (squared * np.eye(3) - along) + longitudinal**2 * along
             self._add(joint, mass, self.pos[joint] + com * axis, inertia)
         hand, forearm = joints[2], joints[1]
-        if roles[2] in (Role.LEFT_HAND, Role.RIGHT_HAND) and hand is not None:
+        if roles[2] in HANDS and hand is not None:
             direction = np.zeros(3) if forearm is None else self.pos[hand] - self.pos[forearm]
             direction = direction / max(float(np.linalg.norm(direction)), 1e-9)
             self._add(

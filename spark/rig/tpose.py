@@ -25,7 +25,7 @@ from spark.rig.nulls import all_but, motion_of, nulls_of
 from spark.rig.observed import bend_axis, mean_rotations, nearest_right_angle
 from spark.rig.pitched_feet import flat_feet
 from spark.rig.reference_pose import GROUP_OF, Reference, pelvis_frame, reference_of
-from spark.rig.roles import LIMBS, Group, Role, RoleMap
+from spark.rig.roles import HANDS, LIMBS, Group, Role, RoleMap
 from spark.rotation import (
     quat_angle,
     quat_between,
@@ -49,7 +49,6 @@ _STEEPEST_FOOT = np.radians(-75)  # a foot that points further down at rest is n
 _LEFT, _UP = np.eye(3)[1:]
 _FEET = (Role.LEFT_FOOT, Role.RIGHT_FOOT)
 _TOES = (Role.LEFT_TOE, Role.RIGHT_TOE)
-_HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
 _CLAVICLES = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE)
 _BENT = {  # the segment below, and the axis that it bends about in the T-pose
     Role.LEFT_UPPER_LEG: (Role.LEFT_LOWER_LEG, _LEFT),
@@ -57,7 +56,7 @@ _BENT = {  # the segment below, and the axis that it bends about in the T-pose
     Role.LEFT_UPPER_ARM: (Role.LEFT_FOREARM, -_UP),
     Role.RIGHT_UPPER_ARM: (Role.RIGHT_FOREARM, _UP),
 }
-_ROLLING = (Role.LEFT_FOREARM, Role.RIGHT_FOREARM, *_HANDS)
+_ROLLING = (Role.LEFT_FOREARM, Role.RIGHT_FOREARM, *HANDS)
 _OUT = {Group.LEFT_ARM: _LEFT, Group.RIGHT_ARM: -_LEFT}
 
 Vector = Float[np.ndarray, "3"]
@@ -126,7 +125,7 @@ def _find(reference: Reference, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"
             q = _place(reference, j, role, q, parent)
         elif role is Role.HEAD and reference.square:
             q = _skull(q, tpose[(pelvis, *roles.joints(Role.SPINE))[-1]])
-        if role in _HANDS:
+        if role in HANDS:
             q, turn, note = _palm_down(reference, j, q)
             notes += note
             if turn is not None:
@@ -165,7 +164,7 @@ def _place(reference: Reference, joint: int, role: Role, q: Quat, q_parent: Quat
         return q
     arm = GROUP_OF[role] in _OUT
     goal = _OUT.get(GROUP_OF[role], -_UP)
-    if reference.square and role in _HANDS:
+    if reference.square and role in HANDS:
         bone = snap(bone, _MAX_FINGER_SPREAD)
     q = quat_mul(quat_between(quat_rotate(q, bone), goal), q)
     if role in _BENT and not reference.posed:

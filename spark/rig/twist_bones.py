@@ -93,6 +93,8 @@ def twist_bones(
                 found[j] = TwistBone(segment, *turn)
             if segment == lower:
                 for j in _between(skeleton, segment, until):
+                    if j in nulls:
+                        continue
                     away = (places[j] - places[segment]) / length
                     along = float(away @ axis)
                     if along > _ASIDE and np.linalg.norm(away - along * axis) < _IN_LINE:
@@ -100,11 +102,10 @@ def twist_bones(
     return dict(sorted(found.items()))
 
 
-def _between(skeleton: Skeleton, segment: int, until: int) -> list[int]:
-    """The joints that a segment's end hangs on, below the one at its start, without nulls."""
-    above, nulls = skeleton.ancestors(until)[1:], nulls_of(skeleton)
-    between = above[: above.index(segment)] if segment in above else ()
-    return [j for j in between if j not in nulls]
+def _between(skeleton: Skeleton, segment: int, until: int) -> tuple[int, ...]:
+    """The joints that a segment's end hangs on, below the one at its start."""
+    above = skeleton.ancestors(until)[1:]
+    return above[: above.index(segment)] if segment in above else ()
 
 
 def _named_below(skeleton: Skeleton, roles: RoleMap) -> dict[int, list[int]]:
