@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args, overload
 
@@ -11,7 +10,7 @@ from spark.io.bvh import write_bvh
 from spark.io.encoding import encode, encode_new
 from spark.motion import Motion
 from spark.transfer.analytic import transfer
-from spark.transfer.canonical import CanonicalMotion, from_canonical
+from spark.transfer.canonical import from_canonical
 from spark.transfer.leg_fit import travel_scale
 from spark.transfer.noise import without_noise
 from spark.transfer.refine import grounded, refined
@@ -24,7 +23,6 @@ from spark_sim.loading import clip_of
 
 if TYPE_CHECKING:
     from sim.report import Report
-    from spark.network.retarget import NetworkRetargeter
     from spark_sim.simulation import Simulated
 
 COPIED = "each pose is copied to the robot's hinges: feet are not held, parts may collide"
@@ -104,7 +102,10 @@ def retarget(
     if method == "copy":
         moved = transfer(canonical, target.rig)
     else:
-        moved = _filled_in(canonical, target, _learned(checkpoint))
+        from spark.network.fill_in import filled_in
+
+        learned = None if checkpoint is None else Path(checkpoint)
+        moved = filled_in(canonical, target.canonical, learned)
     if refine:
         finish = refined if method == "spark" else grounded
         moved = finish(canonical, moved, noise)
@@ -144,34 +145,6 @@ def _onto_robot(source: AnyClip, target: RobotClip, *, solved: bool) -> RobotCli
         moved = copy(source.canonical, robot)
         moved = replace(moved, notes=(*moved.notes, COPIED))
     return RobotClip(moved, f"{source.name} on {target.name}", source.path, source.span)
-
-
-def _filled_in(
-    source: CanonicalMotion, target: Clip, network: "NetworkRetargeter"
-) -> CanonicalMotion:
-    """The joints without a counterpart as a network fills them in, and the target's own motion; the
-    legs fitted to it. A network that says where every joint is has said all of that."""
-    from spark.transfer.target_prior import with_target_prior
-
-    if not network.network.config.residual:
-        return network(source, target.rig)
-    return network.fit_legs(source, with_target_prior(network, source, target.canonical))
-
-
-def _learned(checkpoint: File | None) -> "NetworkRetargeter":
-    """The network of a checkpoint, or the one that ships."""
-    from spark.inference.weights import read_weights
-    from spark.network.retarget import NetworkRetargeter
-
-    return _shipped() if checkpoint is None else NetworkRetargeter(read_weights(Path(checkpoint)))
-
-
-@cache
-def _shipped() -> "NetworkRetargeter":
-    from spark.inference.weights import SHIPPED, read_weights
-    from spark.network.retarget import NetworkRetargeter
-
-    return NetworkRetargeter(read_weights(SHIPPED))
 
 
 def report(
