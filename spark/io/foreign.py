@@ -10,21 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from spark.errors import ConventionError, FileFormatError
-from spark.io.convention import (
-    CLEARLY,
-    HUMAN_HEIGHTS,
-    UPS,
-    Convention,
-    Up,
-    axis_of,
-    given_unit,
-    given_up,
-    infer_unit,
-    infer_up,
-)
+from spark.io.convention import UPS, Convention, Up, axis_of, given_unit, given_up
 from spark.io.encoding import encode_new
 from spark.io.recording import Recording, in_si
 from spark.io.scanner import LARGEST
+from spark.io.unit_inference import HUMAN_HEIGHTS, infer_unit
+from spark.io.up_inference import CLEARLY, infer_up
 from spark.io.upright import above_feet
 from spark.kinematics import forward
 from spark.motion import Motion

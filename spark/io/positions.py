@@ -10,15 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import ConventionError, FileFormatError, name_list
-from spark.io.convention import (
-    Convention,
-    axis_of,
-    given_unit,
-    given_up,
-    infer_unit,
-    infer_up,
-    standing_axis,
-)
+from spark.io.convention import Convention, axis_of, given_unit, given_up
 from spark.io.encoding import encode_new
 from spark.io.position_files import Points, read_points
 from spark.io.position_fit import Hints, fit_rotations, fitted
@@ -26,6 +18,8 @@ from spark.io.position_layouts import KNOWN, Layout, layouts
 from spark.io.position_tree import parents_first, rigid_tree, still
 from spark.io.recording import Recording, unique_names
 from spark.io.stance import walked
+from spark.io.unit_inference import infer_unit
+from spark.io.up_inference import infer_up, standing_axis
 from spark.io.upright import above_feet
 from spark.kinematics import forward
 from spark.motion import Motion

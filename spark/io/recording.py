@@ -15,8 +15,10 @@ from jaxtyping import Float, Int
 from spark.blocks import BLOCK, blocks
 from spark.errors import ConventionError, FileFormatError, name_list
 from spark.io.bvh import Bvh, read_bvh
-from spark.io.convention import Convention, given_unit, given_up, infer_unit, infer_up
+from spark.io.convention import Convention, given_unit, given_up
 from spark.io.euler import quat_from_angles
+from spark.io.unit_inference import infer_unit
+from spark.io.up_inference import infer_up
 from spark.motion import LazyMotion, Motion, check_frame_time
 from spark.rotation import quat_identity
 from spark.skeleton import Skeleton

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from spark.io.arrays import read_npy, read_npz
-from spark.io.convention import UPS, Up, axis_of, given_up, points_down, standing_axis
+from spark.io.convention import UPS, Up, axis_of, given_up, points_down
 from spark.io.foreign import foreign_recording
 from spark.io.recording import Recording
 from spark.io.smpl_body import Body, mean_body, read_body_model
@@ -19,6 +19,7 @@ from spark.io.smpl_columns import from_array
 from spark.io.smpl_layouts import from_npz, from_tensors
 from spark.io.smpl_motion import SmplMotion
 from spark.io.stance import stance_scale, walked
+from spark.io.up_inference import standing_axis
 from spark.kinematics import end_positions, forward
 from spark.motion import Motion
 from spark.rotation import quat_conj, quat_from_matrix, quat_from_rotvec, quat_mul
