@@ -3,14 +3,17 @@
 import socket
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 import spark_sim
 from spark.errors import ConventionError
 from spark_sim.live import listener as module
+from spark_sim.live import pace
 from spark_sim.live.listener import Listener
 from tests.helpers import mvn, vmc
 
@@ -117,22 +120,32 @@ def test_after_a_pause_the_pose_is_not_an_old_one() -> None:
     assert late < 0.15
 
 
-def test_frames_come_as_often_as_they_are_asked_for() -> None:
+def test_frames_come_as_often_as_they_are_asked_for(
+    out: socket.socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """However long a step takes; and one that took too long is not made up for."""
-    with Listener("vmc://127.0.0.1:0") as person:
-        sender = walking(person.port, 3.0)
+    now = 100.0  # [s] of a clock that nothing but this test moves
+
+    def pass_by(seconds: float) -> None:
+        nonlocal now
+        now += seconds
+
+    with out, Listener("vmc://127.0.0.1:0") as person:
+        out.sendto(vmc.packet({}, 1.0), ("127.0.0.1", person.port))
         person.wait(fps=30.0, timeout=10.0)
-        places = []
-        for frame in person.frames(fps=30.0):
-            places.append(frame.root_pos[0])
-            time.sleep(0.2 if len(places) == 10 else 0.01)
-            if len(places) == 30:
+        monkeypatch.setattr(pace, "time", SimpleNamespace(monotonic=lambda: now))
+        monkeypatch.setattr(person, "listen", pass_by)
+        came = []
+        for _ in person.frames(fps=30.0):
+            came.append(now)
+            pass_by(0.21 if len(came) == 10 else 0.01)
+            if len(came) == 30:
                 break
-        sender.join()
-    steps = np.diff(places)
-    assert np.median(steps) == pytest.approx(1 / 30, abs=0.006)
-    assert 0.15 < steps[9] < 0.3
-    assert len(steps[steps < 0.015]) < 4
+    beats = (np.array(came) - came[0]) * 30.0
+    expected = np.arange(30.0)
+    expected[10:] += 5  # 0.21 s are 6.3 steps: that of 0.2 s is taken late, and five are left out
+    expected[10] += 0.3
+    assert_allclose(beats, expected, atol=1e-6)
 
 
 def test_of_a_flood_the_newest_are_taken(
