@@ -6,7 +6,6 @@ of channel values a frame. Units, axes and Euler angles stay the file's own here
 """
 
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import chain, pairwise
 from pathlib import Path
@@ -18,20 +17,18 @@ from spark.blocks import blocks
 from spark.errors import FileFormatError, SkeletonError
 from spark.files import write_atomically
 from spark.finite import check_output
+from spark.io.bvh_hierarchy import (
+    NAME,
+    BvhJoint,
+    hierarchy_lines,
+    number_text,
+    parse_hierarchy,
+)
 from spark.io.bvh_rows import parse_motion
 from spark.io.charset import to_utf8, without_utf16
 from spark.io.scanner import Scanner, shown
 from spark.opening import read_bytes
 from spark.summary import counted, time_span
-
-Vector = tuple[float, float, float]
-
-CHANNELS = tuple(f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ")
-
-_MAX_JOINTS = 10_000  # the largest rigs, with faces and clothes, have a thousand
-_MAX_DEPTH = 512  # joints above a joint: no creature has as many, a deeper tree is a broken file
-
-_NAME = re.compile(r"[^\s{}]([^\r\n{}]*[^\s{}])?", re.ASCII)
 
 _POINT = re.compile(rb"(?<!\S)[-+]?\d*\.\d")
 _COMMA = re.compile(rb"(?<!\S)([-+]?\d+),(\d+(?:[eE][-+]?\d+)?)(?!\S)")
@@ -39,23 +36,6 @@ _COMMA = re.compile(rb"(?<!\S)([-+]?\d+),(\d+(?:[eE][-+]?\d+)?)(?!\S)")
 _COMMENT = re.compile(rb"(?:^|(?<=[\r\n]))[ \t]*(?:[#;]|//)[^\r\n]*")
 
 _AFTER_TEXT = b"\0\x1a"  # padding, and DOS' end of a file
-
-_CHANNEL_OF = {name.lower().encode(): name for name in CHANNELS}
-
-
-@dataclass(frozen=True)
-class BvhJoint:
-    """A joint in the file's units and axes. `parent` is -1 at the root; `ends` are its End Sites.
-
-    `channels` are names out of `CHANNELS`, in the order of the file. A `name` has no braces or line
-    ends, and no spaces around it.
-    """
-
-    name: str
-    parent: int
-    offset: Vector
-    channels: tuple[str, ...] = ()
-    ends: tuple[Vector, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +67,7 @@ class Bvh:
             )
         open_joints: list[int] = []
         for j, joint in enumerate(self.joints):
-            if not _NAME.fullmatch(joint.name):
+            if not NAME.fullmatch(joint.name):
                 raise SkeletonError(f"joint {j} has the name {joint.name!r}, which BVH can't hold")
             while open_joints and open_joints[-1] != joint.parent:
                 open_joints.pop()
@@ -147,7 +127,7 @@ def read_bvh(path: str | Path, *, frame_time: float | None = None) -> Bvh:
     data, left_out = _without_comments(data)
     data, commas = _with_points(data)
     scanner = Scanner(path, data)
-    joints, repairs = _parse_hierarchy(scanner)
+    joints, repairs = parse_hierarchy(scanner)
     channels = sum(len(joint.channels) for joint in joints)
     frame_time, values, mended = parse_motion(scanner, channels, frame_time)
     return Bvh(joints, frame_time, values, path, encoding, left_out + commas + repairs + mended)
@@ -165,41 +145,13 @@ def write_bvh(bvh: Bvh, path: str | Path) -> None:
         OFFSET=np.array([v for each in rest for v in each]),
         frame_time=np.array([bvh.frame_time]),
     )
-    lines = ["HIERARCHY", *_hierarchy_lines(bvh.joints)]
-    lines += ["MOTION", f"Frames: {len(bvh)}", f"Frame Time: {_text([bvh.frame_time])}"]
-    rows = ("".join(f"{_text(row)}\n" for row in bvh.values[b].tolist()) for b in blocks(len(bvh)))
+    lines = ["HIERARCHY", *hierarchy_lines(bvh.joints)]
+    lines += ["MOTION", f"Frames: {len(bvh)}", f"Frame Time: {number_text([bvh.frame_time])}"]
+    rows = (
+        "".join(f"{number_text(row)}\n" for row in bvh.values[b].tolist()) for b in blocks(len(bvh))
+    )
     text = chain(["\n".join([*lines, ""])], rows)
     write_atomically(Path(path), (piece.encode(bvh.encoding) for piece in text))
-
-
-def _text(numbers: Iterable[float]) -> str:
-    # One repr of the list is faster than one a number; many readers know no exponents.
-    text = repr([*map(float, numbers)])[1:-1].replace(",", "")
-    if "e" in text:
-        text = " ".join(
-            np.format_float_positional(float(word), trim="-") if "e" in word else word
-            for word in text.split()
-        )
-    return text
-
-
-def _hierarchy_lines(joints: tuple[BvhJoint, ...]) -> list[str]:
-    lines: list[str] = []
-    depths: list[int] = []
-    for joint in joints:
-        depth = 0 if joint.parent < 0 else depths[joint.parent] + 1
-        deepest = depths[-1] if depths else -1
-        lines += ["\t" * closing + "}" for closing in range(deepest, depth - 1, -1)]
-        depths.append(depth)
-        indent = "\t" * depth
-        lines += [f"{indent}{'JOINT' if depth else 'ROOT'} {joint.name}", indent + "{"]
-        lines.append(f"{indent}\tOFFSET {_text(joint.offset)}")
-        lines.append(f"{indent}\tCHANNELS {' '.join([str(len(joint.channels)), *joint.channels])}")
-        for end in joint.ends:
-            lines += [f"{indent}\tEnd Site", f"{indent}\t{{"]
-            lines += [f"{indent}\t\tOFFSET {_text(end)}", f"{indent}\t}}"]
-    lines += ["\t" * depth + "}" for depth in range(depths[-1], -1, -1)]
-    return lines
 
 
 def _read(path: Path) -> bytes:
@@ -229,97 +181,3 @@ def _with_points(data: bytes) -> tuple[bytes, tuple[str, ...]]:
     if b"," not in data or _POINT.search(data) or not _COMMA.search(data):
         return data, ()
     return _COMMA.sub(rb"\1.\2", data), ("numbers have decimal commas: read as points",)
-
-
-def _parse_hierarchy(scanner: Scanner) -> tuple[tuple[BvhJoint, ...], tuple[str, ...]]:
-    scanner.expect("HIERARCHY")
-    scanner.expect("ROOT")
-    joints: list[_OpenJoint] = []
-    six = 0
-    open_joints = [_open_joint(scanner, joints, -1)]
-    while open_joints:
-        joint = joints[open_joints[-1]]
-        word = scanner.word()
-        match word.lower():
-            case b"offset" if joint.offset is None:
-                joint.offset, longer = _parse_offset(scanner, f"the OFFSET of {joint.name!r}")
-                six += longer
-            case b"channels" if joint.channels is None:
-                joint.channels = _parse_channels(scanner, joint.name)
-            case b"joint":
-                if len(open_joints) == _MAX_DEPTH:
-                    scanner.fail(f"joints nest deeper than {_MAX_DEPTH}")
-                if len(joints) == _MAX_JOINTS:
-                    scanner.fail(f"more than {_MAX_JOINTS} joints")
-                open_joints.append(_open_joint(scanner, joints, open_joints[-1]))
-            case b"end" | b"endsite" | b"end_site":
-                scanner.label()
-                scanner.expect("{")
-                scanner.expect("OFFSET")
-                end, longer = _parse_offset(scanner, f"the End Site of {joint.name!r}")
-                joint.ends.append(end)
-                six += longer
-                scanner.expect("}")
-            case b"}":
-                if joint.offset is None:
-                    scanner.fail(f"joint {joint.name!r} has no OFFSET")
-                open_joints.pop()
-            case _:
-                scanner.fail(
-                    f"expected OFFSET, CHANNELS (once each), JOINT, End Site or }} in joint "
-                    f"{joint.name!r}, found {shown(word)}"
-                )
-    repairs = (
-        f"{counted(six, 'OFFSET')} of six numbers, as NVIDIA's SOMA has them: the first three are "
-        "the position; the others, a rest rotation, are not needed, since the rows hold whole "
-        "rotations",
-    )
-    return tuple(joint.closed() for joint in joints), repairs if six else ()
-
-
-@dataclass
-class _OpenJoint:
-    name: str
-    parent: int
-    ends: list[Vector]
-    offset: Vector | None = None
-    channels: tuple[str, ...] | None = None
-
-    def closed(self) -> BvhJoint:
-        assert self.offset is not None
-        return BvhJoint(self.name, self.parent, self.offset, self.channels or (), tuple(self.ends))
-
-
-def _open_joint(scanner: Scanner, joints: list[_OpenJoint], parent: int) -> int:
-    name = scanner.label().decode()
-    if not name:
-        scanner.fail("expected the name of a joint")
-    scanner.expect("{")
-    joints.append(_OpenJoint(name, parent, []))
-    return len(joints) - 1
-
-
-def _parse_offset(scanner: Scanner, what: str) -> tuple[Vector, bool]:
-    """The vector, and whether three more numbers came after it."""
-    vector = scanner.number(what), scanner.number(what), scanner.number(what)
-    longer = scanner.at_number()
-    for _ in range(3 * longer):
-        scanner.number(f"{what} (three, or six as in NVIDIA's SOMA)")
-    return vector, longer
-
-
-def _parse_channels(scanner: Scanner, name: str) -> tuple[str, ...]:
-    count = scanner.count(f"the number of CHANNELS of {name!r}")
-    if count > len(CHANNELS):
-        scanner.fail(f"{count} CHANNELS for {name!r}; expected at most {len(CHANNELS)}")
-    channels: list[str] = []
-    for _ in range(count):
-        word = scanner.word()
-        channel = _CHANNEL_OF.get(word.lower())
-        if channel is None or channel in channels:
-            scanner.fail(
-                f"expected {count} different CHANNELS for {name!r} out of {', '.join(CHANNELS)}; "
-                f"found {shown(word)}"
-            )
-        channels.append(channel)
-    return tuple(channels)

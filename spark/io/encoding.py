@@ -8,7 +8,8 @@ from jaxtyping import Float
 
 from spark.blocks import blocks
 from spark.errors import SkeletonError, name_list
-from spark.io.bvh import Bvh, BvhJoint, Vector
+from spark.io.bvh import Bvh
+from spark.io.bvh_hierarchy import BvhJoint, Vector
 from spark.io.convention import Convention, given_unit, given_up
 from spark.io.euler import angles_of, angles_over_time, quat_from_angles
 from spark.io.recording import Recording

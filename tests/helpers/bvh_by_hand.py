@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from spark.io.bvh import CHANNELS, Bvh, BvhJoint, write_bvh
+from spark.io.bvh import Bvh, write_bvh
+from spark.io.bvh_hierarchy import CHANNELS, BvhJoint
 from spark.io.recording import Recording
 from spark.kinematics import forward
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import spark_sim
-from spark.io.bvh import Bvh, BvhJoint, read_bvh, write_bvh
+from spark.io.bvh import Bvh, read_bvh, write_bvh
+from spark.io.bvh_hierarchy import BvhJoint
 from tests.helpers.program import Program
 
 

@@ -12,7 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from spark.errors import FileFormatError, OutputError, SkeletonError, SparkSimError
-from spark.io.bvh import CHANNELS, Bvh, BvhJoint, read_bvh, write_bvh
+from spark.io.bvh import Bvh, read_bvh, write_bvh
+from spark.io.bvh_hierarchy import CHANNELS, BvhJoint
 from spark.io.charset import to_utf8
 from spark.io.encoding import encode
 from spark.io.recording import read_recording

@@ -9,7 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from spark.errors import ConventionError
-from spark.io.bvh import Bvh, BvhJoint, write_bvh
+from spark.io.bvh import Bvh, write_bvh
+from spark.io.bvh_hierarchy import BvhJoint
 from spark.io.convention import UNITS
 from spark.io.encoding import encode, encode_new
 from spark.io.recording import read_recording

@@ -7,7 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from spark.errors import SkeletonError
-from spark.io.bvh import Bvh, BvhJoint, write_bvh
+from spark.io.bvh import Bvh, write_bvh
+from spark.io.bvh_hierarchy import BvhJoint
 from spark.io.encoding import encode, encode_new
 from spark.io.recording import read_recording
 from spark.kinematics import end_positions, forward

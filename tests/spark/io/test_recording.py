@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spark.errors import FileFormatError
-from spark.io.bvh import CHANNELS, Bvh, BvhJoint, read_bvh
+from spark.io.bvh import Bvh, read_bvh
+from spark.io.bvh_hierarchy import CHANNELS, BvhJoint
 from spark.io.convention import UNITS
 from spark.io.encoding import encode
 from spark.io.recording import Recording, read_recording
