@@ -41,7 +41,7 @@ _FIRST_DAMPING, _DAMPING = 0.02, 1e-3  # [1] on the diagonal of the normal equat
 _W_STAY = 0.2  # [1/rad] of how far a hinge turns from frame to frame
 _MAX_STEP = 0.3  # [rad] of a dof in one step
 _STEP_TOL = 0.03  # [rad] after a shorter step there is no further one
-_AT_ONCE = 64  # frames whose spheres fit into a processor's cache
+_AT_ONCE = 32  # frames whose spheres fit into a processor's cache
 _HELD = 1e8  # damping of hinges at their limits
 
 
@@ -137,9 +137,7 @@ def _marched(
         others = np.flatnonzero(~known)
         for row in others.tolist():
             mujoco.mj_normalizeQuat(robot.mjcf.model, way[row])
-        for start in range(0, len(others), _AT_ONCE):
-            here = others[start : start + _AT_ONCE]
-            way[here] = settled(terms, poses.at(here), way[here], _BETWEEN_STEPS)
+        way[others] = settled(terms, poses.at(others), way[others], _BETWEEN_STEPS)
     return [robot.from_qpos(way) for way in ways]
 
 
@@ -161,6 +159,17 @@ def settled(
 ) -> Float[np.ndarray, "L nq"]:
     """`begun` after Gauss-Newton steps in the block's dofs, each frame for itself and, where
     something led there, near where it was begun."""
+    out = np.empty_like(begun)
+    for start in range(0, len(begun), _AT_ONCE):
+        here = np.arange(start, min(start + _AT_ONCE, len(begun)))
+        out[here] = _settled(terms, targets.at(here), begun[here], steps, led)
+    return out
+
+
+def _settled(
+    terms: Terms, targets: PoseTargets, begun: Float[np.ndarray, "L nq"], steps: int, led: bool
+) -> Float[np.ndarray, "L nq"]:
+    """The same of frames whose arrays fit into a cache, all at once."""
     model = terms.robot.mjcf.model
     moved = terms.mj_dofs
     q, rows = begun.copy(), np.arange(len(begun))  # of those that still move
