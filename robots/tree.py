@@ -185,3 +185,14 @@ class Coordinates:
                 balls[:, j] = quat_mul(quat_from_rotvec(step[:, at : at + 3]), balls[:, j])
         quat = quat_mul(quat_from_rotvec(step[:, 3:6]), self.quat)
         return Coordinates(self.pos + step[:, :3], quat, angles, balls)
+
+
+def one_after_another(parts: Sequence[Coordinates]) -> Coordinates:
+    """Some trajectories as one."""
+    balls = [part.ball_quats for part in parts if part.ball_quats is not None]
+    return Coordinates(
+        np.concatenate([part.pos for part in parts]),
+        np.concatenate([part.quat for part in parts]),
+        np.concatenate([part.angles for part in parts]),
+        np.concatenate(balls) if balls else None,
+    )

@@ -15,7 +15,7 @@ from robots.solver.holds import Holds
 from robots.solver.objective import linearize
 from robots.solver.spells import Spells
 from robots.solver.targets import Targets
-from robots.tree import Coordinates
+from robots.tree import Coordinates, one_after_another
 
 _FREE_SPEED = 3.0  # [rad/s] of a hinge that costs nothing where ways are compared, and what
 _W_TURN = 4.0  # [1/rad] a turn beyond that costs, from frame to frame
@@ -37,7 +37,7 @@ def taken(
     d [rad] beyond what is free costs (`_W_TURN` d)² / 2, also from way to way. A spell begins and
     ends on the first way where frames before lead in, or others out.
     """
-    costs = np.stack([_cost(robot, targets, holds, way, block) for way in ways], axis=1)
+    costs = _costs(robot, targets, holds, ways, block)
     hinges = _hinges(robot, block)
     angles = np.stack([way.angles[:, hinges] for way in ways])
     turns = angles[:, None, 1:] - angles[None, :, :-1]
@@ -86,12 +86,15 @@ def cheapest(
     return np.array(taken[::-1])
 
 
-def _cost(
-    robot: Morphology, targets: Targets, holds: Holds, q: Coordinates, block: Block
-) -> Float[np.ndarray, "T"]:
+def _costs(
+    robot: Morphology, targets: Targets, holds: Holds, ways: Sequence[Coordinates], block: Block
+) -> Float[np.ndarray, "T W"]:
     """The solver's objective, each frame for itself."""
+    frames = np.tile(np.arange(len(targets)), len(ways))
+    targets, holds, q = targets.at(frames), holds.at(frames), one_after_another(ways)
     candidates = collisions_of(robot).candidates(forward_kinematics(robot.tree, q), block, 1)
-    return linearize(robot, targets, holds, q, block, candidates, with_jacobian=False).cost
+    terms = robot, targets, holds, q, block, candidates
+    return linearize(*terms, with_jacobian=False).cost.reshape(len(ways), -1).T.copy()
 
 
 def _hinges(robot: Morphology, block: Block) -> list[int]:
