@@ -66,15 +66,15 @@ def _on_other_ways(
     led = [(start > 0, stop < len(q)) for start, stop in runs]
     part, targets, holds = q.at(frames), targets.at(frames), holds.at(frames)
     found = _nearest(robot, targets, part, bones, hinges)
-    limbs = tuple(limbs_of(robot, targets, block))
-    terms, poses = terms_of(robot, limbs, targets.hands is not None), pose_targets(targets, limbs)
+    limb = _limb(robot, block, hinges)
+    terms = terms_of(robot, tuple(bones), targets.hands is not None, limb)
+    poses = pose_targets(targets, bones)
     ways = [part]
     for angles in found:
         begun = part.angles.copy()
         begun[:, hinges] = angles
         qpos = robot.to_qpos(Coordinates(part.pos, part.quat, begun, part.ball_quats))
-        way = robot.from_qpos(settled(terms, poses, qpos, _STEPS, led=False))
-        ways.append(part.with_joints(_limb(robot, block, hinges), way))
+        ways.append(robot.from_qpos(settled(terms, poses, qpos, _STEPS, led=False)))
     on = taken(robot, targets, holds, ways, block, spells, led)
     left = np.flatnonzero(spells.any(on > 0)[spells.of_frames])
     path = along(robot, ways, on, block, spells, targets.frame_time)
@@ -147,9 +147,9 @@ def _hinges(robot: Morphology, block: Block, bones: Sequence[Role]) -> list[int]
     return [j for j in block.joints if j in joints and not tree.balls[j]]
 
 
-def _limb(robot: Morphology, block: Block, hinges: Sequence[int]) -> list[int]:
+def _limb(robot: Morphology, block: Block, hinges: Sequence[int]) -> tuple[int, ...]:
     """A limb's hinges, and the block's joints beyond them."""
-    return [j for j in block.joints if set(hinges) & set(robot.tree.chain(j))]
+    return tuple(j for j in block.joints if set(hinges) & set(robot.tree.chain(j)))
 
 
 def _link(robot: Morphology, role: Role) -> int:

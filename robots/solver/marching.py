@@ -106,7 +106,7 @@ def _marched(
     between those that are marched through begin between them, and then take steps for themselves.
     """
     bones = tuple(limbs_of(robot, targets, block))
-    terms = terms_of(robot, bones, targets.hands is not None)
+    terms = terms_of(robot, bones, targets.hands is not None, block.joints)
     poses = pose_targets(targets, bones)
     columns, tpose = _qpos_columns(robot, block), robot.to_qpos(robot.tpose)
     qpos = robot.to_qpos(q)
@@ -213,6 +213,9 @@ def _qpos_columns(robot: Morphology, block: Block) -> Int[np.ndarray, "n"]:
     return np.concatenate([robot.addresses[j] + np.arange(sizes[j]) for j in block.joints])
 
 
-@lru_cache(maxsize=16)
-def terms_of(robot: Morphology, bones: tuple[Role, ...], hands: bool) -> Terms:
-    return Terms(robot, bones, hands, later_only=True)
+@lru_cache(maxsize=48)
+def terms_of(
+    robot: Morphology, bones: tuple[Role, ...], hands: bool, joints: tuple[int, ...]
+) -> Terms:
+    """Those of some joints of arms and head."""
+    return Terms(robot, bones, hands, only=joints)

@@ -1,5 +1,7 @@
 """Self-collision in a few frames: `robots.solver.collision` for all shapes at once."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float
 
@@ -26,14 +28,16 @@ _WITHIN = _ACTIVE + _REACH
 
 class WindowCollisions:
     """A robot's pairs of shapes that can meet. `rest` is where all bodies are in the rest pose [m].
-    The links of the first block are solved for first: later ones give way to them, and where only
-    these are solved for, what the first do to each other is not looked at."""
+    The links of the first block are solved for first: later ones give way to them. What the dofs do
+    not move is not looked at."""
 
     def __init__(self, robot: Morphology, dofs: WindowDofs, rest: Float[np.ndarray, "B 3"]) -> None:
-        tree, first = robot.tree, dofs.first_links
+        tree = robot.tree
         pairs = collisions_of(robot).pairs
-        if dofs.later_only:
-            pairs = tuple(pair for pair in pairs if not _among(pair, tree, first))
+        moving, weights = _moving(per_metre(robot), tree, pairs, dofs)
+        moved = np.flatnonzero(moving.any(axis=1))
+        self._moving, self._weights = moving[moved], weights[moved]
+        pairs = tuple(pairs[k] for k in moved.tolist())
         apart = np.array([pair.clearance + _MARGIN * (pair.gap > _FAR) for pair in pairs])
         bodies = dofs.bodies([*range(len(tree)), ROOT])
         shapes = list({pair.large.geom: pair.large for pair in pairs}.values())
@@ -49,7 +53,6 @@ class WindowCollisions:
         radii = np.concatenate([np.zeros(0), *(pair.small.radii for pair in pairs)])
         sizes = np.concatenate([arms_of(centers - rest[small]), [radii + apart[own]]])
         self._spheres = NearSpheres(polytopes, np.stack([own, small, large[own]]), sizes)
-        self._index_dofs(per_metre(robot), tree, pairs, dofs)
 
     def candidates(self, poses: WindowPoses) -> NearSpheres:
         """The spheres that collide, or may soon."""
@@ -82,24 +85,23 @@ class WindowCollisions:
         residual *= felt * weights
         return Rows(wrenches.transpose(1, 2, 0), moving, residual)
 
-    def _index_dofs(
-        self, firm: float, tree: Tree, pairs: tuple[ShapePair, ...], dofs: WindowDofs
-    ) -> None:
-        """Which columns move the pairs together (-1) and apart, of the links that give way; all
-        weighted."""
-        first = dofs.first_links
-        self._moving = np.zeros((len(pairs), tree.nv))
-        self._weights = np.full(len(pairs), firm * W_COLLISION)
-        for k, pair in enumerate(pairs):
-            chains = [tree.chain(part.link) for part in (pair.small, pair.large)]
-            both = set(chains[0]) & set(chains[1])
-            early = _among(pair, tree, first)
-            if early:
-                self._weights[k] = firm * W_LEG_COLLISION
-            for sign, chain in zip((-1.0, 1.0), chains, strict=True):
-                moving = tuple(j for j in chain if j not in both and (j in first) == early)
-                self._moving[k, tree.dofs(moving)] = sign
-        self._moving = self._moving.take(dofs.numbers, axis=1) * self._weights[:, None]
+
+def _moving(
+    firm: float, tree: Tree, pairs: Sequence[ShapePair], dofs: WindowDofs
+) -> tuple[Float[np.ndarray, "P D"], Float[np.ndarray, "P"]]:
+    """Which columns move the pairs together (-1) and apart, of the links that give way, weighted;
+    and the weights."""
+    moving, weights = np.zeros((len(pairs), tree.nv)), np.full(len(pairs), firm * W_COLLISION)
+    for k, pair in enumerate(pairs):
+        chains = [tree.chain(part.link) for part in (pair.small, pair.large)]
+        both = set(chains[0]) & set(chains[1])
+        early = _among(pair, tree, dofs.first_links)
+        if early:
+            weights[k] = firm * W_LEG_COLLISION
+        for sign, chain in zip((-1.0, 1.0), chains, strict=True):
+            own = tuple(j for j in chain if j not in both and (j in dofs.first_links) == early)
+            moving[k, tree.dofs(own)] = sign
+    return moving.take(dofs.numbers, axis=1) * weights[:, None], weights
 
 
 def _among(pair: ShapePair, tree: Tree, links: set[int]) -> bool:

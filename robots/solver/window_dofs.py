@@ -11,17 +11,18 @@ from robots.tree import BASE
 
 
 class WindowDofs:
-    """A robot's or, with `later_only`, those of the later block: arms and head hang on base, trunk
-    and legs, and don't move them. `numbers` are those of `robots.tree`, `mj` MuJoCo's."""
+    """A robot's, or those of `only` some joints of the later block: arms and head hang on base,
+    trunk and legs, and don't move them. `numbers` are those of `robots.tree`, `mj` MuJoCo's."""
 
-    def __init__(self, robot: Morphology, *, later_only: bool = False) -> None:
-        self._robot, self.later_only = robot, later_only
+    def __init__(self, robot: Morphology, *, only: Sequence[int] | None = None) -> None:
+        self._robot, self.later_only = robot, only is not None
         model, tree = robot.mjcf.model, robot.tree
-        first, later = blocks_of(robot)
+        first, _ = blocks_of(robot)
         self._in_first_block = np.zeros(len(tree) + 1, dtype=bool)  # of the links, and -1
         self._in_first_block[[*first.joints, -1]] = True
         self.first_links = set(np.flatnonzero(self._in_first_block[:-1]).tolist())
-        self.numbers = np.array(later.dofs if later_only else range(tree.nv), dtype=int)
+        dofs = range(tree.nv) if only is None else tree.dofs(tuple(only))
+        self.numbers = np.array(dofs, dtype=int)
         links = np.repeat(np.arange(len(tree)), np.where(tree.balls, 3, 1))
         starts = model.jnt_dofadr[np.array(robot.mj_joints, dtype=int)[links]]
         base = int(model.jnt_dofadr[robot.mjcf.free_joint]) + np.arange(BASE)

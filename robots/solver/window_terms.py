@@ -31,9 +31,9 @@ from spark.rig.roles import Role
 class Terms:
     """The residuals of a robot's poses, as normal equations. `bones` are the limbs' segments whose
     directions the source gives, `hands` says whether it gives the offset between both, and `parts`
-    are points, in the rest pose [m], of links that may be held. With `later_only`, base, trunk and
-    legs are given: nothing that they alone move is looked at, and the dofs are those of the later
-    block. `mj_dofs` are MuJoCo's numbers of the dofs."""
+    are points, in the rest pose [m], of links that may be held. With `only` some joints of
+    the later block, all others are given: nothing that they alone move is looked at. `mj_dofs` are
+    MuJoCo's numbers of the dofs."""
 
     def __init__(
         self,
@@ -42,10 +42,10 @@ class Terms:
         hands: bool,
         parts: Sequence[tuple[int, Float[np.ndarray, "3"]]] = (),
         *,
-        later_only: bool = False,
+        only: Sequence[int] | None = None,
     ) -> None:
         self.robot = robot
-        self._dofs = WindowDofs(robot, later_only=later_only)
+        self._dofs = WindowDofs(robot, only=only)
         self.mj_dofs = self._dofs.mj
         self._kinematics = Kinematics(robot.mjcf, self.mj_dofs)
         rest = self._kinematics.rest
@@ -149,8 +149,8 @@ class Terms:
             for link, place in zip(links, places, strict=True)
         )
         if dofs.later_only:
-            own = ~dofs.in_first_block([solid.link for solid in solids])
-            solids = tuple(solid for solid, later in zip(solids, own, strict=True) if later)
+            own = np.flatnonzero(dofs.moving([solid.link for solid in solids]).any(axis=1))
+            solids = tuple(solids[k] for k in own.tolist())
             carried = points = ()
         links = [solid.link for solid in (*points, *solids, *carried)]
         first = dofs.in_first_block(links)

@@ -6,23 +6,34 @@ import pytest
 
 from robots.model.known import known
 from robots.model.shapes import surface_of
+from robots.solver.block import blocks_of
 from robots.solver.collision import collisions_of
 from robots.solver.near_spheres import NearSpheres
+from robots.solver.targets import targets_of
 from robots.solver.window_dofs import as_slice
 from robots.solver.window_poses import WindowPoses
+from robots.solver.window_targets import PointTargets, pose_targets
 from robots.solver.window_terms import Terms
+from spark.demo.sample import sample_motion, sample_rig
+from spark.rig.roles import Role
+from spark.transfer.canonical import to_canonical
 
 EMBER = known("robot")
 TERMS = Terms(EMBER, (), False)
+ELBOW = int(EMBER.links[EMBER.rig.roles.require(Role.LEFT_FOREARM)])
 
 
 def tangled(count: int) -> WindowPoses:
     """Poses with parts in each other and in the floor."""
+    return TERMS.poses(tangled_qpos(count))
+
+
+def tangled_qpos(count: int) -> np.ndarray:
     rng = np.random.default_rng(2)
     q = EMBER.to_qpos(EMBER.tpose).repeat(count, axis=0)
     q[:, 2] -= rng.uniform(0.0, 0.4, count)
     q[:, EMBER.addresses] += rng.normal(0.0, 0.7, (count, len(EMBER.addresses)))
-    return TERMS.poses(q)
+    return q
 
 
 def rolled() -> np.ndarray:
@@ -56,6 +67,26 @@ def test_nothing_that_touches_the_floor_is_missed() -> None:
     ]
     np.testing.assert_allclose(low.depth, depth[:, low.spheres], atol=1e-12)
     assert len(low.spheres) < depth.shape[1]
+
+
+def test_a_limb_alone_is_asked_what_it_is_asked_as_a_part_of_the_whole() -> None:
+    """Parts that it does not move are not looked at: they have no say in its share of H and g."""
+    arms, tree = blocks_of(EMBER)[1].joints, EMBER.tree
+    limb = tuple(j for j in arms if j in tree.chain(ELBOW) or ELBOW in tree.chain(j))
+    alone, dofs = Terms(EMBER, (), False, only=limb), tree.dofs(limb)
+    q, rig = tangled_qpos(6), sample_rig("walker")
+    walk = to_canonical(sample_motion("walk", rig, 30.0), rig).frames(0, len(q))
+    normal = []
+    for terms in (TERMS, alone):
+        poses = terms.poses(q)
+        targets = pose_targets(targets_of(walk, EMBER), ())
+        holds = PointTargets(*np.zeros((2, len(q), terms.sole_count, 3)))
+        asked, posture = terms.asked(targets, holds), terms.hinges.at_tpose
+        normal.append(terms.linearize(q, poses, asked, posture, terms.candidates(poses)))
+    (H, g), (own_H, own_g) = normal
+    assert len(alone.candidates(poses)) < len(TERMS.candidates(poses))
+    np.testing.assert_allclose(own_H, H[:, dofs][:, :, dofs], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(own_g, g[:, dofs], rtol=1e-9, atol=1e-9)
 
 
 def test_a_shape_that_moves_is_inside_its_sides_and_touches_them() -> None:
