@@ -12,11 +12,11 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import binary_dilation
-from scipy.stats import qmc
 
 from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
+from robots.solver.halton import halton
 from robots.solver.holds import Holds
 from robots.solver.marching import limbs_of, settled, terms_of
 from robots.solver.spells import Spells
@@ -113,9 +113,8 @@ def _poses(
     """Angles [rad] from all over the ranges of a limb's hinges, and where its bones then point,
     seen from what carries it."""
     tree = robot.tree
-    shares = qmc.Halton(len(hinges), scramble=False).random(_TRIED)
     lower, upper = tree.lower[list(hinges)], tree.upper[list(hinges)]
-    tried = lower + shares * (upper - lower)
+    tried = lower + halton(_TRIED, len(hinges)) * (upper - lower)
     angles = np.repeat(robot.tpose.angles, _TRIED, axis=0)
     angles[:, hinges] = tried
     balls = robot.tpose.ball_quats
