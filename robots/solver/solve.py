@@ -36,6 +36,7 @@ from robots.solver.unparted import unparted
 from robots.tree import Coordinates
 from spark.threads import one_thread
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.loops import continued
 from spark.transfer.noise import without_noise
 from spark.transfer.treads import treads_of
 
@@ -66,12 +67,13 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
 
     Recordings of more than 20 fps are solved at about 20 fps first; splines through that are then
     polished in all frames. Long ones are solved a stretch at a time. Frames of the source that
-    nothing leads to are passed over, and one that trembles is smoothed. A robot without legs stays
-    where it is mounted.
+    nothing leads to are passed over, and one that trembles is smoothed. A loop is solved as it goes
+    on, and closes. A robot without legs stays where it is mounted.
     """
     if robot.mount is not None:
         source = facing_ahead(source)
     source, passed = without_strays(source)
+    source, own = continued(source)
     source, noise, trembles = without_noise(source)
     treads = treads_of(source)
     source = less_deep(source, robot, treads.seats)
@@ -84,7 +86,7 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
         return _trajectory(robot, targets)
 
     with one_thread():
-        q = robot.following(by_stretches(solved, len(source), source.frame_time))
+        q = robot.following(by_stretches(solved, len(source), source.frame_time)).at(own)
         notes.update(dict.fromkeys(unparted(robot, q, collision_stride(source.frame_time))))
     return RobotMotion(robot, q, source.frame_time, tuple(notes))
 
