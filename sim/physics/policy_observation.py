@@ -18,6 +18,7 @@ class Observer:
     def __init__(self, spec: PolicySpec, reference: list[State]) -> None:
         self._spec, self._reference = spec, reference
         self._joints = {name: k for k, name in enumerate(spec.joints)}
+        self._bodies = {name: k for k, name in enumerate(spec.bodies)}
         self.forget()
 
     def forget(self) -> None:
@@ -41,10 +42,12 @@ class Observer:
         self, use: TermUse, own: State, last: Float[np.ndarray, "A"], step: int
     ) -> Float[np.ndarray, "W"]:
         term, end = TERMS[use.term], len(self._reference) - 1
-        parts = []
+        anchor = None if use.anchor is None else self._bodies[use.anchor]
+        bodies = tuple(self._bodies[name] for name in use.bodies)
+        phase, parts = step / max(end, 1), []
         for ahead in use.ahead:
             reference = self._reference[min(max(step + ahead, 0), end)]
-            seen = Seen(own, reference, self._spec.default, last, step / max(end, 1))
+            seen = Seen(own, reference, self._spec.default, last, phase, anchor, bodies)
             values = np.array(term.read(seen), dtype=float)
             if use.zero:
                 values[[self._joints[name] for name in use.zero]] = 0.0

@@ -5,7 +5,7 @@ Rz(yaw) Ry(pitch) Rx(roll).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -19,7 +19,7 @@ _DOWN = np.array([0.0, 0.0, -1.0])
 class State:
     """A robot at one moment: root position [m, world], rotation (wxyz), velocity [m/s, world] and
     angular velocity [rad/s, in the root's axes], and the angles [rad] and speeds of the policy's
-    joints."""
+    joints. `places` [m, world] and `turns` (wxyz) are those of the bodies that the spec names."""
 
     position: Float[np.ndarray, "3"]
     rotation: Float[np.ndarray, "4"]
@@ -27,29 +27,43 @@ class State:
     turning: Float[np.ndarray, "3"]
     angles: Float[np.ndarray, "A"]
     speeds: Float[np.ndarray, "A"]
+    places: Float[np.ndarray, "F 3"]
+    turns: Float[np.ndarray, "F 4"]
+
+    def frame(self, body: int | None) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "4"]]:
+        """Where a body is and how it is turned; for None, the root."""
+        if body is None:
+            return self.position, self.rotation
+        return self.places[body], self.turns[body]
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
     """What a term is read from: the robot's `own` state, the `reference`'s, the joints' `default`
-    angles, the `last` raw action, and the time as a share of the motion's, `phase`."""
+    angles, the `last` raw action, and the time as a share of the motion's, `phase`; for terms of
+    bodies the one that it is seen from, `anchor` (None: the root), and which `bodies`."""
 
     own: State
     reference: State
     default: Float[np.ndarray, "A"]
     last: Float[np.ndarray, "A"]
     phase: float
+    anchor: int | None = None
+    bodies: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
 class Term:
     """`width` numbers (None: one for each joint) that `axes` name, if anything; `reference` where
-    they are the motion's, so that they may be looked up ahead of time."""
+    they are the motion's, so that they may be looked up ahead of time. Where it is `anchored`, a
+    body can stand in for the root; where it is `of_bodies`, `width` is that of each body."""
 
     read: Callable[[Seen], Float[np.ndarray, "W"]]
     width: int | None
     axes: str = ""
     reference: bool = False
+    anchored: bool = False
+    of_bodies: bool = False
 
 
 def roll_pitch(rotation: Float[np.ndarray, "4"]) -> Float[np.ndarray, "2"]:
@@ -67,19 +81,34 @@ def _both(name: str, term: Term) -> dict[str, Term]:
     """A term of the robot's own state, and the same of the reference, by their names."""
 
     def of_reference(seen: Seen) -> Float[np.ndarray, "W"]:
-        as_own = Seen(seen.reference, seen.reference, seen.default, seen.last, seen.phase)
-        return term.read(as_own)
+        return term.read(replace(seen, own=seen.reference))
 
-    return {
-        name: term,
-        f"reference_{name}": Term(of_reference, term.width, term.axes, reference=True),
-    }
+    return {name: term, f"reference_{name}": replace(term, read=of_reference, reference=True)}
+
+
+def _position_to_reference(seen: Seen) -> Float[np.ndarray, "3"]:
+    (own, turn), (wanted, _) = (each.frame(seen.anchor) for each in (seen.own, seen.reference))
+    return quat_rotate(quat_conj(turn), wanted - own)
 
 
 def _rotation_to_reference(seen: Seen) -> Float[np.ndarray, "6"]:
-    """The first two columns of the rotation from the robot's root to the reference's, by rows."""
-    turn = quat_mul(quat_conj(seen.own.rotation), seen.reference.rotation)
-    return matrix_from_quat(turn)[:, :2].ravel()
+    (_, own), (_, wanted) = (each.frame(seen.anchor) for each in (seen.own, seen.reference))
+    return _two_columns(quat_mul(quat_conj(own), wanted))
+
+
+def _body_positions(seen: Seen) -> Float[np.ndarray, "W"]:
+    place, turn = seen.own.frame(seen.anchor)
+    return quat_rotate(quat_conj(turn), seen.own.places[[*seen.bodies]] - place).ravel()
+
+
+def _body_rotations(seen: Seen) -> Float[np.ndarray, "W"]:
+    _, turn = seen.own.frame(seen.anchor)
+    return _two_columns(quat_mul(quat_conj(turn), seen.own.turns[[*seen.bodies]]))
+
+
+def _two_columns(rotations: Float[np.ndarray, "*B 4"]) -> Float[np.ndarray, "W"]:
+    """The first two columns of rotation matrices, by rows."""
+    return matrix_from_quat(rotations)[..., :2].ravel()
 
 
 TERMS: dict[str, Term] = {
@@ -93,9 +122,9 @@ TERMS: dict[str, Term] = {
     **_both("joint_velocities", Term(lambda s: s.own.speeds, None)),
     "last_action": Term(lambda s: s.last, None),
     "phase": Term(lambda s: np.array([s.phase]), 1),
-    "position_to_reference": Term(
-        lambda s: _in_root(s.own, s.reference.position - s.own.position), 3, "xyz", reference=True
-    ),
-    "rotation_to_reference": Term(_rotation_to_reference, 6, reference=True),
+    **_both("body_positions", Term(_body_positions, 3, anchored=True, of_bodies=True)),
+    **_both("body_rotations", Term(_body_rotations, 6, anchored=True, of_bodies=True)),
+    "position_to_reference": Term(_position_to_reference, 3, "xyz", reference=True, anchored=True),
+    "rotation_to_reference": Term(_rotation_to_reference, 6, reference=True, anchored=True),
 }
 """By the names that a spec gives them."""

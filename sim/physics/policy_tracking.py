@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 from scipy.ndimage import uniform_filter1d
 
 from sim.body.compiling import compiled, warnings_as_notes
@@ -16,6 +16,7 @@ from sim.interpolate import at_times
 from sim.physics.floor import NO_STOOLS, Stools, on_floor
 from sim.physics.policy_network import PolicyNetwork
 from sim.physics.policy_observation import Observer
+from sim.physics.policy_parts import moving_bodies, spec_bodies, spec_joints
 from sim.physics.policy_spec import PolicySpec
 from sim.physics.policy_terms import State
 from sim.physics.servos import torque_limit
@@ -85,8 +86,8 @@ class PolicyTracker:
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.data, self.ghost = mujoco.MjData(self.model), mujoco.MjData(self.model)
         self.root = int(self.model.body(target.model.body(target.root).name).id)
-        self.bodies = _moving_bodies(self.model, self.root)
-        joints = _joints(self.model, self.root, spec)
+        self.bodies = moving_bodies(self.model, self.root)
+        joints = spec_joints(self.model, self.root, spec)
         self.columns = self.model.jnt_qposadr[joints]
         self.dofs = self.model.jnt_dofadr[joints]
         own = [torque_limit(self.model, j) for j in joints]
@@ -100,6 +101,7 @@ class PolicyTracker:
         self.place, self.turn = slice(start, start + 3), slice(start + 3, start + 7)
         first = int(self.model.jnt_dofadr[self.model.body_jntadr[self.root]])
         self.move, self.spin = slice(first, first + 3), slice(first + 3, first + 6)
+        self.named = spec_bodies(self.model, spec)
         self.qpos, self.reference = self._reference(frame_time)
 
     @property
@@ -133,9 +135,29 @@ class PolicyTracker:
         angles = qpos[:, self.columns]
         speeds = np.gradient(angles, dt, axis=0)
         return qpos, [
-            State(qpos[t, self.place], q[t], velocity[t], turning[t], angles[t], speeds[t])
+            State(
+                qpos[t, self.place],
+                q[t],
+                velocity[t],
+                turning[t],
+                angles[t],
+                speeds[t],
+                *self._frames(self._posed(qpos[t])),
+            )
             for t in range(len(qpos))
         ]
+
+    def _posed(self, qpos: Float[np.ndarray, "nq"]) -> mujoco.MjData:
+        """The reference in a pose."""
+        self.ghost.qpos[:] = qpos
+        mujoco.mj_kinematics(self.model, self.ghost)
+        return self.ghost
+
+    def _frames(
+        self, data: mujoco.MjData
+    ) -> tuple[Float[np.ndarray, "F 3"], Float[np.ndarray, "F 4"]]:
+        """Where the bodies that the spec names are, and how they are turned."""
+        return data.xpos[self.named].copy(), data.xquat[self.named].copy()
 
     def run(self, seed: int) -> PolicyRun:
         """Follow the whole motion; the same seed gives the same run."""
@@ -145,16 +167,16 @@ class PolicyTracker:
     def _run(self, seed: int) -> PolicyRun:
         rng, spec, count = np.random.default_rng(seed), self.spec, len(self.reference)
         observer = Observer(spec, self.reference)
+        self.network.forget()
         last = self._put(0, rng)
         qpos = self.qpos.copy()
         apart, angles, speed = np.zeros(count), np.zeros(count), np.zeros(count)
         square, peak, saturated = (np.zeros((count, len(spec.joints))) for _ in range(3))
         falls = []
         for step in range(1, count):
-            last = self.network(observer(self._state(), last, step - 1))
+            last = self.network(observer(self._state(), last, step - 1), step - 1)
             limited = np.clip(last, -spec.action_clip, spec.action_clip)
-            wanted = spec.default + spec.scale * limited
-            torques = self._advance(wanted)
+            torques = self._advance(self._base(step - 1) + spec.scale * limited)
             square[step], peak[step] = (torques**2).mean(axis=0), np.abs(torques).max(axis=0)
             saturated[step] = (np.abs(torques) >= 0.999 * self.limits).mean(axis=0)
             qpos[step] = self.data.qpos
@@ -162,6 +184,7 @@ class PolicyTracker:
             if fallen:
                 falls.append(step)
                 observer.forget()
+                self.network.forget()
                 last = self._put(step, rng)
         return PolicyRun(seed, qpos, tuple(falls), apart, angles, speed, square, peak, saturated)
 
@@ -186,7 +209,14 @@ class PolicyTracker:
             data.qvel[self.spin].copy(),
             data.qpos[self.columns].copy(),
             data.qvel[self.dofs].copy(),
+            *self._frames(data),
         )
+
+    def _base(self, step: int) -> Float[np.ndarray, "A"]:
+        """The angles to which a step's action is added [rad]."""
+        if not self.spec.residual:
+            return self.spec.default
+        return self.reference[min(max(step + self.spec.ahead, 0), len(self.reference) - 1)].angles
 
     def _advance(self, wanted: Float[np.ndarray, "A"]) -> Float[np.ndarray, "N A"]:
         """One control step; the torques of its simulation steps."""
@@ -202,9 +232,8 @@ class PolicyTracker:
 
     def _compare(self, step: int) -> tuple[float, float, float, bool]:
         """How far the robot is from the reference, and whether it has fallen."""
-        data, ghost, state = self.data, self.ghost, self.reference[step]
-        ghost.qpos[:] = self.qpos[step]
-        mujoco.mj_kinematics(self.model, ghost)
+        data, state = self.data, self.reference[step]
+        ghost = self._posed(self.qpos[step])
         if not np.isfinite(data.qpos).all() or not np.isfinite(data.qvel).all():
             return self.height, np.pi, 0.0, True
         mujoco.mj_kinematics(self.model, data)
@@ -230,38 +259,3 @@ class PolicyTracker:
         """Where the bodies are, seen from the root."""
         away: Float[np.ndarray, "B 3"] = data.xpos[self.bodies] - data.xpos[self.root]
         return away @ data.xmat[self.root].reshape(3, 3)
-
-
-def _moving_bodies(model: mujoco.MjModel, root: int) -> Int[np.ndarray, "B"]:
-    """The bodies of the robot that have a joint, without the root."""
-    own: Bool[np.ndarray, N] = model.body_rootid == root
-    moving = np.flatnonzero(own & (np.asarray(model.body_jntnum) > 0))
-    return moving[moving != root]
-
-
-def _joints(model: mujoco.MjModel, root: int, spec: PolicySpec) -> list[int]:
-    """The spec's joints in the model, which must be all of the robot's."""
-    free = int(model.body_jntadr[root])
-    if free < 0 or int(model.jnt_type[free]) != int(mujoco.mjtJoint.mjJNT_FREE):
-        raise SkeletonError("the robot's root has no free joint: a policy can't move it")
-    own = {
-        model.joint(j).name: j
-        for j in range(model.njnt)
-        if int(model.body_rootid[model.jnt_bodyid[j]]) == root and j != free
-    }
-    if unknown := [name for name in spec.joints if name not in own]:
-        raise SkeletonError(
-            f"{spec.path}: the robot has no joints {name_list(unknown)}; it has {name_list([*own])}"
-        )
-    hinges = [n for n in spec.joints if int(model.jnt_type[own[n]]) == _HINGE]
-    if other := [name for name in spec.joints if name not in hinges]:
-        raise SkeletonError(f"{spec.path}: {name_list(other)} are no hinges")
-    if left := [name for name in own if name not in spec.joints]:
-        raise SkeletonError(
-            f"{spec.path}: [joints] leaves out {name_list(left)} of the robot; a policy moves all "
-            "joints of the model, so use a model without them"
-        )
-    return [own[name] for name in spec.joints]
-
-
-_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)

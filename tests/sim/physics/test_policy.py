@@ -2,9 +2,11 @@
 
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from onnx import TensorProto, helper, numpy_helper, save_model
@@ -51,14 +53,19 @@ groups = ["all"]
 
 
 def wxyz(rotation: Rotation) -> np.ndarray:
-    return rotation.as_quat()[[3, 0, 1, 2]]
+    return rotation.as_quat()[..., [3, 0, 1, 2]]
+
+
+def scipy_of(wxyz: np.ndarray) -> Rotation:
+    return Rotation.from_quat(wxyz[..., [1, 2, 3, 0]])
 
 
 def some_state(rng: np.random.Generator, count: int = 2) -> State:
     q = wxyz(Rotation.from_rotvec(rng.normal(size=3)))
-    return State(
-        *(rng.normal(size=3) if k != 1 else q for k in range(4)), *rng.normal(size=(2, count))
-    )
+    place, velocity, turning = rng.normal(size=(3, 3))
+    angles, speeds = rng.normal(size=(2, count))
+    turns = wxyz(Rotation.from_rotvec(rng.normal(size=(2, 3))))
+    return State(place, q, velocity, turning, angles, speeds, rng.normal(size=(2, 3)), turns)
 
 
 def test_terms_are_what_scipy_makes_of_the_state() -> None:
@@ -90,6 +97,34 @@ def test_terms_are_what_scipy_makes_of_the_state() -> None:
     assert TERMS["phase"].read(seen) == [0.25]
 
 
+@pytest.mark.parametrize("anchor", [None, 1])
+def test_terms_of_bodies_are_seen_from_their_anchor(anchor: int | None) -> None:
+    rng = np.random.default_rng(2)
+    own, reference = some_state(rng), some_state(rng)
+    nothing = np.zeros(2)
+    seen = Seen(own, reference, nothing, nothing, 0.0, anchor, (1, 0))
+
+    def anchored(state: State) -> tuple[np.ndarray, Rotation]:
+        if anchor is None:
+            return state.position, scipy_of(state.rotation)
+        return state.places[anchor], scipy_of(state.turns[anchor])
+
+    for state, prefix in ((own, ""), (reference, "reference_")):
+        place, turn = anchored(state)
+        away = [turn.inv().apply(state.places[b] - place) for b in (1, 0)]
+        columns = [(turn.inv() * scipy_of(state.turns[b])).as_matrix()[:, :2] for b in (1, 0)]
+        read = TERMS[f"{prefix}body_positions"].read(seen)
+        np.testing.assert_allclose(read, np.ravel(away), atol=1e-12)
+        read = TERMS[f"{prefix}body_rotations"].read(seen)
+        np.testing.assert_allclose(read, np.ravel(columns), atol=1e-12)
+    (place, turn), (goal, wanted) = anchored(own), anchored(reference)
+    way = TERMS["position_to_reference"].read(seen)
+    np.testing.assert_allclose(way, turn.inv().apply(goal - place), atol=1e-12)
+    rotation = TERMS["rotation_to_reference"].read(seen)
+    expected = (turn.inv() * wanted).as_matrix()[:, :2].ravel()
+    np.testing.assert_allclose(rotation, expected, atol=1e-12)
+
+
 def written(folder: Path, text: str) -> PolicySpec:
     path = folder / "spec.toml"
     path.write_text(text)
@@ -119,7 +154,7 @@ def observed(folder: Path, block: str) -> list[list[float]]:
         base = some_state(rng)
         place = np.array([0.0, 0.0, height])
         speeds = np.array([speed, 7.0])
-        return State(place, base.rotation, base.velocity, base.turning, base.angles, speeds)
+        return replace(base, position=place, speeds=speeds)
 
     observer = Observer(spec, [state(10.0 * t, 0.0) for t in range(4)])
     out = [observer(state(0.0, t + 1.0), np.zeros(2), t).tolist() for t in range(3)]
@@ -144,11 +179,33 @@ def test_history_has_the_order_that_the_spec_says(tmp_path: Path) -> None:
     assert by_term[2] == [2, 0, 4, 0, 0, 20, 10, 30]
 
 
+def test_a_block_looks_ahead_step_by_step(tmp_path: Path) -> None:
+    text = TWO.replace('{ term = "joint_velocities", scale = [2, 3], zero = ["b"] }', "HEIGHT")
+    text = text.replace("HEIGHT", '{ term = "reference_root_velocity", axes = "x" }')
+    spec = written(tmp_path, text + '[[observation]]\ngroups = ["g"]\nahead = [1, 3]')
+    rng = np.random.default_rng(1)
+    own, still = some_state(rng), np.array([1.0, 0, 0, 0])
+    steps = [
+        replace(own, position=np.full(3, 10.0 * t), rotation=still, velocity=np.full(3, float(t)))
+        for t in range(4)
+    ]
+    seen = Observer(spec, steps)(own, np.zeros(2), 0)
+    assert seen.tolist() == [1, 10, 3, 30]
+    assert spec.width == 4
+    own_terms = '{ term = "joint_velocities" }, { term = "reference_root_height" }'
+    wrong = text.replace('{ term = "reference_root_velocity", axes = "x" }', own_terms)
+    with pytest.raises(FileFormatError, match=r"observation\[0\]\.ahead is for terms of the ref"):
+        written(tmp_path, wrong + '[[observation]]\ngroups = ["g"]\nahead = 2')
+
+
 WRONG = {
     "rate_hz = 50\n": ("rate_hz = 60\n", "timestep is 0.002 s"),
     "kp = 1\n": ("kp = [1, 2, 3]\n", r"joints\.kp has 3 numbers; expected 2"),
     "kd = 1\n": ("kd = -1\n", r"joints\.kd has -1; expected 0 or more"),
-    "[action]": ("[action]\nskale = 2", r"action\.skale is not known here; available: clip, scale"),
+    "[action]": (
+        "[action]\nskale = 2",
+        r"action\.skale is not known here; available: around, clip, scale",
+    ),
     '["a", "b"]': ('["a", "a"]', r"joints\.names has a name twice"),
     "joint_velocities": (
         "joint_speed",
@@ -157,6 +214,10 @@ WRONG = {
     'zero = ["b"]': ('zero = ["c"]', r"groups\.g\[0\]\.zero names 'c', no joints of the spec"),
     "ahead = [0, 2]": ("ahead = 0.5", "no whole number of control steps"),
     '["g"]': ('["h"]', r"observation\[0\]\.groups names 'h'; \[groups\] has 'g'"),
+    "reference_root_height": ("body_positions", r"g\[1\]\.bodies is missing"),
+    "scale = [2, 3]": ('anchor = "hip"', r"groups\.g\[0\]\.anchor is not known here"),
+    "[action]\n": ("[action]\naround = 'ref'\n", "action.around is 'ref'; expected 'default'"),
+    "[groups]\n": ("[network]\nobservation = 'x'\nstep = 'x'\n[groups]\n", "has another use, too"),
     "[groups]": ("[[observation]]\n[groups", "TOML|Expected"),
 }
 
@@ -192,6 +253,90 @@ def toy(path: Path, weights: np.ndarray, bias: np.ndarray | None = None) -> Path
 @pytest.fixture(scope="module")
 def robot() -> Morphology:
     return understand_robot(registry.find("robot"))
+
+
+def toy_with_memory(path: Path, joints: str = "", count: int = 2) -> Path:
+    """Action = observation + step + 100 * (steps since it began); a second output beside it."""
+    tensor = helper.make_tensor_value_info
+    numbers = {"one": 1.0, "hundred": 100.0}
+    graph = helper.make_graph(
+        [
+            helper.make_node("Add", ["obs", "time_step"], ["with_step"]),
+            helper.make_node("Mul", ["h_in", "hundred"], ["times"]),
+            helper.make_node("ReduceSum", ["times", "axes"], ["past"], keepdims=0),
+            helper.make_node("Add", ["with_step", "past"], ["actions"]),
+            helper.make_node("Add", ["h_in", "one"], ["h_out"]),
+        ],
+        "memory",
+        [
+            tensor("obs", TensorProto.FLOAT, [1, count]),
+            tensor("time_step", TensorProto.FLOAT, [1, 1]),
+            tensor("h_in", TensorProto.FLOAT, [1, 1, 1]),
+        ],
+        [
+            tensor("h_out", TensorProto.FLOAT, [1, 1, 1]),
+            tensor("with_step", TensorProto.FLOAT, [1, count]),
+            tensor("actions", TensorProto.FLOAT, [1, count]),
+        ],
+        [
+            *(numpy_helper.from_array(np.full(1, v, np.float32), k) for k, v in numbers.items()),
+            numpy_helper.from_array(np.array([0]), "axes"),
+        ],
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=9)
+    if joints:
+        helper.set_model_props(model, {"joint_names": joints})
+    save_model(model, str(path))
+    return path
+
+
+MEMORY = """
+[network]
+observation = "obs"
+action = "actions"
+step = "time_step"
+state = { h_in = "h_out" }
+"""
+
+
+def of_two(folder: Path, network: str = "") -> PolicySpec:
+    text = TWO.replace("joint_velocities", "projected_gravity").replace('zero = ["b"]', "")
+    text = text.replace('projected_gravity", scale = [2, 3],', 'phase"').replace("[0, 2]", "0")
+    return written(folder, text + network + '[[observation]]\ngroups = ["g"]\n')
+
+
+def test_a_network_gets_the_step_and_its_own_state(tmp_path: Path) -> None:
+    spec = of_two(tmp_path, MEMORY)
+    network = PolicyNetwork(toy_with_memory(tmp_path / "m.onnx", "a, b"), spec)
+    seen = np.array([0.25, 0.5])
+    for step in range(3):
+        np.testing.assert_allclose(network(seen, step), seen + step + 100 * step)
+    network.forget()
+    np.testing.assert_allclose(network(seen, 7), seen + 7)
+
+
+NOT_FITTING = {
+    "": "has 3 inputs \\(obs, time_step, h_in\\); expected one, or .network. in spec.toml",
+    MEMORY.replace('state = { h_in = "h_out" }', ""): "inputs that get nothing: 'h_in'",
+    MEMORY.replace('"actions"', '"action"'): "has no output 'action', which .network. of spec",
+    MEMORY.replace('action = "actions"\n', ""): "has 3 outputs .*; expected one, or",
+    MEMORY.replace("h_in =", "c_in ="): "has no input 'c_in'",
+    MEMORY.replace('"h_out"', '"with_step"'): r"'h_in' is tensor.* of shape \[1, 1, 1\], and",
+}
+
+
+@pytest.mark.parametrize("network", NOT_FITTING)
+def test_a_network_with_other_inputs_and_outputs_is_refused(network: str, tmp_path: Path) -> None:
+    path = toy_with_memory(tmp_path / "m.onnx")
+    with pytest.raises(FileFormatError, match=NOT_FITTING[network]):
+        PolicyNetwork(path, of_two(tmp_path, network))
+
+
+def test_a_network_that_tells_another_order_of_joints_is_refused(tmp_path: Path) -> None:
+    spec = of_two(tmp_path, MEMORY)
+    path = toy_with_memory(tmp_path / "m.onnx", "b,a")
+    with pytest.raises(FileFormatError, match="its joint 1 is 'b', that of the spec 'a'"):
+        PolicyNetwork(path, spec)
 
 
 def standing(robot: Morphology, seconds: float = 1.0) -> RobotMotion:
@@ -321,6 +466,46 @@ def test_actions_that_are_no_numbers_are_refused(robot: Morphology, tmp_path: Pa
     network = PolicyNetwork(toy(tmp_path / "t.onnx", np.zeros((spec.width, count)), bias), spec)
     with pytest.raises(SparkSimError, match=f"gave {count} numbers of which 0 are finite"):
         network(np.zeros(spec.width))
+
+
+def test_actions_around_the_reference_are_added_to_its_angles(
+    robot: Morphology, tmp_path: Path
+) -> None:
+    """A network that says nothing then does what the toy does that asks for these angles."""
+    qpos = standing(robot, 0.2).qpos.copy()
+    qpos[:, -1] += 0.3 * np.sin(20 * np.arange(len(qpos)) / FPS)
+    motion = RobotMotion(robot, robot.from_qpos(qpos), 1 / FPS)
+    asked = tracker(robot, tmp_path, motion).run(1)
+    spec = spec_of(robot, tmp_path)
+    text = spec.path.read_text().replace("scale = 0.5", 'around = "reference"')
+    spec = written(tmp_path, text)
+    silent = toy(tmp_path / "silent.onnx", np.zeros((spec.width, len(spec.joints))))
+    height = robot.rig.standing_height
+    follower = PolicyTracker(
+        motion.body, motion.frame_time, spec, PolicyNetwork(silent, spec), height=height
+    )
+    np.testing.assert_allclose(follower.run(1).qpos, asked.qpos, atol=2e-3)
+
+
+def test_bodies_of_the_spec_are_where_the_model_has_them(robot: Morphology, tmp_path: Path) -> None:
+    model = robot.mjcf.model
+    name = model.body(model.nbody - 1).name
+    text = spec_of(robot, tmp_path).path.read_text()
+    way = '{ term = "position_to_reference", anchor = "NAME" }, '
+    spec = written(tmp_path, text.replace("all = [", "all = [" + way.replace("NAME", name)))
+    network = PolicyNetwork(
+        toy(tmp_path / "t.onnx", np.zeros((spec.width, len(spec.joints)))), spec
+    )
+    motion = standing(robot, 0.2)
+    follower = PolicyTracker(motion.body, 1 / FPS, spec, network, height=1.7)
+    data = mujoco.MjData(model)
+    data.qpos[:] = motion.qpos[3]
+    mujoco.mj_kinematics(model, data)
+    np.testing.assert_allclose(follower.reference[3].places[0], data.body(name).xpos, atol=1e-9)
+    np.testing.assert_allclose(follower.reference[3].turns[0], data.body(name).xquat, atol=1e-9)
+    other = written(tmp_path, spec.path.read_text().replace(name, "tail"))
+    with pytest.raises(SkeletonError, match="the robot has no bodies 'tail'; it has"):
+        PolicyTracker(motion.body, 1 / FPS, other, network, height=1.7)
 
 
 def test_joints_of_another_robot_are_refused(robot: Morphology, tmp_path: Path) -> None:
