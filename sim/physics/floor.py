@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from sim.physics.unaided import leave_unaided
 from sim.trajectory import ModelTrajectory
 from spark.errors import SkeletonError
 
@@ -30,8 +31,9 @@ def on_floor(
     body: ModelTrajectory, floor_z: float, notes: list[str], stools: Stools = NO_STOOLS
 ) -> mujoco.MjSpec:
     """A copy of the body's spec with something that collides, a floor at the motion's, and stools
-    on it; what was assumed is added to `notes`."""
+    on it, and nothing else that holds it up; what was assumed is added to `notes`."""
     spec = body.spec.copy()
+    leave_unaided(spec, body.model, body.root, notes)
     _let_something_collide(spec, notes)
     meets = {
         "contype": 1 | _bits(body.model, "conaffinity"),

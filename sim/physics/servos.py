@@ -76,6 +76,7 @@ def is_servo(model: mujoco.MjModel, actuator: int) -> bool:
         and int(model.actuator_biastype[actuator]) == int(mujoco.mjtBias.mjBIAS_AFFINE)
         and kp > 0
         and float(model.actuator_biasprm[actuator, 1]) == -kp
+        and float(model.actuator_biasprm[actuator, 0]) == 0.0
     )
 
 

@@ -295,6 +295,64 @@ def test_a_model_that_leaves_contacts_to_its_scene_stands() -> None:
     assert any("set to collide" in note for note in tracked.notes)
 
 
+def supported(model: str, change: str) -> TrackingResult:
+    """A box that is to stay 1 m above the floor, on a model that is changed so that it does."""
+    text = MACHINE.format(actuator="", joint=HINGE).replace('pos="0 0 0.1"', 'pos="0 0 1"')
+    assert model in text
+    spec = mujoco.MjSpec.from_string(text.replace(model, change, 1))
+    held = spec.compile()
+    base = int(held.body("base").id)
+    return follow(ModelTrajectory(spec, held, base, np.tile(held.qpos0, (31, 1))))
+
+
+@pytest.mark.parametrize(
+    ("model", "change", "said"),
+    [
+        ("<worldbody>", '<option><flag gravity="disable"/></option><worldbody>', "off gravity"),
+        ('"base"', '"base" gravcomp="1.01"', "gravcomp"),
+        ("<actuator>", '<equality><weld body1="base"/></equality><actuator>', "ties"),
+        ("<actuator>", '<equality><weld body1="world" body2="arm"/></equality><actuator>', "ties"),
+        (
+            "<worldbody>",
+            '<worldbody><body name="hook" mocap="true" pos="0 0 1"/></worldbody><equality>'
+            '<connect body1="hook" body2="base" anchor="0 0 0"/></equality><worldbody>',
+            "ties",
+        ),
+    ],
+)
+def test_what_holds_a_body_in_its_model_alone_is_not_there(
+    model: str, change: str, said: str
+) -> None:
+    """It falls as freely as it does without."""
+    free, tracked = supported("<worldbody>", "<worldbody>"), supported(model, change)
+    fallen = free.rollout.points[0, 0, 2] - free.rollout.points[-1, 0, 2]
+    assert fallen > 0.7
+    np.testing.assert_allclose(tracked.rollout.points[:, 0, 2], free.rollout.points[:, 0, 2])
+    assert any(said in note for note in tracked.notes)
+    assert not any(said in note for note in free.notes)
+
+
+def test_a_floor_that_the_options_switch_off_is_there() -> None:
+    off = '<option><flag contact="disable" constraint="disable"/></option><worldbody>'
+    tracked = supported("<worldbody>", off)
+    assert tracked.rollout.points[-1, 0, 2] == pytest.approx(0.1, abs=0.02)
+    assert any("switch off contacts, constraints: on here" in note for note in tracked.notes)
+
+
+def test_ties_within_a_body_stay() -> None:
+    tracked = supported(
+        "<actuator>", '<equality><weld body1="base" body2="arm"/></equality><actuator>'
+    )
+    assert tracked.model.eq_active0.all()
+    assert not any("ties" in note for note in tracked.notes)
+
+
+def test_a_servo_with_a_constant_push_is_none_of_the_models_own() -> None:
+    push = '<general joint="elbow" gainprm="200" biastype="affine" biasprm="30 -200 -20"/>'
+    tracked = follow(machine(push, 61))
+    assert "servos of ours" in tracked.notes[0]
+
+
 def on_plane(plane: str, contact: str = "") -> TrackingResult:
     """A box that is told to rest on z = 0, in a world with a plane."""
     text = MACHINE.format(actuator="", joint=HINGE)
