@@ -75,6 +75,7 @@ def summarize(tracked: TrackingResult) -> dict[str, Any]:
             "joints_deg": _rms(np.degrees(_joint_errors(tracked, upright))),
             "mpjpe_cm": _mean_norm(100 * apart),
             "mpjpe_root_cm": _mean_norm(100 * (apart - apart[:, :1])),
+            "furthest_cm": max(_mean_norm(100 * each[None]) for each in apart),
         },
         "assist": assist,
         "joints": [
@@ -106,9 +107,10 @@ def render(metrics: dict[str, Any], name: str) -> str:
     assist, error = metrics["assist"], metrics["error"]
     end = (metrics["frames"] - 1) * metrics["frame_time"]
     lifts = f"the assist lifts {100 * assist['carried']:.0f} % of its weight" if assist else ""
+    away = f", at most {error['furthest_cm']:.0f} cm from the motion"
     verdict = {
-        "stays_up": f"all {end:.2f} s",
-        "helped": f"upright for all {end:.2f} s; {lifts}",
+        "stays_up": f"all {end:.2f} s{away}",
+        "helped": f"upright for all {end:.2f} s{away}; {lifts}",
         "carried": f"for all {end:.2f} s it hangs on the assist, and does not stay up: {lifts}",
         "falls": f"after {metrics['upright_s']:.2f} s of {end:.2f} s, at frame "
         f"{metrics['fall_frame']}" + (f"; until then {lifts}" if assist else ""),

@@ -159,7 +159,19 @@ def test_a_body_that_hangs_does_not_stay_up() -> None:
     text = render(held, "x")
     assert "does not stay up" in text
     assert "  stays up  " not in text
-    assert "  stays up  all 2.00 s" in render(alone, "x")
+    assert "  stays up  all 2.00 s, at most 0 cm from the motion" in render(alone, "x")
+
+
+def test_who_stays_up_elsewhere_is_said_to() -> None:
+    """The target hovers 0.5 m above the floor on which the body stands after a short fall."""
+    tracked = follow(still(1.0, up=0.5))
+    found = summarize(tracked)
+    assert found["verdict"] == "stays_up"
+    apart = np.linalg.norm(tracked.rollout.points - tracked.target_points, axis=2).mean(axis=1)
+    assert found["error"]["furthest_cm"] == pytest.approx(100 * apart.max(), abs=1e-3)
+    assert 50 < found["error"]["furthest_cm"] < 55
+    furthest = f"at most {found['error']['furthest_cm']:.0f} cm from the motion"
+    assert f"stays up  all 1.00 s, {furthest}" in render(found, "x")
 
 
 def test_a_fall_is_said_with_its_time() -> None:
