@@ -47,7 +47,7 @@ class Observer:
         phase, parts = step / max(end, 1), []
         for ahead in use.ahead:
             reference = self._reference[min(max(step + ahead, 0), end)]
-            seen = Seen(own, reference, self._spec.default, last, phase, anchor, bodies)
+            seen = Seen(own, reference, self._spec.default, last, phase, anchor, bodies, use.at)
             values = np.array(term.read(seen), dtype=float)
             if use.zero:
                 values[[self._joints[name] for name in use.zero]] = 0.0

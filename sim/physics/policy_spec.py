@@ -24,7 +24,7 @@ class TermUse:
     """A term in an observation: `axes` of it [indices], times `scale`, within +-`clip`, with the
     entries of the joints `zero` at 0; of the reference `ahead` control steps from now. Terms of
     `bodies`, and of the way to the reference, are seen from the `anchor`, a body (None: the
-    root)."""
+    root); velocities are those of the point `at` of the root [m, in its axes]."""
 
     term: str
     axes: tuple[int, ...] | None
@@ -34,6 +34,7 @@ class TermUse:
     ahead: tuple[int, ...]
     anchor: str | None
     bodies: tuple[str, ...]
+    at: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -195,6 +196,7 @@ def _term(table: Table, count: int, joints: tuple[str, ...], ahead: int) -> Term
         ahead=steps if term.reference else (0,),
         anchor=(table.word("anchor", "") or None) if term.anchored else None,
         bodies=bodies,
+        at=tuple(table.numbers("at", 3, 0.0).tolist()) if term.of_point else (0.0, 0.0, 0.0),
     )
     table.finish()
     return use

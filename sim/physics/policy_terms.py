@@ -41,7 +41,8 @@ class State:
 class Seen:
     """What a term is read from: the robot's `own` state, the `reference`'s, the joints' `default`
     angles, the `last` raw action, and the time as a share of the motion's, `phase`; for terms of
-    bodies the one that it is seen from, `anchor` (None: the root), and which `bodies`."""
+    bodies the one that it is seen from, `anchor` (None: the root), and which `bodies`; for a
+    velocity the point of the root that moves so, `at` [m, in its axes]."""
 
     own: State
     reference: State
@@ -50,13 +51,15 @@ class Seen:
     phase: float
     anchor: int | None = None
     bodies: tuple[int, ...] = ()
+    at: tuple[float, ...] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class Term:
     """`width` numbers (None: one for each joint) that `axes` name, if anything; `reference` where
     they are the motion's, so that they may be looked up ahead of time. Where it is `anchored`, a
-    body can stand in for the root; where it is `of_bodies`, `width` is that of each body."""
+    body can stand in for the root; where it is `of_bodies`, `width` is that of each body; where it
+    is `of_point`, a point of the root can be told."""
 
     read: Callable[[Seen], Float[np.ndarray, "W"]]
     width: int | None
@@ -64,6 +67,7 @@ class Term:
     reference: bool = False
     anchored: bool = False
     of_bodies: bool = False
+    of_point: bool = False
 
 
 def roll_pitch(rotation: Float[np.ndarray, "4"]) -> Float[np.ndarray, "2"]:
@@ -84,6 +88,10 @@ def _both(name: str, term: Term) -> dict[str, Term]:
         return term.read(replace(seen, own=seen.reference))
 
     return {name: term, f"reference_{name}": replace(term, read=of_reference, reference=True)}
+
+
+def _root_velocity(seen: Seen) -> Float[np.ndarray, "3"]:
+    return _in_root(seen.own, seen.own.velocity) + np.cross(seen.own.turning, seen.at)
 
 
 def _position_to_reference(seen: Seen) -> Float[np.ndarray, "3"]:
@@ -112,7 +120,7 @@ def _two_columns(rotations: Float[np.ndarray, "*B 4"]) -> Float[np.ndarray, "W"]
 
 
 TERMS: dict[str, Term] = {
-    **_both("root_velocity", Term(lambda s: _in_root(s.own, s.own.velocity), 3, "xyz")),
+    **_both("root_velocity", Term(_root_velocity, 3, "xyz", of_point=True)),
     **_both("root_angular_velocity", Term(lambda s: s.own.turning, 3, "xyz")),
     **_both("root_height", Term(lambda s: s.own.position[2:], 1)),
     **_both("roll_pitch", Term(lambda s: roll_pitch(s.own.rotation), 2, "rp")),
