@@ -19,7 +19,7 @@ from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.floor import add_floor
 from robots.solver.holds import Holds
 from robots.solver.link_terms import LinkTerms
-from robots.solver.targets import Targets
+from robots.solver.targets import Targets, wrist_links
 from robots.solver.weights import (
     FLOOR_ROUNDING,
     HANDS_RANGE,
@@ -191,8 +191,7 @@ def _add_hands(
     weight = firm * W_HANDS * np.exp(-((firm * away / HANDS_RANGE) ** 2))
     parts, positions = [], []
     dofs: list[int] = []
-    for sign, j in zip((1.0, -1.0), hands, strict=True):
-        link = int(robot.links[j])
+    for sign, j, link in zip((1.0, -1.0), hands, wrist_links(robot), strict=True):
         if not _moves_alone(block, link):
             return
         position = poses.point(link, robot.centers[j])

@@ -250,6 +250,13 @@ def arm_length(rig: Rig) -> float:
     return float(np.linalg.norm(np.diff(chain, axis=0), axis=1).sum())
 
 
+def wrist_links(robot: Morphology) -> list[int]:
+    """The links that carry the wrists of a robot that has two: its forearms. A wrist's axes may lie
+    apart, and what brings hands together is the arms."""
+    rig = robot.rig
+    return [int(robot.links[rig.skeleton.parents[rig.roles.require(role)]]) for role in HANDS]
+
+
 def with_firm_hands(robot: Morphology, targets: Targets) -> Targets:
     """The same with all hands followed as firmly as those that lie on the ground."""
     firm = {

@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from robots.kinematics import skew
 from robots.model.morphology import Morphology
+from robots.solver.targets import wrist_links
 from robots.solver.weights import (
     HANDS_RANGE,
     W_HANDS,
@@ -58,7 +59,7 @@ class WindowPoints:
             places.append(robot.centers[rig.hips].mean(0))
         self._hips = slice(self.soles.stop, len(links))
         wrists = [rig.roles.require(r) for r in HANDS if hands]
-        links += [int(robot.links[j]) for j in wrists]
+        links += wrist_links(robot) if hands else []
         places += [robot.centers[j] for j in wrists]
         self._hands = slice(self._hips.stop, len(links))
         links += [link for link, _ in parts]

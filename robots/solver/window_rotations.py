@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from robots.model.morphology import Morphology
-from robots.solver.weights import W_OTHER_ROTATION, W_ROTATION
+from robots.solver.weights import W_OTHER_ROTATION, W_PALM, W_ROTATION
 from robots.solver.window_dofs import WindowDofs
 from robots.solver.window_poses import WindowPoses
 
@@ -16,16 +16,17 @@ for _i, _j, _k in ((2, 1, 0), (0, 2, 1), (1, 0, 2)):
 class WindowRotations:
     """`robots.residuals.rotation_residual` of all parts with a role that some dofs turn. They turn
     about the same axes, so their Jacobians are summed up as one product of these with each other.
-    """
+    With `firm_hands`, hands weigh as much as those that lie on the ground."""
 
-    def __init__(self, robot: Morphology, dofs: WindowDofs) -> None:
+    def __init__(self, robot: Morphology, dofs: WindowDofs, *, firm_hands: bool) -> None:
         rig, links = robot.rig, robot.links.tolist()
         joints, weights = [], []
         for j, role in enumerate(rig.roles.roles):
             own = j == 0 or links[j] != links[int(rig.skeleton.parents[j])]
             if role is not None and own:
                 joints.append(j)
-                weights.append(W_ROTATION.get(role.part, W_OTHER_ROTATION))
+                firm = W_PALM if firm_hands and role.part == "hand" else 0.0
+                weights.append(W_ROTATION.get(role.part, W_OTHER_ROTATION) + firm)
         joints.append(len(links))  # the chest's target comes after all joints'
         weights.append(W_ROTATION["chest"])
         turned = [links[j] if j < len(links) else links[rig.chest] for j in joints]

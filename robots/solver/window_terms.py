@@ -32,8 +32,9 @@ class Terms:
     """The residuals of a robot's poses, as normal equations. `bones` are the limbs' segments whose
     directions the source gives, `hands` says whether it gives the offset between both, and `parts`
     are points, in the rest pose [m], of links that may be held. With `only` some joints of
-    the later block, all others are given: nothing that they alone move is looked at. `mj_dofs` are
-    MuJoCo's numbers of the dofs."""
+    the later block, all others are given: nothing that they alone move is looked at. With
+    `firm_hands`, hands are followed as by the last steps of whole clips. `mj_dofs` are MuJoCo's
+    numbers of the dofs."""
 
     def __init__(
         self,
@@ -43,6 +44,7 @@ class Terms:
         parts: Sequence[tuple[int, Float[np.ndarray, "3"]]] = (),
         *,
         only: Sequence[int] | None = None,
+        firm_hands: bool = False,
     ) -> None:
         self.robot = robot
         self._dofs = WindowDofs(robot, only=only)
@@ -51,7 +53,7 @@ class Terms:
         rest = self._kinematics.rest
         self.hinges = Hinges(robot, self._dofs.numbers)
         self._points = WindowPoints(robot, self._dofs, rest, bones, hands, parts)
-        self._rotations = WindowRotations(robot, self._dofs)
+        self._rotations = WindowRotations(robot, self._dofs, firm_hands=firm_hands)
         self._collisions = WindowCollisions(robot, self._dofs, rest)
         self._floor = self._whole_floor()
 

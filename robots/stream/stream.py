@@ -55,7 +55,7 @@ class Stream:
         self.robot, self.frame_time = robot, frame_time
         self._reader = FrameReader(source, robot, ground)
         parts = held_points(robot, self._reader.parts)
-        self._terms = Terms(robot, self._reader.bones, self._reader.hands, parts)
+        self._terms = Terms(robot, self._reader.bones, self._reader.hands, parts, firm_hands=True)
         self._window = Window(robot, self._terms, frame_time, fixed=_FIXED, free=LATENCY + 1)
         self._throw = Throw(self._reader.scale, source.hip_height, frame_time)
         self._quieter = Quieter(source, frame_time, ground.noise)

@@ -20,7 +20,7 @@ from robots.solver.footprints import plan_feet, points_of
 from robots.solver.holds import Holds, joined
 from robots.solver.objective import linearize
 from robots.solver.projection import project
-from robots.solver.targets import targets_of
+from robots.solver.targets import targets_of, with_firm_hands
 from robots.solver.window_targets import PointTargets, pose_targets
 from robots.solver.window_terms import Terms
 from robots.stream.frame_targets import LATENCY, Frame, FrameReader, ground_of
@@ -92,10 +92,12 @@ def walked() -> np.ndarray:
     return said(WALK)
 
 
-def test_the_objective_is_that_of_whole_clips() -> None:
+@pytest.mark.parametrize("firm_hands", [False, True])
+def test_the_objective_is_that_of_whole_clips(firm_hands: bool) -> None:
     """The same normal equations, made in another way."""
     source = to_canonical(WALK.frames(20, 24), RIG)
     targets = targets_of(source, EMBER)
+    targets = with_firm_hands(EMBER, targets) if firm_hands else targets
     holds = joined([footing_of(EMBER, foot) for foot in plan_feet(EMBER, targets)])
     tree = EMBER.tree
     rng = np.random.default_rng(0)
@@ -104,7 +106,7 @@ def test_the_objective_is_that_of_whole_clips() -> None:
     q.pos[:, 2] -= 0.1  # shins in the floor, and one hand
     reader = FrameReader(RIG, EMBER, ground_of(source, EMBER))
     parts = held_points(EMBER, reader.parts)
-    terms = Terms(EMBER, reader.bones, True, parts)
+    terms = Terms(EMBER, reader.bones, True, parts, firm_hands=firm_hands)
     links, places = (np.array(part) for part in zip(*parts, strict=True))
     points = np.repeat(places[:, :, None], 4, axis=2)
     laid = Holds(links, points, *rng.uniform(0.0, 1.0, (2, len(parts), 3, 4)))
@@ -250,6 +252,16 @@ def test_the_bars_hold_on_real_clips(clip: str) -> None:
     assert found.limb_error_rad <= np.radians(6.5)  # dab hides its face, where hands give way
     assert found.at_limit == 0
     assert found.fastest_rad_s <= 20
+
+
+@WHEEL
+def test_hands_turn_as_the_sources_where_a_wrists_axes_lie_apart() -> None:
+    """By the wrist, which brings no hands together: arms that hang are near each other, too."""
+    g1, source = known("unitree_g1"), to_canonical(WALK, RIG)
+    found = measure(from_canonical(source), RIG, follow(source, g1))
+    assert found.hand_error_rad is not None
+    assert found.hand_error_rad <= np.radians(3)
+    assert found.limb_error_rad <= np.radians(4)
 
 
 def test_soles_stand_on_the_box_that_the_source_stands_on() -> None:
