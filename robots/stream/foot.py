@@ -35,6 +35,13 @@ class Foot:
         return heel > 0 or toes > 0
 
     @property
+    def freedom(self) -> tuple[float, float]:
+        """How far (0 to 1) heel and toes may rise. What is let go does at once, before it moves
+        over the floor: it would drag."""
+        (heel, toes), (heel_stands, toes_stand) = self.holds, self.planted
+        return 1.0 - heel * heel_stands, 1.0 - toes * toes_stand
+
+    @property
     def on_toe(self) -> bool:
         """Whether it is the toes that it goes along with, and not the heel."""
         return self.planted[1] or not self.planted[0]

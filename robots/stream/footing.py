@@ -27,6 +27,7 @@ from robots.stream.frame_targets import FrameReader, FrameTargets
 from robots.stream.standing import SourceFeet, Standing
 
 HOLD_TIME = 0.1  # [s] over which a foot is taken hold of, and let go
+_LIFT = 1.1  # times as high as in clips is a step that is asked for: smoothness costs some
 
 
 class _Arrived(NamedTuple):
@@ -96,7 +97,7 @@ class ContactTracker:
         settled = len(frames) - 1 - self._ahead
         motion = [self._standing.motion(frames, at) for at in range(settled, len(frames))]
         speeds = self._scale * np.array([speeds for speeds, _ in motion])
-        steps = step_height(speeds, self._hip_height).tolist()
+        steps = (_LIFT * step_height(speeds, self._hip_height)).tolist()
         feet, numbers = self._feet, list[float]()
         places: list[complex] = []
         for at, (arrived, (speed, height), step) in enumerate(
@@ -120,10 +121,13 @@ class ContactTracker:
                 foot.grip(self._grip, tightens)
                 pace = self._scale * speed[s][1] / self._hip_height
                 up = foot.height(clearance, pace, self._uneven)
-                (heel, toes), (heel_step, toe_step) = foot.holds, step[s]
+                (heel, toes), (heel_free, toes_free) = foot.holds, foot.freedom
+                heel_step, toe_step = step[s]
                 # The ball leaves the floor with either end.
                 numbers += (heel, min(heel, toes), toes)
-                numbers += (heel_step, max(heel_step, toe_step), toe_step, up, float(known), top)
+                ball_step = max(heel_step, toe_step) * max(heel_free, toes_free)
+                numbers += (heel_step * heel_free, ball_step, toe_step * toes_free)
+                numbers += (up, float(known), top)
                 places += (foot.footprint.pivot, cmath.rect(1.0, foot.footprint.heading))
             if at == settled:
                 feet = [foot.copy() for foot in feet]
@@ -171,7 +175,7 @@ class ContactTracker:
         most, free = np.maximum(held[0], held[2]), 1 - held
         ends = np.empty((4, *held.shape))
         ends[0] = held
-        np.maximum((1 - most) * up, free * step, out=ends[1])
+        np.maximum((1 - most) * up, step, out=ends[1])
         ends[1] += top
         self.ground = (most * top).take(self._foot)
         np.multiply(known, np.maximum(held, RAISED_HOLD[0] * most), out=ends[2])

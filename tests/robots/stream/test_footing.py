@@ -56,6 +56,22 @@ def test_who_turns_on_the_toes_raises_the_heel_alone() -> None:
     np.testing.assert_allclose(held.holds[0, LEFT - 2 : LEFT], 1.0)
 
 
+def test_a_foot_rises_before_it_moves() -> None:
+    """In the first frame that it is let go it may be as high as fast feet step, where it is."""
+    tracker, begun = ContactTracker(READER, FRAME_TIME, LATENCY), standing()
+    tracker.begin(begun, begun, 1)
+    points = np.zeros((sum(map(len, EMBER.soles)), 3))
+    for _ in range(12):
+        held = tracker.update(begun, points)
+    feet = begun.feet.copy()
+    while (held.holds[0, :LEFT] == 1.0).all():
+        feet = feet.copy()
+        feet[0, :, 0] += 1.5 * FRAME_TIME  # [m]
+        held = tracker.update(replace(begun, feet=feet), points)
+    assert (held.holds[0, :LEFT, :2] > 0.7).all()
+    assert (held.positions[0, :LEFT, 2] > 0.028 * EMBER.rig.hip_height).all()
+
+
 def test_who_stands_on_the_toes_does_not_stand_on_the_heel() -> None:
     raised = 0.03 * RIG.standing_height / 1.75  # low enough for a heel that stands alone
     held = after(0.0, raised)
