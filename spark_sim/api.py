@@ -12,6 +12,7 @@ from spark.motion import Motion
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import from_canonical
 from spark.transfer.leg_fit import travel_scale
+from spark.transfer.loops import continued
 from spark.transfer.noise import without_noise
 from spark.transfer.refine import grounded, refined
 from spark.transfer.root_motion import with_root_motion
@@ -76,9 +77,10 @@ def retarget(
     was trained on, and by the target's own motion, where its file has one. With `refine`, each foot
     is then held where the source's foot stands, what else would be in the floor comes up
     (`spark.transfer.over_floor`), and with "spark" the hips sway so that the weight moves as the
-    source's does (`spark.transfer.hip_sway`). A source that trembles, as motion estimated from
-    video, is smoothed before (`spark.transfer.noise`), and a note says so. Twist bones that the
-    source lacks take their share at the end (`spark.transfer.twists`).
+    source's does (`spark.transfer.hip_sway`). A loop is seen as it goes on, and closes
+    (`spark.transfer.loops`). A source that trembles, as motion estimated from video, is smoothed
+    before (`spark.transfer.noise`), and a note says so. Twist bones that the source lacks take
+    their share at the end (`spark.transfer.twists`).
 
     On a robot the whole trajectory is solved for, within the joints' limits, feet held. With method
     "copy" or without `refine`, each pose is only copied to the robot's hinges, as a baseline.
@@ -97,7 +99,9 @@ def retarget(
         return _onto_robot(source, target, solved=refine and method != "copy")
     canonical, noise = source.canonical, None
     trembles: tuple[str, ...] = ()
+    own = slice(None)
     if refine:
+        canonical, own = continued(canonical)
         canonical, noise, trembles = without_noise(canonical)
     if method == "copy":
         moved = transfer(canonical, target.rig)
@@ -108,7 +112,7 @@ def retarget(
         moved = filled_in(canonical, target.canonical, learned)
     if refine:
         finish = refined if method == "spark" else grounded
-        moved = finish(canonical, moved, noise)
+        moved = finish(canonical, moved, noise).picked(own)
     moved = spread_twists(canonical.rig, moved)
     motion, carried = _carried(from_canonical(moved), source, target, fitted=method == "spark")
     bvh, notes = encode(motion, target.recording)

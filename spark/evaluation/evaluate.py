@@ -118,8 +118,9 @@ def as_method(
     With `target_prior` it is corrected by another recording of the target
     (`spark.transfer.target_prior`), with `legs_fitted` its feet are led where the source's go
     (`spark.transfer.leg_fit`, or by `legs`), with `feet_held` locked where the source's stand
-    (`spark.transfer.foot_lock`). All three are what `retarget` does. With fitted legs and held feet
-    the hips sway, as they do there (`spark.transfer.hip_sway`)."""
+    (`spark.transfer.foot_lock`). All three are what `retarget` does; but a loop ends here
+    where it ends. With fitted legs and held feet the hips sway, as they do there
+    (`spark.transfer.hip_sway`)."""
 
     def run(case: Case) -> Positions:
         if target_prior and case.target_recording is not None:

@@ -10,11 +10,15 @@ import pytest
 
 import spark_sim
 from scripts.corruptions import jittering
+from spark.demo import gait
+from spark.demo.sample import sample_rig
 from spark.errors import ConventionError, DependencyError, OutputError, SkeletonError
 from spark.io.bvh import write_bvh
 from spark.io.encoding import encode_new
 from spark.kinematics import forward
 from spark.rotation import quat_angle
+from spark.transfer.canonical import from_canonical
+from spark.transfer.leg_fit import travel_scale
 from tests.helpers.fbx_text import Fbx, Node
 from tests.helpers.twisting import plain, turning, with_bones
 
@@ -95,6 +99,20 @@ def test_a_recording_that_trembles_is_smoothed_and_says_so(samples: Path) -> Non
     assert not any("tremble" in note for note in plain.recording.notes)
     jerks = [np.diff(forward(own.motion)[0], 3, axis=0).std() for own in (held, plain)]
     assert jerks[0] < jerks[1] / 4
+
+
+def test_a_loop_closes_on_another_body(samples: Path, tmp_path: Path) -> None:
+    """Feet that slide a little are held, also that one which stands as the loop ends and begins."""
+    rig, fps = sample_rig("walker"), 60.0
+    count = round(fps * gait.stride_time(rig)) + 1
+    stride = gait.walk(rig, fps).frames(20, 20 + count)
+    stride = replace(stride, hips=stride.hips * [0.9, 1.0, 1.0])
+    write_bvh(encode_new(from_canonical(stride)), tmp_path / "stride.bvh")
+    moved = spark_sim.retarget(tmp_path / "stride.bvh", samples / "dancer_wave.bvh").canonical
+    assert len(moved) == count
+    assert np.degrees(quat_angle(moved.rotations[0], moved.rotations[-1])).max() < 0.5
+    ahead = (stride.hips[-1] - stride.hips[0]) * travel_scale(rig, moved.rig)
+    np.testing.assert_allclose(moved.hips[-1] - moved.hips[0], ahead, atol=0.003)
 
 
 def test_there_and_back(samples: Path) -> None:
