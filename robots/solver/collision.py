@@ -81,14 +81,13 @@ class Collisions:
                 )
                 near = np.zeros((len(cluster.spheres), len(at)), dtype=bool)
                 near[kept] = apart - cluster.reach[k][kept, None] < within + moved[k, at]
-                for shape, own in zip(
-                    cluster.smalls, np.split(near, cluster.starts[1:]), strict=True
-                ):
-                    if not own.any():
-                        continue
-                    around = times[at[own.any(0)], None] + np.arange(-stride, stride + 1)
+                near_at = np.logical_or.reduceat(near, cluster.starts)
+                for i in np.flatnonzero(near_at.any(axis=1)).tolist():
+                    shape, first = cluster.smalls[i], int(cluster.starts[i])
+                    around = times[at[near_at[i]], None] + np.arange(-stride, stride + 1)
                     frames_near = in_order(np.clip(around, 0, count - 1), count)
-                    spheres = np.flatnonzero(own.any(1))
+                    own = near[first : first + len(shape.spheres)]
+                    spheres = np.flatnonzero(own.any(axis=1))
                     pair = cluster.pairs[k][shape]
                     found.append(Candidate(pair, spheres, cluster.moves[k], frames_near))
         return found
