@@ -21,7 +21,7 @@ ROOMS = (
     ("sim",),  # trajectory, interpolate
     ("sim.physics", "sim.view"),
     ("sim.report",),
-    ("robots",),  # tree, kinematics, registry, least_squares, residuals
+    ("robots",),  # tree, kinematics, registry, coupling, least_squares, residuals
     ("robots.model",),
     ("robots.formats", "robots.solver"),
     ("robots.stream",),

@@ -6,8 +6,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
+from robots.coupling import Smoothness
 from robots.kinematics import forward_kinematics
-from robots.least_squares import NormalEquations, Smoothness
+from robots.least_squares import NormalEquations
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.candidates import Candidate

@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.ndimage import binary_dilation, uniform_filter1d
 
+from robots.coupling import second_differences
 from robots.kinematics import forward_kinematics
-from robots.least_squares import second_differences
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.holds import Holds

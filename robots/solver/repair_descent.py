@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
+from robots.coupling import Smoothness
 from robots.kinematics import forward_kinematics
-from robots.least_squares import NormalEquations, Smoothness
+from robots.least_squares import NormalEquations
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.candidates import Candidate, among

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import uniform_filter1d
 
+from robots.coupling import PointAcceleration, Smoothness, second_differences
 from robots.kinematics import forward_kinematics
-from robots.least_squares import PointAcceleration, Smoothness, second_differences
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.dynamics import center_of_mass, com_jacobian

@@ -7,13 +7,9 @@ import numpy as np
 import pytest
 from jaxtyping import Float
 
+from robots.coupling import PointAcceleration, Smoothness, second_differences
 from robots.kinematics import forward_kinematics
-from robots.least_squares import (
-    NormalEquations,
-    PointAcceleration,
-    Smoothness,
-    second_differences,
-)
+from robots.least_squares import NormalEquations
 from robots.metrics import RobotMetrics, measure
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
