@@ -31,6 +31,18 @@ def test_who_walks_already_begins_without_a_hop(first: int) -> None:
     assert hop < max(1.5 * usual, 10.0)
 
 
+@pytest.mark.parametrize("first", [10, 22, 36, 47])
+def test_who_walks_already_is_joined_from_rest(first: int) -> None:
+    """No base and no hinge is as fast as a walk's within a frame; after 0.3 s it is where one who
+    has walked for longer is."""
+    qpos, longer = said(first), said(first - 10)
+    push = np.abs(np.diff(qpos, 2, axis=0)) * FPS**2
+    assert push[: LATENCY + 2, :2].max() < 10.0  # [m/s²]
+    assert push[: LATENCY + 2, 7:].max() < 100.0  # [rad/s²]
+    np.testing.assert_allclose(qpos[20, :3], longer[30, :3], atol=0.03)
+    np.testing.assert_allclose(qpos[20, 7:], longer[30, 7:], atol=0.1)
+
+
 @pytest.mark.parametrize("missing", [4, 10])
 def test_a_second_frame_that_is_late_throws_no_one(missing: int) -> None:
     """It is a tenth of a second until the next frame, and those come evenly: the robot goes on

@@ -146,15 +146,6 @@ def test_later_frames_change_nothing(walked: np.ndarray) -> None:
     np.testing.assert_array_equal(said(other.frames(0, 45))[:40], walked[:40])
 
 
-def test_a_stream_begins_as_fast_as_its_source() -> None:
-    """It starts to walk nowhere: from rest it would be thrown after a source that walks already."""
-    walk = WALK.frames(30, 60)
-    hips = said(walk)[LATENCY:, :3]
-    wanted = to_canonical(walk, RIG).hips * EMBER.rig.hip_height / RIG.hip_height
-    speed, source = (float(np.linalg.norm((x[6] - x[0])[:2])) for x in (hips, wanted))
-    assert speed == pytest.approx(source, rel=0.1)
-
-
 def test_a_stream_is_not_flung_by_a_jump_at_its_start() -> None:
     """Trackers begin with a T-pose, and elsewhere."""
     walk = WALK.frames(30, 60)
