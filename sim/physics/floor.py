@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from sim.physics.overlaps import let_overlap
 from sim.physics.unaided import leave_unaided
 from sim.trajectory import ModelTrajectory
 from spark.errors import SkeletonError
@@ -34,6 +35,7 @@ def on_floor(
     on it, and nothing else that holds it up; what was assumed is added to `notes`."""
     spec = body.spec.copy()
     leave_unaided(spec, body.model, body.root, notes)
+    let_overlap(spec, body, notes)
     _let_something_collide(spec, notes)
     meets = {
         "contype": 1 | _bits(body.model, "conaffinity"),

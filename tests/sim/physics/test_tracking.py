@@ -365,6 +365,46 @@ def test_a_servo_with_a_constant_push_is_none_of_the_models_own() -> None:
     assert "servos of ours" in tracked.notes[0]
 
 
+NESTED = """
+<mujoco>
+  <option gravity="0 0 0"/>
+  <worldbody>
+    <body name="base" pos="0 0 0.1">
+      <freejoint/>
+      <geom type="box" size="0.5 0.5 0.1" mass="200"/>
+      <body name="link" pos="0 0 0.3">
+        <joint name="shoulder" type="hinge" axis="0 1 0"/>
+        <inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>
+        <body name="ball">
+          <joint name="elbow" type="hinge" axis="0 1 0"/>
+          <geom type="sphere" size="0.1" pos="0.3 0 {height}" mass="1"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>"""
+
+
+def test_parts_that_are_in_each_other_in_the_tpose_do_not_push() -> None:
+    """A ball 8 cm deep in the box on which it turns keeps its angle; one beside it is stopped."""
+
+    def nested(height: float, angle: float) -> TrackingResult:
+        spec = mujoco.MjSpec.from_string(NESTED.format(height=height))
+        model = spec.compile()
+        qpos = np.tile(model.qpos0, (61, 1))
+        qpos[:, -1] = angle * np.linspace(0, 1, 61)
+        return follow(ModelTrajectory(spec, model, 1, qpos, tpose=model.qpos0.copy()))
+
+    inside = nested(-0.18, 0.0)
+    assert abs(inside.rollout.qpos[:, -2:]).max() < 0.01
+    (note,) = [note for note in inside.notes if "T-pose" in note]
+    assert "one pair of the model's parts" in note
+    assert "'base' and 'ball' by 8.0 cm" in note
+    apart = nested(0.0, 1.0)  # on the box it stands at sin(angle) = 0.1 / 0.3
+    assert not any("T-pose" in note for note in apart.notes)
+    assert apart.rollout.qpos[-1, -2:].sum() == pytest.approx(np.arcsin(1 / 3), abs=0.1)
+
+
 def on_plane(plane: str, contact: str = "") -> TrackingResult:
     """A box that is told to rest on z = 0, in a world with a plane."""
     text = MACHINE.format(actuator="", joint=HINGE)

@@ -1,0 +1,37 @@
+"""Parts of a body that are in each other however it stands: they don't push each other apart."""
+
+import copy
+
+import mujoco
+
+from sim.trajectory import ModelTrajectory, subtree
+
+
+def let_overlap(spec: mujoco.MjSpec, body: ModelTrajectory, notes: list[str]) -> None:
+    """Exclude contacts of parts that are in each other in the T-pose, where it is known, as convex
+    hulls of a URDF's meshes often are; what is changed is added to `notes`."""
+    if body.tpose is None:
+        return
+    model = copy.copy(body.model)
+    model.opt.disableflags = 0  # a file may switch contacts off
+    data = mujoco.MjData(model)
+    data.qpos[:] = body.tpose
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_collision(model, data)
+    own, depths = {*subtree(model, body.root)}, dict[tuple[int, int], float]()
+    for k in range(data.ncon):
+        contact = data.contact[k]
+        first, second = sorted(int(b) for b in model.geom_bodyid[contact.geom])
+        if contact.dist < 0 and {first, second} <= own:
+            deeper = max(depths.get((first, second), 0.0), -float(contact.dist))
+            depths[first, second] = deeper
+    for first, second in depths:
+        spec.add_exclude(bodyname1=model.body(first).name, bodyname2=model.body(second).name)
+    if depths:
+        pair = max(depths, key=lambda each: depths[each])
+        names = " and ".join(repr(model.body(b).name) for b in pair)
+        pairs = "one pair" if len(depths) == 1 else f"{len(depths)} pairs"
+        notes.append(
+            f"{pairs} of the model's parts are in each other in the T-pose, {names} by "
+            f"{100 * depths[pair]:.1f} cm: they don't push each other here"
+        )
