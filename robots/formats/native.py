@@ -11,7 +11,7 @@ from robots.formats.about import about, robot_of
 from robots.formats.arrays import number_array, scalar, write_arrays
 from robots.formats.bodies import body_names, contact_array
 from robots.formats.made_from import Source
-from robots.formats.qpos import check_finite, of_qpos, unit
+from robots.formats.qpos import check_finite, check_one_rate, of_qpos, unit
 from robots.model.known import known, model_sha256
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
@@ -89,6 +89,7 @@ def read_npz(arrays: Mapping[str, Any], path: Path, robot: Morphology | None = N
         check_frame_time(frame_time, "frame_time")
     except ConventionError as error:
         raise FileFormatError(path, None, str(error)) from error
+    check_one_rate(arrays, frame_time, path)
     return of_qpos(qpos, robot, frame_time, path, said)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from robots.formats.arrays import number_array, scalar
-from robots.formats.qpos import check_finite, frame_time_of, of_qpos, unit
+from robots.formats.qpos import check_finite, check_one_rate, frame_time_of, of_qpos, unit
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from spark.errors import FileFormatError
@@ -41,7 +41,9 @@ def read_plain(arrays: Mapping[str, Any], path: Path, robot: Morphology) -> Robo
     rotation = slice(base + 3, base + 7)
     qpos[:, rotation], said = unit(qpos[:, rotation], path)
     notes = ("qpos is read as MuJoCo's: metres, quaternion wxyz, radians", *said)
-    return of_qpos(qpos, robot, _frame_time(arrays, path), path, notes)
+    frame_time = _frame_time(arrays, path)
+    check_one_rate(arrays, frame_time, path)
+    return of_qpos(qpos, robot, frame_time, path, notes)
 
 
 def _frame_time(arrays: Mapping[str, Any], path: Path) -> float:

@@ -1,11 +1,13 @@
 """What all files of a robot's motion hold: a base, its rotation, and the angles of the hinges."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
+from robots.formats.arrays import scalar
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.registry import ENTRIES
@@ -14,6 +16,7 @@ from spark.motion import check_frame_time
 
 _HIGH = 10  # hip heights at which a robot hardly walks
 _LARGEST = 1e8  # [m, rad] beyond, no difference between frames is left
+_SAME_RATE = 1e-2  # of a rate: as those of files that round theirs
 _NOTED, _REFUSED = 1e-3, 0.05  # how far the norm of a quaternion may be from 1
 
 
@@ -100,6 +103,22 @@ def frame_time_of(fps: float, path: Path) -> float:
     except ConventionError as error:
         raise FileFormatError(path, None, f"fps is {fps:g}, {error}") from error
     return frame_time
+
+
+def check_one_rate(arrays: Mapping[str, object], frame_time: float, path: Path) -> None:
+    """Raise `FileFormatError` where `fps`, `frame_time` or `dt` say another rate: one of them was
+    changed, or stands for something else, and no one can tell which."""
+    for name in ("fps", "frame_time", "dt"):
+        if name in arrays:
+            value = scalar(arrays, name, path)
+            frames = (value if name == "fps" else 1 / value if value else np.inf) * frame_time
+            if not abs(frames - 1) < _SAME_RATE:
+                raise FileFormatError(
+                    path,
+                    None,
+                    f"tells two rates: {name!r} is {value:g}, and another entry says "
+                    f"{1 / frame_time:g} fps; leave the wrong one out",
+                )
 
 
 def check_finite(path: Path, **arrays: Float[np.ndarray, "T ..."]) -> None:

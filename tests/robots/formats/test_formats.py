@@ -339,6 +339,7 @@ def test_arrays_without_a_motion_are_named_and_no_robot_is_asked_for(tmp_path: P
         ("npz", {"qpos": np.full((3, 36), np.nan)}, r"qpos\[0\] is nan in frame 0"),
         ("npz", {"qpos": np.array("text")}, "'qpos' holds no numbers"),
         ("npz", {"frame_time": np.array(0.0)}, "frame_time is 0"),
+        ("npz", {"fps": np.array(7.0)}, "tells two rates: 'fps' is 7, and another entry says"),
         ("npz", {"joint_names": np.array(["a", "b"])}, "its joint 'a' is not there"),
         ("mjlab", {"fps": None}, "no 'fps'"),
         ("mjlab", {"body_pos_w": None}, "no 'body_pos_w'"),

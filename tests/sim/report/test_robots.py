@@ -342,6 +342,7 @@ def test_qpos_of_any_script_is_read(robot: Morphology, tmp_path: Path) -> None:
     ("wrong", "message"),
     [
         ({"fps": 0}, "fps is 0"),
+        ({"fps": 50, "dt": 0.01}, "tells two rates: 'dt' is 0.01, .* says 50 fps; leave the wrong"),
         ({"dt": 0}, "the frame time is 0 s"),
         ({}, "doesn't say its rate; expected 'fps'"),
         ({"fps": 50, "qpos": np.zeros((3, 40))}, "40 columns; the robot 'ember' has 36"),
