@@ -16,6 +16,7 @@ from robots.solver.window_terms import Terms
 from robots.stream.beginning import Beginning
 from robots.stream.coupling import MAX_ACCELERATION
 from robots.stream.detour import Detours
+from robots.stream.elsewhere import Elsewhere
 from robots.stream.footing import ContactTracker
 from robots.stream.frame_targets import (
     LATENCY,
@@ -61,6 +62,7 @@ class Stream:
         self._quieter = Quieter(source, frame_time, ground.noise)
         self._beginning = Beginning(self._terms, frame_time)
         self._possible = Possible(self._reader)
+        self._elsewhere = Elsewhere(frame_time)
         self._targets: FrameTargets  # of the window's free frames
         self._contacts: ContactTracker
         self._rests: RestTracker
@@ -73,6 +75,7 @@ class Stream:
         self._throw.reset()
         self._quieter.reset()
         self._possible.reset()
+        self._elsewhere.reset()
         self._beginning.reset()
         self._q = np.zeros((_FRAMES, self.robot.mjcf.model.nq))
         self._begun: list[FrameTargets] = []
@@ -94,13 +97,15 @@ class Stream:
             return self._step(frame)
 
     def _step(self, frame: Frame) -> Float[np.ndarray, "nq"]:
+        held = self._elsewhere.hold(frame) if self._moves else frame
         try:
-            targets = self._reader.targets(frame)
-            self._possible.check(frame, targets)
-            quiet = self._quieter.follow(frame, targets.feet)
+            targets = self._reader.targets(held)
+            self._possible.check(held, targets)
+            quiet = self._quieter.follow(held, targets.feet)
             targets = targets if quiet is None else self._reader.targets(quiet)
         except FrameError as error:
             raise FrameError(f"frame {self._count} of the stream: {error}") from error
+        self._elsewhere.take(frame, held)
         thrown = self._throw.follow(targets.hips[2] / self._reader.scale)
         targets = raised(targets, thrown)
         self._count += 1

@@ -4,11 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from robots.stream.elsewhere import FASTEST, UNSEEN
 from robots.stream.frame_targets import Frame
 from spark_sim.live.listener import Arrival
-
-_FASTEST = 12.0  # [m/s]: a person who is faster was put somewhere else
-_UNSEEN = 0.05  # [s] that a person may go on so fast between two poses
 
 
 class Anchor:
@@ -26,8 +24,8 @@ class Anchor:
         if last is not None:
             jump = arrival.frame.root_pos[:2] - last.frame.root_pos[:2]
             far = float(np.hypot(*jump))
-            passed = max(min(arrival.came - last.came, _UNSEEN), self._frame_time)
-            if far > _FASTEST * passed:
+            passed = max(min(arrival.came - last.came, UNSEEN), self._frame_time)
+            if far > FASTEST * passed:
                 self._note(f"the sender jumped by {far:.2f} m: the robot goes on where it is")
                 self._moved -= jump
         place = arrival.frame.root_pos.copy()

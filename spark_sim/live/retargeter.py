@@ -52,8 +52,9 @@ class Retargeter:
 
         A frame is as `Motion` has it, in metres, Z up: `root_pos[t]` (3), `rotations[t]` (N 4), the
         local rotations of all joints (wxyz), and `translations[t]` (N 3) where there are any.
-        Answers given before stay as they are. Raises `FrameError` where the frame is broken; the
-        stream then goes on without it.
+        Answers given before stay as they are. Where the source is put elsewhere, by more than 0.6 m
+        from one frame to the next, the robot goes on where it is. Raises `FrameError` where the
+        frame is broken; the stream then goes on without it.
         """
         if not isinstance(frame, tuple | list) or len(frame) not in (2, 3):
             raise FrameError(
