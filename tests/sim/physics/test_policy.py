@@ -534,11 +534,22 @@ def test_without_onnxruntime_it_says_what_to_install(
         PolicyNetwork(network, spec)
 
 
+def specs_of_docs() -> list[str]:
+    """Those of BeyondMimic and of TWIST2 in docs/policies.md."""
+    return re.findall(r"```toml\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.S)
+
+
 def documented(folder: Path) -> PolicySpec:
     """The whole spec of docs/policies.md."""
-    found = re.search(r"```toml\n(.*?)```", DOCS.read_text(encoding="utf-8"), re.S)
-    assert found
-    return written(folder, found[1])
+    return written(folder, specs_of_docs()[1])
+
+
+def test_the_spec_of_beyondmimic_is_as_wide_as_its_observation(tmp_path: Path) -> None:
+    """Motion 2 n, anchor 3 + 6, velocities 3 + 3, the robot's joints 2 n and last action n."""
+    joints = '[joints]\nnames = ["a", "b"]\ndefault = 0\nkp = 1\nkd = 1\n[action]\n[network]'
+    spec = written(tmp_path, specs_of_docs()[0].replace("[network]", joints, 1))
+    assert spec.width == 5 * 2 + 15
+    assert (spec.ports.step, spec.bodies) == ("time_step", ("torso_link",))
 
 
 def test_the_spec_of_the_docs_is_as_wide_as_they_say(tmp_path: Path) -> None:
