@@ -10,19 +10,17 @@ from pathlib import Path
 import numpy as np
 
 from spark.errors import ConventionError, FileFormatError
-from spark.io.convention import UPS, Convention, Up, axis_of, given_unit, given_up
+from spark.io.convention import Convention, Up, axis_of, given_unit, given_up
 from spark.io.encoding import encode_new
+from spark.io.given import doubts
 from spark.io.recording import Recording, in_si
 from spark.io.scanner import LARGEST
 from spark.io.unit_inference import HUMAN_HEIGHTS, infer_unit
-from spark.io.up_inference import CLEARLY, infer_up
-from spark.io.upright import above_feet
-from spark.kinematics import forward
+from spark.io.up_inference import infer_up, stands_along
 from spark.motion import Motion
 
 _CREATURES = (0.05, 20.0)  # [m] sizes of creatures; of others a file's unit is not believed
 _METRES_AS_CM = 100.0  # how much too small a body is whose metres went for centimetres
-_SAMPLES = 32  # frames that are looked at for the axis along which a body stands
 
 
 def foreign_recording(
@@ -52,6 +50,7 @@ def foreign_recording(
     try:
         if unit is not None:
             unit_m = given_unit(unit)
+            found += doubts(motion, unit_m=unit_m)
         elif unit_m is not None:
             unit_m, note = _believed(motion, unit_m, says)
             found.append(note)
@@ -60,9 +59,10 @@ def foreign_recording(
             found += more
         if up is not None:
             up_axis = given_up(up)
+            found += doubts(motion, up=up_axis)
         elif up_axis is not None:
             found.append(f"up axis {up_axis}, {says}")
-            if (standing := _standing_axis(motion)) not in (up_axis, None):
+            if (standing := stands_along(motion)) not in (up_axis, None):
                 found.append(
                     f"the body stands along {standing}, in its motion and at rest: if it doesn't "
                     f"lie there, give --up={standing}"
@@ -96,12 +96,3 @@ def _believed(motion: Motion, unit_m: float, says: str) -> tuple[float, str]:
                 f"unit {unit:.4g} cm, by its size: in {said}, it is {tall:.4g} m",
             )
     return unit_m, f"unit {said}"
-
-
-def _standing_axis(motion: Motion) -> Up | None:
-    """The axis of the file along which the body clearly stands, in its motion and at rest."""
-    some = motion.thinned(_SAMPLES)
-    rest = some.skeleton.rest_positions[None]
-    standing = [above_feet(some, places) for places in (forward(some)[0], rest)]
-    both = np.concatenate([np.minimum(*standing), np.minimum(*-np.array(standing))])
-    return UPS[int(np.argmax(both))] if both.max() > CLEARLY else None

@@ -17,6 +17,7 @@ from spark.errors import ConventionError, FileFormatError, name_list
 from spark.io.bvh import Bvh, read_bvh
 from spark.io.convention import Convention, given_unit, given_up
 from spark.io.euler import quat_from_angles
+from spark.io.given import doubts
 from spark.io.unit_inference import infer_unit
 from spark.io.up_inference import infer_up
 from spark.motion import LazyMotion, Motion, check_frame_time
@@ -77,6 +78,7 @@ def read_recording(
     decoder = _Decoder(bvh)
     notes = decoder.notes
     sample = decoder.motion(np.unique(np.linspace(0, len(decoder) - 1, _SAMPLES).astype(int)))
+    notes += doubts(sample, unit_m=unit_m, up=up_axis)
     found: tuple[str, ...]
     if unit_m is None:
         try:

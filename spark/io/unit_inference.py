@@ -44,7 +44,7 @@ def infer_unit(motion: Motion) -> tuple[float, tuple[str, ...]]:
     The known unit that makes the body's height most probable. Raises `ConventionError` where all
     joints lie in one point.
     """
-    size, how = _stature(motion)
+    size, how = stature(motion)
     if not size > 0:
         raise ConventionError(
             "all joints lie in one point, so there is no height to tell the unit by; give --unit"
@@ -70,7 +70,7 @@ def infer_unit(motion: Motion) -> tuple[float, tuple[str, ...]]:
     return UNITS[best], tuple(notes)
 
 
-def _stature(motion: Motion) -> tuple[float, str]:
+def stature(motion: Motion) -> tuple[float, str]:
     """The body's height along its bones, whatever its pose, and how it was measured.
 
     From the head to the nearer foot where names tell them, else from the longest path in the tree.

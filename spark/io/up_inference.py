@@ -15,6 +15,7 @@ from spark.motion import Motion
 # The mean direction from feet to body this near to an axis tells that axis.
 CLEARLY = 0.75
 _STEADIER = 1.5  # a floor along an axis moves no more than this many times that of another
+_SAMPLES = 32  # frames that are looked at for the axis along which a body stands at all
 _STEADY = 0.01  # of the body's height: a floor that moves less is steady
 
 _STEADY_FLOOR = 0.05  # [heights] between the quartiles; a floor moves less, a body's side more
@@ -94,3 +95,12 @@ def standing_axis(motion: Motion, usual: Up) -> tuple[Up, bool, str]:
     if np.std(low[:, best]) > _STEADIER * np.std(low[:, own]) + _STEADY * size:
         return usual, False, "as is usual in such files"
     return UPS[best], bool(standing[best] < 0 and best), "along which the body stands"
+
+
+def stands_along(motion: Motion) -> Up | None:
+    """The axis of the file along which the body clearly stands, in its motion and at rest."""
+    some = motion.thinned(_SAMPLES)
+    rest = some.skeleton.rest_positions[None]
+    standing = [above_feet(some, places) for places in (forward(some)[0], rest)]
+    both = np.concatenate([np.minimum(*standing), np.minimum(*-np.array(standing))])
+    return UPS[int(np.argmax(both))] if both.max() > CLEARLY else None

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from spark_sim.shelf.batch import Backend
     from spark_sim.shelf.plan import Job
 
-SUMMARY = "put a shelf of motions on several bodies"
+SUMMARY = "put folders of motions on several bodies, and measure them"
 USAGE = "IN... --to TARGET [--to TARGET] -o OUT [options]"
 DESCRIPTION = """\
 Put every motion below each IN on every TARGET, and measure each result against

@@ -1,11 +1,11 @@
-"""`spark-sim mjcf`: a MuJoCo body from a BVH skeleton."""
+"""`spark-sim mjcf`: a MuJoCo body from a character's skeleton."""
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from spark_sim.commands.options import add_corrections, add_force, check_given, load
 
-SUMMARY = "make a MuJoCo body from a BVH skeleton"
+SUMMARY = "make a MuJoCo body from a character"
 USAGE = "RIG [-o OUT] [options]"
 DESCRIPTION = """\
 Write a MuJoCo model (MJCF) of the skeleton in RIG: one body a bone, capsules

@@ -99,8 +99,12 @@ def run(args: Namespace) -> int:
 
         return _verdict(args, report_folder(args))
     paths = [path for path in (args.file, *args.compare) if path is not None]
-    if len({*paths}) < len(paths) or not paths or (args.compare and len(paths) < 2):
-        raise ConventionError("a report needs a FILE, and --compare at least two that differ")
+    if not paths:
+        raise ConventionError("no FILE is given")
+    if len({*paths}) < len(paths) or (args.compare and len(paths) < 2):
+        raise ConventionError(
+            "--compare puts two files or more beside each other, none of them twice"
+        )
     if args.workers is not None:
         raise ConventionError("--workers goes with a folder; files are measured one by one")
     check_given(args, [*paths, args.truth] if args.truth else paths)

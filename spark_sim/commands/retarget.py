@@ -103,7 +103,9 @@ def configure(parser: ArgumentParser) -> None:
         "--no-refine",
         dest="refine",
         action="store_false",
-        help="do not hold the feet where SRC's stand. On a robot: the same as --method copy",
+        help="stop after the transfer: feet are not held where SRC's stand, hands and knees not "
+        "kept over the floor, a SRC that trembles not smoothed. On a robot: the same as --method "
+        "copy",
     )
     add_force(parser)
     add_json(parser, "one line for each result")

@@ -377,3 +377,14 @@ def test_an_axis_may_point_down(tmp_path: Path, up: str, named: bool) -> None:
     np.testing.assert_allclose(
         np.sin(np.radians(back.values[:, 3:] - found.bvh.values[:, 3:])), 0, atol=1e-6
     )
+
+
+def test_a_given_convention_that_the_body_contradicts_is_pointed_out(tmp_path: Path) -> None:
+    """It is taken all the same: a giant may be meant, and somebody who lies."""
+    path = save(human("y", 0.01), tmp_path)
+    right = read_recording(path, unit="cm", up="y")
+    assert right.notes == ()
+    wrong = read_recording(path, unit="m", up="z")
+    assert (wrong.convention.unit, wrong.convention.up) == ("m", "z")
+    assert "no human's height" in wrong.notes[0]
+    assert "stands along y" in wrong.notes[1]
