@@ -33,8 +33,8 @@ masses, shapes, soles and joint limits.
 
 Of a FOLDER, every motion is measured, against the source that the batch's
 manifest names or that --source has under the same name. FOLDER/report.html has
-them all in a table, the worst first, and leads to a page for each; the table is
-beside it as JSON and CSV, with the extra `parquet` as Parquet, too."""
+them all in a table, the worst first, and leads to a page for each. Beside it
+is the table as JSON and CSV; with the extra `parquet`, as Parquet, too."""
 EXAMPLES = """\
 examples:
   spark-sim report walk_on_mutant.bvh --source walk.bvh
