@@ -57,6 +57,7 @@ def loop_of(source: CanonicalMotion) -> Loop | None:
         return None
     frames = np.arange(count)
     jolts = np.abs(np.diff(_steps(source, frames[:-1], frames[1:]), axis=0)).max(axis=0)
+    jolts[:-1] = jolts[:-1].max()  # of any joint: where loops are closed, one may halt
     if (np.abs(after - before) > jolts + off).any():
         return None
     ends = [0, 1, count - 2, count - 1]

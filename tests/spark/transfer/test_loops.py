@@ -86,12 +86,17 @@ def test_what_ends_elsewhere_is_no_loop(share: float) -> None:
     assert continued(part) == (part, slice(0, len(part)))
 
 
-@pytest.mark.parametrize(("swings", "closes"), [(1, True), (0.5, False)])
-def test_who_comes_back_on_the_way_out_is_no_loop(swings: float, closes: bool) -> None:
-    """An arm that swings is where it was after half of a swing, and moves the other way."""
-    angle = 1.5 * np.sin(np.linspace(0, 2 * np.pi * swings, 61))
+@pytest.mark.parametrize(
+    ("swings", "shakes", "closes"), [(1, 0, True), (0.5, 0, False), (0.5, 4, True)]
+)
+def test_who_comes_back_on_the_way_out_is_no_loop(swings: float, shakes: int, closes: bool) -> None:
+    """An arm that swings is where it was after half of a swing, and moves the other way. Of a body
+    that has such jolts anyway that is how its loop was closed."""
+    time = np.linspace(0, 2 * np.pi, 61)
     rotations = np.tile([1.0, 0, 0, 0], (61, len(RIG.skeleton), 1))
-    rotations[:, RIG.roles.held[-1]] = quat_from_rotvec(np.outer(angle, [0, 1.0, 0]))
+    for joint, often in zip(RIG.roles.held[-2:], (shakes, swings), strict=True):
+        angle = 1.5 * np.sin(often * time)
+        rotations[:, joint] = quat_from_rotvec(np.outer(angle, [0, 1.0, 0]))
     hips = np.tile([0, 0, RIG.hip_height], (61, 1))
     assert (loop_of(CanonicalMotion(RIG, 1 / FPS, rotations, hips)) is not None) == closes
 
