@@ -12,6 +12,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from jaxtyping import Float, Int
 
+from spark.blocks import blocks
 from spark.resample import frames_of_keys, rotations_at, values_at
 from spark.rotation import (
     quat_conj,
@@ -55,8 +56,7 @@ def loop_of(source: CanonicalMotion) -> Loop | None:
     off = np.append(np.full(len(gap) - 1, _OFF), _OFF_HEIGHT * source.rig.hip_height)
     if (np.abs(gap - way * pace) > off).any():
         return None
-    frames = np.arange(count)
-    jolts = np.abs(np.diff(_steps(source, frames[:-1], frames[1:]), axis=0)).max(axis=0)
+    jolts = _jolts(source)
     jolts[:-1] = jolts[:-1].max()  # of any joint: where loops are closed, one may halt
     if (np.abs(after - before) > jolts + off).any():
         return None
@@ -108,6 +108,16 @@ def _gone_on(
     places = turns * (hips[:, 0] + 1j * hips[:, 1]) + moves
     turned = quat_mul(quat_from_yaw(loop.yaw * rounds)[:, None], rotations)
     return turned, np.column_stack([places.real, places.imag, hips[:, 2]])
+
+
+def _jolts(source: CanonicalMotion) -> Float[np.ndarray, "D"]:
+    """By how much steps from frame to frame change at most."""
+    spans = (np.arange(b.start, b.stop + 2) for b in blocks(len(source) - 2))
+    steps = (_steps(source, frames[:-1], frames[1:]) for frames in spans)
+    jolts: Float[np.ndarray, D] = np.max(
+        [np.abs(np.diff(some, axis=0)).max(axis=0) for some in steps], axis=0
+    )
+    return jolts
 
 
 def _steps(
