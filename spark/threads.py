@@ -11,7 +11,7 @@ from threadpoolctl import LibController, ThreadpoolController
 def one_thread() -> Iterator[None]:
     """A context in which matrices are multiplied and factorised by one thread. The robots' are too
     small for more, and where others want the same cores, threads that wait for each other cost a
-    stream up to nine tenths of its speed (docs/performance.md)."""
+    stream up to nine tenths of its speed."""
     controller, libraries = _linear_algebra()
     if all(library.num_threads == 1 for library in libraries):  # to limit takes 30 microseconds
         yield
