@@ -16,6 +16,7 @@ _LONGEST = 0.25  # [s]: who waits longer for a pose waits for a sender that stal
 _CATCH_UP = 6.0  # [1/s], critically damped: half a second to another delay
 _RETURN = 0.5  # [s] from the pose that was held in a stall to the sender's
 _KEPT = 512  # poses, more than come within a stall
+_HIGHER = 3.0  # [m] than another pose is nobody's: the sender's unit is another one
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +130,9 @@ class JitterBuffer:
 
 
 def _between(a: Frame, b: Frame, share: float) -> Frame:
-    """The pose on the way from one to another."""
+    """The pose on the way from one to another; the first, where there is no way."""
+    if abs(b.root_pos[2] - a.root_pos[2]) > _HIGHER:
+        return a
     places = None
     if a.translations is not None and b.translations is not None:
         places = a.translations + share * (b.translations - a.translations)

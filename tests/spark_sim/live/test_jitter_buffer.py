@@ -163,3 +163,19 @@ def test_two_packets_at_once(stamped: bool) -> None:
     for packets in (late, twice):
         moved = speeds(played(packets, 60.0), 60.0)
         np.testing.assert_allclose(moved, 1.0, atol=0.15)
+
+
+@pytest.mark.parametrize("silent", [0.0, 1.0])
+def test_there_is_no_way_to_another_unit(silent: float) -> None:
+    """Of a sender who changes to centimetres, after a stall or in the middle of a walk, every step
+    gets a pose that was sent: one between the two would be in feet."""
+    buffer, heights = JitterBuffer(), []
+    packets = [each for each in sent(40.0) if not 3.0 < each[1] < 3.0 + silent]
+    for now in steps(60.0).tolist():
+        while packets and packets[0][0] <= now:
+            arrived, made, stamp = packets.pop(0)
+            frame = pose(made)
+            unit = 1.0 if made < 3.0 else 100.0
+            buffer.put(frame._replace(root_pos=frame.root_pos * [1.0, 1.0, unit]), arrived, stamp)
+        heights.append(float(buffer.get(now).root_pos[2]))
+    np.testing.assert_allclose(np.unique(np.round(heights, 9)), [1.0, 100.0])
