@@ -1,9 +1,8 @@
 """Parts of a body that are in each other however it stands: they don't push each other apart."""
 
-import copy
-
 import mujoco
 
+from sim.self_contact import colliding, self_contacts
 from sim.trajectory import ModelTrajectory, subtree
 
 
@@ -12,19 +11,9 @@ def let_overlap(spec: mujoco.MjSpec, body: ModelTrajectory, notes: list[str]) ->
     hulls of a URDF's meshes often are; what is changed is added to `notes`."""
     if body.tpose is None:
         return
-    model = copy.copy(body.model)
-    model.opt.disableflags = 0  # a file may switch contacts off
-    data = mujoco.MjData(model)
-    data.qpos[:] = body.tpose
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_collision(model, data)
-    own, depths = {*subtree(model, body.root)}, dict[tuple[int, int], float]()
-    for k in range(data.ncon):
-        contact = data.contact[k]
-        first, second = sorted(int(b) for b in model.geom_bodyid[contact.geom])
-        if contact.dist < 0 and {first, second} <= own:
-            deeper = max(depths.get((first, second), 0.0), -float(contact.dist))
-            depths[first, second] = deeper
+    model = colliding(body.model)
+    own = {*subtree(model, body.root)}
+    depths = self_contacts(model, mujoco.MjData(model), body.tpose, own)
     for first, second in depths:
         spec.add_exclude(bodyname1=model.body(first).name, bodyname2=model.body(second).name)
     if depths:

@@ -1,12 +1,13 @@
 """Where the bodies of a model are in every frame, and how deep its shapes are in each other."""
 
-import copy
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from sim.self_contact import colliding, self_contacts
 from sim.trajectory import ModelTrajectory
 
 
@@ -27,22 +28,21 @@ class ModelPoses:
 
 
 def pose_model(body: ModelTrajectory) -> ModelPoses:
-    """Run MuJoCo's kinematics and collision detection over all frames.
-
-    Shapes collide as the file says: by its bits, excludes and pairs, never with their parents.
-    """
-    model = body.model
-    if model.opt.disableflags:  # a file may switch contacts off for its simulation
-        model = copy.copy(model)
-        model.opt.disableflags = 0
+    """Run MuJoCo's kinematics and collision detection over all frames."""
+    model = colliding(body.model)
     data = mujoco.MjData(model)
     bodies = np.flatnonzero(model.body_rootid == body.root)
-    ignored = set() if body.tpose is None else set(_self_contacts(model, data, body.tpose, bodies))
+    own = {*bodies.tolist()}
+
+    def contacts_in(qpos: Float[np.ndarray, "nq"]) -> dict[tuple[str, str], float]:
+        return _by_parts(model, self_contacts(model, data, qpos, own))
+
+    ignored = {} if body.tpose is None else contacts_in(body.tpose)
     pos = np.empty((len(body.qpos), model.nbody, 3))
     quat = np.empty((len(body.qpos), model.nbody, 4))
     touching = []
     for t, qpos in enumerate(body.qpos):
-        touching.append(_self_contacts(model, data, qpos, bodies))
+        touching.append(contacts_in(qpos))
         pos[t], quat[t] = data.xpos, data.xquat
     pairs = [*dict.fromkeys(p for contacts in touching for p in contacts if p not in ignored)]
     depth = np.array([[contacts.get(p, 0.0) for p in pairs] for contacts in touching])
@@ -55,22 +55,12 @@ def part_name(model: mujoco.MjModel, body: int) -> str:
     return model.body(part).name.replace("_", " ") or f"body {part}"
 
 
-def _self_contacts(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    qpos: Float[np.ndarray, "nq"],
-    bodies: Int[np.ndarray, "B"],
+def _by_parts(
+    model: mujoco.MjModel, depths: Mapping[tuple[int, int], float]
 ) -> dict[tuple[str, str], float]:
-    """How deep the humanoid's parts are in each other [m] in one pose."""
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_collision(model, data)
-    contacts: dict[tuple[str, str], float] = {}
-    if not data.ncon:
-        return contacts
-    touching = model.geom_bodyid[data.contact.geom]
-    for (a, b), distance in zip(touching, data.contact.dist, strict=True):
-        if distance < 0 and a in bodies and b in bodies:
-            one, other = sorted((part_name(model, int(a)), part_name(model, int(b))))
-            contacts[one, other] = max(contacts.get((one, other), 0.0), -float(distance))
-    return contacts
+    """By the names of the parts that bodies belong to."""
+    named: dict[tuple[str, str], float] = {}
+    for pair, depth in depths.items():
+        one, other = sorted(part_name(model, body) for body in pair)
+        named[one, other] = max(named.get((one, other), 0.0), depth)
+    return named
