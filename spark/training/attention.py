@@ -1,9 +1,10 @@
-"""The transformer's parts: attention, the blocks along time, positions in time.
+"""The transformer's parts: attention, the blocks along time and of the decoder, positions in time.
 
 SDPA is torch's fused attention: no scores of all frames are ever kept. On CPUs it is slower in
 bfloat16 than in float32, so that there it reads float32 whatever the products around it use.
 
-Axes: M sequences, L = Q or K their tokens, H heads, C features of a head, D width.
+Axes: M sequences, L = Q or K their tokens, H heads, C features of a head, D width, B batch,
+T frames, J joints.
 """
 
 import torch
@@ -11,7 +12,7 @@ import torch.nn.functional as nnf
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
-from spark.network.config import LN_ROTARY_BASE, LN_SINUSOID_BASE
+from spark.network.config import LN_ROTARY_BASE, LN_SINUSOID_BASE, Config
 from spark.training.precision import exactly
 
 MOST_SEQUENCES = 65535  # blocks of a CUDA grid's last axis, along which the kernels lay sequences
@@ -99,16 +100,50 @@ class Feedforward(nn.Sequential):
 class TemporalBlock(nn.Module):
     """One of the encoder's blocks: each token looks along time (eq. 2 and 3)."""
 
-    def __init__(self, width: int, heads: int, *, rotary: bool, causal: bool) -> None:
+    def __init__(self, config: Config) -> None:
         super().__init__()
+        width = config.width
         self.norm_time, self.norm_ff = nn.LayerNorm(width), nn.LayerNorm(width)
-        self.time = Attention(width, heads, rotary, causal)
+        self.time = Attention(width, config.heads, config.relative_time, config.causal)
         self.ff = Feedforward(width, 4 * width, width)
 
     def forward(self, x: Float[Tensor, "M T D"]) -> Float[Tensor, "M T D"]:
         """M tokens, each along its T frames."""
         x = x + self.time(self.norm_time(x))
         return x + self.ff(self.norm_ff(x))
+
+
+class DecoderBlock(nn.Module):
+    """Joints of a frame look at one another, at its 24 tokens and, as a switch, along time."""
+
+    def __init__(self, config: Config) -> None:
+        super().__init__()
+        width, heads = config.width, config.heads
+        self.norm_self, self.norm_cross = nn.LayerNorm(width), nn.LayerNorm(width)
+        self.norm_ff = nn.LayerNorm(width)
+        self.self_attention = Attention(width, heads)
+        self.cross_attention = Attention(width, heads)
+        self.ff = Feedforward(width, 4 * width, width)
+        self.along_time = TemporalBlock(config) if config.decoder_time else None
+
+    def forward(
+        self,
+        y: Float[Tensor, "B T J D"],
+        latent: Float[Tensor, "B T 24 D"],
+        valid: Bool[Tensor, "B J"],
+    ) -> Float[Tensor, "B T J D"]:
+        """One step of refinement of the target's joint features."""
+        B, T, J, _ = y.shape
+        frames = y.flatten(0, 1)
+        mask = valid[:, None, None].expand(B, T, 1, J).flatten(0, 1)
+        frames = frames + self.self_attention(self.norm_self(frames), mask=mask)
+        frames = frames + self.cross_attention(self.norm_cross(frames), latent.flatten(0, 1))
+        frames = frames + self.ff(self.norm_ff(frames))
+        y = frames.unflatten(0, (B, T))
+        if self.along_time is None:
+            return y
+        tokens = y.transpose(1, 2).flatten(0, 1)
+        return self.along_time(tokens).unflatten(0, (B, J)).transpose(1, 2)
 
 
 def sinusoids(T: int, D: int, like: Tensor) -> Float[Tensor, "T D"]:

@@ -18,18 +18,9 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor, nn
 
-from spark.network.config import (
-    N_GROUPS,
-    N_TOKENS,
-    NO_ROTATION,
-    QUERIES_PER_GROUP,
-    RESIDUAL_SCALE,
-    SHAPE_FEATURES,
-    TPOSE_FEATURES,
-    TPOSE_ROTATION,
-    Config,
-)
-from spark.training.attention import Attention, Feedforward, TemporalBlock, sinusoids
+from spark.network.config import N_GROUPS, N_TOKENS, QUERIES_PER_GROUP, RESIDUAL_SCALE, Config
+from spark.training.attention import Attention, DecoderBlock, TemporalBlock, sinusoids
+from spark.training.joint_embedding import JointEmbedding, withheld
 from spark.training.precision import exactly
 from spark.training.residual import corrected, corrected_joints, rotation_features
 from spark.training.tensors import (
@@ -43,71 +34,6 @@ from spark.training.tensors import (
 )
 
 
-class DecoderBlock(nn.Module):
-    """Joints of a frame look at one another, at its 24 tokens and, as a switch, along time."""
-
-    def __init__(self, config: Config) -> None:
-        super().__init__()
-        width, heads = config.width, config.heads
-        self.norm_self, self.norm_cross = nn.LayerNorm(width), nn.LayerNorm(width)
-        self.norm_ff = nn.LayerNorm(width)
-        self.self_attention = Attention(width, heads)
-        self.cross_attention = Attention(width, heads)
-        self.ff = Feedforward(width, 4 * width, width)
-        self.along_time = _temporal_block(config) if config.decoder_time else None
-
-    def forward(
-        self,
-        y: Float[Tensor, "B T J D"],
-        latent: Float[Tensor, "B T 24 D"],
-        valid: Bool[Tensor, "B J"],
-    ) -> Float[Tensor, "B T J D"]:
-        """One step of refinement of the target's joint features."""
-        B, T, J, _ = y.shape
-        frames = y.flatten(0, 1)
-        mask = valid[:, None, None].expand(B, T, 1, J).flatten(0, 1)
-        frames = frames + self.self_attention(self.norm_self(frames), mask=mask)
-        frames = frames + self.cross_attention(self.norm_cross(frames), latent.flatten(0, 1))
-        frames = frames + self.ff(self.norm_ff(frames))
-        y = frames.unflatten(0, (B, T))
-        if self.along_time is None:
-            return y
-        tokens = y.transpose(1, 2).flatten(0, 1)
-        return self.along_time(tokens).unflatten(0, (B, J)).transpose(1, 2)
-
-
-class JointEmbedding(nn.Module):
-    """Embeds what is known of a joint besides its motion: position in its group, name, T-pose."""
-
-    def __init__(self, config: Config) -> None:
-        super().__init__()
-        width = config.width
-        features = TPOSE_FEATURES + (SHAPE_FEATURES if config.shape_features else 0)
-        self.shape_features, self.arc_length = config.shape_features, config.relative_time
-        self.tpose_rotations = config.tpose_rotations
-        self.position = nn.Parameter(0.02 * torch.randn(N_GROUPS, config.max_group, width))
-        self.arc = nn.Linear(1, width, bias=False)
-        self.name = nn.Linear(config.name_width, width)
-        self.tpose = Feedforward(features, width, width)
-
-    def joints(self, body: Body) -> Float[Tensor, "B J D"]:
-        """E_name + MLP(T-pose) of each joint."""
-        features = body.tpose
-        if not self.tpose_rotations:
-            features = features.clone()
-            features[..., TPOSE_ROTATION] = features.new_tensor(NO_ROTATION)
-        if self.shape_features:
-            features = torch.cat([features, body.shape], -1)
-        return self.name(body.names) + self.tpose(features)
-
-    def positions(self, body: Body) -> Float[Tensor, "B 6 N D"]:
-        """E_pos of each position in each group; those beyond `max_group` share the last."""
-        number = torch.arange(body.groups.shape[-1], device=body.groups.device)
-        embedding = self.position[:, number.clamp(max=self.position.shape[1] - 1)]
-        embedding = embedding.expand(len(body.groups), -1, -1, -1)
-        return embedding + self.arc(body.arc[..., None]) if self.arc_length else embedding
-
-
 class Encoder(nn.Module):
     """Section 4.2: motion on any skeleton to 24 tokens a frame."""
 
@@ -119,7 +45,7 @@ class Encoder(nn.Module):
         self.root = nn.Linear(3, width)
         self.queries = nn.Parameter(torch.rand(N_GROUPS, QUERIES_PER_GROUP, width) - 0.5)
         self.pool = Attention(width, config.heads)
-        self.time = nn.ModuleList(_temporal_block(config) for _ in range(config.encoder_blocks))
+        self.time = nn.ModuleList(TemporalBlock(config) for _ in range(config.encoder_blocks))
         self.norm = nn.LayerNorm(width)  # on H: without it the cycle loss shrinks H to zero
 
     def forward(
@@ -255,7 +181,7 @@ class Spark(nn.Module):
 
     def encode(self, pose: PoseTensors, body: Body) -> Float[Tensor, "B T 24 D"]:
         """H of a motion on its skeleton."""
-        return self.encoder(pose, self._withhold(body), self.embedding)
+        return self.encoder(pose, self._known(body), self.embedding)
 
     def decode(
         self,
@@ -268,7 +194,7 @@ class Spark(nn.Module):
         if self.config.residual and start is None:
             raise ValueError("this network corrects the analytic transfer: `start` is missing")
         start = start if self.config.residual else None
-        return self.decoder(latent, self._withhold(body), self.embedding, start, noise)
+        return self.decoder(latent, self._known(body), self.embedding, start, noise)
 
     def forward(
         self, pose: PoseTensors, source: Body, target: Body, start: Start | None = None
@@ -276,25 +202,5 @@ class Spark(nn.Module):
         """Retarget `pose` from `source` to `target` (figure 2b)."""
         return self.decode(self.encode(pose, source), target, start)
 
-    def _withhold(self, body: Body) -> Body:
-        drop, noise = self.config.drop_names, self.config.blur_bodies
-        if not (self.training and (drop or noise)):
-            return body
-        kept = torch.rand(len(body.names), 1, 1, device=body.names.device) >= drop
-        return body._replace(
-            names=body.names * kept,
-            tpose=_blurred(body.tpose, noise),
-            shape=_blurred(body.shape, noise),
-        )
-
-
-def _temporal_block(config: Config) -> TemporalBlock:
-    return TemporalBlock(
-        config.width, config.heads, rotary=config.relative_time, causal=config.causal
-    )
-
-
-def _blurred(features: Float[Tensor, "B J F"], noise: float) -> Float[Tensor, "B J F"]:
-    """Features whose first three are a place or an offset, which is moved at random."""
-    moved = features[..., :3] + noise * torch.randn_like(features[..., :3])
-    return torch.cat([moved, features[..., 3:]], -1)
+    def _known(self, body: Body) -> Body:
+        return withheld(body, self.config) if self.training else body
