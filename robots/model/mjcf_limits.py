@@ -5,26 +5,23 @@ for numbers without end beside each body. The limits lie far beyond the largest 
 MuJoCo Menagerie (1,300 elements, 40 MB of textures).
 """
 
-import os
-import stat
-import struct
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from math import prod
 from pathlib import Path
 from typing import NoReturn
 
+from robots.model.mjcf_loads import check_loads
+from robots.model.xml import largest_number, numbers
 from spark.errors import FileFormatError
 
 _ELEMENTS = 20_000  # after copying; compiled in seconds
 DEPTH = 200  # bodies in bodies
 _JOINTS = 1_000  # the work on them grows with their square
 _KEYED = 5_000_000  # keyframes, and numbers beside each element, times elements
-_PIXELS = 48 << 20  # of textures and height fields together
 _POINTS = 100_000  # of built-in meshes together; compiled in two seconds
 _FLEXIBLE = 300_000  # numbers in what bends, such as cloth
 _SENSED = 1_000_000  # values of the sensors that look through cameras, or are grids
-_FILE = 256 << 20  # bytes of a mesh, or what else a model loads
 _MEMORY = 4 << 30  # bytes that `size memory` sets aside
 
 # How large a number may be, by the attribute that says it.
@@ -47,8 +44,6 @@ _BESIDE = {
     *("nuser_site", "nuser_tendon", "nsample", "actdim", "dim", "num"),
 }
 _GRIDS = ("count", "cellcount")  # copies along one to three axes
-_LOADED = ("mesh", "hfield", "skin", "texture", "flexcomp")
-_FOLDERS = ("meshdir", "texturedir", "assetdir")
 
 
 def check_limits(path: Path, root: ET.Element, attached: Mapping[str, ET.Element]) -> None:
@@ -69,7 +64,7 @@ def check_limits(path: Path, root: ET.Element, attached: Mapping[str, ET.Element
     largest: dict[str, float] = {}
     for element in every:
         for name in _BESIDE & element.attrib.keys():
-            largest[name] = max(largest.get(name, 0.0), _largest(element, name))
+            largest[name] = max(largest.get(name, 0.0), largest_number(element, name))
     beside = sum(largest.values())
     if beside * elements > _KEYED:
         raise FileFormatError(
@@ -80,8 +75,7 @@ def check_limits(path: Path, root: ET.Element, attached: Mapping[str, ET.Element
         )
     _check_points(path, every)
     _check_sensed(path, every)
-    _check_pixels(path, trees)
-    _check_files(path, trees)
+    check_loads(path, trees)
 
 
 def _many(count: float, noun: str, limit: int) -> str:
@@ -110,7 +104,7 @@ class _Counter:
                 max(1.0, n)
                 for name in _GRIDS
                 if name in element.attrib
-                for n in _numbers(element, name)
+                for n in numbers(element, name)
             )
             elements += copies * (own if element.tag != "replicate" else 1)
             if element.tag in ("joint", "freejoint"):
@@ -132,12 +126,12 @@ def _check_numbers(path: Path, element: ET.Element) -> None:
     for name in element.attrib:
         if name not in _NUMBERS:
             continue
-        for value in _numbers(element, name):
+        for value in numbers(element, name):
             if value > _NUMBERS[name]:
                 _refuse(path, element, name, f"at most {_NUMBERS[name]}")
-    if element.tag == "numeric" and any(n > 1_000_000 for n in _numbers(element, "size")):
+    if element.tag == "numeric" and any(n > 1_000_000 for n in numbers(element, "size")):
         _refuse(path, element, "size", "at most 1000000")
-    if element.tag == "mesh" and any(n > 1_000 for n in _numbers(element, "params")):
+    if element.tag == "mesh" and any(n > 1_000 for n in numbers(element, "params")):
         _refuse(path, element, "params", "at most 1000")
     if element.tag == "size" and _bytes(element.get("memory", "")) > _MEMORY:
         _refuse(path, element, "memory", "at most 4G")
@@ -148,7 +142,7 @@ def _check_points(path: Path, every: list[ET.Element]) -> None:
     points = flexible = 0.0
     for element in every:
         if element.tag == "mesh" and "builtin" in element.attrib:
-            size = _largest(element, "params")
+            size = largest_number(element, "params")
             # A sphere is an icosahedron whose faces are cut in four, so many times.
             points += 10 * 4.0 ** min(size, 20) if element.get("builtin") == "sphere" else size**2
         elif element.tag in ("flex", "flexcomp", "composite"):
@@ -163,104 +157,17 @@ def _check_points(path: Path, every: list[ET.Element]) -> None:
 def _check_sensed(path: Path, every: list[ET.Element]) -> None:
     """Pictures that range finders measure, and grids of touch."""
     sensors = sum(element.tag == "rangefinder" and "camera" in element.attrib for element in every)
-    pixels = max(prod(_numbers(element, "resolution")) for element in every)
+    pixels = max(prod(numbers(element, "resolution")) for element in every)
     values = sensors * pixels
     for element in every:
         if element.tag == "config" and element.get("key") == "size":
-            values += prod(_numbers(element, "value"))
+            values += prod(numbers(element, "value"))
     if values > _SENSED:
         _too_many(path, "sensors", values, "values", _SENSED)
 
 
 def _too_many(path: Path, what: str, count: float, noun: str, limit: int) -> NoReturn:
     raise FileFormatError(path, None, f"has {what} of {count:,.0f} {noun}; at most {limit:,}")
-
-
-def _largest(element: ET.Element, name: str) -> float:
-    return max(_numbers(element, name), default=0.0)
-
-
-def _check_pixels(path: Path, trees: list[ET.Element]) -> None:
-    pixels = 0.0
-    of_classes = [e for tree in trees for d in tree.iter("default") for e in d.findall("texture")]
-    for element in (e for tree in trees for e in tree.iter()):
-        if element.tag == "texture":
-            width, height = (
-                max((n for e in (element, *of_classes) for n in _numbers(e, name)), default=0.0)
-                for name in ("width", "height")
-            )
-            # The six sides of a cube lie above each other, as high as they are wide.
-            pixels += max(width * height, 6 * width * width if element.get("type") != "2d" else 0)
-        elif element.tag == "hfield":
-            pixels += prod(_largest(element, name) for name in ("nrow", "ncol"))
-        if element.tag in ("texture", "hfield"):
-            pixels += sum(_png_pixels(file) for file in _files(path, trees, element))
-    if not pixels <= _PIXELS:  # nor NaN
-        raise FileFormatError(
-            path,
-            None,
-            f"has textures and height fields of {pixels / 1e6:,.0f} million points; at most "
-            f"{_PIXELS / 1e6:.0f} are read",
-        )
-
-
-def _check_files(path: Path, trees: list[ET.Element]) -> None:
-    for element in (e for tree in trees for e in tree.iter()):
-        if element.tag not in _LOADED:
-            continue
-        for file in _files(path, trees, element):
-            state = os.stat(file)
-            if not stat.S_ISREG(state.st_mode):
-                what = "is a folder" if stat.S_ISDIR(state.st_mode) else "is not a regular file"
-                raise FileFormatError(path, None, f"loads {str(file)!r}, which {what}")
-            if state.st_size > _FILE:
-                size = f"{state.st_size >> 20} MB; at most {_FILE >> 20} are read"
-                raise FileFormatError(path, None, f"loads {str(file)!r}, which has {size}")
-
-
-def _files(path: Path, trees: list[ET.Element], element: ET.Element) -> Iterator[Path]:
-    """The files that an element may mean, of those that are there."""
-    names = [value for name, value in element.attrib.items() if name.startswith("file")]
-    names = [name for name in names if name]
-    if not names:
-        return
-    compilers = [c for tree in trees for c in tree.iter("compiler")]
-    folders = {c.get(name, "") for c in compilers for name in _FOLDERS} | {""}
-    seen = set()
-    for name in names:
-        for folder in folders:
-            for own in (name, name.replace("\\", "/").rpartition("/")[2]):
-                file = path.parent / folder / own
-                try:
-                    there = file.exists()
-                except (OSError, ValueError):
-                    there = False
-                if there and file not in seen:
-                    seen.add(file)
-                    yield file
-
-
-def _png_pixels(file: Path) -> float:
-    """Width times height, as a PNG begins; 0 for other files, whose points are their bytes."""
-    if not file.is_file():
-        return 0.0
-    with file.open("rb") as opened:
-        head = opened.read(24)
-    if head[:8] != b"\x89PNG\r\n\x1a\n" or len(head) < 24:
-        return 0.0
-    width, height = struct.unpack(">II", head[16:24])
-    return float(width) * float(height)
-
-
-def _numbers(element: ET.Element, name: str) -> list[float]:
-    """The numbers of an attribute; words that are none are MuJoCo's to refuse."""
-    found = []
-    for word in element.get(name, "").split():
-        try:
-            found.append(float(word))
-        except ValueError:
-            continue
-    return [n for n in found if n == n]  # not NaN
 
 
 def _bytes(text: str) -> float:

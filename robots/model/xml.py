@@ -56,3 +56,19 @@ def parse_xml(path: Path, content: bytes, encoding: str | None = None) -> ET.Ele
         raise FileFormatError(path, skipped + error.lineno, message) from error
     except (ValueError, LookupError) as error:  # an encoding that is none
         raise FileFormatError(path, None, f"is no XML ({error})") from error
+
+
+def numbers(element: ET.Element, name: str) -> list[float]:
+    """The numbers of an attribute; words that are none, and NaN, are passed over."""
+    found = []
+    for word in element.get(name, "").split():
+        try:
+            found.append(float(word))
+        except ValueError:
+            continue
+    return [n for n in found if n == n]
+
+
+def largest_number(element: ET.Element, name: str) -> float:
+    """The largest number of an attribute; 0 of none."""
+    return max(numbers(element, name), default=0.0)
