@@ -69,7 +69,8 @@ class Drift:
 
     `distance` [m] is horizontal, frame by frame, with both paths starting at the same point. A
     source that leaps in its first `_BEGIN` starts after that: a T-pose elsewhere has no distance.
-    `path_length` [m] is that of the scaled source; `heading` [rad] is the difference of headings.
+    `path_length` [m] is that of the scaled source; `heading` [rad] is the difference of headings,
+    at most half a turn.
     """
 
     distance: Float[np.ndarray, "T"]
@@ -94,8 +95,8 @@ def root_drift(
     path = (hips - hips[start])[:, :2]
     source_path = scale * (source_hips - source_hips[start])[:, :2]
     turned = heading - source_heading
-    # Headings are known up to whole turns.
-    turned = turned - 2 * np.pi * np.round(turned[start] / (2 * np.pi))
+    # A whole turn is none to see: a frame that faces back may leave one behind for good.
+    turned = (turned + np.pi) % (2 * np.pi) - np.pi
     begun = np.arange(len(hips)) >= start
     return Drift(
         distance=begun * np.linalg.norm(path - source_path, axis=-1),

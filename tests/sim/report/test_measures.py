@@ -100,6 +100,15 @@ def test_a_t_pose_elsewhere_before_the_source_is_no_drift_of_the_rest() -> None:
     assert drift.path_length == pytest.approx(3.0, rel=0.02)
 
 
+def test_a_frame_that_faces_back_does_not_turn_all_that_follow() -> None:
+    """Without jumps, the heading of what follows is a whole turn off."""
+    path, heading = np.zeros((60, 3)), np.zeros(60)
+    heading[30], heading[31:] = np.pi, 2 * np.pi
+    drift = root_drift(path, heading, path, np.zeros(60), 1.0, frame_time=1 / 60)
+    assert np.abs(drift.heading[30]) == pytest.approx(np.pi)
+    np.testing.assert_allclose(np.delete(drift.heading, 30), 0.0, atol=1e-12)
+
+
 def test_swing_and_twist_add_up_for_a_turn_about_one_axis() -> None:
     for axis, expected in (("x", [0.4, 0, 0]), ("y", [0, 0.4, 0]), ("z", [0, 0, 0.4])):
         turn = quat_about(axis, np.array([0.4]))
