@@ -213,7 +213,7 @@ FINGERS: dict[str, str] = {
     }.items()
     for word in words.split()
 }
-FINGER_TIP = _set("end nub tip leaf site")
+TIP = _set("end nub tip leaf site")
 # Joints inside the palm; those of a thumb, which bend as its first bone, aside.
 METACARPAL = _set("metacarpal metacarpals carpal palm in cup")
 

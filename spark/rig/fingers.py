@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spark.rig.aliases import FINGER_TIP, FINGERS, METACARPAL
+from spark.rig.aliases import FINGERS, METACARPAL, TIP
 from spark.rig.finger_build import fingers_by_build, metacarpals
 from spark.rig.name_hints import split_name
 from spark.rig.nulls import nulls_of
@@ -86,7 +86,7 @@ def _bones_of(skeleton: Skeleton, hand: int, side: str) -> tuple[dict[FingerBone
     chains: dict[str, list[int]] = {}
     for joint, finger in fingers.items():
         chain = chains.setdefault(finger, [])
-        tip = FINGER_TIP.intersection(split_name(skeleton.names[joint]))
+        tip = TIP.intersection(split_name(skeleton.names[joint]))
         if not tip and joint not in nulls and (not chain or chain[-1] in skeleton.ancestors(joint)):
             chain.append(joint)
     for finger, chain in chains.items():

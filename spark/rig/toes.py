@@ -1,12 +1,15 @@
 """Which of the points below a toe joint may be the toe's own.
 
 A toe goes on as its foot does. What lies beyond may be made up: Blender ends each joint that has
-nothing below it in a leaf bone, which points anywhere and goes into the files that it exports.
+nothing below it in a leaf bone, which points anywhere and goes into the files that it exports; and
+a joint that is named the end (`LeftToe_End`) is one, whatever End Site a file puts ahead of it.
 """
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from spark.rig.aliases import TIP
+from spark.rig.name_hints import split_name
 from spark.skeleton import Skeleton
 
 SHORT = 1e-6  # [m] shorter vectors have no direction
@@ -40,11 +43,12 @@ def toe_points(
     tips: Float[np.ndarray, "E 3"],
     ahead: Vector,
 ) -> tuple[list[int], Int[np.ndarray, "K"]]:
-    """The joints below a toe joint and the End Sites there, by where all are [m]. Where one at an
-    end points astray, leaf bones were made up, and none is believed. Several joints that hang on
-    the toe joint are toes, which spread."""
+    """The joints below a toe joint and the End Sites there, by where all are [m]; those of joints
+    that are named ends are none. Where one at an end points astray, leaf bones were made up, and
+    none is believed. Several joints that hang on the toe joint are toes, which spread."""
     joints = list(skeleton.subtree(toe)[1:])
-    ends = np.flatnonzero(np.isin(skeleton.end_parents, [toe, *joints]))
+    going_on = [j for j in joints if not TIP.intersection(split_name(skeleton.names[j]))]
+    ends = np.flatnonzero(np.isin(skeleton.end_parents, [toe, *going_on]))
     if any(astray(tips[e] - positions[skeleton.end_parents[e]], ahead) for e in ends):
         ends = ends[:0]
     leading = set(skeleton.end_parents[ends].tolist())

@@ -8,7 +8,7 @@ import pytest
 
 from spark.demo.sample import sample_motion, sample_rig
 from spark.motion import Motion
-from spark.rig.feet import hip_height
+from spark.rig.feet import hip_height, human_soles
 from spark.rig.roles import Role, RoleMap
 from spark.rig.toes import toe_points
 from spark.rig.tpose import find_tpose
@@ -40,7 +40,7 @@ def spread(skeleton: Skeleton, tip: list[float]) -> Skeleton:
     names, parents, offsets = list(skeleton.names), skeleton.parents.tolist(), []
     for toe in TOES:
         for k, aside in enumerate((-0.02, 0.0, 0.02)):
-            names += [f"{names[toe]} {k}", f"{names[toe]} {k} end"]
+            names += [f"{names[toe]} {k}", f"{names[toe]} {k} bone"]
             parents += [toe, len(parents)]
             offsets += [[0.02, aside, 0.0], tip]
     leaves = list(range(len(skeleton) + 1, len(names), 2))
@@ -113,3 +113,25 @@ def test_toes_that_go_on_as_their_feet_do_are_believed() -> None:
             joints, ends = toe_points(skeleton, toe, places, tips, np.array([1.0, 0.0, -0.5]))
             assert joints == list(skeleton.subtree(toe)[1:])
             assert len(ends) == (3 if joints else 1)
+
+
+@pytest.mark.parametrize("name", ["LeftToe_End", "Bip01 L Toe0Nub", "toe_tip_L"])
+def test_toes_end_where_a_joint_is_named_their_end(name: str) -> None:
+    """Some converters put an End Site ahead of it, too: soles were as much longer, and dipped."""
+    rest, count = RIG.skeleton, len(RIG.skeleton)
+    tips = [rest.end_parents.tolist().index(toe) for toe in TOES]
+    parents, offsets = rest.end_parents.copy(), rest.end_offsets.copy()
+    parents[tips] = count, count + 1
+    longer = Skeleton(
+        (*rest.names, name, name.replace("L", "R")),
+        np.concatenate([rest.parents, TOES]),
+        np.concatenate([rest.offsets, offsets[tips]]),
+        np.arange(count + 2) == 0,
+        parents,
+        offsets,  # as far again
+    )
+    roles = RoleMap((*RIG.roles.roles, None, None), (1.0,) * len(longer), ("",) * len(longer))
+    tpose = np.concatenate([RIG.tpose, np.tile([1.0, 0.0, 0.0, 0.0], (2, 1))])
+    soles = human_soles(longer, roles, tpose, RIG.hip_height)
+    for sole, own in zip(soles, RIG.soles, strict=True):
+        assert sole.offsets == pytest.approx(own.offsets, abs=1e-9)
