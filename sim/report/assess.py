@@ -16,6 +16,7 @@ from sim.report.measures import Drift, floor_height, root_drift
 from sim.report.pace import other_rate, pace_notes
 from sim.report.pose_error import pose_error
 from sim.report.report import Report
+from sim.report.slides import slides_of
 from sim.report.stretches import measure_clip
 from sim.report.swing import swing_of
 from sim.report.thresholds import PLAUSIBILITY_V4
@@ -96,6 +97,7 @@ def assess(
     drift = _drift(course, source_course, times, travel)
     swing = swing_of(clip, swung, times, scale)
     standing = standing_beside(clip, followed, times)
+    slides = slides_of(course, source_course, clip, standing, times, scale)
     notes += source_ground_notes(source_course, own, treads, scale)
     notes += pace_notes(motion, source.motion)
     thrown, hover = scale * source_clip.base_acceleration_p99, scale * source_clip.hover
@@ -115,7 +117,7 @@ def assess(
         source_clip,
         drift,
         standing.match,
-        findings_of(clip, tremble, drift, swing, thrown, limbs, pose, discord, hover),
+        findings_of(clip, tremble, drift, swing, thrown, limbs, pose, discord, slides, hover),
         notes,
         tremble,
         truth=known,

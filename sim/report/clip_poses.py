@@ -79,7 +79,7 @@ def pose_clip(subject: Subject) -> ClipPoses:
         part_names, part_points, part_bodies = lowest_points(body, model_poses, _feet_of(body, rig))
         part_radii = np.zeros(len(part_names))
     soles = soles_of(rig)
-    corner_feet = tuple(f"{sole.side} foot" for sole in soles for _ in sole.joints)
+    corner_feet = feet_of(soles)
     corner_bodies = [] if body is None else _bodies_of(body, rig, soles)
     corners = np.concatenate([sole_positions(s, positions, rotations) for s in soles], axis=1)
     return ClipPoses(
@@ -120,6 +120,11 @@ def soles_of(rig: Rig) -> tuple[Sole, ...]:
             "report; of another one, name the feet in a role map"
         )
     return rig.soles
+
+
+def feet_of(soles: tuple[Sole, ...]) -> tuple[str, ...]:
+    """The foot ("left foot") of each corner of some soles."""
+    return tuple(f"{sole.side} foot" for sole in soles for _ in sole.joints)
 
 
 def _flesh(

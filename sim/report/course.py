@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from sim.report.clip_poses import check_frames, soles_of
+from sim.report.clip_poses import check_frames, feet_of, soles_of
 from sim.trajectory import Subject
 from spark.blocks import in_blocks
 from spark.kinematics import forward
@@ -17,12 +17,14 @@ from spark.rotation import quat_conj, quat_mul, yaw_from_quat
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Where a clip goes [m, world]: the lowest corner of its soles, the `feet` as joints, the
-    middle of the hip joints, and the pelvis's turn about Z since the T-pose, without jumps [rad].
+    """Where a clip goes [m, world]: the lowest corner of its soles, where all `corners` are along
+    the floor, of the feet `corner_feet`, the `feet` as joints, the middle of the hip joints, and
+    the pelvis's turn about Z since the T-pose, without jumps [rad].
     """
 
     subject: Subject
     lowest: Float[np.ndarray, "T 3"]
+    corners: Float[np.ndarray, "T C 2"]
     feet: Float[np.ndarray, "T F 3"]
     hips: Float[np.ndarray, "T 3"]
     heading: Float[np.ndarray, "T"]
@@ -40,6 +42,11 @@ class Course:
         """The body that moves."""
         return self.subject.rig
 
+    @property
+    def corner_feet(self) -> tuple[str, ...]:
+        """The foot ("left foot") of each of `corners`."""
+        return feet_of(soles_of(self.rig))
+
 
 def course_of(subject: Subject) -> Course:
     """The course of a motion. Raises what `pose_clip` raises."""
@@ -53,13 +60,18 @@ def course_of(subject: Subject) -> Course:
         lowest = corners[np.arange(len(corners)), corners[..., 2].argmin(axis=1)]
         heading = yaw_from_quat(quat_mul(world, quat_conj(rig.tpose))[:, rig.pelvis])
         hips = positions[:, rig.hips].mean(axis=1)
-        return np.column_stack([lowest, hips, heading, positions[:, feet].reshape(len(hips), -1)])
+        joints, along = (
+            each.reshape(len(hips), -1) for each in (positions[:, feet], corners[..., :2])
+        )
+        return np.column_stack([lowest, hips, heading, joints, along])
 
     found = in_blocks(places, len(motion))
+    corners = 7 + 3 * len(feet)
     return Course(
         subject,
         lowest=found[:, :3],
-        feet=found[:, 7:].reshape(len(found), -1, 3),
+        corners=found[:, corners:].reshape(len(found), -1, 2),
+        feet=found[:, 7:corners].reshape(len(found), -1, 3),
         hips=found[:, 3:6],
         heading=np.unwrap(found[:, 6]),
     )

@@ -12,12 +12,14 @@ from sim.report.findings_beside import (
     drift_findings,
     limb_findings,
     pose_findings,
+    slide_findings,
     swing_findings,
 )
 from sim.report.limbs import Limbs
 from sim.report.measures import Drift
 from sim.report.pose_error import PoseError
 from sim.report.result import Finding
+from sim.report.slides import Slide
 from sim.report.swing import Swing
 from sim.report.thresholds import PLAUSIBILITY_V4
 from sim.report.tremble import Tremble
@@ -44,6 +46,7 @@ def findings_of(
     limbs: Limbs | None = None,
     pose: PoseError | None = None,
     discord: Discord | None = None,
+    slides: tuple[Slide, ...] = (),
     hover: float = 0.0,
 ) -> tuple[Finding, ...]:
     """All events of a clip, the gravest of each measure first.
@@ -68,6 +71,7 @@ def findings_of(
     return (
         *findings,
         *_hovering(clip, hover),
+        *slide_findings(slides),
         *(contact_findings(discord) if discord else ()),
         # Where feet swing at other times, how high they are when the source's do says nothing.
         *(swing_findings(swing) if swing and not discord else ()),

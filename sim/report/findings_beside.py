@@ -10,6 +10,7 @@ from sim.report.limbs import Limbs
 from sim.report.measures import Drift
 from sim.report.pose_error import Part, PoseError
 from sim.report.result import Finding
+from sim.report.slides import Slide
 from sim.report.swing import Swing
 from spark.constants import GRAVITY
 from spark.runs import true_runs
@@ -35,6 +36,22 @@ def contact_findings(discord: Discord) -> Iterator[Finding]:
     measure = "missed_contact" if missed else "invented_contact"
     f1 = match.f1 or 0.0
     yield Finding(measure, "feet", discord.start, discord.stop, f1, "f1", discord.words)
+
+
+def slide_findings(slides: tuple[Slide, ...]) -> list[Finding]:
+    """Feet that slide where the source's stand, the furthest first."""
+    return [
+        Finding(
+            "skating",
+            foot,
+            start,
+            stop,
+            distance,
+            "m",
+            f"{foot} slides {100 * distance:.1f} cm where the source's stands",
+        )
+        for foot, start, stop, distance in sorted(slides, key=lambda slide: -slide.distance)
+    ]
 
 
 def swing_findings(swing: Swing) -> Iterator[Finding]:
