@@ -18,6 +18,7 @@ from sim.report.pose_error import pose_error
 from sim.report.report import Report
 from sim.report.slides import slides_of
 from sim.report.stretches import measure_clip
+from sim.report.stutter import stutter_notes
 from sim.report.swing import swing_of
 from sim.report.thresholds import PLAUSIBILITY_V4
 from sim.report.tremble import tremble_beside
@@ -64,7 +65,7 @@ def assess(
             notes = (
                 "the floor is the clip's own: one that floats or sinks as a whole can't be told",
             )
-        notes += own_ground_notes(course, ground)
+        notes += own_ground_notes(course, ground) + stutter_notes(motion, "the motion")
         tremble = tremble_beside(subject)
         return Report(
             clip, None, None, None, findings_of(clip, tremble), notes, tremble, truth=known
@@ -100,6 +101,7 @@ def assess(
     slides = slides_of(course, source_course, clip, standing, times, scale)
     notes += source_ground_notes(source_course, own, treads, scale)
     notes += pace_notes(motion, source.motion)
+    notes += stutter_notes(motion, "the motion") + stutter_notes(source.motion, "the source")
     thrown, hover = scale * source_clip.base_acceleration_p99, scale * source_clip.hover
     limbs = limbs_of(clip, followed, times, scale)
     pose = pose_error(subject, source, times)
