@@ -11,6 +11,7 @@ from sim.report.course import Course, course_of
 from sim.report.findings import findings_of
 from sim.report.floor import copied_floor, on_floor, over_level, own_floor
 from sim.report.ground import ground_under, own_ground_notes, source_ground_notes
+from sim.report.hovers import hovers_of
 from sim.report.limbs import limbs_of
 from sim.report.measures import Drift, floor_height, root_drift
 from sim.report.pace import other_rate, pace_notes
@@ -99,6 +100,7 @@ def assess(
     swing = swing_of(clip, swung, times, scale)
     standing = standing_beside(clip, followed, times)
     slides = slides_of(course, source_course, clip, standing, times, scale)
+    hovers = hovers_of(clip, followed, standing, times, scale)
     notes += source_ground_notes(source_course, own, treads, scale)
     notes += pace_notes(motion, source.motion)
     notes += stutter_notes(motion, "the motion") + stutter_notes(source.motion, "the source")
@@ -119,7 +121,9 @@ def assess(
         source_clip,
         drift,
         standing.match,
-        findings_of(clip, tremble, drift, swing, thrown, limbs, pose, discord, slides, hover),
+        findings_of(
+            clip, tremble, drift, swing, thrown, limbs, pose, discord, slides, hover, hovers
+        ),
         notes,
         tremble,
         truth=known,

@@ -15,6 +15,7 @@ from sim.report.findings_beside import (
     slide_findings,
     swing_findings,
 )
+from sim.report.hovers import HOVERS, Hover
 from sim.report.limbs import Limbs
 from sim.report.measures import Drift
 from sim.report.pose_error import PoseError
@@ -30,9 +31,6 @@ _MERGE_GAP = 0.1
 # A foot that lands or leaves is faster for a moment than at rest, within the window of speeds. What
 # slides no longer than that, and by less than this [m, of an adult], is nothing to mend.
 _MIN_SLIDE = 0.015
-# A body hovers whose lowest point keeps further from the floor than this [m, of an adult]: flesh
-# under soles is no thicker, and recordings on robots keep 0.6 cm at most.
-_HOVERS = 0.02
 # A joint beyond its limit by less than this [rad] is nothing to mend: the ranges are no finer.
 _MIN_EXCESS = np.radians(1.0)
 
@@ -48,6 +46,7 @@ def findings_of(
     discord: Discord | None = None,
     slides: tuple[Slide, ...] = (),
     hover: float = 0.0,
+    hovers: tuple[Hover, ...] = (),
 ) -> tuple[Finding, ...]:
     """All events of a clip, the gravest of each measure first.
 
@@ -70,7 +69,7 @@ def findings_of(
     )
     return (
         *findings,
-        *_hovering(clip, hover),
+        *_hovering(clip, hover, hovers),
         *slide_findings(slides),
         *(contact_findings(discord) if discord else ()),
         # Where feet swing at other times, how high they are when the source's do says nothing.
@@ -101,12 +100,19 @@ def _floating(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
         yield Finding("floating", "body", start, stop, amount, "m", sentence)
 
 
-def _hovering(clip: ClipMetrics, source: float) -> Iterator[Finding]:
-    """A body that is a little too high throughout, which no single frame shows."""
+def _hovering(clip: ClipMetrics, source: float, hovers: tuple[Hover, ...]) -> Iterator[Finding]:
+    """A body that is a little too high throughout, which no single frame shows, or for a while."""
     height, limits = clip.hover, clip.thresholds
-    if source + _HOVERS * limits.floating / PLAUSIBILITY_V4.floating < height <= limits.floating:
+    if source + HOVERS * limits.floating / PLAUSIBILITY_V4.floating < height <= limits.floating:
         sentence = f"the body hovers: it keeps {100 * height:.1f} cm above the floor"
         yield Finding("floating", "body", 0, len(clip), height, "m", sentence)
+        return
+    for start, stop, higher in sorted(hovers, key=lambda hover: -hover.height):
+        sentence = (
+            f"the body hovers: it is up to {100 * higher:.1f} cm higher above the floor than the "
+            "source, which stands"
+        )
+        yield Finding("floating", "body", start, stop, higher, "m", sentence)
 
 
 def _skating(clip: ClipMetrics, gap: int) -> Iterator[Finding]:

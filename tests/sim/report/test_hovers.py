@@ -1,0 +1,43 @@
+"""A body that hovers for a while, lower than what floats: a stick man who is lifted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sim.report import Subject, assess
+from sim.report.result import Finding
+from spark.motion import Motion
+from tests.helpers.stick import standing, stick_rig
+
+FPS = 60.0
+RIG = stick_rig()
+
+
+def lifted(height: float, seconds: float, *, fps: float = FPS) -> Motion:
+    """Stands for a second, then `height` [m] higher for so many seconds, then as before."""
+    motion = standing(RIG, round(3 * fps), fps)
+    times = np.arange(len(motion)) / fps
+    path = np.zeros((len(motion), 3))
+    path[:, 2] = np.where((times >= 1) & (times < 1 + seconds), height, 0.0)
+    return replace(motion, root_pos=motion.root_pos + path)
+
+
+def hovers(motion: Motion, source: Motion) -> list[Finding]:
+    report = assess(Subject(motion, RIG), source=Subject(source, RIG))
+    assert not report.clip.flags["floating"].any()
+    return [found for found in report.findings if "the body hovers" in found.sentence]
+
+
+@pytest.mark.parametrize("fps", [24.0, 60.0, 120.0])
+def test_a_body_that_hovers_for_a_while_is_named_there(fps: float) -> None:
+    (found,) = hovers(lifted(0.03, 0.5, fps=fps), lifted(0.0, 0.5))
+    assert found.measure == "floating"
+    assert found.amount == pytest.approx(0.03, abs=1e-6)
+    assert (found.start / fps, found.stop / fps) == pytest.approx((1.0, 1.5), abs=0.05)
+
+
+def test_a_little_or_a_moment_or_what_the_source_does_is_not() -> None:
+    assert hovers(lifted(0.015, 0.5), lifted(0.0, 0.5)) == []
+    assert hovers(lifted(0.03, 0.1), lifted(0.0, 0.5)) == []
+    assert hovers(lifted(0.03, 0.5), lifted(0.03, 0.5)) == []
