@@ -8,6 +8,7 @@ from jaxtyping import Float
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.contact_timing import discord_of, standing_beside
 from sim.report.course import Course, course_of
+from sim.report.fall import fall_notes
 from sim.report.findings import findings_of
 from sim.report.floor import copied_floor, on_floor, over_level, own_floor
 from sim.report.ground import ground_under, own_ground_notes, source_ground_notes
@@ -66,7 +67,8 @@ def assess(
             notes = (
                 "the floor is the clip's own: one that floats or sinks as a whole can't be told",
             )
-        notes += own_ground_notes(course, ground) + stutter_notes(motion, "the motion")
+        notes += own_ground_notes(course, ground)
+        notes += stutter_notes(motion, "the motion") + fall_notes(subject, clip, "the motion")
         tremble = tremble_beside(subject)
         return Report(
             clip, None, None, None, findings_of(clip, tremble), notes, tremble, truth=known
@@ -104,6 +106,7 @@ def assess(
     notes += source_ground_notes(source_course, own, treads, scale)
     notes += pace_notes(motion, source.motion)
     notes += stutter_notes(motion, "the motion") + stutter_notes(source.motion, "the source")
+    notes += fall_notes(source, source_clip, "the source")
     thrown, hover = scale * source_clip.base_acceleration_p99, scale * source_clip.hover
     limbs = limbs_of(clip, followed, times, scale)
     pose = pose_error(subject, source, times)
