@@ -3,8 +3,8 @@
 Inverse dynamics of the model give the generalised forces that the motion needs. The floor gives
 part of them, at the points near it and within friction cones. Which forces it gives at several
 points is not determined by the motion: those are taken that explain the root's wrench and leave
-the joints the least torques, in shares of their limits. What is told is therefore a lower bound:
-no forces of the floor need less.
+the joints the least squares of torques, in shares of their limits. Other forces may ask less of the
+joint that is loaded most.
 """
 
 import copy
