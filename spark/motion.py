@@ -79,6 +79,14 @@ class Motion:
         """The clip of frames `start` to `stop`, exclusive."""
         return self.picked(slice(start, stop))
 
+    def moved(self, way: Float[np.ndarray, "T 3"]) -> "Motion":
+        """The same elsewhere by so much in each frame [m, world]."""
+        translations = self.translations
+        if translations is not None:
+            translations = translations.copy()
+            translations[:, 0] += way
+        return replace(self, root_pos=self.root_pos + way, translations=translations)
+
     def thinned(self, count: int) -> "Motion":
         """Every frame of a motion of at most `count` frames; else every second, third, ..."""
         step = max(1, -(-len(self) // count))

@@ -22,6 +22,9 @@ from sim.report.ground import ground_under
 from sim.trajectory import Subject, model_trajectory
 from sim.view.figure import Figure
 from spark.errors import SkeletonError
+from spark.motion import Motion
+from spark.transfer.in_place import way_taken_out, with_travel
+from spark.transfer.noise import without_noise
 from spark.transfer.treads import treads_of
 from spark_sim.clips import AnyClip, File, RobotClip
 from spark_sim.loading import clip_of
@@ -81,15 +84,15 @@ def simulate(
     A controller looks ahead and keeps the body up by its own strength (docs/playback.md): some ten
     seconds of CPU time for each of the motion, and more where falls are taken back. With `assist` a
     force and a torque on the root help in its place, and without `balance` nothing does: a robot
-    then has its own servos. The body of a character is built with servos. `progress` is told each
-    frame that is reached.
+    then has its own servos. The body of a character is built with servos; one that walks in place
+    gets the travel that its feet tell. `progress` is told each frame that is reached.
 
     Raises `SkeletonError` where the body is no humanoid, or has no shape that collides.
     """
     balance = balance and not assist
     clip = clip_of(clip)
     tracked = track(
-        clip.body or model_trajectory(clip.rig, clip.motion),
+        clip.body or model_trajectory(clip.rig, _over_the_ground(clip)),
         clip.motion.frame_time,
         height=clip.rig.standing_height,
         floor_z=clip.floor_z,
@@ -100,6 +103,12 @@ def simulate(
         progress=progress,
     )
     return Simulated(clip, tracked)
+
+
+def _over_the_ground(clip: AnyClip) -> Motion:
+    """A character's motion, with its travel where it walks in place: no floor is a treadmill."""
+    way = way_taken_out(without_noise(clip.canonical)[0])
+    return clip.motion if way is None else clip.motion.moved(way)
 
 
 def _stools(clip: AnyClip) -> Stools:
@@ -113,9 +122,9 @@ def _stools(clip: AnyClip) -> Stools:
 
 
 def _on_the_ground(clip: AnyClip) -> tuple[str, ...]:
-    """Notes where a motion sits, or stands on what is not in the simulation."""
+    """Notes where a motion sits, walks in place, or stands on what is not in the simulation."""
     treads = treads_of(clip.canonical)
-    notes = []
+    notes = [] if clip.body else [*with_travel(without_noise(clip.canonical)[0])[1]]
     if treads.top:
         notes.append(
             f"the motion's feet stand up to {100 * treads.top:.0f} cm above the floor, on what is "

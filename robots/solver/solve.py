@@ -36,6 +36,7 @@ from robots.solver.unparted import unparted
 from robots.tree import Coordinates
 from spark.threads import one_thread
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.in_place import with_travel
 from spark.transfer.loops import continued
 from spark.transfer.noise import without_noise
 from spark.transfer.treads import treads_of
@@ -75,10 +76,11 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     source, passed = without_strays(source)
     source, own = continued(source)
     source, noise, trembles = without_noise(source)
+    source, travels = with_travel(source)
     treads = treads_of(source)
     source = less_deep(source, robot, treads.seats)
     climb = climb_of(source, treads)
-    notes = dict.fromkeys((*robot.notes, *passed, *trembles, *climbs(treads, robot)))
+    notes = dict.fromkeys((*robot.notes, *passed, *trembles, *travels, *climbs(treads, robot)))
 
     def solved(start: int, stop: int) -> Coordinates:
         targets = targets_of(source.frames(start, stop), robot, noise, climb.frames(start, stop))

@@ -13,6 +13,7 @@ from sim.report.findings import findings_of
 from sim.report.floor import copied_floor, on_floor, over_level, own_floor
 from sim.report.ground import ground_under, own_ground_notes, source_ground_notes
 from sim.report.hovers import hovers_of
+from sim.report.in_place import as_it_travels, in_place_notes
 from sim.report.limbs import limbs_of
 from sim.report.measures import Drift, floor_height, root_drift
 from sim.report.pace import other_rate, pace_notes
@@ -52,7 +53,8 @@ def assess(
     The floor of a model is at z = 0, as in its simulator. Else it is the source's (the 5th
     percentile of its lowest sole point), scaled by the hip heights' ratio; without a source it is
     the motion's own, and a motion that floats or sinks as a whole can't be told. The source is
-    compared at the same times; its frame rate may be another.
+    compared at the same times; its frame rate may be another. One that walks in place is compared
+    as it travels where the motion does (`sim.report.in_place`).
     Raises SkeletonError for a body without feet, for a clip without frames, and for a truth that is
     on another skeleton or has other frames.
     """
@@ -67,18 +69,19 @@ def assess(
             notes = (
                 "the floor is the clip's own: one that floats or sinks as a whole can't be told",
             )
-        notes += own_ground_notes(course, ground)
+        notes += own_ground_notes(course, ground) + in_place_notes(course)
         notes += stutter_notes(motion, "the motion") + fall_notes(subject, clip, "the motion")
         tremble = tremble_beside(subject)
         return Report(
             clip, None, None, None, findings_of(clip, tremble), notes, tremble, truth=known
         )
-    source_course = _course("the source", source)
+    source_course, travels = as_it_travels(_course("the source", source), course)
+    source = source_course.subject
     quiet, source_floor, trembles = _without_tremble(source_course)
     floor = 0.0
     if subject.body is None:
         floor, notes = _floor_from_source(course, source.rig, source_floor)
-    notes += trembles
+    notes += travels + trembles
     treads = treads_of(to_canonical(quiet.motion, quiet.rig))
     own = own_floor(source_course) if quiet is source else level_ground(source_floor)
     source_ground = treads.ground(source_floor)

@@ -57,6 +57,14 @@ def climbing_speeds(
     return np.abs(moves[..., 2]) / time
 
 
+def velocities(
+    positions: Float[np.ndarray, "T *n 3"], frame_time: float
+) -> Float[np.ndarray, "T *n 3"]:
+    """[m/s], measured as `speeds` are."""
+    moves, time = _moves(positions, frame_time)
+    return np.asarray(moves / time[..., None])
+
+
 def _moves(
     positions: Float[np.ndarray, "T *n 3"], frame_time: float
 ) -> tuple[Float[np.ndarray, "T *n 3"], Float[np.ndarray, "T *one"]]:

@@ -133,8 +133,7 @@ def _ground_under(
     stands, ground = np.zeros((count, feet), dtype=bool), np.zeros((count, feet))
     if not feet or count < 2:
         return np.zeros((count, feet, 2)), stands, ground
-    found = in_blocks(lambda block: _feet(source.picked(block)), count)
-    lowest, paths = found[:, :feet], found[:, feet:].reshape(count, feet, 2, 3)
+    lowest, paths = sole_paths(source)
     ways = paths[..., :2].mean(axis=2)
     still = _still(paths, rig.standing_height, frame_time)
     runs = [(k, start, stop) for k in range(feet) for start, stop in true_runs(still[:, k])]
@@ -173,6 +172,16 @@ def feet_by_side(rig: Rig, motion: Motion) -> dict[str, Bool[np.ndarray, "T"]]:
             feet[:, k, 2] -= ground[role.side]
     standing = planted_points(feet, motion.frame_time, rig.standing_height)
     return {role.side: standing[:, k] for k, role in enumerate(roles) if role is not None}
+
+
+def sole_paths(
+    source: CanonicalMotion,
+) -> tuple[Float[np.ndarray, "T S"], Float[np.ndarray, "T S 2 3"]]:
+    """How high over the floor the lowest point of each of `rig.soles` is [m], and where its heel
+    and its toe are [m, world]."""
+    feet = len(source.rig.soles)
+    found = in_blocks(lambda block: _feet(source.picked(block)), len(source))
+    return found[:, :feet], found[:, feet:].reshape(len(source), feet, 2, 3)
 
 
 def _feet(source: CanonicalMotion) -> Float[np.ndarray, "T N"]:
