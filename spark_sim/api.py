@@ -11,6 +11,7 @@ from spark.io.encoding import encode, encode_new
 from spark.motion import Motion
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import from_canonical
+from spark.transfer.in_place import belt_note, way_taken_out
 from spark.transfer.leg_fit import travel_scale
 from spark.transfer.loops import continued
 from spark.transfer.noise import without_noise
@@ -78,7 +79,8 @@ def retarget(
     is then held where the source's foot stands, what else would be in the floor comes up
     (`spark.transfer.over_floor`), and with "spark" the hips sway so that the weight moves as the
     source's does (`spark.transfer.hip_sway`). A loop is seen as it goes on, and closes
-    (`spark.transfer.loops`). A source that trembles, as motion estimated from video, is smoothed
+    (`spark.transfer.loops`). The feet of a walk in place are held as on a treadmill's belt
+    (`spark.transfer.in_place`). A source that trembles, as motion estimated from video, is smoothed
     before (`spark.transfer.noise`), and a note says so. Twist bones that the source lacks take
     their share at the end (`spark.transfer.twists`).
 
@@ -98,11 +100,14 @@ def retarget(
             raise ConventionError("a checkpoint is for characters; robots are solved for")
         return _onto_robot(source, target, solved=refine and method != "copy")
     canonical, noise = source.canonical, None
-    trembles: tuple[str, ...] = ()
-    own = slice(None)
+    notes: tuple[str, ...] = ()
+    own, way = slice(None), None
     if refine:
         canonical, own = continued(canonical)
-        canonical, noise, trembles = without_noise(canonical)
+        canonical, noise, notes = without_noise(canonical)
+        way = way_taken_out(canonical)
+    if way is not None:
+        canonical = replace(canonical, hips=canonical.hips + way)
     if method == "copy":
         moved = transfer(canonical, target.rig)
     else:
@@ -113,26 +118,34 @@ def retarget(
     if refine:
         finish = refined if method == "spark" else grounded
         moved = finish(canonical, moved, noise).picked(own)
+    travel = _travel(source, target, fitted=method == "spark")
+    if way is not None:
+        moved = replace(moved, hips=moved.hips - travel * way[own])
+        notes += (belt_note(way[own], source.frame_time, travel),)
     moved = spread_twists(canonical.rig, moved)
-    motion, carried = _carried(from_canonical(moved), source, target, fitted=method == "spark")
-    bvh, notes = encode(motion, target.recording)
-    recording = replace(
-        target.recording, bvh=bvh, motion=motion, notes=(*trembles, *moved.notes, *carried, *notes)
-    )
+    motion, carried = _carried(from_canonical(moved), source, target, travel)
+    bvh, written = encode(motion, target.recording)
+    notes += (*moved.notes, *carried, *written)
+    recording = replace(target.recording, bvh=bvh, motion=motion, notes=notes)
     # The rig is given: what is known of a body does not depend on the motion that it makes.
     return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig, target.path)
 
 
+def _travel(source: AnyClip, target: Clip, *, fitted: bool) -> float:
+    """How many times as far as the source the target goes over the ground: its path is scaled with
+    the legs, which may be `fitted`."""
+    if fitted:
+        return travel_scale(source.rig, target.rig)
+    return target.rig.hip_height / source.rig.hip_height
+
+
 def _carried(
-    motion: Motion, source: AnyClip, target: Clip, *, fitted: bool
+    motion: Motion, source: AnyClip, target: Clip, travel: float
 ) -> tuple[Motion, tuple[str, ...]]:
-    """`motion` on the target, with root motion where its file can say where its root is; its path
-    is scaled with the legs, which may be `fitted`."""
+    """`motion` on the target, which goes `travel` times as far, with root motion where its file can
+    say where its root is."""
     if not (target.recording.bvh.position_channels[:, 0] == 0).any():
         return motion, ()
-    travel = target.rig.hip_height / source.rig.hip_height
-    if fitted:
-        travel = travel_scale(source.rig, target.rig)
     return with_root_motion(motion, target.rig, source.motion, source.rig, travel)
 
 

@@ -28,8 +28,8 @@ def in_place_notes(course: Course) -> tuple[str, ...]:
 
 
 def as_it_travels(source: Course, course: Course) -> tuple[Course, tuple[str, ...]]:
-    """The course of a source that walks in place with the travel that its feet tell, and a note,
-    where that of the motion made from it travels; else its own."""
+    """The course of a source that walks in place, with the travel that its feet tell where the
+    motion made from it travels, and a note; that of any other source as it is."""
     way = None if source.subject.body is not None else _way(source)
     if way is None:
         return source, ()
@@ -38,12 +38,16 @@ def as_it_travels(source: Course, course: Course) -> tuple[Course, tuple[str, ..
         slow_speed(velocities(path, each.motion.frame_time)[:, :2], each.motion.frame_time)
         for path, each in ((scale * way, source), (course.hips, course))
     )
+    pace = pace_of(way, source.motion.frame_time)
     if goes < _GOES * lacks:
-        return source, ()
+        return source, (
+            f"the source walks in place, as on a treadmill at {pace:.2f} m/s, and the motion with "
+            "it: their feet skate for that",
+        )
     travelling = replace(source.subject, motion=source.motion.moved(way))
     note = (
         "the source walks in place and the motion does not: it is compared with the travel that "
-        f"the source's feet tell, {pace_of(way, source.motion.frame_time):.2f} m/s"
+        f"the source's feet tell, {pace:.2f} m/s"
     )
     return course_of(travelling), (note,)
 

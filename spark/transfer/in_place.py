@@ -61,6 +61,16 @@ def with_travel(source: CanonicalMotion) -> tuple[CanonicalMotion, tuple[str, ..
     return replace(source, hips=source.hips + way), (note,)
 
 
+def belt_note(way: Float[np.ndarray, "T 3"], frame_time: float, travel: float) -> str:
+    """That feet stand on a belt under a source which lacks a `way` [m, world], and under a body
+    which goes `travel` times as far: the speed at which a game has to move that."""
+    pace = pace_of(way, frame_time)
+    return (
+        f"the source walks in place, as on a treadmill at {pace:.2f} m/s: feet stand on its belt, "
+        f"which goes at {travel * pace:.2f} m/s under this body"
+    )
+
+
 def pace_of(way: Float[np.ndarray, "T 3"], frame_time: float) -> float:
     """The mean speed along a way [m/s]."""
     return float(np.linalg.norm(np.diff(way, axis=0), axis=1).mean() / frame_time)

@@ -1,22 +1,51 @@
-"""Simulations of who walks in place: over the ground, as no floor goes backwards."""
+"""Walks in place: on a belt under a character, and over the ground in simulation."""
 
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import spark_sim
+from sim.report import Subject, assess
 from spark.demo.sample import sample_motion, sample_rig
 from spark.io.bvh import write_bvh
 from spark.io.encoding import encode_new
+from spark_sim.clips import Clip
+
+WALK = sample_motion("walk", sample_rig("walker"), 30.0)
+AHEAD = WALK.root_pos[-1] - WALK.root_pos[0]
+WAY = np.linspace(0, 1, len(WALK))[:, None] * AHEAD * [1.0, 1.0, 0.0]
 
 
-def test_a_character_that_walks_in_place_goes_on_in_simulation(tmp_path: Path) -> None:
-    walk = sample_motion("walk", sample_rig("walker"), 30.0)
-    ahead = walk.root_pos[-1] - walk.root_pos[0]
-    path = tmp_path / "in_place.bvh"
-    write_bvh(encode_new(walk.moved(-np.linspace(0, 1, len(walk))[:, None] * ahead)), path)
+@pytest.fixture(scope="module")
+def in_place(tmp_path_factory: pytest.TempPathFactory) -> Clip:
+    path = tmp_path_factory.mktemp("walk") / "in_place.bvh"
+    write_bvh(encode_new(WALK.moved(-WAY)), path)
     clip = spark_sim.load(path)
-    seen = spark_sim.simulate(clip, assist=True)
+    assert isinstance(clip, Clip)
+    return clip
+
+
+def test_on_a_character_it_stays_in_place_and_stands_on_a_belt(
+    in_place: Clip, tmp_path: Path
+) -> None:
+    small = tmp_path / "dancer.bvh"
+    write_bvh(encode_new(sample_motion("squat", sample_rig("dancer"), 30.0)), small)
+    out = spark_sim.retarget(in_place, small)
+    (note,) = [note for note in out.notes if "in place" in note]
+    pace = float(note.split("which goes at ")[1].split()[0])
+    assert np.ptp(out.motion.root_pos[:, 0]) < 0.1
+    belt = pace * np.outer(np.arange(len(WALK)) / 30.0, AHEAD / np.linalg.norm(AHEAD))
+    travelling = Subject(out.motion.moved(belt), out.rig)
+    report = assess(travelling, source=Subject(WALK, in_place.rig))
+    assert report.contacts is not None
+    assert report.contacts.f1 is not None
+    assert report.contacts.f1 > 0.95
+    assert report.clip.flags["skating"].mean() < 0.05
+
+
+def test_in_simulation_it_goes_over_the_ground(in_place: Clip) -> None:
+    seen = spark_sim.simulate(in_place, assist=True)
     went = seen.tracked.target.qpos[-1, :2] - seen.tracked.target.qpos[0, :2]
-    np.testing.assert_allclose(went, ahead[:2], atol=0.15)
+    np.testing.assert_allclose(went, AHEAD[:2], atol=0.15)
     assert any("walks in place" in note for note in seen.notes)
