@@ -8,12 +8,16 @@ from spark.errors import SkeletonError
 from spark.io.convention import Convention
 from spark.rotation import quat_angle, quat_identity
 from spark.summary import counted
+from spark.transfer.in_place import pace_of, way_taken_out
+from spark.transfer.loops import loop_of
+from spark.transfer.noise import without_noise
 from spark_sim.clips import AnyClip, Clip
 from spark_sim.console import columns
 
 
 def describe(clip: "AnyClip") -> dict[str, Any]:
-    """Facts of the file and of the body, ready for JSON. Angles are degrees.
+    """Facts of the file, the motion and the body, ready for JSON. Angles are degrees;
+    `treadmill_m_s` is how fast a walk in place would go over the ground.
 
     A body that is no humanoid has `"body": None` and the reason under `"refused"`.
     """
@@ -29,6 +33,8 @@ def describe(clip: "AnyClip") -> dict[str, Any]:
         "unit_m": convention.unit_m,
         "up": convention.up,
         "joints": len(motion.skeleton),
+        "loop": False,
+        "treadmill_m_s": None,
         "body": None,
         "refused": None,
     }
@@ -63,7 +69,12 @@ def describe(clip: "AnyClip") -> dict[str, Any]:
         "root_joint": rig.skeleton.names[rig.root_joint],
         "joints": joints,
     }
-    return facts | {"body": body, "notes": list(clip.notes)}
+    way = way_taken_out(without_noise(clip.canonical)[0])
+    of_motion = {
+        "loop": loop_of(clip.canonical) is not None,
+        "treadmill_m_s": None if way is None else round(pace_of(way, motion.frame_time), 3),
+    }
+    return facts | of_motion | {"body": body, "notes": list(clip.notes)}
 
 
 def text(facts: dict[str, Any]) -> str:
@@ -99,8 +110,12 @@ def text(facts: dict[str, Any]) -> str:
         )
         for joint in held
     ]
+    goes_on = ["a loop: it goes on at its first frame"] if facts["loop"] else []
+    if facts["treadmill_m_s"] is not None:
+        goes_on.append(f"walks in place, as on a treadmill at {facts['treadmill_m_s']:.2f} m/s")
     lines = [
         *head,
+        *(f"  {what}" for what in goes_on),
         f"  hips {body['hip_height']:.3g} m above the soles; root joint {body['root_joint']}",
         "",
         *columns(rows),
