@@ -15,6 +15,7 @@ from sim.report.ground import ground_under, own_ground_notes, source_ground_note
 from sim.report.hovers import hovers_of
 from sim.report.in_place import as_it_travels, in_place_notes
 from sim.report.limbs import limbs_of
+from sim.report.loop_end import loop_notes
 from sim.report.measures import Drift, floor_height, root_drift
 from sim.report.pace import other_rate, pace_notes
 from sim.report.pose_error import pose_error
@@ -82,7 +83,8 @@ def assess(
     if subject.body is None:
         floor, notes = _floor_from_source(course, source.rig, source_floor)
     notes += travels + trembles
-    treads = treads_of(to_canonical(quiet.motion, quiet.rig))
+    canonical = to_canonical(quiet.motion, quiet.rig)
+    treads = treads_of(canonical)
     own = own_floor(source_course) if quiet is source else level_ground(source_floor)
     source_ground = treads.ground(source_floor)
     if treads.level:
@@ -107,7 +109,7 @@ def assess(
     slides = slides_of(course, source_course, clip, standing, times, scale)
     hovers = hovers_of(clip, followed, standing, times, scale)
     notes += source_ground_notes(source_course, own, treads, scale)
-    notes += pace_notes(motion, source.motion)
+    notes += pace_notes(motion, source.motion) + loop_notes(subject, canonical)
     notes += stutter_notes(motion, "the motion") + stutter_notes(source.motion, "the source")
     notes += fall_notes(source, source_clip, "the source")
     thrown, hover = scale * source_clip.base_acceleration_p99, scale * source_clip.hover

@@ -29,6 +29,7 @@ _LEAST_TIME = 0.4  # [s] from the first to the last frame: a cycle of a fast run
 # The pose that goes on differs from the first one by no more than this: [rad] of any joint, and
 _OFF = np.radians(1.0)
 _OFF_HEIGHT = 0.01  # [hip heights]. Recorded people don't come back as near.
+_MOST = 0.9  # of the largest jump: what hangs on a joint jumps with it
 _SAME = 0.05  # [frames] nearer, the last frame is the first one
 
 Ints: TypeAlias = Int[np.ndarray, "S"]
@@ -93,6 +94,16 @@ def continued(source: CanonicalMotion) -> tuple[CanonicalMotion, slice]:
     rotations, hips = rotations_at(keys.rotations, at), values_at(keys.hips, at)
     rotations, hips = _gone_on(loop, rounds, rotations, hips)
     return replace(source, rotations=rotations, hips=hips), slice(around, around + count)
+
+
+def leap(ends: CanonicalMotion, loop: Loop, count: int) -> tuple[float, int]:
+    """By how much [rad] joints jump at most where a motion goes on that should as a `loop` of
+    `count` frames, and the first joint that does. `ends` are its first two and last two frames."""
+    before, gap, after = _steps(ends, [2, 3, 0], [3, 0, 1])
+    beyond = gap - (loop.period - (count - 1)) * (before + after) / 2
+    angles = np.linalg.norm(beyond[:-1].reshape(-1, 3), axis=1)
+    most, held = float(angles.max()), ends.rig.roles.held
+    return most, min(held[k] for k in np.flatnonzero(angles >= _MOST * most))
 
 
 def _gone_on(
