@@ -22,7 +22,8 @@ from spark.transfer.footfalls import between_contacts
 SWING_HOLD = np.array([0.35, 0.35, 0.6])  # its height in swing is what keeps it off the floor,
 SWING_REACH = 0.2  # [hip heights] over which that fades: a kick is a matter of limbs,
 RAISED_HOLD = np.array([1.0, 1.0, 0.3])  # a standing foot's raised end turns about the other
-STEP_HOLD = 0.8  # and the height of what steps
+STEP_HOLD = 1.0  # and the height of what steps,
+IDLE_HOLD = 3.0  # or would drag, of who lies or kneels: nothing steps there
 # Hip heights/s of an end of a foot, and hip heights that it then is above the floor: the report
 # sees feet skate faster than 0.22 and lower than 0.028.
 STEP_SPEEDS = (0.2, 0.3, 0.6)
@@ -66,7 +67,8 @@ def footing_of(robot: Morphology, plan: FootPlan) -> Holds:
     holds = np.where(stands, RAISED_HOLD, near * SWING_HOLD)
     holds = np.where(on[..., None], 1.0, holds)
     up = np.minimum(lift / (STEP_HEIGHTS[1] * plan.hip_height), 1.0)
-    holds[..., 2] += up * (STEP_HOLD - holds[..., 2])
+    firm = STEP_HOLD + (IDLE_HOLD - STEP_HOLD) * plan.idle[:, None]
+    holds[..., 2] += up * (firm - holds[..., 2])
     positions = np.stack([place.real, place.imag, z + plan.ground[:, None]], axis=-1)
     over_time = (np.ascontiguousarray(x.transpose(1, 2, 0)) for x in (positions, holds))
     links, points = robot.sole_points(plan.sole)

@@ -13,6 +13,7 @@ from jaxtyping import Bool, Complex, Float
 
 from robots.kinematics import LinkPoses, forward_kinematics
 from robots.model.morphology import Morphology
+from robots.solver.settling import APPROACH, around
 from robots.solver.targets import Targets
 from robots.tree import Coordinates
 from spark.kinematics import world_positions
@@ -26,6 +27,17 @@ from spark.vectors import dot, unit
 MAX_WOBBLE = 0.05
 MAX_TWIST = float(np.radians(12))  # and how far it may turn
 _ON_END = (0.3, 0.6)  # of a sole's length, that it reaches over the floor: at 73 degrees, and at 53
+_OVER_TIME = (
+    "points",
+    "toe",
+    "heading",
+    "prints",
+    "contacts",
+    "clearance",
+    "ground",
+    "lift",
+    "idle",
+)
 _SPIN = np.radians(60)  # in one contact: feet turn on their toes, but spin on what carries them
 
 
@@ -35,8 +47,8 @@ class FootPlan:
     `heading` [rad] the middle of its toes and its direction over the floor; `prints` the same of
     the footprint, where `contacts` (of heel and toe) say that it stands. `clearance` [m] is that of
     the source's lowest sole point, scaled, over `ground` [m], and `lift` [m] what a higher flight
-    adds to it. `flat` [m] are the sole's points on the floor, heading along X from the middle of
-    the toes.
+    adds to it; `idle` is how far (0 to 1) it stands nowhere while the body lies or kneels. `flat`
+    [m] are the sole's points on the floor, heading along X from the middle of the toes.
     """
 
     frame_time: float
@@ -51,6 +63,7 @@ class FootPlan:
     clearance: Float[np.ndarray, "T"]
     ground: Float[np.ndarray, "T"]
     lift: Float[np.ndarray, "T"]
+    idle: Float[np.ndarray, "T"]
 
     @property
     def stands(self) -> Bool[np.ndarray, "T"]:
@@ -59,8 +72,7 @@ class FootPlan:
 
     def every(self, stride: int) -> "FootPlan":
         """That of every `stride`-th frame."""
-        names = ("points", "toe", "heading", "prints", "contacts", "clearance", "ground", "lift")
-        parts = {name: getattr(self, name)[::stride] for name in names}
+        parts = {name: getattr(self, name)[::stride] for name in _OVER_TIME}
         return replace(self, frame_time=stride * self.frame_time, **parts)
 
 
@@ -167,7 +179,14 @@ def _plan(
         clearance=targets.clearance[:, s],
         ground=targets.ground[:, s],
         lift=np.zeros(len(targets)),
+        idle=_idle(targets, contacts),
     )
+
+
+def _idle(targets: Targets, contacts: Bool[np.ndarray, "T 2"]) -> Float[np.ndarray, "T"]:
+    down, stands = np.any(targets.parts, axis=1), np.any(contacts, axis=1)
+    frame_time = targets.frame_time
+    return around(down, frame_time, APPROACH) * (1.0 - around(stands, frame_time, APPROACH))
 
 
 def _pivot(

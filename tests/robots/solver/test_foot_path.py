@@ -1,5 +1,7 @@
 """How high feet pass above the floor."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -99,3 +101,24 @@ def test_who_turns_on_the_toes_raises_the_heel() -> None:
     np.testing.assert_allclose(toes[:, :2].mean(axis=0), 0.0, atol=1e-9)
     still = np.abs(time) > 0.15 + 2 * STEP_HEIGHTS[-1] / STEP_RISE
     np.testing.assert_array_equal(heel[:, 2][:, still], 0.0)
+
+
+def test_feet_of_who_lies_are_kept_from_dragging_more_firmly_than_a_step_is_taken() -> None:
+    """At 1 m/s over the floor all the time; only what is fast there is held so."""
+    ember, plan = planned()
+    time = plan.frame_time * np.arange(len(plan.toe))
+    plan.contacts[:], plan.clearance[:], plan.prints[:] = False, 0.0, 0.0
+    swings, lies, rests = (
+        footing_of(ember, plan).shares[:, 2]
+        for plan in (moved(plan, time, 0.0), moved(plan, time, 1.0), moved(plan, 0.0 * time, 1.0))
+    )
+    assert np.all(lies > 2 * swings)
+    assert np.all(rests < swings)
+
+
+def moved(plan: FootPlan, along: np.ndarray, idle: float) -> FootPlan:
+    """A flat foot that goes along X by so much [m]."""
+    flat = plan.flat @ [1, 1j] + along[:, None]
+    points = np.stack([flat.real, flat.imag, np.zeros(flat.shape)], axis=-1)
+    toe, heading = np.column_stack([along, 0.0 * along]), 0.0 * along
+    return replace(plan, points=points, toe=toe, heading=heading, idle=idle + 0.0 * along)

@@ -11,14 +11,20 @@ from robots.metrics import measure
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.registry import find
+from robots.solver.footprints import plan_feet
 from robots.solver.resting import leans, resting
 from robots.solver.solve import copy, retarget
 from robots.solver.targets import targets_of
 from robots.solver.touching import touches_of
-from spark.demo.sample import sample_rig
+from spark.demo.sample import sample_motion, sample_rig
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_mul
-from spark.transfer.canonical import CanonicalMotion, canonical_positions, from_canonical
+from spark.transfer.canonical import (
+    CanonicalMotion,
+    canonical_positions,
+    from_canonical,
+    to_canonical,
+)
 from spark_sim.loading import load_robot
 from tests.helpers.ember import changed_ember
 from tests.helpers.poses import limb_error
@@ -86,7 +92,16 @@ def test_hands_and_knees_of_the_source_are_seen_to_rest(ember: Morphology) -> No
 
 def test_feet_behind_knees_on_the_ground_do_not_stand(ember: Morphology) -> None:
     """Though they lie as low as they ever come, and are still."""
-    assert not targets_of(on_all_fours(), ember).contacts.any()
+    targets = targets_of(on_all_fours(), ember)
+    assert not targets.contacts.any()
+    np.testing.assert_array_equal([foot.idle for foot in plan_feet(ember, targets)], 1.0)
+
+
+def test_feet_that_step_are_not_idle(ember: Morphology) -> None:
+    rig = sample_rig("walker")
+    walk = to_canonical(sample_motion("walk", rig, 60.0), rig)
+    feet = plan_feet(ember, targets_of(walk, ember))
+    np.testing.assert_array_equal([foot.idle for foot in feet], 0.0)
 
 
 def test_all_fours_of_a_robot_with_other_limbs_lie_on_the_ground(ember: Morphology) -> None:
