@@ -2,15 +2,16 @@
 
 A shoulder within its limits has several ways to raise an arm, and descent does not leave the one
 that it begins on: at a limit it stays, though the other way would have led on. So where a limb is
-astray, poses from all over its hinges' ranges are tried, and the cheapest path goes over to those
-that pay for the turn.
+astray, poses from all over its hinges' ranges are tried a few times a second, and the cheapest path
+goes over to those that pay for the turn.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy.ndimage import binary_dilation
 
 from robots.kinematics import forward_kinematics
@@ -21,7 +22,7 @@ from robots.solver.holds import Holds
 from robots.solver.marching import limbs_of, settled, terms_of
 from robots.solver.spells import Spells
 from robots.solver.targets import Targets
-from robots.solver.ways import along, taken
+from robots.solver.ways import along, between, taken
 from robots.solver.window_targets import pose_targets
 from robots.tree import Coordinates
 from spark.rig.roles import LIMBS, Role
@@ -29,6 +30,7 @@ from spark.runs import true_runs
 
 _FAR = np.radians(30)  # of a limb's segment from the source's: it is astray
 _AROUND = 0.5  # [s] before and after that, to go over to another way and back
+_INTERVAL = 0.2  # [s] between the frames in which others are tried
 _TRIED = 2048  # poses of a limb: with four hinges, one in 40 degrees of each
 _WAYS = 6  # of the nearest of them, that differ
 _APART = 1.0  # [rad] by a hinge, at least
@@ -59,26 +61,50 @@ def _on_other_ways(
     hinges: Sequence[int],
     far: Bool[np.ndarray, "T"],
 ) -> Coordinates:
-    around = max(1, round(_AROUND / targets.frame_time))
+    around, stride = (max(1, round(x / targets.frame_time)) for x in (_AROUND, _INTERVAL))
     runs = true_runs(binary_dilation(far, np.ones(2 * around + 1, dtype=bool)))
-    spells = Spells(np.array([stop - start for start, stop in runs], dtype=int))
-    frames = np.concatenate([np.arange(start, stop) for start, stop in runs])
     led = [(start > 0, stop < len(q)) for start, stop in runs]
-    part, targets, holds = q.at(frames), targets.at(frames), holds.at(frames)
-    found = _nearest(robot, targets, part, bones, hinges)
+    at, tried = _joined([np.unique([*range(a, z, stride), z - 1]) for a, z in runs])
     limb = _limb(robot, block, hinges)
+    asked = replace(targets.at(at), frame_time=stride * targets.frame_time)
+    ways = _ways(robot, asked, q.at(at), bones, hinges, limb)
+    on = taken(robot, asked, holds.at(at), ways, block, tried, led)
+    frames, spells = _joined([np.arange(*run) for run in runs])
+    other = np.interp(frames, at, on > 0) > 0
+    left = np.flatnonzero(spells.any(other)[spells.of_frames])
+    if not len(left):
+        return q
+    own = q.at(frames)
+    over, joints = own.angles.copy(), [j for j in limb if not robot.tree.balls[j]]
+    angles = np.stack([way.angles[:, joints] for way in ways])[on, np.arange(len(at))]
+    over[:, joints] = between(at, angles, frames)
+    led_over = Coordinates(own.pos, own.quat, over, own.ball_quats)
+    path = along(robot, [own, led_over], other.astype(int), block, spells, targets.frame_time)
+    return q.replaced(frames[left], path.at(left))
+
+
+def _joined(parts: Sequence[Int[np.ndarray, "F"]]) -> tuple[Int[np.ndarray, "T"], Spells]:
+    """Frames of some spells, one after another."""
+    return np.concatenate(parts), Spells(np.array([len(part) for part in parts]))
+
+
+def _ways(
+    robot: Morphology,
+    targets: Targets,
+    q: Coordinates,
+    bones: Sequence[Role],
+    hinges: Sequence[int],
+    limb: tuple[int, ...],
+) -> list[Coordinates]:
+    """`q`, and what a limb's poses that point nearest to where the source's does settle to."""
     terms = terms_of(robot, tuple(bones), targets.hands is not None, limb)
-    poses = pose_targets(targets, bones)
-    ways = [part]
-    for angles in found:
-        begun = part.angles.copy()
+    poses, ways = pose_targets(targets, bones), [q]
+    for angles in _nearest(robot, targets, q, bones, hinges):
+        begun = q.angles.copy()
         begun[:, hinges] = angles
-        qpos = robot.to_qpos(Coordinates(part.pos, part.quat, begun, part.ball_quats))
+        qpos = robot.to_qpos(Coordinates(q.pos, q.quat, begun, q.ball_quats))
         ways.append(robot.from_qpos(settled(terms, poses, qpos, _STEPS, led=False)))
-    on = taken(robot, targets, holds, ways, block, spells, led)
-    left = np.flatnonzero(spells.any(on > 0)[spells.of_frames])
-    path = along(robot, ways, on, block, spells, targets.frame_time)
-    return q.replaced(frames[left], path.at(left)) if len(left) else q
+    return ways
 
 
 def _nearest(

@@ -22,7 +22,7 @@ from robots.solver.block import Block
 from robots.solver.holds import Holds
 from robots.solver.spells import Spells
 from robots.solver.targets import Targets
-from robots.solver.ways import along, taken
+from robots.solver.ways import along, between, taken
 from robots.solver.window_targets import PointTargets, PoseTargets, pose_targets
 from robots.solver.window_terms import Terms
 from robots.tree import Coordinates
@@ -133,20 +133,12 @@ def _marched(
         for own in spells.slices():
             at = own.start + np.flatnonzero(known[own])
             others = own.start + np.flatnonzero(~known[own])
-            way[np.ix_(others, columns)] = _between(at, way[np.ix_(at, columns)], others)
+            way[np.ix_(others, columns)] = between(at, way[np.ix_(at, columns)], others)
         others = np.flatnonzero(~known)
         for row in others.tolist():
             mujoco.mj_normalizeQuat(robot.mjcf.model, way[row])
         way[others] = settled(terms, poses.at(others), way[others], _BETWEEN_STEPS)
     return [robot.from_qpos(way) for way in ways]
-
-
-def _between(
-    at: Int[np.ndarray, "K"], values: Float[np.ndarray, "K n"], frames: Int[np.ndarray, "S"]
-) -> Float[np.ndarray, "S n"]:
-    """Along lines between the values at some frames, and beyond them as at the nearest."""
-    columns = [np.interp(frames, at, column) for column in values.T]
-    return np.stack(columns, axis=1)
 
 
 def settled(

@@ -70,6 +70,14 @@ def along(
     return Coordinates(out.pos, out.quat, angles, out.ball_quats)
 
 
+def between(
+    at: Int[np.ndarray, "K"], values: Float[np.ndarray, "K n"], frames: Int[np.ndarray, "S"]
+) -> Float[np.ndarray, "S n"]:
+    """Along lines between the values at some frames, and beyond them as at the nearest."""
+    columns = [np.interp(frames, at, column) for column in values.T]
+    return np.stack(columns, axis=1)
+
+
 def cheapest(
     costs: Float[np.ndarray, "T W"], turned: Float[np.ndarray, "T-1 W W"]
 ) -> Int[np.ndarray, "T"]:

@@ -1,6 +1,7 @@
 """Arms that are on a way that leads elsewhere go over to one that leads there."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,13 +12,16 @@ from robots.registry import find
 from robots.solver.astray import led_back
 from robots.solver.block import blocks_of
 from robots.solver.holds import Holds
+from robots.solver.marching import settled
 from robots.solver.solve import retarget
 from robots.solver.targets import Targets, targets_of
+from robots.solver.window_targets import PoseTargets
+from robots.solver.window_terms import Terms
 from robots.tree import Coordinates
 from spark.demo.sample import sample_rig
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec
-from spark.transfer.canonical import CanonicalMotion
+from spark.transfer.canonical import CanonicalMotion, at_frame_time
 from spark_sim.loading import load_robot
 
 FRAME_TIME = 1 / 20
@@ -102,3 +106,27 @@ def test_for_a_moment_no_arm_goes_over_to_another_way(
         raised[role][60] *= -1
     briefly = replace(targets, bones=raised)
     assert led_back(ember, briefly, Holds.none(len(solved)), solved, arms) is solved
+
+
+def test_ways_are_looked_for_a_few_times_a_second_and_followed_in_between(
+    bent: CanonicalMotion, ember: Morphology, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At 20 frames/s and at 60."""
+    counts: list[int] = []
+
+    def counted(terms: Terms, poses: PoseTargets, begun: np.ndarray, *a: int, **k: bool) -> Any:
+        counts.append(len(begun))
+        return settled(terms, poses, begun, *a, **k)
+
+    _, arms = blocks_of(ember)
+    for rate in (1, 3):
+        source = at_frame_time(bent, FRAME_TIME / rate)
+        targets, solved = targets_of(source, ember), retarget(source, ember).coordinates
+        q = astray(ember, solved, "left", slice(30 * rate, 90 * rate))
+        counts.clear()
+        with monkeypatch.context() as patch:
+            patch.setattr("robots.solver.astray.settled", counted)
+            back = led_back(ember, targets, Holds.none(len(q)), q, arms)
+        assert errors(ember, targets, back)[:, 35 * rate : 85 * rate].max() < 0.1
+        seconds = 60 * FRAME_TIME + 1.0  # with what is astray, half of one before and after
+        assert 0 < sum(counts) <= 6 * (5 * seconds + 2)
