@@ -101,18 +101,19 @@ def _floating(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
 
 
 def _hovering(clip: ClipMetrics, source: float, hovers: tuple[Hover, ...]) -> Iterator[Finding]:
-    """A body that is a little too high throughout, which no single frame shows, or for a while."""
+    """A body that is a little too high throughout, which no single frame shows; or else feet that
+    are for a while."""
     height, limits = clip.hover, clip.thresholds
     if source + HOVERS * limits.floating / PLAUSIBILITY_V4.floating < height <= limits.floating:
         sentence = f"the body hovers: it keeps {100 * height:.1f} cm above the floor"
         yield Finding("floating", "body", 0, len(clip), height, "m", sentence)
         return
-    for start, stop, higher in sorted(hovers, key=lambda hover: -hover.height):
+    for foot, start, stop, higher in sorted(hovers, key=lambda hover: -hover.height):
         sentence = (
-            f"the body hovers: it is up to {100 * higher:.1f} cm higher above the floor than the "
-            "source, which stands"
+            f"{foot} hovers: it is up to {100 * higher:.1f} cm higher above the floor than the "
+            "source's, which stands"
         )
-        yield Finding("floating", "body", start, stop, higher, "m", sentence)
+        yield Finding("floating", foot, start, stop, higher, "m", sentence)
 
 
 def _skating(clip: ClipMetrics, gap: int) -> Iterator[Finding]:

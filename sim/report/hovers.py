@@ -1,4 +1,4 @@
-"""A body that hovers for a while where its source stands, lower than what counts as floating."""
+"""Feet that hover for a while where the source's stand, lower than what counts as floating."""
 
 from typing import NamedTuple
 
@@ -18,9 +18,10 @@ _LASTS = 0.2  # [s]
 
 
 class Hover(NamedTuple):
-    """A body is up to `height` [m] higher above the floor than its source in the frames [start,
+    """A foot is up to `height` [m] higher above the floor than the source's in the frames [start,
     stop)."""
 
+    foot: str
     start: int
     stop: int
     height: float
@@ -33,15 +34,20 @@ def hovers_of(
     times: Float[np.ndarray, "T"],
     scale: float,
 ) -> tuple[Hover, ...]:
-    """Where a foot of the source stands, at the same `times` [s], and the body is higher than it by
-    more than `HOVERS`; without what counts as floating. `scale` is the hip height over the
-    source's."""
-    theirs = scale * values_at(source.clearance, times / source.frame_time)
-    higher = clip.clearance - np.maximum(theirs, 0.0)
+    """Where a foot of the source stands, at the same `times` [s], and the sole is higher than its
+    by more than `HOVERS`; without frames in which the body floats. `scale` is the hip height over
+    the source's."""
+    found, at = list[Hover](), times / source.frame_time
     bound = HOVERS * clip.thresholds.floating / PLAUSIBILITY_V4.floating
-    hovers = (higher > bound) & standing.theirs.any(axis=1) & ~clip.flags["floating"]
-    return tuple(
-        Hover(start, stop, float(higher[start:stop].max()))
-        for start, stop in true_runs(hovers)
-        if (stop - start) * clip.frame_time >= _LASTS
-    )
+    for k, foot in enumerate(standing.names):
+        own, theirs = (
+            each.sole_heights[:, each.feet.index(foot)].astype(float) for each in (clip, source)
+        )
+        higher = own - scale * np.maximum(values_at(theirs, at), 0.0)
+        hovers = (higher > bound) & standing.theirs[:, k] & ~clip.flags["floating"]
+        found += [
+            Hover(foot, start, stop, float(higher[start:stop].max()))
+            for start, stop in true_runs(hovers)
+            if (stop - start) * clip.frame_time >= _LASTS
+        ]
+    return tuple(found)
