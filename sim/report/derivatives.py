@@ -33,7 +33,7 @@ def derivative(
     count = len(values)
     duration = (count - 1) * frame_time
     if count < 2:
-        return np.zeros_like(values)
+        return np.zeros_like(values) if order else values.copy()
     half = min(window, 0.5 * duration)
     times = np.arange(count) * frame_time
     centres = np.clip(times, half, duration - half)

@@ -18,8 +18,8 @@ MEANINGS = {
     "Arms that were copied onto a broader body go through it.",
     "balance": "The body stands still beside its feet, and would tip. It comes from a lean that "
     "masses of another distribution can't hold, or from a foot in the wrong place.",
-    "torque": "A joint needs more torque than its motor gives, even with the forces of the floor "
-    "that ask least of it. It comes from fast or jerky moves, deep bends, or a weak motor.",
+    "torque": "A joint needs more torque than its motor gives, even with forces of the floor "
+    "that spare the motors. It comes from fast or jerky moves, deep bends, or a weak motor.",
     "contacts": "Whether the feet stand when the source's stand (1 is always). Differences come "
     "from feet that are lifted late, put down early, or brush the floor in swing.",
     "swing_clearance": "How high the feet pass over the floor in swing, where 1 is as high as the "

@@ -54,6 +54,15 @@ def test_the_fit_of_a_window_is_exact_for_a_parabola() -> None:
     np.testing.assert_allclose(fitted[inside], values[inside], atol=1e-12)
 
 
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_pose_and_a_few_frames_of_it_do_not_tremble(count: int) -> None:
+    """One frame strayed from zeros by as far as it was from the origin: "head by 1624 mm"."""
+    still = standing().frames(0, count)
+    report = assess(subject(still))
+    assert report.tremble.largest < 1e-9
+    assert report.findings == ()
+
+
 @pytest.mark.parametrize("fps", [60.0, 120.0, 240.0])
 def test_a_base_that_goes_to_and_fro_25_times_a_second_trembles(fps: float) -> None:
     """By 1 cm: half of the time it is 1 cm / sqrt 2 away. All goes with it, so only it is named."""
