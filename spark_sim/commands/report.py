@@ -168,7 +168,7 @@ def _verdict(args: Namespace, worst: float | None) -> int:
         return 2
     if args.fail_over is not None and 100 * worst > args.fail_over:
         console.error(
-            f"{100 * worst:.3g} % of the frames are implausible, "
+            f"{100 * worst:.4g} % of the frames are implausible, "
             f"--fail-over allows {args.fail_over:.4g} %"
         )
         return 1
