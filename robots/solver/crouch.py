@@ -4,7 +4,8 @@ Who picks something up from the floor bows over thighs that are raised: the hips
 degrees, and many robots' by 90. What is beyond that is shared: the trunk gives back one half of it
 (`robots.solver.trunk`), and the thighs are raised less by the other half, under hips that stay
 higher, on feet that stay where they are. Taken from the trunk alone, a robot that bows would rear
-up again where its source bows deepest.
+up again where its source bows deepest. A knee that is on the ground would be lifted: there the
+trunk gives back all of it.
 """
 
 from collections.abc import Sequence
@@ -17,12 +18,15 @@ from scipy.ndimage import gaussian_filter1d
 from robots.model.morphology import Morphology
 from robots.solver.trunk import beyond_flexion
 from spark.blocks import in_blocks
+from spark.rig.contacts import ADULT_HEIGHT
 from spark.rig.roles import Group
 from spark.rotation import quat_rotate
+from spark.smoothstep import smoothstep
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.leg_ik import Leg, leg_of, leg_rotations, move_ankles
 from spark.transfer.seats import Seat
 
+_KNEELS = (0.12, 0.25)  # [m, of an adult] of a knee over the floor that is on it, and that is not
 _SHARE = 0.5  # of what hips can't flex, that the thighs give back
 _EASE = 0.1  # [s] standard deviation of the Gaussian that the hips' rise is smoothed by
 _STRAIGHT = 0.98  # of the leg's length up to which it is stretched
@@ -45,7 +49,7 @@ def less_deep(source: CanonicalMotion, robot: Morphology, seats: Sequence[Seat])
         excess = np.where(seated[block], 0.0, beyond_flexion(part, positions, robot))
         if not legs or not excess.any():
             return np.zeros_like(excess)
-        lowered = _SHARE * excess
+        lowered = _SHARE * excess * _off_knees(part, positions, legs)
         return np.max([_rise(leg, part.rotations, positions, lowered) for leg in legs], axis=0)
 
     rise = in_blocks(risen, len(source))
@@ -54,6 +58,16 @@ def less_deep(source: CanonicalMotion, robot: Morphology, seats: Sequence[Seat])
     rise = gaussian_filter1d(rise, _EASE / source.frame_time, axis=0, mode="nearest")
     raised = replace(source, hips=source.hips + rise * _UP)
     return move_ankles(raised, [(leg, -rise * _UP) for leg in legs])
+
+
+def _off_knees(
+    source: CanonicalMotion, positions: Float[np.ndarray, "T J 3"], legs: Sequence[Leg]
+) -> Float[np.ndarray, "T 1"]:
+    """How far (0 to 1) both knees are off the ground: one that is on it would be lifted."""
+    knees = positions[:, [leg.lower_leg for leg in legs], 2].min(axis=1, keepdims=True)
+    adult = source.rig.standing_height / ADULT_HEIGHT
+    low, high = _KNEELS
+    return smoothstep(((knees - source.floor_z) / adult - low) / (high - low))
 
 
 def _rise(

@@ -84,3 +84,21 @@ def test_who_falls_forwards_out_of_a_crouch_stays_as_deep() -> None:
     fallen = replace(BOWED, rotations=falls)
     np.testing.assert_allclose(excess(fallen), 0.0, atol=1e-6)
     assert less_deep(fallen, T1, ()) is fallen
+
+
+@pytest.mark.parametrize(("height", "rises"), [(0.07, False), (0.3, True)])
+def test_a_knee_that_is_on_the_ground_stays_there(height: float, rises: bool) -> None:
+    """It kneels on the right one, or holds it so high [m] over the floor, and bows over the left
+    thigh."""
+    kneels = BOWED.rotations.copy()
+    skeleton, roles = RIG.skeleton, RIG.roles
+    thigh, shank = (roles.require(Role(f"right_{part}")) for part in ("upper_leg", "lower_leg"))
+    kneels[:, list(skeleton.subtree(thigh))] = quat_from_rotvec(np.zeros(3))
+    kneels[:, list(skeleton.subtree(shank))] = quat_from_rotvec(np.array([0.0, np.pi / 2, 0.0]))
+    down = replace(BOWED, rotations=kneels, hips=np.tile(BOWED.hips[:1], (len(BOWED), 1)))
+    knee = canonical_positions(down, [shank])[:, 0, 2] - down.floor_z
+    down = replace(down, hips=down.hips + np.outer(height - knee, [0.0, 0.0, 1.0]))
+    assert excess(down)[DEEPEST] > np.radians(20)
+    higher = less_deep(down, T1, ())
+    assert (higher.hips[DEEPEST, 2] - down.hips[DEEPEST, 2] > 0.05) == rises
+    assert (higher is down) != rises
