@@ -10,7 +10,7 @@ are led out of it.
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Int
 from scipy.ndimage import binary_dilation, maximum_filter1d
 
 from robots.kinematics import forward_kinematics
@@ -32,10 +32,11 @@ from robots.solver.targets import Targets
 from robots.tree import Coordinates
 from spark.runs import true_runs
 
-_MAX_ROUNDS = 6
+_MAX_ROUNDS = 4
 PENALTY_GROWTH = 3.0  # from round to round, of the penalties' weights
 _LEAD_OUT_ROUND = 3  # the round before which arms are led out of what they are stuck in
-_AROUND = 0.4  # [s] before and after a violation that are solved again
+_AROUND = 0.4  # [s] before and after a violation that are solved again,
+_AROUND_LEFT = 0.8  # and around what a round leaves of a spell that it has made better
 _MAX_JERK_RATIO = 5.0  # jerk, over the one from which hinges are smoothed, that is a violation
 SEARCH_DISTANCE = 0.01  # [m] between approximate shapes within which the exact ones are measured
 MAX_DEPTH = 0.009  # hip heights of parts in each other, beyond their clearance,
@@ -52,11 +53,9 @@ def repair(
     block: Block,
 ) -> Coordinates:
     """`q` with the block's dofs solved again around the frames with violations."""
-    around = max(2, round(_AROUND / targets.frame_time))
-    neighbours = np.ones(2 * around + 1, dtype=bool)
     violated = violations(robot, targets, q, block, collision_stride(targets.frame_time))
     violated |= too_jerky(robot, targets, q, block, Spells(np.array([len(q)])))
-    runs = true_runs(binary_dilation(violated, neighbours))
+    runs = true_runs(_around(violated, _AROUND, targets.frame_time))
     if not runs:
         return q
     frames = np.concatenate([np.arange(start, stop) for start, stop in runs])
@@ -75,7 +74,7 @@ def repair(
 
 def _repaired(broken: Repair) -> Coordinates:
     """Of each spell the trajectory of the round with the fewest violations, but for poses that are
-    far worse."""
+    far worse. What a round has mended is left as it is."""
     robot, block = broken.robot, broken.block
     best, frames = broken.start, np.arange(len(broken))
     least = np.full(len(broken.spells), np.inf)
@@ -84,16 +83,17 @@ def _repaired(broken: Repair) -> Coordinates:
         violated = violations(robot, targets, q, block, 1, spells)
         rough = violated | too_jerky(robot, targets, q, block, spells)
         pose = linearize(robot, targets, broken.holds, q, block, [], with_jacobian=False)
-        worth = spells.total(_W_VIOLATION * rough + pose.cost)
-        better = np.flatnonzero((worth < least)[spells.of_frames])
-        best = best.replaced(frames[better], q.at(better))
-        least = np.minimum(least, worth)
-        going = spells.any(rough)
-        if k == _MAX_ROUNDS or not going.any():
+        costs = _W_VIOLATION * rough + pose.cost
+        worth = spells.total(costs)
+        better = worth < least
+        at = np.flatnonzero(better[spells.of_frames])
+        best = best.replaced(frames[at], q.at(at))
+        if k == _MAX_ROUNDS or not rough.any():
             break
-        kept = going[spells.of_frames]
-        broken, frames, least = broken.only(going), frames[kept], least[going]
-        violated = violated[kept]
+        kept, broken = _remaining(broken, rough, better)
+        before = spells.of_frames[kept][broken.spells.starts]
+        least = np.where(better[before], broken.spells.total(costs[kept]), least[before])
+        frames, violated = frames[kept], violated[kept]
         if k == _LEAD_OUT_ROUND and not block.base:
             broken = _led_out(broken, violated)
         q = solve_spells(broken)
@@ -101,6 +101,37 @@ def _repaired(broken: Repair) -> Coordinates:
         penalty_scale = broken.penalty_scale * growth[broken.spells.of_frames]
         broken = replace(broken, start=q, penalty_scale=penalty_scale, exact=True)
     return best
+
+
+def _remaining(
+    broken: Repair, rough: Bool[np.ndarray, "T"], better: Bool[np.ndarray, "S"]
+) -> tuple[Int[np.ndarray, "K"], Repair]:
+    """Which frames are solved once more, and they alone: those around what is rough of a spell that
+    is `better` than before, and all of one that is not."""
+    frame_time = broken.targets.frame_time
+    kept, sizes, fixed = [], [], broken.fixed.copy()
+    for own, is_better in zip(broken.spells.slices(), better.tolist(), strict=True):
+        if not rough[own].any():
+            continue
+        size = own.stop - own.start
+        near = np.ones(size, dtype=bool)
+        if is_better:
+            near = _around(rough[own], _AROUND_LEFT, frame_time)
+        for start, stop in true_runs(near):
+            frames = own.start + np.arange(start, stop)
+            fixed[frames[:2]] |= start > 0
+            fixed[frames[-2:]] |= stop < size
+            kept.append(frames)
+            sizes.append(stop - start)
+    at = np.concatenate(kept)
+    return at, replace(broken.at(at, Spells(np.array(sizes))), fixed=fixed[at])
+
+
+def _around(
+    mask: Bool[np.ndarray, "T"], seconds: float, frame_time: float
+) -> Bool[np.ndarray, "T"]:
+    """Where it holds, and so long before and after that."""
+    return binary_dilation(mask, np.ones(2 * max(2, round(seconds / frame_time)) + 1, dtype=bool))
 
 
 def _led_out(broken: Repair, violated: Bool[np.ndarray, "T"]) -> Repair:

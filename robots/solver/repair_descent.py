@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from robots.coupling import Smoothness
 from robots.kinematics import forward_kinematics
@@ -54,10 +54,13 @@ class Repair:
 
     def only(self, kept: Bool[np.ndarray, "S"]) -> "Repair":
         """Those spells alone."""
-        frames = np.flatnonzero(kept[self.spells.of_frames])
+        return self.at(np.flatnonzero(kept[self.spells.of_frames]), self.spells.only(kept))
+
+    def at(self, frames: Int[np.ndarray, "K"], spells: Spells) -> "Repair":
+        """Some frames alone, which make up other spells."""
         return replace(
             self,
-            spells=self.spells.only(kept),
+            spells=spells,
             targets=self.targets.at(frames),
             holds=self.holds.at(frames),
             start=self.start.at(frames),
