@@ -21,26 +21,21 @@ from sim.report.pace import other_rate, pace_notes
 from sim.report.pose_error import pose_error
 from sim.report.report import Report
 from sim.report.slides import slides_of
+from sim.report.source_floor import floor_from_source, without_tremble
 from sim.report.stretches import measure_clip
 from sim.report.stutter import stutter_notes
 from sim.report.swing import swing_of
 from sim.report.thresholds import PLAUSIBILITY_V4
 from sim.report.tremble import tremble_beside
-from sim.report.truth import accuracy
+from sim.report.truth import Accuracy, accuracy
 from sim.trajectory import Subject
 from spark.errors import SkeletonError
 from spark.motion import Motion
 from spark.resample import values_at
-from spark.rig.rig import Rig
-from spark.transfer.canonical import from_canonical, to_canonical
+from spark.transfer.canonical import to_canonical
 from spark.transfer.ground import level_ground
 from spark.transfer.leg_fit import travel_scale
-from spark.transfer.noise import LEAST_NOISE, noise_in, without_noise
 from spark.transfer.treads import treads_of
-
-# Hip heights: a source whose floor is further from z = 0 than this does not stand on z = 0, and
-# what was made of it may have been put there.
-_MAX_FLOOR_OFFSET = 0.1
 
 
 def assess(
@@ -59,29 +54,32 @@ def assess(
     Raises SkeletonError for a body without feet, for a clip without frames, and for a truth that is
     on another skeleton or has other frames.
     """
-    motion, rig = subject.motion, subject.rig
     course = _course("the motion", subject)
-    known = None if truth is None else accuracy(motion, truth, rig)
-    notes = _about_model(course)
+    known = None if truth is None else accuracy(subject.motion, truth, subject.rig)
     if source is None:
-        ground = own_floor(course)
-        clip = measure_clip(subject, ground)
-        if subject.body is None:
-            notes = (
-                "the floor is the clip's own: one that floats or sinks as a whole can't be told",
-            )
-        notes += own_ground_notes(course, ground) + in_place_notes(course)
-        notes += stutter_notes(motion, "the motion") + fall_notes(subject, clip, "the motion")
-        tremble = tremble_beside(subject)
-        return Report(
-            clip, None, None, None, findings_of(clip, tremble), notes, tremble, truth=known
-        )
-    source_course, travels = as_it_travels(_course("the source", source), course)
-    source = source_course.subject
-    quiet, source_floor, trembles = _without_tremble(source_course)
-    floor = 0.0
+        return _alone(course, known)
+    return _beside(course, _course("the source", source), known)
+
+
+def _alone(course: Course, known: Accuracy | None) -> Report:
+    subject, ground = course.subject, own_floor(course)
+    clip, notes = measure_clip(subject, ground), _about_model(course)
     if subject.body is None:
-        floor, notes = _floor_from_source(course, source.rig, source_floor)
+        notes = ("the floor is the clip's own: one that floats or sinks as a whole can't be told",)
+    notes += own_ground_notes(course, ground) + in_place_notes(course)
+    notes += stutter_notes(course.motion, "the motion") + fall_notes(subject, clip, "the motion")
+    tremble = tremble_beside(subject)
+    return Report(clip, None, None, None, findings_of(clip, tremble), notes, tremble, truth=known)
+
+
+def _beside(course: Course, source_course: Course, known: Accuracy | None) -> Report:
+    subject, motion, rig = course.subject, course.motion, course.rig
+    source_course, travels = as_it_travels(source_course, course)
+    source = source_course.subject
+    quiet, source_floor, trembles = without_tremble(source_course)
+    floor, notes = 0.0, _about_model(course)
+    if subject.body is None:
+        floor, notes = floor_from_source(course, source.rig, source_floor)
     notes += travels + trembles
     canonical = to_canonical(quiet.motion, quiet.rig)
     treads = treads_of(canonical)
@@ -163,41 +161,6 @@ def _about_model(course: Course) -> tuple[str, ...]:
             f"point) is {100 * abs(height):.1f} cm {'above' if height > 0 else 'below'} that"
         )
     return tuple(notes)
-
-
-def _without_tremble(course: Course) -> tuple[Subject, float, tuple[str, ...]]:
-    """What a source's feet, limbs and floor are told from: of one that trembles, from what it
-    trembles about. Noise takes soles below the floor, and no foot stands."""
-    subject = course.subject
-    floor = floor_height(course.lowest[:, 2]) if subject.body is None else 0.0
-    height, frame_time = course.rig.standing_height, course.motion.frame_time
-    trembles = noise_in(course.feet, course.hips, height, frame_time).feet >= LEAST_NOISE
-    if subject.body is not None or not trembles:
-        return subject, floor, ()
-    quiet, noise, _ = without_noise(to_canonical(subject.motion, subject.rig))
-    if noise is None:
-        return subject, floor, ()
-    higher = 100 * (quiet.floor_z - floor)
-    note = (
-        f"the source's feet tremble by {1000 * noise.feet:.0f} mm of white noise (of an adult): "
-        f"its floor is that of its smoothed motion, {higher:.1f} cm higher than the 5th percentile "
-        "of its lowest sole point, and so are the contacts, swings and limbs to compare with"
-    )
-    return replace(subject, motion=from_canonical(quiet)), quiet.floor_z, (note,)
-
-
-def _floor_from_source(
-    course: Course, source_rig: Rig, source_floor: float
-) -> tuple[float, tuple[str, ...]]:
-    scaled = source_floor * course.rig.hip_height / source_rig.hip_height
-    if abs(source_floor) < _MAX_FLOOR_OFFSET * source_rig.hip_height:
-        return scaled, ()
-    own = floor_height(course.lowest[:, 2])
-    floor = min((0.0, scaled, source_floor), key=lambda z: abs(z - own))
-    return floor, (
-        f"the source's floor is at z = {source_floor:.2f} m; for the motion it is taken to be at "
-        f"z = {floor:.2f} m, the nearest to its feet of that height, scaled, kept or moved to 0",
-    )
 
 
 def _beyond_source(
