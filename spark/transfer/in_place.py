@@ -36,6 +36,7 @@ MOST_STANDS = 0.5  # of the frames, in which a foot stands on the floor: slow wa
 _LEAST_STANDS = 0.15  # of the frames, in which one would stand: runners have no more,
 _LEAST_HELD = 0.8  # and in which one would, or the body falls freely, but for
 _GAP = 0.2  # [s] at most in between: feet that come down and leave tell another velocity
+_EXACT = 0.1  # of its speed, to which a fast belt's is known: feet on it may seem as fast
 _FALLS = 0.35  # [body weights] of push below which nothing holds the body up
 _LEVEL = 0.3  # up or down, of a foot that hardly tells the belt's velocity
 _TELLS = 0.1  # how much of what a level one does it tells at least
@@ -98,7 +99,8 @@ def way_taken_out(source: CanonicalMotion) -> Float[np.ndarray, "T 3"] | None:
         return None
     way = np.zeros((len(lacks), 3))
     way[1:, :2] = np.cumsum(lacks[1:] + lacks[:-1], axis=0) * frame_time / 2
-    stands = _stand(paths + way[:, None, None], height, frame_time)
+    known = max(1.0, _EXACT * pace / (PLANTED_SPEED * height / ADULT_HEIGHT))
+    stands = _stand((paths + way[:, None, None]) / [known, known, 1.0], height, frame_time)
     lost = [stop - start for start, stop in true_runs(~stands & ~_falls(source))]
     held = 1 - sum(frames for frames in lost if frames * frame_time > _GAP) / len(source)
     return way if stands.mean() > _LEAST_STANDS and held > _LEAST_HELD else None

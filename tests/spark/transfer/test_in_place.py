@@ -65,6 +65,14 @@ def test_pinned_hips_that_turn_get_a_way_that_turns(speed: float) -> None:
     np.testing.assert_allclose(back, way, atol=0.1)
 
 
+def test_a_fast_belt_is_known_less_exactly_and_found() -> None:
+    sprint = at_frame_time(replace(WALK, frame_time=WALK.frame_time / 4), 1 / 30)  # 4.9 m/s
+    way = over_ground(sprint)
+    back = way_taken_out(replace(sprint, hips=sprint.hips - way))
+    assert back is not None
+    assert np.linalg.norm(back[-1] - way[-1]) < 0.05 * np.linalg.norm(way[-1])
+
+
 def test_it_is_as_long_on_a_body_of_any_size() -> None:
     small = sample_rig("dancer")
     walk = gait.walk(small, FPS)
