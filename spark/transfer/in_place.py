@@ -99,11 +99,17 @@ def way_taken_out(source: CanonicalMotion) -> Float[np.ndarray, "T 3"] | None:
         return None
     way = np.zeros((len(lacks), 3))
     way[1:, :2] = np.cumsum(lacks[1:] + lacks[:-1], axis=0) * frame_time / 2
-    known = max(1.0, _EXACT * pace / (PLANTED_SPEED * height / ADULT_HEIGHT))
-    stands = _stand((paths + way[:, None, None]) / [known, known, 1.0], height, frame_time)
+    return way if _explains(source, paths + way[:, None, None], pace) else None
+
+
+def _explains(source: CanonicalMotion, paths: Paths, pace: float) -> bool:
+    """Whether feet that go on their `paths` at a body's `pace` [m/s] carry it."""
+    height, frame_time = source.rig.standing_height, source.frame_time
+    exact = max(1.0, _EXACT * pace / (PLANTED_SPEED * height / ADULT_HEIGHT))
+    stands = _stand(paths / [exact, exact, 1.0], height, frame_time)
     lost = [stop - start for start, stop in true_runs(~stands & ~_falls(source))]
     held = 1 - sum(frames for frames in lost if frames * frame_time > _GAP) / len(source)
-    return way if stands.mean() > _LEAST_STANDS and held > _LEAST_HELD else None
+    return bool(stands.mean() > _LEAST_STANDS and held > _LEAST_HELD)
 
 
 def slow_speed(velocity: Velocities, frame_time: float) -> float:
