@@ -14,7 +14,7 @@ from spark.rotation import quat_between, quat_rotate
 # Tilts of a foot that stands, and of one that lies; hip heights by which it may then reach below
 # what is known of it.
 _STANDING = np.radians([20.0, 40.0, 60.0]), 0.005
-_LYING = np.radians([80.0, 100.0, 120.0]), 0.01
+_LYING = np.radians([80.0, 100.0, 120.0]), 0.005
 _SIDES = np.linspace(0, 2 * np.pi, 17)[:-1]
 
 
