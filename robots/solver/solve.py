@@ -76,7 +76,7 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     source, passed = without_strays(source)
     source, own = continued(source)
     source, noise, trembles = without_noise(source)
-    source, travels = with_travel(source)
+    source, travels = with_travel(source) if robot.mount is None else (source, ())
     treads = treads_of(source)
     source = less_deep(source, robot, treads.seats)
     climb = climb_of(source, treads)

@@ -262,6 +262,13 @@ def test_a_robot_without_legs_stays_and_its_arms_follow(folder: Path, walk: Clip
         spark_sim.Retargeter(wave, folder / "torso.urdf")
 
 
+def test_who_walks_does_not_walk_in_place_on_a_robot_without_legs(folder: Path, walk: Clip) -> None:
+    """It is its base that stays."""
+    (folder / "torso.urdf").write_text(without_legs((folder / "twin.urdf").read_text()))
+    out = spark_sim.retarget(walk, folder / "torso.urdf")
+    assert not [note for note in out.notes if "in place" in note]
+
+
 EXTRA = [e for e in registry.ENTRIES if e.requirement == "spark-sim[more-robots]"]
 
 
