@@ -58,13 +58,15 @@ class Standing:
 class Discord:
     """Feet stand at other times than the source's: longest in the frames [start, stop).
 
-    `words` say so, and what it looks like: mirrored, late, or another motion.
+    `words` say so, and what it looks like: mirrored, late, or another motion, if it has
+    an `other_pose`.
     """
 
     match: ContactMatch
     start: int
     stop: int
     words: str
+    other_pose: bool
 
 
 def standing_beside(
@@ -94,7 +96,7 @@ def discord_of(
     is taken so much earlier [s]. `question` is asked where neither side nor time explains it.
     """
     match = standing.match
-    other_pose = pose is None or pose > _OTHER_POSE
+    other_pose = pose is None or bool(pose > _OTHER_POSE)
     if match.f1 is None or match.f1 >= (_POOR if other_pose else _VERY_POOR):
         return None
     apart = np.any(standing.own != standing.theirs, axis=1)
@@ -104,7 +106,7 @@ def discord_of(
     if other_pose:
         cause = _cause(standing, match.f1, pose, pose_at_lag) or f": {question}"
     words = f"feet stand at other times than the source's (F1 {match.f1:.2f}){cause}"
-    return Discord(match, start, stop, words)
+    return Discord(match, start, stop, words, other_pose)
 
 
 def _cause(

@@ -67,10 +67,12 @@ def findings_of(
     findings = (
         f for measure in measures for f in sorted(measure(clip, gap), key=lambda f: -f.amount)
     )
+    # Of another motion, feet where the source's stand say nothing.
+    other = discord is not None and discord.other_pose
     return (
         *findings,
-        *_hovering(clip, hover, hovers),
-        *slide_findings(slides),
+        *_hovering(clip, hover, () if other else hovers),
+        *(() if other else slide_findings(slides)),
         *(contact_findings(discord) if discord else ()),
         # Where feet swing at other times, how high they are when the source's do says nothing.
         *(swing_findings(swing) if swing and not discord else ()),

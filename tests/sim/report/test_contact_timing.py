@@ -9,6 +9,8 @@ from jaxtyping import Bool
 from sim.report import assess
 from sim.report.contact_timing import Discord, Standing, discord_of
 from sim.trajectory import Subject
+from spark.demo import gait
+from spark.demo.sample import sample_motion, sample_rig
 from spark.motion import Motion
 from tests.helpers.stick import standing as still_stick
 from tests.helpers.stick import stick_rig
@@ -60,6 +62,20 @@ def test_a_mirrored_motion_is_told() -> None:
     assert found is not None
     assert found.match.f1 == 0
     assert found.words.endswith(", and when its other foot does (F1 1.00): is it mirrored?")
+
+
+def test_of_feet_of_another_motion_it_is_not_told_that_they_hover_or_slide_where_they_swing() -> (
+    None
+):
+    rig = sample_rig("walker")
+    walk, half = sample_motion("walk", rig, 60.0), round(30 * gait.stride_time(rig))
+    early, source = walk.frames(half, len(walk)), walk.frames(0, len(walk) - half)
+    sentences = [
+        found.sentence
+        for found in assess(Subject(early, rig), source=Subject(source, rig)).findings
+    ]
+    assert any("feet stand at other times" in sentence for sentence in sentences)
+    assert not [each for each in sentences if "source's stand" in each or "hovers" in each]
 
 
 @pytest.mark.parametrize("frames", [18, -18])
