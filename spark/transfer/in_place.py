@@ -29,6 +29,7 @@ from spark.transfer.hip_sway import center_of_mass
 from spark.transfer.pressure import NOISE, acceleration
 from spark.transfer.treads import sole_paths
 
+_LEAST_TIME = 0.4  # [s] from the first to the last frame: in less, any foot that slips tells one
 # All speeds [m/s] are of an adult.
 _LEAST_PACE = 2 * PLANTED_SPEED  # that a body lacks: feet that tremble have less,
 _MOST_WAY = 0.4  # and of that, at which its hips go: who slides or skates goes with the feet
@@ -81,10 +82,11 @@ def way_taken_out(source: CanonicalMotion) -> Float[np.ndarray, "T 3"] | None:
     """The way over the ground [m, world] that a walk in place lacks, from 0 in its first frame on.
 
     None for any other motion: if feet stand, if no velocity of the body lets them, or if the hips
-    go over the ground themselves.
+    go over the ground themselves; and for what is too short to tell.
     """
     rig, frame_time = source.rig, source.frame_time
-    if len(rig.soles) < 2 or len(source) < 3:
+    count = len(source)
+    if len(rig.soles) < 2 or count < 3 or (count - 1) * frame_time < _LEAST_TIME:
         return None
     paths, height = sole_paths(source)[1], rig.standing_height
     if _stand(paths, height, frame_time).mean() > MOST_STANDS:
@@ -97,7 +99,7 @@ def way_taken_out(source: CanonicalMotion) -> Float[np.ndarray, "T 3"] | None:
     hips = slow_speed(velocities(source.hips, frame_time)[:, :2], frame_time)
     if pace < _LEAST_PACE * height / ADULT_HEIGHT or hips > _MOST_WAY * pace:
         return None
-    way = np.zeros((len(lacks), 3))
+    way = np.zeros((count, 3))
     way[1:, :2] = np.cumsum(lacks[1:] + lacks[:-1], axis=0) * frame_time / 2
     return way if _explains(source, paths + way[:, None, None], pace) else None
 

@@ -106,6 +106,7 @@ def other_motions() -> dict[str, CanonicalMotion]:
         "walks backwards as it steps ahead": replace(WALK, hips=WALK.hips - 2 * way),
         "slides to and fro": replace(wave.frames(0, len(time)), hips=wave.hips[0] + sways),
         "one frame": WALK.frames(0, 1),
+        "a moment": replace(WALK.frames(0, 15), hips=(WALK.hips - way)[:15]),
     }
 
 
