@@ -24,12 +24,16 @@ def fall_notes(subject: Subject, clip: ClipMetrics, whose: str) -> tuple[str, ..
         return ()
     fps, hard = subject.motion.fps, fall / GRAVITY
     fast = np.sqrt(hard)
-    pace = f"{fast:.2g} times too fast" if hard > 1 else f"{1 / fast:.2g} times too slow"
-    size = f"{hard:.2g} times too large" if hard > 1 else f"{1 / hard:.2g} times too small"
+    pace = f"{_told(fast)} times too fast" if hard > 1 else f"{_told(1 / fast)} times too slow"
+    size = f"{_told(hard)} times too large" if hard > 1 else f"{_told(1 / hard)} times too small"
     return (
         f"in the air {whose} falls at {fall:.1f} m/s², where gravity has {GRAVITY:.1f}: it is "
         f"{pace} (at {fps / fast:.3g} fps, not {fps:.4g}, it would fall so), or {size}",
     )
+
+
+def _told(times: float) -> str:
+    return f"{times:.2g}" if times < 100 else f"{times:.0f}"
 
 
 def fall_of(subject: Subject, clip: ClipMetrics) -> float | None:

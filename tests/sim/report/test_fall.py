@@ -40,6 +40,11 @@ def test_a_jump_tells_the_frame_rate_that_it_was_taken_at(fps: float, times: flo
     assert [told in note for note in note_of(motion)] == ([] if times == 1 else [True])
 
 
+def test_a_unit_that_is_a_hundred_times_too_large_is_told_in_plain_digits() -> None:
+    (note,) = note_of(jumping(600.0, gravity=100 * GRAVITY, seconds=0.1))
+    assert note.endswith("(at 60 fps, not 600, it would fall so), or 100 times too large")
+
+
 def test_who_stands_or_hangs_does_not_fall() -> None:
     hangs = jumping(60.0, gravity=1.0)
     subject = Subject(hangs, RIG)
