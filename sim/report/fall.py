@@ -18,7 +18,8 @@ _HANGS = 0.23  # of gravity: what is softer than at half the speed hangs, climbs
 
 
 def fall_notes(subject: Subject, clip: ClipMetrics, whose: str) -> tuple[str, ...]:
-    """A note where a motion, which is called `whose`, jumps and falls as nothing does on earth."""
+    """A note where a motion, which is called `whose`, jumps and falls as nothing does on earth. A
+    model's size is right."""
     fall = fall_of(subject, clip)
     if fall is None or 1 / _OFF < fall / GRAVITY < _OFF:
         return ()
@@ -26,10 +27,11 @@ def fall_notes(subject: Subject, clip: ClipMetrics, whose: str) -> tuple[str, ..
     fast = np.sqrt(hard)
     pace = f"{_told(fast)} times too fast" if hard > 1 else f"{_told(1 / fast)} times too slow"
     size = f"{_told(hard)} times too large" if hard > 1 else f"{_told(1 / hard)} times too small"
-    return (
+    note = (
         f"in the air {whose} falls at {fall:.1f} m/s², where gravity has {GRAVITY:.1f}: it is "
-        f"{pace} (at {fps / fast:.3g} fps, not {fps:.4g}, it would fall so), or {size}",
+        f"{pace} (at {fps / fast:.3g} fps, not {fps:.4g}, it would fall so)"
     )
+    return (note if subject.body is not None else f"{note}, or {size}",)
 
 
 def _told(times: float) -> str:

@@ -23,7 +23,7 @@ def in_place_notes(course: Course) -> tuple[str, ...]:
     pace = pace_of(way, course.motion.frame_time)
     return (
         "it walks in place: its feet pass over the floor as over a treadmill's belt, at "
-        f"{pace:.2f} m/s, and skate for that; a robot is given the travel that they tell",
+        f"{pace:.2f} m/s, and skate for that; `retarget` gives a robot the travel that they tell",
     )
 
 

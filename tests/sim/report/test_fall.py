@@ -7,6 +7,7 @@ import pytest
 
 from sim.report import Subject, assess
 from sim.report.fall import fall_of
+from sim.trajectory import model_trajectory
 from spark.constants import GRAVITY
 from spark.motion import Motion
 from tests.helpers.stick import standing, stick_rig
@@ -43,6 +44,13 @@ def test_a_jump_tells_the_frame_rate_that_it_was_taken_at(fps: float, times: flo
 def test_a_unit_that_is_a_hundred_times_too_large_is_told_in_plain_digits() -> None:
     (note,) = note_of(jumping(600.0, gravity=100 * GRAVITY, seconds=0.1))
     assert note.endswith("(at 60 fps, not 600, it would fall so), or 100 times too large")
+
+
+def test_of_a_robot_it_is_the_rate_that_is_wrong() -> None:
+    jump = jumping(60.0, gravity=3.0)
+    subject = Subject(jump, RIG, model_trajectory(RIG, jump))
+    (note,) = [each for each in assess(subject).notes if each.startswith("in the air")]
+    assert note.endswith("1.8 times too slow (at 108 fps, not 60, it would fall so)")
 
 
 def test_who_stands_or_hangs_does_not_fall() -> None:
