@@ -22,17 +22,18 @@ def in_place_notes(course: Course) -> tuple[str, ...]:
         return ()
     pace = pace_of(way, course.motion.frame_time)
     return (
-        "it walks in place: its feet pass over the floor as over a treadmill's belt, at "
+        "the motion walks in place: its feet pass over the floor as over a treadmill's belt, at "
         f"{pace:.2f} m/s, and skate for that; `retarget` gives a robot the travel that they tell",
     )
 
 
 def as_it_travels(source: Course, course: Course) -> tuple[Course, tuple[str, ...]]:
     """The course of a source that walks in place, with the travel that its feet tell where the
-    motion made from it travels, and a note; that of any other source as it is."""
+    motion made from it travels, and a note; that of any other source as it is, and a note where the
+    motion alone walks in place."""
     way = None if source.subject.body is not None else _way(source)
     if way is None:
-        return source, ()
+        return source, in_place_notes(course)
     scale = course.rig.hip_height / source.rig.hip_height
     lacks, goes = (
         slow_speed(velocities(path, each.motion.frame_time)[:, :2], each.motion.frame_time)

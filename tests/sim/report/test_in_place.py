@@ -33,6 +33,11 @@ def test_what_travels_is_compared_with_the_travel_that_its_source_lacks() -> Non
     assert any("the source walks in place" in note for note in report.notes)
 
 
+def test_it_is_said_that_a_motion_walks_in_place_where_its_source_goes() -> None:
+    report = assess(Subject(in_place(WALK), RIG), source=Subject(WALK, RIG))
+    assert [note for note in report.notes if note.startswith("the motion walks in place")]
+
+
 @pytest.mark.parametrize("motion", [in_place(WALK), WALK], ids=["in-place", "both-travel"])
 def test_what_goes_as_its_source_does_is_compared_with_that(motion: Motion) -> None:
     report = assess(Subject(motion, RIG), source=Subject(motion, RIG))
