@@ -8,9 +8,8 @@ from spark.errors import SkeletonError
 from spark.io.convention import Convention
 from spark.rotation import quat_angle, quat_identity
 from spark.summary import counted
-from spark.transfer.in_place import pace_of, way_taken_out
+from spark.transfer.in_place import pace_of, way_lacked
 from spark.transfer.loops import loop_of
-from spark.transfer.noise import without_noise
 from spark_sim.clips import AnyClip, Clip
 from spark_sim.console import columns
 
@@ -69,10 +68,10 @@ def describe(clip: "AnyClip") -> dict[str, Any]:
         "root_joint": rig.skeleton.names[rig.root_joint],
         "joints": joints,
     }
-    way = way_taken_out(without_noise(clip.canonical)[0])
+    way = way_lacked(clip.canonical)
     of_motion = {
         "loop": loop_of(clip.canonical) is not None,
-        "treadmill_m_s": None if way is None else round(pace_of(way, motion.frame_time), 3),
+        "treadmill_m_s": None if way is None else pace_of(way, motion.frame_time),
     }
     return facts | of_motion | {"body": body, "notes": list(clip.notes)}
 

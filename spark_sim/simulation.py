@@ -23,8 +23,7 @@ from sim.trajectory import Subject, model_trajectory
 from sim.view.figure import Figure
 from spark.errors import SkeletonError
 from spark.motion import Motion
-from spark.transfer.in_place import way_taken_out, with_travel
-from spark.transfer.noise import without_noise
+from spark.transfer.in_place import pace_of, way_lacked
 from spark.transfer.treads import treads_of
 from spark_sim.clips import AnyClip, File, RobotClip
 from spark_sim.loading import clip_of
@@ -107,7 +106,7 @@ def simulate(
 
 def _over_the_ground(clip: AnyClip) -> Motion:
     """A character's motion, with its travel where it walks in place: no floor is a treadmill."""
-    way = way_taken_out(without_noise(clip.canonical)[0])
+    way = way_lacked(clip.canonical)
     return clip.motion if way is None else clip.motion.moved(way)
 
 
@@ -124,7 +123,12 @@ def _stools(clip: AnyClip) -> Stools:
 def _on_the_ground(clip: AnyClip) -> tuple[str, ...]:
     """Notes where a motion sits, walks in place, or stands on what is not in the simulation."""
     treads = treads_of(clip.canonical)
-    notes = [] if clip.body else [*with_travel(without_noise(clip.canonical)[0])[1]]
+    way, notes = None if clip.body else way_lacked(clip.canonical), []
+    if way is not None:
+        notes.append(
+            "the motion walks in place: in simulation it goes over the ground at "
+            f"{pace_of(way, clip.motion.frame_time):.2f} m/s, as its feet tell"
+        )
     if treads.top:
         notes.append(
             f"the motion's feet stand up to {100 * treads.top:.0f} cm above the floor, on what is "

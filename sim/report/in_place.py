@@ -9,8 +9,7 @@ from jaxtyping import Float
 from sim.report.course import Course, course_of
 from spark.rig.contacts import planted_points, velocities
 from spark.transfer.canonical import to_canonical
-from spark.transfer.in_place import MOST_STANDS, pace_of, slow_speed, way_taken_out
-from spark.transfer.noise import without_noise
+from spark.transfer.in_place import MOST_STANDS, pace_of, slow_speed, way_lacked
 
 _GOES = 0.5  # of the speed that the source lacks, scaled: what stays in place has next to none
 
@@ -59,4 +58,4 @@ def _way(course: Course) -> Float[np.ndarray, "T 3"] | None:
     stands = planted_points(course.feet, motion.frame_time, rig.standing_height).any(axis=1)
     if stands.mean() > MOST_STANDS:
         return None
-    return way_taken_out(without_noise(to_canonical(motion, rig))[0])
+    return way_lacked(to_canonical(motion, rig))

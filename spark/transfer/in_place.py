@@ -26,6 +26,8 @@ from spark.rotation import yaw_from_quat
 from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.hip_sway import center_of_mass
+from spark.transfer.loops import continued
+from spark.transfer.noise import without_noise
 from spark.transfer.pressure import NOISE, acceleration
 from spark.transfer.treads import sole_paths
 
@@ -76,6 +78,13 @@ def belt_note(way: Float[np.ndarray, "T 3"], frame_time: float, travel: float) -
 def pace_of(way: Float[np.ndarray, "T 3"], frame_time: float) -> float:
     """The mean speed along a way [m/s]."""
     return float(np.linalg.norm(np.diff(way, axis=0), axis=1).mean() / frame_time)
+
+
+def way_lacked(source: CanonicalMotion) -> Float[np.ndarray, "T 3"] | None:
+    """`way_taken_out` of a motion as it is retargeted: without noise, as a loop that goes on."""
+    longer, own = continued(source)
+    way = way_taken_out(without_noise(longer)[0])
+    return None if way is None else way[own] - way[own][0]
 
 
 def way_taken_out(source: CanonicalMotion) -> Float[np.ndarray, "T 3"] | None:

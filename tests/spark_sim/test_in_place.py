@@ -7,10 +7,12 @@ import pytest
 
 import spark_sim
 from sim.report import Subject, assess
+from spark.demo import gait
 from spark.demo.sample import sample_motion, sample_rig
 from spark.io.bvh import write_bvh
 from spark.io.encoding import encode_new
 from spark_sim.clips import Clip
+from spark_sim.describe import describe
 
 WALK = sample_motion("walk", sample_rig("walker"), 30.0)
 AHEAD = WALK.root_pos[-1] - WALK.root_pos[0]
@@ -42,6 +44,18 @@ def test_on_a_character_it_stays_in_place_and_stands_on_a_belt(
     assert report.contacts.f1 is not None
     assert report.contacts.f1 > 0.95
     assert report.clip.flags["skating"].mean() < 0.05
+
+
+def test_of_a_loop_inspect_tells_the_speed_that_retarget_does(tmp_path: Path) -> None:
+    """Both see it as it goes on; a stride alone is a little faster."""
+    rig = sample_rig("walker")
+    stride = WALK.frames(20, 21 + round(30 * gait.stride_time(rig)))
+    pinned = stride.moved((stride.root_pos[:1] - stride.root_pos) * [1.0, 1.0, 0.0])
+    write_bvh(encode_new(pinned), tmp_path / "stride.bvh")
+    clip = spark_sim.load(tmp_path / "stride.bvh")
+    facts, notes = describe(clip), spark_sim.retarget(clip, clip).notes
+    assert facts["loop"]
+    assert any(f"treadmill at {facts['treadmill_m_s']:.2f} m/s:" in note for note in notes)
 
 
 def test_in_simulation_it_goes_over_the_ground(in_place: Clip) -> None:
