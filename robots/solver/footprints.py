@@ -38,6 +38,7 @@ _OVER_TIME = (
     "lift",
     "idle",
 )
+_HIPS = (0.75, 0.9)  # hip heights of who kneels or lies, at most, and of who does not
 _SPIN = np.radians(60)  # in one contact: feet turn on their toes, but spin on what carries them
 
 
@@ -179,14 +180,19 @@ def _plan(
         clearance=targets.clearance[:, s],
         ground=targets.ground[:, s],
         lift=np.zeros(len(targets)),
-        idle=_idle(targets, contacts),
+        idle=_idle(targets, contacts, robot.rig.hip_height),
     )
 
 
-def _idle(targets: Targets, contacts: Bool[np.ndarray, "T 2"]) -> Float[np.ndarray, "T"]:
+def _idle(
+    targets: Targets, contacts: Bool[np.ndarray, "T 2"], hip_height: float
+) -> Float[np.ndarray, "T"]:
+    """Who goes over his hands has high hips: his feet come down to step."""
     down, stands = np.any(targets.parts, axis=1), np.any(contacts, axis=1)
-    frame_time = targets.frame_time
-    return around(down, frame_time, APPROACH) * (1.0 - around(stands, frame_time, APPROACH))
+    frame_time, (low, high) = targets.frame_time, _HIPS
+    higher = smoothstep((targets.hips[:, 2] / hip_height - low) / (high - low))
+    idle = around(down, frame_time, APPROACH) * (1.0 - around(stands, frame_time, APPROACH))
+    return idle * (1.0 - higher)
 
 
 def _pivot(

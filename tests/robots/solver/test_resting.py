@@ -97,6 +97,13 @@ def test_feet_behind_knees_on_the_ground_do_not_stand(ember: Morphology) -> None
     np.testing.assert_array_equal([foot.idle for foot in plan_feet(ember, targets)], 1.0)
 
 
+def test_feet_of_who_goes_over_his_hands_are_not_idle(ember: Morphology) -> None:
+    """They come down to step."""
+    targets = targets_of(on_all_fours(), ember)
+    high = replace(targets, hips=targets.hips * [1.0, 1.0, 0.0] + [0.0, 0.0, ember.rig.hip_height])
+    np.testing.assert_array_equal([foot.idle for foot in plan_feet(ember, high)], 0.0)
+
+
 def test_feet_that_step_are_not_idle(ember: Morphology) -> None:
     rig = sample_rig("walker")
     walk = to_canonical(sample_motion("walk", rig, 60.0), rig)
