@@ -4,7 +4,6 @@ import numpy as np
 
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.clip_poses import pose_clip
-from sim.report.thresholds import PLAUSIBILITY_V4
 from sim.trajectory import Subject
 from spark.constants import GRAVITY
 from spark.runs import true_runs
@@ -50,8 +49,10 @@ def fall_of(subject: Subject, clip: ClipMetrics) -> float | None:
         times = step * np.arange(count)
         parabola = np.polynomial.Polynomial.fit(times, height, 2)
         rise = float(np.ptp(height))
-        least = _LEAST_RISE * limits.floating / PLAUSIBILITY_V4.floating
-        if rise > least and np.std(height - parabola(times)) < _MOST_LEFT * rise:
+        if (
+            rise > limits.of_adult(_LEAST_RISE)
+            and np.std(height - parabola(times)) < _MOST_LEFT * rise
+        ):
             falls.append(-float(parabola.deriv(2)(0.0)))
     found = float(np.median(falls)) if falls else 0.0
     return found if found > _HANGS * GRAVITY else None

@@ -22,7 +22,6 @@ from sim.report.pose_error import PoseError
 from sim.report.result import Finding
 from sim.report.slides import Slide
 from sim.report.swing import Swing
-from sim.report.thresholds import PLAUSIBILITY_V4
 from sim.report.tremble import Tremble
 from spark.runs import true_runs
 
@@ -106,7 +105,7 @@ def _hovering(clip: ClipMetrics, source: float, hovers: tuple[Hover, ...]) -> It
     """A body that is a little too high throughout, which no single frame shows; or else feet that
     are for a while."""
     height, limits = clip.hover, clip.thresholds
-    if source + HOVERS * limits.floating / PLAUSIBILITY_V4.floating < height <= limits.floating:
+    if source + limits.of_adult(HOVERS) < height <= limits.floating:
         sentence = f"the body hovers: it keeps {100 * height:.1f} cm above the floor"
         yield Finding("floating", "body", 0, len(clip), height, "m", sentence)
         return
@@ -119,7 +118,7 @@ def _hovering(clip: ClipMetrics, source: float, hovers: tuple[Hover, ...]) -> It
 
 
 def _skating(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
-    least = _MIN_SLIDE * clip.thresholds.skate_height / PLAUSIBILITY_V4.skate_height
+    least = clip.thresholds.of_adult(_MIN_SLIDE)
     moment = round(clip.thresholds.window / clip.frame_time)
     for foot in dict.fromkeys(clip.corner_feet):
         columns = [f == foot for f in clip.corner_feet]

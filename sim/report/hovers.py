@@ -7,7 +7,6 @@ from jaxtyping import Float
 
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.contact_timing import Standing
-from sim.report.thresholds import PLAUSIBILITY_V4
 from spark.resample import values_at
 from spark.runs import true_runs
 
@@ -38,7 +37,7 @@ def hovers_of(
     by more than `HOVERS`; without frames in which the body floats. `scale` is the hip height over
     the source's."""
     found, at = list[Hover](), times / source.frame_time
-    bound = HOVERS * clip.thresholds.floating / PLAUSIBILITY_V4.floating
+    bound = clip.thresholds.of_adult(HOVERS)
     for k, foot in enumerate(standing.names):
         own, theirs = (
             each.sole_heights[:, each.feet.index(foot)].astype(float) for each in (clip, source)

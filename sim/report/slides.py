@@ -8,7 +8,6 @@ from jaxtyping import Float
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.contact_timing import Standing
 from sim.report.course import Course
-from sim.report.thresholds import PLAUSIBILITY_V4
 from spark.resample import values_at
 from spark.runs import true_runs
 
@@ -44,7 +43,7 @@ def slides_of(
     to toe. `scale` is the hip height over the source's.
     """
     limits, found = clip.thresholds, list[Slide]()
-    least = _LEAST * limits.skate_height / PLAUSIBILITY_V4.skate_height
+    least = limits.of_adult(_LEAST)
     at = times / source.motion.frame_time
     for k, foot in enumerate(standing.names):
         own, theirs = (

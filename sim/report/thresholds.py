@@ -112,5 +112,9 @@ class Thresholds:
             balance=self.balance * scale,
         )
 
+    def of_adult(self, length: float) -> float:
+        """A length of an adult [m], on the body that the table was `scaled` for [m]."""
+        return length * self.floating / PLAUSIBILITY_V4.floating
+
 
 PLAUSIBILITY_V4 = Thresholds()
