@@ -7,7 +7,7 @@ import numpy as np
 
 from spark.errors import SkeletonError
 
-_FREE, _SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+_FREE, SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 _DOFS = 6  # of a body in the world
 _RIVAL_SHARE = 0.5  # a second tree with this share of the first one's joints is another robot
 
@@ -54,7 +54,7 @@ def free_root(spec: mujoco.MjSpec, root: str, path: Path, notes: list[str]) -> N
     joints = _base_joints(body)
     if any(_is_free(joint) for joint in joints):
         return
-    if joints and not any(int(joint.type) == _SLIDE for joint in joints):
+    if joints and not any(int(joint.type) == SLIDE for joint in joints):
         raise SkeletonError(
             f"{path}: the root {root!r} turns about {joints[0].name!r} but can't move; expected a "
             "free joint, or none"
@@ -82,7 +82,7 @@ def _base_joints(root: mujoco.MjsBody) -> list[mujoco.MjsJoint]:
     bodies below it, as long as nothing else hangs on them and no shape."""
     joints, body = list(root.joints), root
     while (
-        any(int(joint.type) == _SLIDE for joint in joints)
+        any(int(joint.type) == SLIDE for joint in joints)
         and len(list(body.bodies)) == 1
         and not list(body.geoms)
         and len(joints) + len(list(body.bodies[0].joints)) <= _DOFS

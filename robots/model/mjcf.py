@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from robots.model import model_cache
-from robots.model.base import find_root, free_root, stand
+from robots.model.base import SLIDE, find_root, free_root, stand
 from robots.model.compiling import compiled, one_line
 from robots.model.finite import check_finite, nan_in
 from robots.model.mjcf_source import read_source
@@ -23,8 +23,7 @@ from sim.body.compiling import warnings_as_notes
 from spark.errors import FileFormatError, name_list
 from spark.summary import brief, counted
 
-_JOINT = mujoco.mjtJoint
-BALL, SLIDE, HINGE = map(int, (_JOINT.mjJNT_BALL, _JOINT.mjJNT_SLIDE, _JOINT.mjJNT_HINGE))
+BALL, HINGE = int(mujoco.mjtJoint.mjJNT_BALL), int(mujoco.mjtJoint.mjJNT_HINGE)
 _EQ_JOINT = int(mujoco.mjtEq.mjEQ_JOINT)
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
 

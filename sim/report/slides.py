@@ -46,18 +46,14 @@ def slides_of(
     least = limits.of_adult(_LEAST)
     at = times / source.motion.frame_time
     for k, foot in enumerate(standing.names):
-        own, theirs = (
-            each.corners[:, [name == foot for name in each.corner_feet]]
-            for each in (course, source)
-        )
+        own, theirs = ([name == foot for name in each.corner_feet] for each in (course, source))
         low = clip.sole_heights[:, clip.feet.index(foot)] < limits.stand_height
-        corners = [name == foot for name in clip.corner_feet]
-        skates = np.any(clip.corner_skates[:, corners], axis=1)
+        skates = np.any(clip.corner_skates[:, own], axis=1)
         for start, stop in true_runs(standing.theirs[:, k] & low):
             if skates[start:stop].any():
                 continue
-            moved, first, last = _moved(own[start:stop])
-            usual, *_ = _moved(values_at(theirs, at[start:stop]))
+            moved, first, last = _moved(course.corners[start:stop, own])
+            usual, *_ = _moved(values_at(source.corners[:, theirs], at[start:stop]))
             if (distance := moved - scale * usual) > least:
                 found.append(Slide(foot, start + first, start + last + 1, distance))
     return tuple(found)
