@@ -11,6 +11,7 @@ from spark.io.encoding import encode, encode_new
 from spark.motion import Motion
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import from_canonical
+from spark.transfer.hand_touch import lost_touches, with_touches
 from spark.transfer.in_place import belt_note, way_taken_out
 from spark.transfer.leg_fit import travel_scale
 from spark.transfer.loops import continued
@@ -40,6 +41,7 @@ def retarget(
     method: Method = "spark",
     checkpoint: File | None = None,
     refine: bool = True,
+    keep_touches: bool = False,
 ) -> Clip: ...
 @overload
 def retarget(
@@ -57,6 +59,7 @@ def retarget(
     method: Method = "spark",
     checkpoint: File | None = None,
     refine: bool = True,
+    keep_touches: bool = False,
 ) -> AnyClip: ...
 def retarget(
     source: AnyClip | File,
@@ -65,6 +68,7 @@ def retarget(
     method: str = "spark",
     checkpoint: File | None = None,
     refine: bool = True,
+    keep_touches: bool = False,
 ) -> AnyClip:
     """The motion of `source` on the body of `target`, in the hierarchy and units of its file.
 
@@ -81,11 +85,14 @@ def retarget(
     source's does (`spark.transfer.hip_sway`). A loop is seen as it goes on, and closes
     (`spark.transfer.loops`). The feet of a walk in place are held as on a treadmill's belt
     (`spark.transfer.in_place`). A source that trembles, as motion estimated from video, is smoothed
-    before (`spark.transfer.noise`), and a note says so. Twist bones that the source lacks take
+    before (`spark.transfer.noise`), and a note says so. With `keep_touches`, hands are led to what
+    the source's touch, each other and their own body (`spark.transfer.hand_touch`); without, a note
+    says how far they are off that. Twist bones that the source lacks take
     their share at the end (`spark.transfer.twists`).
 
     On a robot the whole trajectory is solved for, within the joints' limits, feet held. With method
     "copy" or without `refine`, each pose is only copied to the robot's hinges, as a baseline.
+    Otherwise its hands keep their touches.
 
     Raises `SkeletonError` where one of the two is no humanoid, and `ConventionError` for a method
     that is not known or does not go with the rest.
@@ -94,6 +101,10 @@ def retarget(
         raise ConventionError(f"method {method!r} is not known; expected 'copy' or 'spark'")
     if method != "spark" and checkpoint is not None:
         raise ConventionError("a checkpoint goes with method 'spark', and with no other")
+    if keep_touches and (method != "spark" or not refine):
+        raise ConventionError(
+            "keep_touches goes with method 'spark', refined: a baseline keeps none"
+        )
     source, target = clip_of(source), clip_of(target)
     if not isinstance(target, Clip):
         if checkpoint is not None:
@@ -117,7 +128,13 @@ def retarget(
         moved = filled_in(canonical, target.canonical, learned)
     if refine:
         finish = refined if method == "spark" else grounded
-        moved = finish(canonical, moved, noise).picked(own)
+        moved = finish(canonical, moved, noise)
+        touching = with_touches(canonical, moved) if method == "spark" else moved
+        moved, touching = moved.picked(own), touching.picked(own)
+        if keep_touches:
+            moved = touching
+        else:
+            notes += lost_touches(moved, touching)
     travel = _travel(source, target, fitted=method == "spark")
     if way is not None:
         moved = replace(moved, hips=moved.hips - travel * way[own])

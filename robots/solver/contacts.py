@@ -14,11 +14,11 @@ from scipy.ndimage import uniform_filter1d
 
 from robots.solver.carrying import Points, carrying, once_down
 from robots.solver.creeping import creeping
-from sim.body.anthropometry import RADII
 from sim.report.derivatives import derivative
 from sim.report.mass import Mass, human_mass
 from spark.constants import GRAVITY
 from spark.rig.contacts import ADULT_HEIGHT, above, lower_ends, planted_points
+from spark.rig.flesh import RADII
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_mul

@@ -13,17 +13,18 @@ from robots.solver.contacts import has_feet, schedule, touching_joint
 from robots.solver.ground import Climb, level_climb, under_soles
 from robots.solver.haste import limb_jerks
 from robots.solver.palms import laid, resting_palms
-from robots.solver.self_touch import SelfTouch, self_touches
 from robots.solver.trunk import bowing
 from spark.blocks import blocks
 from spark.rig.directions import bone_directions
 from spark.rig.feet import ends_of_feet, lowest_points
 from spark.rig.rig import Rig
-from spark.rig.roles import HANDS, LIMBS, Group, Role
+from spark.rig.roles import HANDS, Role
 from spark.rotation import matrix_from_quat, quat_mul
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.hand_touch import arm_length
 from spark.transfer.noise import Noise
+from spark.transfer.self_touch import SelfTouch, self_touches
 
 HOVERS = (
     "in most frames nothing of the source stands on the floor, though it does not fall: does it "
@@ -167,7 +168,7 @@ def targets_of(
         floor=scale * own_ground.floor,
         seats=scale * climb.seats,
         hands=_between_hands(rig, positions, robot),
-        self_touches=self_touches(source, positions, robot),
+        self_touches=self_touches(source, dict(enumerate(positions.swapaxes(0, 1))), robot.rig),
         notes=(*notes, HOVERS) if has_feet(paths).any() and touches.hovers else notes,
     )
 
@@ -240,14 +241,6 @@ def palm_thickness(robot: Morphology, role: Role) -> float:
     points = surface(robot.mjcf, [body]) - robot.centers[j]
     down = -forward_kinematics(robot.tree, robot.tpose).rotations[link][2, :, 0]
     return float(np.max(points @ down, initial=0.0))
-
-
-def arm_length(rig: Rig) -> float:
-    """From shoulder to wrist [m], along the bones."""
-    joints = [rig.roles.joint(role) for role in LIMBS[Group.LEFT_ARM][1:]]
-    rest = rig.skeleton.rest_positions
-    chain = [rest[j] for j in joints if j is not None]
-    return float(np.linalg.norm(np.diff(chain, axis=0), axis=1).sum())
 
 
 def wrist_links(robot: Morphology) -> list[int]:

@@ -21,8 +21,8 @@ from robots.solver.window_poses import WindowPoses
 from robots.solver.window_targets import PointTargets
 from robots.solver.window_terms import Terms
 from robots.stream.frame_targets import FrameReader, FrameTargets
-from sim.body.anthropometry import RADII
 from spark.rig.contacts import ADULT_HEIGHT, SPEED_WINDOW
+from spark.rig.flesh import RADII
 from spark.rig.roles import Role
 from spark.smoothstep import smoothstep
 

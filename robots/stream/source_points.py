@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 from robots.model.morphology import Morphology
 from robots.solver.contacts import MAY_TOUCH, touching_joint
-from robots.solver.targets import arm_length, palm_thickness
+from robots.solver.targets import palm_thickness
 from robots.solver.touching import touches_of
 from robots.solver.trunk import THIGHS
 from robots.stream.carried_points import carriers, place, row
@@ -16,6 +16,7 @@ from spark.rig.rig import Rig
 from spark.rig.roles import HANDS, Role
 from spark.rig.segments import segments
 from spark.rotation import quat_conj, quat_rotate
+from spark.transfer.hand_touch import arm_length
 
 _ONES = np.ones((3, 1))
 

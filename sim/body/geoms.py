@@ -9,11 +9,11 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from sim.body.anthropometry import RADII
 from sim.body.mesh import Hull
 from sim.body.parts import DETAIL, LINK, part_of, side_of
 from spark.kinematics import end_positions, world_positions
 from spark.rig.feet import sole_positions
+from spark.rig.flesh import RADII
 from spark.rig.rig import Rig
 
 # Fractions of the standing height.

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from sim.body.anthropometry import RADII
 from sim.report.lowest import lowest_points
 from sim.report.mass import Mass, human_mass, model_mass
 from sim.report.model_poses import ModelPoses, pose_model
@@ -14,6 +13,7 @@ from spark.errors import SkeletonError
 from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig.feet import Sole, sole_positions
+from spark.rig.flesh import RADII
 from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul
 

@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
-from sim.body.anthropometry import RADII
 from sim.report.clip_poses import ClipPoses
+from spark.rig.flesh import RADII
 from spark.rig.roles import Role
 from spark.rotation import quat_rotate
 

@@ -50,8 +50,11 @@ def stretch(motion: CanonicalMotion, group: Group) -> Float[np.ndarray, "T"]:
     """How far a leg's ankle is from its hip joint, over the leg's length; 1, that of a leg which
     can't stretch, without a knee or without length."""
     leg = leg_of(motion.rig, group)
-    if leg is None:
-        return np.ones(len(motion))
+    return np.ones(len(motion)) if leg is None else stretch_of(motion, leg)
+
+
+def stretch_of(motion: CanonicalMotion, leg: Leg) -> Float[np.ndarray, "T"]:
+    """The same of a leg that is known, or of an arm."""
     length, away = length_and_ankle(motion, leg)
     distance = np.linalg.norm(away, axis=1)
     return np.divide(distance, length, out=np.ones(len(motion)), where=length > 0)

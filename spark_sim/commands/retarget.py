@@ -107,6 +107,12 @@ def configure(parser: ArgumentParser) -> None:
         "kept over the floor, a SRC that trembles not smoothed. On a robot: the same as --method "
         "copy",
     )
+    parser.add_argument(
+        "--keep-touches",
+        action="store_true",
+        help="of a character: hands stay on what SRC's touch, each other and their own body, where "
+        "other proportions bring them apart (robots' always do)",
+    )
     add_force(parser)
     add_json(parser, "one line for each result")
     add_corrections(parser, "SRC")
@@ -175,7 +181,12 @@ def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> di
 
     clip = _source(args, source)
     result = retarget(
-        clip, target, method=args.method, checkpoint=args.checkpoint, refine=args.refine
+        clip,
+        target,
+        method=args.method,
+        checkpoint=args.checkpoint,
+        refine=args.refine,
+        keep_touches=args.keep_touches,
     )
     if isinstance(result, Clip):
         lacking = character_files.lacking(result.body_file, out)

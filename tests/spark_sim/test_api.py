@@ -183,6 +183,17 @@ def test_unknown_method(samples: Path) -> None:
         spark_sim.retarget(samples / "walker_walk.bvh", samples / "dancer_wave.bvh", method="magic")
 
 
+def test_touches_are_kept_where_feet_are(samples: Path) -> None:
+    """Hands that touch nothing stay as they are; a baseline has none to keep."""
+    walk, body = samples / "walker_walk.bvh", samples / "dancer_walk.bvh"
+    plain = spark_sim.retarget(walk, body)
+    kept = spark_sim.retarget(walk, body, keep_touches=True)
+    np.testing.assert_array_equal(kept.motion.rotations, plain.motion.rotations)
+    for baseline in ({"method": "copy"}, {"refine": False}):
+        with pytest.raises(ConventionError, match="a baseline keeps none"):
+            spark_sim.retarget(walk, body, keep_touches=True, **baseline)
+
+
 def test_errors_of_a_body_name_its_file(tmp_path: Path) -> None:
     path = tmp_path / "stick.bvh"
     path.write_text(

@@ -8,60 +8,18 @@ from robots.model.morphology import Morphology
 from robots.registry import find
 from robots.solver import solve
 from robots.solver.holds import Holds
-from robots.solver.self_touch import on_itself, palm_of, self_touches
+from robots.solver.self_touch import on_itself, palm_of
 from robots.solver.targets import targets_of
 from robots.tree import Coordinates
-from sim.body.anthropometry import RADII
-from spark.demo.sample import sample_rig
+from spark.rig.flesh import RADII
 from spark.rig.roles import Role
-from spark.rotation import quat_between
-from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark_sim.loading import load_robot
-
-FRAME_TIME = 1 / 30
-SIDES = {"left": 1.0, "right": -1.0}
+from tests.helpers.touching import FRAME_TIME, HANDS_ON_HIPS, SIDES, standing, still
 
 
 @pytest.fixture(scope="module")
 def ember() -> Morphology:
     return load_robot(find("robot")).on_robot.robot
-
-
-def standing(wrists: np.ndarray) -> CanonicalMotion:
-    """Who stands, with the left wrist where `wrists` (T, 3) says from the left hip, in standing
-    heights, the hand as the forearm, the elbow out; the right one mirrors it."""
-    rig = sample_rig("walker")
-    rotations = np.tile([1.0, 0, 0, 0], (len(wrists), len(rig.skeleton), 1))
-    places = rig.tpose_positions
-    for side, y in SIDES.items():
-        hip, shoulder, elbow, wrist = (
-            rig.roles.require(Role(f"{side}_{part}"))
-            for part in ("upper_leg", "upper_arm", "forearm", "hand")
-        )
-        upper, lower = (
-            float(np.linalg.norm(places[b] - places[a]))
-            for a, b in ((shoulder, elbow), (elbow, wrist))
-        )
-        for t, there in enumerate(wrists * rig.standing_height * [1.0, y, 1.0]):
-            reach = places[hip] + there - places[shoulder]
-            far = min(float(np.linalg.norm(reach)), 0.999 * (upper + lower))
-            ahead = reach / np.linalg.norm(reach)
-            out = np.array([0.0, y, 0.0]) - y * ahead[1] * ahead
-            along = (far**2 + upper**2 - lower**2) / (2 * far)
-            bend = np.sqrt(max(upper**2 - along**2, 0.0))
-            bent = along * ahead + bend * out / np.linalg.norm(out)
-            for joint, way in ((shoulder, bent), (elbow, far * ahead - bent)):
-                turn = quat_between(np.array([0.0, y, 0.0]), way / np.linalg.norm(way))
-                rotations[t, list(rig.skeleton.subtree(joint))] = turn
-    hips = np.tile([0.0, 0.0, rig.hip_height], (len(wrists), 1))
-    return CanonicalMotion(rig, FRAME_TIME, rotations, hips, 0.0)
-
-
-def still(place: list[float], frames: int = 60) -> CanonicalMotion:
-    return standing(np.tile(place, (frames, 1)))
-
-
-HANDS_ON_HIPS = [0.01, 0.085, 0.04]
 
 
 def from_flanks(robot: Morphology, q: Coordinates) -> np.ndarray:
@@ -115,7 +73,7 @@ def test_hands_that_pass_by_touch_nothing(ember: Morphology) -> None:
 def test_hands_are_led_no_further_than_arms_reach(ember: Morphology) -> None:
     """On the knees of who stands upright: along the thighs as far as the arms reach."""
     source = still(HANDS_ON_HIPS)
-    (touch, *_) = self_touches(source, canonical_positions(source), ember)
+    (touch, *_) = targets_of(source, ember).self_touches
     knees = touch.at(slice(None))
     assert knees.parts[0] == (Role.LEFT_UPPER_LEG, Role.LEFT_LOWER_LEG)
     knees.along[:], knees.shares[:] = 1.0, np.arange(len(knees.parts)) == 0

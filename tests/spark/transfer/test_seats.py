@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import spark_sim
-from sim.body.anthropometry import RADII
+from spark.rig.flesh import RADII
 from spark.rotation import quat_from_rotvec, quat_from_yaw, quat_mul, quat_rotate
 from spark.transfer.canonical import CanonicalMotion, at_frame_time
 from spark.transfer.seats import FLESH, SAME_SEAT, seats_of
