@@ -20,7 +20,7 @@ from spark.rig.roles import Role, RoleMap
 _NAMES = ("virtual_left_thigh", "virtual_left_shank", "virtual_right_thigh", "virtual_right_shank")
 _HIP_HEIGHT, _KNEE_HEIGHT = 0.53, 0.285  # of the height of a human: Drillis and Contini 1966
 _TRUNK = 1.5  # of an upper arm: from the shoulders down to the hips at least
-_SHANK = 0.95  # of a thigh
+_SHANK = 0.9  # of a thigh
 _HALF_WIDTH = 0.05  # of the same, from the body's middle to a hip
 _ARMS = tuple(
     Role(f"{side}_{part}") for side in ("left", "right") for part in ("upper_arm", "forearm")
@@ -48,9 +48,8 @@ def roles_and_parts(
             legged = [*segments, *_legs(segments, points, middle, lateral, highest)]
             shapes = [*points, *(np.zeros((0, 3)) for _ in _NAMES)]
             for k in (-3, -1):  # the shanks' ends
-                shapes[k] = (legged[k].center + 0.9 * (legged[k].center - legged[k - 1].center))[
-                    None
-                ]
+                thigh = legged[k].center - legged[k - 1].center
+                shapes[k] = (legged[k].center + _SHANK * thigh)[None]
             try:
                 found = roles_of(legged, shapes)
             except SkeletonError:

@@ -83,7 +83,7 @@ def _understand(mjcf: Mjcf, tree: Tree, joints: list[int], override: Override | 
     soles = soles_of(skeleton, roles, shapes, ideal, links)
     skeleton = with_soles(skeleton, soles)
     units = doubtful_units(mjcf, tree, joints, roles, links)
-    tree, assumed = _assume_limits(tree, segments, roles)
+    tree, assumed = _assume_limits(tree)
     tpose = search_tpose(tree, skeleton, roles, links, ideal, followers_of(mjcf, joints))
     odd = unmirrored_limits(mjcf.model, tree, joints, roles, links, tpose.coordinates)
     odd += uneven_bones(skeleton, roles)
@@ -161,9 +161,7 @@ def _ordered(roles: RoleMap, order: Sequence[int]) -> RoleMap:
     )
 
 
-def _assume_limits(
-    tree: Tree, segments: Sequence[Segment], roles: RoleMap
-) -> tuple[Tree, tuple[str, ...]]:
+def _assume_limits(tree: Tree) -> tuple[Tree, tuple[str, ...]]:
     """Limits where the file gives none: half a turn to either side, with a note."""
     unlimited = ~np.isfinite(tree.lower) & ~tree.balls
     if not unlimited.any():

@@ -68,7 +68,7 @@ def hulls_of(path: str | Path, rig: Rig) -> tuple[dict[int, Hull], tuple[str, ..
     mesh = read_skinned_mesh(path)
     theirs = _matched(path, mesh, rig)
     vertices, joints = _in_tpose(mesh, rig, theirs)
-    scale, notes = _scale(mesh, rig, theirs, joints)
+    scale, notes = _scale(rig, theirs, joints)
     owners = _owners(mesh, rig, theirs)
     hulls = {}
     for j in sorted(set(owners.tolist())):
@@ -161,9 +161,7 @@ def _in_tpose(
     return joints[mesh.owners] + quat_rotate(tpose[mesh.owners], away), joints
 
 
-def _scale(
-    mesh: SkinnedMesh, rig: Rig, theirs: dict[int, int], joints: Float[np.ndarray, "K 3"]
-) -> tuple[float, str]:
+def _scale(rig: Rig, theirs: dict[int, int], joints: Float[np.ndarray, "K 3"]) -> tuple[float, str]:
     """How much longer the rig's bones are than the mesh's: the median; and a note."""
     positions = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
     ratios = []

@@ -66,9 +66,7 @@ def compare_page(
                 "name": name,
                 "share": f"{100 * report.implausible:.1f} %",
                 "grade": grade(100 * report.implausible),
-                "findings": [
-                    finding_line(f, f.start, report.clip) for f in report.findings[:_LISTED]
-                ],
+                "findings": [finding_line(f, report.clip) for f in report.findings[:_LISTED]],
                 "unlisted": max(len(report.findings) - _LISTED, 0),
             }
             for name, report in reports.items()

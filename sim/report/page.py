@@ -82,13 +82,13 @@ def report_page(
         cards=_cards(result),
         key=CORNER_COLORS,
         replay=page(figures, title="", known=known),
-        findings=[finding_line(f, f.start, clip) for f in result.findings[:_LISTED]],
+        findings=[finding_line(f, clip) for f in result.findings[:_LISTED]],
         unlisted=max(len(result.findings) - _LISTED, 0),
         moments=[
             {
                 "time": f"{moment.frame * frame_time:.3f}",
                 "picture": moment.picture,
-                "findings": [finding_line(f, f.start, clip) for f in moment.findings],
+                "findings": [finding_line(f, clip) for f in moment.findings],
             }
             for moment in moments
         ],
@@ -158,10 +158,10 @@ def _cell(value: float | None, factor: float, unit: str, grade: str = "") -> dic
     return {"text": f"{shown:.{0 if abs(shown) >= 100 else 1}f}{unit}", "grade": grade}
 
 
-def finding_line(finding: Finding, frame: int, clip: ClipMetrics) -> dict[str, Any]:
+def finding_line(finding: Finding, clip: ClipMetrics) -> dict[str, Any]:
     """A finding in words, and the time [s] that a click on it goes to."""
     return {
-        "time": f"{frame * clip.frame_time:.3f}",
+        "time": f"{finding.start * clip.frame_time:.3f}",
         "sentence": finding.sentence,
         "place": finding.place(clip.frame_time),
     }

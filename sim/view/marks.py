@@ -76,10 +76,10 @@ def marks(player: Player) -> Iterator[Mark]:
             yield from _limits(player, placement, known, frame)
 
 
-def rgba(css: str, alpha: float = 1.0) -> RGBA:
+def rgba(css: str) -> RGBA:
     """A colour that is written as "#rrggbb"."""
     red, green, blue = (int(css[k : k + 2], 16) / 255 for k in (1, 3, 5))
-    return red, green, blue, alpha
+    return red, green, blue, 1.0
 
 
 def _name(player: Player, placement: Placement, root: Float[np.ndarray, "3"]) -> Iterator[Mark]:

@@ -1,7 +1,6 @@
 """A replay of a scene: its time, what is shown of it, and where one looks. Views draw it."""
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -9,8 +8,6 @@ from jaxtyping import Float
 from sim.view.annotations import Annotations
 from sim.view.scene import Placement, Scene
 from sim.view.timeline import Event, Timeline
-
-Toggle = Literal["overlaid", "ghosts", "contacts", "mass", "path", "limits", "names", "help"]
 
 
 class Player:

@@ -102,14 +102,11 @@ class Scene:
         return int(lost.argmax()) if lost.any() else len(path)
 
     def in_reach(
-        self,
-        placement: Placement,
-        points: Float[np.ndarray, "N *n 3"],
-        frames: slice | Int[np.ndarray, "N"] = slice(None),
-    ) -> Float[np.ndarray, "N *n 3"]:
-        """Points of a figure in some frames; once it has flown off, no further than `_FLOWN` from
-        where it was lost: 16-bit integers hold no more."""
-        kept = self.kept_path(placement)[frames]
+        self, placement: Placement, points: Float[np.ndarray, "T *n 3"]
+    ) -> Float[np.ndarray, "T *n 3"]:
+        """Points of a figure; once it has flown off, no further than `_FLOWN` from where it was
+        lost: 16-bit integers hold no more."""
+        kept = self.kept_path(placement)
         kept = kept.reshape(len(kept), *[1] * (points.ndim - 2), 3)
         most = _FLOWN * self.height
         return kept + np.clip(points - kept, -most, most)

@@ -2,6 +2,8 @@
 
 import unicodedata
 
+_LONGEST = 32  # letters of a name that others stand beside
+
 
 def plain(text: str) -> str:
     """The text in ASCII: accents fall off, and what has no likeness becomes "?"."""
@@ -13,7 +15,7 @@ def plain(text: str) -> str:
     )
 
 
-def shortened(name: str, most: int = 32) -> str:
+def shortened(name: str) -> str:
     """The name, or its beginning and its end, where names mostly differ."""
-    half = (most - 3) // 2
-    return name if len(name) <= most else f"{name[: most - 3 - half]}...{name[-half:]}"
+    half = (_LONGEST - 3) // 2
+    return name if len(name) <= _LONGEST else f"{name[: _LONGEST - 3 - half]}...{name[-half:]}"

@@ -55,9 +55,7 @@ def empty_world() -> mujoco.MjSpec:
     return spec
 
 
-def add_pillars(
-    spec: mujoco.MjSpec, tops: Float[np.ndarray, "K 3"], radius: float
-) -> mujoco.MjsBody:
+def add_pillars(spec: mujoco.MjSpec, tops: Float[np.ndarray, "K 3"], radius: float) -> None:
     """A body of pillars from the floor at z = 0 up to `tops` [m]: what feet stand on there."""
     body = spec.worldbody.add_body()
     for x, y, z in tops.tolist():
@@ -67,4 +65,3 @@ def add_pillars(
             pos=[x, y, z / 2],
             rgba=_PILLAR_RGBA,
         )
-    return body
