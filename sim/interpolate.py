@@ -4,9 +4,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from sim.body.mj_joints import BALL, FREE
 from spark.resample import rotations_at, values_at
-
-_FREE, _BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
 
 
 def at_times(
@@ -52,7 +51,7 @@ def velocities(
 
 def quaternions(model: mujoco.MjModel) -> Int[np.ndarray, "Q 4"]:
     """The columns of the coordinates that hold quaternions."""
-    kinds = {_FREE: 3, _BALL: 0}
+    kinds = {FREE: 3, BALL: 0}
     starts = [
         int(model.jnt_qposadr[j]) + kinds[int(model.jnt_type[j])]
         for j in range(model.njnt)

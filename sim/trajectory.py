@@ -59,12 +59,8 @@ def model_trajectory(rig: Rig, motion: Motion) -> ModelTrajectory:
 
 
 def subtree(model: mujoco.MjModel, root: int) -> list[int]:
-    """A body and all that hang on it, in rising order."""
-    inside = {root}
-    for b in range(root + 1, model.nbody):
-        if int(model.body_parentid[b]) in inside:
-            inside.add(b)
-    return sorted(inside)
+    """A body of the world and all that hang on it, in rising order."""
+    return np.flatnonzero(model.body_rootid == root).tolist()
 
 
 def coordinates_at(

@@ -9,18 +9,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from robots.formats.arrays import number_array, scalar, write_arrays
 from robots.formats.qpos import Columns, columns_of, frame_time_of, motion_of
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
+from sim.body.mj_joints import FREE, HINGE
 from sim.interpolate import velocities
 from spark.errors import FileFormatError, name_list
 
 _FREE = "root"
-_KINDS = (int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_HINGE))
 _BASE = 7
 
 
@@ -39,7 +38,7 @@ def write_locomujoco(motion: RobotMotion, path: Path) -> None:
         "joint_names": np.array([_FREE, *robot.joint_names]),
         "frequency": np.array(1 / motion.frame_time),
         "njnt": np.array(1 + len(dofs)),
-        "jnt_type": np.array([_KINDS[0], *[_KINDS[1]] * len(dofs)]),
+        "jnt_type": np.array([FREE, *[HINGE] * len(dofs)]),
     }
     write_arrays(path, arrays)
 

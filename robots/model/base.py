@@ -5,9 +5,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from sim.body.mj_joints import FREE, SLIDE
 from spark.errors import SkeletonError
 
-_FREE, SLIDE = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 _DOFS = 6  # of a body in the world
 _RIVAL_SHARE = 0.5  # a second tree with this share of the first one's joints is another robot
 
@@ -42,7 +42,7 @@ def _hinges_below(body: mujoco.MjsBody) -> int:
 
 
 def _is_free(joint: mujoco.MjsJoint) -> bool:
-    return int(joint.type) == _FREE
+    return int(joint.type) == FREE
 
 
 def free_root(spec: mujoco.MjSpec, root: str, path: Path, notes: list[str]) -> None:

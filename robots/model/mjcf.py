@@ -14,16 +14,17 @@ import numpy as np
 from jaxtyping import Float
 
 from robots.model import model_cache
-from robots.model.base import SLIDE, find_root, free_root, stand
+from robots.model.base import find_root, free_root, stand
 from robots.model.compiling import compiled, one_line
 from robots.model.finite import check_finite, nan_in
 from robots.model.mjcf_source import read_source
 from robots.model.urdf import is_urdf, read_urdf
 from sim.body.compiling import warnings_as_notes
+from sim.body.mj_joints import SLIDE, body_name, hinges_and_balls, joint_name
+from sim.trajectory import subtree
 from spark.errors import FileFormatError, name_list
 from spark.summary import brief, counted
 
-BALL, HINGE = int(mujoco.mjtJoint.mjJNT_BALL), int(mujoco.mjtJoint.mjJNT_HINGE)
 _EQ_JOINT = int(mujoco.mjtEq.mjEQ_JOINT)
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
 
@@ -48,23 +49,11 @@ class Mjcf:
 
     def bodies(self) -> list[int]:
         """The root and all bodies below it, parents first."""
-        inside = {self.root}
-        for body in range(self.root + 1, self.model.nbody):
-            if int(self.model.body_parentid[body]) in inside:
-                inside.add(body)
-        return sorted(inside)
+        return subtree(self.model, self.root)
 
     def joints(self) -> list[int]:
         """The hinges and balls of the robot in the order of the tree."""
-        model = self.model
-        return [
-            joint
-            for body in self.bodies()
-            for joint in range(
-                int(model.body_jntadr[body]), int(model.body_jntadr[body] + model.body_jntnum[body])
-            )
-            if int(model.jnt_type[joint]) in (HINGE, BALL)
-        ]
+        return hinges_and_balls(self.model, self.root)
 
     def followers(self) -> list[tuple[int, int, Float[np.ndarray, "5"]]]:
         """The joints that follow others (mimic joints), those others, and the polynomial that takes
@@ -79,17 +68,11 @@ class Mjcf:
 
     def joint_name(self, joint: int) -> str:
         """The joint's name, or where it sits if it has none."""
-        return (
-            self.model.joint(joint).name
-            or f"joint {joint} of {self.body_name(self._body_of(joint))}"
-        )
+        return joint_name(self.model, joint)
 
     def body_name(self, body: int) -> str:
         """The body's name, or its number if it has none."""
-        return self.model.body(body).name or f"body {body}"
-
-    def _body_of(self, joint: int) -> int:
-        return int(self.model.jnt_bodyid[joint])
+        return body_name(self.model, body)
 
 
 def read_mjcf(path: str | Path, *, visuals: bool = True) -> Mjcf:

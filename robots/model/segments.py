@@ -11,8 +11,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from robots.model.mjcf import BALL, Mjcf
+from robots.model.mjcf import Mjcf
 from robots.tree import ROOT, Tree
+from sim.body.mj_joints import BALL
 
 _COS_PARALLEL = np.cos(np.radians(30))
 """Consecutive hinges nearer to parallel are two joints, as a hip's pitch and a knee. Within a joint

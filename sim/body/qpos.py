@@ -7,6 +7,7 @@ from jaxtyping import Float
 from sim.body.hinges import angles_within
 from sim.body.joints import mirrored
 from sim.body.keyframes import standing_position
+from sim.body.mj_joints import HINGE
 from sim.body.parts import hinges_of, kept_joints, side_of
 from spark.blocks import in_blocks
 from spark.kinematics import forward, local_rotations
@@ -47,7 +48,7 @@ def qpos_of_pose(
     since_tpose = quat_mul(world, quat_conj(rig.tpose))
     reached = since_tpose.copy()  # what a joint lacks, those below it make up for
     qpos = model.qpos0.copy()
-    hinged = np.any(model.jnt_type == int(mujoco.mjtJoint.mjJNT_HINGE))
+    hinged = np.any(model.jnt_type == HINGE)
     root, *joints = kept_joints(rig)
     address = int(model.joint(rig.skeleton.names[root]).qposadr[0])
     qpos[address : address + 3] = standing_position(rig, world)

@@ -7,10 +7,11 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from sim.body.mj_joints import BALL, FREE
 from sim.physics.servos import servo_joint, servo_model
 
 SMALL = 0.004  # of the body's mass: what moves less than that is carried as it is in the zero pose
-_WIDTHS = {mujoco.mjtJoint.mjJNT_FREE: (7, 6), mujoco.mjtJoint.mjJNT_BALL: (4, 3)}
+_WIDTHS = {FREE: (7, 6), BALL: (4, 3)}  # of a joint, in qpos and qvel
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
@@ -58,7 +59,7 @@ def looking_ahead(
     touch = ((out.geom_contype | out.geom_conaffinity) != 0).astype(out.geom_contype.dtype)
     out.geom_contype[:], out.geom_conaffinity[:] = touch * ~floors, touch * floors
     moving = np.flatnonzero(~still)
-    widths = [_WIDTHS.get(mujoco.mjtJoint(model.jnt_type[j]), (1, 1)) for j in moving]
+    widths = [_WIDTHS.get(int(model.jnt_type[j]), (1, 1)) for j in moving]
     starts = zip(model.jnt_qposadr[moving], model.jnt_dofadr[moving], widths, strict=True)
     columns = [(np.arange(q, q + n), np.arange(v, v + m)) for q, v, (n, m) in starts]
     qpos, dofs = (np.concatenate(each) for each in zip(*columns, strict=True))

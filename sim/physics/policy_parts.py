@@ -4,10 +4,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Int
 
+from sim.body.mj_joints import FREE, HINGE
 from sim.physics.policy_spec import PolicySpec
 from spark.errors import SkeletonError, name_list
-
-_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
 
 def moving_bodies(model: mujoco.MjModel, root: int) -> Int[np.ndarray, "B"]:
@@ -20,7 +19,7 @@ def moving_bodies(model: mujoco.MjModel, root: int) -> Int[np.ndarray, "B"]:
 def spec_joints(model: mujoco.MjModel, root: int, spec: PolicySpec) -> list[int]:
     """The spec's joints in the model, which must be all of the robot's."""
     free = int(model.body_jntadr[root])
-    if free < 0 or int(model.jnt_type[free]) != int(mujoco.mjtJoint.mjJNT_FREE):
+    if free < 0 or int(model.jnt_type[free]) != FREE:
         raise SkeletonError("the robot's root has no free joint: a policy can't move it")
     own = {
         model.joint(j).name: j
@@ -31,7 +30,7 @@ def spec_joints(model: mujoco.MjModel, root: int, spec: PolicySpec) -> list[int]
         raise SkeletonError(
             f"{spec.path}: the robot has no joints {name_list(unknown)}; it has {name_list([*own])}"
         )
-    hinges = [n for n in spec.joints if int(model.jnt_type[own[n]]) == _HINGE]
+    hinges = [n for n in spec.joints if int(model.jnt_type[own[n]]) == HINGE]
     if other := [name for name in spec.joints if name not in hinges]:
         raise SkeletonError(f"{spec.path}: {name_list(other)} are no hinges")
     if left := [name for name in own if name not in spec.joints]:

@@ -5,6 +5,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.body.compiling import compiled
+from sim.body.mj_joints import BALL, HINGE
 from sim.physics.floor import NO_STOOLS, Stools, on_floor
 from sim.trajectory import ModelTrajectory
 from spark.constants import GRAVITY
@@ -12,7 +13,6 @@ from spark.constants import GRAVITY
 FULL_TORQUE_ERROR = 0.1  # [rad] from its target: a servo of ours gives its full torque there
 DEFAULT_TORQUE = 0.1  # [body weights x height] of a joint whose file tells no limit
 _MAX_PHASE = 0.5  # [rad] of its own oscillation that a servo of ours runs through in one step
-_HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
 _MAX_TIMESTEP = 0.002  # [s]
 
 
@@ -92,7 +92,7 @@ def _replace_motors(
     if model.nu and len(servos) == model.nu:
         return
     motors = {servo_joint(model, a): a for a in range(model.nu) if a not in servos}
-    joints = [j for j in range(model.njnt) if int(model.jnt_type[j]) in (_HINGE, _BALL)]
+    joints = [j for j in range(model.njnt) if int(model.jnt_type[j]) in (HINGE, BALL)]
     if model.nu:
         joints = [j for j in joints if j in motors]
     weight = float(model.body_mass.sum()) * GRAVITY
@@ -103,7 +103,7 @@ def _replace_motors(
     elements = list(spec.joints)
     for j in joints:
         start = int(model.jnt_dofadr[j])
-        width = 3 if int(model.jnt_type[j]) == _BALL else 1
+        width = 3 if int(model.jnt_type[j]) == BALL else 1
         inertia = float(model.dof_M0[start : start + width].mean())
         kp = min(limits[j] / FULL_TORQUE_ERROR, inertia * (_MAX_PHASE / timestep) ** 2)
         if not elements[j].name:

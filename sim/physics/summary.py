@@ -2,10 +2,10 @@
 
 from typing import Any
 
-import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from sim.body.mj_joints import BALL, HINGE
 from sim.interpolate import quaternions
 from sim.physics.tracking import TrackingResult
 from spark.constants import GRAVITY
@@ -23,7 +23,6 @@ BALANCED_LIMITS = (
     "to keep this motion up, not that there is none. It looks ahead in the simulation itself, and "
     "falls are taken back: no machine can do that, but its motors can do what is shown."
 )
-_HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
 _LISTED = 8  # joints and bodies in the text: the most loaded ones
 
 
@@ -175,8 +174,8 @@ def _joint_errors(tracked: TrackingResult, frames: slice) -> Float[np.ndarray, "
     model = tracked.model
     made, wanted = tracked.rollout.qpos[frames], tracked.target.qpos[frames]
     inside = _driven_joints(tracked)
-    hinges = [int(model.jnt_qposadr[j]) for j in inside if int(model.jnt_type[j]) == _HINGE]
-    starts = {int(model.jnt_qposadr[j]) for j in inside if int(model.jnt_type[j]) == _BALL}
+    hinges = [int(model.jnt_qposadr[j]) for j in inside if int(model.jnt_type[j]) == HINGE]
+    starts = {int(model.jnt_qposadr[j]) for j in inside if int(model.jnt_type[j]) == BALL}
     balls = np.array([q for q in quaternions(model) if int(q[0]) in starts], dtype=int)
     balls = balls.reshape(-1, 4)
     turns = rotvec_from_quat(quat_relative(wanted[:, balls], made[:, balls]))

@@ -1,8 +1,8 @@
 """A model's own joints: how far beyond their limits, and how fast they move."""
 
-import mujoco
 import numpy as np
 
+from sim.body.mj_joints import BALL, HINGE, hinges_and_balls, joint_name
 from sim.report.derivatives import derivative
 from sim.report.limits import LimitExcess
 from sim.report.smoothness import Rates, angular_rates, turns_between
@@ -10,7 +10,6 @@ from sim.report.thresholds import PLAUSIBILITY_V4
 from sim.trajectory import ModelTrajectory
 from spark.rotation import quat_normalize, rotvec_from_quat
 
-_HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
 # [rad]: files round, so that a joint on its limit may be written this far beyond it.
 _FILE_ROUNDING = 1e-4
 
@@ -21,12 +20,12 @@ def model_limit_excess(body: ModelTrajectory) -> tuple[LimitExcess, ...]:
     Joints without limits are left out.
     """
     model, limits, excesses = body.model, PLAUSIBILITY_V4, []
-    for joint in _joints(body):
+    for joint in hinges_and_balls(body.model, body.root):
         if not model.jnt_limited[joint]:
             continue
         low, high = model.jnt_range[joint]
-        name, address = _name(model, joint), int(model.jnt_qposadr[joint])
-        if int(model.jnt_type[joint]) == _HINGE:
+        name, address = joint_name(model, joint), int(model.jnt_qposadr[joint])
+        if int(model.jnt_type[joint]) == HINGE:
             angle = body.qpos[:, address]
             beyond, width = np.stack([low - angle, angle - high], axis=1), high - low
             movements: tuple[str, ...] = ("turns back", "turns on")
@@ -41,9 +40,9 @@ def model_limit_excess(body: ModelTrajectory) -> tuple[LimitExcess, ...]:
 
 def model_joint_rates(body: ModelTrajectory, frame_time: float, window: float) -> Rates:
     """The rates of the model's own hinges and balls."""
-    model, joints = body.model, _joints(body)
-    hinges = [j for j in joints if int(model.jnt_type[j]) == _HINGE]
-    balls = [j for j in joints if int(model.jnt_type[j]) == _BALL]
+    model, joints = body.model, hinges_and_balls(body.model, body.root)
+    hinges = [j for j in joints if int(model.jnt_type[j]) == HINGE]
+    balls = [j for j in joints if int(model.jnt_type[j]) == BALL]
     angles = body.qpos[:, model.jnt_qposadr[hinges]]
     velocity = derivative(angles, frame_time, 1, window)
     jerk = derivative(velocity, frame_time, 2, window)
@@ -51,24 +50,8 @@ def model_joint_rates(body: ModelTrajectory, frame_time: float, window: float) -
     ball_speed, ball_jerk = angular_rates(rotations, frame_time, window)
     turns = np.abs(np.diff(angles, axis=0, prepend=angles[:1]))
     return Rates(
-        tuple(_name(model, joint) for joint in (*hinges, *balls)),
+        tuple(joint_name(model, joint) for joint in (*hinges, *balls)),
         np.concatenate([np.abs(velocity), ball_speed], axis=1),
         np.concatenate([np.abs(jerk), ball_jerk], axis=1),
         np.concatenate([turns, turns_between(rotations)], axis=1),
     )
-
-
-def _joints(body: ModelTrajectory) -> list[int]:
-    """The humanoid's hinges and balls."""
-    model = body.model
-    return [
-        joint
-        for joint in range(model.njnt)
-        if int(model.body_rootid[model.jnt_bodyid[joint]]) == body.root
-        and int(model.jnt_type[joint]) in (_HINGE, _BALL)
-    ]
-
-
-def _name(model: mujoco.MjModel, joint: int) -> str:
-    body = int(model.jnt_bodyid[joint])
-    return model.joint(joint).name or f"joint {joint} of {model.body(body).name or f'body {body}'}"

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.optimize import nnls
 
+from sim.body.mj_joints import BALL, FREE, HINGE, hinges_and_balls
 from sim.physics.servos import torque_limit
 from sim.report.derivatives import derivative
 from sim.report.wrench import friction_edges
@@ -24,8 +25,6 @@ from spark.constants import GRAVITY
 from spark.rotation import quat_conj, quat_continuous, quat_mul
 from spark.summary import brief
 
-_HINGE, _BALL = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL)
-_FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 # Of the root's wrench in the least squares: a torque at its limit counts as much as this share of
 # the body's weight that nothing gives, so that the floor explains the root before it spares joints.
 _SPARING = 0.01
@@ -65,8 +64,10 @@ def joint_torques(
     model = _without_contacts(body.model)
     limits = {
         j: limit
-        for j in _hinges(model, body.root)
-        if (limit := torque_limit(model, j)) is not None and limit > 0
+        for j in hinges_and_balls(model, body.root)
+        if int(model.jnt_type[j]) == HINGE
+        and (limit := torque_limit(model, j)) is not None
+        and limit > 0
     }
     if not limits or len(body.qpos) < 2:
         return ()
@@ -122,10 +123,10 @@ def rates(
     out = np.zeros((len(qpos), model.nv))
     for j in range(model.njnt):
         kind, q, v = int(model.jnt_type[j]), int(model.jnt_qposadr[j]), int(model.jnt_dofadr[j])
-        if kind == _FREE:
+        if kind == FREE:
             out[:, v : v + 3] = measured[:, q : q + 3]
             out[:, v + 3 : v + 6] = _turning(qpos[:, q + 3 : q + 7], frame_time, order, window)
-        elif kind == _BALL:
+        elif kind == BALL:
             out[:, v : v + 3] = _turning(qpos[:, q : q + 4], frame_time, order, window)
         else:
             out[:, v] = measured[:, q]
@@ -144,14 +145,6 @@ def _turning(
     return 2 * quat_mul(quat_conj(q), derivative(q, frame_time, order, window))[..., 1:]
 
 
-def _hinges(model: mujoco.MjModel, root: int) -> list[int]:
-    return [
-        j
-        for j in range(model.njnt)
-        if int(model.jnt_type[j]) == _HINGE and int(model.body_rootid[model.jnt_bodyid[j]]) == root
-    ]
-
-
 def _weighted_rows(
     model: mujoco.MjModel,
     root: int,
@@ -164,7 +157,7 @@ def _weighted_rows(
     the hinges'."""
     rows, scale = [*dofs.values()], [_SPARING / limit for limit in limits.values()]
     joint = int(model.body_jntadr[root])
-    if joint >= 0 and int(model.jnt_type[joint]) == _FREE:
+    if joint >= 0 and int(model.jnt_type[joint]) == FREE:
         start = int(model.jnt_dofadr[joint])
         rows = [*range(start, start + 6), *rows]
         scale = [*[1 / weight] * 3, *[1 / (weight * length)] * 3, *scale]

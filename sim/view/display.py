@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from sim.body.mj_joints import BALL, FREE
 from sim.body.parts import kept_joints
 from sim.trajectory import ModelTrajectory, subtree
 from sim.view.bones import bones_of
@@ -33,7 +34,7 @@ _SHOWN_TYPES = (
 )
 _SHOWN_GROUPS = 3  # viewers show the groups below this one
 _UNSET_RGBA = (0.5, 0.5, 0.5, 1.0)
-_WIDTHS = {int(mujoco.mjtJoint.mjJNT_FREE): 7, int(mujoco.mjtJoint.mjJNT_BALL): 4}
+_WIDTHS = {FREE: 7, BALL: 4}
 
 
 def add_display(
