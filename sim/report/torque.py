@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.optimize import nnls
 
-from sim.body.mj_joints import BALL, FREE, HINGE, hinges_and_balls
+from sim.body.mj_joints import BALL, FREE, HINGE, hinges_and_balls, joint_name
 from sim.physics.servos import torque_limit
 from sim.report.derivatives import derivative
 from sim.report.wrench import friction_edges
@@ -96,8 +96,7 @@ def joint_torques(
             needed = needed - gives @ forces
         out[t] = needed[columns]
     return tuple(
-        JointTorque(model.joint(j).name or f"joint {j}", out[:, k], limits[j])
-        for k, j in enumerate(limits)
+        JointTorque(joint_name(model, j), out[:, k], limits[j]) for k, j in enumerate(limits)
     )
 
 

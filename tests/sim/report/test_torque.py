@@ -12,6 +12,7 @@ from robots.model.understand import understand_robot
 from sim.interpolate import velocities as central
 from sim.physics.servos import torque_limit
 from sim.report import Subject, assess
+from sim.report.model_joints import model_joint_rates
 from sim.report.torque import JointTorque, joint_torques, rates
 from sim.trajectory import ModelTrajectory
 from spark.rig.feet import sole_positions
@@ -41,9 +42,9 @@ LEANING = """
 CORNERS = np.array([[x, y, 0.0] for x in (-0.1, 0.2) for y in (-0.05, 0.05)])
 
 
-def leaning(acceleration: float = 0.0) -> tuple[JointTorque, ...]:
+def leaning(acceleration: float = 0.0, mjcf: str = LEANING) -> tuple[JointTorque, ...]:
     """Of the model above, its foot flat; all of it is accelerated upwards [m/s²] with the floor."""
-    spec = mujoco.MjSpec.from_string(LEANING)
+    spec = mujoco.MjSpec.from_string(mjcf)
     model = spec.compile()
     qpos = np.tile(mujoco.MjData(model).qpos, (FRAMES, 1))
     rise = 0.5 * acceleration * (np.arange(FRAMES) * FRAME_TIME) ** 2
@@ -71,6 +72,17 @@ def test_a_body_that_leans_on_its_ankle(acceleration: float) -> None:
     np.testing.assert_allclose(ankle.torque, (10 * 0.1 + 2 * 0.25) * pull, rtol=2e-3)
     assert (shoulder.limit, ankle.limit) == (4, 30)
     np.testing.assert_allclose(shoulder.load, 0.5 * pull / 4, rtol=1e-6)
+
+
+def test_joints_without_a_name_have_one_name_in_all_measures() -> None:
+    """The report's table finds a joint's torque by the name that its speed has."""
+    nameless = LEANING.replace(' name="shoulder"', "")
+    spec = mujoco.MjSpec.from_string(nameless)
+    model = spec.compile()
+    body = ModelTrajectory(spec, model, int(model.body("torso").id), np.zeros((3, model.nq)))
+    rates = model_joint_rates(body, FRAME_TIME, 0.05)
+    assert {each.joint for each in leaning(mjcf=nameless)} == set(rates.names)
+    assert "joint 1 of arm" in rates.names
 
 
 def test_without_the_floor_an_ankle_carries_its_foot_alone() -> None:
