@@ -33,7 +33,7 @@ def write_holosoma(motion: RobotMotion, path: Path) -> None:
     robot, columns = motion.robot, columns_of(motion, path)
     model, bodies = robot.mjcf.model, robot.mjcf.bodies()
     states = body_states(motion, bodies, of_mass=False)
-    start = int(model.jnt_dofadr[robot.mjcf.free_joint])
+    start = robot.mjcf.base_dof
     joints = model.jnt_dofadr[list(robot.mj_joints)]
     speeds = velocities(model, motion.qpos, motion.frame_time)
     arrays = {

@@ -29,7 +29,7 @@ def write_locomujoco(motion: RobotMotion, path: Path) -> None:
     robot = motion.robot
     model = robot.mjcf.model
     dofs = [int(model.jnt_dofadr[joint]) for joint in robot.mj_joints]
-    base = int(model.jnt_dofadr[robot.mjcf.free_joint])
+    base = robot.mjcf.base_dof
     qvel = velocities(model, motion.qpos, motion.frame_time)
     arrays = {
         "qpos": np.hstack([columns.pos, columns.quat, columns.angles]),

@@ -39,7 +39,7 @@ def write_npz(motion: RobotMotion, path: Path, *, source: Source | None = None) 
         "quaternion": "wxyz",
         "length_unit": "m",
         "angle_unit": "rad",
-        "base_qposadr": int(mjcf.model.jnt_qposadr[mjcf.free_joint]),
+        "base_qposadr": mjcf.base_qpos,
         "joint_qposadr": motion.robot.addresses.tolist(),
         "qvel": "linear velocity in world axes, angular velocity in the body's",
         **about(motion, path, source),
@@ -76,12 +76,11 @@ def read_npz(arrays: Mapping[str, Any], path: Path, robot: Morphology | None = N
             None,
             f"was made for {facts.get('model')!r}, not for {robot.mjcf.path.name!r}: {differs}",
         )
-    model = robot.mjcf.model
-    qpos = number_array(arrays, "qpos", path, (None, int(model.nq)))
+    qpos = number_array(arrays, "qpos", path, (None, int(robot.mjcf.model.nq)))
     check_finite(path, qpos=qpos)
-    base = int(model.jnt_qposadr[robot.mjcf.free_joint])
-    turned, said = unit(qpos[:, base + 3 : base + 7], path)
-    qpos[:, base + 3 : base + 7] = turned
+    base = robot.mjcf.base_qpos
+    rotation = slice(base + 3, base + 7)
+    qpos[:, rotation], said = unit(qpos[:, rotation], path)
     if facts.get("model_sha256") != model_sha256(robot.mjcf.path):
         said += (f"the model {robot.mjcf.path.name} has changed since this was written",)
     frame_time = scalar(arrays, "frame_time", path)

@@ -37,7 +37,7 @@ def read_plain(arrays: Mapping[str, Any], path: Path, robot: Morphology) -> Robo
             ". Is it of another robot, or are there objects beside it?",
         )
     check_finite(path, qpos=qpos)
-    base = int(robot.mjcf.model.jnt_qposadr[robot.mjcf.free_joint])
+    base = robot.mjcf.base_qpos
     rotation = slice(base + 3, base + 7)
     qpos[:, rotation], said = unit(qpos[:, rotation], path)
     notes = ("qpos is read as MuJoCo's: metres, quaternion wxyz, radians", *said)

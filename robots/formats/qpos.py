@@ -38,10 +38,12 @@ def columns_of(motion: RobotMotion, path: Path) -> Columns:
         raise OutputError(
             f"{path}: the robot has ball joints, and this format has hinges only; write our .npz"
         )
-    base, joints = _addresses(robot)
-    qpos = motion.qpos
+    base, qpos = robot.mjcf.base_qpos, motion.qpos
     return Columns(
-        qpos[:, base : base + 3], qpos[:, base + 3 : base + 7], qpos[:, joints], motion.frame_time
+        pos=qpos[:, base : base + 3],
+        quat=qpos[:, base + 3 : base + 7],
+        angles=qpos[:, robot.addresses],
+        frame_time=motion.frame_time,
     )
 
 
@@ -62,11 +64,11 @@ def motion_of(
         )
     check_finite(path, pos=columns.pos, quat=columns.quat, angles=columns.angles)
     quat, said = unit(columns.quat, path)
-    base, at = _addresses(robot)
+    base = robot.mjcf.base_qpos
     qpos = np.tile(robot.mjcf.model.qpos0, (len(quat), 1))
     qpos[:, base : base + 3] = columns.pos
     qpos[:, base + 3 : base + 7] = quat
-    qpos[:, at] = columns.angles
+    qpos[:, robot.addresses] = columns.angles
     return of_qpos(qpos, robot, columns.frame_time, path, (*notes, *said))
 
 
@@ -155,10 +157,3 @@ def unit(
     if len(off) and off[worst] > _NOTED:
         notes = (f"quaternions are up to {off[worst]:.2g} off unit length: normalised",)
     return quat / norm[:, None], notes
-
-
-def _addresses(robot: Morphology) -> tuple[int, list[int]]:
-    """Where the base and the hinges are in qpos."""
-    model = robot.mjcf.model
-    base = int(model.jnt_qposadr[robot.mjcf.free_joint])
-    return base, robot.addresses.tolist()

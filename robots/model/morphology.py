@@ -88,7 +88,7 @@ class Morphology:
         model, tree = self.mjcf.model, self.tree
         qpos = np.tile(model.qpos0, (len(q), 1))
         root_quat, body_quats = self._rest_quats
-        base = int(model.jnt_qposadr[self.mjcf.free_joint])
+        base = self.mjcf.base_qpos
         qpos[:, base : base + 3] = q.pos
         qpos[:, base + 3 : base + 7] = quat_continuous(quat_mul(q.quat, root_quat))
         hinges = ~tree.balls
@@ -104,7 +104,7 @@ class Morphology:
         """The inverse of `to_qpos`."""
         model, tree = self.mjcf.model, self.tree
         root_quat, body_quats = self._rest_quats
-        base = int(model.jnt_qposadr[self.mjcf.free_joint])
+        base = self.mjcf.base_qpos
         angles = np.zeros((len(qpos), len(tree)))
         hinges = ~tree.balls
         angles[:, hinges] = qpos[:, self.addresses[hinges]] - model.qpos0[self.addresses[hinges]]

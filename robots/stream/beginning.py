@@ -24,9 +24,8 @@ class Beginning:
     def __init__(self, terms: Terms, frame_time: float) -> None:
         mjcf = terms.robot.mjcf
         self._model, self._terms, self._frame_time = mjcf.model, terms, frame_time
-        base = int(self._model.jnt_dofadr[mjcf.free_joint])
-        self._place = slice(base, base + 3)
-        self._height = int(self._model.jnt_qposadr[mjcf.free_joint]) + 2
+        self._place = slice(mjcf.base_dof, mjcf.base_dof + 3)
+        self._height = mjcf.base_qpos + 2
         self.reset()
 
     def reset(self) -> None:

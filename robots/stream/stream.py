@@ -129,7 +129,7 @@ class Stream:
             self._beginning.wait(self._q[_FIXED])
         if self._count == LATENCY + 1 and self._is_late():
             first, second, *_ = self._begun
-            base = int(self.robot.mjcf.model.jnt_qposadr[self.robot.mjcf.free_joint])
+            base = self.robot.mjcf.base_qpos
             self._q[:, base : base + 3] += second.hips - first.hips
             self._q = self._posed(self._q, second, _FEW_ITERATIONS)
             del self._begun[0]

@@ -17,7 +17,7 @@ class Handover:
 
     def __init__(self, robot: Morphology, fps: float) -> None:
         self._robot, self._model = robot, robot.mjcf.model
-        base = int(self._model.jnt_qposadr[robot.mjcf.free_joint])
+        base = robot.mjcf.base_qpos
         self._place, self._height = slice(base, base + 2), base + 2
         self._steps = max(round(_TIME * fps), 1)
         self._last: Float[np.ndarray, nq] | None = None
