@@ -9,6 +9,7 @@ from typing import Any
 from robots import registry
 from robots.formats.bodies import foot_spans
 from robots.formats.made_from import Source, record_of
+from robots.formats.qpos import rate_of
 from robots.formats.sidecar import SIDECAR, sidecar_of
 from robots.model.known import model_sha256
 from robots.model.motion import RobotMotion
@@ -50,7 +51,7 @@ def write_sidecar(
         "schema": SIDECAR,
         "file": path.name,
         "format": format,
-        "fps": _rate(motion),
+        "fps": float(rate_of(motion.frame_time)),
         "frames": len(motion),
         **conventions,
         "joint_names": list(motion.robot.joint_names),
@@ -81,12 +82,6 @@ def robot_of(facts: dict[str, Any], path: Path) -> str | Path:
         f"was made for the robot {model!r}, which is neither beside it nor here, nor where it lay "
         "as it was; name it with --robot",
     )
-
-
-def _rate(motion: RobotMotion) -> float:
-    """fps, as a whole number where it is one but for rounding."""
-    fps = 1 / motion.frame_time
-    return float(round(fps)) if abs(fps - round(fps)) < 1e-6 else fps
 
 
 def _is_model(path: Path, sha256: object) -> bool:

@@ -13,7 +13,7 @@ from robots.formats.about import write_sidecar
 from robots.formats.arrays import number_array, scalar
 from robots.formats.bodies import body_poses
 from robots.formats.made_from import Source
-from robots.formats.qpos import Columns, columns_of, frame_time_of, motion_of
+from robots.formats.qpos import Columns, columns_of, frame_time_of, motion_of, rate_of
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from spark.errors import FileFormatError
@@ -31,9 +31,8 @@ def write_pkl(motion: RobotMotion, path: Path, source: Source | None = None) -> 
     base = mjcf.base_qpos
     still[:, base : base + 7] = [0.0, 0, 0, 1, 0, 0, 0]
     local, _ = body_poses(motion.robot, still)
-    fps = 1 / motion.frame_time
     entries = {
-        "fps": round(fps) if abs(fps - round(fps)) < 1e-6 else fps,
+        "fps": rate_of(motion.frame_time),
         "root_pos": columns.pos,
         "root_rot": np.roll(columns.quat, -1, axis=1),
         "dof_pos": columns.angles,

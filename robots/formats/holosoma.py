@@ -9,13 +9,18 @@ import numpy as np
 
 from robots.formats.arrays import number_array, scalar, write_arrays
 from robots.formats.bodies import body_names, body_states, contact_array
-from robots.formats.qpos import Columns, check_finite, columns_of, frame_time_of, motion_of
+from robots.formats.qpos import (
+    BASE_WIDTH,
+    Columns,
+    check_finite,
+    columns_of,
+    frame_time_of,
+    motion_of,
+)
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from sim.interpolate import velocities
 from spark.errors import FileFormatError, name_list
-
-_BASE = 7  # columns before the joints': position, quaternion wxyz
 
 
 def is_holosoma(arrays: Mapping[str, Any]) -> bool:
@@ -23,7 +28,7 @@ def is_holosoma(arrays: Mapping[str, Any]) -> bool:
     if not {"joint_pos", "joint_names"} <= arrays.keys():
         return False
     shape = np.shape(arrays["joint_pos"])
-    return len(shape) == 2 and shape[1] == _BASE + np.size(arrays["joint_names"])
+    return len(shape) == 2 and shape[1] == BASE_WIDTH + np.size(arrays["joint_names"])
 
 
 def write_holosoma(motion: RobotMotion, path: Path) -> None:
@@ -61,11 +66,11 @@ def read_holosoma(arrays: Mapping[str, Any], path: Path, robot: Morphology) -> R
             f"its joints are not those of the robot {robot.mjcf.path.stem!r}, which differ in "
             f"{name_list(unknown)}",
         )
-    qpos = number_array(arrays, "joint_pos", path, (None, _BASE + len(names)))
+    qpos = number_array(arrays, "joint_pos", path, (None, BASE_WIDTH + len(names)))
     check_finite(path, joint_pos=qpos)
-    order = [_BASE + names.index(name) for name in robot.joint_names]
+    order = [BASE_WIDTH + names.index(name) for name in robot.joint_names]
     frame_time = frame_time_of(scalar(arrays, "fps", path), path)
-    columns = Columns(qpos[:, :3], qpos[:, 3:_BASE], qpos[:, order], frame_time)
+    columns = Columns(qpos[:, :3], qpos[:, 3:BASE_WIDTH], qpos[:, order], frame_time)
     said = "joint_pos is read as holosoma's: position [m], quaternion wxyz, joints by their names"
     objects = [name for name in arrays if name.startswith("object_")]
     left = (f"{name_list(objects)}: not read",) if objects else ()

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from robots.formats.arrays import number_array, scalar, write_arrays
-from robots.formats.qpos import Columns, columns_of, frame_time_of, motion_of
+from robots.formats.qpos import BASE_WIDTH, Columns, columns_of, frame_time_of, motion_of
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from sim.body.mj_joints import FREE, HINGE
@@ -20,7 +20,6 @@ from sim.interpolate import velocities
 from spark.errors import FileFormatError, name_list
 
 _FREE = "root"
-_BASE = 7
 
 
 def write_locomujoco(motion: RobotMotion, path: Path) -> None:
@@ -51,7 +50,7 @@ def is_locomujoco(arrays: Mapping[str, Any]) -> bool:
 def read_locomujoco(arrays: Mapping[str, Any], path: Path, robot: Morphology) -> RobotMotion:
     """The first trajectory, joints by their names; joints that the file leaves out stay at 0."""
     names = np.asarray(arrays.get("joint_names", [])).tolist()
-    qpos = number_array(arrays, "qpos", path, (None, _BASE - 1 + len(names)))
+    qpos = number_array(arrays, "qpos", path, (None, BASE_WIDTH - 1 + len(names)))
     own = [name for name in names[1:] if name in robot.joint_names]
     if not own or names[0] in robot.joint_names:
         raise FileFormatError(
@@ -72,6 +71,8 @@ def read_locomujoco(arrays: Mapping[str, Any], path: Path, robot: Morphology) ->
     taken = qpos[splits[0] : splits[1]]
     angles = np.zeros((len(taken), len(robot.joint_names)))
     for name in own:
-        angles[:, robot.joint_names.index(name)] = taken[:, _BASE - 1 + names.index(name)]
+        angles[:, robot.joint_names.index(name)] = taken[:, BASE_WIDTH - 1 + names.index(name)]
     frame_time = frame_time_of(scalar(arrays, "frequency", path), path)
-    return motion_of(Columns(taken[:, :3], taken[:, 3:7], angles, frame_time), robot, path, notes)
+    return motion_of(
+        Columns(taken[:, :3], taken[:, 3:BASE_WIDTH], angles, frame_time), robot, path, notes
+    )

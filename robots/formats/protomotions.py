@@ -10,7 +10,7 @@ import numpy as np
 
 from robots.formats.arrays import number_array, scalar
 from robots.formats.bodies import body_states, foot_contacts, gradient
-from robots.formats.qpos import Columns, columns_of, frame_time_of, motion_of
+from robots.formats.qpos import Columns, columns_of, frame_time_of, motion_of, rate_of
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from spark.errors import FileFormatError
@@ -32,7 +32,6 @@ def write_protomotions(motion: RobotMotion, path: Path) -> None:
     contacts = np.zeros(states.pos.shape[:2], dtype=bool)
     for side, standing in foot_contacts(motion).items():
         contacts[:, bodies.index(_foot_body(robot, side))] = standing
-    fps = 1 / motion.frame_time
     arrays = {
         "rigid_body_pos": states.pos,
         "rigid_body_rot": np.roll(states.quat, -1, axis=-1),
@@ -44,7 +43,7 @@ def write_protomotions(motion: RobotMotion, path: Path) -> None:
     }
     entries: dict[str, Any] = {name: values.astype(np.float32) for name, values in arrays.items()}
     entries["rigid_body_contacts"] = contacts
-    entries["fps"] = round(fps) if abs(fps - round(fps)) < 1e-6 else fps
+    entries["fps"] = rate_of(motion.frame_time)
     write_tensors(path, entries)
 
 

@@ -14,6 +14,7 @@ from robots.registry import ENTRIES
 from spark.errors import ConventionError, FileFormatError, OutputError
 from spark.motion import check_frame_time
 
+BASE_WIDTH = 7  # columns before the joints': position, quaternion
 _HIGH = 10  # hip heights at which a robot hardly walks
 _LARGEST = 1e8  # [m, rad] beyond, no difference between frames is left
 _SAME_RATE = 1e-2  # of a rate: as those of files that round theirs
@@ -105,6 +106,12 @@ def frame_time_of(fps: float, path: Path) -> float:
     except ConventionError as error:
         raise FileFormatError(path, None, f"fps is {fps:g}, {error}") from error
     return frame_time
+
+
+def rate_of(frame_time: float) -> int | float:
+    """Frames a second, as a whole number where they are one but for rounding."""
+    fps = 1 / frame_time
+    return round(fps) if abs(fps - round(fps)) < 1e-6 else fps
 
 
 def check_one_rate(arrays: Mapping[str, object], frame_time: float, path: Path) -> None:

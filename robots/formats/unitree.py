@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from robots.formats.about import write_sidecar
 from robots.formats.made_from import Source
-from robots.formats.qpos import Columns, columns_of, frame_time_of, motion_of
+from robots.formats.qpos import BASE_WIDTH, Columns, columns_of, frame_time_of, motion_of
 from robots.formats.table import read_table
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
@@ -19,7 +19,6 @@ from spark.errors import ConventionError, FileFormatError
 from spark.files import write_atomically
 
 ORDERS = ("xyzw", "wxyz")
-_BASE = 7
 _UPRIGHT = 0.5  # cosine of the mean tilt of a trunk that mostly stands
 _CLEARLY = 0.3  # how much less it is where quaternions are read in the wrong order
 
@@ -52,7 +51,7 @@ def read_csv(path: Path, robot: Morphology, *, quat: str, fps: float) -> RobotMo
     if likely not in (quat, None):
         notes = (f"read as {quat} the robot does not stand upright, as {likely} it does",)
     turned = _wxyz(table, quat)
-    columns = Columns(table[:, :3], turned, table[:, _BASE:], frame_time_of(fps, path))
+    columns = Columns(table[:, :3], turned, table[:, BASE_WIDTH:], frame_time_of(fps, path))
     return motion_of(columns, robot, path, notes)
 
 
@@ -76,13 +75,13 @@ def uprightness(table: Float[np.ndarray, "T C"], quat: str) -> float:
 
 
 def _wxyz(table: Float[np.ndarray, "T C"], quat: str) -> Float[np.ndarray, "T 4"]:
-    turned = table[:, 3:_BASE]
+    turned = table[:, 3:BASE_WIDTH]
     return turned if quat == "wxyz" else np.roll(turned, 1, axis=1)
 
 
 def _table(path: Path) -> Float[np.ndarray, "T C"]:
     _, table = read_table(path)
-    if table.shape[1] <= _BASE:
+    if table.shape[1] <= BASE_WIDTH:
         raise FileFormatError(
             path, 1, f"has {table.shape[1]} columns; expected 7 of the base and one for each joint"
         )
