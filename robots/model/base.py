@@ -59,20 +59,15 @@ def free_root(spec: mujoco.MjSpec, root: str, path: Path, notes: list[str]) -> N
             f"{path}: the root {root!r} turns about {joints[0].name!r} but can't move; expected a "
             "free joint, or none"
         )
+    for key in list(spec.keys):  # of other coordinates
+        spec.delete(key)
     if joints:
-        gone = {joint.name for joint in joints}
-        names = ", ".join(repr(joint.name) for joint in joints)
-        for actuator in list(spec.actuators):
-            if actuator.target in gone:
-                spec.delete(actuator)
-        for key in list(spec.keys):
-            spec.delete(key)
-        for joint in joints:
-            spec.delete(joint)
-        notes.append(f"the root {root!r} moves by {names}; in qpos a free joint stands for them")
+        names = [joint.name for joint in joints]
+        for element in [*(a for a in spec.actuators if a.target in names), *joints]:
+            spec.delete(element)
+        moves = ", ".join(map(repr, names))
+        notes.append(f"the root {root!r} moves by {moves}; in qpos a free joint stands for them")
     else:
-        for key in list(spec.keys):
-            spec.delete(key)
         notes.append(f"no free joint: one was given to {root!r}, its first 7 numbers in qpos")
     body.add_freejoint(name=f"{root}_free")
 

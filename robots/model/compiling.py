@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from robots.model import model_cache
+from sim.body.compiling import one_line
 from spark.errors import FileFormatError, name_list
 
 _MIN_MASS, _MIN_INERTIA = 1e-4, 1e-8  # [kg], [kg m²] of bodies whose mass went with their meshes
@@ -134,11 +135,6 @@ def _drop_assets(spec: mujoco.MjSpec) -> None:
             spec.delete(element)
     spec.compiler.boundmass = _MIN_MASS
     spec.compiler.boundinertia = _MIN_INERTIA
-
-
-def one_line(error: Exception) -> str:
-    """MuJoCo's message on one line."""
-    return " ".join(str(error).split())
 
 
 # What a model is read without where it can't be compiled with it, one after another.

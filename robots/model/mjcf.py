@@ -15,11 +15,11 @@ from jaxtyping import Float
 
 from robots.model import model_cache
 from robots.model.base import find_root, free_root, stand
-from robots.model.compiling import compiled, one_line
+from robots.model.compiling import compiled
 from robots.model.finite import check_finite, nan_in
 from robots.model.mjcf_source import read_source
 from robots.model.urdf import is_urdf, read_urdf
-from sim.body.compiling import warnings_as_notes
+from sim.body.compiling import one_line, warnings_as_notes
 from sim.body.mj_joints import SLIDE, body_name, hinges_and_balls, joint_name
 from sim.trajectory import subtree
 from spark.errors import FileFormatError, name_list

@@ -14,6 +14,7 @@ import numpy as np
 from robots.model.mjcf_limits import DEPTH, check_limits
 from robots.model.urdf_meshes import find_meshes
 from robots.model.xml import parse_xml
+from sim.body.compiling import one_line
 from spark.errors import FileFormatError, SkeletonError, name_list
 from spark.opening import LARGEST_TEXT, beginning, read_bytes
 from spark.summary import counted
@@ -89,8 +90,7 @@ def read_urdf(path: Path, notes: list[str], *, visuals: bool = True) -> tuple[mu
     try:
         spec = mujoco.MjSpec.from_string(text, assets=assets)
     except (ValueError, RuntimeError) as error:
-        message = " ".join(str(error).split())
-        raise FileFormatError(path, None, f"MuJoCo can't read it: {message}") from error
+        raise FileFormatError(path, None, f"MuJoCo can't read it: {one_line(error)}") from error
     for mesh in spec.meshes:
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # any mesh has one
     return spec, text

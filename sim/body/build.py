@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from sim.body.actuators import add_servos, ctrl_of_qpos, set_strength, strengths
-from sim.body.compiling import warnings_as_notes
+from sim.body.compiling import one_line, warnings_as_notes
 from sim.body.geoms import add_geoms, add_materials
 from sim.body.inertia import Inertias, inertias
 from sim.body.joints import CONES, HINGES, JointType, Range, mirrored
@@ -52,8 +52,7 @@ def build_body(
     try:
         return _built(rig, mass, joints, mesh)
     except ValueError as error:  # of MuJoCo: two joints, say, whose names come out as the same
-        message = " ".join(str(error).split())
-        raise SkeletonError(f"MuJoCo can't build this body: {message}") from error
+        raise SkeletonError(f"MuJoCo can't build this body: {one_line(error)}") from error
 
 
 def _built(

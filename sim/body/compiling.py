@@ -14,6 +14,11 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
         return spec.compile()
 
 
+def one_line(error: Exception) -> str:
+    """MuJoCo's message on one line."""
+    return " ".join(str(error).split())
+
+
 @contextmanager
 def warnings_as_notes(notes: list[str]) -> Iterator[None]:
     """Collect MuJoCo's warnings as notes, each once."""

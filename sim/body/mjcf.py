@@ -6,7 +6,7 @@ from xml.sax.saxutils import escape
 
 import mujoco
 
-from sim.body.compiling import compiled, warnings_as_notes
+from sim.body.compiling import compiled, one_line, warnings_as_notes
 from spark.errors import OutputError
 from spark.files import write_atomically
 
@@ -72,8 +72,8 @@ def _check_loads(text: str, path: Path) -> None:
         if not list(spec.meshes):  # whose files are still to come
             compiled(spec)
     except ValueError as error:
-        message = " ".join(str(error).split())
-        raise OutputError(f"{path}: not written: MuJoCo could not load it ({message})") from error
+        message = f"MuJoCo could not load it ({one_line(error)})"
+        raise OutputError(f"{path}: not written: {message}") from error
 
 
 def _scene(path: Path) -> str:
