@@ -171,7 +171,7 @@ def _add_meshes(
 ) -> dict[int, str]:
     """The meshes of some geoms, with at most about `MAX_FACES` faces in all, and their names."""
     used = sorted({int(model.geom_dataid[g]) for g in geoms if int(model.geom_type[g]) == _MESH})
-    simplified = simplify_together({mesh: _mesh(model, mesh) for mesh in used}, MAX_FACES)
+    simplified = simplify_together({mesh: mesh_of(model, mesh) for mesh in used}, MAX_FACES)
     names = {mesh: f"{prefix}mesh{mesh}" for mesh in used}
     for mesh, (vertices, faces) in simplified.items():
         spec.add_mesh(
@@ -183,7 +183,8 @@ def _add_meshes(
     return names
 
 
-def _mesh(model: mujoco.MjModel, mesh: int) -> Mesh:
+def mesh_of(model: mujoco.MjModel, mesh: int) -> Mesh:
+    """The vertices and faces of a mesh of the model."""
     start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
     first, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
     return (

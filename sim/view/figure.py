@@ -10,6 +10,7 @@ from spark.kinematics import forward
 from spark.motion import Motion
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
+from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_mul, quat_rotate
 from spark.skin import Skin
 
@@ -54,12 +55,12 @@ class Figure:
         """The height [m] of its crown over its soles in the T-pose; where it has no head, that of a
         human with its legs."""
         rig = self.rig
-        heads = [j for j, role in enumerate(rig.roles.roles) if role is not None and role == "head"]
+        heads = rig.roles.joints(Role.HEAD)
         if not heads or not rig.soles:
             return rig.standing_height
         heights = rig.tpose_positions[:, 2]
         feet = [sole_positions(s, rig.tpose_positions, rig.tpose)[:, 2].min() for s in rig.soles]
-        return float(heights[heads].max() - min(feet)) + _HEAD * rig.standing_height
+        return float(heights[list(heads)].max() - min(feet)) + _HEAD * rig.standing_height
 
     @property
     def ahead(self) -> Float[np.ndarray, "3"]:

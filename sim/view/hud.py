@@ -7,6 +7,7 @@ from sim.view.controls import help_rows
 from sim.view.marks import RGBA, rgba
 from sim.view.player import Player
 from sim.view.text import plain
+from spark.summary import counted
 
 _BACK: RGBA = (0.12, 0.13, 0.16, 1.0)
 _TRACK: RGBA = (0.24, 0.26, 0.31, 1.0)
@@ -90,8 +91,7 @@ class Hud:
         known = player.known
         if known is None:
             return ""
-        count = len(known.events)
-        found = "no findings" if not count else "1 finding" if count == 1 else f"{count} findings"
+        found = counted(len(known.events), "finding") if known.events else "no findings"
         return f"{player.figures[player.judged].label}: {found}"
 
     def _overlay(

@@ -14,6 +14,7 @@ from sim.template import Template
 from sim.view.annotations import Annotations
 from sim.view.camera import distances
 from sim.view.controls import TOGGLES, help_rows
+from sim.view.display import mesh_of
 from sim.view.figure import Figure
 from sim.view.packing import STEPS, in_base64, packed, short
 from sim.view.page_marks import page_marks
@@ -175,17 +176,11 @@ def _geom(
     }
     if kind != _MESH:
         return {**out, "shape": _PRIMITIVES[kind], "size": short(model.geom_size[geom])}
-    mesh = int(model.geom_dataid[geom])
-    start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
-    first, number = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
-    vertices = model.mesh_vert[start : start + count].astype(float)
-    faces = model.mesh_face[first : first + number].astype("<u4" if count > 65535 else "<u2")
+    vertices, corners = mesh_of(model, int(model.geom_dataid[geom]))
+    wide = len(vertices) > 65535
+    faces = corners.astype("<u4" if wide else "<u2")
     # The same mesh of several figures is kept once.
     key = vertices.tobytes() + faces.tobytes()
     if key not in meshes:
-        meshes[key] = {
-            **packed(vertices),
-            "faces": in_base64(faces),
-            "wide": count > 65535,
-        }
+        meshes[key] = {**packed(vertices), "faces": in_base64(faces), "wide": wide}
     return {**out, "shape": "mesh", "mesh": list(meshes).index(key)}
