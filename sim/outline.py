@@ -7,20 +7,19 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from sim.body.geoms import HIDDEN_GROUP
+
 _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = (
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"))
     for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")
 )
 
 
-_HIDDEN = 3  # from this group on MuJoCo's viewer hides geoms: by custom those to collide with
-
-
 def solid(model: mujoco.MjModel, geoms: Sequence[int]) -> list[int]:
     """Those of some geoms that collide. Where none does, as in models that leave it to their
     scene's pairs: those that are hidden, or else all."""
     colliding = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
-    return colliding or [g for g in geoms if model.geom_group[g] >= _HIDDEN] or list(geoms)
+    return colliding or [g for g in geoms if model.geom_group[g] >= HIDDEN_GROUP] or list(geoms)
 
 
 def outline(

@@ -23,7 +23,8 @@ _NO_BONE = 1e-4  # [m] shorter ones have no shape: a toe may lie in its ankle
 _HEAD_CENTER = np.array([0.015, 0.0, 0.055])  # from the head's joint
 _INSIDE = 0.95  # of the thickness of what hangs on a link, so that it ends inside of that
 _AT_JOINT = np.zeros(3)
-_HIDDEN = 3  # the group of geoms that viewers don't show
+HIDDEN_GROUP = 3
+"""From this group on viewers don't show geoms: by custom those to collide with."""
 _FOOT_HEIGHT = 0.022  # of a foot's box
 
 # Warm on the left, cool on the right: a swapped side is seen at once.
@@ -166,7 +167,9 @@ class _GeomBuilder:
             fromto=[*start, *tip],
             size=[min(radius, 0.5 * length + 0.004), 0, 0],
             material=material_of(self.rig, joint),
-            group=_HIDDEN if self._loose(joint) else self.spec.find_default(default).geom.group,
+            group=HIDDEN_GROUP
+            if self._loose(joint)
+            else self.spec.find_default(default).geom.group,
         )
 
     def _loose(self, joint: int) -> bool:
@@ -192,4 +195,4 @@ class _GeomBuilder:
             material=material_of(self.rig, joint),
         )
         if hidden:
-            box.group = _HIDDEN
+            box.group = HIDDEN_GROUP

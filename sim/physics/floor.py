@@ -6,12 +6,12 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from sim.body.geoms import HIDDEN_GROUP
 from sim.physics.overlaps import let_overlap
 from sim.physics.unaided import leave_unaided
 from sim.trajectory import ModelTrajectory
 from spark.errors import SkeletonError
 
-_COLLISION_GROUP = 3  # by custom; viewers don't show it
 _SAME_HEIGHT, _SAME_TILT = 1e-3, 1e-3  # [m], [rad]: within these a plane is the floor
 _AWAY = 100.0  # [m] below the floor: where no body comes
 _PLANE = mujoco.mjtGeom.mjGEOM_PLANE
@@ -101,10 +101,10 @@ def _let_something_collide(spec: mujoco.MjSpec, notes: list[str]) -> None:
         return
     if not shapes:
         raise SkeletonError("the model has no shapes: it would fall through the floor")
-    meant = [geom for geom in shapes if int(geom.group) >= _COLLISION_GROUP]
+    meant = [geom for geom in shapes if int(geom.group) >= HIDDEN_GROUP]
     for geom in meant or shapes:
         geom.conaffinity = 1
-    what = f"those of group {_COLLISION_GROUP} and above" if meant else "all of them"
+    what = f"those of group {HIDDEN_GROUP} and above" if meant else "all of them"
     notes.append(f"no shape of the model is set to collide: {what} do here, with the floor alone")
 
 

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from sim.body.geoms import HIDDEN_GROUP
 from sim.body.mj_joints import BALL, FREE
 from sim.body.parts import kept_joints
 from sim.trajectory import ModelTrajectory, subtree
@@ -32,7 +33,6 @@ _SHOWN_TYPES = (
     int(mujoco.mjtGeom.mjGEOM_BOX),
     _MESH,
 )
-_SHOWN_GROUPS = 3  # viewers show the groups below this one
 _UNSET_RGBA = (0.5, 0.5, 0.5, 1.0)
 _WIDTHS = {FREE: 7, BALL: 4}
 
@@ -57,7 +57,7 @@ def add_display(
     inside = subtree(model, body.root)
     shown = [g for g in range(model.ngeom) if int(model.geom_bodyid[g]) in inside]
     shown = [g for g in shown if int(model.geom_type[g]) in _SHOWN_TYPES and not bare]
-    visible = [g for g in shown if int(model.geom_group[g]) < _SHOWN_GROUPS]
+    visible = [g for g in shown if int(model.geom_group[g]) < HIDDEN_GROUP]
     meshes = _add_meshes(spec, model, visible or shown, prefix, scale)
     columns: list[int] = []
     bodies: dict[int, mujoco.MjsBody] = {}
