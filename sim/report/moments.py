@@ -1,14 +1,12 @@
 """The worst moments of a motion as pictures: each figure in a frame of its own."""
 
-import base64
-import io
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import UInt8
 
 from sim.report.result import Finding, Result
 from sim.view.figure import Figure
+from sim.view.pictures import jpeg
 from sim.view.render import stills
 from sim.view.staging import build_scene
 from spark.errors import DependencyError
@@ -17,6 +15,7 @@ _MOST = 6  # pictures
 _APART = 0.25  # [s] findings nearer to each other than this share a picture
 _SIZE = (360, 400)  # [pixels] of one figure
 _GAP = 6  # [pixels] between figures
+_QUALITY = 85  # of their JPEGs
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,16 +61,9 @@ def _pictures(figures: list[Figure], times: list[float]) -> list[str]:
         columns.append(stills(scene, at, width=width, height=height))
     gap = np.full((height, _GAP, 3), 255, dtype=np.uint8)
     return [
-        _jpeg(np.concatenate([part for column in row for part in (gap, column)][1:], axis=1))
+        jpeg(
+            np.concatenate([part for column in row for part in (gap, column)][1:], axis=1),
+            quality=_QUALITY,
+        )
         for row in zip(*columns, strict=True)
     ]
-
-
-def _jpeg(picture: UInt8[np.ndarray, "H W 3"]) -> str:
-    try:
-        from PIL import Image
-    except ImportError as error:
-        raise DependencyError("pictures need Pillow: pip install 'spark-sim[video]'") from error
-    buffer = io.BytesIO()
-    Image.fromarray(picture).save(buffer, format="JPEG", quality=85)
-    return base64.b64encode(buffer.getvalue()).decode()

@@ -1,17 +1,17 @@
 """A skin as the replay's page reads it."""
 
-import base64
 from collections.abc import Sequence
-from io import BytesIO
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from sim.view.packing import STEPS, in_base64, packed, short
+from sim.view.pictures import jpeg
 from spark.skin import INFLUENCES, Skin
 
 _FEW, _SIDE = 4, 256  # with more pictures than this, each is smaller [pixels]
+_QUALITY = 80  # of their JPEGs
 
 
 def page_skin(skin: Skin, bodies: Sequence[int]) -> dict[str, Any]:
@@ -23,7 +23,8 @@ def page_skin(skin: Skin, bodies: Sequence[int]) -> dict[str, Any]:
     pad = ((0, 0), (0, INFLUENCES - skin.bones_of.shape[1]))
     uv_scale = max(float(np.abs(skin.uv).max()), 1.0) / STEPS
     normals = np.pad(np.round(127 * smooth_normals(skin.vertices, skin.faces)), ((0, 0), (0, 1)))
-    few = sum(material.image is not None for material in skin.materials) <= _FEW
+    count = sum(material.image is not None for material in skin.materials)
+    side = None if count <= _FEW else _SIDE
     return {
         "place": packed(skin.vertices),
         "normals": in_base64(normals.astype("<i1")),
@@ -39,7 +40,7 @@ def page_skin(skin: Skin, bodies: Sequence[int]) -> dict[str, Any]:
                 "start": 3 * start,
                 "count": 3 * size,
                 "rgb": short(np.array(material.rgb)),
-                "image": None if material.image is None else _jpeg(material.image, small=not few),
+                "image": None if material.image is None else _address(material.image, side),
             }
             for material, start, size in zip(skin.materials, starts, sizes, strict=False)
             if size
@@ -61,13 +62,6 @@ def smooth_normals(
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
 
 
-def _jpeg(image: UInt8[np.ndarray, "H W 3"], *, small: bool) -> str:
-    """A picture as an address that holds it; reading it took Pillow."""
-    from PIL import Image
-
-    made = Image.fromarray(image)
-    if small:
-        made.thumbnail((_SIDE, _SIDE))
-    buffer = BytesIO()
-    made.save(buffer, format="JPEG", quality=80)
-    return f"data:image/jpeg;base64,{base64.b64encode(buffer.getvalue()).decode()}"
+def _address(image: UInt8[np.ndarray, "H W 3"], side: int | None) -> str:
+    """An address that holds a picture, which is no larger than `side` [pixels]."""
+    return f"data:image/jpeg;base64,{jpeg(image, quality=_QUALITY, side=side)}"

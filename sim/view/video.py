@@ -5,11 +5,11 @@ from collections.abc import Callable, Iterable
 from io import BytesIO
 from pathlib import Path
 from shutil import which
-from typing import Any
 
 import numpy as np
 
 from sim.view.camera import fitting_aspect
+from sim.view.pictures import pillow
 from sim.view.render import frames, stills
 from sim.view.scene import Scene
 from sim.view.staging import thinned
@@ -90,7 +90,7 @@ def write_strip(
 
     Each is `width` x `height` pixels; without a width, just wide enough for the figures.
     """
-    image = _pillow()
+    image = pillow()
     path = Path(path)
     count = count or (5 if len(scene.placements) < 4 else 3)
     indices = np.linspace(0, len(scene.qpos) - 1, count).round().astype(int).tolist()
@@ -110,7 +110,7 @@ def write_animation(
 ) -> None:
     """A GIF or a WebP, by the ending, that loops for ever: for a README. At most `_ANIMATED_FPS`
     frames a second; just wide enough for the figures. `speed` is that of `write_video`."""
-    image = _pillow()
+    image = pillow()
     path = Path(path)
     step = max(1, round(speed / (_ANIMATED_FPS * scene.frame_time)))
     indices = progress(range(0, len(scene.qpos), step))
@@ -133,15 +133,6 @@ def write_animation(
     kind = "GIF" if path.suffix.lower() == ".gif" else "WebP"
     pictures[0].save(buffer, format=kind, duration=durations, **more)
     write_atomically(path, buffer.getvalue())
-
-
-def _pillow() -> Any:
-    """Pillow's Image."""
-    try:
-        from PIL import Image
-    except ImportError as error:
-        raise DependencyError("pictures need Pillow: pip install 'spark-sim[video]'") from error
-    return Image
 
 
 def _ffmpeg() -> str:
