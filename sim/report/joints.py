@@ -57,8 +57,8 @@ def joint_rows(clip: ClipMetrics) -> list[JointRow]:
 
 
 _BONES = {
-    f"{side} {limit.name}".strip(): f"{side} {limit.role}".strip().replace("_", " ")
+    limit.on(side): f"{side} {limit.role}".strip().replace("_", " ")
     for limit in LIMITS
-    for side in (("left", "right") if limit.paired else ("",))
+    for side in limit.sides
 }
 """What a rig's joint is called by its role, of each anatomical limit."""

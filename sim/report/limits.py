@@ -45,6 +45,15 @@ class JointLimit:
     movements: tuple[_Movements, _Movements, _Movements]
     paired: bool = True
 
+    @property
+    def sides(self) -> tuple[str, ...]:
+        """ "left" and "right"; of the trunk "" alone."""
+        return ("left", "right") if self.paired else ("",)
+
+    def on(self, side: str) -> str:
+        """What the joint is called on a side ("left knee")."""
+        return f"{side} {self.name}".strip()
+
 
 _TWISTS: _Movements = ("twists", "twists")
 _SIDEWAYS: _Movements = ("bends sideways", "bends sideways")
@@ -163,7 +172,7 @@ def limit_excess(since_tpose: Float[np.ndarray, "T J 4"], rig: Rig) -> tuple[Lim
     """
     excesses = []
     for limit in LIMITS:
-        for side in ("left", "right") if limit.paired else ("",):
+        for side in limit.sides:
             joint = _joint(rig, side, limit.role)
             parent = next(
                 (p for role in limit.below if (p := _joint(rig, side, role)) is not None), None
@@ -175,7 +184,7 @@ def limit_excess(since_tpose: Float[np.ndarray, "T J 4"], rig: Rig) -> tuple[Lim
                 rotation = rotation * np.array([1.0, -1.0, 1.0, -1.0])  # mirrored in the XZ plane
             excesses.append(
                 LimitExcess(
-                    f"{side} {limit.name}".strip(),
+                    limit.on(side),
                     _beyond(swing_and_twist(rotation, limit.axis), np.radians(limit.ranges)),
                     tuple(word for words in limit.movements for word in words),
                     PLAUSIBILITY_V4.limit_margin,
@@ -206,8 +215,8 @@ def joint_of_bone(bone: str) -> str:
 def limited_joint(rig: Rig, name: str) -> int | None:
     """The joint that a `LimitExcess` calls `name`."""
     for limit in LIMITS:
-        for side in ("left", "right") if limit.paired else ("",):
-            if f"{side} {limit.name}".strip() == name:
+        for side in limit.sides:
+            if limit.on(side) == name:
                 return _joint(rig, side, limit.role)
     return None
 
