@@ -43,13 +43,7 @@ class NormalEquations:
         if not self.with_jacobian or not len(dofs):
             return
         H = J @ J.transpose(0, 2, 1)
-        g = (J @ residuals.T[:, :, None])[:, :, 0]
-        slices = runs(dofs)
-        for here, there in slices:
-            self.g[:, there] += g[:, here]
-            for here2, there2 in slices:
-                if there2.start >= there.start:
-                    self.H[:, there, there2] += H[:, here, here2]
+        self._scatter(slice(None), dofs, H, (J @ residuals.T[:, :, None])[:, :, 0])
 
     def add_moved(
         self,
@@ -63,7 +57,16 @@ class NormalEquations:
         `twists` (`robots.residuals.twists`): with w the wrench that makes a residual's Jacobian of
         them, the sums of w w' (`squares`) and w r. What they cost is added by who knows them."""
         H = twists @ squares @ twists.transpose(0, 2, 1)
-        g = (twists @ sums[:, :, None])[:, :, 0]
+        self._scatter(frames, dofs, H, (twists @ sums[:, :, None])[:, :, 0])
+
+    def _scatter(
+        self,
+        frames: slice | Int[np.ndarray, "S"],
+        dofs: Sequence[int],
+        H: Float[np.ndarray, "S C C"],
+        g: Float[np.ndarray, "S C"],
+    ) -> None:
+        """Add products of a Jacobian by some of the dofs, in some frames."""
         slices = runs(dofs)
         for here, there in slices:
             self.g[frames, there] += g[:, here]
