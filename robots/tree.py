@@ -79,6 +79,10 @@ class Tree:
             kept = np.minimum(margin, 0.05 * (self.upper - self.lower))
         return self.lower + kept, self.upper - kept
 
+    def rest_balls(self, frames: int) -> Float[np.ndarray, "T N 4"] | None:
+        """The balls' rotations in the rest pose, in each of some frames; None without balls."""
+        return np.tile([1.0, 0, 0, 0], (frames, len(self), 1)) if self.balls.any() else None
+
     def chain(self, link: int) -> tuple[int, ...]:
         """The joints from the base out to `link`."""
         return self._chains[link]

@@ -108,9 +108,8 @@ class Morphology:
         angles = np.zeros((len(qpos), len(tree)))
         hinges = ~tree.balls
         angles[:, hinges] = qpos[:, self.addresses[hinges]] - model.qpos0[self.addresses[hinges]]
-        balls = None
-        if tree.balls.any():
-            balls = np.tile([1.0, 0, 0, 0], (len(qpos), len(tree), 1))
+        balls = tree.rest_balls(len(qpos))
+        if balls is not None:
             for j in np.flatnonzero(tree.balls):
                 at = int(self.addresses[j])
                 local = quat_normalize(qpos[:, at : at + 4])

@@ -39,8 +39,8 @@ def local_poses(
 def half_bent(tree: Tree, segments: Sequence[Segment], skeleton: Skeleton) -> Motion:
     """One frame with every hinge in the middle of its limits: knees and elbows, which can't bend
     both ways, are bent there."""
-    balls = np.tile([1.0, 0, 0, 0], (1, len(tree), 1)) if tree.balls.any() else None
-    q = Coordinates(tree.base[None], np.array([[1.0, 0, 0, 0]]), tree.middle[None], balls)
+    still = np.array([[1.0, 0, 0, 0]])
+    q = Coordinates(tree.base[None], still, tree.middle[None], tree.rest_balls(1))
     links = np.array([segment.link for segment in segments])
     centers = np.array([segment.center for segment in segments])
     local = local_poses(tree, links, centers, skeleton.parents, q)

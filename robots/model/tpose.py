@@ -125,14 +125,11 @@ def _initial_guesses(tree: Tree, upright: Float[np.ndarray, "4"]) -> Coordinates
     middle = tree.middle
     angles = np.stack([rest, middle, (rest + middle) / 2, rest + 0.3 * (middle - rest)])
     angles[:, tree.balls] = 0.0
-    balls = None
-    if tree.balls.any():
-        balls = np.tile([1.0, 0, 0, 0], (len(angles), len(tree), 1))
     return Coordinates(
         np.tile(tree.base, (len(angles), 1)),
         np.tile(upright, (len(angles), 1)),
         angles,
-        balls,
+        tree.rest_balls(len(angles)),
     )
 
 
