@@ -30,26 +30,18 @@ class Shot:
     offset: Float[np.ndarray, "F 3"]
 
 
-def shot(
-    scene: Scene,
-    *,
-    aspect: float,
-    frames: Sequence[int] | None = None,
-    half_view: float = _HALF_VIEW,
-    centered: bool = False,
-) -> Shot:
+def shot(scene: Scene, *, aspect: float, frames: Sequence[int] | None = None) -> Shot:
     """The nearest camera that sees all figures in some frames, each framed anew; or, without any,
     in all of them, from a camera that follows the centres.
 
-    It sees `half_view` (the tangent of half its angle) up and down, and `aspect` times that to the
-    sides. Where it is `centered`, it looks at the centres themselves.
+    It sees `FIELD_OF_VIEW` up and down, and `aspect` times that to the sides.
     """
-    return _fit(extents(scene, _picked(scene, frames)), scene, aspect, half_view, centered, frames)
+    return _fit(extents(scene, _picked(scene, frames)), scene, aspect, _HALF_VIEW, False, frames)
 
 
 def distances(scene: Scene, aspects: Sequence[float], half_view: float) -> list[float]:
-    """How far [m] from the centres a camera is that sees all figures in all frames in pictures of
-    some shapes; `shot` has the rest."""
+    """How far [m] from the centres a camera that looks at them is to see all figures in all frames,
+    in pictures of some shapes. It sees `half_view` (the tangent of half its angle) up and down."""
     found = extents(scene, _picked(scene, None))
     return [_fit(found, scene, aspect, half_view, True, None).distance for aspect in aspects]
 

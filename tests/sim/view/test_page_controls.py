@@ -9,7 +9,7 @@ import pytest
 
 from sim.report import Subject
 from sim.report.watch import known_of
-from sim.view.camera import shot
+from sim.view.camera import distances
 from sim.view.controls import CONTROLS, TOGGLES
 from sim.view.figure import Figure
 from sim.view.page import page
@@ -119,9 +119,7 @@ def test_all_are_seen_whatever_the_shape_of_the_window(tmp_path: Path) -> None:
     text = page(figures, title="three")
     found = asked(text, f"return {shapes}.map(fitting);", tmp_path)
     scene = build_scene(figures, max_fps=30.0)
-    needed = [
-        shot(scene, aspect=1 / tall, half_view=0.27, centered=True).distance for tall in shapes
-    ]
+    needed = distances(scene, [1 / tall for tall in shapes], 0.27)
     assert needed[-1] > 2 * needed[0]
     for got, least in zip(found[1:], needed[1:], strict=True):
         assert least - 1e-6 <= got <= 1.08 * least
