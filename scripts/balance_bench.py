@@ -12,25 +12,32 @@ from pathlib import Path
 import numpy as np
 
 from robots.model.known import known
+from robots.model.morphology import Morphology
 from robots.solver.solve import retarget
-from scripts.robot_bars import FOLDERS, clips_of, plausible
+from scripts.robot_bars import FOLDERS, plausible_clips
 from sim.physics.summary import summarize
 from sim.physics.tracking import track
 from sim.report.assess import assess
 from sim.trajectory import Subject
+from spark.transfer.canonical import CanonicalMotion
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def robots_and_clips(doc: str) -> tuple[dict[str, Morphology], dict[str, CanonicalMotion]]:
+    """What the command line of a program with this docstring names: robots, and clips whose source
+    is itself plausible."""
+    parser = argparse.ArgumentParser(description=doc.splitlines()[0])
     parser.add_argument("data", type=Path, help="the folder with the recordings")
     parser.add_argument("--robots", nargs="+", default=["unitree_g1"])
     parser.add_argument("--clips", nargs="+", default=FOLDERS)
     parser.add_argument("--seconds", type=float, default=8.0, help="of each clip, at most")
     args = parser.parse_args()
-    clips = clips_of(args.data, args.clips, args.seconds)
-    clips = {name: source for name, source in clips.items() if plausible(source)}
-    for name in args.robots:
-        robot = known(name)
+    clips = plausible_clips(args.data, args.clips, args.seconds)
+    return {name: known(name) for name in args.robots}, clips
+
+
+def main() -> None:
+    robots, clips = robots_and_clips(__doc__)
+    for name, robot in robots.items():
         shares, errors = [], []
         for stem, source in clips.items():
             result = retarget(source, robot)

@@ -10,19 +10,17 @@ a least-squares problem with bounds, solved by NNLS. Torques follow from both, a
 the motors' limits. Nothing else holds the robot. docs/policies.md says how far it gets.
 """
 
-import argparse
 import time
-from pathlib import Path
 
 import mujoco
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import nnls
 
-from robots.model.known import known
 from robots.model.motion import RobotMotion
 from robots.solver.solve import retarget
-from scripts.robot_bars import FOLDERS, clips_of, plausible
+from scripts.balance_bench import robots_and_clips
+from sim.body.mj_joints import HINGE
 from sim.interpolate import at_times
 from sim.physics.floor import on_floor
 from sim.physics.policy_tracking import FALL_DROP, FALL_TILT
@@ -59,7 +57,7 @@ class Balance:
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.data, self.root = mujoco.MjData(model), body.root
         self.weight = float(model.body_subtreemass[body.root]) * GRAVITY
-        hinges = [j for j in range(model.njnt) if int(model.jnt_type[j]) == 3]
+        hinges = [j for j in range(model.njnt) if int(model.jnt_type[j]) == HINGE]
         self.dofs = model.jnt_dofadr[hinges]
         self.limits = np.array([torque_limit(model, j) or np.inf for j in hinges])
         self.height = motion.robot.rig.standing_height
@@ -184,15 +182,8 @@ def _followed(
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("data", type=Path, help="the folder with the recordings")
-    parser.add_argument("--robots", nargs="+", default=["unitree_g1"])
-    parser.add_argument("--clips", nargs="+", default=FOLDERS)
-    parser.add_argument("--seconds", type=float, default=8.0, help="of each clip, at most")
-    args = parser.parse_args()
-    clips = clips_of(args.data, args.clips, args.seconds)
-    clips = {name: source for name, source in clips.items() if plausible(source)}
-    for name, robot in {name: known(name) for name in args.robots}.items():
+    robots, clips = robots_and_clips(__doc__)
+    for name, robot in robots.items():
         shares = []
         for stem, source in clips.items():
             start, balance = time.process_time(), Balance(retarget(source, robot))

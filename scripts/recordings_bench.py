@@ -18,7 +18,7 @@ from robots.metrics import measure
 from robots.model.known import known
 from robots.solver.solve import retarget
 from scripts.corruptions import jittering, resampled
-from scripts.robot_bars import cells, clips_of, follow, mean_of, plausible
+from scripts.robot_bars import cells, follow, mean_of, plausible_clips
 from spark.motion import Motion
 from spark.resample import motion_at
 from spark.rig.contacts import ADULT_HEIGHT
@@ -58,8 +58,8 @@ def main() -> None:
     parser.add_argument("--method", choices=("solve", "stream"), default="solve")
     args = parser.parse_args()
     method = {"solve": retarget, "stream": follow}[args.method]
-    clips = clips_of(args.data, args.clips, args.seconds).values()
-    clean = [at_rate(clip, args.fps) for clip in clips if plausible(clip)]
+    clips = plausible_clips(args.data, args.clips, args.seconds).values()
+    clean = [at_rate(clip, args.fps) for clip in clips]
     for name in args.robots:
         robot = known(name)
         print(f"\n| {Path(name).stem}, {len(clean)} clips | {' | '.join(COLUMNS)} |")

@@ -74,9 +74,7 @@ def main() -> None:
     parser.add_argument("--all", action="store_true", help="sources that are implausible, too")
     parser.add_argument("--method", choices=("solve", "copy", "stream"), default="solve")
     args = parser.parse_args()
-    clips = clips_of(args.data, args.clips, args.seconds)
-    if not args.all:
-        clips = {name: c for name, c in clips.items() if plausible(c)}
+    clips = (clips_of if args.all else plausible_clips)(args.data, args.clips, args.seconds)
     method = {"solve": retarget, "copy": copy, "stream": follow}[args.method]
     for name in args.robots:
         robot = known(name)
@@ -100,18 +98,24 @@ def clips_of(data: Path, patterns: Sequence[str], seconds: float) -> dict[str, C
     return {path.stem: clip(path, seconds) for path in paths if path.suffix == ".bvh"}
 
 
+def plausible_clips(
+    data: Path, patterns: Sequence[str], seconds: float
+) -> dict[str, CanonicalMotion]:
+    """Those whose source is itself plausible, in most frames."""
+    clips = clips_of(data, patterns, seconds)
+    return {
+        name: source
+        for name, source in clips.items()
+        if assess(Subject(from_canonical(source), source.rig)).implausible < CLEAN
+    }
+
+
 def clip(path: Path, seconds: float) -> CanonicalMotion:
     """The first seconds of a recording; of those that a converter put a T-pose before, without."""
     motion = read_recording(path).motion
     first = 2 if path.parent.name == "cmu_dance" else 0
     motion = motion.frames(first, min(len(motion), first + round(seconds / motion.frame_time)))
     return to_canonical(motion, understand(motion))
-
-
-def plausible(source: CanonicalMotion) -> bool:
-    """Whether the source itself is, in most frames."""
-    report = assess(Subject(from_canonical(source), source.rig))
-    return report.implausible < CLEAN
 
 
 def follow(source: CanonicalMotion, robot: Morphology) -> RobotMotion:

@@ -21,6 +21,7 @@ from scripts.corruptions import to_and_fro
 from scripts.report_bench import MEASURES, clips, scores, separation, table
 from sim.interpolate import at_times
 from sim.report import Report, Subject, assess
+from sim.report.thresholds import HUMAN_HIP_HEIGHT
 from spark.rig.roles import Role
 from spark.transfer.canonical import to_canonical
 
@@ -29,7 +30,9 @@ Corruption = Callable[[RobotMotion, np.random.Generator], RobotMotion]
 
 def raised(motion: RobotMotion, rng: np.random.Generator, *, height: float) -> RobotMotion:
     """Moved up by `height` [m of a human, scaled] throughout."""
-    return _displaced(motion, np.array([0.0, 0.0, height * motion.robot.rig.hip_height / 0.9]))
+    return _displaced(
+        motion, np.array([0.0, 0.0, height * motion.robot.rig.hip_height / HUMAN_HIP_HEIGHT])
+    )
 
 
 def sliding(motion: RobotMotion, rng: np.random.Generator, *, speed: float) -> RobotMotion:

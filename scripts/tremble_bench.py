@@ -15,7 +15,7 @@ import numpy as np
 
 from scripts.characters_bench import read
 from scripts.recordings_bench import CLIPS, KINDS, at_rate
-from scripts.robot_bars import clips_of, plausible
+from scripts.robot_bars import plausible_clips
 from sim.report.assess import assess
 from sim.trajectory import Subject
 from spark.kinematics import forward
@@ -37,8 +37,7 @@ def main() -> None:
     parser.add_argument("--as-they-are", action="store_true")
     args = parser.parse_args()
     rigs = [read(path)[1].rig for path in args.targets]
-    clips = clips_of(args.data, CLIPS, SECONDS).values()
-    clean = [at_rate(clip, FPS) for clip in clips if plausible(clip)]
+    clean = [at_rate(clip, FPS) for clip in plausible_clips(args.data, CLIPS, SECONDS).values()]
     print("| | implausible, % | skating, % | root wrench, % | contacts, F1 | joints, % |")
     print("|---|---|---|---|---|---|")
     for kind, spoil in KINDS.items():

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from robot_bars import COLUMNS, clip, mean_of
+from robot_bars import cells, clip, mean_of
 
 from robots.metrics import RobotMetrics, measure
 from robots.model.known import known
@@ -60,11 +60,7 @@ def solved(clips: list[CanonicalMotion], robot: Morphology) -> RobotMetrics:
 
 
 def row(label: str, metrics: RobotMetrics) -> str:
-    cells = [label]
-    for title in SHOWN:
-        field, factor, shape, _ = COLUMNS[title]
-        cells.append(f"{factor * getattr(metrics, field):{shape}}")
-    return f"| {' | '.join(cells)} |"
+    return f"| {label} | {cells(metrics, SHOWN)} |"
 
 
 @contextmanager
