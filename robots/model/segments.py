@@ -1,16 +1,13 @@
-"""Hinge chains collapsed into one joint a limb segment: three hinges of a hip are one hip.
+"""Hinge chains collapsed into one joint a limb segment: three hinges of a hip are one hip."""
 
-Real hinges miss each other by centimetres and are anchored anywhere along their axes, so a joint's
-centre is the point nearest to all of its axes.
-"""
-
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from robots.model.joint_centers import joint_centers, nearest_point
 from robots.model.mjcf import Mjcf
 from robots.tree import ROOT, Tree
 from sim.body.mj_joints import BALL
@@ -18,7 +15,6 @@ from sim.body.mj_joints import BALL
 _COS_PARALLEL = np.cos(np.radians(30))
 """Consecutive hinges nearer to parallel are two joints, as a hip's pitch and a knee. Within a joint
 of the registry's robots they are 90 degrees apart."""
-_COS_ALONG = np.cos(np.radians(45))  # of a hinge's axis to a limb that it turns about itself
 _NO_LIMIT = 1e3  # [rad] files that ask for a limit get such a one where there is none
 _MAX_OFFSET_OF_SIZE = 0.025
 """How far the axes of one joint may pass from its centre, as a share of the diagonal around all
@@ -81,7 +77,7 @@ def segments_of(mjcf: Mjcf, tree: Tree, joints: Sequence[int]) -> list[Segment]:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     groups = _groups(tree, [int(body) for body in model.jnt_bodyid[joints]])
-    centers = _centers(tree, groups)
+    centers = joint_centers(tree, groups)
     segments = [Segment(-1, (), ROOT, mjcf.root, tree.base, (mjcf.body_name(mjcf.root),))]
     of_link = {ROOT: 0}
     of_body = {mjcf.root: 0}
@@ -177,77 +173,6 @@ def _leave_girdles_out(
         if pairs and meet(upper[1:], lower[:1]) and meet([upper[1], lower[0]], lower[1:]):
             lower.insert(0, upper.pop())
             of_joint[lower[0]] = of_joint[lower[1]]
-
-
-def nearest_point(
-    anchors: Float[np.ndarray, "N 3"], axes: Float[np.ndarray, "N 3"]
-) -> tuple[Float[np.ndarray, "3"], float]:
-    """The point with the least squared distance to some lines, and its largest distance [m].
-
-    Where the lines leave it open (a single line), it is the one nearest to their anchors.
-    """
-    across = np.eye(3) - axes[:, :, None] * axes[:, None]
-    middle = anchors.mean(0)
-    right = (across @ (anchors - middle)[:, :, None])[..., 0].sum(0)
-    point = middle + np.linalg.lstsq(across.sum(0), right, rcond=1e-3)[0]
-    away = (across @ (point - anchors)[:, :, None])[..., 0]
-    return point, float(np.linalg.norm(away, axis=-1).max())
-
-
-def _centers(tree: Tree, groups: Sequence[tuple[int, ...]]) -> list[Float[np.ndarray, "3"]]:
-    """The centre of each group. A single hinge leaves its place along the axis open: there it lies
-    nearest to the middle of its neighbours. The last one of a limb that turns it about itself, as
-    a wrist does, stays where the file has it: the middle would be at the limb's other end.
-    """
-    fixed = {
-        g: tree.anchors[group[0]]
-        if tree.balls[group[0]]
-        else nearest_point(tree.anchors[list(group)], tree.axes[list(group)])[0]
-        for g, group in enumerate(groups)
-        if len(group) > 1 or tree.balls[group[0]]
-    }
-    of_joint = {j: g for g, group in enumerate(groups) for j in group}
-    above = [of_joint.get(int(tree.parents[group[0]]), -1) for group in groups]
-    below: dict[int, list[int]] = {}
-    for g, up in enumerate(above):
-        below.setdefault(up, []).append(g)
-    centers = []
-    for g, group in enumerate(groups):
-        if g in fixed:
-            centers.append(fixed[g])
-            continue
-        up = above[g]
-        while up >= 0 and up not in fixed:
-            up = above[up]
-        known = [fixed[up]] if up >= 0 else _fixed_below(-1, below, fixed, but=g)
-        known += (beyond := _fixed_below(g, below, fixed))
-        anchor, axis = tree.anchors[group[0]], tree.axes[group[0]]
-        middle = np.mean(known, axis=0) if known else anchor
-        limb = anchor - middle
-        if up >= 0 and not beyond and abs(axis @ limb) > _COS_ALONG * np.linalg.norm(limb):
-            middle = anchor
-        centers.append(anchor + axis * (axis @ (middle - anchor)))
-    return centers
-
-
-def _fixed_below(
-    g: int,
-    below: Mapping[int, Sequence[int]],
-    fixed: dict[int, Float[np.ndarray, "3"]],
-    but: int | None = None,
-) -> list[Float[np.ndarray, "3"]]:
-    """The middle of the nearest groups below g whose centres are known; nothing without any."""
-    found = []
-    waiting = [g]
-    while waiting:
-        for child in below.get(waiting.pop(), ()):
-            if child == but:
-                continue
-            if child in fixed:
-                found.append(fixed[child])
-            else:
-                waiting.append(child)
-    return [np.mean(found, axis=0)] if found else []
 
 
 def _chain_lengths(tree: Tree) -> Float[np.ndarray, "N"]:

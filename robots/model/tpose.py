@@ -8,6 +8,7 @@ from jaxtyping import Float, Int
 
 from robots.kinematics import forward_kinematics
 from robots.least_squares import NormalEquations
+from robots.model.bending import BEND_AXES, bend_hinges_of
 from robots.model.followers import Follower, following
 from robots.residuals import Linearized, direction_residual, limit_residual, rotation_residual
 from robots.tree import BASE, Coordinates, Tree
@@ -27,12 +28,6 @@ _MAX_ITER = 60
 _STEP_TOL = 1e-5  # [rad] the search ends where no dof moves further
 _MAX_STEP = 0.3  # [rad] of a dof in one step: beyond, the linearisation says little
 _DAMPING = 1e-2  # [1] added to the normal equations' diagonal
-_BEND_AXES = {  # the world axis about which a knee or elbow bends, by growing angles, in the T-pose
-    Role.LEFT_LOWER_LEG: np.array([0.0, 1, 0]),
-    Role.RIGHT_LOWER_LEG: np.array([0.0, 1, 0]),
-    Role.LEFT_FOREARM: np.array([0.0, 0, -1]),
-    Role.RIGHT_FOREARM: np.array([0.0, 0, 1]),
-}
 # Weights [1/rad] of residuals that are angles or chords of unit vectors, strongest wish first.
 _W_TRUNK_ROTATION = 20.0  # upright: the trunk must not lean to bring a limb nearer
 _W_LIMB_DIRECTION = 4.0  # arms out, legs down: this is what makes a T-pose
@@ -43,9 +38,6 @@ _W_REST_ANGLE = 0.01  # hinges that nothing determines stay at rest; keeps H reg
 _W_BASE = 1e-3  # keeps H regular for the base's position, which no term sees
 _W_FOLLOW = 100.0  # the file allows nothing else
 _W_LIMIT, _LIMIT_MARGIN = 3.0, np.radians(1.0)  # soft; hard ones by clipping
-_SAME_RANGE = 0.2  # [rad] ranges to both sides of straight that differ by less say nothing
-_BENT = 0.05  # [rad] of a joint in the rest pose that is bent, not merely drawn askew
-_ASKEW = 0.3  # of a turn's motion, along an axis: less of it says nothing
 _NOT_JUDGED = ("hand", "toe")  # ends of limbs: whether a limb is straight is not asked of them
 
 
@@ -83,7 +75,7 @@ def search_tpose(
     pose = rest_pose(skeleton, roles)
     bone_targets = _bone_targets(pose, links)
     forward = quat_rotate(quat_conj(upright), np.array([1.0, 0, 0]))
-    bend_hinges = _bend_hinges(tree, pose, links, forward)
+    bend_hinges = bend_hinges_of(tree, pose, links, forward)
 
     def linearize(q: Coordinates) -> NormalEquations:
         normal = _linearize(tree, q, roles, links, ideal, bone_targets, bend_hinges, skeleton)
@@ -171,7 +163,7 @@ def _linearize(
 
     For each part with a role of its own: `rotation_residual` to `ideal`; for bones of arms and legs
     `direction_residual` to `bone_targets`; for the axes of `bend_hinges` `direction_residual` to
-    `_BEND_AXES`; soft limits, and a pull to the rest pose. All are angles [rad] or chords.
+    `BEND_AXES`; soft limits, and a pull to the rest pose. All are angles [rad] or chords.
     """
     count = len(q)
     poses = forward_kinematics(tree, q)
@@ -195,9 +187,9 @@ def _linearize(
             bone, wanted = bone_targets[j]
             now, goal = poses.direction(link, bone), wanted[:, None].repeat(count, 1)
             _add(normal, dofs, direction_residual(now, goal, axes, _W_LIMB_DIRECTION))
-        if role in _BEND_AXES and j in bend_hinges:
+        if role in BEND_AXES and j in bend_hinges:
             first, bend_axis = bend_hinges[j]
-            goal = _BEND_AXES[role][:, None].repeat(count, 1)
+            goal = BEND_AXES[role][:, None].repeat(count, 1)
             above = tree.chain(int(tree.parents[first]))
             n = 3 + len(tree.dofs(above))
             axis = poses.direction(int(tree.parents[first]), bend_axis)
@@ -216,49 +208,3 @@ def _linearize(
 def _add(normal: NormalEquations, dofs: list[int], term: Linearized) -> None:
     J, residuals = term
     normal.add(dofs, np.ascontiguousarray(J.transpose(2, 0, 1)), residuals)
-
-
-def _bend_hinges(
-    tree: Tree, rest: RigPose, links: Int[np.ndarray, "J"], forward: Float[np.ndarray, "3"]
-) -> dict[int, tuple[int, Float[np.ndarray, "3"]]]:
-    """For each knee and elbow with hinges: the hinge that bends it, and the unit axis, in the rest
-    pose, about which growing angles bend it. `forward` is where the rest pose looks."""
-    out = {}
-    for role in _BEND_AXES:
-        for j in rest.roles.joints(role):
-            link = int(links[j])
-            moves = link >= 0 and link != links[int(rest.skeleton.parents[j])]
-            if moves and not tree.balls[link]:
-                first = _first_own_hinge(tree, rest.skeleton, links, j)
-                bending = forward if role.part == "forearm" else -forward
-                out[j] = first, tree.axes[first] * _bend_sign(tree, rest, j, first, bending)
-    return out
-
-
-def _first_own_hinge(tree: Tree, skeleton: Skeleton, links: Int[np.ndarray, "J"], j: int) -> int:
-    """The first of a joint's own hinges: the one that bends a knee or an elbow."""
-    above = int(links[int(skeleton.parents[j])])
-    own = int(links[j])
-    while int(tree.parents[own]) != above and int(tree.parents[own]) >= 0:
-        own = int(tree.parents[own])
-    return own
-
-
-def _bend_sign(
-    tree: Tree, rest: RigPose, j: int, hinge: int, bending: Float[np.ndarray, "3"]
-) -> float:
-    """+1 where a growing angle bends the joint, -1 where a falling one does: joints bend to the
-    side to which they have the larger range, measured from straight. Of two that are as large, the
-    way it is bent already, or else the way that moves the bone's end along `bending`."""
-    upper, lower = rest.bone(int(rest.skeleton.parents[j])), rest.bone(j)
-    if upper is None or lower is None:
-        return 1.0
-    axis = tree.axes[hinge]
-    across = lower @ upper - (lower @ axis) * (upper @ axis)
-    straight = float(np.arctan2(np.cross(lower, upper) @ axis, across))
-    above, below = tree.upper[hinge] - straight, straight - tree.lower[hinge]
-    if not np.isclose(above, below, atol=_SAME_RANGE):
-        return 1.0 if above > below else -1.0
-    if abs(straight) > _BENT:
-        return -1.0 if straight > 0 else 1.0
-    return -1.0 if np.cross(axis, lower) @ bending < -_ASKEW * np.linalg.norm(lower) else 1.0
