@@ -19,7 +19,7 @@ from mujoco import rollout
 from scipy.ndimage import gaussian_filter1d
 
 from sim.interpolate import at_frames, frames_of, quaternions
-from sim.physics.ahead import looking_ahead
+from sim.physics.lookahead import lookahead_model
 from sim.physics.servos import controls, servo_joint, torque_limit
 from sim.trajectory import subtree
 from spark.constants import GRAVITY
@@ -28,25 +28,25 @@ from spark.resample import values_at
 # In units of the time sqrt(height / g) in which a body of some height tips over, 0.37 s of a G1:
 HORIZON, PERIOD = 2.2, 0.13  # that is looked ahead, and from one look to the next
 STEP = 0.006  # [s] of the simulation that looks ahead, at most
-COURSES = 40  # that are tried in each look
+SAMPLES = 40  # that are tried in each look
 KNOTS = 5  # of the horizon, between which shifts are interpolated
 SPREAD = 0.05  # body weights x height of torque that are tried, more or less,
 MAX_SPREAD = 0.6  # but this share of a servo's limit
-GREED = 0.1  # of the gap between the best cost and the middle one: where a course weighs 1 / e
+GREED = 0.1  # of the gap between the best cost and the middle one: where a sample weighs 1 / e
 # What being off the motion costs, squared: of the root along the floor and up [heights], its turn
 # [rad], its velocity [heights] and its spin [rad] in that time, and the joints [rad].
 W_ALONG, W_UP, W_TURN, W_VELOCITY, W_SPIN, W_JOINTS = 70.0, 135.0, 20.0, 19.0, 2.2, 0.3
 W_SHIFT = 0.02  # and of the shifts, in spreads
 W_END = 0.3  # of the horizon: how much its last moment counts more
-DROPPED = 0.2  # heights that the root is too low, where a course
+DROPPED = 0.2  # heights that the root is too low, where a sample
 W_DROPPED = 50.0  # costs that much more
 BLUR = 0.02  # [s] over which torques go from one contact to the next
-_LOST = 1e9  # the cost of a course without finite numbers
+_LOST = 1e9  # the cost of a sample without finite numbers
 _LOW = 0.06  # heights above the lowest body within which one carries
 _TRUNK = 0.25  # of the mass: joints that carry more move the trunk
 _ROOT = 7  # coordinates of the root: place and quaternion
 
-Course = tuple[Float[np.ndarray, "K A"], Float[np.ndarray, "P nu"]]
+Plan = tuple[Float[np.ndarray, "K A"], Float[np.ndarray, "P nu"]]
 """The shifts at the knots of the horizon, and those of all servos until the next look ahead."""
 
 
@@ -74,7 +74,7 @@ class Balancer:
         self._own = own = float(model.opt.timestep)
         self._stride = max(1, int(STEP / own + 1e-6))
         carries = _carrying(model, root, qpos, height)
-        self._ahead = looking_ahead(spec, model, root, carries, self._stride * own)
+        self._ahead = lookahead_model(spec, model, root, carries, self._stride * own)
         self._model = ahead = self._ahead.model
         self._qpos, self._speeds = qpos[:, self._ahead.qpos], speeds[:, self._ahead.dofs]
         self._scratch = mujoco.MjData(ahead)
@@ -97,13 +97,13 @@ class Balancer:
         self._now = self._beforehand[:1]
 
     @property
-    def course(self) -> Course:
+    def plan(self) -> Plan:
         """What it goes by at a time."""
         return self._shifts, self._now
 
-    def go_back(self, course: Course, seed: int) -> None:
-        """To the course of a time before, and try others from there."""
-        self._shifts, self._now = course
+    def go_back(self, plan: Plan, seed: int) -> None:
+        """To the plan of a time before, and try others from there."""
+        self._shifts, self._now = plan
         self._rng = np.random.default_rng(seed)
 
     def shifts(self, data: mujoco.MjData, step: int) -> Float[np.ndarray, "nu"]:
@@ -128,15 +128,15 @@ class Balancer:
         frames = frames_of(time + self._steps, self._frame_time)
         wanted = at_frames(self._model, self._qpos, frames)
         speeds = values_at(self._speeds, frames)
-        tried = self._rng.normal(size=(COURSES, *self._shifts.shape)) * self._spread
+        tried = self._rng.normal(size=(SAMPLES, *self._shifts.shape)) * self._spread
         tried[0], tried[1] = 0.0, -self._shifts
         tried += self._shifts
         own = self._controls(wanted, speeds)
         own += values_at(self._beforehand, frames)[:, self._ahead.servos]
-        servos = np.repeat(own[None], COURSES, axis=0)
+        servos = np.repeat(own[None], SAMPLES, axis=0)
         ways = np.stack([_hats(self._steps, self._knots) @ each for each in tried])
         servos[:, :, self._shifted] += ways
-        start = np.repeat(self._ahead.state(data)[None], COURSES, axis=0)
+        start = np.repeat(self._ahead.state(data)[None], SAMPLES, axis=0)
         states, _ = rollout.rollout(self._model, self._data, start, servos, persistent_pool=True)
         cost = self._cost(states[:, :, 1:], wanted, speeds)
         cost += W_SHIFT * ((tried / self._spread) ** 2).mean(axis=(1, 2))
@@ -164,7 +164,7 @@ class Balancer:
         qpos: Float[np.ndarray, "S nq"],
         speeds: Float[np.ndarray, "S nv"],
     ) -> Float[np.ndarray, "N"]:
-        """How far courses lead off the motion, in the mean over the horizon."""
+        """How far samples lead off the motion, in the mean over the horizon."""
         own, velocities = states[..., : qpos.shape[1]], states[..., qpos.shape[1] :]
         away = (own - qpos)[..., self._root : self._root + 3] / self._height
         dofs = slice(self._root_dofs, self._root_dofs + 6)

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sim.physics.balance import Balancer, Course
+from sim.physics.balance import Balancer, Plan
 from sim.physics.servos import controls, servo_joint
 from sim.trajectory import subtree
 from spark.summary import brief
@@ -68,7 +68,7 @@ class Moment:
     """All that the steps after it depend on: MuJoCo's state, the balancer's, and the step."""
 
     state: Float[np.ndarray, "S"]
-    course: Course | None
+    plan: Plan | None
     step: int
 
 
@@ -218,8 +218,8 @@ class Simulation:
         """What `go_back` takes the simulation back to."""
         state = np.zeros(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
-        course = None if self.balancer is None else self.balancer.course
-        return Moment(state, course, self.step)
+        plan = None if self.balancer is None else self.balancer.plan
+        return Moment(state, plan, self.step)
 
     def go_back(self, moment: Moment, seed: int) -> None:
         """To a moment, from where the balancer tries other shifts."""
@@ -227,8 +227,8 @@ class Simulation:
         for kind in _DIVERGED:
             self.data.warning[kind].number = 0
         self.step = moment.step
-        if self.balancer is not None and moment.course is not None:
-            self.balancer.go_back(moment.course, seed)
+        if self.balancer is not None and moment.plan is not None:
+            self.balancer.go_back(moment.plan, seed)
 
     def stand_still(self, t: int) -> None:
         """From frame `t` on, in the record."""

@@ -42,7 +42,7 @@ def advance(simulation: Simulation, body: ModelTrajectory, start: int, stop: int
 
 def test_a_try_goes_on_from_the_very_moment(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same seed leads where it led before, to the bit; another does not."""
-    monkeypatch.setattr("sim.physics.balance.COURSES", 4)
+    monkeypatch.setattr("sim.physics.balance.SAMPLES", 4)
     body = stick(40, lean=0.1)
     simulation = balanced(body)
     advance(simulation, body, 1, 7)
@@ -83,7 +83,7 @@ def test_no_fall_is_taken_back_to_before_the_beginning() -> None:
 
 def test_what_no_try_keeps_up_falls_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing holds a body that leans as far as this."""
-    monkeypatch.setattr("sim.physics.balance.COURSES", 4)
+    monkeypatch.setattr("sim.physics.balance.SAMPLES", 4)
     monkeypatch.setattr("sim.physics.retries.BACK", (1.0, 2.0))
     tracked = track(stick(45, lean=0.9), 1 / FPS, height=HEIGHT, balance=True)
     found = summarize(tracked)

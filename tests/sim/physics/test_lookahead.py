@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim.physics.ahead import Ahead, looking_ahead
+from sim.physics.lookahead import LookaheadModel, lookahead_model
 
 BODY = """
 <mujoco>
@@ -39,11 +39,11 @@ BODY = """
 </mujoco>"""
 
 
-def both(more: str = "", *, carries: tuple[str, ...] = ()) -> tuple[mujoco.MjModel, Ahead]:
+def both(more: str = "", *, carries: tuple[str, ...] = ()) -> tuple[mujoco.MjModel, LookaheadModel]:
     spec = mujoco.MjSpec.from_string(BODY.format(more=more))
     model = spec.compile()
     names = [model.body(b).name for b in range(model.nbody)]
-    return model, looking_ahead(spec, model, 1, np.isin(names, carries), 0.006)
+    return model, lookahead_model(spec, model, 1, np.isin(names, carries), 0.006)
 
 
 def test_fingers_do_not_move_in_it() -> None:

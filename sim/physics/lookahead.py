@@ -16,7 +16,7 @@ _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
 @dataclass(frozen=True, eq=False)
-class Ahead:
+class LookaheadModel:
     """A model with longer steps, whose parts touch nothing but the floor. `qpos`, `dofs` and
     `servos` are where it has its coordinates, speeds and servos in the whole model."""
 
@@ -40,13 +40,13 @@ class Ahead:
         return state
 
 
-def looking_ahead(
+def lookahead_model(
     spec: mujoco.MjSpec,
     model: mujoco.MjModel,
     root: int,
     carries: Bool[np.ndarray, "nbody"],
     timestep: float,
-) -> Ahead:
+) -> LookaheadModel:
     """What to look ahead with where `spec` is simulated as `model`, by steps of `timestep` [s];
     bodies that carry something move."""
     small = model.body_subtreemass < SMALL * model.body_subtreemass[root]
@@ -64,7 +64,7 @@ def looking_ahead(
     columns = [(np.arange(q, q + n), np.arange(v, v + m)) for q, v, (n, m) in starts]
     qpos, dofs = (np.concatenate(each) for each in zip(*columns, strict=True))
     joints = np.array([servo_joint(model, a) for a in range(model.nu)], dtype=int)
-    return Ahead(out, qpos, dofs, np.flatnonzero((joints < 0) | ~still[joints]))
+    return LookaheadModel(out, qpos, dofs, np.flatnonzero((joints < 0) | ~still[joints]))
 
 
 def _without(spec: mujoco.MjSpec, still: Bool[np.ndarray, "njnt"]) -> mujoco.MjModel | None:
