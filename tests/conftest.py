@@ -65,7 +65,7 @@ SLOW = (
     "tests/robots/solver/test_stretches.py::test_a_walk_in_stretches_is_the_walk",
     "tests/robots/solver/test_target.py",
     "tests/robots/solver/test_wide_hands.py::test_polishing_does_not_lead_hands_into_thighs",
-    "tests/robots/stream/test_quiet.py::test_a_trembling_walk_keeps_its_contacts",
+    "tests/robots/stream/test_noise_filter.py::test_a_trembling_walk_keeps_its_contacts",
     "tests/robots/stream/test_stream.py::test_an_arm_that_is_wound_up_when_the_source_stops_finds_its_way",
     "tests/robots/stream/test_stream.py::test_hands_and_knees_of_one_who_crawls_are_not_in_the_floor",
     "tests/robots/stream/test_stream.py::test_hands_that_hang_beside_a_wide_trunk_are_not_in_it",

@@ -13,11 +13,12 @@ from robots.solver.projection import project
 from robots.solver.window_poses import WindowPoses
 from robots.solver.window_targets import PointTargets
 from robots.solver.window_terms import Terms
-from robots.stream.beginning import Beginning
 from robots.stream.coupling import MAX_ACCELERATION
 from robots.stream.detour import Detours
 from robots.stream.elsewhere import Elsewhere
+from robots.stream.flight import Flight
 from robots.stream.footing import ContactTracker
+from robots.stream.frame_check import FrameCheck
 from robots.stream.frame_targets import (
     LATENCY,
     Frame,
@@ -28,10 +29,9 @@ from robots.stream.frame_targets import (
     move_on,
     raised,
 )
-from robots.stream.possible import Possible
-from robots.stream.quiet import Quieter
+from robots.stream.noise_filter import NoiseFilter
 from robots.stream.resting import RestTracker, held_points
-from robots.stream.throw import Throw
+from robots.stream.start_blend import StartBlend
 from robots.stream.window import MAX_FIRST_SPEED, Window
 from spark.errors import FrameError
 from spark.rig.rig import Rig
@@ -58,10 +58,10 @@ class Stream:
         parts = held_points(robot, self._reader.parts)
         self._terms = Terms(robot, self._reader.bones, self._reader.hands, parts, firm_hands=True)
         self._window = Window(robot, self._terms, frame_time, fixed=_FIXED, free=LATENCY + 1)
-        self._throw = Throw(self._reader.scale, source.hip_height, frame_time)
-        self._quieter = Quieter(source, frame_time, ground.noise)
-        self._beginning = Beginning(self._terms, frame_time)
-        self._possible = Possible(self._reader)
+        self._flight = Flight(self._reader.scale, source.hip_height, frame_time)
+        self._noise_filter = NoiseFilter(source, frame_time, ground.noise)
+        self._start_blend = StartBlend(self._terms, frame_time)
+        self._frame_check = FrameCheck(self._reader)
         self._elsewhere = Elsewhere(frame_time)
         self._targets: FrameTargets  # of the window's free frames
         self._contacts: ContactTracker
@@ -72,11 +72,11 @@ class Stream:
         """Forget what has been seen: the next frame is a first one."""
         self._count, self._moves = 0, False
         self._window.reset()
-        self._throw.reset()
-        self._quieter.reset()
-        self._possible.reset()
+        self._flight.reset()
+        self._noise_filter.reset()
+        self._frame_check.reset()
         self._elsewhere.reset()
-        self._beginning.reset()
+        self._start_blend.reset()
         self._q = np.zeros((_FRAMES, self.robot.mjcf.model.nq))
         self._begun: list[FrameTargets] = []
         self._detours = Detours(self._reader, self._terms, self.frame_time)
@@ -85,7 +85,7 @@ class Stream:
     def foot_noise(self) -> float:
         """White noise of the source's feet [m, RMS an axis] that is being smoothed away; 0 where
         frames are followed as they are."""
-        return self._quieter.foot_noise
+        return self._noise_filter.foot_noise
 
     def step(self, frame: Frame) -> Float[np.ndarray, "nq"]:
         """The next frame of the source; MuJoCo's coordinates of the robot `LATENCY` frames before
@@ -100,13 +100,13 @@ class Stream:
         held = self._elsewhere.hold(frame) if self._moves else frame
         try:
             targets = self._reader.targets(held)
-            self._possible.check(held, targets)
-            quiet = self._quieter.follow(held, targets.feet)
+            self._frame_check.check(held, targets)
+            quiet = self._noise_filter.follow(held, targets.feet)
             targets = targets if quiet is None else self._reader.targets(quiet)
         except FrameError as error:
             raise FrameError(f"frame {self._count} of the stream: {error}") from error
         self._elsewhere.take(frame, held)
-        thrown = self._throw.follow(targets.hips[2] / self._reader.scale)
+        thrown = self._flight.follow(targets.hips[2] / self._reader.scale)
         targets = raised(targets, thrown)
         self._count += 1
         if not self._moves:
@@ -118,7 +118,7 @@ class Stream:
         foot_targets = self._contacts.update(targets, soles[0], self.foot_noise)
         resting = self._rests.update(targets, poses)
         self._q = self._solved(q, poses, bones[0], foot_targets, resting)
-        return self._beginning.follow(self._q[_FIXED])
+        return self._start_blend.follow(self._q[_FIXED])
 
     def _begin(self, targets: FrameTargets) -> Float[np.ndarray, "nq"]:
         """The answer to one of the first frames: the robot waits until there are enough to set
@@ -126,7 +126,7 @@ class Stream:
         self._begun.append(targets)
         if self._count == 1:
             self._q = self._first(targets)
-            self._beginning.wait(self._q[_FIXED])
+            self._start_blend.wait(self._q[_FIXED])
         if self._count == LATENCY + 1 and self._is_late():
             first, second, *_ = self._begun
             base = self.robot.mjcf.base_qpos
@@ -134,11 +134,11 @@ class Stream:
             self._q = self._posed(self._q, second, _FEW_ITERATIONS)
             del self._begun[0]
         if len(self._begun) <= LATENCY:
-            return self._beginning.waits
+            return self._start_blend.waits
         self._moves = True
         self._q = self._set_off()
-        self._beginning.set_off(self._q[_FIXED])
-        return self._beginning.follow(self._q[_FIXED])
+        self._start_blend.set_off(self._q[_FIXED])
+        return self._start_blend.follow(self._q[_FIXED])
 
     def _is_late(self) -> bool:
         """Whether the source moved so much farther before its second frame than after it that it

@@ -13,8 +13,8 @@ from robots.solver.window_poses import WindowPoses
 from robots.solver.window_targets import PointTargets
 from robots.solver.window_terms import Terms
 from robots.stream.coupling import Coupling
-from robots.stream.firmness import MAX_OVERSPEED, Firmness
 from robots.stream.frame_targets import FrameTargets
+from robots.stream.penalty_scale import MAX_OVERSPEED, PenaltyScale
 from robots.stream.prediction import TargetMotion
 
 _DAMPING = 1e-3  # [1] on the diagonal of the normal equations,
@@ -39,7 +39,7 @@ class Window:
         self._com: Float[np.ndarray, "fixed 3"]  # in the fixed frames [m]
         self._motion = TargetMotion(self._model, terms.mj_dofs, frame_time)
         self._coupling = Coupling(robot, frame_time, fixed=fixed, free=free)
-        self._firmness = Firmness(free)
+        self._penalty = PenaltyScale(free)
         self._max_sinking = MAX_SINKING * robot.rig.hip_height
         self._frame_time = frame_time
         self._max_overspeed = MAX_OVERSPEED * frame_time
@@ -50,7 +50,7 @@ class Window:
         self._com = np.zeros((0, 3))
         self._motion.reset()
         self._coupling.reset()
-        self._firmness.reset()
+        self._penalty.reset()
 
     def move_on(self, q: Float[np.ndarray, "T nq"]) -> WindowPoses:
         """Take in that frames are one later and at `q`; the poses of the free ones."""
@@ -78,14 +78,14 @@ class Window:
         low, steps = terms.low(poses, ground), self._steps(q)
         overspeed = np.maximum.reduce(self._coupling.overspeed(steps[-free:]), axis=1)
         sinking = np.maximum.reduce(low.depth, axis=1, initial=-np.inf)
-        self._firmness.move_on(
+        self._penalty.move_on(
             np.maximum(sinking / self._max_sinking, overspeed / self._max_overspeed)
         )
         for k in range(_MAX_ITER):
             if k:
                 poses = terms.poses(q[-free:], with_mass=True)
                 low, steps = terms.low(poses, ground), self._steps(q)
-            scale = self._firmness.scale
+            scale = self._penalty.scale
             H, g = terms.linearize(q[-free:], poses, asked, posture, candidates, scale, low)
             whole, g = self._coupled(q, steps, poses, H, g)
             q, length = self._moved(q, whole, g, _DAMPING)
@@ -107,7 +107,7 @@ class Window:
         """`q` with its last frames, those that have targets, after so many steps, or a step shorter
         than `until` [rad, m], each frame for itself."""
         terms, count = self._terms, len(targets.hips)
-        scale = self._firmness.scale[-count:]
+        scale = self._penalty.scale[-count:]
         asked = terms.asked(targets, foot_targets, resting)
         for _ in range(steps):
             free = q[-count:]
@@ -132,7 +132,7 @@ class Window:
         lone = self.settle(q, targets, foot_targets, resting, _FIRST_STEPS)
         step, last = np.empty(self._model.nv), self._free - 1
         mujoco.mj_differentiatePos(self._model, step, last, lone[-self._free], lone[-1])
-        step = self._possible(step)
+        step = self._without_jumps(step)
         lone[:] = lone[self._fixed]
         for t, frame in enumerate(lone):
             mujoco.mj_integratePos(self._model, frame, step, t - self._fixed)
@@ -140,10 +140,10 @@ class Window:
         before = lone[[0, *range(self._fixed - 1)]]
         self._com = np.array([self._terms.com(q) for q in before])
         self._motion.set_in_motion(lone[:-1])
-        self._coupling.set_in_motion(self._possible((targets.com[-1] - targets.com[0]) / last))
+        self._coupling.set_in_motion(self._without_jumps((targets.com[-1] - targets.com[0]) / last))
         return lone
 
-    def _possible(self, step: Float[np.ndarray, "N"]) -> Float[np.ndarray, "N"]:
+    def _without_jumps(self, step: Float[np.ndarray, "N"]) -> Float[np.ndarray, "N"]:
         return np.where(np.abs(step) > MAX_FIRST_SPEED * self._frame_time, 0.0, step)
 
     def _whole(self, H: Float[np.ndarray, "F D D"]) -> Float[np.ndarray, "F D F D"]:
@@ -167,7 +167,7 @@ class Window:
         assert poses.com_jacobian is not None
         ahead = self._motion.of(q[-1], H[-1], g[-1])
         com = np.concatenate([self._com, poses.com])
-        com_steps, scale = com[1:] - com[:-1], self._firmness.scale
+        com_steps, scale = com[1:] - com[:-1], self._penalty.scale
         whole, coupled = self._coupling.normal_equations(
             steps, com_steps, poses.com_jacobian, ahead, scale
         )

@@ -22,8 +22,8 @@ _STRETCH = 5.0  # times its length: more than half of the bones are never so lon
 _TURNED, _NEAR = np.cos(np.radians([45.0, 30.0]))
 
 
-class Possible:
-    """Of the frames of a stream that `reader` reads."""
+class FrameCheck:
+    """Refuses frames of a stream that `reader` reads which can't be the person's."""
 
     def __init__(self, reader: FrameReader) -> None:
         source = reader.source

@@ -25,7 +25,7 @@ _SLOWER = 0.4  # of the cutoff of a filter that sees the whole clip
 _STILL = 0.5  # of the least noise that is taken away, at which it no longer is
 
 
-class Quieter:
+class NoiseFilter:
     """Frames of a source on `source`, `frame_time` [s] apart, without their noise, which is
     `expected` to be as it was in an earlier clip."""
 

@@ -18,8 +18,8 @@ _SPEED = 0.3  # [m/s] with which a robot is moved where that is farther,
 _LONGEST = 1.0  # [s] at most
 
 
-class Beginning:
-    """Of the robot of `terms`, frames `frame_time` [s] apart."""
+class StartBlend:
+    """Takes the robot of `terms` from a pose into its motion; frames are `frame_time` [s] apart."""
 
     def __init__(self, terms: Terms, frame_time: float) -> None:
         mjcf = terms.robot.mjcf

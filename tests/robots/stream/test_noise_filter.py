@@ -9,7 +9,7 @@ from robots.metrics import measure
 from robots.model.known import known
 from robots.stream.footing import ContactTracker
 from robots.stream.frame_targets import LATENCY, Frame, FrameReader, ground_of
-from robots.stream.quiet import Quieter, _AlphaBeta
+from robots.stream.noise_filter import NoiseFilter, _AlphaBeta
 from scripts.corruptions import jittering
 from scripts.robot_bars import follow
 from spark.demo.sample import sample_motion, sample_rig
@@ -33,9 +33,9 @@ def trembling(motion: Motion, degrees: float) -> Motion:
 def quietened(motion: Motion, expected: Noise | None = None) -> list[Frame | None]:
     source = to_canonical(motion, RIG)
     reader = FrameReader(RIG, EMBER, ground_of(source, EMBER))
-    quieter = Quieter(RIG, motion.frame_time, expected)
+    noise_filter = NoiseFilter(RIG, motion.frame_time, expected)
     frames = [Frame(*pair) for pair in zip(motion.root_pos, motion.rotations, strict=True)]
-    return [quieter.follow(frame, reader.targets(frame).feet) for frame in frames]
+    return [noise_filter.follow(frame, reader.targets(frame).feet) for frame in frames]
 
 
 @pytest.mark.parametrize("name", ["walk", "squat", "wave"])
@@ -92,12 +92,12 @@ def test_a_sender_may_use_its_arrays_again() -> None:
     motion = trembling(sample_motion("walk", RIG, 30.0), 1.0)
     source = to_canonical(motion, RIG)
     reader = FrameReader(RIG, EMBER, ground_of(source, EMBER))
-    quieter = Quieter(RIG, motion.frame_time, None)
+    noise_filter = NoiseFilter(RIG, motion.frame_time, None)
     again = Frame(np.empty(3), np.empty_like(motion.rotations[0]))
     found = []
     for root, rotations in zip(motion.root_pos, motion.rotations, strict=True):
         again.root_pos[:], again.rotations[:] = root, rotations
-        found.append(quieter.follow(again, reader.targets(again).feet))
+        found.append(noise_filter.follow(again, reader.targets(again).feet))
     for a, b in zip(found, quietened(motion), strict=True):
         assert (a is None) == (b is None)
         if a and b:

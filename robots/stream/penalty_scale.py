@@ -16,7 +16,7 @@ _MOST = PENALTY_GROWTH**3  # as often as a frame is solved
 _SOUND = 0.5  # of that is what firmer walls may hold back: softer ones might not
 
 
-class Firmness:
+class PenaltyScale:
     """The `scale` of the penalties of each of some frames."""
 
     def __init__(self, frames: int) -> None:

@@ -16,7 +16,7 @@ _FLYING = 0.7, 0.95  # tiptoe, or leap with a foot on the floor
 _SPAN = 1 / 15  # [s] over which that is measured
 
 
-class Throw:
+class Flight:
     """Of a robot whose heights are `scale` times those of a source, frame by frame."""
 
     def __init__(self, scale: float, hip_height: float, frame_time: float) -> None:

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from robots.stream.throw import FALL, STANDING, Throw
+from robots.stream.flight import FALL, STANDING, Flight
 from spark.constants import GRAVITY
 
 FRAME_TIME, HIPS = 1 / 60, 0.9
 
 
 def thrown(heights: np.ndarray, scale: float) -> np.ndarray:
-    throw = Throw(scale, HIPS, FRAME_TIME)
-    return np.array([throw.follow(float(height)) for height in heights])
+    flight = Flight(scale, HIPS, FRAME_TIME)
+    return np.array([flight.follow(float(height)) for height in heights])
 
 
 def flight(g: float) -> np.ndarray:
