@@ -12,12 +12,6 @@ from spark.rotation import quat_from_matrix
 from spark.vectors import cross, dot, joined, unit
 
 
-def sixd_from_matrix(R: Float[Any, "*n 3 3"]) -> Float[Any, "*n 6"]:
-    """The first two columns of `R`, one after the other (Zhou et al. 2019)."""
-    xp = array_namespace(R)
-    return xp.concat([R[..., :, 0], R[..., :, 1]], axis=-1)
-
-
 def matrix_from_sixd(sixd: Float[Any, "*n 6"]) -> Float[Any, "*n 3 3"]:
     """Gram-Schmidt on the two columns. Zero or parallel columns have no rotation: the gradient is
     finite there, the value is not a rotation."""
@@ -29,7 +23,7 @@ def matrix_from_sixd(sixd: Float[Any, "*n 6"]) -> Float[Any, "*n 3 3"]:
 
 
 def sixd_from_quat(q: Float[Any, "*n 4"]) -> Float[Any, "*n 6"]:
-    """`sixd_from_matrix` of a unit quaternion."""
+    """The first two columns of the matrix of a unit quaternion, one after the other."""
     w, x, y, z = (q[..., i] for i in range(4))
     columns = [
         *(1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)),

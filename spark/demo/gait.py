@@ -18,7 +18,7 @@ from spark.rig.roles import LIMBS, Group, Role
 from spark.rotation import quat_about, quat_from_yaw, quat_mul, quat_rotate
 from spark.transfer.canonical import CanonicalMotion
 
-FOOT_FLAT, MID_STANCE, HEEL_OFF, TOE_OFF = 0.12, 0.25, 0.31, 0.62
+MID_STANCE, TOE_OFF = 0.25, 0.62
 """Instants of a stride, from one heel strike to the next; the foot stands until `TOE_OFF`."""
 
 # Degrees at instants of a stride: thigh forwards from vertical, knee flexion, and how far foot and

@@ -11,13 +11,11 @@ from dataclasses import astuple, dataclass, fields
 import numpy as np
 from jaxtyping import Bool, Float
 
-from spark.errors import SkeletonError
 from spark.network.features import body_features
 from spark.rig.contacts import planted_feet, speeds
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_rotate
-from spark.transfer.canonical import CanonicalMotion, canonical_positions
 
 
 @dataclass(frozen=True)
@@ -38,19 +36,6 @@ class Score:
     truth_jerk: float
 
 
-def score(result: CanonicalMotion, truth: CanonicalMotion) -> Score:
-    """`result` against `truth` on the same rig, over the joints of its body (no fingers, hair,
-    clothes). Raises `SkeletonError` where frames or joints differ in number."""
-    rig = truth.rig
-    if len(result) != len(truth) or result.rotations.shape != truth.rotations.shape:
-        raise SkeletonError(
-            f"{result.rotations.shape[:2]} frames and joints against {truth.rotations.shape[:2]}; "
-            "expected the same clip on the same body"
-        )
-    own, theirs = canonical_positions(result), canonical_positions(truth)
-    return score_positions(own, theirs, rig, truth.frame_time, san_height(rig))
-
-
 def score_positions(
     own: Float[np.ndarray, "T J 3"],
     truth: Float[np.ndarray, "T J 3"],
@@ -58,7 +43,8 @@ def score_positions(
     frame_time: float,
     height: float,
 ) -> Score:
-    """Positions on `rig` against the true ones; lengths in one unit, that of `height` too."""
+    """Positions on `rig` against the true ones, over the joints of its body (no fingers, hair,
+    clothes); lengths in one unit, that of `height` too."""
     joints = body_features(rig).joints
     planted = planted_feet(rig, truth, frame_time)
     feet, pelvis = rig.contact_joints, rig.pelvis

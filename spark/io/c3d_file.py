@@ -58,7 +58,7 @@ class _Reader:
     def points(self) -> C3dPoints:
         """Those of all frames."""
         count = self._word(2) if (used := self._number("POINT", "USED")) is None else int(used)
-        scale, rate = self._floats(12, 1)[0], self._floats(20, 1)[0]
+        scale, rate = self._float(12), self._float(20)
         rate = self._number("POINT", "RATE") or rate
         rows = self._rows(count, as_floats=scale < 0)
         notes = []
@@ -153,8 +153,8 @@ class _Reader:
             return np.ascontiguousarray(words).view("<f4").ravel() / np.float32(4)
         return np.frombuffer(content, f"{self.order}f4")
 
-    def _floats(self, at: int, count: int) -> list[float]:
-        return [float(x) for x in self._as_floats(self.data[at : at + 4 * count])]
+    def _float(self, at: int) -> float:
+        return float(self._as_floats(self.data[at : at + 4])[0])
 
     def _word(self, at: int) -> int:
         return int(struct.unpack_from(f"{self.order}H", self.data, at)[0])

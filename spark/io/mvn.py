@@ -151,46 +151,38 @@ def metadata(datagram: Datagram) -> dict[str, str]:
 
 
 def pose_datagram(
-    values: Mapping[str, Sequence[float] | Float[np.ndarray, "D"]],
-    kind: int = QUATERNION,
-    *,
-    sample: int = 0,
-    time_ms: int = 0,
-    character: int = 0,
+    values: Mapping[str, Sequence[float] | Float[np.ndarray, "7"]], *, sample: int, time_ms: int
 ) -> bytes:
-    """A pose as MVN sends it: for each segment its place and its turn, in the axes, the unit and
-    the numbers of the type."""
-    names = UNITY_SEGMENTS if kind == UNITY else SEGMENTS
-    form = f">I{_NUMBERS[kind]}f"
-    payload = b"".join(struct.pack(form, names.index(s) + 1, *values[s]) for s in values)
-    return _datagram(kind, payload, len(values), sample, time_ms, character)
+    """A pose as MVN sends it in type 02: for each segment its place [m] and its turn (wxyz)."""
+    form = f">I{_NUMBERS[QUATERNION]}f"
+    payload = b"".join(struct.pack(form, SEGMENTS.index(s) + 1, *values[s]) for s in values)
+    return _datagram(QUATERNION, payload, len(values), sample, time_ms)
 
 
-def scale_datagram(places: Mapping[str, Float[np.ndarray, "3"]], *, character: int = 0) -> bytes:
+def scale_datagram(places: Mapping[str, Float[np.ndarray, "3"]]) -> bytes:
     """The T-pose as MVN sends it: where each segment begins."""
     payload = struct.pack(">i", len(places))
     for name, place in places.items():
         raw = name.encode()
         payload += struct.pack(">i", len(raw)) + raw + struct.pack(">3f", *map(float, place))
-    return _datagram(SCALE, payload + struct.pack(">i", 0), len(places), 0, 0, character)
+    return _datagram(SCALE, payload + struct.pack(">i", 0), len(places))
 
 
-def meta_datagram(tags: Mapping[str, str], *, character: int = 0) -> bytes:
+def meta_datagram(tags: Mapping[str, str]) -> bytes:
     """What is told of the character, as MVN sends it."""
     payload = "".join(f"{tag}:{value}\n" for tag, value in tags.items()).encode()
-    return _datagram(META, payload, 1, 0, 0, character)
+    return _datagram(META, payload, 1)
 
 
-def _datagram(
-    kind: int, payload: bytes, items: int, sample: int, time_ms: int, character: int
-) -> bytes:
+def _datagram(kind: int, payload: bytes, items: int, sample: int = 0, time_ms: int = 0) -> bytes:
+    """A whole sample, of the first character."""
     head = _HEADER.pack(
         f"MXTP{kind:02d}".encode(),
         sample % 2**32,
         _LAST,
         items,
         time_ms % 2**32,
-        character,
+        0,
         len(SEGMENTS),
         0,
         0,

@@ -22,13 +22,12 @@ def frame_time_of(fps: float) -> float:
 class Pace:
     """Steps every `frame_time` [s]. One that is over before it could be taken is left out.
 
-    `step` counts the steps, also those that were left out: `missed` in all, `just_missed` before
-    this one.
+    `step` counts the steps, also those that were left out, `missed` these alone.
     """
 
     def __init__(self, frame_time: float) -> None:
         self.frame_time = frame_time
-        self.step, self.missed, self.just_missed = 0, 0, 0
+        self.step, self.missed = 0, 0
         self.restart()
 
     def restart(self) -> None:
@@ -48,13 +47,12 @@ class Pace:
     def advance(self) -> None:
         """A step was taken: wait for the next one."""
         self.step += 1
-        self.just_missed = 0
         self._due += self.frame_time
         behind = time.monotonic() - self._due
         if behind > _LATE:
             self.restart()
         elif behind > self.frame_time:
-            self.just_missed = over = int(behind / self.frame_time)
+            over = int(behind / self.frame_time)
             self.step += over
             self.missed += over
             self._due += over * self.frame_time

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from spark import euler, sixd
 from spark import rotation as r
 from spark.euler import euler_from_quat, quat_from_euler
-from spark.sixd import matrix_from_sixd, quat_from_sixd, sixd_from_matrix, sixd_from_quat
+from spark.sixd import matrix_from_sixd, quat_from_sixd, sixd_from_quat
 
 ORDERS = ["".join(p) for p in permutations("xyz")]
 KINDS = [
@@ -113,7 +113,6 @@ ALL = {
     "euler_from_quat": lambda q, p, v: euler_from_quat(q, "zxy"),
     "matrix_from_quat": lambda q, p, v: r.matrix_from_quat(q),
     "quat_from_matrix": lambda q, p, v: r.quat_from_matrix(r.matrix_from_quat(q)),
-    "sixd_from_matrix": lambda q, p, v: sixd_from_matrix(r.matrix_from_quat(q)),
     "matrix_from_sixd": lambda q, p, v: matrix_from_sixd(sixd_from_quat(q)),
     "sixd_from_quat": lambda q, p, v: sixd_from_quat(q),
     "quat_from_sixd": lambda q, p, v: quat_from_sixd(sixd_from_quat(q)),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sim.report import Subject, assess
-from spark.demo.gait import FOOT_FLAT, HEEL_OFF, MID_STANCE, TOE_OFF, stride_time
+from spark.demo.gait import MID_STANCE, TOE_OFF, stride_time
 from spark.demo.sample import BUILDS, MOTIONS, sample_motion, sample_rig
 from spark.io.bvh import write_bvh
 from spark.io.encoding import encode_new
@@ -19,6 +19,8 @@ from spark.rotation import quat_angle, rotvec_from_quat
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import from_canonical, to_canonical
 
+# Of a stride: the foot is flat from the one to the other (`spark.demo.gait`).
+FOOT_FLAT, HEEL_OFF = 0.12, 0.31
 EVERY = [(name, build) for name in MOTIONS for build in BUILDS]
 FPS = 60.0
 SIDES = ("left", "right")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from spark.demo.sample import MOTIONS, sample_motion, sample_rig
-from spark.evaluation.metrics import mean_score, score
+from spark.evaluation.metrics import mean_score
 from spark.io.recording import read_recording
 from spark.motion import Motion
 from spark.rig.rig import Rig, understand
@@ -16,6 +16,7 @@ from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.transfer.leg_fit import fit_legs, travel_scale
 from tests.helpers.recordings import recording
+from tests.helpers.scores import score
 from tests.helpers.stick import joint, standing, stick_rig, without
 
 ANKLES = [joint(Role.LEFT_FOOT), joint(Role.RIGHT_FOOT)]
