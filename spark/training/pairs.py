@@ -52,8 +52,8 @@ class PairMaker:
 
     Making a skeleton costs as much as using it many times, so each body has a fixed set of
     `variants`, made when they are first met: itself, itself with joints split as in SAN, and random
-    ones. With `varied`, the target is the body itself under its own names, as real targets are;
-    half of the draws are seen in a mirror, half are slowed down or sped up by up to a third, and
+    ones. These are sources; the target is the body itself under its own names, as real targets are.
+    Half of the draws are seen in a mirror, half are slowed down or sped up by up to a third, and
     sources are drawn again where the analytic transfer matches every joint: there is nothing to
     learn there.
 
@@ -68,10 +68,8 @@ class PairMaker:
         window: int = 64,
         variants: int = 256,
         seed: int = 0,
-        varied: bool = False,
     ) -> None:
         self.window, self.variants, self.seed = window, variants, seed
-        self.varied = varied
         by_body: dict[int, list[TrainingClip]] = {}
         for clip in clips:
             if len(clip.hips) >= window:
@@ -145,14 +143,12 @@ class PairMaker:
     def _sample(self, n: int, windows: int) -> "_Draw":
         rng = np.random.default_rng((self.seed, n))
         k = int(self._chances.searchsorted(rng.random(), "right"))
-        mirrored = self.varied and bool(rng.random() < 0.5)
-        for _ in range(_MAX_TRIES if self.varied else 1):
-            performer, receiver = rng.integers(self.variants, size=2).tolist()
-            if self.varied:
-                receiver = 0
-            pair = self._pair(
-                *(self._staged_body(k, mirrored, number) for number in (performer, receiver))
-            )
+        mirrored = bool(rng.random() < 0.5)
+        target = self._staged_body(k, mirrored, 0)
+        for _ in range(_MAX_TRIES):
+            # Two numbers for one: so a seed draws what it always drew.
+            performer, _ = rng.integers(self.variants, size=2).tolist()
+            pair = self._pair(self._staged_body(k, mirrored, performer), target)
             if pair.some_unmatched:
                 break
         return _Draw(pair, mirrored, self._cuts(k, windows, rng))
@@ -162,7 +158,7 @@ class PairMaker:
         for i in self._chances_of_clips[k].searchsorted(rng.random(windows), "right").tolist():
             clip, speed = clips[i], exp(rng.uniform(-_MAX_LOG_SPEED, _MAX_LOG_SPEED))
             frames = ceil((self.window - 1) * speed) + 1
-            if not self.varied or rng.random() < 0.5 or frames > len(clip.hips):
+            if rng.random() < 0.5 or frames > len(clip.hips):
                 frames, speed = self.window, 1.0
             cuts.append(Cut(clip, int(rng.integers(0, len(clip.hips) - frames + 1)), speed))
         return cuts

@@ -55,7 +55,6 @@ class Steps(Dataset[Batch | UnpairedBatch]):
                 window=config.window,
                 variants=config.variants,
                 seed=config.seed,
-                varied=True,
             )
         self.collator = Collator(names, self.maker.sizes if fixed_sizes else Sizes())
 

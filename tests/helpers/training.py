@@ -1,13 +1,18 @@
 """Small networks, small training runs, and clips to train on."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 import torch
 
-from spark.demo.sample import sample_motion, sample_rig
+from spark.demo.sample import BUILDS, make_skeleton, sample_motion, sample_rig
 from spark.kinematics import forward
+from spark.motion import Motion
 from spark.network.config import Config
 from spark.network.features import body_features
 from spark.rig.contacts import planted_feet
+from spark.rig.rig import Rig, understand
 from spark.training.batch import Batch
 from spark.training.checkpoint import Checkpoint
 from spark.training.cuts import TrainingClip
@@ -42,12 +47,23 @@ def start_of(config: Config, batch: Batch) -> Start | None:
 
 def walk_clip(build: str) -> TrainingClip:
     """The walk of a sample body."""
-    rig = sample_rig(build)
+    return walk_on(sample_rig(build), build)
+
+
+def longer_walk_clip() -> TrainingClip:
+    """The walk of a body with more joints than the samples have."""
+    skeleton = make_skeleton(replace(BUILDS["dancer"], spine=4))
+    still = np.tile([1.0, 0, 0, 0], (1, len(skeleton), 1))
+    return walk_on(understand(Motion(skeleton, 1 / 30, skeleton.offsets[:1], still)), "longer")
+
+
+def walk_on(rig: Rig, name: str) -> TrainingClip:
+    """The walk of any body."""
     motion = sample_motion("walk", rig, 30.0)
     body = body_features(rig)
     canonical = to_canonical(motion, rig)
     return TrainingClip(
-        build,
+        name,
         body,
         canonical.rotations[:, body.joints],
         canonical.hips / rig.hip_height,

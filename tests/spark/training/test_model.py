@@ -7,6 +7,7 @@ from spark.network.config import Config
 from spark.training import losses
 from spark.training.batch import Batch
 from spark.training.collator import Collator
+from spark.training.cuts import TrainingClip
 from spark.training.model import Spark
 from spark.training.name_encoder import NameEncoder
 from spark.training.pairs import PairMaker
@@ -20,7 +21,7 @@ from spark.training.tensors import (
     world_matrices,
 )
 from tests.helpers import plain_spark
-from tests.helpers.training import PRESETS, SMALL, start_of
+from tests.helpers.training import PRESETS, SMALL, longer_walk_clip, start_of
 
 
 def pad_start(start: Start, extra: int) -> Start:
@@ -171,7 +172,9 @@ def test_a_group_may_have_more_joints_than_places(batch: Batch) -> None:
 
 @pytest.mark.parametrize("config", PRESETS)
 @pytest.mark.parametrize("share", [True, False], ids=["shared", "disjoint"])
-def test_the_network_is_its_equations(config: Config, share: bool, maker: PairMaker) -> None:
+def test_the_network_is_its_equations(
+    config: Config, share: bool, walks: list[TrainingClip]
+) -> None:
     """A batch of unlike skeletons, padded and fused, against one skeleton at a time in plain loops.
 
     The noise that the paper's decoder starts from is switched off.
@@ -182,7 +185,8 @@ def test_the_network_is_its_equations(config: Config, share: bool, maker: PairMa
         if head is not None:
             torch.nn.init.normal_(head.weight, std=0.3)
     collator = Collator(NameEncoder().encode)
-    draws = [maker.draw(n, 1) for n in range(3)]
+    maker = PairMaker([*walks, longer_walk_clip()], window=16, variants=8)
+    draws = [maker.draw(n, 1) for n in range(6)]
     batch = collator.pairs(draws).batch()
     assert len({len(draw.target.body.joints) for draw in draws}) > 1
     with torch.no_grad():
