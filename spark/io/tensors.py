@@ -21,7 +21,7 @@ _MAX_PICKLE = 1 << 26  # bytes: it says what there is; the numbers lie beside it
 _MAX_UNPACKED = 1 << 26  # bytes of what is packed, which torch never does
 _MAX_REPEATED = 10_000_000  # numbers of a tensor that repeats those of its storage (stride 0)
 _LEGACY = b"\x80\x02\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19."  # how torch before 1.6 begins a file
-_DTYPES = {
+STORAGES = {
     "FloatStorage": "<f4",
     "DoubleStorage": "<f8",
     "HalfStorage": "<f2",
@@ -32,6 +32,7 @@ _DTYPES = {
     "ByteStorage": "<u1",
     "BoolStorage": "?",
 }
+"""What torch calls the storages of numbers, and numpy their kinds."""
 _CONTAINERS = {"collections OrderedDict": dict, "builtins dict": dict, "builtins list": list}
 _TENSORS = {"torch._utils _rebuild_tensor_v2", "torch._utils _rebuild_tensor"}
 _PARAMETER = "torch._utils _rebuild_parameter"
@@ -170,7 +171,7 @@ def _made(callee: Any, arguments: Any, path: Path) -> Any:
     if name not in _TENSORS:
         return Unknown(name)
     (_, (_, kind, key, *_)), offset, shape, strides, *_ = arguments
-    dtype = _DTYPES.get(kind.name)
+    dtype = STORAGES.get(kind.name)
     numbers = (offset, *shape, *strides)
     if dtype is None or not all(type(n) is int and n >= 0 for n in numbers):
         return Unknown(f"tensor of {kind.name}")

@@ -13,18 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from spark.files import write_atomically
+from spark.io.tensors import STORAGES
 
-_STORAGES = {
-    "FloatStorage": np.dtype("<f4"),
-    "DoubleStorage": np.dtype("<f8"),
-    "HalfStorage": np.dtype("<f2"),
-    "LongStorage": np.dtype("<i8"),
-    "IntStorage": np.dtype("<i4"),
-    "ShortStorage": np.dtype("<i2"),
-    "CharStorage": np.dtype("i1"),
-    "ByteStorage": np.dtype("u1"),
-    "BoolStorage": np.dtype("?"),
-}
 _FOLDER = "archive"
 
 
@@ -37,7 +27,7 @@ def write_tensors(path: Path, entries: Mapping[str, np.ndarray | int | float]) -
         for number, (name, value) in enumerate(entries.items()):
             program.append(_text(name))
             if isinstance(value, np.ndarray):
-                stored = next(s for s, kind in _STORAGES.items() if kind == value.dtype)
+                stored = next(s for s, kind in STORAGES.items() if value.dtype == kind)
                 program.append(_tensor(value, stored, str(number)))
                 archive.writestr(f"{_FOLDER}/data/{number}", np.ascontiguousarray(value).tobytes())
             else:
