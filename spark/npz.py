@@ -11,7 +11,6 @@ import re
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
-from math import prod
 from pathlib import Path
 from typing import NoReturn
 
@@ -19,7 +18,7 @@ import numpy as np
 
 from spark.errors import FileFormatError
 from spark.opening import read_bytes
-from spark.plain_pickle import plain_value
+from spark.plain_pickle import array_of, first_line, plain_value
 
 _BASE, _RATIO = 128 << 20, 4  # bytes that arrays may take, and how many more for each of the file's
 _HEADER = 10_000  # bytes of an array's header, as numpy allows at most
@@ -62,7 +61,7 @@ class Npz(Mapping[str, np.ndarray]):
     @property
     def pickled(self) -> tuple[str, ...]:
         """The arrays of Python objects, which are read by running the pickles in them: not here."""
-        return tuple(name for name in self if self._holds_objects(name))
+        return tuple(name for name in self if holds_objects(self._content(name, _HEADER)))
 
     def lone_value(self, name: str) -> np.ndarray | None:
         """The one number or text in an array of Python objects, whose pickle is not run; None where
@@ -84,16 +83,13 @@ class Npz(Mapping[str, np.ndarray]):
         try:
             return array_in(data)
         except (ValueError, MemoryError) as error:
-            self._fail(f"{name!r} can't be read ({_first_line(error)})", error)
+            self._fail(f"{name!r} can't be read ({first_line(error)})", error)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._members)
 
     def __len__(self) -> int:
         return len(self._members)
-
-    def _holds_objects(self, name: str) -> bool:
-        return holds_objects(self._content(name, _HEADER))
 
     def _content(self, name: str, size: int) -> bytes:
         """The first `size` bytes of a member."""
@@ -109,7 +105,7 @@ class Npz(Mapping[str, np.ndarray]):
             *(ValueError, EOFError, OSError, NotImplementedError, RuntimeError),
             *(zipfile.BadZipFile, zlib.error, MemoryError),
         ) as error:
-            self._fail(f"{name!r} can't be read ({_first_line(error)})", error)
+            self._fail(f"{name!r} can't be read ({first_line(error)})", error)
 
     def _fail(self, message: str, cause: Exception | None = None) -> NoReturn:
         raise FileFormatError(self.path, None, f"{message}; expected {self._expected}") from cause
@@ -125,12 +121,10 @@ def array_in(data: bytes) -> np.ndarray:
     kind, order, lengths = (field[1].decode() for field in found if field)
     shape = tuple(int(n) for n in re.findall(r"\d+", lengths))
     dtype = np.dtype(kind)
-    if len(shape) > 8 or prod(shape) * dtype.itemsize != len(content):
-        raise ValueError(f"{len(content)} bytes are no array of shape {str(shape)[:80]}")
+    array = array_of(content, dtype, shape, "F" if order == "True" else "C")
     if dtype.kind == "U" and not _is_text(np.frombuffer(content, f"{dtype.byteorder}u4")):
         raise ValueError("its text holds what is no letter")
-    array = np.frombuffer(content, dtype) if len(content) else np.zeros(0, dtype)
-    return array.reshape(shape, order="F" if order == "True" else "C")
+    return array
 
 
 def _is_text(codes: np.ndarray) -> bool:
@@ -156,7 +150,3 @@ def _split(data: bytes) -> tuple[bytes, memoryview]:
     if not 0 < length <= min(_HEADER, len(data) - start):
         raise ValueError(f"its header is broken, or has {length} bytes")
     return data[start : start + length], memoryview(data)[start + length :]
-
-
-def _first_line(error: BaseException) -> str:
-    return str(error).splitlines()[0] if str(error) else type(error).__name__

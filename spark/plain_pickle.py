@@ -9,7 +9,7 @@ import re
 from dataclasses import dataclass
 from math import prod
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -31,9 +31,8 @@ def read_plain_pickle(path: Path, *, expected: str) -> Any:
     except RefusedError as error:
         raise FileFormatError(path, None, f"{error}; expected {expected}") from error
     except Exception as error:  # broken pickles fail in any way: it is a small machine's program
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise FileFormatError(
-            path, None, f"is no pickle ({reason}); expected {expected}"
+            path, None, f"is no pickle ({first_line(error)}); expected {expected}"
         ) from error
 
 
@@ -109,7 +108,7 @@ class _NumpyMachine(PickleMachine):
             super().build(made, state)
 
 
-def _array(dtype: Any, shape: Any, content: Any, order: Any) -> np.ndarray:
+def _array(dtype: Any, shape: Any, content: Any, order: Literal["C", "F"]) -> np.ndarray:
     if isinstance(content, str):  # of Python 2
         content = content.encode("latin-1")
     if not isinstance(dtype, _Dtype) or not isinstance(content, bytes | bytearray):
@@ -117,10 +116,26 @@ def _array(dtype: Any, shape: Any, content: Any, order: Any) -> np.ndarray:
     kind = dtype.made()
     if not (isinstance(shape, tuple) and all(type(n) is int and n >= 0 for n in shape)):
         raise ValueError("the shape of an array is none")
-    if len(shape) > 8 or prod(shape) * kind.itemsize != len(content):
+    return array_of(content, kind, shape, order)
+
+
+def array_of(
+    content: bytes | bytearray | memoryview,
+    dtype: np.dtype[Any],
+    shape: tuple[int, ...],
+    order: Literal["C", "F"],
+) -> np.ndarray:
+    """The array of these bytes. Raises `ValueError` where they are not as many as its shape says,
+    or it has more axes than any that is meant."""
+    if len(shape) > 8 or prod(shape) * dtype.itemsize != len(content):
         raise ValueError(f"{len(content)} bytes are no array of shape {str(shape)[:80]}")
-    array = np.frombuffer(content, kind) if content else np.zeros(0, kind)
+    array = np.frombuffer(content, dtype) if len(content) else np.zeros(0, dtype)
     return array.reshape(shape, order=order)
+
+
+def first_line(error: BaseException) -> str:
+    """What an error says, or else is."""
+    return str(error).splitlines()[0] if str(error) else type(error).__name__
 
 
 def _lone(value: Any) -> np.ndarray:
