@@ -1,5 +1,6 @@
 """The nodes of an FBX file and how they move, evaluated by ufbx (the package pufbx)."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import DependencyError, FileFormatError, name_list
-from spark.io.nodes import NodeJoint, chosen_clip, joints_of, varies
+from spark.io.nodes import NodeJoint, chosen_clip, joints_of, line_to, varies
 from spark.resample import frames_of_keys, rotations_at, values_at
 from spark.rotation import matrix_from_quat
 
@@ -41,13 +42,9 @@ class FbxScene:
                 "expected FBX 6.1 to 7.7",
             ) from error
         self._nodes: list[Any] = list(self._scene.nodes)
-        self._parents = [-1 if n.parent is None else n.parent.typed_id for n in self._nodes]
-        self.is_bound = bool(len(self._scene.poses) or len(self._scene.skin_clusters))
-
-    @property
-    def parents(self) -> list[int]:
+        self.parents = [-1 if n.parent is None else n.parent.typed_id or -1 for n in self._nodes]
         """The node above each; -1 for those that hang on the scene alone."""
-        return [parent if parent > 0 else -1 for parent in self._parents]
+        self.is_bound = bool(len(self._scene.poses) or len(self._scene.skin_clusters))
 
     def joints(self) -> tuple[list[NodeJoint], tuple[str, ...]]:
         """Bones, and other nodes that lie between them, depth-first below one root; and notes.
@@ -132,12 +129,12 @@ class FbxScene:
         position: dict[int, Any] = {}
         linear: dict[int, Any] = {}
         turn: dict[int, Any] = {}
-        for i in dict.fromkeys(i for joint in joints for i in self.line(joint.node)):
+        for i in dict.fromkeys(i for joint in joints for i in line_to(joint.node, self.parents)):
             with np.errstate(over="ignore", invalid="ignore"):
                 at, rotation, scale = self._local(i, moved.get(i), times)
                 own = matrix_from_quat(rotation)
-                above = self._parents[i]
-                if above > 0:
+                above = self.parents[i]
+                if above >= 0:
                     at = position[above] + np.einsum("tij,tj->ti", linear[above], at)
                     alone = self._nodes[i].inherit_mode.name == "IGNORE_PARENT_SCALE"
                     within = turn[above] if alone else linear[above]
@@ -158,23 +155,16 @@ class FbxScene:
         quat = np.tile(np.roll(list(own.rotation), 1), (len(times), 1))  # xyzw to wxyz
         scale = np.tile(list(own.scale), (len(times), 1))
         if baked is not None:
-            at = _vectors_at(baked.translation_keys, times, at)
-            scale = _vectors_at(baked.scale_keys, times, scale)
-            quat = _quats_at(baked.rotation_keys, times, quat)
+            at = _at(times, baked.translation_keys, "xyz", values_at, at)
+            scale = _at(times, baked.scale_keys, "xyz", values_at, scale)
+            quat = _at(times, baked.rotation_keys, "wxyz", rotations_at, quat)
         # A scale of zero hides things; as a map it would have no inverse.
         return at, quat, np.where(np.abs(scale) < 1e-9, 1.0, scale)
 
     def paths(self) -> dict[int, tuple[str, ...]]:
         """The names of each node and of those above it, from the top down."""
         nodes = range(1, len(self._nodes))
-        return {i: tuple(self._nodes[k].name for k in self.line(i)) for i in nodes}
-
-    def line(self, node: int) -> list[int]:
-        """The nodes from below the scene's own root to `node`."""
-        line = [node]
-        while self._parents[line[-1]] > 0:
-            line.append(self._parents[line[-1]])
-        return line[::-1]
+        return {i: tuple(self._nodes[k].name for k in line_to(i, self.parents)) for i in nodes}
 
     @staticmethod
     def _is_empty(node: Any) -> bool:
@@ -199,19 +189,14 @@ def _values(keys: Any, axes: str) -> Float[np.ndarray, "K n"]:
     return np.stack([keys["value"][axis] for axis in axes], axis=-1)
 
 
-def _vectors_at(
-    keys: Any, times: Float[np.ndarray, "T"], otherwise: Float[np.ndarray, "T 3"]
-) -> Float[np.ndarray, "T 3"]:
-    """Keyed vectors at `times`; the first and last key hold beyond the ends."""
+def _at(
+    times: Float[np.ndarray, "T"],
+    keys: Any,
+    axes: str,
+    blend: Callable[..., Float[np.ndarray, "T n"]],
+    otherwise: Float[np.ndarray, "T n"],
+) -> Float[np.ndarray, "T n"]:
+    """What is keyed, at `times`; the first and last key hold beyond the ends."""
     if not len(keys):
         return otherwise
-    return values_at(_values(keys, "xyz"), frames_of_keys(keys["time"], times))
-
-
-def _quats_at(
-    keys: Any, times: Float[np.ndarray, "T"], otherwise: Float[np.ndarray, "T 4"]
-) -> Float[np.ndarray, "T 4"]:
-    """Keyed rotations at `times`, between keys along the shorter arc."""
-    if not len(keys):
-        return otherwise
-    return rotations_at(_values(keys, "wxyz"), frames_of_keys(keys["time"], times))
+    return blend(_values(keys, axes), frames_of_keys(keys["time"], times))

@@ -20,7 +20,7 @@ from spark.io.fbx_materials import FbxMaterial, Links, materials_of
 from spark.io.fbx_mesh import FbxMesh, read_mesh
 from spark.io.fbx_rest import bound_maps, scene_nodes
 from spark.io.fbx_scene import FbxScene
-from spark.io.nodes import NodeJoint
+from spark.io.nodes import NodeJoint, line_to
 from spark.io.recording import unique_names
 from spark.io.scanner import LARGEST
 from spark.rotation import matrix_from_quat
@@ -153,7 +153,7 @@ class _Reader:
 
     def _joint(self, node: int) -> int | None:
         """The node itself or the nearest one above it that is a joint."""
-        line = self.scene.line(node)
+        line = line_to(node, self.scene.parents)
         return next((i for i in reversed(line) if i in self.joints), None)
 
     def _world(self, node: int) -> Float[np.ndarray, "4 4"]:
