@@ -23,6 +23,13 @@ Map = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
 """A node's place and linear map in the world."""
 
 
+def matrix_of(placed: Map) -> Float[np.ndarray, "4 4"]:
+    """A node's place and linear map as one matrix."""
+    matrix = np.eye(4)
+    matrix[:3, 3], matrix[:3, :3] = placed
+    return matrix
+
+
 def bound_pose(
     own: Mapping[int, Map],
     placed: Mapping[int, Float[np.ndarray, "4 4"]],

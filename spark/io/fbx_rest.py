@@ -18,6 +18,11 @@ from spark.io.scanner import LARGEST
 _ROOT = 0  # the id of the scene itself
 
 
+def rest_maps(scene: FbxScene, links: Links) -> dict[int, Map]:
+    """The place and linear map in the world at rest of all of the scene's nodes."""
+    return bound_maps(scene, links) or _own_maps(scene)
+
+
 def bound_maps(scene: FbxScene, links: Links | None = None) -> dict[int, Map] | None:
     """Where all of the scene's nodes are in the pose in which the skin was bound; None where that
     pose isn't told, or no straighter than the nodes' own transforms are."""
@@ -28,14 +33,19 @@ def bound_maps(scene: FbxScene, links: Links | None = None) -> dict[int, Map] | 
             links = Links.of(read_document(scene.path))
         except FileFormatError:  # FBX 6, of which the library reads the nodes alone
             return None
-    nodes = range(1, len(scene.parents))
-    at, axes = scene.world([NodeJoint(i, "", -1) for i in nodes], None, np.zeros(1))
-    own = {i: (at[0, k], axes[0, k]) for k, i in enumerate(nodes)}
+    own = _own_maps(scene)
     joints = [joint.node for joint in scene.joints()[0]]
     placed = {node: map for node, map in _placed(scene, links).items() if node in joints}
     if not all((np.abs(map) < LARGEST).all() for maps in own.values() for map in maps):
         return None
     return bound_pose(own, placed, joints, scene.parents)
+
+
+def _own_maps(scene: FbxScene) -> dict[int, Map]:
+    """As the nodes' own transforms have them."""
+    nodes = range(1, len(scene.parents))
+    at, axes = scene.world([NodeJoint(i, "", -1) for i in nodes], None, np.zeros(1))
+    return {i: (at[0, k], axes[0, k]) for k, i in enumerate(nodes)}
 
 
 def scene_nodes(scene: FbxScene, links: Links) -> dict[int, int]:

@@ -15,12 +15,13 @@ from jaxtyping import Float, Int
 
 from spark.errors import FileFormatError
 from spark.euler import quat_from_euler
+from spark.io.bound_pose import matrix_of
 from spark.io.fbx_document import Element, read_document
 from spark.io.fbx_materials import FbxMaterial, Links, materials_of
 from spark.io.fbx_mesh import FbxMesh, read_mesh
-from spark.io.fbx_rest import bound_maps, scene_nodes
+from spark.io.fbx_rest import rest_maps, scene_nodes
 from spark.io.fbx_scene import FbxScene
-from spark.io.nodes import NodeJoint, line_to
+from spark.io.nodes import line_to
 from spark.io.recording import unique_names
 from spark.io.scanner import LARGEST
 from spark.rotation import matrix_from_quat
@@ -82,11 +83,10 @@ class _Reader:
         self.path, self.scene = path, scene
         self.links = Links.of(document)
         self.nodes = scene_nodes(scene, self.links)
-        self.bound = bound_maps(scene, self.links)
         joints, _ = scene.joints()
         names, _ = unique_names([joint.name for joint in joints])
         self.joints = {joint.node: name for joint, name in zip(joints, names, strict=True)}
-        self.known: dict[int, Float[np.ndarray, "4 4"]] = {}
+        self.at_rest = rest_maps(scene, self.links)
 
     def meshes(self) -> Iterator[HungMesh]:
         """All meshes that hang on a joint."""
@@ -99,7 +99,7 @@ class _Reader:
 
     def rest(self) -> dict[str, Float[np.ndarray, "3"]]:
         """Where each joint is at rest."""
-        return {name: self._world(node)[:3, 3] for node, name in self.joints.items()}
+        return {name: self.at_rest[node][0] for node, name in self.joints.items()}
 
     def _mesh(self, model: int, geometry: int, element: Element) -> HungMesh | None:
         mesh = read_mesh(element)
@@ -114,13 +114,13 @@ class _Reader:
                 continue
             transform = cluster.numbers("Transform")
             bind = transform.reshape(4, 4).T if len(transform) == 16 else np.eye(4)
-            bones.append((joint, self._world(node) @ bind @ own))
+            bones.append((joint, matrix_of(self.at_rest[node]) @ bind @ own))
             hangs.append((points, cluster.numbers("Weights")))
         if not bones:
             node = self.nodes[model]
             if (joint := self._joint(node)) is None:
                 return None
-            bones = [(joint, self._world(node) @ own)]
+            bones = [(joint, matrix_of(self.at_rest[node]) @ own)]
             hangs = [(np.arange(len(mesh.points)), np.ones(len(mesh.points)))]
         main = int(np.argmax([weight.sum() for _, weight in hangs]))
         if abs(np.linalg.det(bones[main][1][:3, :3])) < _FLAT:
@@ -155,19 +155,6 @@ class _Reader:
         """The node itself or the nearest one above it that is a joint."""
         line = line_to(node, self.scene.parents)
         return next((i for i in reversed(line) if i in self.joints), None)
-
-    def _world(self, node: int) -> Float[np.ndarray, "4 4"]:
-        """What maps a node's axes into the world at rest, as `read_fbx` has it."""
-        if self.bound is not None:
-            world = np.eye(4)
-            world[:3, 3], world[:3, :3] = self.bound[node]
-            return world
-        if node not in self.known:
-            at, axes = self.scene.world([NodeJoint(node, "", -1)], None, np.zeros(1))
-            world = np.eye(4)
-            world[:3, :3], world[:3, 3] = axes[0, 0], at[0, 0]
-            self.known[node] = world
-        return self.known[node]
 
 
 def _geometric(model: Element) -> Float[np.ndarray, "4 4"]:

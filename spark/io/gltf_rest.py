@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from spark.io.bound_pose import Map, bound_pose
+from spark.io.bound_pose import Map, bound_pose, matrix_of
 from spark.io.gltf_file import GltfFile
 from spark.io.gltf_joints import joint_nodes
 from spark.io.nodes import line_to
@@ -26,7 +26,7 @@ def bound_maps(file: GltfFile) -> dict[int, Map] | None:
     """Where all nodes are in the pose in which the skins of the file's skeleton were bound; None
     where that pose isn't told, or no straighter than the nodes' own transforms are."""
     joints, parents, own = joint_nodes(file), file.parents(), _own_maps(file)
-    placed = _placed(file, joints, parents, {node: _matrix(own[node]) for node in own})
+    placed = _placed(file, joints, parents, {node: matrix_of(own[node]) for node in own})
     return bound_pose(own, placed, joints, parents)
 
 
@@ -105,9 +105,3 @@ def _own(node: dict[str, Any]) -> Map:
     scale = np.array(node.get("scale", (1.0, 1.0, 1.0)), dtype=float)
     axes = matrix_from_quat(np.array([w, x, y, z], dtype=float)) * scale
     return np.array(node.get("translation", (0.0, 0.0, 0.0)), dtype=float), axes
-
-
-def _matrix(of: Map) -> Float[np.ndarray, "4 4"]:
-    matrix = np.eye(4)
-    matrix[:3, 3], matrix[:3, :3] = of
-    return matrix

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from spark.io.bound_pose import matrix_of
 from spark.io.convention import Convention
 from spark.io.gltf_file import GltfFile
 from spark.io.gltf_joints import skeleton_nodes
@@ -43,10 +44,7 @@ class _Reader:
     def __init__(self, file: GltfFile) -> None:
         self._file, self._parents = file, file.parents()
         self._joints = {node: name for name, node in skeleton_nodes(file)}
-        self._rest = {}
-        for node, (at, axes) in rest_maps(file).items():
-            self._rest[node] = np.eye(4)
-            self._rest[node][:3, :3], self._rest[node][:3, 3] = axes, at
+        self._rest = {node: matrix_of(placed) for node, placed in rest_maps(file).items()}
         self._vertices = self._faces = 0
         self.surfaces = Surfaces(file)
         self.notes: list[str] = []
