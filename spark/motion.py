@@ -75,6 +75,16 @@ class Motion:
         """Seconds from the first to the last frame."""
         return (len(self) - 1) * self.frame_time
 
+    @property
+    def local_positions(self) -> Float[np.ndarray, "T J 3"]:
+        """Where each joint is in its parent [m], the root in the world, whether it moves or not."""
+        if self.translations is not None:
+            local = self.translations.copy()
+        else:
+            local = np.repeat(self.skeleton.offsets[None], len(self), axis=0)
+        local[:, 0] = self.root_pos
+        return local
+
     def frames(self, start: int, stop: int) -> "Motion":
         """The clip of frames `start` to `stop`, exclusive."""
         return self.picked(slice(start, stop))

@@ -113,12 +113,7 @@ def _encode_positions(
     offsets = np.array([joint.offset for joint in bvh.joints])
     worst = np.zeros(len(bvh.joints))
     for block in blocks(len(motion)):
-        part = motion.picked(block)
-        local = np.repeat(part.skeleton.offsets[None], len(part), axis=0)
-        if part.translations is not None:
-            local[:] = part.translations
-        local[:, 0] = part.root_pos
-        in_file = convention.to_file(local)
+        in_file = convention.to_file(motion.picked(block).local_positions)
         values[block, columns] = in_file[:, joints, axes]
         lost = np.abs(in_file - offsets) * convention.unit_m
         lost[:, joints, axes] = 0.0

@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 
 from spark.io.convention import Convention
 from spark.io.fbx_skin import FbxSkin
-from spark.io.glb_file import VERTICES, FileNumbers, container, places, turns
+from spark.io.glb_file import VERTICES, FileNumbers, animation, container, places, turns
 from spark.io.glb_mesh import add_skin
 from spark.motion import Motion
 from spark.rotation import quat_between
@@ -32,12 +32,12 @@ def write_glb(
     `convention`, of whose joints the motion is. Raises `OutputError` where `path` can't be
     written."""
     file = FileNumbers()
-    nodes, animation = animated(motion, file, name)
+    nodes, acted = animated(motion, file, name)
     if skin is None or convention is None:
         shown = _draw_bones(motion, file, nodes)
     else:
         shown = add_skin(skin, motion.skeleton, convention, file, nodes)
-    gltf = {**HEAD, "nodes": nodes, "animations": [animation], **shown, **file.entries()}
+    gltf = {**HEAD, "nodes": nodes, "animations": [acted], **shown, **file.entries()}
     container(gltf, file, path)
 
 
@@ -54,28 +54,14 @@ def animated(
     for j, children in enumerate(skeleton.children):
         if children:
             nodes[j]["children"] = list(children)
-    times = file.add(np.arange(len(motion)) * motion.frame_time, bounds=True)
-    samplers: list[dict[str, Any]] = []
-    channels: list[dict[str, Any]] = []
-    local = places(_local(motion))
+    local = places(motion.local_positions)
+    moving: list[tuple[int, dict[str, np.ndarray]]] = []
     for j in range(len(skeleton)):
-        moving = {"rotation": turns(motion.rotations[:, j])}
+        tracks = {"rotation": turns(motion.rotations[:, j])}
         if (local[:, j] != rest[j]).any():
-            moving["translation"] = local[:, j]
-        for what, values in moving.items():
-            channels.append({"sampler": len(samplers), "target": {"node": j, "path": what}})
-            samplers.append({"input": times, "output": file.add(values)})
-    return nodes, {"name": name, "samplers": samplers, "channels": channels}
-
-
-def _local(motion: Motion) -> Float[np.ndarray, "T J 3"]:
-    """Where each joint is in its parent [m], over frames."""
-    if motion.translations is not None:
-        local = motion.translations.copy()
-    else:
-        local = np.repeat(motion.skeleton.offsets[None], len(motion), axis=0)
-    local[:, 0] = motion.root_pos
-    return local
+            tracks["translation"] = local[:, j]
+        moving.append((j, tracks))
+    return nodes, animation(name, len(motion), motion.frame_time, moving, file)
 
 
 def _draw_bones(motion: Motion, file: FileNumbers, nodes: list[dict[str, Any]]) -> dict[str, Any]:

@@ -4,6 +4,7 @@ glTF has Y up, Z ahead, metres, and quaternions xyzw.
 """
 
 import struct
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -80,6 +81,24 @@ class FileNumbers:
     def _accessor(self, content: bytes, accessor: dict[str, Any], target: int | None) -> int:
         self.accessors.append({"bufferView": self.view(content, target), **accessor})
         return len(self.accessors) - 1
+
+
+Moving = Iterable[tuple[int, dict[str, np.ndarray]]]
+"""Nodes, and over frames their "rotation" (xyzw), "translation", ..."""
+
+
+def animation(
+    name: str, count: int, frame_time: float, moving: Moving, file: FileNumbers
+) -> dict[str, Any]:
+    """An animation of `count` frames, `frame_time` [s] apart, whose numbers are added to a file."""
+    times = file.add(np.arange(count) * frame_time, bounds=True)
+    samplers: list[dict[str, Any]] = []
+    channels: list[dict[str, Any]] = []
+    for node, tracks in moving:
+        for what, values in tracks.items():
+            channels.append({"sampler": len(samplers), "target": {"node": node, "path": what}})
+            samplers.append({"input": times, "output": file.add(values)})
+    return {"name": name, "samplers": samplers, "channels": channels}
 
 
 def container(gltf: dict[str, Any], numbers: FileNumbers, path: Path) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import FileFormatError
-from spark.io.glb_file import FileNumbers, container, places, turns
+from spark.io.glb_file import FileNumbers, animation, container, places, turns
 from spark.io.gltf_file import GltfFile
 from spark.io.gltf_joints import skeleton_nodes
 from spark.io.gltf_rest import rest_maps
@@ -38,21 +38,17 @@ def write_on_skin(
             raise FileFormatError(skin, None, "has other joints than the motion")
         local = _local_maps(file, [node for _, node in nodes], motion, unit_m)
         gltf, numbers = _embedded(file)
-    times = numbers.add(np.arange(len(motion)) * motion.frame_time, bounds=True)
-    samplers: list[dict[str, Any]] = []
-    channels: list[dict[str, Any]] = []
+    moving: list[tuple[int, dict[str, np.ndarray]]] = []
     for j, (_, node) in enumerate(nodes):
         at, axes = local[node]
         _as_trs(gltf["nodes"][node], at[0], axes[0])
         scale = np.linalg.norm(axes[0], axis=0)
         quat = quat_continuous(quat_from_matrix(axes / scale))
-        moving = {"rotation": (quat / np.linalg.norm(quat, axis=1)[:, None])[:, [1, 2, 3, 0]]}
+        tracks = {"rotation": (quat / np.linalg.norm(quat, axis=1)[:, None])[:, [1, 2, 3, 0]]}
         if j == 0 or motion.translations is not None:
-            moving["translation"] = at
-        for what, values in moving.items():
-            channels.append({"sampler": len(samplers), "target": {"node": node, "path": what}})
-            samplers.append({"input": times, "output": numbers.add(values)})
-    gltf["animations"] = [{"name": name, "samplers": samplers, "channels": channels}]
+            tracks["translation"] = at
+        moving.append((node, tracks))
+    gltf["animations"] = [animation(name, len(motion), motion.frame_time, moving, numbers)]
     container(gltf | numbers.entries(), numbers, path)
 
 

@@ -19,13 +19,13 @@ def write_vrma(motion: Motion, path: Path, *, name: str = "motion") -> None:
     pose is the T-pose, its hips as high as it stands. Raises `OutputError` where `path` can't be
     written."""
     file = FileNumbers()
-    nodes, animation = animated(motion, file, name)
+    nodes, acted = animated(motion, file, name)
     bones = {bone: {"node": j} for j, bone in enumerate(motion.skeleton.names)}
     gltf = {
         **HEAD,
         "scenes": [{"nodes": [0]}],
         "nodes": nodes,
-        "animations": [animation],
+        "animations": [acted],
         "extensionsUsed": [_NAME],
         "extensions": {_NAME: {"specVersion": "1.0", "humanoid": {"humanBones": bones}}},
         **file.entries(),
