@@ -5,7 +5,7 @@
     left_toe = []                   # the body has none
 
 Roles that a map leaves out are inferred. Joints that share a name are told apart as
-`spark.io.recording` numbers them: `spark-sim inspect` shows it.
+`spark.io.joint_names` numbers them: `spark-sim inspect` shows it.
 """
 
 import json

@@ -21,8 +21,8 @@ from spark.io.fbx_materials import FbxMaterial, Links, materials_of
 from spark.io.fbx_mesh import FbxMesh, read_mesh
 from spark.io.fbx_rest import rest_maps, scene_nodes
 from spark.io.fbx_scene import FbxScene
+from spark.io.joint_names import unique_names
 from spark.io.nodes import line_to
-from spark.io.recording import unique_names
 from spark.io.scanner import LARGEST
 from spark.rotation import matrix_from_quat
 from spark.skin import strongest

@@ -4,8 +4,8 @@ animation moves below them; in a file without any, the nodes that an animation t
 from pathlib import Path
 
 from spark.io.gltf_file import GltfFile
+from spark.io.joint_names import unique_names
 from spark.io.nodes import joints_of, line_to
-from spark.io.recording import unique_names
 from spark.skeleton import Skeleton
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.errors import ConventionError, FileFormatError, name_list
-from spark.io.recording import unique_names
+from spark.io.joint_names import unique_names
 from spark.kinematics import local_rotations
 from spark.motion import Motion
 from spark.rotation import quat_conj, quat_continuous, quat_from_matrix, quat_rotate

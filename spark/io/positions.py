@@ -12,11 +12,12 @@ from jaxtyping import Float
 from spark.errors import ConventionError, FileFormatError, name_list
 from spark.io.convention import Convention, axis_of, given_unit, given_up
 from spark.io.encoding import encode_new
+from spark.io.joint_names import unique_names
 from spark.io.position_files import Points, read_points
 from spark.io.position_fit import Hints, fit_rotations, fitted
 from spark.io.position_layouts import KNOWN, Layout, layouts
 from spark.io.position_tree import parents_first, rigid_tree, still
-from spark.io.recording import Recording, unique_names
+from spark.io.recording import Recording
 from spark.io.stance import walked
 from spark.io.unit_inference import infer_unit
 from spark.io.up_inference import infer_up, standing_axis

@@ -4,8 +4,6 @@ This is the border where file units, file axes, Euler angles and degrees end; `s
 the way back.
 """
 
-import unicodedata
-from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,11 +11,12 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.blocks import BLOCK, blocks
-from spark.errors import ConventionError, FileFormatError, name_list
+from spark.errors import ConventionError, FileFormatError
 from spark.io.bvh import Bvh, read_bvh
 from spark.io.convention import Convention, given_unit, given_up
 from spark.io.euler import quat_from_angles
 from spark.io.given import doubts
+from spark.io.joint_names import unique_names
 from spark.io.unit_inference import infer_unit
 from spark.io.up_inference import infer_up
 from spark.motion import LazyMotion, Motion, check_frame_time
@@ -27,8 +26,6 @@ from spark.skeleton import Skeleton
 _SAMPLES = 32  # frames that unit and up axis are inferred from
 _USUAL_FRAME_TIME = (0.001, 0.5)  # [s] 1000 to 2 frames a second
 
-_NO_XML = "\ufffe\uffff"
-_MUJOCOS = "world"  # MuJoCo's own body, so none of ours
 _ENCODINGS = {"cp932": "Shift-JIS", "latin-1": "Latin-1"}
 
 # Of the body's height: positions that vary less are constant.
@@ -229,38 +226,3 @@ def _turned(
     for block in blocks(len(rotations)):
         out[block] = convention.turns_from_file(rotations[block])
     return out
-
-
-def unique_names(names: list[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Repeated names with a number (Toe, Toe.2, Toe.3), names that can be shown and given to
-    MuJoCo, and notes on what was changed."""
-    plain = [_plain(name) for name in names]
-    odd = [a for a, b in zip(plain, names, strict=True) if a != b]
-    notes: tuple[str, ...] = ()
-    if odd:
-        notes = (f"control characters in names are read as _: {name_list(odd)}",)
-    taken = {*plain, _MUJOCOS}
-    repeats = Counter[str]((_MUJOCOS,))
-    unique: list[str] = []
-    for name in plain:
-        repeats[name] += 1
-        candidate = name
-        while repeats[name] > 1 and candidate in taken:
-            candidate = f"{name}.{repeats[name]}"
-            repeats[name] += candidate in taken
-        taken.add(candidate)
-        unique.append(candidate)
-    renamed = [name for name, before in zip(unique, plain, strict=True) if name != before]
-    if renamed:
-        which = f", and MuJoCo's own {_MUJOCOS!r}," if _MUJOCOS in plain else ""
-        notes += (f"repeated joint names{which} got numbers: {name_list(renamed)}",)
-    return tuple(unique), notes
-
-
-def _plain(name: str) -> str:
-    """A name without control characters, which would steer a terminal and are no XML."""
-    return "".join("_" if _is_control(character) else character for character in name)
-
-
-def _is_control(character: str) -> bool:
-    return unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp") or character in _NO_XML
