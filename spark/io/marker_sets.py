@@ -12,7 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
-from spark.io.position_layouts import Layout, layout_of_joints
+from spark.io.position_layouts import Layout, tpose_position
+from spark.io.smpl_body import joints_of
 
 Points = dict[str, Float[np.ndarray, "T 3"]]
 
@@ -157,5 +158,41 @@ def _unit(vectors: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T 3"]:
 
 
 def layout_of(joints: Points, fps: float) -> Layout:
-    """The layout of these joints, by SMPL's names."""
-    return layout_of_joints("C3D", tuple(joints), fps)
+    """The layout of these joints, by SMPL's names: each on the nearest one above it that is there.
+
+    The hips' middle is the pelvis where that is not there, and the shoulders' middle the chest and
+    the neck.
+    """
+    names, parents = joints_of(22)
+    above = {n: "" if p < 0 else names[p] for n, p in zip(names, parents, strict=True)}
+    means: dict[str, tuple[str, ...]] = {}
+    hints: dict[str, str] = {}
+    places = {joint: joint for joint in names}
+    if "pelvis" not in joints:
+        means["pelvis"] = ("left_hip", "right_hip")
+        places["pelvis"] = "middle of hips"
+    shoulders = ("left_shoulder", "right_shoulder")
+    if all(joint in joints for joint in shoulders):
+        for joint in {"spine3", "neck"}.difference(joints):
+            means[joint] = shoulders
+            places[joint] = "middle of shoulders"
+            hints |= {"spine3": "pelvis"} if joint == "spine3" else {}
+    there = {*joints, *means}
+
+    def parent(joint: str) -> str:
+        line = above[joint]
+        while line and line not in there:
+            line = above[line]
+        return line
+
+    kept = [joint for joint in names if joint in there]
+    return Layout(
+        "C3D",
+        tuple(joints),
+        {joint: parent(joint) for joint in kept},
+        {joint: tpose_position(places[joint]) for joint in kept},
+        fps,
+        usual_up="z",
+        means=means,
+        hints=hints,
+    )

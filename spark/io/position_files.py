@@ -10,9 +10,15 @@ from spark.errors import FileFormatError
 from spark.io.arrays import Arrays, held, numbers, read_npy, read_npz
 from spark.io.humanml3d import FPS, WIDTH, positions_of_features
 from spark.io.intermimic import read_states
-from spark.io.position_layouts import POSITION_KEYS
 from spark.io.position_tree import parents_first
 
+POSITION_KEYS = (
+    *("positions", "joint_positions", "global_joint_positions", "joints", "joints_3d", "joints3d"),
+    *("keypoints", "keypoints_3d", "keypoints3d", "landmarks", "world_landmarks"),
+    *("points", "xyz", "arr_0", "motion", "pose_3d", "poses_3d", "global_positions"),
+    *("new_joints", "human_joints"),
+)
+"""What files call an array of positions."""
 _NAMES = ("names", "joint_names", "joints_names", "labels", "marker_names", "landmark_names")
 _PARENTS = ("parents", "joint_parents", "parent_indices")
 _RATES = ("fps", "frame_rate", "framerate", "mocap_framerate", "mocap_frame_rate")

@@ -9,22 +9,6 @@ from jaxtyping import Float
 from spark.io.convention import Up
 from spark.io.smpl_body import joints_of, rest_position
 
-POSITION_KEYS = (
-    *("positions", "joint_positions", "global_joint_positions", "joints", "joints_3d", "joints3d"),
-    *(
-        "keypoints",
-        "keypoints_3d",
-        "keypoints3d",
-        "landmarks",
-        "world_landmarks",
-        "points",
-        "xyz",
-        "arr_0",
-    ),
-    *("motion", "pose_3d", "poses_3d", "global_positions", "new_joints", "human_joints"),
-)
-"""What files call an array of positions."""
-
 # [m] Points beside SMPL's joints, in its T-pose: x left, y up, z forward; the left one of two.
 _POINTS = {
     "middle of hips": (0.0, 0.0, 0.0),
@@ -80,7 +64,9 @@ KNOWN = (
 )
 
 
-def _at(point: str) -> Float[np.ndarray, "3"]:
+def tpose_position(point: str) -> Float[np.ndarray, "3"]:
+    """[m] Where a point, of SMPL's joints or of those beside them, is in the T-pose: X forward,
+    Z up."""
     side, _, part = point.rpartition("_")
     if part in _POINTS:
         found = np.array(_POINTS[part]) * [-1.0 if side == "right" else 1.0, 1.0, 1.0]
@@ -92,7 +78,7 @@ def _at(point: str) -> Float[np.ndarray, "3"]:
 def _smpl(count: int, name: str, fps: float) -> Layout:
     names, parents = joints_of(count)
     tree = {n: "" if p < 0 else names[p] for n, p in zip(names, parents, strict=True)}
-    return Layout(name, names, tree, {n: _at(n) for n in names}, fps)
+    return Layout(name, names, tree, {n: tpose_position(n) for n in names}, fps)
 
 
 def _of_table(name: str, table: str, fps: float = 30.0, **more: object) -> Layout:
@@ -104,7 +90,7 @@ def _of_table(name: str, table: str, fps: float = 30.0, **more: object) -> Layou
     for line in table.strip().splitlines():
         joint, parent, place = (cell.strip() for cell in line.split("|"))
         own = joint.lstrip("*")
-        tree[own], tpose[own] = parent, _at(place)
+        tree[own], tpose[own] = parent, tpose_position(place)
         if own == joint:
             points.append(own)
     return Layout(name, tuple(points), tree, tpose, fps, **more)  # type: ignore[arg-type]
@@ -253,44 +239,3 @@ _HOLOSOMA = _of_table(
     120.0,
     usual_up="z",
 )  # fmt: skip
-
-
-def layout_of_joints(name: str, points: tuple[str, ...], fps: float) -> Layout:
-    """A layout of some of SMPL's joints, each on the nearest one above it that is there.
-
-    The hips' middle is the pelvis where that is not there, and the shoulders' middle the chest and
-    the neck.
-    """
-    names, parents = joints_of(22)
-    above = {n: "" if p < 0 else names[p] for n, p in zip(names, parents, strict=True)}
-    means: dict[str, tuple[str, ...]] = {}
-    hints: dict[str, str] = {}
-    places = {joint: joint for joint in names}
-    if "pelvis" not in points:
-        means["pelvis"] = ("left_hip", "right_hip")
-        places["pelvis"] = "middle of hips"
-    shoulders = ("left_shoulder", "right_shoulder")
-    if all(joint in points for joint in shoulders):
-        for joint in {"spine3", "neck"}.difference(points):
-            means[joint] = shoulders
-            places[joint] = "middle of shoulders"
-            hints |= {"spine3": "pelvis"} if joint == "spine3" else {}
-    there = {*points, *means}
-
-    def parent(joint: str) -> str:
-        line = above[joint]
-        while line and line not in there:
-            line = above[line]
-        return line
-
-    kept = [joint for joint in names if joint in there]
-    return Layout(
-        name,
-        points,
-        {joint: parent(joint) for joint in kept},
-        {joint: _at(places[joint]) for joint in kept},
-        fps,
-        usual_up="z",
-        means=means,
-        hints=hints,
-    )

@@ -9,7 +9,8 @@ from spark.errors import ConventionError, FileFormatError
 from spark.io.arrays import npy_shape, npz_names
 from spark.io.humanml3d import WIDTH as FEATURES
 from spark.io.intermimic import holds_states
-from spark.io.position_layouts import POSITION_KEYS, layouts
+from spark.io.position_files import POSITION_KEYS
+from spark.io.position_layouts import layouts
 from spark.io.recording import Recording
 from spark.io.smpl_columns import WIDTHS as SMPL_WIDTHS
 from spark.io.smpl_layouts import KEYS, SIGNS
