@@ -35,7 +35,8 @@ for _side in ("Right", "Left"):
         f"{_side}Toe": (f"{_side}Foot",),
     }
 _LIMBS = ("UpperLeg", "LowerLeg", "Foot", "UpperArm", "Forearm", "Hand")
-NEEDED = ("Pelvis", "Head", *(f"{side}{bone}" for side in ("Left", "Right") for bone in _LIMBS))
+LIMBS = tuple(f"{side}{bone}" for side in ("Left", "Right") for bone in _LIMBS)
+NEEDED = ("Pelvis", "Head", *LIMBS)
 
 _MEAN = {
     "Pelvis": (0.0, 0.0, 0.93),
@@ -67,7 +68,6 @@ def mean_body() -> Places:
     return out
 
 
-LIMBS = tuple(f"{side}{bone}" for side in ("Left", "Right") for bone in _LIMBS)
 _UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _AXES = {  # where nothing tells: the rows are X ahead, Y left and Z up
     mvn.QUATERNION: np.eye(3),
@@ -78,7 +78,7 @@ _LEAST_LEG, _MOST_LEG = 0.25, 1.6  # [m] from the hip to the ankle
 
 
 @dataclass(frozen=True, eq=False)
-class Convention:
+class MvnConvention:
     """How a datagram's axes and unit [m] lead to ours."""
 
     axes: Float[np.ndarray, "3 3"]
@@ -98,9 +98,9 @@ class Convention:
         return f"{self.unit}, {up} up, {hand}-handed"
 
 
-def documented(kind: int) -> Convention:
+def documented(kind: int) -> MvnConvention:
     """What Xsens' documents and SDK say of a type of datagram."""
-    return Convention(_AXES[kind], "cm" if kind == mvn.EULER else "m")
+    return MvnConvention(_AXES[kind], "cm" if kind == mvn.EULER else "m")
 
 
 def from_tpose(places: Places) -> Places:
@@ -120,7 +120,7 @@ def leg_length(places: Places) -> float:
     return sum(float(np.linalg.norm(places[bone])) for bone in bones if bone in places) / 2
 
 
-def convention_of(places: Places, kind: int) -> Convention:
+def convention_of(places: Places, kind: int) -> MvnConvention:
     """Axes and unit of a body, given by the places of its segments in their parents in the T-pose;
     those of the type where the body does not tell."""
     leg = leg_length(places)
@@ -135,6 +135,6 @@ def convention_of(places: Places, kind: int) -> Convention:
         free = np.where(np.abs(axes).sum(0) > 0, 0.0, direction)
         column = int(np.abs(free).argmax())
         if abs(free[column]) <= 0.5 * np.linalg.norm(direction):
-            return Convention(documented(kind).axes, unit)
+            return MvnConvention(documented(kind).axes, unit)
         axes[row, column] = np.sign(free[column])
-    return Convention(axes, unit)
+    return MvnConvention(axes, unit)

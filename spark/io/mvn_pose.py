@@ -12,7 +12,7 @@ from spark.io.mvn_body import (
     LIMBS,
     NEEDED,
     PARENTS,
-    Convention,
+    MvnConvention,
     convention_of,
     documented,
     from_tpose,
@@ -65,7 +65,7 @@ class MvnPose(LivePose):
     _local: Rows = field(default_factory=lambda: np.zeros((_SIZE, 7)))  # in the parents
     _world: Rows = field(default_factory=lambda: np.zeros((_SIZE, 7)))
     _placed: Mask = field(default_factory=lambda: np.zeros(_SIZE, dtype=bool))
-    _convention: Convention | None = None
+    _convention: MvnConvention | None = None
 
     def take(self, packet: bytes, now: float) -> bool:
         try:
@@ -243,7 +243,7 @@ class MvnPose(LivePose):
         self._settle()
         return {mvn.SEGMENTS[j]: self._local[j, :3] for j in np.flatnonzero(self._placed).tolist()}
 
-    def _read(self) -> Convention:
+    def _read(self) -> MvnConvention:
         """How the datagrams are to be read; found out once the body is whole."""
         if self._convention is None and self._kind is not None and not self.missing:
             self._convention = convention_of(self._raw_places(), self._kind)

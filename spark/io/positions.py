@@ -202,10 +202,6 @@ def _fit(seen: Motion, layout: Layout | None, frame_time: float, notes: list[str
     if len(motion) > 1 and feet and np.ptp(positions[:, 0], axis=0).max() < _STILL * size:
         notes.append("the hips never move: they are moved so that the lower foot stands")
         motion = walked(motion, feet, 2)
-        if motion.translations is not None:
-            placed = motion.translations.copy()
-            placed[:, 0] = motion.root_pos
-            motion = replace(motion, translations=placed)
     notes.append("rotations are fitted to the bones' directions; turns about bones are guesses")
     return motion
 

@@ -57,4 +57,8 @@ def walked(motion: Motion, feet: list[int], up: int) -> Motion:
     moved = positions[frames, lowest[1:]] - positions[frames - 1, lowest[1:]]
     root_pos = np.concatenate([np.zeros((1, 3)), -np.cumsum(moved, axis=0)])
     root_pos[:, up] = -positions[np.arange(len(motion)), lowest, up]
-    return replace(motion, root_pos=root_pos)
+    placed = motion.translations
+    if placed is not None:
+        placed = placed.copy()
+        placed[:, 0] = root_pos
+    return replace(motion, root_pos=root_pos, translations=placed)
