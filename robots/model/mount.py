@@ -4,6 +4,8 @@ To be compared with people they need a pelvis, an up and a forward. Thighs and s
 or joints, welded to the base below head and shoulders, give them that; nothing else sees them.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from jaxtyping import Float
 
@@ -39,34 +41,37 @@ def roles_and_parts(
         return assign_roles(skeleton, None, override, half_bent(tree, segments, skeleton))
 
     try:
-        found = roles_of(segments, points)
+        return roles_of(segments, points), segments, points, False
     except NoLegsError as error:
-        up, lateral = np.array([0.0, 0, 1]), np.array([0.0, 1, 0])
-        middle = np.mean([segment.center for segment in segments], axis=0)
-        highest = np.inf
-        for _ in range(2):  # under the middle of all parts, then under its head or shoulders
-            legged = [*segments, *_legs(segments, points, middle, lateral, highest)]
-            shapes = [*points, *(np.zeros((0, 3)) for _ in _NAMES)]
-            for k in (-3, -1):  # the shanks' ends
-                thigh = legged[k].center - legged[k - 1].center
-                shapes[k] = (legged[k].center + _SHANK * thigh)[None]
-            try:
-                found = roles_of(legged, shapes)
-            except SkeletonError:
-                raise error from None
-            arms = [found.joint(role) for role in _ARMS]
-            if None in arms:
-                raise error from None
-            left, right = (legged[j or 0].center for j in (arms[0], arms[2]))
-            across = (left - right) * (1 - up)
-            lateral = across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-6 else lateral
-            tops = [j for r in (Role.HEAD, Role.NECK, Role.SPINE) for j in found.joints(r)[-1:]]
-            middle = legged[tops[0]].center if tops else (left + right) / 2
-            # below the trunk, or up would be down: a robot may stand on its waist
-            highest = float(min(left[2], right[2], *(legged[j].center[2] for j in tops)))
-            highest -= _TRUNK * float(np.linalg.norm(legged[arms[1] or 0].center - left))
-        return found, legged, shapes, True
-    return found, segments, points, False
+        try:
+            return *_with_legs(segments, points, roles_of), True
+        except SkeletonError:
+            raise error from None
+
+
+def _with_legs(
+    segments: list[Segment], points: Points, roles_of: Callable[[list[Segment], Points], RoleMap]
+) -> tuple[RoleMap, list[Segment], Points]:
+    """The roles and the parts with virtual legs: under the middle of all parts first, then under
+    head or shoulders. Raises `SkeletonError` where there are no arms."""
+    middle, lateral = np.mean([s.center for s in segments], axis=0), np.array([0.0, 1, 0])
+    highest = np.inf
+    for _ in range(2):
+        legged = [*segments, *_legs(segments, points, middle, lateral, highest)]
+        shapes = [*points, *(np.zeros((0, 3)) for _ in _NAMES)]
+        for k in (-3, -1):  # the shanks' ends
+            thigh = legged[k].center - legged[k - 1].center
+            shapes[k] = (legged[k].center + _SHANK * thigh)[None]
+        found = roles_of(legged, shapes)
+        left, elbow, right, _ = (legged[found.require(role)].center for role in _ARMS)
+        across = (left - right) * np.array([1.0, 1, 0])
+        lateral = across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-6 else lateral
+        tops = [j for r in (Role.HEAD, Role.NECK, Role.SPINE) for j in found.joints(r)[-1:]]
+        middle = legged[tops[0]].center if tops else (left + right) / 2
+        # below the trunk, or up would be down: a robot may stand on its waist
+        highest = float(min(left[2], right[2], *(legged[j].center[2] for j in tops)))
+        highest -= _TRUNK * float(np.linalg.norm(elbow - left))
+    return found, legged, shapes
 
 
 def _legs(
