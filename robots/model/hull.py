@@ -11,6 +11,7 @@ from sim.outline import fibonacci_sphere, outline
 Balls = tuple[Float[np.ndarray, "_ 3"], Float[np.ndarray, "_"]]
 """Points [m], and the radius [m] of the ball around each."""
 
+_NONE: Balls = (np.zeros((0, 3)), np.zeros(0))
 _WAYS = fibonacci_sphere(200)
 _RING = 24  # points on either edge of a cylinder
 
@@ -18,8 +19,7 @@ _RING = 24  # points on either edge of a cylinder
 def hull(model: mujoco.MjModel, geoms: Sequence[int], spared: float) -> Balls:
     """Of shapes that move as one, in the rest pose: no less than they are in any direction, and
     about `spared` [m] more at most."""
-    none = np.zeros((0, 3)), np.zeros(0)
-    points, radii = reaching(_WAYS, outlines(model, geoms, _WAYS), none, spared)
+    points, radii = reaching(_WAYS, outlines(model, geoms, _WAYS), _NONE, spared)
     return points, radii + spared
 
 
@@ -56,8 +56,7 @@ def part_of_hull(
     thick = (radii[one] + share[..., 0] * (radii[other] - radii[one])).ravel()
     points, radii = np.concatenate([points, between]), np.concatenate([radii, thick])
     away = np.linalg.norm(points[:, None] - places, axis=2).min(axis=1) - radii
-    none = np.zeros((0, 3)), np.zeros(0)
-    return reaching(_WAYS, (points[away <= within], radii[away <= within]), none, spared)
+    return reaching(_WAYS, (points[away <= within], radii[away <= within]), _NONE, spared)
 
 
 def outlines(model: mujoco.MjModel, geoms: Sequence[int], ways: Float[np.ndarray, "D 3"]) -> Balls:

@@ -11,10 +11,9 @@ from jaxtyping import Float
 from robots.model.hull import outlines, reaching
 from spark.rotation import quat_between, quat_rotate
 
-# Tilts of a foot that stands, and of one that lies; hip heights by which it may then reach below
-# what is known of it.
-_STANDING = np.radians([20.0, 40.0, 60.0]), 0.005
-_LYING = np.radians([80.0, 100.0, 120.0]), 0.005
+# Tilts of a foot that stands, and of one that lies.
+_STANDING, _LYING = np.radians([20.0, 40.0, 60.0]), np.radians([80.0, 100.0, 120.0])
+_SPARED = 0.005  # hip heights by which it may then reach below what is known of it
 _SIDES = np.linspace(0, 2 * np.pi, 17)[:-1]
 
 
@@ -31,10 +30,10 @@ def rim(
     direction `down`."""
     upright = quat_between(np.array([0.0, 0.0, -1.0]), down)
     kept, kept_radii, counts = corners, np.zeros(len(corners)), []
-    for tilts, spared in (_STANDING, _LYING):
+    for tilts in (_STANDING, _LYING):
         ways = quat_rotate(upright, _tilted_down(tilts))
         balls = outlines(model, geoms, ways)
-        kept, kept_radii = reaching(ways, balls, (kept, kept_radii), spared * hip_height)
+        kept, kept_radii = reaching(ways, balls, (kept, kept_radii), _SPARED * hip_height)
         counts.append(len(kept) - len(corners))
     return kept[len(corners) :], kept_radii[len(corners) :], counts[0]
 

@@ -17,8 +17,7 @@ TILTED, _COPLANAR = np.radians(40), np.radians(3)
 _LONG = 0.7  # a sole's width as a share of its length, up to which its length is known
 _RING = 12  # points on either edge of a cylinder
 
-# 26 unit vectors towards the faces, edges and corners of a cube; DIRECTIONS[i] = -DIRECTIONS[25 -
-# i].
+# 26 unit vectors towards the faces, edges and corners of a cube.
 DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1, keepdims=True)
 
