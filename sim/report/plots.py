@@ -1,5 +1,6 @@
 """A report's measures over time, as inline SVG: no script, no library, any zoom."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,6 +37,12 @@ def plots(result: Result) -> list[Plot]:
     """What is worth a look over time."""
     clip, source, limits = result.clip, result.source, result.clip.thresholds
     flags, never = clip.flags, np.zeros(len(clip), dtype=bool)
+
+    def beside(
+        measure: Callable[[ClipMetrics], Float[np.ndarray, "S"]],
+    ) -> Float[np.ndarray, "S"] | None:
+        return None if source is None else measure(source)
+
     shown = [
         Plot(
             "lowest point above the floor",
@@ -43,7 +50,7 @@ def plots(result: Result) -> list[Plot]:
             100 * _lowest_point(clip),
             flags["penetration"] | flags["floating"],
             -100 * limits.penetration,
-            None if source is None else 100 * _lowest_point(source),
+            beside(lambda each: 100 * _lowest_point(each)),
             worst_is_low=True,
         ),
         Plot(
@@ -52,7 +59,7 @@ def plots(result: Result) -> list[Plot]:
             _skate_speed(clip),
             flags["skating"],
             None,
-            None if source is None else _skate_speed(source),
+            beside(_skate_speed),
             min_range=limits.skate_speed,
         ),
         Plot(
@@ -61,7 +68,7 @@ def plots(result: Result) -> list[Plot]:
             clip.unexplained_wrench[:, 0],
             flags["root_wrench"],
             limits.wrench_force,
-            None if source is None else source.unexplained_wrench[:, 0],
+            beside(lambda each: each.unexplained_wrench[:, 0]),
         ),
         Plot(
             "joints beyond their limits",
@@ -69,7 +76,7 @@ def plots(result: Result) -> list[Plot]:
             _limit_excess(clip),
             _limit_excess(clip) > 0,
             None,
-            None if source is None else _limit_excess(source),
+            beside(_limit_excess),
         ),
         Plot(
             "body parts in each other",
@@ -84,20 +91,20 @@ def plots(result: Result) -> list[Plot]:
             clip.base_acceleration,
             never,
             None,
-            None if source is None else result.scale * source.base_acceleration,
+            beside(lambda each: result.scale * each.base_acceleration),
         ),
         *_limbs(result),
         Plot(
             "fastest joint",
             "rad/s",
-            clip.joint_pace.max(axis=1, initial=0.0),
+            _fastest(clip),
             never,
             None,
-            None if source is None else source.joint_pace.max(axis=1, initial=0.0),
+            beside(_fastest),
         ),
     ]
     tremble = result.tremble
-    beside = tremble.source_points
+    theirs = tremble.source_points
     shown.append(
         Plot(
             "tremble",
@@ -105,7 +112,7 @@ def plots(result: Result) -> list[Plot]:
             1000 * tremble.points.max(axis=1),
             np.any(tremble.points_far, axis=1),
             None,
-            None if beside is None else 1000 * beside.max(axis=1),
+            None if theirs is None else 1000 * theirs.max(axis=1),
         )
     )
     if clip.torques:
@@ -229,6 +236,10 @@ def _lowest_point(clip: ClipMetrics) -> Float[np.ndarray, "T"]:
 
 def _skate_speed(clip: ClipMetrics) -> Float[np.ndarray, "T"]:
     return np.where(clip.corner_skates, clip.corner_speeds, 0.0).max(axis=1)
+
+
+def _fastest(clip: ClipMetrics) -> Float[np.ndarray, "T"]:
+    return clip.joint_pace.max(axis=1, initial=0.0)
 
 
 def _limit_excess(clip: ClipMetrics) -> Float[np.ndarray, "T"]:

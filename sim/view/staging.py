@@ -3,15 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from sim.body.compiling import compiled
-from sim.trajectory import coordinates_at, model_trajectory
+from sim.trajectory import ModelTrajectory, coordinates_at, model_trajectory
 from sim.view.display import add_display, body_names
 from sim.view.figure import Figure
 from sim.view.scene import Placement, Scene
-from sim.view.skin import add_skin, worn_by
+from sim.view.skin import WornSkin, add_skin, worn_by
 from sim.view.text import shortened
 from sim.view.world import add_pillars, empty_world
 from spark.errors import SkeletonError
@@ -47,15 +48,7 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0, blend: bool
     for k, figure in enumerate(figures):
         body = figure.subject.body or model_trajectory(figure.rig, figure.motion.frames(0, 1))
         first_body = len(list(world.bodies))
-        worn = None
-        if figure.skin is not None and not figure.ghost:
-            names = body_names(body.model, figure.rig, f"{k}_")
-            worn = worn_by(figure.skin, figure.rig, names, scale=figure.scale)
-        columns = add_display(
-            world, body, f"{k}_", ghost=figure.ghost, scale=figure.scale, bare=worn is not None
-        )
-        if worn is not None:
-            add_skin(world, worn, f"{k}_")
+        columns, worn = _add_figure(world, figure, body, f"{k}_")
         qpos = _finite(coordinates_at(figure.subject, body.model, times, columns))
         qpos[:, :3] *= figure.scale
         if figure.ghost and placements and not figure.aligned:
@@ -90,6 +83,23 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0, blend: bool
         column = following
     qpos = np.concatenate(coordinates, axis=1)
     return Scene(compiled(world), qpos, frame_time, tuple(placements))
+
+
+def _add_figure(
+    world: mujoco.MjSpec, figure: Figure, body: ModelTrajectory, prefix: str
+) -> tuple[Int[np.ndarray, "n"], WornSkin | None]:
+    """Add a figure's body to the world, in its skin where it wears one, under names that begin with
+    `prefix`; the coordinates of its own model that move it, and the skin."""
+    worn = None
+    if figure.skin is not None and not figure.ghost:
+        names = body_names(body.model, figure.rig, prefix)
+        worn = worn_by(figure.skin, figure.rig, names, scale=figure.scale)
+    columns = add_display(
+        world, body, prefix, ghost=figure.ghost, scale=figure.scale, bare=worn is not None
+    )
+    if worn is not None:
+        add_skin(world, worn, prefix)
+    return columns, worn
 
 
 def thinned(fps: float, most: float) -> int:
