@@ -43,7 +43,7 @@ def write_sidecar(
     format: str,
     columns: Sequence[str],
     conventions: dict[str, str],
-    source: Source | None = None,
+    source: Source | None,
 ) -> None:
     """Write `sidecar_of(path)`: rate, frames, order of the joints, what the `columns` are, and in
     which frames each foot stands, as [first, last] of each contact."""

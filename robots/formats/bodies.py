@@ -34,7 +34,8 @@ def body_states(motion: RobotMotion, bodies: list[int], *, of_mass: bool = False
     pos, quat = (poses[:, at] for poses in body_poses(robot, motion.qpos))
     moving = pos
     if of_mass:
-        moving = pos + quat_rotate(quat, np.broadcast_to(_mass_centers(robot, bodies), pos.shape))
+        centers = robot.mjcf.model.body_ipos[bodies]  # of mass [m], in each body's axes
+        moving = pos + quat_rotate(quat, np.broadcast_to(centers, pos.shape))
     return BodyStates(pos, quat, gradient(moving, dt), turning(quat, dt))
 
 
@@ -114,8 +115,3 @@ def turning(quat: Float[np.ndarray, "T B 4"], dt: float) -> Float[np.ndarray, "T
         turn = rotvec_from_quat(quat_mul(quat[after], quat_conj(quat[before])))
         out = turn / (dt * (after - before))[:, None, None]
     return out
-
-
-def _mass_centers(robot: Morphology, bodies: list[int]) -> Float[np.ndarray, "B 3"]:
-    """Each body's centre of mass [m] in its own axes."""
-    return robot.mjcf.model.body_ipos[bodies].copy()

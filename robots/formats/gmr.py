@@ -23,7 +23,7 @@ from spark.plain_pickle import read_plain_pickle
 _PROTOCOL = 4  # the newest that stores arrays in a way that all of numpy's versions read
 
 
-def write_pkl(motion: RobotMotion, path: Path, source: Source | None = None) -> None:
+def write_pkl(motion: RobotMotion, path: Path, source: Source | None) -> None:
     """Write the six entries that GMR writes, bodies included, and beside it what they don't say."""
     columns = columns_of(motion, path)
     mjcf = motion.robot.mjcf

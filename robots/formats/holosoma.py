@@ -37,7 +37,7 @@ def write_holosoma(motion: RobotMotion, path: Path) -> None:
     velocities in world axes, of their origins; `fps`, the names, and the feet's contacts."""
     robot, columns = motion.robot, columns_of(motion, path)
     model, bodies = robot.mjcf.model, robot.mjcf.bodies()
-    states = body_states(motion, bodies, of_mass=False)
+    states = body_states(motion, bodies)
     start = robot.mjcf.base_dof
     joints = model.jnt_dofadr[list(robot.mj_joints)]
     speeds = velocities(model, motion.qpos, motion.frame_time)

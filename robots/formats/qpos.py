@@ -78,7 +78,7 @@ def of_qpos(
     robot: Morphology,
     frame_time: float,
     path: Path,
-    notes: tuple[str, ...] = (),
+    notes: tuple[str, ...],
 ) -> RobotMotion:
     """The motion of MuJoCo's coordinates, with what is remarkable about them as notes."""
     if not len(qpos):

@@ -26,7 +26,7 @@ _LONGEST = 1 << 16  # bytes of a header
 _ORDER = "zyx"  # about fixed x, y, z is about moving z, y, x
 
 
-def write_seed(motion: RobotMotion, path: Path, source: Source | None = None) -> None:
+def write_seed(motion: RobotMotion, path: Path, source: Source | None) -> None:
     """Write the header and a row a frame, with 6 decimals."""
     columns = columns_of(motion, path)
     turned = np.degrees(euler_over_time(columns.quat, _ORDER)[:, ::-1])

@@ -34,7 +34,7 @@ from spark.opening import read_text
 _SAME_RATE = 1e-3  # of the rate
 
 
-def write_sonic(motion: RobotMotion, path: Path, source: Source | None = None) -> None:
+def write_sonic(motion: RobotMotion, path: Path, source: Source | None) -> None:
     """Write the files into the folder `path`. Raises `OutputError` at another rate than 50 Hz."""
     if abs(motion.frame_time * SONIC_FPS - 1) > _SAME_RATE:
         raise OutputError(

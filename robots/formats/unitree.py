@@ -23,9 +23,7 @@ _UPRIGHT = 0.5  # cosine of the mean tilt of a trunk that mostly stands
 _CLEARLY = 0.3  # how much less it is where quaternions are read in the wrong order
 
 
-def write_csv(
-    motion: RobotMotion, path: Path, *, quat: str = "xyzw", source: Source | None = None
-) -> None:
+def write_csv(motion: RobotMotion, path: Path, *, quat: str, source: Source | None = None) -> None:
     """Write a row a frame, with 9 decimals, and beside it what the rows don't say."""
     columns = columns_of(motion, path)
     turned = columns.quat if quat == "wxyz" else np.roll(columns.quat, -1, axis=1)

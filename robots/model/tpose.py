@@ -61,7 +61,7 @@ def search_tpose(
     roles: RoleMap,
     links: Int[np.ndarray, "J"],
     ideal: Float[np.ndarray, "J 4"],
-    followers: Sequence[Follower] = (),
+    followers: Sequence[Follower],
 ) -> TPose:
     """The pose within the limits that is nearest to the joints' rotations `ideal` [q_world_joint],
     which know no limits.

@@ -42,7 +42,7 @@ def is_urdf(path: Path) -> bool:
     return bool(re.search(rb"<robot[\s>]", beginning(path, _BEGINNING)))
 
 
-def read_urdf(path: Path, notes: list[str], *, visuals: bool = True) -> tuple[mujoco.MjSpec, str]:
+def read_urdf(path: Path, notes: list[str], *, visuals: bool) -> tuple[mujoco.MjSpec, str]:
     """The robot in a URDF, and the text that MuJoCo was given of it.
 
     Meshes that are missing or can't be read are left out, with a note; without `visuals` also those

@@ -21,7 +21,7 @@ def servo_spec(
     *,
     height: float,
     floor_z: float,
-    own: bool = False,
+    own: bool,
     stools: Stools = NO_STOOLS,
 ) -> tuple[mujoco.MjSpec, tuple[str, ...]]:
     """The body's spec on a floor, beside stools, with a position servo where it has an actuator,

@@ -30,9 +30,7 @@ def watch(figures: Sequence[Figure], *, title: str, speed: float = 1.0) -> None:
     open_window(player, title=f"{title} - spark-sim", annotate=lambda: known_of(shown))
 
 
-def write_replay(
-    figures: Sequence[Figure], path: str | Path, *, title: str, speed: float = 1.0
-) -> None:
+def write_replay(figures: Sequence[Figure], path: str | Path, *, title: str, speed: float) -> None:
     """Write the page that shows figures with what their reports find, at first at a `speed` of
     `SPEEDS`."""
     known = iter(known_of([figure for figure in figures if not figure.ghost]))

@@ -42,9 +42,9 @@ def add_display(
     body: ModelTrajectory,
     prefix: str,
     *,
-    ghost: bool = False,
-    scale: float = 1.0,
-    bare: bool = False,
+    ghost: bool,
+    scale: float,
+    bare: bool,
 ) -> Int[np.ndarray, "n"]:
     """Add the body's root and all below it to the spec's world; names begin with `prefix`.
 

@@ -47,7 +47,7 @@ class WornSkin:
         return out
 
 
-def worn_by(skin: Skin, rig: Rig, body_names: Mapping[int, str], *, scale: float = 1.0) -> WornSkin:
+def worn_by(skin: Skin, rig: Rig, body_names: Mapping[int, str], *, scale: float) -> WornSkin:
     """A skin on the rig's own joints, on the bodies that are made of them, which have these names
     in the scene; with about `MAX_FACES` faces at most. Raises `SkeletonError` where it hangs on
     joints that the rig lacks."""
