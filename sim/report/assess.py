@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.report.clip_metrics import ClipMetrics
-from sim.report.contact_timing import discord_of, standing_beside
+from sim.report.contact_timing import Discord, Standing, discord_of, standing_beside
 from sim.report.course import Course, course_of
 from sim.report.fall import fall_notes
 from sim.report.findings import findings_of
@@ -18,7 +18,7 @@ from sim.report.limbs import limbs_of
 from sim.report.loop_end import loop_notes
 from sim.report.measures import Drift, floor_height, root_drift
 from sim.report.pace import other_rate, pace_notes
-from sim.report.pose_error import pose_error
+from sim.report.pose_error import PoseError, pose_error
 from sim.report.report import Report
 from sim.report.slides import slides_of
 from sim.report.source_floor import floor_from_source, without_tremble
@@ -114,22 +114,25 @@ def _beside(course: Course, source_course: Course, known: Accuracy | None) -> Re
     limbs = limbs_of(clip, followed, times, scale)
     pose = pose_error(subject, source, times)
     tremble = tremble_beside(subject, source, times)
-
-    def pose_at(lag: float) -> float | None:
-        earlier = pose_error(subject, source, np.clip(times - lag, 0.0, source.motion.duration))
-        return None if earlier is None else earlier.mean
-
-    same_rate = other_rate(motion, source.motion) is None
-    question = "is it another motion?" if same_rate else "is its rate right?"
-    discord = discord_of(standing, None if pose is None else pose.mean, pose_at, question)
+    findings = findings_of(
+        clip,
+        tremble,
+        drift=drift,
+        swing=swing,
+        thrown=thrown,
+        limbs=limbs,
+        pose=pose,
+        discord=_discord(subject, source, times, standing, pose),
+        slides=slides,
+        hover=hover,
+        hovers=hovers,
+    )
     return Report(
         clip,
         source_clip,
         drift,
         standing.match,
-        findings_of(
-            clip, tremble, drift, swing, thrown, limbs, pose, discord, slides, hover, hovers
-        ),
+        findings,
         notes,
         tremble,
         truth=known,
@@ -173,6 +176,24 @@ def _beyond_source(
     depth = clip.self_depth.copy()
     depth[:, known] -= theirs[:, [column[clip.self_pairs[k]] for k in known]]
     return replace(clip, self_depth=np.maximum(depth, 0.0))
+
+
+def _discord(
+    subject: Subject,
+    source: Subject,
+    times: Float[np.ndarray, "T"],
+    standing: Standing,
+    pose: PoseError | None,
+) -> Discord | None:
+    """Whether the feet stand at other times than the source's, and what may be why."""
+
+    def pose_at_lag(lag: float) -> float | None:
+        earlier = pose_error(subject, source, np.clip(times - lag, 0.0, source.motion.duration))
+        return None if earlier is None else earlier.mean
+
+    same_rate = other_rate(subject.motion, source.motion) is None
+    question = "is it another motion?" if same_rate else "is its rate right?"
+    return discord_of(standing, None if pose is None else pose.mean, pose_at_lag, question)
 
 
 def _drift(course: Course, source: Course, times: Float[np.ndarray, "T"], scale: float) -> Drift:

@@ -88,7 +88,7 @@ def discord_of(
     standing: Standing,
     pose: float | None,
     pose_at_lag: Callable[[float], float | None],
-    question: str = "is it another motion?",
+    question: str,
 ) -> Discord | None:
     """None where the feet stand when the source's do, more or less.
 

@@ -37,6 +37,7 @@ _MIN_EXCESS = np.radians(1.0)
 def findings_of(
     clip: ClipMetrics,
     tremble: Tremble,
+    *,
     drift: Drift | None = None,
     swing: Swing | None = None,
     thrown: float | None = None,

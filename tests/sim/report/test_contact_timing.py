@@ -30,9 +30,8 @@ def steps(seconds: float = 6.0) -> Contacts:
 
 
 def discord(own: Contacts, theirs: Contacts, pose: float, at_lag: float = 0.0) -> Discord | None:
-    return discord_of(
-        Standing(("left foot", "right foot"), own, theirs, 1 / FPS), pose, lambda lag: at_lag
-    )
+    standing = Standing(("left foot", "right foot"), own, theirs, 1 / FPS)
+    return discord_of(standing, pose, lambda lag: at_lag, "is it another motion?")
 
 
 def never(contacts: Contacts) -> Contacts:
