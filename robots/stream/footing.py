@@ -23,7 +23,7 @@ from robots.solver.foot_path import (
 from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
 from robots.solver.window_targets import PointTargets
 from robots.stream.foot import Foot, settling
-from robots.stream.frame_targets import FrameReader, FrameTargets
+from robots.stream.frame_targets import LATENCY, FrameReader, FrameTargets
 from robots.stream.standing import SourceFeet, Standing
 
 HOLD_TIME = 0.1  # [s] over which a foot is taken hold of, and let go
@@ -42,22 +42,22 @@ class _Arrived(NamedTuple):
 
 
 class ContactTracker:
-    """The contacts of a stream's feet and the robot's footholds, with a lookahead of `ahead`
+    """The contacts of a stream's feet and the robot's footholds, with a lookahead of `LATENCY`
     frames."""
 
-    def __init__(self, reader: FrameReader, frame_time: float, ahead: int) -> None:
+    def __init__(self, reader: FrameReader, frame_time: float) -> None:
         # Plain numbers: numpy's take three times as long.
         self._robot, self._scale = reader.robot, float(reader.scale)
         self._standing = Standing(reader, frame_time)
-        self._grip, self._ahead = frame_time / HOLD_TIME, ahead
+        self._grip = frame_time / HOLD_TIME
         self._settles = settling(frame_time)
         hip_height = float(self._robot.rig.hip_height)
         self._hip_height, self._wobble = hip_height, MAX_WOBBLE * hip_height
         self._uneven = MAX_UNEVEN * hip_height
         self._index_points()
-        self._arrived: deque[_Arrived] = deque(maxlen=ahead + 1)
-        self._source: deque[SourceFeet] = deque(maxlen=self._standing.history + ahead + 1)
-        self.ground: Float[np.ndarray, "T P"] = np.zeros((ahead + 1, len(self._foot)))
+        self._arrived: deque[_Arrived] = deque(maxlen=LATENCY + 1)
+        self._source: deque[SourceFeet] = deque(maxlen=self._standing.history + LATENCY + 1)
+        self.ground: Float[np.ndarray, "T P"] = np.zeros((LATENCY + 1, len(self._foot)))
         """Of the last frames, how high [m] what each of the soles' points stands on is."""
         self._last_axes: Complex[np.ndarray, "S 3"]
         self._feet = [Foot() for _ in self._robot.soles]
@@ -74,18 +74,18 @@ class ContactTracker:
         ]
         before = [
             own.before(then, k / frames)
-            for k in range(self._standing.history + self._ahead + 1, -1, -1)
+            for k in range(self._standing.history + LATENCY + 1, -1, -1)
         ]
         moved = self._moved(before[-2], own)
         arrived = _Arrived(first.clearance.tolist(), first.pitched, moved, turned)
-        self._arrived.extend([arrived] * (self._ahead + 1))
+        self._arrived.extend([arrived] * (LATENCY + 1))
         self._source.extend(before[:-1])
         self._last_axes = axes * np.exp(-1j * np.array(turned))[:, None]
 
     def update(
         self, targets: FrameTargets, points: Float[np.ndarray, "P 3"], noise: float = 0.0
     ) -> PointTargets:
-        """Takes in the newest frame, and says how the feet stand in those since `ahead` before it;
+        """Takes in the newest frame, and says how the feet stand in it and the `LATENCY` before it;
         the points of the robot's soles are at `points` in the first of these. How they stand in
         that one is settled then; of the later ones it is what can be seen so far. The source's feet
         came with so much noise [m, RMS an axis]."""
@@ -94,7 +94,7 @@ class ContactTracker:
         self._standing.listen(noise)
         self._take_in(targets)
         frames = list(self._source)
-        settled = len(frames) - 1 - self._ahead
+        settled = len(frames) - 1 - LATENCY
         motion = [self._standing.motion(frames, at) for at in range(settled, len(frames))]
         speeds = self._scale * np.array([speeds for speeds, _ in motion])
         steps = (_LIFT * step_height(speeds, self._hip_height)).tolist()
@@ -212,5 +212,5 @@ class ContactTracker:
             ends.append(1 + (toes - heel).astype(int))
         self._lengths = [-float(points[:2].real.mean()) for points in flat[1:]]
         self._flat = np.concatenate(flat)
-        self._foot = len(soles) * np.arange(self._ahead + 1)[:, None] + sole_of
-        self._end = len(soles) * (self._ahead + 1) * np.concatenate(ends) + self._foot
+        self._foot = len(soles) * np.arange(LATENCY + 1)[:, None] + sole_of
+        self._end = len(soles) * (LATENCY + 1) * np.concatenate(ends) + self._foot

@@ -20,7 +20,7 @@ from robots.solver.touching import touches_of
 from robots.solver.window_poses import WindowPoses
 from robots.solver.window_targets import PointTargets
 from robots.solver.window_terms import Terms
-from robots.stream.frame_targets import FrameReader, FrameTargets
+from robots.stream.frame_targets import LATENCY, FrameReader, FrameTargets
 from spark.rig.contacts import ADULT_HEIGHT, SPEED_WINDOW
 from spark.rig.flesh import RADII
 from spark.rig.roles import Role
@@ -70,9 +70,9 @@ def _points(robot: Morphology, parts: Sequence[Role]) -> list[_Point]:
 
 
 class RestTracker:
-    """The parts of a stream that touch the ground, in the newest frame and `ahead` before it."""
+    """The parts of a stream that touch the ground, in the newest frame and `LATENCY` before it."""
 
-    def __init__(self, reader: FrameReader, terms: Terms, frame_time: float, ahead: int) -> None:
+    def __init__(self, reader: FrameReader, terms: Terms, frame_time: float) -> None:
         robot, source, parts = reader.robot, reader.source, reader.parts
         self._terms, self._frame_time = terms, frame_time
         self._scale, self._adult = reader.scale, source.standing_height / ADULT_HEIGHT
@@ -91,8 +91,7 @@ class RestTracker:
         self._first_spheres = np.cumsum([0, *spheres[:-1]], dtype=int)
         self._reach = max(1, round(SPEED_WINDOW / frame_time))
         self._places: deque[Float[np.ndarray, "K 3"]] = deque(maxlen=self._reach + 1)
-        self._ahead = ahead
-        self._seen: deque[_Seen] = deque(maxlen=ahead + 1)
+        self._seen: deque[_Seen] = deque(maxlen=LATENCY + 1)
         self._rests = np.zeros(len(parts), dtype=bool)
         self._along = np.zeros(len(parts))
         self._held, self._rolled = np.zeros((2, len(parts)), dtype=complex)
@@ -107,7 +106,7 @@ class RestTracker:
         in `poses` in the first of these; None where nothing is near the ground."""
         self._places.append(targets.parts)
         seen = self._look(targets)
-        self._seen.extend([seen] * (1 if self._seen else self._ahead + 1))
+        self._seen.extend([seen] * (1 if self._seen else LATENCY + 1))
         if all(frame.most < _FELT for frame in self._seen):
             self._along[:] = 0.0
             return None

@@ -177,8 +177,8 @@ class Stream:
         """How feet and parts stand in the first frames of a robot in `poses`, where before them
         the source has moved as from the first to a `later` one."""
         frames = self._begun
-        self._contacts = ContactTracker(self._reader, self.frame_time, LATENCY)
-        self._rests = RestTracker(self._reader, self._terms, self.frame_time, LATENCY)
+        self._contacts = ContactTracker(self._reader, self.frame_time)
+        self._rests = RestTracker(self._reader, self._terms, self.frame_time)
         for tracker in (self._contacts, self._rests):
             tracker.begin(frames[0], later, max(1, len(frames) - 1))
         soles = self._terms.sole_points(poses)[0]

@@ -9,7 +9,7 @@ from robots.model.known import known
 from robots.solver.window_targets import PointTargets
 from robots.stream.foot import Foot, settling
 from robots.stream.footing import ContactTracker
-from robots.stream.frame_targets import LATENCY, Frame, FrameReader, FrameTargets, ground_of
+from robots.stream.frame_targets import Frame, FrameReader, FrameTargets, ground_of
 from spark.demo.sample import sample_motion, sample_rig
 from spark.transfer.canonical import to_canonical
 
@@ -32,7 +32,7 @@ def standing() -> FrameTargets:
 def after(heel_speed: float, heel_height: float) -> PointTargets:
     """A foot that stood, and of which the heel has so far moved for a fifth of a second: so fast
     [m/s] to the side, so high [m] over the toes."""
-    tracker, begun = ContactTracker(READER, FRAME_TIME, LATENCY), standing()
+    tracker, begun = ContactTracker(READER, FRAME_TIME), standing()
     tracker.begin(begun, begun, 1)
     points = np.zeros((sum(map(len, EMBER.soles)), 3))
     for k in range(12):
@@ -58,7 +58,7 @@ def test_who_turns_on_the_toes_raises_the_heel_alone() -> None:
 
 def test_a_foot_rises_before_it_moves() -> None:
     """In the first frame that it is let go it may be as high as fast feet step, where it is."""
-    tracker, begun = ContactTracker(READER, FRAME_TIME, LATENCY), standing()
+    tracker, begun = ContactTracker(READER, FRAME_TIME), standing()
     tracker.begin(begun, begun, 1)
     points = np.zeros((sum(map(len, EMBER.soles)), 3))
     for _ in range(12):
@@ -80,7 +80,7 @@ def test_who_stands_on_the_toes_does_not_stand_on_the_heel() -> None:
 
 
 def test_a_foot_that_stood_over_the_floor_is_put_down_on_it() -> None:
-    tracker, begun = ContactTracker(READER, FRAME_TIME, LATENCY), standing()
+    tracker, begun = ContactTracker(READER, FRAME_TIME), standing()
     tracker.begin(begun, begun, 1)
     points = np.zeros((sum(map(len, EMBER.soles)), 3))
     over = 0.04 * EMBER.rig.hip_height  # of which a recorded floor is off

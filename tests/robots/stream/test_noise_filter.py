@@ -8,7 +8,7 @@ import pytest
 from robots.metrics import measure
 from robots.model.known import known
 from robots.stream.footing import ContactTracker
-from robots.stream.frame_targets import LATENCY, Frame, FrameReader, ground_of
+from robots.stream.frame_targets import Frame, FrameReader, ground_of
 from robots.stream.noise_filter import NoiseFilter, _AlphaBeta
 from scripts.corruptions import jittering
 from scripts.robot_bars import follow
@@ -115,7 +115,7 @@ def test_a_foot_that_trembles_stands_and_one_that_steps_does_not() -> None:
     points, left = np.zeros((sum(map(len, EMBER.soles)), 3)), len(EMBER.soles[0])
     held: dict[float, list[float]] = {}
     for told in (0.0, noise):
-        tracker = ContactTracker(reader, frame_time, LATENCY)
+        tracker = ContactTracker(reader, frame_time)
         tracker.begin(own, own, 1)
         for k in range(90):
             feet = still + noise * rng.normal(size=still.shape)

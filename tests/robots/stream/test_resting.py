@@ -11,7 +11,7 @@ from robots.model.known import known
 from robots.solver.touching import touches_of
 from robots.solver.window_targets import PointTargets
 from robots.solver.window_terms import Terms
-from robots.stream.frame_targets import LATENCY, Frame, FrameReader, FrameTargets, ground_of
+from robots.stream.frame_targets import Frame, FrameReader, FrameTargets, ground_of
 from robots.stream.resting import RestTracker, held_points
 from spark.demo.sample import sample_motion, sample_rig
 from spark.rig.roles import Role
@@ -34,7 +34,7 @@ def standing() -> FrameTargets:
 def tracked(paths: Float[np.ndarray, "T 3"], part: int, shift: float = 0.0) -> PointTargets | None:
     """Of one who stands but for a part that goes along a path, the mass being so far [m] ahead of
     the feet."""
-    tracker, begun = RestTracker(READER, TERMS, FRAME_TIME, LATENCY), standing()
+    tracker, begun = RestTracker(READER, TERMS, FRAME_TIME), standing()
     parts = begun.parts.copy()
     parts[part] = paths[0]
     at_first = replace(begun, parts=parts)
