@@ -240,14 +240,8 @@ class PolicyTracker:
         seen, wanted = (self._from_root(each) for each in (data, ghost))
         apart = float(np.linalg.norm(seen - wanted, axis=1).mean())
         angles = float(np.abs(data.qpos[self.columns] - state.angles).mean())
-        speeds = (
-            quat_rotate(quat_conj(rotation), velocity)[:2]
-            for rotation, velocity in (
-                (data.qpos[self.turn], data.qvel[self.move]),
-                (state.rotation, state.velocity),
-            )
-        )
-        ours, theirs = speeds
+        ours = quat_rotate(quat_conj(data.qpos[self.turn]), data.qvel[self.move])[:2]
+        theirs = quat_rotate(quat_conj(state.rotation), state.velocity)[:2]
         ups = (each.xmat[self.root].reshape(3, 3)[2] for each in (data, ghost))
         tilt = float(np.arccos(np.clip(np.dot(*ups), -1.0, 1.0)))
         drop = abs(float(data.xpos[self.root, 2] - ghost.xpos[self.root, 2]))
