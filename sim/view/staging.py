@@ -33,12 +33,7 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0, blend: bool
     if not figures:
         raise SkeletonError("nothing to show: expected at least one motion")
     world = empty_world()
-    first = figures[0].motion
-    step = thinned(first.fps, max_fps)
-    between = max(1, int(max_fps / first.fps * _SAME_FPS)) if blend else 1
-    frame_time = first.frame_time * step / between
-    longest = max(figure.motion.duration for figure in figures)
-    times = np.arange(int(np.floor(longest / frame_time + 1e-6)) + 1) * frame_time
+    frame_time, times = _times(figures, max_fps, blend)
     heights = [figure.rig.standing_height * figure.scale for figure in figures]
     lanes = _lanes(figures, heights)
     turn = _turn_to_front(figures[0])
@@ -100,6 +95,18 @@ def _add_figure(
     if worn is not None:
         add_skin(world, worn, prefix)
     return columns, worn
+
+
+def _times(
+    figures: Sequence[Figure], max_fps: float, blend: bool
+) -> tuple[float, Float[np.ndarray, "T"]]:
+    """From one frame of the scene to the next [s], and when all of them are [s]."""
+    first = figures[0].motion
+    step = thinned(first.fps, max_fps)
+    between = max(1, int(max_fps / first.fps * _SAME_FPS)) if blend else 1
+    frame_time = first.frame_time * step / between
+    longest = max(figure.motion.duration for figure in figures)
+    return frame_time, np.arange(int(np.floor(longest / frame_time + 1e-6)) + 1) * frame_time
 
 
 def thinned(fps: float, most: float) -> int:
