@@ -16,7 +16,8 @@ from robots.model.welded import Points
 from robots.tree import ROOT, Tree
 from spark.errors import SkeletonError
 from spark.rig.anatomy import NoLegsError
-from spark.rig.role_assignment import Override, assign_roles
+from spark.rig.override import Override
+from spark.rig.role_assignment import assign_roles
 from spark.rig.roles import Role, RoleMap
 
 _NAMES = ("virtual_left_thigh", "virtual_left_shank", "virtual_right_thigh", "virtual_right_shank")

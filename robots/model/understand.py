@@ -27,8 +27,8 @@ from spark.errors import SkeletonError, name_list
 from spark.motion import Motion
 from spark.rig.feet import hip_height
 from spark.rig.groups import groups_of
+from spark.rig.override import Override
 from spark.rig.rig import Rig
-from spark.rig.role_assignment import Override
 from spark.rig.roles import Role, RoleMap
 from spark.rig.tpose import find_tpose
 from spark.rotation import quat_normalize

@@ -3,9 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
-from spark.kinematics import world_positions
 from spark.rig.rig import Rig
-from spark.rig.roles import LIMBS, Group, Role
+from spark.rig.roles import LEGS, LIMBS, Group, Role
 from spark.rotation import Axis, quat_about, quat_conj, quat_mul
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.leg_ik import bend_leg, leg_of
@@ -22,7 +21,7 @@ class Actor:
         self.rig = rig
         self.rotations = np.tile([1.0, 0, 0, 0], (frames, len(rig.skeleton), 1))
         self.hips = np.tile([0.0, 0, rig.hip_height], (frames, 1))
-        rest = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
+        rest = rig.tpose_positions
         self.tpose = rest - rest[rig.hips].mean(0) + [0, 0, rig.hip_height]
 
     def rotate(self, role: Role, axis: Axis, angle: Float[np.ndarray, "T"]) -> None:
@@ -65,7 +64,7 @@ class Actor:
     def stand(self) -> None:
         """Both feet flat where they are in the T-pose."""
         still = np.tile([1.0, 0, 0, 0], (len(self.hips), 1))
-        for leg in (Group.LEFT_LEG, Group.RIGHT_LEG):
+        for leg in LEGS:
             ankle = self.tpose[self.rig.roles.require(LIMBS[leg][2])]
             self.place_foot(leg, np.tile(ankle, (len(self.hips), 1)), still, still)
 

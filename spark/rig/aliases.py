@@ -7,14 +7,10 @@ languages are in `spark.rig.languages`.
 """
 
 from spark.rig import languages
+from spark.rig.languages import words_of
 
-
-def _set(words: str) -> frozenset[str]:
-    return frozenset(words.split())
-
-
-LEFT = _set("l left lft hidari 左") | languages.LEFT
-RIGHT = _set("r right rgt rt migi 右") | languages.RIGHT
+LEFT = words_of("l left lft hidari 左") | languages.LEFT
+RIGHT = words_of("r right rgt rt migi 右") | languages.RIGHT
 
 # Which joint a word means, and how surely, by the role's name without its side.
 MEANINGS: dict[str, dict[str, float]] = {
@@ -213,19 +209,19 @@ FINGERS: dict[str, str] = {
     }.items()
     for word in words.split()
 }
-TIP = _set("end nub tip leaf site")
+TIP = words_of("end nub tip leaf site")
 # Joints inside the palm; those of a thumb, which bend as its first bone, aside.
-METACARPAL = _set("metacarpal metacarpals carpal palm in cup")
+METACARPAL = words_of("metacarpal metacarpals carpal palm in cup")
 
-MODIFIERS = _set("upper lower front hind rear base bend bone center c m x stretch")
-NOISE = _set(
+MODIFIERS = words_of("upper lower front hind rear base bend bone center c m x stretch")
+NOISE = words_of(
     "fe aa ie angle jnt joint bn jt link def org bind skin sk rig j b bip biped valve mixamorig"
 )
 # A robot's hinge axes: "roll" is a twist bone elsewhere.
-AXES = _set("pitch roll yaw") | languages.AXES
+AXES = words_of("pitch roll yaw") | languages.AXES
 
 # These mean a part on their own, beside "leg" or "arm" too.
-SPECIFIC = _set(
+SPECIFIC = words_of(
     "thigh femur knee calf shin shank tibia ankle foot toe ball humerus elbow radius ulna wrist "
     "hand shoulder neck head wing hips"
 )

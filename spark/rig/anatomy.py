@@ -56,7 +56,7 @@ def find_anatomy(
         legs = _legs_by_shape(measured, hints, pairs, arms)
     if legs is None:
         raise NoLegsError(_no_legs(skeleton, arms))
-    others = _others(measured, skeleton, pairs, legs)
+    others = _others(measured, pairs, legs)
     if arms is None and others:
         arms = max(others, key=lambda pair: measured.reach[pair.first[0]])
     if arms is None or not _human(hints, arms, named):
@@ -93,11 +93,10 @@ def _human(hints: Sequence[NameHint], arms: LimbPair, named: bool) -> bool:
     return not other and (named or all(_called_arm(hints, x) for x in (arms.first, arms.second)))
 
 
-def _others(
-    measured: Measurements, skeleton: Skeleton, pairs: Sequence[LimbPair], legs: LimbPair
-) -> list[LimbPair]:
+def _others(measured: Measurements, pairs: Sequence[LimbPair], legs: LimbPair) -> list[LimbPair]:
     """The pairs that are no part of the legs and long enough to be limbs beside them; a single
     joint, as a horn, a shoulder's plate or a logo that is welded on, is none."""
+    skeleton = measured.skeleton
     inside = {j for root in legs.roots for j in skeleton.subtree(root)}
     above = set(skeleton.ancestors(legs.roots[0])) | set(skeleton.ancestors(legs.roots[1]))
     least = 0.4 * float(measured.reach[legs.roots[0]])

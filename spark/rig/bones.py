@@ -8,12 +8,12 @@ from jaxtyping import Float
 
 from spark.kinematics import end_positions, world_positions, world_rotations
 from spark.rig.fingers import fingers_below
-from spark.rig.roles import HANDS, LIMBS, Group, Role, RoleMap
+from spark.rig.roles import HANDS, LEGS, LIMBS, Role, RoleMap
 from spark.rig.toes import SHORT, astray, toe_points, toes_ahead
 from spark.rotation import quat_conj, quat_rotate
 from spark.skeleton import Skeleton
 
-_LEG_OF = {LIMBS[leg][-1]: LIMBS[leg] for leg in (Group.LEFT_LEG, Group.RIGHT_LEG)}  # by its toe
+_LEG_OF = {LIMBS[leg][-1]: LIMBS[leg] for leg in LEGS}  # by its toe
 _COS_HELD = np.cos(np.radians(60))  # of what a hand holds to the forearm; fingers lie along it
 _STUB = 0.03  # of the way from ankle to toe joint: a shorter toe is none, toes have 0.13 or more
 _THUMB_DROOP = np.radians(20)  # of a thumb below the plane of the palm, about, in artists' rigs

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.rig.rig import Rig
-from spark.rig.roles import LIMBS, Group, Role
+from spark.rig.roles import LEGS, LIMBS, UPPER_ARMS, Group, Role
 from spark.rotation import quat_rotate
 
 LIMB_SEGMENTS = (  # the limbs' segments, by the roles at their ends
@@ -18,13 +18,10 @@ LIMB_SEGMENTS = (  # the limbs' segments, by the roles at their ends
     (Role.RIGHT_FOREARM, Role.RIGHT_HAND),
 )
 TPOSE_DIRECTIONS = {
-    **{
-        role: np.array([0.0, 0, -1]) for g in (Group.LEFT_LEG, Group.RIGHT_LEG) for role in LIMBS[g]
-    },
+    **{role: np.array([0.0, 0, -1]) for g in LEGS for role in LIMBS[g]},
     **{role: np.array([0.0, 1, 0]) for role in LIMBS[Group.LEFT_ARM]},
     **{role: np.array([0.0, -1, 0]) for role in LIMBS[Group.RIGHT_ARM]},
 }
-_SHOULDERS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
 
 
 def bone_directions(
@@ -55,9 +52,9 @@ def hips_to_shoulders(rig: Rig, positions: Float[np.ndarray, "T J 3"]) -> Float[
 
 def has_shoulders(rig: Rig) -> bool:
     """Whether there is an upper arm on both sides."""
-    return all(rig.roles.joints(role) for role in _SHOULDERS)
+    return all(rig.roles.joints(role) for role in UPPER_ARMS)
 
 
 def shoulder_joints(rig: Rig) -> list[int]:
     """The upper arms' joints, left and right, of a rig that has these."""
-    return [rig.roles.joints(role)[0] for role in _SHOULDERS]
+    return [rig.roles.joints(role)[0] for role in UPPER_ARMS]

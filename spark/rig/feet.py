@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.kinematics import end_positions, world_positions
-from spark.rig.roles import Role, RoleMap
+from spark.rig.roles import LOWER_LEGS, UPPER_LEGS, Role, RoleMap
 from spark.rig.toes import astray, toe_points
 from spark.rotation import quat_conj, quat_rotate
 from spark.skeleton import Skeleton
@@ -28,8 +28,6 @@ FEET: dict[Side, tuple[Role, Role]] = {
     "left": (Role.LEFT_FOOT, Role.LEFT_TOE),
     "right": (Role.RIGHT_FOOT, Role.RIGHT_TOE),
 }
-_SHANKS = (Role.LEFT_LOWER_LEG, Role.RIGHT_LOWER_LEG)
-UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
 
 # Fractions of the standing height: Drillis and Contini 1966, as in Winter, "Biomechanics and Motor
 # Control of Human Movement", fig. 4.1; the ankle and the ball divide the foot at 1/4 and 3/4.
@@ -123,7 +121,7 @@ def below_ankles(skeleton: Skeleton, roles: RoleMap, tpose: Float[np.ndarray, "J
     Sites: judged by the shanks, as on a human. 0 where a foot goes on."""
     pose = _TPose(skeleton, roles, tpose)
     shanks = []
-    for (role, _), knee_role in zip(FEET.values(), _SHANKS, strict=True):
+    for (role, _), knee_role in zip(FEET.values(), LOWER_LEGS, strict=True):
         foot, knee = roles.joint(role), roles.joint(knee_role)
         if foot is None or knee is None:
             continue

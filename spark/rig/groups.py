@@ -1,16 +1,15 @@
 """The paper's six body parts (section 4.1): which of them each joint belongs to."""
 
-from spark.rig.roles import LIMBS, Group, Role, RoleMap
+from spark.rig.roles import LEGS, LIMB_OF, Group, Role, RoleMap
 from spark.skeleton import Skeleton
 
 GROUP_OF_ROLE: dict[Role, Group] = {
-    **{role: group for group, roles in LIMBS.items() for role in roles},
+    **LIMB_OF,
     Role.PELVIS: Group.TORSO,
     Role.SPINE: Group.TORSO,
     Role.NECK: Group.HEAD,
     Role.HEAD: Group.HEAD,
 }
-_ON_LEGS = frozenset({Group.LEFT_LEG, Group.RIGHT_LEG})
 _ON_TOP = frozenset({Group.LEFT_ARM, Group.RIGHT_ARM, Group.HEAD})
 
 
@@ -28,7 +27,7 @@ def groups_of(skeleton: Skeleton, roles: RoleMap) -> tuple[frozenset[Group], ...
         if role is not None:
             own = frozenset({GROUP_OF_ROLE[role]})
             if role is Role.PELVIS:
-                own |= _ON_LEGS
+                own |= {*LEGS}
             if j in top:
                 own |= _ON_TOP
         else:

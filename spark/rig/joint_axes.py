@@ -6,15 +6,13 @@ from jaxtyping import Float
 from spark.motion import Motion
 from spark.rig.bones import RigPose
 from spark.rig.observed import bend_axis
-from spark.rig.roles import LIMBS, Role, limb_joints
+from spark.rig.roles import LIMBS, LOWER_LEGS, UPPER_LEGS, limb_joints
 from spark.rig.toes import SHORT
 from spark.rotation import quat_from_rotvec
 
 _ALIGNED = np.radians(10)  # of a bone from an axis of its joint that it was put along on purpose
 _SLANTED = np.radians(25)  # of both knees' axes from joints' axes; found ones are off by up to 20
 
-_UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
-_LOWER_LEGS = (Role.LEFT_LOWER_LEG, Role.RIGHT_LOWER_LEG)
 
 Vector = Float[np.ndarray, "3"]
 
@@ -28,7 +26,7 @@ def bones_at_right_angles(rest: RigPose) -> bool:
 def knees_at_right_angles(motion: Motion, pose: RigPose) -> bool:
     """Whether a knee bends about a coordinate axis, as far as the motion shows one."""
     tilts = []
-    for upper, lower in zip(_UPPER_LEGS, _LOWER_LEGS, strict=True):
+    for upper, lower in zip(UPPER_LEGS, LOWER_LEGS, strict=True):
         thigh, shank = pose.roles.joint(upper), pose.roles.joint(lower)
         if thigh is None or shank is None:
             continue

@@ -5,20 +5,20 @@ the spelling with an e, too. Words that are others in English names are left out
 """
 
 
-def _set(words: str) -> frozenset[str]:
+def words_of(words: str) -> frozenset[str]:
     return frozenset(words.split())
 
 
-LEFT = _set(
+LEFT = words_of(
     "links linke linker linkes izquierda izquierdo izq gauche sinistra sinistro sx "
     "esquerda esquerdo esq"
 )
-RIGHT = _set(
+RIGHT = words_of(
     "rechts rechte rechter rechtes derecha derecho droite droit destra destro dx direita direito"
 )
 
 # The axes that a robot's hinges turn about: pitch, roll and yaw.
-AXES = _set(
+AXES = words_of(
     "nick nicken rollen gier gieren cabeceo alabeo guinada tangage roulis lacet "
     "beccheggio rollio imbardata arfagem rolagem 俯仰 滚转 翻滚 横滚 偏航"
 )

@@ -11,7 +11,18 @@ from spark.motion import Motion
 from spark.rig.bones import RigPose
 from spark.rig.joint_axes import bones_at_right_angles, knees_at_right_angles, snap, tilt
 from spark.rig.observed import mean_rotations, nearest_right_angle
-from spark.rig.roles import ENDS, HANDS, LIMBS, Group, Role, RoleMap, limb_joints
+from spark.rig.roles import (
+    ENDS,
+    HANDS,
+    LIMB_OF,
+    LIMBS,
+    UPPER_ARMS,
+    UPPER_LEGS,
+    Group,
+    Role,
+    RoleMap,
+    limb_joints,
+)
 from spark.rig.straight_fingers import stretch_fingers
 from spark.rig.toes import SHORT
 from spark.rotation import (
@@ -31,12 +42,9 @@ _STILL = np.radians(2)  # joints that turn less than this from the rest pose sho
 _MAX_BACK = np.radians(20)  # of a joint of a spine that was built straight, in the mean pose
 _UPRIGHT = 20  # the power of the cosine of a trunk's lean that a frame is weighed by
 
-_UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
-_UPPER_ARMS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
 _TRUNK = (Role.PELVIS, Role.SPINE, Role.NECK, Role.HEAD)
 
 _SIDES = {Group.LEFT_ARM: 1.0, Group.RIGHT_ARM: -1.0}
-GROUP_OF = {role: group for group, limb in LIMBS.items() for role in limb}
 """The limb that each limb role belongs to."""
 
 Vector = Float[np.ndarray, "3"]
@@ -84,7 +92,7 @@ def reference_of(motion: Motion, roles: RoleMap) -> Reference:
         turned = nearest_right_angle(mean)
         built = quat_angle(motion.rotations, mean).max(axis=0) < _STILL  # a hip joint's slant
         for j, role in enumerate(roles.roles):
-            if role not in GROUP_OF and not (role is None and built[j]):
+            if role not in LIMB_OF and not (role is None and built[j]):
                 local[j] = turned[j]
         bent = _bent_trunk(RigPose(skeleton, roles, turned), mean)
         straight = not bent
@@ -216,7 +224,7 @@ def _lateral(pose: RigPose) -> Vector:
 
 def _apart(pose: RigPose) -> Vector | None:
     """The same; None where hips lie in one point, and shoulders too."""
-    for pair in (_UPPER_LEGS, _UPPER_ARMS):
+    for pair in (UPPER_LEGS, UPPER_ARMS):
         left, right = (pose.roles.joint(role) for role in pair)
         if left is not None and right is not None:
             across = pose.positions[left] - pose.positions[right]
@@ -234,8 +242,8 @@ def _trunk(pose: RigPose) -> Vector:
 def _landmarks(roles: RoleMap, at: Float[np.ndarray, "J *T 3"]) -> list[Float[np.ndarray, "*T 3"]]:
     """The feet's middle, the hips' middle, and the head or the trunk's topmost joint if any, from
     where the joints are."""
-    hips = np.mean([at[roles.require(role)] for role in _UPPER_LEGS], axis=0)
-    feet = np.mean([at[limb_joints(roles, GROUP_OF[role])[-1]] for role in _UPPER_LEGS], axis=0)
+    hips = np.mean([at[roles.require(role)] for role in UPPER_LEGS], axis=0)
+    feet = np.mean([at[limb_joints(roles, LIMB_OF[role])[-1]] for role in UPPER_LEGS], axis=0)
     tops = [j for role in (Role.HEAD, Role.NECK, Role.SPINE) for j in roles.joints(role)[-1:]]
     return [feet, hips, *(at[j] for j in tops[:1])]
 

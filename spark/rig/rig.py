@@ -14,7 +14,6 @@ from spark.rig.doubles import doubles_of
 from spark.rig.feet import (
     FEET,
     HIP_HEIGHT,
-    UPPER_LEGS,
     Sole,
     below_ankles,
     hip_height,
@@ -23,8 +22,9 @@ from spark.rig.feet import (
 from spark.rig.fingers import FingerBone, finger_bones, palms_of
 from spark.rig.groups import groups_of
 from spark.rig.other_bodies import other_bodies
-from spark.rig.role_assignment import Override, assign_roles
-from spark.rig.roles import Group, Role, RoleMap
+from spark.rig.override import Override
+from spark.rig.role_assignment import assign_roles
+from spark.rig.roles import UPPER_LEGS, Group, Role, RoleMap
 from spark.rig.tpose import find_tpose, root_joint_of
 from spark.rig.twist_bones import TwistBone, twist_bones
 from spark.skeleton import Skeleton

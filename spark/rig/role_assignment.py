@@ -16,8 +16,6 @@ from spark.rig.override import Override, check_chains, check_override
 from spark.rig.roles import SURE, Role, RoleMap
 from spark.skeleton import Skeleton
 
-__all__ = ["Override", "assign_roles"]
-
 # How often each kind of evidence alone is right, by judgement.
 _NAME_RELIABILITY, _CHAIN_RELIABILITY, _SHAPE_RELIABILITY = 0.85, 0.6, 0.6
 _DOUBTED = 0.6  # of the confidence is left where something speaks against a side

@@ -84,11 +84,18 @@ LIMBS: dict[Group, tuple[Role, ...]] = {
     ),
 }
 """The four limbs, each from the body outwards."""
+LIMB_OF = {role: group for group, limb in LIMBS.items() for role in limb}
+LEGS = (Group.LEFT_LEG, Group.RIGHT_LEG)
 
 ENDS = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE, Role.LEFT_TOE, Role.RIGHT_TOE)
 """What lies before a limb's shoulder and after its ankle."""
 
+CLAVICLES = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE)
+UPPER_ARMS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
 HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
+UPPER_LEGS = (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG)
+LOWER_LEGS = (Role.LEFT_LOWER_LEG, Role.RIGHT_LOWER_LEG)
+ANKLES = (Role.LEFT_FOOT, Role.RIGHT_FOOT)
 
 SURE = 0.8
 """Of a role's confidence: below it, one kind of evidence alone says it, or two disagree."""

@@ -11,10 +11,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.errors import SkeletonError
-from spark.kinematics import world_positions
 from spark.rig.feet import sole_positions
 from spark.rig.rig import Rig
-from spark.rig.roles import HANDS, LIMBS, Group, Role
+from spark.rig.roles import HANDS, LIMBS, UPPER_ARMS, UPPER_LEGS, Group, Role
 from spark.rotation import matrix_from_quat, quat_conj, quat_rotate
 
 _Vector = Float[np.ndarray, "3"]
@@ -79,7 +78,7 @@ class _Builder:
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
         self.height = rig.standing_height
-        self.pos = world_positions(rig.skeleton, rig.tpose, np.zeros(3))
+        self.pos = rig.tpose_positions
         self.joints: list[int] = []
         self.masses: list[float] = []
         self.coms: list[_Vector] = []
@@ -115,7 +114,7 @@ class _Builder:
 
     def _trunk(self) -> None:
         rig, pos, height = self.rig, self.pos, self.height
-        legs = [j for r in (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG) for j in rig.roles.joints(r)]
+        legs = [j for r in UPPER_LEGS for j in rig.roles.joints(r)]
         if not legs:
             raise SkeletonError("the rig has no upper leg: its mass can't be placed")
         hips = pos[legs].mean(axis=0)
@@ -158,7 +157,7 @@ class _Builder:
     def _trunk_top(self, hips: _Vector) -> _Vector:
         for roles in (
             (Role.NECK,),
-            (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM),
+            UPPER_ARMS,
             (Role.HEAD,),
         ):
             joints = [j for role in roles if (j := self.rig.roles.joint(role)) is not None]

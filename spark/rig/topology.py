@@ -41,7 +41,7 @@ def chain_below(measured: Measurements, joint: int) -> tuple[int, ...]:
 def path_between(skeleton: Skeleton, start: int, end: int) -> tuple[int, ...]:
     """The joints strictly between two joints, over their common ancestor, in order from `start`."""
     up, down = skeleton.ancestors(start), skeleton.ancestors(end)
-    common = next(j for j in up if j in down)
+    common = common_ancestor(skeleton, start, end)
     whole = [*up[: up.index(common)], common, *reversed(down[: down.index(common)])]
     return tuple(j for j in whole if j not in (start, end))
 

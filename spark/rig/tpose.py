@@ -24,8 +24,8 @@ from spark.rig.moving_feet import feet_ahead, feet_slope
 from spark.rig.nulls import all_but, motion_of, nulls_of
 from spark.rig.observed import bend_axis, mean_rotations, nearest_right_angle
 from spark.rig.pitched_feet import flat_feet
-from spark.rig.reference_pose import GROUP_OF, Reference, pelvis_frame, reference_of
-from spark.rig.roles import HANDS, LIMBS, Group, Role, RoleMap
+from spark.rig.reference_pose import Reference, pelvis_frame, reference_of
+from spark.rig.roles import ANKLES, CLAVICLES, HANDS, LIMB_OF, LIMBS, Group, Role, RoleMap
 from spark.rotation import (
     quat_angle,
     quat_between,
@@ -47,9 +47,7 @@ _BESIDE = np.sin(np.radians(5))  # of a thumb to its hand's axis; nearer to it i
 _STEEPEST_FOOT = np.radians(-75)  # a foot that points further down at rest is not standing
 
 _LEFT, _UP = np.eye(3)[1:]
-_FEET = (Role.LEFT_FOOT, Role.RIGHT_FOOT)
 _TOES = (Role.LEFT_TOE, Role.RIGHT_TOE)
-_CLAVICLES = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE)
 _BENT = {  # the segment below, and the axis that it bends about in the T-pose
     Role.LEFT_UPPER_LEG: (Role.LEFT_LOWER_LEG, _LEFT),
     Role.RIGHT_UPPER_LEG: (Role.RIGHT_LOWER_LEG, _LEFT),
@@ -114,14 +112,14 @@ def _find(reference: Reference, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"
         parent = tpose[int(skeleton.parents[j])]
         q = quat_mul(parent, reference.pose.local[j])
         role = roles.roles[j]
-        if feet is None and role in _FEET:
+        if feet is None and role in ANKLES:
             feet, more = feet_ahead(reference, tpose)
             notes += more
         if feet and j in feet:
             q = feet[j]
-        elif role in _FEET or role in _TOES:
+        elif role in ANKLES or role in _TOES:
             q = _place_foot(reference, j, role, q, tpose[pelvis])
-        elif role is not None and role in GROUP_OF:
+        elif role is not None and role in LIMB_OF:
             q = _place(reference, j, role, q, parent)
         elif role is Role.HEAD and reference.square:
             q = _skull(q, tpose[(pelvis, *roles.joints(Role.SPINE))[-1]])
@@ -137,7 +135,7 @@ def _find(reference: Reference, roles: RoleMap) -> tuple[Float[np.ndarray, "J 4"
 
 def _in_order(skeleton: Skeleton, roles: RoleMap, doubles: dict[int, int]) -> list[int]:
     """All joints, parents before children, feet after both legs, doubles' chains after all."""
-    feet = {k for role in _FEET for j in roles.joints(role) for k in skeleton.subtree(j)}
+    feet = {k for role in ANKLES for j in roles.joints(role) for k in skeleton.subtree(j)}
     later = {k for j in doubles for k in skeleton.subtree(j)}
     return sorted(range(len(skeleton)), key=lambda j: (j in later, j in feet))
 
@@ -160,10 +158,10 @@ def root_joint_of(skeleton: Skeleton, roles: RoleMap) -> int:
 def _place(reference: Reference, joint: int, role: Role, q: Quat, q_parent: Quat) -> Quat:
     """A limb joint's rotation in the T-pose, from `q`, where its parent and the pose take it."""
     bone = reference.pose.bone(joint)
-    if bone is None or (role in _CLAVICLES and reference.posed):
+    if bone is None or (role in CLAVICLES and reference.posed):
         return q
-    arm = GROUP_OF[role] in _OUT
-    goal = _OUT.get(GROUP_OF[role], -_UP)
+    arm = LIMB_OF[role] in _OUT
+    goal = _OUT.get(LIMB_OF[role], -_UP)
     if reference.square and role in HANDS:
         bone = snap(bone, _MAX_FINGER_SPREAD)
     q = quat_mul(quat_between(quat_rotate(q, bone), goal), q)
@@ -199,7 +197,7 @@ def _place_foot(reference: Reference, joint: int, role: Role, q: Quat, q_pelvis:
             return quat_mul(quat_from_yaw(-np.arctan2(y, x)), q)
     if bone is None:
         return q
-    slope = feet_slope(reference)[0] if role in _FEET else 0.0
+    slope = feet_slope(reference)[0] if role in ANKLES else 0.0
     goal = np.array([np.cos(slope), 0.0, np.sin(slope)])
     q = quat_mul(quat_between(quat_rotate(q, bone), goal), q)
     return _square(q, goal, _LEFT) if reference.square_legs else q
@@ -260,7 +258,7 @@ def _turned_with_hand(
     """The joints of an arm that turn as its palm does: the forearm, as no wrist rolls, and the
     upper arm where the elbow bends about a better axis then."""
     skeleton, roles = reference.motion.skeleton, reference.pose.roles
-    upper_role, forearm_role = LIMBS[GROUP_OF[role]][1:3]
+    upper_role, forearm_role = LIMBS[LIMB_OF[role]][1:3]
     top = roles.joint(forearm_role)
     upper = roles.joint(upper_role)
     if top is None:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from spark.rig.rig import Rig
-from spark.rig.roles import LIMBS, Role
+from spark.rig.roles import LIMBS, UPPER_LEGS, Role
 
 # Skeletons whose bones differ by less than this, in hip heights, are one body.
 _SAME_BODY = 1e-3
@@ -69,7 +69,7 @@ def _bones(rig: Rig) -> dict[tuple[Role, Role], float]:
     """The lengths of arms' and legs' bones and the distance between the hips [m]."""
     places = rig.tpose_positions
     ends = [(a, b) for limb in LIMBS.values() for a, b in pairwise(limb)]
-    ends.append((Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG))
+    ends.append(UPPER_LEGS)
     joints = [((a, b), rig.roles.joint(a), rig.roles.joint(b)) for a, b in ends]
     return {
         key: float(np.linalg.norm(places[j] - places[i]))

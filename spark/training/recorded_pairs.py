@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.network.recorded import BodyTokens, matched_rows, tokens_of
-from spark.rig.roles import LIMBS, Group
+from spark.rig.roles import LEGS, LIMBS
 from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 from spark.training.dataset import Performance
 from spark.training.grounded import on_ground
@@ -27,7 +27,6 @@ from spark.transfer.hip_rise import standing
 _MIN_CHARACTERS = 4  # fewer tell nothing of others
 MAX_PAIRS = 4000  # drawn from those of a large dataset
 _FRAMES = 60  # of a clip that are looked at
-_LEGS = (Group.LEFT_LEG, Group.RIGHT_LEG)
 _LARGEST = 0.7  # of a logarithm of a scale, or a length [hip heights]: more is a spoilt file
 
 
@@ -134,7 +133,7 @@ class _Seen:
         self.at = at
         self.seen: CanonicalMotion = _picked(on_ground(one), at)
         roles = body.rig.roles
-        self.legs = [standing(self.seen, g) for g in _LEGS if roles.joint(LIMBS[g][2]) is not None]
+        self.legs = [standing(self.seen, g) for g in LEGS if roles.joint(LIMBS[g][2]) is not None]
 
 
 def _picked(motion: CanonicalMotion, frames: Int[np.ndarray, "N"]) -> CanonicalMotion:

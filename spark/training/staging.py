@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int
 
 from spark.kinematics import world_positions
 from spark.network.features import BodyFeatures
-from spark.rig.roles import Group
+from spark.rig.roles import LEGS, Group
 from spark.rotation import quat_mul, quat_rotate
 from spark.training.variants import Variant
 from spark.transfer.leg_ik import Leg, leg_of, leg_rotations, stance_correction
@@ -141,7 +141,7 @@ def foot_lift(
     body: BodyFeatures, rotations: Float[np.ndarray, "T K 4"], hips: Float[np.ndarray, "T 3"]
 ) -> Float[np.ndarray, "T 2 2"]:
     """How much higher ankle and toe of each foot are than in the T-pose [hip heights]."""
-    legs = (_leg(body, group) for group in (Group.LEFT_LEG, Group.RIGHT_LEG))
+    legs = (_leg(body, group) for group in LEGS)
     joints = np.array([[leg.foot, leg.contact] for leg in legs])
     skeleton = body.skeleton
     heights = world_positions(skeleton, rotations, hips)[..., 2]

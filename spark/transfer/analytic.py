@@ -17,7 +17,7 @@ from jaxtyping import Float, Int
 
 from spark.blocks import in_blocks
 from spark.rig.rig import Rig
-from spark.rig.roles import Role
+from spark.rig.roles import CLAVICLES, Role
 from spark.rotation import quat_conj, quat_slerp
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.finger_pairs import finger_notes, finger_pairs
@@ -31,8 +31,6 @@ _MAX_GAP = 0.26
 
 # [hip heights] A floor further than this from z = 0 is moved to 0.
 FLOOR_TOLERANCE = 0.1
-
-_SHOULDERS = (Role.LEFT_CLAVICLE, Role.RIGHT_CLAVICLE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +125,7 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
         else:
             with_it = target.doubles.get(j, parent)
             first[j], second[j], mix[j] = first[with_it], second[with_it], mix[with_it]
-            unmatched[j] = j if target.roles.roles[j] in _SHOULDERS else unmatched[with_it]
+            unmatched[j] = j if target.roles.roles[j] in CLAVICLES else unmatched[with_it]
     return Correspondence(first, second, mix, unmatched)
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from spark.rig.contacts import ADULT_HEIGHT, speeds
-from spark.rig.roles import LIMBS, Group
+from spark.rig.roles import LEGS, LIMBS
 from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.footfalls import between_contacts, beyond
@@ -54,7 +54,7 @@ def lock_feet(
     as the source's; its hips go with them. `noise` is what was taken from the source."""
     legs = {
         group: leg
-        for group in (Group.LEFT_LEG, Group.RIGHT_LEG)
+        for group in LEGS
         if (leg := leg_of(moved.rig, group)) is not None
         and source.rig.roles.joint(LIMBS[group][2]) is not None
     }

@@ -18,7 +18,7 @@ from scipy.linalg import solveh_banded
 
 from spark.blocks import in_blocks
 from spark.rig.rig import Rig
-from spark.rig.roles import Group
+from spark.rig.roles import LEGS
 from spark.rig.segments import segments
 from spark.rotation import quat_mul, quat_rotate
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
@@ -47,7 +47,7 @@ def sway_hips(source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotio
     own = acceleration(center_of_mass(moved)[:, :2], moved.frame_time)
     surplus = own - _wanted(own, theirs, believed)
     way = _given_back(_QUICK**2 * surplus, _QUICK / moved.frame_time)
-    both = [leg_of(moved.rig, group) for group in (Group.LEFT_LEG, Group.RIGHT_LEG)]
+    both = [leg_of(moved.rig, group) for group in LEGS]
     legs = [leg for leg in both if leg is not None]
     sway = np.column_stack([way / _carried(moved.rig, legs), np.zeros(len(moved))])
     return move_ankles(replace(moved, hips=moved.hips + sway), [(leg, -sway) for leg in legs])

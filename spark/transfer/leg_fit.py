@@ -21,7 +21,7 @@ from jaxtyping import Float
 
 from spark.blocks import blocks
 from spark.rig.rig import Rig
-from spark.rig.roles import LIMBS, Group, Role
+from spark.rig.roles import ANKLES, LEGS, LIMBS, UPPER_ARMS, Group, Role
 from spark.rotation import quat_rotate
 from spark.smoothstep import smoothstep
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
@@ -31,8 +31,6 @@ from spark.transfer.leg_ik import Leg, leg_of, move_ankles
 # animation library the scale over the ground lay between the two (docs/evaluation.md).
 _SHOULDER_WEIGHT = 0.5
 _LYING, _STANDING = 0.15, 0.6  # standing heights of the hips, between which legs come to lie
-_SHOULDERS = (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM)
-_FEET = (Role.LEFT_FOOT, Role.RIGHT_FOOT)
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,7 @@ def _fitted(source: CanonicalMotion, moved: CanonicalMotion, fit: LegFit) -> Can
     lying = _lying(source)
     outwards = quat_rotate(source.rotations[:, start.pelvis], np.array([0.0, 1.0, 0.0]))[:, :2]
     moves: list[tuple[Leg, Float[np.ndarray, "T 3"]]] = []
-    for group in (Group.LEFT_LEG, Group.RIGHT_LEG):
+    for group in LEGS:
         leg = leg_of(target, group)
         ankle = start.roles.joint(foot_role(group))
         if leg is None or ankle is None:
@@ -120,7 +118,7 @@ def _lying(source: CanonicalMotion) -> Float[np.ndarray, "T"]:
     """How much a body lies, 0 to 1: how low its hips are over the floor, or over an ankle that is
     lower, as down a flight of stairs."""
     rig = source.rig
-    ankles = [j for role in _FEET for j in rig.roles.joints(role)]
+    ankles = [j for role in ANKLES for j in rig.roles.joints(role)]
     lowest = canonical_positions(source, ankles)[..., 2].min(axis=1, initial=source.floor_z)
     high = (source.hips[:, 2] - lowest) / rig.hip_height
     return smoothstep((_STANDING - high) / (_STANDING - _LYING))
@@ -146,6 +144,6 @@ def from_sole(rig: Rig, joint: int) -> Float[np.ndarray, "3"]:
 
 def _shoulder_height(rig: Rig) -> float:
     """Of the upper arms' joints over the floor in the T-pose [hip heights]; 0 without arms."""
-    joints = [j for role in _SHOULDERS for j in rig.roles.joints(role)[:1]]
+    joints = [j for role in UPPER_ARMS for j in rig.roles.joints(role)[:1]]
     heights = [from_sole(rig, j)[2] / rig.hip_height for j in joints]
     return float(np.mean(heights)) if heights else 0.0

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from spark.blocks import in_blocks
-from spark.rig.roles import LIMBS, Group, Role
+from spark.rig.roles import LEGS, LIMBS, Role
 from spark.rotation import quat_conj, quat_mul
 from spark.smoothstep import smoothstep
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
@@ -26,10 +26,9 @@ from spark.transfer.reach import in_time
 _FLESH = 0.005  # [hip heights] of a joint's centre over the floor, at least: half a cm of an adult
 _EASE = 0.1  # [s] before something would be in the floor it begins to rise
 _ALOFT = 0.15  # [hip heights] over where it stands at which a foot is in the air
-_LEGS = (Group.LEFT_LEG, Group.RIGHT_LEG)
 _BODY = (
     *(Role.PELVIS, Role.HEAD, Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM),
-    *(role for leg in _LEGS for role in LIMBS[leg][:2]),
+    *(role for leg in LEGS for role in LIMBS[leg][:2]),
 )
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -101,7 +100,7 @@ def _risen(
 ) -> CanonicalMotion:
     """The whole body as high as its parts ask for, the wrists while no foot is near the floor; feet
     that are near it stay."""
-    legs = [leg for group in _LEGS if (leg := leg_of(moved.rig, group)) is not None]
+    legs = [leg for group in LEGS if (leg := leg_of(moved.rig, group)) is not None]
     aloft = [_aloft(moved, leg) for leg in legs]
     on_hands = np.min([np.ones(len(moved)), *aloft], axis=0)
     asked = [*body.values(), *(on_hands * deep for deep in wrists.values())]

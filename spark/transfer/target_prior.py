@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 from spark.blocks import in_blocks
 from spark.errors import name_list
 from spark.rig.rig import Rig
-from spark.rig.roles import Role
+from spark.rig.roles import UPPER_LEGS, Role
 from spark.rotation import quat_from_rotvec, quat_mul, quat_relative, rotvec_from_quat
 from spark.sixd import sixd_from_quat
 from spark.transfer.analytic import Correspondence, correspond, transfer
@@ -32,7 +32,7 @@ _MIN_SPREAD = 0.1  # of rotation matrix entries; a feature that varies less isn'
 _CLIP_AT = 2.5  # [standard deviations] a feature further from its mean predicts no more than this
 _FEATURES = (  # seen from the chest, and from the pelvis
     (Role.HEAD, Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM),
-    (Role.LEFT_UPPER_LEG, Role.RIGHT_UPPER_LEG),
+    UPPER_LEGS,
 )
 
 
