@@ -3,15 +3,11 @@ another floor: the clip's is told without it, and it is put on that."""
 
 from dataclasses import replace
 
-import numpy as np
-from jaxtyping import Float
-
-from spark.blocks import in_blocks
-from spark.rig.contacts import floor_under, lowest_sole
-from spark.rotation import quat_mul
+from spark.rig.contacts import floor_under
 from spark.runs import true_runs
 from spark.transfer.analytic import FLOOR_TOLERANCE
-from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.canonical import CanonicalMotion
+from spark.transfer.soles import lowest_soles
 from spark.transfer.stray_frames import jumps_of, repeats_of, strays_of
 
 
@@ -29,7 +25,7 @@ def on_one_floor(source: CanonicalMotion) -> CanonicalMotion:
     ]
     if not ends:
         return source
-    lowest = _lowest(source)
+    lowest = lowest_soles(source)
     floor, least = floor_under(lowest[~stray]), FLOOR_TOLERANCE * source.rig.hip_height
     hips, notes = source.hips.copy(), []
     for start, stop in ends:
@@ -44,14 +40,3 @@ def on_one_floor(source: CanonicalMotion) -> CanonicalMotion:
     if not notes:
         return source
     return replace(source, hips=hips, floor_z=floor, notes=(*source.notes, *notes))
-
-
-def _lowest(source: CanonicalMotion) -> Float[np.ndarray, "T"]:
-    """The height [m] of the lowest sole point in each frame."""
-
-    def lowest(block: slice) -> Float[np.ndarray, "N"]:
-        part = source.picked(block)
-        world = quat_mul(part.rotations, source.rig.tpose)
-        return lowest_sole(source.rig, canonical_positions(part), world)
-
-    return in_blocks(lowest, len(source))

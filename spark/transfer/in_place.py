@@ -29,7 +29,7 @@ from spark.transfer.hip_sway import center_of_mass
 from spark.transfer.loops import continued
 from spark.transfer.noise import without_noise
 from spark.transfer.pressure import NOISE, acceleration
-from spark.transfer.treads import sole_paths
+from spark.transfer.soles import sole_paths
 
 _LEAST_TIME = 0.4  # [s] from the first to the last frame: in less, any foot that slips tells one
 # All speeds [m/s] are of an adult.

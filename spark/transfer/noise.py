@@ -19,11 +19,11 @@ from spark.rig.contacts import (
     PLANTED_SPEED,
     SPEED_WINDOW,
     floor_under,
-    lowest_sole,
 )
-from spark.rotation import quat_continuous, quat_mul, quat_normalize
+from spark.rotation import quat_continuous, quat_normalize
 from spark.second_differences import second_differences
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.soles import lowest_soles
 
 # The product of a second difference with the next is of white noise -4 times its variance an axis
 # in the mean, and of motion above 0. Its median, which no impact moves, is less far from 0:
@@ -102,7 +102,7 @@ def without_noise(
         f"of estimated motion: it is smoothed above {noise.motion_cutoff:.1f} Hz, and whether feet "
         f"stand is told from what is below {noise.contact_cutoff:.1f} Hz"
     )
-    return replace(quiet, floor_z=_floor(quiet)), noise, (note,)
+    return replace(quiet, floor_z=floor_under(lowest_soles(quiet))), noise, (note,)
 
 
 def noise_of(source: CanonicalMotion) -> Noise:
@@ -159,13 +159,3 @@ class _Smoother:
     def __call__(self, values: Float[np.ndarray, "T *n"]) -> Float[np.ndarray, "T *n"]:
         columns = values.reshape(len(values), -1)
         return np.asarray(cho_solve_banded((self._factor, False), columns)).reshape(values.shape)
-
-
-def _floor(source: CanonicalMotion) -> float:
-    rig = source.rig
-
-    def lowest(block: slice) -> Float[np.ndarray, "T"]:
-        part = source.picked(block)
-        return lowest_sole(rig, canonical_positions(part), quat_mul(part.rotations, rig.tpose))
-
-    return floor_under(in_blocks(lowest, len(source)))

@@ -2,8 +2,8 @@
 
 A heel is put down while the ankle still moves, and the toes' end rests when the ball has left. So
 the ends of the sole tell, and not one joint of the foot; but a foot that turns on its ball stands
-while both its ends move. And what bears a body comes to rest and
-leaves slowly: near a rest it stands until it moves at a speed at which only swinging feet move.
+while both its ends move. And what bears a body comes to rest and leaves slowly: near a rest it
+stands until it moves at a speed at which only swinging feet move.
 """
 
 import numpy as np

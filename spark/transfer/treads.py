@@ -13,7 +13,6 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import gaussian_filter1d
 
-from spark.blocks import in_blocks
 from spark.constants import GRAVITY
 from spark.kinematics import joint_paths
 from spark.motion import Motion
@@ -25,16 +24,15 @@ from spark.rig.contacts import (
     planted_points,
     speeds,
 )
-from spark.rig.feet import ends_of_feet, lowest_points
 from spark.rig.rig import Rig
-from spark.rotation import quat_mul
 from spark.runs import true_runs
-from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
+from spark.transfer.canonical import CanonicalMotion, to_canonical
 from spark.transfer.footfalls import between_contacts, with_ends
 from spark.transfer.ground import Ground, Stand, distinct, level_ground
 from spark.transfer.hip_sway import center_of_mass
 from spark.transfer.pressure import NOISE, acceleration
 from spark.transfer.seats import FLESH, Seat, seats_of
+from spark.transfer.soles import sole_paths
 
 # All lengths [m] are of an adult.
 MIN_STEP = 0.12  # from one place to the next, once at least: floors that drift do so more slowly
@@ -172,29 +170,6 @@ def feet_by_side(rig: Rig, motion: Motion) -> dict[str, Bool[np.ndarray, "T"]]:
             feet[:, k, 2] -= ground[role.side]
     standing = planted_points(feet, motion.frame_time, rig.standing_height)
     return {role.side: standing[:, k] for k, role in enumerate(roles) if role is not None}
-
-
-def sole_paths(
-    source: CanonicalMotion,
-) -> tuple[Float[np.ndarray, "T S"], Float[np.ndarray, "T S 2 3"]]:
-    """How high over the floor the lowest point of each of `rig.soles` is [m], and where its heel
-    and its toe are [m, world]."""
-    feet = len(source.rig.soles)
-    found = in_blocks(lambda block: _feet(source.picked(block)), len(source))
-    return found[:, :feet], found[:, feet:].reshape(len(source), feet, 2, 3)
-
-
-def _feet(source: CanonicalMotion) -> Float[np.ndarray, "T N"]:
-    """How high over the floor the lowest point of each sole is, and heels and toes [m]."""
-    rig, count = source.rig, len(source)
-    joints = sorted({*rig.contact_joints, *(j for sole in rig.soles for j in sole.joints.tolist())})
-    positions = np.zeros((count, len(rig.skeleton), 3))
-    world = np.zeros((count, len(rig.skeleton), 4))
-    positions[:, joints] = canonical_positions(source, joints)
-    world[:, joints] = quat_mul(source.rotations[:, joints], rig.tpose[joints])
-    lowest = lowest_points(rig.soles, positions, world) - source.floor_z
-    ends = ends_of_feet(rig.soles, rig.roles, positions, world).reshape(count, -1)
-    return np.column_stack([lowest, ends])
 
 
 def _still(
