@@ -159,9 +159,8 @@ def _lines(total: int, done: int, label: str) -> Tell:
         shown = "".join(f", {name} {value:.3g}" for name, value in known.items())
         if share is None:
             share = (step - done) / (total - done)
-        if (
-            not first and 0 < share < 1 and step < total
-        ):  # the first step tells nothing of the others
+        # The first step tells nothing of the others.
+        if not first and 0 < share < 1 and step < total:
             shown += f", {duration(_left(began, share))} left"
         note(f"{label}: {step} of {total}{shown}")
 

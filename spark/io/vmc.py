@@ -54,9 +54,8 @@ class VmcPose(LivePose):
     _root: Float[np.ndarray, "7"] = field(default_factory=lambda: np.array([0.0, 0, 0, 1, 0, 0, 0]))
     _bones: dict[str, Float[np.ndarray, "7"]] = field(default_factory=dict)
     _clock: float = float("nan")
-    _seen: set[int] = field(
-        default_factory=set
-    )  # packets with that clock: a pose may be in several
+    # Packets with that clock: a pose may be in several.
+    _seen: set[int] = field(default_factory=set)
 
     def take(self, packet: bytes, now: float) -> bool:
         try:

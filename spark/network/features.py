@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.kinematics import local_rotations, world_rotations
-from spark.network.config import NO_ROTATION, TPOSE_ROTATION
+from spark.network.config import NO_ROTATION, SHAPE_FEATURES, TPOSE_FEATURES, TPOSE_ROTATION
 from spark.rig.rig import Rig
 from spark.rig.roles import Group, Role
 from spark.rotation import quat_from_yaw, quat_mul, quat_relative, quat_rotate, yaw_from_quat
@@ -82,7 +82,7 @@ class BodyFeatures:
         The position is relative to the root [hip heights], the rotation is the joint's in its file,
         relative to its parent, and none at the root. A pose stands still: its velocity is 0.
         """
-        features = np.zeros((len(self.joints), 13))
+        features = np.zeros((len(self.joints), TPOSE_FEATURES))
         features[:, :3] = self.skeleton.rest_positions
         features[:, TPOSE_ROTATION] = sixd_from_quat(local_rotations(self.skeleton, self.turned))
         features[0, TPOSE_ROTATION] = NO_ROTATION
@@ -92,7 +92,7 @@ class BodyFeatures:
     @cached_property
     def shape(self) -> Float[np.ndarray, "K 6"]:
         """Bone offset, depth, leaf flag and degrees of freedom (of three) of each joint."""
-        features = np.zeros((len(self.joints), 6))
+        features = np.zeros((len(self.joints), SHAPE_FEATURES))
         features[:, :3] = self.skeleton.offsets
         for depth, level in enumerate(self.skeleton.levels):
             features[level, 3] = depth / 10

@@ -13,8 +13,8 @@ from spark.rig.groups import groups_of
 from spark.rig.rig import Rig
 from spark.rig.roles import RoleMap
 
-_ACROSS = np.array([1.0, -1.0, 1.0])  # the mirror stands in the plane of X and Z
-_TURNED = np.array([1.0, -1.0, 1.0, -1.0])  # a rotation (wxyz) seen in it
+ACROSS = np.array([1.0, -1.0, 1.0])  # the mirror stands in the plane of X and Z
+TURNED = np.array([1.0, -1.0, 1.0, -1.0])  # a rotation (wxyz) seen in it
 _SIDE = re.compile(r"left|right|(?<![a-z])[lr](?![a-z])|[左右]", re.IGNORECASE)
 _OTHER = {"left": "right", "right": "left", "l": "r", "r": "l", "左": "右", "右": "左"}
 
@@ -30,8 +30,8 @@ def mirrored(motion: Motion, rig: Rig) -> tuple[Motion, Rig]:
     flipped = replace(
         skeleton,
         names=_names(skeleton.names, rig.roles),
-        offsets=skeleton.offsets * _ACROSS,
-        end_offsets=skeleton.end_offsets * _ACROSS,
+        offsets=skeleton.offsets * ACROSS,
+        end_offsets=skeleton.end_offsets * ACROSS,
     )
     role_map = RoleMap(roles, rig.roles.confidence, rig.roles.reasons)
     body = replace(
@@ -39,15 +39,15 @@ def mirrored(motion: Motion, rig: Rig) -> tuple[Motion, Rig]:
         skeleton=flipped,
         roles=role_map,
         groups=groups_of(flipped, role_map),
-        tpose=rig.tpose * _TURNED,
+        tpose=rig.tpose * TURNED,
         shaped_soles=tuple(map(_sole, reversed(rig.shaped_soles))),
     )
     seen = replace(
         motion,
         skeleton=flipped,
-        root_pos=motion.root_pos * _ACROSS,
-        rotations=motion.rotations * _TURNED,
-        translations=None if motion.translations is None else motion.translations * _ACROSS,
+        root_pos=motion.root_pos * ACROSS,
+        rotations=motion.rotations * TURNED,
+        translations=None if motion.translations is None else motion.translations * ACROSS,
     )
     return seen, body
 
@@ -75,6 +75,6 @@ def _swap(found: re.Match[str]) -> str:
 
 def _sole(sole: Sole) -> Sole:
     """A sole of the other foot: of each pair of points, the right one comes first."""
-    offsets: Float[np.ndarray, "P 3"] = sole.offsets * _ACROSS
+    offsets: Float[np.ndarray, "P 3"] = sole.offsets * ACROSS
     pairs = np.arange(len(sole)).reshape(-1, 2)[:, ::-1].ravel()
     return Sole("left" if sole.side == "right" else "right", sole.joints[pairs], offsets[pairs])

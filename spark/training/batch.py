@@ -54,9 +54,8 @@ class Poses(NamedTuple):
         parents, children = (self.rows[:, of].permute(1, 2, 3, 0) for of in self.bones)
         sixd = sixd_from_quat(quat_relative(parents, children))
         none = sixd.new_zeros(1, *sixd.shape[1:])
-        none[..., _ONES] = (
-            1  # without a tensor made of numbers, for which a GPU would be waited for
-        )
+        # Without a tensor made of numbers, for which a GPU would be waited for.
+        none[..., _ONES] = 1
         sixd, root = torch.cat([sixd, none]), self.root.flatten(0, 1)
         at = (
             of_pose[:, : body.valid.shape[1]] for of_pose, body in zip(self.at, bodies, strict=True)

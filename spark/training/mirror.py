@@ -5,12 +5,10 @@ from jaxtyping import Bool, Float
 
 from spark.network.features import BodyFeatures
 from spark.rig.groups import groups_of
+from spark.rig.mirror import ACROSS, TURNED
 from spark.rig.rig import Rig
 from spark.rig.roles import RoleMap
 from spark.skeleton import Skeleton
-
-_ACROSS = np.array([1.0, -1.0, 1.0])  # y points left
-_TURNED = np.array([1.0, -1.0, 1.0, -1.0])  # a rotation seen in a mirror
 
 
 def mirrored_body(body: BodyFeatures) -> BodyFeatures:
@@ -25,14 +23,14 @@ def mirrored_body(body: BodyFeatures) -> BodyFeatures:
             names[j] = skeleton.names[partners[0]]
     role_map = RoleMap(roles, rig.roles.confidence, rig.roles.reasons)
     flipped = Skeleton(
-        tuple(names), skeleton.parents, skeleton.offsets * _ACROSS, np.arange(len(names)) == 0
+        tuple(names), skeleton.parents, skeleton.offsets * ACROSS, np.arange(len(names)) == 0
     )
     groups = groups_of(flipped, role_map)
     return BodyFeatures(
         Rig(flipped, role_map, groups, rig.tpose, rig.root_joint, rig.hip_height),
         body.joints,
         flipped,
-        body.turned * _TURNED,
+        body.turned * TURNED,
     )
 
 
@@ -42,5 +40,5 @@ def mirrored_motion(
     planted: Bool[np.ndarray, "*n 2"],
 ) -> tuple[Float[np.ndarray, "*r 4"], Float[np.ndarray, "*n 3"], Bool[np.ndarray, "*n 2"]]:
     """What a body's motion is in the mirror, on the mirrored body; in the precision it comes in."""
-    turned, across = _TURNED.astype(rotations.dtype), _ACROSS.astype(hips.dtype)
+    turned, across = TURNED.astype(rotations.dtype), ACROSS.astype(hips.dtype)
     return rotations * turned, hips * across, planted[..., ::-1]

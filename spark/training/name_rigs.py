@@ -42,20 +42,8 @@ _VOWELS = ("a", "e", "i", "o", "u", "ee", "oo", "ai", "ou")
 _ONSETS = (*"bcdfghjklmnprstvwyz", "br", "ch", "cl", "dr", "fl", "gr", "pl", "sh", "sk", "st", "tr")
 _CODAS = (
     *"bdgklmnprstxz",
-    "",
-    "",
-    "",
-    "",
-    "",
-    "ck",
-    "ft",
-    "ll",
-    "nd",
-    "ng",
-    "nt",
-    "rm",
-    "sh",
-    "st",
+    *[""] * 5,
+    *("ck", "ft", "ll", "nd", "ng", "nt", "rm", "sh", "st"),
 )
 
 _T = TypeVar("_T")
