@@ -2,6 +2,9 @@
 
 from urllib.parse import urlsplit
 
+LOCAL = ("localhost", "127.0.0.1", "::1")
+"""The names of this machine, which its own browser asks for."""
+
 
 def host_name(host: str) -> str | None:
     """The name in a `Host` header, without the port; None where there is none."""

@@ -206,8 +206,8 @@ def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> di
         "method": method,
         "frames": len(result.motion),
         "fps": result.motion.fps,
-        "source_joints": _joints(clip),
-        "joints": _joints(result),
+        "source_joints": len(clip.joint_names),
+        "joints": len(result.joint_names),
         "scale": result.rig.hip_height / clip.rig.hip_height,
         "notes": [*clip.notes, *result.notes],
     }
@@ -236,12 +236,3 @@ def _source(args: Namespace, path: Path) -> "AnyClip":
         wanted = SONIC_FPS
         console.note(f"{path.name}: resampled to {wanted:g} fps, which SONIC plays")
     return clip if wanted is None else clip.resampled(wanted)
-
-
-def _joints(clip: "AnyClip") -> int:
-    """The joints of a skeleton, or the hinges of a robot."""
-    from spark_sim.clips import Clip
-
-    if isinstance(clip, Clip):
-        return len(clip.motion.skeleton)
-    return len(clip.on_robot.robot.joint_names)

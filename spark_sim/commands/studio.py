@@ -25,13 +25,12 @@ from spark.errors import ConventionError, SparkSimError, unforeseen
 from spark_sim import api
 from spark_sim.clips import AnyClip, Clip
 from spark_sim.loading import load
-from spark_sim.web import host_name, origin_host
+from spark_sim.web import LOCAL, host_name, origin_host
 
 _PAGE = Template("spark_sim.commands", "studio.html", ("studio.js",), server=True)
 MAX_UPLOAD = 64 * 1024 * 1024  # bytes
 UPLOADS = (".bvh", ".fbx", ".glb", ".gltf", ".vrm", ".vrma", ".c3d", ".trc", ".npz", ".npy")
 _KEPT = 8  # clips and pages; the oldest are forgotten
-_LOCAL = ("localhost", "127.0.0.1", "::1")
 
 
 class Studio:
@@ -112,7 +111,7 @@ def serve(host: str, port: int, clips: Sequence[AnyClip], ready: Callable[[str],
             pass
 
         Handler.studio = studio
-        Handler.names = (*_LOCAL, host) if host in _LOCAL else None
+        Handler.names = (*LOCAL, host) if host in LOCAL else None
         try:
             server = ThreadingHTTPServer((host, port), Handler)
         except OSError as error:

@@ -9,10 +9,9 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 from sim.view.live import LivePlayer
-from spark_sim.web import host_name
+from spark_sim.web import LOCAL, host_name
 
 _RATE = 30.0  # pictures a second
-_LOCAL = ("localhost", "127.0.0.1", "::1")
 
 
 def server(address: tuple[str, int], text: str, player: LivePlayer) -> ThreadingHTTPServer:
@@ -23,7 +22,7 @@ def server(address: tuple[str, int], text: str, player: LivePlayer) -> Threading
         def do_GET(self) -> None:
             """The page, or the coordinates, for as long as someone looks."""
             host = host_name(self.headers.get("Host", ""))
-            if address[0] in _LOCAL and host not in _LOCAL:
+            if address[0] in LOCAL and host not in LOCAL:
                 self.send_error(HTTPStatus.FORBIDDEN, "only the page itself may ask")
             elif self.path == "/":
                 body = text.encode()

@@ -11,9 +11,9 @@ from robots.formats.made_from import made_from
 from robots.registry import is_robot
 from spark.errors import FileFormatError
 from spark.io.arrays import npz_names
-from spark.io.reading import SUFFIXES as CHARACTERS
 from spark.io.reading import motion_files
 from spark_sim.shelf.manifest import Entry, Manifest
+from spark_sim.sources import ENDINGS
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def _motion_of(entry: Entry) -> str:
 def _motions(folder: Path, robot: bool) -> Iterator[Path]:
     """Motions of characters and, where their files or the user say which, of robots."""
     try:
-        paths = motion_files(folder, tuple(dict.fromkeys((*CHARACTERS, *SUFFIXES))))
+        paths = motion_files(folder, ENDINGS)
     except FileFormatError:
         return
     for path in paths:
