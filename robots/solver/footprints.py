@@ -67,6 +67,11 @@ class FootPlan:
     idle: Float[np.ndarray, "T"]
 
     @property
+    def length(self) -> float:
+        """From the heel to the toes [m]."""
+        return float(np.linalg.norm(self.flat[-2:].mean(0) - self.flat[:2].mean(0)))
+
+    @property
     def stands(self) -> Bool[np.ndarray, "T"]:
         """Whether heel or toe is on the floor."""
         return np.any(self.contacts, axis=1)
@@ -162,10 +167,12 @@ def _plan(
         share = behind / max(length, 1e-9)
         their_toe, their_heel = targets.feet[frames, s, 1], targets.feet[frames, s, 0]
         place = pivot.mean(0) + beyond(their_toe + share * (their_heel - their_toe), radius)
-        turned = heading[frames].mean() + beyond(heading[frames, None], MAX_TWIST)[:, 0]
         time = np.arange(start, stop)
-        x, y, turn = (np.interp(time, frames, values) for values in (*place.T, turned))
-        prints[start:stop, :2] = np.column_stack([x, y]) + behind * _ahead(turn)
+        turn = heading[time].mean() + beyond(heading[time, None], MAX_TWIST)[:, 0]
+        x, y, known = (np.interp(time, frames, v) for v in (*place.T, turn[frames - start]))
+        # Before the toe comes down, and after it is up, the foot turns about its heel.
+        about_heel = length * (_ahead(turn) - _ahead(known))
+        prints[start:stop, :2] = np.column_stack([x, y]) + behind * _ahead(known) + about_heel
         prints[start:stop, 2] = turn
     return FootPlan(
         frame_time=targets.frame_time,

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from robots.registry import find
-from robots.solver.footprints import headings, on_prints, plan_feet, reachable
+from robots.solver.footprints import MAX_TWIST, headings, on_prints, plan_feet, reachable
 from robots.solver.targets import targets_of
 from spark.demo.sample import sample_motion, sample_rig
 from spark.rig.roles import Role
@@ -58,6 +58,28 @@ def test_a_foot_spins_on_what_carries_it() -> None:
     copied = plan.points[..., 0] + 1j * plan.points[..., 1]
     away = np.abs(on_prints(plan.flat, pivot, heading) - copied)
     assert away.max() < 0.06  # within a wobble; a spin on the toes is 0.2 m away
+
+
+def test_a_foot_whose_toe_is_up_turns_about_its_heel() -> None:
+    """A body that stands, and whose toes then leave the floor while it turns by 50 degrees: the
+    print turns along, but for what is a wobble, and its heel stays."""
+    rig = sample_rig("walker")
+    ember = load_robot(find("robot")).on_robot.robot
+    still = to_canonical(sample_motion("walk", rig, 60.0), rig).frames(0, 40)
+    targets = targets_of(still, ember)
+    up = np.arange(40) >= 20
+    turn = np.radians(50) * np.clip((np.arange(40) - 20) / 19, 0.0, 1.0)
+    world = quat_mul(quat_from_yaw(turn)[:, None], np.repeat(targets.world[:1], 40, axis=0))
+    contacts = np.ones((40, 2, 2), dtype=bool)
+    contacts[up, :, 1] = False
+    hips, feet = (np.repeat(x[:1], 40, axis=0) for x in (targets.hips, targets.feet))
+    turning = replace(targets, world=world, contacts=contacts, hips=hips, feet=feet)
+    for plan in plan_feet(ember, turning):
+        heading = plan.prints[:, 2]
+        np.testing.assert_allclose(heading[-1] - plan.heading[-1], -MAX_TWIST, atol=1e-6)
+        heel = plan.prints[:, :2] - plan.length * np.stack([np.cos(heading), np.sin(heading)], 1)
+        assert np.ptp(heel[up], axis=0).max() < 1e-9
+        assert np.ptp(plan.prints[~up, :2], axis=0).max() < 1e-9
 
 
 def test_a_sole_on_end_heads_where_it_would_if_it_lay_flat() -> None:
