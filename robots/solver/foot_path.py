@@ -46,7 +46,7 @@ def footing_of(robot: Morphology, plan: FootPlan) -> Holds:
     toe, copied_toe = np.column_stack([plan.toe, plan.heading]), plan.toe @ [1, 1j]
     offset = plan.prints - toe
     offset[:, 2] = np.remainder(offset[:, 2] + np.pi, 2 * np.pi) - np.pi
-    way = toe + between_contacts(offset, stands, plan.toe)
+    way = toe + between_contacts(offset, stands, _gone(plan, offset))
     way = settled(way, stands, plan.frame_time, SETTLE)
     pivot, heading = way[:, 0] + 1j * way[:, 1], way[:, 2]
     turn = np.exp(1j * (heading - plan.heading))[:, None]
@@ -73,6 +73,18 @@ def footing_of(robot: Morphology, plan: FootPlan) -> Holds:
     over_time = (np.ascontiguousarray(x.transpose(1, 2, 0)) for x in (positions, holds))
     links, points = robot.sole_points(plan.sole)
     return Holds(links, np.repeat(points[:, :, None], len(positions), axis=2), *over_time)
+
+
+def _gone(plan: FootPlan, offset: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T 3"]:
+    """The copied toe [m], and beside it how far the foot is carried from that, at an even pace from
+    one footprint to the next: one that hardly goes itself would be thrown there as soon as it does.
+    """
+    at = np.flatnonzero(plan.stands)
+    if not len(at):
+        return np.column_stack([plan.toe, np.zeros(len(plan.toe))])
+    between = np.diff(offset[at] * [1.0, 1.0, plan.length], axis=0)
+    carried = np.append(0.0, np.cumsum(np.linalg.norm(between, axis=1)))
+    return np.column_stack([plan.toe, np.interp(np.arange(len(plan.toe)), at, carried)])
 
 
 def near_floor(height: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:

@@ -18,7 +18,7 @@ def beyond(path: Float[np.ndarray, "P D"], radius: float) -> Float[np.ndarray, "
 
 
 def between_contacts(
-    values: Float[np.ndarray, "T D"], stands: Bool[np.ndarray, "T"], path: Float[np.ndarray, "T 2"]
+    values: Float[np.ndarray, "T D"], stands: Bool[np.ndarray, "T"], path: Float[np.ndarray, "T P"]
 ) -> Float[np.ndarray, "T D"]:
     """The values of standing frames, and between these from one to the next by as much of its way
     as the foot has gone. 0 where it never stands."""

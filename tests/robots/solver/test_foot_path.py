@@ -18,6 +18,7 @@ from robots.solver.foot_path import (
 from robots.solver.footprints import FootPlan, plan_feet
 from robots.solver.targets import targets_of
 from spark.demo.sample import sample_motion, sample_rig
+from spark.smoothstep import smoothstep
 from spark.transfer.canonical import to_canonical
 from spark_sim.loading import load_robot
 
@@ -122,3 +123,23 @@ def moved(plan: FootPlan, along: np.ndarray, idle: float) -> FootPlan:
     points = np.stack([flat.real, flat.imag, np.zeros(flat.shape)], axis=-1)
     toe, heading = np.column_stack([along, 0.0 * along]), 0.0 * along
     return replace(plan, points=points, toe=toe, heading=heading, idle=idle + 0.0 * along)
+
+
+def test_a_foot_is_carried_at_an_even_pace_to_where_it_hardly_goes_itself() -> None:
+    """A foot that goes 1 cm, within 0.1 s, on the way between two prints that are 20 cm apart:
+    beside its own 6 m/s² (a smoothstep's) its toe is accelerated by at most 10 d / T². Carried as
+    it goes itself, it would be by twenty times those 6."""
+    ember, plan = planned()
+    count, begin, end = len(plan.toe), 10, 34
+    frames, swing = np.arange(count), slice(begin, end)
+    own = 0.01 * smoothstep((frames - 19) / 6)
+    plan.points[:] = plan.points[0]
+    plan.points[..., 0] += own[:, None] - plan.toe[0, 0]
+    plan.toe[:], plan.heading[:] = np.column_stack([own, np.zeros(count)]), plan.heading[0]
+    plan.contacts[:] = True
+    plan.contacts[swing] = False
+    at = np.column_stack([0.2 * (frames >= end), np.zeros(count), plan.heading])
+    plan.prints[:] = at
+    toe = footing_of(ember, plan).positions[-2:, 0].mean(axis=0)
+    pushed = np.abs(np.diff(toe, 2)).max() / plan.frame_time**2
+    assert pushed < 6.0 + 10 * 0.2 / ((end - begin) * plan.frame_time) ** 2
