@@ -29,6 +29,7 @@ from robots.solver.resting import leans, resting
 from robots.solver.self_touch import on_itself
 from robots.solver.smoothness import limit_speed
 from robots.solver.stance import apart
+from robots.solver.step_time import unhurried
 from robots.solver.strays import without_strays
 from robots.solver.stretches import by_stretches
 from robots.solver.targets import Targets, poses_of, targets_of, with_firm_hands
@@ -116,7 +117,8 @@ def _trajectory(robot: Morphology, targets: Targets) -> Coordinates:
         q, few = _posed(robot, coarse, few, q, whole_of(robot), _WHOLE)
         q = _parted(robot, coarse, few, q, whole_of(robot), _WHOLE)
     q = q.upsampled(stride, len(targets))
-    targets, feet = with_dynamics(robot, targets, apart(reachable(robot, feet, q)), q)
+    feet = unhurried(apart(reachable(robot, feet, q)), targets.flight)
+    targets, feet = with_dynamics(robot, targets, feet, q)
     if leaning:
         return _polished(robot, targets, feet, q, whole_of(robot), _POLISH)
     q = _polished(robot, targets, feet, q, trunk, _POLISH)
