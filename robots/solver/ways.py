@@ -38,7 +38,7 @@ def taken(
     ends on the first way where frames before lead in, or others out.
     """
     costs = _costs(robot, targets, holds, ways, block)
-    hinges = _hinges(robot, block)
+    hinges = hinges_of(robot, block)
     angles = np.stack([way.angles[:, hinges] for way in ways])
     turns = angles[:, None, 1:] - angles[None, :, :-1]
     turns = np.maximum(np.abs(turns) - _FREE_SPEED * targets.frame_time, 0.0)
@@ -65,7 +65,7 @@ def along(
         at = np.flatnonzero(on == k)
         out = out.replaced(at, way.at(at))
     smooth = partial(gaussian_filter1d, sigma=_SMOOTHING / frame_time, axis=0, mode="nearest")
-    angles, hinges = out.angles.copy(), _hinges(robot, block)
+    angles, hinges = out.angles.copy(), hinges_of(robot, block)
     angles[:, hinges] = spells.each(smooth, angles[:, hinges])
     return Coordinates(out.pos, out.quat, angles, out.ball_quats)
 
@@ -105,5 +105,6 @@ def _costs(
     return linearize(*terms, with_jacobian=False).cost.reshape(len(ways), -1).T.copy()
 
 
-def _hinges(robot: Morphology, block: Block) -> list[int]:
+def hinges_of(robot: Morphology, block: Block) -> list[int]:
+    """The block's joints but balls."""
     return [j for j in block.joints if not robot.tree.balls[j]]
