@@ -38,7 +38,8 @@ REST_HEIGHT = 0.05  # and of one that rests: recorded floors are off, and flesh 
 WRIST_HEIGHT = 0.04  # more above a palm or a fist
 REST_SPEED = 0.2  # [m/s, of an adult] below which a part comes to rest,
 UPRIGHT_SHANK = 0.25  # [m, of an adult] from foot to knee, over which no knee is on a step
-ROLL_SPEED = 0.4  # and up to which it then stays in place, though its joint rolls over it
+ROLL_SPEED = 0.4  # and up to which it then stays in place, though its joint rolls over it;
+STIR_TIME = 0.12  # [s] for which it may be faster, as long as it touches
 _WINDOW = 0.05  # [s] before and after a frame over which accelerations are measured
 _TOUCHING = ("hand", "forearm", "upper_arm", "head", "spine", "pelvis", "lower_leg")
 MAY_TOUCH = tuple(role for role in Role if role.part in _TOUCHING)  # and the feet
@@ -183,7 +184,8 @@ def _touching_parts(
         touching[:, b] = near[:, b] | once_down(touching[:, b], height[:, b])
     touches = _steady(touching, frame_time)
     stays = _steady(touches & (speed < ROLL_SPEED), frame_time) & touches
-    return tuple(joints), touches, _runs_with(stays, slow)
+    rests = _with_stirs(_runs_with(stays, slow), round(STIR_TIME / frame_time))
+    return tuple(joints), touches, rests & touches
 
 
 def _sole_points(feet: Float[np.ndarray, "T F 2 3"], height: float) -> Points:
@@ -202,6 +204,16 @@ def _runs_with(
     for b in range(mask.shape[1]):
         for start, stop in true_runs(mask[:, b]):
             out[start:stop, b] = seed[start:stop, b].any()
+    return out
+
+
+def _with_stirs(rests: Bool[np.ndarray, "T B"], frames: int) -> Bool[np.ndarray, "T B"]:
+    """Parts rest on through breaks of so many frames: each rest has a place of its own, and what
+    only stirs would be thrown from one to the next."""
+    out = rests.copy()
+    for b in range(rests.shape[1]):
+        for start, stop in true_runs(rests[:, b], frames):
+            out[start:stop, b] = True
     return out
 
 

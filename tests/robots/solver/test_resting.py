@@ -90,6 +90,23 @@ def test_hands_and_knees_of_the_source_are_seen_to_rest(ember: Morphology) -> No
     assert not {Role.HEAD, Role.PELVIS, Role.SPINE} & resting
 
 
+@pytest.mark.parametrize(("way", "frames", "stays"), [(0.05, 4, True), (0.5, 30, False)])
+def test_what_stirs_for_a_moment_goes_on_to_rest(
+    ember: Morphology, way: float, frames: int, stays: bool
+) -> None:
+    """A body on all fours that goes 5 cm, or half a metre, by 1 m/s at 60 fps: all along its hands
+    touch the ground."""
+    still = on_all_fours()
+    along = np.interp(np.arange(COUNT), [40 - frames / 2, 40 + frames / 2], [0.0, way])
+    targets = targets_of(replace(still, hips=still.hips + along[:, None] * [1.0, 0.0, 0.0]), ember)
+    for role in HANDS:
+        k = targets.part_roles.index(role)
+        assert targets.parts[:, k].all()
+        assert targets.rests[:20, k].all()
+        assert targets.rests[-20:, k].all()
+        assert targets.rests[:, k].all() == stays
+
+
 def test_feet_behind_knees_on_the_ground_do_not_stand(ember: Morphology) -> None:
     """Though they lie as low as they ever come, and are still."""
     targets = targets_of(on_all_fours(), ember)
