@@ -133,28 +133,33 @@ class NormalEquations:
         at_limits: Float[np.ndarray, "T D"],
         *,
         solves: int = 1,
+        room: Float[np.ndarray, "2 T D"] | None = None,
     ) -> Float[np.ndarray, "T D"]:
         """The Gauss-Newton step of all frames together, `smoothness` included; `damping` is added
         to H's diagonal. Dofs that stand at their upper (`at_limits` +1) or lower limit (-1) do not
         move where the gradient would take them beyond it; nor, in more than one of the `solves`,
-        where the step before would."""
+        where the step before would. Given the least and the largest step of each dof, its `room`,
+        those that would go farther in the solve before stop there, and the others step beside
+        them: if they were only clipped after it, what others do in their turn would be in vain."""
         T, D = self.g.shape
         band, g = smoothness.band(self.H), self.g + smoothness.gradient(T)
         held = at_limits * g < 0
-        diagonal = band[..., 0].copy()
+        diagonal, asked = band[..., 0].copy(), np.where(held, 0.0, g)
         for k in range(solves):
             band[..., 0] = diagonal + np.where(held, _HELD, damping[:, None])
             step = -solveh_banded(
                 band.reshape(T * D, -1).T,
-                np.where(held, 0.0, g).ravel(),
+                asked.ravel(),
                 lower=True,
                 overwrite_ab=k == solves - 1,
                 check_finite=False,
             ).reshape(T, D)
-            beyond = (at_limits * step > 0) & ~held
+            stops = np.zeros_like(step) if room is None else np.clip(step, *room)
+            beyond = ~held & (at_limits * step > 0 if room is None else step != stops)
             if not beyond.any():
                 break
             held |= beyond
+            asked = np.where(beyond, -_HELD * stops, asked)
         return step
 
 

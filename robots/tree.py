@@ -123,6 +123,16 @@ class Coordinates:
         )
         return out
 
+    def room(self, tree: Tree, margin: float) -> Float[np.ndarray, "2 T D"]:
+        """The least and the largest step of each dof [rad] after which its hinge is at least
+        `margin` [rad] from its limits; of others without bounds."""
+        out = np.full((2, len(self), tree.nv), np.inf)
+        out[0] = -np.inf
+        hinges = ~tree.balls
+        for own, limits in zip(out, tree.limits_within(margin), strict=True):
+            own[:, tree.dof_starts[hinges]] = (limits - self.angles)[:, hinges]
+        return out
+
     def clipped(self, tree: Tree, margin: float) -> "Coordinates":
         """The same with hinges at least `margin` [rad] from their limits."""
         lower, upper = tree.limits_within(margin)

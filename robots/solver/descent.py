@@ -56,12 +56,14 @@ def solve_block(
     max_rejected: float,
     candidates: Sequence[Candidate] | None = None,
     penalty: float = 1.0,
+    solves: int = 1,
 ) -> Coordinates:
     """At most `max_iter` Gauss-Newton steps in the block's dofs, from `q`.
 
     With `candidates`, the parts that are near each other at `q`, parts in each other are pushed
     apart, by a change of `q` that is smoother than `q`. `penalty` multiplies the weights of
-    collisions and the floor.
+    collisions and the floor. In more than one of the `solves` of a step, hinges that come to their
+    limits stop there, and the others know it.
 
     A step is judged frame by frame: where the cost around a frame rises by more than a share
     of what is gained nearby, the step is rejected there. If more than `max_rejected` of the frames
@@ -113,7 +115,10 @@ def solve_block(
         cost = uniform_filter1d(normal.cost + coupling.cost(len(q)), window)
         limits = q.at_limits(tree, LIMIT_CLEARANCE)[:, block.dofs]
         step = np.zeros((len(q), tree.nv))
-        step[:, block.dofs] = normal.solve_coupled(coupling, damping, limits)
+        room = q.room(tree, LIMIT_CLEARANCE)[..., block.dofs] if solves > 1 else None
+        step[:, block.dofs] = normal.solve_coupled(
+            coupling, damping, limits, solves=solves, room=room
+        )
         share = np.minimum(1.0, MAX_STEP / np.maximum(np.abs(step).max(1), 1e-9))
         step *= smooth_lower_envelope(share, window)[:, None]
         trial, is_last = taken(step), k == max_iter - 1

@@ -49,6 +49,8 @@ share of the frames that may reject that one."""
 _TRUNK, _LIMBS = (12, 0.02, 0.1), (10, 0.05, 0.1)
 _WHOLE = (8, 0.05, 0.1)  # both blocks at once, nearly solved one after the other
 _POLISH, _POLISH_LIMBS = (2, 0.0, 1.0), (1, 0.0, 1.0)  # splines through a solution
+# Of each last step: a foot whose hip comes to its limit in one frame and not in the next would hop.
+_SOLVES = 2
 _SOFT = (3, 0.05, 0.1)  # while collisions cost little:
 _SOFTNESS = 0.2  # this share of their weights, over a rounding that is wider by as much
 _COARSE_INTERVAL = 1 / 20  # [s] between the frames that are solved first
@@ -213,7 +215,7 @@ def _polished(
     for _ in range(2 if targets.rests.any() else 1):
         holds = _holds_of(robot, targets, feet, q, block)
         near = collision_candidates(robot, targets, q, block)
-        q = solve_block(robot, targets, holds, q, block, *steps, near)
+        q = solve_block(robot, targets, holds, q, block, *steps, near, solves=_SOLVES)
     return repair(robot, targets, holds, q, block)
 
 

@@ -196,6 +196,18 @@ def test_a_column_at_its_limit_does_not_go_beyond() -> None:
     np.testing.assert_allclose(step, [[0, 1], [1, 1], [1, 1]], atol=1e-6)
 
 
+def test_others_step_beside_a_column_that_comes_to_its_limit() -> None:
+    """By hand: a + b should be 1, and either costs as much; a may go by 0.2 alone."""
+    normal = NormalEquations(3, 2)
+    normal.add([0, 1], np.ones((3, 2, 1)), -np.ones((1, 3)))
+    normal.add_diagonal(np.full((3, 2), 0.01), np.zeros((3, 2)))
+    ties = Smoothness(np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((2, 1)), np.zeros((2, 2)))
+    room = np.full((2, 3, 2), 9.0)
+    room[0], room[1, 1, 0] = -9.0, 0.2
+    step = normal.solve_coupled(ties, np.zeros(3), np.zeros((3, 2)), solves=2, room=room)
+    np.testing.assert_allclose(step, [[0.5, 0.5], [0.2, 0.8], [0.5, 0.5]], atol=1e-3)
+
+
 def test_unhurried_angles_turn_no_faster_and_slow_ones_stay(ember: Morphology) -> None:
     count, fast = 60, 12.0
     angles = np.zeros((count, len(ember.tree)))
