@@ -36,6 +36,7 @@ class Plot:
 def plots(result: Result) -> list[Plot]:
     """What is worth a look over time."""
     clip, source, limits = result.clip, result.source, result.clip.thresholds
+    tremble, trembles = result.tremble, result.tremble.source_points
     flags, never = clip.flags, np.zeros(len(clip), dtype=bool)
 
     def beside(
@@ -94,27 +95,16 @@ def plots(result: Result) -> list[Plot]:
             beside(lambda each: result.scale * each.base_acceleration),
         ),
         *_limbs(result),
-        Plot(
-            "fastest joint",
-            "rad/s",
-            _fastest(clip),
-            never,
-            None,
-            beside(_fastest),
-        ),
-    ]
-    tremble = result.tremble
-    theirs = tremble.source_points
-    shown.append(
+        Plot("fastest joint", "rad/s", _fastest(clip), never, None, beside(_fastest)),
         Plot(
             "tremble",
             "mm",
             1000 * tremble.points.max(axis=1),
             np.any(tremble.points_far, axis=1),
             None,
-            None if theirs is None else 1000 * theirs.max(axis=1),
-        )
-    )
+            None if trembles is None else 1000 * trembles.max(axis=1),
+        ),
+    ]
     if clip.torques:
         load = np.max([each.load for each in clip.torques], axis=0)
         name, most = "highest torque", limits.torque
