@@ -56,6 +56,16 @@ def stick_rig() -> Rig:
     )
 
 
+def scaled(rig: Rig, factor: float) -> Rig:
+    """The rig in another size."""
+    skeleton = replace(
+        rig.skeleton,
+        offsets=factor * rig.skeleton.offsets,
+        end_offsets=factor * rig.skeleton.end_offsets,
+    )
+    return replace(rig, skeleton=skeleton, hip_height=factor * rig.hip_height)
+
+
 def stick_with(*rows: tuple[str, Role | str]) -> Rig:
     """The stick man with joints, each by its name and what it hangs on: a hand, or a name."""
     rig = stick_rig()

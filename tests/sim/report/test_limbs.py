@@ -12,7 +12,7 @@ from sim.report.thresholds import PLAUSIBILITY_V4
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_about
-from tests.helpers.stick import joint, standing, stick_rig, without
+from tests.helpers.stick import joint, scaled, standing, stick_rig, without
 
 Times = Float[np.ndarray, "T"]
 ELBOW, HAND = 0.3, 0.55  # [m] from the shoulder
@@ -105,13 +105,7 @@ def test_the_worst_limb_is_named_beside_its_source() -> None:
 
 @pytest.mark.parametrize("rate", [0.5, 3.0, 6.0])
 def test_of_a_larger_body_more_is_no_more(rate: float) -> None:
-    small = stick_rig()
-    skeleton = replace(
-        small.skeleton,
-        offsets=2 * small.skeleton.offsets,
-        end_offsets=2 * small.skeleton.end_offsets,
-    )
-    big = replace(small, skeleton=skeleton, hip_height=2 * small.hip_height)
+    small, big = stick_rig(), scaled(stick_rig(), 2.0)
     report = assess(turning(rate, rig=big), source=turning(rate))
     assert report.limbs is not None
     np.testing.assert_allclose(report.limbs.ratios, 1.0, rtol=1e-9)

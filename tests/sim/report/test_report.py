@@ -18,7 +18,7 @@ from spark.rig.roles import Group, Role, RoleMap
 from spark.rotation import quat_about, quat_from_yaw, quat_mul, quat_rotate
 from spark.skeleton import Skeleton
 from tests.helpers.recordings import recordings
-from tests.helpers.stick import joint, standing, stick_rig
+from tests.helpers.stick import joint, scaled, standing, stick_rig
 
 FPS = 60.0
 
@@ -297,15 +297,6 @@ def test_turning_and_moving_the_world_changes_nothing() -> None:
     assert 0 < before.implausible < 1
     for name in before.clip.flags:
         np.testing.assert_array_equal(before.clip.flags[name], after.clip.flags[name])
-
-
-def scaled(rig: Rig, factor: float) -> Rig:
-    skeleton = replace(
-        rig.skeleton,
-        offsets=factor * rig.skeleton.offsets,
-        end_offsets=factor * rig.skeleton.end_offsets,
-    )
-    return replace(rig, skeleton=skeleton, hip_height=factor * rig.hip_height)
 
 
 def test_thresholds_grow_with_the_body() -> None:

@@ -10,7 +10,7 @@ from sim.report.explanations import MEANINGS
 from sim.report.names import LABELS
 from spark.motion import Motion
 from spark.rig.rig import Rig
-from tests.helpers.stick import standing, stick_rig
+from tests.helpers.stick import scaled, standing, stick_rig
 
 FPS = 60.0
 
@@ -42,13 +42,7 @@ def test_clearance_is_the_height_in_swing_over_the_sources(height: float, fps: f
 
 
 def test_clearance_is_for_the_bodys_size() -> None:
-    small = stick_rig()
-    skeleton = replace(
-        small.skeleton,
-        offsets=2 * small.skeleton.offsets,
-        end_offsets=2 * small.skeleton.end_offsets,
-    )
-    big = replace(small, skeleton=skeleton, hip_height=2 * small.hip_height)
+    small, big = stick_rig(), scaled(stick_rig(), 2.0)
     source = Subject(gliding(small, 0.1), small)
     swing = assess(Subject(gliding(big, 0.1), big), source=source).swing
     assert swing is not None
