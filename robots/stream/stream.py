@@ -15,7 +15,6 @@ from robots.solver.window_targets import PointTargets
 from robots.solver.window_terms import Terms
 from robots.stream.coupling import MAX_ACCELERATION
 from robots.stream.detour import Detours
-from robots.stream.elsewhere import Elsewhere
 from robots.stream.flight import Flight
 from robots.stream.footing import ContactTracker
 from robots.stream.frame_check import FrameCheck
@@ -29,6 +28,7 @@ from robots.stream.frame_targets import (
     move_on,
     raised,
 )
+from robots.stream.jump_filter import JumpFilter
 from robots.stream.noise_filter import NoiseFilter
 from robots.stream.resting import RestTracker, held_points
 from robots.stream.start_blend import StartBlend
@@ -62,7 +62,7 @@ class Stream:
         self._noise_filter = NoiseFilter(source, frame_time, ground.noise)
         self._start_blend = StartBlend(self._terms, frame_time)
         self._frame_check = FrameCheck(self._reader)
-        self._elsewhere = Elsewhere(frame_time)
+        self._jump_filter = JumpFilter(frame_time)
         self._targets: FrameTargets  # of the window's free frames
         self._contacts: ContactTracker
         self._rests: RestTracker
@@ -75,7 +75,7 @@ class Stream:
         self._flight.reset()
         self._noise_filter.reset()
         self._frame_check.reset()
-        self._elsewhere.reset()
+        self._jump_filter.reset()
         self._start_blend.reset()
         self._q = np.zeros((_FRAMES, self.robot.mjcf.model.nq))
         self._begun: list[FrameTargets] = []
@@ -97,7 +97,7 @@ class Stream:
             return self._step(frame)
 
     def _step(self, frame: Frame) -> Float[np.ndarray, "nq"]:
-        held = self._elsewhere.hold(frame) if self._moves else frame
+        held = self._jump_filter.hold(frame) if self._moves else frame
         try:
             targets = self._reader.targets(held)
             self._frame_check.check(held, targets)
@@ -105,7 +105,7 @@ class Stream:
             targets = targets if quiet is None else self._reader.targets(quiet)
         except FrameError as error:
             raise FrameError(f"frame {self._count} of the stream: {error}") from error
-        self._elsewhere.take(frame, held)
+        self._jump_filter.take(frame, held)
         thrown = self._flight.follow(targets.hips[2] / self._reader.scale)
         targets = raised(targets, thrown)
         self._count += 1

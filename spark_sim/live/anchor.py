@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from robots.stream.elsewhere import FASTEST, UNSEEN
 from robots.stream.frame_targets import Frame
+from robots.stream.jump_filter import FASTEST, UNSEEN
 from spark_sim.live.listener import Arrival
 
 

@@ -10,7 +10,7 @@ FASTEST = 12.0  # [m/s]: who is faster was put somewhere else
 UNSEEN = 0.05  # [s] that one may go on so fast between two frames: some may be lost
 
 
-class Elsewhere:
+class JumpFilter:
     """Takes jumps over the ground out of frames that are `frame_time` [s] apart."""
 
     def __init__(self, frame_time: float) -> None:
