@@ -4,7 +4,7 @@ A fall is counted, and the robot is put back on the reference, so that one fall 
 rest of the motion.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -112,8 +112,7 @@ class PolicyTracker:
     @property
     def body(self) -> ModelTrajectory:
         """The motion to follow at the policy's rate."""
-        target = self.target
-        return ModelTrajectory(target.spec, target.model, target.root, self.qpos, target.tpose)
+        return replace(self.target, qpos=self.qpos)
 
     def _reference(self, frame_time: float) -> tuple[Float[np.ndarray, "S nq"], list[State]]:
         """The motion at the policy's rate. Velocities of the root are smoothed, as in most
