@@ -13,7 +13,7 @@ from spark.errors import FileFormatError, name_list
 _MIN_MASS, _MIN_INERTIA = 1e-4, 1e-8  # [kg], [kg m²] of bodies whose mass went with their meshes
 
 
-def compiled(
+def compiled_or_cached(
     spec: mujoco.MjSpec, path: Path, notes: list[str], key: Callable[[], str | None]
 ) -> mujoco.MjModel:
     """The model of a spec; from the disk where it was stored under this `key`, which is worked out

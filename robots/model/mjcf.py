@@ -15,7 +15,7 @@ from jaxtyping import Float
 
 from robots.model import model_cache
 from robots.model.base import find_root, free_root, stand
-from robots.model.compiling import compiled
+from robots.model.compiling import compiled_or_cached
 from robots.model.finite import check_finite, nan_in
 from robots.model.mjcf_source import read_source
 from robots.model.urdf import is_urdf, read_urdf
@@ -100,7 +100,7 @@ def read_mjcf(path: str | Path, *, visuals: bool = True) -> Mjcf:
             _drop_visuals(spec)
         root = find_root(spec, path)
         free_root(spec, root, path, notes)
-        model = compiled(spec, path, notes, partial(model_cache.key, spec, text, visuals))
+        model = compiled_or_cached(spec, path, notes, partial(model_cache.key, spec, text, visuals))
     if is_urdf(path):
         stand(spec, model, root)
     _note_others(model, root, notes)
