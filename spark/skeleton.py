@@ -1,5 +1,6 @@
 """A skeleton: named joints in a tree, in SI units and Z-up axes."""
 
+from collections.abc import Container
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -75,6 +76,10 @@ class Skeleton:
         while (joint := int(self.parents[joint])) >= 0:
             chain.append(joint)
         return tuple(chain)
+
+    def above(self, joint: int, among: Container[int]) -> int:
+        """The nearest joint of `among` above `joint`; -1 where there is none."""
+        return next((j for j in self.ancestors(joint)[1:] if j in among), -1)
 
     def subtree(self, joint: int) -> tuple[int, ...]:
         """`joint` and everything below it, parents first."""

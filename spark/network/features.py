@@ -154,9 +154,7 @@ def body_features(rig: Rig) -> BodyFeatures:
         and j not in rig.skeleton.ancestors(pelvis)
     ]
     index = {j: k for k, j in enumerate(kept)}
-    parents = [-1] + [
-        next((index[a] for a in rig.skeleton.ancestors(j)[1:] if a in index), 0) for j in kept[1:]
-    ]
+    parents = [-1] + [index.get(rig.skeleton.above(j, index), 0) for j in kept[1:]]
     positions = rig.tpose_positions[kept]
     hips = [index[j] for j in rig.hips]
     positions[0] = positions[hips].mean(0)

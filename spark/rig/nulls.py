@@ -42,10 +42,7 @@ def skeleton_of(skeleton: Skeleton, kept: Int[np.ndarray, "K"]) -> Skeleton:
     """Some joints of a skeleton, each on the nearest of them above it. What is left out is nulls,
     the root maybe one of them."""
     place = {j: k for k, j in enumerate(kept.tolist())}
-    above = [
-        next((place[j] for j in skeleton.ancestors(joint)[1:] if j in place), -1)
-        for joint in kept.tolist()
-    ]
+    above = [place.get(skeleton.above(joint, place), -1) for joint in place]
     offsets = skeleton.rest_positions[kept]
     offsets[1:] -= offsets[above[1:]]
     return replace(

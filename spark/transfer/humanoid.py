@@ -20,7 +20,8 @@ def on_bones(canonical: CanonicalMotion, bones: Mapping[str, int]) -> Motion:
     """
     rig = canonical.rig
     joints = list(bones.values())
-    parents = np.array([_above(rig.skeleton, joints, j) for j in joints])
+    place = {j: k for k, j in enumerate(joints)}
+    parents = np.array([place.get(rig.skeleton.above(j, place), -1) for j in joints])
     places = rig.tpose_positions[joints]
     offsets = places - np.where(parents[:, None] < 0, 0.0, places[parents])
     middle = rig.tpose_positions[rig.hips].mean(0)
@@ -32,9 +33,3 @@ def on_bones(canonical: CanonicalMotion, bones: Mapping[str, int]) -> Motion:
         canonical_positions(canonical, joints[:1])[:, 0] - [0.0, 0.0, canonical.floor_z],
         local_rotations(skeleton, canonical.rotations[:, joints]),
     )
-
-
-def _above(skeleton: Skeleton, joints: list[int], joint: int) -> int:
-    """The place in `joints` of the nearest of them above a joint; -1 where there is none."""
-    line = skeleton.ancestors(joint)[1:]
-    return next((joints.index(j) for j in line if j in joints), -1)

@@ -67,14 +67,7 @@ def _picked(motion: Motion, frames: np.ndarray) -> Motion:
 def _bones(rig: Rig) -> tuple[list[int], list[list[int]]]:
     """The joints with a role, and a line from each to the next one above it that has one, by their
     places in that list."""
-    roles, parents = rig.roles.roles, rig.skeleton.parents.tolist()
-    joints = [joint for joint, role in enumerate(roles) if role is not None]
+    joints = [*rig.roles.held]
     place = {joint: k for k, joint in enumerate(joints)}
-    bones = []
-    for joint in joints:
-        above = parents[joint]
-        while above >= 0 and above not in place:
-            above = parents[above]
-        if above >= 0:
-            bones.append([place[above], place[joint]])
-    return joints, bones
+    above = [rig.skeleton.above(joint, place) for joint in joints]
+    return joints, [[place[j], k] for k, j in enumerate(above) if j >= 0]
