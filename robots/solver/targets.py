@@ -12,6 +12,7 @@ from robots.model.shapes import surface
 from robots.solver.contacts import has_feet, schedule, touching_joint
 from robots.solver.ground import Climb, level_climb, under_soles
 from robots.solver.haste import limb_jerks
+from robots.solver.level_feet import level_across
 from robots.solver.palms import laid, resting_palms
 from robots.solver.trunk import bowing
 from spark.blocks import blocks
@@ -146,6 +147,10 @@ def targets_of(
     for role in palms:
         j, rests = robot.rig.roles.require(role), touches.rests[:, touches.part_roles.index(role)]
         world[:, j] = laid(world[:, j], rests, source.frame_time)
+    for s, sole in enumerate(robot.soles):
+        flat = np.all(touches.feet[:, s], axis=1)
+        for j in set(sole.joints.tolist()):
+            world[:, j] = level_across(world[:, j], robot.rig.tpose[j], flat)
     return Targets(
         frame_time=source.frame_time,
         world=world,
