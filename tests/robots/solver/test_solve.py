@@ -542,7 +542,7 @@ FALLS_SHORT = {
     "booster_t1": {"contacts F1", "clearance", "hips acc.", "CoM acc."},
     "unitree_h1": {"contacts F1", "heading", "in air %", "skating %"},  # its hips hardly yaw
 }
-"""What the bars of a mean over so few clips miss (docs/robots.md has the mean over 24)."""
+"""What the bars of a mean over so few clips miss (docs/robots-measured.md has the mean over 24)."""
 
 
 @pytest.mark.parametrize("robot", FALLS_SHORT)
