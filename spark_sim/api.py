@@ -7,29 +7,17 @@ from typing import TYPE_CHECKING, get_args, overload
 
 from spark.errors import ConventionError
 from spark.io.bvh import write_bvh
-from spark.io.encoding import encode, encode_new
-from spark.motion import Motion
-from spark.transfer.analytic import transfer
-from spark.transfer.canonical import from_canonical
-from spark.transfer.hand_touch import lost_touches, with_touches
-from spark.transfer.in_place import belt_note, way_taken_out
-from spark.transfer.leg_fit import travel_scale
-from spark.transfer.loops import continued
-from spark.transfer.noise import without_noise
-from spark.transfer.refine import grounded, refined
-from spark.transfer.root_motion import with_root_motion
-from spark.transfer.twists import spread_twists
+from spark.io.encoding import encode_new
 from spark_sim import files
 from spark_sim.choices import Method, RobotName
 from spark_sim.clips import AnyClip, Clip, File, RobotClip
 from spark_sim.loading import clip_of
+from spark_sim.retargeting import onto_character, onto_robot
 
 if TYPE_CHECKING:
     from sim.report import Report
     from spark_sim.simulation import Simulated
 
-COPIED = "each pose is copied to the robot's hinges: feet are not held, parts may collide"
-"""What is to know of a motion that was copied to a robot, and not solved for."""
 _PAGE = (".html", ".htm")
 
 
@@ -109,76 +97,16 @@ def retarget(
     if not isinstance(target, Clip):
         if checkpoint is not None:
             raise ConventionError("a checkpoint is for characters; robots are solved for")
-        return _onto_robot(source, target, solved=refine and method != "copy")
-    canonical, noise = source.canonical, None
-    notes: tuple[str, ...] = ()
-    own, way = slice(None), None
-    if refine:
-        canonical, own = continued(canonical)
-        canonical, noise, notes = without_noise(canonical)
-        way = way_taken_out(canonical)
-    if way is not None:
-        canonical = replace(canonical, hips=canonical.hips + way)
-    if method == "copy":
-        moved = transfer(canonical, target.rig)
-    else:
-        from spark.network.fill_in import filled_in
-
-        learned = None if checkpoint is None else Path(checkpoint)
-        moved = filled_in(canonical, target.canonical, learned)
-    if refine:
-        finish = refined if method == "spark" else grounded
-        moved = finish(canonical, moved, noise)
-        touching = with_touches(canonical, moved) if method == "spark" else moved
-        moved, touching = moved.picked(own), touching.picked(own)
-        if keep_touches:
-            moved = touching
-        else:
-            notes += lost_touches(moved, touching)
-    travel = _travel(source, target, fitted=method == "spark")
-    if way is not None:
-        moved = replace(moved, hips=moved.hips - travel * way[own])
-        notes += (belt_note(way[own], source.frame_time, travel),)
-    moved = spread_twists(canonical.rig, moved)
-    motion, carried = _carried(from_canonical(moved), source, target, travel)
-    bvh, written = encode(motion, target.recording)
-    notes += (*moved.notes, *carried, *written)
-    recording = replace(target.recording, bvh=bvh, motion=motion, notes=notes)
-    # The rig is given: what is known of a body does not depend on the motion that it makes.
-    return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig, target.path)
-
-
-def _travel(source: AnyClip, target: Clip, *, fitted: bool) -> float:
-    """How many times as far as the source the target goes over the ground: its path is scaled with
-    the legs, which may be `fitted`."""
-    if fitted:
-        return travel_scale(source.rig, target.rig)
-    return target.rig.hip_height / source.rig.hip_height
-
-
-def _carried(
-    motion: Motion, source: AnyClip, target: Clip, travel: float
-) -> tuple[Motion, tuple[str, ...]]:
-    """`motion` on the target, which goes `travel` times as far, with root motion where its file can
-    say where its root is."""
-    if not (target.recording.bvh.position_channels[:, 0] == 0).any():
-        return motion, ()
-    return with_root_motion(motion, target.rig, source.motion, source.rig, travel)
-
-
-def _onto_robot(source: AnyClip, target: RobotClip, *, solved: bool) -> RobotClip:
-    """The motion of `source` on a robot: solved for as a whole, within limits, feet planted where
-    the source's are; or, where it is not `solved`, each pose copied to the robot's hinges."""
-    from robots.solver.solve import copy
-    from robots.solver.solve import retarget as solve
-
-    robot = target.on_robot.robot
-    if solved:
-        moved = solve(source.canonical, robot)
-    else:
-        moved = copy(source.canonical, robot)
-        moved = replace(moved, notes=(*moved.notes, COPIED))
-    return RobotClip(moved, f"{source.name} on {target.name}", source.path, source.span)
+        return onto_robot(source, target, solved=refine and method != "copy")
+    learned = None if checkpoint is None else Path(checkpoint)
+    return onto_character(
+        source,
+        target,
+        fitted=method == "spark",
+        checkpoint=learned,
+        refine=refine,
+        keep_touches=keep_touches,
+    )
 
 
 def report(

@@ -29,7 +29,7 @@ ROOMS = (
     ("spark_sim",),  # its own files: choices, files, rolemap, console, clip_base
     ("spark_sim.clips",),
     ("spark_sim.loading",),
-    ("spark_sim.describe", "spark_sim.live", "spark_sim.simulation"),
+    ("spark_sim.describe", "spark_sim.live", "spark_sim.retargeting", "spark_sim.simulation"),
     ("spark_sim.api",),
     ("spark_sim.shelf",),
     ("spark_sim.commands",),

@@ -17,9 +17,9 @@ from spark.errors import ConventionError, SparkSimError
 from spark.kinematics import forward
 from spark.rig.roles import Role
 from spark.transfer.canonical import to_canonical
-from spark_sim.api import COPIED
 from spark_sim.cli import run
 from spark_sim.clips import RobotClip
+from spark_sim.retargeting import COPIED
 
 # A humanoid of hinges, 1.2 m high: hips and shoulders of three, knees, elbows and ankles.
 LEG = """
