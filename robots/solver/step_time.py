@@ -15,7 +15,7 @@ from robots.solver.footprints import FootPlan
 from spark.runs import true_runs
 
 _PUSH = 20.0  # [hip heights/s²] by which a foot may be accelerated in a step, or
-_HASTE = 1.5  # times what the source's takes at least, where that is more
+_HASTE = 2.0  # times what the source's takes at least, where that is more
 # Of a way d from rest to rest in a time T, the acceleration over d / T²: of a foot that is settled
 # at both ends (`robots.solver.foot_path`), and the least there is, half of the time each way.
 _SETTLED, _LEAST = 10.0, 4.0
