@@ -51,11 +51,11 @@ def onto_character(
         finish = refined if fitted else grounded
         moved = finish(canonical, moved, noise)
         touching = with_touches(canonical, moved) if fitted else moved
-        moved, touching = moved.picked(own), touching.picked(own)
         if keep_touches:
             moved = touching
-        else:
-            notes += lost_touches(moved, touching)
+        elif touching is not moved:
+            notes += lost_touches(moved.picked(own), touching.picked(own))
+        moved = moved.picked(own)
     travel = _travel(source, target, fitted=fitted)
     if way is not None:
         moved = replace(moved, hips=moved.hips - travel * way[own])

@@ -43,19 +43,14 @@ class Mjcf:
     __repr__ = brief
 
     @property
-    def free_joint(self) -> int:
-        """The joint that takes the root through the world."""
-        return int(self.model.body_jntadr[self.root])
-
-    @property
     def base_qpos(self) -> int:
         """Where `qpos` has the root's position [m], and then its quaternion (wxyz)."""
-        return int(self.model.jnt_qposadr[self.free_joint])
+        return int(self.model.jnt_qposadr[self.model.body_jntadr[self.root]])
 
     @property
     def base_dof(self) -> int:
         """Where `qvel` has the root's linear velocity, and then its angular one."""
-        return int(self.model.jnt_dofadr[self.free_joint])
+        return int(self.model.jnt_dofadr[self.model.body_jntadr[self.root]])
 
     def bodies(self) -> list[int]:
         """The root and all bodies below it, parents first."""

@@ -52,7 +52,7 @@ def turned(
     carrying = {joint for link in links for joint in tree.chain(link)}
     wanted = {int(link): world[:, j] for j, link in reversed(list(enumerate(robot.links)))}
     angles = np.zeros((count, len(tree)))
-    balls = np.tile([1.0, 0, 0, 0], (count, len(tree), 1)) if tree.balls.any() else None
+    balls = tree.rest_balls(count)
     bones = {
         int(robot.links[robot.rig.roles.require(role)]): bone
         for role, bone in robot.bones.items()

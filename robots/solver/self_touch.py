@@ -14,7 +14,7 @@ from robots.solver.touching import touches_of
 from robots.tree import Coordinates
 from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_rotate
-from spark.transfer.self_touch import HAND, SIDES, SelfTouch, led_along
+from spark.transfer.self_touch import HAND, SIDES, SelfTouch, led_to
 from spark.vectors import unit
 
 _REACH = 0.97  # arm lengths from the shoulder that a hand is led to
@@ -43,25 +43,15 @@ def on_itself(
         if palm is None:
             continue
         shoulder = _center(robot, poses, Role(f"{side}_upper_arm"))
-        total, wanted = np.zeros(len(q)), np.zeros((3, len(q)))
-        for k, (upper, lower) in enumerate(touch.parts):
-            begin, end = (_center(robot, poses, role) for role in (upper, lower))
-            offset = touch.flesh[k] * robot.rig.standing_height * unit(touch.away[:, k])
-            there, share = led_along(
-                touch.along[:, k],
-                touch.shares[:, k],
-                begin + offset.T,
-                end - begin,
-                shoulder,
-                palm.reach,
-                frame_time,
-            )
-            total += share
-            wanted += share * there
+        ends = [[_center(robot, poses, role) for role in part] for part in touch.parts]
+        thick = [flesh * robot.rig.standing_height for flesh in touch.flesh]
+        away = touch.away.swapaxes(0, 1)
+        begins = [a + (t * unit(d)).T for (a, _), t, d in zip(ends, thick, away, strict=True)]
+        lines = [b - a for a, b in ends]
+        there, share = led_to(touch, begins, lines, shoulder, palm.reach, frame_time)
         points = np.repeat(palm.place[:, None], len(q), axis=1)
-        shares = np.repeat(np.minimum(total, 1.0)[None], 3, axis=0)
-        wanted /= np.maximum(total, 1e-9)
-        holds.append(Holds(np.array([palm.link]), points[None], wanted[None], shares[None]))
+        shares = np.repeat(share[None], 3, axis=0)
+        holds.append(Holds(np.array([palm.link]), points[None], there[None], shares[None]))
     return joined(holds)
 
 

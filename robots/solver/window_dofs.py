@@ -25,7 +25,7 @@ class WindowDofs:
         self.numbers = np.array(dofs, dtype=int)
         links = np.repeat(np.arange(len(tree)), np.where(tree.balls, 3, 1))
         starts = model.jnt_dofadr[np.array(robot.mj_joints, dtype=int)[links]]
-        base = int(model.jnt_dofadr[robot.mjcf.free_joint]) + np.arange(BASE)
+        base = robot.mjcf.base_dof + np.arange(BASE)
         within = np.arange(BASE, tree.nv) - tree.dof_starts[links]
         self.mj = np.append(base, starts + within)[self.numbers]
 

@@ -22,7 +22,7 @@ from spark.transfer.self_touch import (
     Paths,
     beside,
     knuckles_of,
-    led_along,
+    led_to,
     self_touches,
     sure,
 )
@@ -83,22 +83,14 @@ def _on_body(
         middle = _middle(moved, own, touch.hand)
         chain = (*(own[j][0] for j in arm[:3]), middle[0])
         reach = float(np.linalg.norm(np.diff(chain, axis=0), axis=1).sum())
-        total, wanted = np.zeros(len(moved)), np.zeros((3, len(moved)))
-        for k, ends in enumerate(touch.parts):
-            begin, end = (own[rig.roles.require(role)].T for role in ends)
-            there, share = led_along(
-                touch.along[:, k],
-                touch.shares[:, k],
-                begin + scale * touch.away[:, k].T,
-                end - begin,
-                own[arm.upper_leg].T,
-                reach,
-                moved.frame_time,
-            )
-            total += share
-            wanted += share * there
-        way = wanted / np.maximum(total, 1e-9) - middle.T
-        moves.append((arm, (np.minimum(total, 1.0) * way).T))
+        ends = [[own[rig.roles.require(role)].T for role in part] for part in touch.parts]
+        begins = [
+            a + scale * away.T for (a, _), away in zip(ends, touch.away.swapaxes(0, 1), strict=True)
+        ]
+        lines = [b - a for a, b in ends]
+        shoulder = own[arm.upper_leg].T
+        there, share = led_to(touch, begins, lines, shoulder, reach, moved.frame_time)
+        moves.append((arm, (share * (there - middle.T)).T))
     return _reaching(moved, moves, [_stretch(moved, arm) for arm, _ in moves])
 
 

@@ -4,7 +4,7 @@ Limbs that point as the source's do lead hands of longer or shorter arms, and of
 what they should be on.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -101,22 +101,27 @@ def self_touches(source: CanonicalMotion, paths: Paths, target: Rig) -> tuple[Se
     return tuple(out)
 
 
-def led_along(
-    along: Float[np.ndarray, "T"],
-    share: Float[np.ndarray, "T"],
-    first: Float[np.ndarray, "3 T"],
-    line: Float[np.ndarray, "3 T"],
+def led_to(
+    touch: SelfTouch,
+    begins: Sequence[Float[np.ndarray, "3 T"]],
+    lines: Sequence[Float[np.ndarray, "3 T"]],
     shoulder: Float[np.ndarray, "3 T"],
     reach: float,
     frame_time: float,
 ) -> tuple[Float[np.ndarray, "3 T"], Float[np.ndarray, "T"]]:
-    """Where a hand is led that touches `along` a `line` from `first` on [m], and how surely: nearer
-    to the `shoulder` where the arm does not `reach` as far [m]; to what it can't reach at all it is
-    not led."""
-    nearer = _over_time(frame_time)(_within(reach, first - shoulder, line, along))
-    there = first + nearer * line
-    beyond = np.linalg.norm(there - shoulder, axis=0) / reach - 1.0
-    return there, share * np.exp(-((np.maximum(beyond, 0.0) / _STRETCH) ** 2))
+    """Where a hand is led that touches along `lines` from their `begins` on [m], one for each part,
+    and how surely: nearer to the `shoulder` where the arm does not `reach` as far [m]; to what it
+    can't reach at all it is not led."""
+    total, wanted = np.zeros(len(touch.shares)), np.zeros((3, len(touch.shares)))
+    steadily = _over_time(frame_time)
+    for k, (begin, line) in enumerate(zip(begins, lines, strict=True)):
+        along = steadily(_within(reach, begin - shoulder, line, touch.along[:, k]))
+        there = begin + along * line
+        beyond = np.linalg.norm(there - shoulder, axis=0) / reach - 1.0
+        share = touch.shares[:, k] * np.exp(-((np.maximum(beyond, 0.0) / _STRETCH) ** 2))
+        total += share
+        wanted += share * there
+    return wanted / np.maximum(total, 1e-9), np.minimum(total, 1.0)
 
 
 def knuckles_of(motion: CanonicalMotion, paths: Paths, hand: Role) -> Float[np.ndarray, "T 3"]:

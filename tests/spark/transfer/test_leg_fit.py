@@ -17,7 +17,7 @@ from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_ca
 from spark.transfer.leg_fit import fit_legs, travel_scale
 from tests.helpers.recordings import recording
 from tests.helpers.scores import score
-from tests.helpers.stick import joint, standing, stick_rig, without
+from tests.helpers.stick import joint, scaled, standing, stick_rig, without
 
 ANKLES = [joint(Role.LEFT_FOOT), joint(Role.RIGHT_FOOT)]
 # One motion on two characters of other proportions: short, wide, on high heels.
@@ -39,16 +39,6 @@ def stout() -> Rig:
         offsets[joint(Role(f"{side}_foot")), 2] = -0.5
         offsets[joint(Role(f"{side}_upper_arm")), 2] += 0.1
     return replace(rig, skeleton=replace(rig.skeleton, offsets=offsets))
-
-
-def big(rig: Rig, scale: float) -> Rig:
-    """The rig in another size."""
-    skeleton = replace(
-        rig.skeleton,
-        offsets=scale * rig.skeleton.offsets,
-        end_offsets=scale * rig.skeleton.end_offsets,
-    )
-    return replace(rig, skeleton=skeleton, hip_height=scale * rig.hip_height)
 
 
 def striding(rig: Rig) -> CanonicalMotion:
@@ -116,7 +106,7 @@ def test_the_tpose_gives_the_tpose() -> None:
 
 
 def test_a_body_in_another_size_does_the_same_in_its_size() -> None:
-    source, target = striding(stick_rig()), big(stick_rig(), 2.5)
+    source, target = striding(stick_rig()), scaled(stick_rig(), 2.5)
     moved = fitted(source, target)
     assert travel_scale(source.rig, target) == pytest.approx(2.5)
     assert travel_scale(target, source.rig) == pytest.approx(1 / 2.5)
