@@ -37,11 +37,11 @@ from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.foot_lock import lock_feet
 from spark.transfer.leg_fit import fit_legs
-from tests.helpers.stick import joint, stick_rig, without
+from tests.helpers.stick import joint, scaled, stick_rig, without
 from tests.helpers.training import TINY, fresh
 from tests.spark.training.test_same_motion import waving
 from tests.spark.transfer.test_hip_rise import built
-from tests.spark.transfer.test_leg_fit import big, stout, striding
+from tests.spark.transfer.test_leg_fit import stout, striding
 
 HIPS_UP, ANKLES_UP = HABITS.index("hips_up"), HABITS.index("ankles_up")
 TRAVEL = HABITS.index("travel")
@@ -58,7 +58,9 @@ def body(seed: int) -> Rig:
         offsets[joint(Role(f"{side}_lower_leg")), 2] *= leg
         offsets[joint(Role(f"{side}_upper_arm")), 2] += shoulder
         offsets[joint(Role(f"{side}_toe"))] *= foot
-    return big(replace(rig, skeleton=replace(rig.skeleton, offsets=offsets)), rng.uniform(0.5, 2))
+    return scaled(
+        replace(rig, skeleton=replace(rig.skeleton, offsets=offsets)), rng.uniform(0.5, 2)
+    )
 
 
 def habits(tokens: BodyTokens) -> Habits:
@@ -130,7 +132,7 @@ def test_held_feet_stand_as_high_as_recorded_answers_have_them() -> None:
         scales[[HIPS_UP, ANKLES_UP]] = 0.02 * (tokens.rig.hip_height > 1.0)
         return Habits(np.zeros((len(tokens.joints), 3)), scales)
 
-    source, target = striding(stick_rig()), big(stick_rig(), 1.5)
+    source, target = striding(stick_rig()), scaled(stick_rig(), 1.5)
     assert source.rig.hip_height < 1.0 < target.hip_height
     plain = transfer(source, target)
     low, high = (
