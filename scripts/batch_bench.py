@@ -128,7 +128,8 @@ def plot(lines: dict[str, list[tuple[float, float]]]) -> str:
     for (name, series), color, row in zip(
         lines.items(), ("#2563c9", "#c77700"), (46, 64), strict=True
     ):
-        slope, start = np.polyfit(*zip(*series, strict=True), 1)
+        frames, seconds = np.transpose(series)
+        slope, start = np.polyfit(frames, seconds, 1)
         last = max(x for x, _ in series)
         (x0, y0), (x1, y1) = (at(x, start + slope * x).split(",") for x in (0.0, last))
         parts.append(f'<line x1="{x0}" y1="{y0}" x2="{x1}" y2="{y1}" stroke="{color}"/>')

@@ -11,6 +11,7 @@ source's is not. Means over the pairs, then the worst targets.
 
 import sys
 from collections import defaultdict
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from jaxtyping import Float
 
 import spark_sim
 from scripts.rigs_bench import middle
+from spark.rig.rig import Rig
 from spark.rig.roles import LIMBS, Group
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
@@ -60,7 +62,7 @@ def compared(source: CanonicalMotion, moved: CanonicalMotion) -> Float[np.ndarra
 def main(seconds: str, *paths: str) -> None:
     split = paths.index("onto")
     sources = [spark_sim.load(path) for path in paths[:split]]
-    methods = {
+    methods: dict[str, Callable[[CanonicalMotion, Rig], CanonicalMotion]] = {
         "copy, feet held": lambda s, rig: lock_feet(s, transfer(s, rig)),
         "`retarget`": lambda s, rig: refined(s, fit_legs(s, transfer(s, rig))),
     }

@@ -15,6 +15,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -39,11 +40,14 @@ class Timed(Blocks):
         return super().__getitem__(block), time.process_time()
 
 
-class TimedPacker(Packer):
+class TimedPacker:
     """Blocks as the training hands them over."""
 
-    def __call__(self, item: tuple[Travels, float]) -> tuple[Packed, float]:  # type: ignore[override]
-        return super().__call__(item[0]), item[1]
+    def __init__(self) -> None:
+        self.pack = Packer()
+
+    def __call__(self, item: Any) -> tuple[Packed, float]:
+        return self.pack(item[0]), item[1]
 
 
 def main(preset: str, *data: str) -> None:

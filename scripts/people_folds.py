@@ -54,16 +54,15 @@ def main(dataset: str, runs: str, names: str) -> None:
     unseen = [replace(p, cell=f"uc+{p.cell[3:]}") for p in found]
     cases = [c for c in made_cases(unseen) if c.structure == "missing"]
 
-    def learned(case: Case, **as_retarget: bool) -> Positions:
-        return as_method(networks[left_out[case.performer]], **as_retarget)(case)
+    def learned(case: Case, *, as_retarget: bool = False) -> Positions:
+        network = networks[left_out[case.performer]]
+        return as_method(network, target_prior=as_retarget, feet_held=as_retarget)(case)
 
     # The rows of each body take up what those of all have made; the last does as `retarget` does.
     methods: dict[str, Method] = {
         "copy": cache(as_method(transfer)),
         "spark": cache(learned),
-        "spark, target prior, feet held": cache(
-            partial(learned, target_prior=True, feet_held=True)
-        ),
+        "spark, target prior, feet held": cache(partial(learned, as_retarget=True)),
     }
     rows = [evaluate(name, method, cases) for name, method in methods.items()]
     print(markdown(rows))

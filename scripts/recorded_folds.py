@@ -54,9 +54,9 @@ def main(folder: str, step: str = "1") -> None:
         methods |= _both("likeness", recorded_method(learned, learned.told))
         methods |= _both("ridge", recorded_method(learned, fit_ridge(known)))
         for a, b in pairs[:: int(step)]:
-            unseen = b.parent.name in fold
-            if unseen or not number:
-                cell = f"{'uc' if unseen else 'sc'}+{'um' if a.stem in held else 'sm'}"
+            held_out = b.parent.name in fold
+            if held_out or not number:
+                cell = f"{'uc' if held_out else 'sc'}+{'um' if a.stem in held else 'sm'}"
                 source, truth = clips[a][0], clips[b][1]
                 for name, method in methods.items():
                     score = compare(method(source, truth.rig), truth)

@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -131,7 +132,7 @@ def follow(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
 def mean_of(rows: list[RobotMetrics]) -> RobotMetrics:
     """The means of what the clips have, but the deepest and the fastest of all."""
     values = [asdict(row) for row in rows]
-    out = {}
+    out: dict[str, Any] = {}
     for field in values[0]:
         found = [row[field] for row in values if row[field] is not None]
         worst = field in ("deepest_m", "fastest_rad_s")

@@ -1,6 +1,6 @@
 """What each weight of the robots' solver does: a table of bars, with the weight 30 % down and up.
 
-    python scripts/weights_table.py --data DIR [--robot unitree_g1] [--seconds 8]
+    python -m scripts.weights_table --data DIR [--robot unitree_g1] [--seconds 8]
 
 Constants of `robots.solver.weights` are scaled one at a time, everywhere in the solver, and the
 same clips are solved again. A figure is the mean over the clips.
@@ -12,13 +12,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from robot_bars import cells, clip, mean_of
-
 from robots.metrics import RobotMetrics, measure
 from robots.model.known import known
 from robots.model.morphology import Morphology
 from robots.solver import weights
 from robots.solver.solve import retarget
+from scripts.robot_bars import cells, clip, mean_of
 from spark.transfer.canonical import CanonicalMotion, from_canonical
 
 CLIPS = ("cmu_asf/cmu_02_08.bvh", "cmu_dance/cmu_05_02.bvh", "animateddrawings/jumping_jacks.bvh")

@@ -42,14 +42,14 @@ def run_page(page: Path, folder: Path) -> None:
             if file:
                 (folder / file).write_text(done.stdout)
     if python := "\n".join(blocks(page, "python")):
-        done = subprocess.run(
+        ran = subprocess.run(
             [sys.executable, "-c", python],
             cwd=folder,
             env=os.environ | {"PYTHONPATH": str(CHECKOUT)},
             capture_output=True,
             text=True,
         )
-        assert done.returncode == 0, done.stderr
+        assert ran.returncode == 0, ran.stderr
 
 
 def samples(folder: Path, **names: str) -> None:

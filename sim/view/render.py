@@ -2,7 +2,7 @@
 
 import os
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from itertools import cycle
@@ -24,7 +24,7 @@ _OUTLINE = (255, 255, 255)
 
 def frames(
     scene: Scene, indices: Iterable[int], *, width: int = 854, height: int = 480
-) -> Iterator[UInt8[np.ndarray, "H W 3"]]:
+) -> Generator[UInt8[np.ndarray, "H W 3"], None, None]:
     """The scene at the picked frames, seen by a camera that follows the figures. `_AT_ONCE` are
     drawn at once, where that is possible.
 

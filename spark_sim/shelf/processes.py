@@ -3,7 +3,7 @@
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import forkserver, get_context, parent_process
@@ -55,7 +55,7 @@ def in_processes(
     jobs: Iterable[Job],
     workers: int,
     slow: Callable[[Job, float], None] | None = None,
-) -> Iterator[tuple[Job, Result | Died]]:
+) -> Generator[tuple[Job, Result | Died], None, None]:
     """Each job with its result, in the order in which they are done. `slow` is told of a job that
     has taken a minute, two, four, ..., and how many seconds it is.
 

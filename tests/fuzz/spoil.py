@@ -33,7 +33,7 @@ def spoilt(
     return damaged(data, changes)
 
 
-changes = st.one_of(st.just([]), edits)
+changes: st.SearchStrategy[list[tuple[str, int, int]]] = st.just([]) | edits
 """None where numbers alone are spoilt: the file is still one of its format."""
 
 

@@ -226,8 +226,8 @@ def as_binary(text: str, version: int = 7400) -> bytes:
                 return b"D" + struct.pack("<d", given)
             case bytes():
                 return b"R" + struct.pack("<I", len(given)) + given
-        kind, _, own = str(given).rpartition("::")
-        word = (f"{own}\0\1{kind}" if kind else own).encode()
+        space, _, own = str(given).rpartition("::")
+        word = (f"{own}\0\1{space}" if space else own).encode()
         return b"S" + struct.pack("<I", len(word)) + word
 
     head = struct.Struct("<QQQB" if version >= 7500 else "<IIIB")

@@ -125,6 +125,7 @@ def decode(model: Spark, latent: Tensor, body: Body, start: Start | None) -> Pos
         if not corrected_joints:
             return start.pose
         seen = ROTATION_GAIN * (start.rotations[0][:, corrected_joints] - torch.tensor(NO_ROTATION))
+        assert decoder.start is not None
         y = y[:, corrected_joints] + decoder.start(seen)
     for block in decoder.blocks:
         for t in range(len(y)):
@@ -137,6 +138,7 @@ def decode(model: Spark, latent: Tensor, body: Body, start: Start | None) -> Pos
     y = decoder.norm(y)
     sixd = decoder.rotation(y)
     if start is None:
+        assert decoder.root is not None
         return PoseTensors(sixd[None], decoder.root(y[:, 0])[None])
     little = matrix_from_sixd(
         model.config.shrink * RESIDUAL_SCALE * sixd + torch.tensor(NO_ROTATION)

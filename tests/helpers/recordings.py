@@ -1,13 +1,14 @@
 """The recordings beside the checkout."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 
 
-def recordings(*patterns: str) -> list[object]:
+def recordings(*patterns: str) -> list[Any]:
     """Parameters for `pytest.mark.parametrize`: the files of `DATA` that match, one test each.
 
     Without the folder there is one parameter, skipped, that names what is missing.

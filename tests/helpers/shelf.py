@@ -9,15 +9,14 @@ from pathlib import Path
 from spark_sim.shelf import batch
 from spark_sim.shelf.made_of import file_facts
 from spark_sim.shelf.plan import Job, Options, plan
+from spark_sim.shelf.processes import Died
 from spark_sim.shelf.tally import Tally
 from spark_sim.shelf.work import Done, Piece
 
 BLOCKS = 8  # in which a result is written
 
 
-def serially(
-    work: Callable[[Job], Done], jobs: Iterable[Job]
-) -> Iterator[tuple[Job, Done | batch.Died]]:
+def serially(work: Callable[[Job], Done], jobs: Iterable[Job]) -> Iterator[tuple[Job, Done | Died]]:
     for job in jobs:
         yield job, work(job)
 
@@ -60,10 +59,10 @@ def made(job: Job, folder: Path) -> Done:
 
 def run(folder: Path, out: Path, **settings: object) -> Tally:
     """A batch of all files in a folder."""
-    batch.work = made
+    batch.work = made  # type: ignore[attr-defined]
     jobs = plan([str(folder)], ["robot"], out, Options()).jobs
     with batch.locked(out):
-        made_now = batch.Batch(out, **settings)  # type: ignore[arg-type]
+        made_now = batch.Batch(out, **settings)
         list(made_now.run(jobs, serially))
     return made_now.tally
 

@@ -1,5 +1,7 @@
 """Jacobians beside central differences, for hinges and balls, with and without the base's dofs."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from jaxtyping import Float
@@ -49,7 +51,9 @@ def q(tree: Tree) -> Coordinates:
     )
 
 
-def differences(function, tree: Tree, q: Coordinates) -> Float[np.ndarray, "D *n"]:
+def differences(
+    function: Callable[[LinkPoses], np.ndarray], tree: Tree, q: Coordinates
+) -> Float[np.ndarray, "D *n"]:
     """The derivatives of a function of the poses by all dofs, by central differences."""
     out = []
     for dof in range(tree.nv):
@@ -103,7 +107,7 @@ def test_pushes_say_how_far_points_yield(tree: Tree, q: Coordinates) -> None:
         arm = poses.point(LINK, rest) - poses.positions[LINK]
         wrenches[:, :, k] = np.concatenate([np.cross(arm, push, axis=0), push]).T
 
-        def along(poses: LinkPoses, rest=rest, push=push) -> np.ndarray:
+        def along(poses: LinkPoses, rest: np.ndarray = rest, push: np.ndarray = push) -> np.ndarray:
             return (poses.point(LINK, rest) * push).sum(0)
 
         numeric[:, :, k] = differences(along, tree, q).T
@@ -120,7 +124,9 @@ def test_pushes_say_how_far_points_yield(tree: Tree, q: Coordinates) -> None:
 
 
 @pytest.mark.parametrize("weight", [1.0, 3.0, np.array([1.0, 2.0, 0.5])])
-def test_directions_turn_as_their_jacobian_says(tree: Tree, q: Coordinates, weight) -> None:
+def test_directions_turn_as_their_jacobian_says(
+    tree: Tree, q: Coordinates, weight: float | np.ndarray
+) -> None:
     target = targets((3, FRAMES))
 
     def residual(poses: LinkPoses) -> np.ndarray:
@@ -135,7 +141,7 @@ def test_directions_turn_as_their_jacobian_says(tree: Tree, q: Coordinates, weig
 
 @pytest.mark.parametrize("weight", [1.0, np.array([1.0, 2.0, 0.5])])
 def test_rotations_cost_one_less_the_cosine_and_have_its_gradient(
-    tree: Tree, q: Coordinates, weight
+    tree: Tree, q: Coordinates, weight: float | np.ndarray
 ) -> None:
     """Their Jacobian is exact at the target only; the gradient of the cost is everywhere."""
     quats = quat_normalize(targets((FRAMES, 4)))

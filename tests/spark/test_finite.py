@@ -46,8 +46,8 @@ def test_no_writer_lets_one_out(tmp_path: Path) -> None:
     coordinates = clip.on_robot.coordinates  # the robot's own T-pose, which others read
     pos = coordinates.pos.copy()
     pos[0, 1] = np.nan
-    broken = replace(clip.on_robot, coordinates=replace(coordinates, pos=pos))
+    motion = replace(clip.on_robot, coordinates=replace(coordinates, pos=pos))
     for name in ("o.npz", "o.csv", "o.pkl"):
         with pytest.raises(OutputError, match="not written: qpos 1 of frame 0 is nan"):
-            RobotClip(broken, clip.name).save(tmp_path / name)
+            RobotClip(motion, clip.name).save(tmp_path / name)
     assert not list(tmp_path.glob("o.*"))

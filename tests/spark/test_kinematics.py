@@ -42,7 +42,7 @@ def test_forward_agrees_with_a_naive_loop(moving: bool) -> None:
         places: list[np.ndarray] = []
         for j in range(12):
             local = Rotation.from_quat(np.roll(motion.rotations[t, j], -1))
-            offset = skeleton.offsets[j] if not moving else motion.translations[t, j]  # type: ignore[index]
+            offset = skeleton.offsets[j] if not moving else motion.translations[t, j]
             if j == 0:
                 turns.append(local)
                 places.append(motion.root_pos[t])

@@ -59,8 +59,8 @@ def test_every_kind_of_output_in_poor_surroundings(tmp_path: Path, home: str | N
     (tmp_path / "takes").mkdir()
     shutil.copy(tmp_path / source, tmp_path / "takes")
     shutil.copy(tmp_path / target, tmp_path / "takes")
-    gone = ("DISPLAY", "WAYLAND_DISPLAY", "HOME", "MUJOCO_GL", "PYOPENGL_PLATFORM", "PYTHONUTF8")
-    gone = (*gone, "XDG_CACHE_HOME")
+    gone = ["DISPLAY", "WAYLAND_DISPLAY", "HOME", "MUJOCO_GL", "PYOPENGL_PLATFORM", "PYTHONUTF8"]
+    gone += ["XDG_CACHE_HOME"]
     kept = {key: value for key, value in os.environ.items() if key not in gone}
     poor = {"LC_ALL": "C"} if home is None else {"LC_ALL": "C", "HOME": home}
     lines = [

@@ -39,7 +39,7 @@ def robot(folder: Path, name: str, suffix: str) -> Path:
 def test_names_are_shown_and_do_nothing(kind: Any, tmp_path: Path) -> None:
     """The replay and the report have the elements that they have with plain names; their scripts
     run, the policy has nothing to stop, and the title is the file's name."""
-    elements = {}
+    elements: dict[str, Any] = {}
     for name, suffix in (("plain", ""), (FILE, HOSTILE)):
         folder = tmp_path / str(len(elements))
         folder.mkdir()

@@ -34,7 +34,7 @@ def test_a_motion_says_which_part_of_which_file_it_is(
 ) -> None:
     sha256 = hashlib.sha256(walk.read_bytes()).hexdigest()
     out = tmp_path / f"walk{FORMATS[format]}"
-    on_robot(spark_sim.load(walk).part(0.5, 1.0)).save(out, format=format)  # type: ignore[arg-type]
+    on_robot(spark_sim.load(walk).part(0.5, 1.0)).save(out, format=format)
     found = made_from(out)
     assert found is not None
     assert (found.name, found.sha256) == (walk.name, sha256)

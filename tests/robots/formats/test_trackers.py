@@ -3,6 +3,7 @@
 import json
 import re
 from pathlib import Path
+from random import Random
 
 import mujoco
 import numpy as np
@@ -375,14 +376,14 @@ def test_spoilt_files_end_in_an_error_that_says_so(
 
     @settings(max_examples=30, deadline=None)
     @given(st.sampled_from(files), st.randoms(use_true_random=False))
-    def spoil(file: Path, random: object) -> None:
+    def spoil(file: Path, random: Random) -> None:
         data = bytearray(whole[file])
-        at = random.randrange(len(data))  # type: ignore[attr-defined]
-        match random.randrange(3):  # type: ignore[attr-defined]
+        at = random.randrange(len(data))
+        match random.randrange(3):
             case 0:
-                data[at] = random.randrange(256)  # type: ignore[attr-defined]
+                data[at] = random.randrange(256)
             case 1:
-                del data[at : at + random.randrange(1, 400)]  # type: ignore[attr-defined]
+                del data[at : at + random.randrange(1, 400)]
             case _:
                 data[at:at] = data[at // 2 : at // 2 + 60]
         file.write_bytes(bytes(data))

@@ -1,5 +1,6 @@
 """Joints that follow others: where their leaders take them, and nothing else is given up for it."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -9,6 +10,7 @@ import pytest
 from robots.model.followers import Follower, led_by
 from robots.model.known import known
 from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
 from robots.solver.solve import copy, retarget
 from scripts.robot_bars import follow
 from sim.report.clip_poses import pose_clip
@@ -16,6 +18,8 @@ from sim.trajectory import Subject
 from spark.demo.sample import sample_motion, sample_rig
 from spark.transfer.canonical import CanonicalMotion, to_canonical
 from tests.helpers.ember import changed_ember
+
+Way = Callable[[CanonicalMotion, Morphology], RobotMotion]
 
 # Of one motor each: the yaw of both hips, as a NAO's, and two hinges of the waist.
 PAIRS = {"right_hip_yaw": ("left_hip_yaw", -1.0), "waist_roll": ("waist_yaw", 0.5)}
@@ -37,7 +41,9 @@ def walk() -> CanonicalMotion:
 
 
 @pytest.mark.parametrize("way", [copy, retarget, follow], ids=["copy", "whole", "stream"])
-def test_followers_are_where_their_leaders_take_them(way, walk, tmp_path: Path) -> None:
+def test_followers_are_where_their_leaders_take_them(
+    way: Way, walk: CanonicalMotion, tmp_path: Path
+) -> None:
     robot = coupled(tmp_path, PAIRS)
     result = way(walk, robot)
     angles = dict(zip(robot.joint_names, result.coordinates.angles.T, strict=True))
@@ -47,7 +53,9 @@ def test_followers_are_where_their_leaders_take_them(way, walk, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("way", [retarget, follow], ids=["whole", "stream"])
-def test_what_follows_is_solved_for_and_not_overwritten(way, walk, tmp_path: Path) -> None:
+def test_what_follows_is_solved_for_and_not_overwritten(
+    way: Way, walk: CanonicalMotion, tmp_path: Path
+) -> None:
     """A hinge that is set afterwards takes its foot off the ground, or into it."""
     robot = coupled(tmp_path, {"right_hip_pitch": ("left_hip_pitch", -0.8)})
     result = way(walk, robot)

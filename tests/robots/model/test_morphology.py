@@ -546,13 +546,13 @@ def test_a_girdle_before_a_shoulder_is_no_part_of_it(tmp_path: Path) -> None:
     root.remove(keys)
     robot = understand_robot(written(tmp_path, ElementTree.tostring(root, encoding="unicode")))
     for side in ("left", "right"):
-        link, above = (
+        link, girdle_link = (
             int(robot.links[robot.rig.roles.require(Role(f"{side}_{part}"))])
             for part in ("upper_arm", "clavicle")
         )
         ball = [robot.joint_names[j] for j in robot.tree.chain(link)[-3:]]
         assert ball == [f"{side}_shoulder_{way}" for way in ("pitch", "roll", "yaw")]
-        assert robot.joint_names[above] == f"{side}_girdle"
+        assert robot.joint_names[girdle_link] == f"{side}_girdle"
 
 
 def test_a_sole_that_is_welded_to_an_ankle_is_the_foot_s(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """The floor under all that a robot has, whatever its shapes are and whether they collide."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -8,6 +9,7 @@ import pytest
 
 from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
+from robots.model.motion import RobotMotion
 from robots.registry import find
 from robots.solver.block import blocks_of, whole_of
 from robots.solver.floor import depth_in_floor, sole_paths, solids_over_floor
@@ -24,6 +26,8 @@ from spark.rotation import quat_conj, quat_from_rotvec, quat_mul
 from spark.transfer.canonical import CanonicalMotion, to_canonical
 from spark_sim.loading import load_robot
 from tests.helpers.ember import changed_ember
+
+Way = Callable[[CanonicalMotion, Morphology], RobotMotion]
 
 FEET = {  # in place of Ember's boxes
     "a box": '<geom class="foot"',
@@ -105,7 +109,7 @@ def test_no_point_of_a_foot_that_lies_is_lower_than_is_known(tmp_path: Path, foo
 
 @pytest.mark.parametrize("foot", FEET)
 @pytest.mark.parametrize("follows", [retarget, follow], ids=["whole", "stream"])
-def test_who_stands_on_tiptoe_does_not_sink(tmp_path: Path, foot: str, follows) -> None:
+def test_who_stands_on_tiptoe_does_not_sink(tmp_path: Path, foot: str, follows: Way) -> None:
     result = follows(tiptoeing(), ember(tmp_path, foot))
     assert lowest(result.robot, result.qpos).min() > -0.007
 
@@ -123,7 +127,7 @@ def on_the_side(height: float) -> CanonicalMotion:
 
 
 @pytest.mark.parametrize("follows", [retarget, follow], ids=["whole", "stream"])
-def test_a_trunk_lifts_the_shoulder_that_no_arm_can_lift(follows) -> None:
+def test_a_trunk_lifts_the_shoulder_that_no_arm_can_lift(follows: Way) -> None:
     result = follows(on_the_side(0.12), EMBER)
     body = result.body
     subject = Subject(result.motion, result.robot.rig, body)

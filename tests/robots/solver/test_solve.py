@@ -411,7 +411,7 @@ def test_what_passes_between_two_looks_is_seen(walked: RobotMotion, ember: Morph
             qpos, collisions_of(ember).candidates(frames, arms, 1)
         )
         np.testing.assert_array_equal(again, every)
-        passed += (every > 0.01).any()
+        passed += int((every > 0.01).any())
         np.testing.assert_allclose(ends[every > 0.01], every[every > 0.01])
     assert passed
 

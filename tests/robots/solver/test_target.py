@@ -335,8 +335,8 @@ def test_formats_are_for_robots(walk_path: Path, tmp_path: Path) -> None:
     assert code == 2
     assert "--format is for robots" in stderr[-1]
     out = tmp_path / "out.npz"
-    command = ("retarget", walk_path, "--to", "robot", "--format", "gmr", "-o", out)
-    code, _, stderr = on_command_line(*command)
+    to_robot = ("retarget", walk_path, "--to", "robot", "--format", "gmr", "-o", out)
+    code, _, stderr = on_command_line(*to_robot)
     assert code == 2
     assert "the format 'gmr' is written as .pkl" in stderr[-1]
 

@@ -1,6 +1,8 @@
 """Streams onto robots: what is said of a frame, and what must never depend on later ones."""
 
 import importlib.util
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,6 +28,7 @@ from robots.solver.window_terms import Terms
 from robots.stream.frame_targets import LATENCY, Frame, FrameReader, ground_of
 from robots.stream.resting import held_points
 from robots.stream.stream import Stream
+from robots.tree import Coordinates
 from scripts.robot_bars import follow
 from spark.demo.sample import sample_motion, sample_rig
 from spark.errors import ConventionError, FrameError
@@ -350,7 +353,7 @@ def posed(motion: Motion, rig: Rig) -> tuple[np.ndarray, np.ndarray]:
     return positions, quat_mul(world, quat_conj(rig.tpose))
 
 
-def project_of(motion: Motion):
+def project_of(motion: Motion) -> Coordinates:
     targets = targets_of(to_canonical(motion, RIG), EMBER)
     return project(EMBER, targets.world, targets.hips)
 
@@ -375,7 +378,11 @@ def test_the_world_has_no_preferred_heading(walked: np.ndarray) -> None:
         (lambda r, q: (r, q * 0), "has length 0"),
     ],
 )
-def test_broken_frames_are_refused_and_leave_no_trace(broken, said_of_it, walked) -> None:
+def test_broken_frames_are_refused_and_leave_no_trace(
+    broken: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]],
+    said_of_it: str,
+    walked: np.ndarray,
+) -> None:
     live = stream(WALK)
     out = []
     for t, frame in enumerate(frames_of(WALK)[:12]):
@@ -386,7 +393,7 @@ def test_broken_frames_are_refused_and_leave_no_trace(broken, said_of_it, walked
     np.testing.assert_array_equal(out, walked[:12])
 
 
-def test_the_public_name_takes_what_retarget_takes(tmp_path, walked) -> None:
+def test_the_public_name_takes_what_retarget_takes(tmp_path: Path, walked: np.ndarray) -> None:
     file = next(p for p in spark_sim.sample(tmp_path) if p.name == "walker_walk.bvh")
     clip = spark_sim.load(file)
     live = spark_sim.Retargeter(file, "robot")

@@ -126,7 +126,7 @@ def test_a_static_root_is_no_body() -> None:
 
 @pytest.mark.parametrize("joints", JOINT_TYPES)
 def test_keyframes_are_within_ranges_and_held_by_their_controls(joints: str) -> None:
-    model = scene_of(sample_rig("walker"), joints)  # type: ignore[arg-type]
+    model = scene_of(sample_rig("walker"), joints)
     low, high = model.actuator_ctrlrange.T
     for key in ("tpose", "home"):
         data = at_key(model, key)
@@ -143,7 +143,7 @@ def test_keyframes_are_within_ranges_and_held_by_their_controls(joints: str) -> 
 
 @pytest.mark.parametrize("joints", JOINT_TYPES)
 def test_everything_that_can_be_named_has_a_name_and_every_joint_a_servo(joints: str) -> None:
-    model = scene_of(sample_rig("walker"), joints)  # type: ignore[arg-type]
+    model = scene_of(sample_rig("walker"), joints)
     named = [
         (model.nbody, model.body),
         (model.njnt, model.joint),
@@ -175,8 +175,8 @@ def test_masses_and_inertias_are_those_of_bodies(path: Path) -> None:
 @pytest.mark.parametrize("joints", JOINT_TYPES)
 def test_the_file_is_written_to_be_read(joints: str) -> None:
     """What joints and servos are like is said once, in their class."""
-    root = ElementTree.fromstring(to_xml(build_body(stick_rig(), joints=joints)))  # type: ignore[arg-type]
-    classes = {default.get("class") for default in root.find("default").iter("default")}  # type: ignore[union-attr]
+    root = ElementTree.fromstring(to_xml(build_body(stick_rig(), joints=joints)))
+    classes = {default.get("class") for default in root.find("default").iter("default")}
     assert {"body", "visual", "collision", "foot", "hip", "knee", "shoulder"} <= classes
     world = root.find("worldbody")
     actuators = root.find("actuator")

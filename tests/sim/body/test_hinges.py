@@ -56,7 +56,7 @@ def test_an_angle_beyond_its_range_stops_there() -> None:
 @pytest.mark.parametrize("path", recordings(*STANDING))
 def test_keyframes_of_hinges_are_those_of_balls(path: Path, key: str) -> None:
     rig = rig_of(path)
-    balls, hinges = (scene_of(rig, joints) for joints in ("ball", "hinge"))  # type: ignore[arg-type]
+    balls, hinges = (scene_of(rig, joints) for joints in ("ball", "hinge"))
     expected, data = at_key(balls, key), at_key(hinges, key)
     for j in rig.skeleton.subtree(rig.root_joint):
         name = rig.skeleton.names[j]

@@ -133,7 +133,7 @@ def _without(rig: Rig, gone: int) -> Rig:
 def test_a_body_of_hulls_is_written_and_stands(joints: str, tmp_path: Path) -> None:
     rig = stick_rig()
     mesh = write_glb(tmp_path / "mesh.glb", rig, scale=100.0)
-    spec = build_body(rig, joints=joints, mesh=mesh)  # type: ignore[arg-type]
+    spec = build_body(rig, joints=joints, mesh=mesh)
     assert any("hulls" in note for note in notes_of(spec))
     body, scene = write_mjcf(spec, tmp_path / "b.xml")
     assert all(path.exists() for path in paths_of(spec, body))

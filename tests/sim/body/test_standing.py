@@ -37,7 +37,7 @@ def on_floor(model: mujoco.MjModel, data: mujoco.MjData) -> set[int]:
 @pytest.mark.parametrize("joints", JOINT_TYPES)
 @pytest.mark.parametrize("path", recordings(*STANDING))
 def test_the_tpose_stands(path: Path, joints: str) -> None:
-    model = scene_of(rig_of(path), joints)  # type: ignore[arg-type]
+    model = scene_of(rig_of(path), joints)
     data = at_key(model, "tpose")
     start = data.qpos.copy()
     for k, _ in enumerate(run(model, data, 1.0)):
@@ -67,7 +67,7 @@ def one_leg_lifted(rig: Rig) -> np.ndarray:
 @pytest.mark.parametrize("path", recordings(*STANDING))
 def test_an_unbalanced_pose_is_held_as_it_tips(path: Path, joints: str) -> None:
     rig = rig_of(path)
-    model = scene_of(rig, joints)  # type: ignore[arg-type]
+    model = scene_of(rig, joints)
     target = qpos_of_pose(model, rig, one_leg_lifted(rig))
     data = mujoco.MjData(model)
     data.qpos[:], data.ctrl[:] = target, ctrl_of_qpos(model, target)
@@ -87,7 +87,7 @@ def test_an_unbalanced_pose_is_held_as_it_tips(path: Path, joints: str) -> None:
 @pytest.mark.parametrize("joints", JOINT_TYPES)
 @pytest.mark.parametrize("path", recordings(*STANDING))
 def test_random_control_breaks_nothing(path: Path, joints: str) -> None:
-    model = scene_of(rig_of(path), joints)  # type: ignore[arg-type]
+    model = scene_of(rig_of(path), joints)
     data = at_key(model, "home")
     rng = np.random.default_rng(0)
     low, high = model.actuator_ctrlrange.T
@@ -100,7 +100,7 @@ def test_random_control_breaks_nothing(path: Path, joints: str) -> None:
 @pytest.mark.parametrize("joints", JOINT_TYPES)
 @pytest.mark.parametrize("path", recordings(*STANDING))
 def test_the_doctor_finds_nothing(path: Path, joints: str) -> None:
-    model = scene_of(rig_of(path), joints)  # type: ignore[arg-type]
+    model = scene_of(rig_of(path), joints)
     found = mjcf_doctor.diagnose(model, duration=0.2).findings
     stock = "contact_default_soft"  # MuJoCo's own contact softness, which is meant for feet
     assert [f"{x.code} {x.subject}: {x.detail}" for x in found if x.code != stock] == []
@@ -145,7 +145,7 @@ def test_sites_are_where_they_are_named() -> None:
 @pytest.mark.parametrize("joints", JOINT_TYPES)
 def test_a_control_moves_both_sides_alike(joints: str) -> None:
     """Controls of right limbs are mirrored: the same on both sides leaves the body symmetric."""
-    model = copy(scene_of(stick_rig(), joints))  # type: ignore[arg-type]
+    model = copy(scene_of(stick_rig(), joints))
     model.opt.gravity[:] = 0
     data = at_key(model, "tpose")
     data.qpos[2] += 1.0

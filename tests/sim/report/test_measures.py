@@ -223,7 +223,7 @@ def test_limits_name_the_joint_the_movement_and_the_excess(
     role: Role, axis: str, degrees: float, movement: str | None, excess: float
 ) -> None:
     rig = stick_rig()
-    turn = quat_about(axis, np.radians(degrees))  # type: ignore[arg-type]
+    turn = quat_about(axis, np.radians(degrees))
     since_tpose = standing(rig, 1).rotations.copy()
     below = list(rig.skeleton.subtree(joint(role)))
     since_tpose[:, below] = turn

@@ -89,7 +89,7 @@ def test_pictures_drawn_at_once_come_in_order(scene: Scene) -> None:
             np.testing.assert_array_equal(picture, painter.frame(frame, seen))
     some = frames(scene, iter(range(100)), width=320, height=240)
     np.testing.assert_array_equal(next(iter(some)), together[0])
-    some.close()  # type: ignore[attr-defined]
+    some.close()
     assert threading.active_count() <= threads
 
 
@@ -114,7 +114,7 @@ def test_page_is_one_file_and_small(tmp_path: Path) -> None:
     assert len(text) < 2_000_000
     assert not re.search(r"(src|href)\s*=\s*[\"']?(https?:)?//", text)
     assert "a &amp; b &lt;/script&gt;" in text
-    data = json.loads(re.search(r'type="application/json">(.*?)</script>', text)[1])  # type: ignore[index]
+    data = json.loads(re.search(r'type="application/json">(.*?)</script>', text)[1])
     assert [f["label"] for f in data["figures"]] == ["walker", "dancer"]
 
 
@@ -335,11 +335,11 @@ def test_a_motion_is_not_overwritten_by_what_shows_it(option: str, tmp_path: Pat
     (walk, *_) = spark_sim.sample(tmp_path)
     before = walk.read_bytes()
     with pytest.raises(OutputError, match=r"is written as \.(html|mp4|png)"):
-        spark_sim.play(walk, force=True, **{option: walk})  # type: ignore[arg-type]
+        spark_sim.play(walk, force=True, **{option: walk})
     with pytest.raises(OutputError, match=r"a page is written as \.html"):
         spark_sim.report(walk, html=walk, force=True)
     with pytest.raises(OutputError, match=r"a MuJoCo model is written as \.xml"):
-        spark_sim.load(walk).save_mjcf(walk, force=True)  # type: ignore[union-attr]
+        spark_sim.load(walk).save_mjcf(walk, force=True)
     assert walk.read_bytes() == before
 
 

@@ -142,7 +142,8 @@ def as_acclaim(motion: Motion, folder: Path, unit: float) -> Path:
 
     names = skeleton.names
     rows = [f"root {' '.join(map(str, to_file(p)))} 0 0 0" for p in motion.root_pos]
-    bones, links, values = [], [], []
+    bones: list[tuple[str, np.ndarray, np.ndarray | None]] = []
+    links, values = [], []
     for j in range(len(skeleton)):
         parent = int(skeleton.parents[j])
         children = skeleton.children[j]
@@ -167,15 +168,15 @@ def as_acclaim(motion: Motion, folder: Path, unit: float) -> Path:
         values.append((frame.inv() * turn * frame).as_euler("xyz", degrees=True))
     lines = [":units", "length 0.45", "angle deg", ":root", "order TX TY TZ RX RY RZ", "axis XYZ"]
     lines += ["position 0 0 0", "orientation 0 0 0", ":bonedata"]
-    for name, tip, axis in bones:
+    for name, tip, euler in bones:
         length = float(np.linalg.norm(tip))
         way = tip / length if length else tip
         lines += ["begin", f"name {name}", f"direction {way[0]} {way[1]} {way[2]}"]
         lines += [f"length {length}"]
-        if axis is None:
+        if euler is None:
             lines += ["axis 0 0 0 XYZ"]
         else:
-            lines += [f"axis {axis[0]} {axis[1]} {axis[2]} XYZ", "dof rx ry rz"]
+            lines += [f"axis {euler[0]} {euler[1]} {euler[2]} XYZ", "dof rx ry rz"]
         lines += ["end"]
     lines += [":hierarchy", "begin", *(f"{a} {b}" for a, b in links), "end"]
     (folder / "07.asf").write_text("\n".join(lines))

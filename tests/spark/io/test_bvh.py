@@ -241,7 +241,7 @@ def test_a_given_frame_time_replaces_a_wrong_one(tmp_path: Path, wrong: str) -> 
 
 # What is refused, where, and with which words
 
-MALFORMED = {
+MALFORMED: dict[str, tuple[str | bytes, int | None, str]] = {
     "empty": ("", None, "is empty"),
     "blank": (" \r\n\t", None, "is empty"),
     "binary": (b"\x00\xff\x01 \x02" * 9, 1, "starts with HIERARCHY"),

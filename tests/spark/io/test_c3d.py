@@ -57,7 +57,7 @@ def centres(clip: Clip, path: Path, **how: object) -> Path:
     places = joints_of(clip)
     labels = [f"subject:{NAMES[name]}" for name in places]
     points = 1000 * np.stack(list(places.values()), axis=1)
-    return write_c3d(path, labels, points, rate=clip.fps, **how)  # type: ignore[arg-type]
+    return write_c3d(path, labels, points, rate=clip.fps, **how)
 
 
 @pytest.mark.parametrize("processor", ["intel", "dec", "sgi"])

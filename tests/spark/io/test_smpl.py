@@ -261,7 +261,7 @@ def test_offsets_of_a_body_model(waving: Motion, tmp_path: Path) -> None:
     rest = model["J_regressor"] @ shaped
     parents = joints_of(55)[1]
     for t in (0, 40, len(poses) - 1):
-        world = []
+        world: list[np.ndarray] = []
         for j, parent in enumerate(parents):
             local = np.eye(4)
             local[:3, :3] = Rotation.from_rotvec(rotvecs[t, j]).as_matrix()

@@ -27,7 +27,7 @@ from spark.training.tensors import PoseTensors, Start
 
 def small(config: Config, **changes: object) -> Config:
     values = {**vars(config), "width": 32, "heads": 2, "encoder_blocks": 2, "decoder_blocks": 2}
-    return Config(**{**values, "noise": False, **changes})  # type: ignore[arg-type]
+    return Config(**{**values, "noise": False, **changes})
 
 
 def awake(model: torch.nn.Module) -> None:

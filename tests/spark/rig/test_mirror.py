@@ -23,8 +23,8 @@ def test_joints_are_where_a_mirror_shows_their_counterparts(name: str) -> None:
     motion, rig = walk(name)
     seen, body = mirrored(motion, rig)
     ours, theirs = forward(motion)[0], forward(seen)[0]
-    for role in {role for role in rig.roles.roles if role is not None}:
-        here, there = rig.roles.joints(role), body.roles.joints(role.mirrored)
+    for one in {role for role in rig.roles.roles if role is not None}:
+        here, there = rig.roles.joints(one), body.roles.joints(one.mirrored)
         np.testing.assert_allclose(theirs[:, there], ours[:, here] * [1, -1, 1], atol=1e-12)
     names = {n: k for k, n in enumerate(body.skeleton.names)}
     for joint, name_here in enumerate(rig.skeleton.names):

@@ -271,7 +271,7 @@ def test_clips_of_a_rig_share_its_tpose(family: str) -> None:
     if not DATA.exists():
         pytest.skip(f"{family}: no recordings beside the checkout")
     parameters = recordings(*CLIPS_OF_ONE_RIG[family])
-    rigs = [rig_of(p.values[0]) for p in parameters[:8]]  # type: ignore[attr-defined]
+    rigs = [rig_of(p.values[0]) for p in parameters[:8]]
     assert len(rigs) > 1
     for rig in rigs[1:]:
         assert np.allclose(rig.skeleton.offsets, rigs[0].skeleton.offsets, atol=5e-3)

@@ -128,7 +128,7 @@ def test_attention_in_chunks_is_attention(masked: bool, monkeypatch: pytest.Monk
         return fused(q, *args, **more)
 
     monkeypatch.setattr(attention, "MOST_SEQUENCES", 4)
-    monkeypatch.setattr(attention.nnf, "scaled_dot_product_attention", count)
+    monkeypatch.setattr(torch.nn.functional, "scaled_dot_product_attention", count)
     torch.testing.assert_close(layer(x, mask=mask), whole)
     assert seen == [4, 4, 3]
 
@@ -140,13 +140,12 @@ def test_losses_keep_full_precision(walks: list[TrainingClip], preset: str) -> N
     inside = []
     mean = losses._mean
     with pytest.MonkeyPatch.context() as patch, torch.autocast("cpu", torch.bfloat16):
-        patch.setattr(
-            losses,
-            "_mean",
-            lambda values, joints: (
-                inside.append(torch.is_autocast_enabled("cpu")) or mean(values, joints)
-            ),
-        )
+
+        def watched(values: torch.Tensor, joints: torch.Tensor) -> torch.Tensor:
+            inside.append(torch.is_autocast_enabled("cpu"))
+            return mean(values, joints)
+
+        patch.setattr(losses, "_mean", watched)
         loss, terms = objective(steps[0])
     assert loss.dtype == torch.float32
     assert {term.dtype for term in terms.values()} == {torch.float32}

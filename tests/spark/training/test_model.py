@@ -33,14 +33,12 @@ def pad(body: Body, extra: int) -> Body:
     """The same skeletons with `extra` joints that are none."""
     J = body.valid.shape[1]
     own = torch.arange(J, J + extra).expand(len(body.valid), -1)
-    zeros = [torch.nn.functional.pad(t, (0, 0, 0, extra)) for t in body[:3]]
-    return Body(
-        *zeros,
-        body.groups,
-        body.arc,
-        torch.nn.functional.pad(body.valid, (0, extra)),
-        torch.cat([body.parents, own], 1),
-        torch.nn.functional.pad(body.offsets, (0, 0, 0, extra)),
+    rows = ("names", "tpose", "shape", "offsets")
+    padded = {row: torch.nn.functional.pad(getattr(body, row), (0, 0, 0, extra)) for row in rows}
+    return body._replace(
+        valid=torch.nn.functional.pad(body.valid, (0, extra)),
+        parents=torch.cat([body.parents, own], 1),
+        **padded,
     )
 
 
@@ -121,10 +119,9 @@ def test_one_step_learns_and_every_weight_takes_part(config: Config, batch: Batc
     errors = []
     for _ in range(30):
         out = model(batch.pose, batch.source, batch.target, start)
-        positions = (forward_kinematics(p, batch.target) for p in (out, truth))
-        loss = losses.reconstruction(out, truth, batch.target) + 100 * losses.positions(
-            *positions, batch.target
-        )
+        found, true = (forward_kinematics(p, batch.target) for p in (out, truth))
+        loss = losses.reconstruction(out, truth, batch.target)
+        loss = loss + 100 * losses.positions(found, true, batch.target)
         loss = loss + 7 * losses.root(out, truth)
         optimiser.zero_grad()
         loss.backward()

@@ -241,6 +241,7 @@ def test_mixed(walks: list[TrainingClip]) -> None:
 
 def test_targets(steps: Steps) -> None:
     bodies = [one.variant.body for one in steps.maker.characters]
+    assert isinstance(steps.maker, UnpairedMaker)
     draws = steps.maker.draws(range(100), 1)
     assert all(target in bodies and target is not windows.body for windows, target in draws)
 
@@ -368,6 +369,7 @@ def test_output(batch: UnpairedBatch) -> None:
 
 
 def test_canonical(steps: Steps) -> None:
+    assert isinstance(steps.maker, UnpairedMaker)
     for windows, _ in steps.maker.draws(range(5), 1):
         np.testing.assert_allclose(windows.root[:, 0, :2], 0, atol=1e-6)
         hips = windows.body.skeleton.rest_positions
@@ -378,6 +380,6 @@ def test_canonical(steps: Steps) -> None:
 def test_sizes() -> None:
     config = network(PAPER, 128)
     assert (config.width, config.heads, config.decoder_blocks) == (128, 4, 4)
-    wide, gelu, _ = small().decoder.blocks[0].ff
+    wide, gelu, _ = small().decoder.blocks[0].ff.children()
     assert wide.out_features == 4 * wide.in_features
     assert isinstance(gelu, torch.nn.GELU)

@@ -44,7 +44,7 @@ def test_it_says_why_nothing_is_learned(tmp_path: Path) -> None:
     def about(data: Path, **changed: str) -> str | None:
         stage = recorded_stage(replace(TINY, data=(str(data),), **changed))
         assert stage is None or stage.known is None
-        return stage and stage.about
+        return stage.about if stage else None
 
     assert "spark-sim prepare" in str(about(walks))
     told = str(about(tmp_path / "dataset"))

@@ -22,7 +22,7 @@ def test_torch_gives_the_same_answers(maker: PairMaker, tmp_path: Path) -> None:
     torch.manual_seed(0)
     names = NameEncoder(NameConfig(width=16, heads=2, blocks=1, rig_blocks=1)).eval()
     small = {"width": 32, "heads": 2, "encoder_blocks": 2, "decoder_blocks": 2, "name_width": 18}
-    config = replace(Config.paper(), **small)  # type: ignore[arg-type]
+    config = replace(Config.paper(), **small)
     assert config.noise
     save_checkpoint(Checkpoint(Spark(config), names), tmp_path / "a.safetensors")
     weights = read_weights(tmp_path / "a.safetensors")

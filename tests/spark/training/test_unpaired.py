@@ -44,7 +44,7 @@ def test_targets_are_other_recorded_characters(walks: list[TrainingClip]) -> Non
     """Under their own names and bones; all of them are met."""
     maker = UnpairedMaker(many(walks, 8), window=16)
     bodies = [one.variant.body for one in maker.characters]
-    met = Counter()
+    met: Counter[int] = Counter()
     for (windows, target), again in zip(
         maker.draws(range(300), 1), maker.draws(range(300), 1), strict=True
     ):

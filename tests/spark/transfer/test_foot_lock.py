@@ -47,7 +47,7 @@ def foot_speed(positions: np.ndarray, rig: Rig, planted: np.ndarray, frame_time:
 def test_standing_feet_slow_down_threefold_and_little_else_moves(source: str, target: str) -> None:
     motion, rig = read(source)
     _, other = read(target)
-    canonical = to_canonical(motion, rig)  # type: ignore[arg-type]
+    canonical = to_canonical(motion, rig)
     copied = transfer(canonical, other)
     refined = lock_feet(canonical, copied)
     planted = planted_feet(rig, canonical_positions(canonical), canonical.frame_time)

@@ -117,10 +117,10 @@ def test_what_is_in_the_source_s_floor_may_be_as_deep() -> None:
 def test_a_body_on_its_hands_rises_as_a_whole() -> None:
     """A handstand, upside down about the pelvis, arms beside the head."""
     arms = {Role.LEFT_UPPER_ARM: [1.57, 0.0, 0.0], Role.RIGHT_UPPER_ARM: [-1.57, 0.0, 0.0]}
-    up = posed(stick_rig(), np.ones(FRAMES), arms)
+    upright = posed(stick_rig(), np.ones(FRAMES), arms)
     over = quat_from_rotvec(np.array([np.pi, 0.0, 0.0]))
     motion = standing(stick_rig(), FRAMES, FPS)
-    motion.rotations[:] = up.rotations
+    motion.rotations[:] = upright.rotations
     motion.rotations[:, 0] = over
     for role, turn in arms.items():
         motion.rotations[:, joint(role)] = quat_from_rotvec(np.array(turn))

@@ -22,7 +22,7 @@ from spark_sim.live.journal import ENDING, Journal, recover
 from spark_sim.live.listener import Listener
 from spark_sim.live.retargeter import Retargeter
 from spark_sim.live.session import Session
-from spark_sim.live.sinks import sink
+from spark_sim.live.sinks import Sink, sink
 from tests.helpers import mvn, vmc
 from tests.helpers.live import running, send
 
@@ -86,7 +86,7 @@ def test_a_sender_that_changes_its_body_and_jumps(tmp_path: Path) -> None:
     told: list[str] = []
     answers: list[np.ndarray] = []
 
-    class Kept(module.Sink):
+    class Kept(Sink):
         def _send(self, data: bytes) -> None:
             answers.append(np.array(json.loads(data)["qpos"]))
 

@@ -29,9 +29,9 @@ def person(tmp_path_factory: pytest.TempPathFactory) -> spark_sim.AnyClip:
 def board(person: spark_sim.AnyClip) -> Board:
     context = multiprocessing.get_context("spawn")
     robot = spark_sim.load("robot")
-    sizes = (3 + 4 * len(person.motion.skeleton), len(robot.qpos[0]))
-    arrays = [context.RawArray("d", size) for size in sizes]
-    return Board(*arrays, context.RawArray("c", 200), context.RawValue("q", 0))
+    pose = context.RawArray("d", 3 + 4 * len(person.motion.skeleton))
+    qpos = context.RawArray("d", len(robot.qpos[0]))
+    return Board(pose, qpos, context.RawArray("c", 200), context.RawValue("q", 0))
 
 
 def show(board: Board, person: spark_sim.AnyClip, frame: int, at: tuple[float, float]) -> None:

@@ -11,6 +11,7 @@ from spark.errors import OutputError
 from spark_sim.shelf import batch
 from spark_sim.shelf.keep import parse
 from spark_sim.shelf.manifest import Manifest
+from spark_sim.shelf.work import work
 from tests.helpers import shelf
 
 KILLS = 50
@@ -18,7 +19,7 @@ KILLS = 50
 
 @pytest.fixture(autouse=True)
 def _real_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(batch, "work", batch.work)  # what `shelf.run` replaces comes back
+    monkeypatch.setattr(batch, "work", work)  # what `shelf.run` replaces comes back
 
 
 def sources(folder: Path, **texts: str) -> Path:

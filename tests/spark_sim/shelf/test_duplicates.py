@@ -151,7 +151,7 @@ def test_few_of_the_pairs_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def counted(one: object, other: object) -> object:
         compared.append((one, other))
-        return original(one, other)  # type: ignore[arg-type]
+        return original(one, other)
 
     monkeypatch.setattr(duplicates, "compare", counted)
     prints = {f"{k:02}": fingerprint(made(k, 5.0, 20.0), RIG) for k in range(30)}

@@ -6,7 +6,7 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -42,12 +42,12 @@ def test_every_job_is_done_once_on_one_thread(monkeypatch: pytest.MonkeyPatch) -
 def test_jobs_are_taken_as_they_are_needed() -> None:
     taken: list[int] = []
 
-    def jobs() -> object:
+    def jobs() -> Iterator[int]:
         for k in range(20):
             taken.append(k)
             yield k
 
-    found = in_processes(square, jobs(), 2)  # type: ignore[arg-type]
+    found = in_processes(square, jobs(), 2)
     next(found)
     assert len(taken) <= 4
     found.close()
