@@ -1,10 +1,11 @@
-"""Imports run one way and in no circle, and only the network needs torch. Each guard is shown to
-catch a breach."""
+"""Imports run one way and in no circle, only the network needs torch, and no test module has what
+another needs. Each guard is shown to catch a breach."""
 
 import ast
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -123,6 +124,21 @@ def test_the_guard_sees_breaches(module: str, source: str, found: set[str]) -> N
     assert breaches(module, source) == found
 
 
+def from_tests(source: str) -> set[str]:
+    """What a module imports from modules of tests: `tests.helpers` has what several share."""
+    return {name for name in imports(source) if any(p.startswith("test_") for p in name.split("."))}
+
+
+def test_no_test_module_imports_from_another() -> None:
+    found = {name: from_tests(path.read_text()) for name, path in modules("tests").items()}
+    assert {name: names for name, names in found.items() if names} == {}
+
+
+def test_the_guard_sees_what_is_shared_in_a_test_module() -> None:
+    source = "from tests.helpers.rigs import build\ndef f():\n    from tests.sim.test_a import b"
+    assert from_tests(source) == {"tests.sim.test_a.b"}
+
+
 def graph(sources: dict[str, str]) -> dict[str, set[str]]:
     """Which of the files import which, by dotted names; what only type checkers see is left out."""
     return {
@@ -165,6 +181,24 @@ def test_the_guard_sees_circles() -> None:
     inside = f"def f():\n    from {b} import x"
     assert circles(graph({**sources, d: inside})) == {b, d}
     assert circles(graph({**sources, c: f"from {a} import x"})) == {a, b, c, d}
+
+
+def test_the_picture_of_the_rooms_is_the_table() -> None:
+    """Every room is drawn; a room above another, in its package, may import it."""
+    drawn = {
+        box.attrib["id"]: (float(box.attrib["x"]), float(box.attrib["y"]))
+        for box in ElementTree.parse(CHECKOUT / "docs" / "images" / "architecture.svg").iter()
+        if box.tag.endswith("rect") and "id" in box.attrib
+    }
+    rooms = {room for room in LEVEL if room.split(".")[0] in PACKAGES}
+    assert set(drawn) == rooms
+    for package in PACKAGES:
+        of_package = [room for room in rooms if room.split(".")[0] == package]
+        for one in of_package:
+            for other in of_package:
+                assert (LEVEL[one] > LEVEL[other]) == (drawn[one][1] < drawn[other][1])
+    left = [min(drawn[room][0] for room in rooms if room.split(".")[0] == p) for p in PACKAGES]
+    assert left == sorted(left)
 
 
 def loads_torch(code: str) -> bool:

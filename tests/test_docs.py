@@ -3,12 +3,10 @@
 import importlib
 import re
 from pathlib import Path
-from xml.etree import ElementTree
 
 import pytest
 
 import spark_sim
-from tests.test_architecture import LEVEL, PACKAGES
 
 CHECKOUT = Path(__file__).parents[1]
 DOCS = CHECKOUT / "docs"
@@ -94,24 +92,6 @@ def test_the_api_page_has_every_public_name() -> None:
 def test_pictures_are_small() -> None:
     for picture in (DOCS / "images").iterdir():
         assert picture.stat().st_size < LARGEST_PICTURE, picture.name
-
-
-def test_the_picture_of_the_rooms_is_the_table() -> None:
-    """Every room is drawn; a room above another, in its package, may import it."""
-    drawn = {
-        box.attrib["id"]: (float(box.attrib["x"]), float(box.attrib["y"]))
-        for box in ElementTree.parse(DOCS / "images" / "architecture.svg").iter()
-        if box.tag.endswith("rect") and "id" in box.attrib
-    }
-    rooms = {room for room in LEVEL if room.split(".")[0] in PACKAGES}
-    assert set(drawn) == rooms
-    for package in PACKAGES:
-        of_package = [room for room in rooms if room.split(".")[0] == package]
-        for one in of_package:
-            for other in of_package:
-                assert (LEVEL[one] > LEVEL[other]) == (drawn[one][1] < drawn[other][1])
-    left = [min(drawn[room][0] for room in rooms if room.split(".")[0] == p) for p in PACKAGES]
-    assert left == sorted(left)
 
 
 def test_the_table_of_changes_names_what_is_there() -> None:

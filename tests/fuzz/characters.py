@@ -120,7 +120,7 @@ def _acclaim_seeds(whole: str) -> Callable[[Path], list[bytes]]:
     """The skeleton or the motion; the other one lies whole beside the case."""
 
     def made(folder: Path) -> list[bytes]:
-        from tests.spark.io.test_acclaim import AMC, ASF
+        from tests.helpers.acclaim import AMC, ASF
 
         (folder / f"case{whole}").write_text(ASF if whole == ".asf" else AMC)
         return [(AMC if whole == ".asf" else ASF).encode()]
@@ -134,7 +134,7 @@ def _use_skeleton(path: Path) -> None:
 
 def _smpl_layouts(suffix: str) -> Callable[[Path], list[bytes]]:
     def made(folder: Path) -> list[bytes]:
-        from tests.spark.io.test_smpl import LAYOUTS, in_layout, made
+        from tests.helpers.smpl import LAYOUTS, in_layout, made
 
         out, path = [], folder / f"seed{suffix}"
         for layout, (up, _) in LAYOUTS.items():
@@ -153,7 +153,7 @@ def _smpl_layouts(suffix: str) -> Callable[[Path], list[bytes]]:
 def _gvhmr_seeds(folder: Path) -> list[bytes]:
     import torch
 
-    from tests.spark.io.test_smpl import made
+    from tests.helpers.smpl import made
 
     rotvecs, trans, _ = made(_walk(), up="y", count=22)
     flat = torch.tensor(rotvecs.reshape(len(rotvecs), -1), dtype=torch.float32)
@@ -170,7 +170,7 @@ def _gvhmr_seeds(folder: Path) -> list[bytes]:
 
 def _positions_npy(folder: Path) -> list[bytes]:
     from spark.io.position_layouts import layouts
-    from tests.spark.io.test_positions import as_person, points_of
+    from tests.helpers.points import as_person, points_of
 
     out, person = [], as_person(_walk())
     for count in (17, 22, 33):

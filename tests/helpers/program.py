@@ -27,6 +27,17 @@ for line in sys.stdin:
 """
 
 
+def environment(**extra: str) -> dict[str, str]:
+    """This process's environment, without a display and with a terminal of 80 columns."""
+    dropped = ("DISPLAY", "WAYLAND_DISPLAY", "SPARK_SIM_TRACEBACK", "NO_COLOR")
+    kept = {name: value for name, value in os.environ.items() if name not in dropped}
+    return kept | {"COLUMNS": "80", "PYTHONPATH": str(CHECKOUT), "TERM": "xterm"} | extra
+
+
+def command(*args: object) -> list[str]:
+    return [sys.executable, "-m", "spark_sim", *map(str, args)]
+
+
 class Done(NamedTuple):
     """What a command line came to."""
 
@@ -39,12 +50,10 @@ class Program(AbstractContextManager["Program"]):
     """The program in `folder`, without a display."""
 
     def __init__(self, folder: Path) -> None:
-        hidden = ("DISPLAY", "WAYLAND_DISPLAY")
-        kept = {name: value for name, value in os.environ.items() if name not in hidden}
         self._process = subprocess.Popen(
             [sys.executable, "-c", _LOOP],
             cwd=folder,
-            env=kept | {"PYTHONPATH": str(CHECKOUT)},
+            env=environment(),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

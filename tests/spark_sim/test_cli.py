@@ -16,28 +16,16 @@ import pytest
 
 import spark_sim
 from spark_sim import cli
-from tests.helpers.program import Program
+from tests.helpers.program import Program, command, environment
 from tests.helpers.skins import write_character
 
 GOLDENS = Path(__file__).parent / "goldens"
-CHECKOUT = Path(__file__).parents[2]
 COMMANDS = (
     *("retarget", "batch", "robots", "inspect", "report", "play", "mjcf", "sample"),
     *("prepare", "train", "evaluate", "export"),
 )
 WALK, TARGET = "walker_walk.bvh", "dancer_wave.bvh"
 RESULT = "walker_walk_on_dancer_wave.bvh"
-
-
-def environment(**extra: str) -> dict[str, str]:
-    """This process's environment, without a display and with a terminal of 80 columns."""
-    dropped = ("DISPLAY", "WAYLAND_DISPLAY", "SPARK_SIM_TRACEBACK", "NO_COLOR")
-    kept = {name: value for name, value in os.environ.items() if name not in dropped}
-    return kept | {"COLUMNS": "80", "PYTHONPATH": str(CHECKOUT), "TERM": "xterm"} | extra
-
-
-def command(*args: object) -> list[str]:
-    return [sys.executable, "-m", "spark_sim", *map(str, args)]
 
 
 def run(*args: object, cwd: Path) -> subprocess.CompletedProcess[str]:

@@ -12,6 +12,7 @@ import spark_sim
 from spark.io.gltf_file import GltfFile
 from spark.kinematics import forward
 from spark_sim import Clip
+from tests.helpers.fbx_arm import arm, placed, png, skin_of
 from tests.helpers.fbx_text import Surface
 from tests.helpers.glb import write_glb as skinned
 from tests.helpers.gltf import animated
@@ -19,7 +20,6 @@ from tests.helpers.node import in_three, needs, validated
 from tests.helpers.recordings import recording
 from tests.helpers.stick import stick_rig
 from tests.helpers.vrm import avatar
-from tests.spark.io.test_fbx_skin import arm, placed, png, skin_of
 
 TIMES = (0.1, 0.5, 0.9)  # [s]
 

@@ -10,7 +10,7 @@ import pytest
 import spark_sim
 from spark.errors import OutputError, lacks_memory
 from spark_sim import cli, files
-from tests.spark_sim.test_cli import command, environment
+from tests.helpers.program import command, environment
 
 WALK, TARGET = "walker_walk.bvh", "dancer_wave.bvh"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import spark_sim
-from tests.spark_sim.test_cli import environment
+from tests.helpers.program import environment
 
 NAMES = ("multiprocessing", "signal", "socket", "json", "numpy", "spark", "sim", "mujoco", "ctypes")
 COMMANDS = (

@@ -13,7 +13,7 @@ from spark.kinematics import forward
 from spark.rig.feet import sole_positions
 from spark.transfer.canonical import from_canonical
 from spark_sim.loading import load_robot
-from tests.spark.transfer.test_treads import BOX, RIG, onto_box
+from tests.helpers.box import BOX, RIG, onto_box
 
 
 @pytest.fixture(scope="module")

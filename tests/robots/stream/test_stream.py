@@ -48,9 +48,9 @@ from spark.rotation import (
 from spark.runs import true_runs
 from spark.transfer.canonical import at_frame_time, from_canonical, to_canonical
 from spark_sim.loading import load_robot
+from tests.helpers.box import BOX, onto_box
 from tests.helpers.poses import limb_error
 from tests.helpers.recordings import recording
-from tests.spark.transfer.test_treads import BOX, onto_box
 
 RIG = sample_rig("walker")
 WALK = sample_motion("walk", RIG, 60.0).frames(0, 90)

@@ -19,9 +19,7 @@ from spark.rig.rig import understand
 from spark.rotation import matrix_from_quat, quat_from_rotvec
 from tests.helpers.hostile import Bomb, damaged, edits
 from tests.helpers.recordings import recordings
-from tests.helpers.smpl import as_smpl
-
-TALL = 1.70  # [m] the mean body of a file that tells no height
+from tests.helpers.smpl import LAYOUTS, TALL, in_layout, made
 
 
 @pytest.fixture(scope="module")
@@ -29,63 +27,8 @@ def waving() -> Motion:
     return sample_motion("wave", sample_rig("walker"), 30.0)
 
 
-def made(
-    motion: Motion, *, count: int = 52, height: float = TALL, up: str = "z"
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return as_smpl(motion, understand(motion), count=count, height=height, up=up)
-
-
 def joints(recording: Recording) -> np.ndarray:
     return forward(recording.motion)[0]
-
-
-def in_layout(layout: str, rotvecs: np.ndarray, trans: np.ndarray) -> dict[str, Any] | np.ndarray:
-    """The first 22 joints of a motion as files have them; fingers are straight."""
-    count = len(rotvecs)
-    body = rotvecs[:, :22]
-    flat = body.reshape(count, -1)
-    none = np.zeros((count, 90))
-    match layout:
-        case "AMASS, SMPL-H":
-            poses = np.concatenate([flat, none], axis=1)
-            return {"poses": poses, "trans": trans, "betas": np.zeros(16), "gender": "neutral",
-                    "mocap_framerate": 30.0, "dmpls": np.zeros((count, 8))}  # fmt: skip
-        case "AMASS, SMPL-X":
-            return {"root_orient": flat[:, :3], "pose_body": flat[:, 3:], "pose_hand": none,
-                    "pose_jaw": none[:, :3], "pose_eye": none[:, :6], "trans": trans,
-                    "betas": np.zeros(16), "gender": np.array(b"neutral"), "num_betas": 16,
-                    "mocap_frame_rate": np.array(30.0), "surface_model_type": "smplx",
-                    "poses": np.concatenate([flat, none[:, :9], none], axis=1)}  # fmt: skip
-        case "parts alone":
-            return {"root_orient": flat[:, :3], "pose_body": flat[:, 3:], "trans": trans,
-                    "mocap_frame_rate": 30}  # fmt: skip
-        case "SMPL":
-            return {"global_orient": flat[:, None, :3], "transl": trans, "fps": 30,
-                    "body_pose": np.concatenate([flat[:, 3:], none[:, :6]], axis=1)}  # fmt: skip
-        case "smplx":
-            return {"global_orient": flat[:, :3], "body_pose": flat[:, 3:].reshape(count, 21, 3),
-                    "left_hand_pose": none[:, :45], "right_hand_pose": none[:, :45],
-                    "transl": trans, "betas": np.zeros((1, 10)), "fps": 30}  # fmt: skip
-        case "PHUMA":
-            return np.concatenate([trans, flat], axis=1)
-        case "PHUMA, preprocessed":
-            return np.concatenate([trans, flat, none[:, :4]], axis=1)
-        case "Motion-X":
-            return np.concatenate([flat, none, np.full((count, 3 + 50 + 100), 0.1), trans,
-                                   np.zeros((count, 10))], axis=1)  # fmt: skip
-    raise AssertionError(layout)
-
-
-LAYOUTS = {
-    "AMASS, SMPL-H": ("z", 52),
-    "AMASS, SMPL-X": ("z", 55),
-    "parts alone": ("z", 22),
-    "SMPL": ("y", 24),
-    "smplx": ("y", 55),
-    "PHUMA": ("y", 22),
-    "PHUMA, preprocessed": ("y", 22),
-    "Motion-X": ("y", 55),
-}
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)

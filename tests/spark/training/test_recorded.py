@@ -9,7 +9,6 @@ import torch
 
 from spark.errors import FileFormatError
 from spark.inference.weights import read_weights
-from spark.network.features import body_features
 from spark.network.likeness import Likeness, apart
 from spark.network.recorded import (
     HABITS,
@@ -27,69 +26,20 @@ from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_mul
 from spark.training.checkpoint import load_checkpoint, save_checkpoint
-from spark.training.cuts import TrainingClip
-from spark.training.dataset import Performance
 from spark.training.recorded_learning import learn_recorded
 from spark.training.recorded_likeness import fit_likeness, surest
 from spark.training.recorded_pairs import RecordedPairs, recorded_pairs
 from spark.training.recorded_ridge import fit_ridge
 from spark.transfer.analytic import transfer
-from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.canonical import canonical_positions
 from spark.transfer.foot_lock import lock_feet
 from spark.transfer.leg_fit import fit_legs
+from tests.helpers.proportions import built, stout, striding, waving
+from tests.helpers.recorded import HIPS_UP, TRAVEL, answered, body, habits, performance
 from tests.helpers.stick import joint, scaled, stick_rig, without
 from tests.helpers.training import TINY, fresh
-from tests.spark.training.test_same_motion import waving
-from tests.spark.transfer.test_hip_rise import built
-from tests.spark.transfer.test_leg_fit import stout, striding
 
-HIPS_UP, ANKLES_UP = HABITS.index("hips_up"), HABITS.index("ankles_up")
-TRAVEL = HABITS.index("travel")
-FOOT = PARTS.index("foot")
-
-
-def body(seed: int) -> Rig:
-    """A stick man with other legs, shoulders and feet, in another size."""
-    rng = np.random.default_rng(seed)
-    rig = stick_rig()
-    offsets = rig.skeleton.offsets.copy()
-    leg, shoulder, foot = rng.uniform(0.9, 1.1), rng.uniform(-0.1, 0.1), rng.uniform(0.8, 1.2)
-    for side in ("left", "right"):
-        offsets[joint(Role(f"{side}_lower_leg")), 2] *= leg
-        offsets[joint(Role(f"{side}_upper_arm")), 2] += shoulder
-        offsets[joint(Role(f"{side}_toe"))] *= foot
-    return scaled(
-        replace(rig, skeleton=replace(rig.skeleton, offsets=offsets)), rng.uniform(0.5, 2)
-    )
-
-
-def habits(tokens: BodyTokens) -> Habits:
-    """A law that is linear in what there is to see: feet turn with their length, hips rise and
-    strides grow with the shoulders."""
-    shoulder, foot = tokens.measures[0], tokens.measures[4]
-    scales = np.zeros(len(HABITS))
-    scales[TRAVEL], scales[HIPS_UP] = 0.03 * shoulder, 0.01 * shoulder - 0.005 * foot
-    turns = np.zeros((len(tokens.joints), 3))
-    turns[tokens.parts == FOOT] = [0.0, 0.02 * foot, 0.03 * foot]
-    return Habits(turns, scales)
-
-
-def answered(source: CanonicalMotion, rig: Rig) -> CanonicalMotion:
-    """What an animation library with these habits, whose feet stand, makes of a motion."""
-    return lock_feet(source, as_recorded(habits, source, transfer(source, rig)))
-
-
-def performance(name: str, motion: CanonicalMotion) -> Performance:
-    own, size = body_features(motion.rig), motion.rig.hip_height
-    clip = TrainingClip(
-        "stride",
-        own,
-        motion.rotations[:, own.joints],
-        (motion.hips - [0, 0, motion.floor_z]) / size,
-        np.zeros((len(motion), 2), bool),
-        motion.frame_time,
-    )
-    return Performance(clip, name, "sc+sm", motion.floor_z)
+ANKLES_UP = HABITS.index("ankles_up")
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ from spark.training.prepare import prepare
 from spark.training.recorded_pairs import RecordedPairs, recorded_pairs
 from spark.training.recorded_stage import recorded_stage
 from spark_sim import sample
+from tests.helpers.proportions import striding
+from tests.helpers.recorded import answered, body, performance
 from tests.helpers.training import TINY
-from tests.spark.training.test_recorded import answered, body, performance
-from tests.spark.transfer.test_leg_fit import striding
 
 
 @pytest.fixture(scope="module")

@@ -9,22 +9,10 @@ from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_mul
 from spark.training.same_motion import same_motion
 from spark.transfer.analytic import transfer
-from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.foot_lock import lock_feet
 from spark.transfer.leg_fit import fit_legs
+from tests.helpers.proportions import stout, striding, waving
 from tests.helpers.stick import joint, stick_rig, without
-from tests.spark.transfer.test_leg_fit import stout, striding
-
-
-def waving(motion: CanonicalMotion, cycles: float) -> CanonicalMotion:
-    """With arms that swing up and down, so many times."""
-    rotations = motion.rotations.copy()
-    angle = np.sin(np.linspace(0.0, 2 * np.pi * cycles, len(motion)))
-    for role in (Role.LEFT_UPPER_ARM, Role.RIGHT_UPPER_ARM):
-        turn = quat_from_rotvec(angle[:, None] * np.array([0.8, 0.0, 0.0]))
-        for j in motion.rig.skeleton.subtree(joint(role)):
-            rotations[:, j] = quat_mul(turn, rotations[:, j])
-    return replace(motion, rotations=rotations)
 
 
 @pytest.mark.parametrize("finished", [lambda s, m: m, fit_legs, lock_feet])

@@ -7,7 +7,6 @@ import pytest
 
 from spark.kinematics import forward
 from spark.rig.feet import sole_positions
-from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec
 from spark.transfer.analytic import transfer
@@ -19,25 +18,12 @@ from spark.transfer.canonical import (
 )
 from spark.transfer.foot_lock import lock_feet
 from spark.transfer.leg_fit import fit_legs
+from tests.helpers.proportions import built
 from tests.helpers.stick import joint, standing, stick_rig
 
 LEFT_LEG = [joint(Role(f"left_{part}")) for part in ("upper_leg", "lower_leg", "foot")]
 FRAMES = 90
 KNEE = np.radians(8)  # straight, but for what rounds off knees that are nearly so
-
-
-def built(wide: float = 0.1, leg: float = 0.8, foot: float = 1.0) -> Rig:
-    """The stick man with hip joints so far off the middle [m], legs so long [m] below hips as high
-    as before, and feet so long for his."""
-    rig = stick_rig()
-    offsets, ends = rig.skeleton.offsets.copy(), rig.skeleton.end_offsets.copy()
-    for side, sign in (("left", 1), ("right", -1)):
-        offsets[joint(Role(f"{side}_upper_leg")), 1] = sign * wide
-        for part in ("lower_leg", "foot"):
-            offsets[joint(Role(f"{side}_{part}")), 2] = -leg / 2
-        offsets[joint(Role(f"{side}_toe"))] *= (foot, 1, (0.9 - leg) / 0.1)
-    ends[:2] *= foot
-    return replace(rig, skeleton=replace(rig.skeleton, offsets=offsets, end_offsets=ends))
 
 
 BODIES = {

@@ -15,6 +15,7 @@ from spark.rotation import quat_from_rotvec
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions, to_canonical
 from spark.transfer.leg_fit import fit_legs, travel_scale
+from tests.helpers.proportions import stout, striding
 from tests.helpers.recordings import recording
 from tests.helpers.scores import score
 from tests.helpers.stick import joint, scaled, standing, stick_rig, without
@@ -26,35 +27,6 @@ PAIRS = (
     ("gangnam_style_372f", "Ortiz", "XBot"),
     ("breakdance_ready_64f", "XBot", "Big_Vegas"),
 )
-
-
-def stout() -> Rig:
-    """The stick man with hips 0.3 m off the middle, thighs of 0.3 and shanks of 0.5 m, on which the
-    shoulders are 0.1 m higher: 1.45 m instead of 1.35."""
-    rig = stick_rig()
-    offsets = rig.skeleton.offsets.copy()
-    for side, sign in (("left", 1), ("right", -1)):
-        offsets[joint(Role(f"{side}_upper_leg")), 1] = 0.3 * sign
-        offsets[joint(Role(f"{side}_lower_leg")), 2] = -0.3
-        offsets[joint(Role(f"{side}_foot")), 2] = -0.5
-        offsets[joint(Role(f"{side}_upper_arm")), 2] += 0.1
-    return replace(rig, skeleton=replace(rig.skeleton, offsets=offsets))
-
-
-def striding(rig: Rig) -> CanonicalMotion:
-    """1 m ahead and 0.2 m to the left with bent knees, thighs swinging against each other."""
-    still = standing(rig, 40)
-    swing = 0.4 * np.sin(np.linspace(0, 6, 40))
-    rotations = still.rotations.copy()
-    for side, sign in (("left", 1), ("right", -1)):
-        pitch = np.zeros((40, 3))
-        pitch[:, 1] = sign * swing - 0.3
-        rotations[:, joint(Role(f"{side}_upper_leg"))] = quat_from_rotvec(pitch)
-        pitch[:, 1] = 0.5
-        rotations[:, joint(Role(f"{side}_lower_leg"))] = quat_from_rotvec(pitch)
-    path = still.root_pos + np.linspace(0, 1, 40)[:, None] * np.array([1.0, 0.2, 0.0])
-    path[:, 2] -= 0.05
-    return to_canonical(Motion(rig.skeleton, still.frame_time, path, rotations), rig)
 
 
 def fitted(source: CanonicalMotion, target: Rig) -> CanonicalMotion:

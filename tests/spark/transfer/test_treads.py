@@ -14,7 +14,6 @@ from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_mul
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import (
-    CanonicalMotion,
     at_frame_time,
     canonical_positions,
     from_canonical,
@@ -22,27 +21,11 @@ from spark.transfer.canonical import (
 )
 from spark.transfer.foot_lock import lock_feet
 from spark.transfer.treads import feet_by_side, treads_of
+from tests.helpers.box import BOX, RIG, at, onto_box
 from tests.helpers.recordings import recordings
 from tests.helpers.stick import joint, stick_rig
 
-FRAME_TIME = 1 / 60
-RIG = sample_rig("walker")
-BOX = 0.4  # [m]
 FOOT = 0.12 * np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])  # [m] around its middle
-
-
-def at(heights: np.ndarray, places: np.ndarray) -> CanonicalMotion:
-    """A body that stands straight, its feet at heights and places along X [m]."""
-    rotations = np.tile([1.0, 0, 0, 0], (len(heights), len(RIG.skeleton), 1))
-    hips = np.column_stack([places, 0 * places, RIG.hip_height + heights])
-    return CanonicalMotion(RIG, FRAME_TIME, rotations, hips, 0.0)
-
-
-def onto_box(box: float = BOX) -> CanonicalMotion:
-    """A body that stands for 1 s, rises onto a box in 0.5 s, stands there, and comes down again."""
-    share = np.interp(np.arange(240) / 60, [1.0, 1.5, 2.5, 3.0], [0.0, 1.0, 1.0, 0.0])
-    share = share**2 * (3 - 2 * share)
-    return at(box * share, 0.8 * share)
 
 
 def test_who_stands_on_a_box_does_so_at_its_height() -> None:
