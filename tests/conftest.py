@@ -24,6 +24,8 @@ import pytest
 
 import sim  # noqa: F401  (it chooses how MuJoCo draws before a test imports MuJoCo)
 import spark_sim
+from robots.model.known import known
+from robots.model.morphology import Morphology
 from tests.helpers.recordings import DATA
 
 # What `make quick` leaves out: files and tests that start processes, train, render in a browser or
@@ -132,6 +134,27 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.slow)
 
 
+@pytest.fixture(scope="session")
+def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The demo motions: tests read here and write elsewhere."""
+    folder = tmp_path_factory.mktemp("samples")
+    spark_sim.sample(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def walk_path(samples: Path) -> Path:
+    return samples / "walker_walk.bvh"
+
+
+@pytest.fixture(scope="session")
+def walk(walk_path: Path) -> spark_sim.Clip:
+    """A second of it."""
+    clip = spark_sim.load(walk_path)
+    assert isinstance(clip, spark_sim.Clip)
+    return clip.part(0.0, 1.0)
+
+
 @pytest.fixture(scope="module")
 def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Sample motions as downloads lie: a folder a character."""
@@ -141,3 +164,9 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / body).mkdir(exist_ok=True)
         path.rename(folder / body / f"{motion}.bvh")
     return folder
+
+
+@pytest.fixture(scope="session")
+def ember() -> Morphology:
+    """The robot that ships."""
+    return known("robot")

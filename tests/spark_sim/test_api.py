@@ -23,13 +23,6 @@ from tests.helpers.fbx_text import Fbx, Node
 from tests.helpers.twisting import plain, turning, with_bones
 
 
-@pytest.fixture(scope="module")
-def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("samples")
-    spark_sim.sample(folder)
-    return folder
-
-
 def test_import_is_light() -> None:
     code = (
         "import sys, spark_sim\n"

@@ -21,13 +21,6 @@ from tests.helpers.program import CHECKOUT, Program
 from tests.helpers.rigs import RIGS, build, walk
 
 
-@pytest.fixture(scope="module")
-def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("samples")
-    spark_sim.sample(folder)
-    return folder
-
-
 @pytest.fixture
 def shelf(samples: Path, tmp_path: Path) -> Path:
     """A folder with `in/` of two motions in two folders, a broken one, and a target."""

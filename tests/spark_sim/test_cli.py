@@ -82,14 +82,6 @@ def golden(name: str, text: str) -> None:
     assert text == path.read_text()
 
 
-@pytest.fixture(scope="module")
-def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The demo motions; tests read here and write elsewhere."""
-    folder = tmp_path_factory.mktemp("samples")
-    spark_sim.sample(folder)
-    return folder
-
-
 @pytest.fixture
 def here(tmp_path: Path, samples: Path) -> Path:
     """A folder with a source and a target."""
@@ -384,7 +376,7 @@ def test_report_as_a_page_and_beside_others(here: Path) -> None:
 
 
 @pytest.mark.parametrize(("limit", "code"), [("0%", 1), ("100", 0)])
-def test_fail_over(limit: str, code: int, here: Path, samples: Path) -> None:
+def test_fail_over(limit: str, code: int, here: Path) -> None:
     """Half of the frames are put 30 cm under the floor."""
     text = (here / WALK).read_text().splitlines()
     first = next(i for i, line in enumerate(text) if line.startswith("Frame Time")) + 1

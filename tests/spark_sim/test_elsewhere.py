@@ -24,15 +24,6 @@ from tests.helpers.vrm import avatar
 TIMES = (0.1, 0.5, 0.9)  # [s]
 
 
-@pytest.fixture(scope="module")
-def walk(tmp_path_factory: pytest.TempPathFactory) -> Clip:
-    folder = tmp_path_factory.mktemp("samples")
-    spark_sim.sample(folder)
-    clip = spark_sim.load(folder / "walker_walk.bvh")
-    assert isinstance(clip, Clip)
-    return clip.part(0.0, 1.0)
-
-
 def test_khronos_validator_finds_no_error(walk: Clip, tmp_path: Path) -> None:
     """None of ours: a target's own, which stay, are those that its file has."""
     needs("gltf-validator")

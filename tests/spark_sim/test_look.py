@@ -19,10 +19,8 @@ OURS = ("spark.", "sim.", "robots.", "spark_sim.")
 
 
 @pytest.fixture(scope="module")
-def walk(tmp_path_factory: pytest.TempPathFactory) -> spark_sim.Clip:
-    folder = tmp_path_factory.mktemp("samples")
-    spark_sim.sample(folder)
-    return spark_sim.load(folder / "walker_walk.bvh", unit="cm")
+def walk(walk_path: Path) -> spark_sim.Clip:
+    return spark_sim.load(walk_path, unit="cm")
 
 
 @pytest.fixture(scope="module")

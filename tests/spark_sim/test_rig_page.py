@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import spark_sim
 from spark.rig.roles import Role
 from spark_sim import rolemap
 from spark_sim.cli import run
@@ -34,12 +33,6 @@ SPIDER = (
 HOSTILE = "</script><svg onload=document.title=1337>\"'\\\x7f"
 
 
-@pytest.fixture(scope="module")
-def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = spark_sim.sample(tmp_path_factory.mktemp("samples"))
-    return next(path for path in made if path.name == "walker_walk.bvh")
-
-
 def page_of(path: Path) -> str:
     clip = load(path)
     return rig_page(clip, describe(clip), str(path))
@@ -58,13 +51,13 @@ def asked(text: str, script: str, folder: Path, *flags: str) -> Any:
     return result["out"]
 
 
-def test_it_saves_the_map_that_save_map_writes(walk: Path, tmp_path: Path) -> None:
+def test_it_saves_the_map_that_save_map_writes(walk_path: Path, tmp_path: Path) -> None:
     """Also of a body that is no humanoid, and of names that mean harm."""
     spider, hostile = tmp_path / "spider.bvh", tmp_path / "hostile.bvh"
     spider.write_text(SPIDER)
-    text = re.sub(r"(ROOT|JOINT) (\S+)", lambda m: f"{m[0]}{HOSTILE}", walk.read_text())
+    text = re.sub(r"(ROOT|JOINT) (\S+)", lambda m: f"{m[0]}{HOSTILE}", walk_path.read_text())
     hostile.write_text(text)
-    for path in (walk, spider, hostile):
+    for path in (walk_path, spider, hostile):
         clip = load(path)
         assert isinstance(clip, Clip)
         shown = rig_page(clip, describe(clip), str(path))
@@ -75,9 +68,9 @@ def test_it_saves_the_map_that_save_map_writes(walk: Path, tmp_path: Path) -> No
         tomllib.loads(saved[0])
 
 
-def test_a_click_gives_a_joint_another_role(walk: Path, tmp_path: Path) -> None:
+def test_a_click_gives_a_joint_another_role(walk_path: Path, tmp_path: Path) -> None:
     """In the picture, by way of the list; what is saved is read back by `retarget`."""
-    clip = load(walk)
+    clip = load(walk_path)
     names = clip.motion.skeleton.names
     hand, forearm = (clip.rig.roles.require(r) for r in (Role.LEFT_HAND, Role.LEFT_FOREARM))
     script = f"""
@@ -95,27 +88,27 @@ def test_a_click_gives_a_joint_another_role(walk: Path, tmp_path: Path) -> None:
       const wrong = problems().length;
       el("reset").onclick();
       return [shown, ...first, wrong, mapText()];"""
-    shown, problems, text, told, wrong, again = asked(page_of(walk), script, tmp_path)
+    shown, problems, text, told, wrong, again = asked(page_of(walk_path), script, tmp_path)
     assert shown == names[forearm]
     assert problems == []
     assert wrong > 0, "a foot that is not below its leg"
     assert f"{names[hand]} is it no more" in told
     (tmp_path / "map.toml").write_text(text)
-    mapped = load(walk, roles=tmp_path / "map.toml")
+    mapped = load(walk_path, roles=tmp_path / "map.toml")
     assert mapped.rig.roles.joint(Role.LEFT_HAND) == forearm
     assert mapped.rig.roles.joint(Role.LEFT_FOREARM) is None
     out = tmp_path / "out.bvh"
-    arguments = ["--to", str(walk), "--to-map", str(tmp_path / "map.toml")]
-    assert run(["retarget", str(walk), *arguments, "-o", str(out)]) == 0
+    arguments = ["--to", str(walk_path), "--to-map", str(tmp_path / "map.toml")]
+    assert run(["retarget", str(walk_path), *arguments, "-o", str(out)]) == 0
     assert out.is_file()
     (tmp_path / "map.toml").write_text(again)
-    back = load(walk, roles=tmp_path / "map.toml").rig.roles.roles
+    back = load(walk_path, roles=tmp_path / "map.toml").rig.roles.roles
     assert back == clip.rig.roles.roles
 
 
-def test_the_poses_are_the_rigs(walk: Path, tmp_path: Path) -> None:
-    rig = load(walk).rig
-    tpose, rest = asked(page_of(walk), "return DATA.poses.map(pose => pose.joints)", tmp_path)
+def test_the_poses_are_the_rigs(walk_path: Path, tmp_path: Path) -> None:
+    rig = load(walk_path).rig
+    tpose, rest = asked(page_of(walk_path), "return DATA.poses.map(pose => pose.joints)", tmp_path)
     np.testing.assert_allclose(tpose, rig.tpose_positions, atol=1e-4)
     left, right = (rig.roles.require(r) for r in (Role.LEFT_HAND, Role.RIGHT_HAND))
     for pose in (tpose, rest):  # both face +X
@@ -126,9 +119,9 @@ def test_the_poses_are_the_rigs(walk: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("width", [1280, 500])
-def test_it_can_be_read_anywhere(walk: Path, width: int, tmp_path: Path) -> None:
+def test_it_can_be_read_anywhere(walk_path: Path, width: int, tmp_path: Path) -> None:
     """It asks for nothing, does not stick out, and every control has a name."""
-    text = page_of(walk)
+    text = page_of(walk_path)
     assert not re.search(r"(src|href)\s*=\s*[\"']?(https?:)?//", text)
     script = """
       const controls = [...document.querySelectorAll("button, select, input, summary, svg")];
@@ -146,9 +139,9 @@ def test_it_can_be_read_anywhere(walk: Path, width: int, tmp_path: Path) -> None
     assert {"mixamorig:LeftForeArm", "name 'mixamorig:LeftForeArm'"} <= {*map(str.strip, texts)}
 
 
-def test_roles_that_are_unsure_are_listed(tmp_path: Path, walk: Path) -> None:
+def test_roles_that_are_unsure_are_listed(tmp_path: Path, walk_path: Path) -> None:
     """The toes' names say nothing, and there is no clavicle."""
-    text = re.sub("LeftToeBase|RightToeBase", lambda m: f"x{len(m[0])}", walk.read_text())
+    text = re.sub("LeftToeBase|RightToeBase", lambda m: f"x{len(m[0])}", walk_path.read_text())
     path = tmp_path / "odd.bvh"
     path.write_text(text)
     clip = load(path)
@@ -158,10 +151,10 @@ def test_roles_that_are_unsure_are_listed(tmp_path: Path, walk: Path) -> None:
     assert dict(listed) == {n: f"{100 * c:.0f}" for n, c in sure.items() if c < 0.8}
 
 
-def test_nothing_is_overwritten(walk: Path, tmp_path: Path) -> None:
+def test_nothing_is_overwritten(walk_path: Path, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
-    assert run(["inspect", str(walk), "--html", str(page)]) == 0
+    assert run(["inspect", str(walk_path), "--html", str(page)]) == 0
     assert "<title>walker_walk</title>" in page.read_text()
-    assert run(["inspect", str(walk), "--html", str(page)]) == 2
-    assert run(["inspect", str(walk), "--html", str(walk), "--force"]) == 2
-    assert run(["inspect", str(walk), str(walk), "--html", str(page), "--force"]) == 2
+    assert run(["inspect", str(walk_path), "--html", str(page)]) == 2
+    assert run(["inspect", str(walk_path), "--html", str(walk_path), "--force"]) == 2
+    assert run(["inspect", str(walk_path), str(walk_path), "--html", str(page), "--force"]) == 2

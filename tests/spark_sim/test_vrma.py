@@ -23,15 +23,6 @@ from tests.helpers.vrm import avatar
 TIMES = (0.0, 0.4, 0.9)  # [s]
 
 
-@pytest.fixture(scope="module")
-def walk(tmp_path_factory: pytest.TempPathFactory) -> Clip:
-    folder = tmp_path_factory.mktemp("samples")
-    spark_sim.sample(folder)
-    clip = spark_sim.load(folder / "walker_walk.bvh")
-    assert isinstance(clip, Clip)
-    return clip.part(0.0, 1.0)
-
-
 def test_what_is_written_is_read_again(walk: Clip, tmp_path: Path) -> None:
     """Bones by VRM's names, in the T-pose at rest, each where it is in the motion."""
     back = spark_sim.load(walk.save(tmp_path / "walk.vrma"))

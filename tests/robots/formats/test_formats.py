@@ -26,6 +26,7 @@ from spark.files import write_atomically
 from spark_sim.clips import RobotClip
 from spark_sim.loading import load_robot_motion
 from tests.helpers.recordings import recordings
+from tests.helpers.robot_clips import all_over
 
 FPS, FRAMES = 30.0, 40
 
@@ -37,17 +38,7 @@ def robot() -> Morphology:
 
 @pytest.fixture(scope="module")
 def qpos(robot: Morphology) -> Float[np.ndarray, "T nq"]:
-    """A smooth motion all over the joints' ranges, the base turning over, MuJoCo's coordinates."""
-    model = robot.mjcf.model
-    t = np.linspace(0, 1, FRAMES)[:, None]
-    low, high = model.jnt_range[1:].T
-    phases = np.random.default_rng(3).uniform(0, 6, model.njnt - 1)
-    out = np.zeros((FRAMES, model.nq))
-    out[:, :3] = [0.3, -0.1, 0.8] + t * [1.0, 0.5, -0.2]
-    turn = Rotation.from_rotvec(t * [0.5, 0.8, 2.0]) * Rotation.from_euler("z", 0.4)
-    out[:, 3:7] = turn.as_quat(scalar_first=True)
-    out[:, 7:] = (low + high) / 2 + (high - low) / 2.1 * np.sin(1.2 * t + phases)
-    return out
+    return all_over(robot, FRAMES, 1.0)
 
 
 @pytest.fixture(scope="module")

@@ -15,13 +15,6 @@ from spark_sim.clips import AnyClip, RobotClip
 SAYING = ("npz", "csv", "csv-wxyz", "bones-seed", "gmr", "sonic")
 
 
-@pytest.fixture(scope="module")
-def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("walk")
-    spark_sim.sample(folder)
-    return folder / "walker_walk.bvh"
-
-
 def on_robot(source: AnyClip) -> RobotClip:
     made = spark_sim.retarget(source.resampled(50.0), "robot", method="copy")
     assert isinstance(made, RobotClip)
@@ -30,30 +23,30 @@ def on_robot(source: AnyClip) -> RobotClip:
 
 @pytest.mark.parametrize("format", SAYING)
 def test_a_motion_says_which_part_of_which_file_it_is(
-    format: str, walk: Path, tmp_path: Path
+    format: str, walk_path: Path, tmp_path: Path
 ) -> None:
-    sha256 = hashlib.sha256(walk.read_bytes()).hexdigest()
+    sha256 = hashlib.sha256(walk_path.read_bytes()).hexdigest()
     out = tmp_path / f"walk{FORMATS[format]}"
-    on_robot(spark_sim.load(walk).part(0.5, 1.0)).save(out, format=format)
+    on_robot(spark_sim.load(walk_path).part(0.5, 1.0)).save(out, format=format)
     found = made_from(out)
     assert found is not None
-    assert (found.name, found.sha256) == (walk.name, sha256)
+    assert (found.name, found.sha256) == (walk_path.name, sha256)
     assert found.part == pytest.approx((0.5, 1.0), abs=0.01)
-    assert found.is_of(walk)
+    assert found.is_of(walk_path)
     assert not found.is_of(out / "joint_pos.csv" if out.is_dir() else out)
 
 
-def test_all_of_a_file_is_no_part(walk: Path, tmp_path: Path) -> None:
-    clip = spark_sim.load(walk)
+def test_all_of_a_file_is_no_part(walk_path: Path, tmp_path: Path) -> None:
+    clip = spark_sim.load(walk_path)
     assert clip.part(0.0, 99.0).span is None
     on_robot(clip).save(tmp_path / "walk.npz")
     assert made_from(tmp_path / "walk.npz") == MadeFrom(
-        walk.name, hashlib.sha256(walk.read_bytes()).hexdigest()
+        walk_path.name, hashlib.sha256(walk_path.read_bytes()).hexdigest()
     )
 
 
-def test_a_part_of_a_part_is_told_in_the_file_s_own_time(walk: Path) -> None:
-    clip = spark_sim.load(walk)
+def test_a_part_of_a_part_is_told_in_the_file_s_own_time(walk_path: Path) -> None:
+    clip = spark_sim.load(walk_path)
     dt = clip.frame_time
     part = clip.part(10 * dt, 60 * dt).resampled(50.0).part(0.2, 0.4)
     assert part.span == pytest.approx((10 * dt + 0.2, 10 * dt + 0.4))

@@ -15,13 +15,12 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 import spark_sim
-from robots import registry
 from robots.formats import FORMATS, SIDECARS, SONIC_FILES, written_files
-from robots.model.morphology import Morphology
+from robots.model.known import known
 from robots.model.motion import RobotMotion
-from robots.model.understand import understand_robot
 from spark.errors import ConventionError, FileFormatError, OutputError, SparkSimError
 from spark_sim.clips import RobotClip
+from tests.helpers.robot_clips import all_over
 
 FPS, FRAMES = 50.0, 30
 
@@ -60,28 +59,21 @@ SONIC_BODIES = {
 }
 
 
-def moving(robot: Morphology) -> RobotClip:
+def moving(name: str) -> RobotClip:
     """A smooth motion all over the joints' ranges, the base turning over."""
-    model = robot.mjcf.model
-    t = np.linspace(0, 0.6, FRAMES)[:, None]
-    low, high = model.jnt_range[1:].T
-    phases = np.random.default_rng(3).uniform(0, 6, model.njnt - 1)
-    qpos = np.zeros((FRAMES, model.nq))
-    qpos[:, :3] = [0.3, -0.1, 0.8] + t * [1.0, 0.5, -0.2]
-    turn = Rotation.from_rotvec(t * [0.5, 0.8, 2.0]) * Rotation.from_euler("z", 0.4)
-    qpos[:, 3:7] = turn.as_quat(scalar_first=True)
-    qpos[:, 7:] = (low + high) / 2 + (high - low) / 2.1 * np.sin(1.2 * t + phases)
-    return RobotClip(RobotMotion(robot, robot.from_qpos(qpos), 1 / FPS), "clip")
+    robot = known(name)
+    q = robot.from_qpos(all_over(robot, FRAMES, 0.6))
+    return RobotClip(RobotMotion(robot, q, 1 / FPS), "clip")
 
 
 @pytest.fixture(scope="module")
 def clip() -> RobotClip:
-    return moving(understand_robot(registry.find("robot")))
+    return moving("robot")
 
 
 @pytest.fixture(scope="module")
 def g1() -> RobotClip:
-    return moving(understand_robot(registry.find("unitree_g1")))
+    return moving("unitree_g1")
 
 
 def model_of(clip: RobotClip) -> mujoco.MjModel:

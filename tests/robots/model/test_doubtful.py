@@ -18,7 +18,7 @@ DOUBTS = "beyond two turns|hardly turn|equally long|not above 0 kg"
 
 
 @pytest.fixture
-def ember() -> str:
+def model() -> str:
     return registry.find("robot").read_text()
 
 
@@ -44,8 +44,8 @@ def with_raised_arms(text: str) -> str:
     )
 
 
-def test_degrees_that_are_read_as_radians_are_said(ember: str, tmp_path: Path) -> None:
-    degrees = with_ranges(ember, lambda angle: float(np.degrees(angle)))
+def test_degrees_that_are_read_as_radians_are_said(model: str, tmp_path: Path) -> None:
+    degrees = with_ranges(model, lambda angle: float(np.degrees(angle)))
     (note,) = doubts(tmp_path, degrees)
     assert "29 of 29 hinges go beyond two turns ('left_shoulder_pitch' the most, to 171.9" in note
     assert 'set <compiler angle="degree"/>' in note
@@ -62,15 +62,15 @@ def test_degrees_in_a_urdf_are_said(tmp_path: Path) -> None:
     assert "in degrees, and a URDF's are radians; convert them" in note
 
 
-def test_one_range_without_end_is_no_other_unit(ember: str, tmp_path: Path) -> None:
-    (note,) = doubts(tmp_path, ember.replace('range="-0.05 2.5"', 'range="-100 100"', 1))
+def test_one_range_without_end_is_no_other_unit(model: str, tmp_path: Path) -> None:
+    (note,) = doubts(tmp_path, model.replace('range="-0.05 2.5"', 'range="-100 100"', 1))
     assert note.startswith("by their limits 1 of 29 hinges go beyond two turns ('left_knee'")
     assert note.endswith("check their ranges in the file")
 
 
-def test_radians_that_are_read_as_degrees_are_said(ember: str, tmp_path: Path) -> None:
+def test_radians_that_are_read_as_degrees_are_said(model: str, tmp_path: Path) -> None:
     """Where the arms hang at zero, that is also why they can't be raised for a T-pose."""
-    tiny = ember.replace('angle="radian"', 'angle="degree"')
+    tiny = model.replace('angle="radian"', 'angle="degree"')
     with pytest.raises(SkeletonError, match=r"forbid a T-pose.*29 of 29 hinges hardly turn"):
         doubts(tmp_path, tiny)
     (note,) = doubts(tmp_path, with_raised_arms(tiny))
@@ -78,12 +78,12 @@ def test_radians_that_are_read_as_degrees_are_said(ember: str, tmp_path: Path) -
     assert 'set <compiler angle="radian"/>' in note
 
 
-def test_a_robot_whose_hinges_are_held_is_no_other_unit(ember: str, tmp_path: Path) -> None:
+def test_a_robot_whose_hinges_are_held_is_no_other_unit(model: str, tmp_path: Path) -> None:
     """But for its legs, as who trains a walk holds the rest."""
     held = re.sub(
         r'(name="\w*(?:shoulder|elbow|wrist|waist)\w*"\s+axis="[^"]*"\s+range=)"[^"]*"',
         r'\1"-1e-6 1e-6"',
-        with_raised_arms(ember),
+        with_raised_arms(model),
     )
     assert held.count("1e-6 1e-6") == 17
     assert not doubts(tmp_path, held)
@@ -97,9 +97,9 @@ def test_a_robot_whose_hinges_are_held_is_no_other_unit(ember: str, tmp_path: Pa
     ],
 )
 def test_a_bone_that_is_shorter_than_the_other_side_s_is_said(
-    body: str, said: str, ember: str, tmp_path: Path
+    body: str, said: str, model: str, tmp_path: Path
 ) -> None:
-    short = ember.replace(
+    short = model.replace(
         f'<body name="{body}" pos="0 0 -0.32"', f'<body name="{body}" pos="0 0 -0.28"'
     )
     (note,) = doubts(tmp_path, short)
@@ -118,16 +118,16 @@ KNEE = '<joint class="leg" name="left_knee"'
     ],
 )
 def test_a_mass_below_zero_is_refused(
-    given: str, said: str, bound: str, ember: str, tmp_path: Path
+    given: str, said: str, bound: str, model: str, tmp_path: Path
 ) -> None:
     """Also where the file has MuJoCo lift it."""
-    text = ember.replace(KNEE, f'<inertial pos="0 0 0" {given}/>{KNEE}')
+    text = model.replace(KNEE, f'<inertial pos="0 0 0" {given}/>{KNEE}')
     with pytest.raises(FileFormatError, match=f"body 'left_shin': its <inertial> {said}"):
         doubts(tmp_path, text.replace("<compiler ", f"<compiler {bound} "))
 
 
-def test_bodies_that_move_without_mass_are_named(ember: str, tmp_path: Path) -> None:
-    text = ember.replace(KNEE, f'<inertial pos="0 0 0" mass="0" diaginertia="0 0 0"/>{KNEE}')
+def test_bodies_that_move_without_mass_are_named(model: str, tmp_path: Path) -> None:
+    text = model.replace(KNEE, f'<inertial pos="0 0 0" mass="0" diaginertia="0 0 0"/>{KNEE}')
     (tmp_path / "robot.xml").write_text(text)
     (note,) = understand_robot(tmp_path / "robot.xml").notes
     assert note == "some bodies move without mass, and get next to none: 'left_shin'"

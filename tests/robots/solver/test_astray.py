@@ -8,7 +8,6 @@ import pytest
 
 from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
-from robots.registry import find
 from robots.solver.astray import led_back
 from robots.solver.block import blocks_of
 from robots.solver.holds import Holds
@@ -22,15 +21,9 @@ from spark.demo.sample import sample_rig
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec
 from spark.transfer.canonical import CanonicalMotion, at_frame_time
-from spark_sim.loading import load_robot
 
 FRAME_TIME = 1 / 20
 ARMS = [Role(f"{side}_{part}") for side in ("left", "right") for part in ("upper_arm", "forearm")]
-
-
-@pytest.fixture(scope="module")
-def ember() -> Morphology:
-    return load_robot(find("robot")).on_robot.robot
 
 
 @pytest.fixture(scope="module")

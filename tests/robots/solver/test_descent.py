@@ -6,7 +6,6 @@ import pytest
 
 from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
-from robots.registry import find
 from robots.solver.block import blocks_of
 from robots.solver.descent import solve_block
 from robots.solver.footprints import points_of
@@ -18,15 +17,9 @@ from robots.solver.targets import targets_of
 from robots.tree import Coordinates
 from spark.demo.sample import sample_rig
 from spark.transfer.canonical import CanonicalMotion
-from spark_sim.loading import load_robot
 
 COUNT = 120
 HOVERING = slice(70, COUNT)
-
-
-@pytest.fixture(scope="module")
-def ember() -> Morphology:
-    return load_robot(find("robot")).on_robot.robot
 
 
 def standing() -> CanonicalMotion:

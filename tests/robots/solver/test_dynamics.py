@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from robots.kinematics import forward_kinematics
-from robots.model.known import known
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.solver.com_plan import plan_com
@@ -21,11 +20,6 @@ from spark.demo.sample import sample_motion, sample_rig
 from spark.transfer.canonical import to_canonical
 
 FRAME_TIME = 1 / 60
-
-
-@pytest.fixture(scope="module")
-def ember() -> Morphology:
-    return known("robot")
 
 
 @pytest.fixture(scope="module")

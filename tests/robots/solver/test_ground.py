@@ -1,10 +1,8 @@
 """A robot on what its source climbs."""
 
 import numpy as np
-import pytest
 
 from robots.model.morphology import Morphology
-from robots.registry import find
 from robots.solver.ground import under_soles
 from robots.solver.solve import retarget
 from sim.report.assess import assess
@@ -12,13 +10,7 @@ from sim.trajectory import Subject
 from spark.kinematics import forward
 from spark.rig.feet import sole_positions
 from spark.transfer.canonical import from_canonical
-from spark_sim.loading import load_robot
 from tests.helpers.box import BOX, RIG, onto_box
-
-
-@pytest.fixture(scope="module")
-def ember() -> Morphology:
-    return load_robot(find("robot")).on_robot.robot
 
 
 def test_its_feet_stand_as_high_for_its_size(ember: Morphology) -> None:

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from robots.model.morphology import Morphology
-from robots.registry import find
 from robots.solver.block import Block, blocks_of
 from robots.solver.holds import Holds
 from robots.solver.marching import abrupt, calmed
@@ -20,14 +19,8 @@ from spark.kinematics import forward
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec
 from spark.transfer.canonical import CanonicalMotion
-from spark_sim.loading import load_robot
 
 FRAME_TIME = 1 / 30
-
-
-@pytest.fixture(scope="module")
-def ember() -> Morphology:
-    return load_robot(find("robot")).on_robot.robot
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,6 @@ from robots.kinematics import forward_kinematics
 from robots.metrics import measure
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
-from robots.registry import find
 from robots.solver.footprints import plan_feet
 from robots.solver.resting import leans, resting
 from robots.solver.solve import copy, retarget
@@ -25,18 +24,12 @@ from spark.transfer.canonical import (
     from_canonical,
     to_canonical,
 )
-from spark_sim.loading import load_robot
 from tests.helpers.ember import changed_ember
 from tests.helpers.poses import limb_error
 
 KNEES = (Role.LEFT_LOWER_LEG, Role.RIGHT_LOWER_LEG)
 HANDS = (Role.LEFT_HAND, Role.RIGHT_HAND)
 COUNT = 90
-
-
-@pytest.fixture(scope="module")
-def ember() -> Morphology:
-    return load_robot(find("robot")).on_robot.robot
 
 
 def turn(x: float = 0.0, y: float = 0.0) -> np.ndarray:

@@ -5,7 +5,6 @@ import pytest
 
 from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
-from robots.registry import find
 from robots.solver import solve
 from robots.solver.holds import Holds
 from robots.solver.self_touch import on_itself, palm_of
@@ -13,13 +12,7 @@ from robots.solver.targets import targets_of
 from robots.tree import Coordinates
 from spark.rig.flesh import RADII
 from spark.rig.roles import Role
-from spark_sim.loading import load_robot
 from tests.helpers.touching import FRAME_TIME, HANDS_ON_HIPS, SIDES, standing, still
-
-
-@pytest.fixture(scope="module")
-def ember() -> Morphology:
-    return load_robot(find("robot")).on_robot.robot
 
 
 def from_flanks(robot: Morphology, q: Coordinates) -> np.ndarray:

@@ -51,11 +51,6 @@ from tests.helpers.recordings import recording
 
 
 @pytest.fixture(scope="module")
-def ember() -> Morphology:
-    return load_robot(find("robot")).on_robot.robot
-
-
-@pytest.fixture(scope="module")
 def walk() -> CanonicalMotion:
     rig = sample_rig("walker")
     return to_canonical(sample_motion("walk", rig, 60.0), rig)

@@ -71,13 +71,6 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def walk_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("samples")
-    spark_sim.sample(folder)
-    return folder / "walker_walk.bvh"
-
-
-@pytest.fixture(scope="module")
 def walk(walk_path: Path) -> spark_sim.Clip:
     clip = spark_sim.load(walk_path)
     assert isinstance(clip, spark_sim.Clip)

@@ -7,19 +7,12 @@ import pytest
 
 from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
-from robots.registry import find
 from robots.solver.floor import solids_over_floor
 from robots.solver.touching import touches_of
 from robots.tree import Coordinates
 from spark.rig.roles import Role
 from spark.rotation import quat_from_rotvec, quat_mul, quat_rotate
-from spark_sim.loading import load_robot
 from tests.helpers.ember import changed_ember
-
-
-@pytest.fixture(scope="module")
-def ember() -> Morphology:
-    return load_robot(find("robot")).on_robot.robot
 
 
 def links_of(robot: Morphology, role: Role) -> set[int]:

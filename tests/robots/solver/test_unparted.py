@@ -5,19 +5,12 @@ import numpy as np
 import pytest
 
 from robots.model.morphology import Morphology
-from robots.registry import find
 from robots.solver import solve
 from robots.solver.unparted import unparted
 from robots.tree import Coordinates
 from scripts.robot_memory import pacing
-from spark_sim.loading import load_robot
 
 FRAMES = slice(4, 11)
-
-
-@pytest.fixture(scope="module")
-def ember() -> Morphology:
-    return load_robot(find("robot")).on_robot.robot
 
 
 def with_arms_in(robot: Morphology, q: Coordinates) -> Coordinates:

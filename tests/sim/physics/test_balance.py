@@ -8,7 +8,6 @@ import pytest
 
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
-from robots.registry import find
 from robots.solver.solve import retarget
 from sim.physics.balance import beforehand
 from sim.physics.servos import servo_model, servo_spec
@@ -18,15 +17,9 @@ from sim.report.assess import assess
 from sim.trajectory import Subject
 from spark.demo.sample import sample_motion, sample_rig
 from spark.transfer.canonical import to_canonical
-from spark_sim.loading import load_robot
 
 FPS = 60.0
 SECONDS = 1.4  # of a walk: servos alone let Ember fall before that
-
-
-@pytest.fixture(scope="module")
-def ember() -> Morphology:
-    return load_robot(find("robot")).on_robot.robot
 
 
 @pytest.fixture(scope="module")

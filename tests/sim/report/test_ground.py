@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robots.model.known import known
 from robots.model.morphology import Morphology
 from robots.solver.solve import retarget
 from sim.report import Subject, assess
@@ -17,11 +16,6 @@ from spark.transfer.treads import treads_of
 from tests.helpers.sitting import RIG, SITS, sitting
 
 SOURCE = sitting()
-
-
-@pytest.fixture(scope="module")
-def ember() -> Morphology:
-    return known("robot")
 
 
 def test_beside_its_source_who_sits_is_in_balance(ember: Morphology) -> None:

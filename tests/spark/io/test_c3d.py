@@ -35,15 +35,6 @@ ROLES = {
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def walk(tmp_path_factory: pytest.TempPathFactory) -> Clip:
-    folder = tmp_path_factory.mktemp("samples")
-    spark_sim.sample(folder)
-    clip = spark_sim.load(folder / "walker_walk.bvh")
-    assert isinstance(clip, Clip)
-    return clip.part(0.0, 1.0)
-
-
 def joints_of(clip: Clip) -> dict[str, np.ndarray]:
     """The places [m] of the joints that C3Ds have, by SMPL's names."""
     positions, _ = forward(clip.motion)

@@ -21,15 +21,6 @@ from tests.helpers.gltf import animated
 from tests.helpers.stick import stick_rig
 
 
-@pytest.fixture(scope="module")
-def walk(tmp_path_factory: pytest.TempPathFactory) -> Clip:
-    folder = tmp_path_factory.mktemp("samples")
-    spark_sim.sample(folder)
-    clip = spark_sim.load(folder / "walker_walk.bvh")
-    assert isinstance(clip, Clip)
-    return clip.part(0.0, 1.0)
-
-
 def parts(path: Path) -> tuple[dict[str, Any], bytes]:
     data = path.read_bytes()
     magic, version, length = struct.unpack_from("<4sII", data)

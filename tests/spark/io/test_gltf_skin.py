@@ -33,15 +33,6 @@ def seen(clip: Clip, skin: Skin) -> Any:
     return skinned(skin, clip.motion.skeleton, *forward(clip.motion))
 
 
-@pytest.fixture(scope="module")
-def walk(tmp_path_factory: pytest.TempPathFactory) -> Clip:
-    folder = tmp_path_factory.mktemp("samples")
-    spark_sim.sample(folder)
-    clip = spark_sim.load(folder / "walker_walk.bvh")
-    assert isinstance(clip, Clip)
-    return clip.part(0.0, 1.0)
-
-
 # What three.js 0.160 gives for these vertices (SkinnedMesh.getVertexPosition, matrixWorld): mesh,
 # vertex, and glTF's x, y, z [m] at 0 and 0.5 s.
 THREE = [

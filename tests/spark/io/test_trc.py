@@ -16,15 +16,6 @@ from spark_sim import Clip
 from tests.helpers.trc import HALPE, trc_text
 
 
-@pytest.fixture(scope="module")
-def walk(tmp_path_factory: pytest.TempPathFactory) -> Clip:
-    folder = tmp_path_factory.mktemp("samples")
-    spark_sim.sample(folder)
-    clip = spark_sim.load(folder / "walker_walk.bvh")
-    assert isinstance(clip, Clip)
-    return clip.part(0.0, 1.0)
-
-
 def places_of(clip: Clip) -> np.ndarray:
     """Where the joints are [m] that HALPE names, Z up."""
     positions, _ = forward(clip.motion)
