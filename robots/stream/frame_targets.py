@@ -117,14 +117,14 @@ class FrameReader:
         self.bones, self.parts = self._follower.bones, self._follower.parts
         self.has_feet, self.hands = self._follower.has_feet, self._follower.hands
 
-    def targets(self, frame: Frame) -> FrameTargets:
-        """The targets that a frame sets for the robot.
+    def targets(self, frame: Frame, rolls: Sequence[float] = ()) -> FrameTargets:
+        """The targets that a frame sets for the robot, whose feet are rolled so far [rad].
 
         Raises `FrameError` where it is not a frame of the source's skeleton.
         """
         world, joints = self._world(frame)
         points = self._follower.of(world, joints)
-        copied = self._copier.of(world, joints, points)
+        copied = self._copier.of(world, joints, points, rolls)
         return FrameTargets(
             world=copied.world,
             chest=copied.chest,

@@ -1,0 +1,42 @@
+"""Soles that are level from side to side, as far as can be seen.
+
+A skeleton's foot is rolled against its rest pose (`robots.solver.level_feet`). Of a clip the median
+roll of the frames in which it stands flat is taken out of all; of a stream the mean of those that
+have come.
+"""
+
+from collections.abc import Sequence
+from math import atan2
+
+import numpy as np
+from jaxtyping import Float
+
+from robots.model.morphology import Morphology
+from spark.rotation import matrix_from_quat
+
+_FEWEST, _MOST = 0.1, 4.0  # [s] of standing that count: a first frame says little, old ones fade
+
+
+class LevelSoles:
+    """By how much the feet of a robot are to be rolled; frames are `frame_time` [s] apart."""
+
+    def __init__(self, robot: Morphology, frame_time: float) -> None:
+        self._frame_time = frame_time
+        self._feet = [sole.foot for sole in robot.soles]
+        self._left_up = [matrix_from_quat(robot.rig.tpose[j]).T[:, 1:] for j in self._feet]
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what has been seen."""
+        self._stood = [0.0] * len(self._feet)
+        self.rolls = [0.0] * len(self._feet)
+        """How far each foot is rolled [rad] about its own axis, so that it is level."""
+
+    def follow(self, world: Float[np.ndarray, "J 3 3"], flat: Sequence[bool]) -> None:
+        """Take in a frame in which some feet stand `flat`, and the joints of the robot's rig, its
+        feet rolled, are turned by `world` (`R_world_joint`)."""
+        for s in (s for s, stands in enumerate(flat) if stands):
+            left, up = (world[self._feet[s], 2] @ self._left_up[s]).tolist()
+            self._stood[s] = min(self._stood[s] + self._frame_time, _MOST)
+            share = self._frame_time / max(self._stood[s], _FEWEST)
+            self.rolls[s] -= share * atan2(left, up)
