@@ -17,9 +17,10 @@ from robots.solver.candidates import Candidate
 from robots.solver.collision import collisions_of
 from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.floor import add_floor
+from robots.solver.hands import wrist_links
 from robots.solver.holds import Holds
 from robots.solver.link_terms import LinkTerms
-from robots.solver.targets import Targets, wrist_links
+from robots.solver.targets import Targets
 from robots.solver.weights import (
     FLOOR_ROUNDING,
     HANDS_RANGE,

@@ -6,11 +6,10 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
-from robots.model.shapes import surface
 from robots.solver.contacts import has_feet, schedule, touching_joint
 from robots.solver.ground import Climb, level_climb, under_soles
+from robots.solver.hands import between_hands
 from robots.solver.haste import limb_jerks
 from robots.solver.level_feet import level_across
 from robots.solver.palms import laid, resting_palms
@@ -23,7 +22,6 @@ from spark.rig.roles import HANDS, Role
 from spark.rotation import matrix_from_quat, quat_mul
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
-from spark.transfer.hand_touch import arm_length
 from spark.transfer.noise import Noise
 from spark.transfer.self_touch import SelfTouch, self_touches
 
@@ -172,7 +170,7 @@ def targets_of(
         ground=scale * own_ground.ground,
         floor=scale * own_ground.floor,
         seats=scale * climb.seats,
-        hands=_between_hands(rig, positions, robot),
+        hands=between_hands(rig, positions, robot),
         self_touches=self_touches(source, dict(enumerate(positions.swapaxes(0, 1))), robot.rig),
         notes=(*notes, HOVERS) if has_feet(paths).any() and touches.hovers else notes,
     )
@@ -221,38 +219,6 @@ def for_soles(
         if sole.side in sides:
             out[:, s] = values[:, sides[sole.side]]
     return out
-
-
-def _between_hands(
-    rig: Rig, positions: Float[np.ndarray, "T J 3"], robot: Morphology
-) -> Float[np.ndarray, "T 3"] | None:
-    """From the right hand to the left, in the robot's arm lengths, and no nearer than its palms
-    allow; None where a hand is missing."""
-    hands = [rig.roles.joint(role) for role in HANDS]
-    if None in hands or None in [robot.rig.roles.joint(role) for role in HANDS]:
-        return None
-    scale = arm_length(robot.rig) / arm_length(rig)
-    between = scale * (positions[:, hands[0]] - positions[:, hands[1]])
-    distance = np.linalg.norm(between, axis=1, keepdims=True)
-    least = sum(palm_thickness(robot, role) for role in HANDS)
-    return between * (np.maximum(distance, least) / np.maximum(distance, 1e-9))
-
-
-def palm_thickness(robot: Morphology, role: Role) -> float:
-    """How far [m] a hand reaches below its wrist's centre in the T-pose, where palms look down."""
-    j = robot.rig.roles.require(role)
-    link = int(robot.links[j])
-    body = int(robot.mjcf.model.jnt_bodyid[robot.mj_joints[link]])
-    points = surface(robot.mjcf, [body]) - robot.centers[j]
-    down = -forward_kinematics(robot.tree, robot.tpose).rotations[link][2, :, 0]
-    return float(np.max(points @ down, initial=0.0))
-
-
-def wrist_links(robot: Morphology) -> list[int]:
-    """The links that carry the wrists of a robot that has two: its forearms. A wrist's axes may lie
-    apart, and what brings hands together is the arms."""
-    rig = robot.rig
-    return [int(robot.links[rig.skeleton.parents[rig.roles.require(role)]]) for role in HANDS]
 
 
 def with_firm_hands(robot: Morphology, targets: Targets) -> Targets:

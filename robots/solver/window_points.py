@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from robots.kinematics import skew
 from robots.model.morphology import Morphology
-from robots.solver.targets import wrist_links
+from robots.solver.hands import wrist_links
 from robots.solver.weights import (
     HANDS_RANGE,
     W_HANDS,

@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 from robots.model.morphology import Morphology
 from robots.solver.contacts import MAY_TOUCH, touching_joint
-from robots.solver.targets import palm_thickness
+from robots.solver.hands import palm_thickness
 from robots.solver.touching import touches_of
 from robots.solver.trunk import THIGHS
 from robots.stream.carried_points import carriers, place, row
