@@ -22,7 +22,7 @@ from robots.solver.block import Block
 from robots.solver.holds import Holds
 from robots.solver.spells import Spells
 from robots.solver.targets import Targets
-from robots.solver.ways import along, between, hinges_of, taken
+from robots.solver.ways import along, between, taken
 from robots.solver.window_targets import PointTargets, PoseTargets, pose_targets
 from robots.solver.window_terms import Terms
 from robots.tree import Coordinates
@@ -34,8 +34,6 @@ _MAX_RATIO = 2.0  # of a limb's to the source's, and beyond that
 _MAX_EXCESS = 10.0  # [rad/s²], that is abrupt
 _AROUND = 1.0  # [s] before and after such frames that are marched through,
 _BETWEEN = 4.0  # [s] and between: what throws arms onto another way may hide until they return
-_ELSEWHERE = 1.0  # [rad] of a hinge from where another way has it,
-_FURTHER = 2.0  # [s] that it is then followed on
 # In the first frame, from the T-pose, in each that is marched through, and in those between.
 _FIRST_STEPS, _STEPS, _BETWEEN_STEPS = 60, 3, 2
 _INTERVAL = 0.1  # [s] between the frames that are marched through; the others follow together
@@ -82,44 +80,17 @@ def calmed(
 
     In each spell of such frames, which goes on between two that are less than `_BETWEEN` apart, the
     cheapest path is taken through three ways: `q`, and the block's joints marched forth and back.
-    Where one of these comes to an end on another way than `q`, it is marched on: what throws limbs
-    back may be no throw itself.
     """
     around = max(1, round(_AROUND / targets.frame_time))
     near = binary_dilation(thrown, np.ones(2 * around + 1, dtype=bool))
-    q, elsewhere = _calmed(robot, targets, holds, q, block, near)
-    if elsewhere.any():
-        q, _ = _calmed(robot, targets, holds, q, block, elsewhere)
-    return q
-
-
-def _calmed(
-    robot: Morphology,
-    targets: Targets,
-    holds: Holds,
-    q: Coordinates,
-    block: Block,
-    near: Bool[np.ndarray, "T"],
-) -> tuple[Coordinates, Bool[np.ndarray, "T"]]:
-    """The same in some frames; and those around which to march on."""
     runs = true_runs(near, round(_BETWEEN / targets.frame_time))
-    spells = Spells(np.array([stop - start for start, stop in runs], dtype=int))
+    spells = Spells(np.array([stop - start for start, stop in runs]))
     frames = np.concatenate([np.arange(start, stop) for start, stop in runs])
     led = [(start > 0, stop < len(q)) for start, stop in runs]
-    own_targets, own_holds = targets.at(frames), holds.at(frames)
-    part = q.at(frames)
-    ways = [part, *_marched(robot, own_targets, part, block, spells, led)]
-    on = taken(robot, own_targets, own_holds, ways, block, spells, led)
-    calm = along(robot, ways, on, block, spells, targets.frame_time)
-    hinges = hinges_of(robot, block)
-    away = [np.abs(way.angles - part.angles)[:, hinges].max(axis=1) > _ELSEWHERE for way in ways]
-    further, elsewhere = round(_FURTHER / targets.frame_time), np.zeros(len(q), dtype=bool)
-    for own, (start, stop), ends in zip(spells.slices(), runs, led, strict=True):
-        before = ends[0] and away[2][own][0]
-        after = ends[1] and away[1][own][-1]
-        if before or after:
-            elsewhere[max(0, start - further * before) : stop + further * after] = True
-    return q.replaced(frames, calm), elsewhere
+    targets, holds, part = targets.at(frames), holds.at(frames), q.at(frames)
+    ways = [part, *_marched(robot, targets, part, block, spells, led)]
+    on = taken(robot, targets, holds, ways, block, spells, led)
+    return q.replaced(frames, along(robot, ways, on, block, spells, targets.frame_time))
 
 
 def _marched(
