@@ -3,25 +3,23 @@
 Collisions, the floor and the speed of hinges are soft penalties to the solver: other residuals may
 outweigh them. The frames around a violation are solved again with penalties that grow round by
 round (a penalty method: Nocedal and Wright, "Numerical Optimization", 17.1): in the first with
-approximate shapes, which suffices for most, then with MuJoCo's. Arms that are stuck in something
-are led out of it.
+approximate shapes, which suffices for most, then with MuJoCo's.
 """
 
 from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Int
-from scipy.ndimage import binary_dilation, maximum_filter1d
+from scipy.ndimage import binary_dilation
 
 from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.collision import collisions_of
-from robots.solver.descent import collision_stride, smooth_lower_envelope
+from robots.solver.descent import collision_stride
 from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.floor import depth_in_floor
 from robots.solver.footprints import points_of
-from robots.solver.hinges import LIMIT_CLEARANCE
 from robots.solver.holds import Holds
 from robots.solver.hulls import MAX_PROTRUSION
 from robots.solver.objective import linearize
@@ -34,7 +32,6 @@ from spark.runs import true_runs
 
 _MAX_ROUNDS = 4
 PENALTY_GROWTH = 3.0  # from round to round, of the penalties' weights
-_LEAD_OUT_ROUND = 3  # the round before which arms are led out of what they are stuck in
 _AROUND = 0.4  # [s] before and after a violation that are solved again,
 _AROUND_LEFT = 0.8  # and around what a round leaves of a spell that it has made better
 _MAX_JERK_RATIO = 5.0  # jerk, over the one from which hinges are smoothed, that is a violation
@@ -94,8 +91,6 @@ def _repaired(broken: Repair) -> Coordinates:
         before = spells.of_frames[kept][broken.spells.starts]
         least = np.where(better[before], broken.spells.total(costs[kept]), least[before])
         frames, violated = frames[kept], violated[kept]
-        if k == _LEAD_OUT_ROUND and not block.base:
-            broken = _led_out(broken, violated)
         q = solve_spells(broken)
         growth = np.where(broken.spells.any(violated), PENALTY_GROWTH, 1.0)
         penalty_scale = broken.penalty_scale * growth[broken.spells.of_frames]
@@ -132,28 +127,6 @@ def _around(
 ) -> Bool[np.ndarray, "T"]:
     """Where it holds, and so long before and after that."""
     return binary_dilation(mask, np.ones(2 * max(2, round(seconds / frame_time)) + 1, dtype=bool))
-
-
-def _led_out(broken: Repair, violated: Bool[np.ndarray, "T"]) -> Repair:
-    """The same from where the block's hinges are as in the T-pose where there are violations, and
-    on the way there and back between: out in the open, from where descent finds another way."""
-    robot, q = broken.robot, broken.start
-    share = np.zeros(len(q))
-    for own in broken.spells.slices():
-        at = np.flatnonzero(violated[own]).tolist()
-        if not at:
-            continue
-        count = max(1, at[0], own.stop - own.start - 1 - at[-1])
-        window = 2 * max(1, count // 2) + 1
-        untouched = 1.0 - maximum_filter1d(violated[own].astype(np.float64), 3)
-        share[own] = 1.0 - smooth_lower_envelope(untouched, window)
-    share[broken.fixed] = 0.0
-    joints = [j for j in broken.block.joints if not robot.tree.balls[j]]
-    angles = q.angles.copy()
-    rest = robot.tpose.angles[0, joints]
-    angles[:, joints] += share[:, None] * (rest - angles[:, joints])
-    led = Coordinates(q.pos, q.quat, angles, q.ball_quats)
-    return replace(broken, start=led.clipped(robot.tree, LIMIT_CLEARANCE))
 
 
 def too_jerky(
