@@ -16,6 +16,7 @@ from scipy.linalg import solveh_banded
 from robots.coupling import Smoothness
 
 _HELD = 1e8  # damping that keeps a dof where it is: far above any weight squared
+_NO_ROOM = 1e-9  # [rad, m]
 
 
 class NormalEquations:
@@ -130,20 +131,19 @@ class NormalEquations:
         self,
         smoothness: Smoothness,
         damping: Float[np.ndarray, "T"],
-        at_limits: Float[np.ndarray, "T D"],
+        room: Float[np.ndarray, "2 T D"],
         *,
         solves: int = 1,
-        room: Float[np.ndarray, "2 T D"] | None = None,
     ) -> Float[np.ndarray, "T D"]:
         """The Gauss-Newton step of all frames together, `smoothness` included; `damping` is added
-        to H's diagonal. Dofs that stand at their upper (`at_limits` +1) or lower limit (-1) do not
-        move where the gradient would take them beyond it; nor, in more than one of the `solves`,
-        where the step before would. Given the least and the largest step of each dof, its `room`,
-        those that would go farther in the solve before stop there, and the others step beside
-        them: if they were only clipped after it, what others do in their turn would be in vain."""
+        to H's diagonal. `room` is the least and the largest step of each dof. Those without any do
+        not move where the gradient would take them beyond it; and in each of the `solves` after the
+        first, those that would go farther in the one before stop at its end, and the others step
+        beside them: if they were only clipped after it, what others do in their turn would be in
+        vain."""
         T, D = self.g.shape
         band, g = smoothness.band(self.H), self.g + smoothness.gradient(T)
-        held = at_limits * g < 0
+        held = ((room[1] <= _NO_ROOM) & (g < 0)) | ((room[0] >= -_NO_ROOM) & (g > 0))
         diagonal, asked = band[..., 0].copy(), np.where(held, 0.0, g)
         for k in range(solves):
             band[..., 0] = diagonal + np.where(held, _HELD, damping[:, None])
@@ -154,8 +154,8 @@ class NormalEquations:
                 overwrite_ab=k == solves - 1,
                 check_finite=False,
             ).reshape(T, D)
-            stops = np.zeros_like(step) if room is None else np.clip(step, *room)
-            beyond = ~held & (at_limits * step > 0 if room is None else step != stops)
+            stops = np.clip(step, *room)
+            beyond = ~held & (step != stops)
             if not beyond.any():
                 break
             held |= beyond

@@ -113,12 +113,9 @@ def solve_block(
         stiffening = np.maximum(stiffening, jerky)
         coupling = smoothness_at(q, True)
         cost = uniform_filter1d(normal.cost + coupling.cost(len(q)), window)
-        limits = q.at_limits(tree, LIMIT_CLEARANCE)[:, block.dofs]
+        room = q.room(tree, LIMIT_CLEARANCE)[..., block.dofs]
         step = np.zeros((len(q), tree.nv))
-        room = q.room(tree, LIMIT_CLEARANCE)[..., block.dofs] if solves > 1 else None
-        step[:, block.dofs] = normal.solve_coupled(
-            coupling, damping, limits, solves=solves, room=room
-        )
+        step[:, block.dofs] = normal.solve_coupled(coupling, damping, room, solves=solves)
         share = np.minimum(1.0, MAX_STEP / np.maximum(np.abs(step).max(1), 1e-9))
         step *= smooth_lower_envelope(share, window)[:, None]
         trial, is_last = taken(step), k == max_iter - 1

@@ -124,9 +124,9 @@ def solve_spells(broken: Repair) -> Coordinates:
         stiffening = np.maximum(stiffening, broken.stiffening(q))
         coupling = broken.smoothness(q, stiffening, True)
         cost = spells.total(normal.cost + coupling.cost(len(q)))
-        limits = q.at_limits(tree, LIMIT_CLEARANCE)[:, dofs]
+        room = q.room(tree, LIMIT_CLEARANCE)[..., dofs]
         step = np.zeros((len(q), tree.nv))
-        step[:, dofs] = normal.solve_coupled(coupling, damping, limits, solves=_MAX_SOLVES)
+        step[:, dofs] = normal.solve_coupled(coupling, damping, room, solves=_MAX_SOLVES)
         shortening = np.minimum(1.0, MAX_STEP / np.maximum(np.abs(step).max(1), 1e-9))
         step *= spells.each(lambda own: smooth_lower_envelope(own, window), shortening)[:, None]
         trial = q.integrated(tree, step).clipped(tree, LIMIT_CLEARANCE)

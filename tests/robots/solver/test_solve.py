@@ -130,6 +130,11 @@ def test_the_gradient_is_that_of_the_cost(
         np.testing.assert_allclose(normal.g[:, k], slope, rtol=1e-4, atol=1e-5)
 
 
+def anywhere(frames: int, dofs: int) -> np.ndarray:
+    """Room without end for any step: [2 T D]."""
+    return np.stack([np.full((frames, dofs), -np.inf), np.full((frames, dofs), np.inf)])
+
+
 def test_frames_are_tied_as_by_one_large_matrix() -> None:
     rng = np.random.default_rng(1)
     T, D = 7, 3
@@ -138,7 +143,7 @@ def test_frames_are_tied_as_by_one_large_matrix() -> None:
     normal.add([0, 1, 2], J, rng.normal(size=(5, T)))
     smooth, values = rng.uniform(1, 2, (T - 2, D)), rng.normal(size=(T, D))
     ties = Smoothness(smooth, second_differences(values), np.ones((T - 1, 1)), np.zeros((T - 1, D)))
-    step = normal.solve_coupled(ties, np.full(T, 0.1), np.zeros((T, D)))
+    step = normal.solve_coupled(ties, np.full(T, 0.1), anywhere(T, D))
     A = np.zeros((T - 2, T))
     for row in range(T - 2):
         A[row, row : row + 3] = 1, -2, 1
@@ -171,7 +176,7 @@ def test_what_is_cut_is_solved_as_apart() -> None:
         count = own.stop - own.start
         normal = NormalEquations(count, D)
         normal.add([0, 1, 2], J[own], residuals[:, own])
-        step = normal.solve_coupled(coupling, np.full(count, 0.1), np.zeros((count, D)))
+        step = normal.solve_coupled(coupling, np.full(count, 0.1), anywhere(count, D))
         return step, coupling.cost(count)
 
     whole, apart = slice(0, T), (slice(0, cut), slice(cut, T))
@@ -186,8 +191,9 @@ def test_a_column_at_its_limit_does_not_go_beyond() -> None:
     normal = NormalEquations(3, 2)
     normal.add_diagonal(np.ones((3, 2)), -np.ones((3, 2)))
     ties = Smoothness(np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((2, 1)), np.zeros((2, 2)))
-    limits = np.array([[1.0, 0], [-1, 0], [0, 0]])
-    step = normal.solve_coupled(ties, np.zeros(3), limits)
+    room = anywhere(3, 2)
+    room[1, 0, 0] = room[0, 1, 0] = 0.0
+    step = normal.solve_coupled(ties, np.zeros(3), room)
     np.testing.assert_allclose(step, [[0, 1], [1, 1], [1, 1]], atol=1e-6)
 
 
@@ -197,9 +203,9 @@ def test_others_step_beside_a_column_that_comes_to_its_limit() -> None:
     normal.add([0, 1], np.ones((3, 2, 1)), -np.ones((1, 3)))
     normal.add_diagonal(np.full((3, 2), 0.01), np.zeros((3, 2)))
     ties = Smoothness(np.zeros((1, 2)), np.zeros((1, 2)), np.zeros((2, 1)), np.zeros((2, 2)))
-    room = np.full((2, 3, 2), 9.0)
-    room[0], room[1, 1, 0] = -9.0, 0.2
-    step = normal.solve_coupled(ties, np.zeros(3), np.zeros((3, 2)), solves=2, room=room)
+    room = anywhere(3, 2)
+    room[1, 1, 0] = 0.2
+    step = normal.solve_coupled(ties, np.zeros(3), room, solves=2)
     np.testing.assert_allclose(step, [[0.5, 0.5], [0.2, 0.8], [0.5, 0.5]], atol=1e-3)
 
 
