@@ -17,10 +17,11 @@ from typing import NamedTuple
 import numpy as np
 
 from scripts.robot_memory import pacing
+from spark.files import alone
 from spark.io.bvh import write_bvh
 from spark.io.encoding import encode_new
 from spark.transfer.canonical import from_canonical
-from spark_sim.shelf.batch import Batch, locked
+from spark_sim.shelf.batch import Batch
 from spark_sim.shelf.plan import Options, plan
 from spark_sim.shelf.processes import in_processes
 
@@ -47,7 +48,7 @@ def cost(source: Path, workers: int) -> Cost:
     """Of a whole batch: processes started, motions read, solved, measured and written."""
     out = source.with_name(f"{source.name}_{workers}")
     start, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
-    with locked(out):
+    with alone(out):
         batch = Batch(out)
         jobs = plan([str(source)], [TARGET], out, Options()).jobs
         list(batch.run(jobs, partial(in_processes, workers=workers)))

@@ -12,7 +12,6 @@ from pathlib import Path
 from spark.errors import OutputError
 
 _PART = ".spark-sim-{}-{}.part"
-_LOCK = ".spark-sim.lock"
 _NUMBERS = count()
 
 
@@ -58,14 +57,16 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def alone(folder: Path) -> Iterator[None]:
-    """Make `folder`, and keep other processes that ask for it out of it meanwhile.
+def alone(folder: Path, part: str = "") -> Iterator[None]:
+    """Make `folder`, and keep other processes that ask for it, or for the same part of it, out
+    meanwhile.
 
     Raises `OutputError` where another one is in it, or where it can't be made.
     """
     with _named(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        lock = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT, 0o666)
+        name = f".spark-sim-{part}.lock" if part else ".spark-sim.lock"
+        lock = os.open(folder / name, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         try:
             _lock(lock)

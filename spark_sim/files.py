@@ -1,11 +1,15 @@
 """Where results go: nothing is overwritten unasked, and no file has an ending that says what it is
 not. Both are said before the work, not after."""
 
+import errno
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from spark.errors import OutputError
+from spark.files import alone
+from spark_sim import console
 
 
 def check_free(path: Path, *, force: bool) -> None:
@@ -58,3 +62,18 @@ def claim(path: Path, *, force: bool, endings: tuple[str, ...] = (), what: str =
         raise OutputError(f"{path}: leads to {real}, and there is no such folder")
     if not os.access(real.parent, os.W_OK):
         raise OutputError(f"{path}: can't be written, its folder is read-only")
+
+
+@contextmanager
+def one_run(folder: Path, part: str = "") -> Iterator[None]:
+    """Make `folder`, and keep other runs out of it, or out of a part of it. Where the system can't
+    lock files there, a note says so. Raises `OutputError` where another run is in it."""
+    with ExitStack() as held:
+        try:
+            held.enter_context(alone(folder, part))
+        except OSError as error:
+            if error.errno not in (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP):
+                raise
+            reason = f"can't be locked here ({error.strerror})"
+            console.note(f"{folder}: {reason}: start one run in it alone")
+        yield

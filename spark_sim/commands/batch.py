@@ -105,7 +105,8 @@ def run(args: Namespace) -> int:
     from spark.summary import counted
     from spark_sim import console
     from spark_sim.clip_base import MAX_FPS
-    from spark_sim.shelf.batch import Batch, locked
+    from spark_sim.files import one_run
+    from spark_sim.shelf.batch import Batch
     from spark_sim.shelf.keep import parse
     from spark_sim.shelf.plan import Options, plan
     from spark_sim.shelf.work import target_clip
@@ -130,7 +131,7 @@ def run(args: Namespace) -> int:
         number, count = args.shard
         jobs, shard = jobs[number - 1 :: count], f"{number}of{count}"
     start = time.perf_counter()
-    with locked(out, shard), console.meter(len(jobs), 0, "batch", lines=True) as tell:
+    with one_run(out, shard), console.meter(len(jobs), 0, "batch", lines=True) as tell:
         batch = Batch(out, keep=keep, shard=shard, force=args.force)
         for count, (job, entries) in enumerate(batch.run(jobs, backend), 1):
             if error := entries[0]["error"]:

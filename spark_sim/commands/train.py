@@ -1,6 +1,5 @@
 """`spark-sim train`: a network of your own."""
 
-import errno
 import shlex
 from argparse import ArgumentParser, BooleanOptionalAction, Namespace
 from collections.abc import Mapping
@@ -198,19 +197,13 @@ def _run(args: Namespace, held: ExitStack) -> int:
 def _hold(out: Path, held: ExitStack) -> None:
     """Make the folder of the run, and keep other runs out of it. Under `torchrun` the process that
     writes does. Raises `OutputError` where another run is in it."""
-    from spark.files import alone
-    from spark_sim import console
+    from spark_sim.files import one_run
     from spark_sim.watching import is_first
 
-    if not is_first():
+    if is_first():
+        held.enter_context(one_run(out))
+    else:
         out.mkdir(parents=True, exist_ok=True)
-        return
-    try:
-        held.enter_context(alone(out))
-    except OSError as error:
-        if error.errno not in (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP):
-            raise
-        console.note(f"{out}: can't be locked here ({error.strerror}): start one run in it alone")
 
 
 def _learn_recorded(start: "Checkpoint", config: "TrainConfig", out: Path) -> "Checkpoint":

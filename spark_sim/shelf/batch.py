@@ -1,18 +1,15 @@
 """A batch: what is missing or changed is made, and each result takes its name when it is whole."""
 
-import fcntl
 import os
 import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from secrets import token_hex
 from typing import Any, TypeAlias
 
-from spark.errors import OutputError
 from spark_sim.shelf.duplicates import Duplicates, near_duplicates
 from spark_sim.shelf.keep import Keep
 from spark_sim.shelf.made_of import is_still, is_still_made_of, target_sha256
@@ -215,27 +212,6 @@ def _part(entry: Entry, which: str) -> dict[str, Any]:
 
 def _work_below(parts: Path, job: Job) -> Done:
     return work(job, parts / job.output)
-
-
-@contextmanager
-def locked(folder: Path, shard: str = "") -> Iterator[None]:
-    """One run at a time in a folder, or in a shard of it; the lock ends with the process.
-
-    Raises `OutputError` where another run has it, or the folder can't be made.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = (folder / (f".lock-{shard}" if shard else ".lock")).open("w")
-    except OSError as error:
-        raise OutputError(f"{folder}: can't be written ({error.strerror})") from error
-    with lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise OutputError(
-                f"{folder}: another batch is writing here; wait for it, or give another folder"
-            ) from error
-        yield
 
 
 def _reason(error: str, source: Path) -> str:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
+from spark.files import alone
 from spark_sim.shelf import batch
 from spark_sim.shelf.made_of import file_facts
 from spark_sim.shelf.plan import Job, Options, plan
@@ -61,7 +62,7 @@ def run(folder: Path, out: Path, **settings: object) -> Tally:
     """A batch of all files in a folder."""
     batch.work = made  # type: ignore[attr-defined]
     jobs = plan([str(folder)], ["robot"], out, Options()).jobs
-    with batch.locked(out):
+    with alone(out):
         made_now = batch.Batch(out, **settings)
         list(made_now.run(jobs, serially))
     return made_now.tally

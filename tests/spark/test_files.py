@@ -101,7 +101,7 @@ def test_alone(tmp_path: Path) -> None:
     with alone(tmp_path / "new"):
         with pytest.raises(OutputError, match="another run"), alone(tmp_path / "new"):
             pass
-        with alone(tmp_path / "other"):
+        with alone(tmp_path / "other"), alone(tmp_path / "new", "1of2"):
             pass
     with alone(tmp_path / "new"):
         pass

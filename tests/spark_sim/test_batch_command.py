@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import spark_sim
+from spark.files import alone
 from tests.helpers.gltf import animated
 from tests.helpers.program import CHECKOUT, Program
 from tests.helpers.rigs import RIGS, build, walk
@@ -109,6 +110,13 @@ def test_mistakes_are_told_before_the_work(
     assert done.code == 2
     assert says in done.stderr
     assert not list((shelf / "out").rglob("*.npz"))
+
+
+def test_one_run_at_a_time(shelf: Path, program: Program) -> None:
+    with alone(shelf / "out"):
+        done = program("batch", "in", "--to", "robot", "-o", "out")
+    assert done.code == 2
+    assert "another run is writing to it" in done.stderr
 
 
 def test_shares_are_the_whole(shelf: Path, program: Program) -> None:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from spark.errors import OutputError
 from spark_sim.shelf import batch
 from spark_sim.shelf.keep import parse
 from spark_sim.shelf.manifest import Manifest
@@ -143,7 +142,7 @@ def test_killed_at_random_moments_it_resumes_to_the_same_bytes(tmp_path: Path) -
     assert killed > KILLS / 4  # or nothing was tried
     shelf.run(folder, out)
     assert shelf.results(out) == whole(folder)
-    assert {path.name for path in out.iterdir()} == {"robot", "manifest.jsonl", ".lock"}
+    assert {path.name for path in out.iterdir()} == {"robot", "manifest.jsonl", ".spark-sim.lock"}
     shelf.run(folder, tmp_path / "undisturbed")
     assert shelf.lines(out) == shelf.lines(tmp_path / "undisturbed")
 
@@ -158,13 +157,3 @@ def test_a_torn_last_line_is_dropped(tmp_path: Path) -> None:
     (out / "robot" / "b.npz").unlink()
     assert shelf.run(folder, out).written == 1
     assert shelf.lines(out) == expected
-
-
-def test_one_run_at_a_time(tmp_path: Path) -> None:
-    with (
-        batch.locked(tmp_path),
-        batch.locked(tmp_path, "1of2"),
-        pytest.raises(OutputError, match="another batch is writing here"),
-        batch.locked(tmp_path),
-    ):
-        pass
