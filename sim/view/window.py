@@ -12,7 +12,6 @@ from types import FrameType, TracebackType
 from typing import Any
 
 import mujoco
-import numpy as np
 
 from sim import has_display
 from sim.view.annotations import Annotations
@@ -166,13 +165,6 @@ class Window:
         viewport = mujoco.MjrRect(0, 0, width, height)
         mujoco.mjr_render(room, self._scene, self._context)
         self._hud.draw(player, viewport, message=self._current_message(), waiting=waiting)
-
-    def pixels(self) -> np.ndarray[Any, np.dtype[np.uint8]]:
-        """The last picture, (H, W, 3)."""
-        width, height = self._glfw.get_framebuffer_size(self._window)
-        rgb = np.empty((height, width, 3), dtype=np.uint8)
-        mujoco.mjr_readPixels(rgb, None, mujoco.MjrRect(0, 0, width, height), self._context)
-        return rgb[::-1]
 
     def _aim(self, aspect: float) -> None:
         player, camera = self.player, self._camera
