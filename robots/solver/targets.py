@@ -20,7 +20,7 @@ from spark.rig.feet import ends_of_feet, lowest_points
 from spark.rig.rig import Rig
 from spark.rig.roles import HANDS, Role
 from spark.rotation import matrix_from_quat, quat_mul
-from spark.transfer.analytic import transfer
+from spark.transfer.analytic import copied
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.noise import Noise
 from spark.transfer.self_touch import SelfTouch, self_touches
@@ -182,7 +182,7 @@ def poses_of(
     """The poses of a source, whose joints are at `positions` [m], on the robot's rig: its joints'
     rotations (`q_world_joint`), the path of the hips' middle [m] over a floor at z = 0, and notes.
     """
-    moved = transfer(source, robot.rig)
+    moved = copied(source, robot.rig)
     turns, pelvis = moved.rotations, robot.rig.pelvis
     turns[:, pelvis] = bowing(source.rig, robot, turns[:, pelvis], positions, source.floor_z)
     for block in blocks(len(turns)):

@@ -13,28 +13,27 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from spark.network.recorded import BodyTokens, Habits
+from spark.network.recorded import BodyTokens
 
 
 @dataclass(frozen=True, eq=False)
 class Likeness:
-    """`turns[p]` maps the turn of a rest pose to that of a joint of part p. `measures` are those of
-    the N known bodies, `weights` what each adds to `HABITS` of one just like it, and `lengths` the
-    distances, in `BodyTokens.measures`, within which bodies are alike. `sizes` are the habits'
-    standard deviations, `certain` says by how much what is known lowers them."""
+    """`measures` are those of the N known bodies, `weights` what each adds to `HABITS` of one just
+    like it, and `lengths` the distances, in `BodyTokens.measures`, within which bodies are alike.
+    `sizes` are the habits' standard deviations, `certain` says by how much what is known lowers
+    them."""
 
-    turns: Float[np.ndarray, "P 3 3"]
     measures: Float[np.ndarray, "N M"]
     weights: Float[np.ndarray, "N 6"]
     lengths: Float[np.ndarray, "6"]
     sizes: Float[np.ndarray, "6"]
     certain: Float[np.ndarray, "6 N N"]
 
-    def __call__(self, body: BodyTokens) -> Habits:
+    def __call__(self, body: BodyTokens) -> Float[np.ndarray, "6"]:
         """The habits of any body."""
         alike = covariance(apart(body.measures[None], self.measures)[0, :, None], self.lengths)
-        turns = np.einsum("kx,kxy->ky", body.rest_turns, self.turns[body.parts])
-        return Habits(turns, (alike * self.weights).sum(0))
+        told: Float[np.ndarray, 6] = (alike * self.weights).sum(0)
+        return told
 
     def doubt(self, source: BodyTokens, target: BodyTokens) -> Float[np.ndarray, "6"]:
         """Standard deviations of what the scales of two bodies differ by."""

@@ -12,7 +12,7 @@ from spark.network.likeness import Likeness
 from spark.network.recorded import KnownBodies
 
 PREFIX = "recorded."  # of its tensors in a checkpoint
-VERSION = 4.0  # of what these tensors mean
+VERSION = 5.0  # of what these tensors mean
 
 
 def check_recorded(weights: Weights) -> None:

@@ -14,7 +14,6 @@ from jaxtyping import Bool, Float, Int
 from spark.network.likeness import Likeness, apart, covariance
 from spark.network.recorded import HABITS
 from spark.training.recorded_pairs import RecordedPairs
-from spark.training.recorded_turns import PairTurns
 
 _LENGTHS = (1.0, 3.0)  # of likeness: two people are about 1 apart
 _NOISES = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)  # of pairs, over what bodies differ by
@@ -62,8 +61,7 @@ class _Told:
                 matrix, right = self._normal(h, np.zeros(len(self.known.pairs), bool))
                 weights[:, h] = self._solved(matrix, right, *choice)
                 certain[h] = self._solved(matrix, matrix, *choice)
-        turns = self._turns.fitted() * self._turning
-        return Likeness(turns, self._measures, weights, lengths, sizes, certain)
+        return Likeness(self._measures, weights, lengths, sizes, certain)
 
     @cached_property
     def _choices(self) -> list[tuple[tuple[float, float], float] | None]:
@@ -75,16 +73,6 @@ class _Told:
             variance = 0.0 if best is None else np.mean([spread[best] for _, spread in tests])
             found.append(None if best is None else (_CHOICES[best], float(np.sqrt(variance))))
         return found
-
-    @cached_property
-    def _turning(self) -> bool:
-        """Whether turns of rest poses tell those of joints."""
-        gains = [[self._turns.gain(out, self._onto(name))] for name, out in self.characters()]
-        return surest(np.array(gains)) is not None
-
-    @cached_property
-    def _turns(self) -> PairTurns:
-        return PairTurns(self.known)
 
     @cached_property
     def _ends(self) -> Int[np.ndarray, "P 2"]:

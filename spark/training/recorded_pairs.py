@@ -1,8 +1,8 @@
 """Recorded pairs: one motion on two bodies, and by what the answer differs from the analytic one.
 
 The same name of a motion on two characters of a dataset is a pair, both ways round. What a pair
-says is measured by least squares, as the differences of two bodies' `spark.network.recorded.Habits`
-would make it: each joint's mean turn, and how path, hips and ankles are scaled and moved.
+says is measured by least squares, as the differences of two bodies' `spark.network.recorded.HABITS`
+would make it: how path, hips and ankles are scaled and moved.
 """
 
 from collections import defaultdict
@@ -13,9 +13,8 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
-from spark.network.recorded import BodyTokens, matched_rows, tokens_of
+from spark.network.recorded import BodyTokens, tokens_of
 from spark.rig.roles import LEGS, LIMBS
-from spark.rotation import quat_conj, quat_mul, rotvec_from_quat
 from spark.training.dataset import Performance
 from spark.training.grounded import on_ground
 from spark.training.recorded_scales import measured_scales
@@ -32,15 +31,12 @@ _LARGEST = 0.7  # of a logarithm of a scale, or a length [hip heights]: more is 
 
 @dataclass(frozen=True, eq=False)
 class RecordedPair:
-    """`source` and `target` number bodies. `rows` are rows of their tokens (target's, source's),
-    `turns` [rad] by which these turn, right sides mirrored. `scales` are differences of `HABITS`,
-    `weights` how much a joint's squared error [hip heights²] grows with theirs."""
+    """`source` and `target` number bodies. `scales` are differences of `HABITS`, `weights` how much
+    a joint's squared error [hip heights²] grows with theirs."""
 
     motion: str
     source: int
     target: int
-    rows: list[tuple[int, int]]
-    turns: Float[np.ndarray, "R 3"]
     scales: Float[np.ndarray, "6"]
     weights: Float[np.ndarray, "6"]
 
@@ -161,15 +157,6 @@ def _measured(shared: _Shared) -> RecordedPair | None:
     a, b, theirs, own = shared.a, shared.b, shared.theirs, shared.own
     if len(own) < 2 or len(a.legs) != 2 or len(b.legs) != 2:
         return None
-    rows = matched_rows(a.body, b.body)
-    turns = np.stack(
-        [
-            _mean_turn(theirs.rotations[:, a.body.joints[i]], own.rotations[:, b.body.joints[k]])
-            for k, i in rows
-        ]
-    )
-    mirrored = np.array([b.body.mirrored[k] for k, _ in rows])
-    turns = np.where(mirrored[:, None], [-1.0, 1.0, -1.0] * turns, turns)
     legs = [
         (leg.at(shared.of_a), own_leg.at(shared.of_b))
         for leg, own_leg in zip(a.legs, b.legs, strict=True)
@@ -177,13 +164,4 @@ def _measured(shared: _Shared) -> RecordedPair | None:
     scales, weights = measured_scales(theirs, own, legs)
     if not np.isfinite(scales).all() or np.abs(scales).max() > _LARGEST:
         return None
-    return RecordedPair(a.motion, a.number, b.number, rows, turns, scales, weights)
-
-
-def _mean_turn(
-    theirs: Float[np.ndarray, "T 4"], own: Float[np.ndarray, "T 4"]
-) -> Float[np.ndarray, "3"]:
-    """By what rotation in the T-pose's axes a joint turns further than its counterpart, mostly."""
-    further = quat_mul(quat_conj(theirs), own)
-    mean = np.linalg.eigh(further.T @ further)[1][:, -1]
-    return rotvec_from_quat(mean if mean[0] > 0 else -mean)
+    return RecordedPair(a.motion, a.number, b.number, scales, weights)

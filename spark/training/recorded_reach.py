@@ -10,8 +10,6 @@ from spark.network.recorded import BodyTokens, KnownBodies, sure
 from spark.training.recorded_likeness import surest
 from spark.training.recorded_pairs import RecordedPair, RecordedPairs
 
-_SMALLEST_LEVER = 0.01  # [hip heights] of joints that no other joint hangs from
-
 
 class Test(NamedTuple):
     """Pairs, what they tell of bodies like theirs, and pairs of characters left out."""
@@ -64,28 +62,9 @@ def _errors(
     pair: RecordedPair, source: BodyTokens, target: BodyTokens, told: Likeness
 ) -> tuple[float, float]:
     """The squared error of positions [hip heights²] of a pair, without a correction and with it."""
-    of_source, of_target = told(source), told(target)
-    own, theirs = (list(rows) for rows in zip(*pair.rows, strict=True))
-    turns = of_target.turns[own] - of_source.turns[theirs]
-    scales = sure(of_target.scales - of_source.scales, told.doubt(source, target))
-    levers = _levers(target)[own, None]
+    found = sure(told(target) - told(source), told.doubt(source, target))
     before, left = (
-        float((levers * np.square(turn)).sum() + (pair.weights * np.square(scale)).sum())
-        for turn, scale in ((pair.turns, pair.scales), (pair.turns - turns, pair.scales - scales))
+        float((pair.weights * np.square(scales)).sum())
+        for scales in (pair.scales, pair.scales - found)
     )
     return before, left
-
-
-def _levers(body: BodyTokens) -> Float[np.ndarray, "K"]:
-    """The mean squared error of joints [hip heights²] for each squared radian of a joint's turn:
-    what hangs from it moves with its bones."""
-    skeleton = body.body.skeleton
-    row = {j: k for k, j in enumerate(body.body.joints.tolist())}
-    out = []
-    for joint in body.joints:
-        below = skeleton.children[row[joint]]
-        moved = (
-            float(np.square(skeleton.offsets[c]).sum()) * len(skeleton.subtree(c)) for c in below
-        )
-        out.append(max(sum(moved) / len(skeleton), _SMALLEST_LEVER**2))
-    return np.array(out)

@@ -1,4 +1,4 @@
-"""The linear model of recorded pairs: habits as products with a body's measures and rest pose.
+"""The linear model of recorded pairs: habits as products with a body's measures.
 
 The row to beat for what `spark.training.recorded_learning` learns; `spark-sim evaluate` prints it.
 In closed form; how strongly it is regularised, or whether a scale is left alone, is chosen by
@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from spark.network.recorded import HABITS, BodyTokens, Habits
+from spark.network.recorded import HABITS, BodyTokens
 from spark.training.recorded_pairs import RecordedPairs
-from spark.training.recorded_turns import PairTurns
 
 _STRENGTHS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0, np.inf)  # the last leaves a scale alone
 _FOLDS = 8
@@ -20,15 +19,13 @@ _FOLDS = 8
 
 @dataclass(frozen=True, eq=False)
 class Ridge:
-    """`turns[p]` maps the turn of a rest pose to that of a joint of part p, `scales` measures to
-    `HABITS`."""
+    """`scales` maps measures to `HABITS`."""
 
-    turns: Float[np.ndarray, "P 3 3"]
     scales: Float[np.ndarray, "M 6"]
 
-    def __call__(self, body: BodyTokens) -> Habits:
-        turns = np.einsum("kx,kxy->ky", body.rest_turns, self.turns[body.parts])
-        return Habits(turns, body.measures @ self.scales)
+    def __call__(self, body: BodyTokens) -> Float[np.ndarray, "6"]:
+        habits: Float[np.ndarray, 6] = body.measures @ self.scales
+        return habits
 
 
 def fit_ridge(known: RecordedPairs) -> Ridge:
@@ -40,7 +37,7 @@ def fit_ridge(known: RecordedPairs) -> Ridge:
     W = np.stack([pair.weights for pair in known.pairs]) * known.balance[:, None]
     folds = _folds(ends)
     scales = [_of_scale(X, Y[:, h], W[:, h], ends, folds) for h in range(len(HABITS))]
-    return Ridge(PairTurns(known).fitted(), np.stack(scales, -1))
+    return Ridge(np.stack(scales, -1))
 
 
 def _folds(ends: np.ndarray) -> list[np.ndarray]:

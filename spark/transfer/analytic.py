@@ -21,6 +21,7 @@ from spark.rig.roles import CLAVICLES, Role
 from spark.rotation import quat_conj, quat_slerp
 from spark.transfer.canonical import CanonicalMotion
 from spark.transfer.finger_pairs import finger_notes, finger_pairs
+from spark.transfer.rest_ends import from_rest_to_rest
 
 # Normalised arc length along a chain, 0 to 1. Joints of two chains of equal length are taken one by
 # one where none lies further than this from its counterpart.
@@ -130,7 +131,13 @@ def correspond(source: Rig, target: Rig) -> Correspondence:
 
 
 def transfer(source: CanonicalMotion, target: Rig) -> CanonicalMotion:
-    """`source`'s motion on `target`, in canonical form.
+    """`source`'s motion on a character, in canonical form: `copied`, hands and feet from rest pose
+    to rest pose (`spark.transfer.rest_ends`)."""
+    return from_rest_to_rest(source.rig, copied(source, target))
+
+
+def copied(source: CanonicalMotion, target: Rig) -> CanonicalMotion:
+    """`source`'s motion on `target`, whose joints turn since the T-pose as the source's do.
 
     The hips' path is scaled by the hip heights' ratio about the floor. The floor is z = 0, unless
     the source's feet say that it is elsewhere: then it is moved to 0 and a note says so.

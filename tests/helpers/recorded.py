@@ -3,9 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 
 from spark.network.features import body_features
-from spark.network.recorded import HABITS, PARTS, BodyTokens, Habits, as_recorded
+from spark.network.recorded import HABITS, BodyTokens, as_recorded
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.training.cuts import TrainingClip
@@ -16,7 +17,6 @@ from spark.transfer.foot_lock import lock_feet
 from tests.helpers.stick import joint, scaled, stick_rig
 
 HIPS_UP, TRAVEL = HABITS.index("hips_up"), HABITS.index("travel")
-FOOT = PARTS.index("foot")
 
 
 def body(seed: int) -> Rig:
@@ -34,15 +34,13 @@ def body(seed: int) -> Rig:
     )
 
 
-def habits(tokens: BodyTokens) -> Habits:
-    """A law that is linear in what there is to see: feet turn with their length, hips rise and
-    strides grow with the shoulders."""
+def habits(tokens: BodyTokens) -> Float[np.ndarray, "6"]:
+    """A law that is linear in what there is to see: hips rise and strides grow with the shoulders,
+    and hips sink with the feet's length."""
     shoulder, foot = tokens.measures[0], tokens.measures[4]
     scales = np.zeros(len(HABITS))
     scales[TRAVEL], scales[HIPS_UP] = 0.03 * shoulder, 0.01 * shoulder - 0.005 * foot
-    turns = np.zeros((len(tokens.joints), 3))
-    turns[tokens.parts == FOOT] = [0.0, 0.02 * foot, 0.03 * foot]
-    return Habits(turns, scales)
+    return scales
 
 
 def answered(source: CanonicalMotion, rig: Rig) -> CanonicalMotion:

@@ -1,0 +1,96 @@
+"""Hands and feet as they rest, between bodies that rest in a T."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from spark.rig.rig import Rig, understand
+from spark.rig.roles import ANKLES, HANDS, Role
+from spark.rotation import (
+    quat_angle,
+    quat_conj,
+    quat_from_rotvec,
+    quat_from_yaw,
+    quat_mul,
+    quat_rotate,
+)
+from spark.transfer.analytic import copied, transfer
+from spark.transfer.canonical import CanonicalMotion, to_canonical
+from tests.helpers.recordings import DATA, recordings
+from tests.helpers.stick import joint, stick_rig
+from tests.spark.transfer.test_leg_fit import striding
+
+SIDES = {"left": 1.0, "right": -1.0}
+
+
+def splayed(degrees: float, arms: float = 0.0) -> Rig:
+    """The stick man as a maker has it whose feet rest so far outwards, and arms so far down."""
+    rig = stick_rig()
+    offsets, ends = rig.skeleton.offsets.copy(), rig.skeleton.end_offsets.copy()
+    tpose = rig.tpose.copy()
+    for side, sign in SIDES.items():
+        outwards = quat_from_yaw(sign * np.radians(degrees))
+        toe = joint(Role(f"{side}_toe"))
+        offsets[toe] = quat_rotate(outwards, offsets[toe])
+        end = rig.skeleton.end_parents == toe
+        ends[end] = quat_rotate(outwards, ends[end])
+        tpose[[joint(Role(f"{side}_foot")), toe]] = quat_conj(outwards)
+        down = quat_from_rotvec(np.array([-sign * np.radians(arms), 0.0, 0.0]))
+        for part in ("forearm", "hand"):
+            offsets[joint(Role(f"{side}_{part}"))] = quat_rotate(
+                down, offsets[joint(Role(f"{side}_{part}"))]
+            )
+        for part in ("upper_arm", "forearm", "hand"):
+            tpose[joint(Role(f"{side}_{part}"))] = quat_conj(down)
+    skeleton = replace(rig.skeleton, offsets=offsets, end_offsets=ends)
+    return replace(rig, skeleton=skeleton, tpose=tpose)
+
+
+def resting(rig: Rig) -> CanonicalMotion:
+    """The body as its file has it at rest."""
+    return CanonicalMotion(rig, 1 / 30, quat_conj(rig.tpose)[None], np.zeros((1, 3)))
+
+
+@pytest.mark.parametrize("degrees", [0.0, 12.0, 22.0])
+def test_a_body_at_rest_puts_another_s_feet_to_rest(degrees: float) -> None:
+    target = splayed(degrees)
+    moved = transfer(resting(splayed(5.0)), target)
+    for role in (*ANKLES, *HANDS):
+        world = quat_mul(moved.rotations[0, joint(role)], target.tpose[joint(role)])
+        assert quat_angle(world, np.eye(4)[0]) < 1e-9
+
+
+def test_there_and_back_is_the_same() -> None:
+    source = striding(splayed(18.0))
+    back = transfer(transfer(source, stick_rig()), source.rig)
+    np.testing.assert_allclose(back.rotations, source.rotations, atol=1e-12)
+    assert quat_angle(transfer(source, stick_rig()).rotations, source.rotations).max() > 0.3
+
+
+@pytest.mark.parametrize("target", [splayed(18.0, arms=40.0), splayed(40.0)])
+def test_who_rests_otherwise_is_measured_from_the_t_pose(target: Rig) -> None:
+    """Arms that hang at rest, or feet that no one stands on: their turns say nothing."""
+    source = striding(stick_rig())
+    np.testing.assert_array_equal(
+        transfer(source, target).rotations, copied(source, target).rotations
+    )
+
+
+@pytest.mark.parametrize("path", recordings("mixamo_pairs/sk108/idle_251f.bvh"))
+def test_an_animation_library_lets_feet_rest_so(path: object) -> None:
+    """Its own answer for a body whose feet rest 6 degrees outwards, of one whose rest 13 inwards:
+    from T-pose to T-pose they are 19 degrees off."""
+    import spark_sim
+
+    truth = spark_sim.load(str(path))
+    source = spark_sim.load(DATA / "mixamo_pairs/sk033/idle_251f.bvh")
+    rig = understand(truth.motion)
+    known = to_canonical(truth.motion, rig)
+    for role in ANKLES:
+        foot = rig.roles.require(role)
+        off = [
+            np.degrees(quat_angle(way(source.canonical, rig).rotations, known.rotations))[:, foot]
+            for way in (transfer, copied)
+        ]
+        assert off[0].max() < 1 < 15 < off[1].min()
