@@ -26,11 +26,10 @@ from spark.rotation import (
 )
 from spark.transfer.canonical import (
     CanonicalMotion,
-    canonical_positions,
     from_canonical,
     to_canonical,
 )
-from spark.transfer.leg_ik import bend_leg, leg_of
+from spark.transfer.leg_ik import leg_of, move_ankles
 
 _ARMS = tuple(role for role in Role if role.part in ("upper_arm", "forearm"))
 
@@ -252,14 +251,14 @@ def _with_feet_moved(
     canonical: CanonicalMotion, moves: Float[np.ndarray, "F T 3"]
 ) -> CanonicalMotion:
     """The ankle of each foot that has a sole moved by so much, by hip and knee."""
-    rig, rotations = canonical.rig, canonical.rotations
-    for sole, move in zip(rig.soles, moves, strict=True):
+    legs = []
+    for sole in canonical.rig.soles:
         limb = {"left": Group.LEFT_LEG, "right": Group.RIGHT_LEG}[sole.side]
-        leg = leg_of(rig, limb)
+        leg = leg_of(canonical.rig, limb)
         if leg is None:
             raise SkeletonError("a leg without a knee")
-        rotations = bend_leg(rotations, canonical_positions(canonical), leg, move)
-    return replace(canonical, rotations=rotations)
+        legs.append(leg)
+    return move_ankles(canonical, list(zip(legs, moves, strict=True)))
 
 
 def _turned(

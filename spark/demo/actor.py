@@ -7,7 +7,7 @@ from spark.rig.rig import Rig
 from spark.rig.roles import LEGS, LIMBS, Group, Role
 from spark.rotation import Axis, quat_about, quat_conj, quat_mul
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
-from spark.transfer.leg_ik import bend_leg, leg_of
+from spark.transfer.leg_ik import leg_of, move_ankles
 
 
 class Actor:
@@ -54,9 +54,8 @@ class Actor:
         skeleton, roles = self.rig.skeleton, self.rig.roles
         joints = leg_of(self.rig, leg)
         assert joints is not None  # the demo's rigs have legs
-        positions = self.positions()
-        move = ankle - positions[:, joints.foot]
-        self.rotations = bend_leg(self.rotations, positions, joints, move)
+        move = ankle - self.positions()[:, joints.foot]
+        self.rotations = move_ankles(self.finish(1.0), [(joints, move)]).rotations
         self.rotations[:, list(skeleton.subtree(joints.foot))] = q_foot[:, None]
         for toe in roles.joints(LIMBS[leg][3]):
             self.rotations[:, list(skeleton.subtree(toe))] = q_toe[:, None]

@@ -125,32 +125,23 @@ def _neighbours(
     return before, after, smoothstep((time - since) / np.maximum(until - since, 1))
 
 
-def bend_leg(
-    rotations: Float[np.ndarray, "*n J 4"],
-    positions: Float[np.ndarray, "*n J 3"],
-    leg: Leg,
-    move: Float[np.ndarray, "*n 3"],
-) -> Float[np.ndarray, "*n J 4"]:
-    """Rotations with the ankle moved by `move`, or as near to it as the leg reaches."""
-    hip, knee, ankle = (positions[..., j, :] for j in leg[:3])
-    upper_leg = rotations[..., leg.upper_leg, :]
-    both = leg_rotations(knee - hip, ankle - knee, upper_leg, move, leg.bends_about)
-    out = rotations.copy()
-    for joints, turned in zip((leg.with_thigh, leg.with_shank), both, strict=True):
-        out[..., list(joints), :] = quat_mul(turned[..., None, :], rotations[..., list(joints), :])
-    return out
-
-
 def move_ankles(
     motion: CanonicalMotion, moves: Sequence[tuple[Leg, Float[np.ndarray, "T 3"]]]
 ) -> CanonicalMotion:
-    """`motion` with the ankles of some legs moved by so much [m], as `bend_leg` does it."""
+    """`motion` with the ankles of some legs moved by so much [m], or as near to it as they
+    reach."""
+    joints = [j for leg, _ in moves for j in leg[:3]]
 
     def bent(block: slice) -> Float[np.ndarray, "T J 4"]:
-        rotations, positions = motion.rotations[block], canonical_positions(motion.picked(block))
-        for leg, move in moves:
-            rotations = bend_leg(rotations, positions, leg, move[block])
-        return rotations
+        part = motion.picked(block)
+        out, positions = part.rotations.copy(), canonical_positions(part, joints)
+        for (leg, move), k in zip(moves, range(0, len(joints), 3), strict=True):
+            hip, knee, ankle = positions[:, k : k + 3].swapaxes(0, 1)
+            upper_leg = out[:, leg.upper_leg]
+            both = leg_rotations(knee - hip, ankle - knee, upper_leg, move[block], leg.bends_about)
+            for moved, turned in zip((leg.with_thigh, leg.with_shank), both, strict=True):
+                out[:, moved] = quat_mul(turned[:, None], out[:, moved])
+        return out
 
     return replace(motion, rotations=in_blocks(bent, len(motion)))
 
