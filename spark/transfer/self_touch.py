@@ -88,9 +88,12 @@ def self_touches(source: CanonicalMotion, paths: Paths, target: Rig) -> tuple[Se
             along, away = _from_line(middle, a, b)
             _, ahead_away = _from_line(knuckles, a, b)
             distance = np.linalg.norm([away, ahead_away], axis=2).min(axis=0)
-            across = 1.0 - np.einsum("ti,ti->t", forearm, unit(b - a)) ** 2
             thick = flesh + RADII["hand"]
-            share = free * across * beside(source.rig, distance, thick) * _slow(source, away)
+            near = beside(source.rig, distance, thick)
+            if near.max() <= _DOUBT:
+                continue  # what follows only takes from it
+            across = 1.0 - np.einsum("ti,ti->t", forearm, unit(b - a)) ** 2
+            share = free * across * near * _slow(source, away)
             share = sure(_over_time(source.frame_time)(share))
             if share.any():
                 touched.append(((upper, lower), thick, along, away, share))
