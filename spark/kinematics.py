@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from spark.blocks import in_blocks
 from spark.motion import Motion
@@ -39,14 +39,12 @@ def world_positions(
     world: Float[np.ndarray, "*n J 4"],
     root_pos: Float[np.ndarray, "*n 3"],
     translations: Float[np.ndarray, "*n J 3"] | None = None,
-    levels: Sequence[Int[np.ndarray, "_"]] | None = None,
 ) -> Float[np.ndarray, "*n J 3"]:
-    """Joint positions [m, world] from world rotations; `translations` replace the offsets. With
-    `levels`, some of each of the skeleton's, the others' are left undefined."""
+    """Joint positions [m, world] from world rotations; `translations` replace the offsets."""
     local = skeleton.offsets if translations is None else translations
     positions = np.empty((*world.shape[:-1], 3))
     positions[..., 0, :] = root_pos
-    for level in (levels or skeleton.levels)[1:]:
+    for level in skeleton.levels[1:]:
         parents = skeleton.parents[level]
         positions[..., level, :] = positions[..., parents, :] + quat_rotate(
             world[..., parents, :], local[..., level, :]

@@ -62,6 +62,12 @@ class Skeleton:
             depth[j] = depth[parent] + 1
         return tuple(np.flatnonzero(depth == d) for d in range(int(depth.max()) + 1))
 
+    def upper(self, joints: Int[np.ndarray, "K"]) -> "Skeleton":
+        """Some joints, in order, and with each all that are above it; without End Sites."""
+        names, above = tuple(self.names[j] for j in joints), self.parents[joints[1:]]
+        parents = np.append(-1, np.searchsorted(joints, above))
+        return Skeleton(names, parents, self.offsets[joints], self.translating[joints])
+
     @cached_property
     def rest_positions(self) -> Float[np.ndarray, "J 3"]:
         """Joint positions [m] in the rest pose, the root at its own offset."""

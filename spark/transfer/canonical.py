@@ -74,19 +74,19 @@ def canonical_positions(
     """Where the joints are [m, world], or some of them; those above the root joint as if rigid with
     it."""
     rig, skeleton = canonical.rig, canonical.rig.skeleton
-    # Fingers, hair and clothes are most of the joints of some rigs, and seldom asked for.
-    asked = range(len(skeleton)) if joints is None else {*joints, *rig.hips}
-    needed = np.zeros(len(skeleton), dtype=bool)
-    needed[[above for joint in asked for above in skeleton.ancestors(joint)]] = True
-    levels = [level[needed[level]] for level in skeleton.levels]
+    needed = np.arange(len(skeleton))
+    if joints is not None:
+        # Fingers, hair and clothes are most of the joints of some rigs, and seldom asked for.
+        asked = {above for joint in (*joints, *rig.hips) for above in skeleton.ancestors(joint)}
+        needed = np.array(sorted(asked))
+        skeleton = skeleton.upper(needed)
+    hips, given = (np.searchsorted(needed, some) for some in (rig.hips, joints or []))
 
     def some(block: slice) -> Float[np.ndarray, "T J 3"]:
-        hips = canonical.hips[block]
-        world = np.empty_like(canonical.rotations[block])
-        world[:, needed] = quat_mul(canonical.rotations[block][:, needed], rig.tpose[needed])
-        positions = world_positions(skeleton, world, np.zeros_like(hips), levels=levels)
-        away = hips - positions[:, rig.hips].mean(1)
-        return (positions if joints is None else positions[:, joints]) + away[:, None]
+        world = quat_mul(canonical.rotations[block][:, needed], rig.tpose[needed])
+        positions = world_positions(skeleton, world, np.zeros_like(canonical.hips[block]))
+        away = canonical.hips[block] - positions[:, hips].mean(1)
+        return (positions if joints is None else positions[:, given]) + away[:, None]
 
     return in_blocks(some, len(canonical))
 
