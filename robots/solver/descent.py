@@ -1,6 +1,7 @@
 """Gauss-Newton in a block of a robot's coordinates, over all frames of the trajectory at once."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -32,6 +33,19 @@ MIN_DAMPING = 1e-3  # [1] on the diagonal of the normal equations
 REJECTED_DAMPING = 0.1  # at least, where a step was rejected
 
 
+class Steps(NamedTuple):
+    """Of Gauss-Newton: at most `most` steps, of which one is the last that lowers the cost by less
+    than the share `gain` of it, if at most the share `rejected` of the frames reject it. `penalty`
+    multiplies the weights of collisions and the floor. In more than one of the `solves` of a step,
+    hinges that come to their limits stop there, and the others know it."""
+
+    most: int
+    gain: float
+    rejected: float
+    penalty: float = 1.0
+    solves: int = 1
+
+
 def collision_stride(frame_time: float) -> int:
     """The number of frames from one that is searched for collisions to the next."""
     return max(1, round(_COLLISION_INTERVAL / frame_time))
@@ -51,29 +65,20 @@ def solve_block(
     holds: Holds,
     q: Coordinates,
     block: Block,
-    max_iter: int,
-    rel_tol: float,
-    max_rejected: float,
+    steps: Steps,
     candidates: Sequence[Candidate] | None = None,
-    penalty: float = 1.0,
-    solves: int = 1,
 ) -> Coordinates:
-    """At most `max_iter` Gauss-Newton steps in the block's dofs, from `q`.
+    """Gauss-Newton steps in the block's dofs, from `q`.
 
     With `candidates`, the parts that are near each other at `q`, parts in each other are pushed
-    apart, by a change of `q` that is smoother than `q`. `penalty` multiplies the weights of
-    collisions and the floor. In more than one of the `solves` of a step, hinges that come to their
-    limits stop there, and the others know it.
+    apart, by a change of `q` that is smoother than `q`.
 
     A step is judged frame by frame: where the cost around a frame rises by more than a share
-    of what is gained nearby, the step is rejected there. If more than `max_rejected` of the frames
+    of what is gained nearby, the step is rejected there. If more frames than the last step may have
     reject a step of the base, it is halved there, again and again: down to the floor, of which
     nothing is felt from above, most are too long. Where it is rejected all the same, damping grows
     (Levenberg and Marquardt's rule, a frame each). Between rejected and accepted frames the step is
     blended, and the normal equations with it: exact where the cost is a parabola.
-
-    It ends where a step lowers the cost by less than `rel_tol` of it and at most `max_rejected` of
-    the frames reject it.
     """
     tree = robot.tree
     window = max(1, 2 * round(WINDOW / targets.frame_time) + 1)
@@ -85,7 +90,7 @@ def solve_block(
 
     def linearize_at(q: Coordinates, with_jacobian: bool = True) -> NormalEquations:
         terms = robot, targets, holds, q, block, candidates or []
-        return linearize(*terms, np.full(len(q), penalty), with_jacobian=with_jacobian)
+        return linearize(*terms, np.full(len(q), steps.penalty), with_jacobian=with_jacobian)
 
     def smoothness_at(q: Coordinates, with_jacobian: bool) -> Smoothness:
         frame_time = targets.frame_time
@@ -108,23 +113,23 @@ def solve_block(
         return after, after > cost * (1 + 1e-3) + _ALLOWED_LOSS * gained + 1e-9
 
     normal, stalled = linearize_at(q), 0
-    for k in range(max_iter):
+    for k in range(steps.most):
         jerky = jerk_stiffening(robot, q, targets.frame_time, targets.jerks)[:, block.dofs]
         stiffening = np.maximum(stiffening, jerky)
         coupling = smoothness_at(q, True)
         cost = uniform_filter1d(normal.cost + coupling.cost(len(q)), window)
         room = q.room(tree, LIMIT_CLEARANCE)[..., block.dofs]
         step = np.zeros((len(q), tree.nv))
-        step[:, block.dofs] = normal.solve_coupled(coupling, damping, room, solves=solves)
+        step[:, block.dofs] = normal.solve_coupled(coupling, damping, room, solves=steps.solves)
         share = np.minimum(1.0, MAX_STEP / np.maximum(np.abs(step).max(1), 1e-9))
         step *= smooth_lower_envelope(share, window)[:, None]
-        trial, is_last = taken(step), k == max_iter - 1
+        trial, is_last = taken(step), k == steps.most - 1
         if candidates is not None and k % COLLISION_PERIOD == COLLISION_PERIOD - 1:
             candidates = collision_candidates(robot, targets, trial, block)
         trial_normal = linearize_at(trial, with_jacobian=not is_last)
         after, rejected = judged(trial, trial_normal)
         for _ in range(_MAX_HALVINGS):
-            if not block.base or rejected.mean() <= max_rejected:
+            if not block.base or rejected.mean() <= steps.rejected:
                 break
             step *= smooth_lower_envelope(1.0 - 0.5 * rejected, window)[:, None]
             trial = taken(step)
@@ -140,9 +145,9 @@ def solve_block(
             if trial_normal.with_jacobian:
                 trial_normal = normal.blended(trial_normal, share)
             after = cost + share * (after - cost)
-        stalled = stalled + 1 if after.sum() > (1 - rel_tol) * cost.sum() else 0
+        stalled = stalled + 1 if after.sum() > (1 - steps.gain) * cost.sum() else 0
         q, normal = trial, trial_normal
-        if stalled > (_PATIENCE if rejected.mean() > max_rejected else 0):
+        if stalled > (_PATIENCE if rejected.mean() > steps.rejected else 0):
             break
     return q
 

@@ -15,7 +15,7 @@ from robots.model.motion import RobotMotion
 from robots.solver.astray import led_back
 from robots.solver.block import Block, blocks_of, carriers, whole_of
 from robots.solver.crouch import less_deep
-from robots.solver.descent import collision_candidates, collision_stride, solve_block
+from robots.solver.descent import Steps, collision_candidates, collision_stride, solve_block
 from robots.solver.foot_path import footing_of
 from robots.solver.footprints import FootPlan, plan_feet, reachable
 from robots.solver.ground import climb_of, climbs
@@ -42,17 +42,13 @@ from spark.transfer.loops import continued
 from spark.transfer.noise import without_noise
 from spark.transfer.treads import treads_of
 
-Steps = tuple[int, float, float]
-"""How many Gauss-Newton steps at most; of the cost, what one must gain not to be the last; and the
-share of the frames that may reject that one."""
-
-_TRUNK, _LIMBS = (12, 0.02, 0.1), (10, 0.05, 0.1)
-_WHOLE = (8, 0.05, 0.1)  # both blocks at once, nearly solved one after the other
-_POLISH, _POLISH_LIMBS = (2, 0.0, 1.0), (1, 0.0, 1.0)  # splines through a solution
-# Of each last step: a foot whose hip comes to its limit in one frame and not in the next would hop.
-_SOLVES = 2
-_SOFT = (3, 0.05, 0.1)  # while collisions cost little:
-_SOFTNESS = 0.2  # this share of their weights, over a rounding that is wider by as much
+_TRUNK, _LIMBS = Steps(12, 0.02, 0.1), Steps(10, 0.05, 0.1)
+_WHOLE = Steps(8, 0.05, 0.1)  # both blocks at once, nearly solved one after the other
+# While collisions cost little, over a rounding that is wider by as much:
+_SOFT = Steps(3, 0.05, 0.1, penalty=0.2)
+# Splines through a solution. A foot whose hip comes to its limit in one frame and not in the next
+# would hop, if that was only clipped.
+_POLISH, _POLISH_LIMBS = Steps(2, 0.0, 1.0, solves=2), Steps(1, 0.0, 1.0, solves=2)
 _COARSE_INTERVAL = 1 / 20  # [s] between the frames that are solved first
 
 
@@ -104,7 +100,23 @@ def _trajectory(robot: Morphology, targets: Targets) -> Coordinates:
     into thighs. Before, they are solved for what they weigh. A body that leans on its arms is
     polished as a whole.
     """
-    feet = plan_feet(robot, targets)
+    feet, leaning = plan_feet(robot, targets), leans(robot, targets)
+    q = _coarse(robot, targets, feet, leaning)
+    feet = unhurried(apart(reachable(robot, feet, q)), targets.flight)
+    targets, feet = with_dynamics(robot, targets, feet, q)
+    if leaning:
+        return _polished(robot, targets, feet, q, whole_of(robot), _POLISH)
+    trunk, limbs = blocks_of(robot)
+    q = _polished(robot, targets, feet, q, trunk, _POLISH)
+    q = _with_arms(robot, targets, q, limbs)
+    return _polished(robot, with_firm_hands(robot, targets), feet, q, limbs, _POLISH_LIMBS)
+
+
+def _coarse(
+    robot: Morphology, targets: Targets, feet: Sequence[FootPlan], leaning: bool
+) -> Coordinates:
+    """Few frames solved: base, trunk and legs, then arms and head for what they weigh, and of who
+    is `leaning` on these both at once."""
     stride = coarse_stride(targets)
     coarse, few = targets.every(stride), [foot.every(stride) for foot in feet]
     q = idle_at_rest(robot, on_mount(robot, project(robot, coarse.world, coarse.hips)))
@@ -113,22 +125,20 @@ def _trajectory(robot: Morphology, targets: Targets) -> Coordinates:
     q, few = _posed(robot, coarse, few, q, trunk, _TRUNK)
     q = _parted(robot, coarse, few, q, trunk, _TRUNK)
     q, _ = _posed(robot, coarse, few, q, limbs, _LIMBS)
-    leaning = leans(robot, targets)
     if leaning:
         q = _parted(robot, coarse, few, q, limbs, _LIMBS)
         q, few = _posed(robot, coarse, few, q, whole_of(robot), _WHOLE)
         q = _parted(robot, coarse, few, q, whole_of(robot), _WHOLE)
-    q = q.upsampled(stride, len(targets))
-    feet = unhurried(apart(reachable(robot, feet, q)), targets.flight)
-    targets, feet = with_dynamics(robot, targets, feet, q)
-    if leaning:
-        return _polished(robot, targets, feet, q, whole_of(robot), _POLISH)
-    q = _polished(robot, targets, feet, q, trunk, _POLISH)
-    coarse, few = targets.every(stride), [foot.every(stride) for foot in feet]
-    arms = _led_out(robot, coarse, q.every(stride), limbs)
-    arms = _parted(robot, coarse, few, arms, limbs, _LIMBS)
-    q = q.with_joints(limbs.joints, arms.upsampled(stride, len(targets)))
-    return _polished(robot, with_firm_hands(robot, targets), feet, q, limbs, _POLISH_LIMBS)
+    return q.upsampled(stride, len(targets))
+
+
+def _with_arms(robot: Morphology, targets: Targets, q: Coordinates, limbs: Block) -> Coordinates:
+    """Arms and head solved in few frames, on a trunk that stays."""
+    stride = coarse_stride(targets)
+    coarse, arms = targets.every(stride), q.every(stride)
+    arms = _led_out(robot, coarse, arms, limbs)
+    arms = _parted(robot, coarse, [], arms, limbs, _LIMBS)
+    return q.with_joints(limbs.joints, arms.upsampled(stride, len(targets)))
 
 
 def idle_at_rest(robot: Morphology, q: Coordinates) -> Coordinates:
@@ -160,7 +170,7 @@ def _posed(
     if not block.dofs:
         return q, feet
     sliding = _holds_of(robot, targets, feet, q, block).sliding()
-    q = solve_block(robot, targets, sliding, q, block, *steps)
+    q = solve_block(robot, targets, sliding, q, block, steps)
     return q, apart(reachable(robot, feet, q)) if block.base else feet
 
 
@@ -171,7 +181,7 @@ def _led_out(robot: Morphology, targets: Targets, q: Coordinates, limbs: Block) 
     if not near:
         return q
     holds = _holds_of(robot, targets, [], q, limbs)
-    return solve_block(robot, targets, holds, q, limbs, *_SOFT, near, _SOFTNESS)
+    return solve_block(robot, targets, holds, q, limbs, _SOFT, near)
 
 
 def _parted(
@@ -188,7 +198,7 @@ def _parted(
     holds = _holds_of(robot, targets, feet, q, block)
     near = collision_candidates(robot, targets, q, block)
     if near:
-        q = solve_block(robot, targets, holds, q, block, *steps, near)
+        q = solve_block(robot, targets, holds, q, block, steps, near)
     if not block.base:
         solved = q
         if (thrown := abrupt(robot, targets, q, block)).any():
@@ -196,7 +206,7 @@ def _parted(
         q = led_back(robot, targets, holds, q, block)
         if q is not solved:
             near = collision_candidates(robot, targets, q, block)
-            q = solve_block(robot, targets, holds, q, block, *steps, near)
+            q = solve_block(robot, targets, holds, q, block, steps, near)
     return repair(robot, targets, holds, q, block)
 
 
@@ -215,7 +225,7 @@ def _polished(
     for _ in range(2 if targets.rests.any() else 1):
         holds = _holds_of(robot, targets, feet, q, block)
         near = collision_candidates(robot, targets, q, block)
-        q = solve_block(robot, targets, holds, q, block, *steps, near, solves=_SOLVES)
+        q = solve_block(robot, targets, holds, q, block, steps, near)
     return repair(robot, targets, holds, q, block)
 
 

@@ -7,7 +7,7 @@ import pytest
 from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
 from robots.solver.block import blocks_of
-from robots.solver.descent import solve_block
+from robots.solver.descent import Steps, solve_block
 from robots.solver.footprints import points_of
 from robots.solver.holds import Holds
 from robots.solver.objective import linearize
@@ -62,7 +62,7 @@ def test_whoever_hovers_comes_down_though_the_first_step_ends_deep_in_the_floor(
     start = raised(ember)
     holds = drawn_down(ember, start)
     before = linearize(ember, targets, holds, start, block, [], with_jacobian=False).cost
-    q = solve_block(ember, targets, holds, start, block, 6, 0.0, 0.1)
+    q = solve_block(ember, targets, holds, start, block, Steps(6, 0.0, 0.1))
     after = linearize(ember, targets, holds, q, block, [], with_jacobian=False).cost
     assert after[HOVERING].mean() < 0.5 * before[HOVERING].mean()
     assert (q.pos[90:, 2] < start.pos[90:, 2] - 0.04).all()

@@ -7,7 +7,7 @@ import pytest
 from robots.model.morphology import Morphology
 from robots.solver import repair, solve
 from robots.solver.block import blocks_of
-from robots.solver.descent import collision_candidates, solve_block
+from robots.solver.descent import Steps, collision_candidates, solve_block
 from robots.solver.holds import Holds
 from robots.solver.objective import linearize
 from robots.solver.repair_descent import Repair
@@ -51,7 +51,7 @@ def test_soft_walls_lead_out_faster(tmp_path: Path) -> None:
 
     def steps(q: Coordinates, count: int, penalty: float) -> Coordinates:
         near = collision_candidates(robot, targets, q, arms)
-        return solve_block(robot, targets, holds, q, arms, count, 0.0, 0.1, near, penalty)
+        return solve_block(robot, targets, holds, q, arms, Steps(count, 0.0, 0.1, penalty), near)
 
     def cost(q: Coordinates) -> float:
         near = collision_candidates(robot, targets, q, arms)
