@@ -12,7 +12,7 @@ from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
 from robots.solver.block import Block
 from robots.solver.dynamics import center_of_mass, com_jacobian
-from robots.solver.haste import JERK_WINDOW, limb_dofs
+from robots.solver.limb_jerk import JERK_WINDOW, limb_dofs
 from robots.solver.weights import (
     AVOIDANCE_CUTOFF,
     JERK_SHARE,

@@ -10,8 +10,8 @@ from robots.model.morphology import Morphology
 from robots.solver.contacts import has_feet, schedule, touching_joint
 from robots.solver.ground import Climb, level_climb, under_soles
 from robots.solver.hands import between_hands
-from robots.solver.haste import limb_jerks
 from robots.solver.level_feet import level_across
+from robots.solver.limb_jerk import limb_jerks
 from robots.solver.palms import laid, resting_palms
 from robots.solver.trunk import bowing
 from spark.blocks import blocks
@@ -42,7 +42,7 @@ class Targets:
     paths of the source's parts, and of its heels and toes, over the floor [m]; `part_ground`, how
     high that under each part is, `ground` and `floor`, those of each sole (`GroundUnderSoles`), and
     `clearance`, how high the source's soles are over it, scaled; `jerks`, how jerky the source's
-    limbs are (`robots.solver.haste`); `seats`, how high the hips are where the body sits on
+    limbs are (`robots.solver.limb_jerk`); `seats`, how high the hips are where the body sits on
     something, else 0 [m]; `hands`, from the right hand to the left [m]; `self_touches`, what hands
     touch of their own body. `com` [m] is planned where it is known.
     """

@@ -20,8 +20,8 @@ from robots.solver.descent import smooth_lower_envelope
 from robots.solver.exact_contact import exact_contacts_of
 from robots.solver.foot_path import STEP_HEIGHTS, footing_of
 from robots.solver.footprints import plan_feet
-from robots.solver.haste import limb_dofs
 from robots.solver.holds import Holds, joined
+from robots.solver.limb_jerk import limb_dofs
 from robots.solver.objective import linearize
 from robots.solver.projection import project
 from robots.solver.repair import repair, violations

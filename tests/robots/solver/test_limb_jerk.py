@@ -5,7 +5,7 @@ import pytest
 
 from robots.model.known import known
 from robots.solver import smoothness
-from robots.solver.haste import limb_dofs, limb_jerks
+from robots.solver.limb_jerk import limb_dofs, limb_jerks
 from robots.solver.solve import retarget
 from spark.kinematics import forward
 from spark.motion import Motion
