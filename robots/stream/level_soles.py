@@ -2,7 +2,7 @@
 
 A skeleton's foot is rolled against its rest pose (`robots.solver.level_feet`). Of a clip the median
 roll of the frames in which it stands flat is taken out of all; of a stream the mean of those that
-have come.
+have come, where the robot's ankle can roll.
 """
 
 from collections.abc import Sequence
@@ -11,9 +11,13 @@ from math import atan2
 import numpy as np
 from jaxtyping import Float
 
+from robots.kinematics import forward_kinematics
 from robots.model.morphology import Morphology
+from spark.rig.feet import Sole
+from spark.rig.roles import Role
 from spark.rotation import matrix_from_quat
 
+_ALONG = 0.5  # share of a hinge's axis along the foot from which on it rolls it
 _FEWEST, _MOST = 0.1, 4.0  # [s] of standing that count: a first frame says little, old ones fade
 
 
@@ -23,6 +27,7 @@ class LevelSoles:
     def __init__(self, robot: Morphology, frame_time: float) -> None:
         self._frame_time = frame_time
         self._feet = [sole.foot for sole in robot.soles]
+        self._can_roll = [_rolls(robot, sole) for sole in robot.soles]
         self._left_up = [matrix_from_quat(robot.rig.tpose[j]).T[:, 1:] for j in self._feet]
         self.reset()
 
@@ -35,8 +40,17 @@ class LevelSoles:
     def follow(self, world: Float[np.ndarray, "J 3 3"], flat: Sequence[bool]) -> None:
         """Take in a frame in which some feet stand `flat`, and the joints of the robot's rig, its
         feet rolled, are turned by `world` (`R_world_joint`)."""
-        for s in (s for s, stands in enumerate(flat) if stands):
+        for s in (s for s, stands in enumerate(flat) if stands and self._can_roll[s]):
             left, up = (world[self._feet[s], 2] @ self._left_up[s]).tolist()
             self._stood[s] = min(self._stood[s] + self._frame_time, _MOST)
             share = self._frame_time / max(self._stood[s], _FEWEST)
             self.rolls[s] -= share * atan2(left, up)
+
+
+def _rolls(robot: Morphology, sole: Sole) -> bool:
+    """Whether a hinge between shank and foot rolls the foot."""
+    tree, shank = robot.tree, robot.rig.roles.joint(Role(f"{sole.side}_lower_leg"))
+    above = [] if shank is None else tree.chain(int(robot.links[shank]))
+    ankle = [j for j in tree.chain(int(robot.links[sole.foot])) if j not in above]
+    poses = forward_kinematics(tree, robot.tpose)
+    return any(tree.balls[j] or abs(poses.axis(j, 0)[0, 0]) > _ALONG for j in ankle)

@@ -1,6 +1,7 @@
 """Feet that are rolled against their rest pose stand level, once they have stood."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from spark.demo.sample import sample_motion, sample_rig
 from spark.rig.roles import Role
 from spark.rotation import matrix_from_quat, quat_from_rotvec, quat_mul
 from spark.transfer.canonical import from_canonical, to_canonical
+from tests.helpers.ember import changed_ember
 
 RIG, EMBER = sample_rig("walker"), known("robot")
 FPS = 60.0
@@ -52,6 +54,14 @@ def test_a_step_on_the_edge_tilts_no_foot_for_long() -> None:
         own = ROLL if 200 <= k < 206 else 0.0
         level.follow(rolled((own + level.rolls[0], level.rolls[1])), [True, True])
     assert abs(level.rolls[0]) < np.radians(0.3)
+
+
+def test_ankles_that_cannot_roll_are_left_alone(tmp_path: Path) -> None:
+    stiff = changed_ember(tmp_path, r'(_ankle_roll)" axis="1 0 0"', r'\1" axis="0 0 1"')
+    level = LevelSoles(stiff, 1 / FPS)
+    for _ in range(60):
+        level.follow(rolled((ROLL, ROLL)), [True, True])
+    assert level.rolls == [0.0, 0.0]
 
 
 @pytest.mark.parametrize("roll", [0.0, ROLL])
