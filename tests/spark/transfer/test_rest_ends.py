@@ -17,9 +17,9 @@ from spark.rotation import (
 )
 from spark.transfer.analytic import copied, transfer
 from spark.transfer.canonical import CanonicalMotion, to_canonical
+from tests.helpers.proportions import striding
 from tests.helpers.recordings import DATA, recordings
 from tests.helpers.stick import joint, stick_rig
-from tests.spark.transfer.test_leg_fit import striding
 
 SIDES = {"left": 1.0, "right": -1.0}
 
