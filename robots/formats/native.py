@@ -11,7 +11,7 @@ from robots.formats.about import about, robot_of
 from robots.formats.arrays import number_array, scalar, write_arrays
 from robots.formats.bodies import body_names, contact_array
 from robots.formats.made_from import Source
-from robots.formats.qpos import check_finite, check_one_rate, of_qpos, unit
+from robots.formats.qpos import check_one_rate, of_qpos
 from robots.model.known import known, model_sha256
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
@@ -77,19 +77,16 @@ def read_npz(arrays: Mapping[str, Any], path: Path, robot: Morphology | None = N
             f"was made for {facts.get('model')!r}, not for {robot.mjcf.path.name!r}: {differs}",
         )
     qpos = number_array(arrays, "qpos", path, (None, int(robot.mjcf.model.nq)))
-    check_finite(path, qpos=qpos)
-    base = robot.mjcf.base_qpos
-    rotation = slice(base + 3, base + 7)
-    qpos[:, rotation], said = unit(qpos[:, rotation], path)
+    notes: tuple[str, ...] = ()
     if facts.get("model_sha256") != model_sha256(robot.mjcf.path):
-        said += (f"the model {robot.mjcf.path.name} has changed since this was written",)
+        notes = (f"the model {robot.mjcf.path.name} has changed since this was written",)
     frame_time = scalar(arrays, "frame_time", path)
     try:
         check_frame_time(frame_time, "frame_time")
     except ConventionError as error:
         raise FileFormatError(path, None, str(error)) from error
     check_one_rate(arrays, frame_time, path)
-    return of_qpos(qpos, robot, frame_time, path, said)
+    return of_qpos(qpos, robot, frame_time, path, notes)
 
 
 def is_native(arrays: Mapping[str, Any]) -> bool:

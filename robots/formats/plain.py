@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from robots.formats.arrays import number_array, scalar
-from robots.formats.qpos import check_finite, check_one_rate, frame_time_of, of_qpos, unit
+from robots.formats.qpos import check_one_rate, frame_time_of, of_qpos
 from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from spark.errors import FileFormatError
@@ -36,11 +36,7 @@ def read_plain(arrays: Mapping[str, Any], path: Path, robot: Morphology) -> Robo
             f"'qpos' has {qpos.shape[1]} columns; the robot {robot.mjcf.path.stem!r} has {expected}"
             ". Is it of another robot, or are there objects beside it?",
         )
-    check_finite(path, qpos=qpos)
-    base = robot.mjcf.base_qpos
-    rotation = slice(base + 3, base + 7)
-    qpos[:, rotation], said = unit(qpos[:, rotation], path)
-    notes = ("qpos is read as MuJoCo's: metres, quaternion wxyz, radians", *said)
+    notes = ("qpos is read as MuJoCo's: metres, quaternion wxyz, radians",)
     frame_time = _frame_time(arrays, path)
     check_one_rate(arrays, frame_time, path)
     return of_qpos(qpos, robot, frame_time, path, notes)

@@ -64,13 +64,12 @@ def motion_of(
             f"another robot{f', such as {others}' if others else ''}?",
         )
     check_finite(path, pos=columns.pos, quat=columns.quat, angles=columns.angles)
-    quat, said = unit(columns.quat, path)
     base = robot.mjcf.base_qpos
-    qpos = np.tile(robot.mjcf.model.qpos0, (len(quat), 1))
+    qpos = np.tile(robot.mjcf.model.qpos0, (len(columns.quat), 1))
     qpos[:, base : base + 3] = columns.pos
-    qpos[:, base + 3 : base + 7] = quat
+    qpos[:, base + 3 : base + 7] = columns.quat
     qpos[:, robot.addresses] = columns.angles
-    return of_qpos(qpos, robot, columns.frame_time, path, (*notes, *said))
+    return of_qpos(qpos, robot, columns.frame_time, path, notes)
 
 
 def of_qpos(
@@ -80,9 +79,14 @@ def of_qpos(
     path: Path,
     notes: tuple[str, ...],
 ) -> RobotMotion:
-    """The motion of MuJoCo's coordinates, with what is remarkable about them as notes."""
+    """The motion of MuJoCo's coordinates, with what is remarkable about them as notes. Raises
+    `FileFormatError` where a value is broken."""
     if not len(qpos):
         raise FileFormatError(path, None, "holds no frames")
+    check_finite(path, qpos=qpos)
+    rotation = slice(robot.mjcf.base_qpos + 3, robot.mjcf.base_qpos + 7)
+    qpos[:, rotation], said = _unit(qpos[:, rotation], path)
+    notes += said
     q = robot.from_qpos(qpos)
     over = np.maximum(robot.tree.lower - q.angles, q.angles - robot.tree.upper)
     over[:, robot.tree.balls] = 0.0
@@ -145,7 +149,7 @@ def check_finite(path: Path, **arrays: Float[np.ndarray, "T ..."]) -> None:
             )
 
 
-def unit(
+def _unit(
     quat: Float[np.ndarray, "T 4"], path: Path
 ) -> tuple[Float[np.ndarray, "T 4"], tuple[str, ...]]:
     """The quaternions at length 1, and a note where they were not. Raises `FileFormatError` where
