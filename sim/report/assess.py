@@ -10,6 +10,7 @@ from sim.report.contact_timing import Discord, Standing, discord_of, standing_be
 from sim.report.course import Course, course_of
 from sim.report.fall import fall_notes
 from sim.report.findings import findings_of
+from sim.report.findings_beside import Beside
 from sim.report.floor import copied_floor, on_floor, over_level, own_floor
 from sim.report.ground import ground_under, own_ground_notes, source_ground_notes
 from sim.report.hovers import hovers_of
@@ -101,43 +102,35 @@ def _beside(course: Course, source_course: Course, known: Accuracy | None) -> Re
             ground = on_floor(ground, copied)
     clip = _beyond_source(measure_clip(subject, ground), source_clip, times, scale)
     travel = scale if subject.body is not None else travel_scale(source.rig, rig)
-    drift = _drift(course, source_course, times, travel)
-    swing = swing_of(clip, swung, times, scale)
     standing = standing_beside(clip, followed, times)
-    slides = slides_of(course, source_course, clip, standing, times, scale)
-    hovers = hovers_of(clip, followed, standing, times, scale)
     notes += source_ground_notes(source_course, own, treads, scale)
     notes += pace_notes(motion, source.motion) + loop_notes(subject, canonical)
     notes += stutter_notes(motion, "the motion") + stutter_notes(source.motion, "the source")
     notes += fall_notes(source, source_clip, "the source")
-    thrown, hover = scale * source_clip.base_acceleration_p99, scale * source_clip.hover
-    limbs = limbs_of(clip, followed, times, scale)
     pose = pose_error(subject, source, times)
     tremble = tremble_beside(subject, source, times)
-    findings = findings_of(
-        clip,
-        tremble,
-        drift=drift,
-        swing=swing,
-        thrown=thrown,
-        limbs=limbs,
+    beside = Beside(
+        drift=_drift(course, source_course, times, travel),
+        swing=swing_of(clip, swung, times, scale),
+        limbs=limbs_of(clip, followed, times, scale),
         pose=pose,
         discord=_discord(subject, source, times, standing, pose),
-        slides=slides,
-        hover=hover,
-        hovers=hovers,
+        slides=slides_of(course, source_course, clip, standing, times, scale),
+        hovers=hovers_of(clip, followed, standing, times, scale),
+        thrown=scale * source_clip.base_acceleration_p99,
+        hover=scale * source_clip.hover,
     )
     return Report(
         clip,
         source_clip,
-        drift,
+        beside.drift,
         standing.match,
-        findings,
+        findings_of(clip, tremble, beside),
         notes,
         tremble,
         truth=known,
-        swing=swing,
-        limbs=limbs,
+        swing=beside.swing,
+        limbs=beside.limbs,
         pose=pose,
         scale=scale,
     )

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from sim.report.clip_metrics import ClipMetrics
-from sim.report.contact_timing import Discord
 from sim.report.findings_beside import (
+    Beside,
     base_findings,
     contact_findings,
     drift_findings,
@@ -16,12 +16,7 @@ from sim.report.findings_beside import (
     swing_findings,
 )
 from sim.report.hovers import HOVERS, Hover
-from sim.report.limbs import Limbs
-from sim.report.measures import Drift
-from sim.report.pose_error import PoseError
 from sim.report.result import Finding
-from sim.report.slides import Slide
-from sim.report.swing import Swing
 from sim.report.tremble import Tremble
 from spark.runs import true_runs
 
@@ -35,24 +30,9 @@ _MIN_EXCESS = np.radians(1.0)
 
 
 def findings_of(
-    clip: ClipMetrics,
-    tremble: Tremble,
-    *,
-    drift: Drift | None = None,
-    swing: Swing | None = None,
-    thrown: float | None = None,
-    limbs: Limbs | None = None,
-    pose: PoseError | None = None,
-    discord: Discord | None = None,
-    slides: tuple[Slide, ...] = (),
-    hover: float = 0.0,
-    hovers: tuple[Hover, ...] = (),
+    clip: ClipMetrics, tremble: Tremble, beside: Beside | None = None
 ) -> tuple[Finding, ...]:
-    """All events of a clip, the gravest of each measure first.
-
-    `thrown` [m/s²] is the 99th percentile of the source's base acceleration, `hover` [m] the height
-    that its lowest point keeps, both scaled.
-    """
+    """All events of a clip, and those beside its source, the gravest of each measure first."""
     gap = int(_MERGE_GAP / clip.frame_time)
     measures = (
         _penetration,
@@ -67,22 +47,31 @@ def findings_of(
     findings = (
         f for measure in measures for f in sorted(measure(clip, gap), key=lambda f: -f.amount)
     )
-    # Of another motion, feet where the source's stand say nothing.
-    other = discord is not None and discord.other_pose
     return (
         *findings,
-        *_hovering(clip, hover, () if other else hovers),
-        *(() if other else slide_findings(slides)),
-        *(contact_findings(discord) if discord else ()),
-        # Where feet swing at other times, how high they are when the source's do says nothing.
-        *(swing_findings(swing) if swing and not discord else ()),
-        *(base_findings(clip, thrown) if thrown is not None else ()),
-        *(limb_findings(clip, limbs, gap) if limbs else ()),
-        *(pose_findings(pose, clip.frame_time, gap) if pose else ()),
+        *(_hovering(clip, 0.0, ()) if beside is None else _beside(clip, beside, gap)),
         *_tremble(tremble, gap),
         *_pops(tremble),
-        *(drift_findings(drift) if drift else ()),
+        *(() if beside is None else drift_findings(beside.drift)),
     )
+
+
+def _beside(clip: ClipMetrics, beside: Beside, gap: int) -> Iterator[Finding]:
+    # Of another motion, feet where the source's stand say nothing.
+    other = beside.discord is not None and beside.discord.other_pose
+    yield from _hovering(clip, beside.hover, () if other else beside.hovers)
+    if not other:
+        yield from slide_findings(beside.slides)
+    # Where feet swing at other times, how high they are when the source's do says nothing.
+    if beside.discord:
+        yield from contact_findings(beside.discord)
+    elif beside.swing:
+        yield from swing_findings(beside.swing)
+    yield from base_findings(clip, beside.thrown)
+    if beside.limbs:
+        yield from limb_findings(clip, beside.limbs, gap)
+    if beside.pose:
+        yield from pose_findings(beside.pose, clip.frame_time, gap)
 
 
 def _penetration(clip: ClipMetrics, gap: int) -> Iterator[Finding]:

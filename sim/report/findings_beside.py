@@ -1,11 +1,13 @@
 """What is wrong beside the source: findings of one measure each."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.contact_timing import Discord
+from sim.report.hovers import Hover
 from sim.report.limbs import Limbs
 from sim.report.measures import Drift
 from sim.report.pose_error import Part, PoseError
@@ -27,6 +29,21 @@ _LASTS = 0.2
 # And in the mean over all frames [rad], but for feet, which other soles tilt: of 20 results on a G1
 # a boxer's hands reach 14 degrees.
 _ELSEWHERE = np.radians(16)
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """How a motion differs from its source."""
+
+    drift: Drift
+    swing: Swing | None
+    limbs: Limbs | None
+    pose: PoseError | None
+    discord: Discord | None
+    slides: tuple[Slide, ...]
+    hovers: tuple[Hover, ...]
+    thrown: float  # [m/s²] the 99th percentile of the source's base acceleration, scaled
+    hover: float  # [m] the height that the source's lowest point keeps, scaled
 
 
 def contact_findings(discord: Discord) -> Iterator[Finding]:
