@@ -24,8 +24,9 @@ from tests.helpers.stick import joint, stick_rig
 SIDES = {"left": 1.0, "right": -1.0}
 
 
-def splayed(degrees: float, arms: float = 0.0) -> Rig:
-    """The stick man as a maker has it whose feet rest so far outwards, and arms so far down."""
+def splayed(degrees: float, arms: float = 0.0, hands: float = 0.0) -> Rig:
+    """The stick man as a maker has it whose feet rest so far outwards, and arms and hands so far
+    down."""
     rig = stick_rig()
     offsets, ends = rig.skeleton.offsets.copy(), rig.skeleton.end_offsets.copy()
     tpose = rig.tpose.copy()
@@ -43,6 +44,9 @@ def splayed(degrees: float, arms: float = 0.0) -> Rig:
             )
         for part in ("upper_arm", "forearm", "hand"):
             tpose[joint(Role(f"{side}_{part}"))] = quat_conj(down)
+        droop = quat_from_rotvec(np.array([-sign * np.radians(hands), 0.0, 0.0]))
+        hand = joint(Role(f"{side}_hand"))
+        tpose[hand] = quat_mul(quat_conj(droop), tpose[hand])
     skeleton = replace(rig.skeleton, offsets=offsets, end_offsets=ends)
     return replace(rig, skeleton=skeleton, tpose=tpose)
 
@@ -68,9 +72,11 @@ def test_there_and_back_is_the_same() -> None:
     assert quat_angle(transfer(source, stick_rig()).rotations, source.rotations).max() > 0.3
 
 
-@pytest.mark.parametrize("target", [splayed(18.0, arms=40.0), splayed(40.0)])
+@pytest.mark.parametrize(
+    "target", [splayed(18.0, arms=40.0), splayed(40.0), splayed(0.0, hands=17.0)]
+)
 def test_who_rests_otherwise_is_measured_from_the_t_pose(target: Rig) -> None:
-    """Arms that hang at rest, or feet that no one stands on: their turns say nothing."""
+    """Arms that hang at rest, feet that no one stands on, hands that droop: that says nothing."""
     source = striding(stick_rig())
     np.testing.assert_array_equal(
         transfer(source, target).rotations, copied(source, target).rotations
