@@ -1,15 +1,15 @@
 """Repair: the frames that violate a limit after a trajectory is solved are solved again.
 
 Collisions, the floor and the speed of hinges are soft penalties to the solver: other residuals may
-outweigh them. The frames around a violation are solved again with penalties that grow round by
-round (a penalty method: Nocedal and Wright, "Numerical Optimization", 17.1): in the first with
-approximate shapes, which suffices for most, then with MuJoCo's.
+outweigh them. The frames around a violation are solved again with approximate shapes, which
+suffices for most, and then with MuJoCo's and firmer penalties (a penalty method: Nocedal and
+Wright, "Numerical Optimization", 17.1).
 """
 
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool
 from scipy.ndimage import binary_dilation
 
 from robots.kinematics import forward_kinematics
@@ -30,10 +30,9 @@ from robots.solver.targets import Targets
 from robots.tree import Coordinates
 from spark.runs import true_runs
 
-_MAX_ROUNDS = 4
+_MAX_ROUNDS = 2
 PENALTY_GROWTH = 3.0  # from round to round, of the penalties' weights
-_AROUND = 0.4  # [s] before and after a violation that are solved again,
-_AROUND_LEFT = 0.8  # and around what a round leaves of a spell that it has made better
+_AROUND = 0.4  # [s] before and after a violation that are solved again
 _MAX_JERK_RATIO = 5.0  # jerk, over the one from which hinges are smoothed, that is a violation
 SEARCH_DISTANCE = 0.01  # [m] between approximate shapes within which the exact ones are measured
 MAX_DEPTH = 0.009  # hip heights of parts in each other, beyond their clearance,
@@ -52,7 +51,8 @@ def repair(
     """`q` with the block's dofs solved again around the frames with violations."""
     violated = violations(robot, targets, q, block, collision_stride(targets.frame_time))
     violated |= too_jerky(robot, targets, q, block, Spells(np.array([len(q)])))
-    runs = true_runs(_around(violated, _AROUND, targets.frame_time))
+    reach = max(2, round(_AROUND / targets.frame_time))
+    runs = true_runs(binary_dilation(violated, np.ones(2 * reach + 1, dtype=bool)))
     if not runs:
         return q
     frames = np.concatenate([np.arange(start, stop) for start, stop in runs])
@@ -71,62 +71,27 @@ def repair(
 
 def _repaired(broken: Repair) -> Coordinates:
     """Of each spell the trajectory of the round with the fewest violations, but for poses that are
-    far worse. What a round has mended is left as it is."""
-    robot, block = broken.robot, broken.block
-    best, frames = broken.start, np.arange(len(broken))
-    least = np.full(len(broken.spells), np.inf)
+    far worse."""
+    robot, block, best = broken.robot, broken.block, broken.start
+    frames, least = np.arange(len(broken)), np.full(len(broken.spells), np.inf)
     for k in range(_MAX_ROUNDS + 1):
         q, targets, spells = broken.start, broken.targets, broken.spells
         violated = violations(robot, targets, q, block, 1, spells)
         rough = violated | too_jerky(robot, targets, q, block, spells)
         pose = linearize(robot, targets, broken.holds, q, block, [], with_jacobian=False)
-        costs = _W_VIOLATION * rough + pose.cost
-        worth = spells.total(costs)
-        better = worth < least
-        at = np.flatnonzero(better[spells.of_frames])
+        worth = spells.total(_W_VIOLATION * rough + pose.cost)
+        at = np.flatnonzero((worth < least)[spells.of_frames])
         best = best.replaced(frames[at], q.at(at))
-        if k == _MAX_ROUNDS or not rough.any():
+        left = spells.any(rough)
+        if k == _MAX_ROUNDS or not left.any():
             break
-        kept, broken = _remaining(broken, rough, better)
-        before = spells.of_frames[kept][broken.spells.starts]
-        least = np.where(better[before], broken.spells.total(costs[kept]), least[before])
-        frames, violated = frames[kept], violated[kept]
-        q = solve_spells(broken)
-        growth = np.where(broken.spells.any(violated), PENALTY_GROWTH, 1.0)
+        frames, least = frames[left[spells.of_frames]], np.minimum(worth, least)[left]
+        growth = np.where(spells.any(violated), PENALTY_GROWTH, 1.0)[left]
+        broken = broken.only(left)
         penalty_scale = broken.penalty_scale * growth[broken.spells.of_frames]
+        q = solve_spells(broken)
         broken = replace(broken, start=q, penalty_scale=penalty_scale, exact=True)
     return best
-
-
-def _remaining(
-    broken: Repair, rough: Bool[np.ndarray, "T"], better: Bool[np.ndarray, "S"]
-) -> tuple[Int[np.ndarray, "K"], Repair]:
-    """Which frames are solved once more, and they alone: those around what is rough of a spell that
-    is `better` than before, and all of one that is not."""
-    frame_time = broken.targets.frame_time
-    kept, sizes, fixed = [], [], broken.fixed.copy()
-    for own, is_better in zip(broken.spells.slices(), better.tolist(), strict=True):
-        if not rough[own].any():
-            continue
-        size = own.stop - own.start
-        near = np.ones(size, dtype=bool)
-        if is_better:
-            near = _around(rough[own], _AROUND_LEFT, frame_time)
-        for start, stop in true_runs(near):
-            frames = own.start + np.arange(start, stop)
-            fixed[frames[:2]] |= start > 0
-            fixed[frames[-2:]] |= stop < size
-            kept.append(frames)
-            sizes.append(stop - start)
-    at = np.concatenate(kept)
-    return at, replace(broken.at(at, Spells(np.array(sizes))), fixed=fixed[at])
-
-
-def _around(
-    mask: Bool[np.ndarray, "T"], seconds: float, frame_time: float
-) -> Bool[np.ndarray, "T"]:
-    """Where it holds, and so long before and after that."""
-    return binary_dilation(mask, np.ones(2 * max(2, round(seconds / frame_time)) + 1, dtype=bool))
 
 
 def too_jerky(

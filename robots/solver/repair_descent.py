@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from robots.coupling import Smoothness
 from robots.kinematics import forward_kinematics
@@ -54,13 +54,10 @@ class Repair:
 
     def only(self, kept: Bool[np.ndarray, "S"]) -> "Repair":
         """Those spells alone."""
-        return self.at(np.flatnonzero(kept[self.spells.of_frames]), self.spells.only(kept))
-
-    def at(self, frames: Int[np.ndarray, "K"], spells: Spells) -> "Repair":
-        """Some frames alone, which make up other spells."""
+        frames = np.flatnonzero(kept[self.spells.of_frames])
         return replace(
             self,
-            spells=spells,
+            spells=self.spells.only(kept),
             targets=self.targets.at(frames),
             holds=self.holds.at(frames),
             start=self.start.at(frames),

@@ -273,7 +273,7 @@ def test_arms_in_the_body_are_led_out_and_the_rest_stays(
     for sign in (1.0, -1.0):
         for j in chain:
             tried = angles.copy()
-            tried[:, j] += sign * 0.5 * bump
+            tried[:, j] += sign * 0.3 * bump
             pushed = Coordinates(q.pos, q.quat, tried).clipped(ember.tree, 0.02)
             sides.append((violations(ember, targets, pushed, arms, 1)[middle], pushed))
     into = [pushed for wrong, pushed in sides if wrong]
@@ -323,34 +323,6 @@ def test_no_repair_gives_up_the_pose(
     monkeypatch.setattr("robots.solver.repair.solve_spells", spread)
     kept = repair(ember, targets, footholds(ember, targets), pushed, arms)
     np.testing.assert_array_equal(kept.angles, pushed.angles)
-
-
-def test_what_a_round_has_mended_is_not_solved_again(
-    walk: CanonicalMotion, walked: RobotMotion, ember: Morphology, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Of many thrusts at 60 frames/s all but the first are mended at once; that one never is."""
-    arms, targets, q = blocks_of(ember)[1], targets_of(walk, ember), walked.coordinates
-    pushed = Coordinates(q.pos, q.quat, q.angles.copy(), q.ball_quats)
-    shoulder = int(ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)])
-    thrusts = range(20, 160, 24)
-    for thrust in thrusts:
-        pushed.angles[thrust : thrust + 2, shoulder] += 1.0  # [rad] in a frame: far too fast
-    solved = []
-
-    def mended(broken: Repair) -> Coordinates:
-        first = broken.start
-        solved.append(len(first))
-        assert not broken.fixed[:-2].any()
-        assert broken.fixed[-2:].all()
-        later = np.arange(24, len(first))
-        return first.replaced(later, q.at(later))
-
-    monkeypatch.setattr("robots.solver.repair.solve_spells", mended)
-    kept = repair(ember, targets, footholds(ember, targets), pushed, arms)
-    assert solved[0] > thrusts[-1]
-    assert 20 < max(solved[1:]) < 24 + 1.2 / walk.frame_time
-    np.testing.assert_array_equal(kept.angles[:24], pushed.angles[:24])
-    np.testing.assert_array_equal(kept.angles[24:], q.angles[24:])
 
 
 def test_what_is_measured_is_what_mujoco_finds(ember: Morphology) -> None:
