@@ -35,14 +35,13 @@ REJECTED_DAMPING = 0.1  # at least, where a step was rejected
 
 class Steps(NamedTuple):
     """Of Gauss-Newton: at most `most` steps, of which one is the last that lowers the cost by less
-    than the share `gain` of it, if at most the share `rejected` of the frames reject it. `penalty`
-    multiplies the weights of collisions and the floor. In more than one of the `solves` of a step,
-    hinges that come to their limits stop there, and the others know it."""
+    than the share `gain` of it, if at most the share `rejected` of the frames reject it. In more
+    than one of the `solves` of a step, hinges that come to their limits stop there, and the others
+    know it."""
 
     most: int
     gain: float
     rejected: float
-    penalty: float = 1.0
     solves: int = 1
 
 
@@ -90,7 +89,7 @@ def solve_block(
 
     def linearize_at(q: Coordinates, with_jacobian: bool = True) -> NormalEquations:
         terms = robot, targets, holds, q, block, candidates or []
-        return linearize(*terms, np.full(len(q), steps.penalty), with_jacobian=with_jacobian)
+        return linearize(*terms, with_jacobian=with_jacobian)
 
     def smoothness_at(q: Coordinates, with_jacobian: bool) -> Smoothness:
         frame_time = targets.frame_time

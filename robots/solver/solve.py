@@ -44,8 +44,6 @@ from spark.transfer.treads import treads_of
 
 _TRUNK, _LIMBS = Steps(12, 0.02, 0.1), Steps(10, 0.05, 0.1)
 _WHOLE = Steps(8, 0.05, 0.1)  # both blocks at once, nearly solved one after the other
-# While collisions cost little, over a rounding that is wider by as much:
-_SOFT = Steps(3, 0.05, 0.1, penalty=0.2)
 # Splines through a solution. A foot whose hip comes to its limit in one frame and not in the next
 # would hop, if that was only clipped.
 _POLISH, _POLISH_LIMBS = Steps(2, 0.0, 1.0, solves=2), Steps(1, 0.0, 1.0, solves=2)
@@ -135,9 +133,7 @@ def _coarse(
 def _with_arms(robot: Morphology, targets: Targets, q: Coordinates, limbs: Block) -> Coordinates:
     """Arms and head solved in few frames, on a trunk that stays."""
     stride = coarse_stride(targets)
-    coarse, arms = targets.every(stride), q.every(stride)
-    arms = _led_out(robot, coarse, arms, limbs)
-    arms = _parted(robot, coarse, [], arms, limbs, _LIMBS)
+    arms = _parted(robot, targets.every(stride), [], q.every(stride), limbs, _LIMBS)
     return q.with_joints(limbs.joints, arms.upsampled(stride, len(targets)))
 
 
@@ -172,16 +168,6 @@ def _posed(
     sliding = _holds_of(robot, targets, feet, q, block).sliding()
     q = solve_block(robot, targets, sliding, q, block, steps)
     return q, apart(reachable(robot, feet, q)) if block.base else feet
-
-
-def _led_out(robot: Morphology, targets: Targets, q: Coordinates, limbs: Block) -> Coordinates:
-    """Arms a few steps out of what they are in, while that is soft. Steps see no firm wall but
-    those that they are in, and lead from one into the next."""
-    near = collision_candidates(robot, targets, q, limbs)
-    if not near:
-        return q
-    holds = _holds_of(robot, targets, [], q, limbs)
-    return solve_block(robot, targets, holds, q, limbs, _SOFT, near)
 
 
 def _parted(
