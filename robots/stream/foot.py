@@ -7,6 +7,7 @@ from robots.solver.foot_path import STEP_SPEEDS
 from robots.stream.footprint import Footprint
 
 _STILL, _STEPS = STEP_SPEEDS[:2]
+CLIMB_SPEED = 1.0  # [hip heights/s] of a sole to a ground that is seen only once it is stood on
 _SETTLE_TIME = 1.0  # [s] in which a foot on a step comes down most of the way to its source's
 
 
@@ -67,13 +68,17 @@ class Foot:
         if hold > 0:
             self.footprint.follow(moved[self.on_toe], turned, hold, wobble)
 
-    def stand_on(self, top: float, clearance: float, settles: float) -> None:
+    def stand_on(
+        self, top: float, clearance: float, own: float, settles: float, climbs: float
+    ) -> None:
         """What so high a ground [m, the source's own] over the floor its soles are on, so high [m,
-        scaled] there: it rises with the highest frame, and settles on the others by a share of what
-        it is over them. Who stands a little too high sinks into nothing."""
+        scaled] there; the robot's are at `own` [m]. It rises with the highest frame, by so much at
+        most, and settles on the others by a share of what it is over them. Who stands a little too
+        high sinks into nothing."""
         stays = True in self.planted and top == self.top
-        rise = max(clearance, self.rise + settles * (clearance - self.rise)) if stays else clearance
-        self.top, self.rise = top, rise if top > 0 else 0.0
+        before = self.rise if stays else max(own, 0.0)
+        rise = max(clearance, before + settles * (clearance - before)) if stays else clearance
+        self.top, self.rise = top, min(rise, before + climbs) if top > 0 else 0.0
 
     def grip(self, loosens: float, tightens: float) -> None:
         """Take hold of what stands, and let go of the rest, by so much at most."""

@@ -22,7 +22,7 @@ from robots.solver.foot_path import (
 )
 from robots.solver.footprints import MAX_WOBBLE, flat_sole, on_points
 from robots.solver.window_targets import PointTargets
-from robots.stream.foot import Foot, settling
+from robots.stream.foot import CLIMB_SPEED, Foot, settling
 from robots.stream.frame_targets import LATENCY, FrameReader, FrameTargets
 from robots.stream.standing import SourceFeet, Standing
 
@@ -52,6 +52,7 @@ class ContactTracker:
         self._grip = frame_time / HOLD_TIME
         self._settles = settling(frame_time)
         hip_height = float(self._robot.rig.hip_height)
+        self._climbs = CLIMB_SPEED * hip_height * frame_time
         self._hip_height, self._wobble = hip_height, MAX_WOBBLE * hip_height
         self._uneven = MAX_UNEVEN * hip_height
         self._index_points()
@@ -99,6 +100,7 @@ class ContactTracker:
         speeds = self._scale * np.array([speeds for speeds, _ in motion])
         steps = (_LIFT * step_height(speeds, self._hip_height)).tolist()
         feet, numbers = self._feet, list[float]()
+        own = [float(points[sole, 2].min()) for sole in self._points]
         places: list[complex] = []
         for at, (arrived, (speed, height), step) in enumerate(
             zip(self._arrived, motion, steps, strict=True), settled
@@ -108,7 +110,9 @@ class ContactTracker:
             stands = self._standing.of(frames, at, stood, speed, height, ground)
             for s, foot in enumerate(feet):
                 if True in stands[s]:
-                    foot.stand_on(ground[s], arrived.clearance[s], self._settles)
+                    foot.stand_on(
+                        ground[s], arrived.clearance[s], own[s], self._settles, self._climbs
+                    )
                 top = foot.rise if ground[s] == foot.top else self._scale * ground[s]
                 clearance = arrived.clearance[s] - top
                 moved, turned = arrived.moved[s], arrived.turned[s]
@@ -116,8 +120,8 @@ class ContactTracker:
                 # Where a foot will come down that is still in the air is not known yet.
                 known = foot.is_held or at == settled
                 if at == settled and not foot.is_held:
-                    own = [complex(x, y) for x, y, _ in points[self._points[s]].tolist()]
-                    foot.footprint.put(own, self._lengths[s], on_toe=foot.on_toe)
+                    here = [complex(x, y) for x, y, _ in points[self._points[s]].tolist()]
+                    foot.footprint.put(here, self._lengths[s], on_toe=foot.on_toe)
                 foot.grip(self._grip, tightens)
                 pace = self._scale * speed[s][1] / self._hip_height
                 up = foot.height(clearance, pace, self._uneven)

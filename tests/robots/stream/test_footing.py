@@ -98,12 +98,23 @@ def test_a_foot_that_stood_over_the_floor_is_put_down_on_it() -> None:
 def test_a_foot_on_a_step_settles_at_any_rate_and_never_sinks() -> None:
     rises = []
     for frame_time in (1 / 24, 1 / 120):
-        foot, share = Foot(planted=(True, True)), settling(frame_time)
-        foot.stand_on(0.3, 0.34, share)
+        foot, pace = Foot(planted=(True, True)), (settling(frame_time), 1.0)
+        foot.stand_on(0.3, 0.34, 0.34, *pace)
         for _ in range(round(0.5 / frame_time)):
-            foot.stand_on(0.3, 0.30, share)
+            foot.stand_on(0.3, 0.30, 0.34, *pace)
         rises.append(foot.rise)
-        foot.stand_on(0.3, 0.33, share)
+        foot.stand_on(0.3, 0.33, 0.34, *pace)
         assert foot.rise == 0.33
     assert rises[0] == pytest.approx(rises[1], abs=1e-9)
     assert 0.31 < rises[0] < 0.33
+
+
+def test_a_foot_left_below_comes_up_to_the_ground_step_by_step() -> None:
+    """The source has been lifted from the floor, on which the robot's foot still is."""
+    foot = Foot(planted=(True, True))
+    rises = []
+    for _ in range(20):
+        foot.stand_on(1.0, 0.8, 0.0, settling(1 / 60), 0.1)
+        rises.append(foot.rise)
+    np.testing.assert_allclose(rises[:8], np.arange(1, 9) * 0.1, atol=1e-9)
+    np.testing.assert_allclose(rises[8:], 0.8, atol=1e-9)
