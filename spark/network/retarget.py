@@ -53,15 +53,12 @@ class NetworkRetargeter:
         except (KeyError, TypeError, ValueError) as error:
             raise weights.damaged(error) from error
 
-    def __call__(
-        self, source: CanonicalMotion, target: Rig, *, window: int | None = None
-    ) -> CanonicalMotion:
+    def __call__(self, source: CanonicalMotion, target: Rig) -> CanonicalMotion:
         """`source`'s motion on `target`; any length, 1 frame too.
 
-        `window` [frames at 30 fps] is the training's by default. A residual network corrects the
-        joints that the analytic transfer leaves unmatched, the less the less the target resembles
-        the bodies that it was trained on (`similarity`); a body unlike all of them is left as it
-        is.
+        A residual network corrects the joints that the analytic transfer leaves unmatched, the less
+        the less the target resembles the bodies that it was trained on (`similarity`); a body
+        unlike all of them is left as it is.
         """
         start = transfer(source, target)
         bodies = body_features(source.rig), body_features(target)
@@ -81,9 +78,7 @@ class NetworkRetargeter:
             if not strength:
                 return start
         source_30fps, start_30fps = (at_frame_time(c, FRAME_TIME) for c in (source, start))
-        blended = self._blend_windows(
-            source_30fps, start_30fps, bodies, unmatched, strength, window or self.window
-        )
+        blended = self._blend_windows(source_30fps, start_30fps, bodies, unmatched, strength)
         if start_30fps is start:
             return blended
         correction = in_blocks(
@@ -125,10 +120,9 @@ class NetworkRetargeter:
         bodies: tuple[BodyFeatures, BodyFeatures],
         unmatched: Int[np.ndarray, "J"],
         strength: float,
-        window: int,
     ) -> CanonicalMotion:
         """The windows' outputs, blended; quaternions are averaged as vectors."""
-        count, size = len(start), min(window, len(start))
+        count, size = len(start), min(self.window, len(start))
         hop = max(3 * size // 4, 1)
         starts = sorted({*range(0, count - size + 1, hop), count - size})
         weight = np.minimum(np.arange(size) + 1, np.arange(size)[::-1] + 1).astype(np.float64)

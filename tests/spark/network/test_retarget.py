@@ -38,7 +38,7 @@ def test_an_untrained_residual_is_the_analytic_transfer(
     motion = sample_motion("walk", sample_rig("walker"), fps).frames(0, frames)
     canonical = to_canonical(motion, source)
     new = replace(fresh(TINY), bodies=[trunk_of(body_features(target))])
-    moved = learned(new, tmp_path)(canonical, target, window=12)
+    moved = learned(new, tmp_path)(canonical, target)
     copied = transfer(canonical, target)
     assert len(moved) == frames
     assert "the network fills them in" in moved.notes[-1]
@@ -69,8 +69,9 @@ def test_windows_agree_with_the_whole(clips: list[TrainingClip], tmp_path: Path)
     trained = learned(train(bowed, config, tmp_path, start=fresh(config)), tmp_path)
     source, target = without(sample_rig("walker"), Role.NECK), sample_rig("dancer")
     canonical = to_canonical(sample_motion("walk", sample_rig("walker"), 30.0), source)
-    whole = trained(canonical, target, window=len(canonical))
     chunks = trained(canonical, target)
+    trained.window = len(canonical)
+    whole = trained(canonical, target)
     copied = transfer(canonical, target)
     assert np.abs(canonical_positions(whole) - canonical_positions(copied)).max() > 1e-4
     apart = np.abs(canonical_positions(whole) - canonical_positions(chunks)).max()
