@@ -25,7 +25,6 @@ WINDOW = 0.15  # [s] before and after a frame over which its cost is averaged to
 _WIDE_WINDOW = 0.5  # [s] the same for what is gained nearby,
 _MAX_HALVINGS = 4  # of a step, where it is rejected
 _ALLOWED_LOSS = 0.5  # and the share of that by which a frame's cost may rise
-_PATIENCE = 2  # steps without progress that are allowed while many frames reject them
 COLLISION_PERIOD = 5  # steps from one search for collision candidates to the next
 _COLLISION_INTERVAL = 0.06  # [s] between the frames that are searched
 MAX_STEP = 1.0  # [rad, m] of a dof in one step
@@ -35,9 +34,9 @@ REJECTED_DAMPING = 0.1  # at least, where a step was rejected
 
 class Steps(NamedTuple):
     """Of Gauss-Newton: at most `most` steps, of which one is the last that lowers the cost by less
-    than the share `gain` of it, if at most the share `rejected` of the frames reject it. In more
-    than one of the `solves` of a step, hinges that come to their limits stop there, and the others
-    know it."""
+    than the share `gain` of it. A step of the base that more than the share `rejected` of the
+    frames reject is shortened there. In more than one of the `solves` of a step, hinges that come
+    to their limits stop there, and the others know it."""
 
     most: int
     gain: float
@@ -73,9 +72,9 @@ def solve_block(
     apart, by a change of `q` that is smoother than `q`.
 
     A step is judged frame by frame: where the cost around a frame rises by more than a share
-    of what is gained nearby, the step is rejected there. If more frames than the last step may have
-    reject a step of the base, it is halved there, again and again: down to the floor, of which
-    nothing is felt from above, most are too long. Where it is rejected all the same, damping grows
+    of what is gained nearby, the step is rejected there. One of the base that many frames reject is
+    halved there, again and again: down to the floor, of which nothing is felt from above, most are
+    too long. Where it is rejected all the same, damping grows
     (Levenberg and Marquardt's rule, a frame each). Between rejected and accepted frames the step is
     blended, and the normal equations with it: exact where the cost is a parabola.
     """
@@ -111,7 +110,7 @@ def solve_block(
         gained = np.maximum(uniform_filter1d(cost - after, wide), 0.0)
         return after, after > cost * (1 + 1e-3) + _ALLOWED_LOSS * gained + 1e-9
 
-    normal, stalled = linearize_at(q), 0
+    normal = linearize_at(q)
     for k in range(steps.most):
         jerky = jerk_stiffening(robot, q, targets.frame_time, targets.jerks)[:, block.dofs]
         stiffening = np.maximum(stiffening, jerky)
@@ -144,9 +143,9 @@ def solve_block(
             if trial_normal.with_jacobian:
                 trial_normal = normal.blended(trial_normal, share)
             after = cost + share * (after - cost)
-        stalled = stalled + 1 if after.sum() > (1 - steps.gain) * cost.sum() else 0
+        gained_little = after.sum() > (1 - steps.gain) * cost.sum()
         q, normal = trial, trial_normal
-        if stalled > (_PATIENCE if rejected.mean() > steps.rejected else 0):
+        if gained_little:
             break
     return q
 
