@@ -1,6 +1,6 @@
 """What each step of the robots' solver gives: a table of bars, with one step left out at a time.
 
-    python scripts/steps_table.py --data DIR [--robot unitree_h1] [--seconds 8]
+    python -m scripts.steps_table --data DIR [--robot unitree_h1] [--seconds 8]
 
 The steps are those that `robots.solver.solve` names. A figure is the mean over the clips: dances,
 one who picks something up, a referee who rolls his forearm, and three on the ground.
@@ -12,12 +12,12 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-from robot_bars import cells, clip, mean_of
 
 from robots.metrics import RobotMetrics, measure
 from robots.model.known import known
 from robots.model.morphology import Morphology
 from robots.solver import solve
+from scripts.robot_bars import cells, clip, mean_of
 from spark.transfer.canonical import CanonicalMotion, from_canonical
 
 CLIPS = (

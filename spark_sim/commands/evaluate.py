@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from spark.evaluation.evaluate import LegFitter, MethodScores
     from spark.inference.weights import Weights
     from spark.network.forward import Network
+    from spark.network.retarget import NetworkRetargeter
     from spark.transfer.target_prior import RetargetMethod
 
 SUMMARY = "measure methods against a ground truth"
@@ -120,6 +121,7 @@ def run(args: Namespace) -> int:
     if results and args.made:
         raise ConventionError("--result goes with recorded answers: no tool was given those --made")
     checkpoints = dict(_checkpoint(given) for given in args.checkpoint)
+    networks = {name: _network(weights) for name, weights in checkpoints.items()}
     found = performances(Path(args.data))
     if args.made:
         cases = made_cases(found, args.seed, args.limit)
@@ -164,10 +166,7 @@ def run(args: Namespace) -> int:
     seen = recorded_pairs([] if args.made else [p for p in found if p.cell == CELLS[0]])
     if seen.enough:
         add("ridge", transfer, _FITTED | _BOTH, partial(as_recorded, fit_ridge(seen)))
-    for name, weights in checkpoints.items():
-        from spark.network.retarget import NetworkRetargeter
-
-        network = NetworkRetargeter(weights, _runner(weights))
+    for name, network in networks.items():
         of_legs: tuple[Why, ...] = ()
         ways = _PLAIN
         if network.network.config.residual:
@@ -176,7 +175,15 @@ def run(args: Namespace) -> int:
                 ways = _PLAIN | _FITTED | _BOTH | _ALL
                 of_legs = (why_unfamiliar(network.recorded.known),)
         whys = (why_silent(network),)
-        add(name, network, ways, network.fit_legs, whys, of_legs, settings=weights.settings)
+        add(
+            name,
+            network,
+            ways,
+            network.fit_legs,
+            whys,
+            of_legs,
+            settings=checkpoints[name].settings,
+        )
     for name, folder in results.items():
         answered = [case for case in cases if case.answer is not None]
         rows.append(row(name, results_in(Path(folder)), answered))
@@ -194,6 +201,12 @@ def run(args: Namespace) -> int:
     for path in outputs:
         write_atomically(path, _text(path, rows, about).encode())
     return 0
+
+
+def _network(weights: "Weights") -> "NetworkRetargeter":
+    from spark.network.retarget import NetworkRetargeter
+
+    return NetworkRetargeter(weights, _runner(weights))
 
 
 def _runner(weights: "Weights") -> "type[Network]":
