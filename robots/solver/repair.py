@@ -2,7 +2,7 @@
 
 Collisions, the floor and the speed of hinges are soft penalties to the solver: other residuals may
 outweigh them. The frames around a violation are solved again with approximate shapes, which
-suffices for most, and then with MuJoCo's and firmer penalties (a penalty method: Nocedal and
+suffices for most, and then with MuJoCo's and ever firmer penalties (a penalty method: Nocedal and
 Wright, "Numerical Optimization", 17.1).
 """
 
@@ -30,7 +30,7 @@ from robots.solver.targets import Targets
 from robots.tree import Coordinates
 from spark.runs import true_runs
 
-_MAX_ROUNDS = 2
+_MAX_ROUNDS = 3
 PENALTY_GROWTH = 3.0  # from round to round, of the penalties' weights
 _AROUND = 0.4  # [s] before and after a violation that are solved again
 _MAX_JERK_RATIO = 5.0  # jerk, over the one from which hinges are smoothed, that is a violation

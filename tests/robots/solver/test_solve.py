@@ -273,7 +273,7 @@ def test_arms_in_the_body_are_led_out_and_the_rest_stays(
     for sign in (1.0, -1.0):
         for j in chain:
             tried = angles.copy()
-            tried[:, j] += sign * 0.3 * bump
+            tried[:, j] += sign * 0.4 * bump
             pushed = Coordinates(q.pos, q.quat, tried).clipped(ember.tree, 0.02)
             sides.append((violations(ember, targets, pushed, arms, 1)[middle], pushed))
     into = [pushed for wrong, pushed in sides if wrong]
