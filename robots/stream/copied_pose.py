@@ -1,6 +1,5 @@
 """How a robot would stand if its parts turned as the source's do."""
 
-from collections.abc import Sequence
 from math import cos, sin
 from typing import NamedTuple
 
@@ -58,7 +57,7 @@ class Copier:
         world: Float[np.ndarray, "N 3 3"],
         joints: Float[np.ndarray, "N 3"],
         points: SourcePoints,
-        rolls: Sequence[float] = (),
+        rolls: Float[np.ndarray, "S"],
     ) -> Copied:
         """Of a source with these rotations and places [m] of its joints, and these points; feet are
         rolled so far [rad] about their own axes."""
@@ -66,7 +65,7 @@ class Copier:
         for j, first, second, mix, tpose in self._between:
             own[j] = self._mixed(world, first, second, mix) @ tpose
         own[self._at_rest] = _UNTURNED
-        for joint, foot, untpose, tpose in self._of_feet if any(rolls) else ():
+        for joint, foot, untpose, tpose in self._of_feet if rolls.any() else ():
             c, s = cos(rolls[foot]), sin(rolls[foot])
             rolled = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
             own[joint] = own[joint] @ untpose @ rolled @ tpose

@@ -18,7 +18,7 @@ from spark.rig.roles import Role
 from spark.rotation import matrix_from_quat
 
 _ALONG = 0.5  # share of a hinge's axis along the foot from which on it rolls it
-_FEWEST, _MOST = 0.1, 4.0  # [s] of standing that count: a first frame says little, old ones fade
+_FEWEST, _MOST = 0.1, 4.0  # [s] of standing: at first feet turn little by little, old frames fade
 
 
 class LevelSoles:
@@ -33,18 +33,25 @@ class LevelSoles:
 
     def reset(self) -> None:
         """Forget what has been seen."""
-        self._stood = [0.0] * len(self._feet)
-        self.rolls = [0.0] * len(self._feet)
+        self._stood, self._means = [0.0] * len(self._feet), [0.0] * len(self._feet)
+        self.rolls = np.zeros(len(self._feet))
         """How far each foot is rolled [rad] about its own axis, so that it is level."""
 
-    def follow(self, world: Float[np.ndarray, "J 3 3"], flat: Sequence[bool]) -> None:
+    def follow(
+        self,
+        world: Float[np.ndarray, "J 3 3"],
+        rolled: Float[np.ndarray, "S"],
+        flat: Sequence[bool],
+    ) -> None:
         """Take in a frame in which some feet stand `flat`, and the joints of the robot's rig, its
-        feet rolled, are turned by `world` (`R_world_joint`)."""
+        feet `rolled` by so much [rad] when the frame came, are turned by `world`
+        (`R_world_joint`)."""
         for s in (s for s, stands in enumerate(flat) if stands and self._can_roll[s]):
             left, up = (world[self._feet[s], 2] @ self._left_up[s]).tolist()
             self._stood[s] = min(self._stood[s] + self._frame_time, _MOST)
-            share = self._frame_time / max(self._stood[s], _FEWEST)
-            self.rolls[s] -= share * atan2(left, up)
+            own = atan2(left, up) - rolled[s]
+            self._means[s] += self._frame_time / self._stood[s] * (own - self._means[s])
+            self.rolls[s] = -self._means[s] * min(self._stood[s] / _FEWEST, 1.0)
 
 
 def _rolls(robot: Morphology, sole: Sole) -> bool:

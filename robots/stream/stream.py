@@ -119,7 +119,7 @@ class Stream:
         poses = self._window.move_on(q)
         bones, soles = self._terms.bones_and_soles(poses)
         foot_targets = self._contacts.update(targets, soles[0], self.foot_noise)
-        self._level.follow(self._targets.world[0], self._contacts.flat)
+        self._level.follow(self._targets.world[0], self._targets.rolls[0], self._contacts.flat)
         resting = self._rests.update(targets, poses)
         self._q = self._solved(q, poses, bones[0], foot_targets, resting)
         return self._start_blend.follow(self._q[_FIXED])
