@@ -127,6 +127,11 @@ class Rig:
         """For each joint that doubles one with a role, that one: they turn alike."""
         return doubles_of(self.skeleton, self.roles.roles)
 
+    def carried_by(self, joint: int) -> set[int]:
+        """The joint and all below it, and its doubles and all below those."""
+        tops = (joint, *(j for j, own in self.doubles.items() if own == joint))
+        return {below for top in tops for below in self.skeleton.subtree(top)}
+
     @cached_property
     def fingers(self) -> dict[FingerBone, int]:
         """The joints of the fingers, as far as names tell them."""

@@ -65,14 +65,7 @@ def _limb_of(
 ) -> Leg | None:
     if upper is None or lower is None or foot is None:
         return None
-    below_hip, below_knee, below_ankle = (
-        {
-            below
-            for top in (joint, *(j for j, own in rig.doubles.items() if own == joint))
-            for below in rig.skeleton.subtree(top)
-        }
-        for joint in (upper, lower, foot)
-    )
+    below_hip, below_knee, below_ankle = map(rig.carried_by, (upper, lower, foot))
     return Leg(
         upper,
         lower,

@@ -40,7 +40,7 @@ def from_rest_to_rest(source: Rig, moved: CanonicalMotion) -> CanonicalMotion:
         return moved
     rotations = moved.rotations.copy()
     for role in shared:
-        joints = list(moved.rig.skeleton.subtree(moved.rig.roles.require(role)))
+        joints = sorted(moved.rig.carried_by(moved.rig.roles.require(role)))
         turn = quat_from_yaw(np.array(theirs[role] - own[role]))
         rotations[:, joints] = quat_mul(rotations[:, joints], turn)
     return replace(moved, rotations=rotations)

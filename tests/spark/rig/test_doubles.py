@@ -11,9 +11,9 @@ from spark.rig.doubles import doubles_of
 from spark.rig.nulls import nulls_of
 from spark.rig.rig import understand
 from spark.rig.roles import Role
-from spark.rotation import quat_from_rotvec
+from spark.rotation import quat_angle, quat_from_rotvec, quat_from_yaw, quat_rotate
 from spark.skeleton import Skeleton
-from spark.transfer.analytic import transfer
+from spark.transfer.analytic import copied, transfer
 from spark.transfer.canonical import from_canonical, to_canonical
 from spark.transfer.foot_lock import lock_feet
 from spark.transfer.leg_fit import fit_legs
@@ -72,6 +72,24 @@ def test_doubles_go_where_their_originals_go() -> None:
         np.testing.assert_allclose(positions[:, double], positions[:, own], atol=2e-3)
     ankle = out.skeleton.names.index("左足首D")
     assert np.ptp(positions[:, ankle], axis=0).max() > 0.1
+
+
+def test_doubles_of_feet_head_where_their_originals_head() -> None:
+    """Of a body whose feet rest outwards, beside that of the source."""
+    walking, target = walk(*build(RIGS["mixamo"]), frames=2), with_doubles()
+    skeleton = target.skeleton
+    offsets = skeleton.offsets.copy()
+    for j, name in enumerate(skeleton.names):
+        if name[1:] in ("つま先", "足先EX"):
+            outwards = quat_from_yaw(np.radians(18.0 if name[0] == "左" else -18.0))
+            offsets[j] = quat_rotate(outwards, offsets[j])
+    rig = understand(replace(target, skeleton=replace(skeleton, offsets=offsets)))
+    source = to_canonical(walking, understand(walking))
+    turns = transfer(source, rig).rotations
+    feet = [pair for pair in pairs(rig.skeleton) if skeleton.names[pair[1]][1:] == "足首"]
+    assert quat_angle(turns, copied(source, rig).rotations)[:, feet].min() > np.radians(15)
+    for double, own in pairs(rig.skeleton):
+        np.testing.assert_allclose(turns[:, double], turns[:, own], atol=1e-12)
 
 
 def test_a_chain_elsewhere_is_no_double() -> None:
