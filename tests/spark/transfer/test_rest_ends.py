@@ -21,6 +21,7 @@ from tests.helpers.proportions import striding
 from tests.helpers.recordings import DATA, recordings
 from tests.helpers.stick import joint, stick_rig
 
+TOES = (Role.LEFT_TOE, Role.RIGHT_TOE)
 SIDES = {"left": 1.0, "right": -1.0}
 
 
@@ -51,6 +52,28 @@ def splayed(degrees: float, arms: float = 0.0, hands: float = 0.0) -> Rig:
     return replace(rig, skeleton=skeleton, tpose=tpose)
 
 
+def with_hands_ahead(rig: Rig, degrees: float) -> Rig:
+    """The same with hands that rest so far ahead."""
+    tpose = rig.tpose.copy()
+    for side, sign in SIDES.items():
+        back = quat_from_yaw(sign * np.radians(degrees))
+        hand = joint(Role(f"{side}_hand"))
+        tpose[hand] = quat_mul(back, tpose[hand])
+    return replace(rig, tpose=tpose)
+
+
+def facing(rig: Rig, degrees: float) -> Rig:
+    """The same in a file that has it turned."""
+    turn = quat_from_yaw(np.radians(degrees))
+    skeleton = rig.skeleton
+    skeleton = replace(
+        skeleton,
+        offsets=quat_rotate(turn, skeleton.offsets),
+        end_offsets=quat_rotate(turn, skeleton.end_offsets),
+    )
+    return replace(rig, skeleton=skeleton, tpose=quat_mul(rig.tpose, quat_conj(turn)))
+
+
 def resting(rig: Rig) -> CanonicalMotion:
     """The body as its file has it at rest."""
     return CanonicalMotion(rig, 1 / 30, quat_conj(rig.tpose)[None], np.zeros((1, 3)))
@@ -58,11 +81,19 @@ def resting(rig: Rig) -> CanonicalMotion:
 
 @pytest.mark.parametrize("degrees", [0.0, 12.0, 22.0])
 def test_a_body_at_rest_puts_another_s_feet_to_rest(degrees: float) -> None:
-    target = splayed(degrees)
-    moved = transfer(resting(splayed(5.0)), target)
-    for role in (*ANKLES, *HANDS):
+    target = with_hands_ahead(splayed(degrees), 6.0)
+    moved = transfer(resting(with_hands_ahead(splayed(5.0), 9.0)), target)
+    for role in (*ANKLES, *TOES, *HANDS):
         world = quat_mul(moved.rotations[0, joint(role)], target.tpose[joint(role)])
         assert quat_angle(world, np.eye(4)[0]) < 1e-9
+
+
+def test_it_does_not_matter_where_a_file_faces() -> None:
+    source, target = striding(splayed(5.0)), splayed(18.0)
+    aside = facing(target, 90.0)
+    np.testing.assert_allclose(aside.tpose_positions, target.tpose_positions, atol=1e-9)
+    turned = transfer(source, aside).rotations
+    np.testing.assert_allclose(turned, transfer(source, target).rotations, atol=1e-9)
 
 
 def test_there_and_back_is_the_same() -> None:
