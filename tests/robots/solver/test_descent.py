@@ -68,8 +68,25 @@ def test_whoever_hovers_comes_down_though_the_first_step_ends_deep_in_the_floor(
     assert (q.pos[90:, 2] < start.pos[90:, 2] - 0.04).all()
 
 
+def test_a_step_that_gains_less_than_asked_is_the_last(ember: Morphology) -> None:
+    targets, block, start = targets_of(standing(), ember), blocks_of(ember)[0], raised(ember)
+    holds = drawn_down(ember, start)
+
+    def found(steps: Steps) -> Coordinates:
+        return solve_block(ember, targets, holds, start, block, steps)
+
+    one, last, more = (
+        found(Steps(1, 0.0, 0.1)),
+        found(Steps(6, 1.0, 0.1)),
+        found(Steps(2, 0.0, 0.1)),
+    )
+    np.testing.assert_allclose(last.pos, one.pos, atol=1e-12)
+    np.testing.assert_allclose(last.angles, one.angles, atol=1e-12)
+    assert np.abs(more.pos - one.pos).max() > 1e-4
+
+
 @pytest.mark.parametrize("above", [0.07, 0.03])  # [m] the floor
-def test_a_repair_comes_down_to_a_floor_that_is_as_firm_as_it_gets(
+def test_a_repair_comes_down_to_a_floor_far_firmer_than_repairs_have(
     ember: Morphology, above: float
 ) -> None:
     block, firm = blocks_of(ember)[0], np.full(COUNT, 729.0)

@@ -24,7 +24,7 @@ from robots.solver.holds import Holds, joined
 from robots.solver.limb_jerk import limb_dofs
 from robots.solver.objective import linearize
 from robots.solver.projection import project
-from robots.solver.repair import repair, violations
+from robots.solver.repair import PENALTY_GROWTH, repair, violations
 from robots.solver.repair_descent import Repair
 from robots.solver.smoothness import jerk_stiffening, limit_speed
 from robots.solver.solve import copy, retarget
@@ -303,6 +303,31 @@ def test_repairs_far_apart_know_nothing_of_each_other(
     assert np.abs(second - q.angles - late).max() > 0.5
     np.testing.assert_allclose(both[:90], first[:90], atol=1e-7)
     np.testing.assert_allclose(both[90:], second[90:], atol=1e-7)
+
+
+def test_what_the_first_round_leaves_is_solved_exactly_and_more_firmly(
+    walk: CanonicalMotion, walked: RobotMotion, ember: Morphology, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two spells, of which the first round mends one."""
+    arms, targets, q = blocks_of(ember)[1], targets_of(walk, ember), walked.coordinates
+    pushed = Coordinates(q.pos, q.quat, q.angles.copy(), q.ball_quats)
+    shoulder = int(ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)])
+    pushed.angles[[40, 140], shoulder] += 1.0  # [rad] in a frame: far too fast
+    rounds = []
+
+    def mend_the_first(broken: Repair) -> Coordinates:
+        rounds.append((broken.exact, len(broken.spells), set(broken.penalty_scale.tolist())))
+        angles = broken.start.angles.copy()
+        if len(broken.spells) == 2:
+            own = angles[broken.spells.slices()[0], shoulder]
+            own[1 + np.abs(np.diff(own, n=2)).argmax()] -= 1.0
+        return Coordinates(broken.start.pos, broken.start.quat, angles, broken.start.ball_quats)
+
+    monkeypatch.setattr("robots.solver.repair.solve_spells", mend_the_first)
+    kept = repair(ember, targets, footholds(ember, targets), pushed, arms)
+    assert rounds == [(False, 2, {1.0}), (True, 1, {PENALTY_GROWTH})]
+    np.testing.assert_allclose(kept.angles[:90], q.angles[:90], atol=1e-9)
+    np.testing.assert_array_equal(kept.angles[90:], pushed.angles[90:])
 
 
 def test_no_repair_gives_up_the_pose(

@@ -109,12 +109,13 @@ def test_a_foot_on_a_step_settles_at_any_rate_and_never_sinks() -> None:
     assert 0.31 < rises[0] < 0.33
 
 
-def test_a_foot_left_below_comes_up_to_the_ground_step_by_step() -> None:
-    """The source has been lifted from the floor, on which the robot's foot still is."""
+@pytest.mark.parametrize("own", [-0.02, 0.0, 0.3])
+def test_a_foot_left_below_comes_up_to_the_ground_step_by_step(own: float) -> None:
+    """The source has been lifted, and the robot's foot is still where it was."""
     foot = Foot(planted=(True, True))
     rises = []
     for _ in range(20):
-        foot.stand_on(1.0, 0.8, 0.0, settling(1 / 60), 0.1)
+        foot.stand_on(1.0, 0.8, own, settling(1 / 60), 0.1)
         rises.append(foot.rise)
-    np.testing.assert_allclose(rises[:8], np.arange(1, 9) * 0.1, atol=1e-9)
-    np.testing.assert_allclose(rises[8:], 0.8, atol=1e-9)
+    expected = np.minimum(max(own, 0.0) + 0.1 * np.arange(1, 21), 0.8)
+    np.testing.assert_allclose(rises, expected, atol=1e-9)
