@@ -1,6 +1,5 @@
 """How a robot would stand if its parts turned as the source's do."""
 
-from math import cos, sin
 from typing import NamedTuple
 
 import mujoco
@@ -46,29 +45,18 @@ class Copier:
             for j in np.flatnonzero((ways.mix != 0) & (ways.first >= 0)).tolist()
         ]
         self._index_soles(robot)
-        self._of_feet = [
-            (j, s, tpose[j].T, tpose[j])
-            for s, sole in enumerate(robot.soles)
-            for j in set(sole.joints.tolist())
-        ]
 
     def of(
         self,
         world: Float[np.ndarray, "N 3 3"],
         joints: Float[np.ndarray, "N 3"],
         points: SourcePoints,
-        rolls: Float[np.ndarray, "S"],
     ) -> Copied:
-        """Of a source with these rotations and places [m] of its joints, and these points; feet are
-        rolled so far [rad] about their own axes."""
+        """Of a source with these rotations and places [m] of its joints, and these points."""
         own = world.take(self._first, axis=0) @ self._to_own
         for j, first, second, mix, tpose in self._between:
             own[j] = self._mixed(world, first, second, mix) @ tpose
         own[self._at_rest] = _UNTURNED
-        for joint, foot, untpose, tpose in self._of_feet if rolls.any() else ():
-            c, s = cos(rolls[foot]), sin(rolls[foot])
-            rolled = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-            own[joint] = own[joint] @ untpose @ rolled @ tpose
         pelvis = own[self._pelvis] @ self._pelvis_tpose.T
         bowed = self._bowing.of(pelvis, points.trunk, points.thighs, joints)
         if bowed is not pelvis:

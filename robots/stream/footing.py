@@ -141,11 +141,6 @@ class ContactTracker:
             np.array(places, dtype=complex).reshape(-1, 2).T,
         )
 
-    @property
-    def flat(self) -> list[bool]:
-        """Which feet stand on heel and toes in the frame that was settled last."""
-        return [all(foot.planted) for foot in self._feet]
-
     def _take_in(self, targets: FrameTargets) -> None:
         """The newest frame."""
         own, axes = self._standing.feet(targets), self._axes_over_floor(targets)

@@ -56,7 +56,7 @@ class FrameTargets(PoseTargets):
     `clearance` is how high its soles are, scaled, and `pitched` where the points of the robot's
     would be: from the middle of its toes along the foot and to its left, and above the lowest of
     them [m]. `parts` are its joints that may touch the ground, in the order of `FrameReader.parts`
-    [m, the source's own world]. In `world` the feet are rolled by `rolls` [rad].
+    [m, the source's own world].
     """
 
     com: Float[np.ndarray, "*T 3"]
@@ -64,7 +64,6 @@ class FrameTargets(PoseTargets):
     clearance: Float[np.ndarray, "*T S"]
     pitched: Float[np.ndarray, "*T P 3"]
     parts: Float[np.ndarray, "*T K 3"]
-    rolls: Float[np.ndarray, "*T S"]
 
 
 def raised(targets: FrameTargets, by: float) -> FrameTargets:
@@ -118,15 +117,14 @@ class FrameReader:
         self.bones, self.parts = self._follower.bones, self._follower.parts
         self.has_feet, self.hands = self._follower.has_feet, self._follower.hands
 
-    def targets(self, frame: Frame, rolls: Float[np.ndarray, "S"] | None = None) -> FrameTargets:
-        """The targets that a frame sets for the robot, whose feet are rolled so far [rad].
+    def targets(self, frame: Frame) -> FrameTargets:
+        """The targets that a frame sets for the robot.
 
         Raises `FrameError` where it is not a frame of the source's skeleton.
         """
-        rolls = np.zeros(len(self.robot.soles)) if rolls is None else rolls.copy()
         world, joints = self._world(frame)
         points = self._follower.of(world, joints)
-        copied = self._copier.of(world, joints, points, rolls)
+        copied = self._copier.of(world, joints, points)
         return FrameTargets(
             world=copied.world,
             chest=copied.chest,
@@ -138,7 +136,6 @@ class FrameReader:
             clearance=points.clearance,
             pitched=copied.pitched,
             parts=points.parts,
-            rolls=rolls,
         )
 
     def _world(self, frame: Frame) -> tuple[Float[np.ndarray, "N 3 3"], Float[np.ndarray, "N 3"]]:

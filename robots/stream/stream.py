@@ -29,7 +29,6 @@ from robots.stream.frame_targets import (
     raised,
 )
 from robots.stream.jump_filter import JumpFilter
-from robots.stream.level_soles import LevelSoles
 from robots.stream.noise_filter import NoiseFilter
 from robots.stream.resting import RestTracker, held_points
 from robots.stream.start_blend import StartBlend
@@ -64,7 +63,6 @@ class Stream:
         self._start_blend = StartBlend(self._terms, frame_time)
         self._frame_check = FrameCheck(self._reader)
         self._jump_filter = JumpFilter(frame_time)
-        self._level = LevelSoles(robot, frame_time)
         self._targets: FrameTargets  # of the window's free frames
         self._contacts: ContactTracker
         self._rests: RestTracker
@@ -78,7 +76,6 @@ class Stream:
         self._noise_filter.reset()
         self._frame_check.reset()
         self._jump_filter.reset()
-        self._level.reset()
         self._start_blend.reset()
         self._q = np.zeros((_FRAMES, self.robot.mjcf.model.nq))
         self._begun: list[FrameTargets] = []
@@ -102,10 +99,10 @@ class Stream:
     def _step(self, frame: Frame) -> Float[np.ndarray, "nq"]:
         held = self._jump_filter.hold(frame) if self._moves else frame
         try:
-            targets = self._reader.targets(held, self._level.rolls)
+            targets = self._reader.targets(held)
             self._frame_check.check(held, targets)
             quiet = self._noise_filter.follow(held, targets.feet)
-            targets = targets if quiet is None else self._reader.targets(quiet, self._level.rolls)
+            targets = targets if quiet is None else self._reader.targets(quiet)
         except FrameError as error:
             raise FrameError(f"frame {self._count} of the stream: {error}") from error
         self._jump_filter.take(frame, held)
@@ -119,7 +116,6 @@ class Stream:
         poses = self._window.move_on(q)
         bones, soles = self._terms.bones_and_soles(poses)
         foot_targets = self._contacts.update(targets, soles[0], self.foot_noise)
-        self._level.follow(self._targets.world[0], self._targets.rolls[0], self._contacts.flat)
         resting = self._rests.update(targets, poses)
         self._q = self._solved(q, poses, bones[0], foot_targets, resting)
         return self._start_blend.follow(self._q[_FIXED])
