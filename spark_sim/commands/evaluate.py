@@ -1,10 +1,10 @@
 """`spark-sim evaluate`: methods against ground truths, as the paper's tables."""
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from spark_sim.commands.options import add_force
 
@@ -35,6 +35,7 @@ examples:
                                                       # MOTION.bvh
   spark-sim evaluate dataset --made --checkpoint run
 """
+_T = TypeVar("_T")
 Ways = dict[str, dict[str, bool]]
 """What a row adds to its method, by the end of its name."""
 _PLAIN: Ways = {"": {}}
@@ -117,10 +118,10 @@ def run(args: Namespace) -> int:
         raise ConventionError(f"--limit {args.limit}: expected 1 or more")
     if args.seed < 0:
         raise ConventionError(f"--seed {args.seed}: expected 0 or more")
-    results = dict(_named(result) for result in args.result)
+    results = _by_name("--result", map(_named, args.result))
     if results and args.made:
         raise ConventionError("--result goes with recorded answers: no tool was given those --made")
-    checkpoints = dict(_checkpoint(given) for given in args.checkpoint)
+    checkpoints = _by_name("--checkpoint", map(_checkpoint, args.checkpoint))
     networks = {name: _network(weights) for name, weights in checkpoints.items()}
     found = performances(Path(args.data))
     if args.made:
@@ -237,6 +238,18 @@ def _named(given: str) -> tuple[str, str]:
     if not (name and equals and Path(rest).is_dir()):
         raise ConventionError(f"--result {given}: expected NAME=DIR, and DIR a folder of results")
     return name, rest
+
+
+def _by_name(option: str, given: Iterable[tuple[str, _T]]) -> dict[str, _T]:
+    """Raises `ConventionError` where two have one name: a table would show one of them."""
+    from spark.errors import ConventionError
+
+    found: dict[str, _T] = {}
+    for name, value in given:
+        if name in found:
+            raise ConventionError(f"{option}: two are called {name!r}; expected NAME=... of each")
+        found[name] = value
+    return found
 
 
 def _checkpoint(given: str) -> tuple[str, Any]:

@@ -296,8 +296,10 @@ def test_command(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     names = NameEncoder(NameConfig(width=16, heads=2, blocks=1))
     torch.manual_seed(0)
     new = Checkpoint(Spark(network(TrainConfig.of("tiny"), 16)), names, settings={"window": 32})
-    (tmp_path / "run").mkdir()
-    save_checkpoint(new, tmp_path / "run" / "checkpoint.safetensors")
+    old = replace(new, recorded={"trust": torch.ones(7)})
+    for name, checkpoint in (("run", new), ("old", old)):
+        (tmp_path / name).mkdir()
+        save_checkpoint(checkpoint, tmp_path / name / "checkpoint.safetensors")
     outputs = [word for suffix in ("md", "json", "csv") for word in ("-o", f"t.{suffix}")]
     command = [sys.executable, "-m", "spark_sim", "evaluate", tree, "--checkpoint", "run", *outputs]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
@@ -319,6 +321,8 @@ def test_command(tree: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         ((tree, "--result", f"mine={tree}", "--made"), "--result goes with"),
         ((tree, "--limit", "0", "--made"), "--limit 0"),
         ((tree, "--checkpoint", "t.csv"), "no safetensors"),
+        ((tree, *("--checkpoint", "run") * 2), "two are called 'run'"),
+        (("nowhere", "--checkpoint", "old"), "of an older spark-sim"),  # before anything is read
         (("nowhere",), "nowhere"),
     ):
         parsed = cli.parse(["evaluate", *map(str, args)])
