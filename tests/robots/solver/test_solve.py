@@ -325,7 +325,8 @@ def test_what_the_first_round_leaves_is_solved_exactly_and_more_firmly(
 
     monkeypatch.setattr("robots.solver.repair.solve_spells", mend_the_first)
     kept = repair(ember, targets, footholds(ember, targets), pushed, arms)
-    assert rounds == [(False, 2, {1.0}), (True, 1, {PENALTY_GROWTH})]
+    firmer = [PENALTY_GROWTH, PENALTY_GROWTH**2]
+    assert rounds == [(False, 2, {1.0}), *((True, 1, {scale}) for scale in firmer)]
     np.testing.assert_allclose(kept.angles[:90], q.angles[:90], atol=1e-9)
     np.testing.assert_array_equal(kept.angles[90:], pushed.angles[90:])
 
