@@ -29,11 +29,11 @@ def lock_nothing(monkeypatch: pytest.MonkeyPatch, number: int) -> None:
 
 
 def test_a_system_that_locks_nothing_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     lock_nothing(monkeypatch, errno.ENOLCK)
     with one_run(tmp_path):
-        assert "start one run in it alone" in capsys.readouterr().err
+        assert "start one run in it alone" in capfd.readouterr().err
 
 
 def test_what_else_fails_is_no_lock(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
