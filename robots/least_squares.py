@@ -19,6 +19,15 @@ _HELD = 1e8  # damping that keeps a dof where it is: far above any weight square
 _NO_ROOM = 1e-9  # [rad, m]
 
 
+def stopped(
+    room: Float[np.ndarray, "2 T D"], gradient: Float[np.ndarray, "T D"]
+) -> Bool[np.ndarray, "T D"]:
+    """The dofs that have no `room` (the least and the largest step) where the gradient would take
+    them."""
+    least, largest = room
+    return ((largest <= _NO_ROOM) & (gradient < 0)) | ((least >= -_NO_ROOM) & (gradient > 0))
+
+
 class NormalEquations:
     """The normal equations `H step = -g` of weighted residuals r, a frame each, being summed up.
 
@@ -143,7 +152,7 @@ class NormalEquations:
         vain."""
         T, D = self.g.shape
         band, g = smoothness.band(self.H), self.g + smoothness.gradient(T)
-        held = ((room[1] <= _NO_ROOM) & (g < 0)) | ((room[0] >= -_NO_ROOM) & (g > 0))
+        held = stopped(room, g)
         diagonal, asked = band[..., 0].copy(), np.where(held, 0.0, g)
         for k in range(solves):
             band[..., 0] = diagonal + np.where(held, _HELD, damping[:, None])

@@ -111,18 +111,6 @@ class Coordinates:
     def __len__(self) -> int:
         return len(self.pos)
 
-    def at_limits(self, tree: Tree, margin: float) -> Float[np.ndarray, "T D"]:
-        """For each dof +1 where its hinge is within `margin` [rad] of its upper limit (less where
-        its range is small), -1 at the lower limit, 0 elsewhere."""
-        out = np.zeros((len(self), tree.nv))
-        hinges = ~tree.balls
-        lower, upper = tree.limits_within(margin)
-        angles = self.angles[:, hinges]
-        out[:, tree.dof_starts[hinges]] = (angles >= upper[hinges] - 1e-9) * 1.0 - (
-            angles <= lower[hinges] + 1e-9
-        )
-        return out
-
     def room(self, tree: Tree, margin: float) -> Float[np.ndarray, "2 T D"]:
         """The least and the largest step of each dof [rad] after which its hinge is at least
         `margin` [rad] from its limits; of others without bounds."""

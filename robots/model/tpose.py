@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from robots.kinematics import forward_kinematics
-from robots.least_squares import NormalEquations
+from robots.least_squares import NormalEquations, stopped
 from robots.model.bending import BEND_AXES, bend_hinges_of
 from robots.model.followers import Follower, following
 from robots.residuals import Linearized, direction_residual, limit_residual, rotation_residual
@@ -87,7 +87,7 @@ def search_tpose(
 
     for _ in range(_MAX_ITER):
         normal = linearize(q)
-        normal.hold(q.at_limits(tree, 0.0) * normal.g < 0)
+        normal.hold(stopped(q.room(tree, 0.0), normal.g))
         step = normal.solve_per_frame(_DAMPING)
         after = q.integrated(tree, np.clip(step, -_MAX_STEP, _MAX_STEP)).clipped(tree, 0.0)
         moved = max(np.abs(after.angles - q.angles).max(initial=0.0), np.abs(step[:, 3:6]).max())
