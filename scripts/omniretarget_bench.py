@@ -21,7 +21,7 @@ import numpy as np
 
 import spark_sim
 from robots.metrics import RobotMetrics, measure
-from scripts.policy_bench import row
+from scripts.policy_bench import follow
 from scripts.robot_bars import cells, mean_of, misses
 from spark.kinematics import forward
 from spark.rig.roles import Role
@@ -61,11 +61,13 @@ def main() -> None:
     theirs = [spark_sim.load(path, robot=ROBOT) for path in results(args.out)]
     ours = [spark_sim.retarget(clip, ROBOT) for clip in clips]
     print(f"| | {' | '.join(TITLES)} |\n|---|{'---|' * len(TITLES)}")
-    for name, made in (("OmniRetarget", theirs), ("ours", ours)):
+    both = {"OmniRetarget": theirs, "ours": ours}
+    for name, made in both.items():
         compare(name, clips, made)
     if args.follow:
-        for name, made in (("OmniRetarget", theirs), ("ours", ours)):
-            follow(name, made, *args.follow)
+        for name, made in both.items():
+            names = [f"{name}: {clip.name}" for clip in clips]
+            follow(zip(names, made, strict=True), *args.follow)
 
 
 def results(out: Path) -> list[Path]:
@@ -80,11 +82,8 @@ def write(path: Path, out: Path, seconds: float) -> None:
     positions, _ = forward(clip.motion)
     joints = [clip.rig.hips if role is None else clip.rig.roles.require(role) for role in _JOINTS]
     height = _STATURE * clip.rig.hip_height
-    np.savez(
-        out / f"{path.stem}.npz",
-        global_joint_positions=positions[:, joints],
-        height=height,
-    )
+    at = out / f"{path.stem}.npz"
+    np.savez(at, global_joint_positions=positions[:, joints], height=height)
 
 
 def compare(name: str, clips: list[spark_sim.Clip], made: list[spark_sim.RobotClip]) -> None:
@@ -96,15 +95,6 @@ def compare(name: str, clips: list[spark_sim.Clip], made: list[spark_sim.RobotCl
     mean = mean_of(rows)
     print(f"| {name}: mean of {len(rows)} | {cells(mean, TITLES)} |")
     print(f"{name} misses in the mean: {', '.join(misses(mean)) or 'none'}")
-
-
-def follow(name: str, made: list[spark_sim.RobotClip], policy: Path, spec: Path) -> None:
-    """How well a policy follows them in simulation."""
-    told = [spark_sim.follow(clip, policy, spec).json() for clip in made]
-    for clip, each in zip(made, told, strict=True):
-        print(row(f"{name}: {clip.name}", [each], " ".join(str(s["falls"]) for s in each["seeds"])))
-    sound = np.mean([seed["falls"] == 0 for each in told for seed in each["seeds"]])
-    print(row(f"{name}: all {len(told)}", told, f"none in {100 * sound:.1f} % of the runs"))
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ Prints Markdown: for each file the falls of each run and the means of `spark-sim
 """
 
 import argparse
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -35,14 +36,21 @@ def main() -> None:
     args = parser.parse_args()
     print("| | s | falls | bodies, cm | joints, ° | root, m/s | torque |", flush=True)
     print("|---|---|---|---|---|---|---|")
+    clips = (spark_sim.load(path).part(end=args.seconds) for path in args.files)
+    made = ((clip.name, spark_sim.retarget(clip, args.robot)) for clip in clips)
+    follow(made, args.policy, args.spec, args.seeds)
+
+
+def follow(
+    motions: Iterable[tuple[str, spark_sim.RobotClip]], policy: Path, spec: Path, seeds: int = 3
+) -> None:
+    """Print a row of each motion that a policy follows, and of all."""
     found = []
-    for path in args.files:
-        clip = spark_sim.load(path).part(end=args.seconds)
-        robot = spark_sim.retarget(clip, args.robot)
-        told = spark_sim.follow(robot, args.policy, args.spec, seeds=args.seeds).json()
+    for name, motion in motions:
+        told = spark_sim.follow(motion, policy, spec, seeds=seeds).json()
         found.append(told)
         falls = " ".join(str(seed["falls"]) for seed in told["seeds"])
-        print(row(path.stem, [told], falls), flush=True)
+        print(row(name, [told], falls), flush=True)
     sound = np.mean([seed["falls"] == 0 for told in found for seed in told["seeds"]])
     print(row(f"all {len(found)}", found, f"none in {100 * sound:.1f} % of the runs"))
 

@@ -140,6 +140,11 @@ def mean_of(rows: list[RobotMetrics]) -> RobotMetrics:
     return RobotMetrics(**out)
 
 
+def mean_solved(clips: Iterable[CanonicalMotion], robot: Morphology) -> RobotMetrics:
+    """The means of clips that are solved for."""
+    return mean_of([measure(from_canonical(c), c.rig, retarget(c, robot)) for c in clips])
+
+
 def misses(metrics: RobotMetrics) -> list[str]:
     """The columns of the table that are over their bars."""
     out = []

@@ -13,12 +13,9 @@ from unittest.mock import patch
 
 import numpy as np
 
-from robots.metrics import RobotMetrics, measure
 from robots.model.known import known
-from robots.model.morphology import Morphology
 from robots.solver import solve
-from scripts.robot_bars import cells, clip, mean_of
-from spark.transfer.canonical import CanonicalMotion, from_canonical
+from scripts.robot_bars import cells, clip, mean_solved
 
 CLIPS = (
     "cmu_asf/cmu_02_06.bvh",
@@ -70,14 +67,10 @@ def main() -> None:
     robot = known(args.robot)
     clips = [clip(args.data / path, args.seconds) for path in args.clips]
     print(f"| {args.robot} | {' | '.join(SHOWN)} |\n|---|{'---|' * len(SHOWN)}")
-    print(f"| as it is | {cells(solved(clips, robot), SHOWN)} |", flush=True)
+    print(f"| as it is | {cells(mean_solved(clips, robot), SHOWN)} |", flush=True)
     for name, nothing in WITHOUT.items():
         with patch.object(solve, name, nothing):
-            print(f"| no `{name}` | {cells(solved(clips, robot), SHOWN)} |", flush=True)
-
-
-def solved(clips: list[CanonicalMotion], robot: Morphology) -> RobotMetrics:
-    return mean_of([measure(from_canonical(c), c.rig, solve.retarget(c, robot)) for c in clips])
+            print(f"| no `{name}` | {cells(mean_solved(clips, robot), SHOWN)} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -12,13 +12,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from robots.metrics import RobotMetrics, measure
+from robots.metrics import RobotMetrics
 from robots.model.known import known
-from robots.model.morphology import Morphology
 from robots.solver import weights
-from robots.solver.solve import retarget
-from scripts.robot_bars import cells, clip, mean_of
-from spark.transfer.canonical import CanonicalMotion, from_canonical
+from scripts.robot_bars import cells, clip, mean_solved
 
 CLIPS = ("cmu_asf/cmu_02_08.bvh", "cmu_dance/cmu_05_02.bvh", "animateddrawings/jumping_jacks.bvh")
 SHOWN = (
@@ -46,16 +43,12 @@ def main() -> None:
     robot = known(args.robot)
     clips = [clip(args.data / path, args.seconds) for path in args.clips]
     print(f"| {args.robot} | {' | '.join(SHOWN)} |\n|---|{'---|' * len(SHOWN)}")
-    print(row("as it is", solved(clips, robot)), flush=True)
+    print(row("as it is", mean_solved(clips, robot)), flush=True)
     for name in sorted(vars(weights)):
         if name.isupper():
             for change in CHANGES:
                 with scaled(name, change):
-                    print(row(f"`{name}` x {change}", solved(clips, robot)), flush=True)
-
-
-def solved(clips: list[CanonicalMotion], robot: Morphology) -> RobotMetrics:
-    return mean_of([measure(from_canonical(c), c.rig, retarget(c, robot)) for c in clips])
+                    print(row(f"`{name}` x {change}", mean_solved(clips, robot)), flush=True)
 
 
 def row(label: str, metrics: RobotMetrics) -> str:

@@ -305,14 +305,20 @@ def test_repairs_far_apart_know_nothing_of_each_other(
     np.testing.assert_allclose(both[90:], second[90:], atol=1e-7)
 
 
+def thrown(robot: Morphology, q: Coordinates, frames: list[int]) -> tuple[Coordinates, int]:
+    """The left shoulder far too fast: 1 rad away in some frames; and which link it is."""
+    pushed = Coordinates(q.pos, q.quat, q.angles.copy(), q.ball_quats)
+    shoulder = int(robot.links[robot.rig.roles.require(Role.LEFT_UPPER_ARM)])
+    pushed.angles[frames, shoulder] += 1.0
+    return pushed, shoulder
+
+
 def test_what_the_first_round_leaves_is_solved_exactly_and_more_firmly(
     walk: CanonicalMotion, walked: RobotMotion, ember: Morphology, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two spells, of which the first round mends one."""
     arms, targets, q = blocks_of(ember)[1], targets_of(walk, ember), walked.coordinates
-    pushed = Coordinates(q.pos, q.quat, q.angles.copy(), q.ball_quats)
-    shoulder = int(ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)])
-    pushed.angles[[40, 140], shoulder] += 1.0  # [rad] in a frame: far too fast
+    pushed, shoulder = thrown(ember, q, [40, 140])
     rounds = []
 
     def mend_the_first(broken: Repair) -> Coordinates:
@@ -336,9 +342,7 @@ def test_no_repair_gives_up_the_pose(
 ) -> None:
     """Arms as in the T-pose are in nothing, and not those of a walk."""
     arms, targets, q = blocks_of(ember)[1], targets_of(walk, ember), walked.coordinates
-    pushed = Coordinates(q.pos, q.quat, q.angles.copy(), q.ball_quats)
-    shoulder = int(ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)])
-    pushed.angles[100:103, shoulder] += 1.0  # [rad] in a frame: far too fast
+    pushed, _ = thrown(ember, q, [100, 101, 102])
     assert 0 < violations(ember, targets, pushed, arms, 1).sum() < 10
 
     def spread(broken: Repair) -> Coordinates:
