@@ -2,13 +2,13 @@
 
 import shlex
 from argparse import ArgumentParser, BooleanOptionalAction, Namespace
-from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from spark.training.checkpoint import Checkpoint
+    from spark.training.cuts import TrainingClip
     from spark.training.settings import TrainConfig
 
 SUMMARY = "train the network that retargets"
@@ -36,8 +36,6 @@ _FLAGS = {
     "seed": "seed of all that is drawn",
     "workers": "processes that make batches (default: 8 for a GPU, else none)",
 }
-# What the weights in a checkpoint were made for.
-_OF_THE_NETWORK = ("preset", "ablate", "width", "heads", "blocks", "names", "t5")
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -80,31 +78,52 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    with ExitStack() as held:
-        return _run(args, held)
-
-
-def _run(args: Namespace, held: ExitStack) -> int:
-    from spark.errors import ConventionError, DependencyError, OutputError
-    from spark.files import write_atomically
-    from spark.training.settings import TrainConfig, read_settings, toml
     from spark_sim import console
-    from spark_sim.stopping import asked_to_stop
-    from spark_sim.watching import is_first, watching, watching_stage
+    from spark_sim.commands.train_start import fresh, hold, learn_recorded, resumed
+    from spark_sim.watching import is_first
 
     out = Path(args.output)
+    config = _config(args, out)
+    if is_first():
+        console.note(
+            f"{out}: preset {config.preset}, {config.steps} steps of {config.batch} windows, on "
+            f"{', '.join(config.data)}; loading torch"
+        )
+    _check_installed(args.tensorboard)
+    threads = _set_threads(config)
+    with ExitStack() as held:
+        if args.resume:
+            hold(out, held)  # before what another run may yet write is read
+            start = resumed(out, config)
+            clips = _clips(config, threads)
+        else:
+            clips = _clips(config, threads)
+            start = fresh(config)
+            hold(out, held)
+        _write_settings(config, out)
+        if not start.step and not start.recorded:
+            start = learn_recorded(start, config, out)
+        return _steps(clips, config, out, start, board=args.tensorboard)
+
+
+def _config(args: Namespace, out: Path) -> "TrainConfig":
+    """The settings of the run, those of the command line over those of a file over the preset's.
+
+    Raises `ConventionError` for what does not go together, `OutputError` where there is a run in
+    `out` already, or none to resume."""
+    from spark.errors import ConventionError, OutputError
+    from spark.training.settings import TrainConfig, read_settings
+
     path = out / "checkpoint.safetensors"
     if args.resume and args.config:
         raise ConventionError("--resume takes its settings from DIR/config.toml, not from --config")
     if args.resume and not path.exists():
         raise OutputError(f"{path}: no such file, so there is no run to resume")
     file = out / "config.toml" if args.resume else args.config and Path(args.config)
+    compiled = {None: None, True: "on", False: "off"}[args.compile]
     given = {n: getattr(args, n) for n in (*_FLAGS, "preset", "ablate", "names", "t5")}
-    if args.compile is not None:
-        given["compile"] = "on" if args.compile else "off"
-    given = {n: v for n, v in given.items() if v is not None} | (
-        {"data": args.data} if args.data else {}
-    )
+    given |= {"compile": compiled, "data": args.data or None}
+    given = {n: v for n, v in given.items() if v is not None}
     stored = read_settings(file) if file else {}
     preset = given.get("preset", stored.get("preset", "default"))
     config = TrainConfig.of(preset).changed(file, **stored).changed("command line", **given)
@@ -112,49 +131,50 @@ def _run(args: Namespace, held: ExitStack) -> int:
         raise ConventionError("no DATA to train on; expected datasets or folders of motion files")
     if path.exists() and not (args.resume or args.force):
         raise OutputError(f"{path}: exists; go on with --resume, or overwrite it with --force")
-    if is_first():
-        console.note(
-            f"{out}: preset {config.preset}, {config.steps} steps of {config.batch} windows, on "
-            f"{', '.join(config.data)}; loading torch"
-        )
+    return config
+
+
+def _check_installed(board: bool) -> None:
+    """Raise `DependencyError` before minutes of work, not after."""
+    from spark.errors import DependencyError
+
     Path.cwd()  # raises where it was deleted: there torch's oneMKL would end the process
     try:
-        import torch
-
-        from spark.training.checkpoint import load_checkpoint
-        from spark.training.dataset import training_clips
-        from spark.training.processes import check_shares, process_count
-        from spark.training.threads import choose_threads
-        from spark.training.train import fresh_checkpoint, train
+        import spark.training.train  # noqa: F401
     except ImportError as error:
         raise DependencyError(
             f"training needs {error.name}: pip install 'spark-sim[train]'"
         ) from error
-    if args.tensorboard:
+    if board:
         try:
-            import torch.utils.tensorboard  # before minutes of work, not after
+            import torch.utils.tensorboard  # noqa: F401
         except ImportError as error:
             raise DependencyError(
                 f"--tensorboard needs {error.name}: pip install 'spark-sim[tensorboard]'"
             ) from error
-    check_shares(config.draws, process_count())  # before minutes of work, too
+
+
+def _set_threads(config: "TrainConfig") -> int | None:
+    """The number of threads that is chosen; None where the environment says it. Raises
+    `ConventionError` where a step has too few windows for the processes of `torchrun`."""
+    import torch
+
+    from spark.training.processes import check_shares, process_count
+    from spark.training.threads import choose_threads
+
+    check_shares(config.draws, process_count())
     threads = choose_threads(config.width)
     if threads:
         torch.set_num_threads(threads)
-    if args.resume:
-        _hold(out, held)  # before what another run may yet write is read
-    start = load_checkpoint(path) if args.resume else None
-    if start and start.step and not start.optimizer:
-        raise OutputError(
-            f"{path}: optimizer-{start.step}.safetensors is not beside it, and without it a run "
-            "can't go on as it was; put it back, or start anew with --force"
-        )
-    if start:
-        _check_same_network(path, start.settings, config)
-        if start.step > config.steps:
-            raise ConventionError(
-                f"--steps {config.steps}: the run in {out} is at step {start.step} already"
-            )
+    return threads
+
+
+def _clips(config: "TrainConfig", threads: int | None) -> "list[TrainingClip]":
+    """What is trained on, read and counted."""
+    from spark.training.dataset import training_clips
+    from spark_sim import console
+    from spark_sim.watching import is_first
+
     clips, notes = training_clips(
         [Path(p) for p in config.data],
         lambda files: console.progress(files, "reading", lines=is_first()),
@@ -167,24 +187,40 @@ def _run(args: Namespace, held: ExitStack) -> int:
             f"{sum(len(clip.hips) * clip.frame_time for clip in clips) / 60:.3g} minutes; "
             f"on {_device(threads)}"
         )
-    if start is None:
-        name_steps = 0 if config.names or config.t5 else config.name_steps
-        with watching_stage("learning names", name_steps) as watch_names:
-            start = fresh_checkpoint(config, watch_names)
-    if not args.resume:
-        _hold(out, held)
+    return clips
+
+
+def _write_settings(config: "TrainConfig", out: Path) -> None:
+    from spark.files import write_atomically
+    from spark.training.settings import toml
+
     write_atomically(out / "config.toml", toml(config).encode())
-    if not start.step and not start.recorded:
-        start = _learn_recorded(start, config, out)
+
+
+def _steps(
+    clips: "list[TrainingClip]",
+    config: "TrainConfig",
+    out: Path,
+    start: "Checkpoint",
+    *,
+    board: bool,
+) -> int:
+    """Train, and return the exit code: 128 and the signal's number where a signal ended it."""
+    from spark.training.train import train
+    from spark_sim import console
+    from spark_sim.stopping import asked_to_stop
+    from spark_sim.watching import is_first, watching
+
     if is_first():
         console.note(f"training: {start.step} of {config.steps}; the first step takes longest")
     with (
         asked_to_stop(_say_stopping) as asked,
-        watching(out, start.step, config.steps, board=args.tensorboard) as watch,
+        watching(out, start.step, config.steps, board=board) as watch,
     ):
         done = train(clips, config, out, start=start, watch=watch, stop=lambda: asked() > 0)
         by_signal = asked()
     if is_first():
+        path = out / "checkpoint.safetensors"
         console.say(f"{path}: {done.step} steps on {len(clips)} clips")
         if done.step < config.steps:
             console.note(
@@ -192,36 +228,6 @@ def _run(args: Namespace, held: ExitStack) -> int:
                 f"spark-sim train -o {shlex.quote(str(out))} --resume"
             )
     return 128 + by_signal if done.step < config.steps else 0
-
-
-def _hold(out: Path, held: ExitStack) -> None:
-    """Make the folder of the run, and keep other runs out of it. Under `torchrun` the process that
-    writes does. Raises `OutputError` where another run is in it."""
-    from spark_sim.files import one_run
-    from spark_sim.watching import is_first
-
-    if is_first():
-        held.enter_context(one_run(out))
-    else:
-        out.mkdir(parents=True, exist_ok=True)
-
-
-def _learn_recorded(start: "Checkpoint", config: "TrainConfig", out: Path) -> "Checkpoint":
-    """`start` with what the recorded pairs of the data say, where they are enough. Under
-    `torchrun` the process that writes learns from them, and the others wait for it."""
-    from spark.training.recorded_stage import recorded_stage, with_recorded
-    from spark_sim import console
-    from spark_sim.watching import is_first
-
-    stage = recorded_stage(config) if is_first() else None
-    if stage is None:
-        return start
-    console.note(stage.about)
-    if stage.known is None:
-        return start
-    start, told = with_recorded(start, stage.known, config, out)
-    console.note(told)
-    return start
 
 
 def _device(threads: int | None) -> str:
@@ -239,17 +245,3 @@ def _say_stopping() -> None:
     from spark_sim import console
 
     console.note("stopping after this step, which is saved; once more ends at once, unsaved")
-
-
-def _check_same_network(path: Path, trained: Mapping[str, object], config: "TrainConfig") -> None:
-    """Raise `ConventionError` where a resumed run is asked for another network than it has."""
-    from spark.errors import ConventionError
-
-    for name in _OF_THE_NETWORK:
-        before, now = trained.get(name), getattr(config, name)
-        before = tuple(before) if isinstance(before, list) else before
-        if name in trained and before != now:
-            raise ConventionError(
-                f"{path}: was trained with {name} = {before!r}, not {now!r}; --resume goes on with "
-                "the network that is there"
-            )
