@@ -1,8 +1,7 @@
 """`spark-sim evaluate`: methods against ground truths, as the paper's tables."""
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Iterable, Sequence
-from functools import partial
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -10,11 +9,11 @@ from spark_sim.commands.options import add_force
 
 if TYPE_CHECKING:
     from spark.evaluation.cases import Case
-    from spark.evaluation.evaluate import LegFitter, MethodScores
+    from spark.evaluation.evaluate import MethodScores
+    from spark.evaluation.rows import Row
     from spark.inference.weights import Weights
     from spark.network.forward import Network
     from spark.network.retarget import NetworkRetargeter
-    from spark.transfer.target_prior import RetargetMethod
 
 SUMMARY = "measure methods against a ground truth"
 USAGE = "DATA [--checkpoint RUN]... [--result NAME=DIR]..."
@@ -36,17 +35,6 @@ examples:
   spark-sim evaluate dataset --made --checkpoint run
 """
 _T = TypeVar("_T")
-Ways = dict[str, dict[str, bool]]
-"""What a row adds to its method, by the end of its name."""
-_PLAIN: Ways = {"": {}}
-_HELD: Ways = {", feet held": {"feet_held": True}}
-_PRIOR: Ways = {", target prior": {"target_prior": True}}
-_FITTED: Ways = {", legs fitted": {"legs_fitted": True}}
-_BOTH: Ways = {", legs fitted, feet held": {"legs_fitted": True, "feet_held": True}}
-_ALL: Ways = {
-    ", as retarget": {"target_prior": True, "legs_fitted": True, "feet_held": True},
-}
-_ALL_MADE: Ways = {", target prior, feet held": {"target_prior": True, "feet_held": True}}
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -96,31 +84,17 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    from spark.errors import ConventionError, name_list
+    from spark.errors import name_list
     from spark.evaluation.cases import made_cases, performances, recorded_cases
-    from spark.evaluation.equal import Why, equal_rows, why_no_prior, why_silent, why_unfamiliar
-    from spark.evaluation.evaluate import CELLS, as_method, evaluate, results_in
+    from spark.evaluation.equal import equal_rows
     from spark.evaluation.met import met_unseen
+    from spark.evaluation.rows import copy_rows, network_rows, result_row, ridge_rows
     from spark.evaluation.tables import markdown
     from spark.files import write_atomically
-    from spark.network.recorded import as_recorded
-    from spark.training.recorded_pairs import recorded_pairs
-    from spark.training.recorded_ridge import fit_ridge
-    from spark.transfer.analytic import transfer
-    from spark.transfer.leg_fit import fit_legs
-    from spark_sim import console, files
+    from spark_sim import console
 
-    outputs = [Path(output) for output in args.output]
-    for path in outputs:
-        files.check_free(path, force=args.force)
-        files.check_ending(path, (".md", ".json", ".csv"), "a table")
-    if args.limit is not None and args.limit < 1:
-        raise ConventionError(f"--limit {args.limit}: expected 1 or more")
-    if args.seed < 0:
-        raise ConventionError(f"--seed {args.seed}: expected 0 or more")
+    _check(args)
     results = _by_name("--result", map(_named, args.result))
-    if results and args.made:
-        raise ConventionError("--result goes with recorded answers: no tool was given those --made")
     checkpoints = _by_name("--checkpoint", map(_checkpoint, args.checkpoint))
     networks = {name: _network(weights) for name, weights in checkpoints.items()}
     found = performances(Path(args.data))
@@ -130,66 +104,14 @@ def run(args: Namespace) -> int:
         cases, notes = recorded_cases(found, args.seed, args.limit)
         for note in notes:
             console.note(note)
-
-    def row(
-        name: str, method: "Callable[[Case], Any]", of: "Sequence[Case]", **more: Any
-    ) -> "MethodScores":
-        return evaluate(
-            name, method, of, progress=lambda it: console.progress(it, name, len(of)), **more
-        )
-
-    rows: list[MethodScores] = []
-    parts: dict[str, list[Why]] = {}  # of the rows' methods, beside the analytic transfer
-
-    def add(
-        name: str,
-        method: "RetargetMethod",
-        ways: Ways,
-        legs: "LegFitter" = fit_legs,
-        whys: Sequence[Why] = (),
-        of_legs: Sequence[Why] = (),
-        **about: Any,
-    ) -> None:
-        for way, added in ways.items():
-            parts[name + way] = [
-                *whys,
-                *(of_legs if added.get("legs_fitted") else ()),
-                *((why_no_prior,) if added.get("target_prior") else ()),
-            ]
-        rows.extend(
-            row(name + way, as_method(method, legs=legs, **added), cases, **about)
-            for way, added in ways.items()
-        )
-
-    # Made answers keep the legs' rotations and the path in hip heights: they can't judge fitted
-    # legs.
-    add("copy", transfer, _PLAIN | _HELD | _PRIOR | ({} if args.made else _FITTED | _BOTH))
-    seen = recorded_pairs([] if args.made else [p for p in found if p.cell == CELLS[0]])
-    if seen.enough:
-        add("ridge", transfer, _FITTED | _BOTH, partial(as_recorded, fit_ridge(seen)))
+    rows = copy_rows(made=args.made)
+    rows += [] if args.made else ridge_rows(found)
     for name, network in networks.items():
-        of_legs: tuple[Why, ...] = ()
-        ways = _PLAIN
-        if network.network.config.residual:
-            ways = _PLAIN | _PRIOR | (_ALL_MADE if args.made else _ALL)
-            if network.recorded and not args.made:
-                ways = _PLAIN | _FITTED | _BOTH | _ALL
-                of_legs = (why_unfamiliar(network.recorded.known),)
-        whys = (why_silent(network),)
-        add(
-            name,
-            network,
-            ways,
-            network.fit_legs,
-            whys,
-            of_legs,
-            settings=checkpoints[name].settings,
-        )
-    for name, folder in results.items():
-        answered = [case for case in cases if case.answer is not None]
-        rows.append(row(name, results_in(Path(folder)), answered))
-    equal = equal_rows(rows, cases, parts)
-    console.say(markdown(rows).rstrip("\n"))
+        rows += network_rows(name, network, checkpoints[name].settings, made=args.made)
+    rows += [result_row(name, Path(folder)) for name, folder in results.items()]
+    scores = [_scored(row, cases) for row in rows]
+    equal = equal_rows(scores, cases, {row.name: row.parts for row in rows if not row.answered})
+    console.say(markdown(scores).rstrip("\n"))
     for sentence in equal:
         console.note(sentence)
     for name, weights in checkpoints.items():
@@ -199,9 +121,39 @@ def run(args: Namespace) -> int:
                 "cells uc say nothing of unseen characters; train it on this dataset"
             )
     about = {"data": args.data, "made": args.made, "seed": args.seed, "limit": args.limit}
-    for path in outputs:
-        write_atomically(path, _text(path, rows, about).encode())
+    for path in map(Path, args.output):
+        write_atomically(path, _text(path, scores, about).encode())
     return 0
+
+
+def _check(args: Namespace) -> None:
+    """Raise before anything is computed."""
+    from spark.errors import ConventionError
+    from spark_sim import files
+
+    for path in map(Path, args.output):
+        files.check_free(path, force=args.force)
+        files.check_ending(path, (".md", ".json", ".csv"), "a table")
+    if args.limit is not None and args.limit < 1:
+        raise ConventionError(f"--limit {args.limit}: expected 1 or more")
+    if args.seed < 0:
+        raise ConventionError(f"--seed {args.seed}: expected 0 or more")
+    if args.result and args.made:
+        raise ConventionError("--result goes with recorded answers: no tool was given those --made")
+
+
+def _scored(row: "Row", cases: "Sequence[Case]") -> "MethodScores":
+    from spark.evaluation.evaluate import evaluate
+    from spark_sim import console
+
+    of = [case for case in cases if case.answer is not None] if row.answered else cases
+    return evaluate(
+        row.name,
+        row.method,
+        of,
+        settings=row.settings,
+        progress=lambda those: console.progress(those, row.name, len(of)),
+    )
 
 
 def _network(weights: "Weights") -> "NetworkRetargeter":
