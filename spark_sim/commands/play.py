@@ -1,6 +1,7 @@
 """`spark-sim play`: watch motions, in a window, a video, a web page or a picture."""
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from textwrap import fill
@@ -40,6 +41,9 @@ examples:
   spark-sim play walk_on_g1.npz --physics --assist --html physics.html
   spark-sim play walk_on_g1.npz --physics --policy my.onnx --spec my.toml
 """
+_OUTPUTS = ("video", "html", "strip", "gif", "webp")
+_SIMULATION = ("physics", "assist", "no_balance", "policy", "spec", "seeds")
+_NOT_SERVED = (*_SIMULATION, "json", "mesh", "same_height")
 
 
 def configure(parser: ArgumentParser) -> None:
@@ -112,23 +116,46 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    from spark.errors import ConventionError, DependencyError
-    from spark_sim import api, console
+    from spark_sim import console
 
-    if args.address and not args.serve:
-        raise ConventionError("--address goes with --serve")
-    outputs = {name: getattr(args, name) for name in ("video", "html", "strip", "gif", "webp")}
+    outputs = {name: getattr(args, name) for name in _OUTPUTS}
     wanted = {name: Path(path) for name, path in outputs.items() if path is not None}
+    _check(args, wanted)
+    if args.serve:
+        return _serve(args)
+    shown: list[Any] = [load(args, path) for path in args.files]
+    if args.mesh:
+        from spark_sim.loading import dressed
+
+        shown = dressed(shown, args.mesh)
+    visible = bool(wanted) or not args.json
+    if visible:
+        for path, clip in zip(args.files, shown, strict=True):
+            console.notes(path, clip.surface[1])
+    if args.physics:
+        shown = _simulated(args, shown)
+    if visible:
+        _show(args, shown, wanted)
+    for out in wanted.values():
+        size = f"{out}: {out.stat().st_size / 1000:.0f} kB"
+        console.note(size) if args.json else console.say(size)
+    return 0
+
+
+def _check(args: Namespace, wanted: Mapping[str, Path]) -> None:
+    """Raise `ConventionError` for options that don't go together."""
+    from spark.errors import ConventionError
+
     check_given(args, args.files)
     if args.serve:
-        simulation = ("physics", "assist", "no_balance", "policy", "spec", "seeds")
-        others = (*simulation, "json", "mesh", "same_height")
-        refused = [*wanted, *(name for name in others if getattr(args, name))]
-        refused += ["speed"] * (args.speed != 1.0)
-        if refused:
-            other = refused[0].replace("_", "-")
+        given = [*wanted, *(name for name in _NOT_SERVED if getattr(args, name))]
+        given += ["speed"] * (args.speed != 1.0)
+        if given:
+            other = given[0].replace("_", "-")
             raise ConventionError(f"--serve shows a page in a browser; --{other} goes without it")
-        return _serve(args)
+        return
+    if args.address:
+        raise ConventionError("--address goes with --serve")
     if not args.files:
         raise ConventionError("no FILE is given; only --serve needs none")
     if not args.physics and (args.assist or args.no_balance or args.json):
@@ -141,39 +168,30 @@ def run(args: Namespace) -> int:
         raise ConventionError("--policy holds the body up; --assist and --no-balance go without it")
     if args.seeds and not args.policy:
         raise ConventionError("--seeds goes with --policy")
-    shown: list[Any] = [load(args, path) for path in args.files]
-    if args.mesh:
-        from spark_sim.loading import dressed
 
-        shown = dressed(shown, args.mesh)
-    if wanted or not args.json:
-        for path, clip in zip(args.files, shown, strict=True):
-            console.notes(path, clip.surface[1])
-    if args.physics:
-        shown = _simulated(args, shown)
-    if wanted or not args.json:
-        progress = partial(console.progress, label="video")
-        try:
-            api.play(
-                *shown,
-                **wanted,
-                same_height=args.same_height,
-                speed=args.speed,
-                force=args.force,
-                progress=progress,
-            )
-        except DependencyError:
-            if wanted or not args.physics:
-                raise
-            # The report is the result, and is printed: that no window opens is no failure.
-            console.note(
-                "there is no display to show it on; --html out.html or --video out.mp4 writes what "
-                "there is to see"
-            )
-    for out in wanted.values():
-        size = f"{out}: {out.stat().st_size / 1000:.0f} kB"
-        console.note(size) if args.json else console.say(size)
-    return 0
+
+def _show(args: Namespace, shown: list[Any], wanted: Mapping[str, Path]) -> None:
+    """In a window, or as the files that are wanted."""
+    from spark.errors import DependencyError
+    from spark_sim import api, console
+
+    try:
+        api.play(
+            *shown,
+            **wanted,
+            same_height=args.same_height,
+            speed=args.speed,
+            force=args.force,
+            progress=partial(console.progress, label="video"),
+        )
+    except DependencyError:
+        if wanted or not args.physics:
+            raise
+        # The report is the result, and is printed: that no window opens is no failure.
+        console.note(
+            "there is no display to show it on; --html out.html or --video out.mp4 writes what "
+            "there is to see"
+        )
 
 
 def _simulated(args: Namespace, clips: list[Any]) -> list[Any]:
