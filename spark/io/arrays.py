@@ -7,7 +7,7 @@ never run: such members are left out, and named.
 import re
 import struct
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,10 @@ from spark.npz import Npz, array_in, holds_objects
 from spark.opening import beginning, check_regular, read_bytes
 
 _MAGIC = b"\x93NUMPY"
+_RATES = (
+    *("mocap_frame_rate", "mocap_framerate", "mocap_fps"),
+    *("fps", "frame_rate", "framerate"),
+)
 _MAX_HEADER = 65536  # bytes; numpy's own writer stays below for plain dtypes
 
 
@@ -95,3 +99,19 @@ def held(arrays: Arrays) -> str:
     names = [f"{name} {'x'.join(map(str, array.shape))}" for name, array in arrays.items()]
     pickled = f", and Python objects ({name_list(list(arrays.pickled))})" if arrays.pickled else ""
     return (", ".join(names[:12]) or "nothing") + pickled
+
+
+def first_of(arrays: Mapping[str, np.ndarray], names: Iterable[str]) -> str | None:
+    """The first of the names that one thing has in files of different tools; None without."""
+    return next((name for name in names if name in arrays), None)
+
+
+def rate_in(arrays: Mapping[str, np.ndarray], path: Path) -> float | None:
+    """Frames a second, as one of the arrays says. Raises `FileFormatError` where it can't be."""
+    name = first_of(arrays, _RATES)
+    if name is None or arrays[name].size != 1:
+        return None
+    fps = float(numbers(arrays, name, path).ravel()[0])
+    if not 1 <= fps <= 10000:
+        raise FileFormatError(path, None, f"{name!r} is {fps:g}; expected frames a second")
+    return fps

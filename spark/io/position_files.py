@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from spark.errors import FileFormatError
-from spark.io.arrays import Arrays, held, numbers, read_npy, read_npz
+from spark.io.arrays import Arrays, first_of, held, numbers, rate_in, read_npy, read_npz
 from spark.io.humanml3d import FPS, WIDTH, positions_of_features
 from spark.io.intermimic import read_states
 from spark.io.position_tree import parents_first
@@ -21,7 +21,6 @@ POSITION_KEYS = (
 """What files call an array of positions."""
 _NAMES = ("names", "joint_names", "joints_names", "labels", "marker_names", "landmark_names")
 _PARENTS = ("parents", "joint_parents", "parent_indices")
-_RATES = ("fps", "frame_rate", "framerate", "mocap_framerate", "mocap_frame_rate")
 
 _MAX_JOINTS = 512
 
@@ -66,6 +65,22 @@ def read_points(path: Path) -> Points:
 
 
 def _points(array: np.ndarray, arrays: Arrays, path: Path, what: str) -> Points:
+    values, notes = _frames(array, path, what)
+    values, gaps = filled(values, path)
+    if gaps:
+        notes.append(f"{gaps} positions are missing: filled in from the frames around")
+    if np.abs(values).max() > 1e9:
+        raise FileFormatError(path, None, f"{what} holds {np.abs(values).max():.3g}; expected less")
+    names = _texts(arrays, values.shape[1], path)
+    parents = None if names is None else _parents(arrays, len(names), path)
+    return Points(values, names, parents, rate_in(arrays, path), tuple(notes))
+
+
+def _frames(
+    array: np.ndarray, path: Path, what: str
+) -> tuple[Float[np.ndarray, "T J 3"], list[str]]:
+    """The positions in an array that may be one of a batch, turned round, or have confidences, and
+    what is said of it. Positions that are missing are no numbers."""
     notes: list[str] = []
     values = numbers({what: array}, what, path, finite=False)
     if values.ndim == 4 and 1 in values.shape[:2]:
@@ -88,28 +103,22 @@ def _points(array: np.ndarray, arrays: Arrays, path: Path, what: str) -> Points:
         raise FileFormatError(path, None, "has no frames")
     if values.shape[2] > 3:
         notes.append("numbers beyond three of each joint, its confidence, are not read")
-    values, gaps = filled(values[..., :3], path)
-    if gaps:
-        notes.append(f"{gaps} positions are missing: filled in from the frames around")
-    if np.abs(values).max() > 1e9:
-        raise FileFormatError(path, None, f"{what} holds {np.abs(values).max():.3g}; expected less")
-    names = _texts(arrays, values.shape[1], path)
-    key = next((n for n in _PARENTS if n in arrays), None)
-    parents = None
-    if key is not None and names is not None:
-        parents = numbers(arrays, key, path).ravel().astype(np.int64)
-        if len(parents) != len(names) or np.sum(parents < 0) != 1 or (parents >= len(names)).any():
-            raise FileFormatError(
-                path, None, f"{key!r} is no tree of {len(names)} joints with one root (-1)"
-            )
-        if len(parents_first(parents.tolist())) != len(names):
-            raise FileFormatError(path, None, f"{key!r} goes round in a circle; expected a tree")
-    fps = None
-    if (key := next((n for n in _RATES if n in arrays), None)) and arrays[key].size == 1:
-        fps = float(numbers(arrays, key, path).ravel()[0])
-        if not 1 <= fps <= 10000:
-            raise FileFormatError(path, None, f"{key!r} is {fps:g}; expected frames a second")
-    return Points(values, names, parents, fps, tuple(notes))
+    return values[..., :3], notes
+
+
+def _parents(arrays: Arrays, count: int, path: Path) -> Int[np.ndarray, "J"] | None:
+    """The joints above the `count` joints; None where the file doesn't say."""
+    key = first_of(arrays, _PARENTS)
+    if key is None:
+        return None
+    parents = numbers(arrays, key, path).ravel().astype(np.int64)
+    if len(parents) != count or np.sum(parents < 0) != 1 or (parents >= count).any():
+        raise FileFormatError(
+            path, None, f"{key!r} is no tree of {count} joints with one root (-1)"
+        )
+    if len(parents_first(parents.tolist())) != count:
+        raise FileFormatError(path, None, f"{key!r} goes round in a circle; expected a tree")
+    return parents
 
 
 def filled(values: np.ndarray, path: Path) -> tuple[Float[np.ndarray, "T J 3"], int]:
