@@ -1,6 +1,7 @@
 """The skeleton in an ASF file (Acclaim): its bones, their axes, and what each may turn about."""
 
 import re
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -60,51 +61,78 @@ def numbers(path: Path, at: Line, words: list[str], count: int) -> list[float]:
 
 
 def read_asf(path: Path) -> Figure:
+    """The skeleton, its bones parents first. Raises `FileFormatError` with the line where it is
+    none."""
+    sections = _sections(path)
     figure = Figure()
-    index = {"root": 0}
-    section, bone, inside, last = "", Bone(), False, 0
-    linked: dict[int, int] = {}
-    for at in lines_of(path):
-        line, words = at
-        last = line
-        key = words[0].lower()
-        if key.startswith(":"):
-            section, inside = key[1:], False
-        elif section == "units":
-            if key == "length":
-                figure.length = numbers(path, at, words[1:], 1)[0]
-            elif key == "angle":
-                figure.degrees = words[-1].lower().startswith("deg")
-        elif section == "root":
-            _read_root(path, at, figure.bones[0])
-        elif section == "bonedata":
-            if key == "begin":
-                bone, inside = Bone(), True
-            elif key == "end" and inside:
-                inside = False
-                if not bone.name or bone.name in index:
-                    fail(path, line, f"bone {bone.name!r} has no name, or that of another")
-                if len(index) == _MAX_BONES:
-                    fail(path, line, f"has more than {_MAX_BONES} bones")
-                index[bone.name] = len(figure.bones)
-                figure.bones.append(bone)
-                figure.parents.append(-1)
-            elif inside:
-                _read_bone(path, at, bone)
-        elif section == "hierarchy" and key not in ("begin", "end"):
-            for name in words:
-                if name not in index:
-                    fail(path, line, f"{name!r} is none of the bones")
-            for name in words[1:]:
-                if index[name] in linked or name == "root":
-                    fail(path, line, f"{name!r} hangs on two bones")
-                linked[index[name]] = index[words[0]]
+    for line, words in sections["units"]:
+        if words[0].lower() == "length":
+            figure.length = numbers(path, (line, words), words[1:], 1)[0]
+        elif words[0].lower() == "angle":
+            figure.degrees = words[-1].lower().startswith("deg")
+    for at in sections["root"]:
+        _read_root(path, at, figure.bones[0])
+    figure.bones += _bones(path, sections["bonedata"])
     if len(figure.bones) < 2:
         fail(path, None, "holds no bones; expected an ASF with :bonedata and :hierarchy")
-    return _in_order(figure, linked, path, last)
+    hierarchy = sections["hierarchy"]
+    last = hierarchy[-1][0] if hierarchy else None
+    return _in_order(figure, _links(path, hierarchy, figure.bones), path, last)
 
 
-def _in_order(figure: Figure, linked: dict[int, int], path: Path, last: int) -> Figure:
+def _sections(path: Path) -> defaultdict[str, list[Line]]:
+    """The lines below `:units`, `:bonedata` and so on."""
+    sections: defaultdict[str, list[Line]] = defaultdict(list)
+    section = ""
+    for line, words in lines_of(path):
+        if words[0].startswith(":"):
+            section = words[0][1:].lower()
+        else:
+            sections[section].append((line, words))
+    return sections
+
+
+def _bones(path: Path, lines: list[Line]) -> list[Bone]:
+    """What stands between each `begin` and `end`."""
+    bones: list[Bone] = []
+    names = {"root"}
+    bone: Bone | None = None
+    for at in lines:
+        line, words = at
+        key = words[0].lower()
+        if key == "begin":
+            bone = Bone()
+        elif key == "end" and bone:
+            if not bone.name or bone.name in names:
+                fail(path, line, f"bone {bone.name!r} has no name, or that of another")
+            if len(names) == _MAX_BONES:
+                fail(path, line, f"has more than {_MAX_BONES} bones")
+            names.add(bone.name)
+            bones.append(bone)
+            bone = None
+        elif bone:
+            _read_bone(path, at, bone)
+    return bones
+
+
+def _links(path: Path, lines: list[Line], bones: list[Bone]) -> dict[int, int]:
+    """The bone above each bone."""
+    index = {bone.name: i for i, bone in enumerate(bones)}
+    above: dict[int, int] = {}
+    for line, words in lines:
+        if words[0].lower() in ("begin", "end"):
+            continue
+        for name in words:
+            if name not in index:
+                fail(path, line, f"{name!r} is none of the bones")
+        for name in words[1:]:
+            if index[name] in above or name == "root":
+                fail(path, line, f"{name!r} hangs on two bones")
+            above[index[name]] = index[words[0]]
+    return above
+
+
+def _in_order(figure: Figure, linked: dict[int, int], path: Path, last: int | None) -> Figure:
     """The bones below the root, parents first."""
     order = [0]
     for parent in order:
