@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from spark_sim import console
 
 if TYPE_CHECKING:
+    from spark.training.keeper import Watch
     from spark.training.loss_plot import LossPlot
-    from spark.training.train import Watch
 
 
 def is_first() -> bool:

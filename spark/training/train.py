@@ -6,28 +6,20 @@ run that never stopped, to the bit. Under `torchrun` every process takes its sha
 draws; losses are means over windows, so the processes' mean gradient is that of one process.
 """
 
-import json
-import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
 
 import torch
 from torch import nn
 
-from spark.errors import DivergedError
 from spark.inference.weights import SHIPPED
 from spark.network.known_bodies import distinct_trunks
 from spark.training.batch import Batch, UnpairedBatch
-from spark.training.checkpoint import (
-    Checkpoint,
-    optimizer_tensors,
-    restore_optimizer,
-    save_checkpoint,
-)
+from spark.training.checkpoint import Checkpoint, restore_optimizer
 from spark.training.compiling import compiled, compiles
 from spark.training.cuts import TrainingClip
+from spark.training.keeper import Keeper, Watch
 from spark.training.model import Spark
 from spark.training.name_encoder import NameEncoder
 from spark.training.name_file import load_names
@@ -59,9 +51,6 @@ def _own_names(config: TrainConfig, watch: Callable[[int, float], None]) -> Name
     if config.name_steps and not config.names:
         return train_names(config.name_steps, seed=config.seed, watch=watch)
     return load_names(SHIPPED if config.names in ("", "shipped") else Path(config.names))
-
-
-Watch = Callable[[int, dict[str, float]], None]
 
 
 def train(
@@ -96,59 +85,26 @@ def train(
     names = name_vectors(start.names, own=own)
     steps = Steps(clips, names, config, rank, world, fixed_sizes=one_graph or device.type == "cuda")
     bodies = distinct_trunks(clip.body for clip in clips)
-    checkpoint = start
     model.train()
-    began = saved = perf_counter()
+    done = start.step
     with open_log(out, start.step, rank) as log:
+        keeper = Keeper(start, optimiser, config, out, bodies, log, watch)
         for n, batch in zip(
             range(start.step, config.steps),
             batches_from(steps, start.step, device),
             strict=True,
         ):
             terms = take_step(runner, optimiser, batch, n, config, rank)
-            done, now = n + 1, perf_counter()
-            last = done == config.steps
-            logs = last or done == 1 or done % config.log_every == 0
+            done = n + 1
+            logs = done in (1, config.steps) or done % config.log_every == 0
             # Processes agree on it, which takes a moment, where they wait for one another anyway.
             stopped = agreed(stop()) if world == 1 or logs else False
             if not rank:
-                saves = last or stopped or done % config.save_every == 0
-                saves = saves or now - saved > 60 * config.save_minutes
-                values: dict[str, float] = {}
-                if logs or saves:
-                    values = {k: float(v) for k, v in terms.items()}
-                    _check_finite(done, values.items(), checkpoint.step)
-                if logs:
-                    entry = {"step": done, "seconds": round(now - began, 3), **values}
-                    log.write(json.dumps(entry) + "\n")
-                    log.flush()
-                watch(done, values if logs else {})
-                if saves:
-                    sums = ((k, float(p.detach().sum())) for k, p in model.named_parameters())
-                    _check_finite(done, sums, checkpoint.step)
-                    state = optimizer_tensors(optimiser, model)
-                    checkpoint = Checkpoint(
-                        model, start.names, done, asdict(config), bodies, state, start.recorded
-                    )
-                    save_checkpoint(checkpoint, out / "checkpoint.safetensors")
-                    saved = perf_counter()
-            else:  # what the first process saves, or would
-                checkpoint = replace(checkpoint, step=done)
+                last = stopped or done == config.steps
+                keeper.keep(done, terms, logs=logs, last=last)
             if stopped:
                 break
-    return checkpoint
-
-
-def _check_finite(done: int, numbers: Iterable[tuple[str, float]], saved: int) -> None:
-    """Raise `DivergedError` where a loss term, or the sum of a parameter, is no number."""
-    bad = next((name for name, value in numbers if not math.isfinite(value)), None)
-    if bad is None:
-        return
-    kept = f"the checkpoint of step {saved} is kept" if saved else "no checkpoint was written"
-    raise DivergedError(
-        f"training diverged at step {done}: {bad} is no finite number; {kept}. A lower rate, or a "
-        "longer warmup, helps"
-    )
+    return replace(keeper.checkpoint, step=done)
 
 
 def take_step(
