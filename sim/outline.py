@@ -16,10 +16,17 @@ _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = (
 
 
 def solid(model: mujoco.MjModel, geoms: Sequence[int]) -> list[int]:
-    """Those of some geoms that collide. Where none does, as in models that leave it to their
-    scene's pairs: those that are hidden, or else all."""
-    colliding = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
-    return colliding or [g for g in geoms if model.geom_group[g] >= HIDDEN_GROUP] or list(geoms)
+    """Those of some geoms that collide. Of a part where none does, as of a body that a model lets
+    touch the floor with its feet alone: those that are hidden, or else all."""
+    parts: dict[int, list[int]] = {}
+    for g in geoms:
+        parts.setdefault(int(model.body_weldid[model.geom_bodyid[g]]), []).append(g)
+    found = set()
+    for own in parts.values():
+        colliding = [g for g in own if model.geom_contype[g] or model.geom_conaffinity[g]]
+        hidden = [g for g in own if model.geom_group[g] >= HIDDEN_GROUP]
+        found.update(colliding or hidden or own)
+    return [g for g in geoms if g in found]
 
 
 def outline(

@@ -156,3 +156,23 @@ def test_what_nobody_moves_is_over_the_floor_with_what_carries_it(
     assert deepest > 0.1
     for block in (whole_of(robot), *([] if part == "left_hand" else [first])):
         assert depth_in_floor(robot, poses, block)[0] == pytest.approx(deepest)
+
+
+@pytest.mark.parametrize("follows", [retarget, follow], ids=["whole", "stream"])
+def test_a_body_that_touches_with_its_feet_alone_is_not_in_the_floor(
+    tmp_path: Path, follows: Way
+) -> None:
+    """Models for learning to walk let nothing else touch, to be fast."""
+    apart = '<geom contype="0" conaffinity="0" class="collision"'
+    robot = changed_ember(tmp_path, '<geom class="collision"', apart)
+    model, source = robot.mjcf.model, on_the_side(0.12)
+    touching = {int(model.geom_bodyid[g]) for g in np.flatnonzero(model.geom_contype)}
+    assert {model.body(b).name for b in touching} == {"left_foot", "right_foot"}
+    for lies in (follows(source, robot), follows(source, EMBER)):
+        judged = [
+            pose_clip(Subject(lies.motion, each.rig, RobotMotion(each, lies.coordinates, 1.0).body))
+            for each in (robot, EMBER)
+        ]
+        own, same = ((parts.part_points[..., 2] - parts.part_radii).min() for parts in judged)
+        assert own == pytest.approx(same, abs=1e-9)
+        assert own > -0.011 * robot.rig.hip_height

@@ -42,7 +42,8 @@ def test_no_shape_of_a_hand_that_hangs_beside_it_touches_for_the_pelvis(ember: M
 
 def test_a_pelvis_without_shapes_lies_on_the_hips(tmp_path: Path) -> None:
     mass = '<inertial pos="0 0 0" mass="3.6" diaginertia="0.01 0.01 0.01"/>'
-    robot = changed_ember(tmp_path, r'<geom class="collision" mass="3.6"[^>]*/>', mass)
+    shapes = r'<geom class="collision" mass="3.6"[^>]*/>(\s*<geom[^>]*/>)*'
+    robot = changed_ember(tmp_path, shapes, mass)
     base = int(robot.links[robot.rig.pelvis])
     assert base not in {solid.link for solid in solids_over_floor(robot)}
     touch, poses = touches_of(robot)[Role.PELVIS], forward_kinematics(robot.tree, robot.tpose)
