@@ -25,6 +25,7 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "
 _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
 _MAX_ZEROS = 1 << 24  # numbers of an accessor without a buffer, which are zeros
 _EXPECTED = "a glTF file"
+_OLD = "is glTF 1; expected glTF 2.0"
 
 
 class GltfFile:
@@ -36,13 +37,15 @@ class GltfFile:
         self._binary = b""
         with self.checked():
             if content[:4] == struct.pack("<I", _GLB):
+                if content[4:8] == struct.pack("<I", 1):
+                    raise self.error(_OLD)
                 content, self._binary = _chunks(content)
             try:
                 self.json: dict[str, Any] = parse_json(path, content, "it")
             except FileFormatError as error:
                 raise self.error("is no valid glTF 2.0 file: neither a GLB nor JSON") from error
             if str(self.json.get("asset", {}).get("version", "2")).startswith("1"):
-                raise self.error("is glTF 1; expected glTF 2.0")
+                raise self.error(_OLD)
             self.nodes: list[dict[str, Any]] = self.json.get("nodes", [])
             self._buffers: dict[int, bytes] = {}
             compressed = [x for x in _COMPRESSED if x in self.json.get("extensionsRequired", ())]
@@ -163,4 +166,6 @@ def _chunks(content: bytes) -> tuple[bytes, bytes]:
         length, kind = struct.unpack_from("<II", content, at)
         found.setdefault(kind, content[at + 8 : at + 8 + length])
         at += 8 + length
+    if _JSON_CHUNK not in found:
+        raise ValueError("it has no JSON; is it cut short?")
     return found[_JSON_CHUNK], found.get(_BINARY_CHUNK, b"")

@@ -267,6 +267,17 @@ def test_broken_files_are_refused(walking: Motion, tmp_path: Path, change: str) 
         read_gltf(gltf.write(tmp_path / "a.gltf", buffer="inside"))
 
 
+@pytest.mark.parametrize(
+    ("start", "says"),
+    [(b"glTF\1\0\0\0", "is glTF 1"), (b"glTF\2\0\0\0", "no JSON; is it cut short")],
+)
+def test_binary_files_without_our_json_are_refused(tmp_path: Path, start: bytes, says: str) -> None:
+    path = tmp_path / "a.glb"
+    path.write_bytes(start + b"\x20\0\0\0\4\0\0\0\0\0\0\0{}  ")
+    with pytest.raises(FileFormatError, match=rf"a\.glb: .*{says}"):
+        read_gltf(path)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("gltf")
