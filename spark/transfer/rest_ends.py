@@ -27,7 +27,7 @@ from spark.transfer.canonical import CanonicalMotion
 # Arms and legs of 37 of Mixamo's characters rest within 10 degrees of the T-pose, those of CMU's
 # skeletons 20; feet of the former point up to 22 degrees outwards.
 _T = np.radians(15)
-_BUILT = np.radians(30)
+_BUILT = np.radians(30)  # in the mean of a pair: one foot is not told otherwise than the other
 _ENDS = (*ANKLES, *HANDS)
 
 
@@ -48,12 +48,17 @@ def from_rest_to_rest(source: Rig, moved: CanonicalMotion) -> CanonicalMotion:
 
 def _headings(rig: Rig) -> dict[Role, float]:
     """By what yaw [rad] hands and feet are turned from the rest pose to the T-pose; of a body that
-    rests in another pose none, and none that rests bent."""
+    rests in another pose none, and no pair that rests bent."""
     # At rest all axes lie as the world's.
     turns = quat_mul(rig.tpose, quat_conj(rig.tpose[rig.pelvis]))
     ends = {role: j for role in _ENDS if (j := rig.roles.joint(role)) is not None}
     limbs = {j for group in LIMBS for j in limb_joints(rig.roles, group)} - {*ends.values()}
     if quat_angle(turns, quat_identity(turns))[[*limbs]].max(initial=0.0) > _T:
         return {}
-    headings = {role: float(yaw_from_quat(turns[j])) for role, j in ends.items()}
-    return {role: yaw for role, yaw in headings.items() if abs(yaw) < _BUILT}
+    yaws = {role: float(yaw_from_quat(turns[j])) for role, j in ends.items()}
+    built: dict[Role, float] = {}
+    for pair in (ANKLES, HANDS):  # of one of a pair as of both: they were built alike
+        both = {role: yaws[role] for role in pair if role in yaws}
+        if both and np.mean([abs(yaw) for yaw in both.values()]) < _BUILT:
+            built |= both
+    return built

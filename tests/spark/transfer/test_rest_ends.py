@@ -25,14 +25,17 @@ TOES = (Role.LEFT_TOE, Role.RIGHT_TOE)
 SIDES = {"left": 1.0, "right": -1.0}
 
 
-def splayed(degrees: float, arms: float = 0.0, hands: float = 0.0) -> Rig:
-    """The stick man as a maker has it whose feet rest so far outwards, and arms and hands so far
-    down."""
+def splayed(
+    degrees: float, arms: float = 0.0, hands: float = 0.0, right: float | None = None
+) -> Rig:
+    """The stick man as a maker has it whose feet rest so far outwards, the right one as far as the
+    left unless it is given, and arms and hands so far down."""
     rig = stick_rig()
     offsets, ends = rig.skeleton.offsets.copy(), rig.skeleton.end_offsets.copy()
     tpose = rig.tpose.copy()
+    feet = {"left": degrees, "right": degrees if right is None else right}
     for side, sign in SIDES.items():
-        outwards = quat_from_yaw(sign * np.radians(degrees))
+        outwards = quat_from_yaw(sign * np.radians(feet[side]))
         toe = joint(Role(f"{side}_toe"))
         offsets[toe] = quat_rotate(outwards, offsets[toe])
         end = rig.skeleton.end_parents == toe
@@ -112,6 +115,15 @@ def test_who_rests_otherwise_is_measured_from_the_t_pose(target: Rig) -> None:
     np.testing.assert_array_equal(
         transfer(source, target).rotations, copied(source, target).rotations
     )
+
+
+@pytest.mark.parametrize(("left", "right", "kept"), [(28.0, 31.0, True), (29.5, 31.0, False)])
+def test_both_feet_are_told_alike(left: float, right: float, kept: bool) -> None:
+    """Also where one is a little less far out than feet are built, and one a little more."""
+    source, target = striding(stick_rig()), splayed(left, right=right)
+    off = quat_angle(transfer(source, target).rotations, copied(source, target).rotations)
+    expected = np.radians([left, right]) if kept else np.zeros(2)
+    np.testing.assert_allclose(off[0, [joint(role) for role in ANKLES]], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("path", recordings("mixamo_pairs/sk108/idle_251f.bvh"))
