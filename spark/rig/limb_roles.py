@@ -20,10 +20,6 @@ _NAME_WEIGHT = 3.0  # of a sure name, in units of the log-likelihoods of lengths
 _NOT_THE_FIRST = 6.0
 _FINGERS = 3  # joints that one past the elbow carries are fingers, and it is the wrist
 _BELOW_A_WRIST = 4.0  # of a hand below such a joint, in the same units
-# Of joints in one place at the end of a long bone the last one turns with all; breaks ties.
-_NOT_THE_LAST = 0.01
-_LONG = ("upper_leg", "lower_leg", "upper_arm", "forearm")
-_ONE_PLACE = 0.01  # of the limb's length
 # Shares of the bend of the joint of a chain that bends most: a joint that bends less is stiff, and
 # one that bends more lies in no bone of an arm. Beasts' legs have a joint more than ours.
 _STIFF, _BENDS = 0.05, 0.2
@@ -73,9 +69,6 @@ def _best_labels(
     shape = _leg_shape if parts is LEG else _arm_shape
     carried = np.bincount(measured.skeleton.parents[1:], minlength=len(measured.skeleton))
     branching = {i for i in range(length) if min(carried[c[i]] for c in chains) >= _FINGERS}
-    repeated = {
-        i for i in range(length) if all(at[i + 1] - at[i] < _ONE_PLACE * at[-1] for at in along)
-    }
     best = Labels({}, float("-inf"))
     for index in _placements(free, parts):
         score = _NAME_WEIGHT * sum(names[part, i] for part, i in index.items())
@@ -90,9 +83,6 @@ def _best_labels(
         score -= _NOT_THE_FIRST * sum(
             any(k < i and names[part, k] > names[part, i] > 0 for k in left_out)
             for part, i in index.items()
-        )
-        score -= _NOT_THE_LAST * sum(
-            i in repeated and i + 1 in left_out for part, i in index.items() if part in _LONG
         )
         score += sum(shape(index, at) for at in along) / len(chains)
         score -= stiff[index["lower_leg" if parts is LEG else "forearm"]]
