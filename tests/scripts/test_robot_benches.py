@@ -8,6 +8,7 @@ from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from robots.model.understand import understand_robot
 from scripts.balance_qp import Balance
+from scripts.climb_bench import climbed
 from scripts.robot_report_bench import CORRUPTIONS
 from spark.rig.feet import sole_positions
 
@@ -75,3 +76,19 @@ def test_a_standing_robot_is_balanced_by_its_own_forces(standing: RobotMotion) -
     limp.limits[:] = 0.0
     limp.run()
     assert np.abs(limp.data.qpos - limp.q[-1]).max() > 0.2
+
+
+@pytest.mark.parametrize("top", [0.03, -0.05])
+def test_a_box_is_as_deep_under_a_foot_as_it_is(standing: RobotMotion, top: float) -> None:
+    """Under the left foot alone, its top so high [m] over where that stands."""
+    robot, lift = standing.robot, 0.5
+    qpos = standing.qpos + np.eye(standing.qpos.shape[1])[2] * lift
+    corners = np.array([[x, y, z] for x in (-0.3, 0.3) for y in (0.01, 0.4) for z in (0.0, 1.0)])
+    box = corners * [1, 1, lift + top]
+    climb = climbed(robot, robot.from_qpos(qpos), [box], standing.frame_time)
+    sides = [sole.side for sole in robot.soles]
+    np.testing.assert_allclose(climb.over[:, sides.index("left")], -top, atol=1e-6)
+    np.testing.assert_allclose(climb.over[:, sides.index("right")], lift, atol=1e-6)
+    np.testing.assert_allclose(climb.feet, max(top, 0.0), atol=1e-6)
+    assert (climb.others <= climb.feet).all()  # an ankle, too, is in a box that is high enough
+    np.testing.assert_allclose(climb.speed, 0.0, atol=1e-9)
