@@ -34,7 +34,7 @@ _INTERVAL = 0.2  # [s] between the frames in which others are tried
 _TRIED = 2048  # poses of a limb: with four hinges, one in 40 degrees of each
 _WAYS = 6  # of the nearest of them, that differ
 _APART = 1.0  # [rad] by a hinge, at least
-_STEPS = 12  # from there
+_STEPS = 5  # from there
 
 
 def led_back(
