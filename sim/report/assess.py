@@ -148,8 +148,9 @@ def _about_model(course: Course) -> tuple[str, ...]:
     if body is None:
         return ()
     own = body.model.body_rootid[body.model.geom_bodyid] == body.root
-    if not ((body.model.geom_contype | body.model.geom_conaffinity)[own] != 0).any():
-        notes.append("none of the model's shapes collide: self-penetration is not measured")
+    touch, touched = body.model.geom_contype[own], body.model.geom_conaffinity[own]
+    if not np.bitwise_and.outer(touch, touched)[~np.eye(len(touch), dtype=bool)].any():
+        notes.append("no two of the model's shapes may collide: self-penetration is not measured")
     height = floor_height(course.lowest[:, 2])
     if abs(height) > PLAUSIBILITY_V4.scaled(course.rig.hip_height).penetration:
         notes.append(

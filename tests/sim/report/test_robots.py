@@ -34,6 +34,7 @@ from spark.rig.rig import understand
 from spark.transfer.canonical import to_canonical
 from spark_sim.cli import run
 from spark_sim.clips import RobotClip
+from tests.helpers.ember import changed_ember
 from tests.helpers.recordings import recording
 
 FPS, FRAMES = 60.0, 90
@@ -359,3 +360,13 @@ def test_qpos_that_is_broken_is_refused(
     np.savez(path, **arrays)
     with pytest.raises(FileFormatError, match=message):
         spark_sim.load(path, robot="robot")
+
+
+def test_who_may_touch_the_floor_alone_is_not_said_to_be_out_of_itself(
+    robot: Morphology, tmp_path: Path
+) -> None:
+    apart = changed_ember(tmp_path, '<geom group="3"', '<geom conaffinity="0" group="3"')
+    for each, said in ((apart, True), (robot, False)):
+        still = moving(each, standing(each, 3))
+        report = assess(Subject(still.motion, each.rig, still.body))
+        assert any("self-penetration is not measured" in note for note in report.notes) is said
