@@ -19,8 +19,7 @@ def filled_in(
     network = _shipped() if checkpoint is None else NetworkRetargeter(read_weights(checkpoint))
     if not network.network.config.residual:
         return network(source, recording.rig)
-    moved = with_target_prior(network, source, recording)
-    return network.fit_legs(source, moved, recording)
+    return network.fit_legs(source, with_target_prior(network, source, recording))
 
 
 @cache

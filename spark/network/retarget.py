@@ -34,7 +34,7 @@ from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_normalize
 from spark.transfer.analytic import correspond, transfer
 from spark.transfer.canonical import FRAME_TIME, CanonicalMotion, at_frame_time
-from spark.transfer.leg_fit import fit_body, on_own_floor
+from spark.transfer.leg_fit import fit_legs
 
 _WINDOWS_AT_ONCE = 32  # bounds memory
 
@@ -97,27 +97,21 @@ class NetworkRetargeter:
             hips=start.hips + values_at(blended.hips - start_30fps.hips, at),
         )
 
-    def fit_legs(
-        self,
-        source: CanonicalMotion,
-        moved: CanonicalMotion,
-        recording: CanonicalMotion | None = None,
-    ) -> CanonicalMotion:
+    def fit_legs(self, source: CanonicalMotion, moved: CanonicalMotion) -> CanonicalMotion:
         """`moved`, the transfer of `source`, with its legs fitted: by the two bodies' proportions,
         and where the network learned from recorded pairs, and met bodies like these two, as
-        these have it (`spark.network.recorded`). `recording` is a motion of the target's own."""
+        these have it (`spark.network.recorded`)."""
         if self.recorded is None:
-            return fit_body(source, moved, recording)
+            return fit_legs(source, moved)
         bodies = tokens_of(source.rig), tokens_of(moved.rig)
         known = self.recorded.known
         share = known.nearness(bodies[0]) * known.nearness(bodies[1])
         moved = replace(moved, notes=(*moved.notes, known.told(*bodies)))
         if not share:
-            return fit_body(source, moved, recording)
+            return fit_legs(source, moved)
         told = self.recorded.told
         doubt = told.doubt(*bodies)
-        fitted = as_recorded(told, source, moved, share, bodies=bodies, doubt=doubt)
-        return on_own_floor(fitted, recording, 1.0 - share)
+        return as_recorded(told, source, moved, share, bodies=bodies, doubt=doubt)
 
     def _blend_windows(
         self,

@@ -7,8 +7,7 @@ and so does this:
 - over the ground, the hips' path and the ankles about it are scaled alike (`travel_scale`), and
   each ankle is moved out by as much as its hip joint is farther out than the source's, scaled; of
   who lies, ankles are scaled about the hips as legs are long, which then reach along the ground;
-- in height, the ankles' way above where they stand in the T-pose is scaled as the hips' is, and the
-  body stands on its own soles, not on the source's (`on_own_floor`);
+- in height, the ankles' way above where they stand in the T-pose is scaled as the hips' is;
 - the feet keep their rotations, and the knees bend by two-bone inverse kinematics.
 
 A body's own motion comes back as it was. Recorded answers tell more than proportions do
@@ -25,17 +24,12 @@ from spark.rig.rig import Rig
 from spark.rig.roles import ANKLES, LEGS, LIMBS, UPPER_ARMS, Group, Role
 from spark.rotation import quat_rotate
 from spark.smoothstep import smoothstep
-from spark.transfer.analytic import FLOOR_TOLERANCE
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.leg_ik import Leg, leg_of, move_ankles
 
 # Of the shoulders' height in `travel_scale`, against the hips'. On retargeted characters of an
 # animation library the scale over the ground lay between the two (docs/evaluation.md).
 _SHOULDER_WEIGHT = 0.5
-# [hip heights] from the lowest joint of a foot down to what it stands on: a centimetre of skin and
-# shoe of an adult. Of 37 of Mixamo's characters, whose floor is z = 0, it is 0 to 0.034, in the
-# mean 0.009.
-_SOLE = 0.01
 _LYING, _STANDING = 0.15, 0.6  # standing heights of the hips, between which legs come to lie
 
 
@@ -90,27 +84,6 @@ def fit_legs(
         fitted = _fitted(source.picked(block), moved.picked(block), fit)
         out.rotations[block], out.hips[block] = fitted.rotations, fitted.hips
     return replace(out, floor_z=out.floor_z + fit.ankles_up)
-
-
-def on_own_floor(
-    moved: CanonicalMotion, recording: CanonicalMotion | None = None, share: float = 1.0
-) -> CanonicalMotion:
-    """`moved` so high over z = 0 as the target stands by itself, or by a `share` of the way: as in
-    `recording`, a motion of its own, if that stands about there; else as soles are thick. What
-    feet of the source have under them, shoes or a file's error, is none of the target's."""
-    size = moved.rig.hip_height
-    own = _SOLE * size if recording is None else recording.floor_z
-    if abs(own) > FLOOR_TOLERANCE * size:
-        own = _SOLE * size
-    up = share * (own - moved.floor_z)
-    return replace(moved, hips=moved.hips + np.array([0.0, 0.0, up]), floor_z=moved.floor_z + up)
-
-
-def fit_body(
-    source: CanonicalMotion, moved: CanonicalMotion, recording: CanonicalMotion | None = None
-) -> CanonicalMotion:
-    """`moved`, the transfer of `source`, with its legs fitted by proportions, on its own floor."""
-    return on_own_floor(fit_legs(source, moved), recording)
 
 
 def _fitted(source: CanonicalMotion, moved: CanonicalMotion, fit: LegFit) -> CanonicalMotion:

@@ -32,7 +32,7 @@ from spark.training.recorded_ridge import fit_ridge
 from spark.transfer.analytic import transfer
 from spark.transfer.canonical import canonical_positions
 from spark.transfer.foot_lock import lock_feet
-from spark.transfer.leg_fit import fit_body, fit_legs
+from spark.transfer.leg_fit import fit_legs
 from tests.helpers.proportions import built, stout, striding, waving
 from tests.helpers.recorded import HIPS_UP, TRAVEL, answered, body, habits, performance
 from tests.helpers.stick import joint, scaled, stick_rig, without
@@ -206,7 +206,7 @@ def test_a_checkpoint_says_what_was_learned(known: RecordedPairs, tmp_path: Path
     near, far = (retargeter.fit_legs(source, transfer(source, rig)) for rig in (body(2), wide))
     assert "as in the training's recorded pairs, " in near.notes[-1]
     assert "unlike the characters of the training's recorded pairs" in far.notes[-1]
-    np.testing.assert_array_equal(far.hips, fit_body(source, transfer(source, wide)).hips)
+    np.testing.assert_array_equal(far.hips, fit_legs(source, transfer(source, wide)).hips)
     assert np.abs(near.hips - fit_legs(source, transfer(source, body(2))).hips).max() > 1e-3
 
 
