@@ -19,9 +19,10 @@ from spark.rotation import quat_conj, quat_mul
 from spark.smoothstep import smoothstep
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
 from spark.transfer.hands_up import bent_up
+from spark.transfer.knee_ease import ease_knees
 from spark.transfer.leg_fit import from_sole
 from spark.transfer.leg_ik import ELBOWS, Leg, arm_of, leg_of, move_ankles
-from spark.transfer.reach import in_time
+from spark.transfer.reach import in_time, stretch_of
 
 _FLESH = 0.005  # [hip heights] of a joint's centre over the floor, at least: half a cm of an adult
 _EASE = 0.1  # [s] before something would be in the floor it begins to rise
@@ -99,7 +100,7 @@ def _risen(
     wrists: Mapping[Role, Float[np.ndarray, "T"]],
 ) -> CanonicalMotion:
     """The whole body as high as its parts ask for, the wrists while no foot is near the floor; feet
-    that are near it stay."""
+    that are near it stay, as far as knees follow smoothly."""
     legs = [leg for group in LEGS if (leg := leg_of(moved.rig, group)) is not None]
     aloft = [_aloft(moved, leg) for leg in legs]
     on_hands = np.min([np.ones(len(moved)), *aloft], axis=0)
@@ -107,10 +108,10 @@ def _risen(
     most = np.max([np.zeros(len(moved)), *asked], axis=0)
     rise = in_time(most, _EASE, moved.frame_time)
     higher = replace(moved, hips=moved.hips + rise[:, None] * _UP)
-    stay = [(1 - own) * rise for own in aloft]
-    return move_ankles(
-        higher, [(leg, -down[:, None] * _UP) for leg, down in zip(legs, stay, strict=True)]
-    )
+    stay = [(leg, -((1 - own) * rise)[:, None] * _UP) for leg, own in zip(legs, aloft, strict=True)]
+    stretches = [stretch_of(moved, leg) for leg in legs]
+    down = np.ones((len(legs), len(moved)), dtype=bool)
+    return move_ankles(higher, ease_knees(higher, stay, stretches, down))
 
 
 def _aloft(moved: CanonicalMotion, leg: Leg) -> Float[np.ndarray, "T"]:

@@ -149,6 +149,29 @@ def test_a_knee_is_raised_with_the_hips_while_feet_stay() -> None:
     assert lowest(over_floor(kneels, low), knees) > -1e-3
 
 
+def test_knees_follow_smoothly_where_a_body_rises_from_its_feet() -> None:
+    """Who sits with legs ahead and sinks by 15 cm within a fifth of a second: with feet that stay,
+    risen hips would stretch the legs to the end, and the knees' turn would change by 8 degrees
+    between two frames."""
+    turns = {Role(f"{s}_upper_leg"): [0.0, -1.52, 0.0] for s in ("left", "right")}
+    turns |= {Role(f"{s}_lower_leg"): [0.0, 0.5, 0.0] for s in ("left", "right")}
+    sits = posed(stick_rig(), np.ones(FRAMES), turns)
+    pelvis = [joint(Role.PELVIS)]
+    up = np.array([0.0, 0.0, 0.03 - lowest(sits, pelvis)])
+    sits = replace(sits, hips=sits.hips + up)
+    time = (np.arange(FRAMES) - FRAMES // 2) / FPS
+    dip = 0.15 * np.exp(-((time / 0.1) ** 2))
+    low = replace(sits, hips=sits.hips - dip[:, None] * [0.0, 0.0, 1.0])
+    risen = over_floor(sits, low)
+    assert lowest(low, pelvis) < -0.04
+    assert lowest(risen, pelvis) > 0.0
+    legs = [joint(Role(f"left_{part}")) for part in ("upper_leg", "lower_leg", "foot")]
+    thigh, shank = np.moveaxis(np.diff(canonical_positions(risen, legs), axis=1), 1, 0)
+    cosine = (thigh * shank).sum(axis=1) / np.linalg.norm(thigh, axis=1)
+    bend = np.degrees(np.arccos(np.clip(cosine / np.linalg.norm(shank, axis=1), -1.0, 1.0)))
+    assert np.abs(np.diff(bend, 2)).max() < 2.0
+
+
 def test_fingers_turn_up_at_the_wrist() -> None:
     source = bowed()
     rig = with_fingers(stick_rig())
