@@ -9,6 +9,8 @@ from robots.model.morphology import Morphology
 from robots.registry import find
 from robots.solver.foot_path import (
     LET_DOWN,
+    LEVEL,
+    LEVEL_LIFT,
     MAX_UNEVEN,
     STEP_HEIGHTS,
     STEP_RISE,
@@ -21,6 +23,8 @@ from spark.demo.sample import sample_motion, sample_rig
 from spark.smoothstep import smoothstep
 from spark.transfer.canonical import to_canonical
 from spark_sim.loading import load_robot
+
+HIGHEST = STEP_HEIGHTS[-1] * (1 + LEVEL_LIFT)  # [hip heights] of any step
 
 
 def planned() -> tuple[Morphology, FootPlan]:
@@ -40,7 +44,7 @@ def test_feet_pass_as_high_above_the_floor_as_the_source_but_for_ground(stood: f
     lowest = footing_of(ember, plan).positions[:, 2].min(axis=0)
     frames, standing = np.arange(len(plan.toe)), np.flatnonzero(plan.stands)
     swinging = np.abs(frames[:, None] - np.flatnonzero(~plan.stands)).min(axis=1)
-    rests = swinging * plan.frame_time > STEP_HEIGHTS[-1] / STEP_RISE
+    rests = swinging * plan.frame_time > HIGHEST / STEP_RISE
     assert rests.sum() > 20
     np.testing.assert_allclose(lowest[rests], 0.0, atol=1e-9)
     apart = np.abs(frames[:, None] - standing).min(axis=1) * plan.frame_time
@@ -100,7 +104,7 @@ def test_who_turns_on_the_toes_raises_the_heel() -> None:
     assert np.all(heel[:2, 2][:, turning] >= 0.99 * STEP_HEIGHTS[1] * plan.hip_height)
     assert np.all(toes[:, 2].min(axis=0) < STEP_HEIGHTS[1] * plan.hip_height)
     np.testing.assert_allclose(toes[:, :2].mean(axis=0), 0.0, atol=1e-9)
-    still = np.abs(time) > 0.15 + 2 * STEP_HEIGHTS[-1] / STEP_RISE
+    still = np.abs(time) > 0.15 + 2 * HIGHEST / STEP_RISE
     np.testing.assert_array_equal(heel[:, 2][:, still], 0.0)
 
 
@@ -115,6 +119,17 @@ def test_feet_of_who_lies_are_kept_from_dragging_more_firmly_than_a_step_is_take
     )
     assert np.all(lies > 2 * swings)
     assert np.all(rests < swings)
+
+
+@pytest.mark.parametrize(("tilt", "higher"), [(0.0, LEVEL_LIFT), (1.1 * LEVEL[1], 0.0)])
+def test_a_level_foot_steps_higher_than_one_on_its_end(tilt: float, higher: float) -> None:
+    """`tilt` [hip heights] is how far its heel is up, at 1 m/s all the time."""
+    ember, plan = planned()
+    plan.contacts[:], plan.clearance[:], plan.prints[:] = False, 0.0, 0.0
+    plan = moved(plan, plan.frame_time * np.arange(len(plan.toe)), 0.0)
+    plan.points[:, :2, 2] = tilt * plan.hip_height
+    toes = footing_of(ember, plan).positions[-2:, 2] / plan.hip_height
+    np.testing.assert_allclose(toes, STEP_HEIGHTS[-1] * (1 + higher), rtol=1e-9)
 
 
 def moved(plan: FootPlan, along: np.ndarray, idle: float) -> FootPlan:
