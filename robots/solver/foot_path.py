@@ -13,7 +13,7 @@ from scipy.ndimage import grey_dilation, median_filter
 from robots.model.morphology import Morphology
 from robots.solver.footprints import FootPlan, on_points, on_prints
 from robots.solver.holds import Holds
-from robots.solver.settling import settled
+from robots.solver.settling import around, settled
 from spark.runs import true_runs
 from spark.smoothstep import smoothstep
 from spark.transfer.footfalls import between_contacts
@@ -67,17 +67,30 @@ def footing_of(robot: Morphology, plan: FootPlan) -> Holds:
     lift = _in_time(step, plan)
     height = _height(plan)
     z = np.where(on, lift, pitched + np.maximum(height[:, None], lift))
-    near = near_floor(height / plan.hip_height)[:, None, None]
-    stands = np.any(on, axis=1)[:, None, None]
-    holds = np.where(stands, RAISED_HOLD, near * SWING_HOLD)
-    holds = np.where(on[..., None], 1.0, holds)
-    up = np.minimum(lift / (STEP_HEIGHTS[1] * plan.hip_height), 1.0)
-    firm = STEP_HOLD + (IDLE_HOLD - STEP_HOLD) * plan.idle[:, None]
-    holds[..., 2] += up * (firm - holds[..., 2])
+    holds = _shares(plan, on, height, lift)
     positions = np.stack([place.real, place.imag, z + plan.ground[:, None]], axis=-1)
     over_time = (np.ascontiguousarray(x.transpose(1, 2, 0)) for x in (positions, holds))
     links, points = robot.sole_points(plan.sole)
     return Holds(links, np.repeat(points[:, :, None], len(positions), axis=2), *over_time)
+
+
+def _shares(
+    plan: FootPlan,
+    on: Bool[np.ndarray, "T P"],
+    height: Float[np.ndarray, "T"],
+    lift: Float[np.ndarray, "T P"],
+) -> Float[np.ndarray, "T P 3"]:
+    """How firmly points are held that are `on` the floor or not, of a foot at a `height` [m] whose
+    ends are lifted [m]. Along the floor one that comes to stand, or leaves, is so ever more firmly:
+    it would be late, and slide where it comes down."""
+    swings = near_floor(height / plan.hip_height)[:, None] * SWING_HOLD
+    swings[:, :2] += around(plan.stands, plan.frame_time, SETTLE)[:, None] * (1.0 - swings[:, :2])
+    stands = np.any(on, axis=1)[:, None]
+    holds = np.where(on[..., None], 1.0, np.where(stands, RAISED_HOLD, swings)[:, None])
+    up = np.minimum(lift / (STEP_HEIGHTS[1] * plan.hip_height), 1.0)
+    firm = STEP_HOLD + (IDLE_HOLD - STEP_HOLD) * plan.idle[:, None]
+    holds[..., 2] += up * (firm - holds[..., 2])
+    return holds
 
 
 def _gone(plan: FootPlan, offset: Float[np.ndarray, "T 3"]) -> Float[np.ndarray, "T 3"]:

@@ -12,9 +12,11 @@ from robots.solver.foot_path import (
     LEVEL,
     LEVEL_LIFT,
     MAX_UNEVEN,
+    SETTLE,
     STEP_HEIGHTS,
     STEP_RISE,
     STEP_SPEEDS,
+    SWING_HOLD,
     footing_of,
 )
 from robots.solver.footprints import FootPlan, plan_feet
@@ -130,6 +132,17 @@ def test_a_level_foot_steps_higher_than_one_on_its_end(tilt: float, higher: floa
     plan.points[:, :2, 2] = tilt * plan.hip_height
     toes = footing_of(ember, plan).positions[-2:, 2] / plan.hip_height
     np.testing.assert_allclose(toes, STEP_HEIGHTS[-1] * (1 + higher), rtol=1e-9)
+
+
+def test_a_foot_is_held_ever_more_firmly_along_the_floor_as_it_comes_to_stand() -> None:
+    ember, plan = planned()
+    plan.contacts[:], plan.clearance[:] = False, 0.0
+    plan.contacts[60:] = True
+    along = footing_of(ember, plan).shares[-2:, :2]
+    before = round(SETTLE / plan.frame_time)
+    assert np.all(along[..., 60:] == 1.0)
+    assert np.all(np.diff(along[..., 60 - before : 61], axis=-1) >= 0.0)
+    np.testing.assert_allclose(along[..., : 59 - before], SWING_HOLD[0])
 
 
 def moved(plan: FootPlan, along: np.ndarray, idle: float) -> FootPlan:
