@@ -36,7 +36,7 @@ LEVEL = (0.03, 0.06)
 STEP_RISE = 0.33  # [hip heights/s] at which it is lifted before that and let down after it
 UP_SHARE = 0.4  # of a contact, at each end, in which the foot may still, or already, be up
 SPEED_SPAN = 0.025  # [s] before and after a frame for a foot's speed
-SETTLE = 0.13  # [s] before and after a contact in which a foot already stays, ever less
+SETTLE = 0.11  # [s] before and after a contact in which a foot already stays, ever less
 MIN_CREEP = 0.08  # [s], half of which a standing foot has to move for before it is lifted
 LET_DOWN = 0.15  # [s] within which a foot comes down that is in the air where its contact begins
 # Hip heights above the floor at which a foot may stand on it: skeletons and recorded floors are off
