@@ -31,7 +31,7 @@ STEP_HEIGHTS = (0.0, 0.03, 0.033)
 # What is asked for is missed by some millimetres. The report sees a level foot skate, all of it
 # below 0.044, whatever it carries. So such a foot steps higher, by this share. `LEVEL` is from its
 # lowest point to its highest [hip heights], of a level foot and of one that is on its end.
-LEVEL_LIFT = 0.2
+LEVEL_LIFT = 0.18
 LEVEL = (0.03, 0.06)
 STEP_RISE = 0.33  # [hip heights/s] at which it is lifted before that and let down after it
 UP_SHARE = 0.4  # of a contact, at each end, in which the foot may still, or already, be up
