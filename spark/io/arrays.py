@@ -17,9 +17,10 @@ from spark.npz import Npz, array_in, holds_objects
 from spark.opening import beginning, check_regular, read_bytes
 
 _MAGIC = b"\x93NUMPY"
+# That of the file first: who resamples a recording and keeps its other arrays leaves `mocap_...`.
 _RATES = (
-    *("mocap_frame_rate", "mocap_framerate", "mocap_fps"),
     *("fps", "frame_rate", "framerate"),
+    *("mocap_frame_rate", "mocap_framerate", "mocap_fps"),
 )
 _MAX_HEADER = 65536  # bytes; numpy's own writer stays below for plain dtypes
 
@@ -106,12 +107,18 @@ def first_of(arrays: Mapping[str, np.ndarray], names: Iterable[str]) -> str | No
     return next((name for name in names if name in arrays), None)
 
 
-def rate_in(arrays: Mapping[str, np.ndarray], path: Path) -> float | None:
-    """Frames a second, as one of the arrays says. Raises `FileFormatError` where it can't be."""
-    name = first_of(arrays, _RATES)
-    if name is None or arrays[name].size != 1:
-        return None
-    fps = float(numbers(arrays, name, path).ravel()[0])
-    if not 1 <= fps <= 10000:
-        raise FileFormatError(path, None, f"{name!r} is {fps:g}; expected frames a second")
-    return fps
+def rate_in(arrays: Mapping[str, np.ndarray], path: Path, notes: list[str]) -> float | None:
+    """Frames a second, as one of the arrays says; `notes` says where another says otherwise.
+    Raises `FileFormatError` where it can't be."""
+    names = [name for name in _RATES if name in arrays and arrays[name].size == 1]
+    said = {name: float(numbers(arrays, name, path).ravel()[0]) for name in names}
+    for name, fps in said.items():
+        if not 1 <= fps <= 10000:
+            raise FileFormatError(path, None, f"{name!r} is {fps:g}; expected frames a second")
+    if len({*said.values()}) > 1:
+        rates = ", ".join(f"{name!r} is {fps:g}" for name, fps in said.items())
+        notes.append(
+            f"two rates: {rates}; the first counts, unless --fps (of retarget: --source-fps) gives "
+            "another"
+        )
+    return next(iter(said.values()), None)

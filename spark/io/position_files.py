@@ -73,7 +73,8 @@ def _points(array: np.ndarray, arrays: Arrays, path: Path, what: str) -> Points:
         raise FileFormatError(path, None, f"{what} holds {np.abs(values).max():.3g}; expected less")
     names = _texts(arrays, values.shape[1], path)
     parents = None if names is None else _parents(arrays, len(names), path)
-    return Points(values, names, parents, rate_in(arrays, path), tuple(notes))
+    fps = rate_in(arrays, path, notes)
+    return Points(values, names, parents, fps, tuple(notes))
 
 
 def _frames(

@@ -28,7 +28,6 @@ KEYS = frozenset({*POSES, *ROOT, *BODY} - {"pose"})
 SIGNS = frozenset({"betas", "v_template", "surface_model_type"})
 """An npz with one of these has to do with the family, though it may be no motion."""
 
-
 # Of the vectors in a dict of a video method, those in the world come first.
 _WORLD_FIRST = ("smpl_params_global", "smplx_params_global", "world", "global")
 
@@ -95,6 +94,7 @@ def _named(arrays: Mapping[str, np.ndarray], path: Path, origin: str, up: Up) ->
     if (name := first_of(arrays, _BETAS)) is not None and arrays[name].size:
         given = numbers(arrays, name, path)
         betas = np.median(given.reshape(-1, given.shape[-1] if given.ndim else 1), axis=0)
+    fps = rate_in(arrays, path, notes)
     return SmplMotion(
         rotvecs,
         trans,
@@ -102,7 +102,7 @@ def _named(arrays: Mapping[str, np.ndarray], path: Path, origin: str, up: Up) ->
         up,
         betas=betas,
         gender=_text(arrays, _GENDER),
-        fps=rate_in(arrays, path),
+        fps=fps,
         notes=tuple(notes),
     )
 

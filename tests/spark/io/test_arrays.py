@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays_of
 
 from spark.errors import FileFormatError
-from spark.io.arrays import npz_names, read_npy, read_npz
+from spark.io.arrays import npz_names, rate_in, read_npy, read_npz
 from spark.npz import array_in
 from tests.helpers.hostile import Bomb, damaged, edits
 
@@ -127,3 +127,22 @@ def test_other_objects_are_left_out_and_named(value: object, tmp_path: Path) -> 
     np.savez(tmp_path / "a.npz", it=held)
     arrays = read_npz(tmp_path / "a.npz")
     assert (arrays.pickled, dict(arrays)) == (("it",), {})
+
+
+@pytest.mark.parametrize(
+    ("rates", "fps", "said"),
+    [
+        ({}, None, ""),
+        ({"mocap_framerate": [120.0]}, 120, ""),
+        ({"fps": 30, "mocap_framerate": 30.0}, 30, ""),
+        ({"mocap_framerate": 120.0, "fps": 30}, 30, "'fps' is 30, 'mocap_framerate' is 120"),
+    ],
+)
+def test_of_two_rates_the_file_s_own_counts(
+    rates: dict[str, object], fps: float | None, said: str
+) -> None:
+    """Who resamples AMASS's recordings and keeps their other arrays leaves theirs beside it."""
+    notes: list[str] = []
+    arrays = {name: np.array(rate) for name, rate in rates.items()}
+    assert rate_in(arrays, Path("a.npz"), notes) == fps
+    assert [said in note for note in notes] == [True] * bool(said)
