@@ -40,3 +40,12 @@ def self_contacts(
         if distance < 0 and first in bodies and second in bodies:
             depths[first, second] = max(depths.get((first, second), 0.0), -distance)
     return depths
+
+
+def may_touch_itself(model: mujoco.MjModel, root: int) -> bool:
+    """Whether the file lets any two parts of a body touch, by their shapes' bits or as a pair."""
+    own = model.body_rootid[model.geom_bodyid] == root
+    parts = model.body_weldid[model.geom_bodyid[own]]
+    bits = np.bitwise_and.outer(model.geom_contype[own], model.geom_conaffinity[own])
+    paired = own[model.pair_geom1] & own[model.pair_geom2]
+    return bool((bits[parts[:, None] != parts]).any() or paired.any())

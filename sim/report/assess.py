@@ -29,6 +29,7 @@ from sim.report.swing import swing_of
 from sim.report.thresholds import PLAUSIBILITY_V4
 from sim.report.tremble import tremble_beside
 from sim.report.truth import Accuracy, accuracy
+from sim.self_contact import may_touch_itself
 from sim.trajectory import Subject
 from spark.errors import SkeletonError
 from spark.motion import Motion
@@ -147,9 +148,7 @@ def _about_model(course: Course) -> tuple[str, ...]:
     body, notes = course.subject.body, []
     if body is None:
         return ()
-    own = body.model.body_rootid[body.model.geom_bodyid] == body.root
-    touch, touched = body.model.geom_contype[own], body.model.geom_conaffinity[own]
-    if not np.bitwise_and.outer(touch, touched)[~np.eye(len(touch), dtype=bool)].any():
+    if not may_touch_itself(body.model, body.root):
         notes.append("no two of the model's shapes may collide: self-penetration is not measured")
     height = floor_height(course.lowest[:, 2])
     if abs(height) > PLAUSIBILITY_V4.scaled(course.rig.hip_height).penetration:
