@@ -27,7 +27,7 @@ from spark.transfer.canonical import CanonicalMotion
 # Arms and legs of 37 of Mixamo's characters rest within 10 degrees of the T-pose, those of CMU's
 # skeletons 20; feet of the former point up to 22 degrees outwards.
 _T = np.radians(15)
-_BUILT = np.radians(30)  # in the mean of a pair: one foot is not told otherwise than the other
+_BUILT = np.radians(30)
 _ENDS = (*ANKLES, *HANDS)
 
 
@@ -57,8 +57,8 @@ def _headings(rig: Rig) -> dict[Role, float]:
         return {}
     yaws = {role: float(yaw_from_quat(turns[j])) for role, j in ends.items()}
     built: dict[Role, float] = {}
-    for pair in (ANKLES, HANDS):  # of one of a pair as of both: they were built alike
+    for pair in (ANKLES, HANDS):  # which were built alike: where one is bent, so is the other
         both = {role: yaws[role] for role in pair if role in yaws}
-        if both and np.mean([abs(yaw) for yaw in both.values()]) < _BUILT:
+        if all(abs(yaw) < _BUILT for yaw in both.values()):
             built |= both
     return built

@@ -117,9 +117,11 @@ def test_who_rests_otherwise_is_measured_from_the_t_pose(target: Rig) -> None:
     )
 
 
-@pytest.mark.parametrize(("left", "right", "kept"), [(28.0, 31.0, True), (29.5, 31.0, False)])
+@pytest.mark.parametrize(
+    ("left", "right", "kept"), [(28.0, 29.0, True), (28.0, 31.0, False), (5.0, 50.0, False)]
+)
 def test_both_feet_are_told_alike(left: float, right: float, kept: bool) -> None:
-    """Also where one is a little less far out than feet are built, and one a little more."""
+    """Also where one alone is farther out than feet are built."""
     source, target = striding(stick_rig()), splayed(left, right=right)
     off = quat_angle(transfer(source, target).rotations, copied(source, target).rotations)
     expected = np.radians([left, right]) if kept else np.zeros(2)
