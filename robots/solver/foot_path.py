@@ -36,7 +36,8 @@ LEVEL = (0.03, 0.06)
 STEP_RISE = 0.33  # [hip heights/s] at which it is lifted before that and let down after it
 UP_SHARE = 0.4  # of a contact, at each end, in which the foot may still, or already, be up
 SPEED_SPAN = 0.025  # [s] before and after a frame for a foot's speed
-SETTLE = 0.11  # [s] before and after a contact in which a foot already stays, ever less
+SETTLE = 0.11  # [s] before and after a contact in which a foot already stays, ever less,
+SETTLE_HOLD = 0.65  # and is held along the floor ever less, up to this: at 1 it lands with a jerk
 MIN_CREEP = 0.08  # [s], half of which a standing foot has to move for before it is lifted
 LET_DOWN = 0.15  # [s] within which a foot comes down that is in the air where its contact begins
 # Hip heights above the floor at which a foot may stand on it: skeletons and recorded floors are off
@@ -84,7 +85,8 @@ def _shares(
     ends are lifted [m]. Along the floor one that comes to stand, or leaves, is so ever more firmly:
     it would be late, and slide where it comes down."""
     swings = near_floor(height / plan.hip_height)[:, None] * SWING_HOLD
-    swings[:, :2] += around(plan.stands, plan.frame_time, SETTLE)[:, None] * (1.0 - swings[:, :2])
+    near = around(plan.stands, plan.frame_time, SETTLE)[:, None]
+    swings[:, :2] += near * np.maximum(SETTLE_HOLD - swings[:, :2], 0.0)
     stands = np.any(on, axis=1)[:, None]
     holds = np.where(on[..., None], 1.0, np.where(stands, RAISED_HOLD, swings)[:, None])
     up = np.minimum(lift / (STEP_HEIGHTS[1] * plan.hip_height), 1.0)
