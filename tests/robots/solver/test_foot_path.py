@@ -13,6 +13,7 @@ from robots.solver.foot_path import (
     LEVEL_LIFT,
     MAX_UNEVEN,
     SETTLE,
+    SETTLE_HOLD,
     STEP_HEIGHTS,
     STEP_RISE,
     STEP_SPEEDS,
@@ -140,8 +141,9 @@ def test_a_foot_is_held_ever_more_firmly_along_the_floor_as_it_comes_to_stand() 
     plan.contacts[60:] = True
     along = footing_of(ember, plan).shares[-2:, :2]
     before = round(SETTLE / plan.frame_time)
-    assert np.all(along[..., 60:] == 1.0)
+    assert np.all(along[..., 60:80] == 1.0)
     assert np.all(np.diff(along[..., 60 - before : 61], axis=-1) > 0.0)
+    assert np.all(along[..., 59] < SETTLE_HOLD)
     np.testing.assert_allclose(along[..., : 59 - before], SWING_HOLD[0])
 
 
