@@ -53,7 +53,7 @@ WITHOUT: dict[str, Callable[..., object]] = {  # what is done in a step's place
     "abrupt": lambda robot, targets, q, block: np.zeros(len(q), dtype=bool),
     "led_back": lambda robot, targets, holds, q, block: q,
     "with_firm_hands": lambda robot, targets: targets,
-    "repair": lambda robot, targets, holds, q, block: q,
+    "repair": lambda robot, targets, holds, q, block: (q, np.zeros(len(q), dtype=bool)),
 }
 
 

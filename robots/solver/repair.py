@@ -47,14 +47,15 @@ def repair(
     holds: Holds,
     q: Coordinates,
     block: Block,
-) -> Coordinates:
-    """`q` with the block's dofs solved again around the frames with violations."""
+) -> tuple[Coordinates, Bool[np.ndarray, "T"]]:
+    """`q` with the block's dofs solved again around the frames with violations, and where some are
+    left."""
     violated = violations(robot, targets, q, block, collision_stride(targets.frame_time))
     violated |= too_jerky(robot, targets, q, block, Spells(np.array([len(q)])))
     reach = max(2, round(_AROUND / targets.frame_time))
     runs = true_runs(binary_dilation(violated, np.ones(2 * reach + 1, dtype=bool)))
     if not runs:
-        return q
+        return q, violated
     frames = np.concatenate([np.arange(start, stop) for start, stop in runs])
     spells = Spells(np.array([stop - start for start, stop in runs]))
     # Accelerations couple a frame to two: as many stay at the ends, but for the trajectory's.
@@ -66,14 +67,17 @@ def repair(
     # What is rougher than the violations can't mend them.
     exact = MAX_DEPTH * robot.rig.hip_height < MAX_PROTRUSION
     broken = Repair(robot, block, spells, *part, np.ones(len(frames)), fixed, exact)
-    return q.replaced(frames, _repaired(broken))
+    repaired, left = _repaired(broken)
+    violated[frames] = left
+    return q.replaced(frames, repaired), violated
 
 
-def _repaired(broken: Repair) -> Coordinates:
+def _repaired(broken: Repair) -> tuple[Coordinates, Bool[np.ndarray, "T"]]:
     """Of each spell the trajectory of the round with the fewest violations, but for poses that are
-    far worse."""
+    far worse, and its violations."""
     robot, block, best = broken.robot, broken.block, broken.start
     frames, least = np.arange(len(broken)), np.full(len(broken.spells), np.inf)
+    remain = np.zeros(len(broken), dtype=bool)
     for k in range(_MAX_ROUNDS + 1):
         q, targets, spells = broken.start, broken.targets, broken.spells
         violated = violations(robot, targets, q, block, 1, spells)
@@ -82,6 +86,7 @@ def _repaired(broken: Repair) -> Coordinates:
         worth = spells.total(_W_VIOLATION * rough + pose.cost)
         at = np.flatnonzero((worth < least)[spells.of_frames])
         best = best.replaced(frames[at], q.at(at))
+        remain[frames[at]] = violated[at]
         left = spells.any(rough)
         if k == _MAX_ROUNDS or not left.any():
             break
@@ -91,7 +96,7 @@ def _repaired(broken: Repair) -> Coordinates:
         penalty_scale = broken.penalty_scale * growth[broken.spells.of_frames]
         q = solve_spells(broken)
         broken = replace(broken, start=q, penalty_scale=penalty_scale, exact=True)
-    return best
+    return best, remain
 
 
 def too_jerky(

@@ -46,7 +46,7 @@ _TRUNK, _LIMBS = Steps(12, 0.02, 0.1), Steps(10, 0.05, 0.1)
 _WHOLE = Steps(8, 0.05, 0.1)  # both blocks at once, nearly solved one after the other
 # Splines through a solution. A foot whose hip comes to its limit in one frame and not in the next
 # would hop, if that was only clipped.
-_POLISH, _POLISH_LIMBS = Steps(2, 0.0, 1.0, solves=2), Steps(1, 0.0, 1.0, solves=2)
+_POLISH, POLISH_LIMBS = Steps(2, 0.0, 1.0, solves=2), Steps(1, 0.0, 1.0, solves=2)
 _COARSE_INTERVAL = 1 / 20  # [s] between the frames that are solved first
 
 
@@ -103,11 +103,11 @@ def _trajectory(robot: Morphology, targets: Targets) -> Coordinates:
     feet = unhurried(apart(reachable(robot, feet, q)), targets.flight)
     targets, feet = with_dynamics(robot, targets, feet, q)
     if leaning:
-        return _polished(robot, targets, feet, q, whole_of(robot), _POLISH)
+        return polished(robot, targets, feet, q, whole_of(robot), _POLISH)
     trunk, limbs = blocks_of(robot)
-    q = _polished(robot, targets, feet, q, trunk, _POLISH)
+    q = polished(robot, targets, feet, q, trunk, _POLISH)
     q = _with_arms(robot, targets, q, limbs)
-    return _polished(robot, with_firm_hands(robot, targets), feet, q, limbs, _POLISH_LIMBS)
+    return polished(robot, with_firm_hands(robot, targets), feet, q, limbs, POLISH_LIMBS)
 
 
 def _coarse(
@@ -193,10 +193,10 @@ def _parted(
         if q is not solved:
             near = collision_candidates(robot, targets, q, block)
             q = solve_block(robot, targets, holds, q, block, steps, near)
-    return repair(robot, targets, holds, q, block)
+    return repair(robot, targets, holds, q, block)[0]
 
 
-def _polished(
+def polished(
     robot: Morphology,
     targets: Targets,
     feet: list[FootPlan],
@@ -204,15 +204,34 @@ def _polished(
     block: Block,
     steps: Steps,
 ) -> Coordinates:
-    """What is nearly solved, in all frames, and repaired. Twice where parts rest: as these turn,
-    other points of them are on the ground."""
+    """What is nearly solved, in all frames, and repaired; arms that are left in something after
+    that are marched around it."""
     if not block.dofs:
         return q
+    q, holds = _followed(robot, targets, feet, q, block, steps)
+    q, stuck = repair(robot, targets, holds, q, block)
+    if block.base or not stuck.any():
+        return q
+    q = calmed(robot, targets, holds, q, block, stuck)
+    q, holds = _followed(robot, targets, feet, q, block, steps)
+    return repair(robot, targets, holds, q, block)[0]
+
+
+def _followed(
+    robot: Morphology,
+    targets: Targets,
+    feet: list[FootPlan],
+    q: Coordinates,
+    block: Block,
+    steps: Steps,
+) -> tuple[Coordinates, Holds]:
+    """Solved in all frames, and what held it. Twice where parts rest: as these turn, other points
+    of them are on the ground."""
     for _ in range(2 if targets.rests.any() else 1):
         holds = _holds_of(robot, targets, feet, q, block)
         near = collision_candidates(robot, targets, q, block)
         q = solve_block(robot, targets, holds, q, block, steps, near)
-    return repair(robot, targets, holds, q, block)
+    return q, holds
 
 
 def _holds_of(

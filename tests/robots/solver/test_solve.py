@@ -28,7 +28,7 @@ from robots.solver.projection import project
 from robots.solver.repair import PENALTY_GROWTH, repair, violations
 from robots.solver.repair_descent import Repair
 from robots.solver.smoothness import jerk_stiffening, limit_speed
-from robots.solver.solve import copy, retarget
+from robots.solver.solve import POLISH_LIMBS, copy, polished, retarget
 from robots.solver.targets import Targets, targets_of
 from robots.tree import Coordinates
 from scripts.robot_bars import mean_of, misses
@@ -285,9 +285,10 @@ def test_arms_in_the_body_are_led_out_and_the_rest_stays(
     deep = []
     for push, (sign, j) in product((0.24, 0.3, 0.36, 0.44, 0.52, 0.6, 0.68), into):
         begun = pushed(sign * push, j)
-        mended = repair(ember, targets, holds, begun, arms)
+        mended, left = repair(ember, targets, holds, begun, arms)
         before, after = wrong(begun), wrong(mended)
         assert before[middle]
+        np.testing.assert_array_equal(left, after)
         if push < 0.38:
             assert not after.any()
         else:
@@ -296,6 +297,26 @@ def test_arms_in_the_body_are_led_out_and_the_rest_stays(
         np.testing.assert_array_equal(mended.angles[early], begun.angles[early])
     assert all(after <= before for before, after in deep)
     assert any(after == 0 for _, after in deep)
+
+
+def test_an_arm_that_no_repair_leads_out_is_marched_around(
+    walk: CanonicalMotion, walked: RobotMotion, ember: Morphology
+) -> None:
+    """Pushed into the trunk by up to 1 rad, of which repair alone leaves some in it."""
+    arms, targets, q = blocks_of(ember)[1], targets_of(walk, ember), walked.coordinates
+    shoulder = ember.links[ember.rig.roles.require(Role.LEFT_UPPER_ARM)]
+    bump = np.exp(-(((np.arange(len(q)) - len(q) // 2) / 6) ** 2))
+    left_by_repair = 0
+    for push, j in product((-0.44, -0.6, -1.0), ember.tree.chain(int(shoulder))):
+        if j not in arms.joints:
+            continue
+        angles = q.angles.copy()
+        angles[:, j] += push * bump
+        pushed = Coordinates(q.pos, q.quat, angles).clipped(ember.tree, 0.02)
+        left_by_repair += repair(ember, targets, footholds(ember, targets), pushed, arms)[1].sum()
+        out = polished(ember, targets, [], pushed, arms, POLISH_LIMBS)
+        assert not violations(ember, targets, out, arms, 1).any()
+    assert left_by_repair
 
 
 def test_repairs_far_apart_know_nothing_of_each_other(
@@ -310,7 +331,7 @@ def test_repairs_far_apart_know_nothing_of_each_other(
 
     def repaired(push: Float[np.ndarray, "T N"]) -> Float[np.ndarray, "T N"]:
         pushed = Coordinates(q.pos, q.quat, q.angles + push, q.ball_quats)
-        return repair(ember, targets, holds, pushed, arms).angles
+        return repair(ember, targets, holds, pushed, arms)[0].angles
 
     first, second, both = repaired(early), repaired(late), repaired(early + late)
     assert np.abs(first - q.angles - early).max() > 0.5
@@ -344,7 +365,7 @@ def test_what_the_first_round_leaves_is_solved_exactly_and_more_firmly(
         return Coordinates(broken.start.pos, broken.start.quat, angles, broken.start.ball_quats)
 
     monkeypatch.setattr("robots.solver.repair.solve_spells", mend_the_first)
-    kept = repair(ember, targets, footholds(ember, targets), pushed, arms)
+    kept, _ = repair(ember, targets, footholds(ember, targets), pushed, arms)
     firmer = [PENALTY_GROWTH, PENALTY_GROWTH**2]
     assert rounds == [(False, 2, {1.0}), *((True, 1, {scale}) for scale in firmer)]
     np.testing.assert_allclose(kept.angles[:90], q.angles[:90], atol=1e-9)
@@ -365,7 +386,7 @@ def test_no_repair_gives_up_the_pose(
         return Coordinates(here.pos, here.quat, tpose, here.ball_quats)
 
     monkeypatch.setattr("robots.solver.repair.solve_spells", spread)
-    kept = repair(ember, targets, footholds(ember, targets), pushed, arms)
+    kept, _ = repair(ember, targets, footholds(ember, targets), pushed, arms)
     np.testing.assert_array_equal(kept.angles, pushed.angles)
 
 
