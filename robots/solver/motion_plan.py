@@ -13,6 +13,7 @@ from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from robots.kinematics import LinkPoses, forward_kinematics
 from robots.model.morphology import Morphology
+from robots.solver.ankles import within_ankles
 from robots.solver.com_plan import plan_com
 from robots.solver.dynamics import angular_momentum, center_of_mass
 from robots.solver.foot_path import footing_of
@@ -77,8 +78,10 @@ def _support(
     heights = np.column_stack([ground, targets.part_ground[:, known], targets.seats])
     height = (pushing * heights).sum(axis=1) / np.maximum(pushing.sum(axis=1), 1)
     places = [*parts, hips_of(robot, poses)[:, :2]]
+    soles = [foot.sole for foot in feet]
+    pushed = within_ankles(robot, soles, points[..., :2], touching)
     return Support(
-        np.concatenate([points[..., :2], *(p[:, None] for p in places)], axis=1),
+        np.concatenate([pushed, *(p[:, None] for p in places)], axis=1),
         pushing,
         height,
         float(feet[0].heading[0]),
