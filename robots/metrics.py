@@ -77,6 +77,7 @@ class RobotMetrics:
     fastest_rad_s: float
     jerk_rad_s3: float
     self_collision: float
+    over_torque: float | None
 
 
 def measure(motion: Motion, rig: Rig, result: RobotMotion) -> RobotMetrics:
@@ -137,6 +138,7 @@ def measure(motion: Motion, rig: Rig, result: RobotMotion) -> RobotMetrics:
         fastest_rad_s=float(np.abs(np.diff(angles, axis=0)).max(initial=0.0) / frame_time),
         jerk_rad_s3=float(np.sqrt(np.mean(jerk**2))) if len(jerk) else 0.0,
         self_collision=float(clip.self_penetration.mean()),
+        over_torque=clip.overload_share,
     )
 
 

@@ -63,6 +63,7 @@ COLUMNS = {  # title: (field, factor, format, the bar: what it must not exceed, 
     "rad/s": ("fastest_rad_s", 1, ".1f", lambda m: 15.0),
     "jerk": ("jerk_rad_s3", 1, ".0f", lambda m: 400.0),
     "self %": ("self_collision", 100, ".2f", lambda m: 0.0),
+    "torque %": ("over_torque", 100, ".1f", None),
 }
 
 
