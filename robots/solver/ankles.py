@@ -17,6 +17,9 @@ from spark.constants import GRAVITY
 from spark.rig.feet import Sole
 
 _LOAD = 1.1  # [body weights] that a foot carries where it carries all
+_LEAST = (
+    0.02  # [hip heights] that an ankle reaches on which a body stands; less is no motor's limit
+)
 
 
 def within_ankles(
@@ -90,8 +93,9 @@ def _reach(robot: Morphology, sole: Sole) -> Float[np.ndarray, "2"]:
     poses, out = forward_kinematics(tree, robot.tpose), np.full(2, np.inf)
     for joint in set(tree.chain(foot)) - set(tree.chain(shank)):
         limit = torque_limit(model, robot.mj_joints[joint])
-        if limit and not tree.balls[joint]:
+        reach = (limit or np.inf) / (_LOAD * weight)
+        if reach > _LEAST * robot.rig.hip_height and not tree.balls[joint]:
             ahead, left = np.abs(poses.axis(joint, 0)[:2, 0])
             across = int(ahead > left)
-            out[across] = min(out[across], limit / (_LOAD * weight))
+            out[across] = min(out[across], reach)
     return out

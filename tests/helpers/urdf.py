@@ -6,6 +6,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
+from sim.physics.servos import torque_limit
+
 
 def twins(spec: mujoco.MjSpec) -> tuple[str, str]:
     """The MJCF and the URDF of a robot, both with what URDF knows: shapes that collide, capsules as
@@ -46,10 +48,12 @@ def to_urdf(model: mujoco.MjModel) -> str:
                 assert np.allclose(model.jnt_pos[joint], 0)
                 axis = " ".join(map(repr, model.jnt_axis[joint].tolist()))
                 low, high = model.jnt_range[joint].tolist()
+                effort = torque_limit(model, joint) or 9.0
                 out.append(
                     f'<joint name="{model.joint(joint).name}" type="revolute">'
                     f'<parent link="{above}"/><child link="{below}"/>{place}<axis xyz="{axis}"/>'
-                    f'<limit lower="{low!r}" upper="{high!r}" effort="9" velocity="9"/></joint>'
+                    f'<limit lower="{low!r}" upper="{high!r}" effort="{effort!r}" '
+                    'velocity="9"/></joint>'
                 )
                 if below != name:
                     out.append(f'<link name="{below}"/>')

@@ -68,10 +68,16 @@ def test_a_foot_on_its_toes_is_pushed_there(weak: Morphology) -> None:
     np.testing.assert_allclose(pushed(weak, points, [False, False, True, True]), points, atol=1e-12)
 
 
-@pytest.mark.parametrize("without", ["actuators", "limits"])
-def test_ankles_that_tell_nothing_hold_everything(tmp_path: Path, without: str) -> None:
-    pattern = {"actuators": "(?s)<actuator>.*</actuator>", "limits": 'forcerange="[^"]*"'}[without]
-    robot = changed_ember(tmp_path, pattern, "")
+@pytest.mark.parametrize(
+    ("pattern", "by"),
+    [
+        ("(?s)<actuator>.*</actuator>", ""),
+        ('forcerange="[^"]*"', ""),
+        ('"-50 50"', '"-1 1"'),  # a placeholder, as many a URDF has: nothing stands on that
+    ],
+)
+def test_ankles_that_tell_nothing_hold_everything(tmp_path: Path, pattern: str, by: str) -> None:
+    robot = changed_ember(tmp_path, pattern, by)
     points, _ = soles_and_ankles(robot)
     np.testing.assert_array_equal(pushed(robot, points, [True] * 4), points)
 
