@@ -16,10 +16,8 @@ from sim.physics.servos import torque_limit
 from spark.constants import GRAVITY
 from spark.rig.feet import Sole
 
-_LOAD = 1.1  # [body weights] that a foot carries where it carries all
-_LEAST = (
-    0.02  # [hip heights] that an ankle reaches on which a body stands; less is no motor's limit
-)
+_LOAD = 1.1  # [body weights] that a foot carries in a step, alone
+_LEAST = 0.02  # [hip heights] of reach without which nobody stands: less is no motor's limit
 
 
 def within_ankles(
@@ -29,8 +27,8 @@ def within_ankles(
     touching: Bool[np.ndarray, "T K"],
 ) -> Float[np.ndarray, "T K 2"]:
     """Where these soles may be pushed, all of whose `points` [m] may be while they touch: no
-    further from the ankle than it holds where the foot carries all, but at the edge that touches
-    where that is beyond. Where no motor of an ankle tells what it gives, wherever they touch."""
+    further from the ankle than it holds a body that stands on this foot alone, or at the nearest
+    that touches. Where no motor of an ankle tells what it gives, wherever they touch."""
     reaches = [_reach(robot, sole) for sole in soles]
     if not np.isfinite(reaches).any():
         return points
