@@ -38,6 +38,7 @@ def retarget(
     *,
     method: Method = "spark",
     refine: bool = True,
+    terrain: File | None = None,
 ) -> RobotClip: ...
 @overload
 def retarget(
@@ -48,6 +49,7 @@ def retarget(
     checkpoint: File | None = None,
     refine: bool = True,
     keep_touches: bool = False,
+    terrain: File | None = None,
 ) -> AnyClip: ...
 def retarget(
     source: AnyClip | File,
@@ -57,6 +59,7 @@ def retarget(
     checkpoint: File | None = None,
     refine: bool = True,
     keep_touches: bool = False,
+    terrain: File | None = None,
 ) -> AnyClip:
     """The motion of `source` on the body of `target`, in the hierarchy and units of its file.
 
@@ -80,10 +83,13 @@ def retarget(
 
     On a robot the whole trajectory is solved for, within the joints' limits, feet held. With method
     "copy" or without `refine`, each pose is only copied to the robot's hinges, as a baseline.
-    Otherwise its hands keep their touches.
+    Otherwise its hands keep their touches. `terrain` is the ground under the source: a mesh in the
+    unit and axes of the source's file, or the fixed shapes of an MJCF or a URDF. It is scaled as
+    the motion is, feet stand on it, nothing of the robot is in it, and the result has it.
 
-    Raises `SkeletonError` where one of the two is no humanoid, and `ConventionError` for a method
-    that is not known or does not go with the rest.
+    Raises `SkeletonError` where one of the two is no humanoid, `ConventionError` for a method that
+    is not known or does not go with the rest and for a terrain that the source is not on, and
+    `FileFormatError` where that is broken.
     """
     if method not in get_args(Method):
         raise ConventionError(f"method {method!r} is not known; expected 'copy' or 'spark'")
@@ -97,7 +103,19 @@ def retarget(
     if not isinstance(target, Clip):
         if checkpoint is not None:
             raise ConventionError("a checkpoint is for characters; robots are solved for")
-        return onto_robot(source, target, solved=refine and method != "copy")
+        solved = refine and method != "copy"
+        if terrain is not None and not solved:
+            raise ConventionError(
+                "a terrain goes with method 'spark', refined: copies know no ground"
+            )
+        if terrain is not None and target.on_robot.robot.mount is not None:
+            raise ConventionError(
+                f"a terrain is for robots with legs; {target.name} stays in place"
+            )
+        ground = None if terrain is None else Path(terrain)
+        return onto_robot(source, target, solved=solved, terrain=ground)
+    if terrain is not None:
+        raise ConventionError("a terrain is for robots; characters are put on a level floor")
     learned = None if checkpoint is None else Path(checkpoint)
     return onto_character(
         source,

@@ -1,6 +1,7 @@
 """What all clips have in common: a motion, the body that makes it, and what follows from both."""
 
 from abc import ABC, abstractmethod
+from dataclasses import replace
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -15,6 +16,7 @@ from spark.resample import frames_at_rate
 from spark.rig.rig import Rig
 from spark.skin import Skin
 from spark.summary import counted, html_table, time_span
+from spark.terrain import Terrain
 from spark.transfer.canonical import CanonicalMotion, to_canonical
 from spark.transfer.held_floor import on_one_floor
 from spark.transfer.treads import feet_by_side, treads_of
@@ -129,13 +131,21 @@ class ClipBase(ABC):
     @cached_property
     def canonical(self) -> CanonicalMotion:
         """The motion in canonical form. Raises what `rig` raises."""
-        return on_one_floor(to_canonical(self.motion, self.rig))
+        canonical = to_canonical(self.motion, self.rig)
+        if self.terrain is not None:
+            return replace(canonical, terrain=self.terrain, floor_z=0.0)
+        return on_one_floor(canonical)
+
+    @property
+    def terrain(self) -> Terrain | None:
+        """The ground that is stated [m, world], where there is any; its floor is at z = 0."""
+        return None
 
     @cached_property
     def contacts(self) -> dict[str, Bool[np.ndarray, "T"]]:
         """In which frames each foot stands (slow, and near its lowest height over the floor or what
         is climbed), by side: "left", "right"."""
-        return feet_by_side(self.rig, self.motion)
+        return feet_by_side(self.rig, self.motion, self.terrain)
 
     @property
     def floor_z(self) -> float:
@@ -158,8 +168,9 @@ class ClipBase(ABC):
         """What a picture or a video shows of the clip."""
         from sim.view.figure import Figure
 
-        skin, tops = self.surface[0], treads_of(self.canonical).ground(self.floor_z).tops
-        return [Figure(self.subject, self.name, self.floor_z, skin=skin, tops=tops)]
+        ground = treads_of(self.canonical).ground(self.floor_z)
+        figure = Figure(self.subject, self.name, self.floor_z, skin=self.surface[0])
+        return [replace(figure, tops=ground.tops, terrain=ground.terrain)]
 
     def save_mjcf(
         self,

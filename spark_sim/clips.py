@@ -17,6 +17,7 @@ from spark.resample import motion_at
 from spark.rig.override import Override
 from spark.rig.rig import Rig, understand
 from spark.skin import Skin
+from spark.terrain import Terrain
 from spark.transfer.skin_binding import bind_to
 from spark_sim import character_files, files
 from spark_sim.choices import Format
@@ -181,6 +182,11 @@ class RobotClip(ClipBase):
         return self.on_robot.notes
 
     @property
+    def terrain(self) -> Terrain | None:
+        """The ground that it was solved on, in the robot's world."""
+        return self.on_robot.terrain
+
+    @property
     def joint_names(self) -> tuple[str, ...]:
         """The robot's hinges and balls, in the order of `qpos`."""
         return self.on_robot.robot.joint_names
@@ -231,14 +237,15 @@ class RobotClip(ClipBase):
     def save(self, path: File, *, force: bool = False, format: Format | None = None) -> Path:
         """Write the motion in one of `robots.formats.FORMATS`, by default the one of the ending.
 
-        What a CSV or a pickle doesn't say is written beside it, as JSON. Raises `OutputError` where
-        a file exists, unless forced, or `path` has an ending of none of the formats.
+        What a CSV or a pickle doesn't say is written beside it, as JSON, and stated ground that the
+        format has no room for as an OBJ (`robots.formats.terrain_beside`). Raises `OutputError`
+        where a file exists, unless forced, or `path` has an ending of none of the formats.
         """
-        from robots.formats import dispatch, written_files
+        from robots.formats import dispatch, terrain_beside, written_files
         from robots.formats.made_from import Source
 
         path = Path(path)
-        for file in written_files(path, format):
+        for file in (*written_files(path, format), terrain_beside(path)):
             files.check_free(file, force=force)
         if not path.is_dir():
             files.claim(path, force=force)

@@ -3,10 +3,11 @@
 from dataclasses import replace
 from pathlib import Path
 
+from spark.io.convention import Convention
 from spark.io.encoding import encode
 from spark.motion import Motion
 from spark.transfer.analytic import transfer
-from spark.transfer.canonical import from_canonical
+from spark.transfer.canonical import from_canonical, to_canonical
 from spark.transfer.hand_touch import lost_touches, with_touches
 from spark.transfer.in_place import belt_note, way_taken_out
 from spark.transfer.leg_fit import travel_scale
@@ -14,8 +15,10 @@ from spark.transfer.loops import continued
 from spark.transfer.noise import without_noise
 from spark.transfer.refine import grounded, refined
 from spark.transfer.root_motion import with_root_motion
+from spark.transfer.stated import on_terrain
 from spark.transfer.twists import spread_twists
 from spark_sim.clips import AnyClip, Clip, RobotClip
+from spark_sim.grounds import read_ground
 
 COPIED = "each pose is copied to the robot's hinges: feet are not held, parts may collide"
 """What is to know of a motion that was copied to a robot, and not solved for."""
@@ -69,17 +72,25 @@ def onto_character(
     return Clip(recording, f"{source.name} on {target.name}", target.roles, target.rig, target.path)
 
 
-def onto_robot(source: AnyClip, target: RobotClip, *, solved: bool) -> RobotClip:
+def onto_robot(
+    source: AnyClip, target: RobotClip, *, solved: bool, terrain: Path | None = None
+) -> RobotClip:
     """The motion of `source` on a robot: solved for as a whole, within limits, feet planted where
-    the source's are; or, where it is not `solved`, each pose copied to the robot's hinges."""
+    the source's are; or, where it is not `solved`, each pose copied to the robot's hinges. With a
+    file of stated ground it is solved for on that."""
     from robots.solver.solve import copy
     from robots.solver.solve import retarget as solve
 
-    robot = target.on_robot.robot
+    robot, canonical = target.on_robot.robot, source.canonical
+    if terrain is not None:
+        own = source.recording.convention if isinstance(source, Clip) else Convention(1.0, "z")
+        stated, notes = read_ground(terrain, own)
+        canonical = on_terrain(to_canonical(source.motion, source.rig), stated)
+        canonical = replace(canonical, notes=(*canonical.notes, *notes))
     if solved:
-        moved = solve(source.canonical, robot)
+        moved = solve(canonical, robot)
     else:
-        moved = copy(source.canonical, robot)
+        moved = copy(canonical, robot)
         moved = replace(moved, notes=(*moved.notes, COPIED))
     return RobotClip(moved, f"{source.name} on {target.name}", source.path, source.span)
 

@@ -72,6 +72,14 @@ def written_files(path: Path, format: str | None = None) -> tuple[Path, ...]:
     return (path, path.with_name(f"{path.name}.json")) if name in SIDECARS else (path,)
 
 
+def terrain_beside(path: Path) -> Path:
+    """The OBJ [m, Z up] of the stated ground of a motion at `path`, which only our npz has itself:
+    in its folder where it is one."""
+    if path.suffix.lower() in SUFFIXES:
+        return path.with_name(f"{path.name}.terrain.obj")
+    return path / "terrain.obj"
+
+
 def is_sonic(path: Path) -> bool:
     """Whether a folder holds one motion, as SONIC's deployment reads them."""
     return path.is_dir() and (path / "joint_pos.csv").is_file()

@@ -82,7 +82,7 @@ def body_names(robot: Morphology, bodies: list[int]) -> tuple[str, ...]:
 
 def foot_contacts(motion: RobotMotion) -> dict[str, Bool[np.ndarray, "T"]]:
     """In which frames each foot stands, by side; empty for a robot without feet."""
-    return feet_by_side(motion.robot.rig, motion.motion)
+    return feet_by_side(motion.robot.rig, motion.motion, motion.terrain)
 
 
 def contact_array(motion: RobotMotion) -> dict[str, np.ndarray]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from robots.formats import format_of, is_sonic
+from robots.formats import format_of, is_sonic, terrain_beside
 from robots.formats.about import robot_of
 from robots.formats.gmr import read_pkl, write_pkl
 from robots.formats.holomotion import is_holomotion, read_holomotion, write_holomotion
@@ -26,6 +26,8 @@ from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from spark.errors import ConventionError, FileFormatError
 from spark.finite import check_output
+from spark.io.convention import Convention
+from spark.io.terrain_file import read_terrain, write_obj
 from spark.npz import Npz
 from spark.opening import check_regular
 from spark.summary import counted
@@ -62,6 +64,11 @@ def write(
             write_seed(motion, path, source)
         case name:
             write_csv(motion, path, quat="wxyz" if name == "csv-wxyz" else "xyzw", source=source)
+    beside = terrain_beside(path)
+    if motion.terrain is None or format_of(path, format) == "npz":
+        beside.unlink(missing_ok=True)  # that of a motion which was here before
+    else:
+        write_obj(motion.terrain, beside)
 
 
 def read(
@@ -75,9 +82,17 @@ def read(
     is.
 
     What is given here wins over what the file, or the JSON beside it, says; `quat` and `fps` are
-    for CSVs. Raises `ConventionError` where what nothing says is not given, and `FileFormatError`
-    where the file is broken.
+    for CSVs. An OBJ beside it (`terrain_beside`) is the ground that it is on. Raises
+    `ConventionError` where what nothing says is not given, and `FileFormatError` where the file is
+    broken.
     """
+    motion, beside = _read(path, robot, quat, fps), terrain_beside(path)
+    if motion.terrain is not None or not beside.is_file():
+        return motion
+    return replace(motion, terrain=read_terrain(beside, Convention(1.0, "z")))
+
+
+def _read(path: Path, robot: Morphology | None, quat: str | None, fps: float | None) -> RobotMotion:
     suffix = path.suffix.lower()
     folder = is_sonic(path)
     if not folder:

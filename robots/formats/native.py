@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,10 @@ from robots.model.morphology import Morphology
 from robots.model.motion import RobotMotion
 from sim.interpolate import velocities
 from spark.errors import ConventionError, FileFormatError
+from spark.io.terrain_file import checked
 from spark.motion import check_frame_time
 from spark.opening import parse_json
+from spark.terrain import Terrain
 
 SCHEMA = "spark-sim qpos 1"
 
@@ -30,7 +33,8 @@ def write_npz(motion: RobotMotion, path: Path, *, source: Source | None = None) 
     unless the model has other bodies that move: `about` says in which columns each begins;
     `qvel` [T, nv] is the base's linear velocity in world axes, its angular one in its own, then the
     joints', by central differences; `frame_time` [s] is the step. `foot_contacts` [T, F] tells
-    which of `foot_names` stand. `about` is JSON, what `robots.formats.about` says and conventions.
+    which of `foot_names` stand. `terrain_vertices` [m, world] and `terrain_faces` are the stated
+    ground, where there is any. `about` is JSON, what `robots.formats.about` says and conventions.
     Raises `OutputError` where `path` can't be written.
     """
     mjcf = motion.robot.mjcf
@@ -52,6 +56,7 @@ def write_npz(motion: RobotMotion, path: Path, *, source: Source | None = None) 
         "joint_names": np.array(motion.robot.joint_names),
         "body_names": np.array(body_names(motion.robot, mjcf.bodies())),
         **contact_array(motion),
+        **_terrain_arrays(motion.terrain),
         "about": np.array(
             json.dumps(facts, ensure_ascii=False).encode("utf-8", "replace").decode()
         ),
@@ -86,7 +91,24 @@ def read_npz(arrays: Mapping[str, Any], path: Path, robot: Morphology | None = N
     except ConventionError as error:
         raise FileFormatError(path, None, str(error)) from error
     check_one_rate(arrays, frame_time, path)
-    return of_qpos(qpos, robot, frame_time, path, notes)
+    motion = of_qpos(qpos, robot, frame_time, path, notes)
+    return replace(motion, terrain=_terrain(arrays, path))
+
+
+def _terrain_arrays(terrain: Terrain | None) -> dict[str, np.ndarray]:
+    if terrain is None:
+        return {}
+    vertices, faces = terrain.vertices.astype(np.float32), terrain.faces.astype(np.int32)
+    return {"terrain_vertices": vertices, "terrain_faces": faces}
+
+
+def _terrain(arrays: Mapping[str, Any], path: Path) -> Terrain | None:
+    if "terrain_vertices" not in arrays:
+        return None
+    vertices, faces = (
+        number_array(arrays, f"terrain_{name}", path, (None, 3)) for name in ("vertices", "faces")
+    )
+    return checked(path, vertices, faces.astype(np.int64))
 
 
 def is_native(arrays: Mapping[str, Any]) -> bool:

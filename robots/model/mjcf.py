@@ -90,7 +90,7 @@ def read_mjcf(path: str | Path, *, visuals: bool = True) -> Mjcf:
     path = Path(path)
     notes: list[str] = []
     with warnings_as_notes(notes):
-        spec, text = _parse(path, notes, visuals=visuals)
+        spec, text = parse_model(path, notes, visuals=visuals)
         if not visuals:
             _drop_visuals(spec)
         root = find_root(spec, path)
@@ -104,7 +104,7 @@ def read_mjcf(path: str | Path, *, visuals: bool = True) -> Mjcf:
     return Mjcf(model, spec, int(model.body(root).id), path, tuple(notes))
 
 
-def _parse(path: Path, notes: list[str], *, visuals: bool) -> tuple[mujoco.MjSpec, str]:
+def parse_model(path: Path, notes: list[str], *, visuals: bool = True) -> tuple[mujoco.MjSpec, str]:
     """The spec of a file, and the text that MuJoCo was given."""
     if is_urdf(path):
         return read_urdf(path, notes, visuals=visuals)

@@ -11,16 +11,19 @@ from robots.tree import Coordinates
 from sim.trajectory import ModelTrajectory
 from spark.motion import Motion
 from spark.summary import time_span
+from spark.terrain import Terrain
 
 
 @dataclass(frozen=True, eq=False)
 class RobotMotion:
-    """A robot's trajectory, with what was assumed on the way to it."""
+    """A robot's trajectory, with what was assumed on the way to it, and the `terrain` that it is
+    on, where that is stated [m, world]."""
 
     robot: Morphology
     coordinates: Coordinates
     frame_time: float
     notes: tuple[str, ...] = ()
+    terrain: Terrain | None = None
 
     def __repr__(self) -> str:
         return f"RobotMotion({time_span(len(self), self.frame_time)}, {self.robot!r})"

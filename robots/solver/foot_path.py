@@ -11,6 +11,7 @@ from jaxtyping import Bool, Complex, Float
 from scipy.ndimage import grey_dilation, median_filter
 
 from robots.model.morphology import Morphology
+from robots.solver.footholds import below_swing, over_edges
 from robots.solver.footprints import FootPlan, on_points, on_prints
 from robots.solver.holds import Holds
 from robots.solver.settling import around, settled
@@ -35,6 +36,7 @@ LEVEL_LIFT = 0.18
 LEVEL = (0.03, 0.06)
 STEP_RISE = 0.33  # [hip heights/s] at which it is lifted before that and let down after it
 UP_SHARE = 0.4  # of a contact, at each end, in which the foot may still, or already, be up
+_LOW = 0.3  # of `SWING_REACH`: stated ground is as far below a foot as it is
 SPEED_SPAN = 0.025  # [s] before and after a frame for a foot's speed
 SETTLE = 0.11  # [s] before and after a contact in which a foot already stays, ever less,
 SETTLE_HOLD = 0.65  # and is held along the floor ever less, up to this: at 1 it lands with a jerk
@@ -67,12 +69,39 @@ def footing_of(robot: Morphology, plan: FootPlan) -> Holds:
     place = np.where(on, flat, own)
     lift = _in_time(step, plan)
     height = _height(plan)
-    z = np.where(on, lift, pitched + np.maximum(height[:, None], lift))
-    holds = _shares(plan, on, height, lift)
+    if plan.around is None:
+        z = np.where(on, lift, pitched + np.maximum(height[:, None], lift))
+        holds = _shares(plan, on, height, lift)
+    else:
+        z, holds = _over_ground(plan, on, place, pitched, height, lift)
     positions = np.stack([place.real, place.imag, z + plan.ground[:, None]], axis=-1)
     over_time = (np.ascontiguousarray(x.transpose(1, 2, 0)) for x in (positions, holds))
     links, points = robot.sole_points(plan.sole)
     return Holds(links, np.repeat(points[:, :, None], len(positions), axis=2), *over_time)
+
+
+def _over_ground(
+    plan: FootPlan,
+    on: Bool[np.ndarray, "T P"],
+    place: Complex[np.ndarray, "T P"],
+    pitched: Float[np.ndarray, "T P"],
+    height: Float[np.ndarray, "T"],
+    lift: Float[np.ndarray, "T P"],
+) -> tuple[Float[np.ndarray, "T P"], Float[np.ndarray, "T P 3"]]:
+    """How high points are over `plan.ground` [m] on stated ground, and how firmly they are held. A
+    foot is lifted over what is below it there, not over what lies between two footprints."""
+    below = below_swing(plan, place, height + plan.ground) - plan.ground
+    below = np.where(plan.stands, 0.0, below)
+    low = height - below
+    near = near_floor(low.clip(0.0) / (_LOW * plan.hip_height))
+    lift = lift * np.where(plan.stands, 1.0, near)[:, None]
+    z = np.where(on, lift, pitched + np.maximum(height[:, None], below[:, None] + lift))
+    if plan.relief is not None:
+        lowest = np.take_along_axis(plan.relief, pitched.argmin(axis=1)[:, None], 1)
+        z += np.where(on, plan.relief, lowest)
+    over = over_edges(plan, place, z + plan.ground[:, None])[:, None]
+    holds = _shares(plan, on, low, np.maximum(lift, over))
+    return z + over, holds
 
 
 def _shares(

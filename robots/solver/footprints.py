@@ -20,6 +20,7 @@ from spark.kinematics import world_positions
 from spark.rig.feet import Sole, sole_positions
 from spark.runs import true_runs
 from spark.smoothstep import smoothstep
+from spark.transfer.distance_field import DistanceField
 from spark.transfer.footfalls import beyond
 from spark.vectors import dot, unit
 
@@ -49,7 +50,9 @@ class FootPlan:
     the footprint, where `contacts` (of heel and toe) say that it stands. `clearance` [m] is that of
     the source's lowest sole point, scaled, over `ground` [m], and `lift` [m] what a higher flight
     adds to it; `idle` is how far (0 to 1) it stands nowhere while the body lies or kneels. `flat`
-    [m] are the sole's points on the floor, heading along X from the middle of the toes.
+    [m] are the sole's points on the floor, heading along X from the middle of the toes. Of
+    stated ground, `around` is the distance, and `relief` [m] is how much higher than `ground` it is
+    below each point of a footprint.
     """
 
     frame_time: float
@@ -65,6 +68,8 @@ class FootPlan:
     ground: Float[np.ndarray, "T"]
     lift: Float[np.ndarray, "T"]
     idle: Float[np.ndarray, "T"]
+    relief: Float[np.ndarray, "T P"] | None = None
+    around: DistanceField | None = None
 
     @property
     def length(self) -> float:
@@ -79,7 +84,8 @@ class FootPlan:
     def every(self, stride: int) -> "FootPlan":
         """That of every `stride`-th frame."""
         parts = {name: getattr(self, name)[::stride] for name in _OVER_TIME}
-        return replace(self, frame_time=stride * self.frame_time, **parts)
+        relief = None if self.relief is None else self.relief[::stride]
+        return replace(self, frame_time=stride * self.frame_time, relief=relief, **parts)
 
 
 def plan_feet(robot: Morphology, targets: Targets) -> list[FootPlan]:
@@ -188,6 +194,7 @@ def _plan(
         ground=targets.ground[:, s],
         lift=np.zeros(len(targets)),
         idle=_idle(targets, contacts, robot.rig.hip_height),
+        around=targets.around,
     )
 
 

@@ -8,32 +8,60 @@ from jaxtyping import Bool, Float
 
 from robots.model.morphology import Morphology
 from spark.runs import true_runs
+from spark.terrain import Terrain
 from spark.transfer.canonical import CanonicalMotion
+from spark.transfer.distance_field import DistanceField, distance_field
 from spark.transfer.footfalls import between_contacts
 from spark.transfer.ground import Ground, level_ground
 from spark.transfer.treads import Treads
+
+_AROUND = 2.0  # hip heights around the hips' path within which ground is looked at
+_SPACING = 0.03  # hip heights from one place to the next at which it is known how far that is
 
 
 class Climb(NamedTuple):
     """What a source stands on: the `heights` [m] of the ground under each of its feet over time
     (`Treads`), the `ground` all around, and how high [m] its hips are over the floor where it sits
-    on something (`seats`), 0 where it does not."""
+    on something (`seats`), 0 where it does not. Where ground is stated, `relief` [m] is that under
+    heel and toe over that under the foot, and `around` the distance from it in the robot's world.
+    """
 
     heights: Float[np.ndarray, "T F"]
     ground: Ground
     seats: Float[np.ndarray, "T"]
+    relief: Float[np.ndarray, "T F 2"] | None = None
+    around: DistanceField | None = None
 
     def frames(self, start: int, stop: int) -> "Climb":
         """That of frames `start` to `stop`, exclusive."""
-        return self._replace(heights=self.heights[start:stop], seats=self.seats[start:stop])
+        own = slice(start, stop)
+        relief = None if self.relief is None else self.relief[own]
+        return self._replace(heights=self.heights[own], seats=self.seats[own], relief=relief)
 
 
-def climb_of(source: CanonicalMotion, treads: Treads) -> Climb:
+def climb_of(source: CanonicalMotion, treads: Treads, robot: Morphology) -> Climb:
     """Where a source's feet stand, and so all of it may; and where it sits."""
     seats, ground = np.zeros(len(source)), replace(treads, seats=()).ground(source.floor_z)
     for seat in treads.seats:
         seats[seat.start : seat.stop] = seat.high
-    return Climb(treads.heights, replace(ground, stands=()), seats)
+    around = None if source.terrain is None else _around(source, robot, source.terrain)
+    return Climb(treads.heights, replace(ground, stands=()), seats, treads.relief, around)
+
+
+def _around(source: CanonicalMotion, robot: Morphology, terrain: Terrain) -> DistanceField:
+    """The distance from stated ground in the robot's world, around where the robot goes."""
+    size = robot.rig.hip_height
+    placed = on_robot(source, robot, terrain)
+    path = size / source.rig.hip_height * (source.hips - [0.0, 0.0, source.floor_z])
+    low, high = path.min(axis=0) - _AROUND * size, path.max(axis=0) + _AROUND * size
+    return distance_field(placed, low, high, _SPACING * size)
+
+
+def on_robot(source: CanonicalMotion, robot: Morphology, terrain: Terrain) -> Terrain:
+    """Stated ground as the robot has it, scaled as the motion is: about the world's origin, and
+    along Z about the floor, which is at 0."""
+    scale = robot.rig.hip_height / source.rig.hip_height
+    return terrain.placed(scale, np.array([0.0, 0.0, -source.floor_z]))
 
 
 def level_climb(source: CanonicalMotion) -> Climb:
@@ -71,10 +99,16 @@ def under_soles(
     return GroundUnderSoles(ground, floor)
 
 
-def climbs(treads: Treads, robot: Morphology) -> tuple[str, ...]:
+def climbs(treads: Treads, robot: Morphology, floor_z: float) -> tuple[str, ...]:
     """Notes where the source's feet stand, or it sits, on more than the floor."""
     scale, notes = robot.rig.hip_height / treads.rig.hip_height, []
-    if not treads.level and robot.soles:
+    if treads.terrain is not None:
+        top = float(treads.terrain.vertices[:, 2].max()) - floor_z
+        notes.append(
+            f"stated ground up to {100 * top:.0f} cm high is scaled by {scale:.3g}, as the motion "
+            f"is: up to {100 * scale * top:.0f} cm"
+        )
+    elif not treads.level and robot.soles:
         notes.append(
             f"feet of the source stand on something up to {100 * treads.top:.0f} cm above its "
             f"floor: the robot's do up to {100 * scale * treads.top:.0f} cm above its own, where "

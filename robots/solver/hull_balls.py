@@ -35,7 +35,11 @@ def hull_of(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Hull | Non
     if int(model.geom_type[geom]) != int(mujoco.mjtGeom.mjGEOM_MESH):
         return None
     vertices = _hull_vertices(model, int(model.geom_dataid[geom]))
-    placed = vertices @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+    return hull_around(vertices @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom])
+
+
+def hull_around(placed: Float[np.ndarray, "V 3"]) -> Hull | None:
+    """That of some points [m]; None where it is flat."""
     outer = placed[np.unique((placed @ _LOOKS.T).argmax(axis=0))]
     try:
         found = ConvexHull(outer)
@@ -47,20 +51,22 @@ def hull_of(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Hull | Non
     return Hull(outer, outer[found.simplices], np.column_stack([normals, reach]))
 
 
-def balls_in(hull: Hull) -> tuple[Float[np.ndarray, "S 3"], Float[np.ndarray, "S"]]:
-    """Centres and radii [m] of balls that cover the hull's surface but for `_NEAR`, as far as
-    `_MAX_BALLS` go, and bulge out of it by half of that at most: of those on a grid the one that
-    covers most, again and again."""
+def balls_in(
+    hull: Hull, most_near: float = _NEAR, most: int = _MAX_BALLS
+) -> tuple[Float[np.ndarray, "S 3"], Float[np.ndarray, "S"]]:
+    """Centres and radii [m] of balls that cover the hull's surface but for `most_near`, as far as
+    so many go, and bulge out of it by half of that at most: of those on a grid the one that covers
+    most, again and again."""
     centres = _grid(hull)
     depth = (hull.planes[:, 3] - centres @ hull.planes[:, :3].T).min(axis=1)
-    near = min(_NEAR, 2 * _NEAR_SHARE * float(depth.max(initial=0.0)))
+    near = min(most_near, 2 * _NEAR_SHARE * float(depth.max(initial=0.0)))
     radii = depth + _BULGE_SHARE * near
     fit = radii > _LEAST_RADIUS
     centres, radii = centres[fit], radii[fit]
     away = np.linalg.norm(_surface(hull)[:, None] - centres, axis=2) - radii
     covers = away < near
     chosen: list[int] = []
-    while len(chosen) < _MAX_BALLS and covers.any():
+    while len(chosen) < most and covers.any():
         chosen.append(int(covers.sum(axis=0).argmax()))
         covers = covers[~covers[:, chosen[-1]]]
     return centres[chosen], radii[chosen]

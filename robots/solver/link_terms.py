@@ -121,6 +121,26 @@ class LinkTerms:
                 for j, product in zip(rows, products, strict=True):
                     load.squares[i, j, frames] += product
 
+    def add_distances(
+        self,
+        link: int,
+        points: Float[np.ndarray, "3 M S"],
+        out: Float[np.ndarray, "3 M S"],
+        residuals: Float[np.ndarray, "M S"],
+        slopes: Float[np.ndarray, "M S"],
+        frames: Int[np.ndarray, "S"],
+    ) -> None:
+        """Residuals of how far some of a link's points [m] are from something, in some frames: the
+        unit vectors away from that, and their derivatives by the distances [1/m]."""
+        self.normal.cost[frames] += 0.5 * np.square(residuals).sum(axis=0)
+        if self.normal.with_jacobian:
+            arms, wrenches = points - self.about[:, None, frames], np.zeros((6, *slopes.shape))
+            np.multiply(out, slopes, out=wrenches[3:])
+            cross(arms, wrenches[3:], wrenches[:3])
+            load = self._load(link, 6)
+            load.squares[:, :, frames] += np.einsum("imt,jmt->ijt", wrenches, wrenches)
+            load.sums[:, frames] += np.einsum("imt,mt->it", wrenches, residuals)
+
     def add_to_normal(self) -> None:
         """What all links ask of the block's dofs, from the last link to the base."""
         loads, parents = self._loads, self.poses.tree.parents.tolist()

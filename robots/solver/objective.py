@@ -21,6 +21,7 @@ from robots.solver.hands import wrist_links
 from robots.solver.holds import Holds
 from robots.solver.link_terms import LinkTerms
 from robots.solver.targets import Targets
+from robots.solver.walls import add_walls
 from robots.solver.weights import (
     FLOOR_ROUNDING,
     HANDS_RANGE,
@@ -62,9 +63,9 @@ def linearize(
 
     Per frame: the rotation of each part with a role and the direction of each limb (`_add_pose`);
     points that are held; hips and the floor under soles, where the base is free; hands that touch,
-    where the block alone moves them;
-    the depth of all other parts in the floor, and of the colliding `candidates` in each other,
-    approximate or `exact`; joints that follow others; limits; a pull to the T-pose.
+    where the block alone moves them; the depth of all other parts in the floor, of all parts in
+    stated ground, and of the colliding `candidates` in each other, approximate or `exact`; joints
+    that follow others; limits; a pull to the T-pose.
     `penalty_scale` multiplies the weights of collisions and the floor, frame by frame.
     """
     tree, rig = robot.tree, robot.rig
@@ -89,6 +90,8 @@ def linearize(
         _add_hands(robot, targets, poses, block, normal)
     firm = per_metre(robot) * penalty_scale
     add_floor(robot, terms, W_FLOOR * firm, FLOOR_ROUNDING / firm)
+    if targets.around is not None:
+        add_walls(robot, terms, targets.around, W_FLOOR * firm, FLOOR_ROUNDING / firm)
     if with_jacobian:
         terms.add_to_normal()
     weight = per_metre(robot) * (W_LEG_COLLISION if block.base else W_COLLISION)

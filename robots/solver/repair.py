@@ -27,6 +27,7 @@ from robots.solver.repair_descent import Repair, solve_spells
 from robots.solver.smoothness import jerk_stiffening, overspeed
 from robots.solver.spells import Spells
 from robots.solver.targets import Targets
+from robots.solver.walls import depth_in_walls
 from robots.tree import Coordinates
 from spark.runs import true_runs
 
@@ -137,4 +138,6 @@ def violations(
         for s, sole in enumerate(robot.soles):
             lowest = points_of(robot, poses, sole)[:, 2].min(0) - targets.floor[:, s]
             violated |= lowest < -max_sinking
+    if targets.around is not None:
+        violated |= depth_in_walls(robot, poses, block, targets.around) > max_sinking
     return violated | (depth_in_floor(robot, poses, block) > max_sinking)

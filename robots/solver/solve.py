@@ -17,6 +17,7 @@ from robots.solver.block import Block, blocks_of, carriers, whole_of
 from robots.solver.crouch import less_deep
 from robots.solver.descent import Steps, collision_candidates, collision_stride, solve_block
 from robots.solver.foot_path import footing_of
+from robots.solver.footholds import on_ground
 from robots.solver.footprints import FootPlan, plan_feet, reachable
 from robots.solver.ground import climb_of, climbs
 from robots.solver.holds import Holds, joined
@@ -73,11 +74,14 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     source, passed = without_strays(source)
     source, own = continued(source)
     source, noise, trembles = without_noise(source)
-    source, travels = with_travel(source) if robot.mount is None else (source, ())
+    stays = robot.mount is not None or source.terrain is not None
+    source, travels = (source, ()) if stays else with_travel(source)
     treads = treads_of(source)
     source = less_deep(source, robot, treads.seats)
-    climb = climb_of(source, treads)
-    notes = dict.fromkeys((*robot.notes, *passed, *trembles, *travels, *climbs(treads, robot)))
+    climb = climb_of(source, treads, robot)
+    notes = dict.fromkeys(
+        (*robot.notes, *passed, *trembles, *travels, *climbs(treads, robot, source.floor_z))
+    )
 
     def solved(start: int, stop: int) -> Coordinates:
         targets = targets_of(source.frames(start, stop), robot, noise, climb.frames(start, stop))
@@ -87,7 +91,8 @@ def retarget(source: CanonicalMotion, robot: Morphology) -> RobotMotion:
     with one_thread():
         q = robot.following(by_stretches(solved, len(source), source.frame_time)).at(own)
         notes.update(dict.fromkeys(unparted(robot, q, collision_stride(source.frame_time))))
-    return RobotMotion(robot, q, source.frame_time, tuple(notes))
+    terrain = None if climb.around is None else climb.around.terrain
+    return RobotMotion(robot, q, source.frame_time, tuple(notes), terrain)
 
 
 def _trajectory(robot: Morphology, targets: Targets) -> Coordinates:
@@ -98,9 +103,9 @@ def _trajectory(robot: Morphology, targets: Targets) -> Coordinates:
     into thighs. Before, they are solved for what they weigh. A body that leans on its arms is
     polished as a whole.
     """
-    feet, leaning = plan_feet(robot, targets), leans(robot, targets)
+    feet, leaning = [on_ground(foot) for foot in plan_feet(robot, targets)], leans(robot, targets)
     q = _coarse(robot, targets, feet, leaning)
-    feet = unhurried(apart(reachable(robot, feet, q)), targets.flight)
+    feet = unhurried(_standing(robot, feet, q), targets.flight)
     targets, feet = with_dynamics(robot, targets, feet, q)
     if leaning:
         return polished(robot, targets, feet, q, whole_of(robot), _POLISH)
@@ -167,7 +172,12 @@ def _posed(
         return q, feet
     sliding = _holds_of(robot, targets, feet, q, block).sliding()
     q = solve_block(robot, targets, sliding, q, block, steps)
-    return q, apart(reachable(robot, feet, q)) if block.base else feet
+    return q, _standing(robot, feet, q) if block.base else feet
+
+
+def _standing(robot: Morphology, feet: Sequence[FootPlan], q: Coordinates) -> list[FootPlan]:
+    """Feet where those of `q` stand on average, apart, and on the ground that is there."""
+    return [on_ground(foot) for foot in apart(reachable(robot, feet, q))]
 
 
 def _parted(

@@ -22,6 +22,7 @@ from spark.rig.roles import HANDS, Role
 from spark.rotation import matrix_from_quat, quat_mul
 from spark.transfer.analytic import copied
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
+from spark.transfer.distance_field import DistanceField
 from spark.transfer.noise import Noise
 from spark.transfer.self_touch import SelfTouch, self_touches
 
@@ -44,7 +45,8 @@ class Targets:
     `clearance`, how high the source's soles are over it, scaled; `jerks`, how jerky the source's
     limbs are (`robots.solver.limb_jerk`); `seats`, how high the hips are where the body sits on
     something, else 0 [m]; `hands`, from the right hand to the left [m]; `self_touches`, what hands
-    touch of their own body. `com` [m] is planned where it is known.
+    touch of their own body; `around`, the distance from stated ground. `com` [m] is planned where
+    it is known.
     """
 
     frame_time: float
@@ -70,6 +72,7 @@ class Targets:
     hands: Float[np.ndarray, "T 3"] | None
     self_touches: tuple[SelfTouch, ...]
     notes: tuple[str, ...]
+    around: DistanceField | None = None
     com: Float[np.ndarray, "T 3"] | None = None
 
     def __len__(self) -> int:
@@ -136,11 +139,16 @@ def targets_of(
     climb = level_climb(source) if climb is None else climb
     under = for_soles(climb.heights, rig, robot)
     paths[..., 2] -= under[..., None]
+    relief = None if climb.relief is None else for_soles(climb.relief, rig, robot)
+    if relief is not None:
+        paths[..., 2] -= relief
     scale = robot.rig.hip_height / rig.hip_height
     sides = [sole.side for sole in robot.soles]
     touches = schedule(source, positions, paths, sides, climb.ground, noise)
     touching = [j for r in touches.part_roles if (j := touching_joint(rig, r)) is not None]
     own_ground = under_soles(under, touches.feet, paths[:, :, 1, :2])
+    if relief is not None:  # the soles' own floor is level then, and below the stated ground
+        own_ground = own_ground._replace(floor=np.zeros_like(own_ground.floor))
     palms = resting_palms(robot, touches.part_roles, touches.rests, source.frame_time)
     for role in palms:
         j, rests = robot.rig.roles.require(role), touches.rests[:, touches.part_roles.index(role)]
@@ -170,6 +178,7 @@ def targets_of(
         ground=scale * own_ground.ground,
         floor=scale * own_ground.floor,
         seats=scale * climb.seats,
+        around=climb.around,
         hands=between_hands(rig, positions, robot),
         self_touches=self_touches(source, dict(enumerate(positions.swapaxes(0, 1))), robot.rig),
         notes=(*notes, HOVERS) if has_feet(paths).any() and touches.hovers else notes,

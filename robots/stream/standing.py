@@ -23,7 +23,8 @@ from spark.rig.contacts import (
     SPEED_WINDOW,
 )
 from spark.transfer.noise import BORNE_SPEED, LEEWAY
-from spark.transfer.treads import MIN_PUSH, MIN_STEP, SAME_HEIGHT
+from spark.transfer.soles import SAME_HEIGHT
+from spark.transfer.treads import MIN_PUSH, MIN_STEP
 
 _RELEASE_FACTOR = (
     1.5  # times the speed and height at which a foot comes to stand: there it is let go

@@ -111,7 +111,7 @@ def _figure(
     meshes: dict[bytes, dict[str, Any]],
 ) -> dict[str, Any]:
     """A figure's tree of bodies, what they look like, and its coordinates in every frame."""
-    model, bodies = scene.model, [*placement.bodies, *placement.pillars]
+    model, bodies = scene.model, [*placement.bodies, *placement.ground]
     qpos = scene.qpos[:, placement.columns]
     lost = scene.lost_from(placement)
     most = float(np.abs(qpos[: max(lost, 1), 3:]).max(initial=1.0))

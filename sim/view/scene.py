@@ -25,7 +25,7 @@ class Placement:
     Of the scene's model it has the coordinates `columns` and the bodies `bodies`, its root first;
     `own` are the coordinates of its subject's model that these are.
     Its standing `height` in the scene is in metres; `lane` [m] is where it stands beside the
-    others, along Y. `ahead` is where it faces, in its root body's axes. `pillars` is the body of
+    others, along Y. `ahead` is where it faces, in its root body's axes. `ground` is the body of
     what it stands on, where there is any.
     """
 
@@ -41,7 +41,7 @@ class Placement:
     lane: float
     ahead: Float[np.ndarray, "3"]
     skin: WornSkin | None = None
-    pillars: range = range(0)
+    ground: range = range(0)
 
     def to_scene(self, points: Float[np.ndarray, "*N 3"]) -> Float[np.ndarray, "*N 3"]:
         """Points of the figure's own world in the scene's."""

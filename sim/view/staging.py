@@ -14,7 +14,7 @@ from sim.view.figure import Figure
 from sim.view.scene import Placement, Scene
 from sim.view.skin import WornSkin, add_skin, worn_by
 from sim.view.text import shortened
-from sim.view.world import add_pillars, empty_world
+from sim.view.world import add_pillars, add_terrain, empty_world
 from spark.errors import SkeletonError
 from spark.rotation import quat_about, quat_conj, quat_mul, quat_rotate
 
@@ -71,9 +71,13 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0, blend: bool
             ahead=quat_rotate(quat_conj(qpos[0, 3:7]), ahead),
             skin=worn,
         )
-        if len(figure.tops) and not figure.ghost:
-            add_pillars(world, placement.to_scene(figure.tops), _PILLAR * heights[k])
-            placement = replace(placement, pillars=range(bodies.stop, bodies.stop + 1))
+        if not figure.ghost and (figure.terrain is not None or len(figure.tops)):
+            if figure.terrain is not None:
+                shown = placement.to_scene(figure.terrain.vertices)
+                add_terrain(world, replace(figure.terrain, vertices=shown), f"{k}_terrain")
+            else:
+                add_pillars(world, placement.to_scene(figure.tops), _PILLAR * heights[k])
+            placement = replace(placement, ground=range(bodies.stop, bodies.stop + 1))
         placements.append(placement)
         column = following
     qpos = np.concatenate(coordinates, axis=1)

@@ -4,7 +4,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-_PILLAR_RGBA = (0.80, 0.79, 0.76, 1.0)
+from spark.terrain import Terrain
+
+_GROUND_RGBA = (0.80, 0.79, 0.76, 1.0)
 
 
 def empty_world() -> mujoco.MjSpec:
@@ -63,5 +65,17 @@ def add_pillars(spec: mujoco.MjSpec, tops: Float[np.ndarray, "K 3"], radius: flo
             type=mujoco.mjtGeom.mjGEOM_CYLINDER,
             size=[radius, max(z / 2, 1e-3), 0.0],
             pos=[x, y, z / 2],
-            rgba=_PILLAR_RGBA,
+            rgba=_GROUND_RGBA,
         )
+
+
+def add_terrain(spec: mujoco.MjSpec, terrain: Terrain, name: str) -> None:
+    """A body of stated ground [m, scene]: a thin shell, drawn from both sides."""
+    body = spec.worldbody.add_body()
+    spec.add_mesh(
+        name=name,
+        uservert=terrain.vertices.ravel().tolist(),
+        userface=terrain.faces.ravel().tolist(),
+        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+    )
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, rgba=_GROUND_RGBA)

@@ -14,6 +14,7 @@ from spark.rig.contacts import floor_under, lowest_sole
 from spark.rig.rig import Rig
 from spark.rotation import quat_conj, quat_mul, quat_rotate
 from spark.summary import counted, time_span
+from spark.terrain import Terrain
 from spark.transfer.breaks import breaks
 
 FRAME_TIME = 1 / 30  # [s] of what the network and the target prior read: 30 fps
@@ -25,7 +26,8 @@ class CanonicalMotion:
 
     `rotations[t, j]` is `G_j(t) = R_world_j(t) R_world_j(T)^-1`; `hips` is the path of the middle
     of the two upper-leg joints [m], the same point of the anatomy wherever a rig's pelvis joint
-    lies; `floor_z` is the height [m] of the floor under the motion.
+    lies; `floor_z` is the height [m] of the floor under the motion, and `terrain` what is stated to
+    be on it [m, world].
     """
 
     rig: Rig
@@ -34,6 +36,7 @@ class CanonicalMotion:
     hips: Float[np.ndarray, "T 3"]
     floor_z: float = 0.0
     notes: tuple[str, ...] = ()
+    terrain: Terrain | None = None
 
     def __repr__(self) -> str:
         span = time_span(len(self), self.frame_time)
@@ -128,4 +131,5 @@ def at_frame_time(canonical: CanonicalMotion, frame_time: float) -> CanonicalMot
         values_at(canonical.hips, at),
         canonical.floor_z,
         canonical.notes,
+        canonical.terrain,
     )

@@ -1,16 +1,22 @@
-"""The ground under a motion: a level floor, and what feet stand on above it."""
+"""The ground under a motion: a level floor, and what is above it, stated or told from its feet."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
+
+from spark.terrain import Terrain
+from spark.transfer.distance_field import DistanceField, distance_field
 
 # Hip heights around a place to which what a foot stands on there reaches, for feet, and for hands
 # and knees: things end somewhere, and feet swing by.
 FOOT_REACH, REACH = 0.3, 0.5
 _BELOW = 0.01  # hip heights below its top at which a point is still on it, and not beside it
 _SAME_PLACE, _SAME_HEIGHT = 0.2, 0.02  # hip heights: places that are one
+_SPACING = 0.02  # [m] between the nodes that say how deep points are in stated ground
+_UNDER = 0.15  # [m] that a point may be in it, of a body whose parts are where they are drawn
 
 
 @dataclass(frozen=True)
@@ -29,7 +35,7 @@ class Ground:
     reaches as far as for a body with hips at `hip_height` [m], and when feet stand there.
 
     A floor that slopes is `gradient` [m] higher a metre further along X and Y, and at `floor_z` at
-    the place `middle` [m].
+    the place `middle` [m]. A `terrain` [m, world] is stated, and then nothing else is above it.
     """
 
     floor_z: float
@@ -38,6 +44,7 @@ class Ground:
     hip_height: float = 0.0
     gradient: tuple[float, float] = (0.0, 0.0)
     middle: tuple[float, float] = (0.0, 0.0)
+    terrain: Terrain | None = None
 
     def picked(self, span: slice) -> "Ground":
         """In the frames of a slice."""
@@ -62,6 +69,10 @@ class Ground:
         out = points[..., 2] - self.floor_z
         if any(self.gradient):
             out = out - (points[..., :2] - np.array(self.middle)) @ np.array(self.gradient)
+        if self.terrain is not None and points.size:
+            out = np.minimum(out, points[..., 2] - self.terrain.tops(points, 0.0))
+            depth = self._field.distance(np.moveaxis(points, -1, 0))
+            return np.where(depth < 0.0, np.minimum(depth, 0.0), out)
         if not len(self.tops) or not points.size:
             return out
         across = points[..., :2].reshape(-1, 2)
@@ -79,8 +90,17 @@ class Ground:
         return out
 
     def under(self, points: Float[np.ndarray, "T P 3"]) -> Float[np.ndarray, "T P"]:
-        """How high [m] over the floor the ground below points is."""
+        """How high [m] over the floor the ground below points is, or around them."""
+        if self.terrain is not None:
+            return np.maximum(self.terrain.tops(points, _UNDER) - self.floor_z, 0.0)
         return points[..., 2] - self.floor_z - self.heights(points)
+
+    @cached_property
+    def _field(self) -> DistanceField:
+        """How far points are from the terrain."""
+        assert self.terrain is not None
+        low, high = (bound(self.terrain.vertices, axis=0) for bound in (np.min, np.max))
+        return distance_field(self.terrain, low - 1.0, high + 1.0, _SPACING)
 
 
 def level_ground(floor_z: float) -> Ground:

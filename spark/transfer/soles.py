@@ -1,13 +1,25 @@
 """Where the soles of a canonical motion are."""
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from spark.blocks import in_blocks
-from spark.rig.contacts import lowest_sole
+from spark.rig.contacts import (
+    ADULT_HEIGHT,
+    PLANTED_SPEED,
+    climbing_speeds,
+    lower_ends,
+    lowest_sole,
+    speeds,
+)
 from spark.rig.feet import ends_of_feet, lowest_points
 from spark.rotation import quat_mul
+from spark.runs import true_runs
 from spark.transfer.canonical import CanonicalMotion, canonical_positions
+
+# All lengths [m] are of an adult.
+SAME_HEIGHT = 0.05  # between two feet on one thing, or between one and the floor
+STAY = 0.05  # that a foot may move without having gone elsewhere
 
 
 def lowest_soles(source: CanonicalMotion) -> Float[np.ndarray, "T"]:
@@ -29,6 +41,25 @@ def sole_paths(
     feet = len(source.rig.soles)
     found = in_blocks(lambda block: _feet(source.picked(block)), len(source))
     return found[:, :feet], found[:, feet:].reshape(len(source), feet, 2, 3)
+
+
+def still_feet(
+    paths: Float[np.ndarray, "T S 2 3"], height: float, frame_time: float
+) -> Bool[np.ndarray, "T S"]:
+    """When feet don't move, heel or toe, whichever is the lower; or stay in their place."""
+    scale = height / ADULT_HEIGHT
+    limit = PLANTED_SPEED * scale
+    slow = speeds(paths, frame_time) < limit
+    slow &= climbing_speeds(paths, frame_time) < limit
+    still = np.any(slow & lower_ends(paths, height), axis=2)
+    middles = paths.mean(axis=2)
+    for k in range(still.shape[1]):
+        for start, stop in true_runs(~still[:, k]):
+            if start > 0 and stop < len(still):
+                away = middles[start : stop + 1, k] - middles[start - 1, k]
+                near = np.linalg.norm(away[:, :2], axis=1).max() < STAY * scale
+                still[start:stop, k] = near and np.abs(away[:, 2]).max() < SAME_HEIGHT * scale
+    return still
 
 
 def _feet(source: CanonicalMotion) -> Float[np.ndarray, "T N"]:

@@ -7,7 +7,7 @@ lies or stands on the hands.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -16,29 +16,22 @@ from scipy.ndimage import gaussian_filter1d
 from spark.constants import GRAVITY
 from spark.kinematics import joint_paths
 from spark.motion import Motion
-from spark.rig.contacts import (
-    ADULT_HEIGHT,
-    PLANTED_SPEED,
-    climbing_speeds,
-    lower_ends,
-    planted_points,
-    speeds,
-)
+from spark.rig.contacts import ADULT_HEIGHT, planted_points
 from spark.rig.rig import Rig
 from spark.runs import true_runs
+from spark.terrain import Terrain
 from spark.transfer.canonical import CanonicalMotion, to_canonical
 from spark.transfer.footfalls import between_contacts, with_ends
 from spark.transfer.ground import Ground, Stand, distinct, level_ground
 from spark.transfer.hip_sway import center_of_mass
 from spark.transfer.pressure import NOISE, acceleration
 from spark.transfer.seats import FLESH, Seat, seats_of
-from spark.transfer.soles import sole_paths
+from spark.transfer.soles import SAME_HEIGHT, sole_paths, still_feet
+from spark.transfer.stated import stated_under
 
 # All lengths [m] are of an adult.
 MIN_STEP = 0.12  # from one place to the next, once at least: floors that drift do so more slowly
-SAME_HEIGHT = 0.05  # between two feet on one thing, or between one and the floor
 SAME_PLACE = 0.6
-STAY = 0.05  # that a foot may move without having gone elsewhere
 MIN_TIME = 0.1  # [s] that a foot carries the body to stand on something
 MIN_PUSH = 0.5  # [body weights] while it does
 UNDER_FOOT = 0.15  # from the centre of pressure to the foot, or to the line between both,
@@ -50,7 +43,8 @@ class Treads:
     """When each of a rig's S feet `stands`, and the `heights` [m] of the ground under it over the
     floor; in swing, between the two places by as much of its way as it has gone. 0 all over where
     the floor is level. `ways` [m, world] are those of the feet, `hips` that of the hips; `seats`
-    are what the body sits on."""
+    are what the body sits on. Where a `terrain` [m, world] is stated, `relief` [m] is how much
+    higher than that the ground under heel and toe is."""
 
     rig: Rig
     frame_time: float
@@ -59,6 +53,8 @@ class Treads:
     heights: Float[np.ndarray, "T S"]
     hips: Float[np.ndarray, "T 2"]
     seats: tuple[Seat, ...]
+    terrain: Terrain | None = None
+    relief: Float[np.ndarray, "T S 2"] | None = None
 
     @property
     def level(self) -> bool:
@@ -77,6 +73,8 @@ class Treads:
 
     def ground(self, floor_z: float) -> Ground:
         """That under the body, over a floor at `floor_z` [m, world]."""
+        if self.terrain is not None:
+            return replace(level_ground(floor_z), terrain=self.terrain)
         sides = [sole.side for sole in self.rig.soles]
         ways = dict(zip(sides, self.ways.swapaxes(0, 1), strict=True))
         ground = self.under(self.rig, ways, self.frame_time, floor_z, 1.0)
@@ -116,8 +114,12 @@ class Treads:
 
 def treads_of(source: CanonicalMotion) -> Treads:
     """What a motion stands and sits on; the feet are those of `rig.soles`."""
-    ways, stands, ground = _ground_under(source)
     hips, seats = source.hips[:, :2], seats_of(source)
+    if source.terrain is not None:
+        ways, held = stated_under(source, source.terrain)
+        own = Treads(source.rig, source.frame_time, ways, held.stands, held.heights, hips, seats)
+        return replace(own, terrain=source.terrain, relief=held.relief)
+    ways, stands, ground = _ground_under(source)
     return Treads(source.rig, source.frame_time, ways, stands, ground, hips, seats)
 
 
@@ -133,7 +135,7 @@ def _ground_under(
         return np.zeros((count, feet, 2)), stands, ground
     lowest, paths = sole_paths(source)
     ways = paths[..., :2].mean(axis=2)
-    still = _still(paths, rig.standing_height, frame_time)
+    still = still_feet(paths, rig.standing_height, frame_time)
     runs = [(k, start, stop) for k in range(feet) for start, stop in true_runs(still[:, k])]
     runs.sort(key=lambda run: run[1])
     heights = np.array([np.median(lowest[start:stop, k]) for k, start, stop in runs])
@@ -158,10 +160,15 @@ def _ground_under(
     return ways, stands, ground
 
 
-def feet_by_side(rig: Rig, motion: Motion) -> dict[str, Bool[np.ndarray, "T"]]:
+def feet_by_side(
+    rig: Rig, motion: Motion, terrain: Terrain | None = None
+) -> dict[str, Bool[np.ndarray, "T"]]:
     """In which frames each foot stands, on the floor or on what is climbed, by side: "left",
-    "right"; empty for a body without feet."""
-    treads = treads_of(to_canonical(motion, rig))
+    "right"; empty for a body without feet. With a stated `terrain` the floor is at z = 0."""
+    source = to_canonical(motion, rig)
+    if terrain is not None:
+        source = replace(source, floor_z=0.0, terrain=terrain)
+    treads = treads_of(source)
     ground = dict(zip((sole.side for sole in rig.soles), treads.heights.T, strict=True))
     roles = [rig.roles.roles[j] for j in rig.contact_joints]
     feet = joint_paths(motion, rig.contact_joints)
@@ -170,25 +177,6 @@ def feet_by_side(rig: Rig, motion: Motion) -> dict[str, Bool[np.ndarray, "T"]]:
             feet[:, k, 2] -= ground[role.side]
     standing = planted_points(feet, motion.frame_time, rig.standing_height)
     return {role.side: standing[:, k] for k, role in enumerate(roles) if role is not None}
-
-
-def _still(
-    paths: Float[np.ndarray, "T S 2 3"], height: float, frame_time: float
-) -> Bool[np.ndarray, "T S"]:
-    """When feet don't move, heel or toe, whichever is the lower; or stay in their place."""
-    scale = height / ADULT_HEIGHT
-    limit = PLANTED_SPEED * scale
-    slow = speeds(paths, frame_time) < limit
-    slow &= climbing_speeds(paths, frame_time) < limit
-    still = np.any(slow & lower_ends(paths, height), axis=2)
-    middles = paths.mean(axis=2)
-    for k in range(still.shape[1]):
-        for start, stop in true_runs(~still[:, k]):
-            if start > 0 and stop < len(still):
-                away = middles[start : stop + 1, k] - middles[start - 1, k]
-                near = np.linalg.norm(away[:, :2], axis=1).max() < STAY * scale
-                still[start:stop, k] = near and np.abs(away[:, 2]).max() < SAME_HEIGHT * scale
-    return still
 
 
 def _carry(

@@ -113,6 +113,12 @@ def configure(parser: ArgumentParser) -> None:
         help="of a character: hands stay on what SRC's touch, each other and their own body, where "
         "other proportions bring them apart (robots' always do)",
     )
+    parser.add_argument(
+        "--terrain",
+        metavar="FILE",
+        help="of a robot: the ground under SRC. A mesh (.obj, .stl, .ply, .glb) in the unit and "
+        "axes of SRC's file, or the fixed shapes of an MJCF or URDF. It is scaled as the motion is",
+    )
     add_force(parser)
     add_json(parser, "one line for each result")
     add_corrections(parser, "SRC")
@@ -121,7 +127,7 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    from robots.formats import SUFFIXES, written_files
+    from robots.formats import SUFFIXES, terrain_beside, written_files
     from robots.registry import is_robot
     from spark.errors import OutputError, SparkSimError
     from spark.summary import counted
@@ -140,12 +146,13 @@ def run(args: Namespace) -> int:
         console.note(sentence)
     written: list[Path] = []
     for _, out in jobs:
-        written += written_files(out, args.format) if robot else [out]
+        written += [*written_files(out, args.format), terrain_beside(out)] if robot else [out]
         if not robot:
             files.check_ending(out, character_files.ENDINGS, "a character's motion")
     for file in written:
         files.check_free(file, force=args.force)
-    files.check_not_read(written, [*(source for source, _ in jobs), Path(args.to)])
+    read = [*(source for source, _ in jobs), *map(Path, filter(None, (args.to, args.terrain)))]
+    files.check_not_read(written, read)
     check_given(args, [source for source, _ in jobs], fps="source-fps")
     check_given(args, [args.to], "to-")
     target = load(args, args.to, "to-")
@@ -174,7 +181,7 @@ def run(args: Namespace) -> int:
 
 
 def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> dict[str, Any]:
-    from robots.formats import format_of, unsaid
+    from robots.formats import format_of, terrain_beside, unsaid
     from spark_sim import character_files, console
     from spark_sim.api import retarget
     from spark_sim.clips import Clip
@@ -187,6 +194,7 @@ def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> di
         checkpoint=args.checkpoint,
         refine=args.refine,
         keep_touches=args.keep_touches,
+        terrain=args.terrain,
     )
     if isinstance(result, Clip):
         lacking = character_files.lacking(result.body_file, out)
@@ -194,7 +202,10 @@ def _retarget(args: Namespace, source: Path, target: "AnyClip", out: Path) -> di
         result.save(out, force=args.force)
     else:
         new = [note for note in result.notes if note not in target.notes]
-        console.notes(out, [*new, *unsaid(out, format_of(out, args.format), result.motion.fps)])
+        format = format_of(out, args.format)
+        if result.terrain is not None and format != "npz":
+            new.append(f"the ground is beside it, in metres, Z up: {terrain_beside(out).name}")
+        console.notes(out, [*new, *unsaid(out, format, result.motion.fps)])
         result.save(out, force=args.force, format=args.format)
     method = args.method
     if not isinstance(result, Clip):
