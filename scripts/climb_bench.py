@@ -2,16 +2,16 @@
 
     python -m scripts.climb_bench CLIMBS OUT
 
-`CLIMBS` has a folder a climb: the positions of its joints (.npy) and its boxes (box_models/*.obj),
-as `holosoma-retargeting` on PyPI has them. `OUT` has what OmniRetarget, which is told the boxes,
-makes of them:
+`CLIMBS` has a folder a climb: the positions of its joints (.npy) and its boxes (box_models/*.obj,
+together multi_boxes.obj), as `holosoma-retargeting` on PyPI has them. `OUT` has what OmniRetarget,
+which is told the boxes, makes of them:
 
     python examples/robot_retarget.py --data_path CLIMBS --task-type climbing --data_format mocap \\
       --robot-config.robot-urdf-file models/g1/g1_29dof_spherehand.urdf --save_dir OUT \\
       --task-name NAME
 
-Ours is not told. Its boxes are put where the robot's course is and are scaled as that is; MuJoCo
-says how deep its shapes are in them.
+Ours is judged twice: told nothing, when its boxes are put where the robot's course is and are
+scaled as that is, and told the boxes (`--terrain`). MuJoCo says how deep its shapes are in them.
 """
 
 import argparse
@@ -64,12 +64,13 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     args = parser.parse_args()
     print(f"| | {' | '.join(_COLUMNS)} |\n|---|{'---|' * len(_COLUMNS)}")
-    rows: dict[str, list[Float[np.ndarray, C]]] = {"OmniRetarget": [], "ours": []}
+    rows: dict[str, list[Float[np.ndarray, C]]] = {"OmniRetarget": [], "ours": [], "ours, told": []}
     for path in sorted(args.climbs.glob("*/*.npy")):
         clip = spark_sim.load(path).resampled(FPS)
         boxes, theirs = boxes_of(path.parent), args.out / f"{path.parent.name}_original.npz"
         ours = spark_sim.retarget(clip, ROBOT)
-        made = {"ours": (ours, along(clip, ours, boxes))}
+        told = spark_sim.retarget(clip, ROBOT, terrain=path.parent / "multi_boxes.obj")
+        made = {"ours": (ours, along(clip, ours, boxes)), "ours, told": (told, parts_of(told))}
         if theirs.exists():
             scaled = [THEIR_SCALE * box for box in boxes]
             made["OmniRetarget"] = spark_sim.load(theirs, robot=ROBOT), scaled
@@ -94,6 +95,14 @@ def boxes_of(folder: Path) -> Boxes:
         lines = (line.split() for line in path.read_text(encoding="utf-8").splitlines())
         boxes.append(np.array([line[1:4] for line in lines if line[:1] == ["v"]], dtype=float))
     return boxes
+
+
+def parts_of(made: spark_sim.RobotClip) -> Boxes:
+    """The corners [m] of the boxes that a robot was told, in its world."""
+    terrain = made.terrain
+    assert terrain is not None
+    parts = np.unique(terrain.parts).tolist()
+    return [terrain.corners[terrain.parts == part].reshape(-1, 3) for part in parts]
 
 
 def along(clip: spark_sim.Clip, made: spark_sim.RobotClip, boxes: Boxes) -> Boxes:
