@@ -1,5 +1,6 @@
 """Stated ground: boxes, stairs, hills that a motion is on, as triangles."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -14,6 +15,7 @@ from spark.summary import brief
 # Of the terrain's size: vertices as near are one, and places are looked up so far from where they
 # are, so that none lies on the edge between two triangles.
 _SAME, _BESIDE = 1e-6, (1.3e-7, 0.7e-7)
+_AT_ONCE = 1_000_000  # pairs of a triangle and a place
 
 
 class Crossings(NamedTuple):
@@ -69,34 +71,40 @@ class Terrain:
         closed[np.tile(parts, 3)[odd[edge.reshape(-1)]]] = False
         return parts, closed
 
+    @cached_property
+    def _extents(self) -> tuple[Float[np.ndarray, "F 2"], Float[np.ndarray, "F 2"]]:
+        """From where to where each triangle is along X and Y."""
+        return self.corners[..., :2].min(axis=1), self.corners[..., :2].max(axis=1)
+
     def crossings(self, places: Float[np.ndarray, "N 2"]) -> Crossings:
         """Where vertical lines through places go through triangles; upright ones have none."""
-        order = places[:, 0].argsort(kind="stable")
         size = float(np.ptp(self.vertices, axis=0).max(initial=0.0))
-        x, y = places[order].T + size * np.array(_BESIDE)[:, None]
-        corners = self.corners
-        low, high = corners.min(axis=1), corners.max(axis=1)
-        first, last = np.searchsorted(x, low[:, 0]), np.searchsorted(x, high[:, 0])
-        met = first < last
-        if len(places):
-            met &= (high[:, 1] > y.min()) & (low[:, 1] < y.max())
-        found = []
-        for f in np.flatnonzero(met).tolist():
-            (ax, ay, az), (bx, by, bz), (cx, cy, cz) = corners[f].tolist()
-            area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-            if area == 0.0:
-                continue
-            own = slice(first[f], last[f])
-            dx, dy = x[own] - ax, y[own] - ay
-            v = (dx * (cy - ay) - (cx - ax) * dy) / area
-            w = ((bx - ax) * dy - dx * (by - ay)) / area
-            inside = np.flatnonzero((v >= 0) & (w >= 0) & (v + w <= 1))
-            if len(inside):
-                z = az + v[inside] * (bz - az) + w[inside] * (cz - az)
-                found.append((order[first[f] + inside], z, np.full(len(inside), self.parts[f])))
+        x, y = places.T + size * np.array(_BESIDE)[:, None]
+        found = [
+            self._crossed(face, place, x[place], y[place])
+            for face, place in boxed(x, y, *self._extents)
+        ]
         if not found:
             return Crossings(np.zeros(0, dtype=int), np.zeros(0), np.zeros(0, dtype=int))
         return Crossings(*(np.concatenate(column) for column in zip(*found, strict=True)))
+
+    def _crossed(
+        self,
+        face: Int[np.ndarray, "P"],
+        place: Int[np.ndarray, "P"],
+        x: Float[np.ndarray, "P"],
+        y: Float[np.ndarray, "P"],
+    ) -> Crossings:
+        """Those of pairs of a triangle and a place at `x`, `y`."""
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = self.corners[face].transpose(1, 2, 0)
+        area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+        area = np.where(area == 0.0, np.nan, area)
+        dx, dy = x - ax, y - ay
+        v = (dx * (cy - ay) - (cx - ax) * dy) / area
+        w = ((bx - ax) * dy - dx * (by - ay)) / area
+        inside = (v >= 0) & (w >= 0) & (v + w <= 1)
+        z = az + v * (bz - az) + w * (cz - az)
+        return Crossings(place[inside], z[inside], self.parts[face[inside]])
 
     def tops(
         self, points: Float[np.ndarray, "*n 3"], above: float | Float[np.ndarray, "*n"]
@@ -117,3 +125,41 @@ class Terrain:
         out = np.full(len(flat), -np.inf)
         np.maximum.at(out, place[kept], z[kept])
         return out.reshape(points.shape[:-1])
+
+
+def boxed(
+    x: Float[np.ndarray, "N"],
+    y: Float[np.ndarray, "N"],
+    low: Float[np.ndarray, "F 2"],
+    high: Float[np.ndarray, "F 2"],
+) -> Iterator[tuple[Int[np.ndarray, "P"], Int[np.ndarray, "P"]]]:
+    """Pairs of a triangle and a place in the box around it, from `low` to `high`, some at once:
+    places are sorted along Y in strips along X, and a triangle's are a run in each strip."""
+    if not len(x):
+        return
+    start, end = np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
+    met = np.flatnonzero(((low <= end) & (high >= start)).all(axis=1))
+    low, high = np.maximum(low[met], start) - start, np.minimum(high[met], end) - start
+    wide, deep = end - start + 1e-9
+    count = int(np.sqrt(len(x))) + 1
+    strip = ((x - start[0]) / wide * count).astype(int)
+    along = strip * deep + (y - start[1])
+    order = along.argsort(kind="stable")
+    first, last = ((bound[:, 0] / wide * count).astype(int) for bound in (low, high))
+    row = np.repeat(np.arange(len(met)), last - first + 1)
+    strips = deep * _runs(first, last - first + 1)
+    begins = np.searchsorted(along[order], strips + low[row, 1], "left")
+    counts = np.searchsorted(along[order], strips + high[row, 1], "right") - begins
+    for own in np.split(np.arange(len(row)), _cuts(counts)):
+        yield np.repeat(met[row[own]], counts[own]), order[_runs(begins[own], counts[own])]
+
+
+def _cuts(counts: Int[np.ndarray, "R"]) -> Int[np.ndarray, "_"]:
+    """Where to cut rows of so many pairs, that few of them are looked at at once."""
+    return 1 + np.flatnonzero(np.diff(counts.cumsum() // _AT_ONCE))
+
+
+def _runs(first: Int[np.ndarray, "R"], counts: Int[np.ndarray, "R"]) -> Int[np.ndarray, "_"]:
+    """So many numbers from each first one on, one run after another."""
+    before = counts.cumsum() - counts
+    return np.repeat(first - before, counts) + np.arange(counts.sum())

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from spark.terrain import Terrain
+from spark.terrain import Terrain, boxed
 from tests.helpers.grounds import box, hill, profile, stairs, together
 
 FAR = 1e3
@@ -66,3 +66,15 @@ def test_placing_scales_what_was_shifted() -> None:
     placed = box((0, 0, 1), (1, 1, 2)).placed(0.5, np.array([0.0, 0.0, -1.0]))
     np.testing.assert_allclose(placed.vertices.min(axis=0), [0, 0, 0])
     np.testing.assert_allclose(placed.vertices.max(axis=0), 0.5)
+
+
+def test_each_place_is_met_once_by_the_triangles_around_it_and_by_few_others() -> None:
+    ground, places = hill(0.3, 1.0, 0.25), np.random.default_rng(0).uniform(-5, 5, (500, 2))
+    low, high = (bound(ground.corners[..., :2], axis=1) for bound in (np.min, np.max))
+    found = [*boxed(places[:, 0], places[:, 1], low, high)]
+    met = np.concatenate([np.stack(pair, axis=1) for pair in found])
+    inside = ((places >= low[:, None]) & (places <= high[:, None])).all(axis=2)
+    times = np.zeros(inside.shape, dtype=int)
+    np.add.at(times, tuple(met.T), 1)
+    assert times[inside].min() == times.max() == 1
+    assert len(met) < 5 * inside.sum()
