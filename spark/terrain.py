@@ -106,6 +106,24 @@ class Terrain:
         z = az + v * (bz - az) + w * (cz - az)
         return Crossings(place[inside], z[inside], self.parts[face[inside]])
 
+    def way_up(self, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N"]:
+        """How far up [m] points are from where nothing is solid; 0 outside."""
+        place, z, part = self.crossings(points[:, :2])
+        order = np.lexsort((z, part, place))
+        place, z, part = place[order], z[order], part[order]
+        begins, ends = np.ones((2, len(z)), dtype=bool)
+        begins[1:] = (np.diff(place) != 0) | (np.diff(part) != 0)
+        ends[:-1] = begins[1:]
+        first = np.maximum.accumulate(np.where(begins, np.arange(len(z)), 0))
+        odd = (np.arange(len(z)) - first) % 2 == 1  # from the lowest crossing up, these are tops
+        top = np.flatnonzero(np.where(self.closed[part], odd, ends))
+        low = np.where(self.closed[part[top]], z[top - 1], -np.inf)
+        high, place = z[top], place[top]
+        out = points[:, 2].copy()
+        while (inside := (low <= out[place]) & (out[place] < high)).any():
+            np.maximum.at(out, place[inside], high[inside])
+        return out - points[:, 2]
+
     def tops(
         self, points: Float[np.ndarray, "*n 3"], above: float | Float[np.ndarray, "*n"]
     ) -> Float[np.ndarray, "*n"]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float
@@ -71,8 +71,8 @@ class Ground:
             out = out - (points[..., :2] - np.array(self.middle)) @ np.array(self.gradient)
         if self.terrain is not None and points.size:
             out = np.minimum(out, points[..., 2] - self.terrain.tops(points, 0.0))
-            depth = self._field.distance(np.moveaxis(points, -1, 0))
-            return np.where(depth < 0.0, np.minimum(depth, 0.0), out)
+            depth = self.depth(points)
+            return np.where(depth > 0.0, -depth, out)
         if not len(self.tops) or not points.size:
             return out
         across = points[..., :2].reshape(-1, 2)
@@ -95,12 +95,24 @@ class Ground:
             return np.maximum(self.terrain.tops(points, _UNDER) - self.floor_z, 0.0)
         return points[..., 2] - self.floor_z - self.heights(points)
 
-    @cached_property
-    def _field(self) -> DistanceField:
-        """How far points are from the terrain."""
-        assert self.terrain is not None
-        low, high = (bound(self.terrain.vertices, axis=0) for bound in (np.min, np.max))
-        return distance_field(self.terrain, low - 1.0, high + 1.0, _SPACING)
+    def depth(self, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n"]:
+        """How deep [m] points are in what is stated; 0 outside. Of the way out that a grid knows
+        and the way straight up it is the shorter."""
+        out = np.zeros(points.shape[:-1])
+        if self.terrain is None:
+            return out
+        field = _field(self.terrain)
+        away = field.distance(np.moveaxis(points, -1, 0))
+        near = away < 0.0
+        out[near] = np.minimum(-away[near], self.terrain.way_up(points[near]))
+        return out
+
+
+@lru_cache(maxsize=4)
+def _field(terrain: Terrain) -> DistanceField:
+    """How far points are from a terrain."""
+    low, high = (bound(terrain.vertices, axis=0) for bound in (np.min, np.max))
+    return distance_field(terrain, low - 1.0, high + 1.0, _SPACING)
 
 
 def level_ground(floor_z: float) -> Ground:

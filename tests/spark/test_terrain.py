@@ -78,3 +78,14 @@ def test_each_place_is_met_once_by_the_triangles_around_it_and_by_few_others() -
     np.add.at(times, tuple(met.T), 1)
     assert times[inside].min() == times.max() == 1
     assert len(met) < 5 * inside.sum()
+
+
+def test_the_way_up_leads_out_of_all_parts_that_are_in_or_on_each_other() -> None:
+    """Inside a box under another, in both, in none, between two, and below an open surface."""
+    low, high = box((0, 0, 0), (1, 1, 0.3)), box((0.5, 0, 0.2), (1, 1, 0.7))
+    both = together(low, high, box((0, 0, 0.9), (1, 1, 1.0)))
+    points = np.array([[0.2, 0.5, 0.1], [0.7, 0.5, 0.1], [0.7, 0.5, 0.8], [0.2, 1.5, 0.1]])
+    np.testing.assert_allclose(both.way_up(points), [0.2, 0.6, 0.0, 0.0], atol=1e-9)
+    ramp = profile(np.array([[0.0, 0.0], [2.0, 1.0]]), 2.0)
+    points = np.array([[0.6, 0.3, 0.1], [0.6, 0.3, -5.0], [0.6, 0.3, 0.4]])
+    np.testing.assert_allclose(ramp.way_up(points), [0.2, 5.3, 0.0], atol=1e-6)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from spark.transfer.ground import Ground, Stand, distinct, level_ground
+from tests.helpers.grounds import box, together
 
 BOX = Ground(0.1, np.array([[1.0, 0.0, 0.5]]), (Stand("left foot", 2, 4, 0.5),), hip_height=1.0)
 
@@ -44,3 +45,27 @@ def test_places_that_are_one_are_kept_once() -> None:
     tops = np.array([[0.0, 0, 0.5], [0.15, 0, 0.51], [0.15, 0, 0.6], [0.5, 0, 0.5]])
     np.testing.assert_array_equal(distinct(tops, 1.0), tops[[0, 2, 3]])
     assert distinct(np.zeros((0, 3)), 1.0).shape == (0, 3)
+
+
+def test_stated_ground_is_as_deep_as_its_nearest_way_out() -> None:
+    """In a box near its side and below its top; beside it, over the floor."""
+    ground = replace(level_ground(0.0), terrain=box((0, 0, 0), (1, 1, 0.4)))
+    points = np.array([[0.03, 0.5, 0.2], [0.5, 0.5, 0.35], [-0.01, 0.5, 0.2], [0.5, 0.5, 0.45]])
+    np.testing.assert_allclose(ground.depth(points), [0.03, 0.05, 0.0, 0.0], atol=1e-6)
+    np.testing.assert_allclose(
+        ground.heights(points[None])[0], [-0.03, -0.05, 0.2, 0.05], atol=1e-6
+    )
+
+
+def test_in_the_corner_of_a_stair_nothing_is_in_the_stated_ground() -> None:
+    """Wherever tread and riser lie between the nodes of the grid, and on them."""
+    rng = np.random.default_rng(0)
+    for riser, rise in ((0.3, 0.2), (0.311, 0.207), (0.295, 0.213)):
+        steps = together(box((0, 0, 0), (1, 1, rise)), box((riser, 0, 0), (1, 1, 2 * rise)))
+        ground = replace(level_ground(0.0), terrain=steps)
+        x, y, z = rng.uniform(0.0, 1.0, (3, 2000))
+        above = np.stack([riser - 0.05 * x, y, rise + 0.05 * z], axis=1)
+        assert not ground.depth(above).any()
+        below = above * [1.0, 1.0, 0.0] + [0.0, 0.0, rise - 0.005]
+        inner = below[(y > 0.05) & (y < 0.95)]
+        assert ground.depth(inner).max() < 0.0051
