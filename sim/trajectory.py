@@ -14,6 +14,7 @@ from spark.blocks import in_blocks
 from spark.motion import Motion
 from spark.rig.rig import Rig
 from spark.summary import brief
+from spark.terrain import Terrain
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,11 +37,13 @@ class ModelTrajectory:
 @dataclass(frozen=True, eq=False)
 class Subject:
     """Who is looked at: a motion on its rig and, where there is one, a model that moves as it does,
-    whose masses, shapes, soles and joint limits count then."""
+    whose masses, shapes, soles and joint limits count then; on the `terrain` that is stated [m,
+    world], over a floor at z = 0."""
 
     motion: Motion
     rig: Rig
     body: ModelTrajectory | None = None
+    terrain: Terrain | None = None
 
     def picked(self, span: slice) -> "Subject":
         """The frames of a slice."""

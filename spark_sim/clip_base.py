@@ -157,7 +157,7 @@ class ClipBase(ABC):
         """Motion, rig and model, as reports and pictures take them."""
         from sim.trajectory import Subject
 
-        return Subject(self.motion, self.rig, self.body)
+        return Subject(self.motion, self.rig, self.body, self.terrain)
 
     @property
     def surface(self) -> tuple[Skin | None, tuple[str, ...]]:
@@ -168,9 +168,8 @@ class ClipBase(ABC):
         """What a picture or a video shows of the clip."""
         from sim.view.figure import Figure
 
-        ground = treads_of(self.canonical).ground(self.floor_z)
-        figure = Figure(self.subject, self.name, self.floor_z, skin=self.surface[0])
-        return [replace(figure, tops=ground.tops, terrain=ground.terrain)]
+        tops = treads_of(self.canonical).ground(self.floor_z).tops
+        return [Figure(self.subject, self.name, self.floor_z, skin=self.surface[0], tops=tops)]
 
     def save_mjcf(
         self,

@@ -13,7 +13,6 @@ from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_conj, quat_mul, quat_rotate
 from spark.skin import Skin
-from spark.terrain import Terrain
 
 _HEAD = 0.12  # of the standing height: from the head's joint to the crown
 
@@ -26,7 +25,7 @@ class Figure:
     where the figure before it stands: in the same world, or, where it is `aligned`, so that both
     begin in one place. With a `height` [m], the body and its way are scaled to stand as tall. A
     `skin` on the rig's joints is shown instead of the body that is built from the rig. It stands
-    on the `terrain` that is stated, or on pillars up to `tops` [m], in its own world.
+    on the terrain that is stated, or on pillars up to `tops` [m], in its own world.
     """
 
     subject: Subject
@@ -37,7 +36,6 @@ class Figure:
     height: float | None = None
     skin: Skin | None = None
     tops: Float[np.ndarray, "K 3"] = field(default_factory=lambda: np.zeros((0, 3)))
-    terrain: Terrain | None = None
 
     @property
     def motion(self) -> Motion:

@@ -71,10 +71,11 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0, blend: bool
             ahead=quat_rotate(quat_conj(qpos[0, 3:7]), ahead),
             skin=worn,
         )
-        if not figure.ghost and (figure.terrain is not None or len(figure.tops)):
-            if figure.terrain is not None:
-                shown = placement.to_scene(figure.terrain.vertices)
-                add_terrain(world, replace(figure.terrain, vertices=shown), f"{k}_terrain")
+        terrain = figure.subject.terrain
+        if not figure.ghost and (terrain is not None or len(figure.tops)):
+            if terrain is not None:
+                shown = placement.to_scene(terrain.vertices)
+                add_terrain(world, replace(terrain, vertices=shown), f"{k}_terrain")
             else:
                 add_pillars(world, placement.to_scene(figure.tops), _PILLAR * heights[k])
             placement = replace(placement, ground=range(bodies.stop, bodies.stop + 1))

@@ -120,7 +120,7 @@ def stretch(clip: AnyClip, start: float, duration: float) -> Subject:
         stop = len(motion)
     if body is not None:
         body = replace(body, qpos=body.qpos[first:stop])
-    return Subject(motion.frames(first, stop), clip.rig, body)
+    return replace(clip.subject, motion=motion.frames(first, stop), body=body)
 
 
 def mirror_clip(clip: AnyClip) -> Clip:
