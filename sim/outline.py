@@ -6,6 +6,7 @@ from itertools import product
 import mujoco
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial import ConvexHull, QhullError
 
 from sim.body.geoms import HIDDEN_GROUP
 
@@ -13,6 +14,17 @@ _SPHERE, _CAPSULE, _ELLIPSOID, _CYLINDER, _BOX, _MESH = (
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{kind}"))
     for kind in ("SPHERE", "CAPSULE", "ELLIPSOID", "CYLINDER", "BOX", "MESH")
 )
+
+
+def fibonacci_sphere(count: int) -> Float[np.ndarray, "N 3"]:
+    """Evenly spread unit directions: a Fibonacci lattice (Gonzalez 2010)."""
+    k = np.arange(count) + 0.5
+    z, angle = 1 - 2 * k / count, np.pi * (1 + np.sqrt(5)) * k
+    across = np.sqrt(1 - z**2)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
+
+
+_LOOKS, _RING = fibonacci_sphere(200), 32  # of `surface`, on what is round
 
 
 def solid(model: mujoco.MjModel, geoms: Sequence[int]) -> list[int]:
@@ -65,9 +77,24 @@ def outline(
     return np.zeros((0, 3)), 0.0
 
 
-def fibonacci_sphere(count: int) -> Float[np.ndarray, "N 3"]:
-    """Evenly spread unit directions: a Fibonacci lattice (Gonzalez 2010)."""
-    k = np.arange(count) + 0.5
-    z, angle = 1 - 2 * k / count, np.pi * (1 + np.sqrt(5)) * k
-    across = np.sqrt(1 - z**2)
-    return np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
+def surface(model: mujoco.MjModel, geom: int, spacing: float) -> Float[np.ndarray, "P 3"]:
+    """Points [m] all over a geom's convex hull, at most about `spacing` [m] from each other; of a
+    round one to within a millimetre or two. A plane and a height field have none."""
+    points, radius = outline(model, geom, ellipsoid=_LOOKS, mesh=_LOOKS, ring=_RING)
+    if radius:
+        points = (points[:, None] + radius * _LOOKS).reshape(-1, 3)
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError):  # it is flat, or has no points
+        return points
+    found = [hull.points[hull.vertices]]
+    for corners in hull.points[hull.simplices]:
+        longest = float(np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max())
+        count = max(int(np.ceil(longest / spacing)), 1)
+        u, v = np.indices((count + 1, count + 1)).reshape(2, -1) / count
+        inside = u + v < 1 + 1e-9
+        shares = np.stack([u, v, 1 - u - v], axis=1)[inside]
+        found.append(shares @ corners)
+    every = np.concatenate(found)
+    kept = np.unique((every / (spacing / 2)).round(), axis=0, return_index=True)[1]
+    return every[kept]

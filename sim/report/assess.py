@@ -11,8 +11,8 @@ from sim.report.course import Course, course_of
 from sim.report.fall import fall_notes
 from sim.report.findings import findings_of
 from sim.report.findings_beside import Beside
-from sim.report.floor import copied_floor, on_floor, over_level, own_floor
-from sim.report.ground import ground_under, own_ground_notes, source_ground_notes
+from sim.report.floor import over_level
+from sim.report.grounds import ground_of, grounds_beside
 from sim.report.hovers import hovers_of
 from sim.report.in_place import as_it_travels, in_place_notes
 from sim.report.limbs import limbs_of
@@ -35,9 +35,7 @@ from spark.errors import SkeletonError
 from spark.motion import Motion
 from spark.resample import values_at
 from spark.transfer.canonical import to_canonical
-from spark.transfer.ground import level_ground
 from spark.transfer.leg_fit import travel_scale
-from spark.transfer.treads import treads_of
 
 
 def assess(
@@ -48,11 +46,12 @@ def assess(
     Masses, shapes, soles and joint limits are those of the subject's model, or a human's on the
     rig's bones where it has none. `truth` is what the motion should have been.
 
-    The floor of a model is at z = 0, as in its simulator. Else it is the source's (the 5th
-    percentile of its lowest sole point), scaled by the hip heights' ratio; without a source it is
-    the motion's own, and a motion that floats or sinks as a whole can't be told. The source is
-    compared at the same times; its frame rate may be another. One that walks in place is compared
-    as it travels where the motion does (`sim.report.in_place`).
+    Ground that a motion states is its ground, over a floor at z = 0, and that of its source, scaled
+    back (`sim.report.stated`). The floor of a model is at z = 0, as in its simulator. Else it is
+    the source's (the 5th percentile of its lowest sole point), scaled by the hip heights' ratio;
+    without a source it is the motion's own, and a motion that floats or sinks as a whole can't be
+    told. The source is compared at the same times; its frame rate may be another. One that walks in
+    place is compared as it travels where the motion does (`sim.report.in_place`).
     Raises SkeletonError for a body without feet, for a clip without frames, and for a truth that is
     on another skeleton or has other frames.
     """
@@ -64,11 +63,9 @@ def assess(
 
 
 def _alone(course: Course, known: Accuracy | None) -> Report:
-    subject, ground = course.subject, own_floor(course)
-    clip, notes = measure_clip(subject, ground), _about_model(course)
-    if subject.body is None:
-        notes = ("the floor is the clip's own: one that floats or sinks as a whole can't be told",)
-    notes += own_ground_notes(course, ground) + in_place_notes(course)
+    subject, (ground, notes) = course.subject, ground_of(course)
+    clip, notes = measure_clip(subject, ground), _about_model(course) + notes
+    notes += in_place_notes(course)
     notes += stutter_notes(course.motion, "the motion") + fall_notes(subject, clip, "the motion")
     tremble = tremble_beside(subject)
     return Report(clip, None, None, None, findings_of(clip, tremble), notes, tremble, truth=known)
@@ -84,27 +81,20 @@ def _beside(course: Course, source_course: Course, known: Accuracy | None) -> Re
         floor, notes = floor_from_source(course, source.rig, source_floor)
     notes += travels + trembles
     canonical = to_canonical(quiet.motion, quiet.rig)
-    treads = treads_of(canonical)
-    own = own_floor(source_course) if quiet is source else level_ground(source_floor)
-    source_ground = treads.ground(source_floor)
-    if treads.level:
-        source_ground = on_floor(source_ground, own)
-    source_clip = measure_clip(source, source_ground)
-    followed = source_clip if quiet is source else measure_clip(quiet, source_ground)
+    grounds = grounds_beside(
+        course, source_course, canonical, floor, source_floor, trembles=quiet is not source
+    )
+    source_clip = measure_clip(source, grounds.source)
+    followed = source_clip if quiet is source else measure_clip(quiet, grounds.source)
     times = np.arange(len(course)) * motion.frame_time
     scale = rig.hip_height / source.rig.hip_height
-    ground = ground_under(course, treads, floor, scale)
     swung = followed
-    if treads.level:
-        copied = copied_floor(course, floor, source_course, source_floor, own, scale)
-        if copied is None:
-            swung = over_level(followed, source_course, own, source_floor)
-        else:
-            ground = on_floor(ground, copied)
-    clip = _beyond_source(measure_clip(subject, ground), source_clip, times, scale)
+    if grounds.lost_slope is not None:
+        swung = over_level(followed, source_course, grounds.lost_slope, source_floor)
+    clip = _beyond_source(measure_clip(subject, grounds.own), source_clip, times, scale)
     travel = scale if subject.body is not None else travel_scale(source.rig, rig)
     standing = standing_beside(clip, followed, times)
-    notes += source_ground_notes(source_course, own, treads, scale)
+    notes += grounds.notes
     notes += pace_notes(motion, source.motion) + loop_notes(subject, canonical)
     notes += stutter_notes(motion, "the motion") + stutter_notes(source.motion, "the source")
     notes += fall_notes(source, source_clip, "the source")
@@ -151,7 +141,8 @@ def _about_model(course: Course) -> tuple[str, ...]:
     if not may_touch_itself(body.model, body.root):
         notes.append("no two of the model's shapes may collide: self-penetration is not measured")
     height = floor_height(course.lowest[:, 2])
-    if abs(height) > PLAUSIBILITY_V4.scaled(course.rig.hip_height).penetration:
+    stated = course.subject.terrain is not None
+    if not stated and abs(height) > PLAUSIBILITY_V4.scaled(course.rig.hip_height).penetration:
         notes.append(
             f"the model's floor is at z = 0; the clip's own (the 5th percentile of its lowest sole "
             f"point) is {100 * abs(height):.1f} cm {'above' if height > 0 else 'below'} that"

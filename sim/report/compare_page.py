@@ -10,12 +10,11 @@ from sim.report.annotate import annotate
 from sim.report.compare import lines
 from sim.report.explanations import MEANINGS
 from sim.report.names import LABELS
-from sim.report.page import finding_line
+from sim.report.page import figure_of, finding_line
 from sim.report.palette import CORNER_COLORS, css, grade
 from sim.report.result import Result
 from sim.template import Template
 from sim.trajectory import Subject
-from sim.view.figure import Figure
 from sim.view.page import REPLAY, page
 from spark.files import write_atomically
 
@@ -49,9 +48,7 @@ def compare_page(
     theirs = next((r.source for r in reports.values() if r.source is not None), None)
     if source is not None and theirs is not None:
         shown.append((f"{source[0]} (source)", source[1], theirs))
-    figures = [
-        Figure(subject, name, clip.floor_z, tops=clip.ground.tops) for name, subject, clip in shown
-    ]
+    figures = [figure_of(subject, clip, name) for name, subject, clip in shown]
     found = [*(report.findings for report in reports.values()), ()]
     known = [
         annotate(clip, subject, findings)

@@ -80,7 +80,8 @@ def _penetration(clip: ClipMetrics, gap: int) -> Iterator[Finding]:
         for start, stop in true_runs(depth > clip.thresholds.penetration, gap):
             deepest = start + int(depth[start:stop].argmax())
             amount = float(depth[deepest])
-            sentence = f"{name} sinks {100 * amount:.1f} cm under the floor"
+            into = "under the floor" if clip.ground.terrain is None else "into the ground"
+            sentence = f"{name} sinks {100 * amount:.1f} cm {into}"
             yield Finding("penetration", name, start, stop, amount, "m", sentence)
 
 

@@ -9,6 +9,7 @@ from sim.report.limb_ends import limb_ends
 from sim.report.limits import limit_excess
 from sim.report.measures import floating, horizontal_speed, penetration_depth, windowed_min
 from sim.report.model_joints import model_joint_rates, model_limit_excess
+from sim.report.nearest import nearest_to
 from sim.report.self_penetration import capsules, self_penetration
 from sim.report.smoothness import joint_rates
 from sim.report.support import support_of
@@ -22,6 +23,7 @@ def measure(poses: ClipPoses, ground: Ground) -> ClipMetrics:
     """The measures of a posed clip over some ground."""
     thresholds = PLAUSIBILITY_V4.scaled(poses.rig.hip_height)
     frame_time, window = poses.motion.frame_time, thresholds.window
+    poses = nearest_to(poses, ground)
     support = support_of(poses, ground, thresholds)
     corners = len(support.feet)
     inside = np.concatenate([poses.part_points, poses.finger_points], axis=1)

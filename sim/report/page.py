@@ -1,5 +1,6 @@
 """The report as one self-contained web page: headline, replay, worst moments, plots."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -56,10 +57,7 @@ def report_page(
     shown = [(subject, result.clip, names[0])]
     if source is not None and result.source is not None:
         shown.append((source, result.source, names[1]))
-    figures = [
-        Figure(each, name, metrics.floor_z, tops=metrics.ground.tops)
-        for each, metrics, name in shown
-    ]
+    figures = [figure_of(each, metrics, name) for each, metrics, name in shown]
     clip, frame_time = result.clip, result.clip.frame_time
     duration = (len(clip) - 1) * frame_time
     source_duration = (subject if source is None else source).motion.duration
@@ -101,6 +99,12 @@ def report_page(
         duration=duration,
         record=record(result),
     )
+
+
+def figure_of(subject: Subject, clip: ClipMetrics, name: str) -> Figure:
+    """What is shown of a subject: the ground that it was judged on, too."""
+    on_it = replace(subject, terrain=clip.ground.terrain)
+    return Figure(on_it, name, clip.floor_z, tops=clip.ground.tops)
 
 
 def _cards(result: Result) -> list[dict[str, Any]]:

@@ -98,14 +98,18 @@ class Ground:
     def depth(self, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n"]:
         """How deep [m] points are in what is stated; 0 outside. Of the way out that a grid knows
         and the way straight up it is the shorter."""
-        out = np.zeros(points.shape[:-1])
-        if self.terrain is None:
-            return out
-        field = _field(self.terrain)
-        away = field.distance(np.moveaxis(points, -1, 0))
+        out, away = np.zeros(points.shape[:-1]), self.distance(points)
         near = away < 0.0
-        out[near] = np.minimum(-away[near], self.terrain.way_up(points[near]))
+        if self.terrain is not None and near.any():
+            out[near] = np.minimum(-away[near], self.terrain.way_up(points[near]))
         return out
+
+    def distance(self, points: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n"]:
+        """How far [m] points are from what is stated, as a grid knows it; below 0 inside, and inf
+        where nothing is."""
+        if self.terrain is None:
+            return np.full(points.shape[:-1], np.inf)
+        return _field(self.terrain).distance(np.moveaxis(points, -1, 0))
 
 
 @lru_cache(maxsize=4)
