@@ -119,7 +119,7 @@ class Terrain:
         top = np.flatnonzero(np.where(self.closed[part], odd, ends))
         low = np.where(self.closed[part[top]], z[top - 1], -np.inf)
         high, place = z[top], place[top]
-        out = points[:, 2].copy()
+        out = points[:, 2].astype(np.float64)  # single precision would never reach a top
         while (inside := (low <= out[place]) & (out[place] < high)).any():
             np.maximum.at(out, place[inside], high[inside])
         return out - points[:, 2]
