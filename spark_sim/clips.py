@@ -241,11 +241,11 @@ class RobotClip(ClipBase):
         format has no room for as an OBJ (`robots.formats.terrain_beside`). Raises `OutputError`
         where a file exists, unless forced, or `path` has an ending of none of the formats.
         """
-        from robots.formats import dispatch, terrain_beside, written_files
+        from robots.formats import dispatch, taken_files
         from robots.formats.made_from import Source
 
         path = Path(path)
-        for file in (*written_files(path, format), terrain_beside(path)):
+        for file in taken_files(path, format):
             files.check_free(file, force=force)
         if not path.is_dir():
             files.claim(path, force=force)

@@ -72,6 +72,12 @@ def written_files(path: Path, format: str | None = None) -> tuple[Path, ...]:
     return (path, path.with_name(f"{path.name}.json")) if name in SIDECARS else (path,)
 
 
+def taken_files(path: Path, format: str | None = None) -> tuple[Path, ...]:
+    """Those, and that of its ground where `path` has no room for it."""
+    ground = () if format_of(path, format) == "npz" else (terrain_beside(path),)
+    return (*written_files(path, format), *ground)
+
+
 def terrain_beside(path: Path) -> Path:
     """The OBJ [m, Z up] of the stated ground of a motion at `path`, which only our npz has itself:
     in its folder where it is one."""

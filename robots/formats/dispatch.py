@@ -1,6 +1,7 @@
 """Reading and writing a robot's motion in any of the formats."""
 
 from dataclasses import replace
+from os.path import isfile
 from pathlib import Path
 from typing import Any
 
@@ -65,10 +66,10 @@ def write(
         case name:
             write_csv(motion, path, quat="wxyz" if name == "csv-wxyz" else "xyzw", source=source)
     beside = terrain_beside(path)
-    if motion.terrain is None or format_of(path, format) == "npz":
-        beside.unlink(missing_ok=True)  # that of a motion which was here before
-    else:
+    if motion.terrain is not None and format_of(path, format) != "npz":
         write_obj(motion.terrain, beside)
+    elif isfile(beside):  # that of a motion which was here before
+        beside.unlink()
 
 
 def read(
@@ -87,7 +88,7 @@ def read(
     broken.
     """
     motion, beside = _read(path, robot, quat, fps), terrain_beside(path)
-    if motion.terrain is not None or not beside.is_file():
+    if motion.terrain is not None or not isfile(beside):  # which may be too long a name
         return motion
     return replace(motion, terrain=read_terrain(beside, Convention(1.0, "z")))
 

@@ -127,7 +127,7 @@ def configure(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    from robots.formats import SUFFIXES, terrain_beside, written_files
+    from robots.formats import SUFFIXES, taken_files
     from robots.registry import is_robot
     from spark.errors import OutputError, SparkSimError
     from spark.summary import counted
@@ -146,7 +146,7 @@ def run(args: Namespace) -> int:
         console.note(sentence)
     written: list[Path] = []
     for _, out in jobs:
-        written += [*written_files(out, args.format), terrain_beside(out)] if robot else [out]
+        written += taken_files(out, args.format) if robot else [out]
         if not robot:
             files.check_ending(out, character_files.ENDINGS, "a character's motion")
     for file in written:
