@@ -119,10 +119,11 @@ class Terrain:
         top = np.flatnonzero(np.where(self.closed[part], odd, ends))
         low = np.where(self.closed[part[top]], z[top - 1], -np.inf)
         high, place = z[top], place[top]
-        out = points[:, 2].astype(np.float64)  # single precision would never reach a top
+        out = points[:, 2].astype(np.float64)  # of a lower precision, no top would be reached
         while (inside := (low <= out[place]) & (out[place] < high)).any():
             np.maximum.at(out, place[inside], high[inside])
-        return out - points[:, 2]
+        up: Float[np.ndarray, N] = out - points[:, 2]
+        return up
 
     def tops(
         self, points: Float[np.ndarray, "*n 3"], above: float | Float[np.ndarray, "*n"]

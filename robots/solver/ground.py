@@ -23,7 +23,8 @@ class Climb(NamedTuple):
     """What a source stands on: the `heights` [m] of the ground under each of its feet over time
     (`Treads`), the `ground` all around, and how high [m] its hips are over the floor where it sits
     on something (`seats`), 0 where it does not. Where ground is stated, `relief` [m] is that under
-    heel and toe over that under the foot, and `around` the distance from it in the robot's world.
+    heel and toe over that under the foot, and `around` the distance from it in the robot's world:
+    scaled as the motion is, about the world's origin, and along Z about the floor, which is at 0.
     """
 
     heights: Float[np.ndarray, "T F"]
@@ -44,24 +45,22 @@ def climb_of(source: CanonicalMotion, treads: Treads, robot: Morphology) -> Clim
     seats, ground = np.zeros(len(source)), replace(treads, seats=()).ground(source.floor_z)
     for seat in treads.seats:
         seats[seat.start : seat.stop] = seat.high
-    around = None if source.terrain is None else _around(source, robot, source.terrain)
-    return Climb(treads.heights, replace(ground, stands=()), seats, treads.relief, around)
+    ground = replace(ground, stands=())
+    if source.terrain is None:
+        return Climb(treads.heights, ground, seats)
+    around = _around(source, source.terrain)
+    on_robot = around.placed(
+        robot.rig.hip_height / source.rig.hip_height, np.array([0.0, 0.0, -source.floor_z])
+    )
+    ground = replace(ground, around=around)
+    return Climb(treads.heights, ground, seats, treads.relief, on_robot)
 
 
-def _around(source: CanonicalMotion, robot: Morphology, terrain: Terrain) -> DistanceField:
-    """The distance from stated ground in the robot's world, around where the robot goes."""
-    size = robot.rig.hip_height
-    placed = on_robot(source, robot, terrain)
-    path = size / source.rig.hip_height * (source.hips - [0.0, 0.0, source.floor_z])
-    low, high = path.min(axis=0) - _AROUND * size, path.max(axis=0) + _AROUND * size
-    return distance_field(placed, low, high, _SPACING * size)
-
-
-def on_robot(source: CanonicalMotion, robot: Morphology, terrain: Terrain) -> Terrain:
-    """Stated ground as the robot has it, scaled as the motion is: about the world's origin, and
-    along Z about the floor, which is at 0."""
-    scale = robot.rig.hip_height / source.rig.hip_height
-    return terrain.placed(scale, np.array([0.0, 0.0, -source.floor_z]))
+def _around(source: CanonicalMotion, terrain: Terrain) -> DistanceField:
+    """The distance from stated ground, around where a source goes."""
+    size = source.rig.hip_height
+    low, high = source.hips.min(axis=0) - _AROUND * size, source.hips.max(axis=0) + _AROUND * size
+    return distance_field(terrain, low, high, _SPACING * size)
 
 
 def level_climb(source: CanonicalMotion) -> Climb:

@@ -40,6 +40,11 @@ class DistanceField:
 
     __repr__ = brief
 
+    def placed(self, scale: float, shift: Float[np.ndarray, "3"]) -> "DistanceField":
+        """That of the terrain shifted [m], and then scaled about the origin."""
+        terrain, low = self.terrain.placed(scale, shift), scale * (self.low + shift)
+        return DistanceField(terrain, low, scale * self.spacing, scale * self.values)
+
     def distance(self, points: Float[np.ndarray, "3 *n"]) -> Float[np.ndarray, "*n"]:
         """Of points [m, world]; far outside of the grid."""
         return self.away(points).distance

@@ -35,7 +35,8 @@ class Ground:
     reaches as far as for a body with hips at `hip_height` [m], and when feet stand there.
 
     A floor that slopes is `gradient` [m] higher a metre further along X and Y, and at `floor_z` at
-    the place `middle` [m]. A `terrain` [m, world] is stated, and then nothing else is above it.
+    the place `middle` [m]. A `terrain` [m, world] is stated, and then nothing else is above it;
+    `around` is the distance from it, where that is known already.
     """
 
     floor_z: float
@@ -45,6 +46,7 @@ class Ground:
     gradient: tuple[float, float] = (0.0, 0.0)
     middle: tuple[float, float] = (0.0, 0.0)
     terrain: Terrain | None = None
+    around: DistanceField | None = None
 
     def picked(self, span: slice) -> "Ground":
         """In the frames of a slice."""
@@ -109,7 +111,8 @@ class Ground:
         where nothing is."""
         if self.terrain is None:
             return np.full(points.shape[:-1], np.inf)
-        return _field(self.terrain).distance(np.moveaxis(points, -1, 0))
+        field = _field(self.terrain) if self.around is None else self.around
+        return field.distance(np.moveaxis(points, -1, 0))
 
 
 @lru_cache(maxsize=4)
