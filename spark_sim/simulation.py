@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sim.physics import policy_summary
-from sim.physics.floor import NO_STOOLS, Stools
+from sim.physics.floor import NO_PROPS, Props
 from sim.physics.policy_network import PolicyNetwork
 from sim.physics.policy_spec import read_spec
 from sim.physics.policy_tracking import PolicyRun, PolicyTracker
@@ -19,7 +19,7 @@ from sim.physics.tracking import TrackingResult, track
 from sim.report.assess import assess
 from sim.report.course import course_of
 from sim.report.ground import ground_under
-from sim.trajectory import Subject, model_trajectory
+from sim.trajectory import model_trajectory
 from sim.view.figure import Figure
 from spark.errors import SkeletonError
 from spark.motion import Motion
@@ -64,9 +64,9 @@ class Simulated:
     def figures(self) -> list[Figure]:
         """What is shown: the motion as simulated, and its target as a ghost."""
         clip, tracked = self.clip, self.tracked
-        made, wanted = (Subject(clip.motion, clip.rig, b) for b in (tracked.body, tracked.target))
+        made, wanted = (replace(clip.subject, body=b) for b in (tracked.body, tracked.target))
         return [
-            Figure(made, self.name, clip.floor_z, skin=clip.surface[0], tops=_stools(clip).seats),
+            Figure(made, self.name, clip.floor_z, skin=clip.surface[0], tops=_props(clip).seats),
             Figure(wanted, "target", clip.floor_z, ghost=True),
         ]
 
@@ -95,7 +95,7 @@ def simulate(
         clip.motion.frame_time,
         height=clip.rig.standing_height,
         floor_z=clip.floor_z,
-        stools=_stools(clip),
+        props=_props(clip),
         assist=Assist() if assist else None,
         balance=balance,
         torques=_needed_torques(clip) if balance else {},
@@ -110,18 +110,24 @@ def _over_the_ground(clip: AnyClip) -> Motion:
     return clip.motion if way is None else clip.motion.moved(way)
 
 
-def _stools(clip: AnyClip) -> Stools:
-    """What a motion sits on, below where it reaches lowest while it does."""
+def _props(clip: AnyClip) -> Props:
+    """The ground that is stated; or else what a motion sits on, below where it reaches lowest while
+    it does."""
+    if clip.terrain is not None:
+        return Props(terrain=clip.terrain)
     treads = treads_of(clip.canonical)
     if not treads.seats:
-        return NO_STOOLS
+        return NO_PROPS
     floor = replace(treads, heights=np.zeros_like(treads.heights))
     ground = ground_under(course_of(clip.subject), floor, clip.floor_z, 1.0)
-    return Stools(ground.tops, _STOOL * clip.rig.standing_height)
+    return Props(ground.tops, _STOOL * clip.rig.standing_height)
 
 
 def _on_the_ground(clip: AnyClip) -> tuple[str, ...]:
-    """Notes where a motion sits, walks in place, or stands on what is not in the simulation."""
+    """Notes where a motion sits, walks in place, or stands on what is not in the simulation; none
+    on ground that is stated, which is."""
+    if clip.terrain is not None:
+        return ()
     treads = treads_of(clip.canonical)
     way, notes = None if clip.body else way_lacked(clip.canonical), []
     if way is not None:
@@ -185,10 +191,11 @@ class Followed:
         clip, target = self.clip, self.tracker.body
         robot, dt = clip.on_robot.robot, self.tracker.frame_time
         motion = robot.motion(robot.from_qpos(target.qpos), dt)
-        made, tops = replace(target, qpos=self.runs[0].qpos), _stools(clip).seats
+        wanted = replace(clip.subject, motion=motion, body=target)
+        made, tops = replace(target, qpos=self.runs[0].qpos), _props(clip).seats
         return [
-            Figure(Subject(motion, clip.rig, made), self.name, clip.floor_z, tops=tops),
-            Figure(Subject(motion, clip.rig, target), "target", clip.floor_z, ghost=True),
+            Figure(replace(wanted, body=made), self.name, clip.floor_z, tops=tops),
+            Figure(wanted, "target", clip.floor_z, ghost=True),
         ]
 
 
@@ -212,7 +219,7 @@ def follow(clip: RobotClip | File, policy: File, spec: File, *, seeds: int = 3) 
         settings,
         PolicyNetwork(Path(policy), settings),
         height=loaded.rig.standing_height,
-        stools=_stools(loaded),
+        props=_props(loaded),
     )
     runs = tuple(tracker.run(seed) for seed in range(1, seeds + 1))
     return Followed(loaded, Path(policy).stem, tracker, runs)

@@ -1,4 +1,4 @@
-"""The floor that a motion is simulated on, and the stools on it."""
+"""The floor that a motion is simulated on, and what is on it."""
 
 from typing import NamedTuple
 
@@ -8,30 +8,33 @@ from jaxtyping import Float
 
 from sim.body.geoms import HIDDEN_GROUP
 from sim.physics.overlaps import let_overlap
+from sim.physics.stated import add_stated
 from sim.physics.unaided import leave_unaided
 from sim.trajectory import ModelTrajectory
 from spark.errors import SkeletonError
+from spark.terrain import Terrain
 
 _SAME_HEIGHT, _SAME_TILT = 1e-3, 1e-3  # [m], [rad]: within these a plane is the floor
 _AWAY = 100.0  # [m] below the floor: where no body comes
 _PLANE = mujoco.mjtGeom.mjGEOM_PLANE
 
 
-class Stools(NamedTuple):
-    """What a body sits on: the middle of the seat of each [m, world], as wide as its `radius` [m]
-    says."""
+class Props(NamedTuple):
+    """What is on the floor: stools that a body sits on, the middle of the seat of each [m, world],
+    as wide as their `radius` [m] says; and the `terrain` that is stated [m, world]."""
 
     seats: Float[np.ndarray, "K 3"] = np.zeros((0, 3))
     radius: float = 0.0
+    terrain: Terrain | None = None
 
 
-NO_STOOLS = Stools()
+NO_PROPS = Props()
 
 
 def on_floor(
-    body: ModelTrajectory, floor_z: float, notes: list[str], stools: Stools = NO_STOOLS
+    body: ModelTrajectory, floor_z: float, notes: list[str], props: Props = NO_PROPS
 ) -> mujoco.MjSpec:
-    """A copy of the body's spec with something that collides, a floor at the motion's, and stools
+    """A copy of the body's spec with something that collides, a floor at the motion's, and props
     on it, and nothing else that holds it up; what was assumed is added to `notes`."""
     spec = body.spec.copy()
     leave_unaided(spec, body.model, body.root, notes)
@@ -43,11 +46,13 @@ def on_floor(
     }
     if not _has_floor(spec, body.model, floor_z, notes):
         spec.worldbody.add_geom(type=_PLANE, size=[0, 0, 1], pos=[0, 0, floor_z], **meets)
-    for x, y, z in stools.seats.tolist():
+    for x, y, z in props.seats.tolist():
         half, middle = (z - floor_z) / 2, (z + floor_z) / 2
         if half > 0:
-            size, cylinder = [stools.radius, half, 0], mujoco.mjtGeom.mjGEOM_CYLINDER
+            size, cylinder = [props.radius, half, 0], mujoco.mjtGeom.mjGEOM_CYLINDER
             spec.worldbody.add_geom(type=cylinder, size=size, pos=[x, y, middle], **meets)
+    if props.terrain is not None:
+        add_stated(spec, props.terrain, floor_z, meets, notes)
     return spec
 
 

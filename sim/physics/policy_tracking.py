@@ -13,7 +13,7 @@ from scipy.ndimage import uniform_filter1d
 
 from sim.body.compiling import compiled, warnings_as_notes
 from sim.interpolate import at_times
-from sim.physics.floor import NO_STOOLS, Stools, on_floor
+from sim.physics.floor import NO_PROPS, Props, on_floor
 from sim.physics.policy_network import PolicyNetwork
 from sim.physics.policy_observation import Observer
 from sim.physics.policy_parts import moving_bodies, spec_bodies, spec_joints
@@ -74,11 +74,11 @@ class PolicyTracker:
         network: PolicyNetwork,
         *,
         height: float,
-        stools: Stools = NO_STOOLS,
+        props: Props = NO_PROPS,
     ) -> None:
         self.spec, self.network, self.height, self.target = spec, network, height, target
         notes: list[str] = []
-        mujoco_spec = on_floor(target, 0.0, notes, stools)
+        mujoco_spec = on_floor(target, 0.0, notes, props)
         mujoco_spec.option.timestep, mujoco_spec.option.gravity = spec.timestep, [0, 0, -GRAVITY]
         self.model = compiled(mujoco_spec)
         # The policy's torques are applied to the joints, and nothing else drives them.

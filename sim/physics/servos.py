@@ -6,7 +6,7 @@ from jaxtyping import Float
 
 from sim.body.compiling import compiled
 from sim.body.mj_joints import BALL, HINGE
-from sim.physics.floor import NO_STOOLS, Stools, on_floor
+from sim.physics.floor import NO_PROPS, Props, on_floor
 from sim.trajectory import ModelTrajectory
 from spark.constants import GRAVITY
 
@@ -22,9 +22,9 @@ def servo_spec(
     height: float,
     floor_z: float,
     own: bool,
-    stools: Stools = NO_STOOLS,
+    props: Props = NO_PROPS,
 ) -> tuple[mujoco.MjSpec, tuple[str, ...]]:
-    """The body's spec on a floor, beside stools, with a position servo where it has an actuator,
+    """The body's spec on a floor, beside props, with a position servo where it has an actuator,
     and what was assumed on the way.
 
     A model's own position servos stay as they are, unless `own` asks for servos of ours in their
@@ -32,7 +32,7 @@ def servo_spec(
     actuators gets servos on all its joints.
     """
     notes: list[str] = []
-    spec = on_floor(body, floor_z, notes, stools)
+    spec = on_floor(body, floor_z, notes, props)
     timestep = min(float(body.model.opt.timestep), _MAX_TIMESTEP)
     _replace_motors(spec, body.model, height, timestep, own, notes)
     spec.option.timestep, spec.option.gravity = timestep, [0.0, 0.0, -GRAVITY]

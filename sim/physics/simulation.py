@@ -129,9 +129,18 @@ class Simulation:
         nearest = _HIGH
         for floor in np.flatnonzero(fixed & touch):
             for geom in np.flatnonzero(~fixed & touch):
-                found = mujoco.mj_geomDistance(model, self.data, floor, geom, nearest, None)
-                nearest = min(nearest, found)
+                nearest = min(nearest, self._distance(int(floor), int(geom), nearest))
         return nearest
+
+    def _distance(self, floor: int, geom: int, most: float) -> float:
+        """How far a shape is from one that is fixed [m], up to `most`. MuJoCo has no distance from
+        height fields: from those it is that of the ball around the shape, straight down."""
+        model, data = self.model, self.data
+        if int(model.geom_type[floor]) != int(mujoco.mjtGeom.mjGEOM_HFIELD):
+            return float(mujoco.mj_geomDistance(model, data, floor, geom, most, None))
+        middle = data.geom_xpos[geom]
+        down = mujoco.mj_rayHfield(model, data, floor, middle, np.array([0.0, 0.0, -1.0]))
+        return most if down < 0 else float(down - model.geom_rbound[geom])
 
     def _empty(self, frames: int) -> Rollout:
         model = self.model

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from sim.body.compiling import warnings_as_notes
 from sim.interpolate import at_times, velocities
 from sim.physics.balance import Balancer
-from sim.physics.floor import NO_STOOLS, Stools
+from sim.physics.floor import NO_PROPS, Props
 from sim.physics.retries import Retries
 from sim.physics.servos import servo_model, servo_spec
 from sim.physics.simulation import Assist, Rollout, Simulation
@@ -64,7 +64,7 @@ def track(
     *,
     height: float,
     floor_z: float = 0.0,
-    stools: Stools = NO_STOOLS,
+    props: Props = NO_PROPS,
     assist: Assist | None = None,
     balance: bool = False,
     torques: Mapping[str, Float[np.ndarray, "T"]] = MappingProxyType({}),
@@ -80,7 +80,7 @@ def track(
     """
     if not np.isfinite(target.qpos).all():
         raise SkeletonError("the motion has coordinates that are no finite numbers")
-    spec, notes = servo_spec(target, height=height, floor_z=floor_z, own=balance, stools=stools)
+    spec, notes = servo_spec(target, height=height, floor_z=floor_z, own=balance, props=props)
     model = servo_model(spec)
     steps = int(np.ceil(frame_time / model.opt.timestep - 1e-6))
     model.opt.timestep = frame_time / steps

@@ -7,7 +7,7 @@ import pytest
 import spark_sim
 from robots.model.known import known
 from robots.solver.solve import retarget
-from sim.physics.floor import NO_STOOLS, Stools, on_floor
+from sim.physics.floor import NO_PROPS, Props, on_floor
 from spark_sim import simulation
 from spark_sim.clips import RobotClip
 from tests.helpers.sitting import FRAME_TIME, SITS, sitting
@@ -37,7 +37,7 @@ def test_servos_alone_sit_on_a_stool_and_on_nothing_else(
     clip: RobotClip, stool: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not stool:
-        monkeypatch.setattr(simulation, "_stools", lambda clip: NO_STOOLS)
+        monkeypatch.setattr(simulation, "_props", lambda clip: NO_PROPS)
     start = SITS.start * FRAME_TIME
     seen = spark_sim.simulate(clip.part(start=start + 0.3, end=start + 1.8), balance=False)
     made, wanted = (body.qpos[-1, 2] for body in (seen.tracked.body, seen.tracked.target))
@@ -46,7 +46,7 @@ def test_servos_alone_sit_on_a_stool_and_on_nothing_else(
 
 def test_a_stool_reaches_from_the_floor_to_its_seat(clip: RobotClip) -> None:
     seats = np.array([[1.0, 2.0, 0.7], [0.0, 0.0, 0.1]])
-    model = on_floor(clip.body, 0.2, [], Stools(seats, 0.3)).compile()
+    model = on_floor(clip.body, 0.2, [], Props(seats, 0.3)).compile()
     (stool,) = np.flatnonzero(
         (model.geom_type == mujoco.mjtGeom.mjGEOM_CYLINDER) & (model.geom_bodyid == 0)
     )
