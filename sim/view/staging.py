@@ -21,6 +21,7 @@ from spark.rotation import quat_about, quat_conj, quat_mul, quat_rotate
 _SAME_FPS = 1.005  # of frames a second: a file's 0.016666 s means 60, and 0.004166 s means 240
 _PILLAR = 0.09  # of the standing height: the radius of what a foot stands on above the floor
 _SPACING = 0.8  # of two neighbours' mean standing height, between their roots: arms do not meet
+_WIDEST = 3.0  # of that height, between what is stated to be under them: hills go on and on
 
 
 def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0, blend: bool = False) -> Scene:
@@ -35,8 +36,8 @@ def build_scene(figures: Sequence[Figure], *, max_fps: float = 60.0, blend: bool
     world = empty_world()
     frame_time, times = _times(figures, max_fps, blend)
     heights = [figure.rig.standing_height * figure.scale for figure in figures]
-    lanes = _lanes(figures, heights)
     turn = _turn_to_front(figures[0])
+    lanes = _lanes(figures, heights, turn)
     coordinates: list[Float[np.ndarray, "T n"]] = []
     placements: list[Placement] = []
     column = 0
@@ -128,13 +129,31 @@ def _finite(qpos: Float[np.ndarray, "T n"]) -> Float[np.ndarray, "T n"]:
     return np.nan_to_num(qpos[last], posinf=0.0, neginf=0.0)
 
 
-def _lanes(figures: Sequence[Figure], heights: Sequence[float]) -> Float[np.ndarray, "K"]:
-    """Where each figure stands, from left to right as the camera sees them; the middle is 0."""
+def _lanes(
+    figures: Sequence[Figure], heights: Sequence[float], turn: Float[np.ndarray, "4"]
+) -> Float[np.ndarray, "K"]:
+    """Where each figure stands, from left to right as the camera sees them; the middle is 0. What
+    is stated to be under them is side by side, too, as far as `_WIDEST`."""
     lanes = np.zeros(len(figures))
+    reaches = [_reaches(figure, turn) for figure in figures]
     for k in range(1, len(figures)):
-        gap = 0.0 if figures[k].ghost else _SPACING * (heights[k - 1] + heights[k]) / 2
-        lanes[k] = lanes[k - 1] + gap
+        if figures[k].ghost:
+            lanes[k] = lanes[k - 1]
+            continue
+        height = (heights[k - 1] + heights[k]) / 2
+        between = np.clip(reaches[k - 1][1] - reaches[k][0], 0.0, _WIDEST * height)
+        lanes[k] = lanes[k - 1] + _SPACING * height + between
     return lanes - lanes[-1] / 2
+
+
+def _reaches(figure: Figure, turn: Float[np.ndarray, "4"]) -> tuple[float, float]:
+    """From where a figure starts to the two sides of what is stated to be under it [m, scene]."""
+    terrain = figure.subject.terrain
+    if terrain is None or figure.ghost:
+        return 0.0, 0.0
+    away = figure.scale * (terrain.vertices - figure.motion.root_pos[0])
+    across = quat_rotate(turn, away)[:, 1]
+    return float(across.min()), float(across.max())
 
 
 def _turn_to_front(figure: Figure) -> Float[np.ndarray, "4"]:

@@ -78,4 +78,10 @@ def add_terrain(spec: mujoco.MjSpec, terrain: Terrain, name: str) -> None:
         userface=terrain.faces.ravel().tolist(),
         inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
     )
-    body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, rgba=_GROUND_RGBA)
+    body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_MESH,
+        meshname=name,
+        rgba=_GROUND_RGBA,
+        contype=0,  # what does not collide may be flat
+        conaffinity=0,
+    )
