@@ -165,14 +165,16 @@ def _beside(
     """How far [m] nodes are from the nearest triangle, and its point there; inf beyond the band."""
     shape, start = np.array([len(axis) for axis in axes]), np.array([axis[0] for axis in axes])
     spacing, corners = axes[0][1] - axes[0][0], terrain.corners
-    first = np.ceil((corners.min(axis=1) - band - start) / spacing).astype(int)
-    last = np.floor((corners.max(axis=1) + band - start) / spacing).astype(int)
+    low, high, middles = corners.min(axis=1), corners.max(axis=1), corners.mean(axis=1)
+    first = np.ceil((low - band - start) / spacing).astype(int)
+    last = np.floor((high + band - start) / spacing).astype(int)
     first, last = np.maximum(first, 0), np.minimum(last, shape - 1)
     met = np.flatnonzero((first <= last).all(axis=1))
     sizes = last[met] - first[met] + 1
     order = np.lexsort((*sizes.T, sizes.prod(axis=1)))  # alike ones are looked at together
     met, sizes = met[order], sizes[order]
     distance, nearest = np.full(shape.prod(), np.inf), np.zeros((shape.prod(), 3))
+    most_away = np.full(shape.prod(), band)  # as the middles of triangles say: most are farther
     begin = 0
     while begin < len(met):
         most = np.maximum.accumulate(sizes[begin : begin + _AT_ONCE], axis=0).prod(axis=1)
@@ -180,15 +182,23 @@ def _beside(
         size, own = sizes[begin:end].max(axis=0), met[begin:end]
         nodes = first[own, None] + np.indices(size).reshape(3, -1).T
         which, at = np.nonzero((nodes <= last[own, None]).all(axis=2))
-        nodes = nodes[which, at]
-        places = start + spacing * nodes
-        points = on_triangles(places, corners[own[which]])
-        away, flat = np.linalg.norm(places - points, axis=1), np.ravel_multi_index(nodes.T, shape)
+        nodes, which = nodes[which, at], own[which]
+        flat, places = np.ravel_multi_index(nodes.T, shape), start + spacing * nodes
+        np.minimum.at(most_away, flat, _length(places - middles[which]))
+        outside = np.maximum(low[which] - places, places - high[which]).clip(0.0)
+        kept = _length(outside) <= most_away[flat]
+        flat, places = flat[kept], places[kept]
+        points = on_triangles(places, corners[which[kept]])
+        away = _length(places - points)
         nearer = np.flatnonzero(away < np.minimum(distance[flat], band))
         nearer = nearer[away[nearer].argsort()[::-1]]  # of one node the nearest is written last
         distance[flat[nearer]], nearest[flat[nearer]] = away[nearer], points[nearer]
         begin = end
     return distance.reshape(shape), nearest.T.reshape(3, *shape)
+
+
+def _length(vectors: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N"]:
+    return np.sqrt(np.einsum("ni,ni->n", vectors, vectors))
 
 
 def on_triangles(
