@@ -16,6 +16,7 @@ from spark.terrain import Terrain
 
 MESHES: Final = (".obj", ".stl", ".ply", ".glb", ".off")
 _LARGEST = 256 << 20  # bytes
+_FARTHEST = 1e6  # [m] from the origin
 _EXPECTED = "a mesh (" + ", ".join(MESHES) + ")"
 
 
@@ -46,6 +47,8 @@ def checked(
         )
     if not np.isfinite(vertices[used]).all():
         raise FileFormatError(path, None, "has a vertex that is no number")
+    if np.abs(vertices[used]).max() > _FARTHEST:
+        raise FileFormatError(path, None, f"has a vertex beyond {_FARTHEST:g} m: check its unit")
     if np.ptp(vertices[used, :2], axis=0).min() <= 0.0:
         raise FileFormatError(path, None, "has no surface to stand on: all of it is upright")
     return Terrain(vertices[used], np.searchsorted(used, faces))

@@ -26,6 +26,7 @@ _MISFIT = 0.08  # by which a foot may be higher or lower over it than others are
 _EDGE = 0.09  # from the middle of a foot to an end, up or down, beyond which that is over an edge
 _BASE = 0.15  # from where feet stand to the floor that the file, or the terrain's base, says
 _NOWHERE = 3.0  # from the terrain to the nearest footfall, of a terrain that is not the motion's
+_INSIDE = 0.5  # of the time in which hips are in it, of one that is not the motion's either
 _OFF = 0.05  # between drawn soles and the ground, which a note tells
 _DRAWN = 0.5  # [s] over which the body is brought from one height over the ground to another
 
@@ -145,16 +146,19 @@ def _floor(
 def _check_near(
     terrain: Terrain, source: CanonicalMotion, paths: Float[np.ndarray, "T S 2 3"], scale: float
 ) -> None:
-    """Raise `ConventionError` where the terrain is far from wherever the source goes."""
+    """Raise `ConventionError` where the terrain is far from wherever the source goes, or most of
+    that is inside it."""
     low, high = terrain.vertices.min(axis=0), terrain.vertices.max(axis=0)
     places = paths.reshape(-1, 3) if paths.size else source.hips
     away = np.linalg.norm(np.maximum(np.maximum(low - places, places - high), 0.0), axis=1)
-    if float(away.min()) < _NOWHERE * scale:
+    inside = bool((terrain.way_up(source.hips) > 0.0).mean() > _INSIDE)
+    if float(away.min()) < _NOWHERE * scale and not inside:
         return
     size = " x ".join(f"{length:.3g}" for length in high - low)
     goes = " x ".join(f"{length:.3g}" for length in np.ptp(places, axis=0))
+    where = "around" if inside else f"{away.min():.3g} m from the nearest step of"
     raise ConventionError(
-        f"the stated ground, {size} m large, is {away.min():.3g} m from the nearest step of the "
+        f"the stated ground, {size} m large, is {where} the "
         f"source, which goes over {goes} m: both are read in the unit and axes of the source's "
         f"file{_fitting(low, high, places)}"
     )

@@ -54,6 +54,7 @@ def test_other_meshes_are_read_by_trimesh(tmp_path: Path, kind: str) -> None:
         ("v 0 0 0\nf 1 2\n", "three vertices or more"),
         ("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "no number"),
         ("v 0 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n", "upright"),
+        ("v 0 0 0\nv 1e9 1 0\nv 0 0 1\nf 1 2 3\n", "check its unit"),
     ],
 )
 def test_what_is_broken_is_refused_by_its_place(tmp_path: Path, text: str, said: str) -> None:

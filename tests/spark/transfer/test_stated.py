@@ -74,6 +74,11 @@ def test_ground_that_is_nowhere_near_is_refused_with_what_would_fit() -> None:
         on_terrain(onto_box(), THERE.placed(1.0, np.array([30.0, 0, 0])))
 
 
+def test_ground_that_the_source_is_inside_of_is_refused() -> None:
+    with pytest.raises(ConventionError, match=r"is around the source.*scaled by 0.01 "):
+        on_terrain(onto_box(), box((-50, -50, 0), (50, 50, 40)))
+
+
 def test_soles_far_from_the_ground_are_told() -> None:
     assert not on_terrain(onto_box(), THERE).notes
     (note,) = on_terrain(
