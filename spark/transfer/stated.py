@@ -178,7 +178,7 @@ def _fitting(
                 continue
             if (np.maximum(a - middle, middle - b) < reach).all():
                 return f"; scaled by {factor:g}{words} it would be where the source is"
-    return ""
+    return "; move it to where the source is"
 
 
 def stated_under(
