@@ -18,7 +18,7 @@ from scripts.corruptions import CORRUPTIONS, HARMLESS
 from sim.report import Report, Subject, assess
 from sim.report.course import course_of
 from sim.report.names import FLAGS
-from sim.report.thresholds import PLAUSIBILITY_V4
+from sim.report.thresholds import PLAUSIBILITY
 from spark.constants import GRAVITY
 from spark.errors import SkeletonError, SparkSimError
 from spark.io.recording import read_recording
@@ -116,7 +116,7 @@ def clips(data: Path) -> Iterator[tuple[str, Motion, Rig]]:
                 print(f"left out: {error}", file=sys.stderr)
                 continue
             height = lowest - np.percentile(lowest, 5)
-            limit = PLAUSIBILITY_V4.scaled(rig.hip_height).floating
+            limit = PLAUSIBILITY.scaled(rig.hip_height).floating
             if motion.duration >= 1 and (height > limit).mean() <= 0.1:
                 found.append((path.stem, motion, rig))
         step = max(1, -(-len(found) // PER_FOLDER))

@@ -24,7 +24,7 @@ from robots.solver.solve import copy, retarget
 from robots.stream.frame_targets import LATENCY, Frame, ground_of
 from robots.stream.stream import Stream
 from sim.report.assess import assess
-from sim.report.thresholds import PLAUSIBILITY_V4
+from sim.report.thresholds import PLAUSIBILITY
 from sim.trajectory import Subject
 from spark.io.recording import read_recording
 from spark.rig.rig import understand
@@ -46,7 +46,7 @@ COLUMNS = {  # title: (field, factor, format, the bar: what it must not exceed, 
     "drag %": ("dragging", 100, ".2f", lambda m: m.dragging_source + 0.005),
     "hips acc.": ("hips_acceleration", 1, ".2f", lambda m: 1.0),
     "CoM acc.": ("com_acceleration", 1, ".2f", lambda m: 1.0),
-    "limb acc.": ("limb_acceleration", 1, ".2f", lambda m: PLAUSIBILITY_V4.limb_throw),
+    "limb acc.": ("limb_acceleration", 1, ".2f", lambda m: PLAUSIBILITY.limb_throw),
     "contacts F1": ("contact_f1", 1, ".3f", None),
     "heading": ("heading_rad", 57.3, ".1f", lambda m: np.radians(8)),
     "drift cm": ("drift_m", 100, ".1f", lambda m: 0.1),

@@ -26,7 +26,7 @@ from sim.report.source_floor import floor_from_source, without_tremble
 from sim.report.stretches import measure_clip
 from sim.report.stutter import stutter_notes
 from sim.report.swing import swing_of
-from sim.report.thresholds import PLAUSIBILITY_V4
+from sim.report.thresholds import PLAUSIBILITY
 from sim.report.tremble import tremble_beside
 from sim.report.truth import Accuracy, accuracy
 from sim.self_contact import may_touch_itself
@@ -142,7 +142,7 @@ def _about_model(course: Course) -> tuple[str, ...]:
         notes.append("no two of the model's shapes may collide: self-penetration is not measured")
     height = floor_height(course.lowest[:, 2])
     stated = course.subject.terrain is not None
-    if not stated and abs(height) > PLAUSIBILITY_V4.scaled(course.rig.hip_height).penetration:
+    if not stated and abs(height) > PLAUSIBILITY.scaled(course.rig.hip_height).penetration:
         notes.append(
             f"the model's floor is at z = 0; the clip's own (the 5th percentile of its lowest sole "
             f"point) is {100 * abs(height):.1f} cm {'above' if height > 0 else 'below'} that"

@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float
 from sim.report.clip_metrics import ClipMetrics
 from sim.report.course import Course
 from sim.report.measures import LEVEL, Slope, fitted_slope, floor_height
-from sim.report.thresholds import HUMAN_HIP_HEIGHT, PLAUSIBILITY_V4, Thresholds
+from sim.report.thresholds import HUMAN_HIP_HEIGHT, PLAUSIBILITY, Thresholds
 from spark.rig.contacts import ADULT_HEIGHT, PLANTED_SPEED, climbing_speeds, speeds
 from spark.transfer.ground import Ground, level_ground
 
@@ -115,7 +115,7 @@ def _explained(course: Course, ground: Ground) -> int:
 
 
 def _limits(course: Course) -> Thresholds:
-    return PLAUSIBILITY_V4.scaled(course.rig.hip_height)
+    return PLAUSIBILITY.scaled(course.rig.hip_height)
 
 
 def _still(course: Course) -> Bool[np.ndarray, "T"]:

@@ -6,7 +6,7 @@ from sim.report.clip_poses import ClipPoses, pose_clip
 from sim.report.course import Course
 from sim.report.floor import standing_places
 from sim.report.measures import Slope, floor_slope
-from sim.report.thresholds import PLAUSIBILITY_V4
+from sim.report.thresholds import PLAUSIBILITY
 from spark.transfer.canonical import to_canonical
 from spark.transfer.ground import Ground
 from spark.transfer.seats import FLESH
@@ -95,7 +95,7 @@ def _slope(course: Course, floor: Ground, whose: str) -> tuple[str, ...]:
         gradient, middle = np.array(floor.gradient), np.array(floor.middle)
         slope = Slope(gradient, middle, float(np.ptp(places[:, :2] @ gradient)))
         there = "and the floor is taken to be that slope"
-    if slope.rise < PLAUSIBILITY_V4.scaled(course.rig.hip_height).floating / 2:
+    if slope.rise < PLAUSIBILITY.scaled(course.rig.hip_height).floating / 2:
         return ()
     if slope.angle > _STEEPEST:
         return (

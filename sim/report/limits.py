@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sim.report.thresholds import PLAUSIBILITY_V4
+from sim.report.thresholds import PLAUSIBILITY
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_relative, quat_swing_twist, rotvec_from_quat
@@ -187,7 +187,7 @@ def limit_excess(since_tpose: Float[np.ndarray, "T J 4"], rig: Rig) -> tuple[Lim
                     limit.on(side),
                     _beyond(swing_and_twist(rotation, limit.axis), np.radians(limit.ranges)),
                     tuple(word for words in limit.movements for word in words),
-                    PLAUSIBILITY_V4.limit_margin,
+                    PLAUSIBILITY.limit_margin,
                 )
             )
     return tuple(excesses)

@@ -13,7 +13,7 @@ from sim.report.nearest import nearest_to
 from sim.report.self_penetration import capsules, self_penetration
 from sim.report.smoothness import joint_rates
 from sim.report.support import support_of
-from sim.report.thresholds import PLAUSIBILITY_V4
+from sim.report.thresholds import PLAUSIBILITY
 from sim.report.torque import JointTorque, joint_torques
 from spark.constants import GRAVITY
 from spark.transfer.ground import Ground
@@ -21,7 +21,7 @@ from spark.transfer.ground import Ground
 
 def measure(poses: ClipPoses, ground: Ground) -> ClipMetrics:
     """The measures of a posed clip over some ground."""
-    thresholds = PLAUSIBILITY_V4.scaled(poses.rig.hip_height)
+    thresholds = PLAUSIBILITY.scaled(poses.rig.hip_height)
     frame_time, window = poses.motion.frame_time, thresholds.window
     poses = nearest_to(poses, ground)
     support = support_of(poses, ground, thresholds)

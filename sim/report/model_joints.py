@@ -6,7 +6,7 @@ from sim.body.mj_joints import BALL, HINGE, hinges_and_balls, joint_name
 from sim.report.derivatives import derivative
 from sim.report.limits import LimitExcess
 from sim.report.smoothness import Rates, angular_rates, turns_between
-from sim.report.thresholds import PLAUSIBILITY_V4
+from sim.report.thresholds import PLAUSIBILITY
 from sim.trajectory import ModelTrajectory
 from spark.rotation import quat_normalize, rotvec_from_quat
 
@@ -19,7 +19,7 @@ def model_limit_excess(body: ModelTrajectory) -> tuple[LimitExcess, ...]:
 
     Joints without limits are left out.
     """
-    model, limits, excesses = body.model, PLAUSIBILITY_V4, []
+    model, limits, excesses = body.model, PLAUSIBILITY, []
     for joint in hinges_and_balls(body.model, body.root):
         if not model.jnt_limited[joint]:
             continue

@@ -11,7 +11,7 @@ from sim.report.derivatives import SPLINE, derivative, whole_windows
 from sim.report.limb_ends import limb_ends
 from sim.report.limits import joint_of_bone
 from sim.report.smoothness import bone_pairs, turns_between
-from sim.report.thresholds import PLAUSIBILITY_V4
+from sim.report.thresholds import PLAUSIBILITY
 from spark.blocks import blocks
 from spark.kinematics import forward
 from spark.motion import Motion
@@ -66,7 +66,7 @@ def strays_of(rig: Rig, picked: Callable[[slice], Motion], count: int, frame_tim
     Of joints that have one name, as those of a spine, the outermost is taken; toes are left out,
     which tremble in recordings and carry nothing that shows.
     """
-    window = PLAUSIBILITY_V4.window
+    window = PLAUSIBILITY.window
     pop_window = max(window, _LEAST_FRAMES * frame_time)
     margin = int(np.ceil(pop_window / frame_time)) + SPLINE
     bones = {joint_of_bone(n): pair for n, *pair in bone_pairs(rig) if "toe" not in n}

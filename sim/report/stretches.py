@@ -11,7 +11,7 @@ from sim.report.clip_metrics import ClipMetrics
 from sim.report.clip_poses import pose_clip
 from sim.report.derivatives import SPLINE
 from sim.report.measuring import measure
-from sim.report.thresholds import PLAUSIBILITY_V4
+from sim.report.thresholds import PLAUSIBILITY
 from sim.trajectory import Subject
 from spark.blocks import blocks
 from spark.transfer.ground import Ground
@@ -50,7 +50,7 @@ def measure_clip(subject: Subject, ground: Ground) -> ClipMetrics:
 def _margin(frame_time: float) -> int:
     """How many frames beside a stretch its measures depend on: those of the second derivative of a
     first one, and of the least of a first one over `static_time`."""
-    limits = PLAUSIBILITY_V4
+    limits = PLAUSIBILITY
     seconds = max(2 * limits.window, limits.window + limits.static_time)
     return int(np.ceil(seconds / frame_time)) + 2 * SPLINE
 

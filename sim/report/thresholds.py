@@ -7,7 +7,7 @@ HUMAN_HIP_HEIGHT = 0.9  # [m] of an adult: the size that the thresholds are give
 
 @dataclass(frozen=True)
 class Thresholds:
-    """`plausibility v4`: what counts as implausible, for a body whose hips stand 0.9 m high.
+    """What counts as implausible, for a body whose hips stand 0.9 m high.
 
     Those of skating were chosen on clean recordings of people, which must show little of it; the
     others were set beforehand. `scripts/report_bench.py` measures on spoilt recordings what they
@@ -114,7 +114,7 @@ class Thresholds:
 
     def of_adult(self, length: float) -> float:
         """A length of an adult [m], on the body that the table was `scaled` for [m]."""
-        return length * self.floating / PLAUSIBILITY_V4.floating
+        return length * self.floating / PLAUSIBILITY.floating
 
 
-PLAUSIBILITY_V4 = Thresholds()
+PLAUSIBILITY = Thresholds()

@@ -18,7 +18,7 @@ from robots.tree import Coordinates
 from scripts.robot_bars import follow
 from sim.outline import outline, solid
 from sim.report.clip_poses import pose_clip
-from sim.report.thresholds import HUMAN_HIP_HEIGHT, PLAUSIBILITY_V4
+from sim.report.thresholds import HUMAN_HIP_HEIGHT, PLAUSIBILITY
 from sim.trajectory import Subject
 from spark.demo.sample import sample_motion, sample_rig
 from spark.rig.roles import Role
@@ -104,7 +104,7 @@ def test_no_point_of_a_foot_that_lies_is_lower_than_is_known(tmp_path: Path, foo
     own = [solid for solid in solids_over_floor(robot) if solid.link in robot.foot_links]
     known = np.vstack([*soles, *(solid.lowest(poses) for solid in own)]).min(axis=0)
     excess = (known - lowest(robot, robot.to_qpos(q))).max()
-    assert excess < PLAUSIBILITY_V4.penetration / 2 * robot.rig.hip_height / HUMAN_HIP_HEIGHT
+    assert excess < PLAUSIBILITY.penetration / 2 * robot.rig.hip_height / HUMAN_HIP_HEIGHT
 
 
 @pytest.mark.parametrize("foot", FEET)

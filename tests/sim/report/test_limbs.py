@@ -8,7 +8,7 @@ import pytest
 from jaxtyping import Float
 
 from sim.report import Report, Subject, assess
-from sim.report.thresholds import PLAUSIBILITY_V4
+from sim.report.thresholds import PLAUSIBILITY
 from spark.rig.rig import Rig
 from spark.rig.roles import Role
 from spark.rotation import quat_about
@@ -16,7 +16,7 @@ from tests.helpers.stick import joint, scaled, standing, stick_rig, without
 
 Times = Float[np.ndarray, "T"]
 ELBOW, HAND = 0.3, 0.55  # [m] from the shoulder
-LEAST = PLAUSIBILITY_V4.limb_least
+LEAST = PLAUSIBILITY.limb_least
 
 
 def turning(rate: float, *, rig: Rig | None = None, fps: float = 60.0) -> Subject:

@@ -22,7 +22,7 @@ from sim.report.measures import (
 )
 from sim.report.self_penetration import Capsules, segment_distance, self_penetration
 from sim.report.smoothness import joint_rates
-from sim.report.thresholds import PLAUSIBILITY_V4
+from sim.report.thresholds import PLAUSIBILITY
 from spark.kinematics import forward
 from spark.rig.roles import Role
 from spark.rotation import quat_about, quat_mul
@@ -262,6 +262,6 @@ def test_the_documents_tell_the_thresholds() -> None:
     told = {
         name: float(value) for name, value in re.findall(r"^\| `(\w+)` \| ([\d.]+) ", text, re.M)
     }
-    used = asdict(PLAUSIBILITY_V4)
+    used = asdict(PLAUSIBILITY)
     assert used.pop("version") in text
     assert told == used

@@ -9,7 +9,7 @@ from sim.body.qpos import qpos_from_motion
 from sim.report.clip_poses import pose_clip
 from sim.report.mass import Mass
 from sim.report.support import Support
-from sim.report.thresholds import PLAUSIBILITY_V4
+from sim.report.thresholds import PLAUSIBILITY
 from sim.report.wrench import angular_momentum, required_wrench, unexplained_wrench
 from sim.trajectory import Subject
 from spark.motion import Motion
@@ -144,7 +144,7 @@ def swinging(com_y: float, heel_height: float, toe_speed: float) -> np.ndarray:
     heights[6:] = [heel_height, heel_height, 0.015, 0.015, 0.015, 0.015]
     speeds = np.repeat([0.0, toe_speed], 6)
     support = Support(
-        thresholds=PLAUSIBILITY_V4,
+        thresholds=PLAUSIBILITY,
         feet=("right foot",) * 6 + ("left foot",) * 6,
         heights=heights[None],
         speeds=speeds[None],
