@@ -48,10 +48,11 @@ def assess(
 
     Ground that a motion states is its ground, over a floor at z = 0, and that of its source, scaled
     back (`sim.report.stated`). The floor of a model is at z = 0, as in its simulator. Else it is
-    the source's (the 5th percentile of its lowest sole point), scaled by the hip heights' ratio;
-    without a source it is the motion's own, and a motion that floats or sinks as a whole can't be
-    told. The source is compared at the same times; its frame rate may be another. One that walks in
-    place is compared as it travels where the motion does (`sim.report.in_place`).
+    the source's (the 5th percentile of its lowest sole point), scaled by the hip heights' ratio, or
+    under soles that are as thick as shoes are (`sim.report.source_floor`); without a source it is
+    the motion's own, and a motion that floats or sinks as a whole can't be told. The source is
+    compared at the same times; its frame rate may be another. One that walks in place is compared
+    as it travels where the motion does (`sim.report.in_place`).
     Raises SkeletonError for a body without feet, for a clip without frames, and for a truth that is
     on another skeleton or has other frames.
     """
@@ -78,7 +79,8 @@ def _beside(course: Course, source_course: Course, known: Accuracy | None) -> Re
     quiet, source_floor, trembles = without_tremble(source_course)
     floor, notes = 0.0, _about_model(course)
     if subject.body is None:
-        floor, notes = floor_from_source(course, source.rig, source_floor)
+        quiet_course = source_course if quiet is source else course_of(quiet)
+        floor, notes = floor_from_source(course, quiet_course, source_floor)
     notes += travels + trembles
     canonical = to_canonical(quiet.motion, quiet.rig)
     grounds = grounds_beside(

@@ -40,7 +40,7 @@ def own_floor(course: Course) -> Ground:
     if slope.angle > MAX_SLOPE:
         return level
     sloping = _floor(course, slope)
-    better = _CLEARLY * _explained(course, sloping) > _explained(course, level)
+    better = _CLEARLY * explained(course, sloping) > explained(course, level)
     return sloping if better else level
 
 
@@ -66,7 +66,7 @@ def copied_floor(
     higher = scale * float(_over(own, source.hips[:1], source_floor_z)[0])
     x, y = course.hips[0, :2].tolist()
     copied = replace(level, floor_z=floor_z + higher, gradient=own.gradient, middle=(x, y))
-    return copied if _explained(course, copied) > _explained(course, level) else None
+    return copied if explained(course, copied) > explained(course, level) else None
 
 
 def over_level(clip: ClipMetrics, course: Course, own: Ground, floor_z: float) -> ClipMetrics:
@@ -108,8 +108,8 @@ def _height(lowest: Float[np.ndarray, "T"], course: Course) -> float:
     return float(good[np.abs(good - floor_height(stand)).argmin()])
 
 
-def _explained(course: Course, ground: Ground) -> int:
-    """In how many frames a foot stands on some ground."""
+def explained(course: Course, ground: Ground) -> int:
+    """In how many of the frames in which a foot is still it stands on some ground."""
     heights, limits = ground.heights(course.lowest[_still(course), None])[:, 0], _limits(course)
     return int(((heights >= -limits.penetration) & (heights <= limits.floating)).sum())
 
@@ -118,9 +118,15 @@ def _limits(course: Course) -> Thresholds:
     return PLAUSIBILITY.scaled(course.rig.hip_height)
 
 
+def still_feet(course: Course) -> Bool[np.ndarray, "T F"]:
+    """Which feet are still, however high."""
+    still: Bool[np.ndarray, "T F"] = _slow(course, speeds) & _slow(course, climbing_speeds)
+    return still
+
+
 def _still(course: Course) -> Bool[np.ndarray, "T"]:
     """The frames in which a foot is still, however high."""
-    return (_slow(course, speeds) & _slow(course, climbing_speeds)).any(axis=1)
+    return np.asarray(still_feet(course).any(axis=1))
 
 
 def _slow(

@@ -14,7 +14,7 @@ class Thresholds:
     tell apart: docs/report.md has its table.
     """
 
-    version: str = "plausibility v4"
+    version: str = "plausibility v5"
 
     # Penetration: the lowest point lies deeper than this under the floor [m].
     penetration: float = 0.01

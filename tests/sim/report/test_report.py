@@ -394,7 +394,7 @@ def test_json_is_json_and_says_what_it_is() -> None:
     again = json.loads(json.dumps(record, allow_nan=False))
     assert again == record
     assert again["schema"] == "spark-sim report 1"
-    assert again["thresholds"] == "plausibility v4"
+    assert again["thresholds"] == "plausibility v5"
 
 
 def test_rows_hold_what_the_record_does_beside_the_source() -> None:
