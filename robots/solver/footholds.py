@@ -7,7 +7,7 @@ shifted until most of it is on top, or out of the wall that it would be in.
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Bool, Complex, Float
 from scipy.ndimage import grey_dilation
 
 from robots.solver.footprints import FootPlan
@@ -34,16 +34,20 @@ def on_ground(plan: FootPlan) -> FootPlan:
     if plan.around is None:
         return plan
     terrain = plan.around.terrain
-    prints, ground = plan.prints.copy(), plan.ground.copy()
+    prints, ground, contacts = plan.prints.copy(), plan.ground.copy(), plan.contacts.copy()
     relief = np.zeros((len(prints), len(plan.flat)))
     for start, stop in true_runs(plan.stands):
         own, height = slice(start, stop), float(np.median(ground[start:stop]))
         toe, heading = prints[own, :2].mean(axis=0) @ [1, 1j], float(prints[own, 2].mean())
         shift = _shift(terrain, plan, toe, heading, height)
         prints[own, :2] += [shift.real, shift.imag]
-        ground[own], relief[own] = _under(terrain, plan, toe + shift, heading, height)
+        level, relief[own] = _under(terrain, plan, toe + shift, heading, height)
+        ground[own] = level
+        carried = _carried(terrain, plan, toe + shift, heading, level)
+        if not carried.all():
+            contacts[own] |= carried
     ground = between_contacts(ground[:, None], plan.stands, plan.toe)[:, 0]
-    return replace(plan, prints=prints, ground=ground, relief=relief)
+    return replace(plan, prints=prints, ground=ground, contacts=contacts, relief=relief)
 
 
 def _shift(
@@ -101,6 +105,17 @@ def _under(
         return level, none
     corners = toe + np.exp(1j * heading) * (plan.flat @ [1, 1j]) - middle
     return float(plane[0]), plane[1] * corners.real + plane[2] * corners.imag
+
+
+def _carried(
+    terrain: Terrain, plan: FootPlan, toe: complex, heading: float, level: float
+) -> Bool[np.ndarray, "2"]:
+    """Whether there is ground below the heel and below the toes of a footprint: one that is over an
+    edge can't carry a foot alone, and the other end stands, too."""
+    points = toe + np.exp(1j * heading) * (plan.flat @ [1, 1j])
+    tops = _tops(terrain, points, level, _LEVEL * plan.hip_height)
+    carry = np.abs(tops - level) < _LEVEL * plan.hip_height
+    return np.array([carry[:2].any(), carry[-2:].any()])
 
 
 def _sole(plan: FootPlan, margin: float, heading: float) -> Complex[np.ndarray, "K"]:
