@@ -64,7 +64,10 @@ def _triangles(model: mujoco.MjModel, geom: int) -> Triangles:
     if radius:
         points = (points[:, None] + radius * _LOOKS).reshape(-1, 3)
     hull = ConvexHull(points)
-    return points, hull.simplices.astype(np.int64)
+    a, b, c = points[hull.simplices].swapaxes(0, 1)
+    inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
+    faces = np.where(inward[:, None], hull.simplices[:, ::-1], hull.simplices)
+    return points, faces.astype(np.int64)
 
 
 def _height_field(model: mujoco.MjModel, k: int) -> Triangles:

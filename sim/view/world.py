@@ -2,7 +2,7 @@
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from spark.terrain import Terrain
 
@@ -70,12 +70,12 @@ def add_pillars(spec: mujoco.MjSpec, tops: Float[np.ndarray, "K 3"], radius: flo
 
 
 def add_terrain(spec: mujoco.MjSpec, terrain: Terrain, name: str) -> None:
-    """A body of stated ground [m, scene]: a thin shell, drawn from both sides."""
+    """A body of stated ground [m, scene]: as a shell, which needs no volume."""
     body = spec.worldbody.add_body()
     spec.add_mesh(
         name=name,
         uservert=terrain.vertices.ravel().tolist(),
-        userface=terrain.faces.ravel().tolist(),
+        userface=_outward(terrain).ravel().tolist(),
         inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
     )
     body.add_geom(
@@ -85,3 +85,13 @@ def add_terrain(spec: mujoco.MjSpec, terrain: Terrain, name: str) -> None:
         contype=0,  # what does not collide may be flat
         conaffinity=0,
     )
+
+
+def _outward(terrain: Terrain) -> Int[np.ndarray, "F 3"]:
+    """The corners of the triangles of stated ground, counter-clockwise from outside: only that side
+    is drawn. Those of an open surface are seen from above."""
+    a, b, c = terrain.corners.swapaxes(0, 1)
+    normals, parts = np.cross(b - a, c - a), terrain.parts
+    volumes = np.bincount(parts, (normals * (a + b + c)).sum(axis=1))
+    turned = np.where(terrain.closed[parts], volumes[parts] < 0.0, normals[:, 2] < 0.0)
+    return np.where(turned[:, None], terrain.faces[:, ::-1], terrain.faces)

@@ -22,6 +22,9 @@ def test_what_is_fixed_is_ground_and_what_moves_and_planes_are_not(tmp_path: Pat
     points = np.array([[1.4, 0.3, 9.0], [-2.0, 0.1, 9.0], [0.0, 0.0, 9.0]])
     np.testing.assert_allclose(terrain.tops(points, 0.0), [0.2, 0.4, -np.inf])
     assert terrain.closed.tolist() == [True, True]
+    a, b, c = terrain.corners.swapaxes(0, 1)
+    volumes = np.bincount(terrain.parts, (a * np.cross(b, c)).sum(axis=1) / 6)
+    np.testing.assert_allclose(sorted(volumes), [np.pi * 0.3**2 * 0.4, 1.0 * 0.8 * 0.2], rtol=2e-3)
 
 
 def test_a_world_of_planes_alone_is_no_terrain(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -46,6 +47,18 @@ def test_a_ghost_and_grounds_that_go_on_and_on_take_no_room() -> None:
     assert apart[1] == pytest.approx(apart[0] + 3 * far[0].height)
 
 
-def test_a_sheet_without_volume_is_shown() -> None:
-    placement = build_scene([on(SHEET)]).placements[0]
-    assert len(placement.ground) == 1
+@pytest.mark.parametrize("ground", [SHEET, STAND])
+@pytest.mark.parametrize("turned", [False, True])
+def test_ground_is_seen_from_outside_whichever_way_its_triangles_turn(
+    ground: Terrain, turned: bool
+) -> None:
+    """A box, and a sheet without volume."""
+    faces = ground.faces[:, ::-1] if turned else ground.faces
+    model = build_scene([on(replace(ground, faces=faces))]).model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    turn = data.geom_xmat[model.geom_dataid == 0][0].reshape(3, 3)
+    corners = model.mesh_vert[model.mesh_face[model.mesh_faceadr[0] :]].astype(float) @ turn.T
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    outward = corners.mean(axis=1) if ground is STAND else [0.0, 0.0, 1.0]
+    assert (np.sum(normals * outward, axis=1) > 0).all()
