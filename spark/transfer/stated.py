@@ -89,7 +89,9 @@ def on_terrain(source: CanonicalMotion, terrain: Terrain) -> CanonicalMotion:
     floor_z = _floor(terrain, lowest, still & ~on.stands, on, source.floor_z, scale)
     held, notes = footholds(terrain, floor_z, paths, lowest, still, scale, _REACH), []
     if not on.stands.any():
-        notes.append("no foot of the source is seen to stand on the stated ground")
+        notes.append(
+            f"no foot of the source is seen to stand on the stated ground, {_size(terrain)} m large"
+        )
     if not held.stands.any():
         return replace(source, terrain=terrain, floor_z=floor_z, notes=(*source.notes, *notes))
     below = held.heights + np.minimum(held.relief.min(axis=2), 0.0)
@@ -154,14 +156,17 @@ def _check_near(
     inside = bool((terrain.way_up(source.hips) > 0.0).mean() > _INSIDE)
     if float(away.min()) < _NOWHERE * scale and not inside:
         return
-    size = " x ".join(f"{length:.3g}" for length in high - low)
     goes = " x ".join(f"{length:.3g}" for length in np.ptp(places, axis=0))
     where = "around" if inside else f"{away.min():.3g} m from the nearest step of"
     raise ConventionError(
-        f"the stated ground, {size} m large, is {where} the "
+        f"the stated ground, {_size(terrain)} m large, is {where} the "
         f"source, which goes over {goes} m: both are read in the unit and axes of the source's "
         f"file{_fitting(low, high, places)}"
     )
+
+
+def _size(terrain: Terrain) -> str:
+    return " x ".join(f"{length:.3g}" for length in np.ptp(terrain.vertices, axis=0))
 
 
 def _fitting(
