@@ -66,7 +66,7 @@ def _add_field(
     distance [m] between its heights."""
     used = terrain.corners.reshape(-1, 3)
     low, high = used.min(axis=0), used.max(axis=0)
-    wide, deep, _ = (high - low).tolist()
+    wide, deep = np.maximum(high - low, _SPACING)[:2].tolist()  # upright walls may be of no width
     spacing = max(_SPACING, float(np.sqrt(wide * deep / _MOST)))
     columns, rows = (max(int(np.ceil(length / spacing)) + 1, 2) for length in (wide, deep))
     # A node on the rim would be beside the ground.

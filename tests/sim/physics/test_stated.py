@@ -19,6 +19,11 @@ from tests.helpers.grounds import box, hill, profile, stairs, together
 RADIUS = 0.03
 THERE = box((0.4, -0.5, 0.0), (1.4, 0.5, BOX))
 
+UPRIGHT = Terrain(  # a wall of no width
+    np.array([[2.0, 0.0, 0.0], [2.0, 3.0, 0.0], [2.0, 3.0, 0.4], [2.0, 0.0, 0.4]]),
+    np.array([[0, 1, 2], [0, 2, 3]]),
+)
+
 
 def moved(terrain: Terrain, x: float, y: float) -> Terrain:
     return terrain.placed(1.0, np.array([x, y, 0.0]))
@@ -46,6 +51,7 @@ def under_a_ball(terrain: Terrain, x: float, y: float) -> tuple[float, list[str]
         (moved(stairs(3, 0.2, 0.3, 1.0), 0.0, 0.4), "height field"),
         (moved(hill(0.5, 0.6, 0.1), 1.5, 0.9), "height field"),
         (together(box((0, 0, 0), (1, 2, 0.3)), moved(stairs(2, 0.2, 0.3, 1.2), 0, 1)), "; what"),
+        (together(box((0, 0, 0), (1, 2, 0.3)), UPRIGHT), "1 convex part"),
         (moved(profile(np.array([[0.0, 0.0], [3.0, 0.6]]), 1.6), 0.0, 0.9), "height field"),
     ],
 )
